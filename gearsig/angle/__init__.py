@@ -1,0 +1,1 @@
+"""Shaft speed and angle, and resampling over angle."""

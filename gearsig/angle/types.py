@@ -1,0 +1,148 @@
+"""Shaft angle over time, and signals sampled over it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from gearsig.checks import FloatArray, frozen_array, positive
+from gearsig.errors import InputError
+
+AngleMethod = Literal["constant", "pulses", "encoder", "speed channel", "tachless"]
+
+
+@dataclass(frozen=True)
+class ShaftAngle:
+    """Angle of a shaft against time, as a piecewise cubic through knots.
+
+    Parameters
+    ----------
+    shaft : str
+    time_s : array, (n_knots,)
+        Strictly increasing; at least two.
+    revolutions : array, (n_knots,)
+        Shaft angle in revolutions, not decreasing. A shaft that turns backwards counts up as well.
+    speed_rev_per_s : array, (n_knots,)
+        Slope at the knots, not negative; the cubic (Hermite) through value and slope is the angle between them.
+    method : str
+        How it was found.
+    relative_speed_uncertainty : float
+        One standard deviation of the mean speed over the mean speed, as estimated by the method; nan if not known.
+    quality : float
+        0 to 1: the method's own confidence that this is the true angle and not, e.g., another harmonic.
+    notes : tuple of str
+        What was repaired or assumed on the way (missed pulses, …), for the reader of the report.
+    """
+
+    shaft: str
+    time_s: FloatArray
+    revolutions: FloatArray
+    speed_rev_per_s: FloatArray
+    method: AngleMethod
+    relative_speed_uncertainty: float = float("nan")
+    quality: float = 1.0
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("time_s", "revolutions", "speed_rev_per_s"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        if not len(self.time_s) == len(self.revolutions) == len(self.speed_rev_per_s) >= 2:
+            raise InputError("time_s, revolutions and speed_rev_per_s differ in length or have fewer than two knots")
+        if np.any(np.diff(self.time_s) <= 0):
+            raise InputError("time_s of a shaft angle does not increase")
+        if np.any(np.diff(self.revolutions) < 0):
+            raise InputError("revolutions of a shaft angle decrease")
+
+    @property
+    def start_s(self) -> float:
+        """First time at which the angle is known."""
+        return float(self.time_s[0])
+
+    @property
+    def end_s(self) -> float:
+        """Last time at which the angle is known."""
+        return float(self.time_s[-1])
+
+    @property
+    def n_revolutions(self) -> float:
+        """Revolutions from first to last knot."""
+        return float(self.revolutions[-1] - self.revolutions[0])
+
+    @property
+    def mean_speed_rpm(self) -> float:
+        """Revolutions over time, in rpm."""
+        return 60.0 * self.n_revolutions / (self.end_s - self.start_s)
+
+    @property
+    def speed_range_rpm(self) -> tuple[float, float]:
+        """Lowest and highest speed at the knots."""
+        return 60.0 * float(self.speed_rev_per_s.min()), 60.0 * float(self.speed_rev_per_s.max())
+
+    def revolutions_at(self, time_s: FloatArray) -> FloatArray:
+        """Shaft angle in revolutions at `time_s`; beyond the knots it goes on at the last speed."""
+        return self._evaluate(time_s, 0)
+
+    def speed_rpm_at(self, time_s: FloatArray) -> FloatArray:
+        """Speed in rpm at `time_s`; beyond the knots it stays at the last one."""
+        return 60.0 * self._evaluate(time_s, 1)
+
+    def of_shaft(self, shaft: str, ratio: float) -> ShaftAngle:
+        """Return the angle of another shaft that makes `ratio` revolutions per revolution of this one."""
+        positive(ratio, "ratio")
+        return replace(
+            self, shaft=shaft, revolutions=self.revolutions * ratio, speed_rev_per_s=self.speed_rev_per_s * ratio
+        )
+
+    def _evaluate(self, time_s: FloatArray, derivative: int) -> FloatArray:
+        from scipy.interpolate import CubicHermiteSpline
+
+        t = np.asarray(time_s, dtype=np.float64)
+        inside = np.clip(t, self.time_s[0], self.time_s[-1])
+        spline = CubicHermiteSpline(self.time_s, self.revolutions, self.speed_rev_per_s)
+        result: FloatArray = spline(inside, derivative)
+        if derivative == 0:
+            ends = np.where(t < inside, self.speed_rev_per_s[0], self.speed_rev_per_s[-1])
+            result = result + (t - inside) * ends
+        return result
+
+
+@dataclass(frozen=True)
+class AngleSignal:
+    """Channels sampled at equal steps of a shaft's angle.
+
+    Parameters
+    ----------
+    samples : array, (n_channels, n_samples)
+    samples_per_revolution : int
+    shaft_angle : ShaftAngle
+        The angle it was resampled with; sample 0 lies at `start_revolution`.
+    start_revolution : float
+    channel_names, units : tuples of str
+    highest_order : float
+        Orders above this one are attenuated by the anti-aliasing filter or were never in the recording.
+    """
+
+    samples: FloatArray
+    samples_per_revolution: int
+    shaft_angle: ShaftAngle
+    start_revolution: float
+    channel_names: tuple[str, ...]
+    units: tuple[str, ...]
+    highest_order: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "samples", frozen_array(self.samples, "samples (channel, angle)", ndim=2))
+
+    @property
+    def n_revolutions(self) -> float:
+        """Length in revolutions."""
+        return float(self.samples.shape[1] / self.samples_per_revolution)
+
+    def values(self, name: str) -> FloatArray:
+        """Samples of one channel, (n_samples,)."""
+        if name not in self.channel_names:
+            raise InputError(f"there is no channel {name!r}", allowed=", ".join(self.channel_names))
+        row: FloatArray = self.samples[self.channel_names.index(name)]
+        return row

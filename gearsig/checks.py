@@ -1,0 +1,109 @@
+"""Checks at the public functions: each raises an `InputError` that names the parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.errors import InputError
+
+FloatArray = NDArray[np.floating[Any]]
+
+
+def positive(value: float, name: str, unit: str = "", *, remedy: str = "") -> float:
+    """Return `value` as float if it is finite and above zero."""
+    return _number(value, name, unit, minimum=0.0, exclusive=True, remedy=remedy)
+
+
+def not_negative(value: float, name: str, unit: str = "", *, remedy: str = "") -> float:
+    """Return `value` as float if it is finite and not below zero."""
+    return _number(value, name, unit, minimum=0.0, exclusive=False, remedy=remedy)
+
+
+def within(value: float, name: str, low: float, high: float, unit: str = "", *, remedy: str = "") -> float:
+    """Return `value` as float if low <= value <= high."""
+    number = _number(value, name, unit, remedy=remedy)
+    if not low <= number <= high:
+        allowed = f"{low:g} to {high:g} {unit}".strip()
+        raise InputError(f"{name} is {number:g} {unit}".strip(), allowed=allowed, remedy=remedy)
+    return number
+
+
+def count(value: int, name: str, *, minimum: int = 1, remedy: str = "") -> int:
+    """Return `value` as int if it is a whole number of at least `minimum`."""
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not whole or value < minimum:
+        raise InputError(
+            f"{name} is {value!r}", allowed=f"a whole number of at least {minimum}", remedy=remedy
+        )
+    return int(value)
+
+
+def one_of(value: str, name: str, allowed: Iterable[str]) -> str:
+    """Return `value` if it is among `allowed`; name the closest match if it is not."""
+    choices = tuple(allowed)
+    if value not in choices:
+        raise InputError(
+            f"{name} is {value!r}", allowed=", ".join(choices), remedy=closest_match_hint(value, choices)
+        )
+    return value
+
+
+def closest_match_hint(value: object, choices: Iterable[str]) -> str:
+    """Return "did you mean …?" for a misspelt name, or nothing.
+
+    Examples
+    --------
+    >>> closest_match_hint("teth", ["teeth", "module_mm"])
+    'did you mean teeth?'
+    """
+    from difflib import get_close_matches
+
+    matches = get_close_matches(str(value), list(choices), n=1)
+    return f"did you mean {matches[0]}?" if matches else ""
+
+
+def frozen_array(values: Any, name: str, *, ndim: int, finite: bool = True) -> FloatArray:
+    """Return a read-only float array of `ndim` dimensions; float32 and float64 are kept, others become float64."""
+    array: FloatArray = np.asarray(values)
+    if array.dtype not in (np.float32, np.float64):
+        try:
+            array = array.astype(np.float64)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{name} does not hold numbers ({error})", allowed="an array of numbers") from error
+    if array.ndim != ndim:
+        raise InputError(f"{name} has shape {array.shape}", allowed=f"an array of {ndim} dimension(s)")
+    if finite and not np.isfinite(array).all():
+        bad = int(np.size(array) - np.isfinite(array).sum())
+        first = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise InputError(
+            f"{name} holds {bad} NaN or infinite value(s), the first at index {first}",
+            allowed="finite numbers",
+            remedy="cut out the gap or interpolate it before the analysis, knowingly",
+        )
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def _number(
+    value: float,
+    name: str,
+    unit: str,
+    *,
+    minimum: float = -np.inf,
+    exclusive: bool = False,
+    remedy: str = "",
+) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} is {value!r}", allowed="a number", remedy=remedy) from None
+    if not np.isfinite(number) or number < minimum or (exclusive and number == minimum):
+        sign = ">" if exclusive else ">="
+        allowed = f"a finite number {sign} {minimum:g}" if minimum > -np.inf else "a finite number"
+        raise InputError(f"{name} is {number:g} {unit}".strip(), allowed=f"{allowed} {unit}".strip(), remedy=remedy)
+    return number

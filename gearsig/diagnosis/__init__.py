@@ -1,0 +1,1 @@
+"""From signals and indicators to findings in words and numbers."""

@@ -1,0 +1,161 @@
+"""What an analysis says: findings with place, strength, floor and confidence, or why it cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from gearsig.angle.types import ShaftAngle
+from gearsig.indicators.types import Indicator
+from gearsig.orders.types import OrderMap, SynchronousAverage
+from gearsig.recording.types import Recording
+from gearsig.rig.types import Rig
+from gearsig.spectra.types import Spectrum
+
+
+class Kind(Enum):
+    """How much a finding matters; listed most important first."""
+
+    FAULT = "fault"
+    SUSPICION = "suspicion"
+    DATA_PROBLEM = "data problem"
+    CANNOT_TELL = "cannot tell"
+    NOTICE = "notice"
+    INFORMATION = "information"
+
+
+@dataclass(frozen=True)
+class Where:
+    """The place of a finding; what does not apply is None or empty."""
+
+    channels: tuple[str, ...] = ()
+    shaft: str = ""
+    gear: str = ""
+    bearing: str = ""
+    order: float | None = None
+    order_shaft: str = ""
+    frequency_hz: float | None = None
+    angle_deg: float | None = None
+    tooth: int | None = None
+    time_s: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Strength:
+    """The size of a finding against the floor it has to exceed.
+
+    `ratio_db` is 20 lg(value/floor) for amplitudes; None where a ratio has no meaning.
+    """
+
+    value: float
+    unit: str
+    floor: float
+    floor_is: str
+    ratio_db: float | None = None
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One statement about the machine or the recording.
+
+    Parameters
+    ----------
+    code : str
+        Stable identifier, e.g. "tooth-local-impact".
+    kind : Kind
+    title : str
+        The statement in one sentence.
+    where : Where
+    strength : Strength or None
+    confidence : float
+        0 to 1, that the statement is true.
+    confidence_basis : str
+        What the number rests on.
+    evidence : tuple of str
+        The numbers behind the statement, one sentence each; also those that speak against it.
+    surer : str
+        What would make it surer.
+    """
+
+    code: str
+    kind: Kind
+    title: str
+    where: Where = field(default_factory=Where)
+    strength: Strength | None = None
+    confidence: float = 1.0
+    confidence_basis: str = ""
+    evidence: tuple[str, ...] = ()
+    surer: str = ""
+
+
+@dataclass(frozen=True)
+class CannotTell:
+    """An answer that is not to be had from these data, and what would give it."""
+
+    question: str
+    reason: str
+    remedy: str = ""
+
+
+@dataclass(frozen=True)
+class ChannelAnalysis:
+    """The signals and spectra of one vibration channel.
+
+    `order_spectrum`, `order_map` and `averages` are None or empty where the speed is not known.
+
+    Parameters
+    ----------
+    channel : str
+    spectrum : Spectrum
+        Amplitude peak over frequency.
+    power_density : Spectrum
+        Welch power spectral density.
+    envelope_spectrum : Spectrum or None
+        Of the band `envelope_band_hz`; over order where the speed is known, else over frequency.
+    order_spectrum : Spectrum or None
+    order_map : OrderMap or None
+        Only where the speed varies.
+    averages : mapping
+        (shaft, kind) → SynchronousAverage.
+    """
+
+    channel: str
+    spectrum: Spectrum
+    power_density: Spectrum
+    envelope_spectrum: Spectrum | None = None
+    envelope_band_hz: tuple[float, float] | None = None
+    order_spectrum: Spectrum | None = None
+    order_map: OrderMap | None = None
+    averages: Mapping[tuple[str, str], SynchronousAverage] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Everything `analyze` found out about one recording.
+
+    Parameters
+    ----------
+    recording : Recording
+    rig : Rig or None
+    shaft_angle : ShaftAngle or CannotTell
+        Of the reference shaft.
+    channels : tuple of ChannelAnalysis
+        Dead and non-vibration channels are left out; a finding says so.
+    indicators : tuple of Indicator
+    findings : tuple of Finding
+        Most important first.
+    verdict : str
+        One sentence.
+    settings : mapping
+        The parameters that were in force, for the report.
+    """
+
+    recording: Recording
+    rig: Rig | None
+    shaft_angle: ShaftAngle | CannotTell
+    channels: tuple[ChannelAnalysis, ...]
+    indicators: tuple[Indicator, ...]
+    findings: tuple[Finding, ...]
+    verdict: str
+    settings: Mapping[str, str | float | int | None] = field(default_factory=dict)

@@ -1,0 +1,1 @@
+"""Spectra and averages over shaft angle: orders, maps, tracked orders, synchronous averages."""

@@ -1,0 +1,1 @@
+"""Figures of results; no arithmetic beyond display units."""

@@ -1,0 +1,241 @@
+"""What a recording is: channels over time, with units, a speed source and where it came from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from gearsig.checks import FloatArray, closest_match_hint, frozen_array, one_of, positive
+from gearsig.errors import InputError
+from gearsig.rig.types import Rig, SpeedSource
+
+QUANTITIES = (
+    "acceleration",
+    "velocity",
+    "displacement",
+    "sound_pressure",
+    "force",
+    "torque",
+    "transmission_error",
+    "tachometer",
+    "encoder",
+    "angle",
+    "rotational_speed",
+    "temperature",
+    "voltage",
+    "unknown",
+)
+"""What a channel may measure."""
+
+VIBRATION_QUANTITIES = frozenset(
+    {"acceleration", "velocity", "displacement", "sound_pressure", "force", "torque", "transmission_error", "unknown"}
+)
+"""Quantities that the analysis chain treats as vibration; the others describe the motion or the surroundings."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One channel of a recording.
+
+    Parameters
+    ----------
+    name : str
+        Unique in its recording. Text from a file: never markup.
+    quantity : str
+        One of `QUANTITIES`.
+    unit : str
+        As the file or the rig states it, empty where it is not known.
+    position : str
+        Where the sensor sits, e.g. "pinion bearing, vertical".
+    """
+
+    name: str
+    quantity: str = "unknown"
+    unit: str = ""
+    position: str = ""
+
+    def __post_init__(self) -> None:
+        one_of(self.quantity, f"quantity of channel {self.name!r}", QUANTITIES)
+
+    @property
+    def is_vibration(self) -> bool:
+        """Whether the analysis chain looks at this channel for faults."""
+        return self.quantity in VIBRATION_QUANTITIES
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a recording came from, and what was done to it since.
+
+    Parameters
+    ----------
+    source : str
+        File name or simulator; empty if made in memory.
+    sha256 : str
+        Hash of the file's bytes, empty if made in memory.
+    reader : str
+        The reader or simulator with its version.
+    history : tuple of str
+        Processing steps in order.
+    """
+
+    source: str = ""
+    sha256: str = ""
+    reader: str = ""
+    history: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Samples of one or more channels at a constant sampling rate.
+
+    Parameters
+    ----------
+    samples : array, (n_channels, n_samples)
+        In each channel's unit; finite. Kept as float32 or float64, read-only.
+    sampling_rate_hz : float
+        Above zero.
+    channels : tuple of Channel
+        One per row of `samples`, names unique.
+    speed : SpeedSource or None
+        Where shaft speed and angle come from; None if the recording has no such thing. A rig's own `speed` is
+        used where this is None: see `speed_source`.
+    rig : Rig or None
+        The machine, as far as it is known.
+    provenance : Provenance
+    truth : mapping or None
+        What a simulator put in (JSON-like values); None for measured data.
+    warnings : tuple of str
+        What the reader noticed and the user should know, e.g. a doubled variable that was left out.
+
+    Raises
+    ------
+    InputError
+        On a shape, rate, name or value that does not fit.
+
+    Examples
+    --------
+    >>> r = Recording(np.zeros((1, 8)), 4.0, (Channel("a1", "acceleration", "m/s^2"),))
+    >>> r.duration_s
+    2.0
+    """
+
+    samples: FloatArray
+    sampling_rate_hz: float
+    channels: tuple[Channel, ...]
+    speed: SpeedSource | None = None
+    rig: Rig | None = None
+    provenance: Provenance = field(default_factory=Provenance)
+    truth: Mapping[str, Any] | None = None
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        where = self.provenance.source or "recording"
+        positive(self.sampling_rate_hz, f"{where}: sampling rate", "Hz", remedy="give --fs or sampling_rate_hz in the rig file")
+        if len(np.shape(self.samples)) == 2 and np.shape(self.samples)[1] == 0:
+            raise InputError("there are no samples", where=where, remedy="check that the file was written completely")
+        try:
+            samples = frozen_array(self.samples, "samples (channel, time)", ndim=2)
+        except InputError as error:
+            raise InputError(error.what, where=where, allowed=error.allowed, remedy=error.remedy) from None
+        object.__setattr__(self, "samples", samples)
+        object.__setattr__(self, "channels", tuple(self.channels))
+        if len(self.channels) != samples.shape[0]:
+            raise InputError(f"{len(self.channels)} channel names for {samples.shape[0]} channels", where=where)
+        names = self.channel_names
+        doubled = sorted({name for name in names if names.count(name) > 1})
+        if doubled:
+            raise InputError(f"channel name(s) {', '.join(doubled)} occur more than once", where=where, remedy="rename the columns")
+        if self.truth is not None:
+            object.__setattr__(self, "truth", MappingProxyType(dict(self.truth)))
+
+    @property
+    def n_samples(self) -> int:
+        """Samples per channel."""
+        return int(self.samples.shape[1])
+
+    @property
+    def duration_s(self) -> float:
+        """Number of samples over sampling rate."""
+        return self.n_samples / self.sampling_rate_hz
+
+    @property
+    def channel_names(self) -> tuple[str, ...]:
+        """Names in the order of the rows."""
+        return tuple(channel.name for channel in self.channels)
+
+    @property
+    def speed_source(self) -> SpeedSource | None:
+        """The recording's own speed source, or the rig's."""
+        if self.speed is not None:
+            return self.speed
+        return self.rig.speed if self.rig is not None else None
+
+    def time_s(self) -> FloatArray:
+        """Sample times from zero, (n_samples,)."""
+        return np.arange(self.n_samples) / self.sampling_rate_hz
+
+    def index(self, name: str) -> int:
+        """Row of the channel called `name`."""
+        if name not in self.channel_names:
+            raise InputError(
+                f"there is no channel {name!r}",
+                where=self.provenance.source or "recording",
+                allowed=", ".join(self.channel_names),
+                remedy=closest_match_hint(name, self.channel_names),
+            )
+        return self.channel_names.index(name)
+
+    def values(self, name: str) -> FloatArray:
+        """Samples of one channel, (n_samples,), read-only."""
+        row: FloatArray = self.samples[self.index(name)]
+        return row
+
+    def vibration_names(self) -> tuple[str, ...]:
+        """Names of the channels that the analysis looks at for faults."""
+        return tuple(channel.name for channel in self.channels if channel.is_vibration)
+
+    def select(self, names: Iterable[str]) -> Recording:
+        """Return the recording with only the named channels, in that order."""
+        rows = [self.index(name) for name in names]
+        return self._changed(
+            "select " + ", ".join(self.channel_names[i] for i in rows),
+            samples=self.samples[rows],
+            channels=tuple(self.channels[i] for i in rows),
+        )
+
+    def with_rig(self, rig: Rig | None) -> Recording:
+        """Return the recording with another rig; its sensors' quantity, unit, scale and position are applied.
+
+        Sensors apply once, to the values as they were read: give the rig to a recording that has none.
+        """
+        if rig is None:
+            return replace(self, rig=None)
+        if self.rig is not None and self.rig.sensors and self.rig != rig:
+            raise InputError("the recording already carries a rig whose sensor scales were applied", remedy="read the file again with the other rig")
+        if self.rig is rig or not rig.sensors:
+            return replace(self, rig=rig)
+        samples = np.array(self.samples)
+        channels = list(self.channels)
+        for sensor in rig.sensors:
+            if sensor.channel not in self.channel_names:
+                continue  # a rig may describe more sensors than this file holds
+            i = self.index(sensor.channel)
+            if sensor.scale != 1.0 or sensor.offset != 0.0:
+                samples[i] = samples[i] * sensor.scale + sensor.offset
+            old = channels[i]
+            channels[i] = Channel(
+                old.name,
+                sensor.quantity or old.quantity,
+                sensor.unit or old.unit,
+                sensor.position or old.position,
+            )
+        return replace(self, samples=samples, channels=tuple(channels), rig=rig)
+
+    def _changed(self, step: str, **changes: Any) -> Recording:
+        provenance = replace(self.provenance, history=(*self.provenance.history, step))
+        return replace(self, provenance=provenance, **changes)

@@ -1,0 +1,283 @@
+"""What the machine is: shafts, gear pairs, bearings, sensors, operating point. Only what is known need be given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, isclose, radians
+
+from gearsig.checks import closest_match_hint, count, not_negative, one_of, positive, within
+from gearsig.errors import InputError
+from gearsig.rig.ratios import shaft_ratios
+from gearsig.rig.speed import SpeedSource
+
+
+@dataclass(frozen=True)
+class Shaft:
+    """A rotating shaft.
+
+    Parameters
+    ----------
+    name : str
+    direction : str
+        "ccw" or "cw" seen from the drive end; empty if not known.
+    """
+
+    name: str
+    direction: str = ""
+
+    def __post_init__(self) -> None:
+        if self.direction:
+            one_of(self.direction, f"direction of shaft {self.name!r}", ("ccw", "cw"))
+
+
+@dataclass(frozen=True)
+class GearPair:
+    """Two gears in mesh.
+
+    Parameters
+    ----------
+    name : str
+    driver, driven : str
+        Names of the shafts that carry the gears.
+    driver_teeth, driven_teeth : int or None
+        At least 3 where known. The mesh order needs one of them; the driven shaft's order needs both.
+    module_mm, face_width_mm : float or None
+        Above zero where known.
+    pressure_angle_deg : float or None
+        10 to 35.
+    """
+
+    name: str
+    driver: str
+    driven: str
+    driver_teeth: int | None = None
+    driven_teeth: int | None = None
+    module_mm: float | None = None
+    pressure_angle_deg: float | None = None
+    face_width_mm: float | None = None
+
+    def __post_init__(self) -> None:
+        for label, teeth in (("driver", self.driver_teeth), ("driven", self.driven_teeth)):
+            if teeth is not None:
+                count(teeth, f"{label} teeth of pair {self.name!r}", minimum=3, remedy="leave it out if it is not known")
+        for label, value in (("module_mm", self.module_mm), ("face_width_mm", self.face_width_mm)):
+            if value is not None:
+                positive(value, f"{label} of pair {self.name!r}", "mm")
+        if self.pressure_angle_deg is not None:
+            within(self.pressure_angle_deg, f"pressure_angle_deg of pair {self.name!r}", 10, 35, "deg")
+        if self.driver == self.driven:
+            raise InputError(f"pair {self.name!r} meshes shaft {self.driver!r} with itself", remedy="name two shafts")
+
+    def teeth(self, shaft: str) -> int | None:
+        """Teeth of the gear on `shaft`, None if not known."""
+        if shaft not in (self.driver, self.driven):
+            raise InputError(f"pair {self.name!r} has no gear on shaft {shaft!r}", allowed=f"{self.driver}, {self.driven}")
+        return self.driver_teeth if shaft == self.driver else self.driven_teeth
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """A rolling-element bearing with a turning inner ring and a standing outer ring.
+
+    Give the geometry (`n_rolling_elements`, both diameters, contact angle) or the orders from a catalogue; orders win
+    where both are given. Orders are cycles per revolution of the bearing's own shaft.
+    """
+
+    name: str
+    shaft: str
+    n_rolling_elements: int | None = None
+    rolling_element_diameter_mm: float | None = None
+    pitch_diameter_mm: float | None = None
+    contact_angle_deg: float = 0.0
+    bpfo_order: float | None = None
+    bpfi_order: float | None = None
+    bsf_order: float | None = None
+    ftf_order: float | None = None
+
+    def __post_init__(self) -> None:
+        where = f"of bearing {self.name!r}"
+        geometry = (self.n_rolling_elements, self.rolling_element_diameter_mm, self.pitch_diameter_mm)
+        if any(v is not None for v in geometry) and not all(v is not None for v in geometry):
+            raise InputError(
+                f"the geometry {where} is incomplete",
+                allowed="n_rolling_elements, rolling_element_diameter_mm and pitch_diameter_mm together, or none",
+            )
+        if self.n_rolling_elements is not None:
+            count(self.n_rolling_elements, f"n_rolling_elements {where}", minimum=3)
+            ball = positive(self.rolling_element_diameter_mm or 0.0, f"rolling_element_diameter_mm {where}", "mm")
+            pitch = positive(self.pitch_diameter_mm or 0.0, f"pitch_diameter_mm {where}", "mm")
+            if ball >= pitch:
+                raise InputError(f"rolling elements {where} are not smaller than the pitch diameter ({ball:g} >= {pitch:g} mm)")
+        within(self.contact_angle_deg, f"contact_angle_deg {where}", 0, 89, "deg")
+        for key in ("bpfo_order", "bpfi_order", "bsf_order", "ftf_order"):
+            value = getattr(self, key)
+            if value is not None:
+                positive(value, f"{key} {where}")
+
+    def orders(self) -> dict[str, float]:
+        """Return the orders that are known, by name: BPFO, BPFI, BSF, FTF.
+
+        With n elements of diameter d on pitch diameter D and contact angle a, and g = d cos(a)/D:
+        BPFO = n(1 - g)/2, BPFI = n(1 + g)/2, BSF = (D/2d)(1 - g²), FTF = (1 - g)/2.
+        BSF is the rolling element's spin; a defect on it strikes both races: twice per spin.
+
+        Source: T. A. Harris, *Rolling Bearing Analysis*, 4th ed., ch. 2 (kinematics without slip).
+        """
+        found: dict[str, float] = {}
+        if self.n_rolling_elements is not None:
+            ball, pitch = self.rolling_element_diameter_mm or 0.0, self.pitch_diameter_mm or 0.0
+            g = ball * cos(radians(self.contact_angle_deg)) / pitch
+            n = self.n_rolling_elements
+            found = {
+                "BPFO": n * (1 - g) / 2,
+                "BPFI": n * (1 + g) / 2,
+                "BSF": pitch / (2 * ball) * (1 - g * g),
+                "FTF": (1 - g) / 2,
+            }
+        stated = {"BPFO": self.bpfo_order, "BPFI": self.bpfi_order, "BSF": self.bsf_order, "FTF": self.ftf_order}
+        return found | {name: order for name, order in stated.items() if order is not None}
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """What a channel of the recordings measures: value = number in the file × scale + offset."""
+
+    channel: str
+    quantity: str = ""
+    unit: str = ""
+    position: str = ""
+    scale: float = 1.0
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.scale == 0.0:
+            raise InputError(f"scale of sensor {self.channel!r} is 0", allowed="any number but 0")
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """The nominal running condition. A nominal speed guides the search for the true one; it is not taken as measured."""
+
+    shaft: str = ""
+    speed_rpm: float | None = None
+    speed_tolerance_percent: float = 5.0
+    torque_nm: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.speed_rpm is not None:
+            not_negative(self.speed_rpm, "operating_point.speed_rpm", "rpm")
+        within(self.speed_tolerance_percent, "operating_point.speed_tolerance_percent", 0.01, 90, "%")
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A machine, as far as it is known; validated when it is made.
+
+    Parameters
+    ----------
+    name : str
+    shafts, pairs, bearings, sensors : tuples
+        Pairs and bearings name their shafts. Where there are several pairs, they must connect.
+    operating_point : OperatingPoint
+    speed : SpeedSource or None
+        How recordings of this rig tell the speed.
+    sampling_rate_hz : float or None
+        For files that do not state it.
+    sources : tuple of str
+        Where the data come from.
+    assumed : tuple of str
+        Names of facts that were inferred or guessed ("teeth", "sampling_rate_hz", …): a diagnosis that rests on
+        them is worth less, and says so.
+    """
+
+    name: str = ""
+    shafts: tuple[Shaft, ...] = ()
+    pairs: tuple[GearPair, ...] = ()
+    bearings: tuple[Bearing, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
+    operating_point: OperatingPoint = OperatingPoint()
+    speed: SpeedSource | None = None
+    sampling_rate_hz: float | None = None
+    sources: tuple[str, ...] = ()
+    assumed: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for kind, items in (("shaft", self.shafts), ("pair", self.pairs), ("bearing", self.bearings)):
+            names = [item.name for item in items]
+            doubled = sorted({n for n in names if names.count(n) > 1})
+            if doubled:
+                raise InputError(f"{kind} name(s) {', '.join(doubled)} occur more than once", remedy="give each its own name")
+        for pair in self.pairs:
+            for shaft in (pair.driver, pair.driven):
+                self._check_shaft(shaft, f"pair {pair.name!r}")
+        for bearing in self.bearings:
+            self._check_shaft(bearing.shaft, f"bearing {bearing.name!r}")
+        if self.operating_point.shaft:
+            self._check_shaft(self.operating_point.shaft, "operating_point")
+        if self.speed is not None and self.speed.shaft:
+            self._check_shaft(self.speed.shaft, "speed")
+        if self.sampling_rate_hz is not None:
+            positive(self.sampling_rate_hz, "sampling_rate_hz", "Hz")
+        shaft_ratios(self)  # raises where the pairs do not connect or contradict each other
+
+    def _check_shaft(self, name: str, user: str) -> None:
+        if name not in self.shaft_names:
+            raise InputError(
+                f"{user} names shaft {name!r}, which is not described",
+                allowed=", ".join(self.shaft_names) or "none: no [[shaft]] is given",
+                remedy=closest_match_hint(name, self.shaft_names) or "add a [[shaft]] with that name",
+            )
+
+    @property
+    def shaft_names(self) -> tuple[str, ...]:
+        """Names in the order given."""
+        return tuple(shaft.name for shaft in self.shafts)
+
+    @property
+    def reference_shaft(self) -> str:
+        """The shaft that orders are counted on unless another is asked for: the speed source's, the operating point's, or the first."""
+        if self.speed is not None and self.speed.shaft:
+            return self.speed.shaft
+        if self.operating_point.shaft:
+            return self.operating_point.shaft
+        return self.shafts[0].name if self.shafts else ""
+
+    def ratio(self, shaft: str, to: str = "") -> float | None:
+        """Revolutions of `shaft` per revolution of `to` (default: the reference shaft); None if the teeth are not known."""
+        self._check_shaft(shaft, "ratio")
+        ratios = shaft_ratios(self)
+        own, other = ratios.get(shaft), ratios.get(to or self.reference_shaft)
+        if shaft == (to or self.reference_shaft):
+            return 1.0
+        return None if own is None or other is None else own / other
+
+    def nominal_speed_rpm(self, shaft: str = "") -> float | None:
+        """Nominal speed of `shaft` (default: the reference shaft), None if not known."""
+        point = self.operating_point
+        if point.speed_rpm is None:
+            return None
+        ratio = self.ratio(shaft or self.reference_shaft, to=point.shaft or self.reference_shaft)
+        return None if ratio is None else point.speed_rpm * ratio
+
+    def pair(self, name: str) -> GearPair:
+        """Return the pair called `name`."""
+        for pair in self.pairs:
+            if pair.name == name:
+                return pair
+        names = [pair.name for pair in self.pairs]
+        raise InputError(f"there is no pair {name!r}", allowed=", ".join(names), remedy=closest_match_hint(name, names))
+
+    def mesh_order(self, pair: GearPair, shaft: str = "") -> float | None:
+        """Mesh cycles of `pair` per revolution of `shaft` (default: the reference shaft); None if it cannot be known.
+
+        Teeth of either gear times that gear's shaft ratio; both give the same where both are known.
+        """
+        orders = [
+            teeth * ratio
+            for gear_shaft in (pair.driver, pair.driven)
+            if (teeth := pair.teeth(gear_shaft)) is not None
+            and (ratio := self.ratio(gear_shaft, to=shaft or self.reference_shaft)) is not None
+        ]
+        if len(orders) == 2 and not isclose(orders[0], orders[1], rel_tol=1e-9):
+            raise InputError(f"pair {pair.name!r} gives two mesh orders, {orders[0]:g} and {orders[1]:g}", remedy="check the teeth")
+        return orders[0] if orders else None

@@ -1,0 +1,1 @@
+"""Spectra over frequency: amplitude, power, envelope, cepstrum."""

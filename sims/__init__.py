@@ -1,0 +1,1 @@
+"""Simulators and signal models; they use only gearsig.rig and gearsig.recording."""
