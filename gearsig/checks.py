@@ -36,9 +36,7 @@ def count(value: int, name: str, *, minimum: int = 1, remedy: str = "") -> int:
     """Return `value` as int if it is a whole number of at least `minimum`."""
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not whole or value < minimum:
-        raise InputError(
-            f"{name} is {value!r}", allowed=f"a whole number of at least {minimum}", remedy=remedy
-        )
+        raise InputError(f"{name} is {value!r}", allowed=f"a whole number of at least {minimum}", remedy=remedy)
     return int(value)
 
 
@@ -46,9 +44,7 @@ def one_of(value: str, name: str, allowed: Iterable[str]) -> str:
     """Return `value` if it is among `allowed`; name the closest match if it is not."""
     choices = tuple(allowed)
     if value not in choices:
-        raise InputError(
-            f"{name} is {value!r}", allowed=", ".join(choices), remedy=closest_match_hint(value, choices)
-        )
+        raise InputError(f"{name} is {value!r}", allowed=", ".join(choices), remedy=closest_match_hint(value, choices))
     return value
 
 

@@ -43,7 +43,9 @@ class OrderMap:
         for name in ("positions", "time_s", "speed_rpm"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
         if self.values.shape != (len(self.time_s), len(self.positions)):
-            raise InputError(f"values have shape {self.values.shape} for {len(self.time_s)} blocks × {len(self.positions)} lines")
+            raise InputError(
+                f"values of shape {self.values.shape} for {len(self.time_s)} blocks × {len(self.positions)} lines"
+            )
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ class SynchronousAverage:
     values : array, (n_angles,)
         Mean over the revolutions, at equal steps of angle from 0 to just under 1 revolution.
     standard_error : array, (n_angles,)
-        Standard deviation of the mean, from the scatter of the revolutions (jackknife over blocks of whole revolutions).
+        Standard deviation of the mean, from the scatter of the revolutions (jackknife over blocks of revolutions).
     n_revolutions : int
         Revolutions averaged.
     shaft, channel, unit : str

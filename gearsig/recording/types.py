@@ -11,7 +11,8 @@ import numpy as np
 
 from gearsig.checks import FloatArray, closest_match_hint, frozen_array, one_of, positive
 from gearsig.errors import InputError
-from gearsig.rig.types import Rig, SpeedSource
+from gearsig.rig.speed import SpeedSource
+from gearsig.rig.types import Rig
 
 QUANTITIES = (
     "acceleration",
@@ -135,7 +136,12 @@ class Recording:
 
     def __post_init__(self) -> None:
         where = self.provenance.source or "recording"
-        positive(self.sampling_rate_hz, f"{where}: sampling rate", "Hz", remedy="give --fs or sampling_rate_hz in the rig file")
+        positive(
+            self.sampling_rate_hz,
+            f"{where}: sampling rate",
+            "Hz",
+            remedy="give --fs or sampling_rate_hz in the rig file",
+        )
         if len(np.shape(self.samples)) == 2 and np.shape(self.samples)[1] == 0:
             raise InputError("there are no samples", where=where, remedy="check that the file was written completely")
         try:
@@ -149,7 +155,9 @@ class Recording:
         names = self.channel_names
         doubled = sorted({name for name in names if names.count(name) > 1})
         if doubled:
-            raise InputError(f"channel name(s) {', '.join(doubled)} occur more than once", where=where, remedy="rename the columns")
+            raise InputError(
+                f"channel name(s) {', '.join(doubled)} occur more than once", where=where, remedy="rename the columns"
+            )
         if self.truth is not None:
             object.__setattr__(self, "truth", MappingProxyType(dict(self.truth)))
 
@@ -216,7 +224,10 @@ class Recording:
         if rig is None:
             return replace(self, rig=None)
         if self.rig is not None and self.rig.sensors and self.rig != rig:
-            raise InputError("the recording already carries a rig whose sensor scales were applied", remedy="read the file again with the other rig")
+            raise InputError(
+                "the recording already carries a rig whose sensor scales were applied",
+                remedy="read the file again with the other rig",
+            )
         if self.rig is rig or not rig.sensors:
             return replace(self, rig=rig)
         samples = np.array(self.samples)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
-    from gearsig.rig.types import Rig
+    from gearsig.rig.types import GearPair, Rig
 
 
 def shaft_ratios(rig: Rig) -> dict[str, float]:
@@ -42,21 +42,20 @@ def shaft_ratios(rig: Rig) -> dict[str, float]:
         pair = next((p for p in touching if p.driver in known or p.driven in known), touching[0])
         waiting.remove(pair)
         reached |= {pair.driver, pair.driven}
-        _follow(pair.name, pair.driver, pair.driven, pair.driver_teeth, pair.driven_teeth, known)
+        _follow(pair, known)
     return {name: float(ratio) for name, ratio in known.items()}
 
 
-def _follow(
-    name: str, driver: str, driven: str, z1: int | None, z2: int | None, known: dict[str, Fraction]
-) -> None:
+def _follow(pair: GearPair, known: dict[str, Fraction]) -> None:
     """Add the shaft at the other end of one pair, or check it if both are known."""
+    driver, driven, z1, z2 = pair.driver, pair.driven, pair.driver_teeth, pair.driven_teeth
     if z1 is None or z2 is None:
         return
     ratio = Fraction(z1, z2)
     if driver in known and driven in known:
         if known[driven] != known[driver] * ratio:
             raise InputError(
-                f"pair {name!r} ({z1}/{z2}) contradicts the ratio of its shafts by the other pairs",
+                f"pair {pair.name!r} ({z1}/{z2}) contradicts the ratio of its shafts by the other pairs",
                 where="rig",
                 allowed=f"a ratio of {known[driven] / known[driver]}",
                 remedy="check the teeth",

@@ -59,7 +59,9 @@ class GearPair:
     def __post_init__(self) -> None:
         for label, teeth in (("driver", self.driver_teeth), ("driven", self.driven_teeth)):
             if teeth is not None:
-                count(teeth, f"{label} teeth of pair {self.name!r}", minimum=3, remedy="leave it out if it is not known")
+                count(
+                    teeth, f"{label} teeth of pair {self.name!r}", minimum=3, remedy="leave it out if it is not known"
+                )
         for label, value in (("module_mm", self.module_mm), ("face_width_mm", self.face_width_mm)):
             if value is not None:
                 positive(value, f"{label} of pair {self.name!r}", "mm")
@@ -71,7 +73,9 @@ class GearPair:
     def teeth(self, shaft: str) -> int | None:
         """Teeth of the gear on `shaft`, None if not known."""
         if shaft not in (self.driver, self.driven):
-            raise InputError(f"pair {self.name!r} has no gear on shaft {shaft!r}", allowed=f"{self.driver}, {self.driven}")
+            raise InputError(
+                f"pair {self.name!r} has no gear on shaft {shaft!r}", allowed=f"{self.driver}, {self.driven}"
+            )
         return self.driver_teeth if shaft == self.driver else self.driven_teeth
 
 
@@ -100,14 +104,16 @@ class Bearing:
         if any(v is not None for v in geometry) and not all(v is not None for v in geometry):
             raise InputError(
                 f"the geometry {where} is incomplete",
-                allowed="n_rolling_elements, rolling_element_diameter_mm and pitch_diameter_mm together, or none",
+                allowed="all three or none: n_rolling_elements, rolling_element_diameter_mm, pitch_diameter_mm",
             )
         if self.n_rolling_elements is not None:
             count(self.n_rolling_elements, f"n_rolling_elements {where}", minimum=3)
             ball = positive(self.rolling_element_diameter_mm or 0.0, f"rolling_element_diameter_mm {where}", "mm")
             pitch = positive(self.pitch_diameter_mm or 0.0, f"pitch_diameter_mm {where}", "mm")
             if ball >= pitch:
-                raise InputError(f"rolling elements {where} are not smaller than the pitch diameter ({ball:g} >= {pitch:g} mm)")
+                raise InputError(
+                    f"rolling elements {where} are not smaller than the pitch diameter ({ball:g} >= {pitch:g} mm)"
+                )
         within(self.contact_angle_deg, f"contact_angle_deg {where}", 0, 89, "deg")
         for key in ("bpfo_order", "bpfi_order", "bsf_order", "ftf_order"):
             value = getattr(self, key)
@@ -156,7 +162,7 @@ class Sensor:
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """The nominal running condition. A nominal speed guides the search for the true one; it is not taken as measured."""
+    """The nominal running condition; its speed guides the search for the true one and is not taken as measured."""
 
     shaft: str = ""
     speed_rpm: float | None = None
@@ -206,7 +212,9 @@ class Rig:
             names = [item.name for item in items]
             doubled = sorted({n for n in names if names.count(n) > 1})
             if doubled:
-                raise InputError(f"{kind} name(s) {', '.join(doubled)} occur more than once", remedy="give each its own name")
+                raise InputError(
+                    f"{kind} name(s) {', '.join(doubled)} occur more than once", remedy="give each its own name"
+                )
         for pair in self.pairs:
             for shaft in (pair.driver, pair.driven):
                 self._check_shaft(shaft, f"pair {pair.name!r}")
@@ -235,7 +243,7 @@ class Rig:
 
     @property
     def reference_shaft(self) -> str:
-        """The shaft that orders are counted on unless another is asked for: the speed source's, the operating point's, or the first."""
+        """The shaft that orders are counted on: the speed source's, else the operating point's, else the first."""
         if self.speed is not None and self.speed.shaft:
             return self.speed.shaft
         if self.operating_point.shaft:
@@ -243,7 +251,7 @@ class Rig:
         return self.shafts[0].name if self.shafts else ""
 
     def ratio(self, shaft: str, to: str = "") -> float | None:
-        """Revolutions of `shaft` per revolution of `to` (default: the reference shaft); None if the teeth are not known."""
+        """Revolutions of `shaft` per revolution of `to` (default: the reference shaft); None if not known."""
         self._check_shaft(shaft, "ratio")
         ratios = shaft_ratios(self)
         own, other = ratios.get(shaft), ratios.get(to or self.reference_shaft)
@@ -279,5 +287,7 @@ class Rig:
             and (ratio := self.ratio(gear_shaft, to=shaft or self.reference_shaft)) is not None
         ]
         if len(orders) == 2 and not isclose(orders[0], orders[1], rel_tol=1e-9):
-            raise InputError(f"pair {pair.name!r} gives two mesh orders, {orders[0]:g} and {orders[1]:g}", remedy="check the teeth")
+            raise InputError(
+                f"pair {pair.name!r} gives two mesh orders, {orders[0]:g} and {orders[1]:g}", remedy="check the teeth"
+            )
         return orders[0] if orders else None
