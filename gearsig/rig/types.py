@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, isclose, radians
+from math import cos, isclose, isfinite, radians
 
 from gearsig.checks import closest_match_hint, count, not_negative, one_of, positive, within
 from gearsig.errors import InputError
@@ -156,8 +156,11 @@ class Sensor:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.scale == 0.0:
-            raise InputError(f"scale of sensor {self.channel!r} is 0", allowed="any number but 0")
+        for label, value in (("scale", self.scale), ("offset", self.offset)):
+            if not isfinite(value) or (label == "scale" and value == 0.0):
+                raise InputError(
+                    f"{label} of sensor {self.channel!r} is {value:g}", allowed="a finite number, scale not 0"
+                )
 
 
 @dataclass(frozen=True)

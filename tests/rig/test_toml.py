@@ -1,0 +1,106 @@
+"""Rig files: round trip, closest name for a misspelt key, errors that name file, table and key."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gearsig.errors import InputError
+from gearsig.rig.describe import describe_rig
+from gearsig.rig.speed import ConstantSpeed, EncoderChannel, SpeedChannel, TachometerChannel
+from gearsig.rig.toml import read_rig, rig_from_dict, rig_to_dict, write_rig
+from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
+
+NAMES = st.text(min_size=1, max_size=12)
+
+
+@given(
+    name=NAMES,
+    channel=NAMES,
+    teeth=st.tuples(st.integers(3, 300), st.integers(3, 300) | st.none()),
+    module=st.floats(0.1, 50) | st.none(),
+    speed=st.sampled_from(
+        [
+            None,
+            ConstantSpeed(1500.0, "in"),
+            TachometerChannel("t", 2, 0.5, 0.1, "falling", "in"),
+            EncoderChannel("e", 360.0, wraps=False),
+            SpeedChannel("n", 60.0),
+        ]
+    ),
+)
+def test_round_trip(name, channel, teeth, module, speed, tmp_path_factory) -> None:  # type: ignore[no-untyped-def]
+    rig = Rig(
+        name=name,
+        shafts=(Shaft("in"), Shaft("out", "cw")),
+        pairs=(GearPair("p", "in", "out", *teeth, module_mm=module),),
+        bearings=(Bearing("b", "out", bpfo_order=3.1),),
+        sensors=(Sensor(channel, "acceleration", "m/s^2", scale=9.81),),
+        operating_point=OperatingPoint("in", 1500.0, 2.0),
+        speed=speed,
+        sources=("a", "b"),
+        assumed=("teeth",),
+    )
+    assert rig_from_dict(rig_to_dict(rig)) == rig
+    path = tmp_path_factory.mktemp("rig") / "rig.toml"
+    write_rig(rig, path)
+    assert read_rig(path) == rig
+
+
+def test_shafts_may_be_left_out() -> None:
+    rig = rig_from_dict({"pair": [{"name": "p", "driver": "in", "driven": "out", "driver_teeth": 23}]})
+    assert rig.shaft_names == ("in", "out")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("[[pair]\n", "rig.toml: is not valid TOML"),
+        (
+            '[[pair]]\nname = "p"\ndriver = "a"\ndriven = "b"\ndriver_teth = 20\n',
+            r"\[\[pair\]\] 1.*did you mean driver_teeth",
+        ),
+        (
+            '[[pair]]\nname = "p"\ndriver = "a"\ndriven = "b"\ndriver_teeth = 20.5\n',
+            "driver_teeth: is 20.5.*whole number",
+        ),
+        ('[[pair]]\nname = "p"\ndriver = "a"\ndriven = "b"\ndriver_teeth = 0\n', "driver teeth of pair 'p' is 0"),
+        ('[[pair]]\nname = "p"\n', "driver, driven must be given"),
+        ("[gears]\n", "no 'gears'"),
+        ("shaft = 3\n", r"write \[\[shaft\]\]"),
+        ('[speed]\nsource = "tacho"\n', "did you mean tachometer"),
+        ('[speed]\nsource = "pulse times"\n', "--tach-times"),
+        ('[speed]\nsource = "constant"\nspeed_rpm = nan\n', "speed_rpm is nan"),
+        ('sources = "book"\n', "a list of texts"),
+    ],
+)
+def test_errors_name_the_place(tmp_path: Path, text: str, expected: str) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=expected) as caught:
+        read_rig(path)
+    assert "rig.toml" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_not_a_text_file(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_bytes(b"\x80\x04\x95\xff")
+    with pytest.raises(InputError, match="UTF-8"):
+        read_rig(path)
+    with pytest.raises(InputError, match="cannot be read"):
+        read_rig(tmp_path / "absent.toml")
+
+
+def test_description_lists_every_order() -> None:
+    rig = Rig(
+        shafts=(Shaft("in"), Shaft("out")),
+        pairs=(GearPair("p", "in", "out", 23, 46),),
+        bearings=(Bearing("b", "in", 9, 7.94, 39.04),),
+        operating_point=OperatingPoint("in", 1200.0),
+    )
+    text = describe_rig(rig)
+    for part in ("mesh order 23", "460.000 Hz", "BPFO", "BPFI", "BSF", "FTF", "hunting tooth", "1× mesh p + 1× out"):
+        assert part in text
+    assert "No shafts" in describe_rig(Rig())
