@@ -1,0 +1,63 @@
+"""Options that several commands share, and how a recording is opened with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gearsig.errors import InputError
+
+if TYPE_CHECKING:
+    from gearsig.recording.types import Recording
+    from gearsig.rig.speed import SpeedSource
+    from gearsig.rig.types import Rig
+
+RigOption = Annotated[
+    Path | None, typer.Option("--rig", help="Rig file (TOML): shafts, teeth, bearings, sensors, speed source.")
+]
+SamplingRateOption = Annotated[
+    float | None, typer.Option("--fs", metavar="HZ", help="Sampling rate in Hz, where the file does not state it.")
+]
+SpeedOption = Annotated[
+    float | None,
+    typer.Option("--speed-rpm", metavar="RPM", help="Constant speed of the reference shaft, if it is known well."),
+]
+TachometerTimesOption = Annotated[
+    Path | None, typer.Option("--tach-times", metavar="FILE", help="File with the times of the tachometer pulses in s.")
+]
+PulsesOption = Annotated[int, typer.Option("--pulses-per-revolution", help="Pulses per revolution in --tach-times.")]
+
+
+def open_rig(path: Path | None) -> Rig | None:
+    """Read the rig file, if one is given."""
+    if path is None:
+        return None
+    from gearsig.rig.toml import read_rig
+
+    return read_rig(path)
+
+
+def stated_speed(speed_rpm: float | None, tach_times: Path | None, pulses_per_revolution: int) -> SpeedSource | None:
+    """Return the speed source that the options state, None if they state none."""
+    if speed_rpm is not None and tach_times is not None:
+        raise InputError("--speed-rpm and --tach-times are both given", remedy="give the one that is measured")
+    if tach_times is not None:
+        from gearsig.recording.pulse_file import read_pulse_times
+
+        return read_pulse_times(tach_times, pulses_per_revolution)
+    if speed_rpm is not None:
+        from gearsig.rig.speed import ConstantSpeed
+
+        return ConstantSpeed(speed_rpm)
+    return None
+
+
+def open_recording(
+    path: Path, rig: Rig | None, sampling_rate_hz: float | None, speed: SpeedSource | None = None
+) -> Recording:
+    """Read one recording with what the options say of it."""
+    from gearsig.recording.read import read_recording
+
+    return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
