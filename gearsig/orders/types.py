@@ -95,7 +95,7 @@ class SynchronousAverage:
     shaft, channel, unit : str
     kind : str
         "average"; "residual": without mesh harmonics; "difference": without mesh harmonics and their first-order
-        sidebands; "regular": what was taken out for the difference.
+        sidebands; "regular": what was taken out for the difference; "band-passed mesh": lines around a mesh harmonic.
     highest_order : float
         Orders above it are not in the average.
     """
@@ -106,7 +106,7 @@ class SynchronousAverage:
     shaft: str
     channel: str
     unit: str
-    kind: Literal["average", "residual", "difference", "regular"]
+    kind: Literal["average", "residual", "difference", "regular", "band-passed mesh"]
     highest_order: float
 
     def __post_init__(self) -> None:

@@ -1,0 +1,82 @@
+"""Time-synchronous average of a shaft: one mean revolution, with its standard error."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from gearsig.angle.types import AngleSignal
+from gearsig.checks import FloatArray, count
+from gearsig.orders.revolutions import unit_of, whole_revolutions
+from gearsig.orders.types import SynchronousAverage
+
+DEFAULT_JACKKNIFE_BLOCKS = 32
+
+
+def synchronous_average(
+    signal: AngleSignal, channel: str, *, n_jackknife_blocks: int = DEFAULT_JACKKNIFE_BLOCKS
+) -> SynchronousAverage:
+    """Return the mean over whole revolutions of the shaft that the signal was resampled on.
+
+    a(θ) = 1/N Σ_r x(θ + r). Over N revolutions, the shaft's whole orders stay, noise falls as 1/√N, and order o is
+    multiplied by |sin(πNo)/(N sin πo)|: other shafts' orders fall as 1/N, but are only gone where N·o is whole.
+
+    Parameters
+    ----------
+    signal : AngleSignal
+        Resampled on the angle of the shaft in question.
+    channel : str
+    n_jackknife_blocks : int
+        At least 2. Revolutions are grouped in so many blocks (or as many as there are revolutions) before their
+        scatter is taken, so that a correlation between neighbouring revolutions does not make the error too small.
+
+    Returns
+    -------
+    SynchronousAverage
+        From shaft angle 0, with the standard error of the mean at each angle.
+
+    Raises
+    ------
+    RefusalError
+        With fewer than two whole revolutions.
+    InputError
+        On an unknown channel.
+
+    References
+    ----------
+    P. D. McFadden, "A revised model for the extraction of periodic waveforms by time domain averaging", 1987.
+    S. Braun, "The synchronous (time domain) average revisited", 2011.
+    M. H. Quenouille, "Notes on bias in estimation", 1956 (jackknife).
+    """
+    count(n_jackknife_blocks, "n_jackknife_blocks", minimum=2)
+    revolutions = whole_revolutions(signal, channel, at_least=2)
+    mean, standard_error = mean_and_error(revolutions, n_jackknife_blocks)
+    return SynchronousAverage(
+        values=mean,
+        standard_error=standard_error,
+        n_revolutions=len(revolutions),
+        shaft=signal.shaft_angle.shaft,
+        channel=channel,
+        unit=unit_of(signal, channel),
+        kind="average",
+        highest_order=signal.highest_order,
+    )
+
+
+def mean_and_error(revolutions: FloatArray, n_blocks: int) -> tuple[FloatArray, FloatArray]:
+    """Return mean over rows and its standard error by the delete-one-block jackknife.
+
+    With B blocks, block sums s_b of n_b rows out of N: m_(b) = (Σs - s_b)/(N - n_b),
+    SE² = (B - 1)/B Σ_b (m_(b) - mean of m_(b))².
+    """
+    n = len(revolutions)
+    b = min(n, n_blocks)
+    edges = np.linspace(0, n, b + 1).round().astype(np.intp)
+    # Row blocks are summed one by one: no copy of the whole signal in double precision is made.
+    sums = np.stack([revolutions[i:j].sum(axis=0, dtype=np.float64) for i, j in pairwise(edges)])
+    total = sums.sum(axis=0)
+    without = (total - sums) / (n - np.diff(edges))[:, None]
+    standard_error: FloatArray = np.sqrt((b - 1.0) * without.var(axis=0))
+    mean: FloatArray = total / n
+    return mean, standard_error
