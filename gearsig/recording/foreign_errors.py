@@ -1,0 +1,45 @@
+"""Turns the many exceptions of file-format libraries into one-line input errors."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from gearsig.errors import GearsigError, InputError
+
+# What parsers raise when the bytes are not what they expect. MemoryError is here because a damaged length field asks
+# for an absurd allocation that fails at once, long before memory is really short.
+FOREIGN_ERRORS = (
+    ValueError,
+    TypeError,
+    LookupError,
+    AttributeError,
+    ArithmeticError,
+    AssertionError,
+    OSError,
+    EOFError,
+    MemoryError,
+    RuntimeError,
+    RecursionError,
+    struct.error,
+    zlib.error,
+)
+
+
+@contextmanager
+def foreign_errors(where: str, file_format: str) -> Iterator[None]:
+    """Raise `InputError` where a library fails inside the block; gearsig's own errors pass."""
+    try:
+        yield
+    except GearsigError:
+        raise
+    except FOREIGN_ERRORS as error:
+        reason = str(error)[:200] or type(error).__name__
+        raise InputError(
+            f"cannot be read as {file_format} ({reason})",
+            where=where,
+            allowed=f"a complete {file_format} file",
+            remedy="the file is damaged or was cut off: copy or export it again",
+        ) from error

@@ -1,0 +1,114 @@
+"""What names and units of columns mean: sampling rates, quantities, units in brackets."""
+
+from __future__ import annotations
+
+import re
+
+RATE_NAMES = frozenset(
+    """fs sr fsamp sampfreq samplefreq samplingfreq samplingfrequency samplefrequency samplingrate samplerate
+    samplingratehz sampleratehz fshz sfreq freqsampling fsample samplingfrequencyhz abtastrate""".split()
+)
+"""Names of sampling rates in Hz, lower case, without spaces and underscores."""
+INTERVAL_NAMES = frozenset(
+    "dt xinc ts deltat samplinginterval sampleinterval samplingperiod tsample dts wfincrement".split()
+)
+"""Names of sampling intervals in seconds."""
+SPEED_NAMES = frozenset("rpm rate speed shaftspeed rotspeed speedrpm drehzahl shaftrate hz".split())
+"""Names of scalars that may be a shaft speed; told to the user, never used."""
+
+_QUANTITY_OF_UNIT = {
+    "m/s^2": "acceleration",
+    "m/s2": "acceleration",
+    "m/s²": "acceleration",
+    "m/s**2": "acceleration",
+    "ms-2": "acceleration",
+    "mm/s^2": "acceleration",
+    "mm/s²": "acceleration",
+    "g": "acceleration",
+    "gn": "acceleration",
+    "g_n": "acceleration",
+    "mg": "acceleration",
+    "m/s": "velocity",
+    "mm/s": "velocity",
+    "in/s": "velocity",
+    "ips": "velocity",
+    "mm": "displacement",
+    "µm": "displacement",
+    "μm": "displacement",
+    "um": "displacement",
+    "mil": "displacement",
+    "pa": "sound_pressure",
+    "n": "force",
+    "kn": "force",
+    "nm": "torque",
+    "n*m": "torque",
+    "n·m": "torque",
+    "rpm": "rotational_speed",
+    "r/min": "rotational_speed",
+    "tr/min": "rotational_speed",
+    "u/min": "rotational_speed",
+    "1/min": "rotational_speed",
+    "min^-1": "rotational_speed",
+    "°c": "temperature",
+    "degc": "temperature",
+    "v": "voltage",
+    "mv": "voltage",
+}
+RPM_UNITS = frozenset(("rpm", "r/min", "tr/min", "u/min", "1/min", "min^-1"))
+
+_UNIT_AT_END = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\]\[]*)\]|\((?P<round>[^()]*)\))\s*$", re.DOTALL)
+
+
+def plain_name(name: str) -> str:
+    """Return a name folded for comparison with the sets above.
+
+    Examples
+    --------
+    >>> plain_name("Sampling_Rate"), plain_name("Head_1.SampFreq")
+    ('samplingrate', 'sampfreq')
+    """
+    return re.sub(r"[\s_\-]+", "", name.rpartition(".")[2].casefold())
+
+
+def split_unit(header: str) -> tuple[str, str]:
+    """Split "acc [m/s^2]" or "acc (g)" into name and unit; round brackets only where they hold a known unit.
+
+    Examples
+    --------
+    >>> split_unit("acc [m/s^2]"), split_unit("Time (s)"), split_unit("bearing (left)")
+    (('acc', 'm/s^2'), ('Time', 's'), ('bearing (left)', ''))
+    """
+    match = _UNIT_AT_END.match(header.strip())
+    if match is None or not match["name"]:
+        return header.strip(), ""
+    if match["square"] is not None:
+        return match["name"], match["square"].strip()
+    if is_unit(match["round"]):
+        return match["name"], match["round"].strip()
+    return header.strip(), ""
+
+
+def is_unit(text: str) -> bool:
+    """Whether the text is a unit of a quantity or of time that is known here."""
+    from gearsig.recording.time_axis import SECONDS_PER_UNIT
+
+    word = text.strip().casefold()
+    return word in _QUANTITY_OF_UNIT or (word != "" and word in SECONDS_PER_UNIT)
+
+
+def quantity_of(name: str, unit: str) -> str:
+    """Return the quantity that a unit, or a telling name, stands for; "unknown" where neither tells.
+
+    A pulse channel is known by its name, because its unit is that of a voltage.
+
+    Examples
+    --------
+    >>> quantity_of("a1", "m/s^2"), quantity_of("Tacho", "V"), quantity_of("a1", "")
+    ('acceleration', 'tachometer', 'unknown')
+    """
+    quantity = _QUANTITY_OF_UNIT.get(unit.strip().casefold(), "unknown")
+    if quantity in ("unknown", "voltage") and re.match(r"tach|keyphas", name.strip().casefold()):
+        return "tachometer"
+    if quantity == "unknown" and plain_name(name) in ("rpm", "speedrpm"):
+        return "rotational_speed"
+    return quantity
