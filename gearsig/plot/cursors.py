@@ -1,0 +1,188 @@
+"""Marks at known orders or frequencies: mesh harmonics, sidebands, shaft and bearing lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from gearsig.plot import style
+from gearsig.plot.display import plain
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from gearsig.rig.orders import OrderLine
+
+PRIORITY = ("mesh", "bearing", "shaft", "hunting", "sideband")
+"""Which kind keeps its place where two marks collide, first wins."""
+
+N_ROWS = 3
+ROW_IN = 0.15
+OVERHANG_IN = 0.4  # a label may reach this far out of the panel
+LONGEST = 24
+LEAST_DISTANCE_IN = 0.03
+CHARACTER_EM = 0.62  # mean width of the font's characters, on the safe side
+LINE_LOOKS = {
+    "mesh": ("-", 0.9, 0.55),
+    "sideband": (":", 0.8, 0.6),
+    "shaft": ("--", 0.8, 0.55),
+    "bearing": ("-.", 0.9, 0.65),
+    "hunting": (":", 0.8, 0.6),
+}
+
+
+@dataclass(frozen=True)
+class LabelPlace:
+    """A label's row above the panel and its extent, in inches from the panel's left edge."""
+
+    row: int
+    line_in: float
+    low_in: float
+    high_in: float
+
+    def collides(self, other: LabelPlace) -> bool:
+        """Whether the labels overlap, or the line up to the higher one crosses the lower one."""
+        if self.row == other.row:
+            return self.low_in < other.high_in and other.low_in < self.high_in
+        lower, higher = (self, other) if self.row < other.row else (other, self)
+        return lower.low_in < higher.line_in < lower.high_in
+
+
+@dataclass(frozen=True)
+class Cursor:
+    """A mark at one position of a spectrum's axis.
+
+    Parameters
+    ----------
+    position : float
+        In the spectrum's own axis: order or frequency (Hz).
+    kind : str
+        "mesh", "sideband", "shaft", "bearing", "hunting".
+    label : str
+    harmonic : int
+        Where labels collide, the lower harmonic keeps its own.
+    """
+
+    position: float
+    kind: str
+    label: str
+    harmonic: int = 1
+
+
+def order_cursors(lines: Iterable[OrderLine], revolutions_per_s: float = 1.0) -> tuple[Cursor, ...]:
+    """Turn a rig's order lines into cursors with short labels.
+
+    Names of pairs and bearings are left out where there is only one; a sideband is called by its distance.
+
+    Parameters
+    ----------
+    lines : iterable of OrderLine
+    revolutions_per_s : float
+        1 for an order axis; the speed of the shaft that orders are counted on for a frequency axis (Hz).
+
+    Returns
+    -------
+    tuple of Cursor
+    """
+    lines = tuple(lines)
+    only = {
+        kind: len({line.element for line in lines if line.kind == kind}) == 1 for kind in ("mesh", "bearing", "hunting")
+    }
+    return tuple(
+        Cursor(line.order * revolutions_per_s, line.kind, _short_label(line, only.get(line.kind, False)), line.harmonic)
+        for line in lines
+    )
+
+
+def place(
+    cursors: Iterable[Cursor], limits: tuple[float, float], width_in: float
+) -> list[tuple[Cursor, LabelPlace | None]]:
+    """Choose the cursors to draw and the places of their labels; None: a line without label.
+
+    A cursor nearly on top of a more important one is left out. Labels fill the rows from the lowest; one that would
+    touch another label, or a line on its way up to one, is left out; its line stays.
+
+    Parameters
+    ----------
+    cursors : iterable of Cursor
+    limits : (float, float)
+        Of the axis.
+    width_in : float
+        Of the panel, in inches.
+
+    Returns
+    -------
+    list of (Cursor, LabelPlace or None)
+        Most important first.
+    """
+    scale = width_in / (limits[1] - limits[0])
+    drawn: list[float] = []
+    taken: list[LabelPlace] = []
+    result: list[tuple[Cursor, LabelPlace | None]] = []
+    for cursor in sorted(cursors, key=_importance):
+        at = (cursor.position - limits[0]) * scale
+        if not 0.0 <= at <= width_in or any(abs(at - other) < LEAST_DISTANCE_IN for other in drawn):
+            continue
+        drawn.append(at)
+        label = _free_place(taken, at, cursor.label, width_in) if cursor.label else None
+        if label is not None:
+            taken.append(label)
+        result.append((cursor, label))
+    return result
+
+
+def draw(
+    axes: Axes,
+    cursors: Sequence[Cursor],
+    limits: tuple[float, float],
+    size_in: tuple[float, float],
+    *,
+    through: bool = True,
+) -> None:
+    """Draw cursors into a panel of known size, their labels in rows above it; through the panel, or only above it."""
+    width, height = size_in
+    for cursor, label in place(cursors, limits, width):
+        colour = style.CURSOR_COLOURS.get(cursor.kind, style.QUIET)
+        dashes, thickness, alpha = LINE_LOOKS.get(cursor.kind, LINE_LOOKS["sideband"])
+        base = 0.05 + ROW_IN * (label.row if label else 0)
+        top = 1.0 + (base if label else 0.05) / height
+        low = 0.0 if through else 1.0
+        transform = axes.get_xaxis_transform()
+        ends = ([cursor.position] * 2, [low, top])
+        looks = {"color": colour, "linestyle": dashes, "linewidth": thickness, "alpha": alpha}
+        axes.plot(*ends, **looks, transform=transform, clip_on=False, zorder=1.5)  # type: ignore[arg-type]
+        if label is not None:
+            axes.text(
+                (label.low_in + label.high_in) / 2 / width,
+                1.0 + base / height,
+                plain(cursor.label, LONGEST),
+                transform=axes.transAxes,
+                ha="center",
+                va="bottom",
+                fontsize=style.SMALL_PT,
+                color=colour,
+                parse_math=False,
+            )
+
+
+def _short_label(line: OrderLine, only_one: bool) -> str:
+    if line.kind == "sideband":
+        return line.label.partition(line.element)[2].strip().replace("+ ", "+").replace("− ", "−")
+    return line.label.removesuffix(line.element).strip() if only_one else line.label
+
+
+def _importance(cursor: Cursor) -> tuple[int, int, float]:
+    rank = PRIORITY.index(cursor.kind) if cursor.kind in PRIORITY else len(PRIORITY)
+    return rank, cursor.harmonic, cursor.position
+
+
+def _free_place(taken: Sequence[LabelPlace], at_in: float, text: str, width_in: float) -> LabelPlace | None:
+    """Return the lowest free place of a label over the line at `at_in`, inside the figure."""
+    half = (len(plain(text, LONGEST)) * CHARACTER_EM + 0.8) * style.SMALL_PT / 72 / 2
+    middle = min(max(at_in, half - OVERHANG_IN), width_in + OVERHANG_IN / 2 - half)
+    for row in range(N_ROWS):
+        new = LabelPlace(row, at_in, middle - half, middle + half)
+        if not any(new.collides(other) for other in taken):
+            return new
+    return None
