@@ -47,19 +47,22 @@ def unit_of(signal: AngleSignal, channel: str) -> str:
     return signal.units[signal.channel_names.index(channel)]
 
 
-def time_of_revolution(angle: ShaftAngle, revolutions: FloatArray) -> FloatArray:
-    """Return the times at which the shaft passes `revolutions`, within the knots; the angle function inverted.
+def times_of_revolutions(angle: ShaftAngle, first: float, step: float, n: int) -> FloatArray:
+    """Return the times at which the shaft passes `first`, `first` + `step`, … revolutions: n times."""
+    from gearsig.angle.inversion import times_at
 
-    Linear between the knots to start with, then Newton's steps on the cubic. Where the shaft stands, the time is not
-    unique and any time of the standstill is returned.
-    """
-    wanted = np.clip(np.asarray(revolutions, dtype=np.float64), angle.revolutions[0], angle.revolutions[-1])
-    t = np.interp(wanted, angle.revolutions, angle.time_s)
-    for _ in range(3):
-        speed = angle.speed_rpm_at(t) / 60.0
-        step = np.divide(wanted - angle.revolutions_at(t), speed, out=np.zeros_like(t), where=speed > 1e-6)
-        t = np.clip(t + step, angle.start_s, angle.end_s)
-    return t
+    out = np.empty(n)
+    interval = int(np.searchsorted(angle.revolutions, first, side="right")) - 1
+    times_at(
+        angle.time_s,
+        angle.revolutions,
+        angle.speed_rev_per_s,
+        min(max(interval, 0), len(angle.time_s) - 2),
+        float(first),
+        float(step),
+        out,
+    )
+    return out
 
 
 def block_times(
@@ -67,8 +70,10 @@ def block_times(
 ) -> tuple[FloatArray, FloatArray]:
     """Return (time of the middle, mean speed in rpm) of blocks of an angle signal."""
     per_rev = signal.samples_per_revolution
-    start = signal.start_revolution + (first_sample + np.arange(n_blocks) * step) / per_rev
+    start = signal.start_revolution + first_sample / per_rev
     length = n_per_block / per_rev
-    begin, middle, end = (time_of_revolution(signal.shaft_angle, start + f * length) for f in (0.0, 0.5, 1.0))
-    revolutions = signal.shaft_angle.revolutions_at(end) - signal.shaft_angle.revolutions_at(begin)
-    return middle, 60.0 * revolutions / (end - begin)
+    begin, middle, end = (
+        times_of_revolutions(signal.shaft_angle, start + part * length, step / per_rev, n_blocks)
+        for part in (0.0, 0.5, 1.0)
+    )
+    return middle, 60.0 * length / (end - begin)

@@ -63,17 +63,38 @@ def track_orders(
     ----------
     K. R. Fyfe and E. D. S. Munck, "Analysis of computed order tracking", 1997.
     """
-    x = signal.values(channel)
-    wanted = _checked_orders(signal, orders)
-    per_rev = signal.samples_per_revolution
-    n_per_block = round(positive(revolutions_per_block, "revolutions_per_block") * per_rev)
-    if not 2 <= n_per_block <= len(x):
+    wanted, plan = plan_track(signal, channel, orders, revolutions_per_block, overlap, window)
+    cycles = wanted / signal.samples_per_revolution
+    c = order_amplitudes(signal.values(channel), plan, cycles, wanted * signal.start_revolution)
+    return tracked_orders(signal, channel, wanted, plan, c)
+
+
+def plan_track(
+    signal: AngleSignal,
+    channel: str,
+    orders: Sequence[float],
+    revolutions_per_block: float,
+    overlap: float,
+    window: str,
+    *,
+    margin: float = 0.0,
+) -> tuple[FloatArray, BlockPlan]:
+    """Check what is to be tracked; return the orders and the blocks."""
+    wanted = _checked_orders(signal, orders, margin)
+    n = len(signal.values(channel))
+    n_per_block = round(positive(revolutions_per_block, "revolutions_per_block") * signal.samples_per_revolution)
+    if not 2 <= n_per_block <= n:
         raise RefusalError(
             f"a block of {revolutions_per_block:g} revolutions does not fit {signal.n_revolutions:.1f} revolutions",
             remedy="shorten the block or record longer",
         )
-    plan = plan_blocks(len(x), n_per_block, overlap, window)
-    c = order_amplitudes(x, plan, wanted / per_rev, wanted * signal.start_revolution)
+    return wanted, plan_blocks(n, n_per_block, overlap, window)
+
+
+def tracked_orders(
+    signal: AngleSignal, channel: str, orders: FloatArray, plan: BlockPlan, c: ComplexArray
+) -> tuple[TrackedOrder, ...]:
+    """Wrap complex amplitudes (n_blocks, n_orders) with time, speed and unit."""
     time_s, speed_rpm = block_times(signal, 0, plan.n_per_block, plan.step, plan.n_blocks)
     return tuple(
         TrackedOrder(
@@ -83,11 +104,11 @@ def track_orders(
             amplitude=np.abs(c[:, i]),
             phase_rad=np.angle(c[:, i]),
             unit=unit_of(signal, channel),
-            bandwidth_orders=plan.window.noise_bandwidth_bins * per_rev / n_per_block,
+            bandwidth_orders=plan.window.noise_bandwidth_bins * signal.samples_per_revolution / plan.n_per_block,
             source=channel,
             shaft=signal.shaft_angle.shaft,
         )
-        for i, order in enumerate(wanted)
+        for i, order in enumerate(orders)
     )
 
 
@@ -145,11 +166,11 @@ def amplitude_at_speeds(tracked: TrackedOrder, speeds_rpm: FloatArray) -> FloatA
     return amplitude
 
 
-def _checked_orders(signal: AngleSignal, orders: Sequence[float]) -> FloatArray:
+def _checked_orders(signal: AngleSignal, orders: Sequence[float], margin: float) -> FloatArray:
     if len(orders) == 0:
         raise InputError("no orders are given", remedy="name at least one")
     wanted = np.array([not_negative(order, "order") for order in orders])
-    if wanted.max() > signal.highest_order:
+    if wanted.max() + margin > signal.highest_order:
         raise RefusalError(
             f"order {wanted.max():g} lies above the highest valid order {signal.highest_order:g} of the signal",
             remedy="resample with more samples per revolution, or record at a higher rate",
