@@ -197,8 +197,9 @@ def _check_finite(values: NumberArray, column: RawColumn, table: RawTable, sourc
     if finite.all():
         return
     bad = np.flatnonzero(~finite)
+    place = table.row_place(int(bad[0]))
     raise InputError(
-        f"channel {column.name!r} holds {len(bad)} NaN or infinite value(s), the first at {table.row_place(int(bad[0]))}",
+        f"channel {column.name!r} holds {len(bad)} NaN or infinite value(s), the first at {place}",
         where=source,
         allowed="finite numbers",
         remedy="cut out the gap or interpolate it before the analysis, knowingly",

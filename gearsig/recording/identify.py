@@ -35,9 +35,9 @@ ALLOWED_EXTENSIONS = " ".join(FORMAT_OF_EXTENSION) + ", text also with .gz"
 
 HEAD_BYTES = 4096
 
-_HDF5 = b"\x89HDF\r\n\x1a\n"
 _MAGIC = (
-    (_HDF5, "HDF5"),
+    (b"\x89HDF\r\n\x1a\n", "HDF5"),
+    (b"\x1f\x8b", "gzip"),
     (b"PAR1", "Parquet"),
     (b"TDSm", "TDMS"),
     (b"TDSh", "a TDMS index without its data"),
@@ -54,6 +54,13 @@ _MAGIC = (
     (b"\x28\xb5\x2f\xfd", "a Zstandard archive"),
     (b"7z\xbc\xaf", "a 7-Zip archive"),
 )
+_MAT_VERSIONS = {
+    b"\x00\x01IM": "MAT v5",
+    b"\x01\x00MI": "MAT v5",
+    b"\x00\x02IM": "MAT v7.3",
+    b"\x02\x00MI": "MAT v7.3",
+}
+_PICKLE_STARTS = (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
 # Pickle protocols 0 and 1 are text: an opening mark, or a global "cmodule\nname\n".
 _TEXT_PICKLE = re.compile(rb"\A(?:\((?:dp|lp|[dl]|i)\d*\n|c[\w.]+\n[\w.]+\n|[\])}]q|\(c[\w.]+\n[\w.]+\n)")
 _MARKUP = re.compile(rb"\A\s*<(?:!doctype|html|\?xml|svg|script)", re.IGNORECASE)
@@ -99,22 +106,14 @@ def content_kind(head: bytes) -> str:
     """Name the kind of content from a file's first bytes, never by trying to open it."""
     if not head.strip(b"\0"):
         return "zero bytes"
-    if head[:2] == b"\x80" + head[1:2] and head[1:2] in (b"\x02", b"\x03", b"\x04", b"\x05"):
-        return "a Python pickle"
-    if _TEXT_PICKLE.match(head):
+    if head[:2] in _PICKLE_STARTS or _TEXT_PICKLE.match(head):
         return "a Python pickle"
     if head[:4] in (b"RIFF", b"RIFX", b"RF64"):
         return "WAV" if head[8:12] == b"WAVE" else "RIFF but not WAVE"
-    if len(head) >= 128 and head[124:128] in (b"\x00\x01IM", b"\x01\x00MI"):
-        return "MAT v5"
-    if head[:10] == b"MATLAB 7.3" or (head[124:128] in (b"\x00\x02IM", b"\x02\x00MI") and _HDF5 in head):
-        return "MAT v7.3"
-    for magic, kind in _MAGIC:
-        if head.startswith(magic):
-            return kind
-    if head[:2] == b"\x1f\x8b":
-        return "gzip"
-    return _text_kind(head)
+    if head[124:128] in _MAT_VERSIONS:
+        return _MAT_VERSIONS[head[124:128]]
+    known = [kind for magic, kind in _MAGIC if head.startswith(magic)]
+    return known[0] if known else _text_kind(head)
 
 
 def _text_kind(head: bytes) -> str:

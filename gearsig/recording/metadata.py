@@ -34,6 +34,7 @@ def metadata_json(recording: Recording) -> str:
         {
             "layout": LAYOUT,
             "sampling_rate_hz": float(recording.sampling_rate_hz),
+            "dtype": recording.samples.dtype.name,
             "channels": [asdict(channel) for channel in recording.channels],
             "speed": _speed_to_dict(recording.speed),
             "truth": None if recording.truth is None else dict(recording.truth),
@@ -54,11 +55,10 @@ def table_from_metadata(
     """Return the table of a file in gearsig's own layout from its JSON text and its columns in order."""
     try:
         facts = json.loads(text)
-        if facts["layout"] != LAYOUT:
-            raise InputError(f"layout {facts['layout']!r} is not known", where=where, allowed=LAYOUT)
         channels = facts["channels"]
-        if len(channels) != len(values):
-            raise InputError(f"describes {len(channels)} channels but holds {len(values)}", where=where)
+        _check_own(str(facts["layout"]), len(channels), len(values), where)
+        if facts["dtype"] == "float32":  # text has no types
+            values = [np.asarray(v, dtype=np.float32) for v in values]
         columns = tuple(
             RawColumn(str(c["name"]), v, str(c["unit"]), str(c["quantity"]), str(c["position"]))
             for c, v in zip(channels, values, strict=True)
@@ -83,6 +83,20 @@ def table_from_metadata(
             allowed="what write_recording writes",
             remedy="write the file again, or remove the description",
         ) from error
+
+
+def _check_own(layout: str, n_described: int, n_held: int, where: str) -> None:
+    if layout != LAYOUT:
+        raise InputError(
+            f"layout {layout[:60]!r} is not known", where=where, allowed=LAYOUT, remedy="use the gearsig that wrote it"
+        )
+    if n_described != n_held:
+        raise InputError(
+            f"describes {n_described} channels but holds {n_held}",
+            where=where,
+            allowed="as many columns as are described",
+            remedy="the columns were changed after writing: remove the description",
+        )
 
 
 def _speed_to_dict(speed: SpeedSource | None) -> dict[str, Any] | None:

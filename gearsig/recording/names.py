@@ -5,15 +5,44 @@ from __future__ import annotations
 import re
 
 RATE_NAMES = frozenset(
-    """fs sr fsamp sampfreq samplefreq samplingfreq samplingfrequency samplefrequency samplingrate samplerate
-    samplingratehz sampleratehz fshz sfreq freqsampling fsample samplingfrequencyhz abtastrate""".split()
+    [
+        "fs",
+        "sr",
+        "fsamp",
+        "sampfreq",
+        "samplefreq",
+        "samplingfreq",
+        "samplingfrequency",
+        "samplefrequency",
+        "samplingrate",
+        "samplerate",
+        "samplingratehz",
+        "sampleratehz",
+        "fshz",
+        "sfreq",
+        "freqsampling",
+        "fsample",
+        "samplingfrequencyhz",
+        "abtastrate",
+    ]
 )
 """Names of sampling rates in Hz, lower case, without spaces and underscores."""
 INTERVAL_NAMES = frozenset(
-    "dt xinc ts deltat samplinginterval sampleinterval samplingperiod tsample dts wfincrement".split()
+    [
+        "dt",
+        "xinc",
+        "ts",
+        "deltat",
+        "samplinginterval",
+        "sampleinterval",
+        "samplingperiod",
+        "tsample",
+        "dts",
+        "wfincrement",
+    ]
 )
 """Names of sampling intervals in seconds."""
-SPEED_NAMES = frozenset("rpm rate speed shaftspeed rotspeed speedrpm drehzahl shaftrate hz".split())
+SPEED_NAMES = frozenset(["rpm", "rate", "speed", "shaftspeed", "rotspeed", "speedrpm", "drehzahl", "shaftrate", "hz"])
 """Names of scalars that may be a shaft speed; told to the user, never used."""
 
 _QUANTITY_OF_UNIT = {

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.recording.formats.csv_layout import CsvLayout, find_layout
+from gearsig.recording.formats.csv_layout import CsvLayout, find_layout, own_layout
 from gearsig.recording.formats.csv_rows import line_of_row, parse_rows
 from gearsig.recording.limits import check_memory, read_text_bytes
 from gearsig.recording.metadata import OWN_TEXT_MARK, table_from_metadata
@@ -32,7 +32,8 @@ def read_csv(path: Path) -> RawTable:
     """
     where = path.name
     data = read_text_bytes(path)
-    layout = find_layout(data, where)
+    is_own = data.startswith(OWN_TEXT_MARK.encode())
+    layout = own_layout(data) if is_own else find_layout(data, where)
     n_rows = (len(data) - layout.offset) / layout.bytes_per_line
     check_memory(int(len(data) + 16 * n_rows * layout.n_columns), where)
     names, units = _names_and_units(layout)
@@ -41,9 +42,8 @@ def read_csv(path: Path) -> RawTable:
     def place(row: int) -> str:
         return f"line {line_of_row(data, layout, row)}"
 
-    own = [line for line in layout.preamble if line.startswith(OWN_TEXT_MARK)]
-    if own:
-        return table_from_metadata(own[0].removeprefix(OWN_TEXT_MARK), values, READER, where, place)
+    if is_own:
+        return table_from_metadata(layout.preamble[0].removeprefix(OWN_TEXT_MARK), values, READER, where, place)
     warnings = list(_doubtful_comma(layout, values))
     columns = [RawColumn(name, v, unit) for name, unit, v in zip(names, units, values, strict=True)]
     columns, warning = _without_counter(columns, layout)

@@ -108,6 +108,17 @@ def find_layout(data: bytes, where: str) -> CsvLayout:
     )
 
 
+def own_layout(data: bytes) -> CsvLayout:
+    """Return the layout that gearsig itself writes: a description, a header, then the numbers."""
+    header_at = data.find(b"\n") + 1
+    offset = data.find(b"\n", header_at) + 1
+    end = data.find(b"\n", offset)
+    first = data[offset : end if end > 0 else len(data)]
+    description = data[: header_at - 1].decode("utf-8", errors="replace")
+    n_columns = first.count(b",") + 1
+    return CsvLayout(",", ".", n_columns, False, (), (), (description,), 3, offset, len(first) + 1.0)
+
+
 def _first_lines(data: bytes) -> list[bytes]:
     """Return the complete lines at the beginning, or all if the file is short."""
     lines = data[:SNIFF_BYTES].splitlines(keepends=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from gearsig.errors import InputError
 from gearsig.recording.foreign_errors import foreign_errors
+from gearsig.recording.formats.writers import HDF5_SAMPLES, OWN_NAME
 from gearsig.recording.limits import check_memory
 from gearsig.recording.metadata import table_from_metadata
 from gearsig.recording.named_arrays import NamedArrays, table_from_arrays
@@ -16,8 +17,6 @@ from gearsig.recording.names import INTERVAL_NAMES, RATE_NAMES, plain_name
 from gearsig.recording.raw_table import NumberArray, RawTable
 
 READER = "gearsig HDF5 reader"
-OWN_ATTRIBUTE = "gearsig_recording"
-OWN_DATASET = "samples"
 MAX_DEPTH = 8
 MAX_DATASETS = 10_000
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "unit_string")
@@ -39,14 +38,17 @@ def read_hdf5(path: Path) -> RawTable:
 
     where = path.name
     with foreign_errors(where, "HDF5"), h5py.File(path, "r", locking=False) as file:
-        if OWN_ATTRIBUTE in file.attrs and OWN_DATASET in file:
-            samples = load_dataset(file[OWN_DATASET], where)
-            return table_from_metadata(str(file.attrs[OWN_ATTRIBUTE]), list(samples), READER, where)
         arrays: dict[str, NumberArray] = {}
         units: dict[str, str] = {}
         rates_hz = _rates_of(file.attrs, "")
         skipped: list[str] = []
-        for dataset_path, dataset in own_datasets(file, skipped):
+        datasets = own_datasets(file, skipped)
+        by_path = dict(datasets)
+        if OWN_NAME in by_path and HDF5_SAMPLES in by_path:
+            samples = load_dataset(by_path[HDF5_SAMPLES], where)
+            text = by_path[OWN_NAME].asstr()[()]
+            return table_from_metadata(str(text), list(np.atleast_2d(samples)), READER, where)
+        for dataset_path, dataset in datasets:
             if dataset.dtype.kind not in "fiubc" or dataset.ndim > 2 or dataset.size == 0:
                 continue
             arrays[dataset_path] = np.atleast_1d(load_dataset(dataset, where))

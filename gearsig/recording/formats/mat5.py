@@ -12,12 +12,13 @@ import numpy as np
 from gearsig.errors import InputError
 from gearsig.recording.foreign_errors import foreign_errors
 from gearsig.recording.formats.mat5_size import check_mat5_size
+from gearsig.recording.formats.writers import OWN_NAME
 from gearsig.recording.metadata import table_from_metadata
 from gearsig.recording.named_arrays import NamedArrays, table_from_arrays
 from gearsig.recording.raw_table import NumberArray, RawTable
 
 READER = "gearsig MAT v5 reader"
-OWN_VARIABLE = "gearsig_recording"
+
 MAX_DEPTH = 6
 
 
@@ -41,8 +42,8 @@ def read_mat5(path: Path) -> RawTable:
     texts: dict[str, str] = {}
     for name, value in variables.items():
         _flatten(name, value, arrays, texts, MAX_DEPTH)
-    if OWN_VARIABLE in texts and "samples" in arrays:
-        return table_from_metadata(texts[OWN_VARIABLE], list(arrays["samples"].T), READER, where)
+    if OWN_NAME in texts and "samples" in arrays:
+        return table_from_metadata(texts[OWN_NAME], list(arrays["samples"].T), READER, where)
     return table_from_arrays(NamedArrays(arrays, texts, warnings=tuple(notes)), READER, where)
 
 
@@ -68,10 +69,10 @@ def _load_doubled(path: Path, counts: Counter[str]) -> tuple[dict[str, Any], lis
         for name, stream in varmats_from_mat(file):
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # scipy repeats what is told below
-                value = loadmat(stream).get(name)
-            if name in chosen and not _is_blank(value) and not _is_blank(chosen[name]):
-                if not _equal(value, chosen[name]):
-                    differ.add(name)
+                value = loadmat(stream).get(name)  # type: ignore[arg-type]  # the stubs know paths only
+            both = name in chosen and not _is_blank(value) and not _is_blank(chosen[name])
+            if both and not _equal(value, chosen[name]):
+                differ.add(name)
             if name not in chosen or not _is_blank(value):
                 chosen[name] = value
     doubled = ", ".join(name for name, n in counts.items() if n > 1)

@@ -10,12 +10,13 @@ import numpy as np
 from gearsig.errors import InputError
 from gearsig.recording.foreign_errors import foreign_errors
 from gearsig.recording.formats.wav_chunks import LeaChannel, find_chunks, parse_lea
+from gearsig.recording.formats.writers import WAV_CHUNK
 from gearsig.recording.limits import check_memory
 from gearsig.recording.metadata import table_from_metadata
 from gearsig.recording.raw_table import NumberArray, RawColumn, RawTable
 
 READER = "gearsig WAV reader"
-OWN_CHUNK = b"gsig"
+
 # Zero and full scale of the integer types as scipy returns them; it left-justifies 24 bit in 32.
 _SCALES = {"uint8": (128.0, 128.0), "int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "int64": (0.0, 2.0**63)}
 
@@ -42,8 +43,8 @@ def read_wav(path: Path) -> RawTable:
         warnings.filterwarnings("ignore", message="Chunk .*not understood")
         rate_hz, frames = wavfile.read(path)
     rows = [frames] if frames.ndim == 1 else list(frames.T)
-    if OWN_CHUNK in chunks:
-        return table_from_metadata(chunks[OWN_CHUNK].decode("utf-8", errors="replace"), rows, READER, where)
+    if WAV_CHUNK in chunks:
+        return table_from_metadata(chunks[WAV_CHUNK].decode("utf-8", errors="replace"), rows, READER, where)
     described = parse_lea(chunks.get(b"LEA ", b""))
     columns = [_column(i, row, described if len(described) == len(rows) else []) for i, row in enumerate(rows)]
     return RawTable(tuple(columns), READER, sampling_rate_hz=float(rate_hz))
@@ -65,6 +66,7 @@ def _to_full_scale(values: NumberArray) -> NumberArray:
         raise InputError(f"coding {values.dtype} is not known", allowed="8, 16, 24, 32 bit integer, 32, 64 bit float")
     zero, full = _SCALES[values.dtype.name]
     narrow = values.dtype.itemsize <= 2 or (values.dtype == np.int32 and not np.any(values & 0xFF))
-    dtype = np.float32 if narrow else np.float64
-    scaled: NumberArray = (values.astype(dtype) - dtype(zero)) / dtype(full)
+    scaled: NumberArray = values.astype(np.float32 if narrow else np.float64)
+    scaled -= zero
+    scaled /= full
     return scaled
