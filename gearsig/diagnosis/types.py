@@ -36,6 +36,7 @@ class Where:
     order: float | None = None
     order_shaft: str = ""
     frequency_hz: float | None = None
+    band_hz: tuple[float, float] | None = None
     angle_deg: float | None = None
     tooth: int | None = None
     time_s: tuple[float, float] | None = None

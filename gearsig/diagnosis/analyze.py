@@ -1,0 +1,138 @@
+"""From a recording to findings: the main job."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+from gearsig.diagnosis.detectors.bearing import detect_bearings
+from gearsig.diagnosis.detectors.lines import detect_lines
+from gearsig.diagnosis.detectors.mesh import detect_mesh
+from gearsig.diagnosis.detectors.quality import detect_data_problems
+from gearsig.diagnosis.detectors.sidebands import detect_sidebands
+from gearsig.diagnosis.detectors.tooth import detect_tooth_damage
+from gearsig.diagnosis.envelopes import BandEnvelope, band_envelopes
+from gearsig.diagnosis.indicator_table import indicator_table
+from gearsig.diagnosis.settings import AnalysisSettings
+from gearsig.diagnosis.signals import Signals, compute_signals
+from gearsig.diagnosis.speed import determine_angle, speed_finding
+from gearsig.diagnosis.types import Analysis, CannotTell, ChannelAnalysis, Finding, Kind
+from gearsig.diagnosis.verdict import ranked, verdict_of
+from gearsig.errors import InputError
+from gearsig.recording.types import Recording
+from gearsig.rig.types import Rig
+
+MINIMUM_SAMPLES = 256
+"""Below it no spectrum has a noise floor to compare with."""
+
+
+def analyze(recording: Recording, rig: Rig | None = None, settings: AnalysisSettings | None = None) -> Analysis:
+    """Diagnose one recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        Its rig, if any, tells what the machine is.
+    rig : Rig or None
+        Used where the recording carries none.
+    settings : AnalysisSettings or None
+
+    Returns
+    -------
+    Analysis
+        Findings, most important first; what cannot be told is a finding with its reason, not an error.
+
+    Raises
+    ------
+    InputError
+        If there is no vibration channel, or the record is shorter than 256 samples.
+    """
+    settings = settings or AnalysisSettings()
+    if recording.rig is None and rig is not None:
+        recording = recording.with_rig(rig)
+    known = recording.rig or Rig()
+    _check_size(recording)
+    findings, dead = detect_data_problems(recording)
+    names = [name for name in recording.vibration_names() if name not in dead]
+    angle = determine_angle(recording, known)
+    findings.append(speed_finding(angle))
+    if not names:
+        findings.append(Finding("all-channels-dead", Kind.CANNOT_TELL, "Every vibration channel is dead."))
+        order = ranked(findings)
+        return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings))
+    usable = angle if not isinstance(angle, CannotTell) else None
+    signals = compute_signals(recording.select(names), known, usable, settings)
+    envelopes = list(band_envelopes(signals))
+    findings += _detect(signals, envelopes)
+    order = ranked(findings)
+    return Analysis(
+        recording=recording,
+        rig=recording.rig,
+        shaft_angle=angle,
+        channels=tuple(_channel(signals, name, envelopes, order) for name in names),
+        indicators=indicator_table(signals, envelopes),
+        findings=order,
+        verdict=verdict_of(order),
+        settings=asdict(settings),
+    )
+
+
+def _detect(signals: Signals, envelopes: list[BandEnvelope]) -> list[Finding]:
+    return [
+        *detect_mesh(signals),
+        *detect_tooth_damage(signals),
+        *detect_bearings(signals, envelopes),
+        *detect_sidebands(signals),
+        *detect_lines(signals),
+    ]
+
+
+def _check_size(recording: Recording) -> None:
+    where = recording.provenance.source or "recording"
+    if recording.n_samples < MINIMUM_SAMPLES:
+        raise InputError(
+            f"{recording.n_samples} samples are too few", where=where, allowed=f"{MINIMUM_SAMPLES} or more"
+        )
+    if not recording.vibration_names():
+        quantities = ", ".join(sorted({c.quantity for c in recording.channels}))
+        raise InputError(
+            f"there is no vibration channel (only {quantities})",
+            where=where,
+            remedy="name the channel's quantity with a [[sensor]] in the rig file",
+        )
+
+
+def _channel(
+    signals: Signals, name: str, envelopes: list[BandEnvelope], findings: tuple[Finding, ...]
+) -> ChannelAnalysis:
+    from gearsig.spectra.density import channel_density
+
+    envelope = _shown_envelope(name, envelopes, findings)
+    averages = {}
+    for shaft in signals.shafts:
+        averages[shaft.shaft, "average"] = shaft.averages[name]
+        if name in shaft.separated:
+            parts = shaft.separated[name]
+            for part in (parts.residual, parts.difference, parts.regular):
+                averages[shaft.shaft, part.kind] = part
+    return ChannelAnalysis(
+        channel=name,
+        spectrum=signals.spectra[name],
+        power_density=channel_density(signals.recording, name),
+        envelope_spectrum=envelope.excess.spectrum if envelope else None,
+        envelope_band_hz=envelope.band_hz if envelope else None,
+        order_spectrum=signals.order_excess[name].spectrum if name in signals.order_excess else None,
+        order_map=signals.order_maps.get(name),
+        averages=averages,
+    )
+
+
+def _shown_envelope(name: str, envelopes: list[BandEnvelope], findings: tuple[Finding, ...]) -> BandEnvelope | None:
+    """Return the envelope in which the surest family of impacts was found, else the one whose lines stand out most."""
+    own = [e for e in envelopes if e.channel == name]
+    if not own:
+        return None
+    for finding in findings:
+        for envelope in own:
+            if finding.where.band_hz == envelope.band_hz and name in finding.where.channels:
+                return envelope
+    return max(own, key=lambda e: float(e.excess.scores().sum()))

@@ -1,0 +1,255 @@
+"""Families of equally spaced lines in a spectrum, and whether noise could have made them.
+
+The score of a fundamental is the sum, over its harmonics, of the logarithm of line power over local floor, each cut at
+a limit so that one huge line cannot make a family. Its null distribution is not assumed: the terms are drawn from the
+spectrum's own lines, and the distribution of their sum is their convolution.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray
+from gearsig.spectra.types import Spectrum
+
+LOG_RATIO_LIMIT = 6.0
+"""Natural log of power over floor at which a harmonic counts in full: 26 dB, far above what noise reaches."""
+
+CLEAR_LINE_DB = 6.0
+"""A line that counts as seen: noise exceeds it in 2 % of the lines, so that only several together say anything."""
+
+FOOT_LINES = 3
+"""Lines that one tone reaches to either side: two by the Hann window, and one by the widening of the log ratios."""
+
+N_FITS = 4
+"""Passes of fitting the fundamental to the peaks and looking for the peaks again."""
+
+_STEP = 0.05
+"""Width of the cells in which the distribution of the terms is kept."""
+
+
+@dataclass(frozen=True)
+class LineExcess:
+    """How far each line of a spectrum stands above its floor.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Amplitudes.
+    floor : array, (n_lines,)
+        Amplitude of the floor (root of the mean noise power) at each line.
+    log_ratio : array, (n_lines,)
+        ln(power/floor power) of the largest of the line and its two neighbours, 0 to `LOG_RATIO_LIMIT`.
+    masked : array of bool, (n_lines,)
+        Lines that are explained already; their `log_ratio` counts as 0.
+    """
+
+    spectrum: Spectrum
+    floor: FloatArray
+    log_ratio: FloatArray
+    masked: NDArray[np.bool_]
+
+    def without_multiples(
+        self, fundamental: float, *, half_width: float = 0.0, start: float = 0.0, skirt: float = 0.0
+    ) -> LineExcess:
+        """Return the same with the lines around start ± k·fundamental masked.
+
+        At least a line's own foot is masked; `half_width` makes it more, in the axis' unit, and `skirt` in proportion
+        to the position, for lines that smear as the speed wanders.
+        Where the multiples lie so close that most lines would go, nothing is masked: then they cannot be told apart.
+        """
+        reach = max(half_width, FOOT_LINES * self.spectrum.resolution)
+        if fundamental < 4 * reach:
+            return self
+        positions = self.spectrum.positions
+        offset = (positions - start) / fundamental
+        near = np.abs(offset - np.rint(offset)) * fundamental <= np.maximum(reach, skirt * positions)
+        return replace(self, masked=self.masked | near)
+
+    def scores(self) -> FloatArray:
+        """Log ratios with the masked lines at 0."""
+        return np.where(self.masked, 0.0, self.log_ratio)
+
+
+@dataclass(frozen=True)
+class Comb:
+    """The best family of lines in a range of fundamentals.
+
+    Parameters
+    ----------
+    fundamental : float
+        In the axis' unit of the spectrum.
+    score : float
+    p_value : float
+        Probability that the best of all fundamentals tried scores as high where there is no family.
+    positions : tuple of float
+        Harmonics whose line stands at least 6 dB above the floor.
+    ratios_db : tuple of float
+        Their power over the floor.
+    amplitude, floor : float
+        Of the strongest of them.
+    """
+
+    fundamental: float
+    score: float
+    p_value: float
+    positions: tuple[float, ...]
+    ratios_db: tuple[float, ...]
+    amplitude: float
+    floor: float
+
+
+def line_excess(spectrum: Spectrum, floor: FloatArray) -> LineExcess:
+    """Return the excess of each line of an amplitude spectrum over its floor."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        log_ratio = 2.0 * np.log(spectrum.values / floor)
+    log_ratio = np.clip(np.nan_to_num(log_ratio, nan=0.0, posinf=LOG_RATIO_LIMIT, neginf=0.0), 0.0, LOG_RATIO_LIMIT)
+    padded = np.pad(log_ratio, 1)
+    widened = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:])
+    return LineExcess(spectrum, np.asarray(floor), widened, np.zeros(len(widened), dtype=np.bool_))
+
+
+def best_comb(
+    excess: LineExcess,
+    low: float,
+    high: float,
+    offsets: NDArray[np.int_] | None = None,
+    centres: FloatArray | None = None,
+) -> Comb | None:
+    """Find the fundamental between `low` and `high` whose family of lines stands out most.
+
+    Parameters
+    ----------
+    excess : LineExcess
+    low, high : float
+        Range of fundamentals, in the axis' unit.
+    offsets : array of int or None
+        Multiples of the fundamental that make the family; default 1 to 6.
+    centres : array or None
+        Positions that the multiples are counted from (mesh harmonics, for sidebands); default 0.
+
+    Returns
+    -------
+    Comb or None
+        None where the range holds no fundamental that the spectrum can resolve.
+    """
+    multiples = np.arange(1, 7) if offsets is None else np.asarray(offsets)
+    starts = np.zeros(1) if centres is None else np.asarray(centres, dtype=np.float64)
+    resolution = excess.spectrum.resolution
+    low = max(low, 3 * resolution)
+    if high <= low or len(excess.log_ratio) < 16:
+        return None
+    # A step of a third of a line at the highest multiple: no family falls between two candidates.
+    step = resolution / (3 * float(np.abs(multiples).max()))
+    candidates = np.arange(low, high + step / 2, step)
+    scores = excess.scores()
+    total = np.zeros(len(candidates))
+    n_terms = 0
+    for start in starts:
+        for multiple in multiples:
+            index = np.rint((start + multiple * candidates - excess.spectrum.positions[0]) / resolution).astype(
+                np.int64
+            )
+            inside = (index >= 0) & (index < len(scores))
+            n_terms += bool(inside.any())
+            total += np.where(inside, scores[np.clip(index, 0, len(scores) - 1)], 0.0)
+    if n_terms == 0:
+        return None
+    best = _sharpest(excess, starts, multiples, candidates, total)
+    n_independent = max(1, len(candidates) // 3)
+    single = _tail_probability(scores[~excess.masked], n_terms, float(total[best]))
+    p_value = float(-np.expm1(n_independent * np.log1p(-min(single, 1 - 1e-12))))
+    origins = np.repeat(starts, len(multiples))
+    return _described(excess, origins, np.tile(multiples, len(starts)), candidates[best], float(total[best]), p_value)
+
+
+def _sharpest(
+    excess: LineExcess, starts: FloatArray, multiples: NDArray[np.int_], candidates: FloatArray, total: FloatArray
+) -> int:
+    """Return the candidate whose harmonics meet the peaks best, among those whose score is as good as the highest.
+
+    Scores are cut and widened by a line, so that strong families score the same over several candidates.
+    """
+    among = np.flatnonzero(total >= total.max() - 0.5)
+    spectrum = excess.spectrum
+    places = np.repeat(starts, len(multiples))[:, None] + np.tile(multiples, len(starts))[:, None] * candidates[among]
+    index = np.rint((places - spectrum.positions[0]) / spectrum.resolution).astype(np.int64)
+    index = np.clip(index, 0, len(spectrum.values) - 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        heights = np.nan_to_num(np.log(spectrum.values[index] / excess.floor[index]), nan=0.0, posinf=40.0, neginf=0.0)
+    heights = np.where(excess.masked[index], 0.0, heights)
+    return int(among[np.argmax(heights.sum(axis=0))])
+
+
+def _tail_probability(terms: FloatArray, n_terms: int, score: float) -> float:
+    """Return P(sum of n_terms independent draws from `terms` >= score), by convolution of their histogram."""
+    n_cells = int(np.ceil(LOG_RATIO_LIMIT / _STEP)) + 1
+    cells = np.bincount(np.floor(terms / _STEP).astype(np.int64), minlength=n_cells).astype(np.float64)
+    density = (cells + 1e-9) / (cells.sum() + 1e-9 * n_cells)
+    total = density
+    for _ in range(n_terms - 1):
+        total = np.convolve(total, density)
+    # Draws were floored to their cell, so the sum may lie half a cell per term higher than its cell says.
+    threshold = int(np.floor((score - n_terms * _STEP / 2) / _STEP))
+    return float(np.clip(total[max(threshold, 0) :].sum(), 0.0, 1.0))
+
+
+def _described(
+    excess: LineExcess,
+    origins: FloatArray,
+    multiples: NDArray[np.int_],
+    fundamental: float,
+    score: float,
+    p_value: float,
+) -> Comb:
+    """Fit the fundamental to the peaks, and gather the family's lines."""
+    fitted = float(fundamental)
+    for _ in range(N_FITS):
+        found = _lines_near(excess, origins, multiples, fitted)
+        # Least squares of position - origin = multiple · fundamental, clearer lines counting more.
+        weights = sum(line.ratio_db * line.multiple**2 for line in found)
+        if not weights:
+            break
+        fitted = sum(line.ratio_db * line.multiple * line.distance for line in found) / weights
+    strongest = max(found, key=lambda line: line.ratio_db, default=None)
+    return Comb(
+        fitted,
+        score,
+        p_value,
+        tuple(line.position for line in found),
+        tuple(line.ratio_db for line in found),
+        strongest.amplitude if strongest else 0.0,
+        strongest.floor if strongest else 0.0,
+    )
+
+
+@dataclass(frozen=True)
+class _Line:
+    position: float
+    distance: float
+    multiple: int
+    amplitude: float
+    floor: float
+    ratio_db: float
+
+
+def _lines_near(
+    excess: LineExcess, origins: FloatArray, multiples: NDArray[np.int_], fundamental: float
+) -> list[_Line]:
+    """Return the family's lines that stand clearly above the floor; two lines off is still the same peak."""
+    spectrum = excess.spectrum
+    found = []
+    for origin, multiple in zip(origins, multiples, strict=True):
+        place = float(origin + multiple * fundamental)
+        if not 0 < place <= spectrum.positions[-1]:
+            continue
+        position, amplitude = spectrum.largest_near(place, 2 * spectrum.resolution)
+        i = spectrum.index_of(position)
+        floor = float(excess.floor[i])
+        ratio = 20 * float(np.log10(max(amplitude, 1e-300) / max(floor, 1e-300)))
+        if ratio >= CLEAR_LINE_DB and not excess.masked[i]:
+            found.append(_Line(position, position - float(origin), int(multiple), amplitude, floor, ratio))
+    return found

@@ -1,0 +1,1 @@
+"""One question per file: each detector looks at the signals and returns findings."""

@@ -1,0 +1,256 @@
+"""Bearings: families of lines in the envelope, at known bearing orders or at none that the rig explains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TypeGuard
+
+from gearsig.diagnosis.comb import Comb, LineExcess, best_comb
+from gearsig.diagnosis.confidence import WITH_ASSUMED_DATA, from_p_value
+from gearsig.diagnosis.envelopes import BandEnvelope
+from gearsig.diagnosis.signals import Signals
+from gearsig.diagnosis.types import Finding, Kind, Strength, Where
+from gearsig.rig.types import Bearing
+
+PARTS = {
+    "BPFO": ("outer race", 1.0),
+    "BPFI": ("inner race", 1.0),
+    "BSF": ("rolling element", 2.0),
+    "FTF": ("cage", 1.0),
+}
+"""Part that strikes at each order, and strikes per cycle: a damaged rolling element strikes both races each spin."""
+
+CLEAR_MODULATION = 0.05
+"""Depth of the strongest line of the envelope from which a race is called damaged, not only worth watching."""
+
+MINIMUM_LINES = 3
+"""Lines of a family over 6 dB that must be there: two may coincide by chance with the harmonics of something else."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One family found, and what it may be."""
+
+    comb: Comb
+    envelope: BandEnvelope
+    p_value: float
+    bearing: Bearing | None = None
+    name: str = ""
+    expected: float = 0.0
+
+    @property
+    def modulation(self) -> float:
+        """Amplitude of the strongest line over the mean envelope."""
+        return self.comb.amplitude / self.envelope.mean if self.envelope.mean > 0 else 0.0
+
+
+def detect_bearings(signals: Signals, envelopes: list[BandEnvelope]) -> list[Finding]:
+    """Name the race where the rig gives the bearing; else report families that nothing known explains."""
+    cleaned = [replace(e, excess=without_synchronous(signals, e.excess)) for e in envelopes]
+    if signals.angle is None:
+        return _over_frequency(signals, cleaned)
+    named = _best_named(signals, cleaned)
+    findings = [_named_finding(signals, c) for c in named]
+    unnamed = _best_unnamed(signals, cleaned, named)
+    if unnamed is not None:
+        findings.append(_unnamed_finding(signals, unnamed))
+    return findings or [_none_found(signals, cleaned)] if signals.rig.bearings else findings
+
+
+def without_synchronous(signals: Signals, excess: LineExcess) -> LineExcess:
+    """Mask the multiples of every known shaft order: gears and shafts, not bearings."""
+    for order in signals.known_shaft_orders.values():
+        excess = excess.without_multiples(order)
+    return excess
+
+
+def _best_named(signals: Signals, envelopes: list[BandEnvelope]) -> list[Candidate]:
+    """Return the significant bearing parts, surest first; one that is a multiple of a surer one is left out."""
+    slip = signals.settings.bearing_slip
+    found = []
+    expected = [
+        (bearing, name, order * ratio * PARTS[name][1])
+        for bearing in signals.rig.bearings
+        if (ratio := signals.rig.ratio(bearing.shaft)) is not None
+        for name, order in bearing.orders().items()
+    ]
+    n_tests = len(expected) * len(envelopes)
+    for bearing, name, order in expected:
+        best: Candidate | None = None
+        for envelope in envelopes:
+            comb = best_comb(envelope.excess, order * (1 - slip), order * (1 + slip))
+            if (
+                comb is not None
+                and len(comb.positions) >= MINIMUM_LINES
+                and (best is None or comb.p_value < best.p_value)
+            ):
+                best = Candidate(comb, envelope, comb.p_value, bearing, name, order)
+        if best is not None:
+            best = replace(best, p_value=min(1.0, best.p_value * n_tests))
+            if best.p_value <= signals.settings.false_alarm_probability:
+                found.append(best)
+    found.sort(key=lambda c: (c.p_value, -c.comb.score))
+    kept: list[Candidate] = []
+    for candidate in found:
+        if not any(_shares_lines(candidate.comb, other.comb) for other in kept):
+            kept.append(candidate)
+    return kept
+
+
+def _is_better(comb: Comb | None, best: Candidate | None) -> TypeGuard[Comb]:
+    """Whether a family has lines enough and is surer than the best so far."""
+    if comb is None or len(comb.positions) < MINIMUM_LINES:
+        return False
+    return best is None or (comb.p_value, -comb.score) < (best.p_value, -best.comb.score)
+
+
+def _shares_lines(comb: Comb, surer: Comb) -> bool:
+    """Whether most lines of a family are those of a surer one."""
+    shared = [p for p in comb.positions if any(abs(p / q - 1) < 0.005 for q in surer.positions)]
+    return len(shared) >= len(comb.positions) / 2
+
+
+def _best_unnamed(signals: Signals, envelopes: list[BandEnvelope], named: list[Candidate]) -> Candidate | None:
+    """Return the clearest family that is neither a shaft's nor of a part already named."""
+    slowest = min(signals.known_shaft_orders.values(), default=1.0)
+    fastest = max(signals.known_shaft_orders.values(), default=1.0)
+    best: Candidate | None = None
+    for envelope in envelopes:
+        excess = envelope.excess
+        for candidate in named:
+            excess = _without_family(signals, excess, candidate)
+        # Impacts of rolling bearings come between about 1.5 and 14 times per revolution of their shaft.
+        comb = best_comb(excess, 1.5 * slowest, 14.0 * fastest)
+        if _is_better(comb, best):
+            best = Candidate(comb, envelope, comb.p_value)
+    if best is None:
+        return None
+    best = replace(best, p_value=min(1.0, best.p_value * len(envelopes)))
+    return best if best.p_value <= signals.settings.false_alarm_probability else None
+
+
+def _without_family(signals: Signals, excess: LineExcess, candidate: Candidate) -> LineExcess:
+    """Mask a named part's lines and their sidebands at its own shaft's order."""
+    width = 3 * excess.spectrum.resolution + 0.002 * candidate.comb.fundamental
+    ratio = signals.rig.ratio(candidate.bearing.shaft) if candidate.bearing is not None else None
+    for k in range(-3, 4) if ratio is not None else (0,):
+        excess = excess.without_multiples(candidate.comb.fundamental, half_width=width, start=k * (ratio or 0.0))
+    return excess
+
+
+def _named_finding(signals: Signals, candidate: Candidate) -> Finding:
+    bearing, comb = candidate.bearing, candidate.comb
+    assert bearing is not None  # noqa: S101 - a named candidate has one; narrows the type
+    part = PARTS[candidate.name][0]
+    confidence = from_p_value(candidate.p_value)
+    if signals.rig.assumed:
+        confidence *= WITH_ASSUMED_DATA
+    clear = candidate.modulation >= CLEAR_MODULATION and confidence >= 0.75
+    slip = comb.fundamental / candidate.expected - 1
+    return Finding(
+        "bearing-" + part.replace(" ", "-"),
+        Kind.FAULT if clear else Kind.SUSPICION,
+        f"{'Damage' if clear else 'Perhaps damage'} at the {part} of bearing {bearing.name} on shaft {bearing.shaft}.",
+        _where(signals, candidate),
+        _strength(candidate),
+        confidence,
+        f"chance that lines fall on the order so well: {candidate.p_value:.1g} (all parts, bands, channels tried); "
+        "at most 0.95 without a healthy reference",
+        (
+            f"{_family_text(candidate)}, {100 * slip:+.2f} % from the kinematic order {candidate.expected:.4f}.",
+            _modulation_text(candidate),
+        ),
+        "A recording of the same bearing when it was good, or another sensor nearer to it.",
+    )
+
+
+def _unnamed_finding(signals: Signals, candidate: Candidate) -> Finding:
+    order, hertz = candidate.comb.fundamental, candidate.comb.fundamental * signals.frequency_per_order_hz
+    confidence = from_p_value(candidate.p_value, limit=0.99)
+    return Finding(
+        "non-synchronous-impacts",
+        Kind.SUSPICION if candidate.modulation >= CLEAR_MODULATION else Kind.NOTICE,
+        f"Impacts at order {order:.4f} of {signals.rig.reference_shaft or 'the shaft'} ({hertz:.5g} Hz), "
+        "which no shaft, gear or bearing of the rig explains.",
+        _where(signals, candidate),
+        _strength(candidate),
+        confidence,
+        f"that the family exists: chance of it in noise {candidate.p_value:.1g}, all orders and bands tried; "
+        "what causes it is not known",
+        (
+            f"{_family_text(candidate)}.",
+            _modulation_text(candidate),
+            "A rolling bearing that is not in the rig file is the usual cause; other machines and belts do it too.",
+        ),
+        "Give the bearings in the rig file: then the part is named, or the bearings are ruled out.",
+    )
+
+
+def _over_frequency(signals: Signals, envelopes: list[BandEnvelope]) -> list[Finding]:
+    """Without speed: report the clearest family of the envelope over frequency, without a cause."""
+    best: Candidate | None = None
+    for envelope in envelopes:
+        comb = best_comb(envelope.excess, 4.0, min(1000.0, float(envelope.excess.spectrum.positions[-1]) / 4))
+        if _is_better(comb, best):
+            best = Candidate(comb, envelope, comb.p_value)
+    if best is None or best.p_value * len(envelopes) > signals.settings.false_alarm_probability:
+        return []
+    best = replace(best, p_value=best.p_value * len(envelopes))
+    return [
+        Finding(
+            "periodic-impacts",
+            Kind.NOTICE,
+            f"The signal is modulated periodically at {best.comb.fundamental:.5g} Hz; by what, cannot be told.",
+            replace(_where(signals, best), order=None, frequency_hz=best.comb.fundamental),
+            _strength(best),
+            from_p_value(best.p_value, limit=0.99),
+            f"that the family exists: chance of it in noise {best.p_value:.1g}",
+            (f"{_family_text(best)}.", _modulation_text(best)),
+            "Give the shaft speed: then shafts, gears and bearings can be told apart.",
+        )
+    ]
+
+
+def _none_found(signals: Signals, envelopes: list[BandEnvelope]) -> Finding:
+    names = ", ".join(b.name for b in signals.rig.bearings)
+    return Finding(
+        "no-bearing-damage",
+        Kind.INFORMATION,
+        f"No damage shows in the bearings ({names}).",
+        Where(channels=tuple(dict.fromkeys(e.channel for e in envelopes))),
+        confidence=0.8,
+        confidence_basis="early damage may be hidden below the gears",
+        evidence=(f"No family at their orders in {len(envelopes)} envelope spectra (channels × bands).",),
+    )
+
+
+def _where(signals: Signals, candidate: Candidate) -> Where:
+    return Where(
+        (candidate.envelope.channel,),
+        shaft=candidate.bearing.shaft if candidate.bearing else "",
+        bearing=candidate.bearing.name if candidate.bearing else "",
+        order=candidate.comb.fundamental,
+        order_shaft=signals.rig.reference_shaft,
+        frequency_hz=candidate.comb.fundamental * signals.frequency_per_order_hz if signals.angle is not None else None,
+        band_hz=candidate.envelope.band_hz,
+    )
+
+
+def _strength(candidate: Candidate) -> Strength:
+    ratio = max(candidate.comb.ratios_db, default=None)
+    low, high = candidate.envelope.band_hz
+    floor_is = f"noise floor of the envelope spectrum, band {low:.0f} to {high:.0f} Hz"
+    unit = candidate.envelope.excess.spectrum.unit
+    return Strength(candidate.comb.amplitude, unit, candidate.comb.floor, floor_is, ratio)
+
+
+def _family_text(candidate: Candidate) -> str:
+    ratios = ", ".join(f"{r:.0f}" for r in candidate.comb.ratios_db)
+    return (
+        f"{len(candidate.comb.positions)} of 6 harmonics of {candidate.comb.fundamental:.4f} stand out in the envelope "
+        f"of {candidate.envelope.channel} ({ratios} dB over the floor)"
+    )
+
+
+def _modulation_text(candidate: Candidate) -> str:
+    return f"The strongest line is {100 * candidate.modulation:.1f} % of the mean envelope."

@@ -1,0 +1,167 @@
+"""Damage at one tooth: energy of the difference signal gathered at one angle, revolution after revolution."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearsig.diagnosis.confidence import WITH_ASSUMED_DATA, from_p_value
+from gearsig.diagnosis.localisation import Localisation, localise
+from gearsig.diagnosis.signals import ShaftSignals, Signals
+from gearsig.diagnosis.types import Finding, Kind, Strength, Where
+
+REPEATABLE = 4.0
+"""Energy in the window over what the scatter of the revolutions puts there; a single shock gives about 1."""
+
+CLEAR_RATIO_DB = 9.0
+"""Window over median window: below it, teeth of a healthy gear differ as much."""
+
+
+def detect_tooth_damage(signals: Signals) -> list[Finding]:
+    """Look at each shaft's difference signals for a local event."""
+    tested = [(s, _localised(s, signals)) for s in signals.shafts if s.separated]
+    if not tested:
+        return _why_not(signals)
+    findings = [f for s, place in tested if (f := _finding(signals, s, place, len(tested))) is not None]
+    if findings:
+        return _without_images(signals, findings)
+    return [_none_found(signals, tested)]
+
+
+def _localised(shaft: ShaftSignals, signals: Signals) -> Localisation:
+    differences = [parts.difference for parts in shaft.separated.values()]
+    values = np.stack([d.values for d in differences])
+    errors = np.stack([d.standard_error for d in differences])
+    # One pitch of the coarsest gear: the events last about as long as the tooth is in mesh.
+    rng = np.random.default_rng(signals.settings.seed)
+    return localise(values, errors, 1.0 / min(shaft.teeth), signals.settings.n_surrogates, rng)
+
+
+def _finding(signals: Signals, shaft: ShaftSignals, place: Localisation, n_tests: int) -> Finding | None:
+    p_value = min(1.0, place.p_value * n_tests)
+    if p_value > 0.05 or place.repeatability < REPEATABLE:
+        return None
+    confidence = from_p_value(p_value)
+    assumed = [fact for fact in signals.rig.assumed if fact]
+    if assumed:
+        confidence *= WITH_ASSUMED_DATA
+    clear = place.ratio_db >= CLEAR_RATIO_DB and confidence >= 0.75
+    names = list(shaft.separated)
+    strongest = names[int(np.argmax(place.channel_shares))]
+    tooth = int(place.angle_rev * shaft.teeth[0]) + 1 if len(shaft.teeth) == 1 else None
+    at = f"at {360 * place.angle_rev:.0f}° of shaft {shaft.shaft}"
+    return Finding(
+        "tooth-local-damage",
+        Kind.FAULT if clear else Kind.SUSPICION,
+        f"{'Local tooth damage' if clear else 'A local event, perhaps tooth damage,'} {at}"
+        + (f" (tooth {tooth} of {shaft.teeth[0]})." if tooth is not None else "."),
+        Where(
+            tuple(n for n, share in zip(names, place.channel_shares, strict=True) if share >= 4.0) or (strongest,),
+            shaft=shaft.shaft,
+            gear=_gear_name(signals, shaft),
+            angle_deg=360 * place.angle_rev,
+            tooth=tooth,
+        ),
+        _strength(shaft, strongest, place),
+        confidence=confidence,
+        confidence_basis=f"chance of this in a signal of the same spectrum without a local event: {p_value:.1g}"
+        + (f"; halved because {', '.join(assumed)} are assumed" if assumed else "")
+        + "; at most 0.95 without a healthy reference",
+        evidence=_evidence(signals, shaft, place),
+        surer=_surer(signals),
+    )
+
+
+def _strength(shaft: ShaftSignals, channel: str, place: Localisation) -> Strength:
+    difference = shaft.separated[channel].difference
+    n = len(difference.values)
+    width = round(place.width_rev * n)
+    start = round(place.angle_rev * n - width / 2)
+    inside = np.arange(start, start + width) % n
+    value = float(np.sqrt(np.mean(difference.values[inside] ** 2)))
+    share = place.channel_shares[list(shaft.separated).index(channel)]
+    floor = value / np.sqrt(share) if share > 0 else 0.0
+    ratio = 10 * float(np.log10(share)) if share > 0 else None
+    return Strength(value, difference.unit, float(floor), f"median tooth of the difference signal in {channel}", ratio)
+
+
+def _evidence(signals: Signals, shaft: ShaftSignals, place: Localisation) -> tuple[str, ...]:
+    texts = [
+        f"Energy in one tooth pitch is {place.ratio_db:.1f} dB over the median pitch, all channels together.",
+        f"{shaft.angle.n_revolutions:.0f} revolutions were averaged.",
+        f"It comes back every revolution: {place.repeatability:.0f} times the energy that scatter would leave there.",
+    ]
+    if signals.angle is not None and signals.angle.method in ("tachless", "constant"):
+        texts.append("There is no tachometer: the angle counts from the start of the record, not from a mark.")
+    if len(shaft.teeth) > 1:
+        texts.append(
+            f"The shaft carries {len(shaft.teeth)} gears ({', '.join(map(str, shaft.teeth))} teeth); it may be either."
+        )
+    return tuple(texts)
+
+
+def _surer(signals: Signals) -> str:
+    if signals.rig.assumed:
+        return "Confirm what is assumed of the rig: " + ", ".join(signals.rig.assumed) + "."
+    if signals.angle is not None and signals.angle.method in ("tachless", "constant"):
+        return "A recording with a tachometer, at another load, or of the same gearbox when it was good."
+    return (
+        "A recording at another load or speed (damage stays at its tooth), or one of the same gearbox when it was good."
+    )
+
+
+def _without_images(signals: Signals, findings: list[Finding]) -> list[Finding]:
+    """Drop the image that a fault on a fast shaft leaves in the average of a shaft that is slower by a whole number."""
+    kept = []
+    for finding in findings:
+        own = signals.rig.ratio(finding.where.shaft) or 1.0
+        faster = [signals.rig.ratio(f.where.shaft) or 1.0 for f in findings if f is not finding]
+        if not any(other > own and abs(other / own - round(other / own)) < 1e-9 for other in faster):
+            kept.append(finding)
+    return kept
+
+
+def _none_found(signals: Signals, tested: list[tuple[ShaftSignals, Localisation]]) -> Finding:
+    texts = [
+        f"Shaft {s.shaft}: largest tooth {place.ratio_db:.1f} dB over the median one; a signal of the same spectrum "
+        f"without a local event does as much with probability {place.p_value:.2g}."
+        for s, place in tested
+    ]
+    shafts = ", ".join(s.shaft for s, _ in tested)
+    caveat = " What is assumed of the rig may be wrong, and then damage would not show." if signals.rig.assumed else ""
+    return Finding(
+        "no-tooth-local-damage",
+        Kind.INFORMATION,
+        f"No local tooth damage shows on shaft(s) {shafts}.{caveat}",
+        Where(channels=tuple(tested[0][0].separated), shaft=tested[0][0].shaft if len(tested) == 1 else ""),
+        confidence=0.4 if signals.rig.assumed else 0.8,
+        confidence_basis="small damage may be hidden below the mesh's own variation",
+        evidence=tuple(texts),
+        surer=_surer(signals),
+    )
+
+
+def _why_not(signals: Signals) -> list[Finding]:
+    if not signals.rig.pairs:
+        return []
+    if signals.angle is None:
+        reason = "the speed is not known"
+    elif signals.angle.n_revolutions < signals.settings.minimum_revolutions:
+        reason = (
+            f"the record holds {signals.angle.n_revolutions:.3g} revolutions and "
+            f"{signals.settings.minimum_revolutions} are needed"
+        )
+    else:
+        reason = "no gear has known teeth and a mesh below half the sampling rate"
+    return [
+        Finding(
+            "tooth-not-examined",
+            Kind.CANNOT_TELL,
+            f"Teeth cannot be examined: {reason}.",
+            surer="A longer recording with a tachometer, and the teeth of the gears.",
+        )
+    ]
+
+
+def _gear_name(signals: Signals, shaft: ShaftSignals) -> str:
+    pairs = [p.name for p in signals.rig.pairs if shaft.shaft in (p.driver, p.driven)]
+    return f"{pairs[0]}/{shaft.shaft}" if len(pairs) == 1 else ""

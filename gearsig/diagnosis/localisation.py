@@ -1,0 +1,121 @@
+"""Whether the energy of a periodic signal is gathered at one angle, more than its spectrum alone would make it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+
+_SURROGATES_AT_ONCE = 256
+"""Bounds the memory: 256 × 4 channels × 4096 angles in double precision are 34 MB."""
+
+
+@dataclass(frozen=True)
+class Localisation:
+    """The window of angle with the most energy.
+
+    Parameters
+    ----------
+    angle_rev : float
+        Middle of the window, 0 to 1 revolution.
+    width_rev : float
+    ratio_db : float
+        Energy in it over the median window's, summed over channels that are each scaled to unit energy.
+    p_value : float
+        Share of surrogates (same spectra, same relations between the channels, random phases) with as high a ratio.
+    repeatability : float
+        Energy in the window over the energy that the scatter of the revolutions puts there; about 1 for noise or for
+        a single event in one revolution, which is not the machine's.
+    channel_shares : tuple of float
+        Energy in the window over the median window's for each channel.
+    """
+
+    angle_rev: float
+    width_rev: float
+    ratio_db: float
+    p_value: float
+    repeatability: float
+    channel_shares: tuple[float, ...]
+
+
+def localise(
+    signals: FloatArray, standard_errors: FloatArray, width_rev: float, n_surrogates: int, rng: np.random.Generator
+) -> Localisation:
+    """Test whether the energy of a synchronous average's difference signal sits at one tooth.
+
+    Phase-randomised surrogates keep the spectrum: a residual of few lines, tooth-to-tooth scatter or coloured noise
+    gives windows of unequal energy too, and only what goes beyond them counts. The same random phases are used for all
+    channels, which keeps their relations.
+
+    Parameters
+    ----------
+    signals : array, (n_channels, n_angles)
+        Over one revolution.
+    standard_errors : array, (n_channels, n_angles)
+    width_rev : float
+        Width of the window in revolutions, e.g. one tooth pitch.
+    n_surrogates : int
+    rng : Generator
+
+    Returns
+    -------
+    Localisation
+        The p-value is at least 1/(n_surrogates + 1).
+
+    References
+    ----------
+    J. Theiler, S. Eubank, A. Longtin, B. Galdrikian, J. D. Farmer, "Testing for nonlinearity in time series: the
+    method of surrogate data", 1992.
+    """
+    n = signals.shape[1]
+    width = max(2, round(width_rev * n))
+    scale = np.sqrt(np.mean(signals**2, axis=1, keepdims=True))
+    used = scale[:, 0] > 0
+    x = signals[used] / scale[used]
+    kernel = np.conj(np.fft.rfft(np.r_[np.ones(width) / width, np.zeros(n - width)]))
+    energies = _window_energy(x**2, kernel, n)
+    joint = energies.sum(axis=0)
+    start = int(np.argmax(joint))
+    ratio = float(joint[start] / np.median(joint))
+    n_higher = sum(int(np.sum(_ratios(s, kernel, n) >= ratio)) for s in _surrogates(x, n_surrogates, rng))
+    inside = (start + np.arange(width)) % n
+    scatter = float(np.sum((standard_errors[used][:, inside] / scale[used]) ** 2))
+    medians = np.median(energies, axis=1)
+    shares = np.zeros(len(signals))
+    shares[used] = energies[:, start] / medians
+    return Localisation(
+        angle_rev=((start + width / 2) / n) % 1.0,
+        width_rev=width / n,
+        ratio_db=10 * float(np.log10(ratio)),
+        p_value=(n_higher + 1) / (n_surrogates + 1),
+        repeatability=float(np.sum(x[:, inside] ** 2)) / scatter if scatter > 0 else float("inf"),
+        channel_shares=tuple(float(s) for s in shares),
+    )
+
+
+def _window_energy(square: FloatArray, kernel: np.ndarray, n: int) -> FloatArray:
+    """Return the mean square in the window that starts at each angle, by circular correlation."""
+    energy: FloatArray = np.fft.irfft(np.fft.rfft(square, axis=-1) * kernel, n, axis=-1)
+    return energy
+
+
+def _surrogates(x: FloatArray, n_surrogates: int, rng: np.random.Generator) -> Iterator[FloatArray]:
+    """Yield surrogates of all channels, (n, n_channels, n_angles), in bounded portions."""
+    n = x.shape[1]
+    lines = np.fft.rfft(x, axis=1)
+    done = 0
+    while done < n_surrogates:
+        m = min(_SURROGATES_AT_ONCE, n_surrogates - done)
+        phases = rng.uniform(0, 2 * np.pi, (m, 1, lines.shape[1]))
+        phases[..., 0] = 0.0
+        yield np.fft.irfft(lines * np.exp(1j * phases), n, axis=-1)
+        done += m
+
+
+def _ratios(surrogates: FloatArray, kernel: np.ndarray, n: int) -> FloatArray:
+    joint = _window_energy(surrogates**2, kernel, n).sum(axis=1)
+    ratios: FloatArray = joint.max(axis=1) / np.median(joint, axis=1)
+    return ratios

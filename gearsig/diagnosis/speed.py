@@ -1,0 +1,126 @@
+"""The shaft angle of an analysis: found, checked against the signal, or refused with a reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import isfinite
+
+from gearsig.angle.types import ShaftAngle
+from gearsig.diagnosis.types import CannotTell, Finding, Kind, Where
+from gearsig.errors import RefusalError
+from gearsig.recording.types import Recording
+from gearsig.rig.speed import ConstantSpeed
+from gearsig.rig.types import Rig
+
+STATED_SPEED_TOLERANCE = 0.03
+"""How far the true speed may be from a stated one: the slip of an induction motor from no load to full load."""
+
+N_SHAFT_HARMONICS = 8
+
+
+def determine_angle(recording: Recording, rig: Rig) -> ShaftAngle | CannotTell:
+    """Return the angle of the reference shaft, or why it cannot be known.
+
+    A stated constant speed is refined where the signal shows the true one near it: synchronous averages need it to a
+    small part of a revolution over the whole record, and nameplates are not as good as that.
+    """
+    from gearsig.angle.shaft import find_shaft_angle
+
+    try:
+        angle = find_shaft_angle(recording, rig)
+    except RefusalError as refusal:
+        return CannotTell("What is the speed of the shafts?", refusal.reason, refusal.remedy)
+    if isinstance(recording.speed_source, ConstantSpeed):
+        return _refined(recording, rig, angle)
+    return angle
+
+
+def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:
+    """State the speed and how it was found, or that it is not known."""
+    if isinstance(angle, CannotTell):
+        return Finding(
+            "speed-unknown",
+            Kind.CANNOT_TELL,
+            "The speed is not known: orders, synchronous averages and everything that rests on them are left out.",
+            evidence=(angle.reason,),
+            surer=angle.remedy,
+        )
+    low, high = angle.speed_range_rpm
+    uncertainty = angle.relative_speed_uncertainty
+    plus_minus = f" ± {100 * uncertainty:.2g} %" if isfinite(uncertainty) else ""
+    text = f"Shaft {angle.shaft or 'of reference'} turns at {angle.mean_speed_rpm:.6g} rpm{plus_minus}"
+    if high - low > 0.001 * angle.mean_speed_rpm:
+        text += f", between {low:.5g} and {high:.5g} rpm"
+    return Finding(
+        "speed",
+        Kind.INFORMATION,
+        f"{text} ({angle.method}, {angle.n_revolutions:.5g} revolutions).",
+        Where(shaft=angle.shaft, time_s=(angle.start_s, angle.end_s)),
+        confidence=angle.quality,
+        confidence_basis=f"quality figure of the method '{angle.method}'",
+        evidence=angle.notes,
+        surer="" if angle.method in ("pulses", "encoder") else "A tachometer: it also fixes the zero of the angle.",
+    )
+
+
+def _refined(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle:
+    """Return the speed that mesh lines or shaft harmonics show near the stated one, else the stated one."""
+    found = _from_meshes(recording, rig, stated) if rig.pairs else _from_shaft_harmonics(recording, stated)
+    if found is None:
+        return replace(
+            stated, quality=0.5, notes=(*stated.notes, "The stated speed could not be confirmed from the signal.")
+        )
+    difference = 100 * (found.mean_speed_rpm / stated.mean_speed_rpm - 1)
+    lines_say = f"the signal's own lines say {found.mean_speed_rpm:.6g} rpm ({difference:+.2f} %)"
+    note = f"Stated {stated.mean_speed_rpm:.6g} rpm; {lines_say}."
+    return replace(found, shaft=stated.shaft, notes=(*found.notes, note))
+
+
+def _from_meshes(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle | None:
+    from gearsig.angle.tachless import estimate_shaft_angle
+
+    speed = stated.mean_speed_rpm
+    limits = (speed * (1 - STATED_SPEED_TOLERANCE), speed * (1 + STATED_SPEED_TOLERANCE))
+    try:
+        return estimate_shaft_angle(recording, rig, speed_range_rpm=limits)
+    except RefusalError:
+        return None
+
+
+def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngle | None:
+    """Find the shaft's harmonics in the envelopes, where a bearing's modulation shows them better than the spectrum."""
+    import numpy as np
+
+    from gearsig.diagnosis.comb import best_comb
+    from gearsig.diagnosis.envelopes import bands
+    from gearsig.diagnosis.signals import floor_of
+    from gearsig.errors import InputError
+    from gearsig.spectra.amplitude import channel_spectrum
+    from gearsig.spectra.envelope import envelope_recording
+
+    hertz = stated.mean_speed_rpm / 60
+    low, high = hertz * (1 - STATED_SPEED_TOLERANCE), hertz * (1 + STATED_SPEED_TOLERANCE)
+    combs = []
+    for band in bands(recording.sampling_rate_hz):
+        try:
+            envelopes = envelope_recording(recording, band, kind="magnitude")
+        except InputError:
+            continue
+        for name in envelopes.channel_names:
+            spectrum = channel_spectrum(envelopes, name)
+            comb = best_comb(floor_of(spectrum), low, high, offsets=np.arange(1, N_SHAFT_HARMONICS + 1))
+            if comb is not None:
+                combs.append((comb.p_value, comb.fundamental, spectrum.resolution))
+    if not combs:
+        return None
+    p_value, found, resolution = min(combs)
+    p_value = min(1.0, p_value * len(combs))
+    if p_value > 1e-3:
+        return None
+    return replace(
+        stated,
+        revolutions=stated.revolutions * (found / hertz),
+        speed_rev_per_s=stated.speed_rev_per_s * (found / hertz),
+        relative_speed_uncertainty=resolution / (3 * N_SHAFT_HARMONICS) / found,
+        quality=min(0.95, 1 - p_value),
+    )

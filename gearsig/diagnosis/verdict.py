@@ -1,0 +1,48 @@
+"""Order the findings and put the most important into one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from gearsig.diagnosis.types import Finding, Kind
+
+_RANK = {kind: i for i, kind in enumerate(Kind)}
+
+
+def ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return the findings, most important first: by kind, then by confidence, then by strength."""
+
+    def key(finding: Finding) -> tuple[int, float, float]:
+        ratio = finding.strength.ratio_db if finding.strength is not None else None
+        return (_RANK[finding.kind], -finding.confidence, -(ratio or 0.0))
+
+    return tuple(sorted(findings, key=key))
+
+
+def verdict_of(findings: tuple[Finding, ...]) -> str:
+    """Return the sentence a hurried reader takes away.
+
+    "No fault shows" is only said where something was examined that would have shown one.
+    """
+    faults = [f for f in findings if f.kind is Kind.FAULT]
+    suspicions = [f for f in findings if f.kind is Kind.SUSPICION]
+    gaps = [f for f in findings if f.kind is Kind.CANNOT_TELL]
+    examined = [f for f in findings if f.code in ("no-tooth-local-damage", "no-bearing-damage")]
+    if faults:
+        return "Fault: " + _first_and_number(faults)
+    if suspicions:
+        return "Suspicion: " + _first_and_number(suspicions)
+    if examined and all(f.confidence < 0.5 for f in examined):
+        return "Cannot tell: nothing shows, but what is assumed of the machine may be wrong."
+    if examined:
+        rest = " " + gaps[0].title if gaps else ""
+        return "No fault shows. " + " ".join(f.title for f in examined) + rest
+    if gaps:
+        return "Cannot tell: " + gaps[0].title
+    return "Cannot tell: the machine is not described, so only spectra are given. A rig file allows a diagnosis."
+
+
+def _first_and_number(findings: list[Finding]) -> str:
+    more = len(findings) - 1
+    first = f"{findings[0].title} (confidence {findings[0].confidence:.2f})"
+    return first + (f", and {more} more." if more else "")
