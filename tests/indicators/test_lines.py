@@ -1,0 +1,178 @@
+"""Mesh, shaft and bearing levels from spectra and averages."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gearsig.errors import InputError, RefusalError
+from gearsig.indicators.bearing import bearing_indicators, defect_orders, envelope_level_over_floor_db
+from gearsig.indicators.lines import find_line, floor_near, noise_reaches
+from gearsig.indicators.mesh import mesh_indicators, mesh_level, sideband_levels, sideband_to_carrier_db
+from gearsig.indicators.shaft import shaft_indicators, shaft_order_level
+from gearsig.orders.types import SynchronousAverage
+from gearsig.rig.types import Bearing, GearPair, Rig, Shaft
+from gearsig.spectra.types import Spectrum
+
+N_REV, N = 64, 64 * 256
+REV = np.arange(N) * N_REV / N
+RIG = Rig(shafts=(Shaft("input"), Shaft("output")), pairs=(GearPair("stage 1", "input", "output", 29, 47),))
+PAIR = RIG.pairs[0]
+BEARING = Bearing("b", "input", 9, 7.94, 39.04)
+HANN = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(N) / N)
+
+
+def spectrum(x, **changes):
+    """Hann amplitude spectrum over order, written out here to be independent of gearsig.spectra."""
+    values = 2 * np.abs(np.fft.rfft(x * HANN)) / HANN.sum()
+    facts = {
+        "positions": np.arange(len(values)) / N_REV, "axis": "order", "scaling": "amplitude peak", "unit": "m/s^2",
+        "resolution": 1 / N_REV, "noise_bandwidth": 1.5 / N_REV, "window": "hann", "n_averages": 1, "source": "a1",
+        "shaft": "input",
+    }  # fmt: skip
+    return Spectrum(values, **(facts | changes))
+
+
+def cosine(order, amplitude=1.0, phase=0.0):
+    return amplitude * np.cos(2 * np.pi * order * REV + phase)
+
+
+@settings(deadline=None)
+@given(st.floats(5, 100), st.floats(-3, 3))
+def test_amplitude_does_not_depend_on_the_place_between_lines(order, phase):
+    assert find_line(spectrum(cosine(order, 3.0, phase)), order).amplitude == pytest.approx(3.0, rel=0.003)
+
+
+def test_rms_scaling_and_frequency_axis_give_the_same_peak_amplitude():
+    s = spectrum(cosine(29, 2.0))
+    as_rms = spectrum(cosine(29, 2.0) / math.sqrt(2), scaling="amplitude rms")
+    hz = spectrum(
+        cosine(29, 2.0), axis="frequency", positions=s.positions * 25, resolution=25 / N_REV,
+        noise_bandwidth=1.5 * 25 / N_REV,
+    )  # fmt: skip
+    for level in (mesh_level(s, 29), mesh_level(as_rms, 29), mesh_level(hz, 29, speed_rev_per_s=25.0)):
+        assert level == pytest.approx(2.0, rel=1e-9)
+    with pytest.raises(InputError, match="cannot be placed"):
+        mesh_level(hz, 29)
+    with pytest.raises(InputError, match="scaled as 'power'"):
+        mesh_level(spectrum(cosine(29), scaling="power"), 29)
+
+
+def modulated(spacing, am, pm):
+    angle = 2 * np.pi * spacing * REV
+    return 4 * (1 + am * np.cos(angle)) * np.cos(2 * np.pi * 29 * REV + pm * np.sin(angle))
+
+
+@pytest.mark.parametrize("shaft", ["input", "output"])
+def test_sidebands_belong_to_the_shaft_that_modulates(shaft):
+    spacing = RIG.ratio(shaft)
+    found = {(i.name, i.shaft): i.value for i in mesh_indicators(spectrum(modulated(spacing, 0.3, 0.0)), RIG, PAIR)}
+    other = "output" if shaft == "input" else "input"
+    assert found["mesh level 1×", ""] == pytest.approx(4.0, rel=0.003)
+    assert found["sideband level 1×-1", shaft] == pytest.approx(0.6, rel=0.005)
+    assert found["sideband level 1×+1", shaft] == pytest.approx(0.6, rel=0.005)
+    assert found["sideband ratio 1×", shaft] == pytest.approx(20 * math.log10(0.15), abs=0.05)
+    assert found["sideband ratio 1×", other] < -50
+
+
+def test_amplitude_and_phase_modulation_together_lean_to_one_side():
+    ((lower, upper),) = sideband_levels(spectrum(modulated(1.0, 0.1, 0.06)), 29, 1.0)
+    assert lower == pytest.approx(4 * (0.1 - 0.06) / 2, rel=0.02)
+    assert upper == pytest.approx(4 * (0.1 + 0.06) / 2, rel=0.02)
+
+
+def test_average_and_spectrum_agree():
+    x = modulated(1.0, 0.2, 0.0) + cosine(1, 0.5)
+    one = SynchronousAverage(x[:256], np.zeros(256), N_REV, "input", "a1", "m/s^2", "average", 120.0)
+    s = spectrum(x)
+    for source in (one, s):
+        assert mesh_level(source, 29) == pytest.approx(4.0, rel=1e-6)
+        assert sideband_to_carrier_db(source, 29, 1.0) == pytest.approx(-20.0, abs=1e-6)
+        assert shaft_order_level(source, 1) == pytest.approx(0.5, rel=1e-6)
+    found = mesh_indicators(one, RIG, PAIR)
+    assert {i.shaft for i in found} == {"", "input"}
+    assert {i.channel for i in found} == {"a1"}
+
+
+def test_orders_that_are_not_there_are_nan_with_a_note():
+    one = SynchronousAverage(modulated(1, 0.2, 0)[:256], np.zeros(256), 9, "input", "a1", "g", "average", 60.0)
+    found = {i.name: i for i in mesh_indicators(one, RIG, PAIR)}
+    assert math.isnan(found["mesh level 3×"].value)
+    assert "above the average's end" in found["mesh level 3×"].note
+    assert math.isnan(found["sideband ratio 3×"].value)
+    odd = shaft_indicators(one, "output", shaft_ratio=29 / 47)[0]
+    assert math.isnan(odd.value)
+    assert "not whole" in odd.note
+    assert "lies above the spectrum's end" in find_line(spectrum(cosine(3)), 1000.0).note
+
+
+def test_unresolved_sidebands_are_refused_by_a_note():
+    coarse = spectrum(modulated(1.0, 0.2, 0), resolution=0.5, noise_bandwidth=0.75, positions=np.arange(N // 2 + 1) / 2)
+    found = [i for i in mesh_indicators(coarse, RIG, PAIR) if i.name.startswith("sideband")]
+    assert all(math.isnan(i.value) and "not resolved" in i.note for i in found)
+
+
+def test_mesh_order_must_follow_from_the_rig():
+    rig = Rig(shafts=(Shaft("input"), Shaft("output")), pairs=(GearPair("p", "input", "output"),))
+    with pytest.raises(RefusalError, match="mesh order"):
+        mesh_indicators(spectrum(cosine(3)), rig, rig.pairs[0])
+
+
+def test_shaft_orders_and_the_line_at_zero():
+    found = shaft_indicators(spectrum(cosine(1, 0.5) + cosine(2, 0.2)), "input", channel="a1")
+    assert [i.value for i in found] == pytest.approx([0.5, 0.2, 0.0], abs=1e-9)
+    near_zero = shaft_indicators(spectrum(cosine(1)), "slow", shaft_ratio=0.03)
+    assert "close to zero" in near_zero[0].note
+
+
+def envelope_with(order, strength, seed=1):
+    rng = np.random.default_rng(seed)
+    lines = sum(cosine(h * order, strength / h) for h in (1, 2, 3))
+    return spectrum(lines + rng.standard_normal(N), unit="(m/s^2)^2")
+
+
+def test_bearing_order_is_found_within_its_slip():
+    orders = defect_orders(BEARING)
+    assert orders["2×BSF"] == pytest.approx(2 * BEARING.orders()["BSF"])
+    found = {i.name: i for i in bearing_indicators(envelope_with(1.01 * orders["BPFO"], 0.5), BEARING, channel="a1")}
+    assert found["BPFO envelope level 1×"].value == pytest.approx(0.5, rel=0.1)
+    assert found["BPFO over floor 1×"].value > 25
+    assert found["BPFI over floor 1×"].value < 14
+    assert (found["BPFO over floor 1×"].unit, found["BPFO envelope level 1×"].unit) == ("dB", "(m/s^2)^2")
+    assert found["BPFO over floor 1×"].shaft == "input"
+    assert "bearing b" in found["BPFO over floor 1×"].note
+
+
+def test_floor_of_noise_is_exceeded_as_rarely_as_stated():
+    over, n_trials = 0, 400
+    for seed in range(n_trials):
+        s = envelope_with(50.0, 0.0, seed)
+        n_lines = find_line(s, 20.0, search_orders=0.3).n_lines
+        over += envelope_level_over_floor_db(s, 20.0, slip_fraction=0.015) > 20 * math.log10(noise_reaches(n_lines))
+    # At most 5 % by the docstring; three standard deviations of a binomial count on top.
+    assert over / n_trials <= 0.05 + 3 * math.sqrt(0.05 * 0.95 / n_trials)
+    assert over > 0
+
+
+def test_noise_reaches_is_the_rayleigh_quantile():
+    draws = np.random.default_rng(3).rayleigh(size=(20_000, 12))
+    share = np.mean(draws.max(axis=1) / np.median(draws) > noise_reaches(12))
+    assert share == pytest.approx(0.05, abs=0.006)
+
+
+def test_too_few_lines_for_a_floor():
+    assert math.isnan(floor_near(spectrum(cosine(9)), 9.0, 0.05, leave_out_orders=0.0, speed_rev_per_s=None))
+
+
+def test_bearing_without_orders_is_refused():
+    with pytest.raises(RefusalError, match="no order of bearing"):
+        bearing_indicators(envelope_with(3, 1.0), Bearing("x", "input"))
+
+
+@pytest.mark.parametrize("ratio", [1.0, 29 / 47])
+def test_bearing_on_another_shaft(ratio):
+    s = envelope_with(defect_orders(BEARING)["BPFI"] * ratio, 0.5)
+    found = {i.name: i.value for i in bearing_indicators(s, BEARING, shaft_ratio=ratio)}
+    assert found["BPFI over floor 1×"] > 25
