@@ -1,3 +1,71 @@
-"""gearsig: signal processing and diagnostics for gear vibration, simulated and measured."""
+"""gearsig: signal processing and diagnostics for gear vibration, simulated and measured.
+
+The main job in three lines:
+
+>>> import gearsig
+>>> result = gearsig.analyze(gearsig.read_recording("gearbox.csv", rig=gearsig.read_rig("rig.toml")))  # doctest: +SKIP
+>>> print(gearsig.analysis_text(result))  # doctest: +SKIP
+
+Everything else is imported from its room, e.g. `from gearsig.orders.average import synchronous_average`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gearsig.diagnosis.analyze import analyze
+    from gearsig.diagnosis.text import analysis_text
+    from gearsig.errors import GearsigError, InputError, RefusalError
+    from gearsig.recording.read import read_recording
+    from gearsig.recording.types import Channel, Recording
+    from gearsig.recording.write import write_recording
+    from gearsig.rig.toml import read_rig
+    from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
 
 __version__ = "0.1.0"
+
+_HOMES = {
+    "analyze": "gearsig.diagnosis.analyze",
+    "analysis_text": "gearsig.diagnosis.text",
+    "GearsigError": "gearsig.errors",
+    "InputError": "gearsig.errors",
+    "RefusalError": "gearsig.errors",
+    "read_recording": "gearsig.recording.read",
+    "write_recording": "gearsig.recording.write",
+    "Channel": "gearsig.recording.types",
+    "Recording": "gearsig.recording.types",
+    "read_rig": "gearsig.rig.toml",
+    **dict.fromkeys(("Bearing", "GearPair", "OperatingPoint", "Rig", "Sensor", "Shaft"), "gearsig.rig.types"),
+}
+
+__all__ = [
+    "Bearing",
+    "Channel",
+    "GearPair",
+    "GearsigError",
+    "InputError",
+    "OperatingPoint",
+    "Recording",
+    "RefusalError",
+    "Rig",
+    "Sensor",
+    "Shaft",
+    "analysis_text",
+    "analyze",
+    "read_recording",
+    "read_rig",
+    "write_recording",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from its room when it is first used, so that `import gearsig` stays light."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'gearsig' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

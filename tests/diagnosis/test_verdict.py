@@ -1,0 +1,45 @@
+"""The verdict says no more than the findings do."""
+
+import pytest
+
+from gearsig.diagnosis.confidence import from_p_value
+from gearsig.diagnosis.types import Finding, Kind
+from gearsig.diagnosis.verdict import ranked, verdict_of
+
+
+def test_faults_come_first_and_the_surest_of_them() -> None:
+    findings = ranked(
+        [
+            Finding("a", Kind.INFORMATION, "info"),
+            Finding("b", Kind.FAULT, "less sure", confidence=0.8),
+            Finding("c", Kind.CANNOT_TELL, "gap"),
+            Finding("d", Kind.FAULT, "surer", confidence=0.9),
+        ]
+    )
+    assert [f.code for f in findings] == ["d", "b", "c", "a"]
+    assert verdict_of(findings) == "Fault: surer (confidence 0.90), and 1 more."
+
+
+@pytest.mark.parametrize(
+    ("findings", "start"),
+    [
+        ([], "Cannot tell"),
+        ([Finding("speed-unknown", Kind.CANNOT_TELL, "No speed.")], "Cannot tell: No speed."),
+        ([Finding("no-tooth-local-damage", Kind.INFORMATION, "Teeth look alike.", confidence=0.8)], "No fault shows."),
+        ([Finding("no-tooth-local-damage", Kind.INFORMATION, "Teeth look alike.", confidence=0.4)], "Cannot tell"),
+        ([Finding("x", Kind.NOTICE, "hum")], "Cannot tell"),
+        ([Finding("x", Kind.SUSPICION, "odd", confidence=0.5)], "Suspicion: odd"),
+    ],
+)
+def test_no_fault_is_only_said_where_one_would_have_shown(findings: list[Finding], start: str) -> None:
+    assert verdict_of(tuple(findings)).startswith(start)
+
+
+def test_confidence_falls_with_the_p_value_and_is_bounded() -> None:
+    values = [from_p_value(p) for p in (1e-9, 1e-4, 1e-3, 1e-2, 0.05, 0.3, 1.0)]
+    assert values == sorted(values, reverse=True)
+    assert values[0] == 0.95
+    assert values[-1] == pytest.approx(0.1)  # a test that says nothing leaves the prior
+    # Sellke, Bayarri, Berger 2001, table 1: p = 0.05 and 0.01 leave 0.289 and 0.111 for the null at even prior.
+    assert 1 - from_p_value(0.05, prior=0.5, limit=1) == pytest.approx(0.289, abs=5e-4)
+    assert 1 - from_p_value(0.01, prior=0.5, limit=1) == pytest.approx(0.111, abs=5e-4)
