@@ -29,7 +29,8 @@ def noise_floor(spectrum: Spectrum, *, width: float | None = None, quantile: flo
         Of any scaling but "dimensionless".
     width : float or None
         Of the neighbourhood, in the axis' unit; at least 16 lines. It should hold many more noise lines than
-        tones, and the density should change little over it. None takes 1/200 of the lines, at least 64.
+        tones, and the density should change little over it. None takes 1/200 of the lines, but at least 256 lines
+        (fewer, down to 48, where the spectrum is an average).
     quantile : float
         0.05 to 0.95. Lower ones bear more tones (at 0.25, three in four lines may be tones) but scatter more.
 
@@ -95,7 +96,8 @@ def gamma_quantile(q: float, n_averages: int) -> float:
 def _block_lines(spectrum: Spectrum, width: float | None) -> int:
     n_lines = len(spectrum.values)
     if width is None:
-        return min(n_lines, max(64, n_lines // 200))
+        # The floor's own scatter multiplies the false-alarm rate of a search above it; so many lines keep that small.
+        return min(n_lines, max(48, 256 // spectrum.n_averages, n_lines // 200))
     block = round(positive(width, "width") / spectrum.resolution)
     if block < FEWEST_LINES:
         raise InputError(
