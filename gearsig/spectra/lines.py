@@ -81,7 +81,8 @@ def find_lines(
     Notes
     -----
     The rate holds for Gaussian noise with a floor that follows its density; impulses and a modulated carrier's skirts
-    are neither. A floor from few lines scatters and raises the rate: 256 lines about 1.3 times, 64 lines 2.5 times. The two lines at DC and Nyquist and the window's main lobe around DC are left out.
+    are neither. A floor from few lines scatters and raises the rate: 256 lines about 1.3 times, 64 lines 2.5 times.
+    The lines at DC and Nyquist and the window's main lobe around DC are left out.
 
     References
     ----------

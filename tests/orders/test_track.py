@@ -35,7 +35,9 @@ def test_levels_of_a_run_up_within_a_tenth_of_a_decibel(run_up, track, order):
     assert np.abs(20 * np.log10(tracked.amplitude / AMPLITUDES[order])).max() < 0.1
     assert tracked.speed_rpm[0] < 800
     assert tracked.speed_rpm[-1] > 3500
-    assert tracked.speed_rpm == pytest.approx(60 * (10 + 2.5 * tracked.time_s), rel=0.01)
+    assert tracked.speed_rpm == pytest.approx(
+        60 * (10 + 2.5 * tracked.time_s), rel=0.02
+    )  # mean in a block: middle in angle
     assert tracked.unit == "g"
 
 
