@@ -10,15 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearsig.angle.inversion import speeds_at, times_at
-from gearsig.angle.kaiser_sinc import (
-    HALF_WIDTH,
-    PASSBAND,
-    interpolate,
-    interpolate_stretched,
-    interpolation_table,
-    stretched_table,
-)
+from gearsig.angle.antialias import LOWEST_SCALE, interpolate_coarse, kernel_side
+from gearsig.angle.interpolation import HALF_BAND, PASSBAND, REACH, delay_table, doubling_filter, interpolate
+from gearsig.angle.inversion import scales_at, times_at
 from gearsig.angle.types import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray, count, positive
 from gearsig.errors import InputError, RefusalError
@@ -26,7 +20,6 @@ from gearsig.recording.types import Recording
 
 _CHUNK = 1 << 15  # angles at a time: positions and a stretch of the signal stay in the cache
 _MOST_VALUES = 1 << 28  # 2 GB of results; beyond it a typing error is likelier than a wish
-_LOWEST_SCALE = 1.0 / 1024.0  # a standing shaft would ask for an endless filter
 _SLOW_SHARE = 0.05  # revolutions that may lose bandwidth to the default number of samples per revolution
 
 
@@ -41,7 +34,7 @@ def resample_to_angle(
     """Sample channels at equal steps of a shaft's angle.
 
     The times of the equal angles come from the angle's cubic, inverted exactly; values between samples from a
-    Kaiser-windowed sinc, y(t) = Σ x[k] h(t·fs - k). Where the angle grid is coarser than the time grid, the sinc is stretched
+    pair of filters that doubles the rate and then delays by a fraction, y(t) = Σ x[k] h(t·fs - k). Where the angle grid is coarser than the time grid, the sinc is stretched
     to cut off at half the angle grid's momentary sampling rate.
 
     Parameters
@@ -62,8 +55,8 @@ def resample_to_angle(
     -------
     AngleSignal
         Same unit as the channels. Sample i lies at start_revolution + i / samples_per_revolution; the start is a whole step,
-        so that revolution 0 of the shaft angle falls on the grid. Sixteen samples at each end of the recording have no
-        complete kernel and are left out. Error below 5e-6 of full scale up to 0.4 of the lower of both sampling rates.
+        so that revolution 0 of the shaft angle falls on the grid. The first and last 24 samples of the recording (more where
+        the grid is coarse) have no complete kernel and are left out. Error below 5e-6 of full scale up to 0.4 of the lower of both sampling rates.
 
     Raises
     ------
@@ -80,9 +73,9 @@ def resample_to_angle(
     rows = [recording.index(name) for name in names]
     if not rows:
         raise InputError("there is no vibration channel to resample", allowed=", ".join(recording.channel_names))
-    begin, end = _covered_revolutions(recording, shaft_angle)
     covered = _covered_speeds(recording, shaft_angle)
-    n_per_rev = _grid(recording, covered, end - begin, samples_per_revolution, highest_order)
+    n_per_rev = _grid(recording, covered, samples_per_revolution, highest_order)
+    begin, end = _covered_revolutions(recording, shaft_angle, n_per_rev)
     first = math.ceil(begin * n_per_rev - 1e-9)
     n = math.floor(end * n_per_rev + 1e-9) - first + 1
     if n * len(rows) > _MOST_VALUES:
@@ -105,21 +98,27 @@ def resample_to_angle(
     )
 
 
-def _covered_times(recording: Recording, angle: ShaftAngle) -> tuple[float, float]:
-    rate = recording.sampling_rate_hz
-    begin = max(angle.start_s, (HALF_WIDTH - 1) / rate)
-    end = min(angle.end_s, (recording.n_samples - HALF_WIDTH - 1) / rate)
+def _covered_times(recording: Recording, angle: ShaftAngle, n_per_rev: int | None = None) -> tuple[float, float]:
+    """Times between which angle and complete kernels exist; kernels are longer where the grid of angles is coarse."""
+    rate, last_s = recording.sampling_rate_hz, (recording.n_samples - 1) / recording.sampling_rate_hz
+    begin, end = max(angle.start_s, REACH / rate), min(angle.end_s, last_s - REACH / rate)
+    if n_per_rev is not None and end > begin:
+        t = np.linspace(begin, end, 4096)
+        scale = np.maximum(n_per_rev * angle.speed_rpm_at(t) / 60.0 / rate, LOWEST_SCALE)
+        margin = np.where(scale < 1.0, 1.02 * (REACH + HALF_BAND) / scale, REACH) / rate
+        complete = t[(t >= margin) & (t <= last_s - margin)]
+        begin, end = (complete[0], complete[-1]) if len(complete) else (begin, begin)
     if end <= begin:
         raise RefusalError(
             f"the shaft angle is known from {angle.start_s:.4g} to {angle.end_s:.4g} s, the recording lasts from 0 to "
-            f"{recording.duration_s:.4g} s: nothing to resample",
+            f"{recording.duration_s:.4g} s: there is nothing to resample",
             remedy="check that both use the same time axis",
         )
-    return begin, end
+    return float(begin), float(end)
 
 
-def _covered_revolutions(recording: Recording, angle: ShaftAngle) -> tuple[float, float]:
-    begin, end = angle.revolutions_at(np.array(_covered_times(recording, angle)))
+def _covered_revolutions(recording: Recording, angle: ShaftAngle, n_per_rev: int) -> tuple[float, float]:
+    begin, end = angle.revolutions_at(np.array(_covered_times(recording, angle, n_per_rev)))
     if end - begin < 1.0:
         raise RefusalError(
             f"the shaft makes {end - begin:.3g} revolutions within the recording",
@@ -138,9 +137,7 @@ def _covered_speeds(recording: Recording, angle: ShaftAngle) -> FloatArray:
     return np.sort(np.interp(steps, revolutions, speeds))
 
 
-def _grid(
-    recording: Recording, covered: FloatArray, n_revolutions: float, wanted: int | None, highest_order: float | None
-) -> int:
+def _grid(recording: Recording, covered: FloatArray, wanted: int | None, highest_order: float | None) -> int:
     """Samples per revolution, as wanted, as the highest order needs, or keeping the bandwidth on most revolutions."""
     from scipy.fft import next_fast_len
 
@@ -157,9 +154,9 @@ def _grid(
         return wanted
     if highest_order is not None:
         return int(next_fast_len(math.ceil(highest_order / PASSBAND), real=True))
-    typical = max(float(covered[int(_SLOW_SHARE * len(covered))]), 1e-9)
-    most = 4.0 * recording.n_samples / n_revolutions
-    return max(2, int(next_fast_len(math.ceil(min(recording.sampling_rate_hz / typical, most)), real=True)))
+    # No more than four times the samples there are at the mean speed: a nearly standing shaft asks for endless ones.
+    typical = max(float(covered[int(_SLOW_SHARE * len(covered))]), float(covered.mean()) / 4.0)
+    return max(2, int(next_fast_len(math.ceil(recording.sampling_rate_hz / typical - 1e-9), real=True)))
 
 
 def _fill(
@@ -170,26 +167,25 @@ def _fill(
         np.ascontiguousarray(a, dtype=np.float64) for a in (angle.time_s, angle.revolutions, angle.speed_rev_per_s)
     )
     rate, n = recording.sampling_rate_hz, samples.shape[1]
-    table, side = interpolation_table(), stretched_table()
+    half_band, table, side = doubling_filter(), delay_table(), kernel_side()
     signals = [np.ascontiguousarray(recording.samples[i]) for i in rows]
 
     def fill_chunk(start: int) -> None:
         stop = min(n, start + _CHUNK)
         begin = (first + start) / n_per_rev
         times = np.empty(stop - start)
-        knot = max(0, int(np.searchsorted(revolutions, begin)) - 1)
-        times_at(knots, revolutions, speeds, min(knot, len(knots) - 2), begin, 1.0 / n_per_rev, times)
+        knot = min(max(0, int(np.searchsorted(revolutions, begin)) - 1), len(knots) - 2)
+        times_at(knots, revolutions, speeds, knot, begin, 1.0 / n_per_rev, times)
         scale = np.empty(stop - start)
-        speeds_at(knots, speeds, times, scale)
-        scale *= n_per_rev / rate
-        positions = np.clip(times * rate, HALF_WIDTH - 1, recording.n_samples - HALF_WIDTH - 1)
-        coarse = bool(scale.min() < 1.0 - 1e-6)
-        np.clip(scale, _LOWEST_SCALE, 1.0, out=scale)
+        around = slice(knot, min(len(knots), int(np.searchsorted(knots, times[-1])) + 1))
+        coarse = scales_at(knots[around], speeds[around], times, n_per_rev / rate, LOWEST_SCALE, scale) < 1.0 - 1e-6
+        times *= rate
+        positions = np.clip(times, REACH, recording.n_samples - 1 - REACH, out=times)
         for signal, out in zip(signals, samples, strict=True):
             if coarse:
-                interpolate_stretched(signal, positions, scale, side, HALF_WIDTH, out[start:stop])
+                interpolate_coarse(signal, positions, scale, side, table, out[start:stop])
             else:
-                interpolate(signal, positions, table, out[start:stop])
+                interpolate(signal, positions, half_band, table, out[start:stop])
 
     starts = range(0, n, _CHUNK)
     if len(starts) == 1:
@@ -209,6 +205,6 @@ def _with_notes(angle: ShaftAngle, recording: Recording, covered: FloatArray, n_
             f"on {share:.0f} % of the revolutions the angle grid is coarser than the samples; there, frequencies above "
             f"{PASSBAND * n_per_rev:.4g} times the speed are filtered out"
         )
-    if scale[0] < _LOWEST_SCALE:
+    if scale[0] < LOWEST_SCALE:
         notes.append("while the shaft nearly stands still, the anti-aliasing filter stops short of its speed")
     return replace(angle, notes=tuple(notes))

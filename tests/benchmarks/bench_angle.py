@@ -41,9 +41,11 @@ def values_only(recording: Recording, times: np.ndarray) -> np.ndarray:
 
 
 def kernel_only(recording: Recording, positions: np.ndarray, out: np.ndarray) -> None:
-    from gearsig.angle.kaiser_sinc import interpolate, interpolation_table
+    from gearsig.angle.interpolation import delay_table, doubling_filter, interpolate
 
-    interpolate(recording.samples[0], positions, interpolation_table(), out)
+    side, table = doubling_filter(), delay_table()
+    for i in range(0, len(out), 1 << 15):
+        interpolate(recording.samples[0], positions[i : i + (1 << 15)], side, table, out[i : i + (1 << 15)])
 
 
 def main() -> None:
@@ -59,7 +61,7 @@ def main() -> None:
         2 * np.pi * ORDER * (fine.start_revolution + np.arange(fine.samples.shape[1]) / fine.samples_per_revolution)
     )
     out = np.empty(n)
-    positions = times * RATE
+    positions = np.clip(times * RATE, 24, N - 25)
     jobs = {
         "public call": lambda: resample_to_angle(recording, angle, samples_per_revolution=n_per_rev),
         "public call, default grid": lambda: resample_to_angle(recording, angle),
