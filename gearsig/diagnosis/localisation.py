@@ -20,7 +20,9 @@ class Localisation:
     Parameters
     ----------
     angle_rev : float
-        Middle of the window, 0 to 1 revolution.
+        Where in the window the event is strongest, 0 to 1 revolution: a knock is there and rings on afterwards.
+    start_rev : float
+        Where the window begins.
     width_rev : float
     ratio_db : float
         Energy in it over the median window's, summed over channels that are each scaled to unit energy.
@@ -34,6 +36,7 @@ class Localisation:
     """
 
     angle_rev: float
+    start_rev: float
     width_rev: float
     ratio_db: float
     p_value: float
@@ -87,13 +90,22 @@ def localise(
     shares = np.zeros(len(signals))
     shares[used] = energies[:, start] / medians
     return Localisation(
-        angle_rev=((start + width / 2) / n) % 1.0,
+        angle_rev=_onset(x, start, width),
+        start_rev=start / n,
         width_rev=width / n,
         ratio_db=10 * float(np.log10(ratio)),
         p_value=(n_higher + 1) / (n_surrogates + 1),
         repeatability=float(np.sum(x[:, inside] ** 2)) / scatter if scatter > 0 else float("inf"),
         channel_shares=tuple(float(s) for s in shares),
     )
+
+
+def _onset(x: FloatArray, start: int, width: int) -> float:
+    """Return the angle of the highest energy within the window, over an eighth of its width."""
+    n, short = x.shape[1], max(1, width // 8)
+    inside = (start + np.arange(width)) % n
+    energy = np.convolve((x[:, inside] ** 2).sum(axis=0), np.ones(short), "valid")
+    return float(((start + int(np.argmax(energy)) + short / 2) / n) % 1.0)
 
 
 def _window_energy(square: FloatArray, kernel: np.ndarray, n: int) -> FloatArray:

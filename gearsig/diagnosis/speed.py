@@ -47,8 +47,8 @@ def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:
         )
     low, high = angle.speed_range_rpm
     uncertainty = angle.relative_speed_uncertainty
-    plus_minus = f" ± {100 * uncertainty:.2g} %" if isfinite(uncertainty) else ""
-    text = f"Shaft {angle.shaft or 'of reference'} turns at {angle.mean_speed_rpm:.6g} rpm{plus_minus}"
+    plus_minus = f" ± {uncertainty * angle.mean_speed_rpm:.2g}" if isfinite(uncertainty) else ""
+    text = f"Shaft {angle.shaft or 'of reference'} turns at {angle.mean_speed_rpm:.6g}{plus_minus} rpm"
     if high - low > 0.001 * angle.mean_speed_rpm:
         text += f", between {low:.5g} and {high:.5g} rpm"
     return Finding(

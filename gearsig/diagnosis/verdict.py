@@ -35,8 +35,10 @@ def verdict_of(findings: tuple[Finding, ...]) -> str:
     if examined and all(f.confidence < 0.5 for f in examined):
         return "Cannot tell: nothing shows, but what is assumed of the machine may be wrong."
     if examined:
-        rest = " " + gaps[0].title if gaps else ""
-        return "No fault shows. " + " ".join(f.title for f in examined) + rest
+        rest = [f.title for f in (*examined, *gaps[:1])]
+        return " ".join(
+            ["No fault shows.", *rest, "Wear of all teeth alike would only show against an earlier recording."]
+        )
     if gaps:
         return "Cannot tell: " + gaps[0].title
     return "Cannot tell: the machine is not described, so only spectra are given. A rig file allows a diagnosis."

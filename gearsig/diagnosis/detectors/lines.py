@@ -15,6 +15,9 @@ CLEAR_DB = 15.0
 SKIRT = 5e-4
 """Relative width of a line's foot where the speed wanders by as little as that."""
 
+RUN_UP_FOOT_ORDERS = 0.1
+"""Width of a line's foot over a run-up, where its level changes from resonance to resonance."""
+
 
 def detect_lines(signals: Signals) -> list[Finding]:
     """Report mains hum and the strongest unexplained line."""
@@ -65,9 +68,10 @@ def _is_synchronous(signals: Signals, hertz: float) -> bool:
 def _unexplained(signals: Signals) -> Finding | None:
     """Return the strongest order line that is no multiple of a known shaft's order."""
     best: tuple[float, str, int] | None = None
+    foot = RUN_UP_FOOT_ORDERS if signals.speed_varies else 0.0
     for name, excess in signals.order_excess.items():
         for order in signals.known_shaft_orders.values():
-            excess = excess.without_multiples(order, skirt=SKIRT)  # noqa: PLW2901
+            excess = excess.without_multiples(order, half_width=foot, skirt=SKIRT)  # noqa: PLW2901
         if signals.rig.bearings:
             excess = _without_bearings(signals, excess)  # noqa: PLW2901
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -13,8 +13,8 @@ from gearsig.diagnosis.signals import Signals
 from gearsig.diagnosis.types import Finding, Kind, Strength, Where
 from gearsig.rig.types import GearPair
 
-STRONG_DB = -8.0
-"""Sideband over carrier power. Two sidebands per harmonic at -11 dB each mean an amplitude modulation of 56 %."""
+STRONG_DB = -10.0
+"""Sidebands over carrier, in power: an amplitude modulation of 45 %, or a third together with some phase modulation."""
 
 N_SIDEBANDS = 2
 N_CARRIERS = 3
@@ -78,7 +78,7 @@ def _strong(
             (channel,), shaft=shaft, gear=f"{pair.name}/{shaft}", order=order, order_shaft=signals.rig.reference_shaft
         ),
         Strength(10 ** (median / 20), "sideband/carrier", 10 ** (STRONG_DB / 20), "usual for a good mounting", median),
-        confidence=0.6 * (WITH_ASSUMED_DATA if signals.rig.assumed else 1.0),
+        confidence=0.5 * (WITH_ASSUMED_DATA if signals.rig.assumed else 1.0),
         confidence_basis="a rule of thumb: how much modulation is usual depends on the machine and the sensor's place",
         evidence=(
             f"Sidebands against mesh harmonics: {median:.1f} dB (median), {levels[channel]:.1f} dB in {channel}.",

@@ -12,8 +12,9 @@ from gearsig.diagnosis.types import Finding, Kind, Strength, Where
 REPEATABLE = 4.0
 """Energy in the window over what the scatter of the revolutions puts there; a single shock gives about 1."""
 
-CLEAR_RATIO_DB = 9.0
-"""Window over median window: below it, teeth of a healthy gear differ as much."""
+WORTH_SAYING = (0.01, 8.0)
+CLEAR = (0.001, 10.0)
+"""p-value at most, and dB of the window over the median window at least: teeth of a good gear differ by up to 8 dB."""
 
 
 def detect_tooth_damage(signals: Signals) -> list[Finding]:
@@ -38,13 +39,13 @@ def _localised(shaft: ShaftSignals, signals: Signals) -> Localisation:
 
 def _finding(signals: Signals, shaft: ShaftSignals, place: Localisation, n_tests: int) -> Finding | None:
     p_value = min(1.0, place.p_value * n_tests)
-    if p_value > 0.05 or place.repeatability < REPEATABLE:
+    if place.repeatability < REPEATABLE or not _reaches(WORTH_SAYING, p_value, place):
         return None
     confidence = from_p_value(p_value)
     assumed = [fact for fact in signals.rig.assumed if fact]
     if assumed:
         confidence *= WITH_ASSUMED_DATA
-    clear = place.ratio_db >= CLEAR_RATIO_DB and confidence >= 0.75
+    clear = _reaches(CLEAR, p_value, place) and not assumed
     names = list(shaft.separated)
     strongest = names[int(np.argmax(place.channel_shares))]
     tooth = int(place.angle_rev * shaft.teeth[0]) + 1 if len(shaft.teeth) == 1 else None
@@ -71,11 +72,15 @@ def _finding(signals: Signals, shaft: ShaftSignals, place: Localisation, n_tests
     )
 
 
+def _reaches(level: tuple[float, float], p_value: float, place: Localisation) -> bool:
+    return p_value <= level[0] and place.ratio_db >= level[1]
+
+
 def _strength(shaft: ShaftSignals, channel: str, place: Localisation) -> Strength:
     difference = shaft.separated[channel].difference
     n = len(difference.values)
     width = round(place.width_rev * n)
-    start = round(place.angle_rev * n - width / 2)
+    start = round(place.start_rev * n)
     inside = np.arange(start, start + width) % n
     value = float(np.sqrt(np.mean(difference.values[inside] ** 2)))
     share = place.channel_shares[list(shaft.separated).index(channel)]
@@ -92,6 +97,8 @@ def _evidence(signals: Signals, shaft: ShaftSignals, place: Localisation) -> tup
     ]
     if signals.angle is not None and signals.angle.method in ("tachless", "constant"):
         texts.append("There is no tachometer: the angle counts from the start of the record, not from a mark.")
+    if len(shaft.teeth) == 1:
+        texts.append("Teeth count from 1 at the zero of the angle, in the sense of rotation.")
     if len(shaft.teeth) > 1:
         texts.append(
             f"The shaft carries {len(shaft.teeth)} gears ({', '.join(map(str, shaft.teeth))} teeth); it may be either."
