@@ -60,14 +60,14 @@ class Cursor:
     kind : str
         "mesh", "sideband", "shaft", "bearing", "hunting".
     label : str
-    harmonic : int
-        Where labels collide, the lower harmonic keeps its own.
+    number : int
+        Of the harmonic, or of the sideband counted from its mesh line: the lower one keeps its label in a collision.
     """
 
     position: float
     kind: str
     label: str
-    harmonic: int = 1
+    number: int = 1
 
 
 def order_cursors(lines: Iterable[OrderLine], revolutions_per_s: float = 1.0) -> tuple[Cursor, ...]:
@@ -89,10 +89,7 @@ def order_cursors(lines: Iterable[OrderLine], revolutions_per_s: float = 1.0) ->
     only = {
         kind: len({line.element for line in lines if line.kind == kind}) == 1 for kind in ("mesh", "bearing", "hunting")
     }
-    return tuple(
-        Cursor(line.order * revolutions_per_s, line.kind, _short_label(line, only.get(line.kind, False)), line.harmonic)
-        for line in lines
-    )
+    return tuple(_cursor(line, revolutions_per_s, only_one=only.get(line.kind, False)) for line in lines)
 
 
 def place(
@@ -132,17 +129,21 @@ def place(
     return result
 
 
+def n_rows(placed: Iterable[tuple[Cursor, LabelPlace | None]]) -> int:
+    """Return how many rows of labels are used."""
+    return max((label.row + 1 for _, label in placed if label is not None), default=0)
+
+
 def draw(
     axes: Axes,
-    cursors: Sequence[Cursor],
-    limits: tuple[float, float],
+    placed: Iterable[tuple[Cursor, LabelPlace | None]],
     size_in: tuple[float, float],
     *,
     through: bool = True,
 ) -> None:
-    """Draw cursors into a panel of known size, their labels in rows above it; through the panel, or only above it."""
+    """Draw placed cursors into a panel of known size, labels in rows above it; through the panel, or only above it."""
     width, height = size_in
-    for cursor, label in place(cursors, limits, width):
+    for cursor, label in placed:
         colour = style.CURSOR_COLOURS.get(cursor.kind, style.QUIET)
         dashes, thickness, alpha = LINE_LOOKS.get(cursor.kind, LINE_LOOKS["sideband"])
         base = 0.05 + ROW_IN * (label.row if label else 0)
@@ -166,15 +167,20 @@ def draw(
             )
 
 
-def _short_label(line: OrderLine, only_one: bool) -> str:
+def _cursor(line: OrderLine, scale: float, *, only_one: bool) -> Cursor:
+    label, number = line.label, line.harmonic
     if line.kind == "sideband":
-        return line.label.partition(line.element)[2].strip().replace("+ ", "+").replace("− ", "−")
-    return line.label.removesuffix(line.element).strip() if only_one else line.label
+        label = label.partition(line.element)[2].strip().replace("+ ", "+").replace("− ", "−")
+        digits = label.lstrip("+−").partition("×")[0]
+        number = int(digits) if digits.isdecimal() else number
+    elif only_one:
+        label = label.removesuffix(line.element).strip()
+    return Cursor(line.order * scale, line.kind, label, number)
 
 
 def _importance(cursor: Cursor) -> tuple[int, int, float]:
     rank = PRIORITY.index(cursor.kind) if cursor.kind in PRIORITY else len(PRIORITY)
-    return rank, cursor.harmonic, cursor.position
+    return rank, cursor.number, cursor.position
 
 
 def _free_place(taken: Sequence[LabelPlace], at_in: float, text: str, width_in: float) -> LabelPlace | None:

@@ -9,7 +9,7 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.orders.types import OrderMap
 from gearsig.plot import style
-from gearsig.plot.cursors import Cursor, draw
+from gearsig.plot.cursors import Cursor, draw, place
 from gearsig.plot.display import decibels, plain, unit_text
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 DYNAMIC_RANGE_DB = 60.0
 N_COLUMNS, N_ROWS = 1200, 500
-LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN, SPEED_IN = 0.75, 1.0, 0.55, 0.85, 1.25
+LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN, SPEED_IN = 0.75, 1.0, 0.55, 0.7, 1.25
 
 
 def order_map_figure(
@@ -64,16 +64,18 @@ def order_map_figure(
     axes.set_xlim(*limits)
     speed.set_ylim(float(y[0]), float(y[-1]))
     speed.plot(order_map.speed_rpm, order_map.time_s, color=style.MEASURED, linewidth=1.2)
-    draw(axes, cursors, limits, (style.WIDTH_IN - left - RIGHT_IN, height_in - BOTTOM_IN - TOP_IN), through=False)
+    width = style.WIDTH_IN - left - RIGHT_IN
+    draw(axes, place(cursors, limits, width), (width, height_in - BOTTOM_IN - TOP_IN), through=False)
     name = f"order (of {order_map.shaft or 'the shaft'})" if order_map.axis == "order" else "frequency (Hz)"
     style.label_axes(axes, name)
     style.label_axes(speed, "speed (rpm)", "time (s)")
     figure.text(
         LEFT_IN / style.WIDTH_IN,
-        1 - 0.27 / height_in,
+        1 - 0.14 / height_in,
         plain(order_map.source, 110),
         fontsize=style.TEXT_PT,
         fontweight="bold",
+        va="top",
         color=style.INK,
         parse_math=False,
     )

@@ -10,8 +10,8 @@ import numpy as np
 from gearsig.checks import FloatArray, one_of
 from gearsig.errors import InputError
 from gearsig.plot import style
-from gearsig.plot.cursors import Cursor, draw
-from gearsig.plot.display import Scale, above_zero, decibels, unit_text, with_unit
+from gearsig.plot.cursors import ROW_IN, Cursor, draw, n_rows, place
+from gearsig.plot.display import Scale, above_zero, decibels, plain, unit_text, with_unit
 from gearsig.plot.thin import N_POINTS, envelope, thin
 from gearsig.spectra.types import Spectrum
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEFT_IN, RIGHT_IN, BOTTOM_IN = 0.85, 0.2, 0.55
-TOP_IN = 0.85  # title and three rows of labels
+TITLE_IN = 0.36
 SPECTRUM_POINTS = N_POINTS // 2
 
 
@@ -33,7 +33,7 @@ def spectrum_figure(
     limits: tuple[float, float] | None = None,
     marked: Sequence[float] = (),
     title: str = "",
-    height_in: float = 3.4,
+    panel_height_in: float = 2.1,
 ) -> Figure:
     """Draw a spectrum with the lines that the machine's kinematics explain.
 
@@ -70,13 +70,16 @@ def spectrum_figure(
     low, high = limits if limits is not None else _whole(spectrum)
     if not low < high:
         raise InputError(f"limits are {low:g} to {high:g}", allowed="ascending")
-    figure = style.new_figure(height_in)
-    axes = style.panel(figure, left_in=LEFT_IN, right_in=RIGHT_IN, bottom_in=BOTTOM_IN, top_in=TOP_IN)
+    width = style.WIDTH_IN - LEFT_IN - RIGHT_IN
+    placed = place(cursors, (low, high), width)
+    labels_in = ROW_IN * n_rows(placed)
+    top = TITLE_IN + labels_in
+    figure = style.new_figure(BOTTOM_IN + panel_height_in + top)
+    axes = style.panel(figure, left_in=LEFT_IN, right_in=RIGHT_IN, bottom_in=BOTTOM_IN, top_in=top)
     _draw_lines(axes, spectrum, floor, (low, high), scale, marked)
-    size = (style.WIDTH_IN - LEFT_IN - RIGHT_IN, height_in - BOTTOM_IN - TOP_IN)
-    draw(axes, cursors, (low, high), size)
+    draw(axes, placed, (width, panel_height_in))
     style.label_axes(axes, spectrum.axis_label, _value_label(spectrum, scale))
-    _title_above_labels(axes, title or spectrum.source, size[1])
+    _title(axes, title or spectrum.source, (0.1 + labels_in) / panel_height_in)
     return figure
 
 
@@ -108,11 +111,12 @@ def _draw_lines(
     for position in marked:
         if limits[0] <= position <= limits[1]:
             value = displayed(spectrum.values)[spectrum.index_of(position)]
-            axes.plot([position], [value], marker="o", markersize=6, color=style.FAULT, fillstyle="none", zorder=3)
+            looks = {"marker": "o", "markersize": 9, "markeredgewidth": 1.8, "fillstyle": "none"}
+            axes.plot([position], [value], color=style.FAULT, zorder=3, **looks)  # type: ignore[arg-type]
     axes.set_xlim(*limits)
     if logarithmic:
         axes.set_yscale("log")
-    axes.set_ylim(*_value_limits(displayed(shown), "log" if logarithmic else scale))
+    axes.set_ylim(*_value_limits(displayed(shown), "linear" if scale == "log" and not logarithmic else scale))
     if not logarithmic:
         style.no_offset(axes)
 
@@ -136,12 +140,10 @@ def _value_label(spectrum: Spectrum, scale: Scale) -> str:
     return with_unit(name or "value", spectrum.unit)
 
 
-def _title_above_labels(axes: Axes, title: str, height_in: float) -> None:
-    from gearsig.plot.display import plain
-
+def _title(axes: Axes, title: str, above: float) -> None:
     axes.text(
         0.0,
-        1.0 + 0.58 / height_in,
+        1.0 + above,
         plain(title, 110),
         transform=axes.transAxes,
         ha="left",

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PANEL_IN = 1.35
-MARGINS_IN = 0.75
+MARGINS_IN = 0.55
 
 
 def time_figure(
@@ -50,7 +50,7 @@ def time_figure(
     first: Axes | None = None
     for i, name in enumerate(names):
         bottom = 0.55 + PANEL_IN * (len(names) - 1 - i)
-        axes = style.panel(figure, bottom_in=bottom, top_in=height - bottom - PANEL_IN + 0.35, sharex=first)
+        axes = style.panel(figure, bottom_in=bottom, top_in=height - bottom - PANEL_IN + 0.33, sharex=first)
         first = first or axes
         channel = recording.channels[recording.index(name)]
         time, values = _stretch(recording, name, limits_s)

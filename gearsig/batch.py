@@ -1,0 +1,262 @@
+"""Many recordings: analysed by local processes, or by any executor, into one folder of pages."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gearsig.errors import GearsigError, InputError
+
+if TYPE_CHECKING:
+    from gearsig.report.entry import Entry, Failure
+    from gearsig.rig.types import Rig
+
+Progress = Callable[[int, int, "Entry | Failure"], object]
+
+Results = Generator[tuple[int, "Entry | Failure"], None, None]
+_THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """What became of the recordings.
+
+    Parameters
+    ----------
+    entries : tuple of Entry
+        Those analysed, in the order given.
+    failures : tuple of Failure
+        Those that could not be, with the reason, in the order given.
+    index_path : Path
+        The page that compares them.
+    """
+
+    entries: tuple[Entry, ...]
+    failures: tuple[Failure, ...]
+    index_path: Path
+
+
+@dataclass(frozen=True)
+class _Job:
+    """One recording and where its page goes; everything a worker needs."""
+
+    path: Path
+    name: str
+    page: Path
+    rig: Rig | None
+    sampling_rate_hz: float | None
+    command: str
+
+
+def report_many(
+    paths: Sequence[str | Path],
+    output_folder: str | Path,
+    *,
+    rig: Rig | None = None,
+    sampling_rate_hz: float | None = None,
+    n_processes: int | None = None,
+    executor: Executor | None = None,
+    on_progress: Progress | None = None,
+    command: str = "",
+) -> BatchResult:
+    """Analyse recordings and write a page for each, and an index that compares them.
+
+    A file that fails does not stop the others: the index lists it with its reason. Ctrl-C leaves whole pages only.
+
+    Parameters
+    ----------
+    paths : sequence of str or Path
+        At least one.
+    output_folder : str or Path
+        Made if it is not there; pages of the same name are replaced.
+    rig : Rig or None
+        Of all recordings; None: what each file says itself.
+    sampling_rate_hz : float or None
+        For files that do not state it.
+    n_processes : int or None
+        Local processes; None: one per processor, not more than files. With 1, everything runs in this process. With
+        more, the caller's script needs the usual ``if __name__ == "__main__":``, as processes are spawned.
+    executor : concurrent.futures.Executor or None
+        Runs the recordings instead, e.g. a cluster's. Its workers must see the same files under the same paths.
+    on_progress : callable or None
+        Called as ``on_progress(n_done, n_total, result)`` with an `Entry` or a `Failure`, in the order of completion.
+    command : str
+        The command that makes the report again, for the pages.
+
+    Returns
+    -------
+    BatchResult
+
+    Raises
+    ------
+    InputError
+        If there are no paths, `n_processes` is below 1, or the folder cannot be made.
+    """
+    from gearsig.checks import count
+    from gearsig.report.files import remove_parts
+    from gearsig.report.index import write_index
+
+    files = [Path(path) for path in paths]
+    if not files:
+        raise InputError("there are no recordings to report on", remedy="name at least one file")
+    workers = min(len(files), _n_processors()) if n_processes is None else count(n_processes, "n_processes")
+    folder = _made(Path(output_folder))
+    jobs = _jobs(files, folder, rig, sampling_rate_hz, command)
+    results: dict[int, Entry | Failure] = {}
+    try:
+        with closing(_run(jobs, min(workers, len(jobs)), executor)) as running:
+            for number, result in running:
+                results[number] = result
+                if on_progress is not None:
+                    on_progress(len(results), len(jobs), result)
+    finally:
+        remove_parts(folder, [job.page.name for job in jobs])
+    entries, failures = _sorted_out(results)
+    index = write_index(entries, folder / "index.html", failures=failures, command=command)
+    return BatchResult(entries, failures, index)
+
+
+def _jobs(
+    files: Sequence[Path], folder: Path, rig: Rig | None, sampling_rate_hz: float | None, command: str
+) -> list[_Job]:
+    from gearsig.report.files import page_names
+
+    pages = page_names(files)
+    names = [file.name for file in files]
+    return [
+        # Files of the same name are told apart by their folders.
+        _Job(
+            file,
+            file.name if names.count(file.name) == 1 else str(file),
+            folder / f"{page}.html",
+            rig,
+            sampling_rate_hz,
+            command,
+        )
+        for file, page in zip(files, pages, strict=True)
+    ]
+
+
+def _run(jobs: Sequence[_Job], n_workers: int, executor: Executor | None) -> Results:
+    """Run the jobs and yield each result with its number, as they finish."""
+    numbered = dict(enumerate(jobs))
+    if executor is not None:
+        yield from _collect(executor, numbered)
+    elif n_workers == 1:
+        for number, job in numbered.items():
+            yield number, _report_one(job)
+    else:
+        yield from _run_local(numbered, n_workers)
+
+
+def _run_local(jobs: Mapping[int, _Job], n_workers: int) -> Results:
+    """Run jobs in local processes; where one kills its process, the unfinished ones get a process each."""
+    unfinished = dict(jobs)
+    try:
+        with _pool(n_workers) as pool:
+            for number, result in _collect(pool, jobs):
+                del unfinished[number]
+                yield number, result
+    except BrokenProcessPool:
+        for number, job in unfinished.items():
+            try:
+                with _pool(1) as pool:
+                    result = pool.submit(_report_one, job).result()
+            except BrokenProcessPool:
+                result = _failure(job, "the process that analysed it was killed: perhaps it ran out of memory")
+            yield number, result
+
+
+def _collect(executor: Executor, jobs: Mapping[int, _Job]) -> Results:
+    futures: dict[Future[Entry | Failure], int] = {executor.submit(_report_one, j): n for n, j in jobs.items()}
+    try:
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+@contextmanager
+def _pool(n_workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Open a pool of fresh processes with one computing thread each: more would fight over the processors.
+
+    The libraries read the thread settings when they load, hence the environment; it is restored afterwards.
+    """
+    before = {name: os.environ.get(name) for name in _THREAD_SETTINGS}
+    os.environ.update(dict.fromkeys(_THREAD_SETTINGS, "1"))
+    pool = ProcessPoolExecutor(n_workers, mp_context=get_context("spawn"), initializer=_start_worker)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def _start_worker() -> None:
+    """Let Ctrl-C end a worker at once and without a traceback; the parent tidies up."""
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def _report_one(job: _Job) -> Entry | Failure:
+    """Analyse one recording and write its page; every error becomes a reason."""
+    from gearsig.diagnosis.analyze import analyze
+    from gearsig.recording.read import read_recording
+    from gearsig.report.entry import entry_of
+    from gearsig.report.page import write_page
+
+    try:
+        recording = read_recording(job.path, rig=job.rig, sampling_rate_hz=job.sampling_rate_hz)
+        analysis = analyze(recording, job.rig)
+        write_page(analysis, job.page, command=job.command, index="index.html")
+        return entry_of(analysis, job.name, job.page.name)
+    except GearsigError as error:
+        return _failure(job, str(error))
+    except Exception as error:  # noqa: BLE001 - one broken file must not stop the rest; the reason is passed on
+        return _failure(job, f"unexpected error, please report: {type(error).__name__}: {' '.join(str(error).split())}")
+
+
+def _failure(job: _Job, reason: str) -> Failure:
+    from gearsig.report.entry import Failure
+
+    return Failure(job.name, reason)
+
+
+def _sorted_out(results: Mapping[int, Entry | Failure]) -> tuple[tuple[Entry, ...], tuple[Failure, ...]]:
+    from gearsig.report.entry import Entry, Failure
+
+    ordered = [results[number] for number in sorted(results)]
+    return (
+        tuple(item for item in ordered if isinstance(item, Entry)),
+        tuple(item for item in ordered if isinstance(item, Failure)),
+    )
+
+
+def _made(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"the folder cannot be made ({error.strerror or error})", where=str(folder), remedy="choose another with -o"
+        ) from error
+    return folder
+
+
+def _n_processors() -> int:
+    """Return the processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

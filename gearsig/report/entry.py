@@ -1,0 +1,69 @@
+"""What the index page needs to know of each recording; small, so that it travels between processes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gearsig.diagnosis.types import Analysis, Kind
+from gearsig.indicators.types import Indicator
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A recording that was analysed.
+
+    Parameters
+    ----------
+    name : str
+        As given by the user, e.g. the file's name.
+    page : str
+        Address of its page, relative to the index; empty: no page.
+    kind : Kind
+        Of its most important finding.
+    verdict : str
+    top_finding : str
+        Title of the most important finding; empty if there is none.
+    confidence : float or None
+        Of that finding.
+    ratio_db : float or None
+        Of that finding over its floor.
+    indicators : tuple of Indicator
+    """
+
+    name: str
+    page: str
+    kind: Kind
+    verdict: str
+    top_finding: str = ""
+    confidence: float | None = None
+    ratio_db: float | None = None
+    indicators: tuple[Indicator, ...] = ()
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A recording that could not be analysed, and why."""
+
+    name: str
+    reason: str
+
+
+def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
+    """Sum up an analysis for the index page."""
+    order = list(Kind)
+    top = min(analysis.findings, key=lambda finding: order.index(finding.kind), default=None)
+    return Entry(
+        name,
+        page,
+        top.kind if top is not None else Kind.INFORMATION,
+        analysis.verdict,
+        top.title if top is not None else "",
+        top.confidence if top is not None else None,
+        top.strength.ratio_db if top is not None and top.strength is not None else None,
+        analysis.indicators,
+    )
+
+
+def by_severity(entry: Entry) -> tuple[int, float, float, str]:
+    """Key that sorts the most important first: kind, then confidence, then strength."""
+    return list(Kind).index(entry.kind), -(entry.confidence or 0.0), -(entry.ratio_db or 0.0), entry.name

@@ -1,0 +1,65 @@
+"""Names of report files, and writing them so that none is ever half there."""
+
+from __future__ import annotations
+
+import re
+import secrets
+from collections.abc import Iterable
+from glob import escape
+from pathlib import Path
+
+PART_SUFFIX = ".part"
+LONGEST_NAME = 50  # a letter may take four bytes, and file systems stop at 255
+_RESERVED = {"index", "con", "prn", "aux", "nul"} | {f"{port}{i}" for port in ("com", "lpt") for i in range(1, 10)}
+
+
+def page_names(sources: Iterable[str | Path]) -> tuple[str, ...]:
+    """Return a safe and unique file name, without ending, for each source, in their order.
+
+    Letters, digits, "-", "_" and "." stay; what else may steer a path or a link becomes "-". Two sources that would
+    share a name, also when only case tells them apart, get a number.
+
+    Examples
+    --------
+    >>> page_names(["a/run 1.csv", "b/run 1.csv", "../../etc/passwd", "index.mat", "…"])
+    ('run-1', 'run-1-2', 'passwd', 'index-2', 'recording')
+    """
+    taken = set(_RESERVED)
+    return tuple(_unique(_safe(str(source)), taken) for source in sources)
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a file beside its place and move it there when it is complete; a failure leaves what was there before."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PART_SUFFIX}")
+    try:
+        with part.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        part.replace(path)
+    except BaseException:  # also on Ctrl-C
+        part.unlink(missing_ok=True)
+        raise
+    return path
+
+
+def remove_parts(folder: Path, file_names: Iterable[str]) -> None:
+    """Remove what an interrupted process left of the named files."""
+    for name in file_names:
+        for part in folder.glob(f".{escape(name)}.*{PART_SUFFIX}"):
+            part.unlink(missing_ok=True)
+
+
+def _safe(source: str) -> str:
+    stem = Path(source.replace("\\", "/")).name
+    for ending in (".gz", Path(stem.removesuffix(".gz")).suffix):
+        stem = stem.removesuffix(ending) or stem
+    return re.sub(r"[^\w.-]+", "-", stem).strip(".-_")[:LONGEST_NAME].strip(".-_") or "recording"
+
+
+def _unique(name: str, taken: set[str]) -> str:
+    choice, number = name, 1
+    while choice.lower() in taken:
+        number += 1
+        choice = f"{name}-{number}"
+    taken.add(choice.lower())
+    return choice

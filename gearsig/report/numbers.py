@@ -1,0 +1,40 @@
+"""Numbers for people and for JSON."""
+
+from __future__ import annotations
+
+from math import floor, isfinite, log10
+
+N_DIGITS = 9
+"""Significant digits kept in JSON: more than any measurement has, and free of rounding noise."""
+
+
+def rounded(value: float, n_digits: int = N_DIGITS) -> float | None:
+    """Return `value` with so many significant digits; None for nan and infinity, which JSON does not know.
+
+    Examples
+    --------
+    >>> rounded(0.1 + 0.2), rounded(float("nan")), rounded(1999.7612345678)
+    (0.3, None, 1999.76123)
+    """
+    number = float(value)
+    return float(f"{number:.{n_digits}g}") if isfinite(number) else None
+
+
+def readable(value: float, n_digits: int = 4) -> str:
+    """Write a number for reading: so many significant digits, an en dash where it is not defined.
+
+    Examples
+    --------
+    >>> readable(1999.7612, 6), readable(0.000012345), readable(float("nan")), readable(-1234567)
+    ('1999.76', '1.234e-05', '–', '−1.235e+06')
+    """
+    number = float(value)
+    if not isfinite(number):
+        return "–" if number != number else ("∞" if number > 0 else "−∞")  # noqa: PLR0124 - nan alone differs from itself
+    if number == 0:
+        return "0"
+    power = floor(log10(abs(number)))
+    text = f"{number:.{n_digits - 1}e}" if power < -4 or power > 5 else f"{number:.{max(0, n_digits - 1 - power)}f}"
+    if "." in text and "e" not in text:
+        text = text.rstrip("0").rstrip(".")
+    return text.replace("-", "−", 1) if text.startswith("-") else text

@@ -1,0 +1,157 @@
+"""An analysis as JSON, in a schema that stays.
+
+The object has these members; names end in their unit, numbers carry nine significant digits, and what is not known or
+not defined is null. Members may be added within a version, never renamed or removed.
+
+- ``schema``: "gearsig.analysis", ``schema_version``: 1, ``gearsig_version``
+- ``verdict``: one sentence
+- ``findings``: most important first; each with ``code``, ``kind`` ("fault", "suspicion", "data problem", "cannot tell",
+  "notice", "information"), ``title``, ``where``, ``strength`` (or null), ``confidence``, ``confidence_basis``,
+  ``evidence``, ``surer``
+- ``speed``: ``known``; if true ``shaft``, ``method``, ``mean_rpm``, ``lowest_rpm``, ``highest_rpm``,
+  ``relative_uncertainty``, ``quality``, ``n_revolutions``, ``notes``; if false ``question``, ``reason``, ``remedy``
+- ``indicators``: each with ``name``, ``value``, ``unit``, ``channel``, ``computed_on``, ``shaft``, ``gear``,
+  ``band``, ``note``
+- ``recording``: ``source``, ``sha256``, ``reader``, ``history``, ``warnings``, ``sampling_rate_hz``, ``n_samples``,
+  ``duration_s``, ``channels``, ``speed_source``
+- ``rig``: what is known of the machine, or null
+- ``channels``: per analysed channel the description of its spectra and averages; arrays as their
+  ``{"shape": […]}``, or as lists where they were asked for
+- ``settings``: the parameters that were in force
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearsig import __version__
+from gearsig.angle.types import ShaftAngle
+from gearsig.diagnosis.types import Analysis, CannotTell, ChannelAnalysis
+from gearsig.recording.types import Recording
+from gearsig.report.files import write_text
+from gearsig.report.numbers import rounded
+from gearsig.rig.speed import SpeedSource
+
+SCHEMA, SCHEMA_VERSION = "gearsig.analysis", 1
+Json = dict[str, Any]
+
+
+def analysis_to_dict(analysis: Analysis, *, arrays: bool = False) -> Json:
+    """Return an analysis as plain dictionaries, lists, texts and numbers, see the module's description.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    arrays : bool
+        Whether spectra, maps and averages come with their numbers; a long recording then makes a large object.
+
+    Returns
+    -------
+    dict
+        `json.dumps(..., allow_nan=False)` takes it.
+    """
+    return {
+        "schema": SCHEMA,
+        "schema_version": SCHEMA_VERSION,
+        "gearsig_version": __version__,
+        "verdict": analysis.verdict,
+        "findings": [_plain(finding, arrays=False) for finding in analysis.findings],
+        "speed": _speed(analysis.shaft_angle, arrays=arrays),
+        "indicators": [_plain(indicator, arrays=False) for indicator in analysis.indicators],
+        "recording": _recording(analysis.recording),
+        "rig": _plain(analysis.rig, arrays=False),
+        "channels": [_channel(channel, arrays=arrays) for channel in analysis.channels],
+        "settings": _plain(analysis.settings, arrays=False),
+    }
+
+
+def analysis_to_json(analysis: Analysis, *, arrays: bool = False) -> str:
+    """Return an analysis as JSON text, see `analysis_to_dict`."""
+    indent = None if arrays else 2
+    return json.dumps(analysis_to_dict(analysis, arrays=arrays), indent=indent, ensure_ascii=False, allow_nan=False)
+
+
+def write_json(analysis: Analysis, path: str | Path, *, arrays: bool = False) -> Path:
+    """Write an analysis as JSON; the file appears only when it is complete."""
+    return write_text(Path(path), analysis_to_json(analysis, arrays=arrays) + "\n")
+
+
+def _recording(recording: Recording) -> Json:
+    origin = recording.provenance
+    return {
+        "source": origin.source,
+        "sha256": origin.sha256,
+        "reader": origin.reader,
+        "history": list(origin.history),
+        "warnings": list(recording.warnings),
+        "sampling_rate_hz": recording.sampling_rate_hz,
+        "n_samples": recording.n_samples,
+        "duration_s": rounded(recording.duration_s),
+        "channels": [_plain(channel, arrays=False) for channel in recording.channels],
+        "speed_source": _speed_source(recording.speed_source),
+    }
+
+
+def _speed_source(source: SpeedSource | None) -> Json | None:
+    return None if source is None else {"kind": type(source).__name__, **_plain(source, arrays=False)}
+
+
+def _speed(angle: ShaftAngle | CannotTell, *, arrays: bool) -> Json:
+    if isinstance(angle, CannotTell):
+        return {"known": False, **_plain(angle, arrays=False)}
+    lowest, highest = angle.speed_range_rpm
+    result = {
+        "known": True,
+        "shaft": angle.shaft,
+        "method": angle.method,
+        "mean_rpm": rounded(angle.mean_speed_rpm),
+        "lowest_rpm": rounded(lowest),
+        "highest_rpm": rounded(highest),
+        "relative_uncertainty": rounded(angle.relative_speed_uncertainty),
+        "quality": rounded(angle.quality),
+        "n_revolutions": rounded(angle.n_revolutions),
+        "notes": list(angle.notes),
+    }
+    if arrays:
+        result |= {name: _plain(getattr(angle, name), arrays=True) for name in ("time_s", "revolutions")}
+    return result
+
+
+def _channel(channel: ChannelAnalysis, *, arrays: bool) -> Json:
+    result: Json = _plain(channel, arrays=arrays)
+    result["averages"] = [_plain(average, arrays=arrays) for average in channel.averages.values()]
+    return result
+
+
+def _plain(value: Any, *, arrays: bool) -> Any:
+    """Return a value as JSON knows it; arrays as lists, or as their length where they are not asked for."""
+    if isinstance(value, np.ndarray):
+        return _array(value) if arrays else {"shape": list(value.shape)}
+    if is_dataclass(value):
+        return {field.name: _plain(getattr(value, field.name), arrays=arrays) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item, arrays=arrays) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item, arrays=arrays) for item in value]
+    return _scalar(value)
+
+
+def _scalar(value: Any) -> str | bool | float | None:
+    if isinstance(value, Enum):
+        return str(value.value)
+    if value is None or isinstance(value, (str, bool)):
+        return value
+    return int(value) if isinstance(value, (int, np.integer)) else rounded(value)
+
+
+def _array(values: np.ndarray[Any, np.dtype[Any]]) -> list[Any]:
+    if values.ndim > 1:
+        return [_array(row) for row in values]
+    return [rounded(value) for value in values.tolist()]

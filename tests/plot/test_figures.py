@@ -1,0 +1,185 @@
+"""Every kind of figure draws what it is given, at its edges too."""
+
+import gc
+import weakref
+from concurrent.futures import ThreadPoolExecutor
+from io import BytesIO
+from time import perf_counter
+
+import numpy as np
+import pytest
+
+from gearsig.angle.types import ShaftAngle
+from gearsig.errors import InputError
+from gearsig.indicators.types import Indicator
+from gearsig.orders.types import OrderMap
+from gearsig.plot.average import average_figure
+from gearsig.plot.cursors import Cursor
+from gearsig.plot.marks import AngleMark
+from gearsig.plot.order_map import order_map_figure
+from gearsig.plot.polar import polar_figure
+from gearsig.plot.spectrum import spectrum_figure
+from gearsig.plot.speed import speed_figure
+from gearsig.plot.time import time_figure
+from gearsig.plot.trend import trend_figure
+
+
+def _drawn(figure):
+    """Draw, which raises where matplotlib warns; return all texts."""
+    figure.savefig(BytesIO(), format="png", dpi=40)
+    from matplotlib.text import Text
+
+    return [text.get_text() for text in figure.findobj(Text) if text.get_text()]
+
+
+def _line(figure, axes=0):
+    return max(figure.axes[axes].lines, key=lambda line: len(line.get_ydata()))
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 5000])
+def test_time_of_any_length(recording_of, n):
+    figure = time_figure(recording_of(np.zeros((2, n)), "a", "b"))
+    assert {"a", "b"} <= set(_drawn(figure))
+
+
+def test_time_of_a_million_samples_is_thinned_and_quick(recording_of):
+    samples = np.zeros(1_000_000)
+    samples[123_457] = 7.0
+    recording = recording_of(samples, "a")
+    start = perf_counter()
+    figure = time_figure(recording)
+    _drawn(figure)
+    assert perf_counter() - start < 3.0
+    assert len(_line(figure).get_ydata()) <= 4000
+    assert max(_line(figure).get_ydata()) == 7.0
+
+
+def test_time_limits_cut_the_signal(recording_of):
+    line = _line(time_figure(recording_of(np.arange(1000.0), "a"), limits_s=(0.2, 0.3)))
+    assert min(line.get_xdata()) == pytest.approx(0.2)
+    assert max(line.get_xdata()) == pytest.approx(0.3)
+
+
+def test_names_are_never_markup(recording_of):
+    assert "$\\frac{" in _drawn(time_figure(recording_of(np.zeros(5), "$\\frac{")))
+
+
+@pytest.mark.parametrize("scale", ["log", "decibel", "linear"])
+@pytest.mark.parametrize("values", [np.zeros(10), np.zeros(1), np.ones(1), np.full(10, 1e-30), np.arange(50.0)])
+def test_spectrum_of_any_values(spectrum_of, values, scale):
+    assert _drawn(spectrum_figure(spectrum_of(values), scale=scale))
+
+
+def test_spectrum_draws_cursors_floor_and_marked_positions(spectrum_of):
+    rng = np.random.default_rng(1)
+    spectrum = spectrum_of(rng.rayleigh(size=20_000))
+    cursors = [Cursor(23.0, "mesh", "1× mesh"), Cursor(24.0, "sideband", ""), Cursor(9999.0, "shaft", "far away")]
+    figure = spectrum_figure(spectrum, cursors, floor=np.ones(20_000), limits=(0, 100), marked=(23.0,))
+    texts = _drawn(figure)
+    assert "1× mesh" in texts
+    assert "far away" not in texts
+    assert any(line.get_marker() == "o" for line in figure.axes[0].lines)
+
+
+def test_spectrum_keeps_the_position_of_a_peak(spectrum_of):
+    values = np.full(100_000, 1e-3)
+    values[54_321] = 1.0
+    line = next(line for line in spectrum_figure(spectrum_of(values)).axes[0].lines if len(line.get_xdata()) > 100)
+    assert line.get_xdata()[np.argmax(line.get_ydata())] == pytest.approx(5432.1)
+
+
+def test_decibel_scale_of_amplitudes(spectrum_of):
+    line = _line(spectrum_figure(spectrum_of(np.array([1.0, 10.0, 0.1])), scale="decibel"))
+    np.testing.assert_allclose(line.get_ydata(), [0, 20, -20])
+
+
+def test_spectrum_refuses_what_does_not_fit(spectrum_of):
+    with pytest.raises(InputError, match="floor has 3 values"):
+        spectrum_figure(spectrum_of(np.ones(10)), floor=np.ones(3))
+    with pytest.raises(InputError, match="ascending"):
+        spectrum_figure(spectrum_of(np.ones(10)), limits=(5.0, 5.0))
+    with pytest.raises(InputError, match="did you mean linear"):
+        spectrum_figure(spectrum_of(np.ones(10)), scale="liner")
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 50), (3, 7), (900, 3000)])
+@pytest.mark.parametrize("level", [0.0, 1.0])
+def test_order_map_of_any_shape(shape, level):
+    values = np.full(shape, level)
+    time, positions = np.arange(shape[0]) * 0.1, np.arange(shape[1]) * 0.05
+    order_map = OrderMap(values, positions, time, 1000 + time, "order", "amplitude peak", "m/s^2", 0.05, "a1", "input")
+    assert _drawn(order_map_figure(order_map, [Cursor(1.0, "mesh", "1× mesh")] if shape[1] > 30 else []))
+
+
+def test_order_map_keeps_a_single_tall_cell():
+    values = np.full((900, 3000), 1e-3)
+    values[777, 1234] = 1.0
+    order_map = OrderMap(
+        values, np.arange(3000.0), np.arange(900.0), np.ones(900), "order", "amplitude peak", "g", 1.0, "a1", "in"
+    )
+    mesh = order_map_figure(order_map).axes[1].collections[0]
+    assert mesh.get_array().max() == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize("n", [1, 2, 100, 5000])
+@pytest.mark.parametrize("teeth", [None, 3, 23, 300])
+def test_polar_of_any_length_and_teeth(average_of, n, teeth):
+    assert _drawn(polar_figure(average_of(np.zeros(n)), n_teeth=teeth))
+
+
+def test_polar_without_any_signal_or_scatter(average_of):
+    assert _drawn(polar_figure(average_of(np.zeros(64), error=0.0), n_teeth=8))
+
+
+def test_polar_colours_the_marked_tooth(average_of):
+    from gearsig.plot.style import FAULT
+
+    figure = polar_figure(average_of(np.zeros(64)), n_teeth=8, marks=[AngleMark(100.0, "tooth 3, 100°")])
+    assert "tooth 3, 100°" in _drawn(figure)
+    bold = [text.get_text() for text in figure.axes[0].texts if text.get_color() == FAULT]
+    assert "3" in bold
+    assert "2" not in bold
+
+
+def test_polar_radius_is_zero_ring_plus_value(average_of):
+    figure = polar_figure(average_of(np.array([0.0, 1.0, 0.0, -1.0]), error=0.0))
+    line = next(line for line in figure.axes[0].lines if len(line.get_ydata()) == 5)
+    np.testing.assert_allclose(line.get_ydata(), [1.0, 1.55, 1.0, 0.45, 1.0])
+
+
+@pytest.mark.parametrize("n", [1, 2, 4096])
+def test_average_of_any_length(average_of, n):
+    averages = [average_of(np.ones(n), kind="average"), average_of(np.zeros(n))]
+    assert _drawn(average_figure(averages, n_teeth=23, marks=[AngleMark(359.0, "tooth 23")]))
+
+
+@pytest.mark.parametrize("uncertainty", [float("nan"), 1e-4])
+def test_speed_at_rest_and_turning(uncertainty):
+    for speed in (0.0, 25.0):
+        time = np.array([0.0, 1.0])
+        angle = ShaftAngle("input", time, speed * time, np.full(2, speed), "pulses", uncertainty)
+        assert "speed of input" in _drawn(speed_figure(angle))
+
+
+def test_trend_skips_undefined_values_and_empty_recordings():
+    rows = {"one": [Indicator("FM4", 3.0), Indicator("NA4", float("nan"))], "two": []}
+    texts = _drawn(trend_figure(rows))
+    assert "FM4" in texts
+    assert "NA4" not in texts
+    assert _drawn(trend_figure({})) == []
+
+
+def test_figures_can_be_made_in_threads_and_leave_nothing(spectrum_of):
+    spectrum = spectrum_of(np.random.default_rng(0).rayleigh(size=3000))
+
+    def make(_):
+        figure = spectrum_figure(spectrum, [Cursor(23.0, "mesh", "1× mesh")])
+        buffer = BytesIO()
+        figure.savefig(buffer, format="png", dpi=50)
+        return buffer.getvalue(), weakref.ref(figure)
+
+    with ThreadPoolExecutor(4) as pool:
+        results = list(pool.map(make, range(12)))
+    assert len({picture for picture, _ in results}) == 1
+    gc.collect()
+    assert all(figure() is None for _, figure in results)

@@ -1,0 +1,53 @@
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gearsig.report.files import page_names, remove_parts, write_text
+
+
+@given(st.lists(st.text(max_size=300), max_size=20))
+def test_page_names_are_unique_and_stay_in_their_folder(sources):
+    names = page_names(sources)
+    assert len(names) == len(sources)
+    assert len({name.lower() for name in names}) == len(names)
+    for name in names:
+        assert name
+        assert name == Path(name).name
+        assert not name.startswith(".")
+        assert not set(name) & set('/\\:*?"<>|\0\n #%&')
+        assert len((name + ".html").encode()) < 235
+
+
+def test_name_of_the_index_and_of_devices_are_not_taken():
+    assert page_names(["index.csv", "CON.csv"]) == ("index-2", "CON-2")
+
+
+def test_double_endings_go():
+    assert page_names(["run.csv.gz", "run.csv", "RUN.mat"]) == ("run", "run-2", "RUN-3")
+
+
+def test_a_failed_write_leaves_what_was_there(tmp_path):
+    path = write_text(tmp_path / "page.html", "old")
+    with pytest.raises(UnicodeEncodeError):
+        write_text(path, "x" * 1_000_000 + "\ud800")
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_interrupted_write_is_tidied_up(tmp_path, monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        write_text(tmp_path / "page.html", "new")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_parts_of_the_named_files_are_removed(tmp_path):
+    for name in (".a[1].html.0f.part", ".b.html.0f.part", "a[1].html"):
+        (tmp_path / name).write_text("")
+    remove_parts(tmp_path, ["a[1].html"])
+    assert {path.name for path in tmp_path.iterdir()} == {".b.html.0f.part", "a[1].html"}

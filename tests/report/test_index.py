@@ -1,0 +1,70 @@
+from dataclasses import replace
+
+import pytest
+
+from gearsig.diagnosis.types import Kind
+from gearsig.indicators.types import Indicator
+from gearsig.report.entry import Entry, Failure, entry_of
+from gearsig.report.index import write_index
+
+
+def _entry(name, kind, fm4=3.0, **more):
+    return Entry(
+        name, f"{name}.html", kind, f"verdict of {name}", indicators=(Indicator("FM4", fm4, "", "a1"),), **more
+    )
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(*args, **keywords):
+        return write_index(*args, path=tmp_path / "index.html", **keywords).read_text(encoding="utf-8")
+
+    return write
+
+
+def test_worst_comes_first_and_links_to_its_page(write):
+    html = write([_entry("quiet", Kind.INFORMATION), _entry("bad one", Kind.FAULT), _entry("odd", Kind.SUSPICION)])
+    order = [html.index(f"verdict of {name}") for name in ("bad one", "odd", "quiet")]
+    assert order == sorted(order)
+    assert 'href="bad%20one.html"' in html
+    assert "3 recordings: 1 with a fault, 1 with a suspicion, 1 without a fault found" in html
+
+
+def test_failures_are_listed_with_their_reason(write):
+    html = write([], failures=[Failure("<b>x.csv</b>", "line 3 is <i>text</i>")])
+    assert "&lt;b&gt;x.csv&lt;/b&gt;" in html
+    assert "line 3 is &lt;i&gt;text&lt;/i&gt;" in html
+    assert "1 recording: 1 not analysed" in html
+
+
+def test_bars_compare_the_recordings(write):
+    html = write([_entry("a", Kind.FAULT, 8.0), _entry("b", Kind.NOTICE, 2.0), _entry("c", Kind.NOTICE, float("nan"))])
+    assert "width: 100.0%" in html
+    assert "width: 25.0%" in html
+    assert html.count("data:image/") == 1
+
+
+def test_no_bars_across_units_or_signs(write):
+    one = Entry("a", "", Kind.NOTICE, "", indicators=(Indicator("rms", 2.0, "g", "a"),))
+    other = Entry("b", "", Kind.NOTICE, "", indicators=(Indicator("rms", 3.0, "m/s^2", "a"),))
+    html = write([one, other])
+    assert "width:" not in html.partition("</style>")[2].replace("width=", "")
+    assert "3 m/s²" in html
+
+
+def test_a_single_recording_needs_no_comparison(write):
+    assert "data:image/" not in write([_entry("a", Kind.FAULT)])
+
+
+def test_index_is_strict_html5_and_loads_nothing(write):
+    html5lib = pytest.importorskip("html5lib")
+    html = write([_entry("a", Kind.FAULT), _entry("b", Kind.NOTICE)], failures=[Failure("c", "why")], command="gearsig")
+    html5lib.HTMLParser(strict=True).parse(html)
+    assert "http" not in html.replace("http-equiv", "")
+
+
+def test_entry_sums_up_the_most_important_finding(gearbox):
+    shuffled = replace(gearbox, findings=gearbox.findings[::-1])
+    entry = entry_of(shuffled, "n", "n.html")
+    assert (entry.kind, entry.confidence, entry.ratio_db) == (Kind.FAULT, 0.93, 18.6)
+    assert entry.top_finding.startswith("One tooth")

@@ -1,0 +1,142 @@
+"""The page says everything, escapes everything, and loads nothing."""
+
+import re
+from dataclasses import replace
+from datetime import UTC, datetime
+from html.parser import HTMLParser
+
+import pytest
+
+from gearsig.diagnosis.types import Finding, Kind, Where
+from gearsig.report.page import page_html, severity, write_page
+
+EVIL = "<script>alert(1)</script>"
+QUOTES = "\"rig\" onload='x' & <b>"
+VOID = {"meta", "img", "br", "hr", "link", "input"}
+
+
+class Structure(HTMLParser):
+    """Collect elements and check that every one is closed in its order."""
+
+    def __init__(self):
+        super().__init__(convert_charrefs=True)
+        self.open, self.elements, self.text = [], [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] != "style":
+            self.text.append(data)
+
+
+def parsed(html):
+    structure = Structure()
+    structure.feed(html)
+    structure.close()
+    assert structure.open == []
+    return structure
+
+
+@pytest.fixture(scope="module")
+def html(gearbox):
+    date = datetime(2025, 3, 4, 5, 6, tzinfo=UTC)
+    return page_html(gearbox, command="gearsig report 'monday run.mat'", index="index.html", date=date)
+
+
+def test_everything_is_said(gearbox, html):
+    text = " ".join(" ".join(parsed(html).text).split())
+    for wanted in (
+        gearbox.verdict,
+        *(finding.title for finding in gearbox.findings),
+        *gearbox.findings[0].evidence,
+        "0.94 m/s² against a floor of 0.11 m/s² (2 standard errors of the residual): 18.6 dB",
+        "93 %: agreement of two channels and of both halves of the recording",
+        "tooth 17 at 258.3°",
+        "order 5.415 of input",
+        "23 teeth on input drive 46 on output",
+        "the copy that is all zeros was left out",
+        "pinion bearing, vertical",
+        "found in the vibration, no tachometer",
+        "ab" * 32,
+        "n_mesh_harmonics = 5",
+        "gearsig report 'monday run.mat'",
+        "2025-03-04 05:06 UTC",
+        "needs a healthy run",
+    ):
+        assert wanted in text, wanted
+
+
+def test_most_important_finding_comes_first(html):
+    assert html.index("meshes differently") < html.index("inner-race order of") < html.index("is clipped")
+
+
+def test_page_is_strict_html5(html):
+    html5lib = pytest.importorskip("html5lib")
+    html5lib.HTMLParser(strict=True).parse(html)
+
+
+def test_page_loads_nothing(html):
+    structure = parsed(html)
+    tags = {tag for tag, _ in structure.elements}
+    assert not tags & {"script", "link", "iframe", "object", "embed", "base", "form"}
+    for _, attributes in structure.elements:
+        assert attributes.get("src", "data:").startswith("data:")
+        assert attributes.get("href", "index.html") == "index.html"
+        assert not any(name.startswith("on") for name in attributes)
+    without_data = re.sub(r'"data:[^"]+"', '""', html)
+    assert not re.search(r"(?i)https?:|url\(|@import|//[a-z]", without_data)
+
+
+def test_vector_pictures_load_nothing_either(html):
+    from base64 import b64decode
+
+    vectors = re.findall(r"data:image/svg\+xml;base64,([^\"]+)", html)
+    assert vectors
+    for vector in vectors:
+        svg = b64decode(vector).decode()
+        assert not re.search(r"<script|(?:href|src)=\"(?!#)|url\((?!#)|@import", svg)
+
+
+def test_page_is_small_and_pictures_have_words(html):
+    assert len(html) < 3_000_000
+    pictures = [attributes for tag, attributes in parsed(html).elements if tag == "img"]
+    assert len(pictures) > 10
+    assert all(len(picture["alt"]) > 20 for picture in pictures)
+
+
+@pytest.fixture(scope="module")
+def evil_html(gearbox_with):
+    analysis = gearbox_with([EVIL, "b & c"], QUOTES)
+    finding = Finding(EVIL, Kind.FAULT, EVIL, Where((EVIL,), shaft=EVIL), evidence=(EVIL,), surer=EVIL)
+    return page_html(replace(analysis, verdict=EVIL, findings=(finding,)), command=EVIL)
+
+
+def test_texts_from_files_are_never_markup(evil_html):
+    assert "<script" not in evil_html
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in evil_html
+    structure = parsed(evil_html)
+    assert "script" not in {tag for tag, _ in structure.elements}
+    assert not any(name.startswith("on") for _, attributes in structure.elements for name in attributes)
+    assert QUOTES in " ".join(structure.text)
+
+
+def test_a_recording_that_allows_no_answer_has_a_page(cannot_tell, tmp_path):
+    path = write_page(cannot_tell, tmp_path / "new" / "page.html")
+    structure = parsed(path.read_text(encoding="utf-8"))
+    text = " ".join(" ".join(structure.text).split())
+    assert "cannot tell" in text
+    assert "not known: there is no speed source and no gear data" in text
+    assert "Nothing is known of the machine" in text
+    assert [p.name for p in path.parent.iterdir()] == ["page.html"]
+
+
+def test_severity_is_the_most_important_kind(gearbox, cannot_tell):
+    assert severity(gearbox) is Kind.FAULT
+    assert severity(cannot_tell) is Kind.CANNOT_TELL
+    assert severity(replace(cannot_tell, findings=())) is Kind.INFORMATION
