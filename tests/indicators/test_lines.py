@@ -26,7 +26,7 @@ HANN = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(N) / N)
 
 def spectrum(x, **changes):
     """Hann amplitude spectrum over order, written out here to be independent of gearsig.spectra."""
-    values = 2 * np.abs(np.fft.rfft(x * HANN)) / HANN.sum()
+    values = changes.pop("values", 2 * np.abs(np.fft.rfft(x * HANN)) / HANN.sum())
     facts = {
         "positions": np.arange(len(values)) / N_REV, "axis": "order", "scaling": "amplitude peak", "unit": "m/s^2",
         "resolution": 1 / N_REV, "noise_bandwidth": 1.5 / N_REV, "window": "hann", "n_averages": 1, "source": "a1",
@@ -43,6 +43,23 @@ def cosine(order, amplitude=1.0, phase=0.0):
 @given(st.floats(5, 100), st.floats(-3, 3))
 def test_amplitude_does_not_depend_on_the_place_between_lines(order, phase):
     assert find_line(spectrum(cosine(order, 3.0, phase)), order).amplitude == pytest.approx(3.0, rel=0.003)
+
+
+@pytest.mark.parametrize("name", ["flattop", "blackman", "boxcar"])
+def test_amplitude_in_other_windows_and_on_a_denser_axis(name):
+    from scipy.signal import get_window
+
+    w = get_window(name, N)
+    values = 2 * np.abs(np.fft.rfft(cosine(29.3, 3.0) * w, 4 * N)) / w.sum()
+    bandwidth = N * np.sum(w**2) / w.sum() ** 2 / N_REV
+    s = spectrum(
+        cosine(1), values=values, positions=np.arange(len(values)) / (4 * N_REV), resolution=1 / (4 * N_REV),
+        noise_bandwidth=bandwidth, window=name,
+    )  # fmt: skip
+    # The rectangular window leaves a tenth of the power outside its main lobe, wherever the line lies.
+    assert find_line(s, 29.3, search_orders=0.02).amplitude == pytest.approx(
+        3.0, rel=0.06 if name == "boxcar" else 0.003
+    )
 
 
 def test_rms_scaling_and_frequency_axis_give_the_same_peak_amplitude():
@@ -81,6 +98,14 @@ def test_amplitude_and_phase_modulation_together_lean_to_one_side():
     ((lower, upper),) = sideband_levels(spectrum(modulated(1.0, 0.1, 0.06)), 29, 1.0)
     assert lower == pytest.approx(4 * (0.1 - 0.06) / 2, rel=0.02)
     assert upper == pytest.approx(4 * (0.1 + 0.06) / 2, rel=0.02)
+
+
+def test_each_sideband_is_reported_on_its_own_side():
+    x = cosine(29, 4.0) + sum(cosine(29 + k, 0.1 * (k + 3)) for k in (-2, -1, 1, 2))
+    found = {i.name: i.value for i in mesh_indicators(spectrum(x), RIG, PAIR) if i.shaft == "input"}
+    levels = [found[f"sideband level 1×{k}"] for k in ("-2", "-1", "+1", "+2")]
+    assert levels == pytest.approx([0.1, 0.2, 0.4, 0.5], rel=1e-6)
+    assert found["sideband ratio 1×"] == pytest.approx(20 * math.log10(0.3 / 4), abs=1e-6)
 
 
 def test_average_and_spectrum_agree():

@@ -153,6 +153,14 @@ def test_damaged_tooth_dips_the_mesh_where_it_is_engaged():
     assert engagement_window(np.array([0.99, 0.01]), 0.0, 0.04) == pytest.approx([0.5, 0.5])  # across angle zero
 
 
+def test_damaged_tooth_delays_the_mesh_where_it_is_engaged():
+    damage = ToothDamage("stage 1", "input", 0.5, mesh_lag_rad=0.3, width_teeth=3.0)
+    r = run(meshes=(MeshHarmonics("stage 1", (1.0, 0.5)),), tooth_damages=(damage,))
+    rev = 25 * r.time_s()
+    late = 2 * np.pi * 30 * rev - 0.3 * engagement_window(rev, 0.5, 0.1)
+    np.testing.assert_allclose(r.values("a1"), np.cos(late) + 0.5 * np.cos(2 * late), atol=1e-9)
+
+
 @given(st.integers(3, 60), st.integers(0, 999))
 def test_interpolation_between_teeth_passes_through_every_tooth(n_teeth, seed):
     values = np.random.default_rng(seed).standard_normal(n_teeth)
@@ -168,6 +176,25 @@ def test_slip_makes_the_knocks_drift():
     uneven = np.diff(knock_angles(3.5, 0.01, 0.0, 2000.0, rng)) * 3.5
     assert uneven.mean() == pytest.approx(1.0, abs=4 * 0.01 / np.sqrt(uneven.size))
     assert uneven.std() == pytest.approx(0.01, rel=4 / np.sqrt(2 * uneven.size))
+
+
+def test_first_knock_comes_anywhere_within_one_spacing():
+    first = [knock_angles(3.5, 0.01, 2.0, 5.0, np.random.default_rng(seed))[0] for seed in range(300)]
+    assert min(first) >= 2.0
+    assert np.mean(first) == pytest.approx(2.0 + 0.5 / 3.5, abs=4 / 3.5 / np.sqrt(12 * 300))
+    assert np.ptp(first) == pytest.approx(1 / 3.5, rel=0.05)
+
+
+def test_bearing_on_another_shaft_turns_at_that_shafts_speed():
+    rig = Rig(shafts=RIG.shafts, pairs=RIG.pairs, bearings=(Bearing("b", "output", bpfo_order=4.0),))
+    fault = BearingFault("b", "outer", 5.0, resonance_hz=3000.0, damping_ratio=0.2, slip_fraction=0.0)
+    model = KinematicModel(SPEED, bearing_faults=(fault,))
+    x = simulate_kinematic(rig, model, sampling_rate_hz=RATE, duration_s=DURATION, rng=np.random.default_rng(1))
+    loud = np.flatnonzero(np.abs(x.values("a1")) > 1.0)
+    starts = loud[np.diff(loud, prepend=-1000) > 50]
+    assert 98 <= len(starts) <= 101
+    # 4 knocks per revolution at 12.5 revolutions per second.
+    np.testing.assert_allclose(np.diff(starts), RATE / 50, atol=1.1)
 
 
 @pytest.mark.parametrize("race", ["outer", "inner"])
