@@ -65,6 +65,8 @@ def independent_averages(w: FloatArray, step: int, n_blocks: int) -> int:
     ----------
     P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", 1967.
     """
+    if n_blocks == 1:
+        return 1
     energy = float(np.dot(w, w))
     inflation = 1.0
     for m in range(1, min(n_blocks, (len(w) - 1) // step + 1)):
