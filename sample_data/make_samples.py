@@ -182,7 +182,7 @@ def healthy() -> Sample:
 
 
 def damaged_tooth() -> Sample:
-    """One damaged tooth on the pinion: number 11, at 11.5/29 of a revolution after the tachometer pulse."""
+    """One damaged tooth on the pinion: number 12, at 11.5/29 of a revolution after the tachometer pulse."""
     rig = one_stage_rig("Demonstration gearbox, damaged pinion tooth")
     damage = ToothDamage(
         "stage 1",

@@ -14,10 +14,10 @@ NA4                          residual, with history                 residual, wi
 NA4*, NB4, NB4*              residual; envelope of band-passed mesh not there
 ============================ ====================================== =====================================
 
-The last column follows MATLAB's documentation of what the function takes (average, difference, regular and residual, and
-earlier records for NA4) and returns (RMS, kurtosis and crest factor of the average, FM4, M6A, M8A, FM0, energy ratio, NA4);
-it has not been run side by side. `tsaregular` and `tsadifference` leave a chosen number of shaft harmonics and sidebands
-on the regular side, `gearsig.orders.separate` says which it takes: values agree only where these choices agree.
+The last column follows MATLAB's documentation of what the function takes (average, difference, regular and residual,
+earlier records for NA4) and returns (RMS, kurtosis and crest factor of the average, FM4, M6A, M8A, FM0, energy ratio,
+NA4); it has not been run side by side. `tsaregular` and `tsadifference` leave a chosen number of shaft harmonics and
+sidebands on the regular side, `gearsig.orders.separate` says which it takes: values agree only where these agree.
 """
 
 from __future__ import annotations

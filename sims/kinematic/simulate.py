@@ -219,7 +219,7 @@ class _Run:
                     "pair": d.pair,
                     "shaft": d.shaft,
                     "angle_deg": 360 * d.angle_rev,
-                    "tooth": int(d.angle_rev * known_teeth(rig, d.pair, d.shaft)),
+                    "tooth": int(d.angle_rev % 1.0 * known_teeth(rig, d.pair, d.shaft)) + 1,
                 }
                 for d in model.tooth_damages
             ],

@@ -21,7 +21,8 @@ class ToothDamage:
     pair, shaft : str
         The gear.
     angle_rev : float
-        Shaft angle at which the middle of the damaged tooth is engaged, 0 to 1; tooth number floor(angle_rev Z).
+        Shaft angle at which the middle of the damaged tooth is engaged, 0 to 1. Teeth count from 1 at angle 0: this is
+        tooth floor(angle_rev Z) + 1.
     impulse_mps2 : float
         Envelope of the ring-down at its start, before the transfer path.
     resonance_hz, damping_ratio : float

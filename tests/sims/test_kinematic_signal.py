@@ -254,7 +254,7 @@ def test_truth_is_complete_and_plain():
     assert {key for key, value in EVERYTHING.items() if value} <= set(model)
     assert model["tooth_damages"][0]["impulse_mps2"] == 5.0
     assert model["speed"] == {"kind": "ConstantProfile", "rpm": 1500.0}
-    assert truth["damaged_teeth"] == [{"pair": "stage 1", "shaft": "input", "angle_deg": 90.0, "tooth": 7}]
+    assert truth["damaged_teeth"] == [{"pair": "stage 1", "shaft": "input", "angle_deg": 90.0, "tooth": 8}]
     assert truth["mesh_orders"] == {"stage 1": 30.0}
     assert truth["shafts"]["output"]["n_revolutions"] == pytest.approx(25.0)
     assert len(truth["drawn"]["stage 1/output: tooth amplitude fractions"]) == 60
