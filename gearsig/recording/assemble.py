@@ -136,13 +136,20 @@ def _sampling_rate(
     table: RawTable, source: str, rig: Rig | None, explicit_hz: float | None
 ) -> tuple[float, tuple[str, ...]]:
     """Return the rate by precedence (argument, file, rig) and what contradicts it."""
-    file_hz = _rate_of_file(table, source)
+    file_hz, contradiction = _rate_of_file(table, source)
     rig_hz = None if rig is None else rig.sampling_rate_hz
     if explicit_hz is not None:
         chosen_hz = positive(explicit_hz, f"{source}: sampling rate given", "Hz", remedy="give --fs above zero")
         if file_hz is not None and _differ(chosen_hz, file_hz):
             return chosen_hz, (f"the sampling rate {chosen_hz:g} Hz was given; the file states {file_hz:.9g} Hz",)
         return chosen_hz, ()
+    if contradiction:
+        raise InputError(
+            contradiction,
+            where=source,
+            allowed="statements that agree within 0.1 %",
+            remedy="give the true one as --fs",
+        )
     if file_hz is not None:
         if rig_hz is not None and _differ(file_hz, rig_hz):
             return file_hz, (
@@ -154,24 +161,19 @@ def _sampling_rate(
     raise InputError("states no sampling rate", where=source, allowed="above 0 Hz", remedy=_RATE_REMEDY)
 
 
-def _rate_of_file(table: RawTable, source: str) -> float | None:
+def _rate_of_file(table: RawTable, source: str) -> tuple[float | None, str]:
+    """Return the rate that the file states, and in words how its time column contradicts it."""
     timed_hz = None
     if table.time is not None:
-        scale_s = seconds_per_unit("time", table.time.unit) or 1.0
+        scale_s = seconds_per_unit(table.time.name, table.time.unit) or 1.0
         timed_hz = rate_of_time(table.time.values, scale_s, f"{source}, column {table.time.name!r}", table.row_place)
-    if table.sampling_rate_hz is None:
-        return timed_hz
-    stated_hz = positive(
-        table.sampling_rate_hz, f"{source}: sampling rate in the file", "Hz", remedy="correct it there"
-    )
+    stated_hz = table.sampling_rate_hz
+    if stated_hz is None:
+        return timed_hz, ""
+    positive(stated_hz, f"{source}: sampling rate in the file", "Hz", remedy="correct it there")
     if timed_hz is not None and _differ(stated_hz, timed_hz):
-        raise InputError(
-            f"the file states a sampling rate of {stated_hz:g} Hz, its time column gives {timed_hz:.9g} Hz",
-            where=source,
-            allowed="statements that agree within 0.1 %",
-            remedy="correct the one that is wrong",
-        )
-    return stated_hz
+        return stated_hz, f"a rate of {stated_hz:g} Hz is stated, the time column gives {timed_hz:.9g} Hz"
+    return stated_hz, ""
 
 
 def _differ(a: float, b: float) -> bool:

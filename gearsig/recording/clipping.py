@@ -5,18 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.recording.levels import Levels
 
 MIN_RUN = 3
-EDGE_DROP_STEPS = 8.0
+CORNER_DROP = 8.0
+"""Twice the drop of a parabola, see below."""
+HELD_RATIO = 3.0
+PAIR_RATIO = 20.0
+"""How much more frequent than the average value the extreme must be for pairs to count as runs. A tone whose period
+is a whole number of samples has equal pairs too, but of all its values."""
 PILE_WIDTH = 0.005
 """Width of the bands in the pile-up test, in parts of the range."""
 PILE_RATIO = 6.0
 MIN_PILE_SAMPLES = 20
-MAX_REST_SHARE = 0.45
-"""A level that holds nearly half of the samples or more is where the signal rests (a pulse train's base, a square
-wave's level), not a limit that it runs into."""
+MAX_REST_SHARE = 0.48
+"""A level that holds half of the samples is where the signal rests (a pulse train's base, a square wave's level), not
+a limit that it runs into."""
 
 
 @dataclass(frozen=True)
@@ -27,17 +34,18 @@ class Clipping:
     place: str
 
 
-def find_clipping(x: FloatArray, step: float | None) -> Clipping | None:
+def find_clipping(x: FloatArray, levels: Levels) -> Clipping | None:
     r"""Return where a channel is clipped, or None.
 
-    Two tests per end, either is enough:
+    A smooth peak is a parabola: what stays within a width w of the top for ±h samples has fallen by about 4 w after
+    ±2 h. A run of at least three samples has a *corner* where the signal has fallen by more than 8 w there, on both
+    sides: it was cut, not rounded. Two tests per end of the range look for such runs; either is enough.
 
-    - *Held samples.* Three or more equal samples in a row at the extreme, with a corner at the run's ends. A smooth
-      peak is a parabola: rounded to steps of size q it stays within one step for ±h samples, and has then fallen by
-      about 4 q after ±2 h. Where the signal has fallen by more than 8 q, on either side, it was cut, not rounded.
-      Runs like these must also outnumber the samples in the next step below, as no noise does.
-    - *Pile-up.* The last 0.5 % of the range holds 6 times as many samples as the 0.5 % before. Near a parabolic
-      maximum, time goes with the square root of the distance from it, so that ratio is at most
+    - *Held samples.* Runs of samples equal to the extreme, w being one step of the converter. They must hold three
+      times as many samples as the next step below, as no noise does.
+    - *Pile-up.* Runs in the last 0.5 % of the range, w. That band must hold 6 times as many samples as the 0.5 %
+      before. Near a parabolic maximum, time goes with the square root of the distance from it, so that this ratio
+      is at most
 
       .. math:: 1 / (\sqrt{2} - 1) = 2.41,
 
@@ -46,14 +54,14 @@ def find_clipping(x: FloatArray, step: float | None) -> Clipping | None:
     Parameters
     ----------
     x : array, (n_samples,)
-    step : float or None
-        Step of the converter, if known.
+    levels : Levels
+        Those of `x`.
     """
     low, high = float(x.min()), float(x.max())
     ends = {}
     for sign, extreme in ((1.0, high), (-1.0, low)):
         distance = sign * (extreme - x)  # 0 at the extreme, positive elsewhere
-        n = max(_n_held(distance, step), _n_piled(distance, high - low))
+        n = max(_n_held(distance, levels), _n_piled(distance, high - low, levels.step))
         if n and n < MAX_REST_SHARE * len(x):
             ends[extreme] = n
     if not ends:
@@ -62,29 +70,35 @@ def find_clipping(x: FloatArray, step: float | None) -> Clipping | None:
     return Clipping(sum(ends.values()), place)
 
 
-def _n_held(distance: FloatArray, step: float | None) -> int:
-    """Count samples in runs at the extreme that end in a corner."""
-    at_limit = np.concatenate(([False], distance == 0, [False]))
-    edges = np.flatnonzero(np.diff(at_limit))
+def _n_held(distance: FloatArray, levels: Levels) -> int:
+    """Count the samples held exactly at the extreme, 0 if they are not more than noise would put there."""
+    q = levels.step if levels.step is not None else float(np.finfo(distance.dtype).eps) * float(distance.max())
+    held = distance == 0
+    usual = len(held) / levels.n_used
+    min_run = MIN_RUN if np.count_nonzero(held) < PAIR_RATIO * usual else 2
+    n = _n_in_cornered_runs(held, distance, q, min_run)
+    n_next = int(np.count_nonzero((distance > 0) & (distance <= 1.5 * q)))
+    return n if n > HELD_RATIO * n_next else 0
+
+
+def _n_piled(distance: FloatArray, span: float, step: float | None) -> int:
+    """Count the samples in the last band, 0 if it holds not far more than the one before."""
+    width = PILE_WIDTH * span
+    if step is not None and width < 2 * step:
+        return 0  # the bands would hold one level or none
+    n_last = _n_in_cornered_runs(distance < width, distance, width, MIN_RUN)
+    n_before = int(np.count_nonzero((distance >= width) & (distance < 2 * width)))
+    return n_last if n_last >= max(MIN_PILE_SAMPLES, PILE_RATIO * n_before) else 0
+
+
+def _n_in_cornered_runs(at_limit: NDArray[np.bool_], distance: FloatArray, width: float, min_run: int) -> int:
+    """Count the samples in runs of a length that end in corners."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], at_limit, [False]))))
     starts, stops = edges[::2], edges[1::2]
-    long = stops - starts >= MIN_RUN
+    long = stops - starts >= min_run
     starts, stops = starts[long], stops[long]
-    if not len(starts):
-        return 0
-    q = step if step is not None else float(np.finfo(distance.dtype).eps) * float(distance.max())
     half = -(-(stops - starts) // 2)
     before, after = starts - half, stops - 1 + half
     inside = (before >= 0) & (after < len(distance))
-    drop = np.maximum(distance[before[inside]], distance[after[inside]])
-    cornered = drop > EDGE_DROP_STEPS * q
-    n = int((stops - starts)[inside][cornered].sum())
-    n_next = int(np.count_nonzero((distance > 0) & (distance <= 1.5 * q)))
-    return n if n > n_next else 0
-
-
-def _n_piled(distance: FloatArray, span: float) -> int:
-    """Count samples in the last band if it holds far more than the one before."""
-    width = PILE_WIDTH * span
-    n_last = int(np.count_nonzero(distance < width))
-    n_before = int(np.count_nonzero((distance >= width) & (distance < 2 * width)))
-    return n_last if n_last >= max(MIN_PILE_SAMPLES, PILE_RATIO * n_before) else 0
+    drop = np.minimum(distance[before[inside]], distance[after[inside]])
+    return int((stops - starts)[inside][drop > CORNER_DROP * width].sum())

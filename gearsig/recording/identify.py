@@ -90,7 +90,7 @@ def identify(path: Path) -> str:
     if found in accepted.get(promised, (promised,)):
         return promised if found == "gzip" else found
     hint = "the file was not written completely: copy or export it again"
-    if found != "zero bytes":
+    if "zero bytes" not in found:
         hint = "rename it if only the extension is wrong, or export it again"
     if found == "a Python pickle":
         hint = "pickles can run code and are never opened; export the data as CSV, MAT or HDF5"
@@ -123,6 +123,8 @@ def _text_kind(head: bytes) -> str:
         return "HTML or XML"
     if _UFF.match(head):
         return "UFF58"
+    if b"\0" in head and b"\0" not in head.rstrip(b"\0"):
+        return "text followed by zero bytes"
     if b"\0" in head or sum(c < 9 or 13 < c < 32 for c in head) > 0.01 * len(head):
         return "binary data of an unknown kind"
     return "CSV text"

@@ -114,7 +114,7 @@ def _one_rate(scalars: Mapping[str, NumberArray], stated_hz: Mapping[str, float]
             )
         rates = {path: 1 / dt for path, dt in intervals.items()}
     values = list(rates.values())
-    if values and max(values) > 1.001 * min(values):
+    if values and max(values) - min(values) > 1e-3 * abs(max(values)):
         shown = ", ".join(f"{path} = {hz:g} Hz" for path, hz in list(rates.items())[:4])
         raise InputError(
             f"states several sampling rates: {shown}",

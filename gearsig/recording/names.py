@@ -5,44 +5,21 @@ from __future__ import annotations
 import re
 
 RATE_NAMES = frozenset(
-    [
-        "fs",
-        "sr",
-        "fsamp",
-        "sampfreq",
-        "samplefreq",
-        "samplingfreq",
-        "samplingfrequency",
-        "samplefrequency",
-        "samplingrate",
-        "samplerate",
-        "samplingratehz",
-        "sampleratehz",
-        "fshz",
-        "sfreq",
-        "freqsampling",
-        "fsample",
-        "samplingfrequencyhz",
-        "abtastrate",
-    ]
+    (
+        *("fs", "sr", "fshz", "fsamp", "fsample", "sfreq", "sampfreq", "samplefreq", "samplefrequency", "samplerate"),
+        *("sampleratehz", "samplingfreq", "samplingfrequency", "samplingfrequencyhz", "samplingrate", "samplingratehz"),
+        *("freqsampling", "abtastrate"),
+    )
 )
 """Names of sampling rates in Hz, lower case, without spaces and underscores."""
 INTERVAL_NAMES = frozenset(
-    [
-        "dt",
-        "xinc",
-        "ts",
-        "deltat",
-        "samplinginterval",
-        "sampleinterval",
-        "samplingperiod",
-        "tsample",
-        "dts",
-        "wfincrement",
-    ]
+    (
+        *("dt", "dts", "ts", "deltat", "xinc", "wfincrement", "tsample"),
+        *("sampleinterval", "samplinginterval", "samplingperiod"),
+    )
 )
 """Names of sampling intervals in seconds."""
-SPEED_NAMES = frozenset(["rpm", "rate", "speed", "shaftspeed", "rotspeed", "speedrpm", "drehzahl", "shaftrate", "hz"])
+SPEED_NAMES = frozenset(("rpm", "rate", "speed", "shaftspeed", "rotspeed", "speedrpm", "drehzahl", "shaftrate", "hz"))
 """Names of scalars that may be a shaft speed; told to the user, never used."""
 
 _QUANTITY_OF_UNIT = {

@@ -109,7 +109,7 @@ def _dead(channel: Channel, x: FloatArray, levels: Levels, spread: float, others
 
 
 def _clipped(channel: Channel, x: FloatArray, levels: Levels) -> ChannelProblem | None:
-    clipping = find_clipping(x, levels.step)
+    clipping = find_clipping(x, levels)
     if clipping is None:
         return None
     share = clipping.n_samples / len(x)

@@ -12,24 +12,10 @@ from gearsig.errors import InputError
 from gearsig.recording.raw_table import NumberArray
 
 TIME_NAMES = frozenset(
-    [
-        "time",
-        "t",
-        "zeit",
-        "temps",
-        "tiempo",
-        "tempo",
-        "seconds",
-        "sec",
-        "timestamp",
-        "elapsed_time",
-        "time_s",
-        "t_s",
-        "zeit_s",
-        "temps_s",
-        "time_ms",
-        "t_ms",
-    ]
+    (
+        *("time", "t", "zeit", "temps", "tiempo", "tempo", "seconds", "sec", "timestamp", "elapsed_time"),
+        *("time_s", "t_s", "zeit_s", "temps_s", "time_ms", "t_ms"),
+    )
 )
 SECONDS_PER_UNIT = {
     "": 1.0,

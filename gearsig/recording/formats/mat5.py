@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
-from collections import Counter
+import io
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from gearsig.errors import InputError
 from gearsig.recording.foreign_errors import foreign_errors
-from gearsig.recording.formats.mat5_size import check_mat5_size
+from gearsig.recording.formats.mat5_elements import elements
 from gearsig.recording.formats.writers import OWN_NAME
 from gearsig.recording.metadata import table_from_metadata
 from gearsig.recording.named_arrays import NamedArrays, table_from_arrays
@@ -36,7 +35,6 @@ def read_mat5(path: Path) -> RawTable:
     """
     where = path.name
     with foreign_errors(where, "MAT v5"):
-        check_mat5_size(path)
         variables, notes = _load(path)
     arrays: dict[str, NumberArray] = {}
     texts: dict[str, str] = {}
@@ -48,37 +46,30 @@ def read_mat5(path: Path) -> RawTable:
 
 
 def _load(path: Path) -> tuple[dict[str, Any], list[str]]:
-    """Return the variables by name, and what was noticed about doubled ones."""
-    from scipy.io import loadmat, whosmat
-
-    counts = Counter(name for name, *_ in whosmat(path))
-    if max(counts.values(), default=0) > 1:
-        return _load_doubled(path, counts)
-    loaded = loadmat(path)
-    return {name: value for name, value in loaded.items() if not name.startswith("__")}, []
-
-
-def _load_doubled(path: Path, counts: Counter[str]) -> tuple[dict[str, Any], list[str]]:
-    """Choose among variables that stand in the file twice: the copy with content, or the last."""
+    """Return the variables by name; among copies the last that is not blank, with a note."""
     from scipy.io import loadmat
-    from scipy.io.matlab import varmats_from_mat
 
     chosen: dict[str, Any] = {}
-    differ: set[str] = set()
-    with path.open("rb") as file:
-        for name, stream in varmats_from_mat(file):
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # scipy repeats what is told below
-                value = loadmat(stream).get(name)  # type: ignore[arg-type]  # the stubs know paths only
-            both = name in chosen and not _is_blank(value) and not _is_blank(chosen[name])
-            if both and not _equal(value, chosen[name]):
-                differ.add(name)
-            if name not in chosen or not _is_blank(value):
-                chosen[name] = value
-    doubled = ", ".join(name for name, n in counts.items() if n > 1)
-    notes = [f"variable(s) {doubled} stand in the file more than once: the copy that is not all zeros was taken"]
+    doubled: dict[str, None] = {}
+    differ: dict[str, None] = {}
+    for element in elements(path):
+        loaded = loadmat(io.BytesIO(element))  # type: ignore[arg-type]  # the stubs know paths only
+        for name, value in loaded.items():
+            if name.startswith("__") or not isinstance(value, np.ndarray):
+                continue
+            if name in chosen:
+                doubled[name] = None
+                if _is_blank(value):
+                    continue
+                if not _is_blank(chosen[name]) and not _equal(value, chosen[name]):
+                    differ[name] = None
+            chosen[name] = value
+    notes = []
+    if doubled:
+        names = ", ".join(doubled)
+        notes.append(f"variable(s) {names} stand in the file more than once: the copy that is not all zeros was taken")
     if differ:
-        notes.append(f"the copies of {', '.join(sorted(differ))} differ: the last was taken")
+        notes.append(f"the copies of {', '.join(differ)} differ: the last was taken")
     return chosen, notes
 
 

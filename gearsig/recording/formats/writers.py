@@ -26,7 +26,9 @@ def write_csv(recording: Recording, path: Path) -> None:
 
     header = io.StringIO()
     titles = [f"{c.name} [{c.unit}]" if c.unit else c.name for c in recording.channels]
-    csv.writer(header, lineterminator="\n").writerow([" ".join(title.split()) for title in titles])
+    csv.writer(header, lineterminator="\n").writerow(
+        ["".join(c if c.isprintable() else " " for c in title) for title in titles]
+    )
     table = pa.table({f"column {i}": np.asarray(row) for i, row in enumerate(recording.samples)})
     with path.open("wb") as file:
         file.write(f"{OWN_TEXT_MARK}{metadata_json(recording)}\n".encode())
@@ -70,15 +72,21 @@ def write_wav(recording: Recording, path: Path) -> None:
 
     rate_hz = round(recording.sampling_rate_hz)
     n_bytes = 4 * recording.samples.size
-    if not 1 <= rate_hz < 2**31 or len(recording.channels) >= 2**14 or n_bytes > 0xF000_0000:
+    # The header holds the bytes per second in 32 bits, and per frame in 16.
+    if (
+        rate_hz < 1
+        or 4 * rate_hz * len(recording.channels) >= 2**32
+        or len(recording.channels) >= 2**14
+        or n_bytes > 0xF000_0000
+    ):
         raise InputError(
             f"{rate_hz} Hz × {len(recording.channels)} channels × {n_bytes / 1e9:.3g} GB does not fit",
             where="WAV",
-            allowed="1 Hz or more, up to 16383 channels, below 4 GB",
+            allowed="from 1 Hz, below 4 GB/s, 16384 channels and 4 GB",
             remedy="write .h5",
         )
     largest = float(np.abs(recording.samples).max())
-    if largest > np.finfo(np.float32).max:
+    if largest > float(np.finfo(np.float32).max):
         raise InputError(f"a sample is {largest:g}", where="WAV", allowed="what fits float32", remedy="write .h5")
     wavfile.write(path, rate_hz, np.ascontiguousarray(recording.samples.T, dtype=np.float32))
     text = metadata_json(recording).encode()

@@ -1,0 +1,183 @@
+"""Files that are not what they say: each ends in one line that names file, place, allowed and remedy."""
+
+import gzip
+import os
+import pickle
+import time
+import tracemalloc
+
+import h5py
+import numpy as np
+import pytest
+from scipy.io import savemat, wavfile
+
+from gearsig.errors import InputError
+from gearsig.recording.read import read_recording
+
+EXTENSIONS = (".csv", ".txt", ".csv.gz", ".mat", ".wav", ".h5", ".parquet", ".tdms", ".uff")
+
+
+class Trap:
+    """A pickle that would leave a mark if it were opened."""
+
+    def __init__(self, mark):
+        self.mark = mark
+
+    def __reduce__(self):
+        return os.mkdir, (self.mark,)
+
+
+def refused(path, match=None):
+    with pytest.raises(InputError, match=match) as caught:
+        read_recording(path, sampling_rate_hz=100)
+    error = caught.value
+    assert path.name in str(error)
+    assert "\n" not in str(error)
+    assert error.allowed
+    assert error.remedy
+    return error
+
+
+@pytest.mark.parametrize("extension", EXTENSIONS)
+def test_empty_file(tmp_path, extension):
+    path = tmp_path / f"x{extension}"
+    path.touch()
+    refused(path, "is empty")
+
+
+@pytest.mark.parametrize("extension", EXTENSIONS)
+def test_two_gigabytes_of_zeros(tmp_path, extension):
+    path = tmp_path / f"x{extension}"
+    with path.open("wb") as file:
+        file.truncate(2 << 30)
+    tracemalloc.start()
+    begin = time.perf_counter()
+    refused(path, "zero bytes")
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 5e6
+    assert time.perf_counter() - begin < 2
+
+
+def test_zeros_behind_a_good_beginning(tmp_path):
+    savemat(tmp_path / "x.mat", {"a": np.arange(100.0)})
+    wavfile.write(tmp_path / "x.wav", 100, np.arange(100, dtype=np.int16))
+    (tmp_path / "x.csv").write_text("a,b\n1,2\n3,4\n" * 3)
+    for name in ("x.mat", "x.csv"):
+        with (tmp_path / name).open("r+b") as file:
+            file.truncate(2 << 30)
+        refused(tmp_path / name, "zero bytes")
+
+
+@pytest.mark.parametrize("extension", EXTENSIONS)
+@pytest.mark.parametrize("protocol", range(pickle.HIGHEST_PROTOCOL + 1))
+def test_pickle_is_never_opened(tmp_path, extension, protocol):
+    path, mark = tmp_path / f"x{extension}", tmp_path / "mark"
+    path.write_bytes(pickle.dumps(Trap(str(mark)), protocol))
+    refused(path, "pickle")
+    assert not mark.exists()
+
+
+def test_numpy_files_are_not_read(tmp_path):
+    np.save(tmp_path / "x.npy", np.zeros(5))
+    refused(tmp_path / "x.npy", "NumPy array")
+    (tmp_path / "x.npy").replace(tmp_path / "x.csv")
+    refused(tmp_path / "x.csv", "NumPy array")
+    (tmp_path / "y.npy").write_bytes(pickle.dumps([1]))
+    refused(tmp_path / "y.npy", "pickle")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"PK\x03\x04" + b"x" * 50, "ZIP"),
+        (b"<!DOCTYPE html><p>404", "HTML"),
+        (b"%PDF-1.4", "PDF"),
+        (b"time,a\n0,1\n1,2\n", "CSV text"),
+        (os.urandom(3) + bytes(range(32)) * 8, "binary data"),
+    ],
+)
+@pytest.mark.parametrize("extension", [".mat", ".wav", ".h5", ".parquet", ".tdms", ".uff"])
+def test_content_of_another_kind(tmp_path, extension, content, said):
+    path = tmp_path / f"x{extension}"
+    path.write_bytes(content)
+    refused(path, f"the extension says .*, but the content is .*{said}")
+
+
+def test_names_that_are_no_files(tmp_path):
+    (tmp_path / "recording.csv").write_text("a\n1\n2\n")
+    assert "did you mean recording.csv?" in str(refused_missing(tmp_path / "recordng.csv"))
+    refused(tmp_path, "is a folder")
+    os.mkfifo(tmp_path / "pipe.csv")
+    refused(tmp_path / "pipe.csv", "no regular file")
+    (tmp_path / "x.xyz").write_text("1,2\n")
+    refused(tmp_path / "x.xyz", r"extension '\.xyz' is not known")
+    refused_missing(tmp_path / "nul\0l.csv")
+    refused_missing(tmp_path / ".." / "none" / "x.csv")
+
+
+def refused_missing(path):
+    with pytest.raises(InputError, match="cannot be opened") as caught:
+        read_recording(path)
+    return caught.value
+
+
+def test_gzip_that_is_cut_damaged_or_a_bomb(tmp_path):
+    good = gzip.compress(b"a,b\n" + b"1.25,2\n" * 10_000)
+    path = tmp_path / "x.csv.gz"
+    path.write_bytes(good[:-30])
+    refused(path, "damaged or cut off")
+    path.write_bytes(good[:40] + b"\xff\xff\xff" + good[43:])
+    refused(path)
+    with gzip.open(path, "wb", compresslevel=9) as file:
+        for _ in range(100):
+            file.write(b"0,0\n" * (1 << 18))
+    refused(path, "200 times")
+    path.write_bytes(gzip.compress(bytes(1 << 26)))
+    refused(path, "zero bytes")
+    path.replace(tmp_path / "x.mat.gz")
+    refused(tmp_path / "x.mat.gz", "only text files are read compressed")
+
+
+def make(path):
+    x = np.random.default_rng(1).standard_normal(5000)
+    if path.suffix == ".mat":
+        savemat(path, {"a": x, "s": {"b": x, "fs": 100.0}}, do_compression="z" in path.stem)
+    elif path.suffix == ".h5":
+        with h5py.File(path, "w") as file:
+            file["a"] = x
+    else:
+        wavfile.write(path, 100, x.astype(np.float32))
+    return path
+
+
+@pytest.mark.parametrize("name", ["x.mat", "z.mat", "x.h5", "x.wav"])
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.5, 0.9, 0.999])
+def test_truncated(tmp_path, name, share):
+    path = make(tmp_path / name)
+    data = path.read_bytes()
+    path.write_bytes(data[: max(1, int(share * len(data)))])
+    refused(path)
+
+
+@pytest.mark.parametrize("name", ["x.mat", "z.mat", "x.h5", "x.wav"])
+def test_flipped_bytes_give_a_recording_or_one_line(tmp_path, name):
+    data = make(tmp_path / name).read_bytes()
+    rng = np.random.default_rng(5)
+    for i in range(150):
+        broken = bytearray(data)
+        for at in rng.integers(0, min(len(data), 3000 if i % 2 else len(data)), 3):
+            broken[at] = rng.integers(256)
+        path = tmp_path / f"b{name}"
+        path.write_bytes(broken)
+        try:
+            read_recording(path, sampling_rate_hz=100)
+        except InputError as error:
+            assert path.name in str(error)  # noqa: PT017  either outcome is right, anything else is not
+
+
+def test_packed_bomb_in_mat(tmp_path, monkeypatch):
+    monkeypatch.setattr("gearsig.recording.limits.available_memory_bytes", lambda: 1 << 24)
+    savemat(tmp_path / "x.mat", {"s": {"a": np.zeros(1 << 21)}, "fs": 1.0}, do_compression=True)
+    assert (tmp_path / "x.mat").stat().st_size < 1 << 15
+    refused(tmp_path / "x.mat", "decoded size")

@@ -1,0 +1,191 @@
+"""Text files: layouts that are read, and what is said about those that are not."""
+
+import gzip
+
+import numpy as np
+import pytest
+
+from gearsig.errors import InputError
+from gearsig.recording.read import read_recording
+from gearsig.rig.speed import SpeedChannel
+from gearsig.rig.types import Rig, Sensor
+
+FS_HZ = 25600.0
+
+
+def rows(n=50, rate_hz=FS_HZ):
+    t = np.arange(n) / rate_hz
+    return [(float(t[i]), float(np.sin(i)), float(np.cos(i))) for i in range(n)]
+
+
+def write(path, lines, *, newline="\n"):
+    path.write_bytes((newline.join(lines) + newline).encode())
+    return path
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", " ", ", ", "   "])
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_separators(tmp_path, separator, newline):
+    lines = [separator.join(["time", "a1", "a2"]), *(separator.join(map(repr, r)) for r in rows())]
+    r = read_recording(write(tmp_path / "x.csv", lines, newline=newline))
+    assert r.channel_names == ("a1", "a2")
+    assert r.sampling_rate_hz == pytest.approx(FS_HZ, rel=1e-12)
+    np.testing.assert_array_equal(r.samples, np.array(rows()).T[1:])
+    assert r.warnings == ()
+
+
+@pytest.mark.parametrize("separator", [";", "\t", " "])
+def test_decimal_comma(tmp_path, separator):
+    lines = [
+        separator.join(["Zeit[s]", "a1[g]", "a2"]),
+        *(separator.join(map(repr, r)).replace(".", ",") for r in rows()),
+    ]
+    r = read_recording(write(tmp_path / "x.csv", lines))
+    np.testing.assert_array_equal(r.samples, np.array(rows()).T[1:])
+    assert (r.channels[0].unit, r.channels[0].quantity) == ("g", "acceleration")
+
+
+def test_units_in_header_and_in_a_row_of_their_own(tmp_path):
+    lines = ["Time (ms),acc [m/s^2],tacho (V),left (top)"]
+    lines += [f"{1000 * t!r},{a!r},{b!r},1" for t, a, b in rows()]
+    r = read_recording(write(tmp_path / "x.csv", lines))
+    assert [(c.name, c.unit, c.quantity) for c in r.channels] == [
+        ("acc", "m/s^2", "acceleration"),
+        ("tacho", "V", "tachometer"),
+        ("left (top)", "", "unknown"),
+    ]
+    assert r.sampling_rate_hz == pytest.approx(FS_HZ)
+    r = read_recording(
+        write(tmp_path / "y.tsv", ["t\tacc\tmic", "s\tm/s^2\tPa", *("\t".join(map(repr, q)) for q in rows())])
+    )
+    assert [(c.name, c.unit) for c in r.channels] == [("acc", "m/s^2"), ("mic", "Pa")]
+
+
+def test_preamble_comments_and_stated_rate(tmp_path):
+    lines = ["# made by a logger", "Date: 2024-01-01", "Sampling rate: 25.6 kHz", "", "a,b", "1,2", "3.5,4", "5,6"]
+    r = read_recording(write(tmp_path / "x.csv", lines))
+    assert r.sampling_rate_hz == 25600
+    assert r.channel_names == ("a", "b")
+    np.savetxt(tmp_path / "y.txt", np.array(rows()), header="time a1 a2")
+    assert read_recording(tmp_path / "y.txt").channel_names == ("a1", "a2")
+
+
+def test_headerless(tmp_path):
+    r = read_recording(write(tmp_path / "x.csv", [f"{a!r},{b!r}" for _, a, b in rows()]), sampling_rate_hz=10)
+    assert r.channel_names == ("ch1", "ch2")
+    assert r.sampling_rate_hz == 10
+    r = read_recording(write(tmp_path / "y.csv", [f"{t!r},{b!r}" for t, _, b in rows()]))
+    assert r.sampling_rate_hz == pytest.approx(FS_HZ)
+    assert "taken for the time" in r.warnings[0]
+
+
+def test_row_counter_is_left_out(tmp_path):
+    r = read_recording(write(tmp_path / "x.csv", [",a", *(f"{i},{i % 7}.5" for i in range(20))]), sampling_rate_hz=10)
+    assert r.channel_names == ("a",)
+    assert "only counts" in r.warnings[0]
+
+
+def test_signs_bom_trailing_separator_quotes_and_utf16(tmp_path):
+    text = '\ufeff"acc, x [g]";"b";\r\n+1.5;2;\r\n-1e-3;.5;\r\n 3. ; 4 ;\r\n'
+    expected = [[1.5, -1e-3, 3.0], [2, 0.5, 4]]
+    for encoding in ("utf-8", "utf-16"):
+        (tmp_path / "x.csv").write_bytes(text.lstrip("\ufeff" if encoding == "utf-16" else "").encode(encoding))
+        r = read_recording(tmp_path / "x.csv", sampling_rate_hz=1)
+        assert r.channel_names == ("acc, x", "b")
+        np.testing.assert_array_equal(r.samples, expected)
+
+
+def test_gzip_and_one_column(tmp_path):
+    with gzip.open(tmp_path / "x.csv.gz", "wb") as f:
+        f.write(b"a\n1.25\n2.5\n")
+    np.testing.assert_array_equal(read_recording(tmp_path / "x.csv.gz", sampling_rate_hz=2).samples, [[1.25, 2.5]])
+
+
+def test_rate_precedence(tmp_path):
+    path = write(tmp_path / "x.csv", ["time,a", *(f"{t!r},{a!r}" for t, a, _ in rows())])
+    r = read_recording(path, sampling_rate_hz=1000)
+    assert r.sampling_rate_hz == 1000
+    assert "25600" in r.warnings[0]
+    assert read_recording(path, sampling_rate_hz=25601).warnings == ()
+    r = read_recording(path, rig=Rig(sampling_rate_hz=1000))
+    assert r.sampling_rate_hz == pytest.approx(25600)
+    assert "rig" in r.warnings[0]
+    bare = write(tmp_path / "y.csv", ["a", "1.5", "2", "0.25"])
+    assert read_recording(bare, rig=Rig(sampling_rate_hz=1000)).sampling_rate_hz == 1000
+    with pytest.raises(InputError, match="--fs"):
+        read_recording(bare)
+    for bad in (0, -5, float("nan"), float("inf")):
+        with pytest.raises(InputError, match=r"y\.csv.*Hz"):
+            read_recording(bare, sampling_rate_hz=bad)
+
+
+def test_rig_is_applied_and_provenance_names_the_file_only(tmp_path):
+    path = write(tmp_path / "x.csv", ["a,n [rpm]", "1.5,100", "2,100", "0.25,100"])
+    r = read_recording(path, rig=Rig(sensors=(Sensor("a", "acceleration", "g", "top", scale=2.0),)), sampling_rate_hz=1)
+    np.testing.assert_array_equal(r.values("a"), [3, 4, 0.5])
+    assert r.channels[0].position == "top"
+    assert r.provenance.source == "x.csv"
+    assert len(r.provenance.sha256) == 64
+    assert r.speed == SpeedChannel("n")
+    assert "taken as the shaft speed" in r.warnings[0]
+
+
+def test_time_printed_with_few_digits_is_uniform(tmp_path):
+    path = write(tmp_path / "x.csv", ["time,a", *(f"{i / FS_HZ:.6f},{i % 3}" for i in range(5000))])
+    assert read_recording(path).sampling_rate_hz == pytest.approx(FS_HZ, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda t: t.__setitem__(slice(30, None), t[30:] + 5), "a gap of .* before line 32"),
+        (lambda t: t.__setitem__(20, t[19]), "does not increase at line 22"),
+        (lambda t: t.__setitem__(20, t[18]), "does not increase at line 22"),
+        (lambda t: t.__setitem__(20, t[20] + 0.37), "not uniform.*line 22"),
+        (lambda t: t.__imul__(1 + 0.01 * np.linspace(0, 1, len(t))), "not uniform"),
+    ],
+)
+def test_time_that_is_not_uniform(tmp_path, change, said):
+    t = np.arange(50.0)
+    change(t)
+    with pytest.raises(InputError, match=rf"x\.csv, column 'time': .*{said}"):
+        read_recording(write(tmp_path / "x.csv", ["time,a", *(f"{v!r},1.5" for v in t.tolist())]))
+
+
+def test_jitter_below_one_percent_is_fine(tmp_path):
+    t = np.arange(500) + np.random.default_rng(1).uniform(-0.007, 0.007, 500)
+    t[[0, -1]] = 0, 499
+    r = read_recording(write(tmp_path / "x.csv", ["time,a", *(f"{v!r},1.5" for v in t.tolist())]))
+    assert r.sampling_rate_hz == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        (["a,b", "1,2", "3,x", "5,6"], "line 3, column 'b': 'x' is not a number"),
+        (["a,b", "1,2", "", "3,4", "5,", "5,6"], "line 5, column 'b': the field is empty"),
+        (["a,b", "1,2", "3,4", "5"], "line 4 has 1 of 2 columns.*cut off"),
+        (["a,b", "1,2", "3,4", "5,6,7"], "line 4 has 3 of 2 columns"),
+        (["a,b", "1,2", "3,4", "5,nan"], "'b' holds 1 NaN.*line 4"),
+        (["a,b", "1,2", "3,4", "inf,6"], "'a' holds 1 NaN.*line 4"),
+        (["a,a", "1,2", "3,4"], "'a' occur more than once"),
+        (["a,b"], "no line of numbers"),
+        (["<html><body>1,2"], "HTML"),
+        (["time", "1", "2", "3"], "only column"),
+        (["a b", "1 2", "3 4", "5 1_0"], "line 4, column 'b': '1_0'"),
+    ],
+)
+def test_broken_text(tmp_path, lines, said):
+    with pytest.raises(InputError, match=said) as caught:
+        read_recording(write(tmp_path / "x.csv", lines), sampling_rate_hz=1)
+    text = str(caught.value)
+    assert text.startswith("x.csv")
+    assert "\n" not in text
+    assert caught.value.allowed
+    assert caught.value.remedy
+
+
+def test_markup_in_names_stays_text(tmp_path):
+    name = "<img src=x onerror=alert(1)>"
+    r = read_recording(write(tmp_path / "x.csv", [f"a,{name}", "1,2", "3,4"]), sampling_rate_hz=1)
+    assert r.channel_names[1] == name

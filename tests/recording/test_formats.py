@@ -1,0 +1,302 @@
+"""Every binary format, on files made by its own library."""
+
+import struct
+import wave
+
+import h5py
+import numpy as np
+import pyarrow as pa
+import pytest
+import pyuff
+from nptdms import ChannelObject, RootObject, TdmsWriter
+from pyarrow import parquet
+from scipy.io import savemat, wavfile
+
+from gearsig.errors import InputError
+from gearsig.recording.formats.wav_chunks import parse_lea
+from gearsig.recording.read import read_recording
+from gearsig.rig.speed import SpeedChannel
+from gearsig.rig.types import Rig, Sensor
+
+RNG = np.random.default_rng(7)
+X = RNG.standard_normal(1000)
+Y = RNG.standard_normal(1000).astype(np.float32)
+
+
+class TestMat5:
+    @pytest.mark.parametrize("shape", [(-1, 1), (1, -1), (-1,)])
+    @pytest.mark.parametrize("packed", [True, False])
+    def test_vectors_and_rate(self, tmp_path, shape, packed):
+        savemat(tmp_path / "x.mat", {"a": X.reshape(shape), "Fs": 100.0}, do_compression=packed)
+        r = read_recording(tmp_path / "x.mat")
+        assert r.channel_names == ("a",)
+        assert r.sampling_rate_hz == 100
+        np.testing.assert_array_equal(r.samples[0], X)
+
+    @pytest.mark.parametrize(("name", "value"), [("sr", 50), ("SampFreq", 50.0), ("dt", 0.02), ("samplingRate", 50)])
+    def test_rate_names_in_structs_single_kept(self, tmp_path, name, value):
+        savemat(tmp_path / "x.mat", {"run": {"acc": Y, "head": {name: value}, "note": "text"}})
+        r = read_recording(tmp_path / "x.mat")
+        assert r.sampling_rate_hz == 50
+        assert r.channel_names == ("acc",)
+        assert r.samples.dtype == np.float32
+
+    @pytest.mark.parametrize("orient", [lambda m: m, lambda m: m.T])
+    def test_matrix(self, tmp_path, orient):
+        savemat(tmp_path / "x.mat", {"m": orient(np.stack([X, Y])), "fs": 1.0})
+        r = read_recording(tmp_path / "x.mat")
+        assert r.channel_names == ("m_1", "m_2")
+        np.testing.assert_array_equal(r.samples, np.stack([X, Y]))
+
+    def test_time_vector_and_speed_hint(self, tmp_path):
+        savemat(
+            tmp_path / "x.mat", {"t": np.arange(1000) / 50, "a": X, "X097RPM": 1796, "BPFO": 81.1, "win": [1, 2, 3]}
+        )
+        r = read_recording(tmp_path / "x.mat")
+        assert r.sampling_rate_hz == pytest.approx(50)
+        assert r.speed is None
+        assert any("X097RPM = 1796 may be" in w for w in r.warnings)
+        assert any("win" in w for w in r.warnings)
+
+    @pytest.mark.parametrize("zero_first", [True, False])
+    def test_doubled_variables(self, tmp_path, zero_first):
+        copies = [np.zeros_like(X), X] if zero_first else [X, np.zeros_like(X)]
+        for i, values in enumerate(copies):
+            savemat(tmp_path / f"{i}.mat", {"a": values, "h": {"fs": 0 if values is not X else 10}})
+        data = (tmp_path / "0.mat").read_bytes() + (tmp_path / "1.mat").read_bytes()[128:]
+        (tmp_path / "x.mat").write_bytes(data)
+        r = read_recording(tmp_path / "x.mat")
+        np.testing.assert_array_equal(r.samples[0], X)
+        assert r.sampling_rate_hz == 10
+        assert "more than once" in r.warnings[0]
+
+    def test_two_rates(self, tmp_path):
+        savemat(tmp_path / "x.mat", {"a": X, "b": {"fs": 1.0}, "c": {"fs": 2.0}})
+        with pytest.raises(InputError, match=r"several sampling rates: b\.fs = 1 Hz, c\.fs = 2 Hz"):
+            read_recording(tmp_path / "x.mat")
+
+    def test_unequal_lengths_and_no_signal(self, tmp_path):
+        savemat(tmp_path / "x.mat", {"a": X, "b": X[:500], "fs": 1.0})
+        with pytest.raises(InputError, match="differ in length: 'a' 1000, 'b' 500"):
+            read_recording(tmp_path / "x.mat")
+        savemat(tmp_path / "y.mat", {"fs": 1.0, "s": "text"})
+        with pytest.raises(InputError, match="no signal"):
+            read_recording(tmp_path / "y.mat")
+        savemat(tmp_path / "z.mat", {"a": X * 1j, "fs": 1.0})
+        with pytest.raises(InputError, match="complex"):
+            read_recording(tmp_path / "z.mat")
+
+    @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan])
+    def test_bad_rate(self, tmp_path, rate):
+        savemat(tmp_path / "x.mat", {"a": X, "fs": rate})
+        with pytest.raises(InputError, match=r"x\.mat: sampling rate in the file"):
+            read_recording(tmp_path / "x.mat")
+        savemat(tmp_path / "x.mat", {"a": X, "dt": rate})
+        with pytest.raises(InputError, match="sampling interval"):
+            read_recording(tmp_path / "x.mat")
+
+
+class TestMat73AndHdf5:
+    def matlab_file(self, path):
+        """Make a file as MATLAB does: HDF5 behind a 512-byte header, arrays transposed, classes as attributes."""
+        with h5py.File(path, "w", userblock_size=512) as f:
+            group = f.create_group("run")
+            for name, value, kind in (
+                ("a", X.reshape(1, -1), b"double"),
+                ("m", np.stack([X, X + 1]), b"double"),
+                ("fs", np.array([[512.0]]), b"double"),
+                ("label", np.frombuffer("Prüfstand".encode("utf-16-le"), "<u2").reshape(-1, 1), b"char"),
+            ):
+                group.create_dataset(name, data=value).attrs["MATLAB_class"] = np.bytes_(kind)
+        with path.open("r+b") as f:
+            f.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+
+    def test_mat73(self, tmp_path):
+        self.matlab_file(tmp_path / "x.mat")
+        r = read_recording(tmp_path / "x.mat")
+        assert r.channel_names == ("a", "m_1", "m_2")
+        assert r.sampling_rate_hz == 512
+        np.testing.assert_array_equal(r.values("m_2"), X + 1)
+
+    def test_foreign_hdf5(self, tmp_path):
+        with h5py.File(tmp_path / "x.h5", "w") as f:
+            f.attrs["sampling_rate"] = 64.0
+            f.create_dataset("rig/a", data=X).attrs["unit"] = "m/s^2"
+            f["rig/b"] = Y
+            f["text"] = "hello"
+        r = read_recording(tmp_path / "x.h5")
+        assert [(c.name, c.unit) for c in r.channels] == [("a", "m/s^2"), ("b", "")]
+        assert r.sampling_rate_hz == 64
+
+    def test_links_out_of_the_file_are_not_followed(self, tmp_path):
+        with h5py.File(tmp_path / "secret.h5", "w") as f:
+            f["s"] = X
+        layout = h5py.VirtualLayout((1000,), "f8")
+        layout[:] = h5py.VirtualSource(str(tmp_path / "secret.h5"), "s", (1000,))
+        (tmp_path / "raw").write_bytes(X.tobytes())
+        with h5py.File(tmp_path / "x.h5", "w") as f:
+            f["a"] = Y
+            f["fs"] = 8.0
+            f["link"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "s")
+            f["soft"] = h5py.SoftLink("/a")
+            f.create_virtual_dataset("virtual", layout)
+            f.create_dataset("outside", (1000,), "f8", external=[(str(tmp_path / "raw"), 0, 8000)])
+        r = read_recording(tmp_path / "x.h5")
+        assert r.channel_names == ("a",)
+        assert all(name in r.warnings[0] for name in ("link", "soft", "virtual", "outside"))
+
+    def test_allocated_but_never_written(self, tmp_path):
+        with h5py.File(tmp_path / "x.h5", "w") as f:
+            f.create_dataset("a", (1000,), "f8")
+        with pytest.raises(InputError, match="never written"):
+            read_recording(tmp_path / "x.h5", sampling_rate_hz=1)
+
+    def test_larger_than_memory(self, tmp_path):
+        with h5py.File(tmp_path / "x.h5", "w") as f:
+            f.create_dataset("a", (1 << 40,), "f8", chunks=(1 << 20,), compression="gzip")[:1] = 1
+        with pytest.raises(InputError, match="GB"):
+            read_recording(tmp_path / "x.h5", sampling_rate_hz=1)
+
+
+class TestWav:
+    @pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.int32, np.float32, np.float64])
+    def test_codings(self, tmp_path, dtype):
+        info = None if np.dtype(dtype).kind == "f" else np.iinfo(dtype)
+        values = np.array([[-1, -0.5], [0, 0.5]]) if info is None else np.array([[info.min, 0], [info.max, 1]])
+        wavfile.write(tmp_path / "x.wav", 8000, values.astype(dtype))
+        r = read_recording(tmp_path / "x.wav")
+        zero, full = (0, 1) if info is None else (128 if dtype == np.uint8 else 0, 2.0 ** (info.bits - 1))
+        np.testing.assert_array_equal(r.samples, (values.T - float(zero)) / full)
+        assert [(c.name, c.unit) for c in r.channels] == [("ch1", "FS"), ("ch2", "FS")]
+        assert r.samples.dtype == (np.float64 if dtype in (np.int32, np.float64) else np.float32)
+
+    def test_24_bit(self, tmp_path):
+        with wave.open(str(tmp_path / "x.wav"), "wb") as f:
+            f.setnchannels(1)
+            f.setsampwidth(3)
+            f.setframerate(100)
+            f.writeframes(b"".join(int(v).to_bytes(3, "little", signed=True) for v in (-(2**23), 1, 2**23 - 1)))
+        np.testing.assert_array_equal(read_recording(tmp_path / "x.wav").samples[0], [-1, 2.0**-23, 1 - 2.0**-23])
+
+    def test_speed_channel_by_rig(self, tmp_path):
+        wavfile.write(tmp_path / "x.wav", 8000, np.array([[0, 16384], [5, 16384]], np.int16))
+        sensors = (Sensor("ch2", "rotational_speed", "rpm", scale=6000.0),)
+        r = read_recording(tmp_path / "x.wav", rig=Rig(sensors=sensors, speed=SpeedChannel("ch2")))
+        np.testing.assert_array_equal(r.values("ch2"), [3000, 3000])
+        assert r.speed_source == SpeedChannel("ch2")
+
+    def test_unknown_chunk_is_no_matter_but_a_cut_file_is(self, tmp_path):
+        wavfile.write(tmp_path / "x.wav", 8000, np.arange(100, dtype=np.int16))
+        data = (tmp_path / "x.wav").read_bytes()
+        (tmp_path / "y.wav").write_bytes(data + b"abcd" + struct.pack("<I", 4) + b"1234")
+        assert read_recording(tmp_path / "y.wav").n_samples == 100
+        (tmp_path / "z.wav").write_bytes(data[:-50])
+        with pytest.raises(InputError, match=r"z\.wav: chunk 'data'.*50 are missing"):
+            read_recording(tmp_path / "z.wav")
+        (tmp_path / "z.wav").write_bytes(data[:36])
+        with pytest.raises(InputError, match="no samples"):
+            read_recording(tmp_path / "z.wav")
+
+    def test_lea_chunk(self, tmp_path):
+        def entry(i, scale, name, unit):
+            body = struct.pack("<f", scale)
+            for text in (name, unit):
+                body += struct.pack("<H", len(text)) + text
+            body += struct.pack("<ff", 0, 1)
+            return b"le%02d" % i + struct.pack("<I", len(body)) + body
+
+        chunk = entry(0, 2.0, b"mic", b"Pa") + entry(1, 5000.0, b"mic_RPM", b"tr/min")
+        wavfile.write(tmp_path / "x.wav", 8000, np.array([[16384, 16384]] * 3, np.int16))
+        with (tmp_path / "x.wav").open("ab") as f:
+            f.write(b"LEA " + struct.pack("<I", len(chunk)) + chunk)
+        r = read_recording(tmp_path / "x.wav")
+        np.testing.assert_array_equal(r.samples, [[1.0] * 3, [2500.0] * 3])
+        assert [c.quantity for c in r.channels] == ["sound_pressure", "rotational_speed"]
+        assert r.speed == SpeedChannel("mic_RPM")
+        for cut in range(1, len(chunk)):
+            assert len(parse_lea(chunk[:cut])) in (0, 1)
+
+
+class TestParquet:
+    def test_units_rate_and_text_column(self, tmp_path):
+        fields = [
+            pa.field("a", pa.float64(), metadata={"unit": "m/s^2"}),
+            pa.field("b [Pa]", pa.float32()),
+            pa.field("s", pa.string()),
+        ]
+        schema = pa.schema(fields, metadata={"fs": "128"})
+        parquet.write_table(
+            pa.table([pa.array(X), pa.array(Y), pa.array(["q"] * 1000)], schema=schema), tmp_path / "x.parquet"
+        )
+        r = read_recording(tmp_path / "x.parquet")
+        assert [(c.name, c.unit) for c in r.channels] == [("a", "m/s^2"), ("b", "Pa")]
+        assert r.sampling_rate_hz == 128
+        assert "s" in r.warnings[0]
+
+    def test_missing_values_and_cut_file(self, tmp_path):
+        parquet.write_table(pa.table({"a": pa.array([1, None, 3])}), tmp_path / "x.parquet")
+        with pytest.raises(InputError, match=r"NaN.*sample 1"):
+            read_recording(tmp_path / "x.parquet", sampling_rate_hz=1)
+        (tmp_path / "y.parquet").write_bytes((tmp_path / "x.parquet").read_bytes()[:-20])
+        with pytest.raises(InputError, match="cannot be read as Parquet"):
+            read_recording(tmp_path / "y.parquet", sampling_rate_hz=1)
+
+
+class TestTdms:
+    def write(self, path, **properties):
+        with TdmsWriter(path) as f:
+            f.write_segment(
+                [
+                    RootObject({"operator": "<b>x</b>"}),
+                    ChannelObject("g", "acc.x", X, {"unit_string": "g", **properties}),
+                ]
+            )
+            f.write_segment([ChannelObject("g", "acc.x", X)])
+
+    def test_rate_and_unit(self, tmp_path):
+        self.write(tmp_path / "x.tdms", wf_increment=1 / 2048)
+        r = read_recording(tmp_path / "x.tdms")
+        assert [(c.name, c.unit, c.quantity) for c in r.channels] == [("acc_x", "g", "acceleration")]
+        assert r.sampling_rate_hz == pytest.approx(2048)
+        np.testing.assert_array_equal(r.samples[0], np.concatenate([X, X]))
+
+    def test_bad_increment_and_cut_file(self, tmp_path):
+        self.write(tmp_path / "x.tdms", wf_increment=-1.0)
+        with pytest.raises(InputError, match="wf_increment"):
+            read_recording(tmp_path / "x.tdms")
+        self.write(tmp_path / "x.tdms", wf_increment=1.0)
+        (tmp_path / "y.tdms").write_bytes((tmp_path / "x.tdms").read_bytes()[:-100])
+        with pytest.raises(InputError, match="cut off"):
+            read_recording(tmp_path / "y.tdms")
+
+
+class TestUff58:
+    # pyuff's writer leaves its file to the garbage collector.
+    @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+    @pytest.mark.parametrize("binary", [0, 1])
+    def test_time_response(self, tmp_path, binary):
+        for node, values in ((3, X), (4, X + 1)):
+            facts = {
+                "type": 58,
+                "binary": binary,
+                "func_type": 1,
+                "rsp_node": node,
+                "rsp_dir": 3,
+                "ref_node": 1,
+                "ref_dir": 1,
+                "data": values,
+                "x": np.arange(1000) / 256,
+                "ordinate_spec_data_type": 12,
+                "id1": "run",
+                "ordinate_axis_units_lab": "m/s^2",
+                "abscissa_spec_data_type": 17,
+                "orddenom_spec_data_type": 0,
+            }
+            pyuff.UFF(str(tmp_path / "x.uff")).write_sets(facts, mode="add")
+        r = read_recording(tmp_path / "x.uff")
+        assert [(c.name, c.unit, c.quantity) for c in r.channels] == [
+            ("3+Z", "m/s^2", "acceleration"),
+            ("4+Z", "m/s^2", "acceleration"),
+        ]
+        assert r.sampling_rate_hz == pytest.approx(256)
+        np.testing.assert_allclose(r.samples, [X, X + 1], rtol=1e-5, atol=1e-5)
