@@ -1,0 +1,201 @@
+"""Many recordings: broken ones, killed workers, interruptions, other executors."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearsig import batch
+from gearsig.batch import report_many
+from gearsig.diagnosis.types import Kind
+from gearsig.errors import InputError
+from gearsig.report.entry import Entry, Failure
+
+RATE_HZ = 2048.0
+
+
+@pytest.fixture
+def recordings(tmp_path) -> list[Path]:
+    rng = np.random.default_rng(3)
+    paths = []
+    for name in ("one", "two"):
+        time_s = np.arange(4096) / RATE_HZ
+        table = np.column_stack([time_s, np.sin(2 * np.pi * 200 * time_s) + 0.1 * rng.normal(size=4096)])
+        paths.append(tmp_path / f"{name}.csv")
+        np.savetxt(paths[-1], table, delimiter=",", header="time (s),a1 (m/s^2)", comments="", fmt="%.9f")
+    return paths
+
+
+@pytest.fixture
+def broken(tmp_path) -> Path:
+    path = tmp_path / "broken.csv"
+    path.write_text("time (s),a1\n0,1\n0.1,<b>abc</b>\n")
+    return path
+
+
+def _page_for(job):
+    """Stand in for the analysis: a page without figures."""
+    job.page.write_text("page")
+    return Entry(job.name, job.page.name, Kind.INFORMATION, "verdict")
+
+
+def test_one_broken_file_does_not_stop_the_rest(recordings, broken, tmp_path):
+    steps = []
+    result = report_many(
+        [recordings[0], broken, recordings[1], tmp_path / "absent.csv"],
+        tmp_path / "out",
+        n_processes=1,
+        on_progress=lambda *step: steps.append(step),
+        command="gearsig report",
+    )
+    assert [entry.name for entry in result.entries] == ["one.csv", "two.csv"]
+    assert [failure.name for failure in result.failures] == ["broken.csv", "absent.csv"]
+    assert "abc" in result.failures[0].reason
+    assert "\n" not in result.failures[0].reason
+    assert [(done, total) for done, total, _ in steps] == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    html = result.index_path.read_text(encoding="utf-8")
+    assert "absent.csv" in html
+    assert "<b>abc" not in html
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"one.html", "two.html", "index.html"}
+
+
+def test_local_processes_give_the_same_as_one(recordings, broken, tmp_path):
+    files = [*recordings, broken]
+    alone = report_many(files, tmp_path / "a", n_processes=1)
+    before = dict(os.environ)
+    together = report_many(files, tmp_path / "b", n_processes=2)
+    assert dict(os.environ) == before
+    assert [e.verdict for e in together.entries] == [e.verdict for e in alone.entries]
+    assert [repr(e.indicators) for e in together.entries] == [repr(e.indicators) for e in alone.entries]
+    assert together.failures == alone.failures
+
+
+def test_any_executor_does(recordings, tmp_path, monkeypatch):
+    monkeypatch.setattr(batch, "_report_one", _page_for)
+    with ThreadPoolExecutor(2) as executor:
+        result = report_many(recordings, tmp_path / "out", executor=executor)
+    assert [entry.page for entry in result.entries] == ["one.html", "two.html"]
+
+
+def test_unexpected_errors_ask_for_a_report(recordings, tmp_path, monkeypatch):
+    def fail(*_, **__):
+        raise ZeroDivisionError("by\nnothing")
+
+    monkeypatch.setattr("gearsig.recording.read.read_recording", fail)
+    result = report_many(recordings, tmp_path / "out", n_processes=1)
+    assert result.failures[0] == Failure("one.csv", "unexpected error, please report: ZeroDivisionError: by nothing")
+
+
+def test_files_of_one_name_are_told_apart(tmp_path, monkeypatch):
+    monkeypatch.setattr(batch, "_report_one", _page_for)
+    result = report_many(["a/run.csv", "b/run.csv"], tmp_path / "out", n_processes=1)
+    assert [entry.name for entry in result.entries] == [str(Path("a/run.csv")), str(Path("b/run.csv"))]
+    assert [entry.page for entry in result.entries] == ["run.html", "run-2.html"]
+
+
+def test_an_interruption_leaves_whole_pages_only(recordings, tmp_path, monkeypatch):
+    def interrupted(job):
+        if job.path.name == "two.csv":
+            (job.page.parent / f".{job.page.name}.0f.part").write_text("half a pa")
+            raise KeyboardInterrupt
+        return _page_for(job)
+
+    monkeypatch.setattr(batch, "_report_one", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        report_many(recordings, tmp_path / "out", n_processes=1)
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["one.html"]
+
+
+SCRIPT = """
+import os, signal, sys, time
+from pathlib import Path
+from gearsig import batch
+from gearsig.report.entry import Entry
+from gearsig.diagnosis.types import Kind
+
+def work(job):
+    if job.name == "killer.csv":
+        time.sleep(0.5)
+        os.kill(os.getpid(), signal.SIGKILL)
+    if job.name == "slow.csv":
+        (job.page.parent / ".slow.html.0f.part").write_text("half")
+        time.sleep(60)
+    job.page.write_text("page")
+    return Entry(job.name, job.page.name, Kind.INFORMATION, "fine")
+
+batch._report_one = work
+
+if __name__ == "__main__":
+    result = batch.report_many(sys.argv[2:], sys.argv[1], n_processes=2)
+    print([e.name for e in result.entries], [(f.name, f.reason) for f in result.failures])
+"""
+
+
+@pytest.fixture
+def script(tmp_path) -> Path:
+    path = tmp_path / "script.py"
+    path.write_text(SCRIPT)
+    return path
+
+
+def test_a_killed_worker_costs_only_its_own_file(script, tmp_path):
+    command = [sys.executable, script, tmp_path / "out", "a.csv", "killer.csv", "b.csv"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.startswith("['a.csv', 'b.csv'] [('killer.csv', 'the process that analysed it was killed")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of process groups are POSIX")
+def test_ctrl_c_ends_the_workers_and_tidies_up(script, tmp_path):
+    out = tmp_path / "out"
+    command = [sys.executable, script, out, "a.csv", "slow.csv"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as running:
+        limit = time.monotonic() + 30
+        while not ((out / ".slow.html.0f.part").exists() and (out / "a.html").exists()):
+            assert time.monotonic() < limit
+            time.sleep(0.05)
+        os.killpg(running.pid, signal.SIGINT)
+        errors = running.communicate(timeout=20)[1]
+    assert running.returncode != 0
+    assert "KeyboardInterrupt" in errors
+    assert [path.name for path in out.iterdir()] == ["a.html"]
+
+
+@pytest.mark.parametrize(
+    ("keywords", "message"),
+    [({"paths": []}, "no recordings"), ({"n_processes": 0}, "n_processes is 0"), ({"output_folder": None}, "folder")],
+)
+def test_what_cannot_work_is_said_before_anything_runs(recordings, tmp_path, keywords, message):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    arguments = {"paths": recordings, "output_folder": tmp_path / "out"} | keywords
+    if arguments["output_folder"] is None:
+        arguments["output_folder"] = blocked / "out"
+    with pytest.raises(InputError, match=message):
+        report_many(**arguments)
+    assert not (tmp_path / "out" / "one.html").exists()
+
+
+def test_importing_the_batch_is_light():
+    code = (
+        "import sys, gearsig.batch; print([m for m in ('numpy', 'matplotlib', 'scipy', 'jinja2') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_drawing_never_loads_pyplot():
+    code = (
+        "import sys, io, numpy as np\n"
+        "from gearsig.plot.time import time_figure\n"
+        "from gearsig.recording.types import Channel, Recording\n"
+        "time_figure(Recording(np.zeros((1, 9)), 1.0, (Channel('a'),))).savefig(io.BytesIO())\n"
+        "print('matplotlib.pyplot' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
