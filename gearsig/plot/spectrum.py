@@ -93,8 +93,10 @@ def _draw_lines(
 ) -> None:
     start, stop = spectrum.index_of(limits[0]), spectrum.index_of(limits[1]) + 1
     x, y = spectrum.positions[start:stop], spectrum.values[start:stop]
-    # The zero line's value is an offset of the sensor, not vibration: it must not squeeze the rest on the axis.
-    shown = y[1:] if start == 0 and len(y) > 2 else y
+    # The zero line is an offset of the sensor, or the mean of an envelope, not vibration; with the window's leakage
+    # around it, it must not squeeze the rest on the axis.
+    n_zero = 1 + int(2 * spectrum.noise_bandwidth / spectrum.resolution) if spectrum.resolution > 0 else 1
+    shown = y[n_zero:] if start == 0 and len(y) > 2 * n_zero else y
     logarithmic = scale == "log" and bool(np.any(shown > 0))
 
     def displayed(values: FloatArray) -> FloatArray:

@@ -96,14 +96,12 @@ def label_axes(axes: Axes, x: str = "", y: str = "", title: str = "") -> None:
 
 
 def no_offset(axes: Axes) -> None:
-    """Write tick labels in full: "1999.8", not "-0.2 + 2e3"."""
-    from matplotlib.ticker import ScalarFormatter
+    """Write the labels of linear axes in full: "1999.8", not "-0.2 + 2e3"; "8e−05", not "8" and a factor elsewhere."""
+    from matplotlib.ticker import FuncFormatter, ScalarFormatter
 
     for axis in (axes.xaxis, axes.yaxis):
         if isinstance(axis.get_major_formatter(), ScalarFormatter):
-            formatter = ScalarFormatter(useOffset=False, useMathText=True)
-            formatter.set_powerlimits((-4, 6))
-            axis.set_major_formatter(formatter)
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.8g}".replace("-", "−")))
 
 
 def note(axes: Axes, text: str) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.plot import style
-from gearsig.plot.display import with_unit
+from gearsig.plot.display import plain, unit_text
 from gearsig.plot.thin import N_POINTS, thin
 from gearsig.recording.types import Recording
 
@@ -57,8 +57,8 @@ def time_figure(
         axes.plot(*thin(time, values, n_points), color=style.MEASURED, linewidth=0.6)
         last = i == len(names) - 1
         axes.tick_params(labelbottom=last)
-        quantity = channel.quantity.replace("_", " ").replace("unknown", "value")
-        style.label_axes(axes, "time (s)" if last else "", with_unit(_short(quantity), channel.unit), name)
+        quantity = "" if channel.quantity == "unknown" else ": " + channel.quantity.replace("_", " ")
+        style.label_axes(axes, "time (s)" if last else "", unit_text(channel.unit), f"{plain(name)}{quantity}")
         style.no_offset(axes)
         axes.set_xlim(*_limits(time, recording.sampling_rate_hz))
     return figure
@@ -75,9 +75,3 @@ def _stretch(recording: Recording, name: str, limits_s: tuple[float, float] | No
 def _limits(time: FloatArray, rate_hz: float) -> tuple[float, float]:
     """Return the ends of the time axis, a sample apart at least."""
     return float(time[0]), float(max(time[-1], time[0] + 1 / rate_hz))
-
-
-def _short(quantity: str) -> str:
-    return {"acceleration": "accel.", "transmission error": "transm. error", "rotational speed": "speed"}.get(
-        quantity, quantity
-    )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from gearsig.indicators.types import Indicator
 from gearsig.plot.display import unit_text
 from gearsig.report.numbers import readable
+from gearsig.report.sections import named
 
 Key = tuple[str, str, str, str]
 
@@ -43,8 +44,12 @@ def indicator_tables(indicators: Iterable[Indicator]) -> tuple[IndicatorTable, .
 
 def _place(indicator: Indicator) -> str:
     if indicator.gear:
-        return f"Gear {indicator.gear}"
-    return f"Shaft {indicator.shaft}" if indicator.shaft else "Channels as a whole"
+        return _capital(named("gear", indicator.gear))
+    return _capital(named("shaft", indicator.shaft)) or "Channels as a whole"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:] if text.startswith(("gear ", "shaft ")) else text
 
 
 def _table(title: str, items: list[Indicator]) -> IndicatorTable:

@@ -11,6 +11,7 @@ from gearsig.spectra.types import Spectrum
 CONSTANT_SPEED = 0.01
 """Relative range of speed up to which lines over frequency may be marked."""
 MOST_PAIRS = 3
+WITHOUT_MESH = 50.0  # highest order shown where no mesh is known
 N_MESH_HARMONICS = 3
 
 
@@ -49,10 +50,11 @@ def bearing_cursors(analysis: Analysis, spectrum: Spectrum) -> tuple[Cursor, ...
 
 
 def highest_order_of_interest(analysis: Analysis, spectrum: Spectrum) -> float:
-    """Return where an order spectrum may end: past the third harmonic of the fastest mesh, or its own end."""
+    """Return where an order spectrum may end: past the third harmonic of the fastest mesh, at 50 if none is known."""
     end = float(spectrum.positions[-1])
     meshes = [cursor.position for cursor in line_cursors(analysis, spectrum) if cursor.kind == "mesh"]
-    return min(end, 1.12 * max(meshes)) if meshes and spectrum.resolution < max(meshes) else end
+    highest = 1.12 * max(meshes) if meshes else WITHOUT_MESH
+    return min(end, highest) if spectrum.resolution < highest else end
 
 
 def mesh_windows(analysis: Analysis, spectrum: Spectrum) -> list[tuple[str, float, float]]:

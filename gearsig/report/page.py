@@ -65,6 +65,7 @@ def page_html(analysis: Analysis, *, command: str = "", index: str = "", date: d
         findings=[finding_card(finding) for finding in analysis.findings],
         machine=machine_rows(analysis.rig),
         recording=recording,
+        warnings=[text for text in recording.warnings if text not in {f.title for f in analysis.findings}],
         speed=speed_rows(analysis.shaft_angle),
         gallery=gallery(analysis),
         tables=indicator_tables(analysis.indicators),

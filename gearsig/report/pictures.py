@@ -134,15 +134,18 @@ def _order_or_frequency(analysis: Analysis, channel: ChannelAnalysis) -> Iterato
         yield _frequency_picture(analysis, channel)
         return
     highest = highest_order_of_interest(analysis, spectrum)
+    cursors = line_cursors(analysis, spectrum)
     yield embed(
         spectrum_figure(
             spectrum,
-            line_cursors(analysis, spectrum),
+            cursors,
             limits=(0.0, highest),
             marked=marked_positions(analysis, spectrum, channel.channel),
             title=f"Order spectrum of {channel.channel}",
         ),
-        "Look whether the mesh harmonics stand alone or carry sidebands, and whether a tall line lies off every mark.",
+        "Look whether the mesh harmonics stand alone or carry sidebands, and whether a tall line lies off every mark."
+        if any(cursor.kind == "mesh" for cursor in cursors)
+        else "Look which orders stand out: what keeps its order turns with the shaft.",
         f"Order spectrum of {channel.channel} up to order {highest:.4g}, with the orders that the rig implies.",
     )
 
@@ -244,8 +247,8 @@ def _averages(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]
         teeth = _teeth(analysis, shaft)
         yield embed(
             average_figure(chosen, n_teeth=teeth, marks=marks_of(analysis.findings, shaft, teeth)),
-            "Grey: ± 2 standard errors. Where it stays clear of zero in the residual, something comes back every turn.",
-            f"Synchronous average and residual of {channel.channel} over one revolution of {shaft}.",
+            "Grey: ± 2 standard errors. Where it stays clear of zero, something comes back at that angle every turn.",
+            f"Synchronous {' and '.join(a.kind for a in chosen)} of {channel.channel} over one revolution of {shaft}.",
         )
 
 
@@ -262,7 +265,9 @@ def _polar(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
         seen = f"; marked: {', '.join(mark.label for mark in marks)}" if marks else ""
         yield embed(
             polar_figure(average, n_teeth=teeth, marks=marks),
-            f"{shaft}: sound teeth draw an even ring, a damaged one swings out. Grey is ± 2 standard errors.",
+            f"{shaft}: sound teeth draw an even ring, a damaged one swings out. Grey is ± 2 standard errors."
+            if teeth
+            else f"{shaft}: what leaves the ring comes back at that angle every turn. Grey is ± 2 standard errors.",
             f"Polar picture of the {average.kind} of {channel.channel} over one revolution of {shaft}{seen}.",
         )
 

@@ -37,7 +37,7 @@ class FindingCard:
 
 def finding_card(finding: Finding) -> FindingCard:
     """Put a finding into words."""
-    stated = bool(finding.confidence_basis) or finding.confidence < 1.0
+    stated = finding.kind in (Kind.FAULT, Kind.SUSPICION) or finding.confidence < 1.0
     return FindingCard(
         finding.kind.value,
         css_class(finding.kind),
@@ -62,8 +62,8 @@ def where_texts(where: Where) -> tuple[str, ...]:
     """Return the place of a finding, one text per part of it."""
     texts = [
         ("channel " if len(where.channels) == 1 else "channels ") + ", ".join(where.channels) if where.channels else "",
-        f"gear {where.gear}" if where.gear else (f"shaft {where.shaft}" if where.shaft else ""),
-        _bearing_name(where.bearing),
+        named("gear", where.gear) if where.gear else named("shaft", where.shaft),
+        named("bearing", where.bearing),
         _tooth_text(where),
         _order_text(where),
         f"{readable(where.frequency_hz, 6)} Hz" if where.frequency_hz is not None else "",
@@ -72,8 +72,9 @@ def where_texts(where: Where) -> tuple[str, ...]:
     return tuple(text for text in texts if text)
 
 
-def _bearing_name(name: str) -> str:
-    return name if not name or "bearing" in name.lower() else f"bearing {name}"
+def named(what: str, name: str) -> str:
+    """Return a name with what it names before it, unless the name says so itself; empty for an empty name."""
+    return name if not name or what in name.lower() else f"{what} {name}"
 
 
 def _tooth_text(where: Where) -> str:
@@ -111,7 +112,7 @@ def machine_rows(rig: Rig | None) -> Rows:
         return ()
     rows = [("machine", rig.name), ("shafts", ", ".join(rig.shaft_names))]
     rows += [(f"gear pair {pair.name}", _pair_text(pair)) for pair in rig.pairs]
-    rows += [(_bearing_name(bearing.name), _bearing_text(bearing)) for bearing in rig.bearings]
+    rows += [(named("bearing", bearing.name), _bearing_text(bearing)) for bearing in rig.bearings]
     nominal = rig.nominal_speed_rpm()
     rows += [
         ("nominal speed", f"{readable(nominal, 6)} rpm of {rig.reference_shaft}" if nominal is not None else ""),

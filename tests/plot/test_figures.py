@@ -39,7 +39,7 @@ def _line(figure, axes=0):
 @pytest.mark.parametrize("n", [1, 2, 3, 5000])
 def test_time_of_any_length(recording_of, n):
     figure = time_figure(recording_of(np.zeros((2, n)), "a", "b"))
-    assert {"a", "b"} <= set(_drawn(figure))
+    assert {"a: acceleration", "b: acceleration"} <= set(_drawn(figure))
 
 
 def test_time_of_a_million_samples_is_thinned_and_quick(recording_of):
@@ -61,7 +61,7 @@ def test_time_limits_cut_the_signal(recording_of):
 
 
 def test_names_are_never_markup(recording_of):
-    assert "$\\frac{" in _drawn(time_figure(recording_of(np.zeros(5), "$\\frac{")))
+    assert "$\\frac{: acceleration" in _drawn(time_figure(recording_of(np.zeros(5), "$\\frac{")))
 
 
 @pytest.mark.parametrize("scale", ["log", "decibel", "linear"])
