@@ -50,7 +50,8 @@ def average_figure(
             axes.axvline(mark.angle_deg, color=style.FAULT, linewidth=0.9, linestyle="--", zorder=1.5)
         last = i == len(averages) - 1
         axes.tick_params(labelbottom=last)
-        title = f"{average.kind}, shaft {average.shaft}, channel {average.channel}, {average.n_revolutions} revolutions"
+        shaft = f", shaft {average.shaft}" if average.shaft else ""
+        title = f"{average.kind}{shaft}, channel {average.channel}, {average.n_revolutions} revolutions"
         x = f"angle of {average.shaft or 'the shaft'} (deg)" if last else ""
         style.label_axes(axes, x, with_unit("amplitude", average.unit), title)
         style.no_offset(axes)

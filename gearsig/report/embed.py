@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PNG_DOTS_PER_INCH = 160  # 1440 pixels for 900 on the page: sharp on dense screens and on paper
-N_COLOURS = 96  # figures have few colours and their blends; a third of the size
+N_COLOURS = 192  # figures have few colours and their blends; a third of the size
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ def bearing_cursors(analysis: Analysis, spectrum: Spectrum) -> tuple[Cursor, ...
     return tuple(result)
 
 
-def highest_order_of_interest(analysis: Analysis, spectrum: Spectrum) -> float:
+def highest_order_of_interest(analysis: Analysis, spectrum: Spectrum | OrderMap) -> float:
     """Return where an order spectrum may end: past the third harmonic of the fastest mesh, at 50 if none is known."""
     end = float(spectrum.positions[-1])
     meshes = [cursor.position for cursor in line_cursors(analysis, spectrum) if cursor.kind == "mesh"]

@@ -223,11 +223,13 @@ def _map(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
     order_map = channel.order_map
     if order_map is None:
         return
-    cursors = (
-        tuple(c for c in line_cursors(analysis, order_map) if c.kind == "mesh") if order_map.axis == "order" else ()
-    )
+    cursors: tuple[Cursor, ...] = ()
+    highest = None
+    if order_map.axis == "order":
+        cursors = tuple(c for c in line_cursors(analysis, order_map) if c.kind == "mesh")
+        highest = highest_order_of_interest(analysis, order_map)
     yield embed(
-        order_map_figure(order_map, cursors),
+        order_map_figure(order_map, cursors, highest=highest),
         "Upright lines turn with the shaft; bent bands are resonances that stay at their frequency.",
         f"Levels of {channel.channel} over {order_map.axis} and time.",
         n_colours=256,

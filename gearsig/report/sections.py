@@ -74,7 +74,7 @@ def where_texts(where: Where) -> tuple[str, ...]:
 
 def named(what: str, name: str) -> str:
     """Return a name with what it names before it, unless the name says so itself; empty for an empty name."""
-    return name if not name or what in name.lower() else f"{what} {name}"
+    return name if not name or what.rsplit(maxsplit=1)[-1] in name.lower() else f"{what} {name}"
 
 
 def _tooth_text(where: Where) -> str:
@@ -111,7 +111,7 @@ def machine_rows(rig: Rig | None) -> Rows:
     if rig is None:
         return ()
     rows = [("machine", rig.name), ("shafts", ", ".join(rig.shaft_names))]
-    rows += [(f"gear pair {pair.name}", _pair_text(pair)) for pair in rig.pairs]
+    rows += [(named("gear pair", pair.name), _pair_text(pair)) for pair in rig.pairs]
     rows += [(named("bearing", bearing.name), _bearing_text(bearing)) for bearing in rig.bearings]
     nominal = rig.nominal_speed_rpm()
     rows += [
