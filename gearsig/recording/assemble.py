@@ -189,7 +189,8 @@ def _stack(table: RawTable, source: str) -> FloatArray:
     check_memory(n_samples * len(table.columns) * np.dtype(dtype).itemsize, source)
     samples = np.empty((len(table.columns), n_samples), dtype)
     for row, column in zip(samples, table.columns, strict=True):
-        row[:] = column.values
+        with np.errstate(invalid="ignore"):  # a signalling NaN, which is found in the next line
+            row[:] = column.values
         _check_finite(row, column, table, source)
     return samples
 

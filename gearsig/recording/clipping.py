@@ -78,7 +78,7 @@ def _n_held(distance: FloatArray, levels: Levels) -> int:
     min_run = MIN_RUN if np.count_nonzero(held) < PAIR_RATIO * usual else 2
     n = _n_in_cornered_runs(held, distance, q, min_run)
     n_next = int(np.count_nonzero((distance > 0) & (distance <= 1.5 * q)))
-    return n if n > HELD_RATIO * n_next else 0
+    return int(np.count_nonzero(held)) if n > HELD_RATIO * n_next else 0
 
 
 def _n_piled(distance: FloatArray, span: float, step: float | None) -> int:
@@ -86,9 +86,10 @@ def _n_piled(distance: FloatArray, span: float, step: float | None) -> int:
     width = PILE_WIDTH * span
     if step is not None and width < 2 * step:
         return 0  # the bands would hold one level or none
-    n_last = _n_in_cornered_runs(distance < width, distance, width, MIN_RUN)
+    in_last = distance < width
+    n_last = _n_in_cornered_runs(in_last, distance, width, MIN_RUN)
     n_before = int(np.count_nonzero((distance >= width) & (distance < 2 * width)))
-    return n_last if n_last >= max(MIN_PILE_SAMPLES, PILE_RATIO * n_before) else 0
+    return int(np.count_nonzero(in_last)) if n_last >= max(MIN_PILE_SAMPLES, PILE_RATIO * n_before) else 0
 
 
 def _n_in_cornered_runs(at_limit: NDArray[np.bool_], distance: FloatArray, width: float, min_run: int) -> int:

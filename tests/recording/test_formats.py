@@ -10,9 +10,11 @@ import pytest
 import pyuff
 from nptdms import ChannelObject, RootObject, TdmsWriter
 from pyarrow import parquet
-from scipy.io import savemat, wavfile
+from scipy.io import loadmat, savemat, wavfile
+from scipy.sparse import csc_array
 
 from gearsig.errors import InputError
+from gearsig.recording.formats.mat5_elements import variables
 from gearsig.recording.formats.wav_chunks import parse_lea
 from gearsig.recording.read import read_recording
 from gearsig.rig.speed import SpeedChannel
@@ -69,6 +71,40 @@ class TestMat5:
         np.testing.assert_array_equal(r.samples[0], X)
         assert r.sampling_rate_hz == 10
         assert "more than once" in r.warnings[0]
+
+    @pytest.mark.parametrize("packed", [True, False])
+    def test_values_are_those_of_scipy(self, tmp_path, packed):
+        kinds = ("i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f4", "f8", "c16")
+        numbers = {f"v{kind}": np.array([[1, 2, 3], [4, 5, 100]], kind) for kind in kinds}
+        nested = {"text": "Prüfstand", "cell": np.array([np.arange(3.0), "b"], dtype=object), "empty": np.zeros((0, 3))}
+        savemat(tmp_path / "x.mat", {**numbers, "s": {**nested, "flag": True}}, do_compression=packed)
+        ours, theirs = dict(variables(tmp_path / "x.mat")), loadmat(tmp_path / "x.mat")
+        for name in numbers:
+            np.testing.assert_array_equal(ours[name], theirs[name])
+            assert ours[name].dtype == theirs[name].dtype
+        struct_, reference = ours["s"], theirs["s"][0, 0]
+        assert struct_["text"] == reference["text"][0]
+        np.testing.assert_array_equal(struct_["cell"][0], reference["cell"][0, 0])
+        assert struct_["cell"][1] == "b"
+        assert struct_["empty"].shape == (0, 3)
+        assert struct_["flag"] == reference["flag"]
+
+    def test_struct_arrays_and_sparse(self, tmp_path):
+        runs = np.array([(X, 1.0), (X + 1, 2.0)], dtype=[("a", object), ("q", object)])
+        savemat(tmp_path / "x.mat", {"runs": runs, "w": csc_array(np.eye(3)), "fs": 5.0})
+        r = read_recording(tmp_path / "x.mat")
+        assert r.channel_names == ("runs(1).a", "runs(2).a")
+        assert "sparse" in r.warnings[0]
+
+    def test_big_endian(self, tmp_path):
+        savemat(tmp_path / "x.mat", {"a": X, "fs": 5.0})
+        data = (tmp_path / "x.mat").read_bytes()
+        words = struct.pack(">II8s", 6, 8, bytes([0, 0, 0, 6, 0, 0, 0, 0]))
+        words += struct.pack(">IIii", 5, 8, 1, 3) + struct.pack(">HH4s", 1, 1, b"b\0\0\0")
+        words += struct.pack(">II3d", 9, 24, 1.5, 2.5, 3.5)
+        (tmp_path / "y.mat").write_bytes(data[:124] + b"\x01\x00MI" + struct.pack(">II", 14, len(words)) + words)
+        r = read_recording(tmp_path / "y.mat", sampling_rate_hz=1)
+        np.testing.assert_array_equal(r.values("b"), [1.5, 2.5, 3.5])
 
     def test_two_rates(self, tmp_path):
         savemat(tmp_path / "x.mat", {"a": X, "b": {"fs": 1.0}, "c": {"fs": 2.0}})

@@ -60,7 +60,7 @@ class CsvLayout:
 
 def is_number(text: str, decimal: str) -> bool:
     """Whether a field is a number with this decimal sign; blanks around it do not matter."""
-    field = text.strip()
+    field = text.strip(" \t\r")
     if decimal == ",":
         if "." in field:
             return False

@@ -49,7 +49,9 @@ def read_parquet(path: Path) -> RawTable:
             remedy="rename the columns",
         )
     if OWN_NAME.encode() in metadata:
-        return table_from_metadata(metadata[OWN_NAME.encode()].decode(), list(values.values()), READER, where)
+        return table_from_metadata(
+            metadata[OWN_NAME.encode()].decode(errors="replace"), list(values.values()), READER, where
+        )
     left_out = [f.name for f in schema if f not in numeric]
     notes = (f"column(s) {', '.join(left_out[:8])} hold no numbers and were left out",) if left_out else ()
     columns = tuple(_column(f, values[f.name]) for f in kept)

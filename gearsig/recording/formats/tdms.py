@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +36,7 @@ def read_tdms(path: Path) -> RawTable:
     where = path.name
     check_memory(3 * path.stat().st_size, where)
     # The open file is given, not its name: the index file beside it, which may be of another recording, is not read.
-    with foreign_errors(where, "TDMS"), path.open("rb") as stream, TdmsFile.open(stream) as file:
+    with foreign_errors(where, "TDMS"), _quiet(), path.open("rb") as stream, TdmsFile.open(stream) as file:
         _check_complete(file, where)
         channels = {}
         units = {}
@@ -53,6 +56,19 @@ def read_tdms(path: Path) -> RawTable:
                 rates_hz |= _waveform_rate(channel, name, where) or _stated_rates(channel.properties, name)
     notes = (f"channel(s) {', '.join(left_out[:8])} hold no numbers and were left out",) if left_out else ()
     return table_from_arrays(NamedArrays(channels, {}, units, rates_hz, notes), READER, where)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the library from writing to the terminal what is raised here as an error."""
+    from nptdms.log import log_manager
+
+    before = log_manager.log_level
+    log_manager.set_level(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        log_manager.set_level(before)
 
 
 def _check_complete(file: Any, where: str) -> None:

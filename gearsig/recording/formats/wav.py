@@ -38,7 +38,7 @@ def read_wav(path: Path) -> RawTable:
     chunks = find_chunks(path)
     check_memory(4 * path.stat().st_size, where)
     with foreign_errors(where, "WAV"), warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.simplefilter("error")  # a warning means a damaged file, and becomes an error
         # Chunks that scipy does not know are none of its business; find_chunks has checked the lengths.
         warnings.filterwarnings("ignore", message="Chunk .*not understood")
         rate_hz, frames = wavfile.read(path)
