@@ -118,8 +118,8 @@ def _check_two_levels(x: FloatArray, low: float, high: float) -> None:
 def _schmitt(x, sign, threshold, half_width, near):  # type: ignore[no-untyped-def]
     """Return positions (in samples) of upward edges of sign·x, and whether each is a jump from level to level.
 
-    A jump leaves one sample by no more than `near` around where the signal was, i.e. the samples before and after the two
-    at the edge change by less than `near`.
+    At a jump the two samples around the edge differ by most of the step between the levels (ten times `near`), and the
+    samples before and after change by less than `near`.
     """
     n = x.shape[0]
     positions = np.empty(n // 2 + 1)
@@ -141,7 +141,8 @@ def _schmitt(x, sign, threshold, half_width, near):  # type: ignore[no-untyped-d
                 positions[count] = crossing
                 flat_before = at < 2 or abs(x[at - 1] - x[at - 2]) < near
                 flat_after = at + 1 >= n or abs(x[at + 1] - x[at]) < near
-                jumps[count] = flat_before and flat_after
+                high_step = abs(x[at] - x[at - 1]) > 7 * near
+                jumps[count] = high_step and flat_before and flat_after
                 count += 1
                 armed = False
                 crossing = -1.0

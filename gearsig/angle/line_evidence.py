@@ -1,0 +1,113 @@
+"""How much each frequency looks like a line: heights over the local floor, turned into log likelihood ratios by rank."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+
+_FLOOR_BINS = 96  # the floor is a median over so many bins
+_HIGHEST_LOG_RATIO = 9.0  # 78 dB in power; beyond it a line is no more of a line
+# A line that the comb asks for is there with these odds, and then stands among the top ranks: density a·q^(a-1) of its rank q.
+_PRESENT_MESH, _PRESENT_SIDE, _RANK_EXPONENT = 0.6, 0.4, 0.3
+
+
+@dataclass(frozen=True)
+class LineEvidence:
+    """Log likelihood ratio of "a line of the comb is here" for each interval between two bins.
+
+    Parameters
+    ----------
+    mesh, side : arrays, (n_intervals,)
+        For mesh harmonics and for sidebands and shaft harmonics; interval i spans i to i + 1 bins.
+    log_ratio : array, (n_bins,)
+        ln(power / floor), mean over the channels.
+    bin_width : float
+        Hz, or orders.
+    top : float
+        Upper end of what is looked at.
+    """
+
+    mesh: FloatArray
+    side: FloatArray
+    log_ratio: FloatArray
+    bin_width: float
+    top: float
+
+
+def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float) -> LineEvidence:
+    """Return the evidence for lines in all channels together.
+
+    Hann windows of `n_segment` samples at half overlap; mean power over them; heights over the floor averaged over channels.
+
+    Parameters
+    ----------
+    samples : array, (n_channels, n_samples)
+    rate : float
+        Samples per second, or per revolution.
+    n_segment : int
+    top : float
+        In the unit of `rate`.
+    """
+    n_keep = min(n_segment // 2, int(top / rate * n_segment) + 4)
+    ratios = [_log_ratio(_mean_power(row, n_segment)[:n_keep]) for row in samples]
+    log_ratio = np.mean(ratios, axis=0)
+    peaks = _only_peaks(log_ratio)
+    # Interval i holds the higher of its two ends, so that a candidate may miss a line's middle by half a bin.
+    height = np.maximum(peaks[:-1], peaks[1:])
+    rank = _tail_share(height)
+    return LineEvidence(
+        _log_likelihood_ratio(rank, _PRESENT_MESH),
+        _log_likelihood_ratio(rank, _PRESENT_SIDE),
+        log_ratio,
+        rate / n_segment,
+        top,
+    )
+
+
+def _mean_power(x: FloatArray, n_segment: int) -> FloatArray:
+    from scipy.fft import rfft
+    from scipy.signal.windows import hann
+
+    window = hann(n_segment, sym=False)
+    step = max(1, n_segment // 2)
+    power = np.zeros(n_segment // 2 + 1)
+    for start in range(0, len(x) - n_segment + 1, step):
+        segment = x[start : start + n_segment]
+        power += np.square(np.abs(rfft((segment - segment.mean()) * window)))
+    return power
+
+
+def _log_ratio(power: FloatArray) -> FloatArray:
+    """ln(power/floor); the floor is the median in blocks, straight lines (in decibels) between their middles."""
+    tiny = max(float(power.max()) * 1e-24, 1e-300)
+    log_power = np.log(np.maximum(power, tiny))
+    n_blocks = max(1, len(power) // _FLOOR_BINS)
+    blocks = np.array_split(log_power, n_blocks)
+    middles = np.cumsum([len(b) for b in blocks]) - np.array([len(b) for b in blocks]) / 2
+    medians = np.array([np.median(b) for b in blocks])
+    return np.clip(log_power - np.interp(np.arange(len(power)), middles, medians), -2.0, _HIGHEST_LOG_RATIO)
+
+
+def _only_peaks(x: FloatArray) -> FloatArray:
+    """Keep values that are the largest within two bins each way; the flanks of a line are not lines."""
+    largest = x.copy()
+    for k in (1, 2):
+        largest[k:] = np.maximum(largest[k:], x[:-k])
+        largest[:-k] = np.maximum(largest[:-k], x[k:])
+    return np.where((x >= largest) & (x > 0), x, 0.0)
+
+
+def _tail_share(x: FloatArray) -> FloatArray:
+    """Share of values at least as large as each one."""
+    ordered = np.sort(x)
+    share: FloatArray = (len(x) - np.searchsorted(ordered, x, side="left")) / len(x)
+    return share
+
+
+def _log_likelihood_ratio(rank: FloatArray, present: float) -> FloatArray:
+    """ln(1 - p + p·a·q^(a-1)): a line missing costs little, a line of high rank gives a lot, none decides alone."""
+    ratio: FloatArray = np.log(1.0 - present + present * _RANK_EXPONENT * rank ** (_RANK_EXPONENT - 1.0))
+    return ratio
