@@ -232,7 +232,6 @@ def _map(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
         order_map_figure(order_map, cursors, highest=highest),
         "Upright lines turn with the shaft; bent bands are resonances that stay at their frequency.",
         f"Levels of {channel.channel} over {order_map.axis} and time.",
-        n_colours=256,
     )
 
 
