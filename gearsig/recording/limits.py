@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import gzip
 import os
+import re
 import zlib
 from pathlib import Path
 
 from gearsig.errors import InputError
 
 CHUNK_BYTES = 1 << 22
+HEAD_BYTES = 1 << 16
 MAX_GZIP_RATIO = 200
 """Text of numbers shrinks by 2 to 20; anything far beyond carries no information."""
 GZIP_FREE_BYTES = 1 << 26
@@ -84,7 +86,11 @@ def read_text_bytes(path: Path) -> bytes:
         if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
             check_memory(4 * path.stat().st_size, path.name)
             return _from_utf16(path)
-        check_memory(2 * path.stat().st_size, path.name)
+        file.seek(0)
+        # The numbers on the first lines tell how many there will be: 8 bytes each as read and again as samples.
+        first = file.read(HEAD_BYTES)
+        numbers_per_byte = len(re.findall(rb"[^\s,;]+", first)) / len(first)
+        check_memory(int((2 + 16 * numbers_per_byte) * path.stat().st_size), path.name)
         file.seek(0)
         chunks = []
         while chunk := file.read(CHUNK_BYTES):

@@ -35,7 +35,7 @@ def read_csv(path: Path) -> RawTable:
     is_own = data.startswith(OWN_TEXT_MARK.encode())
     layout = own_layout(data) if is_own else find_layout(data, where)
     n_rows = (len(data) - layout.offset) / layout.bytes_per_line
-    check_memory(int(len(data) + 16 * n_rows * layout.n_columns), where)
+    check_memory(int(16 * n_rows * layout.n_columns), where)  # beside the text, which is in memory now
     names, units = _names_and_units(layout)
     values = parse_rows(data, layout, names, where)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -39,7 +38,7 @@ def _parse_fast(data: bytes, layout: CsvLayout) -> list[FloatArray]:
     table_bytes = memoryview(data)[layout.offset :]
     separator = layout.separator
     if separator == " ":
-        table_bytes = memoryview(re.sub(rb"(?m)^ +| +$", b"", re.sub(rb"[ \t\r]+", b" ", table_bytes)))
+        table_bytes = memoryview(_with_single_blanks(bytes(table_bytes)))
     columns = [f"column {i}" for i in range(layout.n_columns)]
     table = csv.read_csv(
         pa.BufferReader(pa.py_buffer(table_bytes)),
@@ -53,6 +52,14 @@ def _parse_fast(data: bytes, layout: CsvLayout) -> list[FloatArray]:
         ),
     )
     return [table.column(name).to_numpy() for name in columns]
+
+
+def _with_single_blanks(text: bytes) -> bytes:
+    """Return the lines with one blank between fields and none at the ends."""
+    text = text.replace(b"\t", b" ").replace(b"\r", b"")
+    while b"  " in text:
+        text = text.replace(b"  ", b" ")
+    return text.replace(b" \n", b"\n").replace(b"\n ", b"\n").strip(b" ")
 
 
 def _parse_carefully(data: bytes, layout: CsvLayout, names: tuple[str, ...], where: str) -> list[FloatArray]:

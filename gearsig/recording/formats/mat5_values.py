@@ -114,7 +114,8 @@ def _array(parts: Sequence[Part], shape: tuple[int, ...], dtype: str, is_complex
     values = [_numbers(part, order) for part in parts]
     if len(values) != 1 + is_complex or any(len(v) != prod(shape) for v in values):
         raise _damage(f"an array of shape {shape} holds {[len(v) for v in values]} numbers")
-    real = values[0].astype(dtype)
+    with np.errstate(invalid="ignore"):  # a NaN in single precision may be a signalling one
+        real = values[0].astype(dtype)
     whole: NumberArray = real + 1j * values[1] if is_complex else real
     return whole.reshape(shape, order="F")
 

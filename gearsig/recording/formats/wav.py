@@ -36,7 +36,7 @@ def read_wav(path: Path) -> RawTable:
 
     where = path.name
     chunks = find_chunks(path)
-    check_memory(4 * path.stat().st_size, where)
+    check_memory(6 * path.stat().st_size, where)
     with foreign_errors(where, "WAV"), warnings.catch_warnings():
         warnings.simplefilter("error")  # a warning means a damaged file, and becomes an error
         # Chunks that scipy does not know are none of its business; find_chunks has checked the lengths.
