@@ -30,10 +30,11 @@ class Localisation:
     ratio_db : float
         Energy in it over the median window's, summed over channels that are each scaled to unit energy.
     p_value : float
-        Share of surrogates (same spectra, same relations between the channels, random phases) with as high a ratio.
+        The larger of two: the share of surrogates (same spectra, same relations between the channels, random phases)
+        with as high a ratio, and the chance of it among teeth that differ as the teeth of a good gear do.
     repeatability : float
-        Energy in the window over the energy that the scatter of the revolutions puts there; about 1 for noise or for
-        a single event in one revolution, which is not the machine's.
+        Correlation of odd and even revolutions within the window, -1 to 1; about 0 for noise, for impacts that are
+        not tied to this shaft, and for a single event in one revolution.
     channel_shares : tuple of float
         Energy in the window over the median window's for each channel.
     """
@@ -48,7 +49,7 @@ class Localisation:
 
 
 def localise(
-    signals: FloatArray, standard_errors: FloatArray, width_rev: float, n_surrogates: int, rng: np.random.Generator
+    signals: FloatArray, halves: FloatArray, width_rev: float, n_surrogates: int, rng: np.random.Generator
 ) -> Localisation:
     """Test whether the energy of a synchronous average's difference signal sits at one tooth.
 
@@ -56,11 +57,16 @@ def localise(
     gives windows of unequal energy too, and only what goes beyond them counts. The same random phases are used for all
     channels, which keeps their relations.
 
+    Surrogates know nothing of teeth. On a good gear each tooth is a little stronger or weaker than its neighbours, over
+    its whole engagement and in all harmonics at once, so that energies per tooth scatter like the square of one normal
+    number (chi-square with one degree of freedom), which is more than surrogates do: that is the second test.
+
     Parameters
     ----------
     signals : array, (n_channels, n_angles)
         Over one revolution.
-    standard_errors : array, (n_channels, n_angles)
+    halves : array, (n_channels, 2, n_angles)
+        The same of odd and even revolutions by themselves.
     width_rev : float
         Width of the window in revolutions, e.g. one tooth pitch.
     n_surrogates : int
@@ -94,7 +100,6 @@ def localise(
         if n_higher >= _ENOUGH_HIGHER:
             break
     inside = (start + np.arange(width)) % n
-    scatter = float(np.sum((standard_errors[used][:, inside] / scale[used]) ** 2))
     medians = np.median(energies, axis=1)
     shares = np.zeros(len(signals))
     shares[used] = energies[:, start] / medians
@@ -103,10 +108,26 @@ def localise(
         start_rev=start / n,
         width_rev=width / n,
         ratio_db=10 * float(np.log10(ratio)),
-        p_value=(n_higher + 1) / (n_drawn + 1),
-        repeatability=float(np.sum(x[:, inside] ** 2)) / scatter if scatter > 0 else float("inf"),
+        p_value=max((n_higher + 1) / (n_drawn + 1), _p_among_teeth(ratio, n / width)),
+        repeatability=_agreement(halves[used][:, :, inside] / scale[used][:, None]),
         channel_shares=tuple(float(s) for s in shares),
     )
+
+
+def _p_among_teeth(ratio: float, n_teeth: float) -> float:
+    """Return P(largest of n chi-square(1) numbers >= ratio · their median)."""
+    from scipy.special import erfc
+
+    median = 0.4549364  # of the chi-square distribution with one degree of freedom
+    single = float(erfc(np.sqrt(ratio * median / 2)))
+    return float(-np.expm1(n_teeth * np.log1p(-min(single, 1 - 1e-12))))
+
+
+def _agreement(halves: FloatArray) -> float:
+    """Return the correlation between odd and even revolutions, (n_channels, 2, n_angles), over all channels."""
+    odd, even = halves[:, 0], halves[:, 1]
+    size = float(np.sqrt(np.sum(odd**2) * np.sum(even**2)))
+    return float(np.sum(odd * even)) / size if size > 0 else 0.0
 
 
 def _onset(x: FloatArray, start: int, width: int) -> float:

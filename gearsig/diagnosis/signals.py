@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gearsig.angle.types import AngleSignal, ShaftAngle
+from gearsig.checks import FloatArray
 from gearsig.diagnosis.comb import LineExcess, line_excess
 from gearsig.diagnosis.settings import AnalysisSettings
 from gearsig.errors import InputError, RefusalError
+from gearsig.orders.revolutions import whole_revolutions
 from gearsig.orders.separate import SeparatedAverage, highest_line, separate
 from gearsig.orders.types import OrderMap, SynchronousAverage
 from gearsig.recording.types import Recording
@@ -35,6 +37,8 @@ class ShaftSignals:
         Channel → synchronous average.
     separated : mapping
         Channel → its parts; empty where no teeth are known or the mesh is beyond the sampling rate.
+    halves : mapping
+        Channel → difference signals, (2, n_angles), of the odd and of the even revolutions by themselves.
     """
 
     shaft: str
@@ -42,6 +46,7 @@ class ShaftSignals:
     angle: ShaftAngle
     averages: Mapping[str, SynchronousAverage]
     separated: Mapping[str, SeparatedAverage]
+    halves: Mapping[str, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -161,7 +166,7 @@ def _one_shaft(shaft: str, rig: Rig, angle: ShaftAngle, signal: AngleSignal) -> 
     averages = {name: synchronous_average(signal, name) for name in signal.channel_names}
     gears = [pair.teeth(shaft) for pair in rig.pairs if shaft in (pair.driver, pair.driven)]
     teeth = tuple(z for z in gears if z is not None)
-    separated = {}
+    separated, halves = {}, {}
     for name, average in averages.items():
         visible = tuple(z for z in teeth if z <= highest_line(average))
         if visible and np.any(average.values):
@@ -169,4 +174,15 @@ def _one_shaft(shaft: str, rig: Rig, angle: ShaftAngle, signal: AngleSignal) -> 
                 separated[name] = separate(average, visible)
             except (RefusalError, InputError):
                 continue  # nothing is left beside the mesh lines: there is no residual to look at
-    return ShaftSignals(shaft, teeth, angle, averages, separated)
+            halves[name] = np.stack([separate(h, visible).difference.values for h in _halves(signal, average)])
+    return ShaftSignals(shaft, teeth, angle, averages, separated, halves)
+
+
+def _halves(signal: AngleSignal, average: SynchronousAverage) -> tuple[SynchronousAverage, SynchronousAverage]:
+    """Average the odd and the even revolutions by themselves: what the machine does is in both."""
+    revolutions = whole_revolutions(signal, average.channel)
+    odd, even = (
+        replace(average, values=revolutions[start::2].mean(axis=0), n_revolutions=len(revolutions[start::2]))
+        for start in (0, 1)
+    )
+    return odd, even

@@ -37,6 +37,7 @@ class Candidate:
     bearing: Bearing | None = None
     name: str = ""
     expected: float = 0.0
+    rivals: tuple[str, ...] = ()
 
     @property
     def modulation(self) -> float:
@@ -50,11 +51,13 @@ def detect_bearings(signals: Signals, envelopes: list[BandEnvelope]) -> list[Fin
     if signals.angle is None:
         return _over_frequency(signals, cleaned)
     named = _best_named(signals, cleaned)
-    findings = [_named_finding(signals, c) for c in named]
-    unnamed = _best_unnamed(signals, cleaned, named)
+    if named:  # combinations with shaft orders make further families, which are no second fault
+        return [_named_finding(signals, c) for c in named]
+    unnamed = _best_unnamed(signals, cleaned)
     if unnamed is not None:
-        findings.append(_unnamed_finding(signals, unnamed))
-    return findings or [_none_found(signals, cleaned)] if signals.rig.bearings else findings
+        known = _known_multiple(signals, unnamed)
+        return [_unnamed_finding(signals, unnamed) if known is None else _named_finding(signals, known)]
+    return [_none_found(signals, cleaned)] if signals.rig.bearings else []
 
 
 def without_synchronous(signals: Signals, excess: LineExcess) -> LineExcess:
@@ -64,37 +67,59 @@ def without_synchronous(signals: Signals, excess: LineExcess) -> LineExcess:
     return excess
 
 
-def _best_named(signals: Signals, envelopes: list[BandEnvelope]) -> list[Candidate]:
-    """Return the significant bearing parts, surest first; one that is a multiple of a surer one is left out."""
-    slip = signals.settings.bearing_slip
-    found = []
-    expected = [
+def _expected(signals: Signals) -> list[tuple[Bearing, str, float]]:
+    """Return every known bearing part with the order at which its damage would strike."""
+    return [
         (bearing, name, order * ratio * PARTS[name][1])
         for bearing in signals.rig.bearings
         if (ratio := signals.rig.ratio(bearing.shaft)) is not None
         for name, order in bearing.orders().items()
     ]
-    n_tests = len(expected) * len(envelopes)
+
+
+def _best_named(signals: Signals, envelopes: list[BandEnvelope]) -> list[Candidate]:
+    """Return the significant bearing parts, surest first; one that shares its lines with a surer one is left out."""
+    slip = signals.settings.bearing_slip
+    expected = _expected(signals)
+    found = []
     for bearing, name, order in expected:
         best: Candidate | None = None
         for envelope in envelopes:
             comb = best_comb(envelope.excess, order * (1 - slip), order * (1 + slip))
-            if (
-                comb is not None
-                and len(comb.positions) >= MINIMUM_LINES
-                and (best is None or comb.p_value < best.p_value)
-            ):
+            if _is_better(comb, best):
                 best = Candidate(comb, envelope, comb.p_value, bearing, name, order)
         if best is not None:
-            best = replace(best, p_value=min(1.0, best.p_value * n_tests))
+            best = replace(best, p_value=min(1.0, best.p_value * len(expected) * len(envelopes)))
             if best.p_value <= signals.settings.false_alarm_probability:
                 found.append(best)
     found.sort(key=lambda c: (c.p_value, -c.comb.score))
     kept: list[Candidate] = []
     for candidate in found:
         if not any(_shares_lines(candidate.comb, other.comb) for other in kept):
-            kept.append(candidate)
+            kept.append(replace(candidate, rivals=_rivals(signals, candidate)))
     return kept
+
+
+def _rivals(signals: Signals, candidate: Candidate) -> tuple[str, ...]:
+    """Name the other parts whose order is so near, or half or twice, that slip alone could make it this one."""
+    rivals = []
+    for bearing, name, order in _expected(signals):
+        if (bearing, name) == (candidate.bearing, candidate.name):
+            continue
+        ratios = [abs(candidate.comb.fundamental / (order * m) - 1) for m in (0.5, 1.0, 2.0)]
+        if min(ratios) <= signals.settings.bearing_slip:
+            rivals.append(f"{PARTS[name][0]} of {bearing.name}")
+    return tuple(rivals)
+
+
+def _known_multiple(signals: Signals, candidate: Candidate) -> Candidate | None:
+    """Return the candidate named, if its fundamental is a low harmonic of a known part: paths may hide the first."""
+    for bearing, name, order in _expected(signals):
+        for m in (1, 2, 3):
+            if abs(candidate.comb.fundamental / (m * order) - 1) <= signals.settings.bearing_slip:
+                named = replace(candidate, bearing=bearing, name=name, expected=m * order)
+                return replace(named, rivals=_rivals(signals, named))
+    return None
 
 
 def _is_better(comb: Comb | None, best: Candidate | None) -> TypeGuard[Comb]:
@@ -110,17 +135,13 @@ def _shares_lines(comb: Comb, surer: Comb) -> bool:
     return len(shared) >= len(comb.positions) / 2
 
 
-def _best_unnamed(signals: Signals, envelopes: list[BandEnvelope], named: list[Candidate]) -> Candidate | None:
-    """Return the clearest family that is neither a shaft's nor of a part already named."""
+def _best_unnamed(signals: Signals, envelopes: list[BandEnvelope]) -> Candidate | None:
+    """Return the clearest family that is no shaft's. Impacts of bearings come about 1.5 to 14 times per revolution."""
     slowest = min(signals.known_shaft_orders.values(), default=1.0)
     fastest = max(signals.known_shaft_orders.values(), default=1.0)
     best: Candidate | None = None
     for envelope in envelopes:
-        excess = envelope.excess
-        for candidate in named:
-            excess = _without_family(signals, excess, candidate)
-        # Impacts of rolling bearings come between about 1.5 and 14 times per revolution of their shaft.
-        comb = best_comb(excess, 1.5 * slowest, 14.0 * fastest)
+        comb = best_comb(envelope.excess, 1.5 * slowest, 14.0 * fastest)
         if _is_better(comb, best):
             best = Candidate(comb, envelope, comb.p_value)
     if best is None:
@@ -129,20 +150,11 @@ def _best_unnamed(signals: Signals, envelopes: list[BandEnvelope], named: list[C
     return best if best.p_value <= signals.settings.false_alarm_probability else None
 
 
-def _without_family(signals: Signals, excess: LineExcess, candidate: Candidate) -> LineExcess:
-    """Mask a named part's lines and their sidebands at its own shaft's order."""
-    width = 3 * excess.spectrum.resolution + 0.002 * candidate.comb.fundamental
-    ratio = signals.rig.ratio(candidate.bearing.shaft) if candidate.bearing is not None else None
-    for k in range(-3, 4) if ratio is not None else (0,):
-        excess = excess.without_multiples(candidate.comb.fundamental, half_width=width, start=k * (ratio or 0.0))
-    return excess
-
-
 def _named_finding(signals: Signals, candidate: Candidate) -> Finding:
     bearing, comb = candidate.bearing, candidate.comb
     assert bearing is not None  # noqa: S101 - a named candidate has one; narrows the type
     part = PARTS[candidate.name][0]
-    confidence = from_p_value(candidate.p_value)
+    confidence = from_p_value(candidate.p_value) / (1 + len(candidate.rivals))
     if signals.rig.assumed:
         confidence *= WITH_ASSUMED_DATA
     clear = candidate.modulation >= CLEAR_MODULATION and confidence >= 0.75
@@ -159,6 +171,7 @@ def _named_finding(signals: Signals, candidate: Candidate) -> Finding:
         (
             f"{_family_text(candidate)}, {100 * slip:+.2f} % from the kinematic order {candidate.expected:.4f}.",
             _modulation_text(candidate),
+            *(f"Within its slip, the {rival} would show at the same order." for rival in candidate.rivals),
         ),
         "A recording of the same bearing when it was good, or another sensor nearer to it.",
     )
