@@ -62,6 +62,11 @@ _QUANTITY_OF_UNIT = {
 }
 RPM_UNITS = frozenset(("rpm", "r/min", "tr/min", "u/min", "1/min", "min^-1"))
 
+_RATE_LINE = re.compile(
+    r"[#%/;\s]*(?P<name>[^=:;,\t]+?)\s*[=:;,\t]+\s*"
+    r"(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(?P<unit>k?hz)?[\s;,]*$",
+    re.IGNORECASE,
+)
 _UNIT_AT_END = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\]\[]*)\]|\((?P<round>[^()]*)\))\s*$", re.DOTALL)
 
 
@@ -92,6 +97,20 @@ def split_unit(header: str) -> tuple[str, str]:
     if is_unit(match["round"]):
         return match["name"], match["round"].strip()
     return header.strip(), ""
+
+
+def rate_in_line(line: str) -> float | None:
+    """Return the sampling rate that a line of text states, in Hz.
+
+    Examples
+    --------
+    >>> rate_in_line("# fs = 25600"), rate_in_line("Sampling rate [Hz];25.6e3"), rate_in_line("# run 5: good")
+    (25600.0, 25600.0, None)
+    """
+    match = _RATE_LINE.match(line)
+    if match is None or re.sub(r"[\[(]hz[\])]$", "", plain_name(match["name"])) not in RATE_NAMES:
+        return None
+    return float(match["value"]) * (1e3 if (match["unit"] or "").casefold() == "khz" else 1.0)
 
 
 def is_unit(text: str) -> bool:

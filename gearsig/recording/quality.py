@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.recording.clipping import find_clipping
+from gearsig.recording.clipping import CORNER_DROP, find_clipping
 from gearsig.recording.levels import Levels, find_levels
 from gearsig.recording.types import Channel, Recording
 
@@ -23,6 +23,7 @@ MAX_QUANTISED_LEVELS = 64
 MAX_OFFSET_RATIO = 3.0
 MIN_STUCK_SAMPLES = 16
 STUCK_RATIO = 10
+CORNER_DISTANCE = 8
 MIN_SAMPLES = 64
 _OFFSET_QUANTITIES = frozenset(("acceleration", "velocity", "sound_pressure", "unknown"))
 
@@ -56,8 +57,9 @@ def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
     - *dead*: constant; or at most four neighbouring levels and a standard deviation below 1/1000 of the median of the
       other vibration channels in the same unit.
     - *clipped*: see `gearsig.recording.clipping`.
-    - *stuck*: runs of equal samples away from the extremes, at least 16 long and ten times longer than 99 % of the
-      runs in the channel: a dropout of the measurement chain.
+    - *stuck*: runs of equal samples away from the extremes, at least 16 long, ten times longer than 99 % of the
+      runs in the channel, and with a corner at both ends (eight samples further the signal is more than eight of the
+      converter's steps away, which it is not at a smooth turning point): a dropout of the measurement chain.
     - *offset*: the mean is more than three times the standard deviation, for quantities without a static part.
     - *quantised*: fewer than 64 equidistant levels in use, less than 6 bits.
 
@@ -91,7 +93,12 @@ def _problems_of(channel: Channel, x: FloatArray, spread: float, others: list[fl
         return [dead]
     if len(x) < MIN_SAMPLES:
         return []
-    tests = (_clipped(channel, x, levels), _stuck(channel, x), _offset(channel, x, spread), _quantised(channel, levels))
+    tests = (
+        _clipped(channel, x, levels),
+        _stuck(channel, x, levels),
+        _offset(channel, x, spread),
+        _quantised(channel, levels),
+    )
     return [problem for problem in tests if problem is not None]
 
 
@@ -118,13 +125,19 @@ def _clipped(channel: Channel, x: FloatArray, levels: Levels) -> ChannelProblem 
     return ChannelProblem(channel.name, "clipped", share, evidence, remedy)
 
 
-def _stuck(channel: Channel, x: FloatArray) -> ChannelProblem | None:
+def _stuck(channel: Channel, x: FloatArray, levels: Levels) -> ChannelProblem | None:
     ends = np.flatnonzero(np.diff(x) != 0)
     lengths = np.diff(np.concatenate(([-1], ends, [len(x) - 1])))
     starts = np.concatenate(([0], ends + 1))
     inside = (x[starts] != x.min()) & (x[starts] != x.max())
     usual = float(np.percentile(lengths, 99))
     long = inside & (lengths >= max(MIN_STUCK_SAMPLES, STUCK_RATIO * usual))
+    step = levels.step or float(np.finfo(x.dtype).eps * np.abs(x).max())
+    before, after = starts - CORNER_DISTANCE, starts + lengths - 1 + CORNER_DISTANCE
+    long &= (before >= 0) & (after < len(x))
+    held = x[starts[long]]
+    away = np.minimum(np.abs(x[before[long]] - held), np.abs(x[after[long]] - held))
+    long[long] = away > CORNER_DROP * step
     if not long.any():
         return None
     longest = int(np.argmax(np.where(long, lengths, 0)))

@@ -70,6 +70,14 @@ def test_preamble_comments_and_stated_rate(tmp_path):
     assert read_recording(tmp_path / "y.txt").channel_names == ("a1", "a2")
 
 
+@pytest.mark.parametrize("line", ["% fs = 1000", "sampling rate,1000", "Abtastrate: 1 kHz", "# sample_rate_hz;1e3"])
+def test_stated_rate_is_no_header(tmp_path, line):
+    for rows_ in (["1,2.5", "3,4"], ["1 2.5 3", "4 5 6"]):
+        r = read_recording(write(tmp_path / "x.csv", [line, *rows_]))
+        assert r.sampling_rate_hz == 1000
+        assert r.channel_names[0] == "ch1"
+
+
 def test_headerless(tmp_path):
     r = read_recording(write(tmp_path / "x.csv", [f"{a!r},{b!r}" for _, a, b in rows()]), sampling_rate_hz=10)
     assert r.channel_names == ("ch1", "ch2")
@@ -172,6 +180,7 @@ def test_jitter_below_one_percent_is_fine(tmp_path):
         (["a,b"], "no line of numbers"),
         (["<html><body>1,2"], "HTML"),
         (["time", "1", "2", "3"], "only column"),
+        (["when,a", "2024-01-01 00:00:01,2", "2024-01-01 00:00:02,2"], "date and time are not read"),
         (["a b", "1 2", "3 4", "5 1_0"], "line 4, column 'b': '1_0'"),
     ],
 )

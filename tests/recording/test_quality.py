@@ -91,6 +91,21 @@ def test_stuck_offset_and_quantised():
     assert kinds(quantise(x * 0.2, 10)) == []
 
 
+@pytest.mark.parametrize("bits", [8, 10, 12, 16])
+def test_smooth_turning_points_are_not_stuck(bits):
+    chirp = np.linspace(0.2, 0.9, N) * np.sin(2 * np.pi * (1e-3 * T + 0.1 * T**2 / N))
+    assert "stuck" not in [kind for _, kind in kinds(quantise(chirp, bits))]
+
+
+def test_a_dropout_in_converter_steps_is_stuck():
+    x = quantise(0.5 * np.sin(0.3 * T) + 0.1 * RNG.standard_normal(N), 12)
+    x[700:760] = 0.0
+    (problem,) = find_problems(Recording(x[np.newaxis], 1e4, (Channel("a", "acceleration"),)))
+    assert problem.kind == "stuck"
+    assert "sample 700" in problem.evidence
+    assert problem.share == pytest.approx(60 / N)
+
+
 def test_other_quantities_are_not_looked_at():
     assert kinds(np.zeros(N), (T % 100 < 50) * 5.0, quantity="tachometer") == []
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ from gearsig.recording.formats.csv_layout import CsvLayout, find_layout, own_lay
 from gearsig.recording.formats.csv_rows import line_of_row, parse_rows
 from gearsig.recording.limits import check_memory, read_text_bytes
 from gearsig.recording.metadata import OWN_TEXT_MARK, table_from_metadata
-from gearsig.recording.names import RATE_NAMES, plain_name, split_unit
+from gearsig.recording.names import plain_name, rate_in_line, split_unit
 from gearsig.recording.raw_table import RawColumn, RawTable
 
 READER = "gearsig CSV reader"
@@ -55,7 +54,7 @@ def read_csv(path: Path) -> RawTable:
     return RawTable(
         tuple(columns),
         READER,
-        sampling_rate_hz=_stated_rate(layout.preamble),
+        sampling_rate_hz=next((hz for line in layout.preamble if (hz := rate_in_line(line)) is not None), None),
         time=time,
         warnings=tuple(warnings),
         row_place=place,
@@ -72,20 +71,6 @@ def _names_and_units(layout: CsvLayout) -> tuple[tuple[str, ...], tuple[str, ...
     prefix = "column " if layout.header else "ch"
     names = [name or f"{prefix}{i + 1}" for i, (name, _) in enumerate(pairs)]
     return tuple(names), tuple(units)
-
-
-def _stated_rate(preamble: tuple[str, ...]) -> float | None:
-    """Return the sampling rate from a line like "# fs = 25600 Hz" above the table."""
-    for line in preamble:
-        match = re.match(
-            r"[#%/;\s]*([^=:;,\t]+?)\s*[=:;,\t]+\s*([-+\d.eE]+)\s*(k?hz)?\s*[;,]*\s*$", line, re.IGNORECASE
-        )
-        if match and re.sub(r"(\[hz\]|\(hz\))$", "", plain_name(match[1])) in RATE_NAMES:
-            try:
-                return float(match[2]) * (1e3 if (match[3] or "").lower() == "khz" else 1.0)
-            except ValueError:
-                continue
-    return None
 
 
 def _without_counter(columns: list[RawColumn], layout: CsvLayout) -> tuple[list[RawColumn], list[str]]:

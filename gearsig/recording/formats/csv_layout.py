@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 from gearsig.errors import InputError
-from gearsig.recording.names import is_unit
+from gearsig.recording.names import is_unit, rate_in_line
 
 SNIFF_BYTES = 1 << 18
 N_PROOF_LINES = 5
@@ -179,6 +179,8 @@ def _header(
 
 def _header_fields(text: str, separator: str, n_columns: int) -> tuple[str, ...] | None:
     """Return a line's fields if it can be the header of so many columns."""
+    if rate_in_line(text) is not None:
+        return None
     for sign in COMMENT_SIGNS:
         text = text.strip().removeprefix(sign)
     if n_columns == 1:
@@ -191,7 +193,7 @@ def _header_fields(text: str, separator: str, n_columns: int) -> tuple[str, ...]
         cleaned = tuple(field.strip() for field in fields)
         if len(cleaned) == n_columns + 1 and cleaned[-1] == "":
             cleaned = cleaned[:-1]
-        if len(cleaned) == n_columns and any(cleaned):
+        if len(cleaned) == n_columns and any(cleaned) and "=" not in cleaned:
             return cleaned
     return None
 
@@ -206,9 +208,12 @@ def _all_units(fields: Iterable[str]) -> bool:
 def _raise_no_table(texts: list[str], where: str) -> None:
     last = next((i for i in range(len(texts) - 1, -1, -1) if texts[i].strip()), 0)
     shown = texts[last][:60] if texts else ""
+    remedy = "the file was cut off after its header, or it holds something else"
+    if re.search(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\d:\d\d", shown):
+        remedy = "date and time are not read: replace that column by seconds, or remove it and give --fs"
     raise InputError(
         f"no line of numbers was found; line {last + 1} begins {shown!r}",
         where=where,
         allowed="columns of numbers separated by comma, semicolon, tab or blanks",
-        remedy="the file was cut off after its header, or it holds something else",
+        remedy=remedy,
     )
