@@ -77,7 +77,7 @@ def report_many(
     output_folder : str or Path
         Made if it is not there; pages of the same name are replaced.
     rig : Rig or None
-        Of all recordings; None: what each file says itself.
+        Of all recordings; None: the rig file of the same name beside each, if there is one.
     sampling_rate_hz : float or None
         For files that do not state it.
     n_processes : int or None
@@ -217,10 +217,12 @@ def _report_one(job: _Job) -> Entry | Failure:
     from gearsig.recording.read import read_recording
     from gearsig.report.entry import entry_of
     from gearsig.report.page import write_page
+    from gearsig.rig.toml import read_rig, rig_file_beside
 
     try:
-        recording = read_recording(job.path, rig=job.rig, sampling_rate_hz=job.sampling_rate_hz)
-        analysis = analyze(recording, job.rig)
+        beside = rig_file_beside(job.path) if job.rig is None else None
+        rig = read_rig(beside) if beside is not None else job.rig
+        analysis = analyze(read_recording(job.path, rig=rig, sampling_rate_hz=job.sampling_rate_hz))
         write_page(analysis, job.page, command=job.command, index="index.html")
         return entry_of(analysis, job.name, job.page.name)
     except GearsigError as error:

@@ -39,7 +39,7 @@ def analyze(
     from gearsig.diagnosis.analyze import analyze as run_analysis
 
     speed = stated_speed(speed_rpm, tach_times, pulses_per_revolution)
-    result = run_analysis(open_recording(recording, open_rig(rig), fs, speed))
+    result = run_analysis(open_recording(recording, open_rig(rig, recording), fs, speed))
     if json:
         from gearsig.report.to_json import analysis_to_json
 

@@ -8,23 +8,31 @@ from typing import Annotated
 
 import typer
 
+MAIN_PAGE = Path(__file__).parents[1] / "dashboard" / "main.py"
+
+OPTIONS = (
+    "server.address=localhost",
+    "server.allowedHosts=localhost",  # whatever other name may have been made to point at this machine
+    "server.allowedHosts=127.0.0.1",
+    "server.maxUploadSize=2000",  # MB; the readers refuse what would not fit into the memory
+    "server.fileWatcherType=none",
+    "server.showEmailPrompt=false",
+    "browser.gatherUsageStats=false",
+    "client.toolbarMode=minimal",
+    "client.showErrorLinks=false",
+    "theme.light.primaryColor=#0072B2",
+    "theme.dark.primaryColor=#6CB8F0",
+)
+"""Flags win over the configuration files of the user and of the folder the command is started in."""
+
 
 def dashboard(
-    port: Annotated[int, typer.Option(help="Port on localhost.")] = 8501,
+    port: Annotated[int, typer.Option(help="Port on localhost.", min=1, max=65535)] = 8501,
     browser: Annotated[bool, typer.Option(help="Open a browser window.")] = True,
 ) -> None:
     """Open the dashboard in a browser. It listens on localhost only and sends nothing anywhere."""
     from streamlit.web import cli as streamlit_cli
 
-    main_page = Path(__file__).parents[1] / "dashboard" / "main.py"
-    sys.argv = [
-        "streamlit",
-        "run",
-        str(main_page),
-        "--server.address=localhost",
-        f"--server.port={port}",
-        f"--server.headless={str(not browser).lower()}",
-        "--browser.gatherUsageStats=false",
-        "--server.maxUploadSize=2000",
-    ]
+    own = (f"server.port={port}", f"server.headless={str(not browser).lower()}")
+    sys.argv = ["streamlit", "run", str(MAIN_PAGE), *(f"--{option}" for option in (*OPTIONS, *own))]
     sys.exit(streamlit_cli.main())

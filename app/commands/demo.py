@@ -16,15 +16,14 @@ def demo(
     ),
 ) -> None:
     """Diagnose the sample recordings, write their report, and say where to look."""
+    from app.commands.options import open_recording, open_rig
+    from app.commands.report import make_report
     from gearsig.diagnosis.analyze import analyze
     from gearsig.diagnosis.text import analysis_text
 
-    from app.commands.options import open_recording, open_rig
-    from app.commands.report import make_report
-
     chosen = samples()
     first = next((s for s in chosen if "damaged" in s.recording.stem), chosen[0])
-    typer.echo(f"$ gearsig analyze {first.recording.name} --rig {first.rig.name}\n")
+    typer.echo(f"$ gearsig analyze {first.recording}\n")
     typer.echo(analysis_text(analyze(open_recording(first.recording, open_rig(first.rig), None))))
     typer.echo(f"\nThe same for all {len(chosen)} samples (they are simulated; {first.recording.parent} says how):")
     make_report([s.recording for s in chosen], output, None, None, None, command=f"gearsig demo -o {output}")

@@ -15,7 +15,11 @@ if TYPE_CHECKING:
     from gearsig.rig.types import Rig
 
 RigOption = Annotated[
-    Path | None, typer.Option("--rig", help="Rig file (TOML): shafts, teeth, bearings, sensors, speed source.")
+    Path | None,
+    typer.Option(
+        "--rig",
+        help="Rig file (TOML): shafts, teeth, bearings, sensors, speed source. Default: the recording's name with .toml.",
+    ),
 ]
 SamplingRateOption = Annotated[
     float | None, typer.Option("--fs", metavar="HZ", help="Sampling rate in Hz, where the file does not state it.")
@@ -30,13 +34,15 @@ TachometerTimesOption = Annotated[
 PulsesOption = Annotated[int, typer.Option("--pulses-per-revolution", help="Pulses per revolution in --tach-times.")]
 
 
-def open_rig(path: Path | None) -> Rig | None:
-    """Read the rig file, if one is given."""
-    if path is None:
-        return None
-    from gearsig.rig.toml import read_rig
+def open_rig(path: Path | None, recording: Path | None = None) -> Rig | None:
+    """Read the rig file that is given, else the one of the same name beside the recording, and say so."""
+    from gearsig.rig.toml import read_rig, rig_file_beside
 
-    return read_rig(path)
+    if path is None and recording is not None:
+        path = rig_file_beside(recording)
+        if path is not None:
+            typer.echo(f"Using the rig file {path.name} beside the recording.", err=True)
+    return read_rig(path) if path is not None else None
 
 
 def stated_speed(speed_rpm: float | None, tach_times: Path | None, pulses_per_revolution: int) -> SpeedSource | None:

@@ -36,9 +36,10 @@ def make_report(
     files: list[Path], output: Path, rig: Path | None, fs: float | None, jobs: int | None, command: str
 ) -> int:
     """Write the pages with a progress bar; return how many files failed."""
-    from gearsig.batch import report_many
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from gearsig.batch import report_many
 
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())

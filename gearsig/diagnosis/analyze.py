@@ -78,11 +78,25 @@ def analyze(recording: Recording, rig: Rig | None = None, settings: AnalysisSett
 
 def _detect(signals: Signals, envelopes: list[BandEnvelope]) -> list[Finding]:
     return [
+        *_nothing_to_examine(signals.rig),
         *detect_mesh(signals),
         *detect_tooth_damage(signals),
         *detect_bearings(signals, envelopes),
         *detect_sidebands(signals),
         *detect_lines(signals),
+    ]
+
+
+def _nothing_to_examine(rig: Rig) -> list[Finding]:
+    if rig.pairs or rig.bearings:
+        return []
+    return [
+        Finding(
+            "machine-not-described",
+            Kind.CANNOT_TELL,
+            "No gears and no bearings are described, so that none can be examined.",
+            surer="A rig file with teeth and bearings; `gearsig rig example` prints one to start from.",
+        )
     ]
 
 

@@ -72,7 +72,7 @@ def _finding_lines(number: int, finding: Finding) -> list[str]:
     if finding.kind in _SHORT:
         return lines
     if finding.confidence_basis:
-        lines.append(_paragraph(f"how sure: {finding.confidence:.2f}; {finding.confidence_basis}"))
+        lines.append(_paragraph(f"how sure: {100 * finding.confidence:.0f} %; {finding.confidence_basis}"))
     lines += [_paragraph(f"evidence: {text}") for text in finding.evidence]
     if finding.surer:
         lines.append(_paragraph(f"surer with: {finding.surer}"))

@@ -32,19 +32,15 @@ def verdict_of(findings: tuple[Finding, ...]) -> str:
         return "Fault: " + _first_and_number(faults)
     if suspicions:
         return "Suspicion: " + _first_and_number(suspicions)
-    if examined and all(f.confidence < 0.5 for f in examined):
-        return "Cannot tell: nothing shows, but what is assumed of the machine may be wrong."
     if examined:
         rest = [f.title for f in (*examined, *gaps[:1])]
         return " ".join(
             ["No fault shows.", *rest, "Wear of all teeth alike would only show against an earlier recording."]
         )
-    if gaps:
-        return "Cannot tell: " + gaps[0].title
-    return "Cannot tell: the machine is not described, so only spectra are given. A rig file allows a diagnosis."
+    return "Cannot tell: " + (gaps[0].title if gaps else "nothing was examined that would show a fault.")
 
 
 def _first_and_number(findings: list[Finding]) -> str:
     more = len(findings) - 1
-    first = f"{findings[0].title} (confidence {findings[0].confidence:.2f})"
+    first = f"{findings[0].title} ({100 * findings[0].confidence:.0f} % sure)"
     return first + (f", and {more} more." if more else "")

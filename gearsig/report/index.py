@@ -13,7 +13,7 @@ from gearsig import __version__
 from gearsig.diagnosis.types import Kind
 from gearsig.indicators.types import Indicator
 from gearsig.plot.display import unit_text
-from gearsig.report.embed import Picture, embed
+from gearsig.plot.embed import Picture, embed
 from gearsig.report.entry import Entry, Failure, by_severity
 from gearsig.report.files import write_text
 from gearsig.report.numbers import readable

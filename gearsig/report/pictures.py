@@ -9,7 +9,7 @@ from gearsig.angle.types import ShaftAngle
 from gearsig.diagnosis.types import Analysis, ChannelAnalysis, Kind
 from gearsig.orders.types import SynchronousAverage
 from gearsig.plot.cursors import Cursor
-from gearsig.report.embed import Picture, embed
+from gearsig.plot.embed import Picture, embed
 from gearsig.report.lines import (
     bearing_cursors,
     highest_order_of_interest,

@@ -58,6 +58,13 @@ def read_rig(path: str | Path) -> Rig:
     return rig_from_dict(data, where=path.name)
 
 
+def rig_file_beside(recording: str | Path) -> Path | None:
+    """Return the rig file of the same name beside a recording (`x.csv.gz`: `x.toml`), None if there is none."""
+    path = Path(recording)
+    beside = path.with_name(path.name.split(".")[0] + ".toml")
+    return beside if beside.is_file() else None
+
+
 def rig_from_dict(data: dict[str, Any], where: str = "rig") -> Rig:
     """Build a rig from the tables of a rig file (or of any mapping of the same shape)."""
     allowed = (*_LISTS, *_PLAIN, "operating_point", "speed")

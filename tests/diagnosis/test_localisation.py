@@ -54,7 +54,7 @@ def test_healthy_signals_seldom_have_small_p_values() -> None:
 
 
 def test_teeth_that_merely_differ_are_no_damage() -> None:
-    """Each tooth engages a little stronger or weaker, in all harmonics: surrogates would take the largest for damage."""
+    """Each tooth engages a little stronger or weaker, in all harmonics: surrogates would take it for damage."""
     rng = np.random.default_rng(12)
     p = []
     for _ in range(60):

@@ -5,7 +5,7 @@ import numpy as np
 from PIL import Image
 
 from gearsig.plot import style
-from gearsig.report.embed import embed
+from gearsig.plot.embed import embed
 
 
 def _pixels(figure):

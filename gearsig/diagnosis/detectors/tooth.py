@@ -170,13 +170,24 @@ def _none_found(signals: Signals, tested: list[tuple[ShaftSignals, Localisation]
         for s, place in tested
     ]
     shafts = ", ".join(s.shaft for s, _ in tested)
-    caveat = " What is assumed of the rig may be wrong, and then damage would not show." if signals.rig.assumed else ""
+    where = Where(channels=tuple(tested[0][0].separated), shaft=tested[0][0].shaft if len(tested) == 1 else "")
+    if signals.rig.assumed:
+        assumed = ", ".join(signals.rig.assumed)
+        return Finding(
+            "tooth-damage-undecided",
+            Kind.CANNOT_TELL,
+            f"Nothing shows at the teeth of shaft(s) {shafts}, but {assumed} are assumed: damage may not show.",
+            where,
+            confidence_basis="a wrong tooth count or sampling rate averages over the wrong revolution",
+            evidence=tuple(texts),
+            surer=_surer(signals),
+        )
     return Finding(
         "no-tooth-local-damage",
         Kind.INFORMATION,
-        f"No local tooth damage shows on shaft(s) {shafts}.{caveat}",
-        Where(channels=tuple(tested[0][0].separated), shaft=tested[0][0].shaft if len(tested) == 1 else ""),
-        confidence=0.4 if signals.rig.assumed else 0.8,
+        f"No local tooth damage shows on shaft(s) {shafts}.",
+        where,
+        confidence=0.8,
         confidence_basis="small damage may be hidden below the mesh's own variation",
         evidence=tuple(texts),
         surer=_surer(signals),
