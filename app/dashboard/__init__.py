@@ -1,0 +1,1 @@
+"""The dashboard: a Streamlit face over the library."""

@@ -1,0 +1,63 @@
+"""Reading and analysis, done once for equal requests and shared between sessions; the number kept is bounded."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import streamlit as st
+
+from app.dashboard.state import Request
+from app.dashboard.uploads import read_recording_bytes, read_recording_file, read_rig_text
+
+if TYPE_CHECKING:
+    from gearsig.diagnosis.types import Analysis
+
+N_ANALYSES = 6
+"""Each holds its recording and several spectra: a few times the size of the file."""
+N_PAGES = 4
+N_HASHES = 64
+
+
+@st.cache_resource(max_entries=N_ANALYSES, show_spinner=False)
+def analysis_of(request: Request, _content: Path | memoryview) -> Analysis:
+    """Read and analyse; the result is frozen, so that sessions may share it."""
+    from gearsig.diagnosis.analyze import analyze
+
+    rig = read_rig_text(request.rig_text, request.rig_name)
+    rate, speed = request.sampling_rate_hz, request.speed_rpm
+    if isinstance(_content, Path):
+        recording = read_recording_file(_content, rig=rig, sampling_rate_hz=rate, speed_rpm=speed)
+    else:
+        recording = read_recording_bytes(_content, request.name, rig=rig, sampling_rate_hz=rate, speed_rpm=speed)
+    return analyze(recording)
+
+
+@st.cache_data(max_entries=N_PAGES, show_spinner=False)
+def report_page(request: Request, _analysis: Analysis) -> bytes:
+    """Return the self-contained report as HTML."""
+    from gearsig.report.page import page_html
+
+    return page_html(_analysis, command=command_of(request)).encode("utf-8")
+
+
+@st.cache_data(max_entries=N_HASHES, show_spinner=False)
+def sha256_of_upload(file_id: str, _content: memoryview) -> str:
+    """Hash an upload once; `file_id` is Streamlit's own, new for every upload."""
+    del file_id  # it is the key of the cache
+    return hashlib.sha256(_content).hexdigest()
+
+
+def command_of(request: Request) -> str:
+    """Return the command that gives the same diagnosis outside the dashboard."""
+    import shlex
+
+    words = ["gearsig", "analyze", request.name]
+    if request.rig_text.strip():
+        words += ["--rig", request.rig_name]
+    if request.sampling_rate_hz is not None:
+        words += ["--fs", f"{request.sampling_rate_hz:.15g}"]
+    if request.speed_rpm is not None:
+        words += ["--speed-rpm", f"{request.speed_rpm:.15g}"]
+    return shlex.join(words)

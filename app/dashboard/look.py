@@ -1,0 +1,53 @@
+"""Colours of the page's own figures: those of the reports, and lighter ones of the same hues on dark ground."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import streamlit as st
+
+from gearsig.plot import style
+
+
+@dataclass(frozen=True)
+class Palette:
+    """Colours by meaning."""
+
+    measured: str
+    fault: str
+    quiet: str
+    cursors: dict[str, str]
+
+
+LIGHT = Palette(style.MEASURED, style.FAULT, style.QUIET, style.CURSOR_COLOURS | {"finding": style.FAULT})
+DARK = Palette(
+    "#6CB8F0",
+    "#FF9A57",
+    "#A2A8B1",
+    {
+        "mesh": "#3FC79D",
+        "sideband": "#3FC79D",
+        "shaft": "#E3B341",
+        "bearing": "#E3A3CB",
+        "hunting": "#A2A8B1",
+        "finding": "#FF9A57",
+    },
+)
+DASHES = {
+    "mesh": "solid",
+    "sideband": "dot",
+    "shaft": "dash",
+    "bearing": "dashdot",
+    "hunting": "dot",
+    "finding": "dash",
+}
+
+
+def is_dark() -> bool:
+    """Whether the user's page is dark."""
+    return st.context.theme.type == "dark"
+
+
+def palette() -> Palette:
+    """Return the colours for the user's page."""
+    return DARK if is_dark() else LIGHT

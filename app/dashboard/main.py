@@ -1,0 +1,15 @@
+"""The dashboard's frame: page settings and navigation. Started by `gearsig dashboard`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import streamlit as st
+
+PAGES = Path(__file__).parent / "pages"
+
+st.set_page_config(page_title="gearsig", page_icon=str(PAGES.parent / "icon.svg"), layout="wide")
+st.html(PAGES.parent / "page.css")
+st.navigation(
+    [st.Page(PAGES / "analysis.py", title="Analysis", icon=":material/troubleshoot:", default=True)], position="top"
+).run()

@@ -1,0 +1,68 @@
+"""The one place that knows what a session remembers, and under which keys."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import streamlit as st
+
+from gearsig.diagnosis.types import Analysis
+
+ORIGIN, SAMPLE, RECORDING_FILE, RIG_FILE = "origin", "sample", "recording file", "rig file"
+TAB, CHANNEL = "tab", "channel"
+_CHOSEN = "chosen"
+
+
+@dataclass(frozen=True)
+class Request:
+    """A recording and everything else that decides its analysis: equal requests have equal answers.
+
+    Parameters
+    ----------
+    name : str
+        Of the file, as the user knows it; never a path to open.
+    sha256 : str
+        Of the file's bytes.
+    rig_name, rig_text : str
+        A rig file; an empty text for none.
+    sampling_rate_hz, speed_rpm : float or None
+        What the user states of a file that does not.
+    """
+
+    name: str
+    sha256: str
+    rig_name: str = "rig.toml"
+    rig_text: str = ""
+    sampling_rate_hz: float | None = None
+    speed_rpm: float | None = None
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A request, and where its bytes are: a file of this machine (a sample), or in memory (an upload)."""
+
+    request: Request
+    content: Path | memoryview
+
+
+def remember(chosen: Chosen | None) -> None:
+    """Keep the choice for other pages of this session."""
+    st.session_state[_CHOSEN] = chosen
+
+
+def chosen() -> Chosen | None:
+    """Return what was chosen last in this session, on whatever page."""
+    found: Chosen | None = st.session_state.get(_CHOSEN)
+    return found
+
+
+def source_key(name: str, source: str) -> str:
+    """Key of a widget that belongs to one file: another file starts with the widget's own default."""
+    return f"{name} of {source}"
+
+
+def view_key(name: str, analysis: Analysis) -> str:
+    """Key of a widget that shows one recording: its choices do not outlive the recording."""
+    recording = analysis.recording
+    return f"{name} of {recording.provenance.sha256 or id(recording)} at {recording.sampling_rate_hz!r}"

@@ -1,0 +1,49 @@
+"""The views of one analysis, of which only the open one is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import streamlit as st
+
+from app.dashboard import state
+from app.dashboard.state import Request
+from app.dashboard.widgets import views
+from app.dashboard.widgets.average import show_average
+from app.dashboard.widgets.channels import show_channels
+from app.dashboard.widgets.indicators import show_indicators
+from app.dashboard.widgets.order_map import show_order_map
+from app.dashboard.widgets.report import show_report
+from app.dashboard.widgets.speed import show_speed
+from gearsig.diagnosis.types import Analysis
+
+OF_RECORDING: dict[str, Callable[[Analysis], None]] = {"Channels": show_channels, "Speed": show_speed}
+OF_CHANNEL: dict[str, views.ChannelView] = {
+    "Spectrum": views.show_frequency_spectrum,
+    "Order spectrum": views.show_order_spectrum,
+    "Order map": show_order_map,
+    "Envelope": views.show_envelope,
+    "Synchronous average": show_average,
+}
+
+
+def show_tabs(analysis: Analysis, request: Request) -> None:
+    """Show the views as tabs."""
+    names = (*OF_RECORDING, *OF_CHANNEL, "Indicators", "Report")
+    for name, tab in zip(names, st.tabs(names, key=state.TAB, on_change="rerun"), strict=True):
+        if tab.open:
+            with tab:
+                _show(name, analysis, request)
+
+
+@st.fragment
+def _show(name: str, analysis: Analysis, request: Request) -> None:
+    """Show one view; what the user changes in it reruns only this."""
+    if name in OF_RECORDING:
+        OF_RECORDING[name](analysis)
+    elif name in OF_CHANNEL:
+        views.show_of_channel(analysis, OF_CHANNEL[name])
+    elif name == "Indicators":
+        show_indicators(analysis)
+    else:
+        show_report(analysis, request)

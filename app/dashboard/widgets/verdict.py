@@ -1,0 +1,51 @@
+"""The answer on top of the page, in words."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import streamlit as st
+
+from app.dashboard.as_typed import as_typed
+from gearsig.diagnosis.types import Analysis, Kind
+from gearsig.report.page import severity
+
+Colour = Literal["red", "orange", "violet", "gray", "blue"]
+COLOURS: dict[Kind, Colour] = {
+    Kind.FAULT: "red",
+    Kind.SUSPICION: "orange",
+    Kind.DATA_PROBLEM: "violet",
+    Kind.CANNOT_TELL: "gray",
+    Kind.NOTICE: "blue",
+    Kind.INFORMATION: "blue",
+}
+ICONS = {
+    Kind.FAULT: ":material/error:",
+    Kind.SUSPICION: ":material/warning:",
+    Kind.DATA_PROBLEM: ":material/database:",
+    Kind.CANNOT_TELL: ":material/help:",
+    Kind.NOTICE: ":material/info:",
+    Kind.INFORMATION: ":material/info:",
+}
+
+
+def show_verdict(analysis: Analysis) -> None:
+    """Show the verdict, the kind of the most important finding, and what was examined."""
+    recording = analysis.recording
+    machine = analysis.rig.name if analysis.rig is not None else ""
+    n = len(recording.channels)
+    st.subheader(as_typed(analysis.verdict), anchor=False)
+    facts = [
+        f"**{as_typed(recording.provenance.source)}**",
+        as_typed(machine) or "machine not described",
+        f"{n} channel{'s' if n != 1 else ''}",
+        f"{recording.duration_s:.4g} s at {recording.sampling_rate_hz:.6g} Hz",
+    ]
+    with st.container(horizontal=True, vertical_alignment="center"):
+        show_kind(severity(analysis))
+        st.markdown(" · ".join(facts), width="content")
+
+
+def show_kind(kind: Kind) -> None:
+    """Show a kind of finding as a badge."""
+    st.badge(kind.value, icon=ICONS[kind], color=COLOURS[kind])
