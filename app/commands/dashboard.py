@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from app.dashboard.theme import THEME_OPTIONS
+
 MAIN_PAGE = Path(__file__).parents[1] / "dashboard" / "main.py"
 
 OPTIONS = (
@@ -20,8 +22,7 @@ OPTIONS = (
     "browser.gatherUsageStats=false",
     "client.toolbarMode=minimal",
     "client.showErrorLinks=false",
-    "theme.light.primaryColor=#0072B2",
-    "theme.dark.primaryColor=#6CB8F0",
+    *THEME_OPTIONS,
 )
 """Flags win over the configuration files of the user and of the folder the command is started in."""
 

@@ -18,7 +18,7 @@ RigOption = Annotated[
     Path | None,
     typer.Option(
         "--rig",
-        help="Rig file (TOML): shafts, teeth, bearings, sensors, speed source. Default: the recording's name with .toml.",
+        help="Rig file (TOML): shafts, teeth, bearings, sensors, speed source. Default: NAME.toml beside it.",
     ),
 ]
 SamplingRateOption = Annotated[

@@ -76,7 +76,6 @@ def localise(
     Returns
     -------
     Localisation
-        The p-value is at least 1/(n_surrogates + 1).
 
     References
     ----------
@@ -93,11 +92,10 @@ def localise(
     joint = energies.sum(axis=0)
     start = int(np.argmax(joint))
     ratio = float(joint[start] / np.median(joint))
-    n_higher = n_drawn = 0
+    drawn = np.empty(0)
     for surrogates in _surrogates(x, n_surrogates, rng):
-        n_higher += int(np.sum(_ratios(surrogates, kernel, n) >= ratio))
-        n_drawn += len(surrogates)
-        if n_higher >= _ENOUGH_HIGHER:
+        drawn = np.append(drawn, _ratios(surrogates, kernel, n))
+        if np.sum(drawn >= ratio) >= _ENOUGH_HIGHER:
             break
     inside = (start + np.arange(width)) % n
     medians = np.median(energies, axis=1)
@@ -108,10 +106,24 @@ def localise(
         start_rev=start / n,
         width_rev=width / n,
         ratio_db=10 * float(np.log10(ratio)),
-        p_value=max((n_higher + 1) / (n_drawn + 1), _p_among_teeth(ratio, n / width)),
+        p_value=max(_p_among_surrogates(ratio, drawn), _p_among_teeth(ratio, n / width)),
         repeatability=_agreement(halves[used][:, :, inside] / scale[used][:, None]),
         channel_shares=tuple(float(s) for s in shares),
     )
+
+
+def _p_among_surrogates(ratio: float, drawn: FloatArray) -> float:
+    """Return the share of surrogates with as high a ratio; beyond the highest, the tail of a Gumbel distribution.
+
+    Window energies of Gaussian signals have exponential tails, and the largest of many such is Gumbel distributed; mean
+    and standard deviation of the drawn ratios give its parameters (E. J. Gumbel, *Statistics of Extremes*, 1958).
+    """
+    share = (float(np.sum(drawn >= ratio)) + 1) / (len(drawn) + 1)
+    scale = float(drawn.std()) * np.sqrt(6) / np.pi
+    if ratio <= drawn.max() or scale == 0:
+        return share
+    location = float(drawn.mean()) - np.euler_gamma * scale
+    return min(share, float(-np.expm1(-np.exp(-(ratio - location) / scale))))
 
 
 def _p_among_teeth(ratio: float, n_teeth: float) -> float:

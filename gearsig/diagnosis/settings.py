@@ -16,7 +16,7 @@ class AnalysisSettings:
     false_alarm_probability : float
         Of one test over everything it tries (all teeth, all fundamentals, all bands and channels).
     n_surrogates : int
-        For the test of tooth-local energy; the smallest p-value is its inverse.
+        For the test of tooth-local energy.
     minimum_revolutions : int
         Fewer revolutions than this are not averaged: 16 lower the noise by 12 dB, and give the jackknife its scatter.
     bearing_slip : float
@@ -29,7 +29,7 @@ class AnalysisSettings:
     """
 
     false_alarm_probability: float = 1e-3
-    n_surrogates: int = 4000
+    n_surrogates: int = 1000
     minimum_revolutions: int = 16
     bearing_slip: float = 0.02
     highest_modulation_order: float = 60.0

@@ -37,7 +37,7 @@ def test_a_burst_is_found_at_its_angle_at_any_gain(at: float, gain: float) -> No
     place = localise(signal, halves_of(signal, gain * 0.01, rng), 1 / 30, 199, rng)
     distance = (place.angle_rev - at + 0.5) % 1 - 0.5
     assert abs(distance) < 1 / 30
-    assert place.p_value == pytest.approx(1 / 200)
+    assert place.p_value < 0.005
     assert place.ratio_db > 9
     assert place.repeatability > 0.99
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import exp
 from typing import TypeGuard
 
 from gearsig.diagnosis.comb import Comb, LineExcess, best_comb
@@ -20,6 +21,12 @@ PARTS = {
 }
 """Part that strikes at each order, and strikes per cycle: a damaged rolling element strikes both races each spin."""
 
+TYPICAL_SLIP = 0.007
+"""Standard deviation of the relative distance from the kinematic order, where parts compete for one family of lines."""
+
+RARE = 0.3
+"""Prior weight of rolling elements and cages against races, which are damaged far more often."""
+
 CLEAR_MODULATION = 0.05
 """Depth of the strongest line of the envelope from which a race is called damaged, not only worth watching."""
 
@@ -29,7 +36,7 @@ MINIMUM_LINES = 3
 
 @dataclass(frozen=True)
 class Candidate:
-    """One family found, and what it may be."""
+    """One family found, and what it may be; `share` is the named part's among all that would show at that order."""
 
     comb: Comb
     envelope: BandEnvelope
@@ -38,6 +45,7 @@ class Candidate:
     name: str = ""
     expected: float = 0.0
     rivals: tuple[str, ...] = ()
+    share: float = 1.0
 
     @property
     def modulation(self) -> float:
@@ -57,7 +65,7 @@ def detect_bearings(signals: Signals, envelopes: list[BandEnvelope]) -> list[Fin
     if unnamed is not None:
         known = _known_multiple(signals, unnamed)
         return [_unnamed_finding(signals, unnamed) if known is None else _named_finding(signals, known)]
-    return [_none_found(signals, cleaned)] if signals.rig.bearings else []
+    return _none_found(signals, cleaned) if signals.rig.bearings and cleaned else []
 
 
 def without_synchronous(signals: Signals, excess: LineExcess) -> LineExcess:
@@ -92,24 +100,31 @@ def _best_named(signals: Signals, envelopes: list[BandEnvelope]) -> list[Candida
             best = replace(best, p_value=min(1.0, best.p_value * len(expected) * len(envelopes)))
             if best.p_value <= signals.settings.false_alarm_probability:
                 found.append(best)
-    found.sort(key=lambda c: (c.p_value, -c.comb.score))
+    found.sort(key=lambda c: -_weight(c.name, c.comb.fundamental / c.expected - 1))
     kept: list[Candidate] = []
     for candidate in found:
         if not any(_shares_lines(candidate.comb, other.comb) for other in kept):
-            kept.append(replace(candidate, rivals=_rivals(signals, candidate)))
-    return kept
+            kept.append(_with_rivals(signals, candidate))
+    return sorted(kept, key=lambda c: c.p_value)
 
 
-def _rivals(signals: Signals, candidate: Candidate) -> tuple[str, ...]:
-    """Name the other parts whose order is so near, or half or twice, that slip alone could make it this one."""
-    rivals = []
+def _weight(name: str, slip: float) -> float:
+    """Return how likely a part is, by how far from its kinematic order the lines are."""
+    return exp(-0.5 * (slip / TYPICAL_SLIP) ** 2) * (RARE if name in ("BSF", "FTF") else 1.0)
+
+
+def _with_rivals(signals: Signals, candidate: Candidate) -> Candidate:
+    """Note the other parts whose order is so near, or half or twice, that slip alone could make it this one."""
+    own = _weight(candidate.name, candidate.comb.fundamental / candidate.expected - 1)
+    others, rivals = 0.0, []
     for bearing, name, order in _expected(signals):
         if (bearing, name) == (candidate.bearing, candidate.name):
             continue
-        ratios = [abs(candidate.comb.fundamental / (order * m) - 1) for m in (0.5, 1.0, 2.0)]
-        if min(ratios) <= signals.settings.bearing_slip:
+        slip = min((candidate.comb.fundamental / (order * m) - 1 for m in (0.5, 1.0, 2.0)), key=abs)
+        if abs(slip) <= signals.settings.bearing_slip:
+            others += _weight(name, slip)
             rivals.append(f"{PARTS[name][0]} of {bearing.name}")
-    return tuple(rivals)
+    return replace(candidate, rivals=tuple(rivals), share=own / (own + others))
 
 
 def _known_multiple(signals: Signals, candidate: Candidate) -> Candidate | None:
@@ -118,7 +133,7 @@ def _known_multiple(signals: Signals, candidate: Candidate) -> Candidate | None:
         for m in (1, 2, 3):
             if abs(candidate.comb.fundamental / (m * order) - 1) <= signals.settings.bearing_slip:
                 named = replace(candidate, bearing=bearing, name=name, expected=m * order)
-                return replace(named, rivals=_rivals(signals, named))
+                return _with_rivals(signals, named)
     return None
 
 
@@ -154,7 +169,7 @@ def _named_finding(signals: Signals, candidate: Candidate) -> Finding:
     bearing, comb = candidate.bearing, candidate.comb
     assert bearing is not None  # noqa: S101 - a named candidate has one; narrows the type
     part = PARTS[candidate.name][0]
-    confidence = from_p_value(candidate.p_value) / (1 + len(candidate.rivals))
+    confidence = from_p_value(candidate.p_value) * candidate.share
     if signals.rig.assumed:
         confidence *= WITH_ASSUMED_DATA
     clear = candidate.modulation >= CLEAR_MODULATION and confidence >= 0.75
@@ -224,17 +239,36 @@ def _over_frequency(signals: Signals, envelopes: list[BandEnvelope]) -> list[Fin
     ]
 
 
-def _none_found(signals: Signals, envelopes: list[BandEnvelope]) -> Finding:
-    names = ", ".join(b.name for b in signals.rig.bearings)
-    return Finding(
-        "no-bearing-damage",
-        Kind.INFORMATION,
-        f"No damage shows in the bearings ({names}).",
-        Where(channels=tuple(dict.fromkeys(e.channel for e in envelopes))),
-        confidence=0.8,
-        confidence_basis="early damage may be hidden below the gears",
-        evidence=(f"No family at their orders in {len(envelopes)} envelope spectra (channels × bands).",),
-    )
+def _none_found(signals: Signals, envelopes: list[BandEnvelope]) -> list[Finding]:
+    """State that nothing shows, and which parts could not have shown."""
+    where = Where(channels=tuple(dict.fromkeys(e.channel for e in envelopes)))
+    hidden = [
+        f"{PARTS[name][0]} of {bearing.name}"
+        for bearing, name, order in _expected(signals)
+        if all(e.excess.masked[e.excess.spectrum.index_of(order)] for e in envelopes)
+    ]
+    findings = [
+        Finding(
+            "no-bearing-damage",
+            Kind.INFORMATION,
+            f"No damage shows in the bearings ({', '.join(b.name for b in signals.rig.bearings)}).",
+            where,
+            confidence=0.8,
+            confidence_basis="early damage may be hidden below the gears",
+            evidence=(f"No family at their orders in {len(envelopes)} envelope spectra (channels × bands).",),
+        )
+    ]
+    if hidden:
+        findings.append(
+            Finding(
+                "bearing-part-hidden",
+                Kind.CANNOT_TELL,
+                f"Not examined: {', '.join(hidden)}. Their orders fall on multiples of a shaft within the resolution.",
+                where,
+                surer="A longer recording: orders that are close need many revolutions to be told apart.",
+            )
+        )
+    return findings
 
 
 def _where(signals: Signals, candidate: Candidate) -> Where:

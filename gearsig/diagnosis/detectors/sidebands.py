@@ -16,6 +16,9 @@ from gearsig.rig.types import GearPair
 STRONG_DB = -10.0
 """Sidebands over carrier, in power: an amplitude modulation of 45 %, or a third together with some phase modulation."""
 
+NOTABLE_DB = -16.0
+"""An amplitude modulation of 22 %: worth a look, common on sound machines."""
+
 N_SIDEBANDS = 2
 N_CARRIERS = 3
 
@@ -61,19 +64,20 @@ def _known_shafts(signals: Signals, pair: GearPair) -> list[Finding]:
             continue
         channel = max(known, key=lambda name: known[name])
         median = float(np.median(list(known.values())))
-        if median >= STRONG_DB:
-            findings.append(_strong(signals, pair, shaft, channel, known, median))
+        if median >= NOTABLE_DB:
+            findings.append(_modulated(signals, pair, shaft, channel, known, median))
     return findings
 
 
-def _strong(
+def _modulated(
     signals: Signals, pair: GearPair, shaft: str, channel: str, levels: dict[str, float], median: float
 ) -> Finding:
     order = signals.rig.ratio(shaft)
+    strong = median >= STRONG_DB
     return Finding(
         "mesh-modulated",
-        Kind.NOTICE if signals.rig.assumed else Kind.SUSPICION,
-        f"The mesh of {pair.name} is strongly modulated once per revolution of shaft {shaft}.",
+        Kind.SUSPICION if strong and not signals.rig.assumed else Kind.NOTICE,
+        f"The mesh of {pair.name} is {'strongly ' if strong else ''}modulated once per revolution of shaft {shaft}.",
         Where(
             (channel,), shaft=shaft, gear=f"{pair.name}/{shaft}", order=order, order_shaft=signals.rig.reference_shaft
         ),
