@@ -210,10 +210,10 @@ def _described(
     for _ in range(N_FITS):
         found = _lines_near(excess, origins, multiples, fitted)
         # Least squares of position - origin = multiple · fundamental, clearer lines counting more.
-        weights = sum(line.ratio_db * line.multiple**2 for line in found)
+        weights = sum(line.weight * line.multiple**2 for line in found)
         if not weights:
             break
-        fitted = sum(line.ratio_db * line.multiple * line.distance for line in found) / weights
+        fitted = sum(line.weight * line.multiple * line.distance for line in found) / weights
     strongest = max(found, key=lambda line: line.ratio_db, default=None)
     return Comb(
         fitted,
@@ -235,6 +235,11 @@ class _Line:
     floor: float
     ratio_db: float
 
+    @property
+    def weight(self) -> float:
+        """Power over the floor, which the variance of a line's position falls with; cut at 30 dB."""
+        return float(10 ** (min(self.ratio_db, 30.0) / 10))
+
 
 def _lines_near(
     excess: LineExcess, origins: FloatArray, multiples: NDArray[np.int_], fundamental: float
@@ -251,5 +256,16 @@ def _lines_near(
         floor = float(excess.floor[i])
         ratio = 20 * float(np.log10(max(amplitude, 1e-300) / max(floor, 1e-300)))
         if ratio >= CLEAR_LINE_DB and not excess.masked[i]:
+            position = _peak_position(spectrum, i)
             found.append(_Line(position, position - float(origin), int(multiple), amplitude, floor, ratio))
     return found
+
+
+def _peak_position(spectrum: Spectrum, i: int) -> float:
+    """Return the vertex of the parabola through the logarithms of a line and its neighbours."""
+    if not 0 < i < len(spectrum.values) - 1:
+        return float(spectrum.positions[i])
+    a, b, c = np.log(np.maximum(spectrum.values[i - 1 : i + 2], 1e-300))
+    curvature = a - 2 * b + c
+    offset = 0.5 * (a - c) / curvature if curvature < 0 else 0.0
+    return float(spectrum.positions[i] + np.clip(offset, -0.5, 0.5) * spectrum.resolution)

@@ -23,7 +23,7 @@ class Localisation:
     Parameters
     ----------
     angle_rev : float
-        Where in the window the event is strongest, 0 to 1 revolution: a knock is there and rings on afterwards.
+        Where in the window the event sets in, 0 to 1 revolution.
     start_rev : float
         Where the window begins.
     width_rev : float
@@ -110,6 +110,49 @@ def localise(
         repeatability=_agreement(halves[used][:, :, inside] / scale[used][:, None]),
         channel_shares=tuple(float(s) for s in shares),
     )
+
+
+def _p_among_surrogates(ratio: float, drawn: FloatArray) -> float:
+    """Return the share of surrogates with as high a ratio; beyond the highest, the tail of a Gumbel distribution.
+
+    Window energies of Gaussian signals have exponential tails, and the largest of many such is Gumbel distributed; mean
+    and standard deviation of the drawn ratios give its parameters (E. J. Gumbel, *Statistics of Extremes*, 1958).
+    """
+    share = (float(np.sum(drawn >= ratio)) + 1) / (len(drawn) + 1)
+    scale = float(drawn.std()) * np.sqrt(6) / np.pi
+    if ratio <= drawn.max() or scale == 0:
+        return share
+    location = float(drawn.mean()) - np.euler_gamma * scale
+    return min(share, float(-np.expm1(-np.exp(-(ratio - location) / scale))))
+
+
+def _p_among_teeth(ratio: float, n_teeth: float) -> float:
+    """Return P(largest of n chi-square(1) numbers >= ratio · their median)."""
+    from scipy.special import erfc
+
+    median = 0.4549364  # of the chi-square distribution with one degree of freedom
+    single = float(erfc(np.sqrt(ratio * median / 2)))
+    return float(-np.expm1(n_teeth * np.log1p(-min(single, 1 - 1e-12))))
+
+
+def _agreement(halves: FloatArray) -> float:
+    """Return the correlation between odd and even revolutions, (n_channels, 2, n_angles), over all channels."""
+    odd, even = halves[:, 0], halves[:, 1]
+    size = float(np.sqrt(np.sum(odd**2) * np.sum(even**2)))
+    return float(np.sum(odd * even)) / size if size > 0 else 0.0
+
+
+def _onset(x: FloatArray, start: int, width: int) -> float:
+    """Return the angle within the window at which the energy has risen to half of its highest value.
+
+    A knock rises at once and rings on: its highest energy comes a little after it. Energy is taken over an eighth of
+    the window, and a little of what lies before the window is looked at too.
+    """
+    n, short = x.shape[1], max(1, width // 8)
+    inside = (start - short + np.arange(width + short)) % n
+    energy = np.convolve((x[:, inside] ** 2).sum(axis=0), np.ones(short), "valid")
+    rise = int(np.argmax(energy >= 0.5 * energy.max()))
+    return float(((start - short + rise + short / 2) / n) % 1.0)
 
 
 def _p_among_surrogates(ratio: float, drawn: FloatArray) -> float:

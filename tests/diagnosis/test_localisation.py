@@ -1,7 +1,6 @@
 """Tooth-local energy: found where it is, not seen in spectra without it, not taken from one shock."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

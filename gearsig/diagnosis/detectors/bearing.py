@@ -58,6 +58,8 @@ def detect_bearings(signals: Signals, envelopes: list[BandEnvelope]) -> list[Fin
     cleaned = [replace(e, excess=without_synchronous(signals, e.excess)) for e in envelopes]
     if signals.angle is None:
         return _over_frequency(signals, cleaned)
+    if signals.angle.n_revolutions < signals.settings.minimum_revolutions:
+        return [_too_short(signals)] if signals.rig.bearings else []
     named = _best_named(signals, cleaned)
     if named:  # combinations with shaft orders make further families, which are no second fault
         return [_named_finding(signals, c) for c in named]
@@ -237,6 +239,17 @@ def _over_frequency(signals: Signals, envelopes: list[BandEnvelope]) -> list[Fin
             "Give the shaft speed: then shafts, gears and bearings can be told apart.",
         )
     ]
+
+
+def _too_short(signals: Signals) -> Finding:
+    revolutions = signals.angle.n_revolutions if signals.angle is not None else 0.0
+    return Finding(
+        "bearings-not-examined",
+        Kind.CANNOT_TELL,
+        f"Bearings cannot be examined: the record holds {revolutions:.3g} revolutions and "
+        f"{signals.settings.minimum_revolutions} are needed.",
+        surer="A longer recording.",
+    )
 
 
 def _none_found(signals: Signals, envelopes: list[BandEnvelope]) -> list[Finding]:

@@ -134,7 +134,9 @@ def _evidence(signals: Signals, shaft: ShaftSignals, place: Localisation) -> tup
             "first mark of the record."
         )
     if len(shaft.teeth) == 1:
-        texts.append("Teeth count from 1 at the zero of the angle, in the sense of rotation.")
+        texts.append(
+            "Teeth count from 1 at the zero of the angle, as they engage; the place is good to about one tooth."
+        )
     if len(shaft.teeth) > 1:
         texts.append(
             f"The shaft carries {len(shaft.teeth)} gears ({', '.join(map(str, shaft.teeth))} teeth); it may be either."

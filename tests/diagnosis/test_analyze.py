@@ -1,0 +1,255 @@
+"""The main job on machines whose condition is known, and on recordings that allow no answer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearsig.diagnosis.analyze import analyze
+from gearsig.diagnosis.text import analysis_text
+from gearsig.diagnosis.types import Analysis, CannotTell, Finding, Kind
+from gearsig.errors import InputError
+from gearsig.recording.types import Channel, Recording
+from gearsig.rig.speed import ConstantSpeed, TachometerChannel
+from gearsig.rig.types import Bearing, GearPair, Rig, Shaft
+from sims.kinematic import (
+    BearingFault,
+    ColouredNoise,
+    ConstantProfile,
+    KinematicModel,
+    LinearRamp,
+    MeshHarmonics,
+    Modulation,
+    SensorChannel,
+    Tachometer,
+    ToothDamage,
+    ToothVariation,
+    Wander,
+    simulate_kinematic,
+)
+
+RIG = Rig(
+    name="test gearbox",
+    shafts=(Shaft("in"), Shaft("out")),
+    pairs=(GearPair("stage", "in", "out", 27, 43),),
+    bearings=(Bearing("front", "in", 9, 7.94, 39.04),),
+)
+GOOD = KinematicModel(
+    speed=Wander(1320.0, 0.004, 0.4),
+    meshes=(MeshHarmonics("stage", (4.0, 2.0, 1.0)),),
+    modulations=(Modulation("stage", "in", 0.05), Modulation("stage", "out", 0.05)),
+    tooth_variations=(ToothVariation("stage", "in", 0.02), ToothVariation("stage", "out", 0.02)),
+    channels=(SensorChannel("a1", noise=ColouredNoise(0.8)),),
+    tachometer=Tachometer("in"),
+)
+
+
+def record(model: KinematicModel = GOOD, *, seconds: float = 5.0, seed: int = 0, rig: Rig = RIG) -> Recording:
+    rng = np.random.default_rng(seed)
+    return simulate_kinematic(rig, model, sampling_rate_hz=10240.0, duration_s=seconds, rng=rng)
+
+
+def codes(analysis: Analysis, *kinds: Kind) -> list[str]:
+    return [f.code for f in analysis.findings if not kinds or f.kind in kinds]
+
+
+def finding(analysis: Analysis, code: str) -> Finding:
+    return next(f for f in analysis.findings if f.code == code)
+
+
+def test_a_good_machine_is_not_accused() -> None:
+    analysis = analyze(record())
+    assert not codes(analysis, Kind.FAULT, Kind.SUSPICION)
+    assert analysis.verdict.startswith("No fault shows.")
+    assert "wear" in analysis.verdict.lower()  # what one recording cannot show is said
+
+
+def test_a_damaged_tooth_is_found_at_its_place() -> None:
+    damage = ToothDamage("stage", "in", 0.4, impulse_mps2=10.0, resonance_hz=3000.0, mesh_dip_fraction=0.2)
+    analysis = analyze(record(replace(GOOD, tooth_damages=(damage,))))
+    found = analysis.findings[0]
+    assert (found.code, found.kind) == ("tooth-local-damage", Kind.FAULT)
+    assert found.where.shaft == "in"
+    assert found.where.angle_deg == pytest.approx(144.0, abs=10.0)
+    assert found.where.tooth in (11, 12)  # 0.4 of 27 teeth: the eleventh; a knock rings on into the next
+    assert found.strength is not None
+    assert found.strength.ratio_db is not None
+    assert found.strength.ratio_db > 10
+    assert 0.8 < found.confidence <= 0.95
+    assert analysis.verdict.startswith("Fault: Local tooth damage")
+
+
+@pytest.mark.parametrize(("race", "order"), [("outer", "BPFO"), ("inner", "BPFI")])
+def test_a_damaged_race_is_named(race: str, order: str) -> None:
+    fault = BearingFault("front", race, 6.0, resonance_hz=3200.0)
+    analysis = analyze(record(replace(GOOD, bearing_faults=(fault,))))
+    found = analysis.findings[0]
+    assert (found.code, found.kind) == (f"bearing-{race}-race", Kind.FAULT)
+    assert found.where.order == pytest.approx(RIG.bearings[0].orders()[order], rel=0.01)
+    assert "tooth-local-damage" not in codes(analysis)
+
+
+def test_a_bearing_that_is_not_described_is_not_named() -> None:
+    model = replace(GOOD, bearing_faults=(BearingFault("front", "outer", 8.0, resonance_hz=3200.0),))
+    recording = record(model)
+    analysis = analyze(replace(recording, rig=replace(RIG, bearings=())))
+    found = finding(analysis, "non-synchronous-impacts")
+    assert found.where.order == pytest.approx(RIG.bearings[0].orders()["BPFO"], rel=0.01)
+    assert not codes(analysis, Kind.FAULT)
+    assert "rig file" in found.surer
+
+
+def test_a_wheel_whose_teeth_are_not_given_shows_by_its_sidebands() -> None:
+    model = replace(GOOD, modulations=(Modulation("stage", "out", 0.2),), tooth_variations=())
+    unknown = replace(RIG, pairs=(GearPair("stage", "in", "out", 27),), bearings=())
+    analysis = analyze(replace(record(model, seconds=8.0), rig=unknown))
+    found = finding(analysis, "sidebands-of-unknown-shaft")
+    assert found.where.order == pytest.approx(27 / 43, abs=0.002)
+    assert any("43 teeth" in text for text in found.evidence)
+
+
+def test_strong_modulation_by_a_shaft_is_a_suspicion() -> None:
+    model = replace(GOOD, modulations=(Modulation("stage", "out", 0.6, 0.2),))
+    found = finding(analyze(record(model)), "mesh-modulated")
+    assert found.kind is Kind.SUSPICION
+    assert found.where.shaft == "out"
+
+
+def test_a_run_up_is_analysed_over_angle() -> None:
+    analysis = analyze(record(replace(GOOD, speed=LinearRamp(600.0, 2400.0, 8.0)), seconds=8.0))
+    assert not codes(analysis, Kind.FAULT, Kind.SUSPICION)
+    assert finding(analysis, "mesh-found").where.order == pytest.approx(27, abs=0.02)
+    assert analysis.channels[0].order_map is not None
+
+
+def test_assumed_teeth_leave_the_teeth_undecided() -> None:
+    analysis = analyze(replace(record(), rig=replace(RIG, bearings=(), assumed=("teeth",))))
+    assert "tooth-damage-undecided" in codes(analysis, Kind.CANNOT_TELL)
+    assert analysis.verdict.startswith("Cannot tell")
+
+
+def test_assumed_teeth_allow_no_certain_fault() -> None:
+    damage = ToothDamage("stage", "in", 0.4, impulse_mps2=12.0)
+    recording = record(replace(GOOD, tooth_damages=(damage,)))
+    analysis = analyze(replace(recording, rig=replace(RIG, assumed=("teeth",))))
+    assert not codes(analysis, Kind.FAULT)
+    assert finding(analysis, "tooth-local-damage").confidence <= 0.5
+
+
+def test_too_few_revolutions() -> None:
+    analysis = analyze(record(seconds=0.5))
+    found = finding(analysis, "tooth-not-examined")
+    assert "16 are needed" in found.title
+    assert analysis.verdict.startswith("Cannot tell")
+
+
+def test_a_rig_that_disagrees_with_the_sampling_rate() -> None:
+    recording = record(replace(GOOD, speed=ConstantProfile(1320.0)))
+    wrong = replace(
+        recording,
+        samples=recording.samples[:1],
+        channels=recording.channels[:1],
+        speed=ConstantSpeed(1320.0 * 0.6, "in"),
+    )
+    analysis = analyze(wrong)
+    assert "mesh-absent" in codes(analysis, Kind.CANNOT_TELL)
+    assert any("1.66" in text for text in finding(analysis, "mesh-absent").evidence)
+
+
+def test_a_mesh_above_half_the_sampling_rate() -> None:
+    recording = record()
+    fast = replace(RIG, pairs=(GearPair("stage", "in", "out", 270, 430),), bearings=())
+    assert "mesh-above-sampling" in codes(analyze(replace(recording, rig=fast)), Kind.CANNOT_TELL)
+
+
+def test_a_machine_at_rest() -> None:
+    rng = np.random.default_rng(1)
+    recording = Recording(
+        rng.normal(size=(1, 20_000)), 10240.0, (Channel("a1", "acceleration"),), speed=ConstantSpeed(0.0), rig=RIG
+    )
+    analysis = analyze(recording)
+    assert isinstance(analysis.shaft_angle, CannotTell)
+    assert "rest" in analysis.shaft_angle.reason
+    assert analysis.verdict.startswith("Cannot tell")
+
+
+def test_noise_allows_no_speed_and_no_fault() -> None:
+    rng = np.random.default_rng(2)
+    recording = Recording(rng.normal(size=(2, 60_000)), 10240.0, (Channel("a1"), Channel("a2")), rig=RIG)
+    analysis = analyze(recording)
+    assert isinstance(analysis.shaft_angle, CannotTell)
+    assert not codes(analysis, Kind.FAULT, Kind.SUSPICION)
+
+
+def test_nothing_but_a_sampling_rate_gives_spectra() -> None:
+    t = np.arange(20_000) / 2000.0
+    values = np.cos(2 * np.pi * 123.0 * t) + 0.1 * np.random.default_rng(3).normal(size=len(t))
+    analysis = analyze(Recording(values[None, :], 2000.0, (Channel("a1"),)))
+    assert analysis.verdict.startswith("Cannot tell")
+    assert finding(analysis, "strongest-line").where.frequency_hz == pytest.approx(123.0, abs=0.1)
+    position, amplitude = analysis.channels[0].spectrum.largest_near(123.0, 1.0)
+    assert (position, amplitude) == pytest.approx((123.0, 1.0), rel=0.01)
+
+
+def test_dead_and_clipped_channels_are_reported_and_the_others_used() -> None:
+    recording = record()
+    samples = np.vstack([recording.samples, np.zeros(recording.n_samples), np.clip(recording.samples[0], -4, 4)])
+    channels = (*recording.channels, Channel("dead", "acceleration"), Channel("cut", "acceleration"))
+    analysis = analyze(replace(recording, samples=samples, channels=channels))
+    problems = {f.code: f.where.channels for f in analysis.findings if f.kind is Kind.DATA_PROBLEM}
+    assert problems == {"channel-dead": ("dead",), "channel-clipped": ("cut",)}
+    assert {c.channel for c in analysis.channels} == {"a1", "cut"}
+
+
+def test_only_dead_channels() -> None:
+    analysis = analyze(
+        Recording(np.zeros((1, 5000)), 1000.0, (Channel("a1", "acceleration"),), speed=ConstantSpeed(600))
+    )
+    assert "all-channels-dead" in codes(analysis)
+    assert analysis.verdict.startswith("Cannot tell")
+
+
+@pytest.mark.parametrize("n_samples", [2, 255])
+def test_too_few_samples_are_an_error(n_samples: int) -> None:
+    with pytest.raises(InputError, match="256 or more"):
+        analyze(Recording(np.ones((1, n_samples)), 1000.0, (Channel("a1"),)))
+
+
+def test_no_vibration_channel_is_an_error() -> None:
+    recording = Recording(np.ones((1, 1000)), 1000.0, (Channel("t", "tachometer"),))
+    with pytest.raises(InputError, match="no vibration channel"):
+        analyze(recording)
+
+
+def test_same_recording_same_answer() -> None:
+    damage = ToothDamage("stage", "in", 0.4, impulse_mps2=4.0)
+    recording = record(replace(GOOD, tooth_damages=(damage,)))
+    assert analyze(recording).findings == analyze(recording).findings
+
+
+@pytest.mark.parametrize("gain", [1e-6, 1e6])
+def test_the_unit_of_the_channel_does_not_matter(gain: float) -> None:
+    recording = record(replace(GOOD, tooth_damages=(ToothDamage("stage", "in", 0.4, impulse_mps2=10.0),)))
+    samples = np.array(recording.samples)
+    samples[0] *= gain
+    here, there = analyze(recording), analyze(replace(recording, samples=samples))
+    assert codes(here) == codes(there)
+    assert [f.confidence for f in here.findings] == pytest.approx([f.confidence for f in there.findings])
+
+
+def test_the_text_tells_place_strength_and_remedy() -> None:
+    damage = ToothDamage("stage", "in", 0.4, impulse_mps2=10.0)
+    analysis = analyze(record(replace(GOOD, tooth_damages=(damage,))))
+    text = analysis_text(analysis, with_indicators=True)
+    for part in ("where: gear stage/in", "how strong:", "how sure:", "surer with:", "FM4", "(tooth 1"):
+        assert part in text
+    assert max(len(line) for line in text.splitlines()[:20]) <= 100
+
+
+def test_tachometer_on_the_slow_shaft() -> None:
+    damage = ToothDamage("stage", "in", 0.4, impulse_mps2=10.0)
+    model = replace(GOOD, tooth_damages=(damage,), tachometer=Tachometer("out", pulses_per_revolution=1))
+    recording = record(model, rig=replace(RIG, speed=TachometerChannel("tacho", shaft="out")))
+    analysis = analyze(recording)
+    assert analysis.findings[0].code == "tooth-local-damage"
+    assert analysis.findings[0].where.shaft == "in"
