@@ -62,7 +62,9 @@ def _is_synchronous(signals: Signals, hertz: float) -> bool:
     if signals.angle is None:
         return False
     order = hertz / signals.frequency_per_order_hz
-    return any(abs(order / o - round(order / o)) * o < 0.01 for o in signals.known_shaft_orders.values())
+    # Also a half and a third of each: wheels that are not described often turn at those.
+    candidates = [o / part for o in signals.known_shaft_orders.values() for part in (1, 2, 3)]
+    return any(abs(order / o - round(order / o)) * o < 0.01 for o in candidates)
 
 
 def _unexplained(signals: Signals) -> Finding | None:

@@ -1,0 +1,164 @@
+"""The command line: what it prints, its exit codes, and that bad input is one line."""
+
+import json
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.cli import main
+from app.samples import samples
+from gearsig import __version__
+
+RIG = '[[pair]]\nname = "p"\ndriver = "in"\ndriven = "out"\ndriver_teeth = 23\ndriven_teeth = 47\n'
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    """Run the command; return exit code, standard output and standard error."""
+    with pytest.raises(SystemExit) as stopped:
+        main([str(a) for a in arguments])
+    out, err = capsys.readouterr()
+    code = stopped.value.code
+    return (code if isinstance(code, int) else int(code is not None)), out, err
+
+
+def sample(stem: str) -> Path:
+    return next(s.recording for s in samples() if s.rig.stem == stem)
+
+
+def csv(folder: Path, text: str, name: str = "record.csv") -> Path:
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def test_analyze_finds_the_rig_file_beside_the_recording(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "analyze", sample("damaged_tooth"))
+    assert code == 0
+    assert "Fault: Local tooth damage" in out
+    assert "damaged_tooth.toml" in err
+
+
+def test_analyze_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(capsys, "analyze", sample("outer_race"), "--json")
+    assert code == 0
+    result = json.loads(out)
+    assert result["findings"][0]["code"] == "bearing-outer-race"
+
+
+def test_analyze_without_a_rig_says_what_is_missing(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    values = np.random.default_rng(0).normal(size=4000)
+    path = csv(tmp_path, "a1\n" + "\n".join(f"{v:.6g}" for v in values))
+    code, out, _ = run(capsys, "analyze", path, "--fs", 1000)
+    assert code == 0
+    assert "Cannot tell" in out
+    assert "rig example" in out
+
+
+def test_rig_check_prints_the_orders(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    code, out, _ = run(capsys, "rig", "check", csv(tmp_path, RIG, "rig.toml"))
+    assert code == 0
+    assert "mesh order 23" in out
+    assert "hunting tooth" in out
+
+
+def test_the_example_rig_is_valid(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    _, text, _ = run(capsys, "rig", "example")
+    code, out, _ = run(capsys, "rig", "check", csv(tmp_path, text, "rig.toml"))
+    assert code == 0
+    assert all(name in out for name in ("BPFO", "BPFI", "BSF", "FTF"))
+
+
+def test_report_lists_the_broken_file_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    broken = csv(tmp_path, "a1\n1\nnonsense\n3\n")
+    code, out, err = run(capsys, "report", sample("healthy"), broken, "-o", tmp_path / "pages", "-j", 1)
+    assert code == 1
+    assert "healthy.h5: No fault shows" in out
+    assert "record.csv: not analysed" in err
+    index = (tmp_path / "pages" / "index.html").read_text()
+    assert "healthy.html" in index
+    assert "record.csv" in index
+    assert not list((tmp_path / "pages").glob("*record*.html"))
+
+
+def test_pulse_times_from_a_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    t = np.arange(20_000) / 2000.0
+    values = np.cos(2 * np.pi * 23 * 10.0 * t) + 0.1 * np.random.default_rng(0).normal(size=len(t))
+    path = csv(tmp_path, "a1\n" + "\n".join(f"{v:.6g}" for v in values))
+    pulses = csv(tmp_path, "\n".join(f"{0.1 * k:.6f}" for k in range(1, 99)), "pulses.csv")
+    rig = csv(tmp_path, RIG, "rig.toml")
+    code, out, _ = run(capsys, "analyze", path, "--fs", 2000, "--rig", rig, "--tach-times", pulses)
+    assert code == 0
+    assert "600" in next(line for line in out.splitlines() if "turns at" in line)
+
+
+def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
+    assert __version__ in run(capsys, "--version")[1]
+    for command in ("analyze", "report", "rig", "demo", "dashboard"):
+        code, out, _ = run(capsys, command, "--help")
+        assert code == 0
+        assert len(out.splitlines()) > 5
+        assert command in run(capsys, "--help")[1]
+
+
+BAD = {
+    "absent.csv": None,
+    "empty.csv": b"",
+    "zeros.mat": bytes(4096),
+    "pickle.mat": pickle.dumps({"a1": [1.0, 2.0]}),
+    "text.csv": b"a1,a2\n1,2\nx,3\n",
+    "nan.csv": b"a1\n" + b"1\n2\nnan\n" * 200,
+    "backwards.csv": b"time [s],a1\n0,1\n0.1,2\n0.05,3\n0.2,1\n",
+    "doubled.csv": b"a1,a1\n1,2\n3,4\n",
+    "short.wav": b"RIFF\x10\x00\x00\x00WAVEfmt ",
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_recordings_are_one_line_and_code_2(capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str) -> None:
+    content = BAD[name]
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    code, out, err = run(capsys, "analyze", tmp_path / name, "--fs", 1000)
+    assert code == 2
+    assert out == ""
+    assert len(err.strip().splitlines()) == 1
+    assert name in err
+    assert [p.name for p in tmp_path.iterdir()] == ([name] if content is not None else [])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("--fs", "0"), "above zero"),
+        (("--fs", "-5"), "above zero"),
+        (("--fs", "1000", "--speed-rpm", "-1"), "speed_rpm is -1"),
+        (("--fs", "1000", "--speed-rpm", "600", "--tach-times", "x.csv"), "both given"),
+        (("--fs", "1000", "--tach-times", "absent.csv"), "absent.csv"),
+        (("--fs", "1000", "--rig", "absent.toml"), "absent.toml"),
+    ],
+)
+def test_bad_options(capsys: pytest.CaptureFixture[str], tmp_path: Path, arguments: tuple[str, ...], text: str) -> None:
+    path = csv(tmp_path, "a1\n" + "1\n2\n" * 500)
+    code, _, err = run(capsys, "analyze", path, *arguments)
+    assert code == 2
+    assert text in err
+    assert len(err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("pulses", ["", "0.5\n", "0.1\n0.2\n0.15\n0.3\n"], ids=["none", "one", "backwards"])
+def test_bad_pulse_files(capsys: pytest.CaptureFixture[str], tmp_path: Path, pulses: str) -> None:
+    path = csv(tmp_path, "a1\n" + "1\n2\n" * 500)
+    times = csv(tmp_path, pulses, "pulses.csv")
+    code, _, err = run(capsys, "analyze", path, "--fs", 1000, "--tach-times", times)
+    assert code == 2
+    assert len(err.strip().splitlines()) == 1
+    assert "puls" in err
+
+
+def test_a_report_that_cannot_be_written(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    occupied = csv(tmp_path, "not a folder", "pages")
+    code, _, err = run(capsys, "report", sample("healthy"), "-o", occupied)
+    assert code == 2
+    assert "pages" in err
