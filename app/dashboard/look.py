@@ -19,28 +19,17 @@ class Palette:
     cursors: dict[str, str]
 
 
-LIGHT = Palette(style.MEASURED, style.FAULT, style.QUIET, style.CURSOR_COLOURS | {"finding": style.FAULT})
-DARK = Palette(
-    "#6CB8F0",
-    "#FF9A57",
-    "#A2A8B1",
-    {
-        "mesh": "#3FC79D",
-        "sideband": "#3FC79D",
-        "shaft": "#E3B341",
-        "bearing": "#E3A3CB",
-        "hunting": "#A2A8B1",
-        "finding": "#FF9A57",
-    },
-)
-DASHES = {
-    "mesh": "solid",
-    "sideband": "dot",
-    "shaft": "dash",
-    "bearing": "dashdot",
-    "hunting": "dot",
-    "finding": "dash",
+_CURSORS_ON_DARK = {
+    "mesh": "#3FC79D",
+    "sideband": "#3FC79D",
+    "shaft": "#E3B341",
+    "bearing": "#E3A3CB",
+    "hunting": "#A2A8B1",
+    "finding": "#FF9A57",
 }
+LIGHT = Palette(style.MEASURED, style.FAULT, style.QUIET, style.CURSOR_COLOURS | {"finding": style.FAULT})
+DARK = Palette("#6CB8F0", "#FF9A57", "#A2A8B1", _CURSORS_ON_DARK)
+DASHES = {"mesh": "solid", "sideband": "dot", "shaft": "dash", "bearing": "dashdot", "finding": "dash"}
 
 
 def is_dark() -> bool:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gearsig.recording.types import Recording
     from gearsig.rig.types import Rig
 
-LONGEST_NAME = 100
+LONGEST_STEM, LONGEST_ENDING, N_ENDINGS = 60, 15, 2
 
 
 def safe_file_name(name: str) -> str:
@@ -25,9 +25,13 @@ def safe_file_name(name: str) -> str:
     >>> safe_file_name("../../etc/run 1.csv"), safe_file_name(r"C:\data\a.MAT"), safe_file_name("..")
     ('run-1.csv', 'a.MAT', 'recording')
     """
-    last = re.split(r"[/\\]", name)[-1]
-    plain = re.sub(r"[^\w.-]+", "-", last, flags=re.ASCII).lstrip(".-")
-    return plain[-LONGEST_NAME:].lstrip(".-") or "recording"
+    stem, *endings = re.split(r"[/\\]", name)[-1].split(".")
+    kept = [plain for ending in endings[-N_ENDINGS:] if (plain := _plain(ending)[:LONGEST_ENDING])]
+    return ".".join([_plain(stem)[:LONGEST_STEM] or "recording", *kept])
+
+
+def _plain(text: str) -> str:
+    return re.sub(r"[^\w-]+", "-", text, flags=re.ASCII).strip("-")
 
 
 def read_rig_text(text: str, name: str = "rig.toml") -> Rig | None:

@@ -79,7 +79,9 @@ def _show_unrolled(analysis: Analysis, average: SynchronousAverage, n_teeth: int
     chosen = np.arange(0, len(average.values), max(1, len(average.values) // N_ANGLES))
     values, error = average.values[chosen], 2 * average.standard_error[chosen]
     angle = chosen * 360 / len(average.values)
-    axes = Axes(f"angle of {average.shaft or 'the shaft'} (deg)", with_unit(average.kind, average.unit), (0.0, 360.0))
+    axes = Axes(
+        f"angle of {average.shaft or 'the shaft'} (deg)", with_unit(average.kind, average.unit), (0.0, 360.0), x_step=45
+    )
     line = Line(angle, values, average.kind, (values - error, values + error))
     key = state.view_key(f"average {average.channel} {average.shaft} {average.kind}", analysis)
     show_lines([line], axes, key, cursors=marks, height_px=360)

@@ -22,11 +22,8 @@ def show_findings(analysis: Analysis) -> None:
     remarks = [f for f in analysis.findings if f.kind in _REMARKS]
     for i, finding in enumerate(important[:N_OPEN]):
         _show_card(finding, with_evidence=i == 0)
-    left = st.columns(2)
-    with left[0]:
-        _show_folded("More findings", important[N_OPEN:])
-    with left[1] if important[N_OPEN:] else left[0]:
-        _show_folded("Remarks: what was examined and held", remarks)
+    _show_folded("More findings", important[N_OPEN:])
+    _show_folded("Remarks", remarks)
 
 
 def _show_folded(title: str, findings: Sequence[Finding]) -> None:

@@ -44,6 +44,7 @@ class Axes:
     x_limits: tuple[float, float]
     y_limits: tuple[float, float] | None = None
     logarithmic: bool = False
+    x_step: float | None = None
 
 
 def show_lines(
@@ -93,7 +94,7 @@ def line_figure(
     if marked:
         ring = {"symbol": "circle-open", "size": 13, "color": colours.fault, "line": {"width": 2}}
         x, y = zip(*marked, strict=True)
-        figure.add_scatter(x=x, y=y, mode="markers", marker=ring, name="finding", hoverinfo="skip")
+        figure.add_scatter(x=x, y=y, yaxis="y2", mode="markers", marker=ring, name="finding", hoverinfo="skip")
     _lay_out(figure, axes, n_rows, height_px)
     return figure
 
@@ -104,6 +105,7 @@ def _add_line(figure: Figure, line: Line, colours: Palette) -> None:
         figure.add_scatter(
             x=line.x,
             y=edge,
+            yaxis="y2",
             mode="lines",
             line={"width": 0},
             fill=fill,
@@ -113,6 +115,7 @@ def _add_line(figure: Figure, line: Line, colours: Palette) -> None:
     figure.add_scatter(
         x=line.x,
         y=line.y,
+        yaxis="y2",
         mode="lines",
         name=name,
         line={"width": 1.1, "color": colours.measured},
@@ -130,7 +133,6 @@ def _add_cursors(figure: Figure, cursors: Sequence[Cursor], limits: tuple[float,
         figure.add_scatter(
             x=x,
             y=[0, 1, None] * len(own),
-            yaxis="y2",
             mode="lines",
             name=kind,
             text=words,
@@ -167,15 +169,18 @@ def _lay_out(figure: Figure, axes: Axes, n_rows: int, height_px: int) -> None:
         hovermode="closest",
         showlegend=False,
         dragmode="zoom",
-        xaxis={"title": as_plot_text(axes.x), "range": axes.x_limits, "exponentformat": "e"},
-        yaxis={
+        xaxis={"title": as_plot_text(axes.x), "range": axes.x_limits, "exponentformat": "e", "dtick": axes.x_step},
+        yaxis2={
+            "overlaying": "y",
+            "tickmode": "auto",
+            "side": "left",
             "title": as_plot_text(axes.y),
             "type": "log" if axes.logarithmic else "linear",
             "range": limits,
             "exponentformat": "e",
             "dtick": _decades(axes),
         },
-        yaxis2={"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True},
+        yaxis={"range": [0, 1], "visible": False, "fixedrange": True},  # of the cursors, behind the lines
     )
 
 

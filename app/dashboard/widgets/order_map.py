@@ -5,7 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from app.dashboard.widgets.picture import show_picture
-from app.dashboard.widgets.range_slider import choose_range
+from app.dashboard.widgets.range_slider import choose_end
 from gearsig.diagnosis.types import Analysis, ChannelAnalysis
 from gearsig.report.lines import highest_order_of_interest, line_cursors
 
@@ -23,7 +23,7 @@ def show_order_map(analysis: Analysis, channel: ChannelAnalysis) -> None:
     if channel.order_spectrum is not None:
         first = min(end, highest_order_of_interest(analysis, channel.order_spectrum))
     label = "Highest order shown" if order_map.axis == "order" else "Highest frequency shown (Hz)"
-    highest = choose_range(label, analysis, end, shown=(0.0, first), name="map")[1]
+    highest = choose_end(label, analysis, end, first)
     on_orders = order_map.axis == "order"
     cursors = [c for c in line_cursors(analysis, order_map) if c.kind == "mesh"] if on_orders else []
     show_picture(

@@ -10,13 +10,13 @@ import streamlit as st
 
 from app.dashboard.as_typed import as_typed
 from app.dashboard.look import is_dark
+from app.dashboard.theme import DARK_PAPER
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 180
-DARK_GROUND = np.array([14, 17, 23]) / 255
-"""Streamlit's own (#0E1117)."""
+DARK_GROUND = np.frombuffer(bytes.fromhex(DARK_PAPER.removeprefix("#")), np.uint8) / 255
 BRIGHTEST = 0.93
 # Turns the hue by half a circle and keeps the lightness: the matrix of hue-rotate(180deg) in the W3C's Filter Effects
 # Module, with which the reports turn their figures over, too.

@@ -39,3 +39,10 @@ def choose_range(
     key = state.view_key(f"{name} {label} {start!r} to {end!r}", analysis)
     low, high = st.slider(label, start, end, value=value, step=step, format="%.5g", key=key)
     return (low, high) if high > low else (max(start, high - step), min(end, high + step))
+
+
+def choose_end(label: str, analysis: Analysis, end: float, shown: float) -> float:
+    """Return the chosen end of what is shown from zero, `shown` at first."""
+    step = end / N_STEPS
+    key = state.view_key(f"{label} to {end!r}", analysis)
+    return st.slider(label, step, end, value=min(shown, end), step=step, format="%.5g", key=key)

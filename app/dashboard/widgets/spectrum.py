@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import streamlit as st
@@ -22,6 +23,9 @@ N_COLUMNS = 1600
 """Points of a line sent to the browser: more than a page has pixel columns."""
 N_OFFSET_LINES = 3
 """Lines over which a window spreads a constant."""
+OFFSET_SHARE = 0.005
+FOUND_SHARE = 0.01
+"""Bearings slip by a percent or so: a finding that near to a cursor is the cursor's."""
 KIND_NAMES = {
     "mesh": "mesh",
     "sideband": "sidebands",
@@ -77,7 +81,14 @@ def show_spectrum(
             )
     unit = {"frequency": "Frequency shown (Hz)", "order": "Orders shown"}.get(spectrum.axis, "Quefrency shown (s)")
     limits = choose_range(f"{unit}", analysis, float(spectrum.positions[-1]), shown=shown, name=name)
-    _draw(analysis, spectrum, SCALES[label or scale], limits, [c for c in cursors if c.kind in chosen], marked, name)
+    shown_cursors = [_first_if_found(cursor, marked) for cursor in cursors if cursor.kind in chosen]
+    _draw(analysis, spectrum, SCALES[label or scale], limits, shown_cursors, marked, name)
+
+
+def _first_if_found(cursor: Cursor, marked: Sequence[float]) -> Cursor:
+    """Give the cursor of a finding the first right to its label."""
+    found = any(abs(cursor.position - position) <= FOUND_SHARE * position for position in marked)
+    return replace(cursor, number=0) if found else cursor
 
 
 def _draw(
@@ -95,8 +106,9 @@ def _draw(
     at, low, top = envelope(x, high, N_COLUMNS)
     thinned = len(at) < len(x)
     points = [(p, float(values[spectrum.index_of(p)])) for p in marked if limits[0] <= p <= limits[1]]
-    # the lines at zero are an offset of the sensor, not vibration: they must not squeeze the rest
-    y_limits = _value_limits(high[N_OFFSET_LINES:] if start == 0 and len(high) > 2 * N_OFFSET_LINES else high, scale)
+    # the lines at zero are an offset or a drift, not vibration: they must not squeeze the rest
+    n_offset = max(N_OFFSET_LINES, int(OFFSET_SHARE * len(high))) if start == 0 and len(high) > 9 else 0
+    y_limits = _value_limits(high[n_offset:], scale)
     show_lines(
         [Line(at, top, spectrum.source, (low, top) if thinned else None)],
         Axes(spectrum.axis_label, _value_label(spectrum, scale), limits, y_limits, logarithmic=scale == "log"),

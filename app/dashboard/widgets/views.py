@@ -32,7 +32,8 @@ def show_of_channel(analysis: Analysis, view: ChannelView) -> None:
     names = list(dict.fromkeys([*named, *channels]))
     name = names[0]
     if len(names) > 1:
-        name = st.selectbox("Channel", list(channels), index=list(channels).index(name), key=_channel_key(analysis))
+        column = st.columns(3)[0]
+        name = column.selectbox("Channel", list(channels), index=list(channels).index(name), key=_channel_key(analysis))
     view(analysis, channels[name])
 
 

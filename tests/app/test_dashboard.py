@@ -1,0 +1,188 @@
+"""The dashboard's pages, run without a browser."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from streamlit.testing.v1 import AppTest
+
+import app.dashboard
+from app.dashboard import state
+from app.dashboard.widgets.tabs import OF_CHANNEL, OF_RECORDING
+from app.samples import samples
+
+MAIN = Path(app.dashboard.__file__).parent / "main.py"
+TABS = (*OF_RECORDING, *OF_CHANNEL, "Indicators", "Report")
+SAMPLES = {sample.rig.stem: sample for sample in samples()}
+
+
+def opened() -> AppTest:
+    return AppTest.from_file(str(MAIN), default_timeout=120).run()
+
+
+def upload(page: AppTest, name: str, content: bytes, rig: str = "") -> AppTest:
+    page.sidebar.radio(key=state.ORIGIN).set_value("Own file").run()
+    page.sidebar.file_uploader(key=state.RECORDING_FILE).upload(name, content)
+    if rig:
+        page.sidebar.file_uploader(key=state.RIG_FILE).upload("machine.toml", rig.encode())
+    return page.run()
+
+
+def shown_text(page: AppTest) -> str:
+    """Return the words of the page as a reader sees them: without escapes and invisible joiners."""
+    parts = [*page.markdown, *page.subheader, *page.caption, *page.error, *page.warning, *page.info]
+    return "\n".join(part.value for part in parts).replace("\\", "").replace("\u2060", "")
+
+
+def test_a_sample_is_open_at_the_start() -> None:
+    page = opened()
+    assert not page.exception
+    assert "tooth" in page.subheader[0].value
+    assert page.subheader[0].value.startswith("Fault")
+    assert [tab.label for tab in page.tabs] == list(TABS)
+
+
+@pytest.mark.parametrize("name", sorted(SAMPLES))
+def test_every_sample_opens_in_every_view(name: str) -> None:
+    page = opened()
+    page.sidebar.selectbox(key=state.SAMPLE).set_value(SAMPLES[name]).run()
+    for tab in TABS:
+        page.session_state[state.TAB] = tab
+        page.run()
+        assert not page.exception, (name, tab)
+        assert not page.error, (name, tab)
+    assert SAMPLES[name].recording.name in shown_text(page)
+
+
+def test_views_draw_what_they_promise() -> None:
+    page = opened()
+    drawn = {}
+    for tab in TABS:
+        page.session_state[state.TAB] = tab
+        page.run()
+        drawn[tab] = (len(page.get("plotly_chart")), len(page.get("image")), len(page.dataframe))
+    assert drawn["Channels"] == (2, 0, 1)
+    assert drawn["Speed"] == drawn["Spectrum"] == drawn["Order spectrum"] == drawn["Envelope"] == (1, 0, 0)
+    assert drawn["Synchronous average"] == (1, 1, 0)
+    assert drawn["Indicators"] == (0, 0, 1)
+
+
+def test_a_map_shows_along_a_run_up() -> None:
+    page = opened()
+    page.sidebar.selectbox(key=state.SAMPLE).set_value(SAMPLES["run_up"])
+    page.session_state[state.TAB] = "Order map"
+    page.run()
+    assert len(page.get("image")) == 1
+
+
+def test_an_upload_and_its_rig_give_the_diagnosis_of_the_same_files_on_disk() -> None:
+    sample = SAMPLES["damaged_tooth"]
+    page = opened()
+    verdict = page.subheader[0].value
+    page = upload(page, sample.recording.name, sample.recording.read_bytes(), sample.rig.read_text())
+    assert not page.exception
+    assert page.subheader[0].value == verdict
+
+
+def test_the_rig_can_be_changed_on_the_page() -> None:
+    page = opened()
+    text = page.sidebar.text_area[0]
+    text.set_value(text.value.replace("driver_teeth = 29", "driver_teeth = -29")).run()
+    assert not page.exception
+    assert "driver teeth of pair 'stage 1'" in shown_text(page)
+    assert "at least 3" in shown_text(page)
+
+
+def test_a_sampling_rate_that_is_missing_is_asked_for_and_taken() -> None:
+    lines = "\n".join(str((i * 37) % 101 - 50) for i in range(4000))
+    page = upload(opened(), "bare.csv", f"a1\n{lines}\n".encode())
+    assert len(page.error) == 1
+    assert "sampling rate" in shown_text(page)
+    page.sidebar.number_input[0].set_value(1000.0).run()
+    assert not page.error
+    assert "4 s at 1000 Hz" in shown_text(page)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "rig"),
+    [
+        ("empty.csv", b"", ""),
+        ("zeros.mat", bytes(4096), ""),
+        ("pickle.mat", b"\x80\x04\x95\x10\x00\x00\x00", ""),
+        ("torn.h5", b"\x89HDF\r\n\x1a\n" + b"\xff" * 64, ""),
+        ("short.csv", b"a1\n1\n2\n", ""),
+        ("good.csv", b"a1\n1\n2\n", "[[shaft]\n"),
+        ("good.csv", b"a1\n1\n2\n", "[[pear]]\n"),
+    ],
+)
+def test_broken_files_show_one_message(name: str, content: bytes, rig: str) -> None:
+    page = upload(opened(), name, content, rig)
+    assert not page.exception
+    assert len(page.error) == 1
+    assert not page.tabs
+
+
+def test_nothing_is_open_before_a_file_is_given() -> None:
+    page = opened()
+    page.sidebar.radio(key=state.ORIGIN).set_value("Own file").run()
+    assert not page.exception
+    assert not page.tabs
+    assert "Open a recording" in shown_text(page)
+
+
+def test_no_long_signal_goes_to_the_browser_whole() -> None:
+    """A million samples: the page carries thousands; a window shows its own samples again."""
+    from io import BytesIO
+
+    import numpy as np
+    from scipy.io import savemat
+
+    x = np.random.default_rng(0).standard_normal(1_000_000).astype(np.float32)
+    x[123_456] = 99.0
+    file = BytesIO()
+    savemat(file, {"a1": x, "fs": 10_000.0})
+    page = upload(opened(), "long.mat", file.getvalue())
+    page.session_state[state.TAB] = "Channels"
+    page.run()
+    assert not page.exception
+    spec = page.get("plotly_chart")[0].proto.spec
+    assert len(spec) < 200_000
+    assert max(points(spec)) == pytest.approx(99.0)
+    slider = next(s for s in page.slider if s.label.startswith("Time"))
+    slider.set_value((12.3, 12.4)).run()
+    near = points(page.get("plotly_chart")[0].proto.spec)
+    assert len(near) == pytest.approx(1000, abs=5)
+    assert max(near) == pytest.approx(99.0)
+
+
+def points(spec: str) -> list[float]:
+    """Return the values of a chart's only line."""
+    from base64 import b64decode
+
+    import numpy as np
+
+    y = json.loads(spec)["data"][0]["y"]
+    return list(np.frombuffer(b64decode(y["bdata"]), y["dtype"]))
+
+
+def test_names_from_files_are_shown_as_typed() -> None:
+    """Markup in channel, shaft and file names stays text, in every view."""
+    names = ("<script>alert(1)</script>", "**x** $y$ :material/delete: :smile: a->b")
+    rows = "\n".join(f"{i / 1000};{(i * 37) % 101};{(i * 53) % 97}" for i in range(3000))
+    rig = '[[shaft]]\nname = "<img src=x onerror=alert(1)>"\n[speed]\nsource = "constant"\nspeed_rpm = 1200\n'
+    page = upload(opened(), "[a](http://x.y) **b**.csv", f"time (s);{names[0]};{names[1]}\n{rows}\n".encode(), rig)
+    for tab in TABS:
+        page.session_state[state.TAB] = tab
+        page.run()
+        assert not page.exception, tab
+        raw = "\n".join(part.value for part in [*page.markdown, *page.subheader, *page.caption, *page.info])
+        for markup in ("<script", "<img", "**x**", "$y$", ":material/delete:", ":red[", "[a](", "http:"):
+            assert not re.search(r"(?<!\\)" + re.escape(markup), raw), (tab, markup)
+        for chart in page.get("plotly_chart"):
+            assert "<script" not in chart.proto.spec
+            assert "<img" not in chart.proto.spec
+    page.session_state[state.TAB] = "Channels"
+    page.run()
+    for name in names:
+        assert name in shown_text(page)
