@@ -49,7 +49,9 @@ def interpolate_coarse(x, positions, scale, side, table, out):  # type: ignore[n
         step = 0.5 if s > 0.5 else np.floor(0.5 / s)
         first = np.floor(positions[i]) - np.ceil(6 * step)
         n_grid = int((positions[stop - 1] - first) / step) + 8
-        delay(_lowpassed(x, int(first), step, n_grid, s, side), first, 1.0 / step, positions[i:stop], table, out[i:stop])
+        delay(
+            _lowpassed(x, int(first), step, n_grid, s, side), first, 1.0 / step, positions[i:stop], table, out[i:stop]
+        )
         i = stop
 
 

@@ -35,6 +35,10 @@ class CombDecision:
         Part of the score that sidebands and shaft harmonics carry.
     narrow : bool
         Whether the search range left the scale of the speed open (False) or not.
+    bin_width : float
+        Of the spectrum it was found in.
+    coverage : float
+        Share of the recording in which the comb lies where a varying angle says.
     """
 
     speed: float
@@ -46,6 +50,8 @@ class CombDecision:
     other_teeth_score: float
     side_score: float
     narrow: bool
+    bin_width: float
+    coverage: float = 1.0
 
     @property
     def significance(self) -> float:
@@ -63,6 +69,8 @@ class CombDecision:
         if not self.narrow:
             # Mesh lines alone fit any number of teeth at another speed; sidebands tell the scale.
             parts.append(_sure(self.side_score, 2.0, 4.0))
+        # Speed that was followed rightly most of the time only is no angle to average over.
+        parts.append(min(1.0, self.coverage / 0.85) ** 12)
         return float(np.prod(parts))
 
     def evidence(self, unit: str = "rev/s") -> str:
@@ -84,7 +92,9 @@ def decide(evidence: LineEvidence, comb: CombLines, low: float, high: float) -> 
     runner_up_speed, runner_up = scores.best_beyond(speed, same)
     mean, deviation = chance_scores(evidence, comb, low, high, _N_CHANCE)
     around = (speed * (1 - same / 2), speed * (1 + same / 2))
-    others = max((score_speeds(evidence, other, *around).best()[1] for other in with_other_teeth(comb)), default=-np.inf)
+    others = max(
+        (score_speeds(evidence, other, *around).best()[1] for other in with_other_teeth(comb)), default=-np.inf
+    )
     return CombDecision(
         speed,
         score,
@@ -95,6 +105,7 @@ def decide(evidence: LineEvidence, comb: CombLines, low: float, high: float) -> 
         others,
         _side_score(evidence, comb, speed),
         high / low <= NARROW,
+        evidence.bin_width,
     )
 
 
@@ -138,9 +149,9 @@ def _line_at(evidence: LineEvidence, position: float) -> tuple[float, float] | N
 
 
 def _side_score(evidence: LineEvidence, comb: CombLines, speed: float) -> float:
-    places = (comb.orders[~comb.is_mesh] * speed / evidence.bin_width).astype(int)
-    places = places[(places < len(evidence.side)) & (places * evidence.bin_width < evidence.top)]
-    return float(evidence.side[places].sum())
+    places = (comb.orders * speed / evidence.bin_width).astype(int)
+    counts = ~comb.is_mesh & (places < evidence.ratios.shape[1]) & (places * evidence.bin_width < evidence.top)
+    return float(evidence.ratios[comb.presence[counts], places[counts]].sum())
 
 
 def _sure(value: float, zero: float, scale: float) -> float:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.rig.ratios import shaft_ratios
@@ -13,7 +16,15 @@ from gearsig.rig.types import Rig
 N_MESH_HARMONICS = 5
 N_SIDEBANDS = 2
 N_SHAFT_HARMONICS = 3
+IntArray = NDArray[np.integer[Any]]
+BoolArray = NDArray[np.bool_]
 Stages = tuple[tuple[float, tuple[float, ...]], ...]
+
+# Odds that a line of the comb is there at all. They tell a speed from its half: low harmonics and near sidebands are likelier.
+PRESENCE = (0.8, 0.6, 0.4, 0.25)
+_MESH_CLASSES = (0, 1, 2, 2, 3)
+_SIDEBAND_CLASSES = (1, 3)
+_SHAFT_CLASSES = (1, 2, 3)
 
 _SAME = 0.02  # orders closer than this are one line
 
@@ -25,6 +36,8 @@ class CombLines:
     Parameters
     ----------
     orders : array, (n_lines,)
+    presence : array of int, (n_lines,)
+        How likely each line is there, index into `PRESENCE`.
     is_mesh : array of bool, (n_lines,)
         Mesh harmonics; the others are sidebands and shaft harmonics, which tell the scale of the speed.
     stages : tuple of (float, tuple of float)
@@ -32,7 +45,8 @@ class CombLines:
     """
 
     orders: FloatArray
-    is_mesh: FloatArray
+    presence: IntArray
+    is_mesh: BoolArray
     stages: Stages
 
     @property
@@ -61,20 +75,29 @@ def comb_of_rig(rig: Rig) -> CombLines | None:
 
 def comb_of_stages(stages: Stages) -> CombLines:
     """Return the comb of (mesh order, shaft orders) per stage."""
-    mesh = [k * m for m, _ in stages for k in range(1, N_MESH_HARMONICS + 1)]
-    side = [
-        k * m + sign * j * shaft
+    turning = {round(s, 9) for _, shafts in stages for s in shafts}
+    lines = [(k * m, _MESH_CLASSES[k - 1]) for m, _ in stages for k in range(1, N_MESH_HARMONICS + 1)]
+    n_mesh = len(lines)
+    lines += [(k * s, _SHAFT_CLASSES[k - 1]) for s in turning for k in range(1, N_SHAFT_HARMONICS + 1)]
+    lines += [
+        (k * m + sign * j * shaft, _SIDEBAND_CLASSES[j - 1])
         for m, shafts in stages
         for k in range(1, N_MESH_HARMONICS)
         for shaft in shafts
         for j in range(1, N_SIDEBANDS + 1)
         for sign in (-1, 1)
     ]
-    turning = {round(s, 9) for _, shafts in stages for s in shafts}
-    side += [k * s for s in turning for k in range(1, N_SHAFT_HARMONICS + 1)]
-    mesh = _distinct(mesh, [])
-    side = _distinct([order for order in side if order > 0.05], mesh)
-    return CombLines(np.array(mesh + side), np.arange(len(mesh) + len(side)) < len(mesh), stages)
+    orders: list[float] = []
+    classes: list[int] = []
+    is_mesh: list[bool] = []
+    # Where two lines fall together, the likelier one counts: mesh before the rest, then by class.
+    ranked = sorted(enumerate(lines), key=lambda item: (item[0] >= n_mesh, item[1][1], item[1][0]))
+    for place, (order, presence) in ranked:
+        if order > 0.05 and all(abs(order - other) > _SAME for other in orders):
+            orders.append(order)
+            classes.append(presence)
+            is_mesh.append(place < n_mesh)
+    return CombLines(np.array(orders), np.array(classes), np.array(is_mesh), stages)
 
 
 def with_other_teeth(comb: CombLines) -> list[CombLines]:
@@ -88,11 +111,3 @@ def with_other_teeth(comb: CombLines) -> list[CombLines]:
         if all(m > 0 for m, _ in stages):
             others.append(comb_of_stages(stages))
     return others
-
-
-def _distinct(orders: list[float], taken: list[float]) -> list[float]:
-    found: list[float] = []
-    for order in sorted(orders):
-        if all(abs(order - other) > _SAME for other in found[-1:]) and all(abs(order - t) > _SAME for t in taken):
-            found.append(order)
-    return found

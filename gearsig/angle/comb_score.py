@@ -58,7 +58,7 @@ def score_speeds(evidence: LineEvidence, comb: CombLines, low: float, high: floa
 
 def score_candidates(evidence: LineEvidence, comb: CombLines, speeds: FloatArray) -> FloatArray:
     """Return the score of each given speed, (n_speeds,)."""
-    return _raw(evidence, comb.orders, comb.is_mesh, speeds)
+    return _raw(evidence, comb, comb.orders, speeds)
 
 
 def chance_scores(
@@ -76,35 +76,29 @@ def chance_scores(
         speeds = speeds[:: len(speeds) // 200_000 + 1]
     best = [
         float(
-            _raw(
-                evidence, comb.orders * np.exp(rng.uniform(-0.12, 0.12, len(comb.orders))), comb.is_mesh, speeds
-            ).max()
+            _raw(evidence, comb, comb.orders * np.exp(rng.uniform(-0.12, 0.12, len(comb.orders))), speeds).max()
         )
         for _ in range(n_trials)
     ]
     return float(np.mean(best)), max(float(np.std(best, ddof=1)), 1.0)
 
 
-def _raw(evidence: LineEvidence, orders: FloatArray, is_mesh: FloatArray, speeds: FloatArray) -> FloatArray:
+def _raw(evidence: LineEvidence, comb: CombLines, orders: FloatArray, speeds: FloatArray) -> FloatArray:
     scores = np.empty(len(speeds))
-    _score(evidence.mesh, evidence.side, 1.0 / evidence.bin_width, evidence.top, orders, is_mesh, speeds, scores)
+    _score(evidence.ratios, 1.0 / evidence.bin_width, evidence.top, orders, comb.presence, comb.is_mesh, speeds, scores)
     return scores
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _score(mesh, side, per_bin, top, orders, is_mesh, speeds, out):  # type: ignore[no-untyped-def]
+def _score(ratios, per_bin, top, orders, presence, is_mesh, speeds, out):  # type: ignore[no-untyped-def]
     """out[i] = Σ over lines below top of the log likelihood ratio where order · speed falls."""
-    limit = min(int(top * per_bin), mesh.shape[0] - 1)
+    limit = min(int(top * per_bin), ratios.shape[1] - 1)
     for i in range(speeds.shape[0]):
         total = 0.0
         # Sidebands closer than four bins to their mesh line cannot be told from it.
         resolved = speeds[i] * per_bin >= 4.0
         for j in range(orders.shape[0]):
             k = int(orders[j] * speeds[i] * per_bin)
-            if k >= limit:
-                continue
-            if is_mesh[j]:
-                total += mesh[k]
-            elif resolved:
-                total += side[k]
+            if k < limit and (is_mesh[j] or resolved):
+                total += ratios[presence[j], k]
         out[i] = total

@@ -75,7 +75,9 @@ def encoder_angle(
         angle,
         np.maximum(slopes, 0.0) * sampling_rate_hz,
         "encoder",
-        relative_speed_uncertainty=float(np.sqrt(2.0 / half_width) * noise / (duration * abs(angle[-1] - angle[0]) / duration)),
+        relative_speed_uncertainty=float(
+            np.sqrt(2.0 / half_width) * noise / (duration * abs(angle[-1] - angle[0]) / duration)
+        ),
         notes=notes + note,
     )
 

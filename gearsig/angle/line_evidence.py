@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gearsig.angle.comb_lines import PRESENCE
 from gearsig.checks import FloatArray
 
 _FLOOR_BINS = 96  # the floor is a median over so many bins
 _HIGHEST_LOG_RATIO = 9.0  # 78 dB in power; beyond it a line is no more of a line
-# A line that the comb asks for is there with these odds, and then stands among the top ranks: density a·q^(a-1) of its rank q.
-_PRESENT_MESH, _PRESENT_SIDE, _RANK_EXPONENT = 0.6, 0.4, 0.3
+# A line that is there stands among the top ranks: density a·q^(a-1) of its rank q, with this a.
+_RANK_EXPONENT = 0.3
 
 
 @dataclass(frozen=True)
@@ -20,8 +21,8 @@ class LineEvidence:
 
     Parameters
     ----------
-    mesh, side : arrays, (n_intervals,)
-        For mesh harmonics and for sidebands and shaft harmonics; interval i spans i to i + 1 bins.
+    ratios : array, (n_classes, n_intervals)
+        For each class of `comb_lines.PRESENCE`; interval i spans i to i + 1 bins.
     log_ratio : array, (n_bins,)
         ln(power / floor), mean over the channels.
     bin_width : float
@@ -30,8 +31,7 @@ class LineEvidence:
         Upper end of what is looked at.
     """
 
-    mesh: FloatArray
-    side: FloatArray
+    ratios: FloatArray
     log_ratio: FloatArray
     bin_width: float
     top: float
@@ -59,8 +59,7 @@ def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float) 
     height = np.maximum(peaks[:-1], peaks[1:])
     rank = _tail_share(height)
     return LineEvidence(
-        _log_likelihood_ratio(rank, _PRESENT_MESH),
-        _log_likelihood_ratio(rank, _PRESENT_SIDE),
+        np.array([_log_likelihood_ratio(rank, present) for present in PRESENCE]),
         log_ratio,
         rate / n_segment,
         top,

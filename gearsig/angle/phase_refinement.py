@@ -16,6 +16,8 @@ from gearsig.recording.types import Recording
 # Half widths around the mesh order, in orders of the shaft: below one, so that the shaft's sidebands stay outside.
 _HALF_WIDTHS = (0.45, 0.45, 0.3, 0.2)
 _MOST_HARMONICS = 3
+# Power of the band over its median line: noise has 0.5. A band of noise must not take part, or it would be bent into a line.
+_LEAST_RATIO, _LEAST_SHARE = 2.0, 0.05
 _PER_WIDTH = 4  # points per reciprocal half width; two would do by the sampling theorem
 
 
@@ -74,6 +76,7 @@ def _refined_once(
     n_per_rev = signal.samples_per_revolution
     harmonics = [_demodulate(signal.samples, n_per_rev, o, half_width) for o in wanted]
     best = sorted((h for h in harmonics if h is not None), key=lambda h: -h.ratio)[:_MOST_HARMONICS]
+    best = [h for h in best if h.ratio > max(_LEAST_RATIO, _LEAST_SHARE * best[0].ratio)]
     if not best or best[0].baseband.shape[1] < 8:
         return None
     shift = _common_shift(best, half_width)
@@ -106,7 +109,9 @@ def _demodulate(samples: FloatArray, n_per_rev: int, order: float, half_width: f
         basebands.append(ifft(spread) * len(spread))
     baseband = np.array(basebands)
     # The middle is a whole number of bins; the rest of the shift is a slow turn.
-    turn = np.exp(2j * np.pi * (middle / per_order - order) * per_order * np.arange(baseband.shape[1]) / baseband.shape[1])
+    turn = np.exp(
+        2j * np.pi * (middle / per_order - order) * per_order * np.arange(baseband.shape[1]) / baseband.shape[1]
+    )
     z = baseband * turn
     power = np.square(np.abs(z)).sum() / (z.size * (2 * reach + 1))
     return _Harmonic(order, z, float(power))

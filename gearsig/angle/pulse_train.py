@@ -126,7 +126,9 @@ def _uncertainty(t: FloatArray, tick_s: float) -> float:
 def _notes(counted: PulseCount, n_pulses: int) -> tuple[str, ...]:
     notes = []
     if len(counted.spurious_s):
-        notes.append(f"{len(counted.spurious_s)} of {n_pulses} pulses were spurious and left out: {_at(counted.spurious_s)}")
+        notes.append(
+            f"{len(counted.spurious_s)} of {n_pulses} pulses were spurious and left out: {_at(counted.spurious_s)}"
+        )
     if counted.n_missed:
         notes.append(f"{counted.n_missed} missed pulse(s) were counted in: {_at(counted.missed_s)}")
     if len(counted.pauses_s):
@@ -140,7 +142,10 @@ def _clock_notes(tick_s: float, late_s: FloatArray) -> tuple[str, ...]:
     note = f"pulse times are quantised to {tick_s * 1e6:.4g} µs; the angle is smoothed within half of that"
     if not len(late_s):
         return (note,)
-    return (note, f"{len(late_s)} single pulse(s) lie more than that off their neighbours and are bridged: {_at(late_s)}")
+    return (
+        note,
+        f"{len(late_s)} single pulse(s) lie more than that off their neighbours and are bridged: {_at(late_s)}",
+    )
 
 
 def _at(times_s: FloatArray) -> str:

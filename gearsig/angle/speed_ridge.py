@@ -12,8 +12,8 @@ from gearsig.angle.comb_score import candidate_speeds, score_candidates
 from gearsig.angle.line_evidence import line_evidence
 from gearsig.checks import FloatArray
 
-# Standard deviation of the change of log speed from block to block, in bins of the highest line; a limit three times as far.
-_STEP_BINS = 6.0
+# Standard deviation of the change of log speed from block to block, in steps of the speed grid; the limit lies three times as far.
+_STEPS = 6.0
 
 
 @dataclass(frozen=True)
@@ -33,10 +33,11 @@ class SpeedRidge:
 
 
 def track_speed(
-    samples: FloatArray, rate: float, comb: CombLines, low: float, high: float, top: float, n_block: int
+    samples: FloatArray, rate: float, comb: CombLines, low: float, high: float, top: float, n_block: int, change: float
 ) -> SpeedRidge:
     """Return the most likely course of speed.
 
+    `change` is the standard deviation of the change of log speed from block to block, or six steps of the grid if that is more.
     Blocks at half overlap are scored for all speeds; the path maximises Σ score - Σ (Δ ln speed)²/(2σ²), found by dynamic
     programming (A. J. Viterbi, *Error bounds for convolutional codes …*, IEEE Trans. Inf. Theory 13 (1967)).
     """
@@ -50,7 +51,8 @@ def track_speed(
         rows.append(score_candidates(evidence, comb, speeds))
     scores = np.array(rows)
     assert speeds is not None  # noqa: S101  # there is at least one block: the caller chooses n_block
-    path = _best_path(scores, _STEP_BINS, int(3 * _STEP_BINS))
+    sigma = max(_STEPS, change / float(np.log(speeds[1] / speeds[0])))
+    path = _best_path(scores, sigma, int(3 * sigma))
     mean = float(scores[np.arange(len(path)), path].mean())
     return SpeedRidge((starts + n_block / 2) / rate, speeds[path], mean)
 

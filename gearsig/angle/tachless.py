@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gearsig.angle.comb_decision import CombDecision, decide
 from gearsig.angle.comb_lines import CombLines, comb_of_rig
+from gearsig.angle.comb_score import score_speeds
 from gearsig.angle.line_evidence import line_evidence
 from gearsig.angle.phase_refinement import refine_by_phase
 from gearsig.angle.resample import resample_to_angle
@@ -27,7 +28,10 @@ _WIDEST_RPM = (30.0, 30_000.0)
 _FEWEST_REVOLUTIONS = 20.0
 _TOP = 0.45  # of the sampling rate; above it lie the anti-aliasing filters of recorders
 _DIVISIONS = (1, 4, 16)  # of the recording's length: long segments for steady lines, short ones for wandering lines
-_BLOCKS = (24, 96, 384)  # per recording, for following a changing speed
+_BLOCKS = (96, 24, 384)  # per recording, for following a changing speed
+_ACCELERATION_PER_S = 0.04  # standard deviation of the change of log speed
+_CORRECTION_SPANS = (0.05, 0.02)
+_CLEAR = 0.9  # quality beyond which no other block length is tried
 _GAIN = 3.0  # a varying angle has to score so much better than the constant one
 
 
@@ -90,18 +94,34 @@ def estimate_shaft_angle(
     Not for friction or belt drives, nor for speeds that change by more than a few per cent within a revolution.
     """
     search = _search(recording, rig, channels, speed_range_rpm)
-    candidate = _constant_speed(search)
-    steady = candidate is not None and candidate.decision.quality >= LOWEST_QUALITY
-    varying = _varying_speed(search, candidate if steady else None)
-    if candidate is None or (
-        varying is not None
-        and varying.decision.quality >= LOWEST_QUALITY
-        and (not steady or varying.decision.score > candidate.decision.score + _GAIN)
-    ):
-        candidate = varying
+    steady = _constant_speed(search)
+    varying = _varying_speed(search, steady if _is_sharp(search, steady) else None)
+    candidate = _better(search, steady, varying)
     if candidate is None or candidate.decision.quality < LOWEST_QUALITY:
         raise _refusal(search, candidate, rig)
     return _finished(search, candidate)
+
+
+def _is_sharp(search: _Search, steady: _Candidate | None) -> bool:
+    """Whether a constant speed was found from lines as narrow as the recording's length allows."""
+    return (
+        steady is not None
+        and steady.decision.quality >= LOWEST_QUALITY
+        and steady.decision.bin_width * search.recording.duration_s < 1.5
+    )
+
+
+def _better(search: _Search, steady: _Candidate | None, varying: _Candidate | None) -> _Candidate | None:
+    """Return the varying angle if it is trustworthy and scores better, else the constant one."""
+    if steady is None:
+        return varying
+    if not _is_sharp(search, steady) and not steady.decision.narrow:
+        # Smeared lines of an unknown speed: half and double speed look much alike.
+        steady = replace(steady, decision=replace(steady.decision, coverage=0.8))
+    sure = steady.decision.quality >= LOWEST_QUALITY
+    if varying is not None and varying.decision.quality >= LOWEST_QUALITY:
+        return varying if not sure or varying.decision.score > steady.decision.score + _GAIN else steady
+    return steady if sure or varying is None else varying
 
 
 def comb_evidence(recording: Recording, rig: Rig, stated_speed_rpm: float) -> str:
@@ -208,37 +228,79 @@ def _best_decision(samples: FloatArray, rate: float, comb: CombLines, low: float
 
 def _varying_speed(search: _Search, start: _Candidate | None) -> _Candidate | None:
     """Best of the refined angles, from the constant one or from tracking with blocks of several lengths."""
-    rough = [start.angle] if start is not None else _rough_angles(search)
-    candidates = []
-    for angle in rough:
-        refined = refine_by_phase(search.recording, search.channels, angle, _mesh_harmonics(search.comb))
-        decision = _decision_over_angle(search, refined)
-        if decision is not None:
-            candidates.append(_Candidate(refined, decision))
+    candidates: list[_Candidate] = []
+    for angle in [start.angle] if start is not None else _rough_angles(search):
+        candidate = _refined(search, angle)
+        if candidate is not None and abs(candidate.decision.speed - 1.0) > 0.02:
+            # Over the true course of speed the comb is sharp at its true scale only: take it from there.
+            candidate = _refined(search, angle.of_shaft(angle.shaft, candidate.decision.speed))
+        if candidate is not None and abs(candidate.decision.speed - 1.0) <= 0.02:
+            candidates.append(candidate)
+            if candidate.decision.quality > _CLEAR:
+                break
     return max(candidates, key=lambda c: (c.decision.quality >= LOWEST_QUALITY, c.decision.score), default=None)
+
+
+def _refined(search: _Search, angle: ShaftAngle) -> _Candidate | None:
+    refined = refine_by_phase(search.recording, search.channels, angle, _mesh_harmonics(search.comb))
+    decision = _decision_over_angle(search, refined)
+    return None if decision is None else _Candidate(refined, decision)
 
 
 def _mesh_harmonics(comb: CombLines) -> tuple[float, ...]:
     return tuple(k * m for m in comb.meshes for k in (1, 2, 3))
 
 
-def _rough_angles(search: _Search) -> list[ShaftAngle]:
+def _rough_angles(search: _Search) -> Iterator[ShaftAngle]:
+    """Follow the speed with blocks of several lengths, the middle one first: it fits most machines."""
     rate, n = search.recording.sampling_rate_hz, search.samples.shape[1]
-    angles = []
     for n_blocks in _BLOCKS:
         n_block = 2 * n // n_blocks
-        if n_block < 512 or search.low * n_block / rate < 2.0:
+        low = max(search.low, 2.0 * rate / n_block)  # two turns per block, or its spectrum does not show orders
+        if n_block < 512 or low >= search.high:
             continue
-        ridge = track_speed(search.samples, rate, search.comb, search.low, search.high, _TOP * rate, n_block)
-        angles.append(_integrated(search, ridge.time_s, ridge.speed_rev_per_s))
-    return angles
+        change = _ACCELERATION_PER_S * 0.5 * n_block / rate
+        ridge = track_speed(search.samples, rate, search.comb, low, search.high, _TOP * rate, n_block, change)
+        angle = _integrated(search, ridge.time_s, ridge.speed_rev_per_s)
+        for span in _CORRECTION_SPANS:
+            angle = _corrected(search, angle, span, n_blocks)
+        yield angle
+
+
+def _corrected(search: _Search, angle: ShaftAngle, span: float, n_blocks: int) -> ShaftAngle:
+    """Follow what is left of the change of speed over the angle found so far, where the lines are already sharper."""
+    try:
+        signal = resample_to_angle(
+            search.recording, angle, channels=search.channels, highest_order=_highest_order(search, angle)
+        )
+    except RefusalError:
+        return angle
+    n_per_rev, n = float(signal.samples_per_revolution), signal.samples.shape[1]
+    n_block = max(512, 2 * n // n_blocks)
+    if n_block > n // 4:
+        return angle
+    ridge = track_speed(signal.samples, n_per_rev, search.comb, 1 - span, 1 + span, _TOP * n_per_rev, n_block, 0.0)
+    # The "time" of this ridge is revolutions over the estimated angle.
+    revolutions = signal.start_revolution + ridge.time_s
+    factor = _smooth(ridge.speed_rev_per_s)
+    fine = np.linspace(angle.start_s, angle.end_s, max(len(angle.time_s), 4 * n_blocks))
+    theta = angle.revolutions_at(fine)
+    factor = np.interp(theta, revolutions, factor)
+    corrected = np.concatenate([[0.0], np.cumsum(0.5 * (factor[1:] + factor[:-1]) * np.diff(theta))])
+    return ShaftAngle(search.shaft, fine, corrected, monotone_slopes(fine, corrected), "tachless")
+
+
+def _smooth(speed: FloatArray) -> FloatArray:
+    """Take out the steps of the speed grid by a short running mean."""
+    from scipy.ndimage import gaussian_filter1d
+
+    smooth: FloatArray = gaussian_filter1d(speed, 1.0, mode="nearest")
+    return smooth
 
 
 def _integrated(search: _Search, time_s: FloatArray, speed: FloatArray) -> ShaftAngle:
-    """Angle from speeds at the middles of blocks; a short running mean takes out the steps of the speed grid."""
-    from scipy.ndimage import gaussian_filter1d
-
-    smooth = gaussian_filter1d(speed, 1.0, mode="nearest")
+    """Angle from speeds at the middles of blocks."""
+    smooth = _smooth(speed)
     t = np.concatenate([[0.0], time_s, [search.recording.duration_s]])
     v = np.concatenate([[smooth[0]], smooth, [smooth[-1]]])
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))])
@@ -247,10 +309,9 @@ def _integrated(search: _Search, time_s: FloatArray, speed: FloatArray) -> Shaft
 
 def _decision_over_angle(search: _Search, angle: ShaftAngle) -> CombDecision | None:
     """Weigh the comb over the order spectrum, where a right angle makes all its lines sharp."""
-    top = _TOP * search.recording.sampling_rate_hz / (angle.speed_range_rpm[1] / 60.0)
     try:
         signal = resample_to_angle(
-            search.recording, angle, channels=search.channels, highest_order=min(2.0 * search.comb.highest, top)
+            search.recording, angle, channels=search.channels, highest_order=_highest_order(search, angle)
         )
     except RefusalError:
         return None
@@ -258,25 +319,61 @@ def _decision_over_angle(search: _Search, angle: ShaftAngle) -> CombDecision | N
     # The search was at least this wide; a known nominal speed leaves a margin for the runner-up.
     low = max(search.low / mean, 0.15) if search.high / search.low > 1.35 else 0.95
     high = min(search.high / mean, 6.0) if search.high / search.low > 1.35 else 1.05
-    return _best_decision(signal.samples, float(signal.samples_per_revolution), search.comb, min(low, 0.95), max(high, 1.05))
+    n_per_rev = float(signal.samples_per_revolution)
+    decision = _best_decision(signal.samples, n_per_rev, search.comb, min(low, 0.95), max(high, 1.05))
+    return None if decision is None else replace(decision, coverage=_coverage(signal.samples, n_per_rev, search.comb))
+
+
+def _highest_order(search: _Search, angle: ShaftAngle) -> float:
+    """Twice the comb, so that a speed of twice the true one shows itself; less where the recording has no more."""
+    top = _TOP * search.recording.sampling_rate_hz / (angle.speed_range_rpm[1] / 60.0)
+    return min(2.0 * search.comb.highest, top)
+
+
+def _coverage(samples: FloatArray, n_per_rev: float, comb: CombLines) -> float:
+    """Share of the recording, in eighths, in which the comb lies where the angle says, and not a few per cent beside."""
+    n_part = samples.shape[1] // 8
+    if n_part < 4 * n_per_rev or n_part < 512:
+        return 1.0
+    right = 0
+    for part in range(8):
+        evidence = line_evidence(samples[:, part * n_part : (part + 1) * n_part], n_per_rev, n_part, _TOP * n_per_rev)
+        scores = score_speeds(evidence, comb, 0.94, 1.06)
+        width = 2.0 * evidence.bin_width / comb.meshes[0]
+        right += abs(scores.best()[0] - 1.0) <= width
+    return right / 8.0
 
 
 def _finished(search: _Search, found: _Candidate) -> ShaftAngle:
     decision, angle = found.decision, found.angle
     constant = len(angle.time_s) == 2
-    notes = [f"estimated from the vibration of {', '.join(search.channels)}: {decision.evidence('rev/s' if constant else 'times')}"]
+    notes = [
+        f"estimated from the vibration of {', '.join(search.channels)}: {decision.evidence('rev/s' if constant else 'times')}"
+    ]
     if not constant:
         notes.append("the speed varies; its course follows the phase of the mesh harmonics")
     notes.append("the angle's zero is arbitrary")
-    # A tenth of a bin of the highest line in sight is what parabolas over its bins resolve.
-    resolution = 1.0 / (search.recording.duration_s * min(search.comb.highest * angle.mean_speed_rpm / 60.0, 1e9))
+    if constant and decision.bin_width * search.recording.duration_s > 1.5:
+        share = 50.0 * decision.bin_width / (search.comb.meshes[0] * decision.speed)
+        notes.append(
+            f"the lines are wider than the recording's length explains: the speed may wander by ± {share:.2g} %"
+        )
     return replace(
         angle,
         shaft=search.shaft,
-        relative_speed_uncertainty=0.3 * resolution,
+        relative_speed_uncertainty=_uncertainty(search, found),
         quality=decision.quality,
         notes=tuple(notes),
     )
+
+
+def _uncertainty(search: _Search, found: _Candidate) -> float:
+    """A third of a bin at the third harmonic of the mesh, where the line was sharp; half a bin at the first, where it was not."""
+    decision, mesh = found.decision, search.comb.meshes[-1]
+    if len(found.angle.time_s) == 2 and decision.bin_width * search.recording.duration_s > 1.5:
+        return float(0.5 * decision.bin_width / (search.comb.meshes[0] * decision.speed))
+    speed = found.angle.mean_speed_rpm / 60.0
+    return float(0.1 / (search.recording.duration_s * mesh * speed))
 
 
 def _refusal(search: _Search, best: _Candidate | None, rig: Rig) -> RefusalError:
