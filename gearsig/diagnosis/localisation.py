@@ -155,44 +155,6 @@ def _onset(x: FloatArray, start: int, width: int) -> float:
     return float(((start - short + rise + short / 2) / n) % 1.0)
 
 
-def _p_among_surrogates(ratio: float, drawn: FloatArray) -> float:
-    """Return the share of surrogates with as high a ratio; beyond the highest, the tail of a Gumbel distribution.
-
-    Window energies of Gaussian signals have exponential tails, and the largest of many such is Gumbel distributed; mean
-    and standard deviation of the drawn ratios give its parameters (E. J. Gumbel, *Statistics of Extremes*, 1958).
-    """
-    share = (float(np.sum(drawn >= ratio)) + 1) / (len(drawn) + 1)
-    scale = float(drawn.std()) * np.sqrt(6) / np.pi
-    if ratio <= drawn.max() or scale == 0:
-        return share
-    location = float(drawn.mean()) - np.euler_gamma * scale
-    return min(share, float(-np.expm1(-np.exp(-(ratio - location) / scale))))
-
-
-def _p_among_teeth(ratio: float, n_teeth: float) -> float:
-    """Return P(largest of n chi-square(1) numbers >= ratio · their median)."""
-    from scipy.special import erfc
-
-    median = 0.4549364  # of the chi-square distribution with one degree of freedom
-    single = float(erfc(np.sqrt(ratio * median / 2)))
-    return float(-np.expm1(n_teeth * np.log1p(-min(single, 1 - 1e-12))))
-
-
-def _agreement(halves: FloatArray) -> float:
-    """Return the correlation between odd and even revolutions, (n_channels, 2, n_angles), over all channels."""
-    odd, even = halves[:, 0], halves[:, 1]
-    size = float(np.sqrt(np.sum(odd**2) * np.sum(even**2)))
-    return float(np.sum(odd * even)) / size if size > 0 else 0.0
-
-
-def _onset(x: FloatArray, start: int, width: int) -> float:
-    """Return the angle of the highest energy within the window, over an eighth of its width."""
-    n, short = x.shape[1], max(1, width // 8)
-    inside = (start + np.arange(width)) % n
-    energy = np.convolve((x[:, inside] ** 2).sum(axis=0), np.ones(short), "valid")
-    return float(((start + int(np.argmax(energy)) + short / 2) / n) % 1.0)
-
-
 def _window_energy(square: FloatArray, kernel: np.ndarray, n: int) -> FloatArray:
     """Return the mean square in the window that starts at each angle, by circular correlation."""
     energy: FloatArray = np.fft.irfft(np.fft.rfft(square, axis=-1) * kernel, n, axis=-1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -23,6 +23,19 @@ class Kind(Enum):
     CANNOT_TELL = "cannot tell"
     NOTICE = "notice"
     INFORMATION = "information"
+
+
+class Outcome(Enum):
+    """What an analysis comes to; listed most severe first."""
+
+    FAULT = "fault"
+    SUSPICION = "suspicion"
+    CANNOT_TELL = "cannot tell"
+    NO_FAULT = "no fault"
+
+
+EXAMINED = ("no-tooth-local-damage", "no-bearing-damage")
+"""Codes of findings that say that something was examined that would have shown a fault."""
 
 
 @dataclass(frozen=True)
@@ -160,3 +173,18 @@ class Analysis:
     findings: tuple[Finding, ...]
     verdict: str
     settings: Mapping[str, str | float | int | None] = field(default_factory=dict)
+
+    @property
+    def outcome(self) -> Outcome:
+        """What the findings come to, in one word."""
+        return outcome_of(self.findings)
+
+
+def outcome_of(findings: Sequence[Finding]) -> Outcome:
+    """Return what findings come to; "no fault" only where something was examined that would have shown one."""
+    kinds = {finding.kind for finding in findings}
+    if Kind.FAULT in kinds:
+        return Outcome.FAULT
+    if Kind.SUSPICION in kinds:
+        return Outcome.SUSPICION
+    return Outcome.NO_FAULT if any(f.code in EXAMINED for f in findings) else Outcome.CANNOT_TELL

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from gearsig.diagnosis.types import Finding, Kind
+from gearsig.diagnosis.types import EXAMINED, Finding, Kind, Outcome, outcome_of
 
 _RANK = {kind: i for i, kind in enumerate(Kind)}
 
@@ -20,24 +20,17 @@ def ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def verdict_of(findings: tuple[Finding, ...]) -> str:
-    """Return the sentence a hurried reader takes away.
-
-    "No fault shows" is only said where something was examined that would have shown one.
-    """
-    faults = [f for f in findings if f.kind is Kind.FAULT]
-    suspicions = [f for f in findings if f.kind is Kind.SUSPICION]
+    """Return the sentence a hurried reader takes away."""
+    outcome = outcome_of(findings)
     gaps = [f for f in findings if f.kind is Kind.CANNOT_TELL]
-    examined = [f for f in findings if f.code in ("no-tooth-local-damage", "no-bearing-damage")]
-    if faults:
-        return "Fault: " + _first_and_number(faults)
-    if suspicions:
-        return "Suspicion: " + _first_and_number(suspicions)
-    if examined:
-        rest = [f.title for f in (*examined, *gaps[:1])]
-        return " ".join(
-            ["No fault shows.", *rest, "Wear of all teeth alike would only show against an earlier recording."]
-        )
-    return "Cannot tell: " + (gaps[0].title if gaps else "nothing was examined that would show a fault.")
+    if outcome is Outcome.FAULT:
+        return "Fault: " + _first_and_number([f for f in findings if f.kind is Kind.FAULT])
+    if outcome is Outcome.SUSPICION:
+        return "Suspicion: " + _first_and_number([f for f in findings if f.kind is Kind.SUSPICION])
+    if outcome is Outcome.CANNOT_TELL:
+        return "Cannot tell: " + (gaps[0].title if gaps else "nothing was examined that would show a fault.")
+    said = [f.title for f in (*(f for f in findings if f.code in EXAMINED), *gaps[:1])]
+    return " ".join(["No fault shows.", *said, "Wear of all teeth alike would only show against an earlier recording."])
 
 
 def _first_and_number(findings: list[Finding]) -> str:

@@ -119,7 +119,7 @@ def place(
     result: list[tuple[Cursor, LabelPlace | None]] = []
     for cursor in sorted(cursors, key=_importance):
         at = (cursor.position - limits[0]) * scale
-        if not 0.0 <= at <= width_in or any(abs(at - other) < LEAST_DISTANCE_IN for other in drawn):
+        if not limits[0] <= cursor.position <= limits[1] or any(abs(at - other) < LEAST_DISTANCE_IN for other in drawn):
             continue
         drawn.append(at)
         label = _free_place(taken, at, cursor.label, width_in) if cursor.label else None

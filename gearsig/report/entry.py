@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gearsig.diagnosis.types import Analysis, Kind
+from gearsig.diagnosis.types import Analysis, Kind, Outcome
 from gearsig.indicators.types import Indicator
 
 
@@ -18,13 +18,10 @@ class Entry:
         As given by the user, e.g. the file's name.
     page : str
         Address of its page, relative to the index; empty: no page.
-    kind : Kind
-        Of its most important finding.
+    outcome : Outcome
     verdict : str
-    top_finding : str
-        Title of the most important finding; empty if there is none.
     confidence : float or None
-        Of that finding.
+        Of the fault or suspicion in the verdict; None without one.
     ratio_db : float or None
         Of that finding over its floor.
     indicators : tuple of Indicator
@@ -32,9 +29,8 @@ class Entry:
 
     name: str
     page: str
-    kind: Kind
+    outcome: Outcome
     verdict: str
-    top_finding: str = ""
     confidence: float | None = None
     ratio_db: float | None = None
     indicators: tuple[Indicator, ...] = ()
@@ -50,14 +46,13 @@ class Failure:
 
 def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
     """Sum up an analysis for the index page."""
-    order = list(Kind)
-    top = min(analysis.findings, key=lambda finding: order.index(finding.kind), default=None)
+    claims = (f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION))
+    top = min(claims, key=lambda finding: finding.kind is not Kind.FAULT, default=None)
     return Entry(
         name,
         page,
-        top.kind if top is not None else Kind.INFORMATION,
+        analysis.outcome,
         analysis.verdict,
-        top.title if top is not None else "",
         top.confidence if top is not None else None,
         top.strength.ratio_db if top is not None and top.strength is not None else None,
         analysis.indicators,
@@ -65,5 +60,5 @@ def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
 
 
 def by_severity(entry: Entry) -> tuple[int, float, float, str]:
-    """Key that sorts the most important first: kind, then confidence, then strength."""
-    return list(Kind).index(entry.kind), -(entry.confidence or 0.0), -(entry.ratio_db or 0.0), entry.name
+    """Key that sorts the most important first: outcome, then confidence, then strength."""
+    return list(Outcome).index(entry.outcome), -(entry.confidence or 0.0), -(entry.ratio_db or 0.0), entry.name

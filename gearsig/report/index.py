@@ -10,7 +10,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from gearsig import __version__
-from gearsig.diagnosis.types import Kind
+from gearsig.diagnosis.types import Outcome
 from gearsig.indicators.types import Indicator
 from gearsig.plot.display import unit_text
 from gearsig.plot.embed import Picture, embed
@@ -23,12 +23,10 @@ from gearsig.report.sections import css_class
 KEY_INDICATORS = ("FM4", "kurtosis", "sideband index", "NA4", "sideband level", "FM0", "rms", "crest factor")
 """Indicators the index compares, where they were computed: tooth-local first, then impulsive, modulation, level."""
 _SUMMARY = {
-    Kind.FAULT: "with a fault",
-    Kind.SUSPICION: "with a suspicion",
-    Kind.DATA_PROBLEM: "with a data problem",
-    Kind.CANNOT_TELL: "without an answer",
-    Kind.NOTICE: "without a fault found",
-    Kind.INFORMATION: "without a fault found",
+    Outcome.FAULT: "with a fault",
+    Outcome.SUSPICION: "with a suspicion",
+    Outcome.CANNOT_TELL: "without an answer",
+    Outcome.NO_FAULT: "without a fault found",
 }
 N_COLUMNS = 3
 N_PANELS = 6
@@ -110,7 +108,7 @@ def _rows(entries: Sequence[Entry], columns: Sequence[str]) -> list[IndexRow]:
     return [
         IndexRow(
             entry,
-            css_class(entry.kind),
+            css_class(entry.outcome),
             quote(entry.page),
             f"{100 * entry.confidence:.0f} %" if entry.confidence is not None else "",
             f"{readable(entry.ratio_db, 3)} dB" if entry.ratio_db is not None else "",
@@ -145,7 +143,7 @@ def _heading(entries: Sequence[Entry], name: str) -> str:
 def _summary(entries: Sequence[Entry], failures: Sequence[Failure]) -> str:
     counts: dict[str, int] = {}
     for entry in entries:
-        counts[_SUMMARY[entry.kind]] = counts.get(_SUMMARY[entry.kind], 0) + 1
+        counts[_SUMMARY[entry.outcome]] = counts.get(_SUMMARY[entry.outcome], 0) + 1
     parts = [f"{n} {words}" for words, n in counts.items()] + ([f"{len(failures)} not analysed"] if failures else [])
     n_files = len(entries) + len(failures)
     return f"{n_files} recording{'s' if n_files != 1 else ''}: {', '.join(parts)}" if parts else "No recordings"
@@ -159,7 +157,7 @@ def _picture(entries: Sequence[Entry], names: Sequence[str]) -> Picture | None:
 
     shown = entries[:MOST_IN_FIGURE]
     rest = f" The {len(shown)} most severe of {len(entries)} recordings." if len(shown) < len(entries) else ""
-    faulty = [entry.name for entry in shown if entry.kind is Kind.FAULT]
+    faulty = [entry.name for entry in shown if entry.outcome is Outcome.FAULT]
     return embed(
         trend_figure({entry.name: entry.indicators for entry in shown}, names=names, highlighted=faulty),
         f"A recording that stands apart deserves a look; orange ones have a fault. One dot per channel and gear.{rest}",

@@ -10,7 +10,7 @@ from importlib.metadata import version
 
 from gearsig import __version__
 from gearsig.angle.types import ShaftAngle
-from gearsig.diagnosis.types import Analysis, CannotTell, Finding, Kind, Strength, Where
+from gearsig.diagnosis.types import Analysis, CannotTell, Finding, Kind, Outcome, Strength, Where
 from gearsig.plot.display import unit_text
 from gearsig.report.numbers import readable
 from gearsig.rig.types import Bearing, GearPair, Rig
@@ -53,9 +53,9 @@ def finding_card(finding: Finding) -> FindingCard:
     )
 
 
-def css_class(kind: Kind) -> str:
-    """Return the style class of a kind: its value without spaces."""
-    return kind.value.replace(" ", "-")
+def css_class(kind: Kind | Outcome) -> str:
+    """Return the style class of a kind or an outcome: its value without spaces."""
+    return str(kind.value).replace(" ", "-")
 
 
 def where_texts(where: Where) -> tuple[str, ...]:

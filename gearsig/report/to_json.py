@@ -4,6 +4,7 @@ The object has these members; names end in their unit, numbers carry nine signif
 not defined is null. Members may be added within a version, never renamed or removed.
 
 - ``schema``: "gearsig.analysis", ``schema_version``: 1, ``gearsig_version``
+- ``outcome``: "fault", "suspicion", "cannot tell" or "no fault"
 - ``verdict``: one sentence
 - ``findings``: most important first; each with ``code``, ``kind`` ("fault", "suspicion", "data problem", "cannot tell",
   "notice", "information"), ``title``, ``where``, ``strength`` (or null), ``confidence``, ``confidence_basis``,
@@ -61,6 +62,7 @@ def analysis_to_dict(analysis: Analysis, *, arrays: bool = False) -> Json:
         "schema": SCHEMA,
         "schema_version": SCHEMA_VERSION,
         "gearsig_version": __version__,
+        "outcome": analysis.outcome.value,
         "verdict": analysis.verdict,
         "findings": [_plain(finding, arrays=False) for finding in analysis.findings],
         "speed": _speed(analysis.shaft_angle, arrays=arrays),

@@ -7,7 +7,7 @@ import pytest
 
 from gearsig.diagnosis.analyze import analyze
 from gearsig.diagnosis.text import analysis_text
-from gearsig.diagnosis.types import Analysis, CannotTell, Finding, Kind
+from gearsig.diagnosis.types import Analysis, CannotTell, Finding, Kind, Outcome
 from gearsig.errors import InputError
 from gearsig.recording.types import Channel, Recording
 from gearsig.rig.speed import ConstantSpeed, TachometerChannel
@@ -61,6 +61,7 @@ def test_a_good_machine_is_not_accused() -> None:
     analysis = analyze(record())
     assert not codes(analysis, Kind.FAULT, Kind.SUSPICION)
     assert analysis.verdict.startswith("No fault shows.")
+    assert analysis.outcome is Outcome.NO_FAULT
     assert "wear" in analysis.verdict.lower()  # what one recording cannot show is said
 
 

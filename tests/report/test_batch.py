@@ -13,7 +13,7 @@ import pytest
 
 from gearsig import batch
 from gearsig.batch import report_many
-from gearsig.diagnosis.types import Kind
+from gearsig.diagnosis.types import Outcome
 from gearsig.errors import InputError
 from gearsig.report.entry import Entry, Failure
 
@@ -42,7 +42,7 @@ def broken(tmp_path) -> Path:
 def _page_for(job):
     """Stand in for the analysis: a page without figures."""
     job.page.write_text("page")
-    return Entry(job.name, job.page.name, Kind.INFORMATION, "verdict")
+    return Entry(job.name, job.page.name, Outcome.NO_FAULT, "verdict")
 
 
 def test_one_broken_file_does_not_stop_the_rest(recordings, broken, tmp_path):
@@ -117,7 +117,7 @@ import os, signal, sys, time
 from pathlib import Path
 from gearsig import batch
 from gearsig.report.entry import Entry
-from gearsig.diagnosis.types import Kind
+from gearsig.diagnosis.types import Outcome
 
 def work(job):
     if job.name == "killer.csv":
@@ -127,7 +127,7 @@ def work(job):
         (job.page.parent / ".slow.html.0f.part").write_text("half")
         time.sleep(60)
     job.page.write_text("page")
-    return Entry(job.name, job.page.name, Kind.INFORMATION, "fine")
+    return Entry(job.name, job.page.name, Outcome.NO_FAULT, "fine")
 
 batch._report_one = work
 

@@ -2,15 +2,15 @@ from dataclasses import replace
 
 import pytest
 
-from gearsig.diagnosis.types import Kind
+from gearsig.diagnosis.types import Outcome
 from gearsig.indicators.types import Indicator
 from gearsig.report.entry import Entry, Failure, entry_of
 from gearsig.report.index import write_index
 
 
-def _entry(name, kind, fm4=3.0, **more):
+def _entry(name, outcome, fm4=3.0, **more):
     return Entry(
-        name, f"{name}.html", kind, f"verdict of {name}", indicators=(Indicator("FM4", fm4, "", "a1"),), **more
+        name, f"{name}.html", outcome, f"verdict of {name}", indicators=(Indicator("FM4", fm4, "", "a1"),), **more
     )
 
 
@@ -23,7 +23,9 @@ def write(tmp_path):
 
 
 def test_worst_comes_first_and_links_to_its_page(write):
-    html = write([_entry("quiet", Kind.INFORMATION), _entry("bad one", Kind.FAULT), _entry("odd", Kind.SUSPICION)])
+    html = write(
+        [_entry("quiet", Outcome.NO_FAULT), _entry("bad one", Outcome.FAULT), _entry("odd", Outcome.SUSPICION)]
+    )
     order = [html.index(f"verdict of {name}") for name in ("bad one", "odd", "quiet")]
     assert order == sorted(order)
     assert 'href="bad%20one.html"' in html
@@ -38,27 +40,35 @@ def test_failures_are_listed_with_their_reason(write):
 
 
 def test_bars_compare_the_recordings(write):
-    html = write([_entry("a", Kind.FAULT, 8.0), _entry("b", Kind.NOTICE, 2.0), _entry("c", Kind.NOTICE, float("nan"))])
+    html = write(
+        [
+            _entry("a", Outcome.FAULT, 8.0),
+            _entry("b", Outcome.NO_FAULT, 2.0),
+            _entry("c", Outcome.NO_FAULT, float("nan")),
+        ]
+    )
     assert "width: 100.0%" in html
     assert "width: 25.0%" in html
     assert html.count("data:image/") == 1
 
 
 def test_no_bars_across_units_or_signs(write):
-    one = Entry("a", "", Kind.NOTICE, "", indicators=(Indicator("rms", 2.0, "g", "a"),))
-    other = Entry("b", "", Kind.NOTICE, "", indicators=(Indicator("rms", 3.0, "m/s^2", "a"),))
+    one = Entry("a", "", Outcome.NO_FAULT, "", indicators=(Indicator("rms", 2.0, "g", "a"),))
+    other = Entry("b", "", Outcome.NO_FAULT, "", indicators=(Indicator("rms", 3.0, "m/s^2", "a"),))
     html = write([one, other])
     assert "width:" not in html.partition("</style>")[2].replace("width=", "")
     assert "3 m/s²" in html
 
 
 def test_a_single_recording_needs_no_comparison(write):
-    assert "data:image/" not in write([_entry("a", Kind.FAULT)])
+    assert "data:image/" not in write([_entry("a", Outcome.FAULT)])
 
 
 def test_index_is_strict_html5_and_loads_nothing(write):
     html5lib = pytest.importorskip("html5lib")
-    html = write([_entry("a", Kind.FAULT), _entry("b", Kind.NOTICE)], failures=[Failure("c", "why")], command="gearsig")
+    html = write(
+        [_entry("a", Outcome.FAULT), _entry("b", Outcome.NO_FAULT)], failures=[Failure("c", "why")], command="gearsig"
+    )
     html5lib.HTMLParser(strict=True).parse(html)
     assert "http" not in html.replace("http-equiv", "")
 
@@ -66,5 +76,4 @@ def test_index_is_strict_html5_and_loads_nothing(write):
 def test_entry_sums_up_the_most_important_finding(gearbox):
     shuffled = replace(gearbox, findings=gearbox.findings[::-1])
     entry = entry_of(shuffled, "n", "n.html")
-    assert (entry.kind, entry.confidence, entry.ratio_db) == (Kind.FAULT, 0.93, 18.6)
-    assert entry.top_finding.startswith("One tooth")
+    assert (entry.outcome, entry.confidence, entry.ratio_db) == (Outcome.FAULT, 0.93, 18.6)

@@ -10,8 +10,8 @@ from gearsig.report.numbers import readable, rounded
 from gearsig.report.to_json import analysis_to_dict, analysis_to_json, write_json
 
 MEMBERS = [
-    "schema", "schema_version", "gearsig_version", "verdict", "findings", "speed", "indicators", "recording", "rig",
-    "channels", "settings",
+    "schema", "schema_version", "gearsig_version", "outcome", "verdict", "findings", "speed", "indicators", "recording",
+    "rig", "channels", "settings",
 ]  # fmt: skip
 FINDING = ["code", "kind", "title", "where", "strength", "confidence", "confidence_basis", "evidence", "surer"]
 RECORDING = [
