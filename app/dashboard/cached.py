@@ -13,24 +13,48 @@ from app.dashboard.uploads import read_recording_bytes, read_recording_file, rea
 
 if TYPE_CHECKING:
     from gearsig.diagnosis.types import Analysis
+    from gearsig.recording.quality import ChannelProblem
+    from gearsig.recording.types import Recording
 
-N_ANALYSES = 6
+N_ANALYSES, N_LARGE_ANALYSES = 6, 2
 """Each holds its recording and several spectra: a few times the size of the file."""
+LARGE_BYTES = 50_000_000
 N_PAGES = 4
-N_HASHES = 64
+N_HASHES = N_QUALITIES = 64
+
+
+def analysis_of(request: Request, content: Path | memoryview) -> Analysis:
+    """Return the analysis of a recording; it is frozen, so that sessions may share it.
+
+    Raises
+    ------
+    InputError
+        If the rig or the recording cannot be read, or not be analysed.
+    """
+    size = content.stat().st_size if isinstance(content, Path) else content.nbytes
+    return (_large if size > LARGE_BYTES else _small)(request, content)
 
 
 @st.cache_resource(max_entries=N_ANALYSES, show_spinner=False)
-def analysis_of(request: Request, _content: Path | memoryview) -> Analysis:
-    """Read and analyse; the result is frozen, so that sessions may share it."""
+def _small(request: Request, _content: Path | memoryview) -> Analysis:
+    return read_and_analyze(request, _content)
+
+
+@st.cache_resource(max_entries=N_LARGE_ANALYSES, show_spinner=False)
+def _large(request: Request, _content: Path | memoryview) -> Analysis:
+    return read_and_analyze(request, _content)
+
+
+def read_and_analyze(request: Request, content: Path | memoryview) -> Analysis:
+    """Read rig and recording, and analyse."""
     from gearsig.diagnosis.analyze import analyze
 
     rig = read_rig_text(request.rig_text, request.rig_name)
     rate, speed = request.sampling_rate_hz, request.speed_rpm
-    if isinstance(_content, Path):
-        recording = read_recording_file(_content, rig=rig, sampling_rate_hz=rate, speed_rpm=speed)
+    if isinstance(content, Path):
+        recording = read_recording_file(content, rig=rig, sampling_rate_hz=rate, speed_rpm=speed)
     else:
-        recording = read_recording_bytes(_content, request.name, rig=rig, sampling_rate_hz=rate, speed_rpm=speed)
+        recording = read_recording_bytes(content, request.name, rig=rig, sampling_rate_hz=rate, speed_rpm=speed)
     return analyze(recording)
 
 
@@ -40,6 +64,15 @@ def report_page(request: Request, _analysis: Analysis) -> bytes:
     from gearsig.report.page import page_html
 
     return page_html(_analysis, command=command_of(request)).encode("utf-8")
+
+
+@st.cache_data(max_entries=N_QUALITIES, show_spinner=False)
+def channel_problems(key: str, _recording: Recording) -> tuple[ChannelProblem, ...]:
+    """Return what is wrong with the channels; `key` stands for the recording."""
+    from gearsig.recording.quality import find_problems
+
+    del key
+    return find_problems(_recording)
 
 
 @st.cache_data(max_entries=N_HASHES, show_spinner=False)

@@ -104,6 +104,14 @@ def test_a_sampling_rate_that_is_missing_is_asked_for_and_taken() -> None:
     assert "4 s at 1000 Hz" in shown_text(page)
 
 
+@pytest.mark.parametrize("rate", [0.0, -1.0])
+def test_an_impossible_sampling_rate_is_one_message(rate: float) -> None:
+    page = opened()
+    page.sidebar.number_input[0].set_value(rate).run()
+    assert not page.exception
+    assert len(page.error) == 1
+
+
 @pytest.mark.parametrize(
     ("name", "content", "rig"),
     [

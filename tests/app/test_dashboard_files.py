@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from app.dashboard.as_typed import as_plot_text, as_typed, one_line
-from app.dashboard.cached import analysis_of, command_of
+from app.dashboard.cached import command_of, read_and_analyze
 from app.dashboard.state import Request
 from app.dashboard.uploads import read_recording_bytes, read_rig_text, safe_file_name
 from app.dashboard.widgets.indicators import csv_text, indicator_frame
@@ -118,7 +118,7 @@ def test_sessions_can_analyse_at_the_same_time() -> None:
 
         sample = chosen[job % len(chosen)]
         request = Request(sample.recording.name, str(job), sample.rig.name, sample.rig.read_text())
-        analysis = analysis_of.__wrapped__(request, memoryview(sample.recording.read_bytes()))
+        analysis = read_and_analyze(request, memoryview(sample.recording.read_bytes()))
         return f"{len(page_html(analysis)) > 100_000} {analysis.verdict}"
 
     with ThreadPoolExecutor(4) as pool:

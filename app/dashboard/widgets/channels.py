@@ -7,13 +7,14 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.as_typed import as_typed
+from app.dashboard.cached import channel_problems
 from app.dashboard.widgets.line_chart import Axes, Line, show_lines
 from app.dashboard.widgets.range_slider import choose_range
 from gearsig.checks import FloatArray
 from gearsig.diagnosis.types import Analysis
 from gearsig.plot.display import unit_text, with_unit
 from gearsig.plot.thin import thin
-from gearsig.recording.types import Channel, Recording
+from gearsig.recording.types import Recording
 
 N_SHOWN = 4
 N_MOST = 12
@@ -25,7 +26,7 @@ def show_channels(analysis: Analysis) -> None:
     recording = analysis.recording
     for warning in recording.warnings:
         st.warning(as_typed(warning), icon=":material/warning:")
-    _show_quality(recording)
+    _show_quality(analysis)
     names = st.multiselect(
         "Channels shown",
         recording.channel_names,
@@ -37,7 +38,7 @@ def show_channels(analysis: Analysis) -> None:
     for name in names:
         channel = recording.channels[recording.index(name)]
         time, values = stretch(recording, name, window)
-        st.markdown(f"**{as_typed(name)}** {as_typed(_words(channel))}")
+        st.markdown(f"**{as_typed(name)}** {as_typed(channel.position)}")
         label = with_unit(
             channel.quantity.replace("_", " ") if channel.quantity != "unknown" else "value", channel.unit
         )
@@ -57,14 +58,9 @@ def stretch(recording: Recording, name: str, window_s: tuple[float, float]) -> t
     return np.arange(start, stop) / rate, recording.values(name)[start:stop]
 
 
-def _words(channel: Channel) -> str:
-    return ", ".join(text for text in (channel.position,) if text)
-
-
-def _show_quality(recording: Recording) -> None:
-    from gearsig.recording.quality import find_problems
-
-    problems = find_problems(recording)
+def _show_quality(analysis: Analysis) -> None:
+    recording = analysis.recording
+    problems = channel_problems(state.view_key("problems", analysis), recording)
     table = {
         "channel": recording.channel_names,
         "quantity": [c.quantity.replace("_", " ") for c in recording.channels],
@@ -79,7 +75,10 @@ def _show_quality(recording: Recording) -> None:
         ],
     }
     number = st.column_config.NumberColumn(format="%.4g")
-    config = dict.fromkeys(("smallest", "mean", "largest"), number)
+    config = {
+        "channel": st.column_config.TextColumn(width="small"),
+        **dict.fromkeys(("smallest", "mean", "largest"), number),
+    }
     st.dataframe(table, hide_index=True, column_config=config, width="stretch")
     for problem in problems:
         text = f"**{as_typed(problem.channel)}** is {problem.kind}: {as_typed(problem.evidence)}. "

@@ -60,6 +60,7 @@ def _choose_file() -> Chosen | None:
         "Rig file (TOML), if you have one",
         type=["toml"],
         key=state.RIG_FILE,
+        max_upload_size=1,
         help="What is known of the machine: shafts, teeth, bearings, sensors, speed source. Teeth add mesh orders and "
         "sidebands, bearings their orders.",
     )

@@ -13,17 +13,16 @@ from gearsig.report.sections import FindingCard, finding_card
 
 N_OPEN = 3
 """Cards shown at once; the rest is a click away."""
-_REMARKS = (Kind.NOTICE, Kind.INFORMATION)
 
 
 def show_findings(analysis: Analysis) -> None:
-    """Show the first findings in full, the others and the remarks folded up."""
-    important = [f for f in analysis.findings if f.kind not in _REMARKS]
-    remarks = [f for f in analysis.findings if f.kind in _REMARKS]
-    for i, finding in enumerate(important[:N_OPEN]):
+    """Show the first findings in full, the others folded up; notices come first only where nothing weighs more."""
+    findings = [f for f in analysis.findings if f.kind is not Kind.INFORMATION]
+    weighty = [f for f in findings if f.kind is not Kind.NOTICE] or findings
+    for i, finding in enumerate(weighty[:N_OPEN]):
         _show_card(finding, with_evidence=i == 0)
-    _show_folded("More findings", important[N_OPEN:])
-    _show_folded("Remarks", remarks)
+    _show_folded("More findings", [f for f in findings if f not in weighty[:N_OPEN]])
+    _show_folded("Remarks", [f for f in analysis.findings if f.kind is Kind.INFORMATION])
 
 
 def _show_folded(title: str, findings: Sequence[Finding]) -> None:

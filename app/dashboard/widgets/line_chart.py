@@ -169,25 +169,29 @@ def _lay_out(figure: Figure, axes: Axes, n_rows: int, height_px: int) -> None:
         hovermode="closest",
         showlegend=False,
         dragmode="zoom",
-        xaxis={"title": as_plot_text(axes.x), "range": axes.x_limits, "exponentformat": "e", "dtick": axes.x_step},
+        xaxis={"title": as_plot_text(axes.x), "range": axes.x_limits, "exponentformat": "none", "dtick": axes.x_step},
         yaxis2={
             "overlaying": "y",
-            "tickmode": "auto",
             "side": "left",
             "title": as_plot_text(axes.y),
             "type": "log" if axes.logarithmic else "linear",
             "range": limits,
             "exponentformat": "e",
-            "dtick": _decades(axes),
+            "minexponent": 4,
+            **_ticks(axes),
         },
         yaxis={"range": [0, 1], "visible": False, "fixedrange": True},  # of the cursors, behind the lines
     )
 
 
-def _decades(axes: Axes) -> int | None:
-    """Return the step of a logarithmic axis: whole decades where there are several, else plotly's choice."""
+def _ticks(axes: Axes) -> dict[str, object]:
+    """Return the ticks of the value axis: whole decades where there are several, else plotly's choice of its own.
+
+    Left alone, an overlaying axis would take its ticks from the one below, wherever they fall.
+    """
     low, high = axes.y_limits or (1.0, 1.0)
-    return 1 if axes.logarithmic and high > 100 * low else None
+    several = axes.logarithmic and high > 100 * low
+    return {"tickmode": "linear", "tick0": 0, "dtick": 1} if several else {"tickmode": "auto"}
 
 
 def _pale(colour: str) -> str:

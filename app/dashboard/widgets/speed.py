@@ -30,7 +30,8 @@ def show_speed(analysis: Analysis) -> None:
 def show_unknown_speed(reason: CannotTell) -> None:
     """Say why there is no speed and what would give it."""
     remedy = f"\n\nWhat would give it: {as_typed(reason.remedy)}" if reason.remedy else ""
-    st.info(f"The speed is not known: {as_typed(reason.reason)}{remedy}", icon=":material/help:")
+    hint = "\n\nA constant speed can be given under *Not in the file?*"
+    st.info(f"The speed is not known: {as_typed(reason.reason)}{remedy}{hint}", icon=":material/help:")
 
 
 def _show_numbers(angle: ShaftAngle) -> None:

@@ -8,8 +8,9 @@ TEXT = """
 ### Open a recording of your own
 
 1. Drop the **recording** in the sidebar: CSV, MAT, WAV, HDF5, Parquet, TDMS or UFF58.
-2. Drop its **rig file**, or write one there under *Rig*. Only what is known need be given: teeth add mesh orders,
-   sidebands and tooth pictures; bearings add their orders; a speed source makes orders out of frequencies.
+2. Drop its **rig file**, or write one under *Rig*, which opens with the recording. Only what is known need be given:
+   teeth add mesh orders, sidebands and tooth pictures; bearings add their orders; a speed source makes orders out of
+   frequencies.
 3. If the file does not state its **sampling rate** or the **speed**, give them under *Not in the file?*
 
 Files stay on this machine. They are read in a private folder that is removed at once.
