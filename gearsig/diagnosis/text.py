@@ -86,6 +86,6 @@ def _paragraph(text: str, indent: str = "      ", *, first: str | None = None) -
 def _indicator_lines(indicators: tuple[Indicator, ...]) -> list[str]:
     lines = [f"{'indicator':<24} {'value':>12} {'unit':<10} {'channel':<12} {'of':<20} computed on"]
     for i in indicators:
-        of = i.gear or i.shaft or i.band
+        of = i.gear or i.bearing or i.shaft or i.band
         lines.append(f"{i.name:<24} {i.value:>12.5g} {i.unit:<10} {i.channel:<12} {of:<20} {i.computed_on}")
     return lines

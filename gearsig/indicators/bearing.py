@@ -100,7 +100,7 @@ def bearing_indicators(
     -------
     tuple of Indicator
         "BPFO envelope level h×" and "BPFO over floor h×" (dB) for each order name. `gear` is empty, `shaft` the
-        bearing's; the note names the bearing and the order found.
+        bearing's; the note names the order found.
 
     Raises
     ------
@@ -123,10 +123,19 @@ def bearing_indicators(
         for row in _rows(envelope_spectrum, name, h, order * shaft_ratio * h, slip_fraction, speed_rev_per_s)
     )
     return tuple(
-        Indicator(name, value, unit or envelope_spectrum.unit, channel, "envelope", bearing.shaft, "", band,
-                  f"bearing {bearing.name}; {note}")
+        Indicator(
+            name,
+            value,
+            unit or envelope_spectrum.unit,
+            channel,
+            "envelope",
+            bearing.shaft,
+            band=band,
+            note=note,
+            bearing=bearing.name,
+        )
         for name, value, unit, note in rows
-    )  # fmt: skip
+    )
 
 
 def _rows(

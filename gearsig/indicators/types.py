@@ -20,8 +20,9 @@ class Indicator:
     channel : str
     computed_on : str
         "raw", "synchronous average", "residual", "difference", "regular", "band-passed mesh", "envelope", …
-    shaft, gear : str
-        What it belongs to: a shaft's name, a gear as "pair/shaft"; empty where it belongs to the channel.
+    shaft, gear, bearing : str
+        What it belongs to: a shaft's name, a gear as "pair/shaft", a bearing's name; all empty where it belongs to the
+        channel.
     band : str
         Frequency or order band, with unit.
     note : str
@@ -36,3 +37,4 @@ class Indicator:
     gear: str = ""
     band: str = ""
     note: str = ""
+    bearing: str = ""

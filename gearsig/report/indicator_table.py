@@ -45,11 +45,13 @@ def indicator_tables(indicators: Iterable[Indicator]) -> tuple[IndicatorTable, .
 def _place(indicator: Indicator) -> str:
     if indicator.gear:
         return _capital(named("gear", indicator.gear))
+    if indicator.bearing:
+        return _capital(named("bearing", indicator.bearing))
     return _capital(named("shaft", indicator.shaft)) or "Channels as a whole"
 
 
 def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:] if text.startswith(("gear ", "shaft ")) else text
+    return text[:1].upper() + text[1:] if text.startswith(("gear ", "bearing ", "shaft ")) else text
 
 
 def _table(title: str, items: list[Indicator]) -> IndicatorTable:

@@ -167,7 +167,7 @@ def test_bearing_order_is_found_within_its_slip():
     assert found["BPFI over floor 1×"].value < 14
     assert (found["BPFO over floor 1×"].unit, found["BPFO envelope level 1×"].unit) == ("dB", "(m/s^2)^2")
     assert found["BPFO over floor 1×"].shaft == "input"
-    assert "bearing b" in found["BPFO over floor 1×"].note
+    assert found["BPFO over floor 1×"].bearing == "b"
 
 
 def test_floor_of_noise_is_exceeded_as_rarely_as_stated():

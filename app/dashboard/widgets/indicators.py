@@ -63,7 +63,7 @@ def indicator_frame(indicators: tuple[Indicator, ...]) -> DataFrame:
             "value": i.value,
             "unit": unit_text(i.unit),
             "channel": i.channel,
-            "of": i.gear or i.shaft or i.band,
+            "of": i.gear or i.bearing or i.shaft or i.band,
             "computed on": i.computed_on,
             "band": i.band,
             "remark": i.note,
