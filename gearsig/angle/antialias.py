@@ -11,7 +11,7 @@ from gearsig.angle.interpolation import HALF_BAND, delay, kaiser_sinc
 from gearsig.checks import FloatArray
 
 LOWEST_SCALE = 1.0 / 1024.0
-"""Lowest cut-off, as a fraction of the recording's Nyquist frequency: a standing shaft would ask for an endless filter."""
+"""Lowest cut-off over the recording's Nyquist frequency: a standing shaft would ask for an endless filter."""
 
 # Steps of the kernel's table between zero crossings: linear interpolation is then good to 1e-7.
 _N_STEPS = 2048
@@ -80,7 +80,7 @@ def _lowpassed(x, first, step, n, s, side):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _along(x, start, n, taps):  # type: ignore[no-untyped-def]
-    """Σⱼ x[start + i + j] taps[j] for each i < n: tap by tap, as neighbouring results then share vector instructions."""
+    """Σⱼ x[start + i + j] taps[j] for each i < n: tap by tap, which suits vector instructions."""
     y = np.zeros(n)
     for block in range(0, n, 2048):
         out = y[block : min(n, block + 2048)]

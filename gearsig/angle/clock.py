@@ -20,8 +20,8 @@ _N_EASINGS = 30
 def clock_tick(times_s: FloatArray) -> float:
     """Find the step that all pulse times are multiples of (plus an offset), 0 if there is none.
 
-    The smallest difference between two intervals is a first guess of the tick; it is then sharpened over longer and longer
-    spans, and accepted if the times lie on its grid within a tenth (a uniform scatter would give 0.29).
+    The smallest difference between two intervals is a first guess of the tick; it is then sharpened over longer and
+    longer spans, and accepted if the times lie on its grid within a tenth (a uniform scatter would give 0.29).
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def clock_tick(times_s: FloatArray) -> float:
     return tick if np.std(off) < 0.1 else 0.0
 
 
-def fit_within_ticks(t: FloatArray, counts: FloatArray, tick_s: float, breaks: FloatArray | None = None) -> FloatArray:
+def fit_within_ticks(t: FloatArray, counts: FloatArray, tick_s: float, breaks: IntArray | None = None) -> FloatArray:
     """Smooth angles (in pulses) at times that are quantised to a tick.
 
     Minimise Σ wₖ(yₖ - kₖ)² + Σ λⱼ (Δ³y)ⱼ² where Δ³ is the third divided difference scaled by the local interval. Start
@@ -130,7 +130,7 @@ def late_pulses(t: FloatArray, counts: FloatArray, tick_s: float) -> IntArray:
 
 
 def _third_differences(t: FloatArray) -> FloatArray:
-    """Rows (n - 3, 4) of third divided differences times 6 × the cube of the mean interval: [-1 3 -3 1] at equal steps."""
+    """Rows (n - 3, 4) of third divided differences times 6 × the mean interval cubed: [-1 3 -3 1] at equal steps."""
     nodes = np.stack([t[:-3], t[1:-2], t[2:-1], t[3:]], axis=1)
     gaps = nodes[:, :, None] - nodes[:, None, :] + np.eye(4)
     scale = 6.0 * ((nodes[:, 3] - nodes[:, 0]) / 3.0) ** 3

@@ -70,7 +70,7 @@ class CombDecision:
             # Mesh lines alone fit any number of teeth at another speed; sidebands tell the scale.
             parts.append(_sure(self.side_score, 2.0, 4.0))
         # Speed that was followed rightly most of the time only is no angle to average over.
-        parts.append(min(1.0, self.coverage / 0.85) ** 12)
+        parts.append(self.coverage**12)
         return float(np.prod(parts))
 
     def evidence(self, unit: str = "rev/s") -> str:
@@ -112,8 +112,8 @@ def decide(evidence: LineEvidence, comb: CombLines, low: float, high: float) -> 
 def refine_speed(evidence: LineEvidence, comb: CombLines, speed: float) -> float:
     """Sharpen a speed by the middles of the lines that are there.
 
-    Parabolas through the logarithm of each line's three highest bins give its frequency; the speed is the least-squares slope of
-    frequency over order, weighted by the lines' heights, lines off by more than a bin left out.
+    Parabolas through the logarithm of each line's three highest bins give its frequency; the speed is the
+    least-squares slope of frequency over order, weighted by the lines' heights, lines off by more than a bin left out.
     """
     found = [
         (order, place, height)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,8 @@ IntArray = NDArray[np.integer[Any]]
 BoolArray = NDArray[np.bool_]
 Stages = tuple[tuple[float, tuple[float, ...]], ...]
 
-# Odds that a line of the comb is there at all. They tell a speed from its half: low harmonics and near sidebands are likelier.
+# Odds that a line of the comb is there at all. They tell a speed from its half: low harmonics and near sidebands are
+# likelier.
 PRESENCE = (0.8, 0.6, 0.4, 0.25)
 _MESH_CLASSES = (0, 1, 2, 2, 3)
 _SIDEBAND_CLASSES = (1, 3)

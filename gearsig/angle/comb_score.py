@@ -33,7 +33,7 @@ class CombScores:
         return float(self.speeds[i]), float(self.scores[i])
 
     def best_beyond(self, speed: float, relative: float) -> tuple[float, float]:
-        """Return (speed, score) of the best candidate further than `relative` from `speed`; (0, -inf) if there is none."""
+        """Return (speed, score) of the best candidate further than `relative` from `speed`, else (0, -inf)."""
         away = np.abs(self.speeds / speed - 1.0) > relative
         if not away.any():
             return 0.0, -np.inf
@@ -66,8 +66,8 @@ def chance_scores(
 ) -> tuple[float, float]:
     """Return mean and standard deviation of the best score of combs whose lines lie at wrong places.
 
-    Each line of the comb is moved by its own random share of up to ± 12 %, which keeps number and spread of the lines but
-    not their harmony. The search range is that of the real comb, so that its many trials are accounted for.
+    Each line of the comb is moved by its own random share of up to ± 12 %, which keeps number and spread of the
+    lines but not their harmony. The search range is that of the real comb, so that its many trials are accounted for.
     """
     # A fixed seed: the same recording gives the same answer.
     rng = np.random.default_rng(20_230_501)
@@ -75,9 +75,7 @@ def chance_scores(
     if len(speeds) > 200_000:
         speeds = speeds[:: len(speeds) // 200_000 + 1]
     best = [
-        float(
-            _raw(evidence, comb, comb.orders * np.exp(rng.uniform(-0.12, 0.12, len(comb.orders))), speeds).max()
-        )
+        float(_raw(evidence, comb, comb.orders * np.exp(rng.uniform(-0.12, 0.12, len(comb.orders))), speeds).max())
         for _ in range(n_trials)
     ]
     return float(np.mean(best)), max(float(np.std(best, ddof=1)), 1.0)

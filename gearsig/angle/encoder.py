@@ -27,8 +27,8 @@ def encoder_angle(
 ) -> ShaftAngle:
     """Turn an angle channel, wrapping or running on, into shaft angle.
 
-    Jumps of a whole revolution are undone; parabolas over a few samples, longer where the angle is noisy or coarse, give
-    angle and speed at knots.
+    Jumps of a whole revolution are undone; parabolas over a few samples, longer where the angle is noisy or coarse,
+    give angle and speed at knots.
 
     Parameters
     ----------
@@ -108,6 +108,5 @@ def _half_width(revolutions: FloatArray, noise: float) -> tuple[int, tuple[str, 
     if half_width <= 2:
         return half_width, ()
     return half_width, (
-        f"the encoder angle scatters by {360 * noise:.2g}°; it is smoothed over {2 * half_width + 1} samples "
-        f"({360 * per_sample * 2 * half_width:.2g}°)",
+        f"the angle scatters by {360 * noise:.2g}° and is smoothed over {360 * per_sample * 2 * half_width:.2g}°",
     )

@@ -10,7 +10,7 @@ from numba import njit
 from gearsig.checks import FloatArray
 
 PASSBAND = 0.4
-"""Upper edge, as a fraction of the lower of both sampling rates, up to which the error stays below 5e-6 of full scale."""
+"""Upper edge over the lower of both sampling rates; up to it the error stays near 5e-6 of full scale or below."""
 
 HALF_BAND = 20  # taps on each side of the doubling filter
 _NEAR = 6  # taps on each side of the fractional delay, at the doubled rate
@@ -43,8 +43,8 @@ def delay_table() -> FloatArray:
     Least squares over the band |f| < a/2 with a = 0.42 (in cycles per doubled sample, i.e. 0.42 of the original rate):
     Σₘ sinc(a(k - m)) hₘ = sinc(a(k - d)) for delay d. Rows sum to one, so that a constant stays that constant.
 
-    Source: T. I. Laakso, V. Välimäki, M. Karjalainen, U. K. Laine, *Splitting the unit delay*, IEEE Signal Processing Magazine
-    13 (1996), general least-squares design.
+    Source: T. I. Laakso, V. Välimäki, M. Karjalainen, U. K. Laine, *Splitting the unit delay*, IEEE Signal
+    Processing Magazine 13 (1996), general least-squares design.
     """
     a = 0.42
     delays = np.arange(_N_PHASES + 1) / _N_PHASES

@@ -13,8 +13,10 @@ _BLOCK = 32
 def times_at(knots, angle, speed, k, first, step, out):  # type: ignore[no-untyped-def]
     """Solve θ(t) = first + i·step for each i, θ the Hermite cubic through knots, values `angle` and slopes `speed`.
 
-    The search starts at interval k, which must not lie beyond the first angle; all angles lie within the knots' range. In
-    u = (t - t₀)/h of an interval, θ - θ₀ = ((c u + b) u + a) u. The ends of each block are solved one by one, the points between by two
+    The search starts at interval k, which must not lie beyond the first angle; all angles lie within the knots'
+    range. In
+    u = (t - t₀)/h of an interval, θ - θ₀ = ((c u + b) u + a) u. The ends of each block are solved one by one, the
+    points between by two
     Newton steps from the cubic through the ends of the inverse function; these steps do not wait for each other.
     """
     n, n_knots = out.shape[0], knots.shape[0]
@@ -46,7 +48,7 @@ def times_at(knots, angle, speed, k, first, step, out):  # type: ignore[no-untyp
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "arcp"})  # type: ignore[untyped-decorator,unused-ignore]
 def _between(a, b, c, low, high, offset, step, start, last, t0, h, out):  # type: ignore[no-untyped-def]
-    """Fill out[start:last] between solved points `low` (at start - 1) and `high` (at last); False if Newton did not settle."""
+    """Fill out[start:last] between solved points `low` (at start - 1) and `high` (at last); say if Newton settled."""
     slope_low, slope_high = (3.0 * c * low + 2.0 * b) * low + a, (3.0 * c * high + 2.0 * b) * high + a
     if slope_low <= 0.0 or slope_high <= 0.0:
         return False
@@ -69,7 +71,7 @@ def _between(a, b, c, low, high, offset, step, start, last, t0, h, out):  # type
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def solve_cubic(a, b, c, rise, wanted, start):  # type: ignore[no-untyped-def]
-    """Return u in 0 to 1 with ((c u + b) u + a) u = wanted, for a cubic that rises from 0 to `rise`; Newton in a bracket."""
+    """Return u in 0 to 1 with ((c u + b) u + a) u = wanted, for a cubic rising to `rise`; Newton in a bracket."""
     if wanted <= 0.0 or rise <= 0.0:
         return 0.0
     if wanted >= rise:
@@ -96,7 +98,7 @@ def solve_cubic(a, b, c, rise, wanted, start):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def scales_at(knots, speed, times, factor, lowest, out):  # type: ignore[no-untyped-def]
-    """factor · speed at sorted times, kept between `lowest` and 1; return the smallest of them.
+    """Take factor · speed at sorted times, kept between `lowest` and 1, and return the smallest of them.
 
     The speed is taken as linear between the knots' slopes: enough for choosing a cut-off frequency.
     """

@@ -1,4 +1,4 @@
-"""How much each frequency looks like a line: heights over the local floor, turned into log likelihood ratios by rank."""
+"""How much each frequency looks like a line: height over the local floor, as log likelihood ratio by rank."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ class LineEvidence:
 def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float) -> LineEvidence:
     """Return the evidence for lines in all channels together.
 
-    Hann windows of `n_segment` samples at half overlap; mean power over them; heights over the floor averaged over channels.
+    Hann windows of `n_segment` samples at half overlap; mean power over them; heights over the floor averaged over
+    channels.
 
     Parameters
     ----------
@@ -87,7 +88,8 @@ def _log_ratio(power: FloatArray) -> FloatArray:
     blocks = np.array_split(log_power, n_blocks)
     middles = np.cumsum([len(b) for b in blocks]) - np.array([len(b) for b in blocks]) / 2
     medians = np.array([np.median(b) for b in blocks])
-    return np.clip(log_power - np.interp(np.arange(len(power)), middles, medians), -2.0, _HIGHEST_LOG_RATIO)
+    over: FloatArray = log_power - np.interp(np.arange(len(power)), middles, medians)
+    return np.clip(over, -2.0, _HIGHEST_LOG_RATIO)
 
 
 def _only_peaks(x: FloatArray) -> FloatArray:

@@ -16,7 +16,8 @@ from gearsig.recording.types import Recording
 # Half widths around the mesh order, in orders of the shaft: below one, so that the shaft's sidebands stay outside.
 _HALF_WIDTHS = (0.45, 0.45, 0.3, 0.2)
 _MOST_HARMONICS = 3
-# Power of the band over its median line: noise has 0.5. A band of noise must not take part, or it would be bent into a line.
+# Power of the band over its median line: noise has 0.5. A band of noise must not take part, or it would be bent into
+# a line.
 _LEAST_RATIO, _LEAST_SHARE = 2.0, 0.05
 _PER_WIDTH = 4  # points per reciprocal half width; two would do by the sampling theorem
 
@@ -35,7 +36,8 @@ def refine_by_phase(
 ) -> ShaftAngle:
     """Return the angle with which the strongest mesh harmonics run at constant phase.
 
-    Over the estimated angle a harmonic of order o has the phase 2πo(θ_true - θ), so θ_true = θ + phase/(2πo). The phase is summed
+    Over the estimated angle a harmonic of order o has the phase 2πo(θ_true - θ), so θ_true = θ + phase/(2πo). The
+    phase is summed
     from sample to sample over all channels, weighted over harmonics by o² times their height over the neighbourhood.
     Repeated, each time over a better angle and with a narrower band.
 
@@ -50,7 +52,8 @@ def refine_by_phase(
 
     Notes
     -----
-    Source: F. Bonnardot, M. El Badaoui, R. B. Randall, J. Danière, F. Guillet, *Use of the acceleration signal of a gearbox in
+    Source: F. Bonnardot, M. El Badaoui, R. B. Randall, J. Danière, F. Guillet, *Use of the acceleration signal of a
+    gearbox in
     order to perform angular resampling*, Mech. Syst. Signal Process. 19 (2005); J. Urbanek, T. Barszcz, J. Antoni, *A
     two-step procedure for estimation of instantaneous rotational speed with large fluctuations*, ibid. 38 (2013).
     """
@@ -79,7 +82,7 @@ def _refined_once(
     best = [h for h in best if h.ratio > max(_LEAST_RATIO, _LEAST_SHARE * best[0].ratio)]
     if not best or best[0].baseband.shape[1] < 8:
         return None
-    shift = _common_shift(best, half_width)
+    shift = _common_shift(best)
     n = best[0].baseband.shape[1]
     revolutions = signal.start_revolution + np.arange(n) * (signal.samples.shape[1] / n_per_rev / n)
     times = _times(angle, revolutions)
@@ -117,7 +120,7 @@ def _demodulate(samples: FloatArray, n_per_rev: int, order: float, half_width: f
     return _Harmonic(order, z, float(power))
 
 
-def _common_shift(harmonics: list[_Harmonic], half_width: float) -> FloatArray:
+def _common_shift(harmonics: list[_Harmonic]) -> FloatArray:
     """Angle by which the shaft runs ahead of the estimate, in revolutions, from all harmonics."""
     n = harmonics[0].baseband.shape[1]
     total, weights = np.zeros(n), 0.0
@@ -132,7 +135,8 @@ def _common_shift(harmonics: list[_Harmonic], half_width: float) -> FloatArray:
     edge = min(n // 4, max(1, int(_PER_WIDTH / 2)))
     shift[:edge] = shift[edge]
     shift[n - edge :] = shift[n - edge - 1]
-    return shift - shift.mean()
+    centred: FloatArray = shift - shift.mean()
+    return centred
 
 
 def _times(angle: ShaftAngle, revolutions: FloatArray) -> FloatArray:

@@ -53,8 +53,8 @@ def local_trend(intervals: FloatArray) -> FloatArray:
     """Expected length of each interval from its neighbours; infinite where they point to a standstill.
 
     At constant acceleration the squared speed grows linearly with angle, so q = 1/interval² is almost linear in the
-    pulse number, from a standing start to a stop. Each interval is predicted by symmetric means (q₋ᵢ + q₊ᵢ)/2, at the ends by
-    extrapolations 2q₁ - q₂; the median over them tolerates faulty neighbours.
+    pulse number, from a standing start to a stop. Each interval is predicted by symmetric means (q₋ᵢ + q₊ᵢ)/2, at
+    the ends by extrapolations 2q₁ - q₂; the median over them tolerates faulty neighbours.
     """
     n = len(intervals)
     q = 1.0 / np.square(intervals)
@@ -81,7 +81,8 @@ def _without_spurious(times_s: FloatArray) -> tuple[FloatArray, list[int]]:
     """Return the times without spurious pulses, and the indices of those."""
     left = np.arange(len(times_s))
     removed: list[int] = []
-    # Each round takes out one pulse of every separate group of short intervals; a train worse than that is refused later.
+    # Each round takes out one pulse of every separate group of short intervals; a train worse than that is refused
+    # later.
     for _ in range(20):
         t = times_s[left]
         if len(t) < 6:
@@ -111,7 +112,7 @@ def _shortest_of_each_group(ratio: FloatArray) -> list[int]:
 
 
 def _spurious_end(t: FloatArray, trend: FloatArray, k: int) -> int | None:
-    """Which end of interval k to take out so that the neighbouring intervals fit the trend best; None if neither helps."""
+    """Which end of interval k to take out so that its neighbours fit the trend best; None if neither helps."""
     expected = trend[k]
     if not np.isfinite(expected):
         return None

@@ -20,8 +20,8 @@ def pulse_train_angle(
 ) -> ShaftAngle:
     """Turn pulse times into shaft angle.
 
-    Pulse k lies at k / pulses_per_revolution revolutions. Spurious pulses are left out and missed ones counted; the notes
-    say how many and where. Times on a clock's grid are smoothed within half a tick, others are taken as exact.
+    Pulse k lies at k / pulses_per_revolution revolutions. Spurious pulses are left out and missed ones counted; the
+    notes say how many and where. Times on a clock's grid are smoothed within half a tick, others are taken as exact.
 
     Parameters
     ----------
@@ -35,8 +35,8 @@ def pulse_train_angle(
     Returns
     -------
     ShaftAngle
-        Knots at the pulses; speed exact at constant acceleration. The uncertainty is the timing error of two pulses (tick/√12
-        each, or the scatter of the intervals) over the duration.
+        Knots at the pulses; speed exact at constant acceleration. The uncertainty is the timing error of two pulses
+        (tick/√12 each, or the scatter of the intervals) over the duration.
 
     Raises
     ------
@@ -47,8 +47,8 @@ def pulse_train_angle(
 
     Notes
     -----
-    Pulses are taken as equally spaced around the shaft. A machine that stops between two pulses is kept: the angle stands
-    still within that interval.
+    Pulses are taken as equally spaced around the shaft. A machine that stops between two pulses is kept: the angle
+    stands still within that interval.
     """
     t = frozen_array(times_s, "tachometer pulse times", ndim=1).astype(np.float64)
     n_per_rev = count(pulses_per_revolution, "pulses_per_revolution")
@@ -105,14 +105,14 @@ def _check_faults(counted: PulseCount, n_pulses: int) -> None:
     n_faulty = len(counted.spurious_s) + counted.n_missed
     if n_faulty > _MOST_FAULTY * n_pulses + 1:
         raise RefusalError(
-            f"{len(counted.spurious_s)} spurious and {counted.n_missed} missed pulses among {n_pulses} are too many to trust "
-            "the rest",
+            f"{len(counted.spurious_s)} spurious and {counted.n_missed} missed pulses among {n_pulses} are too many "
+            "to trust the rest",
             remedy=remedy,
         )
 
 
 def _uncertainty(t: FloatArray, tick_s: float) -> float:
-    """Error of first and last pulse over the duration; without a clock's tick, from the intervals' second differences."""
+    """Error of first and last pulse over the duration; without a tick, from the times' third differences."""
     if tick_s > 0:
         timing_s = tick_s / np.sqrt(12.0)
     elif len(t) >= 5:

@@ -10,7 +10,8 @@ from numba import njit
 from gearsig.checks import FloatArray, frozen_array, one_of, positive
 from gearsig.errors import InputError, RefusalError
 
-# The levels are read at these percentiles: 0.05 % of spikes do no harm, and pulses may be as short as 0.1 % of a period.
+# The levels are read at these percentiles: 0.05 % of spikes do no harm, and pulses may be as short as 0.1 % of a
+# period.
 _LOW_PERCENTILE, _HIGH_PERCENTILE = 0.05, 99.95
 # Share of samples in the middle half between the levels: pulses 0 to 0.1, a sine 0.33, uniform noise 0.5, Gaussian 0.9.
 _MOST_IN_THE_MIDDLE = 0.45
@@ -51,8 +52,8 @@ def find_pulse_edges(
 ) -> PulseEdges:
     """Find the edges of a pulse signal.
 
-    The trigger is armed below threshold - hysteresis/2 and fires above threshold + hysteresis/2; the edge lies where the
-    straight line between the two samples around the last crossing meets the threshold.
+    The trigger is armed below threshold - hysteresis/2 and fires above threshold + hysteresis/2; the edge lies where
+    the straight line between the two samples around the last crossing meets the threshold.
 
     Parameters
     ----------

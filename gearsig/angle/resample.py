@@ -34,7 +34,8 @@ def resample_to_angle(
     """Sample channels at equal steps of a shaft's angle.
 
     The times of the equal angles come from the angle's cubic, inverted exactly; values between samples from a
-    pair of filters that doubles the rate and then delays by a fraction, y(t) = Σ x[k] h(t·fs - k). Where the angle grid is coarser than the time grid, the sinc is stretched
+    pair of filters that doubles the rate and then delays by a fraction, y(t) = Σ x[k] h(t·fs - k). Where the angle
+    grid is coarser than the time grid, the sinc is stretched
     to cut off at half the angle grid's momentary sampling rate.
 
     Parameters
@@ -54,9 +55,12 @@ def resample_to_angle(
     Returns
     -------
     AngleSignal
-        Same unit as the channels. Sample i lies at start_revolution + i / samples_per_revolution; the start is a whole step,
-        so that revolution 0 of the shaft angle falls on the grid. The first and last 24 samples of the recording (more where
-        the grid is coarse) have no complete kernel and are left out. Error below 5e-6 of full scale up to 0.4 of the lower of both sampling rates.
+        Same unit as the channels. Sample i lies at start_revolution + i / samples_per_revolution; the start is a
+        whole step,
+        so that revolution 0 of the shaft angle falls on the grid. The first and last 24 samples of the recording
+        (more where
+        the grid is coarse) have no complete kernel and are left out. Error below 5e-6 of full scale up to 0.4 of the
+        lower of both sampling rates.
 
     Raises
     ------

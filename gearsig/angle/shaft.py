@@ -92,8 +92,8 @@ def _from_tachometer(recording: Recording, source: TachometerChannel) -> ShaftAn
             f"the tachometer has {len(edges.times_s)} pulse(s) in {recording.duration_s:.4g} s",
             where=f"channel {source.channel!r}",
             allowed="at least two",
-            remedy=f"the machine stands, or the threshold of {edges.threshold:.4g} does not fit: signal {edges.low:.4g} to "
-            f"{edges.high:.4g}",
+            remedy=f"the machine stands, or the threshold of {edges.threshold:.4g} does not fit the signal, which runs "
+            f"from {edges.low:.4g} to {edges.high:.4g}",
         )
     return pulse_train_angle(edges.times_s, source.pulses_per_revolution, tick_s=edges.tick_s)
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 
@@ -35,7 +38,7 @@ def monotone_slopes(t: FloatArray, y: FloatArray) -> FloatArray:
     return np.clip(slopes, 0.0, limit)
 
 
-def _lagrange_slope(t: FloatArray, y: FloatArray, start: FloatArray, width: int, at: int) -> FloatArray:
+def _lagrange_slope(t: FloatArray, y: FloatArray, start: NDArray[np.integer[Any]], width: int, at: int) -> FloatArray:
     """Slope at node `at` of the polynomial through `width` nodes from each `start`.
 
     With nodes t_j: p'(t_a) = Σ_{j≠a} (y_j - y_a) · w_j/w_a / (t_a - t_j), w the barycentric weights.

@@ -10,14 +10,15 @@ from gearsig.checks import FloatArray
 def noise_of(x: FloatArray) -> float:
     """Standard deviation of the noise in a smooth quantity, from its third differences.
 
-    A third difference of independent errors has 1 + 9 + 9 + 1 = 20 times their variance; a smooth course has almost none.
+    A third difference of independent errors has 1 + 9 + 9 + 1 = 20 times their variance; a smooth course has almost
+    none.
     """
     if len(x) < 8:
         return 0.0
     third = np.diff(x, 3)
     # The root mean square as well: in a staircase most differences are zero, and the median says nothing.
     spread = max(float(np.median(np.abs(third))) / 0.6745, float(np.sqrt(np.mean(np.square(third)))))
-    return spread / np.sqrt(20.0)
+    return float(spread / np.sqrt(20.0))
 
 
 def local_parabolas(x: FloatArray, half_width: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -26,13 +27,13 @@ def local_parabolas(x: FloatArray, half_width: int) -> tuple[FloatArray, FloatAr
     Returns
     -------
     positions, values, slopes : arrays, (n_knots,)
-        In samples, in x's unit, and in x's unit per sample. The first and the last knot are the first and the last sample, read from
-        the parabola next to them.
+        In samples, in x's unit, and in x's unit per sample. The first and the last knot are the first and the last
+        sample, read from the parabola next to them.
 
     Notes
     -----
-    Source: A. Savitzky, M. J. E. Golay, *Smoothing and differentiation of data by simplified least squares procedures*, Anal.
-    Chem. 36 (1964).
+    Source: A. Savitzky, M. J. E. Golay, *Smoothing and differentiation of data by simplified least squares
+    procedures*, Anal. Chem. 36 (1964).
     """
     n, m = len(x), min(half_width, (len(x) - 1) // 2)
     j = np.arange(-m, m + 1, dtype=np.float64)

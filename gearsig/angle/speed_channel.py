@@ -18,8 +18,8 @@ def speed_channel_angle(
 ) -> ShaftAngle:
     """Integrate a speed channel to shaft angle, zero at the first sample.
 
-    revolutions(t) = ∫ rpm/60 dt, by trapezoids over all samples, knots every 0.05 s; the speed at a knot is a parabola's over
-    ±0.05 s (±2 samples for a slowly sampled channel).
+    revolutions(t) = ∫ rpm/60 dt, by trapezoids over all samples, knots every 0.05 s; the speed at a knot is a
+    parabola's over ±0.05 s (±2 samples for a slowly sampled channel).
 
     Parameters
     ----------
@@ -32,7 +32,8 @@ def speed_channel_angle(
     Returns
     -------
     ShaftAngle
-        Phase between revolutions drifts with any error of the scale, so synchronous averages over many revolutions may smear.
+        Phase between revolutions drifts with any error of the scale, so synchronous averages over many revolutions
+        may smear.
 
     Raises
     ------
@@ -44,8 +45,7 @@ def speed_channel_angle(
     positive(rpm_per_unit, "rpm_per_unit")
     if len(x) < 8:
         raise InputError(f"the speed channel has {len(x)} samples", allowed="at least 8")
-    speed = np.asarray(x, dtype=np.float64) * (rpm_per_unit / 60.0)
-    speed, notes = _forwards(speed)
+    speed, notes = _forwards(np.asarray(x, dtype=np.float64) * (rpm_per_unit / 60.0))
     half_width = max(2, round(_SMOOTHING_S * sampling_rate_hz))
     positions, smooth, _ = local_parabolas(speed, half_width)
     cumulative = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / sampling_rate_hz
@@ -53,8 +53,7 @@ def speed_channel_angle(
     noise = noise_of(speed)
     if noise > 0:
         notes += (
-            f"the speed channel scatters by {60 * noise:.2g} rpm from sample to sample; "
-            f"the speed is smoothed over ±{half_width / sampling_rate_hz:.2g} s",
+            f"the speed scatters by {60 * noise:.2g} rpm and is smoothed over ±{half_width / sampling_rate_hz:.2g} s",
         )
     return ShaftAngle(
         shaft,

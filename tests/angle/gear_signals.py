@@ -52,7 +52,8 @@ def gear_recording(
 ) -> Recording:
     """Return mesh harmonics, each amplitude-modulated once per turn of both gears, shaft harmonics, and white noise.
 
-    `noise` is its standard deviation where the strongest mesh harmonic has amplitude 1; phases and gains differ by channel.
+    `noise` is its standard deviation where the strongest mesh harmonic has amplitude 1; phases and gains differ by
+    channel.
     """
     t = np.arange(round(duration_s * rate_hz)) / rate_hz
     angle = 2 * np.pi * motion.revolutions(t)

@@ -1,0 +1,177 @@
+"""Speed from vibration alone: closed-form gears, refusals, and measured recordings."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearsig.angle.tachless import comb_evidence, estimate_shaft_angle
+from gearsig.errors import RefusalError
+from gearsig.recording.types import Channel, Recording
+
+# By path: test folders are no package.
+from tests.angle.gear_signals import Motion, gear_recording, rig_of
+
+DATA = Path(__file__).parents[3] / "shared" / "data"
+measured = pytest.mark.skipif(not DATA.exists(), reason="measured recordings are not here")
+
+CHECK = np.linspace(0.5, 7.5, 400)
+
+
+@pytest.mark.parametrize(
+    ("teeth", "motion", "nominal", "tolerance", "worst"),
+    [
+        (((23, 46),), Motion(27.31), True, 5.0, 2e-5),
+        (((23, 46),), Motion(27.31), False, 5.0, 2e-5),
+        (((17, 61),), Motion(31.7, depth=0.01), True, 5.0, 1e-3),
+        (((17, 61),), Motion(31.7, depth=0.03, rate=0.3), True, 8.0, 2e-3),
+        (((32, 96), (32, 80)), Motion(21.4, depth=0.01), False, 5.0, 1e-3),
+        (((32, 96), (32, 80)), Motion(18.0, ramp=1.2), True, 30.0, 2e-3),
+    ],
+)
+def test_speed_of_gears(
+    teeth: tuple[tuple[int, int], ...], motion: Motion, nominal: bool, tolerance: float, worst: float
+) -> None:
+    recording = gear_recording(motion, teeth, np.random.default_rng(7))
+    mean = float(motion.speed(CHECK).mean())
+    rig = rig_of(*teeth, nominal_rpm=60 * mean * 1.01 if nominal else None, tolerance=tolerance)
+    angle = estimate_shaft_angle(recording, rig)
+    error = angle.speed_rpm_at(CHECK) / 60 / motion.speed(CHECK) - 1
+    assert np.sqrt(np.mean(error**2)) < worst
+    assert angle.quality > 0.6
+    # The angle itself, but for its zero: good enough to average over.
+    assert np.std(angle.revolutions_at(CHECK) - motion.revolutions(CHECK)) < 0.01
+    assert angle.shaft == "s0"
+    assert angle.method == "tachless"
+
+
+def test_only_the_drivers_teeth_are_known() -> None:
+    motion = Motion(33.0)
+    recording = gear_recording(motion, ((23, 46),), np.random.default_rng(1))
+    angle = estimate_shaft_angle(recording, rig_of((23, None), nominal_rpm=2000.0))
+    assert angle.mean_speed_rpm == pytest.approx(1980.0, rel=2e-5)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("nominal", [None, 2000.0])
+def test_noise_is_refused(seed: int, nominal: float | None) -> None:
+    samples = np.random.default_rng(seed).normal(size=(2, 60_000))
+    noise = Recording(samples, 12_800.0, (Channel("a"), Channel("b")))
+    with pytest.raises(RefusalError, match="no comb"):
+        estimate_shaft_angle(noise, rig_of((23, 46), nominal_rpm=nominal))
+
+
+@pytest.mark.parametrize("nominal", [None, 1500.0])
+def test_a_bearing_alone_is_refused(nominal: float | None) -> None:
+    rng = np.random.default_rng(4)
+    rate = 24_000.0
+    t = np.arange(int(4 * rate)) / rate
+    # Impacts at 4.755 per turn, excite 3 kHz, load zone once per turn.
+    strikes = np.zeros_like(t)
+    times = np.arange(0, 3.95, 1 / (4.755 * 25)) + rng.normal(0, 1e-4, len(np.arange(0, 3.95, 1 / (4.755 * 25))))
+    strikes[np.clip((times * rate).astype(int), 0, len(t) - 1)] = 1 + 0.5 * np.cos(2 * np.pi * 25 * times)
+    ring = np.exp(-800 * t[:200]) * np.sin(2 * np.pi * 3000 * t[:200])
+    x = np.convolve(strikes, ring)[: len(t)] + 0.05 * rng.normal(size=len(t))
+    with pytest.raises(RefusalError):
+        estimate_shaft_angle(Recording(x[None], rate, (Channel("a"),)), rig_of((31, 45), nominal_rpm=nominal))
+
+
+def test_a_plain_harmonic_series_is_no_gear() -> None:
+    t = np.arange(100_000) / 12_800.0
+    x = sum(np.cos(2 * np.pi * 30.3 * k * t + k) for k in range(1, 180))
+    recording = Recording(np.array([x]) + np.random.default_rng(0).normal(size=(1, len(t))), 12_800.0, (Channel("a"),))
+    for nominal in (None, 30.3 * 60):
+        with pytest.raises(RefusalError, match="other teeth"):
+            estimate_shaft_angle(recording, rig_of((23, 46), nominal_rpm=nominal))
+
+
+def test_wrong_teeth_and_wrong_rate_are_refused_with_evidence() -> None:
+    recording = gear_recording(Motion(33.0), ((23, 46),), np.random.default_rng(1))
+    with pytest.raises(RefusalError):
+        estimate_shaft_angle(recording, rig_of((29, None), nominal_rpm=1980.0))
+    slow = Recording(recording.samples, 10_000.0, recording.channels)
+    rig = rig_of((23, 46), nominal_rpm=1980.0)
+    with pytest.raises(RefusalError, match=r"0\.7812"):
+        estimate_shaft_angle(slow, rig)
+    assert "0.7812" in comb_evidence(slow, rig, 1980.0)
+    assert comb_evidence(recording, rig, 1980.0) == ""
+
+
+def test_no_teeth_no_motion_no_time() -> None:
+    recording = gear_recording(Motion(33.0), ((23, 46),), np.random.default_rng(1))
+    with pytest.raises(RefusalError, match="no mesh order"):
+        estimate_shaft_angle(recording, rig_of((None, None)))  # type: ignore[arg-type]
+    with pytest.raises(RefusalError, match="at rest"):
+        estimate_shaft_angle(recording, rig_of((23, 46), nominal_rpm=0.0))
+    dead = Recording(np.zeros((1, 50_000)), 12_800.0, (Channel("a"),))
+    with pytest.raises(RefusalError, match="no vibration channel moves"):
+        estimate_shaft_angle(dead, rig_of((23, 46)))
+    short = Recording(recording.samples[:, :2000], 12_800.0, recording.channels)
+    with pytest.raises(RefusalError, match="fewer than"):
+        estimate_shaft_angle(short, rig_of((23, 46), nominal_rpm=1980.0))
+
+
+def _gear_pair() -> Recording:
+    import warnings
+
+    from scipy.io import loadmat
+
+    rows = []
+    for number in (12, 14):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # each variable is there twice
+            content = loadmat(DATA / "gear_pair_23_46" / f"3027_217_Data_Chan{number}.mat")
+        rows.append(
+            next(np.ravel(v) for k, v in content.items() if not k.startswith("__") and np.size(v) > 1000 and np.any(v))
+        )
+    return Recording(
+        np.array(rows, dtype=float), 25_600.0, (Channel("a12", "acceleration"), Channel("a14", "acceleration"))
+    )
+
+
+@measured
+@pytest.mark.parametrize("nominal", [2000.0, None])
+def test_measured_gear_pair(nominal: float | None) -> None:
+    angle = estimate_shaft_angle(_gear_pair(), rig_of((23, None), nominal_rpm=nominal))
+    assert angle.mean_speed_rpm == pytest.approx(1999.76, rel=5e-4)
+    assert angle.quality > 0.6
+
+
+@measured
+@pytest.mark.parametrize("name", ["InnerRaceFault_vload_3", "OuterRaceFault_vload_4"])
+@pytest.mark.parametrize("nominal", [1500.0, None])
+def test_measured_bearings_are_no_gears(name: str, nominal: float | None) -> None:
+    from scipy.io import loadmat
+
+    bearing = loadmat(DATA / "bearing_races" / f"{name}.mat", squeeze_me=True)["bearing"]
+    samples = np.asarray(bearing["gs"].item(), dtype=float)[None]
+    recording = Recording(samples, float(bearing["sr"].item()), (Channel("a", "acceleration"),))
+    for teeth in (31, 20, 23):
+        with pytest.raises(RefusalError):
+            estimate_shaft_angle(recording, rig_of((teeth, None), nominal_rpm=nominal))
+
+
+@measured
+def test_measured_two_stage_gearbox() -> None:
+    with gzip.open(DATA / "two_stage_gearbox" / "h30hz50.csv.gz", "rt") as file:
+        samples = np.loadtxt(file, delimiter=",", skiprows=1).T
+    recording = Recording(samples, 4266.7, tuple(Channel(f"a{i}") for i in range(4)))
+    angle = estimate_shaft_angle(recording, rig_of((32, 96), (32, 80)))
+    assert angle.mean_speed_rpm == pytest.approx(29.68 * 60, rel=1e-3)
+
+
+@measured
+def test_measured_car_is_not_claimed_wrongly() -> None:
+    import warnings
+
+    from scipy.io import wavfile
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # chunks that scipy does not know
+        rate, samples = wavfile.read(DATA / "car_run_up" / "accel_with_rpm.wav")
+    recording = Recording(samples[:, :1].T.astype(float), float(rate), (Channel("p", "sound_pressure"),))
+    with pytest.raises(RefusalError):
+        estimate_shaft_angle(recording, rig_of((23, None)))
