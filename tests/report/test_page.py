@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 import pytest
 
 from gearsig.diagnosis.types import Finding, Kind, Where
+from gearsig.indicators.types import Indicator
 from gearsig.report.page import page_html, severity, write_page
 
 EVIL = "<script>alert(1)</script>"
@@ -140,3 +141,15 @@ def test_severity_is_the_most_important_kind(gearbox, cannot_tell):
     assert severity(gearbox) is Kind.FAULT
     assert severity(cannot_tell) is Kind.CANNOT_TELL
     assert severity(replace(cannot_tell, findings=())) is Kind.INFORMATION
+
+
+def test_bearings_on_one_shaft_keep_their_indicators_apart(gearbox):
+    twins = tuple(
+        Indicator("BPFO level 1×", value, "g", "a1", "envelope", "input", bearing=name)
+        for name, value in (("left", 1.25), ("right", 7.75))
+    )
+    html = page_html(replace(gearbox, indicators=twins))
+    assert "Bearing left" in html
+    assert "Bearing right" in html
+    assert "1.25" in html
+    assert "7.75" in html
