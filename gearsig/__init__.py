@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gearsig.diagnosis.analyze import analyze
-    from gearsig.diagnosis.text import analysis_text
     from gearsig.errors import GearsigError, InputError, RefusalError
     from gearsig.recording.read import read_recording
     from gearsig.recording.types import Channel, Recording
     from gearsig.recording.write import write_recording
+    from gearsig.report.text import analysis_text
     from gearsig.rig.toml import read_rig
     from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
 
@@ -28,7 +28,7 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "analyze": "gearsig.diagnosis.analyze",
-    "analysis_text": "gearsig.diagnosis.text",
+    "analysis_text": "gearsig.report.text",
     "GearsigError": "gearsig.errors",
     "InputError": "gearsig.errors",
     "RefusalError": "gearsig.errors",

@@ -45,6 +45,6 @@ def analyze(
 
         typer.echo(analysis_to_json(result))
     else:
-        from gearsig.diagnosis.text import analysis_text
+        from gearsig.report.text import analysis_text
 
         typer.echo(analysis_text(result, with_indicators=indicators))

@@ -19,7 +19,7 @@ def demo(
     from app.commands.options import open_recording, open_rig
     from app.commands.report import make_report
     from gearsig.diagnosis.analyze import analyze
-    from gearsig.diagnosis.text import analysis_text
+    from gearsig.report.text import analysis_text
 
     chosen = samples()
     first = next((s for s in chosen if "damaged" in s.recording.stem), chosen[0])

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from gearsig.diagnosis.analyze import analyze
-from gearsig.diagnosis.text import analysis_text
 from gearsig.diagnosis.types import Analysis, CannotTell, Finding, Kind, Outcome
 from gearsig.errors import InputError
 from gearsig.recording.types import Channel, Recording
+from gearsig.report.text import analysis_text
 from gearsig.rig.speed import ConstantSpeed, TachometerChannel
 from gearsig.rig.types import Bearing, GearPair, Rig, Shaft
 from sims.kinematic import (
@@ -242,7 +242,7 @@ def test_the_text_tells_place_strength_and_remedy() -> None:
     damage = ToothDamage("stage", "in", 0.4, impulse_mps2=10.0)
     analysis = analyze(record(replace(GOOD, tooth_damages=(damage,))))
     text = analysis_text(analysis, with_indicators=True)
-    for part in ("where: gear stage/in", "how strong:", "how sure:", "surer with:", "FM4", "(tooth 1"):
+    for part in ("gear stage/in; tooth 1", "how strong:", "how sure:", "surer with:", "FM4", "(tooth 1"):
         assert part in text
     assert max(len(line) for line in text.splitlines()[:20]) <= 100
 

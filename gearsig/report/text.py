@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from textwrap import fill
 
-from gearsig.diagnosis.types import Analysis, Finding, Kind, Strength, Where
+from gearsig.diagnosis.types import Analysis, Finding, Kind
 from gearsig.indicators.types import Indicator
+from gearsig.report.sections import strength_text, where_texts
 
 WIDTH = 100
 _SHORT = (Kind.NOTICE, Kind.INFORMATION)
@@ -30,41 +31,9 @@ def analysis_text(analysis: Analysis, *, with_indicators: bool = False) -> str:
     return "\n".join(lines)
 
 
-def where_text(where: Where) -> str:
-    """Return the place of a finding in words, empty if it has none."""
-    parts = []
-    if where.gear:
-        parts.append(f"gear {where.gear}")
-    elif where.bearing:
-        parts.append(f"bearing {where.bearing}")
-    elif where.shaft:
-        parts.append(f"shaft {where.shaft}")
-    if where.order is not None:
-        parts.append(f"order {where.order:.5g}" + (f" of {where.order_shaft}" if where.order_shaft else ""))
-    if where.frequency_hz is not None:
-        parts.append(f"{where.frequency_hz:.6g} Hz")
-    if where.angle_deg is not None:
-        parts.append(f"{where.angle_deg:.0f}°")
-    if where.tooth is not None:
-        parts.append(f"tooth {where.tooth}")
-    if where.channels:
-        parts.append("channel " + ", ".join(where.channels))
-    return "; ".join(parts)
-
-
-def strength_text(strength: Strength) -> str:
-    """Return the strength and what it is measured against."""
-    ratio = f" ({strength.ratio_db:+.1f} dB)" if strength.ratio_db is not None else ""
-    return (
-        f"{strength.value:.4g} {strength.unit} against {strength.floor:.4g}{ratio}; floor: {strength.floor_is}".replace(
-            "  ", " "
-        )
-    )
-
-
 def _finding_lines(number: int, finding: Finding) -> list[str]:
     lines = [_paragraph(f"{number:2}. [{finding.kind.value}] {finding.title}", "    ", first="")]
-    place = where_text(finding.where)
+    place = "; ".join(where_texts(finding.where))
     if finding.kind not in _SHORT and place:
         lines.append(_paragraph(f"where: {place}"))
     if finding.strength is not None:
