@@ -16,6 +16,7 @@ from app.dashboard.state import Request
 from app.dashboard.uploads import read_recording_bytes, read_rig_text, safe_file_name
 from app.dashboard.widgets.indicators import csv_text, indicator_frame
 from app.dashboard.widgets.picture import picture_bytes
+from app.dashboard.widgets.verdict import headline_of
 from app.samples import samples
 from gearsig.errors import InputError
 from gearsig.indicators.types import Indicator
@@ -72,6 +73,13 @@ def test_markdown_shows_names_as_typed(name: str) -> None:
     html = MarkdownIt("gfm-like", {"linkify": False}).renderInline(as_typed(name))
     seen = html.replace("&lt;", "<").replace("&gt;", ">").replace("&quot;", '"').replace("&amp;", "&")
     assert seen.replace("\u2060", "") == one_line(name)
+
+
+@given(st.text(alphabet="ab .()", max_size=300))
+def test_a_headline_and_its_rest_are_the_verdict(words: str) -> None:
+    headline, rest = headline_of(words)
+    assert f"{headline} {rest}".split() == words.split()
+    assert len(words) > 120 or headline == words
 
 
 def test_text_for_figures_holds_no_tags() -> None:

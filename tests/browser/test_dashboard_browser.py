@@ -140,7 +140,8 @@ def test_own_files(page: playwright.Page) -> None:
     open_files(page, SAMPLE.recording, SAMPLE.rig)
     page.get_by_role("tab", name="Report").wait_for()
     recording = read_recording(SAMPLE.recording, rig=read_rig(SAMPLE.rig))
-    assert verdict(page) == analyze(recording).verdict
+    words = page.get_by_test_id("stMain").inner_text().replace("\u2060", "").split()
+    assert " ".join(analyze(recording).verdict.split()) in " ".join(words)
     page.get_by_role("tab", name="Order spectrum", exact=True).click()
     page.locator(".js-plotly-plot").first.wait_for()
     assert page.get_by_text("1× mesh").count() > 0

@@ -27,6 +27,15 @@ def show_report(analysis: Analysis, request: Request) -> None:
     )
     st.markdown("The same diagnosis from the command line:")
     st.code(command_of(request), language="bash", wrap_lines=True)
+    if request.rig_text.strip():
+        st.download_button(
+            "Download the rig file, with what was changed here",
+            request.rig_text,
+            file_name=f"{safe_file_name(request.rig_name).removesuffix('.toml')}.toml",
+            mime="application/toml",
+            on_click="ignore",
+            icon=":material/download:",
+        )
     _show_provenance(analysis)
 
 

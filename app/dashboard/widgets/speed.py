@@ -23,8 +23,8 @@ def show_speed(analysis: Analysis) -> None:
         return
     _show_numbers(angle)
     _show_curve(analysis, angle)
-    for note in angle.notes:
-        st.markdown(f"- {as_typed(note)}")
+    if angle.notes:
+        st.markdown("\n".join(f"- {as_typed(note)}" for note in angle.notes))
 
 
 def show_unknown_speed(reason: CannotTell) -> None:

@@ -29,12 +29,18 @@ ICONS = {
 }
 
 
+LONGEST_HEADLINE = 120
+
+
 def show_verdict(analysis: Analysis) -> None:
     """Show the verdict, the kind of the most important finding, and what was examined."""
     recording = analysis.recording
     machine = analysis.rig.name if analysis.rig is not None else ""
     n = len(recording.channels)
-    st.subheader(as_typed(analysis.verdict), anchor=False)
+    headline, rest = headline_of(analysis.verdict)
+    st.subheader(as_typed(headline), anchor=False)
+    if rest:
+        st.markdown(as_typed(rest))
     facts = [
         f"**{as_typed(recording.provenance.source)}**",
         as_typed(machine) or "machine not described",
@@ -44,6 +50,18 @@ def show_verdict(analysis: Analysis) -> None:
     with st.container(horizontal=True, vertical_alignment="center"):
         show_kind(severity(analysis))
         st.markdown(" · ".join(facts), width="content")
+
+
+def headline_of(verdict: str) -> tuple[str, str]:
+    """Split a long verdict after its first sentence; a short one stays whole.
+
+    Examples
+    --------
+    >>> headline_of("No fault shows. " + "No damage shows on any tooth or bearing that could be examined. " * 2)[0]
+    'No fault shows.'
+    """
+    first, stop, rest = verdict.partition(". ")
+    return (first + ".", rest.strip()) if stop and len(verdict) > LONGEST_HEADLINE else (verdict, "")
 
 
 def show_kind(kind: Kind) -> None:
