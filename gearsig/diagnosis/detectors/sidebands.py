@@ -73,17 +73,25 @@ def _modulated(
     signals: Signals, pair: GearPair, shaft: str, channel: str, levels: dict[str, float], median: float
 ) -> Finding:
     order = signals.rig.ratio(shaft)
-    strong = median >= STRONG_DB
+    suspect = median >= STRONG_DB and not signals.rig.assumed
+    basis = "how much modulation is usual depends on the machine and the sensor's place"
     return Finding(
         "mesh-modulated",
-        Kind.SUSPICION if strong and not signals.rig.assumed else Kind.NOTICE,
-        f"The mesh of {pair.name} is {'strongly ' if strong else ''}modulated once per revolution of shaft {shaft}.",
+        Kind.SUSPICION if suspect else Kind.NOTICE,
+        f"The mesh of {pair.name} is {'strongly ' if median >= STRONG_DB else ''}modulated once per revolution of shaft "
+        f"{shaft}.",
         Where(
             (channel,), shaft=shaft, gear=f"{pair.name}/{shaft}", order=order, order_shaft=signals.rig.reference_shaft
         ),
-        Strength(10 ** (median / 20), "sideband/carrier", 10 ** (STRONG_DB / 20), "usual for a good mounting", median),
-        confidence=0.5 * (WITH_ASSUMED_DATA if signals.rig.assumed else 1.0),
-        confidence_basis="a rule of thumb: how much modulation is usual depends on the machine and the sensor's place",
+        Strength(
+            10 ** (median / 20),
+            "sideband/carrier",
+            10 ** (NOTABLE_DB / 20),
+            "common on sound machines",
+            median - NOTABLE_DB,
+        ),
+        confidence=0.5 if suspect else 0.95 * (WITH_ASSUMED_DATA if signals.rig.assumed else 1.0),
+        confidence_basis=f"that it is a fault: {basis}" if suspect else f"that it is there; {basis}",
         evidence=(
             f"Sidebands against mesh harmonics: {median:.1f} dB (median), {levels[channel]:.1f} dB in {channel}.",
             "An eccentric gear, a bent shaft, misalignment and a fluctuating load all do this.",
