@@ -74,12 +74,12 @@ def _modulated(
 ) -> Finding:
     order = signals.rig.ratio(shaft)
     suspect = median >= STRONG_DB and not signals.rig.assumed
+    how = "strongly modulated" if median >= STRONG_DB else "modulated"
     basis = "how much modulation is usual depends on the machine and the sensor's place"
     return Finding(
         "mesh-modulated",
         Kind.SUSPICION if suspect else Kind.NOTICE,
-        f"The mesh of {pair.name} is {'strongly ' if median >= STRONG_DB else ''}modulated once per revolution of shaft "
-        f"{shaft}.",
+        f"The mesh of {pair.name} is {how} once per revolution of shaft {shaft}.",
         Where(
             (channel,), shaft=shaft, gear=f"{pair.name}/{shaft}", order=order, order_shaft=signals.rig.reference_shaft
         ),
