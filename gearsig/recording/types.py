@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gearsig.checks import FloatArray, closest_match_hint, frozen_array, one_of, positive
+from gearsig.checks import FloatArray, closest_match_hint, frozen_array, one_of, positive, within
 from gearsig.errors import InputError
 from gearsig.rig.speed import SpeedSource
 from gearsig.rig.types import Rig
@@ -136,12 +136,9 @@ class Recording:
 
     def __post_init__(self) -> None:
         where = self.provenance.source or "recording"
-        positive(
-            self.sampling_rate_hz,
-            f"{where}: sampling rate",
-            "Hz",
-            remedy="give --fs or sampling_rate_hz in the rig file",
-        )
+        remedy = "give --fs or sampling_rate_hz in the rig file"
+        positive(self.sampling_rate_hz, f"{where}: sampling rate", "Hz", remedy=remedy)
+        within(self.sampling_rate_hz, f"{where}: sampling rate", 1e-3, 1e10, "Hz", remedy=remedy)
         if len(np.shape(self.samples)) == 2 and np.shape(self.samples)[1] == 0:
             raise InputError("there are no samples", where=where, remedy="check that the file was written completely")
         try:
