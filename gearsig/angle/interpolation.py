@@ -10,7 +10,7 @@ from numba import njit
 from gearsig.checks import FloatArray
 
 PASSBAND = 0.4
-"""Upper edge over the lower of both sampling rates; up to it the error stays near 5e-6 of full scale or below."""
+"""Upper edge over the lower of both sampling rates; up to it the error stays below 5e-6 of full scale."""
 
 HALF_BAND = 20  # taps on each side of the doubling filter
 _NEAR = 6  # taps on each side of the fractional delay, at the doubled rate

@@ -23,6 +23,7 @@ from gearsig.errors import RefusalError
 _BLOCKS = (96, 24, 384)  # per recording
 _ACCELERATION_PER_S = 0.04  # standard deviation of the change of log speed
 _CORRECTION_SPANS = (0.05, 0.02)
+_LARGEST_JUMP = 0.2  # of log speed between blocks; a path that changes to a multiple of the speed jumps further
 _LOST = 4.0  # score by which another speed has to win in a part for the angle to be wrong there
 _CLEAR = 0.9  # quality beyond which no other block length is tried
 
@@ -30,7 +31,7 @@ _CLEAR = 0.9  # quality beyond which no other block length is tried
 def varying_speed(search: SpeedSearch, start: SpeedCandidate | None) -> SpeedCandidate | None:
     """Best of the refined angles, from the constant one or from tracking with blocks of several lengths."""
     candidates: list[SpeedCandidate] = []
-    for angle in [start.angle] if start is not None else _rough_angles(search):
+    for angle in _starts(search, start):
         candidate = _refined(search, angle)
         if candidate is not None and abs(candidate.decision.speed - 1.0) > 0.02:
             # Over the true course of speed the comb is sharp at its true scale only: take it from there.
@@ -51,6 +52,14 @@ def varying_speed(search: SpeedSearch, start: SpeedCandidate | None) -> SpeedCan
         and abs(other.decision.speed - 1.0) <= 0.02
     ]
     return max([best, *others], key=_rank)
+
+
+def _starts(search: SpeedSearch, start: SpeedCandidate | None) -> Iterator[ShaftAngle]:
+    """Yield the constant speed where there is one; unless that is beyond doubt, the courses followed as well."""
+    if start is not None:
+        yield start.angle
+    if start is None or start.decision.quality < _CLEAR:
+        yield from _rough_angles(search)
 
 
 def _rank(candidate: SpeedCandidate) -> tuple[bool, float]:
@@ -77,6 +86,8 @@ def _rough_angles(search: SpeedSearch) -> Iterator[ShaftAngle]:
             continue
         change = _ACCELERATION_PER_S * 0.5 * n_block / rate
         ridge = track_speed(search.samples, rate, search.comb, low, search.high, TOP * rate, n_block, change)
+        if np.abs(np.diff(np.log(ridge.speed_rev_per_s))).max() > _LARGEST_JUMP:
+            continue
         angle = _integrated(search, ridge.time_s, ridge.speed_rev_per_s)
         for span in _CORRECTION_SPANS:
             angle = _corrected(search, angle, span, n_blocks)

@@ -103,7 +103,7 @@ def test_a_stop_between_two_pulses_does_not_turn_the_shaft() -> None:
 @settings(deadline=None, max_examples=25)
 @given(st.floats(0.01, 100.0), st.floats(1.0, 50.0), st.floats(-0.5, 2.0))
 def test_scaling_time_scales_speed(factor: float, start: float, acceleration: float) -> None:
-    t = accelerated(50, start, acceleration * start / 20)
+    t = accelerated(50, start, acceleration * start**2 / 200)
     one = pulse_train_angle(t, tick_s=0.0)
     other = pulse_train_angle(t * factor, tick_s=0.0)
     np.testing.assert_allclose(other.speed_rev_per_s * factor, one.speed_rev_per_s, rtol=1e-9)
