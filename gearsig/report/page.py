@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
-from gearsig.diagnosis.types import Analysis, Kind
+from gearsig.diagnosis.types import Analysis
 from gearsig.report.files import write_text
 from gearsig.report.indicator_table import indicator_tables
 from gearsig.report.pictures import gallery
@@ -73,9 +73,3 @@ def page_html(analysis: Analysis, *, command: str = "", index: str = "", date: d
         provenance=provenance_rows(analysis, command, date or datetime.now().astimezone()),
         index=index,
     )
-
-
-def severity(analysis: Analysis) -> Kind:
-    """Return the most important kind among the findings; information if there are none."""
-    order = list(Kind)
-    return min((finding.kind for finding in analysis.findings), key=order.index, default=Kind.INFORMATION)

@@ -7,9 +7,9 @@ from html.parser import HTMLParser
 
 import pytest
 
-from gearsig.diagnosis.types import Finding, Kind, Where
+from gearsig.diagnosis.types import Finding, Kind, Outcome, Where
 from gearsig.indicators.types import Indicator
-from gearsig.report.page import page_html, severity, write_page
+from gearsig.report.page import page_html, write_page
 
 EVIL = "<script>alert(1)</script>"
 QUOTES = "\"rig\" onload='x' & <b>"
@@ -137,10 +137,10 @@ def test_a_recording_that_allows_no_answer_has_a_page(cannot_tell, tmp_path):
     assert [p.name for p in path.parent.iterdir()] == ["page.html"]
 
 
-def test_severity_is_the_most_important_kind(gearbox, cannot_tell):
-    assert severity(gearbox) is Kind.FAULT
-    assert severity(cannot_tell) is Kind.CANNOT_TELL
-    assert severity(replace(cannot_tell, findings=())) is Kind.INFORMATION
+def test_the_outcome_follows_from_the_findings(gearbox, cannot_tell):
+    assert gearbox.outcome is Outcome.FAULT
+    assert cannot_tell.outcome is Outcome.CANNOT_TELL
+    assert replace(cannot_tell, findings=()).outcome is Outcome.CANNOT_TELL
 
 
 def test_bearings_on_one_shaft_keep_their_indicators_apart(gearbox):

@@ -7,25 +7,32 @@ from typing import Literal
 import streamlit as st
 
 from app.dashboard.as_typed import as_typed
-from gearsig.diagnosis.types import Analysis, Kind
-from gearsig.report.page import severity
+from gearsig.diagnosis.types import Analysis, Kind, Outcome
 
-Colour = Literal["red", "orange", "violet", "gray", "blue"]
-COLOURS: dict[Kind, Colour] = {
+Colour = Literal["red", "orange", "violet", "gray", "blue", "green"]
+COLOURS: dict[Kind | Outcome, Colour] = {
     Kind.FAULT: "red",
     Kind.SUSPICION: "orange",
     Kind.DATA_PROBLEM: "violet",
     Kind.CANNOT_TELL: "gray",
     Kind.NOTICE: "blue",
     Kind.INFORMATION: "blue",
+    Outcome.FAULT: "red",
+    Outcome.SUSPICION: "orange",
+    Outcome.CANNOT_TELL: "gray",
+    Outcome.NO_FAULT: "green",
 }
-ICONS = {
+ICONS: dict[Kind | Outcome, str] = {
     Kind.FAULT: ":material/error:",
     Kind.SUSPICION: ":material/warning:",
     Kind.DATA_PROBLEM: ":material/database:",
     Kind.CANNOT_TELL: ":material/help:",
     Kind.NOTICE: ":material/info:",
     Kind.INFORMATION: ":material/info:",
+    Outcome.FAULT: ":material/error:",
+    Outcome.SUSPICION: ":material/warning:",
+    Outcome.CANNOT_TELL: ":material/help:",
+    Outcome.NO_FAULT: ":material/check_circle:",
 }
 
 
@@ -33,7 +40,7 @@ LONGEST_HEADLINE = 120
 
 
 def show_verdict(analysis: Analysis) -> None:
-    """Show the verdict, the kind of the most important finding, and what was examined."""
+    """Show the verdict, the outcome in one word, and what was examined."""
     recording = analysis.recording
     machine = analysis.rig.name if analysis.rig is not None else ""
     n = len(recording.channels)
@@ -48,7 +55,7 @@ def show_verdict(analysis: Analysis) -> None:
         f"{recording.duration_s:.4g} s at {recording.sampling_rate_hz:.6g} Hz",
     ]
     with st.container(horizontal=True, vertical_alignment="center"):
-        show_kind(severity(analysis))
+        show_kind(analysis.outcome)
         st.markdown(" · ".join(facts), width="content")
 
 
@@ -64,6 +71,6 @@ def headline_of(verdict: str) -> tuple[str, str]:
     return (first + ".", rest.strip()) if stop and len(verdict) > LONGEST_HEADLINE else (verdict, "")
 
 
-def show_kind(kind: Kind) -> None:
-    """Show a kind of finding as a badge."""
+def show_kind(kind: Kind | Outcome) -> None:
+    """Show a kind of finding, or an outcome, as a badge."""
     st.badge(kind.value, icon=ICONS[kind], color=COLOURS[kind])
