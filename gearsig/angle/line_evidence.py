@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -49,9 +50,13 @@ def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float) 
     rate : float
         Samples per second, or per revolution.
     n_segment : int
+        Shortened a little to a length that transforms fast.
     top : float
         In the unit of `rate`.
     """
+    from scipy.fft import prev_fast_len
+
+    n_segment = prev_fast_len(n_segment, real=True)
     n_keep = min(n_segment // 2, int(top / rate * n_segment) + 4)
     ratios = [_log_ratio(_mean_power(row, n_segment)[:n_keep]) for row in samples]
     log_ratio = np.mean(ratios, axis=0)
@@ -67,11 +72,17 @@ def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float) 
     )
 
 
+@lru_cache(maxsize=8)
+def _hann(n: int) -> FloatArray:
+    """Hann window for spectra; kept, as many blocks of one length follow each other."""
+    window: FloatArray = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(n) / n)
+    return window
+
+
 def _mean_power(x: FloatArray, n_segment: int) -> FloatArray:
     from scipy.fft import rfft
-    from scipy.signal.windows import hann
 
-    window = hann(n_segment, sym=False)
+    window = _hann(n_segment)
     step = max(1, n_segment // 2)
     power = np.zeros(n_segment // 2 + 1)
     for start in range(0, len(x) - n_segment + 1, step):
@@ -84,10 +95,10 @@ def _log_ratio(power: FloatArray) -> FloatArray:
     """ln(power/floor); the floor is the median in blocks, straight lines (in decibels) between their middles."""
     tiny = max(float(power.max()) * 1e-24, 1e-300)
     log_power = np.log(np.maximum(power, tiny))
-    n_blocks = max(1, len(power) // _FLOOR_BINS)
-    blocks = np.array_split(log_power, n_blocks)
-    middles = np.cumsum([len(b) for b in blocks]) - np.array([len(b) for b in blocks]) / 2
-    medians = np.array([np.median(b) for b in blocks])
+    length = min(_FLOOR_BINS, len(power))
+    n_blocks = len(power) // length
+    medians = np.median(log_power[: n_blocks * length].reshape(n_blocks, length), axis=1)
+    middles = (np.arange(n_blocks) + 0.5) * length
     over: FloatArray = log_power - np.interp(np.arange(len(power)), middles, medians)
     return np.clip(over, -2.0, _HIGHEST_LOG_RATIO)
 

@@ -59,7 +59,8 @@ def _starts(search: SpeedSearch, start: SpeedCandidate | None) -> Iterator[Shaft
     if start is not None:
         yield start.angle
     if start is None or start.decision.quality < _CLEAR:
-        yield from _rough_angles(search)
+        # One block length is enough to contradict a steady speed; without one, all are tried.
+        yield from _rough_angles(search, _BLOCKS if start is None else _BLOCKS[:1])
 
 
 def _rank(candidate: SpeedCandidate) -> tuple[bool, float]:
@@ -76,10 +77,10 @@ def _mesh_harmonics(comb: CombLines) -> tuple[float, ...]:
     return tuple(k * m for m in comb.meshes for k in (1, 2, 3))
 
 
-def _rough_angles(search: SpeedSearch) -> Iterator[ShaftAngle]:
+def _rough_angles(search: SpeedSearch, block_counts: tuple[int, ...]) -> Iterator[ShaftAngle]:
     """Follow the speed with blocks of several lengths, the middle one first: it fits most machines."""
     rate, n = search.recording.sampling_rate_hz, search.samples.shape[1]
-    for n_blocks in _BLOCKS:
+    for n_blocks in block_counts:
         n_block = 2 * n // n_blocks
         low = max(search.low, 2.0 * rate / n_block)  # two turns per block, or its spectrum does not show orders
         if n_block < 512 or low >= search.high:
