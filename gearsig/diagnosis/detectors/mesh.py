@@ -2,47 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from gearsig.diagnosis.confirmation import N_HARMONICS, ConfirmingLine, clearest_line
 from gearsig.diagnosis.signals import Signals
 from gearsig.diagnosis.types import Finding, Kind, Strength, Where
 from gearsig.rig.types import GearPair
-
-N_HARMONICS = 3
-CLEAR_DB = 12.0
-"""A line that noise alone exceeds once in 10⁷: power over mean floor is exponential, exp(-15.8) (12 dB)."""
-
-
-@dataclass(frozen=True)
-class MeshLine:
-    """The clearest of a pair's mesh lines."""
-
-    channel: str
-    harmonic: int
-    order: float
-    amplitude: float
-    floor: float
-    ratio_db: float
-    unit: str
-
-
-def strongest_mesh_line(signals: Signals, pair: GearPair) -> MeshLine | None:
-    """Return the mesh harmonic of `pair` that stands out most over all channels; None if none is in the spectrum."""
-    mesh = signals.rig.mesh_order(pair)
-    best: MeshLine | None = None
-    if mesh is None:
-        return None
-    for channel, excess in signals.order_excess.items():
-        spectrum = excess.spectrum
-        for h in range(1, N_HARMONICS + 1):
-            if h * mesh > spectrum.positions[-1]:
-                continue
-            order, amplitude = spectrum.largest_near(h * mesh, 1.5 * spectrum.resolution)
-            floor = float(excess.floor[spectrum.index_of(order)])
-            ratio = _decibel(amplitude, floor)
-            if best is None or ratio > best.ratio_db:
-                best = MeshLine(channel, h, order, amplitude, floor, ratio, spectrum.unit)
-    return best
 
 
 def detect_mesh(signals: Signals) -> list[Finding]:
@@ -73,13 +36,13 @@ def _one_pair(signals: Signals, pair: GearPair) -> Finding | None:
             evidence=("Sampling rate, speed and teeth cannot all be right, or the recording was made too slowly.",),
             surer="Check the sampling rate and the teeth; record at three times the mesh frequency or more.",
         )
-    line = strongest_mesh_line(signals, pair)
+    line = clearest_line(signals, mesh)
     if line is None:
         return None
-    return _found(signals, pair, line) if line.ratio_db >= CLEAR_DB else _absent(signals, pair, line, mesh)
+    return _found(signals, pair, line) if line.is_clear else _absent(signals, pair, line, mesh)
 
 
-def _found(signals: Signals, pair: GearPair, line: MeshLine) -> Finding:
+def _found(signals: Signals, pair: GearPair, line: ConfirmingLine) -> Finding:
     hertz = line.order * signals.frequency_per_order_hz
     return Finding(
         "mesh-found",
@@ -98,7 +61,7 @@ def _found(signals: Signals, pair: GearPair, line: MeshLine) -> Finding:
     )
 
 
-def _absent(signals: Signals, pair: GearPair, line: MeshLine, mesh: float) -> Finding:
+def _absent(signals: Signals, pair: GearPair, line: ConfirmingLine, mesh: float) -> Finding:
     hertz = mesh * signals.frequency_per_order_hz
     return Finding(
         "mesh-absent",
@@ -114,6 +77,15 @@ def _absent(signals: Signals, pair: GearPair, line: MeshLine, mesh: float) -> Fi
     )
 
 
+def _how_near(line: ConfirmingLine) -> str:
+    if line.on_place:
+        return f"The best of {N_HARMONICS} harmonics is {line.ratio_db:.1f} dB over the floor."
+    return (
+        f"Near harmonic {line.harmonic} a line stands beside its place: the speed may be off by little, "
+        "and small errors smear all averages."
+    )
+
+
 def _where_instead(signals: Signals) -> tuple[str, ...]:
     """Say at which multiple of the stated speed the mesh lines do lie, if anywhere."""
     from gearsig.angle.tachless import comb_evidence
@@ -121,9 +93,3 @@ def _where_instead(signals: Signals) -> tuple[str, ...]:
     stated = signals.frequency_per_order_hz * 60
     evidence = comb_evidence(signals.recording, signals.rig, stated)
     return (evidence,) if evidence else ()
-
-
-def _decibel(amplitude: float, floor: float) -> float:
-    from math import log10
-
-    return 20 * log10(max(amplitude, 1e-300) / max(floor, 1e-300))

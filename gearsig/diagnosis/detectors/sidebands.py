@@ -8,7 +8,7 @@ import numpy as np
 
 from gearsig.diagnosis.comb import Comb, LineExcess, best_comb
 from gearsig.diagnosis.confidence import WITH_ASSUMED_DATA, from_p_value
-from gearsig.diagnosis.detectors.mesh import CLEAR_DB, strongest_mesh_line
+from gearsig.diagnosis.confirmation import mesh_is_confirmed
 from gearsig.diagnosis.signals import Signals
 from gearsig.diagnosis.types import Finding, Kind, Strength, Where
 from gearsig.rig.types import GearPair
@@ -27,8 +27,7 @@ def detect_sidebands(signals: Signals) -> list[Finding]:
     """Report strong modulation by known shafts, and sideband families of shafts that the rig does not know."""
     findings: list[Finding] = []
     for pair in signals.rig.pairs:
-        line = strongest_mesh_line(signals, pair)
-        if line is None or line.ratio_db < CLEAR_DB:
+        if not mesh_is_confirmed(signals, pair):
             continue  # without a carrier there are no sidebands of it
         findings += _known_shafts(signals, pair)
         findings += _unknown_family(signals, pair)
