@@ -10,6 +10,9 @@ WITHOUT_REFERENCE = 0.95
 WITH_ASSUMED_DATA = 0.5
 """Factor where the statement rests on data of the machine that are assumed."""
 
+SMALLEST_SHOWN = 1e-6
+"""Smaller p-values are not shown: no model of the noise is known so well in its tails."""
+
 
 def from_p_value(p_value: float, *, prior: float = 0.1, limit: float = WITHOUT_REFERENCE) -> float:
     """Return an upper bound of the probability that the effect is real, given the p-value of its absence.
@@ -38,3 +41,14 @@ def from_p_value(p_value: float, *, prior: float = 0.1, limit: float = WITHOUT_R
     p = min(max(p_value, 1e-300), 1.0)
     bayes_factor = -e * p * log(p) if p < exp(-1) else 1.0
     return min(limit, 1.0 / (1.0 + (1.0 - prior) / prior * bayes_factor))
+
+
+def p_text(p_value: float) -> str:
+    """Write a p-value with one digit, none below 1e-6.
+
+    Examples
+    --------
+    >>> p_text(3.2e-4), p_text(5e-141)
+    ('3e-04', '< 1e-6')
+    """
+    return "< 1e-6" if p_value < SMALLEST_SHOWN else f"{p_value:.0e}" if p_value < 0.01 else f"{p_value:.1g}"
