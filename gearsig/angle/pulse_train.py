@@ -14,6 +14,9 @@ from gearsig.errors import InputError, RefusalError
 # A tenth of the pulses: a 36-1 or 60-2 tooth wheel stays below, and so does an occasional glitch.
 _MOST_FAULTY = 0.1
 
+# Pulses are only as good as the recorder's clock, whose scale no pulse can tell: crystals are right to some 50 ppm.
+_CLOCK_SCALE = 5e-5
+
 
 def pulse_train_angle(
     times_s: FloatArray, pulses_per_revolution: int = 1, *, shaft: str = "", tick_s: float | None = None
@@ -36,7 +39,7 @@ def pulse_train_angle(
     -------
     ShaftAngle
         Knots at the pulses; speed exact at constant acceleration. The uncertainty is the timing error of two pulses
-        (tick/√12 each, or the scatter of the intervals) over the duration.
+        (tick/√12 each, or the scatter of the intervals) over the duration, and at least the 5e-5 of a clock.
 
     Raises
     ------
@@ -112,7 +115,10 @@ def _check_faults(counted: PulseCount, n_pulses: int) -> None:
 
 
 def _uncertainty(t: FloatArray, tick_s: float) -> float:
-    """Error of first and last pulse over the duration; without a tick, from the times' third differences."""
+    """Error of first and last pulse over the duration; without a tick, from the times' third differences.
+
+    It is never below the error of the clock's own rate.
+    """
     if tick_s > 0:
         timing_s = tick_s / np.sqrt(12.0)
     elif len(t) >= 5:
@@ -120,7 +126,7 @@ def _uncertainty(t: FloatArray, tick_s: float) -> float:
         timing_s = float(np.median(np.abs(np.diff(t, 3)))) / 0.6745 / np.sqrt(20.0)
     else:
         return float("nan")
-    return float(np.sqrt(2.0) * timing_s / (t[-1] - t[0]))
+    return max(_CLOCK_SCALE, float(np.sqrt(2.0) * timing_s / (t[-1] - t[0])))
 
 
 def _notes(counted: PulseCount, n_pulses: int) -> tuple[str, ...]:

@@ -27,6 +27,9 @@ FOOT_LINES = 3
 N_FITS = 4
 """Passes of fitting the fundamental to the peaks and looking for the peaks again."""
 
+CHUNK = 1 << 17
+"""Fundamentals tried at a time: long records with wide ranges have millions of them."""
+
 _STEP = 0.05
 """Width of the cells in which the distribution of the terms is kept."""
 
@@ -140,61 +143,112 @@ def best_comb(
     starts = np.zeros(1) if centres is None else np.asarray(centres, dtype=np.float64)
     resolution = excess.spectrum.resolution
     low = max(low, 3 * resolution)
+    high = min(high, _widest(excess.spectrum, starts, multiples))
     if high <= low or len(excess.log_ratio) < 16:
         return None
     # A step of a third of a line at the highest multiple: no family falls between two candidates.
     step = resolution / (3 * float(np.abs(multiples).max()))
-    candidates = np.arange(low, high + step / 2, step)
-    scores = excess.scores()
-    total = np.zeros(len(candidates))
-    n_terms = 0
-    for start in starts:
-        for multiple in multiples:
-            index = np.rint((start + multiple * candidates - excess.spectrum.positions[0]) / resolution).astype(
-                np.int64
-            )
-            inside = (index >= 0) & (index < len(scores))
-            n_terms += bool(inside.any())
-            total += np.where(inside, scores[np.clip(index, 0, len(scores) - 1)], 0.0)
+    n_candidates = int((high - low) / step) + 2
+    origins, factors = np.repeat(starts, len(multiples)), np.tile(multiples, len(starts))
+    candidates, totals, n_terms = _highest(excess, origins, factors, low, step, n_candidates)
     if n_terms == 0:
         return None
-    best = _sharpest(excess, starts, multiples, candidates, total)
-    n_independent = max(1, len(candidates) // 3)
-    single = _tail_probability(scores[~excess.masked], n_terms, float(total[best]))
-    p_value = float(-np.expm1(n_independent * np.log1p(-min(single, 1 - 1e-12))))
-    origins = np.repeat(starts, len(multiples))
-    return _described(excess, origins, np.tile(multiples, len(starts)), candidates[best], float(total[best]), p_value)
+    best = _sharpest(excess, origins, factors, candidates)
+    score = float(totals[best])
+    single = tail_probability(excess, n_terms, score)
+    p_value = float(-np.expm1(independent_trials(n_candidates) * np.log1p(-min(single, 1 - 1e-12))))
+    return _described(excess, origins, factors, candidates[best], score, p_value)
 
 
-def _sharpest(
-    excess: LineExcess, starts: FloatArray, multiples: NDArray[np.int_], candidates: FloatArray, total: FloatArray
-) -> int:
-    """Return the candidate whose harmonics meet the peaks best, among those whose score is as good as the highest.
+def comb_at(excess: LineExcess, fundamental: float, multiples: NDArray[np.int_], p_value: float) -> Comb:
+    """Return the family of the given multiples of a fundamental that was found by other means."""
+    fitted = _described(excess, np.zeros(len(multiples)), multiples, fundamental, 0.0, p_value)
+    scores = excess.scores()
+    index = np.rint((multiples * fitted.fundamental - excess.spectrum.positions[0]) / excess.spectrum.resolution)
+    index = index[(index >= 0) & (index < len(scores))].astype(np.int64)
+    return replace(fitted, score=float(scores[index].sum()))
+
+
+def independent_trials(n_candidates: int) -> int:
+    """Return how many of the fundamentals tried are independent: three fall on one line of the highest multiple."""
+    return max(1, n_candidates // 3)
+
+
+def score_needed(excess: LineExcess, n_terms: int, low: float, high: float, probability: float) -> float:
+    """Return the score that the best family between `low` and `high` reaches by chance with `probability` only.
+
+    Infinite if even lines that all count in full would be likelier than that.
+    """
+    n_candidates = int((high - low) * 3 * n_terms / excess.spectrum.resolution) + 2
+    tail = np.cumsum(_sum_density(excess, n_terms)[::-1])[::-1]
+    allowed = np.flatnonzero(tail <= probability / independent_trials(n_candidates))
+    score = float(allowed[0]) * _STEP + n_terms * _STEP / 2 if len(allowed) else np.inf
+    return score if score <= n_terms * LOG_RATIO_LIMIT else np.inf
+
+
+def _widest(spectrum: Spectrum, starts: FloatArray, multiples: NDArray[np.int_]) -> float:
+    """Return the largest fundamental that has any of its multiples within the axis."""
+    room = np.where(multiples > 0, spectrum.positions[-1] - starts[:, None], starts[:, None])
+    return float(np.max(room / np.abs(multiples)))
+
+
+def _highest(
+    excess: LineExcess, origins: FloatArray, factors: NDArray[np.int_], low: float, step: float, n_candidates: int
+) -> tuple[FloatArray, FloatArray, int]:
+    """Return the fundamentals whose score is as good as the highest, their scores, and the lines that were summed.
 
     Scores are cut and widened by a line, so that strong families score the same over several candidates.
     """
-    among = np.flatnonzero(total >= total.max() - 0.5)
+    scores, resolution = excess.scores(), excess.spectrum.resolution
+    inside_once = np.zeros(len(factors), dtype=np.bool_)
+    kept: list[FloatArray] = []
+    highest = -np.inf
+    for begin in range(0, n_candidates, CHUNK):
+        candidates = low + step * np.arange(begin, min(begin + CHUNK, n_candidates))
+        total = np.zeros(len(candidates))
+        for i, (origin, factor) in enumerate(zip(origins, factors, strict=True)):
+            index = np.rint((origin + factor * candidates - excess.spectrum.positions[0]) / resolution).astype(np.int64)
+            inside = (index >= 0) & (index < len(scores))
+            inside_once[i] |= bool(inside.any())
+            total += np.where(inside, scores[np.clip(index, 0, len(scores) - 1)], 0.0)
+        highest = max(highest, float(total.max()))
+        among = np.flatnonzero(total >= highest - 0.5)[:CHUNK]
+        kept.append(np.stack([candidates[among], total[among]]))
+    found = np.concatenate([part[:, part[1] >= highest - 0.5] for part in kept], axis=1)[:, :CHUNK]
+    return found[0], found[1], int(inside_once.sum())
+
+
+def _sharpest(excess: LineExcess, origins: FloatArray, factors: NDArray[np.int_], candidates: FloatArray) -> int:
+    """Return the candidate whose harmonics meet the peaks best."""
     spectrum = excess.spectrum
-    places = np.repeat(starts, len(multiples))[:, None] + np.tile(multiples, len(starts))[:, None] * candidates[among]
-    index = np.rint((places - spectrum.positions[0]) / spectrum.resolution).astype(np.int64)
-    index = np.clip(index, 0, len(spectrum.values) - 1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        heights = np.nan_to_num(np.log(spectrum.values[index] / excess.floor[index]), nan=0.0, posinf=40.0, neginf=0.0)
-    heights = np.where(excess.masked[index], 0.0, heights)
-    return int(among[np.argmax(heights.sum(axis=0))])
+    heights = np.zeros(len(candidates))
+    for origin, factor in zip(origins, factors, strict=True):
+        index = np.rint((origin + factor * candidates - spectrum.positions[0]) / spectrum.resolution).astype(np.int64)
+        index = np.clip(index, 0, len(spectrum.values) - 1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            height = np.log(spectrum.values[index] / excess.floor[index])
+        height = np.nan_to_num(height, nan=0.0, posinf=40.0, neginf=0.0)
+        heights += np.where(excess.masked[index], 0.0, height)
+    return int(np.argmax(heights))
 
 
-def _tail_probability(terms: FloatArray, n_terms: int, score: float) -> float:
-    """Return P(sum of n_terms independent draws from `terms` >= score), by convolution of their histogram."""
+def tail_probability(excess: LineExcess, n_terms: int, score: float) -> float:
+    """Return P(sum of n_terms independent draws from the unmasked lines >= score)."""
+    # Draws were floored to their cell, so the sum may lie half a cell per term higher than its cell says.
+    threshold = int(np.floor((score - n_terms * _STEP / 2) / _STEP))
+    return float(np.clip(_sum_density(excess, n_terms)[max(threshold, 0) :].sum(), 0.0, 1.0))
+
+
+def _sum_density(excess: LineExcess, n_terms: int) -> FloatArray:
+    """Return the distribution of a sum of independent draws from the unmasked lines, by convolving their histogram."""
     n_cells = int(np.ceil(LOG_RATIO_LIMIT / _STEP)) + 1
+    terms = excess.log_ratio[~excess.masked]
     cells = np.bincount(np.floor(terms / _STEP).astype(np.int64), minlength=n_cells).astype(np.float64)
-    density = (cells + 1e-9) / (cells.sum() + 1e-9 * n_cells)
+    density: FloatArray = (cells + 1e-9) / (cells.sum() + 1e-9 * n_cells)
     total = density
     for _ in range(n_terms - 1):
         total = np.convolve(total, density)
-    # Draws were floored to their cell, so the sum may lie half a cell per term higher than its cell says.
-    threshold = int(np.floor((score - n_terms * _STEP / 2) / _STEP))
-    return float(np.clip(total[max(threshold, 0) :].sum(), 0.0, 1.0))
+    return total
 
 
 def _described(

@@ -54,8 +54,9 @@ class ChannelProblem:
 def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
     """Return the problems of the vibration channels; speed, tachometer and other channels are not looked at.
 
-    - *dead*: constant; or at most four neighbouring levels and a standard deviation below 1/1000 of the median of the
-      other vibration channels in the same unit.
+    - *dead*: constant, or so small that the standard deviation vanishes in double precision; or at most four
+      neighbouring levels and a standard deviation below 1/1000 of the median of the other vibration channels in the
+      same unit.
     - *clipped*: see `gearsig.recording.clipping`.
     - *stuck*: runs of equal samples away from the extremes, at least 16 long, ten times longer than 99 % of the
       runs in the channel, and with a corner at both ends (eight samples further the signal is more than eight of the
@@ -106,6 +107,9 @@ def _dead(channel: Channel, x: FloatArray, levels: Levels, spread: float, others
     remedy = "check sensor, cable and input of this channel, and leave it out"
     if levels.n_used == 1:
         return ChannelProblem(channel.name, "dead", 1.0, f"all {len(x)} samples are {x[0]:g}", remedy)
+    if spread == 0:  # values so small that their squares vanish
+        evidence = f"the samples differ, by {np.ptp(x):.2g} at most, too little for a standard deviation"
+        return ChannelProblem(channel.name, "dead", 1.0, evidence, remedy)
     if not others or levels.n_spanned > MAX_DEAD_LEVELS or spread > DEAD_SHARE * float(np.median(others)):
         return None
     evidence = (

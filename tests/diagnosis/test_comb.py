@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearsig.diagnosis.comb import best_comb, line_excess
+from gearsig.diagnosis.comb import best_comb, comb_at, line_excess, score_needed, tail_probability
 from gearsig.diagnosis.signals import floor_of
 from gearsig.spectra.amplitude import amplitude_spectrum
 
@@ -84,3 +84,42 @@ def test_one_huge_line_is_no_family() -> None:
 def test_nothing_to_resolve() -> None:
     spectrum = amplitude_spectrum(np.random.default_rng(7).normal(size=256), RATE_HZ)
     assert best_comb(line_excess(spectrum, np.ones(len(spectrum.values))), 1.0, 2.0) is None
+
+
+def test_ranges_beyond_the_axis_are_cut_to_it() -> None:
+    rng = np.random.default_rng(8)
+    excess = excess_of(family(23.37, 0.2, rng))
+    wide, far = best_comb(excess, 10.0, 1e9), best_comb(excess, 1e6, 1e9)
+    assert wide is not None
+    assert wide.fundamental == pytest.approx(23.37, abs=0.02)
+    assert far is None
+
+
+def test_pieces_of_a_search_make_the_same_family_as_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    excess = excess_of(family(23.37, 0.06, np.random.default_rng(9)))
+    whole = best_comb(excess, 10.0, 60.0)
+    monkeypatch.setattr("gearsig.diagnosis.comb.CHUNK", 1000)
+    assert best_comb(excess, 10.0, 60.0) == whole
+
+
+def test_a_family_at_a_given_place_is_described() -> None:
+    comb = comb_at(excess_of(family(23.37, 0.3, np.random.default_rng(10))), 23.36, np.arange(1, 11), 0.5)
+    assert comb.fundamental == pytest.approx(23.37, abs=0.01)
+    assert len(comb.positions) == 6
+    assert comb.p_value == 0.5
+
+
+def test_the_score_needed_is_rarely_reached_by_noise() -> None:
+    rng = np.random.default_rng(11)
+    reached = 0
+    for _ in range(100):
+        excess = excess_of(rng.normal(size=N))
+        needed = score_needed(excess, 6, 20.0, 24.0, 0.05)
+        comb = best_comb(excess, 20.0, 24.0)
+        assert comb is not None
+        assert (comb.p_value <= 0.05) == (comb.score >= needed) or abs(comb.score - needed) < 0.2
+        reached += comb.score >= needed
+    # 5 of 100 are expected; 14 or more have a chance of 5 in 10 000.
+    assert reached < 14
+    assert tail_probability(excess, 6, needed) < 0.05
+    assert score_needed(excess, 6, 20.0, 24.0, 1e-300) == np.inf

@@ -79,6 +79,7 @@ def test_dead_channels():
     assert kinds(np.zeros(N), x) == [("a0", "dead")]
     assert kinds(x, flicker, x[::-1]) == [("a1", "dead")]
     assert kinds(x, 1e-4 * x) == []
+    assert kinds(1e-300 * x) == [("a0", "dead")]  # the squares vanish: there is nothing to divide the mean by
 
 
 def test_stuck_offset_and_quantised():
