@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from gearsig.checks import FloatArray, frozen_array, positive
-from gearsig.errors import InputError
+from gearsig.errors import InputError, RefusalError
 
 AngleMethod = Literal["constant", "pulses", "encoder", "speed channel", "tachless"]
 
@@ -93,6 +93,32 @@ class ShaftAngle:
         positive(ratio, "ratio")
         return replace(
             self, shaft=shaft, revolutions=self.revolutions * ratio, speed_rev_per_s=self.speed_rev_per_s * ratio
+        )
+
+    def between(self, start_s: float, end_s: float) -> ShaftAngle:
+        """Return the part of the angle from `start_s` to `end_s`.
+
+        Raises
+        ------
+        RefusalError
+            If the angle is not known in any part of that time.
+        """
+        start, end = max(start_s, self.start_s), min(end_s, self.end_s)
+        if start >= end:
+            raise RefusalError(
+                f"the shaft angle is known from {self.start_s:.4g} to {self.end_s:.4g} s, the recording lasts from "
+                f"{start_s:.4g} to {end_s:.4g} s",
+                remedy="check that both use the same time axis",
+            )
+        if (start, end) == (self.start_s, self.end_s):
+            return self
+        inside = (self.time_s > start) & (self.time_s < end)
+        time = np.concatenate([[start], self.time_s[inside], [end]])
+        return replace(
+            self,
+            time_s=time,
+            revolutions=np.maximum.accumulate(self._evaluate(time, 0)),
+            speed_rev_per_s=np.maximum(self._evaluate(time, 1), 0.0),
         )
 
     def _evaluate(self, time_s: FloatArray, derivative: int) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
+from gearsig.angle.types import ShaftAngle
 from gearsig.diagnosis.detectors.bearing import detect_bearings
 from gearsig.diagnosis.detectors.lines import detect_lines
 from gearsig.diagnosis.detectors.mesh import detect_mesh
@@ -17,7 +18,7 @@ from gearsig.diagnosis.signals import Signals, compute_signals
 from gearsig.diagnosis.speed import determine_angle, speed_finding
 from gearsig.diagnosis.types import Analysis, CannotTell, ChannelAnalysis, Finding, Kind
 from gearsig.diagnosis.verdict import ranked, verdict_of
-from gearsig.errors import InputError
+from gearsig.errors import InputError, RefusalError
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 
@@ -53,7 +54,7 @@ def analyze(recording: Recording, rig: Rig | None = None, settings: AnalysisSett
     _check_size(recording)
     findings, dead = detect_data_problems(recording)
     names = [name for name in recording.vibration_names() if name not in dead]
-    angle = determine_angle(recording, known)
+    angle = _within_record(determine_angle(recording, known), recording)
     findings.append(speed_finding(angle))
     if not names:
         findings.append(Finding("all-channels-dead", Kind.CANNOT_TELL, "Every vibration channel is dead."))
@@ -74,6 +75,16 @@ def analyze(recording: Recording, rig: Rig | None = None, settings: AnalysisSett
         verdict=verdict_of(order),
         settings=asdict(settings),
     )
+
+
+def _within_record(angle: ShaftAngle | CannotTell, recording: Recording) -> ShaftAngle | CannotTell:
+    """Cut the angle to the record's own time: pulses may go on before and after it, revolutions there do not count."""
+    if isinstance(angle, CannotTell):
+        return angle
+    try:
+        return angle.between(0.0, recording.duration_s)
+    except RefusalError as refusal:
+        return CannotTell("What is the speed of the shafts?", refusal.reason, refusal.remedy)
 
 
 def _detect(signals: Signals, envelopes: list[BandEnvelope]) -> list[Finding]:

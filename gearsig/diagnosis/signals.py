@@ -39,6 +39,8 @@ class ShaftSignals:
         Channel → its parts; empty where no teeth are known or the mesh is beyond the sampling rate.
     halves : mapping
         Channel → difference signals, (2, n_angles), of the odd and of the even revolutions by themselves.
+    signal : AngleSignal
+        The channels over this shaft's angle.
     """
 
     shaft: str
@@ -47,6 +49,7 @@ class ShaftSignals:
     averages: Mapping[str, SynchronousAverage]
     separated: Mapping[str, SeparatedAverage]
     halves: Mapping[str, FloatArray]
+    signal: AngleSignal
 
 
 @dataclass(frozen=True)
@@ -116,9 +119,12 @@ def compute_signals(recording: Recording, rig: Rig, angle: ShaftAngle | None, se
     shafts: tuple[ShaftSignals, ...] = ()
     maps: dict[str, OrderMap] = {}
     if angle is not None and angle.n_revolutions >= settings.minimum_revolutions:
-        signal = _resampled(recording, angle)
-        excess = {name: _order_excess(signal, name) for name in names}
-        shafts = _shaft_signals(recording, rig, angle, signal, settings)
+        try:
+            signal = _resampled(recording, angle)
+            excess = {name: _order_excess(signal, name) for name in names}
+            shafts = _shaft_signals(recording, rig, angle, signal, settings)
+        except RefusalError:  # too few samples per revolution or too short: the detectors say that nothing is known
+            excess, shafts = {}, ()
     result = Signals(recording, rig, angle, settings, spectra, excess, shafts, maps)
     if excess and result.speed_varies:
         from gearsig.orders.map import order_map
@@ -175,7 +181,7 @@ def _one_shaft(shaft: str, rig: Rig, angle: ShaftAngle, signal: AngleSignal) -> 
             except (RefusalError, InputError):
                 continue  # nothing is left beside the mesh lines: there is no residual to look at
             halves[name] = np.stack([separate(h, visible).difference.values for h in _halves(signal, average)])
-    return ShaftSignals(shaft, teeth, angle, averages, separated, halves)
+    return ShaftSignals(shaft, teeth, angle, averages, separated, halves, signal)
 
 
 def _halves(signal: AngleSignal, average: SynchronousAverage) -> tuple[SynchronousAverage, SynchronousAverage]:

@@ -181,10 +181,11 @@ class Analysis:
 
 
 def outcome_of(findings: Sequence[Finding]) -> Outcome:
-    """Return what findings come to; "no fault" only where something was examined that would have shown one."""
+    """Return what findings come to; "no fault" only where all that the rig describes could be examined."""
     kinds = {finding.kind for finding in findings}
     if Kind.FAULT in kinds:
         return Outcome.FAULT
     if Kind.SUSPICION in kinds:
         return Outcome.SUSPICION
-    return Outcome.NO_FAULT if any(f.code in EXAMINED for f in findings) else Outcome.CANNOT_TELL
+    examined = any(f.code in EXAMINED for f in findings)
+    return Outcome.NO_FAULT if examined and Kind.CANNOT_TELL not in kinds else Outcome.CANNOT_TELL

@@ -27,10 +27,11 @@ def verdict_of(findings: tuple[Finding, ...]) -> str:
         return "Fault: " + _first_and_number([f for f in findings if f.kind is Kind.FAULT])
     if outcome is Outcome.SUSPICION:
         return "Suspicion: " + _first_and_number([f for f in findings if f.kind is Kind.SUSPICION])
+    said = [f.title for f in findings if f.code in EXAMINED]
     if outcome is Outcome.CANNOT_TELL:
-        return "Cannot tell: " + (gaps[0].title if gaps else "nothing was examined that would show a fault.")
-    said = [f.title for f in (*(f for f in findings if f.code in EXAMINED), *gaps[:1])]
-    return " ".join(["No fault shows.", *said, "Wear of all teeth alike would only show against an earlier recording."])
+        why = " ".join(f.title for f in gaps[:2]) or "Nothing was examined that would show a fault."
+        return " ".join(["Cannot tell.", why, *said])
+    return " ".join(["No fault shows.", *said, "Damage of many teeth would only show against an earlier recording."])
 
 
 def _first_and_number(findings: list[Finding]) -> str:

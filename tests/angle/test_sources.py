@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gearsig.angle.constant import constant_speed_angle
 from gearsig.angle.encoder import encoder_angle
 from gearsig.angle.shaft import find_shaft_angle
 from gearsig.angle.speed_channel import speed_channel_angle
@@ -112,3 +113,14 @@ def test_refusals_and_malformed_sources() -> None:
     unknown = Rig(shafts=(Shaft("in"), Shaft("out")), pairs=(GearPair("p", "in", "out", 20, None),))
     with pytest.raises(InputError, match="ratio"):
         find_shaft_angle(with_source(ConstantSpeed(1200.0, "out"), rig=unknown))
+
+
+def test_the_part_between_two_times_is_the_same_angle() -> None:
+    whole = constant_speed_angle(600.0, 10.0).of_shaft("x", 1.5)
+    part = whole.between(2.0, 3.5)
+    t = np.linspace(2.0, 3.5, 50)
+    assert part.n_revolutions == pytest.approx(22.5)
+    assert part.revolutions_at(t) == pytest.approx(whole.revolutions_at(t))
+    assert whole.between(-5.0, 100.0) is whole
+    with pytest.raises(RefusalError, match="known from 0 to 10 s"):
+        whole.between(20.0, 30.0)

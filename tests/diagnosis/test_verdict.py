@@ -24,7 +24,7 @@ def test_faults_come_first_and_the_surest_of_them() -> None:
     ("findings", "start"),
     [
         ([], "Cannot tell"),
-        ([Finding("speed-unknown", Kind.CANNOT_TELL, "No speed.")], "Cannot tell: No speed."),
+        ([Finding("speed-unknown", Kind.CANNOT_TELL, "No speed.")], "Cannot tell. No speed."),
         ([Finding("no-tooth-local-damage", Kind.INFORMATION, "Teeth look alike.", confidence=0.8)], "No fault shows."),
         ([Finding("x", Kind.NOTICE, "hum")], "Cannot tell"),
         ([Finding("x", Kind.SUSPICION, "odd", confidence=0.5)], "Suspicion: odd"),

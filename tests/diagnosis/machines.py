@@ -1,0 +1,57 @@
+"""A test gearbox whose condition is known, and short words for what an analysis says of it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gearsig.diagnosis.types import Analysis, Finding, Kind
+from gearsig.recording.types import Recording
+from gearsig.rig.types import Bearing, GearPair, Rig, Shaft
+from sims.kinematic import (
+    ColouredNoise,
+    KinematicModel,
+    MeshHarmonics,
+    Modulation,
+    SensorChannel,
+    Tachometer,
+    ToothVariation,
+    Wander,
+    simulate_kinematic,
+)
+
+RIG = Rig(
+    name="test gearbox",
+    shafts=(Shaft("in"), Shaft("out")),
+    pairs=(GearPair("stage", "in", "out", 27, 43),),
+    bearings=(Bearing("front", "in", 9, 7.94, 39.04),),
+)
+GOOD = KinematicModel(
+    speed=Wander(1320.0, 0.004, 0.4),
+    meshes=(MeshHarmonics("stage", (4.0, 2.0, 1.0)),),
+    modulations=(Modulation("stage", "in", 0.05), Modulation("stage", "out", 0.05)),
+    tooth_variations=(ToothVariation("stage", "in", 0.02), ToothVariation("stage", "out", 0.02)),
+    channels=(SensorChannel("a1", noise=ColouredNoise(0.8)),),
+    tachometer=Tachometer("in"),
+)
+SAMPLING_RATE_HZ = 10240.0
+
+
+def record(model: KinematicModel = GOOD, *, seconds: float = 5.0, seed: int = 0, rig: Rig = RIG) -> Recording:
+    """Simulate the gearbox."""
+    rng = np.random.default_rng(seed)
+    return simulate_kinematic(rig, model, sampling_rate_hz=SAMPLING_RATE_HZ, duration_s=seconds, rng=rng)
+
+
+def teeth(driver: int, driven: int) -> Rig:
+    """Return the gearbox with other teeth and without bearings."""
+    return replace(RIG, pairs=(GearPair("stage", "in", "out", driver, driven),), bearings=())
+
+
+def codes(analysis: Analysis, *kinds: Kind) -> list[str]:
+    """Return the codes of the findings of some kinds, or of all."""
+    return [f.code for f in analysis.findings if not kinds or f.kind in kinds]
+
+
+def finding(analysis: Analysis, code: str) -> Finding:
+    """Return the first finding of that code."""
+    return next(f for f in analysis.findings if f.code == code)

@@ -1,0 +1,133 @@
+"""Local events: on the right gear at any ratio, and not taken for a tooth where they are something else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearsig.diagnosis.analyze import analyze
+from gearsig.diagnosis.types import Kind, Outcome
+from gearsig.recording.types import Recording
+from gearsig.rig.speed import SpeedChannel, TachometerChannel
+from sims.kinematic import ColouredNoise, ConstantProfile, SensorChannel, ToothDamage, ToothVariation
+from tests.diagnosis.machines import GOOD, RIG, codes, finding, record, teeth
+
+DAMAGE = ToothDamage("stage", "in", 0.4, impulse_mps2=10.0, resonance_hz=3000.0, mesh_dip_fraction=0.2)
+SHAFT_HZ = 22.0
+STEADY = replace(GOOD, speed=ConstantProfile(60 * SHAFT_HZ))
+
+
+def with_knocks(recording: Recording, times_s: np.ndarray, size: float = 10.0) -> Recording:
+    """Add ring-downs that no gear makes."""
+    t = np.arange(recording.n_samples) / recording.sampling_rate_hz
+    samples = np.array(recording.samples)
+    for start in times_s:
+        after = t >= start
+        decay = np.exp(-400 * (t[after] - start))
+        samples[0, after] += size * decay * np.sin(2 * np.pi * 3000 * (t[after] - start))
+    return replace(recording, samples=samples)
+
+
+@pytest.mark.parametrize("ratio", [(20, 60), (20, 30), (24, 36), (20, 40), (27, 43)], ids=str)
+@pytest.mark.parametrize("damaged", ["in", "out"])
+def test_the_right_gear_is_named_at_whole_and_simple_ratios(ratio: tuple[int, int], damaged: str) -> None:
+    rig = teeth(*ratio)
+    analysis = analyze(record(replace(GOOD, tooth_damages=(replace(DAMAGE, shaft=damaged),)), rig=rig, seconds=8.0))
+    claims = [f for f in analysis.findings if f.code == "tooth-local-damage"]
+    assert [f.where.shaft for f in claims] == [damaged]
+    assert (claims[0].where.tooth is None) == (damaged == "out")  # only the input shaft has a mark
+
+
+def test_equal_gears_cannot_be_told_apart_and_are_both_named() -> None:
+    analysis = analyze(record(replace(GOOD, tooth_damages=(DAMAGE,)), rig=teeth(20, 20)))
+    claims = [f for f in analysis.findings if f.code == "tooth-local-damage"]
+    assert len(claims) == 1
+    assert "in or out" in claims[0].title
+
+
+def test_a_single_shock_is_told_as_one() -> None:
+    analysis = analyze(with_knocks(record(STEADY), np.array([2.345]), size=3000.0))
+    found = finding(analysis, "single-shock")
+    assert found.where.time_s is not None
+    assert found.where.time_s[0] == pytest.approx(2.345, abs=1 / SHAFT_HZ)
+    assert not codes(analysis, Kind.FAULT)
+    assert analysis.outcome is Outcome.CANNOT_TELL
+
+
+def test_an_event_of_every_second_revolution_is_no_tooth() -> None:
+    analysis = analyze(with_knocks(record(STEADY), np.arange(0.01, 5.0, 2 / SHAFT_HZ)))
+    assert "event-in-some-revolutions" in codes(analysis, Kind.CANNOT_TELL)
+    assert "tooth-local-damage" not in codes(analysis)
+    assert "no-tooth-local-damage" not in codes(analysis)
+
+
+def test_pulses_per_revolution_stated_too_low_are_noticed() -> None:
+    two = replace(GOOD.tachometer, pulses_per_revolution=2)  # type: ignore[type-var]
+    recording = record(replace(GOOD, tachometer=two, tooth_damages=(DAMAGE,)))
+    analysis = analyze(replace(recording, speed=TachometerChannel("tacho", shaft="in")))
+    assert "tooth-local-damage" not in codes(analysis)
+    assert "no-tooth-local-damage" not in codes(analysis)
+    assert analysis.outcome is not Outcome.NO_FAULT
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_several_equal_events_are_no_tooth(n: int) -> None:
+    analysis = analyze(with_knocks(record(STEADY), np.arange(0.01, 5.0, 1 / (n * SHAFT_HZ))))
+    assert "several-events-per-revolution" in codes(analysis, Kind.NOTICE)
+    assert "tooth-local-damage" not in codes(analysis)
+
+
+def test_a_tooth_that_is_a_little_weaker_is_no_damage() -> None:
+    even = (ToothVariation("stage", "in", 0.002), ToothVariation("stage", "out", 0.002))
+    slight = ToothDamage("stage", "in", 0.4, mesh_dip_fraction=0.03)
+    analysis = analyze(record(replace(GOOD, tooth_variations=even, tooth_damages=(slight,)), seconds=8.0))
+    assert not codes(analysis, Kind.FAULT, Kind.SUSPICION)
+
+
+def test_a_perfect_machine_is_not_accused_of_the_ends_of_its_record() -> None:
+    perfect = replace(STEADY, modulations=(), tooth_variations=(), channels=(SensorChannel("a1"),))
+    assert not codes(analyze(record(perfect)), Kind.FAULT, Kind.SUSPICION)
+
+
+def test_noise_that_would_hide_damage_leaves_the_teeth_undecided() -> None:
+    loud = replace(GOOD, channels=(SensorChannel("a1", noise=ColouredNoise(25.0)),), tooth_damages=(DAMAGE,))
+    analysis = analyze(record(loud))
+    assert "no-tooth-local-damage" not in codes(analysis)
+    assert analysis.outcome is Outcome.CANNOT_TELL
+
+
+def test_a_sensor_that_is_off_is_not_a_good_machine() -> None:
+    recording = record()
+    samples = np.array(recording.samples)
+    samples[0] = np.random.default_rng(1).normal(size=recording.n_samples)
+    analysis = analyze(replace(recording, samples=samples))
+    assert analysis.outcome is Outcome.CANNOT_TELL
+    assert "no-tooth-local-damage" not in codes(analysis)
+
+
+def test_a_speed_channel_that_is_a_little_off_leaves_the_teeth_undecided() -> None:
+    recording = record(replace(STEADY, tooth_damages=(DAMAGE,)))
+    rpm = np.full(recording.n_samples, 60 * SHAFT_HZ * 1.002)
+    samples = np.vstack([recording.samples[0], rpm])
+    channel = replace(recording.channels[1], quantity="rotational_speed", unit="rpm")
+    wrong = replace(recording, samples=samples, channels=(recording.channels[0], channel), speed=SpeedChannel("tacho"))
+    analysis = analyze(wrong)
+    assert "no-tooth-local-damage" not in codes(analysis)
+    assert analysis.outcome is not Outcome.NO_FAULT
+
+
+def test_revolutions_count_within_the_record_only() -> None:
+    from gearsig.rig.speed import PulseTimes
+
+    recording = record(STEADY, seconds=0.4)
+    pulses = PulseTimes(np.arange(0.01, 20.0, 1 / SHAFT_HZ), shaft="in")
+    analysis = analyze(replace(recording, speed=pulses))
+    assert "8.58 of its revolutions" in finding(analysis, "tooth-not-examined").title
+
+
+def test_a_wrong_tooth_count_is_contradicted_by_the_mesh() -> None:
+    recording = record(replace(GOOD, tooth_damages=(DAMAGE,)), seconds=8.0)
+    wrong = replace(RIG, pairs=(replace(RIG.pairs[0], driver_teeth=26),), bearings=())
+    analysis = analyze(replace(recording, rig=wrong))
+    assert "tooth-local-damage" not in codes(analysis)
+    assert "teeth-disagree" in codes(analysis)
