@@ -6,6 +6,7 @@ import numpy as np
 
 from gearsig.diagnosis.comb import LineExcess
 from gearsig.diagnosis.signals import Signals, floor_of
+from gearsig.diagnosis.surroundings import RUN_UP_FOOT_ORDERS, levels_beside
 from gearsig.diagnosis.types import Finding, Kind, Strength, Where
 
 MAINS_HZ = (50.0, 60.0)
@@ -14,9 +15,6 @@ CLEAR_DB = 15.0
 
 SKIRT = 5e-4
 """Relative width of a line's foot where the speed wanders by as little as that."""
-
-RUN_UP_FOOT_ORDERS = 0.1
-"""Width of a line's foot over a run-up, where its level changes from resonance to resonance."""
 
 
 def detect_lines(signals: Signals) -> list[Finding]:
@@ -73,12 +71,16 @@ def _unexplained(signals: Signals) -> Finding | None:
     foot = RUN_UP_FOOT_ORDERS if signals.speed_varies else 0.0
     for name, excess in signals.order_excess.items():
         for order in signals.known_shaft_orders.values():
-            excess = excess.without_multiples(order, half_width=foot, skirt=SKIRT)  # noqa: PLW2901
+            wide = foot if order >= 4 * foot else 0.0  # closer lines are masked at least themselves
+            excess = excess.without_multiples(order, half_width=wide, skirt=SKIRT)  # noqa: PLW2901
         if signals.rig.bearings:
             excess = _without_bearings(signals, excess)  # noqa: PLW2901
         with np.errstate(divide="ignore", invalid="ignore"):
             height = np.where(excess.masked, 0.0, excess.spectrum.values)
             clear = 20 * np.log10(excess.spectrum.values / excess.floor) > CLEAR_DB
+        if signals.speed_varies:
+            # Skirts of lines that pass a resonance are far above the floor, but not above what lies beside them.
+            clear &= excess.spectrum.values > levels_beside(excess.spectrum) * 10 ** (CLEAR_DB / 20)
         height = np.where(clear & (excess.spectrum.positions > 0.2), height, 0.0)
         i = int(np.argmax(height))
         if height[i] > 0 and (best is None or height[i] > best[0]):

@@ -2,10 +2,60 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
+from gearsig.diagnosis.comb import LineExcess
 from gearsig.diagnosis.confirmation import N_HARMONICS, ConfirmingLine, clearest_line
 from gearsig.diagnosis.signals import Signals
 from gearsig.diagnosis.types import Finding, Kind, Strength, Where
 from gearsig.rig.types import GearPair
+
+MOST_TEETH_WRONG = 3
+CONTRADICTED_DB = 10.0
+"""By so much the true mesh lines exceed the stated ones: more than sidebands exceed their carriers in several harmonics
+at once, always on the same side."""
+
+CONTRADICTED_BY_ONE_DB = 20.0
+"""The same where a single harmonic is to be seen."""
+
+LINE_DB = 12.0
+WITHIN_LINES = 1.5
+AROUND_LINES = 6.0
+APART_LINES = 3.0
+
+
+def teeth_are_contradicted(signals: Signals, pair: GearPair) -> float | None:
+    """Return the order at which the mesh lines of `pair` really are, None where nothing contradicts the stated teeth.
+
+    With d teeth more than stated on the shaft that the mesh is reckoned from, the lines stand at h·(mesh + d·shaft)
+    instead of h·mesh. Those at the stated place are then mere sidebands, and all that is put down to teeth is wrong.
+
+    Parameters
+    ----------
+    signals : Signals
+    pair : GearPair
+
+    Returns
+    -------
+    float or None
+        In cycles per revolution of the reference shaft.
+    """
+    mesh = signals.rig.mesh_order(pair)
+    if mesh is None or not signals.order_excess:
+        return None
+    shifts = [d for d in range(-MOST_TEETH_WRONG, MOST_TEETH_WRONG + 1) if d]
+    best: tuple[float, float] | None = None
+    for step in _reckoned_from(signals, pair):
+        for order in (mesh + d * step for d in shifts):
+            if order <= step or _is_other_mesh(signals, order, mesh):
+                continue
+            margins = [_margin_db(excess, mesh, order) for excess in signals.order_excess.values()]
+            seen = [margin for margin in margins if margin is not None]
+            if seen and (best is None or float(np.median(seen)) > best[0]):
+                best = (float(np.median(seen)), order)
+    return best[1] if best is not None and best[0] > 0 else None
 
 
 def detect_mesh(signals: Signals) -> list[Finding]:
@@ -36,6 +86,9 @@ def _one_pair(signals: Signals, pair: GearPair) -> Finding | None:
             evidence=("Sampling rate, speed and teeth cannot all be right, or the recording was made too slowly.",),
             surer="Check the sampling rate and the teeth; record at three times the mesh frequency or more.",
         )
+    order = teeth_are_contradicted(signals, pair)
+    if order is not None:
+        return _disagree(signals, pair, mesh, order)
     line = clearest_line(signals, mesh)
     if line is None:
         return None
@@ -61,6 +114,73 @@ def _found(signals: Signals, pair: GearPair, line: ConfirmingLine) -> Finding:
     )
 
 
+def _disagree(signals: Signals, pair: GearPair, mesh: float, order: float) -> Finding:
+    hertz = order * signals.frequency_per_order_hz
+    above = (
+        f"The lines there are {CONTRADICTED_DB:.0f} dB or more above those at {mesh:.6g}, at every harmonic that shows."
+    )
+    way = "lower" if order < mesh else "higher"
+    speed = f"A speed that is {100 * abs(order / mesh - 1):.2f} % {way} would do the same."
+    return Finding(
+        "teeth-disagree",
+        Kind.CANNOT_TELL,
+        f"The mesh lines of {pair.name} are at order {order:.6g}, the rig says {mesh:.6g}: check the teeth.",
+        Where(gear=pair.name, order=order, order_shaft=signals.rig.reference_shaft, frequency_hz=hertz),
+        evidence=(above, speed),
+        surer="Count the teeth, and check pulses per revolution and the shaft that the speed belongs to.",
+    )
+
+
+def _reckoned_from(signals: Signals, pair: GearPair) -> list[float]:
+    """Return the orders of the pair's shafts that are known without this pair's own teeth."""
+    without = replace(signals.rig, pairs=tuple(p for p in signals.rig.pairs if p is not pair))
+    reference = signals.rig.reference_shaft
+    orders = [without.ratio(shaft, to=reference) for shaft in (pair.driver, pair.driven)]
+    return [order for order in orders if order is not None]
+
+
+def _is_other_mesh(signals: Signals, order: float, mesh: float) -> bool:
+    """Whether another pair's mesh, or its second or third harmonic, explains lines at `order`."""
+    near = max(APART_LINES * e.spectrum.resolution for e in signals.order_excess.values())
+    others = [signals.rig.mesh_order(pair) for pair in signals.rig.pairs]
+    return any(
+        abs(h * other - order) <= near
+        for other in others
+        if other is not None and abs(other - mesh) > near
+        for h in range(1, N_HARMONICS + 1)
+    )
+
+
+def _margin_db(excess: LineExcess, mesh: float, order: float) -> float | None:
+    """Return by how much the lines at multiples of `order` contradict those of `mesh` in the worst harmonic.
+
+    Positive: they do. Each is compared with the stated line and with the one as far on its other side, as a
+    modulation has sidebands on both. None if no harmonic shows in either place.
+    """
+    margins = []
+    for h in range(1, N_HARMONICS + 1):
+        if h * max(order, 2 * mesh - order) > excess.spectrum.positions[-1]:
+            break
+        true, true_stands = _level_db(excess, h * order)
+        stated, stated_stands = _level_db(excess, h * mesh)
+        mirrored = _level_db(excess, h * (2 * mesh - order))[0]
+        if true_stands or stated_stands:
+            margins.append(true - max(stated, mirrored) if true_stands else -CONTRADICTED_DB)
+    if not margins:
+        return None
+    return min(margins) - (CONTRADICTED_DB if len(margins) > 1 else CONTRADICTED_BY_ONE_DB)
+
+
+def _level_db(excess: LineExcess, order: float) -> tuple[float, bool]:
+    """Return the level at `order`, and whether a line stands there: over the floor, highest of its surroundings."""
+    spectrum = excess.spectrum
+    found, amplitude = spectrum.largest_near(order, WITHIN_LINES * spectrum.resolution)
+    around = spectrum.largest_near(order, AROUND_LINES * spectrum.resolution)[1]
+    floor = float(excess.floor[spectrum.index_of(found)])
+    level = 20 * float(np.log10(max(amplitude, 1e-300)))
+    return level, amplitude >= around and level - 20 * float(np.log10(max(floor, 1e-300))) >= LINE_DB
+
+
 def _absent(signals: Signals, pair: GearPair, line: ConfirmingLine, mesh: float) -> Finding:
     hertz = mesh * signals.frequency_per_order_hz
     return Finding(
@@ -71,7 +191,7 @@ def _absent(signals: Signals, pair: GearPair, line: ConfirmingLine, mesh: float)
         Strength(line.amplitude, line.unit, line.floor, "noise floor of the order spectrum", line.ratio_db),
         evidence=(
             *_where_instead(signals),
-            f"The best of {N_HARMONICS} harmonics is {line.ratio_db:.1f} dB over the floor.",
+            _how_near(line),
         ),
         surer="Check sampling rate, speed source (pulses per revolution, shaft) and teeth; or the gears carry no load.",
     )
