@@ -1,0 +1,178 @@
+"""Friction of a line contact: check value, published maxima, range notes, dissipation, compiled against plain."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gearsig.errors import InputError
+from sims.mesh import friction_kernel as kernel
+from sims.mesh.friction import (
+    COEFFICIENTS,
+    MOST_FRICTION,
+    friction_coefficient,
+    line_contact_pressure_gpa,
+    reduced_modulus_pa,
+    smooth_sign,
+)
+
+STEEL_PA = reduced_modulus_pa(206e9, 0.3, 206e9, 0.3)
+OIL = {"viscosity_cp": 10.0, "roughness_um": 0.4}
+
+ratios = st.floats(1e-6, 2.0)
+pressures = st.floats(0.05, 3.0)
+speeds = st.floats(0.01, 50.0)
+radii = st.floats(1e-3, 0.2)
+oils = st.floats(1.0, 300.0)
+roughnesses = st.floats(0.0, 3.0)
+
+
+def plain(sr, p, nu, s, v, r):
+    return float(
+        friction_coefficient(sr, p, viscosity_cp=nu, roughness_um=s, entrainment_mps=v, radius_m=r).coefficient
+    )
+
+
+def test_check_value_of_the_regression():
+    found = friction_coefficient(0.3, 1.0, entrainment_mps=10.0, radius_m=0.01, **OIL)
+    assert found.coefficient == pytest.approx(0.0190746, abs=5e-8)
+    assert not found.capped
+    assert found.notes == ()
+
+
+def mesh_55_75(n_points=2001):
+    """Contact from root to tip of a 55/75 pair, module 2, at 500 rpm and 110 N m; load halved in double contact."""
+    alpha, module = np.radians(20.0), 2e-3
+    r1, r2 = 0.5 * module * 55, 0.5 * module * 75
+    rb1, rb2 = r1 * np.cos(alpha), r2 * np.cos(alpha)
+    line = (r1 + r2) * np.sin(alpha)
+    start = line - np.sqrt((r2 + module) ** 2 - rb2**2)
+    end = np.sqrt((r1 + module) ** 2 - rb1**2)
+    rho1 = np.linspace(start, end, n_points)
+    rho2, pitch = line - rho1, np.pi * module * np.cos(alpha)
+    u1 = 500 * 2 * np.pi / 60 * rho1
+    u2 = 500 * 2 * np.pi / 60 * 55 / 75 * rho2
+    single = (rho1 > end - pitch) & (rho1 < start + pitch)
+    load = 110 / rb1 * np.where(single, 1.0, 0.5)
+    return load, u1, u2, rho1 * rho2 / line
+
+
+@pytest.mark.parametrize(("roughness", "maximum"), [(0.0, 0.022), (0.45, 0.031), (0.84, 0.050), (1.40, 0.147)])
+def test_maxima_over_the_mesh_at_four_roughnesses(roughness, maximum):
+    load, u1, u2, radius = mesh_55_75()
+    v = 0.5 * (u1 + u2)
+    found = friction_coefficient(
+        np.abs(u1 - u2) / v,
+        line_contact_pressure_gpa(load, 0.02, radius, STEEL_PA),
+        viscosity_cp=17.6,
+        roughness_um=roughness,
+        entrainment_mps=v,
+        radius_m=radius,
+    )
+    assert found.coefficient.max() == pytest.approx(maximum, rel=0.02)
+    assert any("roughness_um" in note for note in found.notes) == (roughness > 0.6)
+
+
+def test_coefficients_of_kernel_and_formula_are_the_same():
+    assert tuple(getattr(kernel, f"B{i}") for i in range(1, 10)) == COEFFICIENTS
+    assert MOST_FRICTION == kernel.MOST_FRICTION
+
+
+@settings(deadline=None)  # kernels compile in the first example
+@given(ratios, pressures, oils, roughnesses, speeds, radii)
+def test_kernel_agrees_with_the_formula(sr, p, nu, s, v, r):
+    compiled = kernel.friction_coefficient(sr, p, v, r, *kernel.oil_terms(nu, s))
+    assert compiled == pytest.approx(plain(sr, p, nu, s, v, r), rel=1e-10)
+    assert 0.0 < compiled <= MOST_FRICTION
+
+
+@settings(deadline=None)  # kernels compile in the first example
+@given(st.floats(0.4, 1.4), ratios)
+def test_powers_of_speed_and_radius_stand_alone(p, sr):
+    """Below the cap μ goes as V^b6 and R^b8."""
+    base, faster, wider = (plain(sr, p, 20.0, 0.2, v, r) for v, r in ((2.0, 0.01), (8.0, 0.01), (2.0, 0.02)))
+    assert faster / base == pytest.approx(4.0**-0.100601, rel=1e-12)
+    assert wider / base == pytest.approx(2.0**-0.390958, rel=1e-12)
+
+
+def test_cap_holds_and_is_told():
+    found = friction_coefficient(0.5, 1.0, viscosity_cp=20.0, roughness_um=2.5, entrainment_mps=1.0, radius_m=0.01)
+    assert found.coefficient == MOST_FRICTION
+    assert found.capped
+    assert "0.6" in found.notes[0]
+    rough = friction_coefficient(0.5, 1.0, viscosity_cp=20.0, roughness_um=900.0, entrainment_mps=1.0, radius_m=0.01)
+    assert rough.coefficient == MOST_FRICTION
+
+
+def test_smooth_flanks_still_rub_but_rolling_and_unloaded_ones_do_not():
+    assert plain(0.3, 1.0, 10.0, 0.0, 10.0, 0.01) > 0.01
+    assert plain(0.0, 1.0, 10.0, 0.4, 10.0, 0.01) == 0.0
+    assert plain(0.3, 0.0, 10.0, 0.4, 10.0, 0.01) == 0.0
+    terms = kernel.oil_terms(10.0, 0.4)
+    assert kernel.friction_coefficient(0.0, 1.0, 10.0, 0.01, *terms) == 0.0
+    assert kernel.friction_coefficient(0.3, 0.0, 10.0, 0.01, *terms) == 0.0
+    assert kernel.friction_coefficient(0.3, 1.0, 0.0, 0.01, *terms) == MOST_FRICTION
+
+
+@settings(deadline=None)  # kernels compile in the first example
+@given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-1.0, 1.0), st.floats(-100.0, 1e5))
+def test_friction_takes_energy_out_at_any_motion(u1, u2, vibration, normal):
+    """The force on body 1 is -f, on body 2 +f: their power is -f v_s, never above zero."""
+    terms = kernel.oil_terms(17.6, 0.45)
+    f = kernel.contact_friction_n(normal, u1, u2, vibration, 0.01, 0.02, STEEL_PA, *terms, 1e-3)
+    sliding = u2 - u1 + vibration
+    assert -f * sliding <= 0.0
+    assert abs(f) <= MOST_FRICTION * max(normal, 0.0)
+
+
+def test_force_is_positive_in_approach_and_turns_at_the_pitch_point():
+    load, u1, u2, radius = mesh_55_75(401)
+    terms = kernel.oil_terms(17.6, 0.45)
+    force = np.array(
+        [
+            kernel.contact_friction_n(n, a, b, 0.0, r, 0.02, STEEL_PA, *terms, 1e-4)
+            for n, a, b, r in zip(load, u1, u2, radius, strict=True)
+        ]
+    )
+    assert (np.sign(force) == np.sign(u2 - u1)).all()
+    assert force[0] > 0 > force[-1]
+    # The plain formula with the same load and speeds.
+    i = 20
+    v = 0.5 * (u1[i] + u2[i])
+    mu = plain(
+        (u2[i] - u1[i]) / v,
+        float(line_contact_pressure_gpa(load[i], 0.02, radius[i], STEEL_PA)),
+        17.6,
+        0.45,
+        v,
+        radius[i],
+    )
+    assert force[i] == pytest.approx(mu * load[i] * float(smooth_sign(u2[i] - u1[i], 1e-4)), rel=1e-10)
+
+
+def test_hertz_pressure_of_steel_cylinders():
+    # p = 0.418 √(F E/(b R)) is the form for equal bodies with ν = 0.3 found in design books.
+    expected = 0.418 * np.sqrt(2128.0 * 206e9 / (0.02 * 0.011)) * 1e-9
+    found = float(line_contact_pressure_gpa(2128.0, 0.02, 0.011, STEEL_PA))
+    assert found == pytest.approx(expected, rel=1e-3)
+    assert kernel.hertz_pressure_gpa(2128.0, 0.02, 0.011, STEEL_PA) == pytest.approx(found, rel=1e-14)
+    assert line_contact_pressure_gpa(-5.0, 0.02, 0.011, STEEL_PA) == 0.0
+
+
+@settings(deadline=None)  # kernels compile in the first example
+@given(st.floats(-10, 10), st.floats(1e-6, 1.0))
+def test_smooth_sign_is_odd_bounded_and_steepest_at_rest(v, threshold):
+    s = float(smooth_sign(v, threshold))
+    assert s == -float(smooth_sign(-v, threshold))
+    assert abs(s) <= min(1.0, abs(v) / threshold)
+    assert s == pytest.approx(kernel.smooth_sign(v, threshold), rel=1e-12, abs=1e-300)
+
+
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [({"radius_m": 0.0}, "radius_m"), ({"entrainment_mps": -1.0}, "entrainment_mps"), ({"viscosity_cp": 0}, "visc")],
+)
+def test_values_without_meaning_are_refused(change, name):
+    good = {"viscosity_cp": 10.0, "roughness_um": 0.4, "entrainment_mps": 1.0, "radius_m": 0.01}
+    with pytest.raises(InputError, match=name):
+        friction_coefficient(0.3, 1.0, **(good | change))
