@@ -9,13 +9,25 @@ from gearsig.angle.types import ShaftAngle
 from gearsig.diagnosis.types import CannotTell, Finding, Kind, Where
 from gearsig.errors import RefusalError
 from gearsig.recording.types import Recording
-from gearsig.rig.speed import ConstantSpeed
+from gearsig.rig.speed import ConstantSpeed, SpeedChannel
 from gearsig.rig.types import Rig
 
 STATED_SPEED_TOLERANCE = 0.03
 """How far the true speed may be from a stated one: the slip of an induction motor from no load to full load."""
 
+LARGEST_DRIFT_REV = 0.01
+"""Drift of the angle over the record that averages bear: a third of a tooth's pitch of thirty teeth."""
+
+STEADY = 0.01
+"""Relative range of a speed channel below which the mesh lines are sought at one speed."""
+
 N_SHAFT_HARMONICS = 8
+
+MAINS_HZ = (50.0, 60.0)
+"""Supplies put their own harmonics, and those of motors, within the slip of a motor's speed."""
+
+MAINS_TOLERANCE = 0.002
+"""How far a supply's frequency wanders."""
 
 
 def determine_angle(recording: Recording, rig: Rig) -> ShaftAngle | CannotTell:
@@ -26,12 +38,19 @@ def determine_angle(recording: Recording, rig: Rig) -> ShaftAngle | CannotTell:
     """
     from gearsig.angle.shaft import find_shaft_angle
 
+    question = "What is the speed of the shafts?"
     try:
         angle = find_shaft_angle(recording, rig)
     except RefusalError as refusal:
-        return CannotTell("What is the speed of the shafts?", refusal.reason, refusal.remedy)
+        return CannotTell(question, refusal.reason, refusal.remedy)
+    hertz, limit_hz = angle.mean_speed_rpm / 60, recording.sampling_rate_hz / 2
+    if hertz >= limit_hz:
+        reason = f"{angle.mean_speed_rpm:.4g} rpm are {hertz:.4g} Hz, above half the sampling rate ({limit_hz:.4g} Hz)"
+        return CannotTell(question, reason, "check the speed's unit and the sampling rate")
     if isinstance(recording.speed_source, ConstantSpeed):
         return _refined(recording, rig, angle)
+    if isinstance(recording.speed_source, SpeedChannel):
+        return _rescaled(recording, rig, angle)
     return angle
 
 
@@ -76,6 +95,25 @@ def _refined(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle:
     return replace(found, shaft=stated.shaft, notes=(*found.notes, note))
 
 
+def _rescaled(recording: Recording, rig: Rig, measured: ShaftAngle) -> ShaftAngle:
+    """Return a steady speed channel's angle at the scale the mesh lines show, if they show another.
+
+    Speed channels are right to a part in a hundred or a thousand, which is revolutions in a long record.
+    """
+    low, high = measured.speed_range_rpm
+    if not rig.pairs or high - low > STEADY * measured.mean_speed_rpm:
+        return measured
+    found = _from_meshes(recording, rig, measured)
+    if found is None:
+        return measured
+    difference = found.mean_speed_rpm / measured.mean_speed_rpm - 1
+    if abs(difference) * measured.n_revolutions < LARGEST_DRIFT_REV:
+        return measured
+    lines_say = f"the signal's own lines say {found.mean_speed_rpm:.6g} rpm ({100 * difference:+.2f} %)"
+    note = f"The speed channel says {measured.mean_speed_rpm:.6g} rpm; {lines_say}."
+    return replace(found, shaft=measured.shaft, notes=(*found.notes, note))
+
+
 def _from_meshes(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle | None:
     from gearsig.angle.tachless import estimate_shaft_angle
 
@@ -88,7 +126,10 @@ def _from_meshes(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAng
 
 
 def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngle | None:
-    """Find the shaft's harmonics in the envelopes, where a bearing's modulation shows them better than the spectrum."""
+    """Find the shaft's harmonics in the envelopes, where a bearing's modulation shows them better than the spectrum.
+
+    Multiples of the mains are left out: a hum's would be taken for the shaft of any motor of little slip.
+    """
     import numpy as np
 
     from gearsig.diagnosis.comb import best_comb
@@ -108,7 +149,10 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
             continue
         for name in envelopes.channel_names:
             spectrum = channel_spectrum(envelopes, name)
-            comb = best_comb(floor_of(spectrum), low, high, offsets=np.arange(1, N_SHAFT_HARMONICS + 1))
+            excess = floor_of(spectrum)
+            for mains_hz in MAINS_HZ:
+                excess = excess.without_multiples(mains_hz, skirt=MAINS_TOLERANCE)
+            comb = best_comb(excess, low, high, offsets=np.arange(1, N_SHAFT_HARMONICS + 1))
             if comb is not None:
                 combs.append((comb.p_value, comb.fundamental, spectrum.resolution))
     if not combs:

@@ -2,55 +2,43 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from math import exp
-from typing import TypeGuard
+from collections.abc import Sequence
+from dataclasses import replace
 
-from gearsig.diagnosis.comb import Comb, LineExcess, best_comb
-from gearsig.diagnosis.confidence import WITH_ASSUMED_DATA, from_p_value
+from gearsig.diagnosis.confidence import WITH_ASSUMED_DATA, from_p_value, p_text
+from gearsig.diagnosis.confirmation import speed_is_confirmed
+from gearsig.diagnosis.detectors.bearing_family import (
+    PARTS,
+    Candidate,
+    Families,
+    clearest_family,
+    expected_parts,
+    find_families,
+    slip_of,
+    speed_is_only_stated,
+    without_synchronous,
+)
+from gearsig.diagnosis.detectors.bearing_limit import smallest_depth
+from gearsig.diagnosis.detectors.impact_trains import slower_train
 from gearsig.diagnosis.envelopes import BandEnvelope
 from gearsig.diagnosis.signals import Signals
 from gearsig.diagnosis.types import Finding, Kind, Strength, Where
-from gearsig.rig.types import Bearing
-
-PARTS = {
-    "BPFO": ("outer race", 1.0),
-    "BPFI": ("inner race", 1.0),
-    "BSF": ("rolling element", 2.0),
-    "FTF": ("cage", 1.0),
-}
-"""Part that strikes at each order, and strikes per cycle: a damaged rolling element strikes both races each spin."""
-
-TYPICAL_SLIP = 0.007
-"""Standard deviation of the relative distance from the kinematic order, where parts compete for one family of lines."""
-
-RARE = 0.3
-"""Prior weight of rolling elements and cages against races, which are damaged far more often."""
 
 CLEAR_MODULATION = 0.05
 """Depth of the strongest line of the envelope from which a race is called damaged, not only worth watching."""
 
-MINIMUM_LINES = 3
-"""Lines of a family over 6 dB that must be there: two may coincide by chance with the harmonics of something else."""
+MOST_PARTS = 2
+"""Parts that may be damaged at once; families at more orders than that have another cause more likely."""
+
+WITH_STATED_SPEED = 0.85
+"""Factor where the speed is a stated one, and nothing but the family itself speaks for it."""
+
+BEYOND_SLIP = 0.5
+"""Factor where the family lies beyond a bearing's slip: it is the part's only if the stated speed is wrong."""
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """One family found, and what it may be; `share` is the named part's among all that would show at that order."""
-
-    comb: Comb
-    envelope: BandEnvelope
-    p_value: float
-    bearing: Bearing | None = None
-    name: str = ""
-    expected: float = 0.0
-    rivals: tuple[str, ...] = ()
-    share: float = 1.0
-
-    @property
-    def modulation(self) -> float:
-        """Amplitude of the strongest line over the mean envelope."""
-        return self.comb.amplitude / self.envelope.mean if self.envelope.mean > 0 else 0.0
+SHARED_BY_OTHERS = 0.5
+"""Factor where impacts of another machine, a belt or an unknown shaft explain the lines as well as the part does."""
 
 
 def detect_bearings(signals: Signals, envelopes: list[BandEnvelope]) -> list[Finding]:
@@ -60,172 +48,150 @@ def detect_bearings(signals: Signals, envelopes: list[BandEnvelope]) -> list[Fin
         return _over_frequency(signals, cleaned)
     if signals.angle.n_revolutions < signals.settings.minimum_revolutions:
         return [_too_short(signals)] if signals.rig.bearings else []
-    named = _best_named(signals, cleaned)
-    if named:  # combinations with shaft orders make further families, which are no second fault
-        return [_named_finding(signals, c) for c in named]
-    unnamed = _best_unnamed(signals, cleaned)
-    if unnamed is not None:
-        known = _known_multiple(signals, unnamed)
-        return [_unnamed_finding(signals, unnamed) if known is None else _named_finding(signals, known)]
-    return _none_found(signals, cleaned) if signals.rig.bearings and cleaned else []
-
-
-def without_synchronous(signals: Signals, excess: LineExcess) -> LineExcess:
-    """Mask the multiples of every known shaft order: gears and shafts, not bearings."""
-    for order in signals.known_shaft_orders.values():
-        excess = excess.without_multiples(order)
-    return excess
-
-
-def _expected(signals: Signals) -> list[tuple[Bearing, str, float]]:
-    """Return every known bearing part with the order at which its damage would strike."""
-    return [
-        (bearing, name, order * ratio * PARTS[name][1])
-        for bearing in signals.rig.bearings
-        if (ratio := signals.rig.ratio(bearing.shaft)) is not None
-        for name, order in bearing.orders().items()
+    families = find_families(signals, cleaned)
+    findings = [_named_finding(signals, c, len(families.named)) for c in families.named]
+    findings += [
+        _unnamed_finding(signals, c) if c.bearing is None else _named_finding(signals, c, 1) for c in families.trains
     ]
+    claimed = any(f.kind in (Kind.FAULT, Kind.SUSPICION) for f in findings)
+    if not claimed and signals.rig.bearings and cleaned:
+        findings += _none_found(signals, cleaned, families)
+    return findings
 
 
-def _best_named(signals: Signals, envelopes: list[BandEnvelope]) -> list[Candidate]:
-    """Return the significant bearing parts, surest first; one that shares its lines with a surer one is left out."""
-    slip = signals.settings.bearing_slip
-    expected = _expected(signals)
-    found = []
-    for bearing, name, order in expected:
-        best: Candidate | None = None
-        for envelope in envelopes:
-            comb = best_comb(envelope.excess, order * (1 - slip), order * (1 + slip))
-            if _is_better(comb, best):
-                best = Candidate(comb, envelope, comb.p_value, bearing, name, order)
-        if best is not None:
-            best = replace(best, p_value=min(1.0, best.p_value * len(expected) * len(envelopes)))
-            if best.p_value <= signals.settings.false_alarm_probability:
-                found.append(best)
-    found.sort(key=lambda c: -_weight(c.name, c.comb.fundamental / c.expected - 1))
-    kept: list[Candidate] = []
-    for candidate in found:
-        if not any(_shares_lines(candidate.comb, other.comb) for other in kept):
-            kept.append(_with_rivals(signals, candidate))
-    return sorted(kept, key=lambda c: c.p_value)
-
-
-def _weight(name: str, slip: float) -> float:
-    """Return how likely a part is, by how far from its kinematic order the lines are."""
-    return exp(-0.5 * (slip / TYPICAL_SLIP) ** 2) * (RARE if name in ("BSF", "FTF") else 1.0)
-
-
-def _with_rivals(signals: Signals, candidate: Candidate) -> Candidate:
-    """Note the other parts whose order is so near, or half or twice, that slip alone could make it this one."""
-    own = _weight(candidate.name, candidate.comb.fundamental / candidate.expected - 1)
-    others, rivals = 0.0, []
-    for bearing, name, order in _expected(signals):
-        if (bearing, name) == (candidate.bearing, candidate.name):
-            continue
-        slip = min((candidate.comb.fundamental / (order * m) - 1 for m in (0.5, 1.0, 2.0)), key=abs)
-        if abs(slip) <= signals.settings.bearing_slip:
-            others += _weight(name, slip)
-            rivals.append(f"{PARTS[name][0]} of {bearing.name}")
-    return replace(candidate, rivals=tuple(rivals), share=own / (own + others))
-
-
-def _known_multiple(signals: Signals, candidate: Candidate) -> Candidate | None:
-    """Return the candidate named, if its fundamental is a low harmonic of a known part: paths may hide the first."""
-    for bearing, name, order in _expected(signals):
-        for m in (1, 2, 3):
-            if abs(candidate.comb.fundamental / (m * order) - 1) <= signals.settings.bearing_slip:
-                named = replace(candidate, bearing=bearing, name=name, expected=m * order)
-                return _with_rivals(signals, named)
-    return None
-
-
-def _is_better(comb: Comb | None, best: Candidate | None) -> TypeGuard[Comb]:
-    """Whether a family has lines enough and is surer than the best so far."""
-    if comb is None or len(comb.positions) < MINIMUM_LINES:
-        return False
-    return best is None or (comb.p_value, -comb.score) < (best.p_value, -best.comb.score)
-
-
-def _shares_lines(comb: Comb, surer: Comb) -> bool:
-    """Whether most lines of a family are those of a surer one."""
-    shared = [p for p in comb.positions if any(abs(p / q - 1) < 0.005 for q in surer.positions)]
-    return len(shared) >= len(comb.positions) / 2
-
-
-def _best_unnamed(signals: Signals, envelopes: list[BandEnvelope]) -> Candidate | None:
-    """Return the clearest family that is no shaft's. Impacts of bearings come about 1.5 to 14 times per revolution."""
-    slowest = min(signals.known_shaft_orders.values(), default=1.0)
-    fastest = max(signals.known_shaft_orders.values(), default=1.0)
-    best: Candidate | None = None
-    for envelope in envelopes:
-        comb = best_comb(envelope.excess, 1.5 * slowest, 14.0 * fastest)
-        if _is_better(comb, best):
-            best = Candidate(comb, envelope, comb.p_value)
-    if best is None:
-        return None
-    best = replace(best, p_value=min(1.0, best.p_value * len(envelopes)))
-    return best if best.p_value <= signals.settings.false_alarm_probability else None
-
-
-def _named_finding(signals: Signals, candidate: Candidate) -> Finding:
-    bearing, comb = candidate.bearing, candidate.comb
+def _named_finding(signals: Signals, candidate: Candidate, n_parts: int) -> Finding:
+    bearing = candidate.bearing
     assert bearing is not None  # noqa: S101 - a named candidate has one; narrows the type
     part = PARTS[candidate.name][0]
-    confidence = from_p_value(candidate.p_value) * candidate.share
-    if signals.rig.assumed:
-        confidence *= WITH_ASSUMED_DATA
-    clear = candidate.modulation >= CLEAR_MODULATION and confidence >= 0.75
-    slip = comb.fundamental / candidate.expected - 1
+    confidence = _confidence(signals, candidate, n_parts)
+    certain = not _is_shared(candidate, n_parts) and not _is_beyond_slip(signals, candidate)
+    clear = certain and candidate.modulation >= CLEAR_MODULATION and confidence >= 0.75
+    place = f"the {part} of bearing {bearing.name} on shaft {bearing.shaft}"
+    title = f"{'Damage' if clear else 'Perhaps damage'} at {place}."
+    if _is_beyond_slip(signals, candidate):
+        title = f"May be {place}: the speed is stated and not confirmed."
     return Finding(
         "bearing-" + part.replace(" ", "-"),
         Kind.FAULT if clear else Kind.SUSPICION,
-        f"{'Damage' if clear else 'Perhaps damage'} at the {part} of bearing {bearing.name} on shaft {bearing.shaft}.",
+        title,
         _where(signals, candidate),
         _strength(candidate),
         confidence,
-        f"chance that lines fall on the order so well: {candidate.p_value:.1g} (all parts, bands, channels tried); "
-        "at most 0.95 without a healthy reference",
-        (
-            f"{_family_text(candidate)}, {100 * slip:+.2f} % from the kinematic order {candidate.expected:.4f}.",
-            _modulation_text(candidate),
-            *(f"Within its slip, the {rival} would show at the same order." for rival in candidate.rivals),
-        ),
+        f"at most {_percent(confidence)}: chance that lines fall on the order so well {p_text(candidate.p_value)} (all "
+        "parts, bands, channels tried); never above 95 % without a healthy reference",
+        _named_evidence(signals, candidate, n_parts),
         "A recording of the same bearing when it was good, or another sensor nearer to it.",
     )
+
+
+def _named_evidence(signals: Signals, candidate: Candidate, n_parts: int) -> tuple[str, ...]:
+    slip = candidate.comb.fundamental / candidate.expected - 1
+    evidence = [
+        f"{_family_text(candidate)}, {100 * slip:+.2f} % from the kinematic order {candidate.expected:.4f}.",
+        _modulation_text(candidate),
+        *(f"Within its slip, the {rival} would show at the same order." for rival in candidate.rivals),
+    ]
+    if speed_is_only_stated(signals):
+        evidence.append("The speed is a stated one that no line of a shaft or mesh confirms.")
+    if candidate.name == "FTF":
+        evidence.append("Belts and other machines at the same rate look the same: lines at the cage's order alone.")
+    if n_parts > MOST_PARTS:
+        evidence.append(f"{n_parts} parts show at once, which a single other source of impacts explains as well.")
+    return tuple(evidence)
+
+
+def _confidence(signals: Signals, candidate: Candidate, n_parts: int) -> float:
+    confidence = from_p_value(candidate.p_value) * candidate.share
+    if signals.rig.assumed:
+        confidence *= WITH_ASSUMED_DATA
+    if _is_shared(candidate, n_parts):
+        confidence *= SHARED_BY_OTHERS
+    if speed_is_only_stated(signals):
+        confidence *= BEYOND_SLIP if _is_beyond_slip(signals, candidate) else WITH_STATED_SPEED
+    return confidence
+
+
+def _is_shared(candidate: Candidate, n_parts: int) -> bool:
+    """Whether other causes explain the lines as well: at a cage's order, or at the orders of several parts."""
+    return candidate.name == "FTF" or n_parts > MOST_PARTS
+
+
+def _is_beyond_slip(signals: Signals, candidate: Candidate) -> bool:
+    """Whether the order fits only if the stated speed is wrong."""
+    off = abs(candidate.comb.fundamental / candidate.expected - 1)
+    return speed_is_only_stated(signals) and off > signals.settings.bearing_slip
 
 
 def _unnamed_finding(signals: Signals, candidate: Candidate) -> Finding:
     order, hertz = candidate.comb.fundamental, candidate.comb.fundamental * signals.frequency_per_order_hz
     confidence = from_p_value(candidate.p_value, limit=0.99)
+    shaft = signals.rig.reference_shaft or "the shaft"
+    near = _near_shaft(signals, order)
+    strong = candidate.modulation >= CLEAR_MODULATION and not (near and not speed_is_confirmed(signals))
+    what = "which no shaft, gear or bearing of the rig explains"
     return Finding(
         "non-synchronous-impacts",
-        Kind.SUSPICION if candidate.modulation >= CLEAR_MODULATION else Kind.NOTICE,
-        f"Impacts at order {order:.4f} of {signals.rig.reference_shaft or 'the shaft'} ({hertz:.5g} Hz), "
-        "which no shaft, gear or bearing of the rig explains.",
+        Kind.SUSPICION if strong else Kind.NOTICE,
+        f"Impacts at order {order:.4f} of {shaft} ({hertz:.5g} Hz), {what}.",
         _where(signals, candidate),
         _strength(candidate),
         confidence,
-        f"that the family exists: chance of it in noise {candidate.p_value:.1g}, all orders and bands tried; "
-        "what causes it is not known",
+        f"at most {_percent(confidence)}, that the family exists: chance of it in noise {p_text(candidate.p_value)}, "
+        "all orders and bands tried; what causes it is not known",
         (
             f"{_family_text(candidate)}.",
             _modulation_text(candidate),
-            "A rolling bearing that is not in the rig file is the usual cause; other machines and belts do it too.",
+            *near,
+            *_other_than_bearings(signals, candidate),
         ),
-        "Give the bearings in the rig file: then the part is named, or the bearings are ruled out.",
+        ""
+        if signals.rig.bearings
+        else "Give the bearings in the rig file: then the part is named, or they are ruled out.",
     )
+
+
+def _near_shaft(signals: Signals, order: float) -> list[str]:
+    """State a shaft whose order is so near that a wrong speed makes the difference."""
+    return [
+        f"Shaft {name or 'of reference'} is near (order {shaft:.4f}, {100 * (order / shaft - 1):+.2f} %): "
+        "the speed may be wrong by as much."
+        for name, shaft in signals.known_shaft_orders.items()
+        if abs(order / shaft - 1) <= 0.03
+    ]
+
+
+def _other_than_bearings(signals: Signals, candidate: Candidate) -> list[str]:
+    text = "A rolling bearing that is not in the rig file is the usual cause; other machines and belts do it too."
+    if not candidate.in_train:
+        return [text]
+    text = "The rate is low for a race: another machine, a belt or a shaft that is not in the rig file does it."
+    parts = [
+        f"{PARTS[name][0]} of {bearing.name}"
+        for bearing, name, order in expected_parts(signals)
+        if abs(order / candidate.comb.fundamental - round(order / candidate.comb.fundamental))
+        * candidate.comb.fundamental
+        <= slip_of(signals) * order
+        and order > candidate.comb.fundamental
+    ]
+    if not parts:
+        return [text]
+    return [text, f"Multiples fall near the order of the {', '.join(parts)} by their density: that is no damage there."]
+
+
+def _percent(confidence: float) -> str:
+    return f"{100 * confidence:.0f} %"
 
 
 def _over_frequency(signals: Signals, envelopes: list[BandEnvelope]) -> list[Finding]:
     """Without speed: report the clearest family of the envelope over frequency, without a cause."""
-    best: Candidate | None = None
-    for envelope in envelopes:
-        comb = best_comb(envelope.excess, 4.0, min(1000.0, float(envelope.excess.spectrum.positions[-1]) / 4))
-        if _is_better(comb, best):
-            best = Candidate(comb, envelope, comb.p_value)
-    if best is None or best.p_value * len(envelopes) > signals.settings.false_alarm_probability:
+    end_hz = min((float(e.excess.spectrum.positions[-1]) for e in envelopes), default=0.0)
+    best = clearest_family(envelopes, 4.0, min(1000.0, end_hz / 4))
+    if best is None or best.p_value > signals.settings.false_alarm_probability:
         return []
-    best = replace(best, p_value=best.p_value * len(envelopes))
+    train = slower_train(best.envelope.excess, best.comb)
+    if train is not None:
+        best = replace(best, comb=train, in_train=True)
+    confidence = from_p_value(best.p_value, limit=0.99)
     return [
         Finding(
             "periodic-impacts",
@@ -233,8 +199,8 @@ def _over_frequency(signals: Signals, envelopes: list[BandEnvelope]) -> list[Fin
             f"The signal is modulated periodically at {best.comb.fundamental:.5g} Hz; by what, cannot be told.",
             replace(_where(signals, best), order=None, frequency_hz=best.comb.fundamental),
             _strength(best),
-            from_p_value(best.p_value, limit=0.99),
-            f"that the family exists: chance of it in noise {best.p_value:.1g}",
+            confidence,
+            f"at most {_percent(confidence)}, that the family exists: chance of it in noise {p_text(best.p_value)}",
             (f"{_family_text(best)}.", _modulation_text(best)),
             "Give the shaft speed: then shafts, gears and bearings can be told apart.",
         )
@@ -252,36 +218,77 @@ def _too_short(signals: Signals) -> Finding:
     )
 
 
-def _none_found(signals: Signals, envelopes: list[BandEnvelope]) -> list[Finding]:
-    """State that nothing shows, and which parts could not have shown."""
+def _none_found(signals: Signals, envelopes: list[BandEnvelope], families: Families) -> list[Finding]:
+    """State that nothing shows as far as it would have shown, and which parts could not have shown."""
     where = Where(channels=tuple(dict.fromkeys(e.channel for e in envelopes)))
-    hidden = [
-        f"{PARTS[name][0]} of {bearing.name}"
-        for bearing, name, order in _expected(signals)
-        if all(e.excess.masked[e.excess.spectrum.index_of(order)] for e in envelopes)
-    ]
-    findings = [
-        Finding(
-            "no-bearing-damage",
-            Kind.INFORMATION,
-            f"No damage shows in the bearings ({', '.join(b.name for b in signals.rig.bearings)}).",
-            where,
-            confidence=0.8,
-            confidence_basis="early damage may be hidden below the gears",
-            evidence=(f"No family at their orders in {len(envelopes)} envelope spectra (channels × bands).",),
-        )
-    ]
+    if not speed_is_confirmed(signals):
+        why = "no line of a mesh or shaft stands where the speed puts it, so that bearing orders may be elsewhere"
+        return [_undecided(why, "A tachometer, or a sensor nearer to the gears.", where)]
+    if families.unclear:
+        parts = ", ".join(f"{PARTS[c.name][0]} of {c.bearing.name}" for c in families.unclear if c.bearing)
+        why = f"lines stand at the order of the {parts}, but families beside it are as clear"
+        return [_undecided(why, "A longer recording, or another sensor.", where)]
+    depths = _smallest_depths(signals, envelopes)
+    shown = {part: depth for part, depth in depths.items() if depth <= CLEAR_MODULATION}
+    hidden = [part for part in depths if part not in shown]
+    if not shown:
+        why = f"a modulation of {100 * CLEAR_MODULATION:.0f} % would not have stood out at any bearing's order"
+        return [_undecided(why, "A longer recording: the floor of the envelope spectrum falls with its root.", where)]
+    findings = [_no_damage(signals, envelopes, shown, where)]
     if hidden:
-        findings.append(
-            Finding(
-                "bearing-part-hidden",
-                Kind.CANNOT_TELL,
-                f"Not examined: {', '.join(hidden)}. Their orders fall on multiples of a shaft within the resolution.",
-                where,
-                surer="A longer recording: orders that are close need many revolutions to be told apart.",
-            )
-        )
+        findings.append(_hidden(hidden, where))
     return findings
+
+
+def _smallest_depths(signals: Signals, envelopes: list[BandEnvelope]) -> dict[str, float]:
+    """Return, for each part, the depth of modulation from which it would have shown."""
+    expected = expected_parts(signals)
+    probability = signals.settings.false_alarm_probability / max(1, len(expected) * len(envelopes))
+    return {
+        f"{PARTS[name][0]} of {bearing.name}": smallest_depth(envelopes, order, slip_of(signals), probability)
+        for bearing, name, order in expected
+    }
+
+
+def _no_damage(signals: Signals, envelopes: Sequence[BandEnvelope], depths: dict[str, float], where: Where) -> Finding:
+    worst = max(depths, key=lambda part: depths[part])
+    limit = (
+        f"Six equal harmonics of {100 * min(depths.values()):.2g} to {100 * depths[worst]:.2g} % of the mean envelope"
+    )
+    return Finding(
+        "no-bearing-damage",
+        Kind.INFORMATION,
+        f"No damage shows in the bearings ({', '.join(b.name for b in signals.rig.bearings)}).",
+        where,
+        confidence=0.8,
+        confidence_basis="early damage may be hidden below the gears",
+        evidence=(
+            f"No family at their orders in {len(envelopes)} envelope spectra (channels × bands).",
+            f"{limit} would have shown in half of the bands (at the {worst}; less at the others).",
+        ),
+        surer="An earlier recording of the same machine: then smaller changes show.",
+    )
+
+
+def _hidden(parts: Sequence[str], where: Where) -> Finding:
+    return Finding(
+        "bearing-part-hidden",
+        Kind.CANNOT_TELL,
+        f"Not examined: {', '.join(parts)}. Their orders fall on multiples of a shaft within the resolution, or the "
+        f"floor there is too high for a modulation of {100 * CLEAR_MODULATION:.0f} % to show.",
+        where,
+        surer="A longer recording: orders that are close need many revolutions to be told apart.",
+    )
+
+
+def _undecided(why: str, surer: str, where: Where) -> Finding:
+    return Finding(
+        "bearings-undecided",
+        Kind.CANNOT_TELL,
+        f"Whether the bearings are damaged cannot be told: {why}.",
+        where,
+        surer=surer,
+    )
 
 
 def _where(signals: Signals, candidate: Candidate) -> Where:
@@ -305,11 +312,19 @@ def _strength(candidate: Candidate) -> Strength:
 
 
 def _family_text(candidate: Candidate) -> str:
-    ratios = ", ".join(f"{r:.0f}" for r in candidate.comb.ratios_db)
+    comb = candidate.comb
+    ratios = ", ".join(f"{r:.0f}" for r in comb.ratios_db[:6]) + (", …" if len(comb.ratios_db) > 6 else "")
     return (
-        f"{len(candidate.comb.positions)} of 6 harmonics of {candidate.comb.fundamental:.4f} stand out in the envelope "
-        f"of {candidate.envelope.channel} ({ratios} dB over the floor)"
+        f"{len(comb.positions)} of {_n_harmonics(candidate)} harmonics of {comb.fundamental:.4f} stand out in the "
+        f"envelope of {candidate.envelope.channel} ({ratios} dB over the floor)"
     )
+
+
+def _n_harmonics(candidate: Candidate) -> int:
+    """Return how many multiples were looked at: six, or all up to the last line of a train."""
+    if not candidate.in_train:
+        return 6
+    return round(candidate.comb.positions[-1] / candidate.comb.fundamental) if candidate.comb.positions else 0
 
 
 def _modulation_text(candidate: Candidate) -> str:

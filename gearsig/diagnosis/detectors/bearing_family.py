@@ -1,0 +1,270 @@
+"""Families of lines in the envelopes: at the orders of known bearing parts, and at others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import exp
+from typing import TypeGuard
+
+from gearsig.diagnosis.comb import Comb, LineExcess, best_comb
+from gearsig.diagnosis.detectors.impact_trains import slower_train, stands_out_from_neighbours
+from gearsig.diagnosis.envelopes import BandEnvelope
+from gearsig.diagnosis.signals import Signals
+from gearsig.rig.types import Bearing
+
+PARTS = {
+    "BPFO": ("outer race", 1.0),
+    "BPFI": ("inner race", 1.0),
+    "BSF": ("rolling element", 2.0),
+    "FTF": ("cage", 1.0),
+}
+"""Part that strikes at each order, and strikes per cycle: a damaged rolling element strikes both races each spin."""
+
+TYPICAL_SLIP = 0.007
+"""Standard deviation of the relative distance from the kinematic order, where parts compete for one family of lines."""
+
+UNCONFIRMED_SLIP = 0.05
+"""Range searched where the speed is stated and nothing confirms it: the slip of a motor comes to the bearing's."""
+
+TYPICAL_UNCONFIRMED_SLIP = 0.02
+
+RARE = 0.3
+"""Prior weight of rolling elements and cages against races, which are damaged far more often."""
+
+MINIMUM_LINES = 3
+"""Lines of a family over 6 dB that must be there: two may coincide by chance with the harmonics of something else."""
+
+MOST_TRAINS = 3
+"""Trains of impacts looked for, each hidden before the next search."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One family found, and what it may be; `share` is the named part's among all that would show at that order."""
+
+    comb: Comb
+    envelope: BandEnvelope
+    p_value: float
+    bearing: Bearing | None = None
+    name: str = ""
+    expected: float = 0.0
+    rivals: tuple[str, ...] = ()
+    share: float = 1.0
+    in_train: bool = False
+
+    @property
+    def modulation(self) -> float:
+        """Amplitude of the strongest line over the mean envelope."""
+        return self.comb.amplitude / self.envelope.mean if self.envelope.mean > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class Families:
+    """What the envelopes show.
+
+    Parameters
+    ----------
+    named : tuple of Candidate
+        Parts of known bearings, surest first.
+    trains : tuple of Candidate
+        Other periodic impacts; without a bearing, or with the one whose cage turns at their rate.
+    unclear : tuple of Candidate
+        Families at a part's order that are no clearer than those beside them.
+    """
+
+    named: tuple[Candidate, ...] = ()
+    trains: tuple[Candidate, ...] = ()
+    unclear: tuple[Candidate, ...] = ()
+
+
+def find_families(signals: Signals, envelopes: list[BandEnvelope]) -> Families:
+    """Return the families of the envelopes, each put down to a part of a bearing only if nothing else explains it.
+
+    A family at a part's order that belongs to a slower train of impacts is the train's; the train is then hidden and
+    the search begins anew, so that a damaged part beside it is found.
+    """
+    trains: list[Candidate] = []
+    for _ in range(MOST_TRAINS):
+        named = _significant(signals, envelopes)
+        train = next((t for c in named if (t := _train_of(signals, c)) is not None), None)
+        if train is None:
+            break
+        trains.append(train)
+        envelopes = [replace(e, excess=e.excess.without_multiples(train.comb.fundamental)) for e in envelopes]
+    named = [c for c in named if _train_of(signals, c) is None]
+    clear = [c for c in named if _stands_out(signals, c)]
+    unclear = [c for c in named if c not in clear]
+    if not clear and not trains:  # combinations with shaft orders make further families, which are no second fault
+        free = best_unnamed(signals, envelopes)
+        if free is not None and free.bearing is not None:
+            return Families((free,), (), tuple(unclear))
+        trains = [] if free is None else [free]
+    return Families(tuple(clear), tuple(trains), tuple(unclear))
+
+
+def without_synchronous(signals: Signals, excess: LineExcess) -> LineExcess:
+    """Mask the multiples of every known shaft order: gears and shafts, not bearings."""
+    for order in signals.known_shaft_orders.values():
+        excess = excess.without_multiples(order)
+    return excess
+
+
+def speed_is_only_stated(signals: Signals) -> bool:
+    """Whether the speed is a stated one that no line of the signal has confirmed."""
+    return signals.angle is not None and signals.angle.method == "constant" and signals.angle.quality <= 0.5
+
+
+def slip_of(signals: Signals) -> float:
+    """Return the relative range in which a part's order is sought."""
+    slip = signals.settings.bearing_slip
+    return max(slip, UNCONFIRMED_SLIP) if speed_is_only_stated(signals) else slip
+
+
+def expected_parts(signals: Signals) -> list[tuple[Bearing, str, float]]:
+    """Return every known bearing part with the order at which its damage would strike."""
+    return [
+        (bearing, name, order * ratio * PARTS[name][1])
+        for bearing in signals.rig.bearings
+        if (ratio := signals.rig.ratio(bearing.shaft)) is not None
+        for name, order in bearing.orders().items()
+    ]
+
+
+def best_unnamed(signals: Signals, envelopes: list[BandEnvelope]) -> Candidate | None:
+    """Return the clearest family that is no shaft's. Impacts of bearings come about 1.5 to 14 times per revolution.
+
+    Slower trains show by their multiples in that range. It carries a bearing's name if its fundamental is a low
+    harmonic of a known part: paths may hide the first.
+    """
+    slowest = min(signals.known_shaft_orders.values(), default=1.0)
+    fastest = max(signals.known_shaft_orders.values(), default=1.0)
+    best = clearest_family(envelopes, 1.5 * slowest, 14.0 * fastest)
+    if best is None or best.p_value > signals.settings.false_alarm_probability:
+        return None
+    train = slower_train(best.envelope.excess, best.comb)
+    if train is not None:
+        return _as_cage(signals, replace(best, comb=train, in_train=True))
+    known = _known_multiple(signals, best)
+    return known if known is not None and _stands_out(signals, known) else best
+
+
+def clearest_family(envelopes: list[BandEnvelope], low: float, high: float) -> Candidate | None:
+    """Return the surest family with a fundamental between `low` and `high`, its p-value over all envelopes."""
+    best: Candidate | None = None
+    for envelope in envelopes:
+        comb = best_comb(envelope.excess, low, high)
+        if _is_better(comb, best):
+            best = Candidate(comb, envelope, comb.p_value)
+    return None if best is None else replace(best, p_value=min(1.0, best.p_value * len(envelopes)))
+
+
+def _significant(signals: Signals, envelopes: list[BandEnvelope]) -> list[Candidate]:
+    """Return the significant bearing parts, surest first; one that shares its lines with a surer one is left out."""
+    slip = slip_of(signals)
+    expected = expected_parts(signals)
+    found = []
+    for bearing, name, order in expected:
+        best = clearest_family(envelopes, order * (1 - slip), order * (1 + slip))
+        if best is not None and _is_within(best.comb, best.envelope, order, slip):
+            p_value = min(1.0, best.p_value * len(expected))
+            if p_value <= signals.settings.false_alarm_probability:
+                found.append(replace(best, p_value=p_value, bearing=bearing, name=name, expected=order))
+    found.sort(key=lambda c: -_weight(signals, c.name, c.comb.fundamental / c.expected - 1))
+    kept: list[Candidate] = []
+    for candidate in found:
+        if not any(_shares_lines(candidate.comb, other.comb) for other in kept):
+            kept.append(_with_rivals(signals, candidate))
+    return sorted(kept, key=lambda c: c.p_value)
+
+
+def _is_within(comb: Comb, envelope: BandEnvelope, order: float, slip: float) -> bool:
+    """Whether the fundamental is still near the order once it is fitted to the lines."""
+    return abs(comb.fundamental - order) <= slip * order + envelope.excess.spectrum.resolution / 6
+
+
+def _train_of(signals: Signals, candidate: Candidate) -> Candidate | None:
+    """Return the train of impacts that a candidate's lines are a part of, if it is one."""
+    train = slower_train(candidate.envelope.excess, candidate.comb)
+    if train is None or _is_modulated_by_cage(signals, candidate, train):
+        return None
+    free = replace(candidate, comb=train, bearing=None, name="", expected=0.0, rivals=(), share=1.0, in_train=True)
+    return _as_cage(signals, free)
+
+
+def _is_modulated_by_cage(signals: Signals, candidate: Candidate, train: Comb) -> bool:
+    """Whether the train is that of the candidate's own cage, and weak beside the candidate's lines.
+
+    An outer race is struck by each element in turn: where they differ, lines stand the cage's order apart, between
+    its harmonics.
+    """
+    if candidate.bearing is None or candidate.name != "BPFO":
+        return False
+    cage = next(
+        (o for b, name, o in expected_parts(signals) if b is candidate.bearing and name == "FTF"), candidate.expected
+    )
+    if abs(train.fundamental / cage - 1) > slip_of(signals):
+        return False
+    own = sorted(candidate.comb.ratios_db)[-MINIMUM_LINES]
+    between = [
+        ratio
+        for position, ratio in zip(train.positions, train.ratios_db, strict=True)
+        if abs(position / candidate.comb.fundamental - round(position / candidate.comb.fundamental)) > 0.02
+    ]
+    return len(between) < MINIMUM_LINES or own >= sorted(between)[-MINIMUM_LINES] + 6.0
+
+
+def _as_cage(signals: Signals, train: Candidate) -> Candidate:
+    """Return the train with the cage's name, if it is one that turns at the train's rate."""
+    for bearing, name, order in expected_parts(signals):
+        if name == "FTF" and abs(train.comb.fundamental / order - 1) <= signals.settings.bearing_slip:
+            return _with_rivals(signals, replace(train, bearing=bearing, name=name, expected=order))
+    return train
+
+
+def _stands_out(signals: Signals, candidate: Candidate) -> bool:
+    others = tuple(order for _, _, order in expected_parts(signals) if order != candidate.expected)
+    slip = signals.settings.bearing_slip
+    return stands_out_from_neighbours(candidate.envelope.excess, candidate.comb, slip, others)
+
+
+def _weight(signals: Signals, name: str, slip: float) -> float:
+    """Return how likely a part is, by how far from its kinematic order the lines are."""
+    typical = TYPICAL_UNCONFIRMED_SLIP if speed_is_only_stated(signals) else TYPICAL_SLIP
+    return exp(-0.5 * (slip / typical) ** 2) * (RARE if name in ("BSF", "FTF") else 1.0)
+
+
+def _with_rivals(signals: Signals, candidate: Candidate) -> Candidate:
+    """Note the other parts whose order is so near, or half or twice, that slip alone could make it this one."""
+    own = _weight(signals, candidate.name, candidate.comb.fundamental / candidate.expected - 1)
+    others, rivals = 0.0, []
+    for bearing, name, order in expected_parts(signals):
+        if (bearing, name) == (candidate.bearing, candidate.name):
+            continue
+        slip = min((candidate.comb.fundamental / (order * m) - 1 for m in (0.5, 1.0, 2.0)), key=abs)
+        if abs(slip) <= slip_of(signals):
+            others += _weight(signals, name, slip)
+            rivals.append(f"{PARTS[name][0]} of {bearing.name}")
+    return replace(candidate, rivals=tuple(rivals), share=own / (own + others))
+
+
+def _known_multiple(signals: Signals, candidate: Candidate) -> Candidate | None:
+    """Return the candidate named, if its fundamental is a low harmonic of a known part: paths may hide the first."""
+    for bearing, name, order in expected_parts(signals):
+        for m in (1, 2, 3):
+            if abs(candidate.comb.fundamental / (m * order) - 1) <= signals.settings.bearing_slip:
+                named = replace(candidate, bearing=bearing, name=name, expected=m * order)
+                return _with_rivals(signals, named)
+    return None
+
+
+def _is_better(comb: Comb | None, best: Candidate | None) -> TypeGuard[Comb]:
+    """Whether a family has lines enough and is surer than the best so far."""
+    if comb is None or len(comb.positions) < MINIMUM_LINES:
+        return False
+    return best is None or (comb.p_value, -comb.score) < (best.p_value, -best.comb.score)
+
+
+def _shares_lines(comb: Comb, surer: Comb) -> bool:
+    """Whether most lines of a family are those of a surer one."""
+    shared = [p for p in comb.positions if any(abs(p / q - 1) < 0.005 for q in surer.positions)]
+    return len(shared) >= len(comb.positions) / 2
