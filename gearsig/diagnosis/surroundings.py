@@ -40,7 +40,7 @@ def level_beside(spectrum: Spectrum, position: float, outer_lines: float = OUTER
     beside = np.concatenate([below, above])
     if len(beside) < FEWEST_LINES:
         return None
-    return float(np.sqrt(np.median(beside**2) / log(2)))
+    return float(np.sqrt(np.sort(beside**2)[len(beside) // 2] / log(2)))
 
 
 def levels_beside(spectrum: Spectrum) -> FloatArray:
@@ -50,4 +50,6 @@ def levels_beside(spectrum: Spectrum) -> FloatArray:
     footprint = np.ones(2 * OUTER_LINES + 1, dtype=np.bool_)
     footprint[OUTER_LINES - INNER_LINES + 1 : OUTER_LINES + INNER_LINES] = False
     power = np.asarray(spectrum.values, dtype=np.float64) ** 2
-    return np.asarray(np.sqrt(median_filter(power, footprint=footprint, mode="reflect") / log(2)))
+    # As a single row: in one dimension SciPy's filter takes the whole width, holes of the footprint included.
+    medians = median_filter(power[None, :], footprint=footprint[None, :], mode="reflect")[0]
+    return np.asarray(np.sqrt(medians / log(2)))

@@ -18,7 +18,7 @@ CONTRADICTED_DB = 10.0
 at once, always on the same side."""
 
 CONTRADICTED_BY_ONE_DB = 20.0
-"""The same where a single harmonic is to be seen."""
+"""The same where the first harmonic alone is to be seen."""
 
 LINE_DB = 12.0
 WITHIN_LINES = 1.5
@@ -155,9 +155,9 @@ def _margin_db(excess: LineExcess, mesh: float, order: float) -> float | None:
     """Return by how much the lines at multiples of `order` contradict those of `mesh` in the worst harmonic.
 
     Positive: they do. Each is compared with the stated line and with the one as far on its other side, as a
-    modulation has sidebands on both. None if no harmonic shows in either place.
+    modulation has sidebands on both. None if no harmonic shows in either place, or only a higher one.
     """
-    margins = []
+    margins: dict[int, float] = {}
     for h in range(1, N_HARMONICS + 1):
         if h * max(order, 2 * mesh - order) > excess.spectrum.positions[-1]:
             break
@@ -165,10 +165,10 @@ def _margin_db(excess: LineExcess, mesh: float, order: float) -> float | None:
         stated, stated_stands = _level_db(excess, h * mesh)
         mirrored = _level_db(excess, h * (2 * mesh - order))[0]
         if true_stands or stated_stands:
-            margins.append(true - max(stated, mirrored) if true_stands else -CONTRADICTED_DB)
-    if not margins:
-        return None
-    return min(margins) - (CONTRADICTED_DB if len(margins) > 1 else CONTRADICTED_BY_ONE_DB)
+            margins[h] = true - max(stated, mirrored) if true_stands else -CONTRADICTED_DB
+    if not margins or set(margins) in ({2}, {3}):
+        return None  # a single line of a higher multiple is where a wrong speed puts any mesh by chance
+    return min(margins.values()) - (CONTRADICTED_DB if len(margins) > 1 else CONTRADICTED_BY_ONE_DB)
 
 
 def _level_db(excess: LineExcess, order: float) -> tuple[float, bool]:
