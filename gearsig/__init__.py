@@ -16,17 +16,20 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gearsig.diagnosis.analyze import analyze
+    from gearsig.diagnosis.settings import AnalysisSettings
     from gearsig.errors import GearsigError, InputError, RefusalError
     from gearsig.recording.read import read_recording
     from gearsig.recording.types import Channel, Recording
     from gearsig.recording.write import write_recording
     from gearsig.report.text import analysis_text
+    from gearsig.rig.speed import ConstantSpeed, EncoderChannel, PulseTimes, SpeedChannel, TachometerChannel
     from gearsig.rig.toml import read_rig
     from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
 
 __version__ = "0.1.0"
 
 _HOMES = {
+    "AnalysisSettings": "gearsig.diagnosis.settings",
     "analyze": "gearsig.diagnosis.analyze",
     "analysis_text": "gearsig.report.text",
     "GearsigError": "gearsig.errors",
@@ -37,21 +40,30 @@ _HOMES = {
     "Channel": "gearsig.recording.types",
     "Recording": "gearsig.recording.types",
     "read_rig": "gearsig.rig.toml",
+    **dict.fromkeys(
+        ("ConstantSpeed", "EncoderChannel", "PulseTimes", "SpeedChannel", "TachometerChannel"), "gearsig.rig.speed"
+    ),
     **dict.fromkeys(("Bearing", "GearPair", "OperatingPoint", "Rig", "Sensor", "Shaft"), "gearsig.rig.types"),
 }
 
 __all__ = [
+    "AnalysisSettings",
     "Bearing",
     "Channel",
+    "ConstantSpeed",
+    "EncoderChannel",
     "GearPair",
     "GearsigError",
     "InputError",
     "OperatingPoint",
+    "PulseTimes",
     "Recording",
     "RefusalError",
     "Rig",
     "Sensor",
     "Shaft",
+    "SpeedChannel",
+    "TachometerChannel",
     "analysis_text",
     "analyze",
     "read_recording",
@@ -68,4 +80,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__])
+    return sorted([*__all__, "__version__"])

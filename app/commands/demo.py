@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from app.samples import samples
+from gearsig.errors import InputError
 
 
 def demo(
@@ -21,6 +22,8 @@ def demo(
     from gearsig.diagnosis.analyze import analyze
     from gearsig.report.text import analysis_text
 
+    if output.exists() and not output.is_dir():
+        raise InputError("is a file, not a folder", where=str(output), remedy="choose another folder with -o")
     chosen = samples()
     first = next((s for s in chosen if "damaged" in s.recording.stem), chosen[0])
     typer.echo(f"$ gearsig analyze {first.recording}\n")

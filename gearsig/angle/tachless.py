@@ -28,9 +28,8 @@ def estimate_shaft_angle(
     """Estimate the angle of the reference shaft from mesh harmonics, their sidebands and shaft harmonics.
 
     First at constant speed: the comb of orders is laid over a whitened spectrum at each speed of the range. If its
-    lines are
-    smeared, the speed is followed from block to block. Either angle is then made exact by the phase of the mesh
-    harmonics, and weighed by the comb over the order spectrum: against chance, other speeds, other teeth.
+    lines are smeared, the speed is followed from block to block. Either angle is then made exact by the phase of the
+    mesh harmonics, and weighed by the comb over the order spectrum: against chance, other speeds, other teeth.
 
     Parameters
     ----------
@@ -64,7 +63,30 @@ def estimate_shaft_angle(
     candidate = _better(search, steady, varying)
     if candidate is None or candidate.decision.quality < LOWEST_QUALITY:
         raise _refusal(search, candidate, rig)
-    return _finished(search, candidate)
+    usual = _range_without_slips(candidate.angle)
+    if usual is None:
+        return _finished(search, candidate)
+    low, high = 60.0 * search.low, 60.0 * search.high
+    if usual[1] - usual[0] > 0.9 * (high - low):  # the range is narrow already, and the course still jumps
+        raise RefusalError(
+            "the speed that follows from the mesh lines jumps for moments, as no shaft does: the phase slips by cycles",
+            remedy="give a tachometer, or a recording with less noise",
+        )
+    return estimate_shaft_angle(recording, rig, channels=channels, speed_range_rpm=usual)
+
+
+def _range_without_slips(angle: ShaftAngle) -> tuple[float, float] | None:
+    """Return the range of speeds (rpm) to search again if the course leaves its usual range for moments; else None.
+
+    A phase that slips by a cycle shows as a short excursion far beyond the speeds of all other times.
+    """
+    speed = angle.speed_rpm_at(np.linspace(angle.start_s, angle.end_s, 4096))
+    low, middle, high = (float(q) for q in np.quantile(speed, (0.05, 0.5, 0.95)))
+    farthest = float(np.abs(speed - middle).max())
+    if farthest < max(3.0 * (high - low), 0.01 * middle):
+        return None
+    margin = max(high - low, 0.002 * middle)
+    return low - margin, high + margin
 
 
 def _is_sharp(search: SpeedSearch, steady: SpeedCandidate | None) -> bool:

@@ -25,6 +25,9 @@ from gearsig.rig.types import Rig
 MINIMUM_SAMPLES = 256
 """Below it no spectrum has a noise floor to compare with."""
 
+LARGEST_VALUE = 1e60
+"""Beyond it, fourth powers leave the range of floating point numbers; no unit makes vibration so large."""
+
 
 def analyze(recording: Recording, rig: Rig | None = None, settings: AnalysisSettings | None = None) -> Analysis:
     """Diagnose one recording.
@@ -116,6 +119,11 @@ def _check_size(recording: Recording) -> None:
     if recording.n_samples < MINIMUM_SAMPLES:
         raise InputError(
             f"{recording.n_samples} samples are too few", where=where, allowed=f"{MINIMUM_SAMPLES} or more"
+        )
+    if max(float(recording.samples.max()), -float(recording.samples.min())) > LARGEST_VALUE:
+        allowed = f"values up to {LARGEST_VALUE:g}"
+        raise InputError(
+            "samples are too large", where=where, allowed=allowed, remedy="check the file's format and unit"
         )
     if not recording.vibration_names():
         quantities = ", ".join(sorted({c.quantity for c in recording.channels}))

@@ -37,6 +37,9 @@ class Outcome(Enum):
 EXAMINED = ("no-tooth-local-damage", "no-bearing-damage")
 """Codes of findings that say that something was examined that would have shown a fault."""
 
+HINDERING = ("channel-clipped", "channel-stuck", "channel-dead")
+"""Codes of data problems behind which a fault may hide."""
+
 
 @dataclass(frozen=True)
 class Where:
@@ -188,4 +191,5 @@ def outcome_of(findings: Sequence[Finding]) -> Outcome:
     if Kind.SUSPICION in kinds:
         return Outcome.SUSPICION
     examined = any(f.code in EXAMINED for f in findings)
-    return Outcome.NO_FAULT if examined and Kind.CANNOT_TELL not in kinds else Outcome.CANNOT_TELL
+    hindered = Kind.CANNOT_TELL in kinds or any(f.code in HINDERING for f in findings)
+    return Outcome.NO_FAULT if examined and not hindered else Outcome.CANNOT_TELL

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from gearsig.diagnosis.types import EXAMINED, Finding, Kind, Outcome, outcome_of
+from gearsig.diagnosis.types import EXAMINED, HINDERING, Finding, Kind, Outcome, outcome_of
 
 _RANK = {kind: i for i, kind in enumerate(Kind)}
 
@@ -22,7 +22,7 @@ def ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 def verdict_of(findings: tuple[Finding, ...]) -> str:
     """Return the sentence a hurried reader takes away."""
     outcome = outcome_of(findings)
-    gaps = [f for f in findings if f.kind is Kind.CANNOT_TELL]
+    gaps = [f for f in findings if f.code in HINDERING or f.kind is Kind.CANNOT_TELL]
     if outcome is Outcome.FAULT:
         return "Fault: " + _first_and_number([f for f in findings if f.kind is Kind.FAULT])
     if outcome is Outcome.SUSPICION:
@@ -36,5 +36,6 @@ def verdict_of(findings: tuple[Finding, ...]) -> str:
 
 def _first_and_number(findings: list[Finding]) -> str:
     more = len(findings) - 1
-    first = f"{findings[0].title} ({100 * findings[0].confidence:.0f} % sure)"
+    sure = f" (at most {100 * findings[0].confidence:.0f} % sure)" if findings[0].kind is Kind.FAULT else ""
+    first = findings[0].title + sure
     return first + (f", and {more} more." if more else "")

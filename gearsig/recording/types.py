@@ -12,25 +12,7 @@ import numpy as np
 from gearsig.checks import FloatArray, closest_match_hint, frozen_array, one_of, positive, within
 from gearsig.errors import InputError
 from gearsig.rig.speed import SpeedSource
-from gearsig.rig.types import Rig
-
-QUANTITIES = (
-    "acceleration",
-    "velocity",
-    "displacement",
-    "sound_pressure",
-    "force",
-    "torque",
-    "transmission_error",
-    "tachometer",
-    "encoder",
-    "angle",
-    "rotational_speed",
-    "temperature",
-    "voltage",
-    "unknown",
-)
-"""What a channel may measure."""
+from gearsig.rig.types import QUANTITIES, Rig
 
 VIBRATION_QUANTITIES = frozenset(
     {"acceleration", "velocity", "displacement", "sound_pressure", "force", "torque", "transmission_error", "unknown"}

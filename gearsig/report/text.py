@@ -13,10 +13,13 @@ _SHORT = (Kind.NOTICE, Kind.INFORMATION)
 """Kinds that get their evidence only in the report."""
 
 
+_CLAIMS = (Kind.FAULT, Kind.SUSPICION)
+
+
 def analysis_text(analysis: Analysis, *, with_indicators: bool = False) -> str:
     """Return the verdict and the findings, most important first, in plain text."""
     recording = analysis.recording
-    machine = analysis.rig.name if analysis.rig is not None and analysis.rig.name else "no rig file"
+    machine = (analysis.rig.name or "rig without a name") if analysis.rig is not None else "no rig file"
     size = f"{len(recording.channels)} channel(s), {recording.duration_s:.6g} s at {recording.sampling_rate_hz:.6g} Hz"
     lines = [
         f"{recording.provenance.source or 'recording'}: {size}, {machine}",
@@ -39,9 +42,12 @@ def _finding_lines(number: int, finding: Finding) -> list[str]:
     if finding.strength is not None:
         lines.append(_paragraph(f"how strong: {strength_text(finding.strength)}"))
     if finding.kind in _SHORT:
-        return lines
+        # How the speed was found, and what was repaired on the way, is worth a line of its own.
+        return lines + [_paragraph(text) for text in finding.evidence if finding.code == "speed"]
     if finding.confidence_basis:
-        lines.append(_paragraph(f"how sure: {100 * finding.confidence:.0f} %; {finding.confidence_basis}"))
+        stated = finding.kind not in _CLAIMS or finding.confidence_basis.startswith("at most")
+        sure = "" if stated else f"at most {100 * finding.confidence:.0f} %; "
+        lines.append(_paragraph(f"how sure: {sure}{finding.confidence_basis}"))
     lines += [_paragraph(f"evidence: {text}") for text in finding.evidence]
     if finding.surer:
         lines.append(_paragraph(f"surer with: {finding.surer}"))

@@ -53,7 +53,7 @@ def read_rig(path: str | Path) -> Rig:
         raise InputError("is not text in UTF-8", where=path.name, remedy="save the rig file as UTF-8") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(
-            f"is not valid TOML: {error}", where=path.name, remedy="see the README for an example"
+            f"is not valid TOML: {error}", where=path.name, remedy="`gearsig rig example` prints one to start from"
         ) from None
     return rig_from_dict(data, where=path.name)
 
@@ -61,6 +61,8 @@ def read_rig(path: str | Path) -> Rig:
 def rig_file_beside(recording: str | Path) -> Path | None:
     """Return the rig file of the same name beside a recording (`x.csv.gz`: `x.toml`), None if there is none."""
     path = Path(recording)
+    if not path.name:
+        return None
     beside = path.with_name(path.name.split(".")[0] + ".toml")
     return beside if beside.is_file() else None
 

@@ -10,6 +10,27 @@ from gearsig.errors import InputError
 from gearsig.rig.ratios import shaft_ratios
 from gearsig.rig.speed import SpeedSource
 
+MOST_TEETH = 5000
+"""More than any slewing ring has."""
+
+QUANTITIES = (
+    "acceleration",
+    "velocity",
+    "displacement",
+    "sound_pressure",
+    "force",
+    "torque",
+    "transmission_error",
+    "tachometer",
+    "encoder",
+    "angle",
+    "rotational_speed",
+    "temperature",
+    "voltage",
+    "unknown",
+)
+"""What a channel may measure."""
+
 
 @dataclass(frozen=True)
 class Shaft:
@@ -58,6 +79,8 @@ class GearPair:
 
     def __post_init__(self) -> None:
         for label, teeth in (("driver", self.driver_teeth), ("driven", self.driven_teeth)):
+            if teeth is not None and teeth > MOST_TEETH:
+                raise InputError(f"{label} teeth of pair {self.name!r} is {teeth}", allowed=f"3 to {MOST_TEETH}")
             if teeth is not None:
                 count(
                     teeth, f"{label} teeth of pair {self.name!r}", minimum=3, remedy="leave it out if it is not known"
@@ -156,6 +179,8 @@ class Sensor:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
+        if self.quantity:
+            one_of(self.quantity, f"quantity of sensor {self.channel!r}", QUANTITIES)
         for label, value in (("scale", self.scale), ("offset", self.offset)):
             if not isfinite(value) or (label == "scale" and value == 0.0):
                 raise InputError(

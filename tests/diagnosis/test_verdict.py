@@ -17,7 +17,7 @@ def test_faults_come_first_and_the_surest_of_them() -> None:
         ]
     )
     assert [f.code for f in findings] == ["d", "b", "c", "a"]
-    assert verdict_of(findings) == "Fault: surer (90 % sure), and 1 more."
+    assert verdict_of(findings) == "Fault: surer (at most 90 % sure), and 1 more."
 
 
 @pytest.mark.parametrize(

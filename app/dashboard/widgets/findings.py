@@ -39,7 +39,7 @@ def _show_card(finding: Finding, *, with_evidence: bool = False) -> None:
         with kind:
             show_kind(finding.kind)
             if card.confidence_percent is not None:
-                st.markdown(f"**{card.confidence_percent} %** sure")
+                st.markdown(f"≤ **{card.confidence_percent} %** sure")
         with body:
             st.markdown(f"**{as_typed(card.title)}**")
             if card.where:
