@@ -16,6 +16,7 @@ from gearsig.errors import GearsigError, InputError
 
 if TYPE_CHECKING:
     from gearsig.report.entry import Entry, Failure
+    from gearsig.rig.speed import SpeedSource
     from gearsig.rig.types import Rig
 
 Progress = Callable[[int, int, "Entry | Failure"], object]
@@ -52,6 +53,7 @@ class _Job:
     page: Path
     rig: Rig | None
     sampling_rate_hz: float | None
+    speed: SpeedSource | None
     command: str
 
 
@@ -61,6 +63,7 @@ def report_many(
     *,
     rig: Rig | None = None,
     sampling_rate_hz: float | None = None,
+    speed: SpeedSource | None = None,
     n_processes: int | None = None,
     executor: Executor | None = None,
     on_progress: Progress | None = None,
@@ -80,6 +83,8 @@ def report_many(
         Of all recordings; None: the rig file of the same name beside each, if there is one.
     sampling_rate_hz : float or None
         For files that do not state it.
+    speed : SpeedSource or None
+        Of all recordings, instead of what file and rig say.
     n_processes : int or None
         Local processes; None: one per processor, not more than files. With 1, everything runs in this process. With
         more, the caller's script needs the usual ``if __name__ == "__main__":``, as processes are spawned.
@@ -108,7 +113,7 @@ def report_many(
         raise InputError("there are no recordings to report on", remedy="name at least one file")
     workers = min(len(files), _n_processors()) if n_processes is None else count(n_processes, "n_processes")
     folder = _made(Path(output_folder))
-    jobs = _jobs(files, folder, rig, sampling_rate_hz, command)
+    jobs = _jobs(files, folder, rig, sampling_rate_hz, speed, command)
     results: dict[int, Entry | Failure] = {}
     try:
         with closing(_run(jobs, min(workers, len(jobs)), executor)) as running:
@@ -124,7 +129,12 @@ def report_many(
 
 
 def _jobs(
-    files: Sequence[Path], folder: Path, rig: Rig | None, sampling_rate_hz: float | None, command: str
+    files: Sequence[Path],
+    folder: Path,
+    rig: Rig | None,
+    sampling_rate_hz: float | None,
+    speed: SpeedSource | None,
+    command: str,
 ) -> list[_Job]:
     from gearsig.report.files import page_names
 
@@ -138,6 +148,7 @@ def _jobs(
             folder / f"{page}.html",
             rig,
             sampling_rate_hz,
+            speed,
             command,
         )
         for file, page in zip(files, pages, strict=True)
@@ -222,7 +233,8 @@ def _report_one(job: _Job) -> Entry | Failure:
     try:
         beside = rig_file_beside(job.path) if job.rig is None else None
         rig = read_rig(beside) if beside is not None else job.rig
-        analysis = analyze(read_recording(job.path, rig=rig, sampling_rate_hz=job.sampling_rate_hz))
+        recording = read_recording(job.path, rig=rig, sampling_rate_hz=job.sampling_rate_hz, speed=job.speed)
+        analysis = analyze(recording)
         write_page(analysis, job.page, command=job.command, index="index.html")
         return entry_of(analysis, job.name, job.page.name)
     except GearsigError as error:

@@ -29,5 +29,5 @@ def demo(
     typer.echo(f"$ gearsig analyze {first.recording}\n")
     typer.echo(analysis_text(analyze(open_recording(first.recording, open_rig(first.rig), None))))
     typer.echo(f"\nThe same for all {len(chosen)} samples (they are simulated; {first.recording.parent} says how):")
-    make_report([s.recording for s in chosen], output, None, None, None, command=f"gearsig demo -o {output}")
+    make_report([s.recording for s in chosen], output, None, None, None, None, command=f"gearsig demo -o {output}")
     typer.echo("Next: `gearsig rig example` for a rig file of your own, `gearsig dashboard` to explore.")

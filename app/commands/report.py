@@ -9,9 +9,10 @@ from typing import Annotated
 
 import typer
 
-from app.commands.options import RigOption, SamplingRateOption, open_rig
+from app.commands.options import RigOption, SamplingRateOption, SpeedOption, open_rig, stated_speed
 
 EXIT_SOME_FAILED = 1
+EXIT_NONE_READ = 2
 
 
 def report(
@@ -19,21 +20,29 @@ def report(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the pages.")],
     rig: RigOption = None,
     fs: SamplingRateOption = None,
+    speed_rpm: SpeedOption = None,
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one per processor.")] = None,
 ) -> None:
     """Write one self-contained HTML page per recording, and an index page that compares them.
 
-    A file that cannot be read does not stop the others: the index lists it with its reason, and the exit code is 1.
+    A file that cannot be read does not stop the others: the index lists it with its reason, and the exit code is 1
+    (2 if no file could be read).
 
     Example: gearsig report monday.csv tuesday.csv --rig gearbox.toml -o report
     """
-    failed = make_report(files, output, rig, fs, jobs, command="gearsig " + shlex.join(sys.argv[1:]))
+    failed = make_report(files, output, rig, fs, speed_rpm, jobs, command="gearsig " + shlex.join(sys.argv[1:]))
     if failed:
-        raise typer.Exit(EXIT_SOME_FAILED)
+        raise typer.Exit(EXIT_NONE_READ if failed == len(files) else EXIT_SOME_FAILED)
 
 
 def make_report(
-    files: list[Path], output: Path, rig: Path | None, fs: float | None, jobs: int | None, command: str
+    files: list[Path],
+    output: Path,
+    rig: Path | None,
+    fs: float | None,
+    speed_rpm: float | None,
+    jobs: int | None,
+    command: str,
 ) -> int:
     """Write the pages with a progress bar; return how many files failed."""
     from rich.console import Console
@@ -50,6 +59,7 @@ def make_report(
             output,
             rig=open_rig(rig),
             sampling_rate_hz=fs,
+            speed=stated_speed(speed_rpm, None, 1),
             n_processes=jobs,
             on_progress=lambda *_: progress.advance(task),
             command=command,

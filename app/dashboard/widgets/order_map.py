@@ -14,7 +14,7 @@ def show_order_map(analysis: Analysis, channel: ChannelAnalysis) -> None:
     """Show the map of a channel, or say why there is none."""
     order_map = channel.order_map
     if order_map is None:
-        st.info("The speed is constant or not known. A map is made of a run-up or coast-down.")
+        st.info("The speed changes by less than 1 %, or is not known. A map is made of a run-up or coast-down.")
         return
     from gearsig.plot.order_map import order_map_figure
 
