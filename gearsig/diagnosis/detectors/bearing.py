@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from gearsig.diagnosis.confidence import WITH_ASSUMED_DATA, from_p_value, p_text
 from gearsig.diagnosis.confirmation import speed_is_confirmed
+from gearsig.diagnosis.detectors.bearing_absence import none_found
 from gearsig.diagnosis.detectors.bearing_family import (
     PARTS,
     Candidate,
-    Families,
     clearest_family,
     expected_parts,
     find_families,
@@ -18,14 +17,11 @@ from gearsig.diagnosis.detectors.bearing_family import (
     speed_is_only_stated,
     without_synchronous,
 )
-from gearsig.diagnosis.detectors.bearing_limit import smallest_depth
+from gearsig.diagnosis.detectors.bearing_limit import CLEAR_MODULATION
 from gearsig.diagnosis.detectors.impact_trains import slower_train
 from gearsig.diagnosis.envelopes import BandEnvelope
 from gearsig.diagnosis.signals import Signals
 from gearsig.diagnosis.types import Finding, Kind, Strength, Where
-
-CLEAR_MODULATION = 0.05
-"""Depth of the strongest line of the envelope from which a race is called damaged, not only worth watching."""
 
 MOST_PARTS = 2
 """Parts that may be damaged at once; families at more orders than that have another cause more likely."""
@@ -55,7 +51,7 @@ def detect_bearings(signals: Signals, envelopes: list[BandEnvelope]) -> list[Fin
     ]
     claimed = any(f.kind in (Kind.FAULT, Kind.SUSPICION) for f in findings)
     if not claimed and signals.rig.bearings and cleaned:
-        findings += _none_found(signals, cleaned, families)
+        findings += none_found(signals, cleaned, families)
     return findings
 
 
@@ -215,79 +211,6 @@ def _too_short(signals: Signals) -> Finding:
         f"Bearings cannot be examined: the record holds {revolutions:.3g} revolutions and "
         f"{signals.settings.minimum_revolutions} are needed.",
         surer="A longer recording.",
-    )
-
-
-def _none_found(signals: Signals, envelopes: list[BandEnvelope], families: Families) -> list[Finding]:
-    """State that nothing shows as far as it would have shown, and which parts could not have shown."""
-    where = Where(channels=tuple(dict.fromkeys(e.channel for e in envelopes)))
-    if not speed_is_confirmed(signals):
-        why = "no line of a mesh or shaft stands where the speed puts it, so that bearing orders may be elsewhere"
-        return [_undecided(why, "A tachometer, or a sensor nearer to the gears.", where)]
-    if families.unclear:
-        parts = ", ".join(f"{PARTS[c.name][0]} of {c.bearing.name}" for c in families.unclear if c.bearing)
-        why = f"lines stand at the order of the {parts}, but families beside it are as clear"
-        return [_undecided(why, "A longer recording, or another sensor.", where)]
-    depths = _smallest_depths(signals, envelopes)
-    shown = {part: depth for part, depth in depths.items() if depth <= CLEAR_MODULATION}
-    hidden = [part for part in depths if part not in shown]
-    if not shown:
-        why = f"a modulation of {100 * CLEAR_MODULATION:.0f} % would not have stood out at any bearing's order"
-        return [_undecided(why, "A longer recording: the floor of the envelope spectrum falls with its root.", where)]
-    findings = [_no_damage(signals, envelopes, shown, where)]
-    if hidden:
-        findings.append(_hidden(hidden, where))
-    return findings
-
-
-def _smallest_depths(signals: Signals, envelopes: list[BandEnvelope]) -> dict[str, float]:
-    """Return, for each part, the depth of modulation from which it would have shown."""
-    expected = expected_parts(signals)
-    probability = signals.settings.false_alarm_probability / max(1, len(expected) * len(envelopes))
-    return {
-        f"{PARTS[name][0]} of {bearing.name}": smallest_depth(envelopes, order, slip_of(signals), probability)
-        for bearing, name, order in expected
-    }
-
-
-def _no_damage(signals: Signals, envelopes: Sequence[BandEnvelope], depths: dict[str, float], where: Where) -> Finding:
-    worst = max(depths, key=lambda part: depths[part])
-    limit = (
-        f"Six equal harmonics of {100 * min(depths.values()):.2g} to {100 * depths[worst]:.2g} % of the mean envelope"
-    )
-    return Finding(
-        "no-bearing-damage",
-        Kind.INFORMATION,
-        f"No damage shows in the bearings ({', '.join(b.name for b in signals.rig.bearings)}).",
-        where,
-        confidence=0.8,
-        confidence_basis="early damage may be hidden below the gears",
-        evidence=(
-            f"No family at their orders in {len(envelopes)} envelope spectra (channels × bands).",
-            f"{limit} would have shown in half of the bands (at the {worst}; less at the others).",
-        ),
-        surer="An earlier recording of the same machine: then smaller changes show.",
-    )
-
-
-def _hidden(parts: Sequence[str], where: Where) -> Finding:
-    return Finding(
-        "bearing-part-hidden",
-        Kind.CANNOT_TELL,
-        f"Not examined: {', '.join(parts)}. Their orders fall on multiples of a shaft within the resolution, or the "
-        f"floor there is too high for a modulation of {100 * CLEAR_MODULATION:.0f} % to show.",
-        where,
-        surer="A longer recording: orders that are close need many revolutions to be told apart.",
-    )
-
-
-def _undecided(why: str, surer: str, where: Where) -> Finding:
-    return Finding(
-        "bearings-undecided",
-        Kind.CANNOT_TELL,
-        f"Whether the bearings are damaged cannot be told: {why}.",
-        where,
-        surer=surer,
     )
 
 

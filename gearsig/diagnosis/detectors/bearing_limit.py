@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf
 from statistics import median, median_high
 
@@ -9,6 +10,9 @@ import numpy as np
 
 from gearsig.diagnosis.comb import LOG_RATIO_LIMIT, score_needed
 from gearsig.diagnosis.envelopes import BandEnvelope
+
+CLEAR_MODULATION = 0.05
+"""Depth of the strongest line of the envelope from which a race is called damaged, not only worth watching."""
 
 N_HARMONICS = 6
 FEWEST_FREE = 3
@@ -19,7 +23,7 @@ SLIPS = (-0.5, 0.0, 0.5)
 """Parts of the range searched: slip takes a part's lines to and from those of the shafts, here a median counts too."""
 
 
-def smallest_depth(envelopes: list[BandEnvelope], order: float, slip: float, probability: float) -> float:
+def smallest_depth(envelopes: Sequence[BandEnvelope], order: float, slip: float, probability: float) -> float:
     """Return the depth of modulation at which six equal harmonics near `order` would have shown in half of the bands.
 
     Each line needs the log ratio score/n over its floor, where `score` is what chance reaches with `probability` and n
@@ -29,7 +33,7 @@ def smallest_depth(envelopes: list[BandEnvelope], order: float, slip: float, pro
 
     Parameters
     ----------
-    envelopes : list of BandEnvelope
+    envelopes : sequence of BandEnvelope
         Multiples of the shafts masked.
     order : float
     slip : float

@@ -1,0 +1,211 @@
+"""Bearings are named where nothing else explains their lines, and called good only where damage would have shown."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearsig.diagnosis.analyze import analyze
+from gearsig.diagnosis.comb import LineExcess, best_comb
+from gearsig.diagnosis.detectors.bearing_limit import smallest_depth
+from gearsig.diagnosis.detectors.impact_trains import slower_train, stands_out_from_neighbours
+from gearsig.diagnosis.envelopes import BandEnvelope
+from gearsig.diagnosis.signals import floor_of
+from gearsig.diagnosis.speed import determine_angle
+from gearsig.diagnosis.types import CannotTell, Kind
+from gearsig.recording.types import Channel, Recording
+from gearsig.rig.speed import ConstantSpeed, SpeedChannel
+from gearsig.rig.types import Bearing, Rig, Shaft
+from gearsig.spectra.amplitude import amplitude_spectrum
+from sims.kinematic import BearingFault, ColouredNoise, ConstantProfile, KinematicModel, SensorChannel
+from tests.diagnosis.machines import GOOD, RIG, SAMPLING_RATE_HZ, codes, finding, record
+
+SECONDS = 8.0
+ONE_SHAFT = Rig(shafts=(Shaft("in"),), bearings=RIG.bearings)
+NAMED = {"bearing-outer-race", "bearing-inner-race", "bearing-rolling-element", "bearing-cage"}
+
+
+def with_impacts(recording: Recording, rate_hz: float, peak: float = 12.0) -> Recording:
+    """Add a machine nearby, whose impacts ring at 2.5 kHz."""
+    t = np.arange(recording.n_samples) / SAMPLING_RATE_HZ
+    impacts = np.zeros_like(t)
+    impacts[np.round(np.arange(0.01, t[-1], 1 / rate_hz) * SAMPLING_RATE_HZ).astype(int)] = peak
+    ringing = np.exp(-2 * np.pi * 0.05 * 2500 * t[:500]) * np.sin(2 * np.pi * 2500 * t[:500])
+    samples = np.array(recording.samples)
+    samples[0] += np.convolve(impacts, ringing)[: len(t)]
+    return replace(recording, samples=samples)
+
+
+def steady(**changes: object) -> Recording:
+    return record(replace(GOOD, speed=ConstantProfile(1320.0), **changes), seconds=SECONDS)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("order", [0.151, 0.37, 0.41, 0.613, 0.7])
+def test_slow_impacts_are_no_bearings(order: float) -> None:
+    analysis = analyze(with_impacts(steady(), 22.0 * order))
+    assert not NAMED & set(codes(analysis))
+    found = finding(analysis, "non-synchronous-impacts")
+    assert found.where.order == pytest.approx(order, rel=2e-3)  # their rate, not a multiple of it
+
+
+def test_a_damaged_race_beside_slow_impacts_is_named() -> None:
+    faulty = steady(bearing_faults=(BearingFault("front", "outer", 8.0, resonance_hz=3200.0),))
+    analysis = analyze(with_impacts(faulty, 22.0 * 0.41, 6.0))
+    assert "bearing-outer-race" in codes(analysis, Kind.FAULT)
+    assert not {"bearing-inner-race", "bearing-rolling-element"} & set(codes(analysis))
+
+
+def test_impacts_at_the_cages_order_are_at_most_a_suspicion() -> None:
+    cage = RIG.bearings[0].orders()["FTF"]
+    found = finding(analyze(with_impacts(steady(), 22.0 * cage)), "bearing-cage")
+    assert found.kind is Kind.SUSPICION
+    assert found.confidence <= 0.5
+    assert any("Belts" in text for text in found.evidence)
+
+
+def test_a_good_bearing_comes_with_what_would_have_shown() -> None:
+    found = finding(analyze(record(seconds=SECONDS)), "no-bearing-damage")
+    assert any("would have shown" in text for text in found.evidence)
+
+
+def test_noise_instead_of_vibration_shows_no_good_bearing() -> None:
+    recording = record(seconds=SECONDS)
+    samples = np.array(recording.samples)
+    samples[0] = np.random.default_rng(5).normal(size=samples.shape[1])
+    analysis = analyze(replace(recording, samples=samples))
+    assert "no-bearing-damage" not in codes(analysis)
+    assert "where the speed puts it" in finding(analysis, "bearings-undecided").title
+
+
+def test_a_short_record_shows_no_good_bearing() -> None:
+    analysis = analyze(record(seconds=0.9))
+    assert "no-bearing-damage" not in codes(analysis)
+    assert "would not have stood out" in finding(analysis, "bearings-undecided").title
+
+
+def test_a_bearing_that_cannot_be_examined_is_not_called_good() -> None:
+    recording = record(seconds=SECONDS)
+    bearings = (*RIG.bearings, Bearing("nameless", "out"))
+    analysis = analyze(replace(recording, rig=replace(RIG, bearings=bearings)))
+    assert "nameless" not in finding(analysis, "no-bearing-damage").title
+    assert "nameless" in finding(analysis, "bearings-undecided").title
+
+
+def humming(recording: Recording, rng: np.random.Generator) -> Recording:
+    """Add noise that is modulated by a supply of 50 Hz."""
+    t = np.arange(recording.n_samples) / SAMPLING_RATE_HZ
+    depth = 1 + sum(a * np.cos(2 * np.pi * 50 * k * t) for k, a in enumerate((0.5, 0.4, 0.3, 0.2), 1))
+    return replace(recording, samples=recording.samples + 0.8 * depth * rng.normal(size=len(t)))
+
+
+def stated(rpm: float, true_rpm: float, rng: np.random.Generator) -> Recording:
+    """Return a bearing with a damaged outer race, without gears, its speed not measured."""
+    model = KinematicModel(
+        speed=ConstantProfile(true_rpm),
+        bearing_faults=(BearingFault("front", "outer", 4.0, resonance_hz=3200.0),),
+        channels=(SensorChannel("a1", noise=ColouredNoise(0.8)),),
+    )
+    recording = record(model, seconds=SECONDS, rig=ONE_SHAFT)
+    return humming(replace(recording, speed=ConstantSpeed(rpm, "in")), rng)
+
+
+def test_a_stated_speed_is_not_taken_from_the_mains() -> None:
+    recording = stated(2950.0, 2916.0, np.random.default_rng(0))
+    angle = determine_angle(recording, ONE_SHAFT)
+    assert not isinstance(angle, CannotTell)
+    assert angle.mean_speed_rpm == pytest.approx(2950.0)
+    assert angle.quality <= 0.5
+    found = finding(analyze(recording), "bearing-outer-race")
+    assert found.confidence < 0.9
+    assert any("no line of a shaft or mesh confirms" in text for text in found.evidence)
+
+
+def test_a_family_beyond_slip_of_a_stated_speed_may_be_the_part() -> None:
+    found = finding(analyze(stated(2950.0, 2850.0, np.random.default_rng(1))), "bearing-outer-race")
+    assert found.kind is Kind.SUSPICION
+    assert found.confidence <= 0.5
+    assert found.title.startswith("May be the outer race")
+    assert "not confirmed" in found.title
+
+
+@pytest.mark.parametrize("scale", [1.0005, 1.02])
+def test_a_speed_channel_of_wrong_scale_is_set_right_by_the_mesh(scale: float) -> None:
+    recording = steady()
+    rpm = np.full((1, recording.n_samples), 1320.0 * scale)
+    measured = replace(
+        recording,
+        samples=np.vstack([recording.samples[:1], rpm]),
+        channels=(recording.channels[0], Channel("rpm", "rotational_speed", "rpm")),
+        speed=SpeedChannel("rpm", shaft="in"),
+    )
+    angle = determine_angle(measured, RIG)
+    assert not isinstance(angle, CannotTell)
+    assert angle.mean_speed_rpm == pytest.approx(1320.0, rel=5e-5)
+    assert any("speed channel says" in note for note in angle.notes)
+
+
+def test_a_speed_beyond_the_sampling_rate_is_refused() -> None:
+    recording = Recording(
+        np.random.default_rng(3).normal(size=(1, 5000)),
+        1000.0,
+        (Channel("a1", "acceleration"),),
+        speed=ConstantSpeed(1e7),
+    )
+    angle = determine_angle(recording, RIG)
+    assert isinstance(angle, CannotTell)
+    assert "above half the sampling rate" in angle.reason
+    assert "no-bearing-damage" not in codes(analyze(recording, RIG))
+
+
+RATE_HZ = 1000.0
+
+
+def lines(frequencies_hz: list[float], rng: np.random.Generator, amplitude: float = 0.3) -> LineExcess:
+    t = np.arange(20_000) / RATE_HZ
+    tones = sum(amplitude * np.cos(2 * np.pi * f * t + rng.uniform(0, 6.28)) for f in frequencies_hz)
+    return floor_of(amplitude_spectrum(rng.normal(size=len(t)) + tones, RATE_HZ))
+
+
+@pytest.mark.parametrize(("multiple", "divisor"), [(4, 1), (13, 1), (5, 2)])
+def test_a_family_on_lines_of_a_slower_train_is_the_trains(multiple: int, divisor: int) -> None:
+    rng = np.random.default_rng(multiple)
+    true_hz = 50.0 * divisor / multiple
+    excess = lines([true_hz * k for k in range(1, int(310 / true_hz))], rng)
+    comb = best_comb(excess, 49.5, 50.5)
+    assert comb is not None
+    train = slower_train(excess, comb)
+    assert train is not None
+    assert train.fundamental == pytest.approx(true_hz, rel=1e-3)
+
+
+def test_a_family_with_sidebands_stands_alone() -> None:
+    rng = np.random.default_rng(6)
+    places = [50.0 * k + side * 9.27 for k in range(1, 7) for side in (-2, -1, 0, 1, 2)]
+    excess = lines(places, rng)
+    comb = best_comb(excess, 49.0, 51.0)
+    assert comb is not None
+    assert slower_train(excess, comb) is None
+    assert stands_out_from_neighbours(excess, comb, 0.02, ())
+
+
+def test_a_family_among_others_as_clear_does_not_stand_out() -> None:
+    rng = np.random.default_rng(7)
+    excess = lines([1.3 * k for k in range(1, 250)], rng)  # any order has a multiple of 1.3 Hz near it
+    comb = best_comb(excess, 49.0, 51.0)
+    assert comb is not None
+    assert not stands_out_from_neighbours(excess, comb, 0.02, ())
+
+
+@pytest.mark.parametrize(("factor", "is_found"), [(0.4, False), (1.8, True)])
+def test_the_smallest_depth_is_where_families_begin_to_show(factor: float, is_found: bool) -> None:
+    rng = np.random.default_rng(8)
+
+    def envelope(amplitude: float) -> BandEnvelope:
+        return BandEnvelope("a1", (300.0, 450.0), lines([50.2 * k for k in range(1, 7)], rng, amplitude), 2.0)
+
+    depth = smallest_depth([envelope(0.0)], 50.0, 0.02, 1e-4)
+    found = 0
+    for _ in range(20):
+        comb = best_comb(envelope(factor * depth * 2.0).excess, 49.0, 51.0)
+        found += comb is not None and comb.p_value <= 1e-4
+    assert found >= 19 if is_found else found <= 1
