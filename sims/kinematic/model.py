@@ -23,8 +23,8 @@ from sims.kinematic.channel import SensorChannel
 from sims.kinematic.mesh import MeshHarmonics, Modulation, ToothVariation
 from sims.kinematic.shaft import ShaftOrder
 from sims.kinematic.speed import SpeedProfile
-from sims.kinematic.tachometer import Tachometer
 from sims.kinematic.tooth import ToothDamage
+from sims.measure.tachometer import Tachometer
 
 
 @dataclass(frozen=True)

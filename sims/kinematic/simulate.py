@@ -17,9 +17,10 @@ from sims.kinematic.mesh import MeshHarmonics, between_teeth, harmonic_sum, modu
 from sims.kinematic.model import KinematicModel, known_mesh_order, known_ratio, known_teeth
 from sims.kinematic.shaft import shaft_vibration
 from sims.kinematic.speed import time_at_revolutions
-from sims.kinematic.tachometer import edge_times, pulse_voltage
+from sims.kinematic.tachometer import edge_times
 from sims.kinematic.tooth import engagement_window, knocks, passages
-from sims.kinematic.truth import plain
+from sims.measure.tachometer import pulse_voltage
+from sims.measure.truth import plain
 
 _LEAD_IN_S = 0.25  # simulated ahead of the recording, so that the path's filters and ring-downs are settled at time 0
 

@@ -1,0 +1,163 @@
+"""The whole chain: from motion to a recording that the analysis side reads as a measured one."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearsig.angle.shaft import find_shaft_angle
+from gearsig.errors import InputError
+from gearsig.rig.speed import EncoderChannel, PulseTimes, TachometerChannel
+from gearsig.rig.types import GearPair, Rig, Shaft
+from sims.measure.accelerometer import Accelerometer, Converter
+from sims.measure.chain import MeasuredChannel, MeasurementChain
+from sims.measure.counter import Encoder, PulseCounter
+from sims.measure.hum import MainsHum
+from sims.measure.motion import Motion
+from sims.measure.path import ModalPath, PathMode
+from sims.measure.sampling import AntiAlias
+from sims.measure.tachometer import Tachometer
+
+STEP, RATE = 2e-5, 5000.0
+RIG = Rig(shafts=(Shaft("in"), Shaft("out")), pairs=(GearPair("p", "in", "out", 20, 40),))
+PATH = ModalPath({"y": 0.2}, (PathMode(640.0, 0.05, {"y": 1.0}),))
+CHAIN = MeasurementChain(RATE, (MeasuredChannel("a1", PATH, position="bearing"),))
+
+
+def motion(seconds=2.3, tone_hz=375.0, rev_per_s=25.0):
+    t = np.arange(round(seconds / STEP)) * STEP
+    angle = 2 * np.pi * rev_per_s * t
+    return Motion(STEP, ("y",), np.cos(2 * np.pi * tone_hz * t)[:, None], {"in": angle, "out": angle / 2})
+
+
+def record(chain=CHAIN, given=None, seed=0, **options):
+    return chain.record(given or motion(), rng=np.random.default_rng(seed), **({"rig": RIG} | options))
+
+
+def line(values, frequency_hz, time_s):
+    return 2 * np.mean(values * np.exp(-2j * np.pi * frequency_hz * time_s))
+
+
+def test_tone_arrives_with_the_paths_gain_and_phase_at_its_time():
+    r = record(duration_s=2.0)
+    assert r.n_samples == 10_000
+    start_s = r.truth["measurement"]["lead_in_s"]
+    found = line(r.values("a1"), 375.0, r.time_s() + start_s)
+    assert found == pytest.approx(PATH.response(np.array([375.0]), "y")[0], rel=1e-3)
+
+
+def test_high_tone_does_not_fold_into_the_recording():
+    quiet = record(replace(CHAIN, channels=(MeasuredChannel("a1", ModalPath({"y": 1.0})),)), motion(tone_hz=4700.0))
+    assert np.abs(quiet.values("a1")).max() < 1e-4
+
+
+def test_anti_alias_filter_smooths_what_the_sensor_clips_but_the_converter_holds():
+    direct = ModalPath({"y": 1.0})
+    sensor = MeasuredChannel("sensor", direct, Accelerometer(range_mps2=0.5))
+    adc = MeasuredChannel("adc", direct, converter=Converter(0.5, 16))
+    r = record(replace(CHAIN, channels=(sensor, adc)))
+    assert r.values("adc").max() == 0.5 - Converter(0.5, 16).step_mps2
+    assert np.mean(r.values("adc") == r.values("adc").max()) > 0.25
+    # Odd harmonics of a clipped tone, within the pass band.
+    assert abs(line(r.values("sensor")[:5000], 1125.0, r.time_s()[:5000])) > 0.05
+
+
+def test_noise_density_survives_sampling():
+    from scipy.signal import welch
+
+    noisy = MeasuredChannel("a1", ModalPath({"y": 0.0}), Accelerometer(noise_mps2_per_sqrt_hz=1e-2))
+    r = record(replace(CHAIN, channels=(noisy,)), motion(6.0))
+    f, density = welch(r.values("a1"), RATE, nperseg=512)
+    band = (f > 50) & (f < 0.38 * RATE)
+    assert np.sqrt(density[band].mean()) == pytest.approx(1e-2, rel=0.02)
+
+
+def test_hum_stays_at_its_frequency():
+    humming = MeasuredChannel("a1", ModalPath({"y": 0.0}), hum=MainsHum((0.2, 0.1)))
+    r = record(replace(CHAIN, channels=(humming,)), duration_s=2.0)
+    assert abs(line(r.values("a1"), 50.0, r.time_s())) == pytest.approx(0.2, rel=1e-9)
+    assert abs(line(r.values("a1"), 100.0, r.time_s())) == pytest.approx(0.1, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("parts", "kind", "tolerance_rev"),
+    [
+        ({"tachometer": Tachometer("out", 4, edge_s=1e-3)}, TachometerChannel, 1e-6),
+        # A tick of the clock is 2.5e-5 rev of the input shaft.
+        ({"tachometer": PulseCounter("out", 4, clock_hz=1e6)}, PulseTimes, 2.6e-5),
+        ({"encoders": (Encoder(shaft="out", counts_per_revolution=3600),)}, EncoderChannel, 6e-4),
+    ],
+)
+def test_shaft_angle_is_found_again(parts, kind, tolerance_rev):
+    r = record(replace(CHAIN, **parts), duration_s=2.0)
+    assert isinstance(r.speed_source, kind)
+    assert r.speed_source.shaft == "out"
+    angle = find_shaft_angle(r)
+    t = np.linspace(0.2, 1.8, 50)
+    turned = np.interp(t, angle.time_s, angle.revolutions)
+    np.testing.assert_allclose(turned - turned[0], 25.0 * (t - t[0]), atol=tolerance_rev)
+    assert r.truth["measurement"]["n_revolutions"]["out"] == pytest.approx(25.0, rel=1e-9)
+
+
+def test_channels_carry_quantity_unit_and_position():
+    chain = replace(CHAIN, tachometer=Tachometer(edge_s=1e-3), encoders=(Encoder(),))
+    r = record(chain)
+    assert [(c.name, c.quantity, c.unit, c.position) for c in r.channels] == [
+        ("a1", "acceleration", "m/s^2", "bearing"),
+        ("tacho", "tachometer", "V", "in"),
+        ("encoder", "encoder", "deg", "in"),
+    ]
+    assert isinstance(r.speed_source, TachometerChannel)
+    assert r.provenance.reader == "sims.measure"
+
+
+def test_pulse_that_the_recording_starts_in_is_high():
+    held = motion(2.3, rev_per_s=0.02)
+    tacho = Tachometer(duty=0.5, first_pulse_rev=0.9, edge_s=1e-3)  # open from -0.1 rev to 0.4 rev
+    r = record(replace(CHAIN, tachometer=tacho), held)
+    np.testing.assert_allclose(r.values("tacho"), 5.0)
+
+
+def test_truth_is_plain_and_holds_the_simulators():
+    chain = replace(CHAIN, tachometer=PulseCounter())
+    r = record(chain, truth={"crack_depth_mm": 2.0})
+    truth = json.loads(json.dumps(dict(r.truth)))
+    assert truth["crack_depth_mm"] == 2.0
+    modes = truth["measurement"]["chain"]["channels"][0]["path"]["modes"]
+    assert modes[0] == {"kind": "PathMode", "frequency_hz": 640.0, "damping_ratio": 0.05, "gains": {"y": 1.0}}
+
+
+def test_same_seed_same_recording():
+    noisy = replace(
+        CHAIN,
+        channels=(MeasuredChannel("a1", PATH, Accelerometer(noise_mps2_per_sqrt_hz=1e-2)),),
+        tachometer=Tachometer(jitter_s=1e-6, noise_v=0.01),
+    )
+    a, b, c = (record(noisy, seed=s).samples for s in (1, 1, 2))
+    np.testing.assert_array_equal(a, b)
+    assert not np.array_equal(a, c)
+
+
+def test_simulated_time_is_enough_and_not_wasteful():
+    for filter_ in (AntiAlias(), AntiAlias(120.0, 0.45)):
+        chain = replace(CHAIN, anti_alias=filter_)
+        needed = chain.simulated_s(1.0)
+        assert record(chain, motion(needed), duration_s=1.0).n_samples == 5000
+        with pytest.raises(InputError, match="simulate longer"):
+            record(chain, motion(needed - 5 / RATE), duration_s=1.0)
+
+
+def test_lead_in_of_zero_keeps_what_the_filter_allows():
+    r = record(lead_in_s=0.0)
+    reach_s = AntiAlias().reach_s(RATE)
+    assert reach_s <= r.truth["measurement"]["lead_in_s"] < reach_s + 2 / RATE
+
+
+def test_misfits_are_refused():
+    with pytest.raises(InputError, match="whose angle the simulation does not give"):
+        record(replace(CHAIN, tachometer=Tachometer("gear")))
+    with pytest.raises(InputError, match="no channel"):
+        MeasurementChain(RATE, ())
+    with pytest.raises(InputError, match="one name per column"):
+        Motion(STEP, ("x", "y"), np.zeros((5, 1)))
