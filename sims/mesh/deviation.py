@@ -1,0 +1,88 @@
+"""How a flank departs from the involute: tip relief, profile and pitch deviations. Positive means metal is missing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsig.checks import FloatArray, frozen_array, not_negative, positive
+from gearsig.errors import InputError
+from sims.mesh.geometry import GearGeometry
+
+
+@dataclass(frozen=True)
+class FlankDeviation:
+    """Deviation shared by all teeth of a gear, along the line of action, plus one value per tooth.
+
+    Parameters
+    ----------
+    tip_relief_um : float
+        Metal taken off at the tip, 0 for none.
+    tip_relief_length_mm : float
+        Length of the relief along the line of action, from the tip down.
+    tip_relief_exponent : float
+        1: straight; 2: parabolic.
+    profile_um : tuple of float
+        Measured profile deviation at equal steps of roll from the end of the fillet to the tip; straight between them.
+        Empty: none.
+    pitch_um : tuple of float
+        Cumulative pitch deviation of each tooth, as many as the gear has teeth. Empty: none.
+    """
+
+    tip_relief_um: float = 0.0
+    tip_relief_length_mm: float = 1.0
+    tip_relief_exponent: float = 1.0
+    profile_um: tuple[float, ...] = ()
+    pitch_um: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        not_negative(self.tip_relief_um, "tip_relief_um", "µm")
+        positive(self.tip_relief_length_mm, "tip_relief_length_mm", "mm")
+        positive(self.tip_relief_exponent, "tip_relief_exponent")
+        frozen_array(self.profile_um, "profile_um", ndim=1)
+        frozen_array(self.pitch_um, "pitch_um", ndim=1)
+        if len(self.profile_um) == 1:
+            raise InputError("profile_um holds one value", allowed="none, or at least two from fillet to tip")
+
+
+IDEAL_FLANK = FlankDeviation()
+"""An involute without deviation."""
+
+
+def check_deviation(gear: GearGeometry, deviation: FlankDeviation) -> None:
+    """Refuse a relief longer than the flank and a number of pitch deviations that is not the number of teeth."""
+    flank = (gear.tip_roll_rad - gear.form_roll_rad) * gear.base_radius_mm
+    if deviation.tip_relief_um > 0.0 and deviation.tip_relief_length_mm > flank:
+        raise InputError(
+            f"tip_relief_length_mm is {deviation.tip_relief_length_mm:g} mm on a flank of {flank:.3g} mm",
+            allowed=f"at most {flank:.3g} mm along the line of action",
+        )
+    if deviation.pitch_um and len(deviation.pitch_um) != gear.teeth:
+        raise InputError(f"pitch_um holds {len(deviation.pitch_um)} values", allowed=f"one per tooth, {gear.teeth}")
+
+
+def flank_separation_m(gear: GearGeometry, deviation: FlankDeviation, roll_length_mm: FloatArray) -> FloatArray:
+    """Missing metal at the given places of the flank, in m.
+
+    Parameters
+    ----------
+    roll_length_mm : array
+        ρ of the gear, distance from its base tangent point. Beyond the tip the relief goes on growing.
+    """
+    rho = np.asarray(roll_length_mm, dtype=np.float64)
+    tip = gear.tip_roll_rad * gear.base_radius_mm
+    into = np.maximum(rho - (tip - deviation.tip_relief_length_mm), 0.0) / deviation.tip_relief_length_mm
+    total = deviation.tip_relief_um * into**deviation.tip_relief_exponent
+    if deviation.profile_um:
+        places = np.linspace(gear.form_roll_rad * gear.base_radius_mm, tip, len(deviation.profile_um))
+        total = total + np.interp(rho, places, np.asarray(deviation.profile_um))
+    result: FloatArray = total * 1e-6
+    return result
+
+
+def pitch_separation_m(gear: GearGeometry, deviation: FlankDeviation) -> FloatArray:
+    """One value per tooth, in m."""
+    if not deviation.pitch_um:
+        return np.zeros(gear.teeth)
+    return np.asarray(deviation.pitch_um, dtype=np.float64) * 1e-6

@@ -1,0 +1,98 @@
+"""The mesh as arrays over its progress, which compiled code reads while it integrates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray, count
+from sims.mesh.crack import RootCrack
+from sims.mesh.deviation import flank_separation_m, pitch_separation_m
+from sims.mesh.gear_mesh import GearMesh
+
+
+@dataclass(frozen=True)
+class MeshTable:
+    """Compliance and separation of a tooth pair over ζ, base pitches since its ideal entry.
+
+    Parameters
+    ----------
+    start, step : float
+        ζ of the first column and between columns; one column lies beyond either end, for cubic interpolation.
+    compliance_1, compliance_2 : arrays, (n_variants, n)
+        Tooth and foundation of either gear, m/N. Row 0 is a sound tooth, each further row a cracked one.
+    variant_1, variant_2 : int arrays, (z,)
+        Row of each tooth.
+    separation_m : array, (n,)
+        Metal missing on both flanks together.
+    pitch_1_m, pitch_2_m : arrays, (z,)
+    contact_coefficient : float
+        m/N, or m/N^0.9 if `load_dependent`.
+    load_dependent : bool
+    contact_ratio, ramp : float
+    n_slots : int
+    """
+
+    start: float
+    step: float
+    compliance_1: FloatArray
+    compliance_2: FloatArray
+    variant_1: NDArray[np.int64]
+    variant_2: NDArray[np.int64]
+    separation_m: FloatArray
+    pitch_1_m: FloatArray
+    pitch_2_m: FloatArray
+    contact_coefficient: float
+    load_dependent: bool
+    contact_ratio: float
+    ramp: float
+    n_slots: int
+
+
+def mesh_table(mesh: GearMesh, n_points: int = 512) -> MeshTable:
+    """Tabulate a mesh.
+
+    Parameters
+    ----------
+    mesh : GearMesh
+    n_points : int
+        Columns over the path of contact, ramps included. With 512 the interpolated compliance is right to 1e-9.
+    """
+    n = count(n_points, "n_points", minimum=16)
+    low, high = -mesh.ramp / 2.0, mesh.pair.contact_ratio + mesh.ramp / 2.0
+    step = (high - low) / (n - 1)
+    progress = low + step * np.arange(-1, n + 1)
+    rows_1, variant_1 = _rows(mesh, 1, progress, mesh.cracks_1, mesh.pair.driver.teeth)
+    rows_2, variant_2 = _rows(mesh, 2, progress, mesh.cracks_2, mesh.pair.driven.teeth)
+    rho_1, rho_2 = mesh.pair.contact_radii_mm(progress)
+    one, two = mesh.pair.driver, mesh.pair.driven
+    separation = flank_separation_m(one, mesh.flank_1, rho_1) + flank_separation_m(two, mesh.flank_2, rho_2)
+    return MeshTable(
+        start=low - step,
+        step=step,
+        compliance_1=rows_1,
+        compliance_2=rows_2,
+        variant_1=variant_1,
+        variant_2=variant_2,
+        separation_m=separation,
+        pitch_1_m=pitch_separation_m(one, mesh.flank_1),
+        pitch_2_m=pitch_separation_m(two, mesh.flank_2),
+        contact_coefficient=mesh.contact_coefficient,
+        load_dependent=mesh.contact_law == "load-dependent",
+        contact_ratio=mesh.pair.contact_ratio,
+        ramp=mesh.ramp,
+        n_slots=mesh.n_slots,
+    )
+
+
+def _rows(
+    mesh: GearMesh, side: int, progress: FloatArray, cracks: tuple[RootCrack, ...], n_teeth: int
+) -> tuple[FloatArray, NDArray[np.int64]]:
+    rows = [mesh.gear_compliance(side, progress)]
+    variant = np.zeros(n_teeth, dtype=np.int64)
+    for row, crack in enumerate(cracks, start=1):
+        rows.append(mesh.gear_compliance(side, progress, crack))
+        variant[crack.tooth] = row
+    return np.array(rows), variant
