@@ -55,6 +55,17 @@ def test_a_damaged_race_beside_slow_impacts_is_named() -> None:
     assert not {"bearing-inner-race", "bearing-rolling-element"} & set(codes(analysis))
 
 
+def test_more_than_two_parts_at_once_are_a_suspicion() -> None:
+    rig = replace(RIG, bearings=(*RIG.bearings, Bearing("rear", "out", 11, 7.94, 47.3)))
+    faults = (("front", "outer", 2900.0), ("front", "inner", 3500.0), ("rear", "outer", 4200.0))
+    model = replace(GOOD, bearing_faults=tuple(BearingFault(b, race, 12.0, resonance_hz=f) for b, race, f in faults))
+    analysis = analyze(record(model, seconds=SECONDS, rig=rig))
+    named = [f for f in analysis.findings if f.code in NAMED]
+    assert {(f.where.bearing, f.code) for f in named} >= {(b, f"bearing-{race}-race") for b, race, _ in faults}
+    assert {f.kind for f in named} == {Kind.SUSPICION}
+    assert all(any("parts show at once" in text for text in f.evidence) for f in named)
+
+
 def test_impacts_at_the_cages_order_are_at_most_a_suspicion() -> None:
     cage = RIG.bearings[0].orders()["FTF"]
     found = finding(analyze(with_impacts(steady(), 22.0 * cage)), "bearing-cage")
