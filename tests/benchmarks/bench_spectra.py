@@ -80,7 +80,7 @@ def main() -> None:
     ]
     for name, ours, others in cases:
         a, b = _milliseconds(ours, others)
-        print(f"{name:45s} {a:8.2f} ms" + (f"  {b:8.2f} ms  {b / a:6.1f} times" if others else ""))  # noqa: T201  # a script
+        print(f"{name:45s} {a:8.2f} ms" + (f"  {b:8.2f} ms  {b / a:6.1f} times" if others else ""))  # a script
 
 
 if __name__ == "__main__":
