@@ -199,6 +199,16 @@ def test_a_family_with_sidebands_stands_alone() -> None:
     assert stands_out_from_neighbours(excess, comb, 0.02, ())
 
 
+def test_sidebands_of_a_shaft_near_a_fifth_of_the_family_are_no_train() -> None:
+    rng = np.random.default_rng(9)
+    shaft_hz = 10.0  # the family is 4.98 times that: its sidebands lie near multiples of a fifth of it
+    places = [4.98 * shaft_hz * k + side * shaft_hz for k in range(1, 7) for side in (-2, -1, 0, 1, 2)]
+    excess = lines(places, rng).without_multiples(shaft_hz)
+    comb = best_comb(excess, 49.0, 50.6)
+    assert comb is not None
+    assert slower_train(excess, comb, (shaft_hz,)) is None
+
+
 def test_a_family_among_others_as_clear_does_not_stand_out() -> None:
     rng = np.random.default_rng(7)
     excess = lines([1.3 * k for k in range(1, 250)], rng)  # any order has a multiple of 1.3 Hz near it

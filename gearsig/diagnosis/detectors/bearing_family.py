@@ -141,7 +141,7 @@ def best_unnamed(signals: Signals, envelopes: list[BandEnvelope]) -> Candidate |
     best = clearest_family(envelopes, 1.5 * slowest, 14.0 * fastest)
     if best is None or best.p_value > signals.settings.false_alarm_probability:
         return None
-    train = slower_train(best.envelope.excess, best.comb)
+    train = slower_train(best.envelope.excess, best.comb, tuple(signals.known_shaft_orders.values()))
     if train is not None:
         return _as_cage(signals, replace(best, comb=train, in_train=True))
     known = _known_multiple(signals, best)
@@ -184,7 +184,7 @@ def _is_within(comb: Comb, envelope: BandEnvelope, order: float, slip: float) ->
 
 def _train_of(signals: Signals, candidate: Candidate) -> Candidate | None:
     """Return the train of impacts that a candidate's lines are a part of, if it is one."""
-    train = slower_train(candidate.envelope.excess, candidate.comb)
+    train = slower_train(candidate.envelope.excess, candidate.comb, tuple(signals.known_shaft_orders.values()))
     if train is None or _is_modulated_by_cage(signals, candidate, train):
         return None
     free = replace(candidate, comb=train, bearing=None, name="", expected=0.0, rivals=(), share=1.0, in_train=True)

@@ -27,6 +27,7 @@ SHARE_SEEN = 0.5
 """Share of a train's further lines that must be seen; sidebands of a race's family make few of them."""
 
 FEWEST_FURTHER = 3
+N_SIDEBANDS = 3
 COST = 0.4
 """What a line costs, between noise (0) and the family's own mean (1): a train that adds noise lines loses."""
 
@@ -35,18 +36,21 @@ PLACEBO_RATIO = 0.9
 """A family that is a part's own scores clearly higher than the best ones beside it."""
 
 
-def slower_train(excess: LineExcess, comb: Comb) -> Comb | None:
+def slower_train(excess: LineExcess, comb: Comb, shafts: tuple[float, ...] = ()) -> Comb | None:
     """Return the train of impacts whose lines a family is a part of, or None if the family stands alone.
 
     Tried are p/q of the family's fundamental (q to 30, p to 3), over the range of the family's own lines. The best is
     that of the largest sum of log ratios less a cost per line: a train that is too slow pays for lines of noise, one
-    that is too fast leaves lines to others. It counts if at least half of its lines beside the family's are seen.
+    that is too fast leaves lines to others. It counts if at least half of its lines beside the family's are seen, and
+    beside the sidebands of the family: a race that turns through the load has them a shaft's order apart.
 
     Parameters
     ----------
     excess : LineExcess
     comb : Comb
         A family of multiples of one fundamental.
+    shafts : tuple of float
+        Orders of the shafts that may modulate the family.
 
     Returns
     -------
@@ -65,7 +69,7 @@ def slower_train(excess: LineExcess, comb: Comb) -> Comb | None:
         if fundamental < FEWEST_LINES_APART * excess.spectrum.resolution:
             continue
         score = float(np.sum(_unmasked(excess, fundamental, reach) - cost))
-        if score > best_score and _is_seen_between(excess, fundamental, comb.fundamental, reach):
+        if score > best_score and _is_seen_between(excess, fundamental, comb.fundamental, reach, shafts):
             best, best_score = fundamental, score
     if best is None:
         return None
@@ -101,11 +105,17 @@ def _unmasked(excess: LineExcess, fundamental: float, reach: float) -> FloatArra
     return ratios
 
 
-def _is_seen_between(excess: LineExcess, fundamental: float, family: float, reach: float) -> bool:
-    """Whether at least half of the train's lines that are none of the family's stand out."""
+def _is_seen_between(
+    excess: LineExcess, fundamental: float, family: float, reach: float, shafts: tuple[float, ...]
+) -> bool:
+    """Whether at least half of the train's lines stand out that are none of the family's and none of its sidebands."""
     places = np.arange(1, int(reach / fundamental) + 1) * fundamental
-    of_family = np.abs(places / family - np.rint(places / family)) * family < 2 * excess.spectrum.resolution
-    index = _lines_of(excess, places[~of_family])
+    sidebands = [0.0, *(side * k * shaft for shaft in shafts for k in range(1, N_SIDEBANDS + 1) for side in (-1, 1))]
+    explained = np.zeros(len(places), dtype=np.bool_)
+    for sideband in sidebands:
+        number = (places - sideband) / family
+        explained |= np.abs(number - np.rint(number)) * family < 2 * excess.spectrum.resolution
+    index = _lines_of(excess, places[~explained])
     further = excess.log_ratio[index[~excess.masked[index]]]
     return len(further) >= FEWEST_FURTHER and float(np.mean(further >= SEEN)) >= SHARE_SEEN
 
