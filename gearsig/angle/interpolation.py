@@ -19,6 +19,7 @@ REACH = HALF_BAND + _NEAR // 2 + 1
 """Samples on each side of a point that take part in its value."""
 
 _N_PHASES = 512
+_BLOCK = 512
 # -116 dB; with 2 × 20 taps the error is 3e-6 at 0.4 of the sampling rate and below 1e-6 up to 0.2.
 _KAISER_BETA = 0.1102 * (116.0 - 8.7)
 
@@ -76,19 +77,25 @@ def interpolate(x, positions, side, table, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _doubled(x, first, n, side):  # type: ignore[no-untyped-def]
-    """Samples first to first + n of x, each followed by the value half way to the next."""
-    middle = np.zeros(n)
-    for j in range(side.shape[0]):
-        weight = side[j]
-        left = x[first - j : first - j + n]
-        right = x[first + j + 1 : first + j + 1 + n]
-        for i in range(n):
-            middle[i] += weight * (left[i] + right[i])
-    here = x[first : first + n]
+    """Samples first to first + n of x, each followed by the value half way to the next.
+
+    In blocks that stay in the processor's nearest cache while the taps run over them.
+    """
     doubled = np.empty(2 * n)
-    for i in range(n):
-        doubled[2 * i] = here[i]
-        doubled[2 * i + 1] = middle[i]
+    middle = np.empty(_BLOCK)
+    for start in range(0, n, _BLOCK):
+        m = min(_BLOCK, n - start)
+        at = first + start
+        middle[:m] = 0.0
+        for j in range(side.shape[0]):
+            weight = side[j]
+            left = x[at - j : at - j + m]
+            right = x[at + j + 1 : at + j + 1 + m]
+            for i in range(m):
+                middle[i] += weight * (left[i] + right[i])
+        for i in range(m):
+            doubled[2 * (start + i)] = x[at + i]
+            doubled[2 * (start + i) + 1] = middle[i]
     return doubled
 
 

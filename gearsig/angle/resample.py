@@ -180,9 +180,12 @@ def _fill(
         times = np.empty(stop - start)
         knot = min(max(0, int(np.searchsorted(revolutions, begin)) - 1), len(knots) - 2)
         times_at(knots, revolutions, speeds, knot, begin, 1.0 / n_per_rev, times)
-        scale = np.empty(stop - start)
         around = slice(knot, min(len(knots), int(np.searchsorted(knots, times[-1])) + 1))
-        coarse = scales_at(knots[around], speeds[around], times, n_per_rev / rate, LOWEST_SCALE, scale) < 1.0 - 1e-6
+        # The speed is linear between knots here: if none of them is slow, no time between them is.
+        coarse = float(speeds[around].min()) * n_per_rev / rate < 1.0 - 1e-6
+        scale = np.empty(stop - start if coarse else 0)
+        if coarse:
+            coarse = scales_at(knots[around], speeds[around], times, n_per_rev / rate, LOWEST_SCALE, scale) < 1.0 - 1e-6
         times *= rate
         positions = np.clip(times, REACH, recording.n_samples - 1 - REACH, out=times)
         for signal, out in zip(signals, samples, strict=True):
