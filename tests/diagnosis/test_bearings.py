@@ -209,6 +209,17 @@ def test_sidebands_of_a_shaft_near_a_fifth_of_the_family_are_no_train() -> None:
     assert slower_train(excess, comb, (shaft_hz,)) is None
 
 
+def test_a_train_three_times_as_slow_as_a_shaft_is_one() -> None:
+    rng = np.random.default_rng(10)
+    shaft_hz, true_hz = 10.0, 3.31  # three of the train's lines make nearly a shaft's order
+    excess = lines([true_hz * k for k in range(1, 30)], rng).without_multiples(shaft_hz)
+    comb = best_comb(excess, 13.0, 13.5)
+    assert comb is not None
+    train = slower_train(excess, comb, (shaft_hz,))
+    assert train is not None
+    assert train.fundamental == pytest.approx(true_hz, rel=1e-3)
+
+
 def test_a_family_among_others_as_clear_does_not_stand_out() -> None:
     rng = np.random.default_rng(7)
     excess = lines([1.3 * k for k in range(1, 250)], rng)  # any order has a multiple of 1.3 Hz near it

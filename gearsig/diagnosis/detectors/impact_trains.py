@@ -111,13 +111,27 @@ def _is_seen_between(
     """Whether at least half of the train's lines stand out that are none of the family's and none of its sidebands."""
     places = np.arange(1, int(reach / fundamental) + 1) * fundamental
     sidebands = [0.0, *(side * k * shaft for shaft in shafts for k in range(1, N_SIDEBANDS + 1) for side in (-1, 1))]
-    explained = np.zeros(len(places), dtype=np.bool_)
-    for sideband in sidebands:
-        number = (places - sideband) / family
-        explained |= np.abs(number - np.rint(number)) * family < 2 * excess.spectrum.resolution
+    explained = np.any([_is_of_family(excess, places, family, sideband) for sideband in sidebands], axis=0)
     index = _lines_of(excess, places[~explained])
     further = excess.log_ratio[index[~excess.masked[index]]]
     return len(further) >= FEWEST_FURTHER and float(np.mean(further >= SEEN)) >= SHARE_SEEN
+
+
+def _is_of_family(excess: LineExcess, places: FloatArray, family: float, sideband: float) -> NDArray[np.bool_]:
+    """Whether a multiple of the family, shifted by `sideband`, is near and meets the peak at least as well."""
+    others = sideband + np.maximum(np.rint((places - sideband) / family), 0) * family
+    near: NDArray[np.bool_] = np.abs(others - places) < 2 * excess.spectrum.resolution
+    if sideband:
+        height, other_height = (excess.spectrum.values[_clipped_lines(excess, x)] for x in (places, others))
+        near = near & (other_height >= height)
+    return near
+
+
+def _clipped_lines(excess: LineExcess, places: FloatArray) -> NDArray[np.int64]:
+    spectrum = excess.spectrum
+    index = np.rint((places - spectrum.positions[0]) / spectrum.resolution).astype(np.int64)
+    clipped: NDArray[np.int64] = np.clip(index, 0, len(spectrum.values) - 1)
+    return clipped
 
 
 def _lines_of(excess: LineExcess, places: FloatArray) -> NDArray[np.int64]:
