@@ -61,8 +61,10 @@ def _between(a, b, c, low, high, offset, step, start, last, t0, h, out):  # type
         s = (j - start + 1) * per_point
         wanted = offset + j * step
         u = low + ((guess_c * s + guess_b) * s + m0) * s
-        u -= (((c * u + b) * u + a) * u - wanted) / ((3.0 * c * u + 2.0 * b) * u + a)
-        change = (((c * u + b) * u + a) * u - wanted) / ((3.0 * c * u + 2.0 * b) * u + a)
+        # The slope hardly changes between the two steps: one division serves both.
+        per_slope = 1.0 / ((3.0 * c * u + 2.0 * b) * u + a)
+        u -= (((c * u + b) * u + a) * u - wanted) * per_slope
+        change = (((c * u + b) * u + a) * u - wanted) * per_slope
         worst = max(worst, abs(change))
         out[j] = t0 + (u - change) * h
     # Newton's error squares itself: after a step of 1e-8 the next one would be below rounding.
