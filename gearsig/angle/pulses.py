@@ -84,6 +84,8 @@ def find_pulse_edges(
     positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
     one_of(edge, "edge", ("rising", "falling"))
     low, high = (float(v) for v in np.percentile(x, (_LOW_PERCENTILE, _HIGH_PERCENTILE)))
+    if high - low < 0.1 * float(np.ptp(x)):  # pulses so short or few that the percentiles pass them by
+        low, high = float(x.min()), float(x.max())
     if threshold is None:
         _check_two_levels(x, low, high)
         threshold = 0.5 * (low + high)

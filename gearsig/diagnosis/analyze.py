@@ -57,7 +57,7 @@ def analyze(recording: Recording, rig: Rig | None = None, settings: AnalysisSett
     _check_size(recording)
     findings, dead = detect_data_problems(recording)
     names = [name for name in recording.vibration_names() if name not in dead]
-    angle = _within_record(determine_angle(recording, known), recording)
+    angle = _angle_of(recording, known)
     findings.append(speed_finding(angle))
     if not names:
         findings.append(Finding("all-channels-dead", Kind.CANNOT_TELL, "Every vibration channel is dead."))
@@ -80,14 +80,17 @@ def analyze(recording: Recording, rig: Rig | None = None, settings: AnalysisSett
     )
 
 
-def _within_record(angle: ShaftAngle | CannotTell, recording: Recording) -> ShaftAngle | CannotTell:
-    """Cut the angle to the record's own time: pulses may go on before and after it, revolutions there do not count."""
-    if isinstance(angle, CannotTell):
-        return angle
+def _angle_of(recording: Recording, rig: Rig) -> ShaftAngle | CannotTell:
+    """Return the angle within the record's own time; pulses may go on before and after it, but do not count."""
+    source = recording.provenance.source
     try:
-        return angle.between(0.0, recording.duration_s)
+        angle = determine_angle(recording, rig)
+        return angle if isinstance(angle, CannotTell) else angle.between(0.0, recording.duration_s)
     except RefusalError as refusal:
         return CannotTell("What is the speed of the shafts?", refusal.reason, refusal.remedy)
+    except InputError as error:  # it names the channel; which file it is in is known here
+        where = ": ".join(part for part in (source, error.where) if part)
+        raise InputError(error.what, where=where, allowed=error.allowed, remedy=error.remedy) from None
 
 
 def _detect(signals: Signals, envelopes: list[BandEnvelope]) -> list[Finding]:

@@ -61,3 +61,11 @@ def test_no_levels_are_refused() -> None:
 def test_a_wrong_edge_is_named() -> None:
     with pytest.raises(InputError, match="rising, falling"):
         find_pulse_edges(np.zeros(10), RATE, edge="up")
+
+
+def test_a_single_short_pulse_is_found_by_its_own_levels() -> None:
+    channel = np.zeros(100_000)
+    channel[5000:5010] = 5.0
+    edges = find_pulse_edges(channel + 1e-3 * np.random.default_rng(0).normal(size=len(channel)), 1000.0)
+    assert edges.times_s == pytest.approx([5.0], abs=1e-3)
+    assert edges.high == pytest.approx(5.0, abs=0.01)

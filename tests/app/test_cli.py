@@ -157,6 +157,30 @@ def test_bad_pulse_files(capsys: pytest.CaptureFixture[str], tmp_path: Path, pul
     assert "puls" in err
 
 
+@pytest.mark.parametrize("n_pulses", [0, 1])
+def test_a_tachometer_channel_without_pulses(capsys: pytest.CaptureFixture[str], tmp_path: Path, n_pulses: int) -> None:
+    tacho = np.zeros(4000)
+    tacho[1000 : 1000 + 20 * n_pulses] = 5.0
+    values = np.random.default_rng(0).normal(size=len(tacho))
+    path = csv(tmp_path, "a1,tacho\n" + "\n".join(f"{v:.4g},{p:g}" for v, p in zip(values, tacho, strict=True)))
+    rig = csv(tmp_path, RIG + '[speed]\nsource = "tachometer"\nchannel = "tacho"\nshaft = "in"\n', "rig.toml")
+    code, out, err = run(capsys, "analyze", path, "--fs", 1000, "--rig", rig)
+    if n_pulses:
+        assert code == 2
+        assert "record.csv" in err
+        assert "tacho" in err
+        assert len(err.strip().splitlines()) == 1
+    else:  # a machine at rest makes no pulses: no mistake of the user's, but no answer either
+        assert code == 0
+        assert "no pulses" in out
+
+
+def test_a_folder_is_no_recording(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    code, _, err = run(capsys, "analyze", tmp_path)
+    assert code == 2
+    assert "folder" in err
+
+
 def test_a_report_that_cannot_be_written(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     occupied = csv(tmp_path, "not a folder", "pages")
     code, _, err = run(capsys, "report", sample("healthy"), "-o", occupied)
