@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from gearsig.angle.pulses import find_pulse_edges
@@ -17,6 +17,8 @@ T = np.arange(250_001) * 4e-6
 @settings(max_examples=25)
 @given(st.integers(1, 30), st.floats(0.05, 0.95), st.floats(0.0, 1.0), st.floats(1.0, 40.0))
 def test_edges_of_steady_rotation_lie_where_the_disc_says(n, duty, offset, rev_per_s):
+    start = (-offset * n) % 1.0
+    assume(min(abs(start - duty), start, 1.0 - start) > 1e-9)  # an edge at time 0 itself may count or not
     rising, falling, high = disc_edges(rev_per_s * T, T, n, duty, offset)
     k = np.round((rising * rev_per_s - offset) * n)
     np.testing.assert_allclose(rising, (k / n + offset) / rev_per_s, atol=1e-11)
