@@ -105,6 +105,11 @@ class Comb:
     floor: float
 
 
+def over_floor_db(amplitude: float, floor: float) -> float:
+    """Return 20 lg(amplitude/floor), of vanishing amplitudes and floors too."""
+    return 20 * float(np.log10(max(amplitude, 1e-300) / max(floor, 1e-300)))
+
+
 def line_excess(spectrum: Spectrum, floor: FloatArray) -> LineExcess:
     """Return the excess of each line of an amplitude spectrum over its floor."""
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -308,7 +313,7 @@ def _lines_near(
         position, amplitude = spectrum.largest_near(place, 2 * spectrum.resolution)
         i = spectrum.index_of(position)
         floor = float(excess.floor[i])
-        ratio = 20 * float(np.log10(max(amplitude, 1e-300) / max(floor, 1e-300)))
+        ratio = over_floor_db(amplitude, floor)
         if ratio >= CLEAR_LINE_DB and not excess.masked[i]:
             position = _peak_position(spectrum, i)
             found.append(_Line(position, position - float(origin), int(multiple), amplitude, floor, ratio))

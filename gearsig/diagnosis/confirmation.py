@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from gearsig.diagnosis.comb import LineExcess
+from gearsig.diagnosis.comb import LineExcess, over_floor_db
 from gearsig.diagnosis.signals import Signals
 from gearsig.rig.types import GearPair
 
@@ -73,5 +71,5 @@ def _line_at(excess: LineExcess, channel: str, harmonic: int, order: float) -> C
     found, amplitude = spectrum.largest_near(order, ON_PLACE_LINES * spectrum.resolution)
     around = spectrum.largest_near(order, AROUND_LINES * spectrum.resolution)[1]
     floor = float(excess.floor[spectrum.index_of(found)])
-    ratio = 20 * float(np.log10(max(amplitude, 1e-300) / max(floor, 1e-300)))
+    ratio = over_floor_db(amplitude, floor)
     return ConfirmingLine(channel, harmonic, found, amplitude, floor, ratio, spectrum.unit, amplitude >= around)

@@ -79,7 +79,7 @@ def largest_event(shaft: ShaftSignals, signals: Signals) -> LocalEvent:
         rng = np.random.default_rng(signals.settings.seed)
         n_surrogates = signals.settings.n_surrogates
         results.append(localise(above(full, start), above(halves, start), width, n_surrogates, rng))
-    best = int(np.argmin([(r.p_value, -r.ratio_db)[0] for r in results]))
+    best = int(np.argmin([r.p_value for r in results]))
     place = replace(results[best], p_value=min(1.0, results[best].p_value * len(results)))
     return _described(shaft, signals, place, above(full, starts[best]), starts[best])
 

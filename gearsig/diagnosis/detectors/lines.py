@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearsig.diagnosis.comb import LineExcess
+from gearsig.diagnosis.comb import LineExcess, over_floor_db
 from gearsig.diagnosis.signals import Signals, floor_of
+from gearsig.diagnosis.speed import MAINS_HZ
 from gearsig.diagnosis.surroundings import RUN_UP_FOOT_ORDERS, levels_beside
 from gearsig.diagnosis.types import Finding, Kind, Strength, Where
 
-MAINS_HZ = (50.0, 60.0)
 CLEAR_DB = 15.0
 """Power over mean floor that noise exceeds in one line of 10¹³: also over a million lines, a chance of 10⁻⁷."""
 
@@ -146,5 +146,4 @@ def _ratio_db(excess: LineExcess, position: float, half_width: float) -> float:
     found, amplitude = spectrum.largest_near(position, half_width)
     if abs(found - position) > half_width:
         return 0.0
-    floor = max(float(excess.floor[spectrum.index_of(found)]), 1e-300)
-    return 20 * float(np.log10(max(amplitude, 1e-300) / floor))
+    return over_floor_db(amplitude, float(excess.floor[spectrum.index_of(found)]))
