@@ -1,0 +1,57 @@
+"""All effects, found by their files: a module of this package with an `EFFECT` is one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from zlib import crc32
+
+import numpy as np
+
+from gearsig.checks import closest_match_hint
+from gearsig.errors import InputError
+from sims.effects.effect import GROUPS, Effect, EffectSetting
+from sims.machine import Machine
+
+
+@cache
+def effects() -> dict[str, Effect]:
+    """Return every effect by name, in the order of the groups."""
+    import sims.effects as package
+
+    modules = [import_module(f"sims.effects.{m.name}") for m in iter_modules(package.__path__)]
+    found = [m.EFFECT for m in modules if hasattr(m, "EFFECT")]
+    return {e.name: e for e in sorted(found, key=lambda e: (GROUPS.index(e.group), e.name))}
+
+
+def effect(name: str) -> Effect:
+    """Return the effect called `name`."""
+    found = effects()
+    if name not in found:
+        raise InputError(
+            f"there is no effect {name!r}", allowed=", ".join(found), remedy=closest_match_hint(name, found)
+        )
+    return found[name]
+
+
+def with_effects(machine: Machine, settings: Iterable[EffectSetting], rng: np.random.Generator) -> Machine:
+    """Return the machine with the effects switched on, mechanical ones first.
+
+    Every effect draws from a stream of its own, made of one number of `rng` and the effect's name: adding an effect
+    leaves what the others draw unchanged, and exactly one number is taken from `rng`.
+    """
+    seed = int(rng.integers(2**63))
+    chosen = sorted(settings, key=lambda s: GROUPS.index(effect(s.name).group))
+    for place, setting in enumerate(chosen):
+        same_before = sum(s.name == setting.name for s in chosen[:place])
+        stream = np.random.default_rng([seed, crc32(setting.name.encode()), same_before])
+        machine = effect(setting.name).apply(machine, setting.severity, setting.options, stream)
+    return machine
+
+
+def replaced_item(items: tuple, index: int, **changes: object) -> tuple:  # type: ignore[type-arg]  # any dataclasses
+    """Return a tuple of dataclasses with fields of one of them changed."""
+    return tuple(replace(item, **changes) if i == index else item for i, item in enumerate(items))
