@@ -125,7 +125,10 @@ def fill_pairs(
     rows_2: FloatArray,
     variant_1: FloatArray,
     variant_2: FloatArray,
-    flank: FloatArray,
+    separation_1: FloatArray,
+    separation_2: FloatArray,
+    surface_1: FloatArray,
+    surface_2: FloatArray,
     pitch_1: FloatArray,
     pitch_2: FloatArray,
     contact_ratio: float,
@@ -144,5 +147,8 @@ def fill_pairs(
             compliance[row, j] = cubic(rows_1[variant_1[tooth_1]], start, step, progress) + cubic(
                 rows_2[variant_2[tooth_2]], start, step, progress
             )
-            separation[row, j] = cubic(flank, start, step, progress) + pitch_1[tooth_1] + pitch_2[tooth_2]
+            flanks = cubic(separation_1[surface_1[tooth_1]], start, step, progress) + cubic(
+                separation_2[surface_2[tooth_2]], start, step, progress
+            )
+            separation[row, j] = flanks + pitch_1[tooth_1] + pitch_2[tooth_2]
             weight[row, j] = engagement(progress, contact_ratio, ramp)

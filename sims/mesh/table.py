@@ -17,22 +17,37 @@ from sims.mesh.gear_mesh import GearMesh
 class MeshTable:
     """Compliance and separation of a tooth pair over ζ, base pitches since its ideal entry.
 
+    A pair made of tooth i of the driver and tooth j of the driven gear has the compliance
+    compliance_1[variant_1[i]] + compliance_2[variant_2[j]] + that of the contact, and the separation
+    separation_1_m[surface_1[i]] + separation_2_m[surface_2[j]] + pitch_1_m[i] + pitch_2_m[j].
+
     Parameters
     ----------
     start, step : float
-        ζ of the first column and between columns; one column lies beyond either end, for cubic interpolation.
+        ζ of the first column and between columns; one column lies beyond either end, for cubic interpolation. All
+        rows share the columns: n = `n_points` + 2.
     compliance_1, compliance_2 : arrays, (n_variants, n)
-        Tooth and foundation of either gear, m/N. Row 0 is a sound tooth, each further row a cracked one.
+        Tooth and foundation of either gear, m/N. Row 0 is a sound tooth, each further row a faulty one.
     variant_1, variant_2 : int arrays, (z,)
-        Row of each tooth.
-    separation_m : array, (n,)
-        Metal missing on both flanks together.
+        Row of `compliance_1`, `compliance_2` for each tooth.
+    separation_1_m, separation_2_m : arrays, (n_surfaces, n)
+        Metal missing on the flank of either gear along the line of action, below 0 where metal stands out. Row 0 is an
+        ordinary tooth of the gear: tip relief, profile deviation, wear. Further rows belong to teeth whose flank is
+        damaged. A gear with roughness of its own has a row for each tooth, row 0 being that of tooth 0.
+    surface_1, surface_2 : int arrays, (z,)
+        Row of `separation_1_m`, `separation_2_m` for each tooth.
     pitch_1_m, pitch_2_m : arrays, (z,)
+        Cumulative pitch deviation of each tooth; not in the rows above.
     contact_coefficient : float
         m/N, or m/N^0.9 if `load_dependent`.
     load_dependent : bool
-    contact_ratio, ramp : float
+        Whether the approach grows with the 0.9th power of the force.
+    contact_ratio : float
+        ε.
+    ramp : float
+        Base pitches over which a pair takes up and gives up its stiffness, centred on ζ = 0 and ζ = ε.
     n_slots : int
+        Most pairs that carry load at once.
     """
 
     start: float
@@ -41,7 +56,10 @@ class MeshTable:
     compliance_2: FloatArray
     variant_1: NDArray[np.int64]
     variant_2: NDArray[np.int64]
-    separation_m: FloatArray
+    separation_1_m: FloatArray
+    separation_2_m: FloatArray
+    surface_1: NDArray[np.int64]
+    surface_2: NDArray[np.int64]
     pitch_1_m: FloatArray
     pitch_2_m: FloatArray
     contact_coefficient: float
@@ -68,7 +86,6 @@ def mesh_table(mesh: GearMesh, n_points: int = 512) -> MeshTable:
     rows_2, variant_2 = _rows(mesh, 2, progress, mesh.cracks_2, mesh.pair.driven.teeth)
     rho_1, rho_2 = mesh.pair.contact_radii_mm(progress)
     one, two = mesh.pair.driver, mesh.pair.driven
-    separation = flank_separation_m(one, mesh.flank_1, rho_1) + flank_separation_m(two, mesh.flank_2, rho_2)
     return MeshTable(
         start=low - step,
         step=step,
@@ -76,7 +93,10 @@ def mesh_table(mesh: GearMesh, n_points: int = 512) -> MeshTable:
         compliance_2=rows_2,
         variant_1=variant_1,
         variant_2=variant_2,
-        separation_m=separation,
+        separation_1_m=flank_separation_m(one, mesh.flank_1, rho_1)[None, :],
+        separation_2_m=flank_separation_m(two, mesh.flank_2, rho_2)[None, :],
+        surface_1=np.zeros(one.teeth, dtype=np.int64),
+        surface_2=np.zeros(two.teeth, dtype=np.int64),
         pitch_1_m=pitch_separation_m(one, mesh.flank_1),
         pitch_2_m=pitch_separation_m(two, mesh.flank_2),
         contact_coefficient=mesh.contact_coefficient,
