@@ -44,7 +44,8 @@ class Option:
     Parameters
     ----------
     name : str
-    default : float or str
+    default : float, str or None
+        None: a number that the effect draws from its random stream where it is not given (an angle, a phase).
     meaning : str
     unit : str
     low, high : float or None
@@ -56,7 +57,7 @@ class Option:
     """
 
     name: str
-    default: OptionValue
+    default: OptionValue | None
     meaning: str
     unit: str = ""
     low: float | None = None
@@ -106,7 +107,8 @@ class Effect:
         The same for programs: of "mesh_harmonics", "mesh_sidebands", "shaft_orders", "tooth_window",
         "envelope_orders", "broadband", "mains_lines", "amplitude_tail", "resonances", "speed", "low_load".
     change : callable
-        (machine, severity, options, rng) → machine. It must not change the machine at severity 0.
+        (machine, severity, options, rng) → machine, for a severity above 0. Its change vanishes with the severity, and
+        what it draws does not depend on it, so that one seed at rising severities shows one fault that grows.
     options : tuple of Option
     """
 
@@ -130,7 +132,7 @@ class Effect:
         options: Mapping[str, OptionValue],
         rng: np.random.Generator,
     ) -> Machine:
-        """Return the machine with the effect, after checking severity and options.
+        """Return the machine with the effect, after checking severity and options; at severity 0, the machine itself.
 
         Raises
         ------
@@ -139,10 +141,11 @@ class Effect:
         """
         s = self.severity
         within(severity, f"{s.name} of {self.name}", s.low, s.high, s.unit)
-        return self.change(machine, float(severity), self.complete(options), rng)
+        complete = self.complete(options)
+        return machine if severity == 0 else self.change(machine, float(severity), complete, rng)
 
     def complete(self, options: Mapping[str, OptionValue]) -> dict[str, OptionValue]:
-        """Return the options, checked, with defaults for those not given."""
+        """Return the options, checked, with defaults for those not given; those left to be drawn are not in it."""
         names = [option.name for option in self.options]
         for name in options:
             if name not in names:
@@ -151,7 +154,8 @@ class Effect:
                     allowed=", ".join(names) or "none",
                     remedy=closest_match_hint(name, names),
                 )
-        return {o.name: o.check(options.get(o.name, o.default), self.name) for o in self.options}
+        given = {o: options.get(o.name, o.default) for o in self.options}
+        return {o.name: o.check(value, self.name) for o, value in given.items() if value is not None}
 
 
 @dataclass(frozen=True)
