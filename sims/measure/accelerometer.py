@@ -27,6 +27,9 @@ class Accelerometer:
         -3 dB point of the coupling; 0: measures down to a standing acceleration.
     range_mps2 : float or None
         Values are held at ± this; None: no limit.
+    clip_percent : float
+        A range that is too small for the signal: values are held at the level that the reading exceeds this part of the
+        recording's time, 0 to 50 %. The level follows from each signal; `range_mps2` stays the same for all.
     noise_mps2_per_sqrt_hz : float
         One-sided density of white noise.
     bias_mps2 : float
@@ -45,6 +48,7 @@ class Accelerometer:
     bias_mps2: float = 0.0
     drift_mps2_per_s: float = 0.0
     wander_mps2_per_sqrt_s: float = 0.0
+    clip_percent: float = 0.0
 
     def __post_init__(self) -> None:
         if self.resonance_hz is not None:
@@ -53,6 +57,7 @@ class Accelerometer:
         not_negative(self.lower_limit_hz, "lower_limit_hz of the accelerometer", "Hz")
         if self.range_mps2 is not None:
             positive(self.range_mps2, "range_mps2 of the accelerometer", "m/s^2")
+        within(self.clip_percent, "clip_percent of the accelerometer", 0.0, 50.0, "%")
         not_negative(self.noise_mps2_per_sqrt_hz, "noise_mps2_per_sqrt_hz of the accelerometer")
         not_negative(self.wander_mps2_per_sqrt_s, "wander_mps2_per_sqrt_s of the accelerometer")
         for name in ("bias_mps2", "drift_mps2_per_s"):
@@ -84,9 +89,15 @@ class Accelerometer:
             # From 0 at the recording's start, so that bias_mps2 means what it says.
             start = walk[np.searchsorted(time_s, 0.0)] if time_s[-1] >= 0 else walk[-1]
             reading += self.wander_mps2_per_sqrt_s * np.sqrt(step_s) * (walk - start)
-        if self.range_mps2 is not None:
-            reading = np.clip(reading, -self.range_mps2, self.range_mps2)
-        return reading
+        limit = self._limit_mps2(reading[time_s >= 0.0] if time_s[-1] >= 0.0 else reading)
+        return reading if limit is None else np.clip(reading, -limit, limit)
+
+    def _limit_mps2(self, reading: FloatArray) -> float | None:
+        """Where values are held; None for nowhere."""
+        if self.clip_percent == 0.0:
+            return self.range_mps2
+        level = float(np.quantile(np.abs(reading), 1.0 - self.clip_percent / 100.0))
+        return level if self.range_mps2 is None else min(level, self.range_mps2)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,33 @@
+"""Effect: more play between the flanks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from sims.effects.effect import Effect, OptionValue, Severity
+from sims.machine import Machine
+
+
+def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+    """Return the machine with wider play; half of it lies on either side."""
+    del options, rng
+    return replace(machine, half_backlash_um=machine.half_backlash_um + severity / 2.0)
+
+
+EFFECT = Effect(
+    name="backlash",
+    group="drive and load",
+    title="more backlash",
+    severity=Severity(
+        "added_um", "µm", 0.0, 1000.0, 100.0, "play that is added along the line of action, from flank to flank"
+    ),
+    changes="The flanks have that much more play. While the mesh force stays above zero nothing changes at all.",
+    signature="Only where teeth separate: at light load, at a resonance, in reversals and start–stop. There: impacts "
+    "on both flanks, a raised floor, subharmonics and chaotic motion, jumps of level over speed. At full steady load "
+    "it cannot be seen, and no method will.",
+    shows_in=("low_load", "broadband", "mesh_harmonics"),
+    change=change,
+)

@@ -1,0 +1,36 @@
+"""Effect: a bearing with too much play."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from sims.effects.bearing_choice import BEARING_OPTION, chosen_bearing, with_bearing
+from sims.effects.effect import Effect, OptionValue, Severity
+from sims.machine import Machine
+
+
+def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+    """Return the machine with clearance added to one bearing."""
+    del rng
+    index = chosen_bearing(machine, options)
+    return with_bearing(machine, index, clearance_um=machine.bearings[index].clearance_um + severity)
+
+
+EFFECT = Effect(
+    name="bearing_clearance",
+    group="bearing",
+    title="clearance in a bearing",
+    severity=Severity(
+        "added_um", "µm", 0.0, 200.0, 30.0, "radial distance from the middle until it carries: half the play; added"
+    ),
+    changes="The shaft moves that far before rolling elements carry; fewer of them do, so the support is softer and "
+    "its stiffness changes as they pass.",
+    signature="Harmonics of the bearing's shaft, and lines at the orders at which elements pass (n(1 − d cos α/D)/2), "
+    "with sums and differences to the mesh; impacts and a raised floor where the load is light enough to let the "
+    "shaft lift. Lower support resonances, also under load.",
+    shows_in=("shaft_orders", "envelope_orders", "resonances", "low_load"),
+    change=change,
+    options=(BEARING_OPTION,),
+)

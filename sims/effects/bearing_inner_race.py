@@ -1,0 +1,32 @@
+"""Effect: a spall on the inner race of a bearing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from sims.effects.bearing_choice import RACE_OPTIONS, with_race_defect
+from sims.effects.effect import Effect, OptionValue, Severity
+from sims.machine import Machine
+
+
+def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+    """Return the machine with the defect; the angle counts from tooth 0 at time 0."""
+    del rng  # the places of the rolling elements are drawn by the simulator
+    return with_race_defect(machine, "inner", severity, options)
+
+
+EFFECT = Effect(
+    name="bearing_inner_race",
+    group="bearing",
+    title="spall on an inner race",
+    severity=Severity("length_mm", "mm", 0.0, 10.0, 2.0, "along the raceway; no longer than the elements' spacing"),
+    changes="Rolling elements sink into a gap of the turning race and strike its far edge, hardest in the load zone.",
+    signature="Knocks at n(1 + d cos α/D)/2 per revolution of the bearing's shaft less slip, strong while the defect "
+    "turns through the load zone and weak outside: envelope lines of that order and its multiples with sidebands of "
+    "one shaft order, and order 1 itself. Slightly random, so that a synchronous average takes it away.",
+    shows_in=("envelope_orders", "resonances", "broadband"),
+    change=change,
+    options=RACE_OPTIONS,
+)

@@ -1,0 +1,33 @@
+"""Effect: a spall on the outer race of a bearing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from sims.effects.bearing_choice import RACE_OPTIONS, with_race_defect
+from sims.effects.effect import Effect, OptionValue, Severity
+from sims.machine import Machine
+
+
+def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+    """Return the machine with the defect; the angle counts from the middle of the load zone."""
+    del rng  # the places of the rolling elements are drawn by the simulator
+    return with_race_defect(machine, "outer", severity, options)
+
+
+EFFECT = Effect(
+    name="bearing_outer_race",
+    group="bearing",
+    title="spall on an outer race",
+    severity=Severity("length_mm", "mm", 0.0, 10.0, 2.0, "along the raceway; no longer than the elements' spacing"),
+    changes="Rolling elements sink into a gap of the standing race and strike its far edge.",
+    signature="A knock for every element that passes, n(1 − d cos α/D)/2 per revolution of the bearing's shaft less "
+    "slip: lines of that order and its multiples in the envelope about a resonance, all nearly as strong as the load "
+    "zone does not move; not a multiple of any shaft order, and slightly random, so that a synchronous average takes "
+    "it away.",
+    shows_in=("envelope_orders", "resonances", "broadband"),
+    change=change,
+    options=RACE_OPTIONS,
+)

@@ -1,0 +1,43 @@
+"""Effect: a measuring range that is too small."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from sims.effects.chain_channels import with_each_channel
+from sims.effects.effect import Effect, OptionValue, Severity
+from sims.machine import Machine
+from sims.measure import MeasuredChannel
+
+
+def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+    """Return the machine with sensors that clip."""
+    del options, rng
+
+    def with_clipping(channel: MeasuredChannel) -> MeasuredChannel:
+        # Of two limits only the lower one is ever reached.
+        percent = max(channel.accelerometer.clip_percent, severity)
+        return replace(channel, accelerometer=replace(channel.accelerometer, clip_percent=percent))
+
+    return with_each_channel(machine, with_clipping)
+
+
+EFFECT = Effect(
+    name="clipping",
+    group="measurement chain",
+    title="clipped signal",
+    severity=Severity(
+        "clipped_percent", "%", 0.0, 50.0, 2.0, "part of the time that the sensor stands at its limit, per recording"
+    ),
+    changes="Every accelerometer is held at the level that its reading exceeds that part of the time. The level "
+    "follows from each recording's own signal: another speed or load has another one. For one range throughout, set "
+    "the accelerometer's range instead.",
+    signature="The amplitude distribution is cut off: crest factor and kurtosis fall, extreme values pile up at one "
+    "level on both sides. Odd harmonics and sums of the strongest lines appear as far as the filter lets them; "
+    "impulses lose most, so that a local fault looks smaller.",
+    shows_in=("amplitude_tail", "mesh_harmonics", "broadband"),
+    change=change,
+)

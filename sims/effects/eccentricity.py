@@ -1,0 +1,52 @@
+"""Effect: a gear that sits off its axis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from sims.effects.catalogue import replaced_item
+from sims.effects.effect import GEAR_OPTION, Effect, OptionValue, Severity
+from sims.effects.gear_side import gear_index
+from sims.effects.polar import ANGLE_OPTION, angle_or_drawn_deg, vector_sum
+from sims.machine import Machine
+
+
+def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+    """Return the machine with run-out, and the unbalance that goes with it."""
+    index, angle = gear_index(options), angle_or_drawn_deg(options, rng)
+    wheel = machine.wheels[index]
+    runout, runout_angle = vector_sum(wheel.runout_um, wheel.runout_angle_deg, severity, angle)
+    # The body is concentric with the pitch circle, so its centre of mass moves along: 1 kg µm = 1 g mm.
+    unbalance, unbalance_angle = vector_sum(
+        wheel.unbalance_g_mm, wheel.unbalance_angle_deg, wheel.mass_kg * severity, angle
+    )
+    wheels = replaced_item(
+        machine.wheels,
+        index,
+        runout_um=runout,
+        runout_angle_deg=runout_angle,
+        unbalance_g_mm=unbalance,
+        unbalance_angle_deg=unbalance_angle,
+    )
+    return replace(machine, wheels=wheels)
+
+
+EFFECT = Effect(
+    name="eccentricity",
+    group="shaft",
+    title="gear off its axis",
+    severity=Severity(
+        "runout_um", "µm", 0.0, 200.0, 20.0, "distance of the pitch circle's centre from the axis: half the run-out"
+    ),
+    changes="The pitch circle of one gear turns about a point off its centre; the centre of mass moves along (mass "
+    "times run-out is added to the unbalance). Both add as vectors to what is there.",
+    signature="Order 1 of that gear's shaft in transmission error, speed and vibration; strong first sidebands of "
+    "that shaft about the mesh harmonics (z ± 1, 2z ± 1, …), a smooth modulation all round the revolution and no "
+    "pulse. Hardly any change with the load; order 1 grows with speed.",
+    shows_in=("shaft_orders", "mesh_sidebands"),
+    change=change,
+    options=(GEAR_OPTION, ANGLE_OPTION),
+)

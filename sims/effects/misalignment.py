@@ -1,0 +1,42 @@
+"""Effect: a coupling that joins two axes at an angle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from gearsig.checks import within
+from sims.effects.catalogue import replaced_item
+from sims.effects.effect import Effect, Option, OptionValue, Severity
+from sims.effects.gear_side import GEARS, gear_index
+from sims.machine import Machine
+
+_MOST_DEG = 5.0  # of a ShaftLine
+
+
+def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+    """Return the machine with the angle added in the plane of the one there is."""
+    del rng
+    index = gear_index(options, "shaft")
+    now = machine.shafts[index].coupling_angle_deg
+    within(severity, f"angle_deg of misalignment, beside the {now:g}° there are,", 0.0, _MOST_DEG - now, "°")
+    shafts = replaced_item(machine.shafts, index, coupling_angle_deg=now + severity)
+    return replace(machine, shafts=shafts)
+
+
+EFFECT = Effect(
+    name="misalignment",
+    group="shaft",
+    title="misaligned coupling",
+    severity=Severity("angle_deg", "°", 0.0, _MOST_DEG, 1.0, "between rotor axis and shaft axis in the coupling"),
+    changes="Rotor and shaft turn as through a universal joint: the twist between them has a part at twice the "
+    "turning speed, and the torque bends the shaft, which loads its bearings.",
+    signature="Order 2 of that shaft (and faintly 4) in speed and vibration, with sidebands two orders apart about "
+    "the mesh harmonics (z ± 2). The twist is β²/4: a doubled angle shows fourfold. The bending follows the torque; "
+    "order 1 hardly changes.",
+    shows_in=("shaft_orders", "mesh_sidebands"),
+    change=change,
+    options=(Option("shaft", "driver", "whose coupling", choices=GEARS),),
+)

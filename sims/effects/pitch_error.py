@@ -1,0 +1,56 @@
+"""Effect: pitch errors of one gear."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from sims.effects.effect import GEAR_OPTION, Effect, OptionValue, Severity
+from sims.effects.gear_side import gear_geometry, gear_index, mesh_field, with_mesh_field
+from sims.machine import Machine
+from sims.mesh import FlankDeviation
+
+
+def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+    """Return the machine with pitch errors added to those it has."""
+    index = gear_index(options)
+    flank: FlankDeviation = mesh_field(machine, "flank", index)
+    added = severity * cumulative_pitch(gear_geometry(machine, index).teeth, rng)
+    total = added + np.asarray(flank.pitch_um) if flank.pitch_um else added
+    return with_mesh_field(machine, "flank", index, replace(flank, pitch_um=tuple(total.tolist())))
+
+
+def cumulative_pitch(n_teeth: int, rng: np.random.Generator) -> FloatArray:
+    """Cumulative pitch deviation of each tooth, from drawn single deviations of standard deviation 1, (n_teeth,).
+
+    F_k = Σ_{i≤k} f_i with f_i normal and Σ f_i = 0 over the revolution, so that the last tooth meets the first. Its
+    mean is taken off: it would only turn the gear.
+    """
+    single = rng.standard_normal(n_teeth)
+    # Closing the circle takes one of n degrees of freedom; the factor gives its variance back.
+    closed = (single - single.mean()) * np.sqrt(n_teeth / (n_teeth - 1.0))
+    cumulative = np.cumsum(closed)
+    result: FloatArray = cumulative - cumulative.mean()
+    return result
+
+
+EFFECT = Effect(
+    name="pitch_error",
+    group="flank",
+    title="pitch errors",
+    severity=Severity(
+        "deviation_um", "µm", 0.0, 50.0, 5.0, "standard deviation of the single pitch deviations, normal and closed"
+    ),
+    changes="Every tooth of one gear stands a little ahead or behind: its pairs come into contact early or late, and "
+    "share the load unevenly. The pattern is drawn, closes over the revolution and adds to pitch errors there are.",
+    signature="All orders of that gear's shaft, falling with order, and its sidebands of every number about the mesh "
+    "harmonics, irregular and unlike from left to right; the same pattern every revolution, on no tooth in "
+    "particular, so that the synchronous average changes all round while its kurtosis hardly does. It fades as the "
+    "load rises.",
+    shows_in=("shaft_orders", "mesh_sidebands"),
+    change=change,
+    options=(GEAR_OPTION,),
+)

@@ -1,0 +1,52 @@
+"""Effect: a crack in a tooth root."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from gearsig.errors import InputError
+from sims.effects.effect import GEAR_OPTION, TOOTH_OPTION, Effect, Option, OptionValue, Severity
+from sims.effects.gear_side import GEARS, gear_index, mesh_field, part_of_width_mm, tooth_number, with_mesh_field
+from sims.machine import Machine
+from sims.mesh import RootCrack
+
+
+def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+    """Return the machine with the crack."""
+    del rng  # nothing is drawn
+    index, tooth = gear_index(options), tooth_number(machine, options)
+    cracks: tuple[RootCrack, ...] = mesh_field(machine, "cracks", index)
+    for other in cracks:
+        if other.tooth == tooth:
+            raise InputError(
+                f"tooth {tooth} of the {GEARS[index]} gear already has a crack, {other.depth_mm:g} mm deep",
+                where="root_crack",
+                allowed="one crack per tooth",
+                remedy="choose another tooth, or take away the crack that the model's parameters give",
+            )
+    crack = RootCrack(severity, float(options["angle_deg"]), tooth, part_of_width_mm(machine, options))
+    return with_mesh_field(machine, "cracks", index, (*cracks, crack))
+
+
+EFFECT = Effect(
+    name="root_crack",
+    group="tooth-local",
+    title="crack in a tooth root",
+    severity=Severity("depth_mm", "mm", 0.0, 10.0, 2.0, "length of the crack in the cross-section, from mid-fillet"),
+    changes="One tooth loses bending, shear and axial stiffness where sections lie behind the crack; the mean force "
+    "stays, so the tooth yields more while it carries.",
+    signature="One burst per revolution of the gear's shaft, at the tooth's angle and about a mesh period long, which "
+    "rings on at the natural frequencies; a family of low, wide sidebands of that shaft about the mesh harmonics and "
+    "the resonances. In the shaft's synchronous average the residual's kurtosis rises; a phase lag at the tooth. It "
+    "grows faster than the depth, and with the load.",
+    shows_in=("tooth_window", "mesh_sidebands", "envelope_orders"),
+    change=change,
+    options=(
+        GEAR_OPTION,
+        TOOTH_OPTION,
+        Option("angle_deg", 45.0, "between the crack and the tooth's centre line", "°", 15.0, 90.0),
+        Option("width_percent", 100.0, "part of the face width it reaches over, from one end", "%", 1.0, 100.0),
+    ),
+)

@@ -1,0 +1,33 @@
+"""Effect: a drive that hunts about its speed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+
+from sims.effects.effect import Effect, Option, OptionValue, Severity
+from sims.machine import Machine, SpeedSwing
+
+
+def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+    """Return the machine with one more swing of the set speed."""
+    swing = SpeedSwing(severity / 100.0, float(options["frequency_hz"]), float(rng.uniform(0.0, 2.0 * pi)))
+    return replace(machine, drive=replace(machine.drive, swings=(*machine.drive.swings, swing)))
+
+
+EFFECT = Effect(
+    name="speed_fluctuation",
+    group="drive and load",
+    title="hunting of the speed",
+    severity=Severity("amplitude_percent", "%", 0.0, 20.0, 2.0, "amplitude of the swing over the mean speed"),
+    changes="The set speed is multiplied by 1 + severity·sin(2πft + φ), φ drawn; the drive follows it.",
+    signature="The speed itself swings at the given frequency, in hertz and whatever the speed. In a spectrum over "
+    "frequency every line is smeared or gets sidebands of that distance, the wider the higher the line; in the order "
+    "domain the lines are sharp again, with a slow change of level.",
+    shows_in=("speed", "mesh_sidebands"),
+    change=change,
+    options=(Option("frequency_hz", 1.0, "of the swing", "Hz", 0.01, 50.0),),
+)

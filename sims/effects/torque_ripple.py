@@ -1,0 +1,42 @@
+"""Effect: a drive whose torque ripples with its angle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+
+from sims.effects.effect import Effect, Option, OptionValue, Severity
+from sims.machine import Machine, TorqueRipple
+
+
+def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+    """Return the machine with one more ripple."""
+    ripple = TorqueRipple(float(options["order"]), severity / 100.0, float(rng.uniform(0.0, 2.0 * pi)))
+    return replace(machine, drive=replace(machine.drive, ripples=(*machine.drive.ripples, ripple)))
+
+
+EFFECT = Effect(
+    name="torque_ripple",
+    group="drive and load",
+    title="ripple of the drive's torque",
+    severity=Severity("amplitude_percent", "%", 0.0, 50.0, 5.0, "amplitude of the ripple over the torque"),
+    changes="The drive torque is multiplied by 1 + severity·cos(order·θ + φ), θ the angle of the input rotor and φ "
+    "drawn.",
+    signature="One line at the ripple's order of the input shaft, in torque, speed and vibration, and weak sidebands "
+    "of that distance about the mesh harmonics. Proportional to the torque; at the same order at every speed, highest "
+    "where that order meets a torsional resonance.",
+    shows_in=("shaft_orders", "mesh_sidebands", "speed"),
+    change=change,
+    options=(
+        Option(
+            "order",
+            6.0,
+            "cycles per revolution of the input rotor; 6 per pole pair for a motor on a three-phase inverter",
+            low=0.1,
+            high=200.0,
+        ),
+    ),
+)

@@ -1,0 +1,59 @@
+"""Effect: one more resonance between the bearings and the sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from sims.effects.chain_channels import with_each_channel
+from sims.effects.effect import Effect, Option, OptionValue, Severity
+from sims.machine import Machine
+from sims.measure import MeasuredChannel, ModalPath, PathMode
+
+
+def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+    """Return the machine with the mode in the path of every channel."""
+    del rng
+    frequency_hz, damping_ratio = float(options["frequency_hz"]), float(options["damping_ratio"])
+
+    def with_mode(channel: MeasuredChannel) -> MeasuredChannel:
+        # A mode of static gain g reaches g/(2ζ) at its frequency.
+        gains = {
+            position: 2.0 * damping_ratio * severity * gain for position, gain in static_gains(channel.path).items()
+        }
+        mode = PathMode(frequency_hz, damping_ratio, gains)
+        return replace(channel, path=replace(channel.path, modes=(*channel.path.modes, mode)))
+
+    return with_each_channel(machine, with_mode)
+
+
+def static_gains(path: ModalPath) -> dict[str, float]:
+    """Return what a path passes well below its modes, d + Σ g, by position."""
+    total = dict(path.direct)
+    for mode in path.modes:
+        for position, gain in mode.gains.items():
+            total[position] = total.get(position, 0.0) + gain
+    return total
+
+
+EFFECT = Effect(
+    name="transfer_path",
+    group="measurement chain",
+    title="resonance of housing or sensor",
+    severity=Severity(
+        "amplification", "", 0.0, 50.0, 5.0, "what the mode adds at its frequency, in multiples of the gain far below"
+    ),
+    changes="The path from bearings to sensor has one more mode, alike in every channel. As modes add up, it also "
+    "adds 2ζ times the severity to the gain below its frequency.",
+    signature="Whatever passes the band about its frequency is raised, in hertz and whatever the speed: over several "
+    "speeds a vertical ridge. Mesh harmonics and floor alike, ratios of neighbouring lines hardly; no new order, no "
+    "change of a tooth's share. Levels differ where a gear fault would differ in orders.",
+    shows_in=("resonances", "broadband", "mesh_harmonics"),
+    change=change,
+    options=(
+        Option("frequency_hz", 3000.0, "of the mode", "Hz", 10.0, 100e3),
+        Option("damping_ratio", 0.03, "of the mode", low=1e-3, high=0.5),
+    ),
+)

@@ -1,0 +1,41 @@
+"""Effect: a gear whose centre of mass lies off its axis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from sims.effects.catalogue import replaced_item
+from sims.effects.effect import GEAR_OPTION, Effect, OptionValue, Severity
+from sims.effects.gear_side import gear_index
+from sims.effects.polar import ANGLE_OPTION, angle_or_drawn_deg, vector_sum
+from sims.machine import Machine
+
+
+def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+    """Return the machine with the unbalance added."""
+    index, angle = gear_index(options), angle_or_drawn_deg(options, rng)
+    wheel = machine.wheels[index]
+    length, direction = vector_sum(wheel.unbalance_g_mm, wheel.unbalance_angle_deg, severity, angle)
+    wheels = replaced_item(machine.wheels, index, unbalance_g_mm=length, unbalance_angle_deg=direction)
+    return replace(machine, wheels=wheels)
+
+
+EFFECT = Effect(
+    name="unbalance",
+    group="shaft",
+    title="unbalance",
+    severity=Severity(
+        "unbalance_g_mm", "g mm", 0.0, 50000.0, 2000.0, "mass times distance of the centre of mass from the axis"
+    ),
+    changes="A force of unbalance times speed squared turns with the gear; it adds as a vector to the unbalance there "
+    "is.",
+    signature="Order 1 of that gear's shaft, nearly a pure sine, alike in both directions across the shaft; its force "
+    "grows with the square of the speed (the acceleration below resonance with the fourth power) and not with the "
+    "load. No mesh sidebands to speak of: that tells it from eccentricity. Faint at low speed.",
+    shows_in=("shaft_orders",),
+    change=change,
+    options=(GEAR_OPTION, ANGLE_OPTION),
+)
