@@ -1,4 +1,4 @@
-"""How a flank departs from the involute: tip relief, profile and pitch deviations. Positive means metal is missing."""
+"""How a flank departs from the involute: relief, profile and pitch deviations, wear. Positive: metal is missing."""
 
 from __future__ import annotations
 
@@ -28,6 +28,8 @@ class FlankDeviation:
         Empty: none.
     pitch_um : tuple of float
         Cumulative pitch deviation of each tooth, as many as the gear has teeth. Empty: none.
+    wear_um : float
+        Greatest depth of wear by sliding, 0 for none; see `sims.mesh.wear` for its course over the flank.
     """
 
     tip_relief_um: float = 0.0
@@ -35,11 +37,13 @@ class FlankDeviation:
     tip_relief_exponent: float = 1.0
     profile_um: tuple[float, ...] = ()
     pitch_um: tuple[float, ...] = ()
+    wear_um: float = 0.0
 
     def __post_init__(self) -> None:
         not_negative(self.tip_relief_um, "tip_relief_um", "µm")
         positive(self.tip_relief_length_mm, "tip_relief_length_mm", "mm")
         positive(self.tip_relief_exponent, "tip_relief_exponent")
+        not_negative(self.wear_um, "wear_um", "µm")
         frozen_array(self.profile_um, "profile_um", ndim=1)
         frozen_array(self.pitch_um, "pitch_um", ndim=1)
         if len(self.profile_um) == 1:
@@ -63,7 +67,7 @@ def check_deviation(gear: GearGeometry, deviation: FlankDeviation) -> None:
 
 
 def flank_separation_m(gear: GearGeometry, deviation: FlankDeviation, roll_length_mm: FloatArray) -> FloatArray:
-    """Missing metal at the given places of the flank, in m.
+    """Missing metal at the given places of the flank, in m; without wear, which depends on the mate.
 
     Parameters
     ----------

@@ -159,7 +159,7 @@ class TimeLockedRoughness:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # two drawn profiles are never the same, and arrays compare element by element
 class FlankRoughness:
     """z of every tooth of one gear over the position on its flank: it returns with the tooth.
 
@@ -195,7 +195,8 @@ class FlankRoughness:
         tooth : int or array
             Any whole number; taken modulo the number of teeth.
         position_m : array
-            Along the flank, from where contact begins, in the shape of `tooth` or one that goes with it.
+            Arc length along the flank, from the root end of the contact, in the shape of `tooth` or one that goes with
+            it.
         """
         return self._sum(self.surface.amplitudes_m, 0.0, tooth, position_m)
 

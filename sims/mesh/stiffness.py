@@ -64,7 +64,11 @@ def one_mesh_cycle(n_points: int = 200) -> FloatArray:
 
 
 def mesh_stiffness(
-    mesh: GearMesh, mesh_cycles: FloatArray | None = None, force_n: float | None = None
+    mesh: GearMesh,
+    mesh_cycles: FloatArray | None = None,
+    force_n: float | None = None,
+    *,
+    table: MeshTable | None = None,
 ) -> MeshStiffness:
     """Stiffness of the mesh along the line of action.
 
@@ -76,8 +80,11 @@ def mesh_stiffness(
     mesh_cycles : array or None
         c; None: 200 points of one cycle.
     force_n : float or None
-        Mesh force, above 0. None: every pair on the path of contact touches (separations do not count), for the linear
-        contact law only. Given: the tangent stiffness of the pairs that carry at that force.
+        Mesh force, above 0. None: every pair on the path of contact touches (separations do not count, so that a chip
+        or a spall over the whole face does not show), for the linear contact law only. Given: the tangent stiffness of
+        the pairs that carry at that force.
+    table : MeshTable or None
+        Of this mesh, if it is at hand: making one takes longer than reading it.
 
     Returns
     -------
@@ -89,7 +96,7 @@ def mesh_stiffness(
         Without a force if the contact stiffens with the load.
     """
     cycles = one_mesh_cycle() if mesh_cycles is None else frozen_array(mesh_cycles, "mesh_cycles", ndim=1)
-    table = mesh_table(mesh)
+    table = mesh_table(mesh) if table is None else table
     compliance, separation, weight = pair_states(table, cycles)
     if force_n is None:
         if table.load_dependent:
@@ -106,7 +113,9 @@ def mesh_stiffness(
     return MeshStiffness(cycles, pairs.sum(axis=1), pairs)
 
 
-def share_torque(mesh: GearMesh, torque_nm: float, mesh_cycles: FloatArray | None = None) -> LoadSharing:
+def share_torque(
+    mesh: GearMesh, torque_nm: float, mesh_cycles: FloatArray | None = None, *, table: MeshTable | None = None
+) -> LoadSharing:
     """Which pair carries how much, and the static transmission error, at a torque on the driver.
 
     Σ N_i(δ − E_i) = T1/r_b1, without friction.
@@ -117,13 +126,30 @@ def share_torque(mesh: GearMesh, torque_nm: float, mesh_cycles: FloatArray | Non
     torque_nm : float
         T1, above 0.
     mesh_cycles : array or None
-        c; None: 200 points of one cycle. With cracks or pitch deviations give a whole revolution or more.
+        c; None: 200 points of one cycle. With faulty teeth, pitch deviations or roughness give a whole revolution or
+        more.
+    table : MeshTable or None
+        Of this mesh, if it is at hand.
     """
     cycles = one_mesh_cycle() if mesh_cycles is None else frozen_array(mesh_cycles, "mesh_cycles", ndim=1)
     force = positive(torque_nm, "torque_nm", "N m") / (mesh.pair.driver.base_radius_mm * 1e-3)
-    table = mesh_table(mesh)
+    table = mesh_table(mesh) if table is None else table
     delta, slope, forces = _equilibrium(table, force, *pair_states(table, cycles))
     return LoadSharing(cycles, delta, forces, slope)
+
+
+def back_stiffness_n_per_m(mesh: GearMesh) -> float:
+    """Mean stiffness of the mesh with the back flanks pressed, by the linear contact law, N/m.
+
+    A symmetric tooth is as stiff on either flank, and back flanks touch along the mirrored path: the mean over a mesh
+    cycle is that of sound drive flanks. A crack of the drive side closes and spalls are not touched. A piece broken off
+    a tip would be missing on both flanks; a constant for the whole gear leaves it out, as it does roughness and wear.
+    """
+    from dataclasses import replace
+
+    faults = {"cracks_1": (), "cracks_2": (), "spalls_1": (), "spalls_2": (), "chips_1": (), "chips_2": ()}
+    sound = replace(mesh, contact_law="linear", **faults)  # type: ignore[arg-type]  # all of them are tuples of faults
+    return mesh_stiffness(sound).mean_n_per_m
 
 
 def pair_states(table: MeshTable, mesh_cycles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

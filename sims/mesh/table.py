@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, count
-from sims.mesh.crack import RootCrack
-from sims.mesh.deviation import flank_separation_m, pitch_separation_m
+from sims.mesh.deviation import pitch_separation_m
 from sims.mesh.gear_mesh import GearMesh
+from sims.mesh.separation import separation_rows
 
 
 @dataclass(frozen=True)
@@ -82,10 +82,10 @@ def mesh_table(mesh: GearMesh, n_points: int = 512) -> MeshTable:
     low, high = -mesh.ramp / 2.0, mesh.pair.contact_ratio + mesh.ramp / 2.0
     step = (high - low) / (n - 1)
     progress = low + step * np.arange(-1, n + 1)
-    rows_1, variant_1 = _rows(mesh, 1, progress, mesh.cracks_1, mesh.pair.driver.teeth)
-    rows_2, variant_2 = _rows(mesh, 2, progress, mesh.cracks_2, mesh.pair.driven.teeth)
-    rho_1, rho_2 = mesh.pair.contact_radii_mm(progress)
-    one, two = mesh.pair.driver, mesh.pair.driven
+    rows_1, variant_1 = _compliance_rows(mesh, 1, progress)
+    rows_2, variant_2 = _compliance_rows(mesh, 2, progress)
+    flanks_1, surface_1 = separation_rows(mesh, 1, progress)
+    flanks_2, surface_2 = separation_rows(mesh, 2, progress)
     return MeshTable(
         start=low - step,
         step=step,
@@ -93,12 +93,12 @@ def mesh_table(mesh: GearMesh, n_points: int = 512) -> MeshTable:
         compliance_2=rows_2,
         variant_1=variant_1,
         variant_2=variant_2,
-        separation_1_m=flank_separation_m(one, mesh.flank_1, rho_1)[None, :],
-        separation_2_m=flank_separation_m(two, mesh.flank_2, rho_2)[None, :],
-        surface_1=np.zeros(one.teeth, dtype=np.int64),
-        surface_2=np.zeros(two.teeth, dtype=np.int64),
-        pitch_1_m=pitch_separation_m(one, mesh.flank_1),
-        pitch_2_m=pitch_separation_m(two, mesh.flank_2),
+        separation_1_m=flanks_1,
+        separation_2_m=flanks_2,
+        surface_1=surface_1,
+        surface_2=surface_2,
+        pitch_1_m=pitch_separation_m(mesh.pair.driver, mesh.flank_1),
+        pitch_2_m=pitch_separation_m(mesh.pair.driven, mesh.flank_2),
         contact_coefficient=mesh.contact_coefficient,
         load_dependent=mesh.contact_law == "load-dependent",
         contact_ratio=mesh.pair.contact_ratio,
@@ -107,12 +107,12 @@ def mesh_table(mesh: GearMesh, n_points: int = 512) -> MeshTable:
     )
 
 
-def _rows(
-    mesh: GearMesh, side: int, progress: FloatArray, cracks: tuple[RootCrack, ...], n_teeth: int
-) -> tuple[FloatArray, NDArray[np.int64]]:
-    rows = [mesh.gear_compliance(side, progress)]
-    variant = np.zeros(n_teeth, dtype=np.int64)
-    for row, crack in enumerate(cracks, start=1):
-        rows.append(mesh.gear_compliance(side, progress, crack))
-        variant[crack.tooth] = row
+def _compliance_rows(mesh: GearMesh, number: int, progress: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Row 0 for sound teeth, one row for each faulty one, and the row of each tooth."""
+    side = mesh.side(number)
+    rows = [mesh.gear_compliance(number, progress)]
+    variant = np.zeros(side.gear.teeth, dtype=np.int64)
+    for row, tooth in enumerate(side.faulty_teeth, start=1):
+        rows.append(mesh.gear_compliance(number, progress, side.faults_of(tooth)))
+        variant[tooth] = row
     return np.array(rows), variant

@@ -15,6 +15,7 @@ from sims.mesh import (
     Material,
     PairGeometry,
     RootCrack,
+    ToothFaults,
     mesh_stiffness,
     mesh_table,
     share_torque,
@@ -255,8 +256,8 @@ def test_table_gives_what_the_formulas_give() -> None:
         for j in range(mesh.n_slots):
             k = int(np.floor(c + mesh.ramp / 2)) - j
             if weight[row, j] > 0.0:
-                crack = mesh.cracks_2[0] if k % 75 == 74 else None
-                direct = mesh.gear_compliance(1, np.array([c - k])) + mesh.gear_compliance(2, np.array([c - k]), crack)
+                faults = ToothFaults(crack=mesh.cracks_2[0] if k % 75 == 74 else None)
+                direct = mesh.gear_compliance(1, np.array([c - k])) + mesh.gear_compliance(2, np.array([c - k]), faults)
                 assert compliance[row, j] == pytest.approx(direct[0], rel=1e-9)
 
 
