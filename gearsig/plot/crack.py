@@ -1,0 +1,154 @@
+"""Acceleration at several crack depths: the impact once per revolution, and how far it reaches."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearsig.checks import FloatArray, count
+from gearsig.errors import InputError
+from gearsig.plot import series, style
+from gearsig.plot.thin import thin
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+ROW_IN, PANEL_IN, TOP_IN, BOTTOM_IN = 1.4, 1.08, 0.62, 0.52
+LEFTS_IN, WIDTHS_IN = (0.75, 5.75), (4.35, 3.05)
+
+
+def crack_comparison_figure(
+    revolutions: FloatArray,
+    acceleration_mps2: Mapping[str, FloatArray],
+    *,
+    impacts_rev: Sequence[float],
+    n_teeth: int,
+    reach_cycles: Mapping[str, float] | None = None,
+    zoom_cycles: tuple[float, float] = (-3.0, 12.0),
+    title: str = "",
+) -> Figure:
+    """Draw the acceleration over some revolutions, one row per crack depth, and a close view of one impact.
+
+    The first case, drawn grey in every close view, is the one to compare with: the sound gear.
+
+    Parameters
+    ----------
+    revolutions : array, (n,)
+        Of the cracked gear, ascending.
+    acceleration_mps2 : mapping
+        Name of the case → array, (n,).
+    impacts_rev : sequence of float
+        Where the cracked tooth enters the mesh; those on the axis are marked, the middle one is enlarged.
+    n_teeth : int
+        Of the cracked gear: mesh cycles per revolution.
+    reach_cycles : mapping or None
+        Name of the case → mesh cycles from the entry over which the impact is felt; shaded.
+    zoom_cycles : (float, float)
+        Close view, from the entry.
+    title : str
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InputError
+        If no impact lies on the axis, or a reach names a case that is not there.
+    """
+    x = series.checked_axis(revolutions, "revolutions")
+    cases = series.checked_curves(acceleration_mps2, len(x), "acceleration_mps2")
+    z = count(n_teeth, "n_teeth", minimum=3)
+    limits = series.checked_limits(zoom_cycles, "zoom_cycles")
+    marked = _marked(impacts_rev, x)
+    reach = _checked_reach(reach_cycles or {}, cases)
+    cycles = (x - marked[len(marked) // 2]) * z
+    near = (cycles >= limits[0]) & (cycles <= limits[1])
+    if np.count_nonzero(near) < 2:
+        raise InputError("zoom_cycles holds fewer than two points", remedy="give a wider view or a finer axis")
+    height = TOP_IN + BOTTOM_IN + ROW_IN * len(cases) - (ROW_IN - PANEL_IN)
+    figure = style.new_figure(height)
+    reference = next(iter(cases.values()))
+    rows = []
+    for i, (name, values) in enumerate(cases.items()):
+        whole, close = _row(figure, height - TOP_IN - PANEL_IN - i * ROW_IN)
+        _draw_whole(whole, x, values, marked)
+        if i > 0:
+            close.plot(cycles[near], reference[near], color=style.FLOOR, linewidth=0.9, alpha=0.8, zorder=2)
+        close.plot(cycles[near], values[near], color=style.MEASURED, linewidth=1.0, zorder=3)
+        close.axvline(0.0, color=style.FAULT, linewidth=0.9, linestyle="--", zorder=1)
+        close.set_xlim(*limits)
+        if name in reach:
+            series.shade(close, (0.0, reach[name]), style.FAULT, 0.10)
+            series.write(close, reach[name], 1.02, f"felt for {reach[name]:.2g} cycles", colour=style.FAULT)
+        style.label_axes(whole, "", "a (m/s²)", name)
+        rows.append((whole, close))
+    _finish(rows, cases, near)
+    whole, close = rows[0]
+    series.write(whole, marked[0], 1.02, "cracked tooth enters", colour=style.FAULT, ha="left")
+    if len(rows) > 1:
+        series.write(close, limits[1], 1.02, f"grey in the rows below: {next(iter(cases))}", ha="right")
+    series.headline(figure, title)
+    return figure
+
+
+def _marked(impacts_rev: Sequence[float], x: FloatArray) -> list[float]:
+    marked = [float(at) for at in impacts_rev if x[0] <= at <= x[-1]]
+    if not marked:
+        raise InputError(
+            f"no impact lies on the axis, {x[0]:g} to {x[-1]:g} revolutions",
+            where="impacts_rev",
+            remedy="give at least one revolution of signal with the cracked tooth in it",
+        )
+    return marked
+
+
+def _checked_reach(reach: Mapping[str, float], cases: Mapping[str, FloatArray]) -> dict[str, float]:
+    for name in reach:
+        if name not in cases:
+            raise InputError(f"reach_cycles names {name!r}", allowed=", ".join(cases))
+    return {name: float(value) for name, value in reach.items() if value > 0.0}
+
+
+def _row(figure: Figure, bottom_in: float) -> tuple[Axes, Axes]:
+    height = figure.get_size_inches()[1]
+    whole, close = (
+        style.panel(
+            figure,
+            left_in=left,
+            right_in=style.WIDTH_IN - left - width,
+            bottom_in=bottom_in,
+            top_in=height - bottom_in - PANEL_IN,
+        )
+        for left, width in zip(LEFTS_IN, WIDTHS_IN, strict=True)
+    )
+    return whole, close
+
+
+def _draw_whole(axes: Axes, x: FloatArray, values: FloatArray, marked: Sequence[float]) -> None:
+    for at in marked:
+        axes.axvline(at, color=style.FAULT, linewidth=0.9, linestyle="--", zorder=1)
+    axes.plot(*thin(x, values), color=style.MEASURED, linewidth=0.6)
+    axes.set_xlim(float(x[0]), float(x[-1]))
+
+
+def _finish(
+    rows: Sequence[tuple[Axes, Axes]],
+    cases: Mapping[str, FloatArray],
+    near: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
+) -> None:
+    """Give each column one scale, and name the axes below the last row."""
+    largest = max(float(np.max(np.abs(values))) for values in cases.values()) or 1.0
+    closest = max(float(np.max(np.abs(values[near]))) for values in cases.values()) or 1.0
+    for whole, close in rows:
+        whole.set_ylim(-1.08 * largest, 1.08 * largest)
+        close.set_ylim(-1.08 * closest, 1.08 * closest)
+        for axes in (whole, close):
+            axes.tick_params(labelbottom=whole is rows[-1][0])
+            style.no_offset(axes)
+    whole, close = rows[-1]
+    whole.set_xlabel("revolutions of the cracked gear", color=style.INK, fontsize=style.TEXT_PT)
+    close.set_xlabel("mesh cycles since the cracked tooth's entry", color=style.INK, fontsize=style.TEXT_PT)

@@ -1,0 +1,112 @@
+"""Figures of the mesh: stiffness, load sharing, the cracked tooth."""
+
+from io import BytesIO
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+
+from gearsig.errors import InputError
+from gearsig.plot.mesh import load_sharing_figure, mesh_stiffness_figure
+from gearsig.plot.tooth import tooth_figure
+
+CYCLES = np.linspace(0.0, 2.0, 401)
+STIFFNESS = {
+    "none": 3e8 + 1e8 * np.sign(np.sin(2 * np.pi * CYCLES)),
+    "2 mm": 2.9e8 + 1e8 * np.sign(np.sin(2 * np.pi * CYCLES)),
+}
+
+
+def _texts(figure):
+    figure.savefig(BytesIO(), format="png", dpi=40)
+    return [text.get_text() for text in figure.findobj(Text) if text.get_text()]
+
+
+def _line(axes, label):
+    return next(line for line in axes.lines if line.get_label() == label)
+
+
+def test_stiffness_is_drawn_as_given_with_units_and_names():
+    figure = mesh_stiffness_figure(CYCLES, STIFFNESS, single_pair=(0.5, 1.0), heading="crack depth", title="A pair")
+    whole, zoom = figure.axes
+    for label, values in STIFFNESS.items():
+        np.testing.assert_array_equal(_line(whole, label).get_xdata(), CYCLES)
+        np.testing.assert_allclose(_line(whole, label).get_ydata(), values / 1e8)
+        inside = (CYCLES >= 0.5) & (CYCLES <= 1.0)
+        np.testing.assert_allclose(_line(zoom, label).get_ydata(), values[inside] / 1e8)
+    assert zoom.get_xlim() == (0.5, 1.0)
+    texts = _texts(figure)
+    assert {"none", "2 mm", "crack depth", "A pair", "mesh cycles (tooth passages)"} <= set(texts)
+    assert texts.count("mesh stiffness (10⁸ N/m)") == 2
+
+
+def test_stiffness_without_a_region_has_one_panel():
+    assert len(mesh_stiffness_figure(CYCLES, STIFFNESS).axes) == 1
+
+
+def test_colours_of_ordered_cases_grow_lighter():
+    figure = mesh_stiffness_figure(CYCLES, {f"{i} mm": np.full(401, 1e8 * i) for i in range(5)})
+    from matplotlib.colors import to_rgb
+
+    light = [np.dot(to_rgb(line.get_color()), (0.2126, 0.7152, 0.0722)) for line in figure.axes[0].lines]
+    assert all(a < b for a, b in pairwise(light))
+
+
+@pytest.mark.parametrize(
+    ("cycles", "curves", "region", "message"),
+    [
+        (CYCLES, {"a": np.ones(3)}, None, r"stiffness_n_per_m\['a'\] has 3 points, its axis 401"),
+        (CYCLES, {}, None, "holds 0 curves"),
+        (CYCLES, {"a": np.full(401, np.nan)}, None, "NaN"),
+        (CYCLES[::-1], {"a": np.ones(401)}, None, "mesh_cycles"),
+        (np.ones((2, 2)), {"a": np.ones(2)}, None, "shape"),
+        (CYCLES, STIFFNESS, (1.0, 0.5), "single_pair"),
+        (CYCLES, STIFFNESS, (5.0, 6.0), "0 point"),
+    ],
+)
+def test_stiffness_refuses_what_does_not_fit(cycles, curves, region, message):
+    with pytest.raises(InputError, match=message):
+        mesh_stiffness_figure(cycles, curves, single_pair=region)
+
+
+def test_load_sharing_draws_forces_where_pairs_touch_and_errors_in_um():
+    one = np.where(CYCLES < 1.0, 2000.0, 0.0)
+    error = 1e-6 * (8 + np.cos(CYCLES))
+    figure = load_sharing_figure(CYCLES, {"pair 0": one, "pair 1": 2000.0 - one}, {"sound": error})
+    upper, lower = figure.axes
+    drawn = _line(upper, "pair 0").get_ydata()
+    np.testing.assert_array_equal(drawn[CYCLES < 1.0], 2000.0)
+    assert drawn[200] == 0.0  # the fall to zero is shown
+    assert np.isnan(drawn[201:]).all()
+    np.testing.assert_allclose(_line(lower, "sound").get_ydata(), error * 1e6)
+    assert {"force of a pair (N)", "transmission error (µm)", "mesh cycles (tooth passages)"} <= set(_texts(figure))
+
+
+def test_load_sharing_refuses_wrong_lengths():
+    with pytest.raises(InputError, match="transmission_error_m"):
+        load_sharing_figure(CYCLES, {"pair 0": np.ones(401)}, {"sound": np.ones(400)})
+
+
+def test_tooth_is_mirrored_to_scale_with_its_crack():
+    x, y = np.linspace(50.0, 54.0, 30), np.linspace(2.0, 0.8, 30)
+    crack = (np.array([50.5, 49.0]), np.array([1.9, 0.4]))
+    figure = tooth_figure(x, y, cracks_mm={"2 mm": crack}, title="Tooth")
+    (axes,) = figure.axes
+    figure.canvas.draw()
+    assert axes.get_aspect() == 1.0
+    outline = max(axes.lines, key=lambda line: len(line.get_xdata()))
+    across, along = np.asarray(outline.get_xdata()), np.asarray(outline.get_ydata())
+    np.testing.assert_allclose(across, -across[::-1])
+    assert set(x) <= set(along)
+    assert any(np.array_equal(line.get_xdata(), crack[1]) for line in axes.lines)
+    assert {"2 mm", "Tooth", "across the tooth (mm)", "from the gear's centre (mm)"} <= set(_texts(figure))
+
+
+def test_tooth_without_cracks_and_with_wrong_ones():
+    x, y = np.linspace(50.0, 54.0, 30), np.linspace(2.0, 0.8, 30)
+    assert _texts(tooth_figure(x, y))
+    with pytest.raises(InputError, match="y_mm has 29 points"):
+        tooth_figure(x, y[1:])
+    with pytest.raises(InputError, match="y of '2 mm'"):
+        tooth_figure(x, y, cracks_mm={"2 mm": (np.ones(2), np.ones(3))})
