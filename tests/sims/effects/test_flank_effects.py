@@ -1,0 +1,103 @@
+"""Effects on teeth and flanks: which tooth, what is allowed, what adds and how."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gearsig.errors import InputError
+from sims.effects import effect
+from sims.effects.pitch_error import cumulative_pitch
+from sims.machine import Lubrication, Machine, Roughness
+from sims.mesh import deepest_crack_mm
+from tests.sims.machines import spur_pair_machine
+
+
+def apply(machine: Machine, name: str, severity: float, seed: int = 0, **options: float | str) -> Machine:
+    return effect(name).apply(machine, severity, options, np.random.default_rng(seed))
+
+
+def test_a_crack_goes_where_it_is_told() -> None:
+    mesh = apply(
+        spur_pair_machine(), "root_crack", 1.5, gear="driven", tooth=7, angle_deg=60.0, width_percent=50.0
+    ).mesh
+    (crack,) = mesh.cracks_2
+    assert mesh.cracks_1 == ()
+    assert (crack.depth_mm, crack.angle_deg, crack.tooth, crack.width_mm) == (1.5, 60.0, 7, 10.0)
+
+
+def test_a_crack_past_the_tooth_is_refused_with_what_is_allowed() -> None:
+    deepest = deepest_crack_mm(spur_pair_machine().mesh.pair.driver)
+    with pytest.raises(InputError, match=rf"goes past the tooth \(allowed: above 0 to {deepest:.3g} mm"):
+        apply(spur_pair_machine(), "root_crack", 1.01 * deepest)
+    assert apply(spur_pair_machine(), "root_crack", 0.99 * deepest).mesh.cracks_1
+
+
+def test_one_crack_per_tooth() -> None:
+    machine = apply(spur_pair_machine(), "root_crack", 1.0, tooth=3)
+    with pytest.raises(InputError, match="tooth 3 of the driver gear already has a crack, 1 mm deep"):
+        apply(machine, "root_crack", 2.0, tooth=3)
+    assert len(apply(machine, "root_crack", 2.0, tooth=4).mesh.cracks_1) == 2
+
+
+@pytest.mark.parametrize("name", ["root_crack"])
+def test_a_tooth_that_is_not_there(name: str) -> None:
+    with pytest.raises(InputError, match=r"tooth of the driver gear is 55.*0 to 54"):
+        apply(spur_pair_machine(), name, 0.5, tooth=55)
+    assert apply(spur_pair_machine(), name, 0.5, gear="driven", tooth=74) != spur_pair_machine()
+
+
+@given(st.integers(5, 200), st.integers(0, 2**31))
+def test_pitch_closes_over_the_revolution(teeth: int, seed: int) -> None:
+    cumulative = cumulative_pitch(teeth, np.random.default_rng(seed))
+    single = np.diff(cumulative, prepend=cumulative[-1])  # the first tooth's pitch is measured from the last tooth
+    assert abs(single.sum()) < 1e-9
+    assert abs(cumulative.mean()) < 1e-12
+    assert np.abs(single).max() < 6.0  # no jump where the revolution closes: drawn from a normal distribution
+
+
+def test_single_pitch_deviations_have_the_severity_as_standard_deviation() -> None:
+    singles = []
+    for seed in range(300):
+        pitch = np.array(apply(spur_pair_machine(), "pitch_error", 8.0, seed).mesh.flank_1.pitch_um)
+        singles.append(np.diff(pitch, prepend=pitch[-1]))
+    values = np.array(singles)  # (300, 55)
+    assert values.std() == pytest.approx(8.0, rel=0.03)
+    assert values[:, 0].std() == pytest.approx(8.0, rel=0.15)  # nothing special about the first tooth
+
+
+def test_pitch_errors_add_and_grow_in_proportion() -> None:
+    once = np.array(apply(spur_pair_machine(), "pitch_error", 5.0).mesh.flank_1.pitch_um)
+    machine = apply(spur_pair_machine(), "pitch_error", 5.0)
+    more = np.array(apply(machine, "pitch_error", 10.0).mesh.flank_1.pitch_um)
+    np.testing.assert_allclose(more, 3.0 * once, rtol=1e-12)
+    assert apply(spur_pair_machine(), "pitch_error", 5.0, gear="driven").mesh.flank_1.pitch_um == ()
+
+
+def test_roughness_adds_in_squares() -> None:
+    machine = replace(spur_pair_machine(), roughness=Roughness(0.3, "time"))
+    rougher = apply(machine, "surface_roughness", 0.4).roughness
+    assert rougher.rms_um == pytest.approx(0.5)
+    assert rougher.locked_to == "time"
+
+
+def test_roughness_there_is_keeps_what_it_returns_with() -> None:
+    assert apply(spur_pair_machine(), "surface_roughness", 0.4, locked_to="time").roughness.locked_to == "time"
+    machine = replace(spur_pair_machine(), roughness=Roughness(0.3, "time"))
+    with pytest.raises(InputError, match=r"already have 0.3 µm, locked to 'time', and 'flank'"):
+        apply(machine, "surface_roughness", 0.4, locked_to="flank")
+
+
+def test_friction_multiplies_the_coefficient() -> None:
+    machine = replace(spur_pair_machine(), lubrication=Lubrication(factor=2.0))
+    assert apply(machine, "sliding_friction", 50.0).lubrication.factor == 2.5
+
+
+def test_friction_starts_at_nothing_where_there_was_none() -> None:
+    """Continuous: hardly any severity switches hardly any friction on."""
+    machine = replace(spur_pair_machine(), lubrication=Lubrication(friction=False, factor=1.0))
+    oil = apply(machine, "sliding_friction", 0.1).lubrication
+    assert oil.friction
+    assert oil.factor == pytest.approx(0.001)
