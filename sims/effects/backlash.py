@@ -22,7 +22,7 @@ EFFECT = Effect(
     group="drive and load",
     title="more backlash",
     severity=Severity(
-        "added_um", "µm", 0.0, 1000.0, 100.0, "play that is added along the line of action, from flank to flank"
+        "added_um", "um", 0.0, 1000.0, 100.0, "play that is added along the line of action, from flank to flank"
     ),
     changes="The flanks have that much more play. While the mesh force stays above zero nothing changes at all.",
     signature="Only where teeth separate: at light load, at a resonance, in reversals and start–stop. There: impacts "

@@ -15,7 +15,7 @@ from sims.machine import BearingSupport, Machine, RaceDefect, bearing_index
 BEARING_OPTION = Option("bearing", "", "name of the bearing; empty: the first of the driver's shaft")
 RACE_OPTIONS = (
     BEARING_OPTION,
-    Option("angle_deg", 0.0, "where the defect lies, see the race", "°", -360.0, 360.0),
+    Option("angle_deg", 0.0, "where the defect lies, see the race", "deg", -360.0, 360.0),
     Option("jitter_percent", 1.0, "scatter of the rolling elements' places, of their spacing", "%", 0.0, 10.0),
     Option("slip_percent", 1.0, "part of the cage's turning that is lost", "%", 0.0, 5.0),
 )

@@ -23,7 +23,7 @@ EFFECT = Effect(
     group="bearing",
     title="clearance in a bearing",
     severity=Severity(
-        "added_um", "µm", 0.0, 200.0, 30.0, "radial distance from the middle until it carries: half the play; added"
+        "added_um", "um", 0.0, 200.0, 30.0, "radial distance from the middle until it carries: half the play; added"
     ),
     changes="The shaft moves that far before rolling elements carry; fewer of them do, so the support is softer and "
     "its stiffness changes as they pass.",

@@ -39,7 +39,7 @@ EFFECT = Effect(
     group="shaft",
     title="gear off its axis",
     severity=Severity(
-        "runout_um", "µm", 0.0, 200.0, 20.0, "distance of the pitch circle's centre from the axis: half the run-out"
+        "runout_um", "um", 0.0, 200.0, 20.0, "distance of the pitch circle's centre from the axis: half the run-out"
     ),
     changes="The pitch circle of one gear turns about a point off its centre; the centre of mass moves along (mass "
     "times run-out is added to the unbalance). Both add as vectors to what is there.",

@@ -37,6 +37,11 @@ def part_of_width_mm(machine: Machine, options: Mapping[str, OptionValue]) -> fl
     return None if percent == 100.0 else percent / 100.0 * gear_geometry(machine, gear_index(options)).face_width_mm
 
 
+def loaded_width_mm(machine: Machine, options: Mapping[str, OptionValue]) -> float:
+    """Return the width that `width_percent` stands for of the face on which the teeth touch."""
+    return float(options["width_percent"]) / 100.0 * machine.mesh.pair.face_width_mm
+
+
 def mesh_field(machine: Machine, name: str, index: int) -> Any:
     """Return a field that the mesh has once per gear, by its name without number: `cracks`, `flank`."""
     return getattr(machine.mesh, f"{name}_{index + 1}")

@@ -21,7 +21,7 @@ def change(machine: Machine, severity: float, options: Mapping[str, OptionValue]
     del rng
     index = gear_index(options, "shaft")
     now = machine.shafts[index].coupling_angle_deg
-    within(severity, f"angle_deg of misalignment, beside the {now:g}° there are,", 0.0, _MOST_DEG - now, "°")
+    within(severity, f"angle_deg of misalignment, beside the {now:g}° there are,", 0.0, _MOST_DEG - now, "deg")
     shafts = replaced_item(machine.shafts, index, coupling_angle_deg=now + severity)
     return replace(machine, shafts=shafts)
 
@@ -30,7 +30,7 @@ EFFECT = Effect(
     name="misalignment",
     group="shaft",
     title="misaligned coupling",
-    severity=Severity("angle_deg", "°", 0.0, _MOST_DEG, 1.0, "between rotor axis and shaft axis in the coupling"),
+    severity=Severity("angle_deg", "deg", 0.0, _MOST_DEG, 1.0, "between rotor axis and shaft axis in the coupling"),
     changes="Rotor and shaft turn as through a universal joint: the twist between them has a part at twice the "
     "turning speed, and the torque bends the shaft, which loads its bearings.",
     signature="Order 2 of that shaft (and faintly 4) in speed and vibration, with sidebands two orders apart about "

@@ -42,7 +42,7 @@ EFFECT = Effect(
     group="flank",
     title="pitch errors",
     severity=Severity(
-        "deviation_um", "µm", 0.0, 50.0, 5.0, "standard deviation of the single pitch deviations, normal and closed"
+        "deviation_um", "um", 0.0, 50.0, 5.0, "standard deviation of the single pitch deviations, normal and closed"
     ),
     changes="Every tooth of one gear stands a little ahead or behind: its pairs come into contact early or late, and "
     "share the load unevenly. The pattern is drawn, closes over the revolution and adds to pitch errors there are.",

@@ -46,7 +46,7 @@ EFFECT = Effect(
     options=(
         GEAR_OPTION,
         TOOTH_OPTION,
-        Option("angle_deg", 45.0, "between the crack and the tooth's centre line", "°", 15.0, 90.0),
+        Option("angle_deg", 45.0, "between the crack and the tooth's centre line", "deg", 15.0, 90.0),
         Option("width_percent", 100.0, "part of the face width it reaches over, from one end", "%", 1.0, 100.0),
     ),
 )

@@ -42,7 +42,7 @@ EFFECT = Effect(
     group="flank",
     title="rougher flanks",
     severity=Severity(
-        "added_rms_um", "µm", 0.0, 3.0, 0.8, "rms roughness that is added; independent finishes add in squares"
+        "added_rms_um", "um", 0.0, 3.0, 0.8, "rms roughness that is added; independent finishes add in squares"
     ),
     changes="The composite rms roughness becomes √(R² + severity²): the fractal profile that opens and closes the "
     "contact grows with it, and so does the friction coefficient.",
