@@ -7,9 +7,10 @@ from dataclasses import replace
 from typing import Any
 
 from gearsig.checks import within
+from gearsig.errors import InputError
 from sims.effects.effect import OptionValue
 from sims.machine import Machine
-from sims.mesh import GearGeometry
+from sims.mesh import GearGeometry, RootCrack, ToothChip, ToothSpall
 
 GEARS = ("driver", "driven")
 
@@ -51,3 +52,16 @@ def with_mesh_field(machine: Machine, name: str, index: int, value: object) -> M
     """Return the machine with that field replaced."""
     fields: dict[str, Any] = {f"{name}_{index + 1}": value}
     return replace(machine, mesh=replace(machine.mesh, **fields))
+
+
+def with_tooth_fault(machine: Machine, faults: str, index: int, fault: RootCrack | ToothSpall | ToothChip) -> Machine:
+    """Return the machine with one more of the mesh's `faults` ("cracks", …) on a gear; a tooth has one of a kind."""
+    present: tuple[RootCrack | ToothSpall | ToothChip, ...] = mesh_field(machine, faults, index)
+    if any(other.tooth == fault.tooth for other in present):
+        word = faults.removesuffix("s")
+        raise InputError(
+            f"tooth {fault.tooth} of the {GEARS[index]} gear already has a {word}",
+            allowed=f"one {word} per tooth",
+            remedy="choose another tooth, or take away what the model's own parameters give",
+        )
+    return with_mesh_field(machine, faults, index, (*present, fault))

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gearsig.errors import InputError
 from sims.effects.effect import GEAR_OPTION, TOOTH_OPTION, Effect, Option, OptionValue, Severity
-from sims.effects.gear_side import GEARS, gear_index, mesh_field, part_of_width_mm, tooth_number, with_mesh_field
+from sims.effects.gear_side import gear_index, part_of_width_mm, tooth_number, with_tooth_fault
 from sims.machine import Machine
 from sims.mesh import RootCrack
 
@@ -16,18 +15,9 @@ from sims.mesh import RootCrack
 def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
     """Return the machine with the crack."""
     del rng  # nothing is drawn
-    index, tooth = gear_index(options), tooth_number(machine, options)
-    cracks: tuple[RootCrack, ...] = mesh_field(machine, "cracks", index)
-    for other in cracks:
-        if other.tooth == tooth:
-            raise InputError(
-                f"tooth {tooth} of the {GEARS[index]} gear already has a crack, {other.depth_mm:g} mm deep",
-                where="root_crack",
-                allowed="one crack per tooth",
-                remedy="choose another tooth, or take away the crack that the model's parameters give",
-            )
-    crack = RootCrack(severity, float(options["angle_deg"]), tooth, part_of_width_mm(machine, options))
-    return with_mesh_field(machine, "cracks", index, (*cracks, crack))
+    tooth, width_mm = tooth_number(machine, options), part_of_width_mm(machine, options)
+    crack = RootCrack(severity, float(options["angle_deg"]), tooth, width_mm)
+    return with_tooth_fault(machine, "cracks", gear_index(options), crack)
 
 
 EFFECT = Effect(

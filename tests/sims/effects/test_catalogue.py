@@ -98,8 +98,6 @@ def test_typical_severity_changes_the_machine_and_the_seed_decides(name: str) ->
 @pytest.mark.parametrize("name", NAMES)
 def test_the_change_grows_steadily_with_the_severity(name: str) -> None:
     """One seed, rising severity: numbers of the machine move monotonically, each on its own."""
-    if name == "sliding_friction":  # switches a flag that reads as a number
-        pytest.skip("tested on its own")
     steps = [numbers(machine_with(EffectSetting(name, part * effect(name).severity.typical))) for part in (0.5, 1, 1.5)]
     assert len({len(step) for step in steps}) == 1
     low, middle, high = (np.array(step) for step in steps)

@@ -11,7 +11,7 @@ from gearsig.errors import InputError
 from sims.effects import effect
 from sims.effects.pitch_error import cumulative_pitch
 from sims.machine import Lubrication, Machine, Roughness
-from sims.mesh import deepest_crack_mm
+from sims.mesh import deepest_crack_mm, highest_chip_mm
 from tests.sims.machines import spur_pair_machine
 
 
@@ -35,18 +35,55 @@ def test_a_crack_past_the_tooth_is_refused_with_what_is_allowed() -> None:
     assert apply(spur_pair_machine(), "root_crack", 0.99 * deepest).mesh.cracks_1
 
 
-def test_one_crack_per_tooth() -> None:
-    machine = apply(spur_pair_machine(), "root_crack", 1.0, tooth=3)
-    with pytest.raises(InputError, match="tooth 3 of the driver gear already has a crack, 1 mm deep"):
-        apply(machine, "root_crack", 2.0, tooth=3)
-    assert len(apply(machine, "root_crack", 2.0, tooth=4).mesh.cracks_1) == 2
+TOOTH_FAULTS = [("root_crack", "crack"), ("tooth_spall", "spall"), ("chipped_tooth", "chip")]
 
 
-@pytest.mark.parametrize("name", ["root_crack"])
-def test_a_tooth_that_is_not_there(name: str) -> None:
-    with pytest.raises(InputError, match=r"tooth of the driver gear is 55.*0 to 54"):
+@pytest.mark.parametrize(("name", "word"), TOOTH_FAULTS)
+def test_one_of_a_kind_per_tooth(name: str, word: str) -> None:
+    machine = apply(spur_pair_machine(), name, 1.0, tooth=3)
+    with pytest.raises(InputError, match=f"tooth 3 of the driver gear already has a {word}"):
+        apply(machine, name, 2.0, tooth=3)
+    assert [f.tooth for f in getattr(apply(machine, name, 2.0, tooth=4).mesh, f"{word}s_1")] == [3, 4]
+    assert [f.tooth for f in getattr(apply(machine, name, 2.0, gear="driven", tooth=3).mesh, f"{word}s_2")] == [3]
+
+
+@pytest.mark.parametrize(("name", "word"), TOOTH_FAULTS)
+def test_a_tooth_that_is_not_there(name: str, word: str) -> None:
+    with pytest.raises(InputError, match=r"tooth of the driver gear is 55 \(allowed: 0 to 54\)"):
         apply(spur_pair_machine(), name, 0.5, tooth=55)
-    assert apply(spur_pair_machine(), name, 0.5, gear="driven", tooth=74) != spur_pair_machine()
+    assert getattr(apply(spur_pair_machine(), name, 0.5, gear="driven", tooth=74).mesh, f"{word}s_2")
+
+
+def test_three_kinds_of_damage_on_one_tooth() -> None:
+    machine = spur_pair_machine()
+    for name, _ in TOOTH_FAULTS:
+        machine = apply(machine, name, 1.0, tooth=5)
+    assert machine.mesh.cracks_1[0].tooth == machine.mesh.spalls_1[0].tooth == machine.mesh.chips_1[0].tooth == 5
+
+
+def test_a_spall_longer_than_the_flank_is_refused_with_what_is_allowed() -> None:
+    with pytest.raises(InputError, match=r"longer than the flank \(allowed: 0 to [34]\.\d+ mm along the profile"):
+        apply(spur_pair_machine(), "tooth_spall", 6.0)
+    (spall,) = apply(spur_pair_machine(), "tooth_spall", 2.0, width_percent=100.0, depth_um=50.0).mesh.spalls_1
+    assert (spall.length_mm, spall.width_mm, spall.depth_um) == (2.0, 20.0, 50.0)
+
+
+def test_a_chip_higher_than_the_flank_is_refused_with_what_is_allowed() -> None:
+    highest = highest_chip_mm(spur_pair_machine().mesh.pair.driver)
+    with pytest.raises(InputError, match=rf"higher than the flank \(allowed: 0 to {highest:.3g} mm"):
+        apply(spur_pair_machine(), "chipped_tooth", 1.01 * highest)
+
+
+@pytest.mark.parametrize("name", ["tooth_spall", "chipped_tooth"])
+def test_a_strip_too_narrow_to_carry_is_refused(name: str) -> None:
+    with pytest.raises(InputError, match=r"19 mm on a loaded face of 20 mm \(allowed: 0 to 18 mm, or 20 mm"):
+        apply(spur_pair_machine(), name, 1.0, width_percent=95.0)
+
+
+def test_wear_adds_on_one_gear() -> None:
+    once = apply(spur_pair_machine(), "tooth_wear", 12.0, gear="driven")
+    mesh = apply(once, "tooth_wear", 8.0, gear="driven").mesh
+    assert (mesh.flank_1.wear_um, mesh.flank_2.wear_um) == (0.0, 20.0)
 
 
 @given(st.integers(5, 200), st.integers(0, 2**31))
