@@ -26,13 +26,14 @@ def crack_comparison_figure(
     *,
     impacts_rev: Sequence[float],
     n_teeth: int,
+    change_mps2: Mapping[str, FloatArray] | None = None,
     reach_cycles: Mapping[str, float] | None = None,
     zoom_cycles: tuple[float, float] = (-3.0, 12.0),
     title: str = "",
 ) -> Figure:
     """Draw the acceleration over some revolutions, one row per crack depth, and a close view of one impact.
 
-    The first case, drawn grey in every close view, is the one to compare with: the sound gear.
+    The first case is the one to compare with: the sound gear.
 
     Parameters
     ----------
@@ -44,6 +45,9 @@ def crack_comparison_figure(
         Where the cracked tooth enters the mesh; those on the axis are marked, the middle one is enlarged.
     n_teeth : int
         Of the cracked gear: mesh cycles per revolution.
+    change_mps2 : mapping or None
+        Name of the case → its acceleration less that of the first case at the same angle, (n,); drawn over the close
+        view. A case that is not named has none.
     reach_cycles : mapping or None
         Name of the case → mesh cycles from the entry over which the impact is felt; shaded.
     zoom_cycles : (float, float)
@@ -57,40 +61,42 @@ def crack_comparison_figure(
     Raises
     ------
     InputError
-        If no impact lies on the axis, or a reach names a case that is not there.
+        If no impact lies on the axis, or a change or reach names a case that is not there.
     """
     x = series.checked_axis(revolutions, "revolutions")
     cases = series.checked_curves(acceleration_mps2, len(x), "acceleration_mps2")
     z = count(n_teeth, "n_teeth", minimum=3)
     limits = series.checked_limits(zoom_cycles, "zoom_cycles")
     marked = _marked(impacts_rev, x)
-    reach = _checked_reach(reach_cycles or {}, cases)
+    reach, change = dict(reach_cycles or {}), dict(change_mps2 or {})
+    _check_names(change, cases, "change_mps2")
+    _check_names(reach, cases, "reach_cycles")
     cycles = (x - marked[len(marked) // 2]) * z
     near = (cycles >= limits[0]) & (cycles <= limits[1])
     if np.count_nonzero(near) < 2:
         raise InputError("zoom_cycles holds fewer than two points", remedy="give a wider view or a finer axis")
     height = TOP_IN + BOTTOM_IN + ROW_IN * len(cases) - (ROW_IN - PANEL_IN)
     figure = style.new_figure(height)
-    reference = next(iter(cases.values()))
     rows = []
     for i, (name, values) in enumerate(cases.items()):
         whole, close = _row(figure, height - TOP_IN - PANEL_IN - i * ROW_IN)
         _draw_whole(whole, x, values, marked)
-        if i > 0:
-            close.plot(cycles[near], reference[near], color=style.FLOOR, linewidth=0.9, alpha=0.8, zorder=2)
-        close.plot(cycles[near], values[near], color=style.MEASURED, linewidth=1.0, zorder=3)
+        close.plot(cycles[near], values[near], color=style.MEASURED, linewidth=0.9, zorder=2)
+        if name in change:
+            changed = series.checked_values(change[name], len(x), f"change_mps2[{name!r}]")
+            close.plot(cycles[near], changed[near], color=style.FAULT, linewidth=1.2, zorder=3)
         close.axvline(0.0, color=style.FAULT, linewidth=0.9, linestyle="--", zorder=1)
         close.set_xlim(*limits)
         if name in reach:
-            series.shade(close, (0.0, reach[name]), style.FAULT, 0.10)
-            series.write(close, reach[name], 1.02, f"felt for {reach[name]:.2g} cycles", colour=style.FAULT)
+            series.shade(close, (0.0, reach[name]), style.FAULT, 0.12)
+            series.write(close, limits[1], 1.02, f"felt for {reach[name]:.2g} cycles", colour=style.FAULT, ha="right")
         style.label_axes(whole, "", "a (m/s²)", name)
         rows.append((whole, close))
     _finish(rows, cases, near)
-    whole, close = rows[0]
-    series.write(whole, marked[0], 1.02, "cracked tooth enters", colour=style.FAULT, ha="left")
-    if len(rows) > 1:
-        series.write(close, limits[1], 1.02, f"grey in the rows below: {next(iter(cases))}", ha="right")
+    series.write(rows[0][0], marked[0], 1.02, "cracked tooth enters", colour=style.FAULT, ha="left")
+    if change:
+        text = f"orange below: change against {next(iter(cases))}"
+        series.write(rows[0][1], limits[1], 1.02, text, colour=style.FAULT, ha="right")
     series.headline(figure, title)
     return figure
 
@@ -106,11 +112,10 @@ def _marked(impacts_rev: Sequence[float], x: FloatArray) -> list[float]:
     return marked
 
 
-def _checked_reach(reach: Mapping[str, float], cases: Mapping[str, FloatArray]) -> dict[str, float]:
-    for name in reach:
+def _check_names(given: Mapping[str, object], cases: Mapping[str, FloatArray], parameter: str) -> None:
+    for name in given:
         if name not in cases:
-            raise InputError(f"reach_cycles names {name!r}", allowed=", ".join(cases))
-    return {name: float(value) for name, value in reach.items() if value > 0.0}
+            raise InputError(f"{parameter} names {name!r}", allowed=", ".join(cases))
 
 
 def _row(figure: Figure, bottom_in: float) -> tuple[Axes, Axes]:

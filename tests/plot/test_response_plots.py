@@ -93,6 +93,7 @@ def test_crack_comparison_marks_impacts_and_enlarges_the_middle_one():
         cases,
         impacts_rev=(1.0, 2.0, 3.0, 9.0),
         n_teeth=50,
+        change_mps2={"3 mm": cases["3 mm"] - cases["sound"]},
         reach_cycles={"3 mm": 5.0},
         zoom_cycles=(-2.98, 11.98),
         title="T",
@@ -102,8 +103,8 @@ def test_crack_comparison_marks_impacts_and_enlarges_the_middle_one():
     marks = {float(line.get_xdata()[0]) for line in whole.lines if len(line.get_xdata()) == 2}
     assert marks == {1.0, 2.0, 3.0}
     at = np.abs((REVOLUTIONS - 2.0) * 50 - 4.5) < 7.48
-    grey, blue = (line for line in close_3.lines if len(line.get_xdata()) > 2)
-    np.testing.assert_allclose(grey.get_ydata(), cases["sound"][at])
+    blue, orange = (line for line in close_3.lines if len(line.get_xdata()) > 2)
+    np.testing.assert_allclose(orange.get_ydata(), (cases["3 mm"] - cases["sound"])[at])
     np.testing.assert_allclose(blue.get_ydata(), cases["3 mm"][at])
     np.testing.assert_allclose(blue.get_xdata(), (REVOLUTIONS[at] - 2.0) * 50)
     assert close.get_ylim() == close_3.get_ylim()
@@ -117,6 +118,8 @@ def test_crack_comparison_marks_impacts_and_enlarges_the_middle_one():
     [
         ({"impacts_rev": (9.0,)}, "no impact lies on the axis"),
         ({"reach_cycles": {"7 mm": 2.0}}, "names '7 mm'"),
+        ({"change_mps2": {"7 mm": np.ones(4000)}}, "change_mps2 names '7 mm'"),
+        ({"change_mps2": {"3 mm": np.ones(4)}}, "has 4 points"),
         ({"zoom_cycles": (3.0, 1.0)}, "zoom_cycles"),
         ({"zoom_cycles": (300.0, 301.0)}, "fewer than two"),
         ({"n_teeth": 0}, "n_teeth"),
