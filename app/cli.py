@@ -12,6 +12,8 @@ from app.commands.dashboard import dashboard
 from app.commands.demo import demo
 from app.commands.report import report
 from app.commands.rig import rig_app
+from app.commands.simulate import simulate
+from app.commands.sweep import sweep
 from gearsig import __version__
 from gearsig.errors import InputError, RefusalError
 
@@ -32,6 +34,8 @@ app = typer.Typer(
 app.command()(analyze)
 app.command()(report)
 app.add_typer(rig_app, name="rig")
+app.command()(simulate)
+app.command()(sweep)
 app.command()(demo)
 app.command()(dashboard)
 

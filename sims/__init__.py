@@ -1,1 +1,83 @@
 """Simulators and signal models; they use only gearsig.rig and gearsig.recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gearsig.recording.types import Recording
+    from sims.effects.effect import EffectSetting
+    from sims.machine.operation import Course
+    from sims.simulator import ParameterValue
+
+    Profile = float | Sequence[tuple[float, float]] | Course
+
+__all__ = ["simulate"]
+
+
+def simulate(
+    model: str = "cracked",
+    *,
+    preset: str = "",
+    parameters: Mapping[str, ParameterValue] | None = None,
+    effects: Mapping[str, float] | Sequence[EffectSetting] | None = None,
+    speed_rpm: Profile | None = None,
+    torque_nm: Profile | None = None,
+    duration_s: float = 5.0,
+    sampling_rate_hz: float = 20480.0,
+    seed: int = 0,
+) -> Recording:
+    """Simulate a machine and measure it; the recording carries rig and truth.
+
+    Parameters
+    ----------
+    model : str
+        See `sims.registry.simulators`, or ``gearsig simulate --list``.
+    preset : str
+        Empty: the model's first.
+    parameters : mapping or None
+        Name → value; what is not given is the preset's.
+    effects : mapping, sequence of EffectSetting or None
+        Name → severity in the effect's unit, or settings with options (which gear, which tooth).
+    speed_rpm, torque_nm : number, sequence of (time in s, value), Course or None
+        Of the input shaft; between points in straight lines. None: the preset's.
+    duration_s, sampling_rate_hz : float
+    seed : int
+        The same seed gives the same recording.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    InputError
+        If a name does not exist (with the closest that does), or a value is outside its range.
+
+    Examples
+    --------
+    >>> from sims import simulate
+    >>> recording = simulate("cracked", preset="workshop_29_47", effects={"root_crack": 1.5}, duration_s=0.1)
+    >>> recording.truth["effects"][0]["name"], recording.channel_names
+    ('root_crack', ('a1', 'a2', 'tacho'))
+    """
+    from dataclasses import replace
+
+    import numpy as np
+
+    from gearsig.checks import count
+    from sims.registry import simulator
+    from sims.request import effect_settings, operation_of
+
+    chosen = simulator(model)
+    recording = chosen.simulate(
+        parameters or {},
+        effect_settings(effects),
+        operation_of(model, preset, speed_rpm, torque_nm),
+        np.random.default_rng(count(seed, "seed", minimum=0)),
+        preset=preset,
+        sampling_rate_hz=sampling_rate_hz,
+        duration_s=duration_s,
+    )
+    return replace(recording, truth={**(recording.truth or {}), "seed": seed})

@@ -1,0 +1,239 @@
+"""From parameter values to a machine, and from a machine to its rig."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import degrees
+
+import numpy as np
+
+from gearsig.errors import InputError
+from gearsig.rig.speed import EncoderChannel, SpeedSource, TachometerChannel
+from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
+from sims.cracked.chain import build_chain
+from sims.cracked.wanted import Wanted
+from sims.machine import BearingSupport, Drive, Lubrication, Machine, Roughness, ShaftLine, Wheel
+from sims.machine.operation import Course, Operation
+from sims.measure import MeasurementChain, Tachometer
+from sims.mesh import (
+    FlankDeviation,
+    GearGeometry,
+    GearMesh,
+    Material,
+    PairGeometry,
+    RootCrack,
+    disc_inertia_kg_m2,
+    disc_mass_kg,
+)
+from sims.values import Values
+
+_SIDES = ("driver", "driven")
+SHAFTS = ("input", "output")
+"""Names of the driver's and the driven shaft."""
+
+
+def build_machine(values: Values, *, sampling_rate_hz: float = 20480.0) -> Machine:
+    """Return the machine that complete values of `PARAMETERS` describe.
+
+    Raises
+    ------
+    InputError
+        If parameters do not fit each other: teeth that interfere, a crack past the tooth, balls that overlap.
+    """
+    wanted = Wanted(values)
+    mesh = build_mesh(wanted)
+    line_deg = wanted.optional("line_of_action_deg")
+    if line_deg is None:  # the line of centres, α_w ahead of x, lies level
+        line_deg = -degrees(mesh.pair.working_pressure_angle_rad)
+    return Machine(
+        mesh=mesh,
+        wheels=(_wheel(wanted, mesh, 0), _wheel(wanted, mesh, 1)),
+        shafts=(_shaft(wanted, 0), _shaft(wanted, 1)),
+        bearings=(_bearing(wanted, 1), _bearing(wanted, 2), _bearing(wanted, 3), _bearing(wanted, 4)),
+        chain=build_chain(wanted, line_deg, sampling_rate_hz),
+        mesh_damping_ratio=wanted.number("mesh_damping_ratio"),
+        half_backlash_um=wanted.number("half_backlash_um"),
+        lubrication=Lubrication(
+            wanted.is_on("friction"), wanted.number("viscosity_cp"), wanted.number("friction_factor")
+        ),
+        roughness=Roughness(
+            wanted.number("roughness_um"), wanted.word("roughness_locked_to"), wanted.number("roughness_dimension")
+        ),
+        drive=Drive(wanted.number("governor_nm_s_per_rad")),
+        gravity_mps2=wanted.number("gravity_mps2"),
+        line_of_action_deg=line_deg,
+    )
+
+
+def build_mesh(wanted: Wanted) -> GearMesh:
+    """Return geometry, material, crack and flanks of the pair."""
+    pair = PairGeometry(_gear(wanted, 0), _gear(wanted, 1), wanted.optional("centre_distance_mm"))
+    material = Material(
+        wanted.number("youngs_modulus_gpa"), wanted.number("poisson_ratio"), wanted.number("density_kg_m3")
+    )
+    return GearMesh(
+        pair,
+        material,
+        material,
+        contact_law=wanted.word("contact_law"),
+        cracks_1=_cracks(wanted, 0),
+        cracks_2=_cracks(wanted, 1),
+        flank_1=_flank(wanted, pair.driver, 0),
+        flank_2=_flank(wanted, pair.driven, 1),
+        ramp=wanted.number("mesh_ramp"),
+    )
+
+
+def build_rig(machine: Machine, operation: Operation, *, name: str = "", sources: Sequence[str] = ()) -> Rig:
+    """Return what somebody who knows the machine's drawing would write into a rig file; no damage is in it.
+
+    Parameters
+    ----------
+    machine : Machine
+    operation : Operation
+        Speed and torque are stated where they are constant.
+    name : str
+    sources : sequence of str
+    """
+    pair = machine.mesh.pair
+    first, second = machine.shaft_names
+    return Rig(
+        name=name,
+        shafts=(Shaft(first, "ccw"), Shaft(second, "cw")),
+        pairs=(
+            GearPair(
+                "stage 1",
+                first,
+                second,
+                pair.driver.teeth,
+                pair.driven.teeth,
+                pair.driver.module_mm,
+                pair.driver.pressure_angle_deg,
+                pair.face_width_mm,
+            ),
+        ),
+        bearings=tuple(support.bearing for support in machine.bearings),
+        sensors=_sensors(machine.chain, first),
+        operating_point=OperatingPoint(
+            first, speed_rpm=_constant(operation.speed_rpm), torque_nm=_constant(operation.torque_nm)
+        ),
+        speed=_speed_source(machine.chain, first),
+        sources=tuple(sources),
+    )
+
+
+def _gear(wanted: Wanted, side: int) -> GearGeometry:
+    name = _SIDES[side]
+    return GearGeometry(
+        wanted.whole(f"teeth_{name}"),
+        wanted.number("module_mm"),
+        wanted.number("pressure_angle_deg"),
+        wanted.number(f"profile_shift_{name}"),
+        wanted.number("face_width_mm"),
+        wanted.number("addendum"),
+        wanted.number("dedendum"),
+        wanted.number("tool_tip_radius"),
+        wanted.optional(f"bore_radius_{name}_mm"),
+    )
+
+
+def _cracks(wanted: Wanted, side: int) -> tuple[RootCrack, ...]:
+    depth_mm, percent = wanted.number("crack_depth_mm"), wanted.number("crack_width_percent")
+    if depth_mm == 0.0 or wanted.word("crack_gear") != _SIDES[side]:
+        return ()
+    width_mm = None if percent == 100.0 else percent / 100.0 * wanted.number("face_width_mm")
+    return (RootCrack(depth_mm, wanted.number("crack_angle_deg"), wanted.whole("crack_tooth"), width_mm),)
+
+
+def _flank(wanted: Wanted, gear: GearGeometry, side: int) -> FlankDeviation:
+    return FlankDeviation(
+        tip_relief_um=wanted.number("tip_relief_um"),
+        tip_relief_length_mm=wanted.number("tip_relief_length_mm"),
+        pitch_um=_pitch_um(wanted, gear.teeth, side),
+    )
+
+
+def _pitch_um(wanted: Wanted, teeth: int, side: int) -> tuple[float, ...]:
+    """Deviations of one specimen's teeth from their places, of the wanted rms and zero mean; the same in every run."""
+    rms_um = wanted.number("pitch_deviation_um")
+    if rms_um == 0.0:
+        return ()
+    drawn = np.random.default_rng([wanted.whole("tolerance_seed"), side]).standard_normal(teeth)
+    drawn -= drawn.mean()
+    return tuple(float(v) for v in rms_um * drawn / np.sqrt(np.mean(drawn**2)))
+
+
+def _wheel(wanted: Wanted, mesh: GearMesh, side: int) -> Wheel:
+    name, gear = _SIDES[side], (mesh.pair.driver, mesh.pair.driven)[side]
+    density = wanted.number("density_kg_m3")
+    mass, inertia = wanted.optional(f"mass_{name}_kg"), wanted.optional(f"inertia_{name}_kg_m2")
+    return Wheel(
+        disc_mass_kg(gear, density) if mass is None else mass,
+        disc_inertia_kg_m2(gear, density) if inertia is None else inertia,
+        wanted.number(f"runout_{name}_um"),
+        wanted.number(f"runout_angle_{name}_deg"),
+        wanted.number(f"unbalance_{name}_g_mm"),
+        wanted.number(f"unbalance_angle_{name}_deg"),
+    )
+
+
+def _shaft(wanted: Wanted, side: int) -> ShaftLine:
+    return ShaftLine(
+        SHAFTS[side],
+        wanted.number("bending_stiffness_n_per_m"),
+        wanted.number("bending_damping_n_s_per_m"),
+        wanted.number("torsional_stiffness_nm_per_rad"),
+        wanted.number("torsional_damping_nm_s_per_rad"),
+        wanted.number(f"rotor_inertia_{SHAFTS[side]}_kg_m2"),
+        bearing_distance_m=1e-3 * wanted.number("bearing_distance_mm"),
+    )
+
+
+def _bearing(wanted: Wanted, number: int) -> BearingSupport:
+    bearing = Bearing(
+        f"bearing {number}",
+        SHAFTS[(number - 1) // 2],
+        wanted.whole("n_balls"),
+        wanted.number("ball_diameter_mm"),
+        wanted.number("ball_pitch_diameter_mm"),
+        wanted.number("ball_contact_angle_deg"),
+    )
+    _check_balls(bearing)
+    return BearingSupport(
+        bearing,
+        wanted.number("bearing_mass_kg"),
+        wanted.number("bearing_stiffness_n_per_m"),
+        wanted.number("bearing_damping_n_s_per_m"),
+        wanted.number("bearing_clearance_um"),
+    )
+
+
+def _check_balls(bearing: Bearing) -> None:
+    n, ball, pitch = bearing.n_rolling_elements, bearing.rolling_element_diameter_mm, bearing.pitch_diameter_mm
+    if n is not None and ball is not None and pitch is not None and ball >= pitch * np.sin(np.pi / n):
+        raise InputError(
+            f"{n} balls of {ball:g} mm do not fit on a pitch diameter of {pitch:g} mm",
+            where="n_balls",
+            allowed=f"balls below {pitch * np.sin(np.pi / n):.3g} mm",
+        )
+
+
+def _sensors(chain: MeasurementChain, shaft: str) -> tuple[Sensor, ...]:
+    found = [Sensor(c.name, "acceleration", "m/s^2", c.position) for c in chain.channels]
+    if isinstance(chain.tachometer, Tachometer):
+        found.append(Sensor(chain.tachometer.channel, "tachometer", "V", f"{chain.tachometer.shaft or shaft} shaft"))
+    found += [Sensor(e.channel, "encoder", "deg", f"{e.shaft or shaft} shaft") for e in chain.encoders]
+    return tuple(found)
+
+
+def _speed_source(chain: MeasurementChain, shaft: str) -> SpeedSource | None:
+    tacho = chain.tachometer
+    if isinstance(tacho, Tachometer):
+        return TachometerChannel(tacho.channel, tacho.pulses_per_revolution, shaft=tacho.shaft or shaft)
+    for encoder in chain.encoders[:1] if tacho is None else ():
+        return EncoderChannel(encoder.channel, 360.0, wraps=encoder.wraps, shaft=encoder.shaft or shaft)
+    return None  # a counter's pulse times belong to the recording
+
+
+def _constant(course: Course) -> float | None:
+    return float(course.values[0]) if np.ptp(course.values) == 0.0 else None

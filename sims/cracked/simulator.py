@@ -1,0 +1,188 @@
+"""The cracked spur pair as a simulator: preset and values → machine → effects → recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearsig.checks import within
+from gearsig.recording.types import Recording
+from sims.cracked.parameters import PARAMETERS
+from sims.effects import EffectSetting, effect, effects, with_effects
+from sims.machine import Machine
+from sims.machine.operation import Course, Operation
+from sims.presets import preset, presets
+from sims.simulator import Parameter, ParameterValue
+from sims.values import Values, complete_values
+
+if TYPE_CHECKING:
+    from sims.cracked.convergence import Convergence
+
+NAME = "cracked"
+SPEED_RANGE_RPM = (0.0, 30000.0)
+TORQUE_RANGE_NM = (0.0, 100000.0)
+SAMPLING_RATE_RANGE_HZ = (100.0, 250000.0)
+DURATION_RANGE_S = (0.01, 600.0)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A machine with its effects switched on, ready to run.
+
+    Parameters
+    ----------
+    machine : Machine
+    operation : Operation
+    preset : str
+    values : mapping
+        Every parameter; None where it follows from the others.
+    effects : tuple of EffectSetting
+        With every option.
+    """
+
+    machine: Machine
+    operation: Operation
+    preset: str
+    values: Values
+    effects: tuple[EffectSetting, ...]
+
+    def truth(self) -> dict[str, Any]:
+        """What was put in, as plain values."""
+        return {
+            "model": NAME,
+            "preset": self.preset,
+            "parameters": dict(self.values),
+            "effects": [
+                {
+                    "name": s.name,
+                    "severity": s.severity,
+                    "unit": effect(s.name).severity.unit,
+                    "options": dict(s.options),
+                }
+                for s in self.effects
+            ],
+            "operation": {
+                "speed_rpm": _plain(self.operation.speed_rpm),
+                "torque_nm": _plain(self.operation.torque_nm),
+            },
+        }
+
+
+@dataclass(frozen=True)
+class CrackedPair:
+    """Spur gear pair on four bearings between two rotors, 16 degrees of freedom; see `sims.cracked`."""
+
+    @property
+    def name(self) -> str:
+        """Short name."""
+        return NAME
+
+    @property
+    def title(self) -> str:
+        """One line for people."""
+        return "spur gear pair with root crack: 16 degrees of freedom, friction, backlash, roughness"
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters."""
+        return PARAMETERS
+
+    @property
+    def presets(self) -> tuple[str, ...]:
+        """Names of the machines."""
+        return tuple(presets(NAME))
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects: all of the catalogue have a meaning here."""
+        return tuple(effects())
+
+    def prepare(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        settings: Sequence[EffectSetting],
+        operation: Operation | None,
+        rng: np.random.Generator,
+        *,
+        preset_name: str = "",
+        sampling_rate_hz: float = 20480.0,
+    ) -> Prepared:
+        """Build the machine and switch its effects on; one number is drawn from `rng`, with and without effects."""
+        from sims.cracked.build import build_machine
+
+        chosen = preset(NAME, preset_name)
+        values = complete_values(PARAMETERS, chosen.parameters, parameters)
+        run = operation or chosen.operation
+        _check_run(run, sampling_rate_hz)
+        complete = tuple(EffectSetting(s.name, s.severity, effect(s.name).complete(s.options)) for s in settings)
+        machine = with_effects(build_machine(values, sampling_rate_hz=sampling_rate_hz), complete, rng)
+        return Prepared(machine, run, chosen.name, values, complete)
+
+    def simulate(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        effects: Sequence[EffectSetting],
+        operation: Operation | None,
+        rng: np.random.Generator,
+        *,
+        preset: str = "",
+        sampling_rate_hz: float = 20480.0,
+        duration_s: float = 5.0,
+    ) -> Recording:
+        """Make a recording with rig and truth; see `sims.simulator.Simulator.simulate`.
+
+        Raises
+        ------
+        InputError
+            If a name does not exist, a value is out of its range, or the values do not fit each other.
+        """
+        from sims.cracked.build import build_rig
+        from sims.cracked.simulate import simulate_machine
+
+        within(duration_s, "duration_s", *DURATION_RANGE_S, "s")
+        ready = self.prepare(parameters, effects, operation, rng, preset_name=preset, sampling_rate_hz=sampling_rate_hz)
+        rig = build_rig(
+            ready.machine,
+            ready.operation,
+            name=f"simulated: {ready.preset}",
+            sources=[f"simulated with the model {NAME!r}, preset {ready.preset!r}; the truth stands in the recording"],
+        )
+        return simulate_machine(
+            ready.machine,
+            ready.operation,
+            rng=rng,
+            sampling_rate_hz=sampling_rate_hz,
+            duration_s=duration_s,
+            rig=rig,
+            truth=ready.truth(),
+        )
+
+    def check_convergence(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        effects: Sequence[EffectSetting],
+        operation: Operation | None,
+        rng: np.random.Generator,
+        *,
+        preset: str = "",
+    ) -> Convergence:
+        """Tell how far a smaller step of the integrator changes the result of this very machine."""
+        from sims.cracked.convergence import check_convergence
+
+        ready = self.prepare(parameters, effects, operation, rng, preset_name=preset)
+        return check_convergence(ready.machine, ready.operation, rng)
+
+
+def _check_run(operation: Operation, sampling_rate_hz: float) -> None:
+    for value in (operation.speed_rpm.values.min(), operation.speed_rpm.values.max()):
+        within(value, "speed_rpm", *SPEED_RANGE_RPM, "rpm")
+    for value in (operation.torque_nm.values.min(), operation.torque_nm.values.max()):
+        within(value, "torque_nm", *TORQUE_RANGE_NM, "N m")
+    within(sampling_rate_hz, "sampling_rate_hz", *SAMPLING_RATE_RANGE_HZ, "Hz")
+
+
+def _plain(course: Course) -> dict[str, list[float]]:
+    return {"times_s": course.times_s.tolist(), "values": course.values.tolist()}

@@ -1,0 +1,110 @@
+"""A simulated recording on disk: the recording, its rig file and its truth, all or none."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from gearsig.errors import InputError
+from gearsig.recording.types import Recording
+from gearsig.recording.write import WRITERS, write_recording
+from gearsig.rig.toml import write_rig
+
+
+class FileSet(NamedTuple):
+    """Names of what belongs to one recording."""
+
+    recording: Path
+    rig: Path
+    truth: Path
+
+
+def file_set(path: str | Path, *, replace: bool = False) -> FileSet:
+    """Return the names that belong to a recording, after checking that they can be written.
+
+    Raises
+    ------
+    InputError
+        If the format is not known, the folder is missing, the name holds a dot more than its extension's (the rig file
+        beside it could not be found), or one of the files exists and `replace` is false.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in WRITERS:
+        raise InputError(
+            f"extension {target.suffix or '(none)'!r} cannot be written", where=target.name, allowed=" ".join(WRITERS)
+        )
+    if "." in target.stem:
+        raise InputError(
+            "the name has more than one dot",
+            where=target.name,
+            remedy=f"take {target.stem.replace('.', '_')}{target.suffix}",
+        )
+    if not target.parent.is_dir():
+        raise InputError(f"folder {str(target.parent)!r} does not exist", where=target.name, remedy="make it first")
+    names = FileSet(target, target.with_suffix(".toml"), target.with_name(f"{target.stem}.truth.json"))
+    for name in names:
+        if name.is_dir():
+            raise InputError("is a folder", where=str(name), remedy="choose another name with -o")
+        if name.exists() and not replace:
+            raise InputError(
+                "exists already", where=str(name), remedy="choose another name, or replace it with --force"
+            )
+    return names
+
+
+def write_set(recording: Recording, names: FileSet) -> None:
+    """Write a recording that has rig and truth, its rig file and its truth.
+
+    They are written beside their places and moved there when all are complete, the recording last: where it stands,
+    the others do.
+    """
+    if recording.rig is None or recording.truth is None:
+        raise InputError("the recording has no rig or no truth", where=names.recording.name)
+    folder = names.recording.parent
+    try:
+        unfinished = Path(tempfile.mkdtemp(dir=folder, prefix=f".{names.recording.stem[:32]}-"))
+    except OSError as error:
+        raise InputError(
+            f"cannot be written ({error.strerror})", where=str(names.recording), remedy="choose another folder"
+        ) from None
+    parts = FileSet(*(unfinished / name.name for name in names))
+    try:
+        write_recording(recording, parts.recording)
+        write_rig(recording.rig, parts.rig)
+        parts.truth.write_text(truth_json(recording.truth), encoding="utf-8")
+        _move(parts, names)
+    except OSError as error:
+        raise InputError(f"cannot be written ({error})", where=str(names.recording), remedy="check the disk") from error
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+
+
+def truth_json(truth: Mapping[str, Any]) -> str:
+    """Return a truth as text for people and programs."""
+    return json.dumps(dict(truth), indent=2, ensure_ascii=False, default=_plain) + "\n"
+
+
+def _move(parts: FileSet, names: FileSet) -> None:
+    """Move all parts to their places; where one cannot be moved, take back those that replaced nothing."""
+    moved: list[Path] = []
+    try:
+        for part, name in reversed(list(zip(parts, names, strict=True))):
+            new = not name.exists()
+            part.replace(name)
+            if new:
+                moved.append(name)
+    except OSError:
+        for name in moved:
+            name.unlink(missing_ok=True)
+        raise
+
+
+def _plain(value: Any) -> Any:
+    """Turn NumPy values and mappings of other kinds into JSON's."""
+    if isinstance(value, Mapping):
+        return dict(value)
+    return value.tolist()  # of arrays and of NumPy's numbers

@@ -1,0 +1,60 @@
+"""All simulators, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from gearsig.checks import closest_match_hint
+from gearsig.errors import InputError
+from sims.effects.effect import EffectSetting
+from sims.machine.operation import Operation
+from sims.simulator import ParameterValue, Simulator
+
+
+@cache
+def simulators() -> dict[str, Simulator]:
+    """Return every simulator by its name."""
+    from sims.cracked.simulator import CrackedPair
+
+    found: tuple[Simulator, ...] = (CrackedPair(),)
+    return {simulator.name: simulator for simulator in found}
+
+
+def simulator(name: str) -> Simulator:
+    """Return the simulator called `name`."""
+    found = simulators()
+    if name not in found:
+        raise InputError(
+            f"there is no model {name!r}", allowed=", ".join(found), remedy=closest_match_hint(name, found)
+        )
+    return found[name]
+
+
+class HasText(Protocol):
+    """A result that explains itself."""
+
+    @property
+    def text(self) -> str:
+        """For people."""
+        ...
+
+
+@runtime_checkable
+class ChecksConvergence(Protocol):
+    """A simulator that can tell how far a smaller step changes its result."""
+
+    def check_convergence(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        effects: Sequence[EffectSetting],
+        operation: Operation | None,
+        rng: np.random.Generator,
+        *,
+        preset: str = "",
+    ) -> HasText:
+        """Check the very machine that would be simulated."""
+        ...
