@@ -6,15 +6,19 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, positive
-from sims.mesh.friction import friction_coefficient, line_contact_pressure_gpa, reduced_modulus_pa
+from sims.mesh.friction import FrictionResult, friction_coefficient, line_contact_pressure_gpa, reduced_modulus_pa
 from sims.mesh.gear_mesh import GearMesh
 from sims.mesh.stiffness import share_torque
 from sims.mesh.table import MeshTable
 
 LEAST_RADIUS = 1e-3
 """In modules: radius of curvature below which a contact, on the base circle, is taken as this curved."""
+
+LEAST_PART = 0.2
+"""Part of the load from which a contact's range is told."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,7 @@ class MeshFriction:
     sliding_mps : array, (n, n_slots)
         v_s = ω2 ρ2 − ω1 ρ1.
     notes : tuple of str
-        Where loaded contacts leave the range of the friction regression.
+        Where contacts that carry a fifth of the load or more leave the range of the friction regression.
     """
 
     mesh_cycles: FloatArray
@@ -76,22 +80,29 @@ def friction_over_mesh(
     shared = share_torque(mesh, torque_nm, mesh_cycles, table=table)
     u_1, u_2, radius_m = _speeds_and_radius(mesh, shared.mesh_cycles, positive(speed_rpm, "speed_rpm", "rpm"))
     normal = shared.pair_forces_n
-    touching = normal > 0.0
-    one, two = mesh.material_1, mesh.material_2
-    modulus = reduced_modulus_pa(one.youngs_modulus_pa, one.poisson_ratio, two.youngs_modulus_pa, two.poisson_ratio)
     sliding, entrainment = u_2 - u_1, 0.5 * (u_1 + u_2)
-    found = friction_coefficient(
-        (sliding / entrainment)[touching],
-        line_contact_pressure_gpa(normal[touching], mesh.face_width_m, radius_m[touching], modulus),
-        viscosity_cp=viscosity_cp,
-        roughness_um=roughness_um,
-        entrainment_mps=entrainment[touching],
-        radius_m=radius_m[touching],
-    )
-    coefficient = np.zeros(normal.shape)
-    coefficient[touching] = found.coefficient
+    pressure = line_contact_pressure_gpa(normal, mesh.face_width_m, radius_m, _reduced_modulus_pa(mesh))
+
+    def found(where: NDArray[np.bool_]) -> FrictionResult:
+        return friction_coefficient(
+            (sliding / entrainment)[where],
+            pressure[where],
+            viscosity_cp=viscosity_cp,
+            roughness_um=roughness_um,
+            entrainment_mps=entrainment[where],
+            radius_m=radius_m[where],
+        )
+
+    coefficient = found(np.ones(normal.shape, dtype=np.bool_)).coefficient.reshape(normal.shape)
+    # A pair that takes up its load passes every small pressure, of which there is nothing to say.
+    notes = found(normal >= LEAST_PART * normal.sum(axis=1, keepdims=True)).notes
     friction = coefficient * normal * np.sign(sliding)
-    return MeshFriction(shared.mesh_cycles, coefficient, friction, normal, sliding, found.notes)
+    return MeshFriction(shared.mesh_cycles, coefficient, friction, normal, sliding, notes)
+
+
+def _reduced_modulus_pa(mesh: GearMesh) -> float:
+    one, two = mesh.material_1, mesh.material_2
+    return reduced_modulus_pa(one.youngs_modulus_pa, one.poisson_ratio, two.youngs_modulus_pa, two.poisson_ratio)
 
 
 def _speeds_and_radius(

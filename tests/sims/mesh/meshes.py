@@ -1,0 +1,34 @@
+"""The spur pair of the mesh tests: 55 and 75 teeth, module 2."""
+
+import numpy as np
+
+from sims.mesh import GearGeometry, GearMesh, MeshTable, PairGeometry
+from sims.mesh.stiffness import pair_states
+
+PAIR = PairGeometry(*(GearGeometry(z, 2.0, face_width_mm=20.0, bore_radius_mm=17.5) for z in (55, 75)))
+MESH = GearMesh(PAIR)
+PITCH_POINT = (PAIR.pitch_point_radius_mm - PAIR.start_radius_mm) / PAIR.base_pitch_mm
+"""ζ at the pitch point, 0.909: in single contact."""
+SINGLE = np.linspace(0.83, 0.97, 29)
+"""Only pair 0 touches."""
+
+
+def own_separation(table: MeshTable, progress: np.ndarray, pair: int = 0) -> np.ndarray:
+    """Separation of one pair over ζ, as the solver reads it."""
+    cycles = progress + pair
+    _, separation, _ = pair_states(table, cycles)
+    column = np.floor(cycles + table.ramp / 2).astype(int) - pair
+    return separation[np.arange(len(cycles)), column]
+
+
+def own_compliance(table: MeshTable, progress: np.ndarray, pair: int = 0) -> np.ndarray:
+    """Compliance of one pair over ζ, contact included."""
+    cycles = progress + pair
+    compliance, _, _ = pair_states(table, cycles)
+    column = np.floor(cycles + table.ramp / 2).astype(int) - pair
+    return compliance[np.arange(len(cycles)), column] + table.contact_coefficient
+
+
+def own_stretch(mesh: GearMesh, n_points: int = 400) -> np.ndarray:
+    """ζ from a pair's entry to its exit."""
+    return np.linspace(0.0, mesh.pair.contact_ratio, n_points)

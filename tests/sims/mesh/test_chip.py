@@ -1,0 +1,148 @@
+"""Chipped teeth: nothing carries beyond the edge, lost width in closed form, limits, refusals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gearsig.errors import InputError
+from sims.mesh import RootCrack, ToothChip, ToothSpall, highest_chip_mm, mesh_table, share_torque
+from sims.mesh.stiffness_tooth import tooth_compliance
+from tests.sims.mesh.meshes import MESH, PAIR, own_compliance, own_separation, own_stretch
+
+ENDS = own_stretch(MESH)
+EDGE = 0.05
+COLUMNS = 0.008
+"""Two columns of the table, by which the interpolation reaches beyond an edge."""
+
+
+def touched_radius_mm(progress: np.ndarray) -> np.ndarray:
+    """Distance from the driver's axis of the point that is touched."""
+    return np.hypot(PAIR.driver.base_radius_mm, PAIR.contact_radii_mm(progress)[0])
+
+
+@pytest.mark.parametrize("height_mm", [0.3, 1.0, 2.0, 3.5])
+@pytest.mark.parametrize("torque_nm", [1.0, 110.0, 500.0])
+def test_nothing_carries_beyond_the_edge_of_a_chip_over_the_face(height_mm: float, torque_nm: float) -> None:
+    """The neighbours carry; where there is none, the pair runs into the gap instead of holding at its place."""
+    mesh = replace(MESH, chips_1=(ToothChip(height_mm, tooth=9),))
+    cycles = 9 + np.linspace(-0.5, 2.5, 1501)
+    sound, chipped = (share_torque(m, torque_nm, cycles) for m in (MESH, mesh))
+    lost = touched_radius_mm(cycles - 9 - EDGE) > PAIR.driver.tip_radius_mm - height_mm
+    column = np.floor(cycles + MESH.ramp / 2).astype(int) - 9
+    here = (column >= 0) & (column < MESH.n_slots)
+    forces = np.where(here, chipped.pair_forces_n[np.arange(len(cycles)), np.clip(column, 0, 1)], 0.0)
+    double = (cycles > 10.05) & (cycles < 9 + PAIR.contact_ratio - 0.05)
+    assert forces[lost & double].max() == 0.0
+    alone = lost & (cycles > 9.85) & (cycles < 9.95)
+    jump = chipped.transmission_error_m - sound.transmission_error_m
+    if alone.any():
+        assert jump[alone].min() > 0.2e-3
+    whole = touched_radius_mm(cycles - 9 + COLUMNS) <= PAIR.driver.tip_radius_mm - height_mm
+    assert jump[whole | (cycles < 9)] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_chip_of_the_driven_gear_lets_its_pair_enter_late() -> None:
+    mesh = replace(MESH, chips_2=(ToothChip(1.0, tooth=4),))
+    shared = share_torque(mesh, 110.0, np.array([79.1, 79.3, 79.7]))
+    assert shared.pair_forces_n[:2, 0] == pytest.approx(0.0)
+    assert shared.pair_forces_n[2, 0] > 500.0
+    at_other_tooth = share_torque(mesh, 110.0, np.array([80.1])).pair_forces_n
+    assert at_other_tooth[0, 0] > 500.0
+
+
+@pytest.mark.parametrize("width_mm", [2.0, 10.0, 18.0])
+def test_chip_over_part_of_the_face_softens_tooth_and_contact(width_mm: float) -> None:
+    mesh = replace(MESH, chips_1=(ToothChip(1.0, width_mm),))
+    extra = own_compliance(mesh_table(mesh), ENDS) - own_compliance(mesh_table(MESH), ENDS)
+    roll = PAIR.contact_radii_mm(ENDS)[0] / PAIR.driver.base_radius_mm
+    own = tooth_compliance(PAIR.driver, MESH.material_1, roll).total / 0.02 + 4 * 0.91 / (np.pi * 206e9 * 0.02)
+    lost = touched_radius_mm(ENDS - EDGE - COLUMNS) > PAIR.driver.tip_radius_mm - 1.0
+    whole = touched_radius_mm(ENDS + COLUMNS) < PAIR.driver.tip_radius_mm - 1.0
+    expected = own * (1 / (1 - width_mm / 20.0) - 1)
+    assert extra[lost] == pytest.approx(expected[lost], rel=1e-6)
+    assert extra[whole] == pytest.approx(0.0, abs=1e-9 * expected.min())
+    assert np.all(own_separation(mesh_table(mesh), ENDS) == 0.0)
+
+
+def test_whole_width_given_as_a_number_is_the_whole_width() -> None:
+    one, two = (mesh_table(replace(MESH, chips_1=(ToothChip(1.0, w),))) for w in (None, 20.0))
+    np.testing.assert_array_equal(one.separation_1_m, two.separation_1_m)
+    assert one.separation_1_m[1].max() == pytest.approx(0.3e-3)
+    assert np.all(one.compliance_1[1] == one.compliance_1[0])
+
+
+@given(st.floats(0.0, 3.7), st.floats(1.0, 600.0))
+@settings(max_examples=30, deadline=None)  # kernels compile in the first example
+def test_load_stays_balanced(height_mm: float, torque_nm: float) -> None:
+    mesh = replace(MESH, chips_1=(ToothChip(height_mm),))
+    shared = share_torque(mesh, torque_nm, np.linspace(0.0, 2.0, 101))
+    force = torque_nm / (PAIR.driver.base_radius_mm * 1e-3)
+    assert shared.pair_forces_n.sum(axis=1) == pytest.approx(force, rel=1e-10)
+
+
+@pytest.mark.parametrize("width_mm", [None, 8.0])
+def test_small_chips_change_little_and_none_changes_nothing(width_mm: float | None) -> None:
+    beyond = np.linspace(0.0, PAIR.contact_ratio + 0.025, 400)
+    sound, none, small = (
+        mesh_table(replace(MESH, chips_1=chips))
+        for chips in ((), (ToothChip(0.0, width_mm),), (ToothChip(1e-4, width_mm),))
+    )
+    assert np.all(own_separation(none, beyond) == 0.0)
+    assert np.all(own_compliance(none, beyond) == own_compliance(sound, beyond))
+    change = own_compliance(small, beyond) / own_compliance(sound, beyond) - 1
+    assert np.abs(change).max() < 1e-3
+    assert own_separation(small, beyond).max() < 1e-6
+    assert np.abs(change).max() + own_separation(small, beyond).max() > 0.0
+
+
+def test_chip_of_no_width_changes_nothing() -> None:
+    table = mesh_table(replace(MESH, chips_1=(ToothChip(1.0, 0.0),)))
+    assert np.all(table.compliance_1[1] == table.compliance_1[0])
+    assert np.all(table.separation_1_m == 0.0)
+
+
+def test_chip_and_spall_over_the_face_add_on_one_tooth() -> None:
+    chip, spall = ToothChip(1.0, tooth=2), ToothSpall(2.0, 20.0, 10.0, tooth=2)
+    tables = [
+        mesh_table(replace(MESH, **more))  # type: ignore[arg-type]  # tuples of faults
+        for more in ({"chips_1": (chip,)}, {"spalls_1": (spall,)}, {"chips_1": (chip,), "spalls_1": (spall,)})
+    ]
+    one, two, both = (own_separation(t, ENDS, pair=2) for t in tables)
+    assert both == pytest.approx(one + two, abs=1e-15)
+    assert own_separation(tables[2], ENDS, pair=3) == pytest.approx(0.0, abs=1e-18)
+
+
+def test_cracked_and_chipped_tooth() -> None:
+    """The cracked tooth's own compliance grows by the lost width."""
+    mesh = replace(MESH, cracks_1=(RootCrack(2.0),), chips_1=(ToothChip(1.0, 10.0),))
+    cracked = replace(MESH, cracks_1=(RootCrack(2.0),))
+    tip = np.array([1.7])
+    extra = own_compliance(mesh_table(mesh), tip) - own_compliance(mesh_table(cracked), tip)
+    plain = own_compliance(mesh_table(replace(MESH, chips_1=mesh.chips_1)), tip) - own_compliance(mesh_table(MESH), tip)
+    grown = own_compliance(mesh_table(cracked), tip) - own_compliance(mesh_table(MESH), tip)
+    assert extra == pytest.approx(plain + grown, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("chips", "words"),
+    [
+        ((ToothChip(3.8),), r"0 to 3\.72 mm"),
+        ((ToothChip(1.0, 19.0),), "whole face"),
+        ((ToothChip(1.0, 25.0),), "width_mm of the chip"),
+        ((ToothChip(1.0, tooth=55),), "tooth of the chip"),
+        ((ToothChip(1.0), ToothChip(0.5)), "two chips on one tooth"),
+    ],
+)
+def test_chips_that_do_not_fit(chips: tuple[ToothChip, ...], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        replace(MESH, chips_1=chips)
+
+
+def test_chips_that_cannot_be() -> None:
+    assert highest_chip_mm(PAIR.driver) == PAIR.driver.tip_radius_mm - PAIR.driver.form_radius_mm
+    for values, words in (((-1.0,), "height_mm"), ((1.0, -1.0), "width_mm"), ((1.0, None, -1), "tooth")):
+        with pytest.raises(InputError, match=words):
+            ToothChip(*values)
