@@ -36,7 +36,7 @@ class Machine:
     chain : MeasurementChain
     gravity_mps2 : float
     line_of_action_deg : float
-        Angle of the line of action from the vertical, towards −x; 0: the line of action points upwards.
+        β, angle between the line of action and the vertical: upwards is x sin β + y cos β.
 
     Notes
     -----

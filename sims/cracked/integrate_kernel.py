@@ -1,0 +1,148 @@
+"""Compiled: the classic Runge–Kutta method of fourth order at a fixed step, for the sixteen coordinates."""
+
+# mypy: allow-untyped-defs, allow-untyped-calls
+from __future__ import annotations
+
+from math import cos, sin
+
+import numpy as np
+from numba import njit
+
+from sims.cracked.energy_kernel import kinetic_energy, potential_energy
+from sims.cracked.right_hand_side import accelerations
+from sims.mesh.roughness_kernel import advance, height_now
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def integrate(
+    k, curves, rows, pitch, q, v, start, step, n_steps, stride, speed, torque, rough, select, found, energies
+):
+    """Run `n_steps` steps from time `start`; fill `found` with the selected signals at every `stride`-th step.
+
+    k, curves, rows, pitch : see `sims.cracked.constants`.
+    q, v : (16,); left at the last step's state.
+    speed, torque : (2, n) times and values of the set courses, in rad/s and N m.
+    rough : phasors of a roughness locked to time at `start`, stepped by half of `step`; see `TimeLockedRoughness`.
+    select : places of the wanted signals in `sims.cracked.layout.SIGNALS`.
+    found : (n_out, n_selected).
+    energies : (n_out,) or (0,): total energy in J, not computed where empty.
+    Returns the number of rows that were filled: fewer where the state is no longer finite.
+    """
+    re, im, omega, half_cos, half_sin = rough
+    re, im = re.copy(), im.copy()
+    a = np.empty(16)
+    extra = np.empty(5)
+    q1, v1 = np.empty(16), np.empty(16)
+    sum_q, sum_v = np.empty(16), np.empty(16)
+    signals = np.empty(53)
+    n_rows = 0
+    h0, r0 = height_now(re, im, omega)
+    for step_number in range(n_steps):
+        t = start + step_number * step
+        w0, d0 = _set_speed(k, speed, t)
+        wh, dh = _set_speed(k, speed, t + 0.5 * step)
+        w1, d1 = _set_speed(k, speed, t + step)
+        m0, mh, m1 = _course(torque, t)[0], _course(torque, t + 0.5 * step)[0], _course(torque, t + step)[0]
+        advance(re, im, half_cos, half_sin)
+        hh, rh = height_now(re, im, omega)
+        advance(re, im, half_cos, half_sin)
+        h1, r1 = height_now(re, im, omega)
+        accelerations(k, curves, rows, pitch, q, v, m0, w0, d0, h0, r0, a, extra)
+        if step_number % stride == 0:
+            for i in range(16):
+                signals[i], signals[16 + i], signals[32 + i] = q[i], v[i], a[i]
+            for i in range(5):
+                signals[48 + i] = extra[i]
+            for i in range(select.shape[0]):
+                found[n_rows, i] = signals[select[i]]
+            if energies.shape[0] > 0:
+                energies[n_rows] = potential_energy(k, curves, rows, pitch, q, h0) + kinetic_energy(k, v, q)
+            if not np.isfinite(a[1] + a[5] + a[7] + a[2]):
+                return n_rows
+            n_rows += 1
+        half = 0.5 * step
+        for i in range(16):
+            sum_q[i], sum_v[i] = v[i], a[i]
+            q1[i], v1[i] = q[i] + half * v[i], v[i] + half * a[i]
+        accelerations(k, curves, rows, pitch, q1, v1, mh, wh, dh, hh, rh, a, extra)
+        for i in range(16):
+            sum_q[i] += 2.0 * v1[i]
+            sum_v[i] += 2.0 * a[i]
+            q1[i] = q[i] + half * v1[i]
+            v1[i] = v[i] + half * a[i]
+        accelerations(k, curves, rows, pitch, q1, v1, mh, wh, dh, hh, rh, a, extra)
+        for i in range(16):
+            sum_q[i] += 2.0 * v1[i]
+            sum_v[i] += 2.0 * a[i]
+            q1[i] = q[i] + step * v1[i]
+            v1[i] = v[i] + step * a[i]
+        accelerations(k, curves, rows, pitch, q1, v1, m1, w1, d1, h1, r1, a, extra)
+        sixth = step / 6.0
+        for i in range(16):
+            q[i] += sixth * (sum_q[i] + v1[i])
+            v[i] += sixth * (sum_v[i] + a[i])
+        h0, r0 = h1, r1
+    return n_rows
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def derivative(k, curves, rows, pitch, t, state, speed, torque, rough, rate):
+    """Fill `rate` (32) with the derivative of `state` (q, v) at any time t: for other integrators and checks.
+
+    rough : (amplitudes, ω, phases) of a roughness locked to time.
+    """
+    amplitude, omega, phase = rough
+    height, height_rate = 0.0, 0.0
+    for n in range(amplitude.shape[0]):
+        height += amplitude[n] * cos(omega[n] * t + phase[n])
+        height_rate -= amplitude[n] * omega[n] * sin(omega[n] * t + phase[n])
+    w, d = _set_speed(k, speed, t)
+    extra = np.empty(5)
+    accelerations(
+        k,
+        curves,
+        rows,
+        pitch,
+        state[:16],
+        state[16:],
+        _course(torque, t)[0],
+        w,
+        d,
+        height,
+        height_rate,
+        rate[16:],
+        extra,
+    )
+    rate[:16] = state[16:]
+    return extra
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _course(course, t):
+    """Value and slope at t: straight between points, held outside."""
+    n = course.shape[1]
+    if t <= course[0, 0]:
+        return course[1, 0], 0.0
+    if t >= course[0, n - 1]:
+        return course[1, n - 1], 0.0
+    low, high = 0, n - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if course[0, middle] <= t:
+            low = middle
+        else:
+            high = middle
+    slope = (course[1, high] - course[1, low]) / (course[0, high] - course[0, low])
+    return course[1, low] + slope * (t - course[0, low]), slope
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _set_speed(k, speed, t):
+    """Set speed in rad/s and its slope, swings included."""
+    value, slope = _course(speed, t)
+    factor, rate = 1.0, 0.0
+    for i in range(k.n_swings):
+        amplitude, omega, phase = k.swings[i, 0], k.swings[i, 1], k.swings[i, 2]
+        factor += amplitude * sin(omega * t + phase)
+        rate += amplitude * omega * cos(omega * t + phase)
+    return value * factor, slope * factor + value * rate

@@ -1,0 +1,194 @@
+"""Run the model and return what it does: displacements, velocities, accelerations, mesh force, transmission error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil, pi
+
+import numpy as np
+
+from gearsig.checks import FloatArray, closest_match_hint, count, positive
+from gearsig.errors import InputError, RefusalError
+from sims.cracked.constants import Constants, constants
+from sims.cracked.layout import SIGNALS
+from sims.cracked.linear import default_step_s
+from sims.cracked.start import start_state
+from sims.machine import Machine
+from sims.machine.operation import Course, Operation
+from sims.mesh.roughness import FlankRoughness, FractalSurface, TimeLockedRoughness
+
+MOST_STEPS = 400_000_000
+"""Ten minutes of computing or so; more is taken for a mistake."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """Signals of a run on an even grid of time.
+
+    Parameters
+    ----------
+    start_s, interval_s : float
+    signals : mapping
+        Name (see `sims.cracked.layout.SIGNALS`) → (n,), in m, rad, s, N.
+    step_s : float
+        Of the integrator.
+    energy_j : array
+        Potential, kinetic and gravitational energy, (n,), or empty where it was not asked for.
+    """
+
+    start_s: float
+    interval_s: float
+    signals: Mapping[str, FloatArray]
+    step_s: float
+    energy_j: FloatArray
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Times of the points."""
+        n = len(next(iter(self.signals.values())))
+        return self.start_s + self.interval_s * np.arange(n)
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Return a signal by its name."""
+        return self.signals[name]
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A run that is ready to start: numbers, first state, set courses, roughness."""
+
+    constants: Constants
+    q: FloatArray
+    v: FloatArray
+    speed: FloatArray
+    torque: FloatArray
+    roughness: TimeLockedRoughness
+
+
+def prepare(machine: Machine, operation: Operation, rng: np.random.Generator, start_s: float = 0.0) -> Prepared:
+    """Draw what is random, tabulate the machine, find the first state."""
+    machine, roughness = draw_roughness(machine, rng)
+    q, v = start_state(machine, operation, start_s)
+    return Prepared(
+        constants(machine, operation, rng),
+        q,
+        v,
+        _points(operation.speed_rpm, pi / 30.0),
+        _points(operation.torque_nm, 1.0),
+        roughness,
+    )
+
+
+def respond(
+    machine: Machine,
+    operation: Operation,
+    *,
+    duration_s: float,
+    rng: np.random.Generator,
+    signals: Sequence[str] = ("driver y", "driver y velocity", "driver y acceleration", "transmission_error_m"),
+    start_s: float = 0.0,
+    step_s: float | None = None,
+    stride: int = 1,
+    with_energy: bool = False,
+) -> Response:
+    """Integrate the sixteen coordinates from the static balance on.
+
+    Parameters
+    ----------
+    machine : Machine
+    operation : Operation
+        Set speed and torque; time 0 of their courses is time 0 here.
+    duration_s : float
+    rng : numpy.random.Generator
+        Draws the roughness, then the rolling elements' places.
+    signals : sequence of str
+        Of `sims.cracked.layout.SIGNALS`.
+    start_s : float
+        First time; below 0 for a lead-in.
+    step_s : float or None
+        None: `sims.cracked.linear.default_step_s`.
+    stride : int
+        Every how many steps a point is kept.
+    with_energy : bool
+
+    Raises
+    ------
+    InputError
+        On an unknown signal, or a run of more than `MOST_STEPS` steps.
+    RefusalError
+        If the solution grows beyond all bounds: the step is too long.
+
+    Notes
+    -----
+    Classic Runge–Kutta method, fourth order. Where a tooth pair loses contact its force has a kink, and the order drops
+    for that step.
+    """
+    from sims.cracked.integrate_kernel import integrate
+
+    positive(duration_s, "duration_s", "s")
+    step = default_step_s(machine, operation) if step_s is None else positive(step_s, "step_s", "s")
+    n_steps = ceil(duration_s / step - 1e-9)
+    if n_steps > MOST_STEPS:
+        raise InputError(
+            f"{n_steps:.3g} steps of {step:.3g} s",
+            where="duration_s",
+            allowed=f"at most {MOST_STEPS:.0e} steps",
+            remedy="simulate a shorter time, or in parts",
+        )
+    every = count(stride, "stride")
+    ready = prepare(machine, operation, rng, start_s)
+    rows = np.empty((-(-n_steps // every), len(signals)))
+    energies = np.empty(len(rows) if with_energy else 0)
+    filled = integrate(
+        *ready.constants.arguments,
+        ready.q,
+        ready.v,
+        start_s,
+        step,
+        n_steps,
+        every,
+        ready.speed,
+        ready.torque,
+        ready.roughness.phasors(step / 2.0),
+        np.array([_place(name) for name in signals], dtype=np.int64),
+        rows,
+        energies,
+    )
+    if filled < len(rows) or not np.isfinite(rows[-1]).all():
+        raise RefusalError(
+            f"the solution grows beyond all bounds after {filled * every * step:.3g} s at a step of {step:.3g} s",
+            remedy="take a shorter step_s, or the default",
+        )
+    return Response(start_s, step * every, dict(zip(signals, rows.T, strict=True)), step, energies)
+
+
+def draw_roughness(machine: Machine, rng: np.random.Generator) -> tuple[Machine, TimeLockedRoughness]:
+    """Give every tooth its profile, or the backlash its endless one; returns what the mesh and the kernel need.
+
+    Composite roughness S is shared evenly by the two flanks of a pair: each has S/√2.
+    """
+    from dataclasses import replace
+
+    rough, pair = machine.roughness, machine.mesh.pair
+    endless = FractalSurface.of_roughness(rough.rms_um if rough.locked_to == "time" else 0.0, rough.dimension)
+    profile = TimeLockedRoughness.draw(endless, rng)
+    if rough.locked_to == "flank" and rough.rms_um > 0.0:
+        surface = FractalSurface.of_roughness(rough.rms_um / np.sqrt(2.0), rough.dimension)
+        flanks = [FlankRoughness.draw(surface, gear.teeth, rng) for gear in (pair.driver, pair.driven)]
+        machine = replace(machine, mesh=replace(machine.mesh, roughness_1=flanks[0], roughness_2=flanks[1]))
+    return machine, profile
+
+
+def _points(course: Course, factor: float) -> FloatArray:
+    return np.ascontiguousarray(np.vstack((course.times_s, factor * np.asarray(course.values))), dtype=np.float64)
+
+
+def _place(name: str) -> int:
+    if name not in SIGNALS:
+        raise InputError(
+            f"there is no signal {name!r}",
+            allowed="names of sims.cracked.layout.SIGNALS",
+            remedy=closest_match_hint(name, SIGNALS),
+        )
+    return SIGNALS.index(name)

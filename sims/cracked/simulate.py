@@ -1,0 +1,157 @@
+"""From a machine to a recording: run the model, then measure it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import ceil, floor
+from typing import Any
+
+import numpy as np
+
+from gearsig.checks import positive
+from gearsig.recording.types import Recording
+from gearsig.rig.types import Rig
+from sims.cracked.layout import POSITIONS
+from sims.cracked.linear import default_step_s, eigenfrequencies_hz
+from sims.cracked.respond import respond
+from sims.machine import Machine
+from sims.machine.operation import Operation
+from sims.measure.chain import MeasurementChain
+from sims.measure.motion import Motion
+from sims.measure.truth import plain
+from sims.mesh import friction_over_mesh
+
+POINTS_PER_CYCLE = 6
+"""Of the fastest resonance in path and sensor, in the motion handed to the measurement chain."""
+LEAST_MOTION_HZ = 80_000.0
+"""Rate of that motion at least: what the model still holds above half of it would fold back."""
+SETTLING = 6.0
+"""Time constants of the slowest start-up motion that are left out ahead of the recording."""
+
+
+def simulate_machine(
+    machine: Machine,
+    operation: Operation,
+    *,
+    rng: np.random.Generator,
+    sampling_rate_hz: float,
+    duration_s: float,
+    rig: Rig | None = None,
+    truth: Mapping[str, Any] | None = None,
+    step_s: float | None = None,
+) -> Recording:
+    """Simulate the sixteen coordinates and measure them.
+
+    Parameters
+    ----------
+    machine : Machine
+    operation : Operation
+        Its time 0 is the recording's start.
+    rng : numpy.random.Generator
+        Two streams are made of it, one for the machine and one for the chain: the same seed gives the same noise
+        whatever the machine draws.
+    sampling_rate_hz, duration_s : float
+    rig : Rig or None
+        Goes with the recording.
+    truth : mapping or None
+        What was asked for; "machine" and "model" are added.
+    step_s : float or None
+        Longest step; None: `sims.cracked.linear.default_step_s`. It is shortened to a whole part of the sampling
+        interval.
+
+    Returns
+    -------
+    Recording
+        With notes of the model as warnings: where a formula is used outside its range.
+    """
+    positive(duration_s, "duration_s", "s")
+    rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    chain = replace(machine.chain, sampling_rate_hz=rate)
+    longest = default_step_s(machine, operation) if step_s is None else positive(step_s, "step_s", "s")
+    per_sample = max(ceil(1.0 / (rate * longest) - 1e-9), 1)
+    stride = motion_stride(chain, per_sample)
+    lead = lead_in_s(machine, chain)
+    machine_rng, chain_rng = rng.spawn(2)
+    positions = used_positions(chain)
+    response = respond(
+        machine,
+        operation,
+        duration_s=chain.simulated_s(duration_s, lead) + 4.0 / rate,
+        rng=machine_rng,
+        signals=("driver angle", "driven angle", *(f"{name} acceleration" for name in positions)),
+        start_s=-lead,
+        step_s=1.0 / (rate * per_sample),
+        stride=stride,
+    )
+    motion = Motion(
+        response.interval_s,
+        positions,
+        np.column_stack([response[f"{name} acceleration"] for name in positions]),
+        dict(zip(machine.shaft_names, (response["driver angle"], response["driven angle"]), strict=True)),
+    )
+    known = {
+        "machine": plain(replace(machine, chain=None)),  # type: ignore[arg-type]  # the chain stands under "measurement"
+        "solver": {
+            "step_s": response.step_s,
+            "eigenfrequencies_hz": [float(f) for f in eigenfrequencies_hz(machine, _force_n(machine, operation))],
+        },
+    }
+    recording = chain.record(
+        motion,
+        rng=chain_rng,
+        rig=rig,
+        duration_s=duration_s,
+        lead_in_s=lead,
+        truth={**(truth or {}), **known},
+        source="simulation: cracked 16-DOF spur pair",
+        reader="sims.cracked",
+    )
+    return replace(recording, warnings=(*recording.warnings, *model_notes(machine, operation)))
+
+
+def lead_in_s(machine: Machine, chain: MeasurementChain) -> float:
+    """Time ahead of the recording: filters, the drive's governor, and the least damped start-up ringing settle."""
+    rotors, wheels = machine.shafts, machine.wheels
+    inertia = rotors[0].rotor_inertia_kg_m2 + wheels[0].inertia_kg_m2
+    inertia += (wheels[1].inertia_kg_m2 + rotors[1].rotor_inertia_kg_m2) / machine.ratio**2
+    return max(chain.lead_in_s, SETTLING * inertia / machine.drive.governor_nm_s_per_rad, 0.1)
+
+
+def motion_stride(chain: MeasurementChain, per_sample: int) -> int:
+    """Every how many steps the chain needs a point."""
+    modes = [mode.frequency_hz for channel in chain.channels for mode in channel.path.modes]
+    sensors = [channel.accelerometer.resonance_hz or 0.0 for channel in chain.channels]
+    wanted = max(POINTS_PER_CYCLE * max([*modes, *sensors, 0.0]), LEAST_MOTION_HZ, 4.0 * chain.sampling_rate_hz)
+    return max(floor(chain.sampling_rate_hz * per_sample / wanted), 1)
+
+
+def used_positions(chain: MeasurementChain) -> tuple[str, ...]:
+    """Places that the channels' paths start from, in the model's order; unknown ones last, for the chain to refuse."""
+    used = {
+        name
+        for channel in chain.channels
+        for gains in (channel.path.direct, *(mode.gains for mode in channel.path.modes))
+        for name in gains
+    }
+    return tuple(name for name in POSITIONS if name in used) or POSITIONS[:1]
+
+
+def model_notes(machine: Machine, operation: Operation) -> tuple[str, ...]:
+    """Where formulas are used outside the range they were made for."""
+    notes = list(machine.mesh.notes)
+    speed, torque = operation.speed_rpm.largest, operation.torque_nm.largest
+    if machine.lubrication.friction and speed > 0.0 and torque > 0.0:
+        oil = machine.lubrication.viscosity_cp, machine.roughness.rms_um
+        notes += friction_over_mesh(machine.mesh, torque, speed, *oil).notes
+    mesh_hz = speed / 60.0 * machine.mesh.pair.driver.teeth
+    if mesh_hz > 0.8 * float(eigenfrequencies_hz(machine)[-1]):
+        notes.append(
+            f"the mesh frequency reaches {mesh_hz:.0f} Hz, near or above the model's highest eigenfrequency: "
+            "modes of gear bodies and teeth, which it lacks, would take part"
+        )
+    return tuple(notes)
+
+
+def _force_n(machine: Machine, operation: Operation) -> float:
+    return operation.torque_nm.largest / (machine.mesh.pair.driver.base_radius_mm * 1e-3)
