@@ -12,7 +12,7 @@ from gearsig.errors import InputError
 from sims.mesh.flank import smooth_step
 from sims.mesh.geometry import GearGeometry
 from sims.mesh.pair import PairGeometry
-from sims.mesh.spall import check_part_of_face
+from sims.mesh.spall import check_part_of_face, spans_face
 
 GAP_M = 0.3e-3
 """Separation beyond the edge of a chip over the whole face: many times the deflection of a loaded pair."""
@@ -94,7 +94,7 @@ def chip_separation_m(pair: PairGeometry, side: int, chip: ToothChip, roll_lengt
 
 
 def _is_whole(pair: PairGeometry, chip: ToothChip) -> bool:
-    return chip.width_mm is None or chip.width_mm >= pair.face_width_mm
+    return chip.width_mm is None or spans_face(chip.width_mm, pair.face_width_mm)
 
 
 def _beyond_edge(pair: PairGeometry, side: int, chip: ToothChip, roll_length_mm: FloatArray) -> FloatArray:

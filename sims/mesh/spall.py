@@ -78,7 +78,8 @@ def check_spall(pair: PairGeometry, side: int, spall: ToothSpall) -> None:
 
 def check_part_of_face(width_mm: float, name: str, face_width_mm: float) -> None:
     """Refuse a width beyond the loaded face, and one that leaves hardly a strip of it."""
-    if width_mm > face_width_mm or LARGEST_PART < width_mm / face_width_mm < 1.0:
+    # A part given in percent of the face comes back from its width with a rounding error.
+    if width_mm > face_width_mm * (1.0 + 1e-12) or LARGEST_PART + 1e-12 < width_mm / face_width_mm < 1.0 - 1e-12:
         raise InputError(
             f"{name} is {width_mm:g} mm on a loaded face of {face_width_mm:g} mm",
             allowed=f"0 to {LARGEST_PART * face_width_mm:g} mm, or {face_width_mm:g} mm for all of it",
@@ -86,6 +87,11 @@ def check_part_of_face(width_mm: float, name: str, face_width_mm: float) -> None
             if width_mm < face_width_mm
             else "",
         )
+
+
+def spans_face(width_mm: float, face_width_mm: float) -> bool:
+    """Whether damage takes the whole loaded face."""
+    return width_mm >= face_width_mm * (1.0 - 1e-12)
 
 
 def spall_share(
@@ -112,7 +118,7 @@ def spall_share(
     array
         0 to 0.9.
     """
-    if spall.width_mm >= pair.face_width_mm:
+    if spans_face(spall.width_mm, pair.face_width_mm):
         return np.zeros(np.shape(roll_length_mm))
     gear = pair.driver if side == 1 else pair.driven
     half_width = contact_half_width_mm(pair, *materials)
@@ -135,7 +141,7 @@ def spall_separation_m(pair: PairGeometry, side: int, spall: ToothSpall, roll_le
     roll_length_mm : array
         ρ of the gear that has the spall.
     """
-    if spall.width_mm < pair.face_width_mm:
+    if not spans_face(spall.width_mm, pair.face_width_mm):
         return np.zeros(np.shape(roll_length_mm))
     gear = pair.driver if side == 1 else pair.driven
     place = arc_length_mm(gear, roll_length_mm)

@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 
 from gearsig.errors import InputError
 from sims.mesh import (
+    GearGeometry,
     GearMesh,
     MeshTable,
+    PairGeometry,
     RootCrack,
     ToothSpall,
     arc_length_mm,
@@ -21,6 +23,7 @@ from sims.mesh import (
 )
 from sims.mesh.flank import curvature_radius_mm, part_inside
 from sims.mesh.profile import involute_outline
+from sims.mesh.spall import check_spall, spans_face
 from tests.sims.mesh.meshes import MESH, PAIR, PITCH_POINT, SINGLE, own_compliance, own_separation, own_stretch
 
 DRIVER = PAIR.driver
@@ -185,6 +188,14 @@ def test_part_of_the_zone_of_contact(place: float, length: float) -> None:
 def test_spalls_that_cannot_be(values: dict[str, float], words: str) -> None:
     with pytest.raises(InputError, match=words):
         spalled(**values)
+
+
+@given(st.floats(0.5, 200.0), st.floats(1.0, 90.0), st.booleans())
+def test_every_part_up_to_nine_tenths_and_the_whole_face_fit(face_mm: float, percent: float, whole: bool) -> None:
+    pair = PairGeometry(*(GearGeometry(z, 2.0, face_width_mm=face_mm) for z in (55, 75)))
+    for part in (percent, 90.0, 100.0):
+        check_spall(pair, 1, ToothSpall(1.0, part / 100.0 * face_mm if whole else face_mm * part / 100.0))
+    assert spans_face(100.0 / 100.0 * face_mm, face_mm)
 
 
 def test_one_spall_per_tooth() -> None:
