@@ -17,7 +17,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ROW_IN, PANEL_IN, TOP_IN, BOTTOM_IN = 1.4, 1.08, 0.62, 0.52
-LEFTS_IN, WIDTHS_IN = (0.75, 5.75), (4.35, 3.05)
+LEFTS_IN, WIDTHS_IN = (0.75, 5.55), (3.95, 3.25)
+LEAST_MPS2 = 1e-12
+"""A change of nothing is drawn here, below every axis: a logarithm needs a bottom."""
+N_POINTS = 1600
+"""Four per pixel column."""
+DECADES = 10.0**-3.5
 
 
 def crack_comparison_figure(
@@ -46,8 +51,9 @@ def crack_comparison_figure(
     n_teeth : int
         Of the cracked gear: mesh cycles per revolution.
     change_mps2 : mapping or None
-        Name of the case → its acceleration less that of the first case at the same angle, (n,); drawn over the close
-        view. A case that is not named has none.
+        Name of the case → its acceleration less that of the first case at the same angle, (n,), for all but the first.
+        Given: close views show its magnitude on a logarithmic axis, and that of the first case's acceleration itself.
+        None: they show the acceleration.
     reach_cycles : mapping or None
         Name of the case → mesh cycles from the entry over which the impact is felt; shaded.
     zoom_cycles : (float, float)
@@ -70,6 +76,7 @@ def crack_comparison_figure(
     marked = _marked(impacts_rev, x)
     reach, change = dict(reach_cycles or {}), dict(change_mps2 or {})
     _check_names(change, cases, "change_mps2")
+    shown = series.checked_curves(change, len(x), "change_mps2") if change else {}
     _check_names(reach, cases, "reach_cycles")
     cycles = (x - marked[len(marked) // 2]) * z
     near = (cycles >= limits[0]) & (cycles <= limits[1])
@@ -81,22 +88,19 @@ def crack_comparison_figure(
     for i, (name, values) in enumerate(cases.items()):
         whole, close = _row(figure, height - TOP_IN - PANEL_IN - i * ROW_IN)
         _draw_whole(whole, x, values, marked)
-        close.plot(cycles[near], values[near], color=style.MEASURED, linewidth=0.9, zorder=2)
-        if name in change:
-            changed = series.checked_values(change[name], len(x), f"change_mps2[{name!r}]")
-            close.plot(cycles[near], changed[near], color=style.FAULT, linewidth=1.2, zorder=3)
+        if change:
+            _draw_magnitude(close, cycles[near], shown.get(name, values)[near], changed=name in shown)
+        else:
+            close.plot(cycles[near], values[near], color=style.MEASURED, linewidth=0.9)
         close.axvline(0.0, color=style.FAULT, linewidth=0.9, linestyle="--", zorder=1)
         close.set_xlim(*limits)
         if name in reach:
             series.shade(close, (0.0, reach[name]), style.FAULT, 0.12)
-            series.write(close, limits[1], 1.02, f"felt for {reach[name]:.2g} cycles", colour=style.FAULT, ha="right")
+            series.write(close, limits[1], 1.02, f"felt for {reach[name]:.1f} cycles", colour=style.FAULT, ha="right")
         style.label_axes(whole, "", "a (m/s²)", name)
         rows.append((whole, close))
-    _finish(rows, cases, near)
-    series.write(rows[0][0], marked[0], 1.02, "cracked tooth enters", colour=style.FAULT, ha="left")
-    if change:
-        text = f"orange below: change against {next(iter(cases))}"
-        series.write(rows[0][1], limits[1], 1.02, text, colour=style.FAULT, ha="right")
+    _finish(rows, cases, near, logarithmic=bool(change))
+    series.write(rows[0][0], marked[len(marked) // 2], 1.02, "cracked tooth enters", colour=style.FAULT)
     series.headline(figure, title)
     return figure
 
@@ -136,21 +140,31 @@ def _row(figure: Figure, bottom_in: float) -> tuple[Axes, Axes]:
 def _draw_whole(axes: Axes, x: FloatArray, values: FloatArray, marked: Sequence[float]) -> None:
     for at in marked:
         axes.axvline(at, color=style.FAULT, linewidth=0.9, linestyle="--", zorder=1)
-    axes.plot(*thin(x, values), color=style.MEASURED, linewidth=0.6)
+    axes.plot(*thin(x, values, N_POINTS), color=style.MEASURED, linewidth=0.6)
     axes.set_xlim(float(x[0]), float(x[-1]))
+
+
+def _draw_magnitude(axes: Axes, cycles: FloatArray, values: FloatArray, *, changed: bool) -> None:
+    colour = style.FAULT if changed else style.MEASURED
+    axes.plot(cycles, np.maximum(np.abs(values), LEAST_MPS2), color=colour, linewidth=0.9)
+    style.label_axes(axes, "", "|change| (m/s²)" if changed else "|a| (m/s²)")
 
 
 def _finish(
     rows: Sequence[tuple[Axes, Axes]],
     cases: Mapping[str, FloatArray],
     near: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
+    *,
+    logarithmic: bool,
 ) -> None:
     """Give each column one scale, and name the axes below the last row."""
     largest = max(float(np.max(np.abs(values))) for values in cases.values()) or 1.0
     closest = max(float(np.max(np.abs(values[near]))) for values in cases.values()) or 1.0
     for whole, close in rows:
         whole.set_ylim(-1.08 * largest, 1.08 * largest)
-        close.set_ylim(-1.08 * closest, 1.08 * closest)
+        if logarithmic:
+            close.set_yscale("log")
+        close.set_ylim(*((closest * DECADES, 2.0 * closest) if logarithmic else (-1.08 * closest, 1.08 * closest)))
         for axes in (whole, close):
             axes.tick_params(labelbottom=whole is rows[-1][0])
             style.no_offset(axes)

@@ -1,4 +1,4 @@
-"""How a gear answers: time signal, spectrum and phase portrait of several cases below each other."""
+"""How a gear answers: time signal, spectrum, phase portrait and Poincaré section of several cases below each other."""
 
 from __future__ import annotations
 
@@ -17,9 +17,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    Row = tuple[Axes, Axes, Axes, Axes]
+
 MICRO, MILLI = 1e6, 1e3
 ROW_IN, TOP_IN, BOTTOM_IN = 1.62, 0.62, 0.52
-LEFTS_IN, WIDTHS_IN = (0.75, 3.95, 7.35), (2.5, 2.6, 1.5)
+LEFTS_IN, WIDTHS_IN = (0.7, 3.12, 5.72, 7.68), (1.75, 1.9, 1.2, 1.17)
+COLUMNS = ("time (s)", "frequency (Hz)", "displacement (µm)", "displacement (µm)")
 PANEL_IN = 1.22
 MOST_CASES = 8
 
@@ -75,7 +78,7 @@ def response_figure(
     lines_hz: Sequence[float] = (),
     title: str = "",
 ) -> Figure:
-    """Draw one row per case: the signal over time, its spectrum, and its phase portrait with the Poincaré points.
+    """Draw one row per case: signal over time, spectrum, phase portrait with the Poincaré points, and these enlarged.
 
     Axes of a column are alike in all rows, so that rows compare.
 
@@ -111,25 +114,26 @@ def response_figure(
     height = TOP_IN + BOTTOM_IN + ROW_IN * len(cases) - (ROW_IN - PANEL_IN)
     figure = style.new_figure(height)
     rows = [_row(figure, height - TOP_IN - PANEL_IN - i * ROW_IN) for i in range(len(cases))]
-    for case, (time, spectrum, phase) in zip(cases, rows, strict=True):
+    for case, (time, spectrum, phase, section) in zip(cases, rows, strict=True):
         _draw_time(time, case, n_periods / mesh_hz)
         _draw_spectrum(spectrum, case, low_high, mesh_hz)
         _mark_lines(spectrum, [line for line in lines_hz if low_high[0] <= line <= low_high[1]])
         _draw_phase(phase, case)
         style.label_axes(time, "", "displacement (µm)", case.name)
         style.label_axes(spectrum, "", "amplitude (µm)")
+        _draw_section(section, case, 2.0)
         style.label_axes(phase, "", "velocity (mm/s)")
     _align(rows, cases, low_high)
-    for axes, name in zip(rows[-1], ("time (s)", "frequency (Hz)", "displacement (µm)"), strict=True):
+    for axes, name in zip(rows[-1], COLUMNS, strict=True):
         style.label_axes(axes, name, axes.get_ylabel(), axes.get_title(loc="left"))
     _name_columns(rows[0], mesh_hz, low_high)
     series.headline(figure, title)
     return figure
 
 
-def _row(figure: Figure, bottom_in: float) -> tuple[Axes, Axes, Axes]:
+def _row(figure: Figure, bottom_in: float) -> Row:
     height = figure.get_size_inches()[1]
-    time, spectrum, phase = (
+    time, spectrum, phase, section = (
         style.panel(
             figure,
             left_in=left,
@@ -139,14 +143,14 @@ def _row(figure: Figure, bottom_in: float) -> tuple[Axes, Axes, Axes]:
         )
         for left, width in zip(LEFTS_IN, WIDTHS_IN, strict=True)
     )
-    return time, spectrum, phase
+    return time, spectrum, phase, section
 
 
 def _draw_time(axes: Axes, case: ResponseCase, duration_s: float) -> None:
     shown = case.time_s <= case.time_s[0] + duration_s
     axes.plot(*thin(case.time_s[shown], case.displacement_m[shown] * MICRO, 2000), color=style.MEASURED, linewidth=0.9)
     axes.set_xlim(float(case.time_s[0]), float(case.time_s[0]) + duration_s)
-    axes.locator_params(axis="x", nbins=5)
+    axes.locator_params(axis="x", nbins=4)
 
 
 def _draw_spectrum(axes: Axes, case: ResponseCase, limits: tuple[float, float], mesh_hz: float) -> None:
@@ -168,15 +172,13 @@ def _mark_lines(axes: Axes, lines_hz: Sequence[float]) -> None:
 def _draw_phase(axes: Axes, case: ResponseCase) -> None:
     looks = {"color": style.MEASURED, "linewidth": 0.5, "alpha": 0.35}
     axes.plot(case.displacement_m * MICRO, case.velocity_mps * MILLI, **looks)  # type: ignore[arg-type]
-    axes.plot(
-        case.poincare_displacement_m * MICRO,
-        case.poincare_velocity_mps * MILLI,
-        "o",
-        color=style.FAULT,
-        markersize=2.6,
-        markeredgewidth=0.0,
-        zorder=3,
-    )
+    _draw_section(axes, case, 2.4)
+
+
+def _draw_section(axes: Axes, case: ResponseCase, size: float) -> None:
+    looks = {"color": style.FAULT, "markersize": size, "markeredgewidth": 0.0, "zorder": 3}
+    points = (case.poincare_displacement_m * MICRO, case.poincare_velocity_mps * MILLI)
+    axes.plot(*points, "o", **looks)  # type: ignore[arg-type]
 
 
 def _inside(case: ResponseCase, limits: tuple[float, float]) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
@@ -186,7 +188,7 @@ def _inside(case: ResponseCase, limits: tuple[float, float]) -> np.ndarray[tuple
     return np.asarray(inside)
 
 
-def _align(rows: Sequence[tuple[Axes, Axes, Axes]], cases: Sequence[ResponseCase], limits: tuple[float, float]) -> None:
+def _align(rows: Sequence[Row], cases: Sequence[ResponseCase], limits: tuple[float, float]) -> None:
     """Give every column one scale, and numbers below the last row only."""
     y = np.concatenate([case.displacement_m for case in cases]) * MICRO
     v = np.concatenate([case.velocity_mps for case in cases]) * MILLI
@@ -195,14 +197,20 @@ def _align(rows: Sequence[tuple[Axes, Axes, Axes]], cases: Sequence[ResponseCase
     # The floor: what most lines of the richest case lie above, at most six decades down.
     richest = max(float(np.median(case.amplitude_m[_inside(case, limits)])) for case in cases) * MICRO
     bottom = min(max(richest / 30.0, top * 1e-6), top / 10.0)
-    for time, spectrum, phase in rows:
+    dots_y = np.concatenate([case.poincare_displacement_m for case in cases]) * MICRO
+    dots_v = np.concatenate([case.poincare_velocity_mps for case in cases]) * MILLI
+    for time, spectrum, phase, section in rows:
         time.set_ylim(*_padded(y))
         spectrum.set_ylim(bottom, 2.0 * top)
         phase.set_xlim(*_padded(y))
         phase.set_ylim(*_padded(v))
+        if dots_y.size:
+            section.set_xlim(*_padded(dots_y))
+            section.set_ylim(*_padded(dots_v))
         phase.locator_params(nbins=4)
+        section.locator_params(nbins=4)
         last = time is rows[-1][0]
-        for axes in (time, spectrum, phase):
+        for axes in (time, spectrum, phase, section):
             axes.tick_params(labelbottom=last)
             style.no_offset(axes)
 
@@ -213,10 +221,11 @@ def _padded(values: FloatArray) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _name_columns(first: tuple[Axes, Axes, Axes], mesh_hz: float, limits: tuple[float, float]) -> None:
-    _, spectrum, phase = first
+def _name_columns(first: Row, mesh_hz: float, limits: tuple[float, float]) -> None:
+    _, spectrum, phase, section = first
     for harmonic in range(1, int(limits[1] / mesh_hz) + 1):
         if harmonic * mesh_hz > limits[0]:
             name = "mesh" if harmonic == 1 else f"{harmonic}×"
             series.write(spectrum, harmonic * mesh_hz, 1.02, name, colour=style.MESH)
-    phase.set_title("dots: once per period", loc="right", color=style.FAULT, fontsize=style.SMALL_PT)
+    for axes, name in ((phase, "once per period"), (section, "these, enlarged")):
+        axes.set_title(name, loc="right", color=style.FAULT, fontsize=style.SMALL_PT)

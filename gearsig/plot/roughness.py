@@ -129,7 +129,7 @@ def backlash_figure(
     if mesh_frequency_hz is not None:
         lower.axvline(mesh_frequency_hz, color=style.MESH, linewidth=1.0, zorder=1)
         at = mesh_frequency_hz * 1.02
-        series.write(lower, at, 0.9, f"mesh, {mesh_frequency_hz:.4g} Hz", colour=style.MESH, ha="left")
+        series.write(lower, at, 0.9, "mesh", colour=style.MESH, ha="left")
     style.label_axes(lower, "frequency (Hz)", "amplitude (µm peak)")
     series.legend_row(figure, drawn, left_in=0.85, top_in=series.NAMES_AT_IN, heading=heading)
     series.headline(figure, title)
