@@ -138,9 +138,10 @@ def crack_comparison() -> Figure:
     """Pinion's acceleration over three revolutions at five crack depths, at equal angles."""
     n_teeth = machine().mesh.pair.driver.teeth
     revolutions = np.arange(4.0, 7.0, 1.0 / (n_teeth * 100))
+    speed = true_speed_rpm(float(PRESET.parameters["roughness_um"]))
     values = {}
     for depth in CRACKS_MM:
-        run = steady(cracked(depth), 1.1, RPM, "driver angle", "driver y acceleration")
+        run = steady(cracked(depth), 1.1, speed, "driver angle", "driver y acceleration")
         turned = run["driver angle"] / (2.0 * np.pi)
         values[named(depth)] = CubicSpline(turned, run["driver y acceleration"])(revolutions)
     sound = values[named(0)]

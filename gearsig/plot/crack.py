@@ -84,22 +84,16 @@ def crack_comparison_figure(
         raise InputError("zoom_cycles holds fewer than two points", remedy="give a wider view or a finer axis")
     height = TOP_IN + BOTTOM_IN + ROW_IN * len(cases) - (ROW_IN - PANEL_IN)
     figure = style.new_figure(height)
-    rows = []
-    for i, (name, values) in enumerate(cases.items()):
-        whole, close = _row(figure, height - TOP_IN - PANEL_IN - i * ROW_IN)
+    rows = [_row(figure, height - TOP_IN - PANEL_IN - i * ROW_IN) for i in range(len(cases))]
+    for (name, values), (whole, close) in zip(cases.items(), rows, strict=True):
         _draw_whole(whole, x, values, marked)
-        if change:
+        style.label_axes(whole, "", "a (m/s²)", name)
+        if shown:
             _draw_magnitude(close, cycles[near], shown.get(name, values)[near], changed=name in shown)
         else:
             close.plot(cycles[near], values[near], color=style.MEASURED, linewidth=0.9)
-        close.axvline(0.0, color=style.FAULT, linewidth=0.9, linestyle="--", zorder=1)
-        close.set_xlim(*limits)
-        if name in reach:
-            series.shade(close, (0.0, reach[name]), style.FAULT, 0.12)
-            series.write(close, limits[1], 1.02, f"felt for {reach[name]:.1f} cycles", colour=style.FAULT, ha="right")
-        style.label_axes(whole, "", "a (m/s²)", name)
-        rows.append((whole, close))
-    _finish(rows, cases, near, logarithmic=bool(change))
+        _mark_reach(close, reach.get(name, 0.0), limits)
+    _finish(rows, cases, near, logarithmic=bool(shown))
     series.write(rows[0][0], marked[len(marked) // 2], 1.02, "cracked tooth enters", colour=style.FAULT)
     series.headline(figure, title)
     return figure
@@ -142,6 +136,14 @@ def _draw_whole(axes: Axes, x: FloatArray, values: FloatArray, marked: Sequence[
         axes.axvline(at, color=style.FAULT, linewidth=0.9, linestyle="--", zorder=1)
     axes.plot(*thin(x, values, N_POINTS), color=style.MEASURED, linewidth=0.6)
     axes.set_xlim(float(x[0]), float(x[-1]))
+
+
+def _mark_reach(axes: Axes, reach: float, limits: tuple[float, float]) -> None:
+    axes.axvline(0.0, color=style.FAULT, linewidth=0.9, linestyle="--", zorder=1)
+    axes.set_xlim(*limits)
+    if reach > 0.0:
+        series.shade(axes, (0.0, reach), style.FAULT, 0.12)
+        series.write(axes, limits[1], 1.02, f"felt for {reach:.1f} cycles", colour=style.FAULT, ha="right")
 
 
 def _draw_magnitude(axes: Axes, cycles: FloatArray, values: FloatArray, *, changed: bool) -> None:
