@@ -170,8 +170,9 @@ def _run(wanted: Sweep, output: Path, jobs: int | None) -> SweepResult:
     from sims.sweep_run import n_complete, run_sweep
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    console = Console(stderr=True)
     try:
-        with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
             task = progress.add_task("simulating", total=wanted.n_points)
             return run_sweep(
                 wanted,

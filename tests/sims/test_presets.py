@@ -1,0 +1,244 @@
+"""Presets and parameters of the cracked pair: ranges, the machine they build, and the rig file it comes with."""
+
+from math import atan2, cos, degrees, pi, radians, sin, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearsig.errors import InputError
+from gearsig.rig.toml import read_rig, write_rig
+from gearsig.rig.types import Rig
+from sims.cracked.build import build_machine, build_rig
+from sims.cracked.parameters import PARAMETERS
+from sims.cracked.simulator import CrackedPair, Prepared
+from sims.effects import EffectSetting
+from sims.machine import Machine
+from sims.machine.operation import Course, Operation
+from sims.presets import preset, presets
+from sims.registry import simulator, simulators
+from sims.simulator import ParameterValue
+from sims.values import checked_value, complete_values
+
+PRESETS = tuple(presets("cracked"))
+SUFFIXES = {
+    "mm": "_mm", "um": "_um", "us": "_us", "deg": "_deg", "kg": "_kg", "kg m^2": "_kg_m2", "GPa": "_gpa",
+    "kg/m^3": "_kg_m3", "cP": "_cp", "%": "_percent", "g mm": "_g_mm", "N/m": "_n_per_m", "N s/m": "_n_s_per_m",
+    "N m/rad": "_nm_per_rad", "N m s/rad": "_nm_s_per_rad", "m/s^2": "_mps2", "m/s^2/√Hz": "_mps2_per_sqrt_hz",
+    "Hz": "_hz",
+}  # fmt: skip
+
+
+def prepared(name: str = "", operation: Operation | None = None, **values: ParameterValue) -> Prepared:
+    return CrackedPair().prepare(values, [], operation, np.random.default_rng(0), preset_name=name)
+
+
+def machine(name: str = "", **values: ParameterValue) -> Machine:
+    return prepared(name, **values).machine
+
+
+def test_every_name_ends_in_its_unit() -> None:
+    for p in PARAMETERS:
+        assert p.name.endswith(SUFFIXES[p.unit] if p.unit else p.name), p.name
+        assert p.meaning
+    assert len({p.name for p in PARAMETERS}) == len(PARAMETERS)
+
+
+def test_defaults_lie_in_their_ranges_and_numbers_have_one() -> None:
+    for p in PARAMETERS:
+        if p.choices:
+            assert p.default in p.choices
+        else:
+            assert p.low is not None
+            assert p.high is not None
+            assert p.default is None or checked_value(p, p.default) == p.default
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_preset_is_sourced_and_builds_a_sane_machine(name: str) -> None:
+    chosen = preset("cracked", name)
+    assert chosen.title
+    assert chosen.sources
+    assert chosen.assumed
+    assert chosen.does_not_represent
+    assert set(chosen.parameters) <= {p.name for p in PARAMETERS}
+    built = machine(name)
+    assert 1.2 < built.mesh.pair.contact_ratio < 2.0
+    assert built.mesh.cracks_1 == built.mesh.cracks_2 == ()
+    # Hertz pressure at the pitch point stays below what hardened gears carry.
+    force = chosen.torque_nm / (built.mesh.pair.driver.base_radius_mm * 1e-3)
+    rho_1, rho_2 = (float(r[0]) * 1e-3 for r in built.mesh.pair.contact_radii_mm(np.array([0.8])))
+    radius = rho_1 * rho_2 / (rho_1 + rho_2)
+    modulus = built.mesh.material_1.youngs_modulus_pa / (2 * (1 - 0.3**2))
+    assert 0.1e9 < sqrt(force * modulus / (pi * radius * 0.02)) < 1.6e9
+
+
+@pytest.mark.parametrize(
+    ("name", "ratio", "centres_mm"),
+    [("published_55_75", 1.7940, 130.0), ("symmetric_50_50", 1.755, 150.0), ("small_30_25", 1.6326, 55.0)],
+)
+def test_contact_ratio_and_centre_distance(name: str, ratio: float, centres_mm: float) -> None:
+    """ε = (√(ra1² − rb1²) + √(ra2² − rb2²) − a sin α)/p_b; the 50/50 pair is published with 1.755 and 150 mm."""
+    pair = machine(name).mesh.pair
+    m, z1, z2, alpha = pair.driver.module_mm, pair.driver.teeth, pair.driven.teeth, radians(20.0)
+
+    def reach(z: int) -> float:
+        return sqrt((m * (z / 2 + 1)) ** 2 - (m * z / 2 * cos(alpha)) ** 2)
+
+    expected = (reach(z1) + reach(z2) - m * (z1 + z2) / 2 * sin(alpha)) / (pi * m * cos(alpha))
+    assert pair.contact_ratio == pytest.approx(expected, rel=1e-9)
+    assert pair.contact_ratio == pytest.approx(ratio, abs=6e-4)
+    assert pair.centre_distance == pytest.approx(centres_mm, rel=1e-12)
+
+
+def test_the_published_pair() -> None:
+    """458.33 Hz at 500 rpm is stated; masses and inertias of discs with a bore of 17.5 mm are textbook formulas."""
+    ready = prepared("published_55_75")
+    rig = rig_of(ready)
+    assert rig.nominal_speed_rpm() == 500.0
+    assert rig.operating_point.torque_nm == 110.0
+    assert rig.mesh_order(rig.pairs[0]) * 500 / 60 == pytest.approx(458.33, abs=0.01)  # type: ignore[operator]  # known
+    for wheel, r in zip(ready.machine.wheels, (0.055, 0.075), strict=True):
+        mass = 7850 * pi * (r**2 - 0.0175**2) * 0.02
+        assert wheel.mass_kg == pytest.approx(mass, rel=1e-12)
+        assert wheel.inertia_kg_m2 == pytest.approx(mass * (r**2 + 0.0175**2) / 2, rel=1e-12)
+    assert ready.machine.roughness.locked_to == "time"
+    assert 2e-6 * ready.machine.half_backlash_um == pytest.approx(2 * 2e-5)
+
+
+def test_the_hub_of_the_symmetric_pair_puts_its_torsion_at_2650_to_2700_hz() -> None:
+    """ω² = k (rb1²/J1 + rb2²/J2) with the mean stiffness of 3.32e8 N/m of loaded gears of this size."""
+    built = machine("symmetric_50_50")
+    rb = built.mesh.pair.driver.base_radius_mm * 1e-3
+    compliance = sum(rb**2 / w.inertia_kg_m2 for w in built.wheels)
+    assert 2600 < sqrt(3.32e8 * compliance) / (2 * pi) < 2700
+
+
+@pytest.mark.parametrize("angle_deg", [-40.0, 0.0, 25.0, 90.0])
+def test_sensors_look_up_and_sideways(angle_deg: float) -> None:
+    """Upwards is x sin β + y cos β, as gravity has it; a horizontal sensor does not see it."""
+    built = machine(line_of_action_deg=angle_deg, channels="all", path_modes="off")
+    up = {"x": sin(radians(angle_deg)), "y": cos(radians(angle_deg))}
+    for channel in built.chain.channels:
+        seen = sum(gain * up[place[-1]] for place, gain in channel.path.direct.items())
+        assert seen == pytest.approx(1.0 if "vertical" in channel.position else 0.0, abs=1e-12)
+        assert sum(g**2 for g in channel.path.direct.values()) == pytest.approx(1.0)
+
+
+def test_gears_lie_side_by_side_unless_told_otherwise() -> None:
+    """The driven gear's centre lies at (a cos α_w, a sin α_w) from the driver's: x = rb1 + rb2, y = ρ1 + ρ2."""
+    built = machine("published_55_75", profile_shift_driver=0.3)
+    pair, beta = built.mesh.pair, radians(built.line_of_action_deg)
+    x, y = pair.driver.base_radius_mm + pair.driven.base_radius_mm, pair.action_length_mm
+    height, along = x * sin(beta) + y * cos(beta), x * cos(beta) - y * sin(beta)
+    assert degrees(atan2(height, along)) == pytest.approx(0.0, abs=1e-9)
+
+
+def rig_of(ready: Prepared) -> Rig:
+    return build_rig(ready.machine, ready.operation, name="x", sources=["simulated"])
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_the_rig_file_reads_back_and_tells_no_damage(name: str, tmp_path: Path) -> None:
+    sound, hurt = rig_of(prepared(name)), rig_of(prepared(name, crack_depth_mm=1.0))
+    write_rig(sound, tmp_path / "rig.toml")
+    assert read_rig(tmp_path / "rig.toml") == sound == hurt
+    assert sound.speed is not None
+    assert {s.channel for s in sound.sensors} == {"a1", "a2", "tacho"}
+    assert {b.shaft for b in sound.bearings[:2]} == {"input"}
+
+
+def test_a_varying_speed_is_left_out_of_the_rig() -> None:
+    run_up = Operation(Course.of([0, 1], [300, 1500]), Course.constant(20.0))
+    point = rig_of(prepared("workshop_29_47", run_up)).operating_point
+    assert point.speed_rpm is None
+    assert point.torque_nm == 20.0
+
+
+def test_parameters_reach_the_machine() -> None:
+    built = machine(
+        "workshop_29_47", crack_depth_mm=1.5, crack_gear="driven", crack_tooth=5, crack_width_percent=50, friction="off"
+    )
+    (crack,) = built.mesh.cracks_2
+    assert (crack.depth_mm, crack.tooth, crack.width_mm) == (1.5, 5, 10.0)
+    assert built.mesh.cracks_1 == ()
+    assert not built.lubrication.friction
+    without = machine(tachometer_pulses=0, encoder_counts=1024).chain
+    assert without.tachometer is None
+    assert without.encoders[0].counts_per_revolution == 1024
+
+
+def test_tolerances_are_those_of_one_specimen() -> None:
+    first, again, other = (machine("workshop_29_47", tolerance_seed=seed).mesh.flank_1.pitch_um for seed in (1, 1, 2))
+    assert first == again
+    assert np.abs(np.subtract(first, other)).max() > 0.1
+    assert np.sqrt(np.mean(np.square(first))) == pytest.approx(1.5, rel=1e-12)
+    assert np.mean(first) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("values", "named"),
+    [
+        ({"crack_depth": 2.0}, "did you mean crack_depth_mm"),
+        ({"crak_mm": 2.0}, "crack_depth_mm"),
+        ({"module_mm": 0.0}, "0.3 to 30 mm"),
+        ({"teeth_driver": 29.5}, "a whole number"),
+        ({"teeth_driver": float("nan")}, "a finite number"),
+        ({"friction": "sometimes"}, "on, off"),
+        ({"contact_law": "load-dependant"}, "did you mean load-dependent"),
+        ({"crack_depth_mm": 9.0}, "goes past the tooth"),
+        ({"crack_depth_mm": 1.0, "crack_tooth": 60.0}, "0 to 54"),
+        ({"teeth_driver": 8.0}, "undercuts"),
+        ({"n_balls": 40.0}, "do not fit"),
+        ({"bore_radius_driver_mm": 60.0}, "bore_radius_mm"),
+    ],
+)
+def test_nonsense_is_refused(values: dict[str, ParameterValue], named: str) -> None:
+    with pytest.raises(InputError) as caught:
+        machine("published_55_75", **values)
+    assert named in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("speed", "torque", "named"), [(-1.0, 10.0, "speed_rpm"), (1e6, 10.0, "0 to 30000 rpm"), (500.0, 1e6, "torque_nm")]
+)
+def test_an_impossible_operation_is_refused(speed: float, torque: float, named: str) -> None:
+    with pytest.raises(InputError) as caught:
+        prepared("published_55_75", Operation.steady(speed, torque))
+    assert named in str(caught.value)
+
+
+def test_names_that_do_not_exist() -> None:
+    with pytest.raises(InputError, match="did you mean cracked"):
+        simulator("craked")
+    with pytest.raises(InputError, match="did you mean published_55_75"):
+        preset("cracked", "publishd_55_75")
+    assert preset("cracked", "").name == PRESETS[0] == simulators()["cracked"].presets[0]
+
+
+def test_effects_change_the_machine_and_stand_in_the_truth() -> None:
+    rng, other = np.random.default_rng(3), np.random.default_rng(3)
+    settings = [EffectSetting("root_crack", 1.0, {"tooth": 4.0})]
+    ready = CrackedPair().prepare({}, settings, None, rng, preset_name="published_55_75")
+    sound = CrackedPair().prepare({}, [], None, other, preset_name="published_55_75")
+    assert ready.machine.mesh.cracks_1[0].tooth == 4
+    assert sound.machine.mesh.cracks_1 == ()
+    assert rng.random() == other.random()  # healthy and faulty runs go on with the same random numbers
+    (entry,) = ready.truth()["effects"]
+    assert (entry["name"], entry["severity"], entry["unit"]) == ("root_crack", 1.0, "mm")
+    assert entry["options"]["tooth"] == 4.0
+
+
+@pytest.mark.parametrize("name", CrackedPair().effects)
+def test_every_effect_has_a_meaning_here(name: str) -> None:
+    from sims.effects import effect
+
+    settings = [EffectSetting(name, effect(name).severity.typical)]
+    values = {"sensor_range_mps2": 1000.0}
+    ready = CrackedPair().prepare(values, settings, None, np.random.default_rng(0), preset_name="workshop_29_47")
+    plain = CrackedPair().prepare(values, [], None, np.random.default_rng(0), preset_name="workshop_29_47")
+    assert ready.machine != plain.machine
+
+
+def test_defaults_alone_make_a_machine() -> None:
+    assert build_machine(complete_values(PARAMETERS)).mesh.pair.driver.teeth == 29
