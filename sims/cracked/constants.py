@@ -51,6 +51,7 @@ SCALARS = (
     "gravity_x",
     "gravity_y",
     "governor",
+    "governor_spring",
     "total_inertia",
     "ratio",
 )
@@ -190,15 +191,15 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
         "gravity_x": -machine.gravity_mps2 * sin(beta),
         "gravity_y": -machine.gravity_mps2 * cos(beta),
         "governor": machine.drive.governor_nm_s_per_rad,
-        "total_inertia": float(rotors[0] + inertia[0] + (inertia[1] + rotors[1]) / machine.ratio**2),
+        "governor_spring": machine.drive.governor_nm_s_per_rad**2 / (4.0 * total_inertia_kg_m2(machine)),
+        "total_inertia": total_inertia_kg_m2(machine),
         "ratio": machine.ratio,
     }
     record = np.zeros((), RECORD)
     for name, value in (values | bearing_fields(machine, force, rng)).items():
         record[name] = value
     curves, rows, pitch = _stacked(table)
-    one: np.void = record[()]  # type: ignore[assignment]  # the one element of an array of no dimension
-    return Constants(one, curves, rows, pitch)
+    return Constants(np.void(record), curves, rows, pitch)
 
 
 def mesh_mass_kg(machine: Machine) -> float:
@@ -216,6 +217,13 @@ def mean_stiffness_n_per_m(machine: Machine, force_n: float) -> float:
     if sound.contact_law == "linear":
         return mesh_stiffness(sound).mean_n_per_m
     return mesh_stiffness(sound, force_n=max(force_n, 1.0)).mean_n_per_m
+
+
+def total_inertia_kg_m2(machine: Machine) -> float:
+    """Everything that turns, as the input shaft feels it."""
+    (input_shaft, output_shaft), (driver, driven) = machine.shafts, machine.wheels
+    far = driven.inertia_kg_m2 + output_shaft.rotor_inertia_kg_m2
+    return input_shaft.rotor_inertia_kg_m2 + driver.inertia_kg_m2 + far / machine.ratio**2
 
 
 def greatest_sliding_mps(machine: Machine, omega_rad_s: float) -> float:

@@ -37,17 +37,21 @@ def integrate(
     signals = np.empty(53)
     n_rows = 0
     h0, r0 = height_now(re, im, omega)
+    angle = q[0]
     for step_number in range(n_steps):
         t = start + step_number * step
         w0, d0 = _set_speed(k, speed, t)
         wh, dh = _set_speed(k, speed, t + 0.5 * step)
         w1, d1 = _set_speed(k, speed, t + step)
+        # The set angle by Simpson's rule, and by the parabola through the same three speeds half way.
+        angle_h = angle + step / 24.0 * (5.0 * w0 + 8.0 * wh - w1)
+        angle_1 = angle + step / 6.0 * (w0 + 4.0 * wh + w1)
         m0, mh, m1 = _course(torque, t)[0], _course(torque, t + 0.5 * step)[0], _course(torque, t + step)[0]
         advance(re, im, half_cos, half_sin)
         hh, rh = height_now(re, im, omega)
         advance(re, im, half_cos, half_sin)
         h1, r1 = height_now(re, im, omega)
-        accelerations(k, curves, rows, pitch, q, v, m0, w0, d0, h0, r0, a, extra)
+        accelerations(k, curves, rows, pitch, q, v, m0, angle, w0, d0, h0, r0, a, extra)
         if step_number % stride == 0:
             for i in range(16):
                 signals[i], signals[16 + i], signals[32 + i] = q[i], v[i], a[i]
@@ -64,31 +68,32 @@ def integrate(
         for i in range(16):
             sum_q[i], sum_v[i] = v[i], a[i]
             q1[i], v1[i] = q[i] + half * v[i], v[i] + half * a[i]
-        accelerations(k, curves, rows, pitch, q1, v1, mh, wh, dh, hh, rh, a, extra)
+        accelerations(k, curves, rows, pitch, q1, v1, mh, angle_h, wh, dh, hh, rh, a, extra)
         for i in range(16):
             sum_q[i] += 2.0 * v1[i]
             sum_v[i] += 2.0 * a[i]
             q1[i] = q[i] + half * v1[i]
             v1[i] = v[i] + half * a[i]
-        accelerations(k, curves, rows, pitch, q1, v1, mh, wh, dh, hh, rh, a, extra)
+        accelerations(k, curves, rows, pitch, q1, v1, mh, angle_h, wh, dh, hh, rh, a, extra)
         for i in range(16):
             sum_q[i] += 2.0 * v1[i]
             sum_v[i] += 2.0 * a[i]
             q1[i] = q[i] + step * v1[i]
             v1[i] = v[i] + step * a[i]
-        accelerations(k, curves, rows, pitch, q1, v1, m1, w1, d1, h1, r1, a, extra)
+        accelerations(k, curves, rows, pitch, q1, v1, m1, angle_1, w1, d1, h1, r1, a, extra)
         sixth = step / 6.0
         for i in range(16):
             q[i] += sixth * (sum_q[i] + v1[i])
             v[i] += sixth * (sum_v[i] + a[i])
-        h0, r0 = h1, r1
+        h0, r0, angle = h1, r1, angle_1
     return n_rows
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def derivative(k, curves, rows, pitch, t, state, speed, torque, rough, rate):
+def derivative(k, curves, rows, pitch, t, state, speed, torque, first_angle, rough, rate):
     """Fill `rate` (32) with the derivative of `state` (q, v) at any time t: for other integrators and checks.
 
+    first_angle : set angle at time 0; the set speed must be constant.
     rough : (amplitudes, ω, phases) of a roughness locked to time.
     """
     amplitude, omega, phase = rough
@@ -97,6 +102,7 @@ def derivative(k, curves, rows, pitch, t, state, speed, torque, rough, rate):
         height += amplitude[n] * cos(omega[n] * t + phase[n])
         height_rate -= amplitude[n] * omega[n] * sin(omega[n] * t + phase[n])
     w, d = _set_speed(k, speed, t)
+    angle = first_angle + w * t
     extra = np.empty(5)
     accelerations(
         k,
@@ -106,6 +112,7 @@ def derivative(k, curves, rows, pitch, t, state, speed, torque, rough, rate):
         state[:16],
         state[16:],
         _course(torque, t)[0],
+        angle,
         w,
         d,
         height,

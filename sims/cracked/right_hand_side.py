@@ -22,11 +22,13 @@ from sims.cracked.contact_kernel import back_flank_force, contact_forces
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
-    k, curves, rows, pitch, q, v, torque, speed, speed_rate, rough, rough_rate, a, extra
+    k, curves, rows, pitch, q, v, torque, set_angle, speed, speed_rate, rough, rough_rate, a, extra
 ):
     """Fill `a` (16) with the accelerations and `extra` (5) with the signals that follow.
 
-    k, curves, rows, pitch : see `sims.cracked.constants`. q, v : (16,). torque, speed, speed_rate : set values of the input at this time, N m, rad/s, rad/s².
+    k, curves, rows, pitch : see `sims.cracked.constants`.
+    q, v : (16,).
+    torque, set_angle, speed, speed_rate : set values of the input at this time, in N m, rad, rad/s, rad/s².
     rough, rough_rate : Δb and its rate.
     """
     rb1, rb2 = k.base_radius[0], k.base_radius[1]
@@ -118,7 +120,8 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
         a[1 + side] = t * k.per_inertia[side]
         a[g], a[g + 1] = ax + k.gravity_x, ay + k.gravity_y
         if side == 0:
-            drive = torque * _ripple(k, q[0]) + k.total_inertia * speed_rate + k.governor * (speed - v[0])
+            drive = torque * _ripple(k, q[0]) + k.total_inertia * speed_rate
+            drive += k.governor * (speed - v[0]) + k.governor_spring * (set_angle - q[0])
             a[0] = (drive - slope * carried) * k.per_rotor[0]
         else:
             a[3] = (-torque * k.ratio - slope * carried) * k.per_rotor[1]

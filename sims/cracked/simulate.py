@@ -12,6 +12,7 @@ import numpy as np
 from gearsig.checks import positive
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
+from sims.cracked.constants import total_inertia_kg_m2
 from sims.cracked.layout import POSITIONS
 from sims.cracked.linear import default_step_s, eigenfrequencies_hz
 from sims.cracked.respond import respond
@@ -112,10 +113,9 @@ def simulate_machine(
 
 def lead_in_s(machine: Machine, chain: MeasurementChain) -> float:
     """Time ahead of the recording: filters, the drive's governor, and the least damped start-up ringing settle."""
-    rotors, wheels = machine.shafts, machine.wheels
-    inertia = rotors[0].rotor_inertia_kg_m2 + wheels[0].inertia_kg_m2
-    inertia += (wheels[1].inertia_kg_m2 + rotors[1].rotor_inertia_kg_m2) / machine.ratio**2
-    return max(chain.lead_in_s, SETTLING * inertia / machine.drive.governor_nm_s_per_rad, 0.1)
+    return max(
+        chain.lead_in_s, SETTLING * 2.0 * total_inertia_kg_m2(machine) / machine.drive.governor_nm_s_per_rad, 0.1
+    )
 
 
 def motion_stride(chain: MeasurementChain, per_sample: int) -> int:

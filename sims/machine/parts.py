@@ -235,13 +235,14 @@ class SpeedSwing:
 class Drive:
     """What turns the input rotor.
 
-    T_i = T(t)·ripple + J ω̇_set + g (ω_set − θ̇_i): the set torque, what the set acceleration needs, and a governor that
-    makes up for friction. The load takes T(t) z2/z1 and turns no energy back.
+    T_i = T(t)·ripple + J ω̇_set + g (ω_set − θ̇_i) + g²/4J (θ_set − θ_i): the set torque, what the set acceleration
+    needs, and a governor that makes up for friction without a lasting error of the speed. J is everything that turns,
+    as felt at the input. The load takes T(t) z2/z1.
 
     Parameters
     ----------
     governor_nm_s_per_rad : float
-        g, above 0. J/g is the time in which a deviation of the speed dies out.
+        g, above 0. 2J/g is the time in which a deviation of the speed dies out.
     ripples : tuple of TorqueRipple
     swings : tuple of SpeedSwing
     """
