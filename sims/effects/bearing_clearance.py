@@ -27,9 +27,9 @@ EFFECT = Effect(
     ),
     changes="The shaft moves that far before rolling elements carry; fewer of them do, so the support is softer and "
     "its stiffness changes as they pass.",
-    signature="Harmonics of the bearing's shaft, and lines at the orders at which elements pass (n(1 − d cos α/D)/2), "
-    "with sums and differences to the mesh; impacts and a raised floor where the load is light enough to let the "
-    "shaft lift. Lower support resonances, also under load.",
+    signature="Lines at the order at which elements pass a point, n(1 − d cos α/D)/2 of the bearing's shaft, and its "
+    "multiples, with sums and differences to the mesh; no knocks. Other mesh harmonics, as the support is softer. "
+    "Under a turning load, harmonics of the shaft; impacts and a raised floor where the load lets the shaft lift.",
     shows_in=("shaft_orders", "envelope_orders", "resonances", "low_load"),
     change=change,
     options=(BEARING_OPTION,),

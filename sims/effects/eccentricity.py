@@ -43,9 +43,9 @@ EFFECT = Effect(
     ),
     changes="The pitch circle of one gear turns about a point off its centre; the centre of mass moves along (mass "
     "times run-out is added to the unbalance). Both add as vectors to what is there.",
-    signature="Order 1 of that gear's shaft in transmission error, speed and vibration; strong first sidebands of "
-    "that shaft about the mesh harmonics (z ± 1, 2z ± 1, …), a smooth modulation all round the revolution and no "
-    "pulse. Hardly any change with the load; order 1 grows with speed.",
+    signature="Order 1 of that gear's shaft in transmission error, by as much as the run-out, at every speed and load; "
+    "in vibration, order 1, and first sidebands of that shaft about the mesh harmonics (z ± 1, 2z ± 1, …), far above "
+    "those further out: a smooth modulation all round the revolution and no pulse. Weak while the torque is steady.",
     shows_in=("shaft_orders", "mesh_sidebands"),
     change=change,
     options=(GEAR_OPTION, ANGLE_OPTION),

@@ -33,9 +33,9 @@ EFFECT = Effect(
     severity=Severity("angle_deg", "deg", 0.0, _MOST_DEG, 1.0, "between rotor axis and shaft axis in the coupling"),
     changes="Rotor and shaft turn as through a universal joint: the twist between them has a part at twice the "
     "turning speed, and the torque bends the shaft, which loads its bearings.",
-    signature="Order 2 of that shaft (and faintly 4) in speed and vibration, with sidebands two orders apart about "
-    "the mesh harmonics (z ± 2). The twist is β²/4: a doubled angle shows fourfold. The bending follows the torque; "
-    "order 1 hardly changes.",
+    signature="Order 2 of that shaft in the vibration of its bearings, from the bending moment, in proportion to angle "
+    "and torque; order 2 in mesh force and speed, from the twist of β²/4, which a doubled angle shows fourfold; weak "
+    "sidebands z ± 2 about the mesh harmonics. Order 1 hardly changes.",
     shows_in=("shaft_orders", "mesh_sidebands"),
     change=change,
     options=(Option("shaft", "driver", "whose coupling", choices=GEARS),),

@@ -28,9 +28,10 @@ EFFECT = Effect(
     severity=Severity("depth_um", "um", 0.0, 200.0, 15.0, "greatest depth of wear on the flank; adds to wear there is"),
     changes="Every flank of one gear loses metal where it slides: nothing at the pitch point, most towards root and "
     "tip, by Archard's law.",
-    signature="Mesh harmonics, the second to fourth more than the first, alike on every tooth: no sidebands and no "
-    "pulse, the same shape in every mesh period. Strongest at light load, where deflection no longer covers the worn "
-    "shape. A smooth path that passes high frequencies better looks alike: ratios at another load tell.",
+    signature="Mesh harmonics, alike on every tooth: no sidebands and no pulse, the same shape in every mesh period. "
+    "On teeth without relief the first micrometres act as one and quieten the mesh; beyond, every harmonic grows. "
+    "Strongest at light load, where deflection no longer covers the worn shape. A path that passes other frequencies "
+    "better looks alike: ratios at another load tell.",
     shows_in=("mesh_harmonics",),
     change=change,
     options=(GEAR_OPTION,),

@@ -7,11 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from gearsig.checks import within
 from sims.effects.catalogue import replaced_item
 from sims.effects.effect import GEAR_OPTION, Effect, OptionValue, Severity
-from sims.effects.gear_side import gear_index
+from sims.effects.gear_side import GEARS, gear_geometry, gear_index
 from sims.effects.polar import ANGLE_OPTION, angle_or_drawn_deg, vector_sum
 from sims.machine import Machine
+
+LARGEST_OFFSET = 0.1
+"""Of the centre of mass, in pitch radii; a gear further out of balance has lost a piece."""
 
 
 def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
@@ -19,6 +23,8 @@ def change(machine: Machine, severity: float, options: Mapping[str, OptionValue]
     index, angle = gear_index(options), angle_or_drawn_deg(options, rng)
     wheel = machine.wheels[index]
     length, direction = vector_sum(wheel.unbalance_g_mm, wheel.unbalance_angle_deg, severity, angle)
+    largest = LARGEST_OFFSET * gear_geometry(machine, index).pitch_radius_mm * wheel.mass_kg * 1e3
+    within(length, f"unbalance_g_mm of the {GEARS[index]} gear", 0.0, largest, "g mm")
     wheels = replaced_item(machine.wheels, index, unbalance_g_mm=length, unbalance_angle_deg=direction)
     return replace(machine, wheels=wheels)
 
@@ -28,13 +34,14 @@ EFFECT = Effect(
     group="shaft",
     title="unbalance",
     severity=Severity(
-        "unbalance_g_mm", "g mm", 0.0, 50000.0, 2000.0, "mass times distance of the centre of mass from the axis"
+        "unbalance_g_mm", "g mm", 0.0, 1e5, 500.0, "mass times distance of the centre of mass from the axis"
     ),
     changes="A force of unbalance times speed squared turns with the gear; it adds as a vector to the unbalance there "
     "is.",
-    signature="Order 1 of that gear's shaft, nearly a pure sine, alike in both directions across the shaft; its force "
-    "grows with the square of the speed (the acceleration below resonance with the fourth power) and not with the "
-    "load. No mesh sidebands to speak of: that tells it from eccentricity. Faint at low speed.",
+    signature="Order 1 of that gear's shaft, alike in both directions across the shaft; its force grows with the "
+    "square of the speed (the acceleration below resonance with the fourth power) and not with the load. Hardly any "
+    "transmission error, which tells it from eccentricity; weak sidebands z ± 1, as the mesh force acts off the centre "
+    "of mass. Faint at low speed.",
     shows_in=("shaft_orders",),
     change=change,
     options=(GEAR_OPTION, ANGLE_OPTION),

@@ -1,0 +1,295 @@
+"""Each effect shows where theory says it does, and the sound machine does not show it there.
+
+Without noise the sound machine is periodic in the mesh: its other lines are the integrator's rounding. So "shows" means
+orders of magnitude, and amplitudes are compared with closed forms where there are any.
+"""
+
+from math import pi, radians
+
+import numpy as np
+import pytest
+from scipy.signal import hilbert
+
+from gearsig.checks import FloatArray
+from gearsig.recording.types import Recording
+from sims.cracked.simulate import simulate_machine
+from sims.effects import EffectSetting, with_effects
+from sims.machine.operation import Operation
+from tests.sims.cracked.order_lines import OUTPUT_ORDER, TEETH, Run, healthy, run
+from tests.sims.machines import spur_pair_machine
+
+Z = TEETH[0]
+SPEED_RPM, TORQUE_NM = 1000.0, 110.0
+OMEGA = SPEED_RPM * pi / 30.0
+ERROR, FORCE = "transmission_error_m", "mesh_force_n"
+ACCELERATION = "bearing 1 y acceleration"
+CONTACT_RATIO = spur_pair_machine().mesh.pair.contact_ratio
+BPFO, BPFI = (9 / 2 * (1 - 7.94 / 39.04), 9 / 2 * (1 + 7.94 / 39.04))
+TOOTH_LOCAL = [("root_crack", 3.0), ("tooth_spall", 2.0), ("chipped_tooth", 1.5)]
+FLOOR = 1e-5
+"""m/s², above the sound machine's lines off the mesh harmonics."""
+
+
+def faulty(name: str, severity: float, **options: float | str) -> Run:
+    return run(EffectSetting(name, severity, options))
+
+
+def kurtosis(x: FloatArray) -> float:
+    return float(np.mean((x - x.mean()) ** 4) / x.var() ** 2)
+
+
+def test_the_sound_machine_has_mesh_harmonics_and_nothing_else() -> None:
+    sound = healthy()
+    assert sound.lines(ACCELERATION, [Z, 2 * Z, 3 * Z]).min() > 1.0
+    others = [1, 2, 6, OUTPUT_ORDER, 2 * OUTPUT_ORDER, BPFO, BPFI, Z - 1, Z + 1, Z - OUTPUT_ORDER, 2.4]
+    assert sound.lines(ACCELERATION, others).max() < FLOOR
+
+
+@pytest.mark.parametrize(("name", "severity"), TOOTH_LOCAL)
+@pytest.mark.parametrize("gear", ["driver", "driven"])
+def test_a_tooth_shows_as_a_burst_at_its_angle(name: str, severity: float, gear: str) -> None:
+    tooth, teeth = 20, TEETH[gear == "driven"]
+    ill = faulty(name, severity, gear=gear, tooth=tooth)
+    residual = ill.residual_over_teeth(ERROR, teeth)
+    row, column = np.unravel_index(np.abs(residual).argmax(), residual.shape)
+    in_mesh = row - tooth + column / residual.shape[1]
+    assert -0.1 < in_mesh < CONTACT_RATIO + 0.1
+    assert kurtosis(residual.ravel()) > 20.0
+    assert np.abs(healthy().residual_over_teeth(ERROR, teeth)).max() < 0.01 * np.abs(residual).max()
+
+
+@pytest.mark.parametrize(("name", "severity"), TOOTH_LOCAL)
+@pytest.mark.parametrize("gear", ["driver", "driven"])
+def test_a_tooth_makes_low_wide_sidebands_of_its_own_shaft(name: str, severity: float, gear: str) -> None:
+    ill = faulty(name, severity, gear=gear)
+    own, other = (1.0, OUTPUT_ORDER) if gear == "driver" else (OUTPUT_ORDER, 1.0)
+    low = ill.lines(ERROR, own * np.arange(1, 11))
+    assert low.max() < 1.2 * low.min()  # a pulse has a flat spectrum far below one over its duration
+    assert ill.lines(ACCELERATION, Z + own * np.array([-3, -2, -1, 1, 2, 3])).min() > 300 * FLOOR
+    assert ill.lines(ACCELERATION, Z + other * np.array([-2, -1, 1, 2])).max() < 30 * FLOOR
+
+
+@pytest.mark.parametrize(("name", "severities"), [(n, (0.4 * s, 0.7 * s, s)) for n, s in TOOTH_LOCAL])
+def test_a_tooth_s_burst_grows_with_the_damage(name: str, severities: tuple[float, ...]) -> None:
+    energy = [faulty(name, s).residual_over_teeth(ERROR, Z).std() for s in severities]
+    assert energy[0] < energy[1] < energy[2]
+
+
+def test_a_chip_shows_in_recess_on_the_driver_and_in_approach_on_the_driven_gear() -> None:
+    """The driver's tip is in mesh as the pair leaves, the driven gear's as it enters."""
+    change = {}
+    for gear, teeth in zip(("driver", "driven"), TEETH, strict=True):
+        residual = np.abs(faulty("chipped_tooth", 1.5, gear=gear).residual_over_teeth(ERROR, teeth)).ravel()
+        cycles = np.arange(len(residual)) / residual.size * teeth
+        near = cycles < CONTACT_RATIO
+        change[gear] = np.sum(cycles[near] * residual[near]) / np.sum(residual[near])
+    assert change["driver"] > CONTACT_RATIO / 2 > change["driven"]
+
+
+def test_wear_changes_mesh_harmonics_alone() -> None:
+    ill = faulty("tooth_wear", 50.0)
+    assert ill.line(ERROR, Z) > 3 * healthy().line(ERROR, Z)
+    assert ill.lines(ACCELERATION, [1, OUTPUT_ORDER, Z - 1, Z + 1, Z - OUTPUT_ORDER]).max() < 10 * FLOOR
+
+
+def test_little_wear_acts_as_a_relief() -> None:
+    assert faulty("tooth_wear", 10.0).line(ERROR, Z) < 0.8 * healthy().line(ERROR, Z)
+
+
+def test_pitch_errors_show_at_all_orders_of_their_shaft_and_at_no_tooth() -> None:
+    ill = faulty("pitch_error", 5.0)
+    assert np.median(ill.lines(ACCELERATION, range(1, 11))) > 0.01
+    assert ill.lines(ACCELERATION, OUTPUT_ORDER * np.array([1, 2, 4, 5])).max() < 1e-3
+    assert kurtosis(ill.residual_over_teeth(ERROR, Z).ravel()) < 4.0
+    assert ill.lines(ACCELERATION, [Z - 2, Z - 1, Z + 1, Z + 2]).min() > 0.05
+
+
+def test_flank_roughness_shows_at_orders_of_both_shafts() -> None:
+    ill = faulty("surface_roughness", 0.8, locked_to="flank")
+    for order in (1.0, OUTPUT_ORDER):
+        assert np.median(ill.lines(ACCELERATION, order * np.arange(1, 11))) > 10 * FLOOR
+    assert ill.lines(ACCELERATION, [2.4, 6.4, 9.4]).max() < 10 * FLOOR  # of neither shaft
+
+
+def test_time_locked_roughness_shows_at_its_fixed_frequencies() -> None:
+    ill = faulty("surface_roughness", 0.8, locked_to="time")
+    fixed_hz = 1.0312 * 1.5 ** np.arange(9, 13)
+    assert ill.lines(ERROR, fixed_hz / (SPEED_RPM / 60.0)).min() > 30 * ill.lines(ERROR, [2.2, 4.9, 6.6]).max()
+
+
+@pytest.mark.parametrize("percent", [50.0, 200.0])
+def test_friction_raises_mesh_harmonics_across_the_line_of_action_in_proportion(percent: float) -> None:
+    ill, sound = faulty("sliding_friction", percent), healthy()
+    across = ill.lines("driver x", [Z, 2 * Z, 3 * Z]) / sound.lines("driver x", [Z, 2 * Z, 3 * Z])
+    assert across == pytest.approx(1.0 + percent / 100.0, rel=0.07)
+    assert ill.line(ACCELERATION, Z) == pytest.approx(sound.line(ACCELERATION, Z), rel=0.05)
+    assert ill.lines(ACCELERATION, [1, Z - 1, Z + 1]).max() < FLOOR
+
+
+@pytest.mark.parametrize(("gear", "order"), [("driver", 1.0), ("driven", OUTPUT_ORDER)])
+def test_eccentricity_is_transmission_error_at_its_shaft_s_order(gear: str, order: float) -> None:
+    ill = faulty("eccentricity", 20.0, gear=gear)
+    assert ill.line(ERROR, order) == pytest.approx(20e-6, rel=0.01)
+    first = ill.lines(ACCELERATION, [Z - order, Z + order])
+    assert first.min() > 300 * FLOOR
+    assert ill.lines(ACCELERATION, [Z - 2 * order, Z + 2 * order]).max() < 0.02 * first.min()
+    other = OUTPUT_ORDER if gear == "driver" else 1.0
+    assert ill.lines(ACCELERATION, [other, Z - other, Z + other]).max() < 10 * FLOOR
+
+
+@pytest.mark.parametrize("speed_rpm", [1000.0, 2000.0])
+def test_unbalance_pushes_the_bearings_with_the_square_of_the_speed(speed_rpm: float) -> None:
+    """Far below resonance: half of u ω² on either bearing's spring, so an acceleration of u ω⁴/(2k)."""
+    ill = run(EffectSetting("unbalance", 500.0), speed_rpm=speed_rpm)
+    omega = speed_rpm * pi / 30.0
+    expected = 500e-6 * omega**4 / (2 * 2e8)
+    for axis in "xy":
+        assert ill.line(f"bearing 1 {axis} acceleration", 1.0) == pytest.approx(expected, rel=0.15)
+    assert healthy(speed_rpm).line(ACCELERATION, 1.0) < 0.01 * expected
+    assert ill.line(ERROR, 1.0) < 0.1 * faulty("eccentricity", 20.0).line(ERROR, 1.0)
+
+
+@pytest.mark.parametrize("angle_deg", [0.5, 2.0])
+def test_misalignment_bends_the_shaft_at_its_second_order(angle_deg: float) -> None:
+    """β T/(2 L) at order 2 on either bearing."""
+    ill = faulty("misalignment", angle_deg)
+    force = radians(angle_deg) * TORQUE_NM / (2 * 0.1)
+    expected = (2 * OMEGA) ** 2 * force / 2e8
+    assert ill.line(ACCELERATION, 2.0) == pytest.approx(expected, rel=0.05)
+    assert ill.lines(ACCELERATION, [1, 3]).max() < 0.01 * expected
+
+
+def test_misalignment_twists_with_the_square_of_the_angle() -> None:
+    single, double = (faulty("misalignment", angle, shaft="driven") for angle in (1.0, 2.0))
+    order = 2 * OUTPUT_ORDER
+    assert double.line(FORCE, order) == pytest.approx(4 * single.line(FORCE, order), rel=0.02)
+    assert single.line(FORCE, order) > 100 * max(healthy().line(FORCE, order), single.line(FORCE, OUTPUT_ORDER))
+
+
+@pytest.mark.parametrize("order", [6.0, 2.4])
+def test_torque_ripple_is_a_line_of_the_mesh_force_at_its_order(order: float) -> None:
+    """The mesh passes on what the inertias behind it leave: J₂*/(J₁ + J₂*) of the ripple, J₂* seen from the driver."""
+    ill, machine = faulty("torque_ripple", 5.0, order=order), spur_pair_machine()
+    before = machine.shafts[0].rotor_inertia_kg_m2 + machine.wheels[0].inertia_kg_m2
+    behind = (machine.shafts[1].rotor_inertia_kg_m2 + machine.wheels[1].inertia_kg_m2) / machine.ratio**2
+    static = 0.05 * TORQUE_NM / (machine.mesh.pair.driver.base_radius_mm * 1e-3)
+    assert ill.line(FORCE, order) == pytest.approx(static * behind / (before + behind), rel=0.05)
+    assert ill.lines(FORCE, [order - 1, order + 1]).max() < 0.01 * ill.line(FORCE, order)
+    assert ill.lines(ACCELERATION, [Z - order, Z + order]).min() > 300 * FLOOR
+
+
+def test_speed_fluctuation_swings_the_speed_by_its_amount() -> None:
+    ill = faulty("speed_fluctuation", 2.0, frequency_hz=10.0)
+    speed = ill.signals["driver angle velocity"]
+    assert ill.line("driver angle velocity", 10.0 / (SPEED_RPM / 60.0)) == pytest.approx(0.02 * speed.mean(), rel=0.03)
+    assert healthy().signals["driver angle velocity"].std() < 1e-3 * speed.std() * 100
+
+
+def test_backlash_shows_only_where_teeth_separate() -> None:
+    """Loaded, the run is the same to the last bit; without torque, teeth rattle from flank to flank."""
+    loaded = faulty("backlash", 100.0)
+    np.testing.assert_array_equal(loaded.signals[FORCE], healthy().signals[FORCE])
+    swing = EffectSetting("speed_fluctuation", 5.0, {"frequency_hz": 20.0})
+    tight, loose = (run(swing, EffectSetting("backlash", added), torque_nm=0.0) for added in (0.0, 100.0))
+    play_um = [1e6 * np.ptp(r.signals[ERROR]) for r in (tight, loose)]
+    assert play_um[0] == pytest.approx(40.0, abs=5.0)
+    assert play_um[1] == pytest.approx(140.0, abs=5.0)
+
+
+def envelope_lines(ill: Run, orders: FloatArray) -> FloatArray:
+    """Lines of the squared envelope of what the defect adds to the sound machine."""
+    n = min(len(ill.revolutions), len(healthy().revolutions))
+    added = ill.signals[ACCELERATION][:n] - np.interp(
+        ill.revolutions[:n], healthy().revolutions, healthy().signals[ACCELERATION]
+    )
+    return Run(ill.revolutions[:n], {"envelope": np.abs(hilbert(added)) ** 2}).lines("envelope", orders)
+
+
+@pytest.mark.parametrize(("race", "order"), [("outer", BPFO), ("inner", BPFI)])
+def test_a_race_defect_knocks_at_its_passing_order(race: str, order: float) -> None:
+    ill = faulty(f"bearing_{race}_race", 2.0, jitter_percent=0.0, slip_percent=0.0)
+    assert ill.lines(ACCELERATION, order * np.arange(1, 5)).min() > 0.05
+    assert healthy().lines(ACCELERATION, order * np.arange(1, 5)).max() < FLOOR
+    scan = np.arange(2.0, 8.0, 0.05)
+    strongest = scan[envelope_lines(ill, scan).argmax()]
+    assert strongest == pytest.approx(order, abs=0.1)
+
+
+def test_only_the_inner_race_is_modulated_by_its_shaft() -> None:
+    """It turns through the load zone once per revolution; the outer race stands in it."""
+    ratio = {}
+    for race, order in (("outer", BPFO), ("inner", BPFI)):
+        ill = faulty(f"bearing_{race}_race", 2.0, jitter_percent=0.0, slip_percent=0.0)
+        middle, below, above = envelope_lines(ill, np.array([order, order - 1, order + 1]))
+        ratio[race] = (below + above) / middle
+    assert ratio["inner"] > 0.5
+    assert ratio["outer"] < 0.05
+
+
+def test_slip_and_jitter_move_and_smear_the_passing_order() -> None:
+    ill = faulty("bearing_outer_race", 2.0, jitter_percent=0.0, slip_percent=3.0)
+    assert ill.line(ACCELERATION, 4 * 0.97 * BPFO) > 30 * ill.line(ACCELERATION, 4 * BPFO)
+    sharp, smeared = (
+        faulty("bearing_outer_race", 2.0, jitter_percent=jitter, slip_percent=0.0).line(ACCELERATION, 8 * BPFO)
+        for jitter in (0.0, 5.0)
+    )
+    assert smeared < 0.5 * sharp
+
+
+def test_clearance_shows_at_the_elements_passing_and_beside_the_mesh() -> None:
+    little, much = (faulty("bearing_clearance", added) for added in (10.0, 40.0))
+    orders = [BPFO, 2 * BPFO, 3 * BPFO]
+    assert np.all(much.lines(ACCELERATION, orders) > 1.5 * little.lines(ACCELERATION, orders))
+    assert little.lines(ACCELERATION, orders).min() > 100 * FLOOR
+    assert much.lines(ACCELERATION, [Z - BPFO, Z + BPFO]).min() > 10 * healthy().line(ACCELERATION, Z - BPFO)
+
+
+def recorded(*settings: EffectSetting, speed_rpm: float = 1200.0) -> Recording:
+    """One second; at 1200 rpm the mesh harmonics stand at multiples of 1100 Hz."""
+    machine = with_effects(spur_pair_machine(), settings, np.random.default_rng(0))
+    return simulate_machine(
+        machine,
+        Operation.steady(speed_rpm, TORQUE_NM),
+        rng=np.random.default_rng(0),
+        sampling_rate_hz=20480.0,
+        duration_s=1.0,
+    )
+
+
+def spectrum(recording: Recording) -> FloatArray:
+    """Amplitudes at whole hertz, by a Hann window."""
+    x = recording.samples[0]
+    window = np.hanning(len(x) + 1)[:-1]
+    result: FloatArray = 4 * np.abs(np.fft.rfft(window * (x - x.mean()))) / len(x)
+    return result
+
+
+def test_a_path_mode_raises_what_lies_in_its_band() -> None:
+    """|1 + 2ζA/(1 − r² + 2jζr)| at every mesh harmonic."""
+    added = EffectSetting("transfer_path", 8.0, {"frequency_hz": 3300.0, "damping_ratio": 0.05})
+    harmonics = np.arange(1, 6) * 1100
+    ratio = spectrum(recorded(added))[harmonics] / spectrum(recorded())[harmonics]
+    r = harmonics / 3300.0
+    assert ratio == pytest.approx(np.abs(1 + 0.8 / (1 - r**2 + 0.1j * r)), rel=0.02)
+
+
+def test_hum_stands_at_its_frequency_whatever_the_speed() -> None:
+    hum = EffectSetting("mains_hum", 0.5)
+    for speed_rpm in (1200.0, 1500.0):
+        assert spectrum(recorded(hum, speed_rpm=speed_rpm))[[50, 100, 150]] == pytest.approx(
+            [0.5, 0.125, 0.125], rel=0.01
+        )
+        assert spectrum(recorded(speed_rpm=speed_rpm))[[50, 100, 150]].max() < 1e-3
+
+
+def test_clipping_cuts_the_tail_of_the_amplitudes() -> None:
+    crest, fourth, at_the_top = zip(
+        *(
+            (np.abs(x).max() / x.std(), kurtosis(x), np.mean(np.abs(x) > 0.95 * np.abs(x).max()))
+            for x in (recorded(*s).samples[0] for s in ((), (EffectSetting("clipping", 10.0),)))
+        ),
+        strict=True,
+    )
+    assert crest[1] < 0.8 * crest[0]
+    assert fourth[1] < fourth[0]
+    assert at_the_top[1] > 0.05 > 3 * at_the_top[0]
