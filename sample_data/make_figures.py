@@ -25,7 +25,6 @@ from sims.cracked.build import build_machine
 from sims.cracked.parameters import PARAMETERS
 from sims.cracked.respond import Response, respond
 from sims.machine import Machine
-from sims.machine.operation import Operation
 from sims.mesh import mesh_stiffness
 from sims.mesh.mesh_friction import friction_over_mesh
 from sims.mesh.roughness import FractalSurface, TimeLockedRoughness
@@ -138,10 +137,9 @@ def crack_comparison() -> Figure:
     """Pinion's acceleration over three revolutions at five crack depths, at equal angles."""
     n_teeth = machine().mesh.pair.driver.teeth
     revolutions = np.arange(4.0, 7.0, 1.0 / (n_teeth * 100))
-    speed = true_speed_rpm(float(PRESET.parameters["roughness_um"]))
     values = {}
     for depth in CRACKS_MM:
-        run = steady(cracked(depth), 1.1, speed, "driver angle", "driver y acceleration")
+        run = steady(cracked(depth), 1.1, "driver angle", "driver y acceleration")
         turned = run["driver angle"] / (2.0 * np.pi)
         values[named(depth)] = CubicSpline(turned, run["driver y acceleration"])(revolutions)
     sound = values[named(0)]
@@ -177,7 +175,7 @@ def response_case(roughness_um: float) -> ResponseCase:
     """Run at a roughness; states once per mesh period of the mean rotation."""
     signals = ("driver angle", "driver y", "driver y velocity")
     rig = rough(roughness_um)
-    run = steady(rig, SETTLING_S + 4.0, true_speed_rpm(roughness_um), *signals)
+    run = steady(rig, SETTLING_S + 4.0, *signals)
     settled = run.time_s > SETTLING_S
     time = run.time_s[settled] - SETTLING_S
     angle, y, v = (run[name][settled] for name in signals)
@@ -198,21 +196,10 @@ def response_case(roughness_um: float) -> ResponseCase:
     )
 
 
-def true_speed_rpm(roughness_um: float) -> float:
-    """Set speed at which the pinion runs at the preset's speed: friction slows the drive a little."""
-    speed = RPM
-    for _ in range(2):
-        run = steady(rough(roughness_um), SETTLING_S + 0.5, speed, "driver angle")
-        settled = run.time_s > SETTLING_S
-        slope, _ = np.polyfit(run.time_s[settled], run["driver angle"][settled], 1)
-        speed += RPM - float(slope) * 30.0 / np.pi
-    return speed
-
-
-def steady(rig: Machine, duration_s: float, rpm: float, *signals: str) -> Response:
-    """Run at constant speed."""
+def steady(rig: Machine, duration_s: float, *signals: str) -> Response:
+    """Run at the preset's speed and torque."""
     rng = np.random.default_rng(SEED)
-    return respond(rig, Operation.steady(rpm, TORQUE_NM), duration_s=duration_s, rng=rng, signals=signals)
+    return respond(rig, PRESET.operation, duration_s=duration_s, rng=rng, signals=signals)
 
 
 @cache
