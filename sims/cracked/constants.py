@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import cos, pi, radians, sin, sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,13 +111,13 @@ class Constants:
         array in a tuple, which took as long as the mechanics.
     """
 
-    record: np.void
+    record: Any
     curves: FloatArray
     rows: NDArray[np.int64]
     pitch: FloatArray
 
     @property
-    def arguments(self) -> tuple[np.void, FloatArray, NDArray[np.int64], FloatArray]:
+    def arguments(self) -> tuple[Any, FloatArray, NDArray[np.int64], FloatArray]:
         """The four, as kernels take them."""
         return self.record, self.curves, self.rows, self.pitch
 
@@ -199,7 +200,7 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
     for name, value in (values | bearing_fields(machine, force, rng)).items():
         record[name] = value
     curves, rows, pitch = _stacked(table)
-    return Constants(np.void(record), curves, rows, pitch)
+    return Constants(record[()], curves, rows, pitch)
 
 
 def mesh_mass_kg(machine: Machine) -> float:

@@ -1,0 +1,152 @@
+"""The equations of motion: forces follow from the energy, inner forces cancel, nothing is created."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sims.cracked.bearing import bearing_loads_n
+from sims.cracked.energy_kernel import potential_energy
+from sims.cracked.integrate_kernel import derivative, integrate
+from sims.cracked.layout import SIGNALS
+from sims.cracked.respond import prepare, respond
+from sims.machine import Machine, Roughness
+from sims.machine.operation import Operation
+from tests.sims.cracked.machines import conservative, cracked, moving_state, one_lasting_pair
+from tests.sims.machines import spur_pair_machine
+
+STEADY = Operation.steady(500.0, 110.0)
+FREE = Operation.steady(500.0, 0.0)
+SMOOTH = (np.zeros(1), np.ones(1), np.zeros(1))
+
+
+def accelerations(machine: Machine, q: np.ndarray, v: np.ndarray, operation: Operation = FREE) -> np.ndarray:
+    ready = prepare(machine, operation, np.random.default_rng(0))
+    rate = np.empty(32)
+    state = np.concatenate((q, v))
+    derivative(*ready.constants.arguments, 0.0, state, ready.speed, ready.torque, q[0], SMOOTH, rate)
+    return rate[16:]
+
+
+def mass_matrix(machine: Machine, q: np.ndarray) -> np.ndarray:
+    """Of the coordinates, with the unbalanced wheels' coupling of x, y and θ (from the kinetic energy)."""
+    m = np.zeros((16, 16))
+    m[0, 0], m[3, 3] = (s.rotor_inertia_kg_m2 for s in machine.shafts)
+    for side, wheel in enumerate(machine.wheels):
+        up, g, rho = (1.0, -1.0)[side], 4 + 2 * side, wheel.mass_offset_m
+        phi = q[1 + side] + np.radians(wheel.unbalance_angle_deg)
+        m[g, g] = m[g + 1, g + 1] = wheel.mass_kg
+        m[1 + side, 1 + side] = wheel.inertia_kg_m2 + wheel.mass_kg * rho**2
+        m[g, 1 + side] = m[1 + side, g] = -wheel.mass_kg * rho * np.sin(phi)
+        m[g + 1, 1 + side] = m[1 + side, g + 1] = up * wheel.mass_kg * rho * np.cos(phi)
+    for row, support in enumerate(machine.bearings):
+        m[8 + 2 * row, 8 + 2 * row] = m[9 + 2 * row, 9 + 2 * row] = support.mass_kg
+    return m
+
+
+@pytest.mark.parametrize("contact_law", ["linear", "load-dependent"])
+@pytest.mark.parametrize("delta_m", [2e-5, -6e-5])
+def test_forces_are_the_slope_of_the_energy(contact_law: str, delta_m: float) -> None:
+    """M a = −∂U/∂q at rest, on the driving flanks and on those behind, with cracks, run-out and unbalance."""
+    base = cracked(spur_pair_machine(), 2.0)
+    base = replace(base, mesh=replace(base.mesh, contact_law=contact_law))
+    machine = conservative(base, runout_um=25.0, runout_angle_deg=30.0, unbalance_g_mm=3000.0, unbalance_angle_deg=70.0)
+    machine = replace(machine, line_of_action_deg=35.0)
+    ready = prepare(machine, FREE, np.random.default_rng(0))
+    arguments = ready.constants.arguments
+    rng = np.random.default_rng(5)
+    scale = np.where(np.arange(16) < 4, 1e-7, 1e-9)
+    for _ in range(12):
+        q = moving_state(rng, delta_m=delta_m, base_radii_m=ready.constants.record["base_radius"])
+        inertial = mass_matrix(machine, q) @ accelerations(machine, q, np.zeros(16))
+        slope = np.empty(16)
+        for i, h in enumerate(scale):
+            up, down = q.copy(), q.copy()
+            up[i] += h
+            down[i] -= h
+            slope[i] = (potential_energy(*arguments, up, 0.0) - potential_energy(*arguments, down, 0.0)) / (2 * h)
+        # The governor's share at rest: g ω on the input rotor, 1e-12 of it.
+        np.testing.assert_allclose(inertial, -slope, atol=2e-4 * np.abs(slope).max(), rtol=2e-4)
+
+
+def test_inner_forces_cancel() -> None:
+    """What the machine as a whole gains in momentum comes from bearings' grounds and weight alone, to 1e-12."""
+    machine = cracked(replace(spur_pair_machine(), roughness=Roughness(0.84, "none")), 3.0)
+    ready = prepare(machine, STEADY, np.random.default_rng(0))
+    rng = np.random.default_rng(6)
+    for _ in range(20):
+        q = moving_state(rng, base_radii_m=ready.constants.record["base_radius"])
+        v = rng.normal(0.0, 1e-2, 16)
+        v[:4] += 50.0
+        a = accelerations(machine, q, v, STEADY)
+        down = -machine.gravity_mps2 * np.array(
+            [np.sin(np.radians(machine.line_of_action_deg)), np.cos(np.radians(machine.line_of_action_deg))]
+        )
+        momentum, outer, size = np.zeros(2), np.zeros(2), 0.0
+        for side, wheel in enumerate(machine.wheels):
+            momentum += wheel.mass_kg * a[4 + 2 * side : 6 + 2 * side]
+            outer += wheel.mass_kg * down
+            size += float(np.abs(wheel.mass_kg * a[4 + 2 * side : 6 + 2 * side]).sum())
+        for row, b in enumerate(machine.bearings):
+            place = slice(8 + 2 * row, 10 + 2 * row)
+            momentum += b.mass_kg * a[place]
+            outer += b.mass_kg * down - b.stiffness_n_per_m * q[place] - b.damping_n_s_per_m * v[place]
+        assert np.abs(momentum - outer).max() < 1e-12 * size
+
+
+def test_static_force_of_the_bearings_is_what_they_carry() -> None:
+    """Bearing loads of the static balance: both shafts' sums are mesh force and weight."""
+    machine = spur_pair_machine()
+    loads = bearing_loads_n(machine, 2000.0)
+    weight = sum(w.mass_kg for w in machine.wheels) + sum(b.mass_kg for b in machine.bearings)
+    assert np.hypot(*loads.sum(axis=0)) == pytest.approx(weight * machine.gravity_mps2)
+    assert loads[:2, 1].sum() < -1900.0 and loads[2:, 1].sum() > 1900.0
+
+
+def energy_drift(step_s: float, duration_s: float = 0.02) -> float:
+    """Greatest change of energy less the work done, with one lasting pair of constant stiffness."""
+    machine = conservative(spur_pair_machine())
+    machine = replace(machine, half_backlash_um=1000.0)
+    ready = prepare(machine, STEADY, np.random.default_rng(0))
+    k = one_lasting_pair(ready.constants)
+    q, v = ready.q.copy(), ready.v.copy()
+    v[5] += 0.02  # strikes every mode a little; the flanks stay in touch
+    n = round(duration_s / step_s)
+    select = np.array([SIGNALS.index(s) for s in ("input rotor angle", "output rotor angle", "mesh_force_n")])
+    found, energies = np.empty((n, 3)), np.empty(n)
+    phasors = ready.roughness.phasors(step_s / 2)
+    integrate(*k.arguments, q, v, 0.0, step_s, n, 1, ready.speed, ready.torque, phasors, select, found, energies)
+    assert found[:, 2].min() > 0.0
+    turned = found[:, :2] - found[0, :2]
+    work = 110.0 * (turned[:, 0] - turned[:, 1] * machine.ratio)
+    return float(np.abs(energies - energies[0] - work).max())
+
+
+def test_energy_drift_falls_at_fifth_order() -> None:
+    """RK4 on an undamped linear oscillation loses energy as h⁵ (its amplification is 1 − (ωh)⁶/144 per step)."""
+    drift = [energy_drift(h) for h in (16e-6, 8e-6, 4e-6)]
+    orders = np.log2(np.array(drift[:-1]) / np.array(drift[1:]))
+    assert orders == pytest.approx(5.0, abs=0.35)
+    assert drift[-1] < 1e-6
+
+
+def test_energy_is_kept_with_varying_stiffness() -> None:
+    """Tooth pairs that come and go, a crack, run-out and unbalance: still nothing is created, and less with the step."""
+    machine = conservative(cracked(spur_pair_machine(), 2.0), runout_um=5.0, unbalance_g_mm=500.0)
+    drift = []
+    for step in (4e-6, 1e-6):
+        run = respond(
+            machine,
+            STEADY,
+            duration_s=0.01,
+            rng=np.random.default_rng(0),
+            signals=("input rotor angle", "output rotor angle"),
+            step_s=step,
+            with_energy=True,
+        )
+        work = 110.0 * (run["input rotor angle"] - machine.ratio * run["output rotor angle"])
+        gained = run.energy_j - work
+        drift.append(float(np.ptp(gained)))
+    assert drift[0] < 1e-4 and drift[1] < drift[0] / 20
+    # Energy in the teeth alone swings by far more.
+    assert drift[0] < 1e-2 * 0.5 * 2128.0 * 1e-5
