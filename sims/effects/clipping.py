@@ -36,8 +36,8 @@ EFFECT = Effect(
     "follows from each recording's own signal: another speed or load has another one. For one range throughout, set "
     "the accelerometer's range instead.",
     signature="The amplitude distribution is cut off: crest factor and kurtosis fall, extreme values pile up at one "
-    "level on both sides. Odd harmonics and sums of the strongest lines appear as far as the filter lets them; "
-    "impulses lose most, so that a local fault looks smaller.",
+    "level on both sides, smeared by the anti-alias filter behind the sensor. Odd harmonics and sums of the strongest "
+    "lines appear as far as the filter lets them; impulses lose most, so that a local fault looks smaller.",
     shows_in=("amplitude_tail", "mesh_harmonics", "broadband"),
     change=change,
 )

@@ -98,17 +98,19 @@ def test_little_wear_acts_as_a_relief() -> None:
 
 def test_pitch_errors_show_at_all_orders_of_their_shaft_and_at_no_tooth() -> None:
     ill = faulty("pitch_error", 5.0)
-    assert np.median(ill.lines(ACCELERATION, range(1, 11))) > 0.01
-    assert ill.lines(ACCELERATION, OUTPUT_ORDER * np.array([1, 2, 4, 5])).max() < 1e-3
+    own, other = ill.lines(ERROR, range(1, 11)), ill.lines(ERROR, OUTPUT_ORDER * np.array([1, 2, 5]))
+    assert np.median(own) > 0.2e-6
+    assert other.max() < 1e-3 * own.min()
     assert kurtosis(ill.residual_over_teeth(ERROR, Z).ravel()) < 4.0
     assert ill.lines(ACCELERATION, [Z - 2, Z - 1, Z + 1, Z + 2]).min() > 0.05
 
 
 def test_flank_roughness_shows_at_orders_of_both_shafts() -> None:
     ill = faulty("surface_roughness", 0.8, locked_to="flank")
+    neither = ill.lines(ERROR, [2.4, 6.4, 9.4]).max()
     for order in (1.0, OUTPUT_ORDER):
-        assert np.median(ill.lines(ACCELERATION, order * np.arange(1, 11))) > 10 * FLOOR
-    assert ill.lines(ACCELERATION, [2.4, 6.4, 9.4]).max() < 10 * FLOOR  # of neither shaft
+        assert np.median(ill.lines(ERROR, order * np.arange(1, 11))) > 1000 * neither
+    assert kurtosis(ill.residual_over_teeth(ERROR, Z).ravel()) < 4.0
 
 
 def test_time_locked_roughness_shows_at_its_fixed_frequencies() -> None:
@@ -122,7 +124,7 @@ def test_friction_raises_mesh_harmonics_across_the_line_of_action_in_proportion(
     ill, sound = faulty("sliding_friction", percent), healthy()
     across = ill.lines("driver x", [Z, 2 * Z, 3 * Z]) / sound.lines("driver x", [Z, 2 * Z, 3 * Z])
     assert across == pytest.approx(1.0 + percent / 100.0, rel=0.07)
-    assert ill.line(ACCELERATION, Z) == pytest.approx(sound.line(ACCELERATION, Z), rel=0.05)
+    assert ill.line(ACCELERATION, Z) == pytest.approx(sound.line(ACCELERATION, Z), rel=0.1)
     assert ill.lines(ACCELERATION, [1, Z - 1, Z + 1]).max() < FLOOR
 
 
@@ -179,10 +181,10 @@ def test_torque_ripple_is_a_line_of_the_mesh_force_at_its_order(order: float) ->
 
 
 def test_speed_fluctuation_swings_the_speed_by_its_amount() -> None:
-    ill = faulty("speed_fluctuation", 2.0, frequency_hz=10.0)
-    speed = ill.signals["driver angle velocity"]
-    assert ill.line("driver angle velocity", 10.0 / (SPEED_RPM / 60.0)) == pytest.approx(0.02 * speed.mean(), rel=0.03)
-    assert healthy().signals["driver angle velocity"].std() < 1e-3 * speed.std() * 100
+    ill, order = faulty("speed_fluctuation", 2.0, frequency_hz=10.0), 10.0 / (SPEED_RPM / 60.0)
+    swing = ill.line("driver angle velocity", order)
+    assert swing == pytest.approx(0.02 * OMEGA, rel=0.03)
+    assert healthy().line("driver angle velocity", order) < 1e-5 * swing
 
 
 def test_backlash_shows_only_where_teeth_separate() -> None:
@@ -192,8 +194,9 @@ def test_backlash_shows_only_where_teeth_separate() -> None:
     swing = EffectSetting("speed_fluctuation", 5.0, {"frequency_hz": 20.0})
     tight, loose = (run(swing, EffectSetting("backlash", added), torque_nm=0.0) for added in (0.0, 100.0))
     play_um = [1e6 * np.ptp(r.signals[ERROR]) for r in (tight, loose)]
-    assert play_um[0] == pytest.approx(40.0, abs=5.0)
-    assert play_um[1] == pytest.approx(140.0, abs=5.0)
+    # 2b and what flanks, shafts and bearings give under the impacts.
+    assert 40.0 < play_um[0] < 55.0
+    assert 140.0 < play_um[1] < 170.0
 
 
 def envelope_lines(ill: Run, orders: FloatArray) -> FloatArray:
@@ -237,11 +240,16 @@ def test_slip_and_jitter_move_and_smear_the_passing_order() -> None:
 
 
 def test_clearance_shows_at_the_elements_passing_and_beside_the_mesh() -> None:
-    little, much = (faulty("bearing_clearance", added) for added in (10.0, 40.0))
-    orders = [BPFO, 2 * BPFO, 3 * BPFO]
-    assert np.all(much.lines(ACCELERATION, orders) > 1.5 * little.lines(ACCELERATION, orders))
-    assert little.lines(ACCELERATION, orders).min() > 100 * FLOOR
-    assert much.lines(ACCELERATION, [Z - BPFO, Z + BPFO]).min() > 10 * healthy().line(ACCELERATION, Z - BPFO)
+    little, middle, much = (faulty("bearing_clearance", added) for added in (10.0, 30.0, 60.0))
+    orders = BPFO * np.arange(1, 5)
+    # In both directions together: the path of the shaft's centre turns with the clearance.
+    size = [
+        np.hypot(*(r.lines(f"bearing 1 {axis} acceleration", orders) for axis in "xy")) for r in (little, middle, much)
+    ]
+    assert np.all(1.5 * size[0] < size[1])
+    assert np.all(1.5 * size[1] < size[2])
+    assert size[0].min() > 1000 * FLOOR
+    assert middle.lines(ACCELERATION, [Z - BPFO, Z + BPFO]).min() > 100 * FLOOR
 
 
 def recorded(*settings: EffectSetting, speed_rpm: float = 1200.0) -> Recording:
@@ -283,13 +291,9 @@ def test_hum_stands_at_its_frequency_whatever_the_speed() -> None:
 
 
 def test_clipping_cuts_the_tail_of_the_amplitudes() -> None:
-    crest, fourth, at_the_top = zip(
-        *(
-            (np.abs(x).max() / x.std(), kurtosis(x), np.mean(np.abs(x) > 0.95 * np.abs(x).max()))
-            for x in (recorded(*s).samples[0] for s in ((), (EffectSetting("clipping", 10.0),)))
-        ),
-        strict=True,
-    )
-    assert crest[1] < 0.8 * crest[0]
-    assert fourth[1] < fourth[0]
-    assert at_the_top[1] > 0.05 > 3 * at_the_top[0]
+    sound, clipped = (recorded(*s).samples[0] for s in ((), (EffectSetting("clipping", 10.0),)))
+    level = np.quantile(np.abs(sound), 0.9)
+    beyond = [np.mean(np.abs(x) > 1.1 * level) for x in (sound, clipped)]
+    assert 0.03 < beyond[0] < 0.1
+    assert beyond[1] < beyond[0] / 4  # what is left is the anti-alias filter's overshoot
+    assert kurtosis(clipped) < kurtosis(sound)
