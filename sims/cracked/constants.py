@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, pi, radians, sin, sqrt
+from math import cos, floor, pi, radians, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from sims.cracked.bearing import BEARING_FIELDS, bearing_fields
+from sims.cracked.contact_kernel import MOST_LATE
 from sims.machine import Machine
 from sims.machine.operation import Operation
 from sims.mesh import back_stiffness_n_per_m, mesh_stiffness, mesh_table
@@ -41,6 +42,8 @@ SCALARS = (
     "damping_ramp",
     "backlash",
     "back_stiffness",
+    "late_x",
+    "late_y",
     "cos_back",
     "sin_back",
     "friction_factor",
@@ -146,7 +149,7 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
         "load_dependent": table.load_dependent,
         "contact_ratio": table.contact_ratio,
         "ramp": table.ramp,
-        "n_slots": table.n_slots,
+        "n_slots": floor(table.contact_ratio + table.ramp + 2.0 * MOST_LATE) + 1,
         "teeth": (pair.driver.teeth, pair.driven.teeth),
         "n_ripples": len(machine.drive.ripples),
         "n_swings": len(machine.drive.swings),
@@ -163,6 +166,9 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
         "damping_ramp": DAMPING_RAMP_M,
         "backlash": 2e-6 * machine.half_backlash_um,
         "back_stiffness": back_stiffness_n_per_m(mesh),
+        # Base pitches per metre that the gears stand apart along their line of centres, (cos α, sin α).
+        "late_x": cos(alpha) / (sin(alpha) * pair.base_pitch_mm * 1e-3),
+        "late_y": 1.0 / (pair.base_pitch_mm * 1e-3),
         "cos_back": cos(2.0 * alpha),
         "sin_back": sin(2.0 * alpha),
         "friction": machine.lubrication.friction,

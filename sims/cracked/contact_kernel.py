@@ -5,6 +5,11 @@ normal force N = w n(d; C) from d = C n + B(n). Its forces on the coordinates ar
 action that gives the driver a torque −∂U/∂c · ∂c/∂θ1, as stiffness and flank shape move past under load. Without it a
 pair would take energy from the drive that appears nowhere (Oh, Grosh, Barber 2005). ∂u/∂C at constant d is −n²/2
 whatever the contact's law is.
+
+Gears that move apart by Δa make a pair enter late, by Δa/(p_b sin α_w) base pitches, as the path of contact begins at
+the driven gear's tip: run-out changes the contact ratio once per revolution. The force −∂U/∂Δa is left out: it would
+follow from the width that is assumed for the ramp, where the geometry of a corner contact gives a tenth of it, and it
+works over the run-out alone.
 """
 
 # mypy: allow-untyped-defs, allow-untyped-calls
@@ -16,48 +21,61 @@ from numba import njit
 from sims.mesh.friction_kernel import contact_friction_n
 from sims.mesh.load_sharing_kernel import cubic, pair_force
 
+MOST_LATE = 0.05
+"""Base pitches by which an entry may be late or early; the places of gears that move further count as that far."""
+
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def engagement(progress, contact_ratio, ramp):
-    """(w, dw/dζ): see `sims.mesh.load_sharing_kernel.engagement`."""
+def engagement(progress, late, contact_ratio, ramp):
+    """(w, ∂w/∂ζ): as `sims.mesh.load_sharing_kernel.engagement`, with an entry `late` base pitches late."""
     if ramp <= 0.0:
-        inside = 0.0 <= progress <= contact_ratio
+        inside = late <= progress <= contact_ratio
         return (1.0 if inside else 0.0), 0.0
-    t = progress / ramp + 0.5
-    if t <= 0.0:
-        return 0.0, 0.0
-    if t < 1.0:
-        return t * t * t * (t * (6.0 * t - 15.0) + 10.0), 30.0 * t * t * (t - 1.0) * (t - 1.0) / ramp
-    t = (contact_ratio - progress) / ramp + 0.5
-    if t <= 0.0:
-        return 0.0, 0.0
-    if t < 1.0:
-        return t * t * t * (t * (6.0 * t - 15.0) + 10.0), -30.0 * t * t * (t - 1.0) * (t - 1.0) / ramp
-    return 1.0, 0.0
+    rise, rise_slope = _smooth_step((progress - late) / ramp + 0.5)
+    fall, fall_slope = _smooth_step((contact_ratio - progress) / ramp + 0.5)
+    return rise * fall, (rise_slope * fall - rise * fall_slope) / ramp
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def contact_forces(  # noqa: PLR0915  one pass over the pairs: no part of it stands alone
-    k, curves, rows, pitch, delta, delta_rate, cycles, cycle_rate, omega_1, omega_2, slip_x, rough, rough_rate
-):
-    """(ΣN, torque −∂U/∂c, Σf, Σfρ1, Σfρ2, n_carrying) of the driving flanks.
+def _smooth_step(t):
+    """6t⁵ − 15t⁴ + 10t³ between 0 and 1, and its slope."""
+    if t <= 0.0:
+        return 0.0, 0.0
+    if t >= 1.0:
+        return 1.0, 0.0
+    return t * t * t * (t * (6.0 * t - 15.0) + 10.0), 30.0 * t * t * (t - 1.0) * (t - 1.0)
 
-    `k` … `pitch`: see `sims.cracked.constants`. `slip_x`: ẋ1 − ẋ2. `rough`, `rough_rate`: Δb and its rate.
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def late_entry(k, dx, dy):
+    """Base pitches by which pairs enter late, from the driver's centre less the driven gear's."""
+    late = -(k.late_x * dx + k.late_y * dy)
+    return min(max(late, -MOST_LATE), MOST_LATE)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def contact_forces(
+    k, curves, rows, pitch, delta, delta_rate, late, cycles, cycle_rate, omega_1, omega_2, slip_x, rough, rough_rate
+):
+    """(ΣN, torque −∂U/∂c, Σf, Σfρ1, Σfρ2) of the driving flanks.
+
+    `k` … `pitch`: see `sims.cracked.constants`. `late`: base pitches by which a pair enters late.
+    `slip_x`: ẋ1 − ẋ2. `rough`, `rough_rate`: Δb and its rate.
     """
     normal, along_cycles, friction, moment_1, moment_2 = 0.0, 0.0, 0.0, 0.0, 0.0
-    n_carrying = 0
-    newest = np.floor(cycles + 0.5 * k.ramp)
+    newest = np.floor(cycles + 0.5 * k.ramp + MOST_LATE)
     z1, z2 = float(k.teeth[0]), float(k.teeth[1])
     columns = curves.shape[1]
     for slot in range(k.n_slots):
         pair = newest - slot
         progress = cycles - pair
-        weight, weight_slope = engagement(progress, k.contact_ratio, k.ramp)
+        weight, weight_slope = engagement(progress, late, k.contact_ratio, k.ramp)
         if weight <= 0.0:
             continue
         # By floats: the remainder of whole numbers takes several times as long.
         tooth_1, tooth_2 = int(pair - z1 * np.floor(pair / z1)), int(pair - z2 * np.floor(pair / z2))
-        place = (progress - k.table_start) / k.table_step
+        # An early entry lies ahead of the table: its first cubic ends there.
+        place = max((progress - k.table_start) / k.table_step, 1.0)
         i = min(max(int(place), 1), columns - 3)
         t = place - i
         # Lagrange's cubic through four columns, and its slope.
@@ -96,7 +114,6 @@ def contact_forces(  # noqa: PLR0915  one pass over the pairs: no part of it sta
         along_cycles += total * shape_slope + weight * 0.5 * force * force * compliance_slope
         if weight_slope != 0.0:
             along_cycles -= weight_slope * energy_of_pair(depth, compliance, force, k.load_dependent)
-        n_carrying += 1
         if k.friction and total > 0.0:
             rho_1 = k.start_radius + progress * k.base_pitch
             rho_2 = k.action_length - rho_1
@@ -115,7 +132,7 @@ def contact_forces(  # noqa: PLR0915  one pass over the pairs: no part of it sta
             friction += rubbing
             moment_1 += rubbing * rho_1
             moment_2 += rubbing * rho_2
-    return normal, along_cycles, friction, moment_1, moment_2, n_carrying
+    return normal, along_cycles, friction, moment_1, moment_2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -127,14 +144,14 @@ def energy_of_pair(depth, compliance, force, load_dependent):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def stored_energy(k, curves, rows, pitch, delta, cycles, rough):
+def stored_energy(k, curves, rows, pitch, delta, late, cycles, rough):
     """ΣU of the driving flanks, in J; for checks."""
     total = 0.0
-    newest = int(np.floor(cycles + 0.5 * k.ramp))
+    newest = int(np.floor(cycles + 0.5 * k.ramp + MOST_LATE))
     for slot in range(k.n_slots):
         pair = newest - slot
         progress = cycles - pair
-        weight, _ = engagement(progress, k.contact_ratio, k.ramp)
+        weight = engagement(progress, late, k.contact_ratio, k.ramp)[0]
         one, two = pair % k.teeth[0], pair % k.teeth[1]
         compliance = cubic(curves[rows[0, one]], k.table_start, k.table_step, progress)
         compliance += cubic(curves[rows[1, two]], k.table_start, k.table_step, progress)

@@ -7,17 +7,17 @@ from math import cos, sin
 
 from numba import njit
 
-from sims.cracked.contact_kernel import back_flank_force, stored_energy
+from sims.cracked.contact_kernel import back_flank_force, late_entry, stored_energy
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def potential_energy(k, curves, rows, pitch, q, rough):
-    """Springs, tooth pairs and weight, in J."""
+def potential_energy(k, curves, rows, pitch, q, late, rough):
+    """Springs, tooth pairs and weight, in J; `late` as for `contact_forces`."""
     cx1, cy1 = k.runout[0] * cos(q[1] + k.runout_angle[0]), k.runout[0] * sin(q[1] + k.runout_angle[0])
     cx2, cy2 = k.runout[1] * cos(q[2] + k.runout_angle[1]), -k.runout[1] * sin(q[2] + k.runout_angle[1])
     error = k.base_radius[0] * q[1] - k.base_radius[1] * q[2]
     dx, dy = q[4] + cx1 - q[6] - cx2, q[5] + cy1 - q[7] - cy2
-    total = stored_energy(k, curves, rows, pitch, error + dy, k.cycles_per_rad * q[1], rough)
+    total = stored_energy(k, curves, rows, pitch, error + dy, late, k.cycles_per_rad * q[1], rough)
     total += back_flank_force(k, -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough, 0.0)[1]
     for side in range(2):
         g, b1, b2 = 4 + 2 * side, 8 + 4 * side, 10 + 4 * side
@@ -35,6 +35,14 @@ def potential_energy(k, curves, rows, pitch, q, rough):
                 place = q[b + axis]
                 total += 0.5 * k.bearing_stiffness[row] * place * place - k.bearing_mass[row] * pull * place
     return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def place_of_entry(k, q):
+    """Late entry of pairs, in base pitches, at the places q."""
+    dx = q[4] + k.runout[0] * cos(q[1] + k.runout_angle[0]) - q[6] - k.runout[1] * cos(q[2] + k.runout_angle[1])
+    dy = q[5] + k.runout[0] * sin(q[1] + k.runout_angle[0]) - q[7] + k.runout[1] * sin(q[2] + k.runout_angle[1])
+    return late_entry(k, dx, dy)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

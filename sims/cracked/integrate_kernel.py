@@ -8,7 +8,7 @@ from math import cos, sin
 import numpy as np
 from numba import njit
 
-from sims.cracked.energy_kernel import kinetic_energy, potential_energy
+from sims.cracked.energy_kernel import kinetic_energy, place_of_entry, potential_energy
 from sims.cracked.right_hand_side import accelerations
 from sims.mesh.roughness_kernel import advance, height_now
 
@@ -60,7 +60,9 @@ def integrate(
             for i in range(select.shape[0]):
                 found[n_rows, i] = signals[select[i]]
             if energies.shape[0] > 0:
-                energies[n_rows] = potential_energy(k, curves, rows, pitch, q, h0) + kinetic_energy(k, v, q)
+                energies[n_rows] = potential_energy(
+                    k, curves, rows, pitch, q, place_of_entry(k, q), h0
+                ) + kinetic_energy(k, v, q)
             if not np.isfinite(a[1] + a[5] + a[7] + a[2]):
                 return n_rows
             n_rows += 1

@@ -17,7 +17,7 @@ from math import cos, sin
 from numba import njit
 
 from sims.cracked.bearing_kernel import carried_part, foot
-from sims.cracked.contact_kernel import back_flank_force, contact_forces
+from sims.cracked.contact_kernel import back_flank_force, contact_forces, late_entry
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -38,16 +38,18 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
         cx1, cy1 = k.runout[0] * cos(q[1] + k.runout_angle[0]), k.runout[0] * sin(q[1] + k.runout_angle[0])
         cx2, cy2 = k.runout[1] * cos(q[2] + k.runout_angle[1]), -k.runout[1] * sin(q[2] + k.runout_angle[1])
     error = rb1 * q[1] - rb2 * q[2]
-    delta = error + q[5] + cy1 - q[7] - cy2
     arm1, arm2 = rb1 + cx1, rb2 - cx2  # ∂δ/∂θ1 and −∂δ/∂θ2
     delta_rate = arm1 * v[1] - arm2 * v[2] + v[5] - v[7]
-    normal, along, friction, moment_1, moment_2, _ = contact_forces(
+    dx, dy = q[4] + cx1 - q[6] - cx2, q[5] + cy1 - q[7] - cy2
+    delta, late = error + dy, late_entry(k, dx, dy)
+    normal, along, friction, moment_1, moment_2 = contact_forces(
         k,
         curves,
         rows,
         pitch,
         delta,
         delta_rate,
+        late,
         k.cycles_per_rad * q[1],
         k.cycles_per_rad * v[1],
         v[1],
@@ -58,7 +60,6 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
     )
     back = 0.0
     if delta < 0.0:
-        dx, dy = q[4] + cx1 - q[6] - cx2, q[5] + cy1 - q[7] - cy2
         depth = -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough
         if depth > 0.0:
             # Velocities of the pitch circles' centres: θ̇ times their places turned by a quarter.

@@ -137,7 +137,7 @@ def test_eccentricity_is_transmission_error_at_its_shaft_s_order(gear: str, orde
     assert ill.line(ERROR, order) == pytest.approx(20e-6, rel=0.01)
     first = ill.lines(ACCELERATION, [Z - order, Z + order])
     assert first.min() > 300 * FLOOR
-    assert ill.lines(ACCELERATION, [Z - 2 * order, Z + 2 * order]).max() < 0.02 * first.min()
+    assert ill.lines(ACCELERATION, [Z - 2 * order, Z + 2 * order]).max() < 0.05 * first.min()
     other = OUTPUT_ORDER if gear == "driver" else 1.0
     assert ill.lines(ACCELERATION, [other, Z - other, Z + other]).max() < 10 * FLOOR
 
