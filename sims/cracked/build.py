@@ -50,7 +50,7 @@ def build_machine(values: Values, *, sampling_rate_hz: float = 20480.0) -> Machi
         wheels=(_wheel(wanted, mesh, 0), _wheel(wanted, mesh, 1)),
         shafts=(_shaft(wanted, 0), _shaft(wanted, 1)),
         bearings=(_bearing(wanted, 1), _bearing(wanted, 2), _bearing(wanted, 3), _bearing(wanted, 4)),
-        chain=build_chain(wanted, line_deg, sampling_rate_hz),
+        chain=build_chain(wanted, line_deg, _first_pulse_rev(mesh.pair), sampling_rate_hz),
         mesh_damping_ratio=wanted.number("mesh_damping_ratio"),
         half_backlash_um=wanted.number("half_backlash_um"),
         lubrication=Lubrication(
@@ -120,6 +120,14 @@ def build_rig(machine: Machine, operation: Operation, *, name: str = "", sources
         speed=_speed_source(machine.chain, first),
         sources=tuple(sources),
     )
+
+
+def _first_pulse_rev(pair: PairGeometry) -> float:
+    """Angle at which the tachometer's disc is fitted: half a tooth pitch later, tooth 0 is half through its contact.
+
+    So tooth 0 is engaged during the first pitch after the edge, tooth 1 during the next: as diagnoses count teeth.
+    """
+    return (pair.contact_ratio / 2.0 - 0.5) / pair.driver.teeth
 
 
 def _gear(wanted: Wanted, side: int) -> GearGeometry:

@@ -40,7 +40,9 @@ _HORIZONTAL = 0.85
 """Horizontal modes lie lower by this factor: a housing stands on its feet."""
 
 
-def build_chain(wanted: Wanted, line_of_action_deg: float, sampling_rate_hz: float) -> MeasurementChain:
+def build_chain(
+    wanted: Wanted, line_of_action_deg: float, first_pulse_rev: float, sampling_rate_hz: float
+) -> MeasurementChain:
     """Return the chain that the parameters describe.
 
     Parameters
@@ -48,6 +50,8 @@ def build_chain(wanted: Wanted, line_of_action_deg: float, sampling_rate_hz: flo
     wanted : Wanted
     line_of_action_deg : float
         β: upwards is x sin β + y cos β, to the right x cos β − y sin β.
+    first_pulse_rev : float
+        Angle of the input shaft at a rising edge of the tachometer.
     sampling_rate_hz : float
     """
     beta = radians(line_of_action_deg)
@@ -60,7 +64,9 @@ def build_chain(wanted: Wanted, line_of_action_deg: float, sampling_rate_hz: flo
         _channel(f"a{i}", wanted, bearing, f"bearing {bearing}, {where}, {direction}", up, right)
         for i, (bearing, where, direction) in enumerate(seats, 1)
     ]
-    return MeasurementChain(sampling_rate_hz, tuple(channels), AntiAlias(), _tachometer(wanted), _encoders(wanted))
+    return MeasurementChain(
+        sampling_rate_hz, tuple(channels), AntiAlias(), _tachometer(wanted, first_pulse_rev), _encoders(wanted)
+    )
 
 
 def _channel(
@@ -107,11 +113,12 @@ def _along(bearing: int, direction: tuple[float, float], gain: float) -> dict[st
     return {f"bearing {bearing} x": gain * direction[0], f"bearing {bearing} y": gain * direction[1]}
 
 
-def _tachometer(wanted: Wanted) -> Tachometer | None:
+def _tachometer(wanted: Wanted, first_pulse_rev: float) -> Tachometer | None:
     pulses = wanted.whole("tachometer_pulses")
     if not pulses:
         return None
-    return Tachometer("input", pulses, jitter_s=1e-6 * wanted.number("tachometer_jitter_us"), noise_v=0.01)
+    jitter_s = 1e-6 * wanted.number("tachometer_jitter_us")
+    return Tachometer("input", pulses, jitter_s=jitter_s, first_pulse_rev=first_pulse_rev, noise_v=0.01)
 
 
 def _encoders(wanted: Wanted) -> tuple[Encoder, ...]:

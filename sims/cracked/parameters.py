@@ -124,7 +124,13 @@ _CHAIN = (
     _number("sensor_range_mps2", "m/s^2", "range of accelerometers and converter, either way", 0.1, 1e6, 500.0),
     _number("converter_bits", "", "bits of the converter", 8, 32, 24, whole=True),
     _number(
-        "tachometer_pulses", "", "pulses per revolution of the input shaft; 0: no tachometer", 0, 1024, 1, whole=True
+        "tachometer_pulses",
+        "",
+        "pulses per revolution of the input shaft, the first where tooth 0 comes in; 0: none",
+        0,
+        1024,
+        1,
+        whole=True,
     ),
     _number("tachometer_jitter_us", "us", "standard deviation of the time of a pulse", 0, 1e4, 2.0),
     _number(

@@ -140,6 +140,14 @@ def test_the_list_names_everything_within_100_columns(capsys: pytest.CaptureFixt
         assert " ".join(e.signature.split()) in flowing
 
 
+@pytest.mark.parametrize("command", ["simulate", "sweep"])
+def test_help(capsys: pytest.CaptureFixture[str], command: str) -> None:
+    code, out, _ = run(capsys, command, "--help")
+    assert code == 0
+    assert f"Example: gearsig {command} cracked" in " ".join(out.split())
+    assert command in run(capsys, "--help")[1]
+
+
 def test_the_list_of_a_preset_says_what_is_assumed(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = run(capsys, "simulate", "cracked", "--preset", "published_55_75", "--list")
     assert code == 0
