@@ -131,7 +131,7 @@ def test_the_same_as_an_adaptive_integrator() -> None:
 
     def slope(t: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
         derivative(*ready.constants.arguments, t, state, ready.speed, ready.torque, ready.q[0], rough, rate)
-        return rate
+        return rate.copy()  # SciPy keeps a reference
 
     exact = solve_ivp(
         slope, (0.0, 5e-3), np.concatenate((ready.q, ready.v)), "DOP853", rtol=1e-10, atol=1e-13, max_step=1e-5
