@@ -91,7 +91,7 @@ def _worth(given: str, unit: str, text: str, name: str) -> float:
     fitting = [kind for kind in _KINDS if wanted in kind]
     for kind in fitting:
         if own in kind:
-            return kind[own] / kind[wanted]
+            return float(f"{kind[own] / kind[wanted]:.15g}")  # 1000 mm in a m, not 1000.0000000000001
     if not unit:
         raise InputError(f"{name} is {text!r}", allowed="a number without unit")
     others = [u for kind in fitting for u in kind if u != wanted]

@@ -196,7 +196,7 @@ BAD = [
     (("cracked", "-o", "a.h5", "--torque", "110m"), "give it in N m"),
     (("cracked", "-o", "a.h5", "--duration", "0s"), "duration_s"),
     (("cracked", "-o", "a.h5", "--duration", "1h"), "give it in s"),
-    (("cracked", "-o", "a.h5", "--duration", "1e6"), "600 s"),
+    (("cracked", "-o", "a.h5", "--duration", "1e6"), "120 s"),
     (("cracked", "-o", "a.h5", "--fs", "0"), "sampling_rate_hz"),
     (("cracked", "-o", "a.h5", "--fs", "20rpm"), "give it in Hz"),
 ]
