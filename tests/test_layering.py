@@ -9,7 +9,21 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 FILES = [p for room in ("gearsig", "sims", "app") for p in sorted((ROOT / room).rglob("*.py"))]
 
-CHAIN = ("rig", "recording", "angle", "spectra", "orders", "indicators", "diagnosis", "gap", "plot", "report")
+CHAIN = (
+    "rig",
+    "recording",
+    "angle",
+    "spectra",
+    "orders",
+    "timefreq",
+    "decompose",
+    "phase",
+    "indicators",
+    "diagnosis",
+    "gap",
+    "plot",
+    "report",
+)
 """Rooms of gearsig; each may import from rooms to its left. Plot draws what the rooms before it compute."""
 
 

@@ -1,0 +1,1 @@
+"""Signals taken apart: variational modes, wavelet denoising."""

@@ -1,0 +1,1 @@
+"""Motion in its phase space: portraits, Poincaré sections, embedding, Lyapunov exponents."""

@@ -1,0 +1,1 @@
+"""Spectra over time: STFT, wavelets, synchrosqueezing, over time or shaft angle."""
