@@ -21,6 +21,8 @@ from numba import njit
 from sims.mesh.friction_kernel import contact_friction_n
 from sims.mesh.load_sharing_kernel import cubic, pair_force
 
+MOST_CYCLES = 1e12
+"""Mesh cycles beyond which a run has burst; until then, single cycles are resolved to 1e-4."""
 MOST_LATE = 0.05
 """Base pitches by which an entry may be late or early; the places of gears that move further count as that far."""
 
@@ -63,6 +65,8 @@ def contact_forces(
     `slip_x`: ẋ1 − ẋ2. `rough`, `rough_rate`: Δb and its rate.
     """
     normal, along_cycles, friction, moment_1, moment_2 = 0.0, 0.0, 0.0, 0.0, 0.0
+    if not abs(cycles) < MOST_CYCLES:  # a solution that bursts, or NaN, must not be taken for a tooth's number
+        return np.nan, np.nan, np.nan, np.nan, np.nan
     newest = np.floor(cycles + 0.5 * k.ramp + MOST_LATE)
     z1, z2 = float(k.teeth[0]), float(k.teeth[1])
     columns = curves.shape[1]

@@ -70,8 +70,9 @@ def simulate_machine(
     rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
     chain = replace(machine.chain, sampling_rate_hz=rate)
     longest = default_step_s(machine, operation) if step_s is None else positive(step_s, "step_s", "s")
-    per_sample = max(ceil(1.0 / (rate * longest) - 1e-9), 1)
-    stride = motion_stride(chain, per_sample)
+    wanted_hz = motion_rate_hz(chain)
+    per_sample = ceil(max(1.0 / longest, wanted_hz) / rate - 1e-9)
+    stride = max(floor(rate * per_sample / wanted_hz + 1e-9), 1)
     lead = lead_in_s(machine, chain)
     machine_rng, chain_rng = rng.spawn(2)
     positions = used_positions(chain)
@@ -118,12 +119,11 @@ def lead_in_s(machine: Machine, chain: MeasurementChain) -> float:
     )
 
 
-def motion_stride(chain: MeasurementChain, per_sample: int) -> int:
-    """Every how many steps the chain needs a point."""
+def motion_rate_hz(chain: MeasurementChain) -> float:
+    """Points per second that the chain needs of the motion at least."""
     modes = [mode.frequency_hz for channel in chain.channels for mode in channel.path.modes]
     sensors = [channel.accelerometer.resonance_hz or 0.0 for channel in chain.channels]
-    wanted = max(POINTS_PER_CYCLE * max([*modes, *sensors, 0.0]), LEAST_MOTION_HZ, 4.0 * chain.sampling_rate_hz)
-    return max(floor(chain.sampling_rate_hz * per_sample / wanted), 1)
+    return max(POINTS_PER_CYCLE * max([*modes, *sensors, 0.0]), LEAST_MOTION_HZ, 4.0 * chain.sampling_rate_hz)
 
 
 def used_positions(chain: MeasurementChain) -> tuple[str, ...]:

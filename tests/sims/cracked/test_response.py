@@ -355,3 +355,16 @@ def test_unknown_signal_is_named() -> None:
 def test_endless_runs_are_refused() -> None:
     with pytest.raises(InputError, match="simulate a shorter time"):
         respond(spur_pair_machine(), STEADY, duration_s=1e6, rng=np.random.default_rng(1))
+
+
+@pytest.mark.parametrize("torque_nm", [1e5, 1e12])
+def test_a_solution_that_bursts_is_refused(torque_nm: float) -> None:
+    """Not a number must not be taken for a tooth's number: that once read beyond the tables."""
+    with pytest.raises(RefusalError, match="beyond all bounds"):
+        respond(
+            spur_pair_machine(),
+            Operation.steady(500.0, torque_nm),
+            duration_s=0.2,
+            rng=np.random.default_rng(1),
+            step_s=2e-5,
+        )
