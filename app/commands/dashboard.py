@@ -32,8 +32,12 @@ def dashboard(
     browser: Annotated[bool, typer.Option(help="Open a browser window.")] = True,
 ) -> None:
     """Open the dashboard in a browser. It listens on localhost only and sends nothing anywhere."""
+    from streamlit.runtime.pages_manager import PagesManager
     from streamlit.web import cli as streamlit_cli
 
+    # main.py lists the pages. Streamlit would take a folder called "pages" for a list of its own until main.py has run
+    # once, and show that instead to who opens a page by its address first.
+    PagesManager.uses_pages_directory = False
     own = (f"server.port={port}", f"server.headless={str(not browser).lower()}")
     sys.argv = ["streamlit", "run", str(MAIN_PAGE), *(f"--{option}" for option in (*OPTIONS, *own))]
     sys.exit(streamlit_cli.main())

@@ -11,5 +11,9 @@ PAGES = Path(__file__).parent / "pages"
 st.set_page_config(page_title="gearsig", page_icon=str(PAGES.parent / "icon.svg"), layout="wide")
 st.html(PAGES.parent / "page.css")
 st.navigation(
-    [st.Page(PAGES / "analysis.py", title="Analysis", icon=":material/troubleshoot:", default=True)], position="top"
+    [
+        st.Page(PAGES / "analysis.py", title="Analysis", icon=":material/troubleshoot:", default=True),
+        st.Page(PAGES / "laboratory.py", title="Fault laboratory", icon=":material/experiment:"),
+    ],
+    position="top",
 ).run()

@@ -11,7 +11,10 @@ from gearsig.diagnosis.types import Analysis
 
 ORIGIN, SAMPLE, RECORDING_FILE, RIG_FILE = "origin", "sample", "recording file", "rig file"
 TAB, CHANNEL = "tab", "channel"
-_CHOSEN = "chosen"
+ANALYSIS_PAGE = Path(__file__).parent / "pages" / "analysis.py"
+OF_LABORATORY = "Laboratory"
+"""Origin of a recording that the laboratory made."""
+_CHOSEN, _SIMULATED, _UPLOAD = "chosen", "simulated", "upload"
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,17 @@ class Chosen:
     content: Path | memoryview
 
 
+@dataclass(frozen=True)
+class Upload:
+    """Files that the user gave: bytes of the recording, text of the rig file."""
+
+    name: str
+    sha256: str
+    content: memoryview
+    rig_name: str = "rig.toml"
+    rig_text: str = ""
+
+
 def remember(chosen: Chosen | None) -> None:
     """Keep the choice for other pages of this session."""
     st.session_state[_CHOSEN] = chosen
@@ -54,6 +68,29 @@ def remember(chosen: Chosen | None) -> None:
 def chosen() -> Chosen | None:
     """Return what was chosen last in this session, on whatever page."""
     found: Chosen | None = st.session_state.get(_CHOSEN)
+    return found
+
+
+def open_simulated(made: Chosen) -> None:
+    """Let the analysis page open a recording of the laboratory."""
+    st.session_state[_SIMULATED] = made
+    st.session_state[ORIGIN] = OF_LABORATORY
+
+
+def simulated() -> Chosen | None:
+    """Return the recording that the laboratory made last in this session."""
+    found: Chosen | None = st.session_state.get(_SIMULATED)
+    return found
+
+
+def keep_upload(upload: Upload | None) -> None:
+    """Keep an upload while another page is shown: Streamlit forgets what its uploader held."""
+    st.session_state[_UPLOAD] = upload
+
+
+def kept_upload() -> Upload | None:
+    """Return the upload that was open when this session last saw the analysis page."""
+    found: Upload | None = st.session_state.get(_UPLOAD)
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ import streamlit as st
 from app.dashboard import state
 from app.dashboard.as_typed import as_typed
 from app.dashboard.cached import sha256_of_upload
-from app.dashboard.state import Chosen, Request
+from app.dashboard.state import Chosen, Request, Upload
 from app.samples import Sample, samples
 from gearsig.errors import InputError
 
@@ -31,8 +32,18 @@ def choose_recording() -> Chosen | None:
         If the rig file is no text.
     """
     with st.sidebar:
-        origin = st.radio("Recording", ORIGINS, horizontal=True, key=state.ORIGIN)
+        made = state.simulated()
+        origins = ORIGINS if made is None else (*ORIGINS, state.OF_LABORATORY)
+        origin = st.radio("Recording", origins, horizontal=True, key=state.ORIGIN, persist_state="session")
+        if origin == state.OF_LABORATORY and made is not None:
+            return _choose_simulated(made)
         return _choose_sample() if origin == ORIGINS[0] else _choose_file()
+
+
+def _choose_simulated(made: Chosen) -> Chosen:
+    st.caption(f"{as_typed(made.request.name)}, from the fault laboratory.")
+    request = made.request
+    return Chosen(_request(request.name, request.sha256, request.rig_name, request.rig_text), made.content)
 
 
 def _choose_sample() -> Chosen:
@@ -40,7 +51,9 @@ def _choose_sample() -> Chosen:
 
     found = samples()
     first = next((i for i, s in enumerate(found) if s.rig.stem == "damaged_tooth"), 0)
-    sample: Sample = st.selectbox("Sample", found, index=first, format_func=_sample_name, key=state.SAMPLE)
+    sample: Sample = st.selectbox(
+        "Sample", found, index=first, format_func=_sample_name, key=state.SAMPLE, persist_state="session"
+    )
     st.caption("Simulated, with a known answer: made by a signal model, not measured.")
     name, digest = sample.recording.name, sha256_of(sample.recording)
     return Chosen(_request(name, digest, sample.rig.name, sample.rig.read_text("utf-8")), sample.recording)
@@ -55,7 +68,9 @@ def _choose_file() -> Chosen | None:
 
     endings = [*FORMAT_OF_EXTENSION, ".gz"]
     kinds = "CSV (also .gz), MAT, WAV, HDF5, Parquet, TDMS or UFF58. It stays on this machine."
-    file = st.file_uploader("Recording file", type=endings, key=state.RECORDING_FILE, help=kinds)
+    file = st.file_uploader(
+        "Recording file", type=endings, key=state.RECORDING_FILE, help=kinds, on_change=state.keep_upload, args=(None,)
+    )
     rig_file = st.file_uploader(
         "Rig file (TOML), if you have one",
         type=["toml"],
@@ -64,12 +79,26 @@ def _choose_file() -> Chosen | None:
         help="What is known of the machine: shafts, teeth, bearings, sensors, speed source. Teeth add mesh orders and "
         "sidebands, bearings their orders.",
     )
-    if file is None:
+    upload = _from_before()
+    if file is not None:
+        content = file.getbuffer()
+        upload = Upload(file.name, sha256_of_upload(file.file_id, content), content)
+    if upload is None:
         return None
-    content = file.getbuffer()
-    digest = sha256_of_upload(file.file_id, content)
-    rig_name, rig_text = (rig_file.name, _text_of(rig_file)) if rig_file is not None else ("rig.toml", "")
-    return Chosen(_request(file.name, digest, rig_name, rig_text), content)
+    if rig_file is not None:
+        upload = replace(upload, rig_name=rig_file.name, rig_text=_text_of(rig_file))
+    state.keep_upload(upload)
+    return Chosen(_request(upload.name, upload.sha256, upload.rig_name, upload.rig_text), upload.content)
+
+
+def _from_before() -> Upload | None:
+    """Return the upload that was open before the user looked at another page; it can be closed."""
+    kept = state.kept_upload()
+    if kept is None or st.session_state.get(state.RECORDING_FILE) is not None:
+        return None
+    st.caption(f"Still open: {as_typed(kept.name)}")
+    st.button("Close it", on_click=state.keep_upload, args=(None,), key="close the upload")
+    return kept
 
 
 def _text_of(file: UploadedFile) -> str:
@@ -90,6 +119,7 @@ def _request(name: str, digest: str, rig_name: str, rig_text: str) -> Request:
             value=None,
             placeholder="from the file or the rig",
             key=state.source_key("rate", source),
+            persist_state="session",
             help="Overrides what the file states.",
         )
         speed = st.number_input(
@@ -97,6 +127,7 @@ def _request(name: str, digest: str, rig_name: str, rig_text: str) -> Request:
             value=None,
             placeholder="from the file or the rig",
             key=state.source_key("speed", source),
+            persist_state="session",
             help="Of the reference shaft, if it held still and is known well. It is refined where the signal shows it.",
         )
     return Request(name, digest, rig_name, rig_text, rate, speed)
@@ -109,6 +140,7 @@ def _edit_rig(name: str, text: str, source: str) -> str:
         f"Edit {as_typed(name)} for this session",
         key=key,
         height=320,
+        persist_state="session",
         help="TOML. Every table is optional. Ctrl+Enter takes it over.",
     )
     if not (edited or "").strip():

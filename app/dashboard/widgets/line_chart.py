@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import streamlit as st
@@ -27,12 +27,13 @@ CONFIG = {"displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"
 
 @dataclass(frozen=True)
 class Line:
-    """A line to draw, already thinned, and a pale band (low, high) behind it."""
+    """A line to draw, already thinned, a pale band (low, high) behind it, and its colour by meaning."""
 
     x: FloatArray
     y: FloatArray
     name: str
     band: tuple[FloatArray, FloatArray] | None = None
+    colour: Literal["measured", "fault"] = "measured"
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def line_figure(
 
 
 def _add_line(figure: Figure, line: Line, colours: Palette) -> None:
-    name = as_plot_text(line.name)
+    name, colour = as_plot_text(line.name), colours.fault if line.colour == "fault" else colours.measured
     for edge, fill in zip(line.band or (), (None, "tonexty"), strict=False):
         figure.add_scatter(
             x=line.x,
@@ -109,7 +110,7 @@ def _add_line(figure: Figure, line: Line, colours: Palette) -> None:
             mode="lines",
             line={"width": 0},
             fill=fill,
-            fillcolor=_pale(colours.measured),
+            fillcolor=_pale(colour),
             hoverinfo="skip",
         )
     figure.add_scatter(
@@ -118,7 +119,7 @@ def _add_line(figure: Figure, line: Line, colours: Palette) -> None:
         yaxis="y2",
         mode="lines",
         name=name,
-        line={"width": 1.1, "color": colours.measured},
+        line={"width": 1.1, "color": colour},
         hovertemplate="%{x:.6g}: %{y:.4g}<extra></extra>",
     )
 

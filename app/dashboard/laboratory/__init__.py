@@ -1,0 +1,1 @@
+"""The fault laboratory: a simulated machine, healthy beside faulty, that follows its sliders."""

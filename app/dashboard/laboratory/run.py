@@ -1,0 +1,158 @@
+"""One simulation of the page: the recording, and the motion behind it that no sensor shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import ceil
+
+import numpy as np
+
+from app.dashboard.laboratory.setup import Setup
+from gearsig.checks import FloatArray
+from gearsig.recording.types import Recording
+from gearsig.rig.types import Rig
+from sims.cracked.build import build_rig
+from sims.cracked.linear import default_step_s
+from sims.cracked.respond import Response, respond
+from sims.cracked.simulate import lead_in_s, model_notes, motion_stride, used_positions
+from sims.machine import Machine
+from sims.machine.operation import Operation
+from sims.measure import Motion
+
+MOTION = (
+    "driver angle",
+    "driven angle",
+    "driver y",
+    "driver y velocity",
+    "driven y",
+    "driven y velocity",
+    "transmission_error_m",
+    "mesh_force_n",
+)
+MOTION_HZ = 40_000.0
+"""Points of the motion per second that are kept, at least."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A setup and what it gives.
+
+    Parameters
+    ----------
+    setup : Setup
+    machine : Machine
+        With its effects.
+    recording : Recording
+        With rig and truth.
+    response : Response
+        Motion from the recording's start on; see `MOTION` for its signals.
+    """
+
+    setup: Setup
+    machine: Machine
+    recording: Recording
+    response: Response
+
+    @property
+    def rig(self) -> Rig:
+        """Rig of the recording; a simulated one always has it."""
+        assert self.recording.rig is not None  # noqa: S101 - said to the type checker
+        return self.recording.rig
+
+    @property
+    def vibration_channels(self) -> tuple[str, ...]:
+        """Names of the acceleration channels."""
+        return tuple(c.name for c in self.recording.channels if c.quantity == "acceleration")
+
+    @cached_property
+    def mesh_cycles(self) -> FloatArray:
+        """Mesh cycles at each point of the motion: tooth k of the driver enters at k, and once per revolution again."""
+        cycles: FloatArray = self.response["driver angle"] * self.machine.mesh.pair.driver.teeth / (2.0 * np.pi)
+        return cycles
+
+
+def run_setup(setup: Setup) -> Run:
+    """Simulate once, and take both from it: the recording, sample by sample that of `sims.simulate`, and the motion.
+
+    Raises
+    ------
+    InputError
+        If a value is out of its range, or the machine allows less.
+    """
+    from sims.cracked.simulator import CrackedPair
+
+    operation = Operation.steady(setup.speed_rpm, setup.torque_nm)
+    rng = np.random.default_rng(setup.seed)
+    ready = CrackedPair().prepare(
+        dict(setup.parameters),
+        setup.effects,
+        operation,
+        rng,
+        preset_name=setup.preset,
+        sampling_rate_hz=setup.sampling_rate_hz,
+    )
+    machine = ready.machine
+    lead, places = lead_in_s(machine, machine.chain), used_positions(machine.chain)
+    machine_rng, chain_rng = rng.spawn(2)
+    response = _respond(setup, machine, operation, machine_rng, lead, places)
+    recording = machine.chain.record(
+        _motion(machine, response, places),
+        rng=chain_rng,
+        rig=build_rig(machine, operation, name=f"simulated: {setup.preset}"),
+        duration_s=setup.duration_s,
+        lead_in_s=lead,
+        truth=ready.truth(),
+    )
+    notes = (*recording.warnings, *model_notes(machine, operation))
+    return Run(setup, machine, replace(recording, warnings=notes), _shown_part(response, setup.duration_s))
+
+
+def _respond(
+    setup: Setup,
+    machine: Machine,
+    operation: Operation,
+    rng: np.random.Generator,
+    lead_s: float,
+    places: Sequence[str],
+) -> Response:
+    rate = setup.sampling_rate_hz
+    per_sample = max(ceil(1.0 / (rate * default_step_s(machine, operation)) - 1e-9), 1)
+    return respond(
+        machine,
+        operation,
+        duration_s=machine.chain.simulated_s(setup.duration_s, lead_s) + 4.0 / rate,
+        rng=rng,
+        signals=(*MOTION, *(f"{place} acceleration" for place in places)),
+        start_s=-lead_s,
+        step_s=1.0 / (rate * per_sample),
+        stride=motion_stride(machine.chain, per_sample),
+    )
+
+
+def _motion(machine: Machine, response: Response, places: tuple[str, ...]) -> Motion:
+    angles = (response["driver angle"], response["driven angle"])
+    accelerations = np.column_stack([response[f"{place} acceleration"] for place in places])
+    return Motion(response.interval_s, places, accelerations, dict(zip(machine.shaft_names, angles, strict=True)))
+
+
+def _shown_part(response: Response, duration_s: float) -> Response:
+    """Keep the signals that are shown, as many points as that takes, from the recording's start to its end."""
+    every = max(int(1.0 / (MOTION_HZ * response.interval_s)), 1)
+    time = response.time_s
+    first, last = (int(i) for i in np.searchsorted(time, (0.0, duration_s)))
+    signals = {name: response[name][first:last:every].copy() for name in MOTION}
+    return Response(float(time[first]), response.interval_s * every, signals, response.step_s, response.energy_j)
+
+
+def lines_per_period(run: Run, n_per_revolution: float) -> FloatArray:
+    """Times at which the driver has turned by another 1/n of a revolution (a Poincaré section's strobe)."""
+    turned = run.response["driver angle"] * n_per_revolution / (2.0 * np.pi)
+    return times_of(run, turned, np.arange(np.ceil(turned[0]), np.floor(turned[-1]) + 1.0))
+
+
+def times_of(run: Run, phase: FloatArray, wanted: FloatArray | Sequence[float]) -> FloatArray:
+    """Times at which a rising phase takes the wanted values."""
+    result: FloatArray = np.interp(wanted, phase, run.response.time_s)
+    return result

@@ -1,0 +1,95 @@
+"""The simulated machine as a recording: files to keep, or straight to the analysis page."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import replace
+from hashlib import sha256
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import streamlit as st
+
+from app.dashboard import state
+from app.dashboard.laboratory.setup import MODEL, Setup
+from app.dashboard.state import Chosen, Request
+from gearsig.recording.types import Recording
+
+ENDINGS = (".h5", ".csv", ".parquet", ".mat", ".wav")
+LENGTHS_S = (2.0, 5.0, 10.0, 20.0)
+ANALYSIS_ENDING = ".h5"
+
+
+def show_saving(setup: Setup) -> None:
+    """Offer the files, and the way to the analysis page."""
+    with st.container(horizontal=True, horizontal_alignment="right"):
+        with st.popover("Save as recording", icon=":material/save:"):
+            length = st.segmented_control(
+                "Length (s)", LENGTHS_S, default=5.0, key="length of the saved recording", persist_state="session"
+            )
+            ending = st.selectbox("Format", ENDINGS, key="ending of the saved recording", persist_state="session")
+            twin = st.toggle("With its healthy twin", key="twin of the saved recording", persist_state="session")
+            kept = replace(setup, duration_s=float(length or 5.0))
+            st.download_button(
+                "Download",
+                data=lambda: zipped((kept, kept.healthy) if twin else (kept,), ending),
+                file_name=f"{setup.file_stem}.zip",
+                mime="application/zip",
+                icon=":material/download:",
+                on_click="ignore",
+                type="primary",
+            )
+            st.caption("A zip with the recording, its rig file, and what was put in (truth).")
+        if st.button("Open in the analysis page", icon=":material/troubleshoot:"):
+            with st.spinner("Simulating the recording …"):
+                state.open_simulated(chosen_of(replace(setup, duration_s=float(length or 5.0))))
+            st.switch_page(state.ANALYSIS_PAGE)
+
+
+def record(setup: Setup) -> Recording:
+    """Simulate the recording that the command line makes of the same settings."""
+    from sims import simulate
+
+    return simulate(
+        MODEL,
+        preset=setup.preset,
+        parameters=dict(setup.parameters),
+        effects=setup.effects,
+        speed_rpm=setup.speed_rpm,
+        torque_nm=setup.torque_nm,
+        duration_s=setup.duration_s,
+        sampling_rate_hz=setup.sampling_rate_hz,
+        seed=setup.seed,
+    )
+
+
+def zipped(setups: tuple[Setup, ...], ending: str) -> bytes:
+    """Return a zip file with recording, rig file and truth of each setup."""
+    buffer = BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for setup in _distinct(setups):
+            for name, content in files(setup, ending).items():
+                archive.writestr(name, content)
+    return buffer.getvalue()
+
+
+def files(setup: Setup, ending: str) -> dict[str, bytes]:
+    """Return recording, rig file and truth, in this order, by file name."""
+    from sims.files import file_set, write_set
+
+    with TemporaryDirectory(prefix="gearsig-") as folder:
+        names = file_set(Path(folder) / f"{setup.file_stem}{ending}")
+        write_set(record(setup), names)
+        return {path.name: path.read_bytes() for path in names}
+
+
+def chosen_of(setup: Setup) -> Chosen:
+    """Return the recording as the analysis page takes an upload."""
+    (name, content), (rig_name, rig), _ = files(setup, ANALYSIS_ENDING).items()
+    request = Request(name, sha256(content).hexdigest(), rig_name, rig.decode("utf-8"))
+    return Chosen(request, memoryview(content))
+
+
+def _distinct(setups: tuple[Setup, ...]) -> tuple[Setup, ...]:
+    return tuple(setup for place, setup in enumerate(setups) if setup not in setups[:place])
