@@ -56,7 +56,7 @@ def late_entry(k, dx, dy):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def contact_forces(
+def contact_forces(  # noqa: PLR0915  one pass over the pairs: no part of it stands alone
     k, curves, rows, pitch, delta, delta_rate, late, cycles, cycle_rate, omega_1, omega_2, slip_x, rough, rough_rate
 ):
     """(ΣN, torque −∂U/∂c, Σf, Σfρ1, Σfρ2) of the driving flanks.
