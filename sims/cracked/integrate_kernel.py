@@ -15,21 +15,21 @@ from sims.mesh.roughness_kernel import advance, height_now
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def integrate(
-    k, curves, rows, pitch, q, v, start, step, n_steps, stride, speed, torque, rough, select, found, energies
+    k, curves, rows, pitch, q, v, set_angle, start, step, n_steps, stride, speed, torque, rough, select, found, energies
 ):
     """Run `n_steps` steps from time `start`; fill `found` with the selected signals at every `stride`-th step.
 
     k, curves, rows, pitch : see `sims.cracked.constants`.
-    q, v : (16,); left at the last step's state.
+    q, v, set_angle : (16,), (16,), (1,); left at the last step's state, for the next call to go on from.
     speed, torque : (2, n) times and values of the set courses, in rad/s and N m.
-    rough : phasors of a roughness locked to time at `start`, stepped by half of `step`; see `TimeLockedRoughness`.
+    rough : phasors of a roughness locked to time at `start`, stepped by half of `step`, left at the end; see
+        `TimeLockedRoughness`.
     select : places of the wanted signals in `sims.cracked.layout.SIGNALS`.
     found : (n_out, n_selected).
     energies : (n_out,) or (0,): total energy in J, not computed where empty.
     Returns the number of rows that were filled: fewer where the state is no longer finite.
     """
     re, im, omega, half_cos, half_sin = rough
-    re, im = re.copy(), im.copy()
     a = np.empty(16)
     extra = np.empty(5)
     q1, v1 = np.empty(16), np.empty(16)
@@ -37,7 +37,7 @@ def integrate(
     signals = np.empty(53)
     n_rows = 0
     h0, r0 = height_now(re, im, omega)
-    angle = q[0]
+    angle = set_angle[0]
     for step_number in range(n_steps):
         t = start + step_number * step
         w0, d0 = _set_speed(k, speed, t)
@@ -88,6 +88,7 @@ def integrate(
             q[i] += sixth * (sum_q[i] + v1[i])
             v[i] += sixth * (sum_v[i] + a[i])
         h0, r0, angle = h1, r1, angle_1
+    set_angle[0] = angle
     return n_rows
 
 

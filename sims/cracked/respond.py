@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, pi
 
@@ -20,6 +20,10 @@ from sims.mesh.roughness import FlankRoughness, FractalSurface, TimeLockedRoughn
 
 MOST_STEPS = 400_000_000
 """Ten minutes of computing or so; more is taken for a mistake."""
+
+
+STEPS_PER_CALL = 200_000
+"""Compiled code cannot be interrupted: it comes back for a look every quarter of a second or so."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +95,7 @@ def respond(
     step_s: float | None = None,
     stride: int = 1,
     with_energy: bool = False,
+    on_progress: Callable[[float], None] | None = None,
 ) -> Response:
     """Integrate the sixteen coordinates from the static balance on.
 
@@ -111,6 +116,8 @@ def respond(
     stride : int
         Every how many steps a point is kept.
     with_energy : bool
+    on_progress : callable or None
+        Called now and then with the part that is done, 0 to 1.
 
     Raises
     ------
@@ -140,26 +147,37 @@ def respond(
     ready = prepare(machine, operation, rng, start_s)
     rows = np.empty((-(-n_steps // every), len(signals)))
     energies = np.empty(len(rows) if with_energy else 0)
-    filled = integrate(
-        *ready.constants.arguments,
-        ready.q,
-        ready.v,
-        start_s,
-        step,
-        n_steps,
-        every,
-        ready.speed,
-        ready.torque,
-        ready.roughness.phasors(step / 2.0),
-        np.array([_place(name) for name in signals], dtype=np.int64),
-        rows,
-        energies,
-    )
-    if filled < len(rows) or not np.isfinite(rows[-1]).all():
-        raise RefusalError(
-            f"the solution grows beyond all bounds after {filled * every * step:.3g} s at a step of {step:.3g} s",
-            remedy="take a shorter step_s, or the default",
+    select = np.array([_place(name) for name in signals], dtype=np.int64)
+    phasors = ready.roughness.phasors(step / 2.0)
+    set_angle = ready.q[:1].copy()
+    per_call = every * max(STEPS_PER_CALL // every, 1)
+    for first in range(0, n_steps, per_call):
+        n = min(per_call, n_steps - first)
+        part = slice(first // every, first // every + -(-n // every))
+        filled = integrate(
+            *ready.constants.arguments,
+            ready.q,
+            ready.v,
+            set_angle,
+            start_s + first * step,
+            step,
+            n,
+            every,
+            ready.speed,
+            ready.torque,
+            phasors,
+            select,
+            rows[part],
+            energies[part] if with_energy else energies,
         )
+        if filled < len(rows[part]) or not np.isfinite(rows[part][-1]).all():
+            raise RefusalError(
+                f"the solution grows beyond all bounds after {(first + filled * every) * step:.3g} s "
+                f"at a step of {step:.3g} s",
+                remedy="take a shorter step_s, or the default",
+            )
+        if on_progress is not None:
+            on_progress((first + n) / n_steps)
     return Response(start_s, step * every, dict(zip(signals, rows.T, strict=True)), step, energies)
 
 

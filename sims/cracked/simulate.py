@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import ceil, floor
 from typing import Any
@@ -41,6 +41,7 @@ def simulate_machine(
     rig: Rig | None = None,
     truth: Mapping[str, Any] | None = None,
     step_s: float | None = None,
+    on_progress: Callable[[float], None] | None = None,
 ) -> Recording:
     """Simulate the sixteen coordinates and measure them.
 
@@ -60,6 +61,8 @@ def simulate_machine(
     step_s : float or None
         Longest step; None: `sims.cracked.linear.default_step_s`. It is shortened to a whole part of the sampling
         interval.
+    on_progress : callable or None
+        Called now and then with the part of the motion that is done, 0 to 1.
 
     Returns
     -------
@@ -85,6 +88,7 @@ def simulate_machine(
         start_s=-lead,
         step_s=1.0 / (rate * per_sample),
         stride=stride,
+        on_progress=on_progress,
     )
     motion = Motion(
         response.interval_s,

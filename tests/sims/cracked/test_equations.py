@@ -124,7 +124,9 @@ def energy_drift(machine: Machine, k: Constants, step_s: float, duration_s: floa
     select = np.array([SIGNALS.index(s) for s in ("input rotor angle", "output rotor angle", "mesh_force_n")])
     found, energies = np.empty((n, 3)), np.empty(n)
     phasors = ready.roughness.phasors(step_s / 2)
-    integrate(*k.arguments, q, v, 0.0, step_s, n, 1, ready.speed, ready.torque, phasors, select, found, energies)
+    integrate(
+        *k.arguments, q, v, q[:1].copy(), 0.0, step_s, n, 1, ready.speed, ready.torque, phasors, select, found, energies
+    )
     assert found[:, 2].min() > 0.0  # the flanks stay in touch
     turned = found[:, :2] - found[0, :2]
     work = 110.0 * (turned[:, 0] - turned[:, 1] * machine.ratio)

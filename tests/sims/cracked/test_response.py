@@ -368,3 +368,31 @@ def test_a_solution_that_bursts_is_refused(torque_nm: float) -> None:
             rng=np.random.default_rng(1),
             step_s=2e-5,
         )
+
+
+def test_a_run_in_parts_is_the_same_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compiled code returns now and then; roughness, set angle and output go on where they were."""
+    from sims.cracked import respond as module
+
+    machine = replace(spur_pair_machine(), roughness=Roughness(0.84, "time"))
+    done: list[float] = []
+    whole, parts = (_short_run(machine, monkeypatch, module, steps, done) for steps in (10**9, 700))
+    assert len(done) > 5
+    assert done[-1] == 1.0
+    np.testing.assert_allclose(parts["driver y"], whole["driver y"], rtol=1e-9)
+    np.testing.assert_array_equal(parts.time_s, whole.time_s)
+
+
+def _short_run(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch, module: object, steps: int, done: list[float]
+) -> Response:
+    monkeypatch.setattr(module, "STEPS_PER_CALL", steps)
+    return respond(
+        machine,
+        STEADY,
+        duration_s=0.05,
+        rng=np.random.default_rng(2),
+        signals=("driver y",),
+        stride=3,
+        on_progress=done.append,
+    )
