@@ -72,12 +72,12 @@ def test_the_example_rig_is_valid(capsys: pytest.CaptureFixture[str], tmp_path: 
 
 def test_report_lists_the_broken_file_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     broken = csv(tmp_path, "a1\n1\nnonsense\n3\n")
-    code, out, err = run(capsys, "report", sample("healthy"), broken, "-o", tmp_path / "pages", "-j", 1)
+    code, out, err = run(capsys, "report", sample("no_tachometer"), broken, "-o", tmp_path / "pages", "-j", 1)
     assert code == 1
-    assert "healthy.h5: No fault shows" in out
+    assert "no_tachometer.csv: No fault shows" in out
     assert "record.csv: not analysed" in err
     index = (tmp_path / "pages" / "index.html").read_text()
-    assert "healthy.html" in index
+    assert "no_tachometer.html" in index
     assert "record.csv" in index
     assert not list((tmp_path / "pages").glob("*record*.html"))
 
