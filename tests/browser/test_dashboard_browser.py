@@ -2,14 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import socket
-import subprocess
-import sys
-import time
-import urllib.error
-import urllib.request
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -18,17 +10,8 @@ from app.samples import samples
 from gearsig.diagnosis.analyze import analyze
 from gearsig.recording.read import read_recording
 from gearsig.rig.toml import read_rig
+from tests.browser.conftest import CHROMIUM, settle
 
-CHROMIUM = next((path for name in ("chromium", "chromium-browser") if (path := shutil.which(name))), None)
-FLAGS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 TABS = ("Speed", "Spectrum", "Order spectrum", "Order map", "Envelope", "Synchronous average", "Indicators", "Report")
 SAMPLE = next(sample for sample in samples() if sample.rig.stem == "no_tachometer")
 HOSTILE = (
@@ -41,66 +24,6 @@ pytestmark = [
     pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine"),
 ]
 playwright = pytest.importorskip("playwright.sync_api")
-
-
-@pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Start `gearsig dashboard` on a free port, in a folder of its own."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    folder = tmp_path_factory.mktemp("home")
-    command = [sys.executable, "-m", "app.cli", "dashboard", "--port", str(port), "--no-browser"]
-    log = (folder / "log.txt").open("w+")
-    server = subprocess.Popen(command, cwd=folder, stdout=log, stderr=log)
-    try:
-        wait_until_up(f"http://localhost:{port}/_stcore/health", server)
-        yield f"http://localhost:{port}/"
-    finally:
-        server.terminate()
-        server.wait(10)
-        log.close()
-
-
-def wait_until_up(health: str, server: subprocess.Popen[bytes]) -> None:
-    for _ in range(200):
-        assert server.poll() is None, "the server stopped"
-        try:
-            with urllib.request.urlopen(health, timeout=1):  # noqa: S310 - http on localhost
-                return
-        except (urllib.error.URLError, OSError):
-            time.sleep(0.1)
-    pytest.fail("the server does not answer")
-
-
-@pytest.fixture
-def page(address: str) -> Iterator[playwright.Page]:
-    """Open the dashboard; afterwards nothing may have gone wrong in the browser, nor left this machine."""
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        view = browser.new_page(viewport={"width": 1280, "height": 1600})
-        view.set_default_timeout(30_000)
-        wrong: list[str] = []
-        view.on("pageerror", lambda error: wrong.append(str(error)))
-        view.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
-        view.on("request", lambda request: None if is_local(request.url) else wrong.append(request.url))
-        view.goto(address)
-        yield view
-        exceptions = view.get_by_test_id("stException").all_inner_texts()
-        browser.close()
-    assert not exceptions
-    assert not wrong
-
-
-def is_local(url: str) -> bool:
-    return url.startswith(("http://localhost:", "ws://localhost:", "data:", "blob:"))
-
-
-def settle(page: playwright.Page) -> None:
-    """Wait until the script has run and the page shows its results."""
-    page.wait_for_timeout(250)
-    idle = "!document.querySelector('[data-testid=stStatusWidget], [data-testid=stSpinner]')"
-    page.wait_for_function(f"{idle} && !document.querySelector('[data-stale=true]')")
 
 
 def open_files(page: playwright.Page, recording: Path | dict[str, object], rig: Path | None = None) -> None:

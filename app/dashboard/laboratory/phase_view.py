@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 MESH_PERIOD = "mesh period"
 GEARS = {"Driver": "driver y", "Driven gear": "driven y"}
 STROBES = {MESH_PERIOD: None, "revolution of the input shaft": 1.0}
-MOST_POINTS = 12_000
+MOST_POINTS, POINTS_PER_MESH_PERIOD = 6_000, 48
+"""A browser without a graphics card draws so many at once."""
 HEIGHT_PX = 430
 Limits = tuple[tuple[float, float], tuple[float, float]]
 Portrait = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
@@ -58,8 +59,9 @@ def portrait(run: Run, signal: str, n_per_revolution: float) -> Portrait:
     y, v = 1e6 * response[signal], 1e3 * response[f"{signal} velocity"]
     index = times_of(run, response.time_s, lines_per_period(run, n_per_revolution))
     points = [np.interp(index, response.time_s, values) for values in (y, v)]
-    n = min(len(y), MOST_POINTS)
-    return y[-n:], v[-n:], points[0], points[1]
+    per_period = len(y) / max(float(np.ptp(run.mesh_cycles)), 1.0)
+    every = max(int(per_period / POINTS_PER_MESH_PERIOD), 1)
+    return y[::every][-MOST_POINTS:], v[::every][-MOST_POINTS:], points[0], points[1]
 
 
 def portrait_figure(found: Portrait, limits: Limits, *, faulty: bool) -> Figure:
@@ -68,7 +70,7 @@ def portrait_figure(found: Portrait, limits: Limits, *, faulty: bool) -> Figure:
 
     colours, figure = palette(), Figure()
     y, v, y_points, v_points = found
-    figure.add_scattergl(
+    figure.add_scatter(
         x=y,
         y=v,
         mode="lines",
@@ -76,7 +78,7 @@ def portrait_figure(found: Portrait, limits: Limits, *, faulty: bool) -> Figure:
         opacity=0.45,
         hoverinfo="skip",
     )
-    figure.add_scattergl(
+    figure.add_scatter(
         x=y_points,
         y=v_points,
         mode="markers",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil
+from math import ceil, floor
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from gearsig.rig.types import Rig
 from sims.cracked.build import build_rig
 from sims.cracked.linear import default_step_s
 from sims.cracked.respond import Response, respond
-from sims.cracked.simulate import lead_in_s, model_notes, motion_stride, used_positions
+from sims.cracked.simulate import lead_in_s, model_notes, motion_rate_hz, used_positions
 from sims.machine import Machine
 from sims.machine.operation import Operation
 from sims.measure import Motion
@@ -117,8 +117,8 @@ def _respond(
     lead_s: float,
     places: Sequence[str],
 ) -> Response:
-    rate = setup.sampling_rate_hz
-    per_sample = max(ceil(1.0 / (rate * default_step_s(machine, operation)) - 1e-9), 1)
+    rate, wanted_hz = setup.sampling_rate_hz, motion_rate_hz(machine.chain)
+    per_sample = ceil(max(1.0 / default_step_s(machine, operation), wanted_hz) / rate - 1e-9)
     return respond(
         machine,
         operation,
@@ -127,7 +127,7 @@ def _respond(
         signals=(*MOTION, *(f"{place} acceleration" for place in places)),
         start_s=-lead_s,
         step_s=1.0 / (rate * per_sample),
-        stride=motion_stride(machine.chain, per_sample),
+        stride=max(floor(rate * per_sample / wanted_hz + 1e-9), 1),
     )
 
 

@@ -68,7 +68,8 @@ def frequencies(run: Run) -> list[str]:
     words.append(f"mesh {(rig.mesh_order(pair) or 0.0) * turns:.5g} Hz")
     words += [f"{name} shaft {(rig.ratio(name) or 0.0) * turns:.4g} Hz" for name in rig.shaft_names]
     words += [f"{as_typed(name)} {frequency:.4g} Hz" for name, frequency in bearing_lines_hz(run).items()]
-    return words
+    # A number and its unit stay on one line.
+    return [word.replace(" Hz", "\u00a0Hz") for word in words]
 
 
 def show_numbers(healthy: Run, faulty: Run | None, channel: str) -> None:

@@ -13,6 +13,8 @@ TEXT = """
    frequencies.
 3. If the file does not state its **sampling rate** or the **speed**, give them under *Not in the file?*
 
+No recording at hand? The *fault laboratory* makes one, with the faults you choose.
+
 Files stay on this machine. They are read in a private folder that is removed at once.
 """
 

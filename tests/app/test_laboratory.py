@@ -1,0 +1,171 @@
+"""The fault laboratory's page, run without a browser."""
+
+from pathlib import Path
+
+import pytest
+from streamlit.testing.v1 import AppTest
+
+import app.dashboard
+from app.dashboard import state
+from app.dashboard.laboratory.controls import automatic_s, shown_name
+from app.dashboard.laboratory.number import nice_step
+from app.dashboard.laboratory.save import chosen_of
+from app.dashboard.laboratory.setup import Setup
+from app.dashboard.laboratory.summary import NUMBERS, change
+from app.dashboard.laboratory.views import NAMES, TAB
+from sims.effects import EffectSetting, effects
+from sims.presets import presets
+
+FOLDER = Path(app.dashboard.__file__).parent
+CHARTS = {"Time": 3, "Spectrum": 1, "Envelope": 1, "Phase portrait": 2, "Mesh": 2}
+
+
+def opened(preset: str = "small_30_25") -> AppTest:
+    """Open the page with a short signal."""
+    page = AppTest.from_file(str(FOLDER / "pages" / "laboratory.py"), default_timeout=300)
+    page.session_state["machine of the laboratory"] = preset
+    page.session_state["length of the laboratory"] = 0.5
+    return page.run()
+
+
+def slider(page: AppTest, start: str):  # type: ignore[no-untyped-def]
+    return next(s for s in page.sidebar.slider if s.label.startswith(start))
+
+
+def typed(page: AppTest, start: str):  # type: ignore[no-untyped-def]
+    return next(s for s in page.sidebar.number_input if s.label.startswith(start))
+
+
+def shown_text(page: AppTest) -> str:
+    parts = [*page.markdown, *page.subheader, *page.caption, *page.error, *page.info]
+    return "\n".join(part.value for part in parts).replace("\\", "").replace("\u2060", "").replace("\u00a0", " ")
+
+
+def test_at_the_start_the_machine_is_healthy() -> None:
+    page = opened()
+    assert not page.exception
+    assert page.subheader[0].value.startswith("Healthy")
+    assert [tab.label for tab in page.tabs] == list(NAMES)
+    assert len(page.get("plotly_chart")) == 1
+    assert [metric.label for metric in page.metric] == list(NUMBERS)
+    assert not any(metric.delta for metric in page.metric)
+    assert "mesh 900 Hz" in shown_text(page)  # 30 teeth at 1800 rpm
+
+
+def test_the_crack_slider_shows_the_faulty_machine_in_every_view() -> None:
+    page = opened()
+    slider(page, "Crack").set_value(1.5).run()
+    assert "Crack in a tooth root, 1.5 mm" in shown_text(page)
+    assert "burst per revolution" in shown_text(page)
+    assert all("healthy" in metric.delta for metric in page.metric)
+    for tab in NAMES:
+        page.session_state[TAB] = tab
+        page.run()
+        assert not page.exception, tab
+        assert not page.error, tab
+        assert len(page.get("plotly_chart")) == CHARTS[tab], tab
+
+
+def test_every_effect_has_a_slider_that_switches_it_on() -> None:
+    page = opened()
+    others = [name for name in effects() if name != "root_crack"]
+    for name in others:
+        page.sidebar.multiselect[0].set_value([name]).run()
+        found = effects()[name]
+        assert not page.exception, name
+        assert not page.error, (name, shown_text(page))
+        own = slider(page, found.title.capitalize()[:8])
+        assert own.value == found.severity.typical, name
+        assert f"typical {found.severity.typical:g}" in own.label
+        assert page.subheader[0].value.replace("\\", "").lower().startswith(found.title), name
+
+
+def test_two_effects_at_once() -> None:
+    page = opened()
+    page.sidebar.multiselect[0].set_value(["mains_hum", "eccentricity"]).run()
+    title = page.subheader[0].value.replace("\\", "")
+    assert title == "Gear off its axis, 20 µm + mains hum, 1 m/s²"
+    for name in ("mains_hum", "eccentricity"):
+        assert effects()[name].signature[:30] in shown_text(page)
+
+
+def test_a_crack_deeper_than_the_tooth_is_one_message() -> None:
+    page = opened()
+    slider(page, "Crack").set_value(9.0).run()
+    assert not page.exception
+    assert len(page.error) == 1
+    assert "past the tooth" in page.error[0].value
+    assert "Allowed" in page.error[0].value
+    assert "healthy machine alone" in page.subheader[0].value
+    assert len(page.metric) == len(NUMBERS)
+    slider(page, "Crack").set_value(1.0).run()
+    assert not page.error
+    assert "1 mm" in shown_text(page)
+
+
+def test_numbers_can_be_typed_and_carry_over() -> None:
+    page = opened()
+    slider(page, "Crack").set_value(1.3).run()
+    page.sidebar.toggle(key="lab typed values").set_value(True).run()
+    assert typed(page, "Crack").value == pytest.approx(1.3)
+    typed(page, "Torque").set_value(75.0).run()
+    typed(page, "Speed").set_value(-5.0).run()
+    assert not page.exception
+    assert len(page.error) == 1
+    assert "at least 0 rpm" in page.error[0].value
+    typed(page, "Speed").set_value(900.0).run()
+    assert not page.error
+    page.sidebar.toggle(key="lab typed values").set_value(False).run()
+    assert slider(page, "Torque").value == pytest.approx(75.0)  # beyond the slider's usual end
+    assert "900 rpm, 75 N·m" in shown_text(page)
+
+
+@pytest.mark.parametrize(("speed", "torque"), [(0.0, 20.0), (1800.0, 0.0)])
+def test_standing_still_and_no_load_are_shown(speed: float, torque: float) -> None:
+    page = opened()
+    page.sidebar.toggle(key="lab typed values").set_value(True).run()
+    typed(page, "Speed").set_value(speed).run()
+    typed(page, "Torque").set_value(torque).run()
+    for tab in NAMES:
+        page.session_state[TAB] = tab
+        page.run()
+        assert not page.exception, tab
+
+
+@pytest.mark.parametrize("name", sorted(presets("cracked")))
+def test_every_machine_opens(name: str) -> None:
+    page = opened(name)
+    assert not page.exception
+    assert not page.error
+    assert presets("cracked")[name].title in shown_text(page)
+
+
+def test_a_recording_of_the_laboratory_opens_in_the_analysis() -> None:
+    setup = Setup("small_30_25", 1800.0, 20.0, effects=(EffectSetting("root_crack", 1.5),), duration_s=2.0)
+    page = AppTest.from_file(str(FOLDER / "main.py"), default_timeout=300)
+    page.session_state["simulated"] = chosen_of(setup)
+    page.session_state[state.ORIGIN] = state.OF_LABORATORY
+    page.run()
+    assert not page.exception
+    assert not page.error
+    assert "small_30_25_root_crack_1_5.h5" in shown_text(page)
+    assert "2 s at 20480 Hz" in shown_text(page)
+    page.sidebar.radio(key=state.ORIGIN).set_value("Sample").run()
+    assert "small_30_25" not in page.subheader[0].value
+
+
+def test_names_and_steps_for_people() -> None:
+    assert shown_name("published_55_75") == "Published 55/75"
+    assert (nice_step(0.07), nice_step(13.3), nice_step(3.0)) == (0.05, 10.0, 2.0)
+    assert (change(2.0, 2.5), change(2.0, 2.0001), change(0.0, 1.0), change(1.0, 3.0)) == (
+        " (+25 %)",
+        " (±0 %)",
+        "",
+        " (3 ×)",
+    )
+
+
+def test_the_automatic_length_holds_eight_revolutions_where_it_can() -> None:
+    preset = presets("cracked")["published_55_75"]
+    assert automatic_s(preset, 500.0) == 1.0  # 8 revolutions of the output shaft would take 1.3 s
+    assert automatic_s(preset, 1400.0) == 0.5  # they take 0.47 s

@@ -1,0 +1,90 @@
+"""The fault laboratory in a real browser: from a slider to the analysis of what it did."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tests.browser.conftest import CHROMIUM, settle
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine"),
+]
+playwright = pytest.importorskip("playwright.sync_api")
+
+
+@pytest.fixture
+def laboratory(page: playwright.Page) -> playwright.Page:
+    """Go from the analysis to the laboratory."""
+    page.set_default_timeout(120_000)  # the simulator may have to be compiled first
+    page.get_by_role("link", name="Fault laboratory").click()
+    page.get_by_role("tab", name="Phase portrait").wait_for()
+    settle(page)
+    return page
+
+
+def title(page: playwright.Page) -> str:
+    text = page.get_by_role("heading", level=3).first.inner_text()
+    assert isinstance(text, str)
+    return text
+
+
+def pull_the_crack(page: playwright.Page, n_steps: int) -> None:
+    page.get_by_role("slider", name="Crack in a tooth root").focus()
+    for _ in range(n_steps):
+        page.keyboard.press("ArrowRight")
+    page.get_by_role("heading", name="Crack in a tooth root").wait_for()
+    settle(page)
+
+
+def test_from_the_slider_to_the_analysis_and_back(laboratory: playwright.Page) -> None:
+    assert title(laboratory).startswith("Healthy")
+    pull_the_crack(laboratory, 40)
+    assert title(laboratory) == "Crack in a tooth root, 2 mm"
+    for name in ("Spectrum", "Envelope", "Phase portrait", "Mesh"):
+        laboratory.get_by_role("tab", name=name, exact=True).click()
+        settle(laboratory)
+        laboratory.locator(".js-plotly-plot").first.wait_for()
+    laboratory.get_by_role("button", name="Open in the analysis page").click()
+    laboratory.get_by_role("tab", name="Report").wait_for()
+    settle(laboratory)
+    assert laboratory.get_by_text("published_55_75_root_crack_2.h5").count() > 0
+    assert laboratory.get_by_text("5 s at 20480 Hz").count() > 0
+    laboratory.get_by_role("link", name="Fault laboratory").click()
+    laboratory.get_by_role("tab", name="Phase portrait").wait_for()
+    settle(laboratory)
+    assert title(laboratory) == "Crack in a tooth root, 2 mm"
+
+
+def test_a_recording_is_saved_with_rig_and_truth(laboratory: playwright.Page) -> None:
+    pull_the_crack(laboratory, 20)
+    laboratory.get_by_role("button", name="Save as recording").click()
+    with laboratory.expect_download() as download:
+        laboratory.get_by_role("button", name="Download", exact=True).click()
+    stem = "published_55_75_root_crack_1"
+    assert download.value.suggested_filename == f"{stem}.zip"
+    with zipfile.ZipFile(Path(download.value.path())) as archive:
+        assert archive.namelist() == [f"{stem}.h5", f"{stem}.toml", f"{stem}.truth.json"]
+
+
+def test_an_own_file_stays_open_while_the_laboratory_is_looked_at(page: playwright.Page) -> None:
+    rows = "\n".join(f"{i / 1000:g};{(i * 37) % 101}" for i in range(3000))
+    content = f"time (s);a1\n{rows}\n".encode()
+    page.get_by_text("Own file", exact=True).click()
+    page.get_by_text("Open a recording of your own").wait_for()
+    uploader = page.locator("[data-testid=stFileUploader] input[type=file]").first
+    uploader.set_input_files({"name": "mine.csv", "mimeType": "text/csv", "buffer": content})
+    page.get_by_role("tab", name="Report").wait_for()
+    settle(page)
+    page.set_default_timeout(120_000)
+    page.get_by_role("link", name="Fault laboratory").click()
+    page.get_by_role("tab", name="Phase portrait").wait_for()
+    page.get_by_role("link", name="Analysis").click()
+    page.get_by_text("Still open: mine.csv").wait_for()
+    settle(page)
+    assert page.get_by_test_id("stMain").get_by_text("mine.csv").count() > 0
+    page.get_by_role("button", name="Close it").click()
+    page.get_by_text("Open a recording of your own").wait_for()
