@@ -8,7 +8,7 @@ from app.dashboard.laboratory.run import Run, run_setup
 from app.dashboard.laboratory.setup import Setup
 
 N_RUNS = 12
-"""Each holds some MB: a recording and seven signals of the motion at 40 kHz."""
+"""Each holds some MB: a recording and eight signals of the motion at 80 kHz."""
 
 
 def simulated(setup: Setup) -> Run:
@@ -19,7 +19,7 @@ def simulated(setup: Setup) -> Run:
     InputError
         If a value is out of its range, or the machine allows less.
     """
-    words = "Simulating …" if _is_ready() else "Preparing the simulator; the very first time takes about a minute …"
+    words = "Simulating …" if _is_ready() else "Preparing the simulator; the first time takes half a minute …"
     with st.spinner(words, show_time=True):
         run = _cached(setup)
     _ready.append(True)

@@ -12,7 +12,7 @@ from gearsig.plot.cursors import Cursor, order_cursors
 from gearsig.rig.orders import order_lines
 from sims.effects import EffectSetting, effect
 
-N_MESH_HARMONICS, N_SIDEBANDS, N_BEARING_HARMONICS = 5, 3, 4
+N_MESH_HARMONICS, N_SIDEBANDS, N_BEARING_HARMONICS, N_SHAFT_HARMONICS = 5, 3, 4, 8
 SIDES = ("driver", "driven")
 
 
@@ -45,8 +45,10 @@ def _hum_cursors(setup: Setup) -> tuple[Cursor, ...]:
 
 
 def envelope_cursors(run: Run) -> tuple[Cursor, ...]:
-    """Return shaft lines, and harmonics of the lines of bearings with a defect, in Hz."""
-    shaft_lines = [line for line in order_lines(run.rig, n_sidebands=0) if line.kind == "shaft"]
+    """Return the lines of shafts concerned, and harmonics of the lines of bearings with a defect, in Hz."""
+    concerned = {run.machine.shaft_names[SIDES.index(side)] for side in affected_sides(run.setup)}
+    lines = order_lines(run.rig, n_shaft_harmonics=N_SHAFT_HARMONICS, n_sidebands=0)
+    shaft_lines = [line for line in lines if line.kind == "shaft" and line.element in concerned]
     cursors = [*order_cursors(shaft_lines, run.setup.revolutions_per_s)]
     for name, frequency in bearing_lines_hz(run).items():
         cursors += [

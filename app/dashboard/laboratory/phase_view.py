@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 MESH_PERIOD = "mesh period"
 GEARS = {"Driver": "driver y", "Driven gear": "driven y"}
 STROBES = {MESH_PERIOD: None, "revolution of the input shaft": 1.0}
-MOST_POINTS, POINTS_PER_MESH_PERIOD = 6_000, 48
+MOST_POINTS = 10_000
 """A browser without a graphics card draws so many at once."""
+REVOLUTIONS = 1.3
+"""Of the line, so that every tooth is on it; the points are of the whole run."""
 HEIGHT_PX = 430
 Limits = tuple[tuple[float, float], tuple[float, float]]
 Portrait = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
@@ -59,9 +61,10 @@ def portrait(run: Run, signal: str, n_per_revolution: float) -> Portrait:
     y, v = 1e6 * response[signal], 1e3 * response[f"{signal} velocity"]
     index = times_of(run, response.time_s, lines_per_period(run, n_per_revolution))
     points = [np.interp(index, response.time_s, values) for values in (y, v)]
-    per_period = len(y) / max(float(np.ptp(run.mesh_cycles)), 1.0)
-    every = max(int(per_period / POINTS_PER_MESH_PERIOD), 1)
-    return y[::every][-MOST_POINTS:], v[::every][-MOST_POINTS:], points[0], points[1]
+    turned = float(np.ptp(response["driver angle"])) / (2.0 * np.pi)
+    n = len(y) if turned <= REVOLUTIONS else round(len(y) * REVOLUTIONS / turned)
+    every = -(-n // MOST_POINTS)
+    return y[-n::every], v[-n::every], points[0], points[1]
 
 
 def portrait_figure(found: Portrait, limits: Limits, *, faulty: bool) -> Figure:

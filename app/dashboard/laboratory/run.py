@@ -31,7 +31,7 @@ MOTION = (
     "transmission_error_m",
     "mesh_force_n",
 )
-MOTION_HZ = 40_000.0
+MOTION_HZ = 80_000.0
 """Points of the motion per second that are kept, at least."""
 
 
