@@ -1,0 +1,237 @@
+"""Variational modes against vmdpy, closed forms and invariants."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from vmdpy import VMD
+
+from gearsig.decompose.types import VmdSettings
+from gearsig.decompose.vmd import variational_modes
+from gearsig.errors import InputError
+
+INIT = {"zero": 0, "uniform": 1, "random": 2}
+
+
+def _signal(n: int, seed: int = 0) -> np.ndarray:
+    i = np.arange(n)
+    modulated = (1 + 0.5 * np.cos(0.01 * i)) * np.cos(2 * np.pi * 0.12 * i + 1)
+    return np.cos(2 * np.pi * 0.03 * i) + modulated + 0.3 * np.random.default_rng(seed).normal(size=n) + 0.2
+
+
+def _reference(x: np.ndarray, s: VmdSettings) -> tuple[np.ndarray, np.ndarray]:
+    tolerance = 1e-9 if s.tolerance is None else s.tolerance
+    u, _, omega = VMD(x, s.penalty, s.dual_step, s.n_modes, s.zero_mode, INIT[str(s.start)], tolerance)
+    return u, omega
+
+
+def _assert_equal(x: np.ndarray, s: VmdSettings, rng: np.random.Generator | None = None) -> None:
+    u, omega = _reference(x, s)
+    modes = variational_modes(x, 1.0, s, rng=rng)
+    assert modes.n_iterations == len(omega)
+    assert np.abs(modes.waveforms - u).max() < 1e-12 * np.abs(x).max()
+    assert np.abs(modes.centre_history - omega).max() < 1e-12
+    assert np.abs(modes.residual - (x - u.sum(axis=0))).max() < 1e-12 * np.abs(x).max()
+
+
+@pytest.mark.parametrize("n", [64, 254, 1000, 1026, 2048])  # also twice an odd number, where the mirror is odd
+@pytest.mark.parametrize("n_modes", [1, 2, 5])
+@pytest.mark.parametrize("start", ["uniform", "zero"])
+def test_equals_vmdpy(n, n_modes, start):
+    _assert_equal(_signal(n), VmdSettings(n_modes, start=start, tolerance=1e-5))
+
+
+@pytest.mark.parametrize("dual_step", [0.05, 1.0])
+@pytest.mark.parametrize("zero_mode", [False, True])
+def test_equals_vmdpy_with_multiplier_and_zero_mode(dual_step, zero_mode):
+    _assert_equal(_signal(600), VmdSettings(4, dual_step=dual_step, zero_mode=zero_mode, tolerance=1e-7))
+
+
+@pytest.mark.parametrize("penalty", [1.0, 50.0, 2e5])
+def test_equals_vmdpy_at_other_penalties(penalty):
+    _assert_equal(_signal(500), VmdSettings(3, penalty=penalty, tolerance=1e-6))
+
+
+def test_equals_vmdpy_where_it_does_not_converge():
+    _assert_equal(_signal(300), VmdSettings(6, tolerance=0.0))
+
+
+def test_equals_vmdpy_from_random_starts():
+    np.random.seed(5)  # noqa: NPY002 - the reference program draws from numpy's global state
+    twister = np.random.MT19937()
+    twister.state = np.random.RandomState(5).get_state(legacy=False)
+    _assert_equal(_signal(800), VmdSettings(4, start="random", tolerance=1e-5), np.random.Generator(twister))
+
+
+@settings(max_examples=25)
+@given(
+    n=st.integers(20, 200).map(lambda half: 2 * half),
+    n_modes=st.integers(1, 5),
+    penalty=st.floats(10.0, 1e4),
+    seed=st.integers(0, 999),
+)
+def test_equals_vmdpy_on_noise(n, n_modes, penalty, seed):
+    # Noise has no modes: the number of iterations may hang on a last digit, so it is fixed by a tolerance of zero.
+    x = np.random.default_rng(seed).normal(size=n)
+    _assert_equal(x, VmdSettings(n_modes, penalty=penalty, tolerance=0.0))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_where_the_multiplier_amplifies_rounding_it_does_no_more_than_in_vmdpy(seed):
+    s = VmdSettings(4, penalty=3000.0, dual_step=0.1, tolerance=0.0)
+    x = np.random.default_rng(seed).normal(size=100)
+    u, v = _reference(x, s)[0], _reference(x * (1 + 1e-15), s)[0]
+    bound = max(1e-12, 20 * np.abs(v - u).max())
+    assert bound < 1e-7
+    assert np.abs(variational_modes(x, 1.0, s).waveforms - u).max() < bound
+
+
+def test_tones_on_lines_of_the_mirrored_signal_come_back_by_the_fixed_point():
+    # For cosines that are single lines of the mirrored spectrum, the fixed point solves a 2 × 2 linear system per line:
+    # (1 + g) weights with g_k = α (ω - ω_k)²; here the tones are so far apart that each centre is its line.
+    n, a, b = 4000, 200, 1600
+    q = np.pi * (np.arange(n) + 0.5) / n
+    x = 2.0 * np.cos(a * q) + 1.0 * np.cos(b * q)
+    modes = variational_modes(x, 1.0, VmdSettings(2, tolerance=1e-18))
+    lines = np.array([np.cos(a * q), np.cos(b * q)])
+    gains = 2000.0 * (np.array([a, b])[None, :] / (2 * n) - modes.centres[:, None]) ** 2  # (mode, line)
+    expected = np.zeros((2, 2))
+    for j, amplitude in enumerate((2.0, 1.0)):
+        expected[:, j] = np.linalg.solve(np.ones((2, 2)) + np.diag(gains[:, j]), np.full(2, amplitude))
+    assert modes.waveforms == pytest.approx(expected @ lines, abs=1e-7)
+    power = expected**2
+    assert modes.centres == pytest.approx(power @ [a / (2 * n), b / (2 * n)] / power.sum(axis=1), rel=1e-8)
+    spread = np.array([a, b])[None, :] / (2 * n) - modes.centres[:, None]
+    assert modes.bandwidths == pytest.approx(np.sqrt((power * spread**2).sum(axis=1) / power.sum(axis=1)), rel=1e-6)
+
+
+def test_modes_and_residual_sum_to_the_signal():
+    x = _signal(1001)
+    modes = variational_modes(x, 1.0, VmdSettings(3))
+    assert modes.waveforms.sum(axis=0) + modes.residual == pytest.approx(x, abs=1e-13)
+
+
+def test_the_multiplier_makes_the_modes_sum_to_the_signal():
+    x = _signal(1001)
+    loose = variational_modes(x, 1.0, VmdSettings(4, penalty=20.0))
+    exact = variational_modes(x, 1.0, VmdSettings(4, penalty=20.0, dual_step=0.5, tolerance=0.0))
+    assert exact.reconstruction_error < 1e-5
+    assert loose.reconstruction_error > 5e-3
+
+
+@pytest.mark.parametrize("factor", [1e-160, 1e-3, -7.0, 1e150])
+def test_the_unit_does_not_matter(factor):
+    x = _signal(700)
+    a, b = (variational_modes(v, 1.0, VmdSettings(3)) for v in (x, factor * x))
+    assert a.n_iterations == b.n_iterations
+    assert b.waveforms / factor == pytest.approx(a.waveforms, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_reversed_in_time_the_modes_are_reversed(seed):
+    x = _signal(901, seed)
+    a, b = (variational_modes(v, 1.0, VmdSettings(3)) for v in (x, x[::-1]))
+    assert a.waveforms == pytest.approx(b.waveforms[:, ::-1], abs=1e-11)
+
+
+@pytest.mark.parametrize("shorter", [0, 1, 2, 3])
+def test_a_sample_more_or_less_changes_little(shorter):
+    x = _signal(4000) - 0.2
+    settings_ = VmdSettings(2, start=(0.03, 0.12))
+    whole = variational_modes(x, 1.0, settings_)
+    part = variational_modes(x[: len(x) - shorter], 1.0, settings_)
+    assert part.centres == pytest.approx(whole.centres, abs=5e-5)
+    assert part.waveforms[:, :3000] == pytest.approx(whole.waveforms[:, :3000], abs=2e-2)
+
+
+def test_single_precision_input_is_computed_in_double():
+    x = _signal(2000).astype(np.float32)
+    a, b = (variational_modes(v, 1.0, VmdSettings(3)) for v in (x, x.astype(np.float64)))
+    assert np.array_equal(a.waveforms, b.waveforms)
+    assert a.waveforms.dtype == np.float64
+
+
+def test_odd_lengths_keep_the_last_sample():
+    modes = variational_modes(_signal(999), 1.0, VmdSettings(2))
+    assert modes.waveforms.shape == (2, 999)
+
+
+def test_given_starts_are_in_hertz():
+    x = _signal(2000)
+    modes = variational_modes(x, 5000.0, VmdSettings(3, start=(0.0, 150.0, 600.0)))
+    assert modes.centre_history[0] == pytest.approx([0.0, 150.0, 600.0])
+    assert modes.centre_frequencies_hz[1:] == pytest.approx([150.0, 600.0], abs=5.0)
+
+
+def test_what_is_not_converged_says_so():
+    modes = variational_modes(_signal(500), 1.0, VmdSettings(3, max_iterations=5))
+    assert not modes.converged
+    assert modes.n_iterations == 5
+    assert "Not converged" in modes.notes[0]
+    assert "not converged" in modes.describe()
+
+
+def test_modes_on_the_same_lines_are_noted():
+    modes = variational_modes(np.cos(0.2 * np.arange(1000)), 1.0, VmdSettings(3, max_iterations=5000))
+    assert any("share the same lines" in note for note in modes.notes)
+    assert not variational_modes(_signal(1000), 1.0, VmdSettings(2, max_iterations=5000)).notes
+
+
+def test_the_table_lists_modes_by_rising_centre():
+    modes = variational_modes(_signal(2000), 1000.0, VmdSettings(2, start=(120.0, 30.0)), unit="g", source="a1")
+    assert modes.centres[0] > modes.centres[1]
+    assert modes.by_centre() == (1, 0)
+    rows = modes.describe().splitlines()
+    assert rows[0].startswith("2 modes of a1")
+    assert [row.split()[0] for row in rows[3:5]] == ["2", "1"]
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (np.r_[np.nan, np.ones(50)], "NaN"),
+        (np.full(100, 3.0), "constant"),
+        (np.arange(7.0), "7 sample"),
+        (np.arange(11.0), "n_modes is 3 for 11 samples"),
+        (np.ones((2, 50)), "shape"),
+    ],
+)
+def test_signals_that_do_not_do(values, message):
+    with pytest.raises(InputError, match=message):
+        variational_modes(values, 1.0, VmdSettings(3))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"n_modes": 0},
+        {"penalty": 0.0},
+        {"penalty": float("nan")},
+        {"dual_step": -1.0},
+        {"start": "unifrom"},
+        {"start": (1.0,)},
+        {"tolerance": -1.0},
+        {"max_iterations": 1},
+    ],
+)
+def test_settings_that_do_not_do(wrong):
+    with pytest.raises(InputError):
+        VmdSettings(**({"n_modes": 2} | wrong))
+
+
+@pytest.mark.parametrize("start", [(0.1, 0.6), (-0.1, 0.2), (0.1, float("nan"))])
+def test_starts_outside_the_spectrum(start):
+    with pytest.raises(InputError, match="half the sampling rate"):
+        variational_modes(_signal(100), 1.0, VmdSettings(2, start=start))
+
+
+def test_random_starts_need_a_generator():
+    with pytest.raises(InputError, match="rng"):
+        variational_modes(_signal(100), 1.0, VmdSettings(2, start="random"))
+
+
+def test_a_tolerance_above_the_signals_energy_is_no_tolerance():
+    with pytest.raises(InputError, match="leave tolerance out"):
+        variational_modes(1e-6 * _signal(100), 1.0, VmdSettings(2, tolerance=1e-5))
