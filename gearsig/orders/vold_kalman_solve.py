@@ -1,0 +1,183 @@
+"""Envelopes and waveforms of orders by the Vold–Kalman filter, from plain arrays; which solver suits which problem."""
+
+from __future__ import annotations
+
+from math import comb
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray
+from gearsig.orders.vold_kalman_splines import (
+    BoolArray,
+    ComplexArray,
+    expected_error,
+    samples_per_cell,
+    solve_by_splines,
+)
+from gearsig.orders.vold_kalman_weight import envelope_weight, waveform_weight
+
+SMALLEST_CELL = 4
+"""Samples. Below, the band is so wide that the coarse grid saves nothing, and rotations lose no digits."""
+
+
+def solve_envelopes(
+    y: FloatArray, cycles: FloatArray, active: BoolArray | None, bandwidths: FloatArray, p: int
+) -> ComplexArray:
+    """Return the complex envelopes of the second generation, jointly for all orders.
+
+    Data equation y_n = Σ_k a_kn e^{2πi c_kn} + η_n, structural equation ∇^p a_kn = ε_kn, minimised as
+    Σ|η_n|² + Σ r_kn² |ε_kn|². Envelopes are 2 a_k: peak amplitudes of cosines, y ≈ Σ Re(2 a_k e^{2πi c_k}).
+
+    Parameters
+    ----------
+    y : array, (n,)
+    cycles : array, (n_orders, n)
+        c, the phase of each order in cycles.
+    active : array of bool, (n_orders, n), or None
+        Where an order is part of the data; None: everywhere. Elsewhere its envelope continues as a polynomial.
+    bandwidths : array, (n_orders, n) or (n_orders, 1)
+        -3 dB, in cycles per sample.
+    p : int
+        Poles, 1 to 3.
+
+    Returns
+    -------
+    array, (n_orders, n), complex
+
+    Raises
+    ------
+    RefusalError
+        If the orders cannot be told apart.
+
+    References
+    ----------
+    H. Vold, M. Mains, J. Blough, "Theoretical foundations for high performance order tracking with the Vold-Kalman
+    tracking filter", 1997. C. Feldbauer, R. Höldrich, "Realization of a Vold-Kalman tracking filter – a least squares
+    problem", 2000. J. Tůma, "Setting the passband width in the Vold-Kalman order tracking filter", 2005.
+    """
+    n = len(y)
+    # A row of the structural equation holds p + 1 samples; its weight is that of the middle one.
+    weights = envelope_weight(_of_rows(bandwidths, n, p), p)
+    d = cell_of(bandwidths, p)
+    if d:
+        a = solve_by_splines(y, cycles, active, weights, p, d)
+    else:
+        stencil = [(-1.0) ** (p - i) * comb(p, i) for i in range(p + 1)]
+        stencils = np.broadcast_to(stencil, (len(cycles), n - p, p + 1))
+        weights = np.broadcast_to(weights, (len(cycles), n - p))
+        a = _solved_sample_by_sample(y, cycles, active, weights, stencils)
+    a *= 2.0
+    return a
+
+
+def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None, bandwidths: FloatArray) -> FloatArray:
+    """Return the waveforms of the first generation, jointly for all orders.
+
+    Data equation y_n = Σ_k x_kn + η_n, structural equation x_kn - 2 cos ω_k(n+1) x_k(n+1) + x_k(n+2) = ε_kn, minimised
+    as Σ η_n² + Σ r_kn² ε_kn².
+
+    Parameters
+    ----------
+    y, cycles, active, bandwidths
+        As in `solve_envelopes`. Half the bandwidth lies below the frequency, also where an order is not active.
+
+    Returns
+    -------
+    array, (n_orders, n)
+
+    References
+    ----------
+    H. Vold, J. Leuridan, "High resolution order tracking at extreme slew rates, using Kalman tracking filters", 1993.
+    """
+    from gearsig.orders.vold_kalman_rotations import solve_by_rotations
+
+    n = len(y)
+    frequency = (cycles[:, 2:] - cycles[:, :-2]) / 2.0
+    width = np.broadcast_to(_of_rows(bandwidths, n, 2), frequency.shape)
+    # Outside the active part the order may stand still: any finite weight does there.
+    inside = np.clip(frequency, 0.6 * width, 0.5 - 0.6 * width)
+    stencils = np.ones((*frequency.shape, 3))
+    stencils[:, :, 1] = -2.0 * np.cos(2.0 * np.pi * frequency)
+    data = np.ones(cycles.shape) if active is None else active.astype(np.float64)
+    return solve_by_rotations(data, y.astype(np.float64), waveform_weight(width, inside), stencils)
+
+
+def cell_of(bandwidths: FloatArray, p: int) -> int:
+    """Return the samples per cell of the coarse grid; 0 where the problem is solved sample by sample."""
+    d = samples_per_cell(float(bandwidths.min()), float(bandwidths.max()), p)
+    return d if d >= SMALLEST_CELL else 0
+
+
+def accuracy_of(bandwidths: FloatArray, p: int) -> float:
+    """Return the expected error of `solve_envelopes`, relative to the largest component of the signal."""
+    d = cell_of(bandwidths, p)
+    if d:
+        return expected_error(float(bandwidths.min()), float(bandwidths.max()), d, p)
+    return 1e-15 * float(envelope_weight(bandwidths.min()[None], p)[0])
+
+
+def waveform_accuracy_of(cycles: FloatArray, active: BoolArray, bandwidths: FloatArray) -> float:
+    """Return the expected error of `solve_waveforms`: rounding times the root of its condition, about 4 r."""
+    frequency = np.abs(np.diff(cycles, axis=1))[active[:, 1:] & active[:, :-1]]
+    narrowest = np.pi * float(bandwidths.min())
+    sine = min(np.sin(2 * np.pi * float(frequency.min())), np.sin(2 * np.pi * float(frequency.max())))
+    return float(1e-15 / (narrowest * max(sine, narrowest)))
+
+
+def envelopes_of_waveforms(x: FloatArray, cycles: FloatArray) -> ComplexArray:
+    """Return complex envelopes of narrow-band waveforms x = Re(a e^{2πi c}).
+
+    For constant a the neighbours are x(n±1) = x cos α± ∓ q sin α±, α the phase step; both give the quadrature q by
+    least squares, and a = (x + iq) e^{-2πi c}.
+    """
+    before, after = _steps(cycles)
+    x_before = np.concatenate([x[:, :1], x[:, :-1]], axis=1)
+    x_after = np.concatenate([x[:, 1:], x[:, -1:]], axis=1)
+    q = (x_before - x * np.cos(before)) * np.sin(before) - (x_after - x * np.cos(after)) * np.sin(after)
+    size = np.sin(before) ** 2 + np.sin(after) ** 2
+    q = np.divide(q, size, out=np.zeros_like(q), where=size > 0.0)
+    a: ComplexArray = (x + 1j * q) * phasors_of(cycles).conj()
+    return a
+
+
+def phasors_of(cycles: FloatArray) -> ComplexArray:
+    """Return e^{2πi c}, (n_orders, n)."""
+    from gearsig.orders.vold_kalman_phasor import cosine_and_sine
+
+    phasors = np.empty(cycles.shape, np.complex128)
+    for row, angle in zip(phasors, cycles, strict=True):
+        cosine_and_sine(np.ascontiguousarray(angle), row.real, row.imag)
+    return phasors
+
+
+def _solved_sample_by_sample(
+    y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, stencils: FloatArray
+) -> ComplexArray:
+    """One order is demodulated first: its problem is real, with a complex right-hand side."""
+    from gearsig.orders.vold_kalman_rotations import solve_by_rotations
+
+    data: NDArray[Any] = phasors_of(cycles)
+    observed = y.astype(np.complex128)
+    if len(cycles) == 1:
+        observed *= data[0].conj()
+        data = np.ones(cycles.shape)
+    if active is not None:
+        data = data * active
+    return solve_by_rotations(data, observed, weights, stencils)
+
+
+def _of_rows(bandwidths: FloatArray, n: int, p: int) -> FloatArray:
+    """Return the bandwidth at the middle of each row of the structural equation."""
+    if bandwidths.shape[1] == 1:
+        return bandwidths
+    middle = p // 2
+    return bandwidths[:, middle : n - p + middle]
+
+
+def _steps(cycles: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the phase steps in rad to the sample before and to the one after, 0 beyond the ends."""
+    step = 2.0 * np.pi * np.diff(cycles, axis=1)
+    none = np.zeros((len(cycles), 1))
+    return np.concatenate([none, step], axis=1), np.concatenate([step, none], axis=1)

@@ -1,0 +1,171 @@
+"""Phase, frequency and bandwidth over time of the orders that the Vold–Kalman filter is to separate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.angle.types import ShaftAngle
+from gearsig.checks import FloatArray, positive
+from gearsig.errors import InputError, RefusalError
+from gearsig.orders.vold_kalman_types import FrequencyTrack
+from gearsig.rig.types import Rig
+
+BoolArray = NDArray[np.bool_]
+OrderLike = float | tuple[str, float] | FrequencyTrack
+CHUNK_SAMPLES = 2**17
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Phase (cycles) and frequency of each order at the samples, (n_orders, n), and where they are known, (n,)."""
+
+    names: tuple[str, ...]
+    shafts: tuple[str, ...]
+    orders: FloatArray
+    cycles: FloatArray
+    frequency_hz: FloatArray
+    known: BoolArray
+
+
+def tracks_of_orders(
+    orders: Sequence[OrderLike], angle: ShaftAngle | None, rig: Rig | None, n: int, sampling_rate_hz: float
+) -> Tracks:
+    """Return the tracks of orders given as number (of the angle's shaft), (shaft, number) or frequency track."""
+    if len(orders) == 0:
+        raise InputError("no orders are given", where="orders", remedy="name at least one")
+    cycles, frequency = np.empty((len(orders), n)), np.empty((len(orders), n))
+    names: list[str] = []
+    shafts: list[str] = []
+    numbers: list[float] = []
+    known = np.ones(n, dtype=bool)
+    turned: tuple[FloatArray, FloatArray] | None = None
+    for k, wanted in enumerate(orders):
+        if isinstance(wanted, FrequencyTrack):
+            cycles[k], frequency[k] = _integrated(wanted, n, sampling_rate_hz)
+            names.append(wanted.name)
+            shafts.append("")
+            numbers.append(np.nan)
+            continue
+        if angle is None:
+            raise InputError("an order is given without a shaft angle", where="orders", remedy="give frequency tracks")
+        shaft, number = wanted if isinstance(wanted, tuple) else (angle.shaft, wanted)
+        number = positive(number, f"order {number!r}")
+        if turned is None:
+            turned = _sampled_angle(angle, n, sampling_rate_hz)
+            known = _known(angle, n, sampling_rate_hz)
+        factor = number * _ratio(angle, shaft, rig)
+        np.multiply(turned[0], factor, out=cycles[k])
+        np.multiply(turned[1], factor, out=frequency[k])
+        names.append(f"{shaft} {number:g}".strip())
+        shafts.append(shaft)
+        numbers.append(number)
+    return Tracks(tuple(names), tuple(shafts), np.array(numbers), cycles, frequency, known)
+
+
+def bandwidths_of(
+    tracks: Tracks, hz: float | Sequence[float] | None, in_orders: float | Sequence[float] | None
+) -> FloatArray:
+    """Return the bandwidths in Hz, (n_orders, 1) if given in Hz, (n_orders, n) if given in orders."""
+    if (hz is None) == (in_orders is None):
+        raise InputError("give either bandwidth_hz or bandwidth_orders", where="bandwidth", allowed="one of both")
+    n_orders = len(tracks.names)
+    name = "bandwidth_orders" if hz is None else "bandwidth_hz"
+    given = np.atleast_1d(np.asarray(in_orders if hz is None else hz, dtype=np.float64))
+    if given.shape not in {(1,), (n_orders,)}:
+        raise InputError(f"{name} has shape {given.shape}", allowed=f"one number, or one for each of {n_orders} orders")
+    widths = np.broadcast_to([positive(width, name) for width in given], (n_orders,))
+    if hz is not None:
+        return widths[:, None].copy()
+    if not np.isfinite(tracks.orders).all():
+        raise InputError("a frequency track has no order", where=name, remedy="give bandwidth_hz")
+    for order, width, label in zip(tracks.orders, widths, tracks.names, strict=True):
+        if width >= 2 * order:
+            raise InputError(
+                f"bandwidth_orders is {width:g} for order {label!r}: its band reaches down to order zero",
+                allowed=f"below {2 * order:g}",
+            )
+    return np.asarray(tracks.frequency_hz * (widths / tracks.orders)[:, None])
+
+
+def valid_parts(tracks: Tracks, bandwidth_hz: FloatArray, sampling_rate_hz: float) -> BoolArray:
+    """Return where each order's whole band lies between zero and half the sampling rate, (n_orders, n).
+
+    Raises
+    ------
+    RefusalError
+        If an order has no such part.
+    """
+    f = tracks.frequency_hz
+    above = f + bandwidth_hz / 2 >= sampling_rate_hz / 2
+    # The margin keeps the first generation's band, which is not quite symmetric, above zero as well.
+    below = f <= bandwidth_hz * 0.51
+    valid: BoolArray = ~(above | below) & tracks.known
+    for k, name in enumerate(tracks.names):
+        if valid[k].any():
+            continue
+        reach = f"runs from {f[k].min():.4g} to {f[k].max():.4g} Hz"
+        if f[k].max() == 0.0:
+            raise RefusalError(f"order {name!r} stands still all the time", remedy="record while the machine turns")
+        if above[k].any():
+            raise RefusalError(
+                f"order {name!r} {reach}, at or above half the sampling rate of {sampling_rate_hz:g} Hz",
+                remedy="record at a higher rate",
+            )
+        raise RefusalError(
+            f"order {name!r} {reach}: its band of {np.max(bandwidth_hz[k]):.4g} Hz reaches down to zero frequency",
+            remedy="narrow the band",
+        )
+    return valid
+
+
+def _sampled_angle(angle: ShaftAngle, n: int, sampling_rate_hz: float) -> tuple[FloatArray, FloatArray]:
+    """Return revolutions and revolutions per second at the samples."""
+    revolutions, speed = np.empty(n), np.empty(n)
+    for start in range(0, n, CHUNK_SAMPLES):
+        part = slice(start, min(start + CHUNK_SAMPLES, n))
+        t = np.arange(part.start, part.stop) / sampling_rate_hz
+        revolutions[part] = angle.revolutions_at(t)
+        speed[part] = angle.speed_rpm_at(t) / 60.0
+    # The cubic's slope may round to a little below zero where the machine stands.
+    return revolutions, np.maximum(speed, 0.0)
+
+
+def _known(angle: ShaftAngle, n: int, sampling_rate_hz: float) -> BoolArray:
+    """Return the samples within the angle's time; one sample of tolerance at either end."""
+    known = np.zeros(n, dtype=bool)
+    first = max(0, int(np.ceil(angle.start_s * sampling_rate_hz - 1.0)))
+    last = int(np.floor(angle.end_s * sampling_rate_hz + 1.0))
+    known[first : max(0, last + 1)] = True
+    return known
+
+
+def _ratio(angle: ShaftAngle, shaft: str, rig: Rig | None) -> float:
+    """Return revolutions of `shaft` per revolution of the angle's shaft."""
+    if shaft == angle.shaft:
+        return 1.0
+    ratio = rig.ratio(angle.shaft, to=shaft) if rig is not None and rig.shafts else None
+    if ratio is None:
+        raise InputError(
+            f"the ratio of shaft {shaft!r} to {angle.shaft!r} is not known",
+            where="orders",
+            remedy="give a rig with the teeth between both shafts",
+        )
+    return ratio
+
+
+def _integrated(track: FrequencyTrack, n: int, sampling_rate_hz: float) -> tuple[FloatArray, FloatArray]:
+    """Return phase in cycles (trapezoidal rule from 0) and frequency."""
+    f = track.frequency_hz.astype(np.float64)
+    if len(f) != n:
+        raise InputError(
+            f"track {track.name!r} has {len(f)} samples, the recording {n}",
+            where="orders",
+            remedy="interpolate the frequency to the recording's samples",
+        )
+    cycles = np.zeros(n)
+    np.cumsum((f[1:] + f[:-1]) / (2.0 * sampling_rate_hz), out=cycles[1:])
+    return cycles, f
