@@ -54,7 +54,7 @@ def separate(
         al. take out "shaft components along with their harmonics"; taking out all of them would leave nothing, since
         every line of the average is a shaft harmonic. Pass () to keep them.
     n_harmonics : int or None
-        Mesh harmonics per gear; None takes all up to the average's highest order.
+        Mesh harmonics per gear; None takes all that the average holds, also above its highest order.
 
     Returns
     -------
@@ -84,7 +84,9 @@ def separate(
     gears = checked_teeth(average, teeth)
     count(n_sidebands, "n_sidebands", minimum=0)
     highest = highest_line(average)
-    mesh = [k * z for z in gears for k in range(1, (n_harmonics or highest) + 1) if k * z <= highest]
+    # Beyond the highest order the filter's flank still lets strong mesh harmonics through: they go as well.
+    last = (len(average.values) - 1) // 2
+    mesh = [k * z for z in gears for k in range(1, (n_harmonics or last) + 1) if k * z <= last]
     bare = _line_mask(len(average.values), [*shaft_orders, *mesh])
     sidebands = [m + s for m in mesh for s in range(-n_sidebands, n_sidebands + 1)]
     full = _line_mask(len(average.values), [*shaft_orders, *sidebands])

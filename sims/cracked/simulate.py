@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import ceil, floor
 from typing import Any
@@ -15,7 +15,7 @@ from gearsig.rig.types import Rig
 from sims.cracked.constants import total_inertia_kg_m2
 from sims.cracked.layout import POSITIONS
 from sims.cracked.linear import default_step_s, eigenfrequencies_hz
-from sims.cracked.respond import respond
+from sims.cracked.respond import Response, respond
 from sims.machine import Machine
 from sims.machine.operation import Operation
 from sims.measure.chain import MeasurementChain
@@ -23,6 +23,7 @@ from sims.measure.motion import Motion
 from sims.measure.truth import plain
 from sims.mesh import friction_over_mesh
 
+ANGLES = ("driver angle", "driven angle")
 POINTS_PER_CYCLE = 6
 """Of the fastest resonance in path and sensor, in the motion handed to the measurement chain."""
 LEAST_MOTION_HZ = 80_000.0
@@ -43,7 +44,35 @@ def simulate_machine(
     step_s: float | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Recording:
-    """Simulate the sixteen coordinates and measure them.
+    """Simulate the sixteen coordinates and measure them; see `simulate_with_motion`."""
+    recording, _ = simulate_with_motion(
+        machine,
+        operation,
+        rng=rng,
+        sampling_rate_hz=sampling_rate_hz,
+        duration_s=duration_s,
+        rig=rig,
+        truth=truth,
+        step_s=step_s,
+        on_progress=on_progress,
+    )
+    return recording
+
+
+def simulate_with_motion(
+    machine: Machine,
+    operation: Operation,
+    *,
+    rng: np.random.Generator,
+    sampling_rate_hz: float,
+    duration_s: float,
+    rig: Rig | None = None,
+    truth: Mapping[str, Any] | None = None,
+    step_s: float | None = None,
+    also: Sequence[str] = (),
+    on_progress: Callable[[float], None] | None = None,
+) -> tuple[Recording, Response]:
+    """Simulate the sixteen coordinates and measure them; return the recording and the motion behind it.
 
     Parameters
     ----------
@@ -57,17 +86,21 @@ def simulate_machine(
     rig : Rig or None
         Goes with the recording.
     truth : mapping or None
-        What was asked for; "machine" and "model" are added.
+        What was asked for; "machine" and "solver" are added.
     step_s : float or None
         Longest step; None: `sims.cracked.linear.default_step_s`. It is shortened to a whole part of the sampling
         interval.
+    also : sequence of str
+        Signals of `sims.cracked.layout.SIGNALS` wanted in the motion besides those that are measured.
     on_progress : callable or None
         Called now and then with the part of the motion that is done, 0 to 1.
 
     Returns
     -------
-    Recording
+    recording : Recording
         With notes of the model as warnings: where a formula is used outside its range.
+    motion : Response
+        Lead-in included: it begins before time 0.
     """
     positive(duration_s, "duration_s", "s")
     rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
@@ -75,26 +108,26 @@ def simulate_machine(
     longest = default_step_s(machine, operation) if step_s is None else positive(step_s, "step_s", "s")
     wanted_hz = motion_rate_hz(chain)
     per_sample = ceil(max(1.0 / longest, wanted_hz) / rate - 1e-9)
-    stride = max(floor(rate * per_sample / wanted_hz + 1e-9), 1)
     lead = lead_in_s(machine, chain)
     machine_rng, chain_rng = rng.spawn(2)
     positions = used_positions(chain)
+    measured = (*ANGLES, *(f"{name} acceleration" for name in positions))
     response = respond(
         machine,
         operation,
         duration_s=chain.simulated_s(duration_s, lead) + 4.0 / rate,
         rng=machine_rng,
-        signals=("driver angle", "driven angle", *(f"{name} acceleration" for name in positions)),
+        signals=tuple(dict.fromkeys((*measured, *also))),
         start_s=-lead,
         step_s=1.0 / (rate * per_sample),
-        stride=stride,
+        stride=max(floor(rate * per_sample / wanted_hz + 1e-9), 1),
         on_progress=on_progress,
     )
     motion = Motion(
         response.interval_s,
         positions,
         np.column_stack([response[f"{name} acceleration"] for name in positions]),
-        dict(zip(machine.shaft_names, (response["driver angle"], response["driven angle"]), strict=True)),
+        dict(zip(machine.shaft_names, (response[name] for name in ANGLES), strict=True)),
     )
     known = {
         "machine": plain(replace(machine, chain=None)),  # type: ignore[arg-type]  # the chain stands under "measurement"
@@ -113,7 +146,7 @@ def simulate_machine(
         source="simulation: cracked 16-DOF spur pair",
         reader="sims.cracked",
     )
-    return replace(recording, warnings=(*recording.warnings, *model_notes(machine, operation)))
+    return replace(recording, warnings=(*recording.warnings, *model_notes(machine, operation))), response
 
 
 def lead_in_s(machine: Machine, chain: MeasurementChain) -> float:

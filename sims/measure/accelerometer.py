@@ -70,7 +70,8 @@ class Accelerometer:
         if self.resonance_hz is not None:
             x = apply(low_pass(self.resonance_hz, self.damping_ratio, step_s), x)
         if self.lower_limit_hz > 0:
-            x = apply(high_pass(self.lower_limit_hz, step_s), x)
+            # The coupling has long settled on the mean, not on a first value that may be the middle of a blow.
+            x = apply(high_pass(self.lower_limit_hz, step_s), np.concatenate(([np.mean(x)], x)))[1:]
         return x
 
     def read(self, acceleration_mps2: FloatArray, time_s: FloatArray, rng: np.random.Generator) -> FloatArray:

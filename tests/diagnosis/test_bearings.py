@@ -69,7 +69,7 @@ def test_more_than_two_parts_at_once_are_a_suspicion() -> None:
 def test_impacts_at_the_cages_order_are_at_most_a_suspicion() -> None:
     cage = RIG.bearings[0].orders()["FTF"]
     found = finding(analyze(with_impacts(steady(), 22.0 * cage)), "bearing-cage")
-    assert found.kind is Kind.SUSPICION
+    assert found.kind in (Kind.NOTICE, Kind.SUSPICION)
     assert found.confidence <= 0.5
     assert any("Belts" in text for text in found.evidence)
 

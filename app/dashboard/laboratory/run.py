@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from math import ceil, floor
 
 import numpy as np
 
@@ -14,12 +13,10 @@ from gearsig.checks import FloatArray
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 from sims.cracked.build import build_rig
-from sims.cracked.linear import default_step_s
-from sims.cracked.respond import Response, respond
-from sims.cracked.simulate import lead_in_s, model_notes, motion_rate_hz, used_positions
+from sims.cracked.respond import Response
+from sims.cracked.simulate import simulate_with_motion
 from sims.machine import Machine
 from sims.machine.operation import Operation
-from sims.measure import Motion
 
 MOTION = (
     "driver angle",
@@ -93,48 +90,17 @@ def run_setup(setup: Setup) -> Run:
         preset_name=setup.preset,
         sampling_rate_hz=setup.sampling_rate_hz,
     )
-    machine = ready.machine
-    lead, places = lead_in_s(machine, machine.chain), used_positions(machine.chain)
-    machine_rng, chain_rng = rng.spawn(2)
-    response = _respond(setup, machine, operation, machine_rng, lead, places)
-    recording = machine.chain.record(
-        _motion(machine, response, places),
-        rng=chain_rng,
-        rig=build_rig(machine, operation, name=f"simulated: {setup.preset}"),
-        duration_s=setup.duration_s,
-        lead_in_s=lead,
-        truth=ready.truth(),
-    )
-    notes = (*recording.warnings, *model_notes(machine, operation))
-    return Run(setup, machine, replace(recording, warnings=notes), _shown_part(response, setup.duration_s))
-
-
-def _respond(
-    setup: Setup,
-    machine: Machine,
-    operation: Operation,
-    rng: np.random.Generator,
-    lead_s: float,
-    places: Sequence[str],
-) -> Response:
-    rate, wanted_hz = setup.sampling_rate_hz, motion_rate_hz(machine.chain)
-    per_sample = ceil(max(1.0 / default_step_s(machine, operation), wanted_hz) / rate - 1e-9)
-    return respond(
-        machine,
+    recording, response = simulate_with_motion(
+        ready.machine,
         operation,
-        duration_s=machine.chain.simulated_s(setup.duration_s, lead_s) + 4.0 / rate,
         rng=rng,
-        signals=(*MOTION, *(f"{place} acceleration" for place in places)),
-        start_s=-lead_s,
-        step_s=1.0 / (rate * per_sample),
-        stride=max(floor(rate * per_sample / wanted_hz + 1e-9), 1),
+        sampling_rate_hz=setup.sampling_rate_hz,
+        duration_s=setup.duration_s,
+        rig=build_rig(ready.machine, operation, name=f"simulated: {setup.preset}"),
+        truth=ready.truth(),
+        also=MOTION,
     )
-
-
-def _motion(machine: Machine, response: Response, places: tuple[str, ...]) -> Motion:
-    angles = (response["driver angle"], response["driven angle"])
-    accelerations = np.column_stack([response[f"{place} acceleration"] for place in places])
-    return Motion(response.interval_s, places, accelerations, dict(zip(machine.shaft_names, angles, strict=True)))
+    return Run(setup, ready.machine, recording, _shown_part(response, setup.duration_s))
 
 
 def _shown_part(response: Response, duration_s: float) -> Response:

@@ -22,6 +22,7 @@ from gearsig.diagnosis.detectors.impact_trains import slower_train
 from gearsig.diagnosis.envelopes import BandEnvelope
 from gearsig.diagnosis.signals import Signals
 from gearsig.diagnosis.types import Finding, Kind, Strength, Where
+from gearsig.rig.orders import hunting_tooth_order
 
 MOST_PARTS = 2
 """Parts that may be damaged at once; families at more orders than that have another cause more likely."""
@@ -35,6 +36,10 @@ BEYOND_SLIP = 0.5
 
 SHARED_BY_OTHERS = 0.5
 """Factor where impacts of another machine, a belt or an unknown shaft explain the lines as well as the part does."""
+
+
+WORTH_A_SUSPICION = 0.3
+"""Below this confidence a family at a part's order is worth a notice: other causes are more likely together."""
 
 
 def detect_bearings(signals: Signals, envelopes: list[BandEnvelope]) -> list[Finding]:
@@ -62,13 +67,13 @@ def _named_finding(signals: Signals, candidate: Candidate, n_parts: int) -> Find
     confidence = _confidence(signals, candidate, n_parts)
     certain = not _is_shared(candidate, n_parts) and not _is_beyond_slip(signals, candidate)
     clear = certain and candidate.modulation >= CLEAR_MODULATION and confidence >= 0.75
-    place = f"the {part} of bearing {bearing.name} on shaft {bearing.shaft}"
+    place = f"the {part} of {_names(candidate)}"
     title = f"{'Damage' if clear else 'Perhaps damage'} at {place}."
     if _is_beyond_slip(signals, candidate):
         title = f"May be {place}: the speed is stated and not confirmed."
     return Finding(
         "bearing-" + part.replace(" ", "-"),
-        Kind.FAULT if clear else Kind.SUSPICION,
+        _kind(clear, confidence),
         title,
         _where(signals, candidate),
         _strength(candidate),
@@ -80,17 +85,38 @@ def _named_finding(signals: Signals, candidate: Candidate, n_parts: int) -> Find
     )
 
 
+def _kind(clear: bool, confidence: float) -> Kind:
+    if clear:
+        return Kind.FAULT
+    return Kind.SUSPICION if confidence >= WORTH_A_SUSPICION else Kind.NOTICE
+
+
+def _names(candidate: Candidate) -> str:
+    """Name the bearing, and those that cannot be told from it."""
+    bearings = [b for b in (candidate.bearing, *candidate.twins) if b is not None]
+    if len({b.shaft for b in bearings}) == 1:
+        return f"{_bearing(' or '.join(b.name for b in bearings))} on shaft {bearings[0].shaft}"
+    return _bearing(" or ".join(f"{b.name} on shaft {b.shaft}" for b in bearings))
+
+
+def _bearing(name: str) -> str:
+    return name if name.lower().startswith("bearing") else f"bearing {name}"
+
+
 def _named_evidence(signals: Signals, candidate: Candidate, n_parts: int) -> tuple[str, ...]:
     slip = candidate.comb.fundamental / candidate.expected - 1
     evidence = [
         f"{_family_text(candidate)}, {100 * slip:+.2f} % from the kinematic order {candidate.expected:.4f}.",
         _modulation_text(candidate),
+        *(["Bearings of the same orders cannot be told apart by their envelope."] if candidate.twins else []),
         *(f"Within its slip, the {rival} would show at the same order." for rival in candidate.rivals),
     ]
     if speed_is_only_stated(signals):
         evidence.append("The speed is a stated one that no line of a shaft or mesh confirms.")
     if candidate.name == "FTF":
         evidence.append("Belts and other machines at the same rate look the same: lines at the cage's order alone.")
+    if _is_among_hunting_lines(signals, candidate):
+        evidence.append("A multiple of a hunting-tooth order is there too: teeth that differ from each other do it.")
     if n_parts > MOST_PARTS:
         evidence.append(f"{n_parts} parts show at once, which a single other source of impacts explains as well.")
     return tuple(evidence)
@@ -102,6 +128,8 @@ def _confidence(signals: Signals, candidate: Candidate, n_parts: int) -> float:
         confidence *= WITH_ASSUMED_DATA
     if _is_shared(candidate, n_parts):
         confidence *= SHARED_BY_OTHERS
+    if _is_among_hunting_lines(signals, candidate):
+        confidence *= SHARED_BY_OTHERS
     if speed_is_only_stated(signals):
         confidence *= BEYOND_SLIP if _is_beyond_slip(signals, candidate) else WITH_STATED_SPEED
     return confidence
@@ -110,6 +138,19 @@ def _confidence(signals: Signals, candidate: Candidate, n_parts: int) -> float:
 def _is_shared(candidate: Candidate, n_parts: int) -> bool:
     """Whether other causes explain the lines as well: at a cage's order, or at the orders of several parts."""
     return candidate.name == "FTF" or n_parts > MOST_PARTS
+
+
+def _is_among_hunting_lines(signals: Signals, candidate: Candidate) -> bool:
+    """Whether a cage's order is no further from a multiple of a hunting-tooth order than a line is wide.
+
+    Teeth that differ meet in turn, and modulate the mesh at multiples of that order: in a short record they are dense.
+    """
+    if candidate.name != "FTF":
+        return False
+    width = 2.0 * candidate.envelope.excess.spectrum.resolution
+    hunting = [o for p in signals.rig.pairs if (o := hunting_tooth_order(signals.rig, p)) is not None]
+    own = candidate.comb.fundamental
+    return any(abs(own - round(own / order) * order) <= width for order in hunting)
 
 
 def _is_beyond_slip(signals: Signals, candidate: Candidate) -> bool:

@@ -31,6 +31,9 @@ TYPICAL_UNCONFIRMED_SLIP = 0.02
 RARE = 0.3
 """Prior weight of rolling elements and cages against races, which are damaged far more often."""
 
+SAME_ORDER = 1e-3
+"""Relative distance below which two bearings' orders are the same for any record: slip alone scatters more."""
+
 MINIMUM_LINES = 3
 """Lines of a family over 6 dB that must be there: two may coincide by chance with the harmonics of something else."""
 
@@ -40,7 +43,11 @@ MOST_TRAINS = 3
 
 @dataclass(frozen=True)
 class Candidate:
-    """One family found, and what it may be; `share` is the named part's among all that would show at that order."""
+    """One family found, and what it may be.
+
+    `twins` are other bearings whose same part has the very same order: no envelope tells them apart. `share` is the
+    part's, twins included, among all that would show at that order.
+    """
 
     comb: Comb
     envelope: BandEnvelope
@@ -49,6 +56,7 @@ class Candidate:
     name: str = ""
     expected: float = 0.0
     rivals: tuple[str, ...] = ()
+    twins: tuple[Bearing, ...] = ()
     share: float = 1.0
     in_train: bool = False
 
@@ -236,15 +244,20 @@ def _weight(signals: Signals, name: str, slip: float) -> float:
 def _with_rivals(signals: Signals, candidate: Candidate) -> Candidate:
     """Note the other parts whose order is so near, or half or twice, that slip alone could make it this one."""
     own = _weight(signals, candidate.name, candidate.comb.fundamental / candidate.expected - 1)
-    others, rivals = 0.0, []
-    for bearing, name, order in expected_parts(signals):
+    parts = expected_parts(signals)
+    order_of_part = next(o for b, name, o in parts if (b, name) == (candidate.bearing, candidate.name))
+    others, rivals, twins = 0.0, [], []
+    for bearing, name, order in parts:
         if (bearing, name) == (candidate.bearing, candidate.name):
+            continue
+        if name == candidate.name and abs(order / order_of_part - 1) < SAME_ORDER:
+            twins.append(bearing)
             continue
         slip = min((candidate.comb.fundamental / (order * m) - 1 for m in (0.5, 1.0, 2.0)), key=abs)
         if abs(slip) <= slip_of(signals):
             others += _weight(signals, name, slip)
             rivals.append(f"{PARTS[name][0]} of {bearing.name}")
-    return replace(candidate, rivals=tuple(rivals), share=own / (own + others))
+    return replace(candidate, rivals=tuple(rivals), twins=tuple(twins), share=own / (own + others))
 
 
 def _known_multiple(signals: Signals, candidate: Candidate) -> Candidate | None:
