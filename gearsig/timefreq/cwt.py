@@ -1,0 +1,192 @@
+"""Continuous wavelet transform over time or shaft angle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearsig.checks import FloatArray, count, one_of
+from gearsig.errors import InputError
+from gearsig.timefreq.bank import Edges, pieces, plan_groups
+from gearsig.timefreq.columns import ColumnPowers, Form, plan_columns
+from gearsig.timefreq.lines import given_lines, logarithmic_lines
+from gearsig.timefreq.types import Coefficients, Reduction, Spacing, TimeFrequencyMap
+from gearsig.timefreq.uniform import Source, UniformSignal, uniform
+from gearsig.timefreq.wavelets import DEFAULT, Wavelet, admissibility, half_support
+
+EDGES = ("reflect", "zero")
+MOST_COEFFICIENTS = 1 << 28
+"""Complex coefficients that are held at once: 2 GB."""
+
+
+def cwt(
+    signal: Source,
+    channel: str | None = None,
+    *,
+    wavelet: Wavelet = DEFAULT,
+    positions: FloatArray | None = None,
+    lowest: float | None = None,
+    highest: float | None = None,
+    n_per_octave: int = 16,
+    step: int = 1,
+    edges: Edges = "reflect",
+) -> Coefficients:
+    """Return the complex wavelet coefficients of every `step`-th sample.
+
+    W(f, t) = (1/2π) ∫ X(ω) Ψ(ω / 2πf) e^{iωt} dω with max Ψ = 2, so that |W| of a unit sine is 1 on its line.
+
+    Parameters
+    ----------
+    signal : Recording, AngleSignal or UniformSignal
+        Over time, lines are frequencies; over angle, orders.
+    channel : str or None
+    wavelet : Morse or Morlet
+    positions : array or None
+        Lines in Hz or orders; None: `lowest` to `highest` at `n_per_octave` per octave.
+    lowest, highest : float or None
+        In Hz or orders; see `logarithmic_lines`.
+    step : int
+        Samples between columns; the columns are exact, not averaged.
+    edges : str
+        What is assumed beyond the ends: "reflect" or "zero".
+
+    Returns
+    -------
+    Coefficients
+        complex64, peak amplitude in the channel's unit. Error about 1e-6 of the largest coefficient of a line.
+
+    Raises
+    ------
+    InputError
+        On values that are not finite, lines beyond half the sampling rate, or more than 2 GB of coefficients.
+    RefusalError
+        If the signal is shorter than the wavelet at the lowest line.
+
+    Notes
+    -----
+    Not for looking at: `cwt_map` gives the same over a long recording in little memory.
+
+    Source: S. Mallat, *A Wavelet Tour of Signal Processing*, 3rd ed. (2009), chapter 4.
+    """
+    x = uniform(signal, channel)
+    lines, spacing = chosen_lines(x, wavelet, positions, lowest, highest, n_per_octave)
+    one_of(edges, "edges", EDGES)
+    n_columns = -(-x.n_samples // count(step, "step"))
+    check_size(len(lines), n_columns)
+    W = np.empty((len(lines), n_columns), dtype=np.complex64)
+    own = largest_power_of_two_in(step)
+    for group in plan_groups(lines / x.rate, wavelet, x.n_samples, step=own):
+        for piece in pieces(x.values, group, edges):
+            column = -(-piece.start // step)
+            thinned = piece.values[:, (column * step - piece.start) // own :: step // own]
+            W[piece.lines, column : column + thinned.shape[1]] = thinned
+    return Coefficients(
+        W,
+        lines,
+        x.instants(step),
+        x.axis,
+        spacing,
+        x.unit,
+        f"CWT, {wavelet.name}",
+        inverse_weights(lines, wavelet),
+        n_reach(lines, wavelet),
+        source=x.source,
+        shaft=x.shaft,
+    )
+
+
+def cwt_map(
+    signal: Source,
+    channel: str | None = None,
+    *,
+    wavelet: Wavelet = DEFAULT,
+    positions: FloatArray | None = None,
+    lowest: float | None = None,
+    highest: float | None = None,
+    n_per_octave: int = 16,
+    n_columns: int = 1000,
+    reduction: Reduction = "mean",
+    scaling: str = "amplitude peak",
+    edges: Edges = "reflect",
+) -> TimeFrequencyMap:
+    """Return levels of the wavelet transform in `n_columns` stretches, never holding the whole matrix.
+
+    Parameters
+    ----------
+    signal, channel, wavelet, positions, lowest, highest, n_per_octave, edges
+        As in `cwt`.
+    n_columns : int
+        Most columns; each stretch has a whole number of samples, the last may be shorter.
+    reduction : str
+        "mean" of the power in each stretch, or "max": short impacts keep their height.
+    scaling : str
+        "amplitude peak" or "power".
+
+    Returns
+    -------
+    TimeFrequencyMap
+        A low line is read as often as its bandwidth asks, not at every sample; its maximum may read 1 % low.
+
+    Raises
+    ------
+    InputError, RefusalError
+        As in `cwt`.
+    """
+    x = uniform(signal, channel)
+    lines, spacing = chosen_lines(x, wavelet, positions, lowest, highest, n_per_octave)
+    one_of(edges, "edges", EDGES)
+    columns = plan_columns(x, n_columns)
+    powers = ColumnPowers(columns, len(lines), reduction)
+    for group in plan_groups(lines / x.rate, wavelet, x.n_samples, step=columns.largest_step, follow_band=True):
+        for piece in pieces(x.values, group, edges):
+            powers.add(piece.lines, piece.start, piece.step, piece.values)
+    edge = half_support(wavelet) / 2 / lines  # half of the support carries all but a thousandth
+    form = Form(lines, spacing, f"CWT, {wavelet.name}", edge, n_reach(lines, wavelet))
+    return powers.finished(x, form, scaling)
+
+
+def chosen_lines(
+    x: UniformSignal,
+    wavelet: Wavelet,
+    positions: FloatArray | None,
+    lowest: float | None,
+    highest: float | None,
+    n_per_octave: int,
+) -> tuple[FloatArray, Spacing]:
+    """Return the asked lines and how they are spaced."""
+    if positions is None:
+        return logarithmic_lines(x, wavelet, lowest, highest, n_per_octave), "logarithmic"
+    if lowest is not None or highest is not None:
+        raise InputError("both positions and a range are given", where="positions", remedy="give one of them")
+    lines = given_lines(positions, x, wavelet)
+    even = len(lines) < 3 or bool(np.ptp(np.diff(lines)) < 1e-6 * (lines[1] - lines[0]))
+    return lines, "linear" if even else "logarithmic"
+
+
+def n_reach(lines: FloatArray, wavelet: Wavelet) -> int:
+    """Return how many lines from its middle a component falls to e⁻² of its power, at the middle line."""
+    middle = len(lines) // 2
+    reach = lines[middle] * (1.0 + np.sqrt(2.0) / wavelet.duration)
+    return max(1, int(np.searchsorted(lines, reach)) - middle)
+
+
+def inverse_weights(lines: FloatArray, wavelet: Wavelet) -> FloatArray:
+    """Return 2 Δ(ln f) / C of each line: the weighted sum of the coefficients is the analytic signal."""
+    if len(lines) < 2:
+        return np.ones(len(lines))
+    return 2.0 * np.gradient(np.log(lines)) / admissibility(wavelet)
+
+
+def check_size(n_lines: int, n_columns: int) -> None:
+    """Raise if the coefficients would take more than 2 GB."""
+    if n_lines * n_columns > MOST_COEFFICIENTS:
+        raise InputError(
+            f"{n_lines} lines × {n_columns} columns make {8e-9 * n_lines * n_columns:.3g} GB of coefficients",
+            where="step",
+            allowed=f"at most {8e-9 * MOST_COEFFICIENTS:.2g} GB",
+            remedy=f"set step to {-(-n_lines * n_columns // MOST_COEFFICIENTS)} times as much, or take the map",
+        )
+
+
+def largest_power_of_two_in(step: int) -> int:
+    """Return the largest power of two, up to 1024, that divides `step`."""
+    return min(step & -step, 1024)
