@@ -8,8 +8,16 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 
-SETTLING_PERIODS = 3.0
-"""Periods of the low cut that either end needs: what lies nearer to an end is disturbed by what is not known beyond."""
+FADE_PERIODS, SETTLING_PERIODS = 2.0, 5.0
+"""Periods of the low cut over which either end is faded, and after which the result has settled."""
+
+FADE_SAMPLES, SETTLING_SAMPLES = 64, 256
+"""The same where there is no low cut."""
+
+
+def n_unsettled(sampling_rate_hz: float, low_cut_hz: float) -> int:
+    """Return how many samples at either end of an integrated signal rest on what is not known beyond it."""
+    return ceil(SETTLING_PERIODS * sampling_rate_hz / low_cut_hz) if low_cut_hz > 0.0 else SETTLING_SAMPLES
 
 
 def integrate_band(
@@ -17,14 +25,15 @@ def integrate_band(
 ) -> FloatArray:
     """Return the signal integrated `n_times` (negative: differentiated) within a band.
 
-    Y(f) = X(f) W(f) / (2πi f)ⁿ, with W = 1 from `low` to `high`, rising smoothly from zero at low/2 and falling to zero
-    half way between `high` and half the sampling rate. No phase is added. Both ends are continued by their point
-    reflection.
+    Y(f) = X(f) W(f) / (2πi f)ⁿ, with W = 1 from `low` to `high`, rising smoothly from zero at low/4 and falling to zero
+    half way between `high` and half the sampling rate. No phase is added. Both ends are faded first: an abrupt end
+    would put slow parts into the signal, which integration magnifies. Before that the mean is taken off, or, without a
+    low cut, the straight line between both ends, which is put back afterwards.
 
     Parameters
     ----------
     values : array, (n_samples,)
-        Finite; float64.
+        Finite; float64; longer than twice `n_unsettled`.
     sampling_rate_hz : float
     n_times : int
         -2 to 2.
@@ -34,7 +43,8 @@ def integrate_band(
     Returns
     -------
     array, (n_samples,)
-        Within 3/low of either end the result is disturbed; the caller leaves that out.
+        Within `n_unsettled` samples of either end the result is disturbed; the caller leaves that out. Beyond, the error
+        is below 5e-4 of the amplitude of displacement for a line anywhere between the low cut and 75 times it.
 
     Notes
     -----
@@ -42,24 +52,38 @@ def integrate_band(
     """
     from scipy import fft
 
-    n = len(values)
-    low, high = band_hz
-    n_pad = min(n - 1, ceil(SETTLING_PERIODS * sampling_rate_hz / low)) if low > 0.0 else min(n - 1, 64)
-    x = np.concatenate(
-        [2.0 * values[0] - values[n_pad:0:-1], values, 2.0 * values[-1] - values[-2 : -2 - n_pad : -1]],
-    )
-    n_fft = fft.next_fast_len(len(x), real=True)
-    lines = fft.rfft(x, n_fft, overwrite_x=True)
+    n, (low, high) = len(values), band_hz
+    line = np.zeros(2) if low > 0.0 else _line(values, sampling_rate_hz)
+    n_fade = ceil(FADE_PERIODS * sampling_rate_hz / low) if low > 0.0 else FADE_SAMPLES
+    time = np.arange(n) / sampling_rate_hz
+    x = _faded(values - (values.mean() if low > 0.0 else line[0] + line[1] * time), n_fade)
+    n_fft = fft.next_fast_len(n + n_unsettled(sampling_rate_hz, low), real=True)
+    lines = fft.rfft(x, n_fft)
     lines *= _gain(np.arange(len(lines)) * (sampling_rate_hz / n_fft), sampling_rate_hz, n_times, low, high)
-    y: FloatArray = fft.irfft(lines, n_fft, overwrite_x=True)[n_pad : n_pad + n]
-    return y
+    y: FloatArray = fft.irfft(lines, n_fft, overwrite_x=True)[:n]
+    if n_times == 0 and low == 0.0:
+        y = y + line[0] + line[1] * time
+    return y + line[1] if n_times == -1 else y
+
+
+def _line(values: FloatArray, rate: float) -> FloatArray:
+    """Offset and slope per second of the line through the first and the last sample."""
+    return np.array([values[0], (values[-1] - values[0]) * rate / (len(values) - 1)])
+
+
+def _faded(x: FloatArray, n_fade: int) -> FloatArray:
+    """Return x, which is overwritten, with both ends brought to zero."""
+    ramp = _smooth_step((np.arange(n_fade) + 0.5) / n_fade)
+    x[:n_fade] *= ramp
+    x[-n_fade:] *= ramp[::-1]
+    return x
 
 
 def _gain(f: FloatArray, rate: float, n_times: int, low: float, high: float) -> np.ndarray:
     """W(f) / (2πi f)ⁿ on the lines of the transform."""
     weight = np.ones(len(f))
     if low > 0.0:
-        weight *= _smooth_step((f - 0.5 * low) / (0.5 * low))
+        weight *= _smooth_step((f - 0.25 * low) / (0.75 * low))
     stop = 0.5 * (high + 0.5 * rate)
     if stop > high:
         weight *= _smooth_step((stop - f) / (stop - high))

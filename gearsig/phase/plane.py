@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import ceil
 from typing import Literal
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from gearsig.checks import FloatArray, one_of, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.phase.checked_series import checked_series
-from gearsig.phase.integration import SETTLING_PERIODS, integrate_band
+from gearsig.phase.integration import SETTLING_PERIODS, integrate_band, n_unsettled
 from gearsig.phase.types import PhasePortrait
 from gearsig.recording.types import Recording
 
@@ -44,7 +43,7 @@ def phase_plane(
     recording : Recording
     channel : str
     low_cut_hz : float or None
-        Lowest frequency kept in full; half of it and less is gone. Needed for acceleration and velocity: integration
+        Lowest frequency kept in full; a quarter of it and less is gone. Needed for acceleration and velocity: integration
         magnifies whatever is slow. None for a displacement keeps everything slow, the mean included.
     high_cut_hz : float or None
         Highest frequency kept in full; None: 0.4 of the sampling rate.
@@ -54,9 +53,9 @@ def phase_plane(
     Returns
     -------
     PhasePortrait
-        Axes displacement (m where the unit is known) and velocity. Starts 3/low_cut after the recording's start and
-        ends as much before its end, as the integral near the ends rests on what is not known; with a low cut at least
-        a factor 2 below the lowest line of the signal, the error is below 1e-3 of the amplitude there.
+        Axes displacement (m where the unit is known) and velocity. Starts 5/low_cut after the recording's start and
+        ends as much before its end (256 samples without a low cut), as the integral near the ends rests on what is not
+        known; the error is below 5e-4 of the amplitude of displacement.
 
     Raises
     ------
@@ -102,7 +101,7 @@ def phase_plane_of(
     n_times = _integrations(quantity, source)
     x = checked_series(values, minimum=16)
     low, high = _band(low_cut_hz, high_cut_hz, rate, n_times)
-    n_lost = ceil(SETTLING_PERIODS * rate / low) if low > 0.0 else 0
+    n_lost = n_unsettled(rate, low)
     _check_length(len(x), n_lost, low, rate)
     factor, length_unit = _length_unit(unit, n_times)
     kept = slice(n_lost, len(x) - n_lost)
@@ -145,6 +144,8 @@ def _band(low_cut_hz: float | None, high_cut_hz: float | None, rate: float, n_ti
 
 
 def _check_length(n: int, n_lost: int, low: float, rate: float) -> None:
+    if low == 0.0 and n < 4 * n_lost:
+        raise InputError(f"values has {n} sample(s)", allowed=f"at least {4 * n_lost}", remedy="record longer")
     if low > 0.0 and n - 2 * n_lost < LEAST_PERIODS * rate / low:
         need = (2 * SETTLING_PERIODS + LEAST_PERIODS) / low
         raise RefusalError(

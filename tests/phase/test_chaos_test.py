@@ -1,0 +1,94 @@
+"""The 0–1 test on maps, sections and signals."""
+
+import numpy as np
+import pytest
+
+from gearsig.errors import InputError, RefusalError
+from gearsig.phase.chaos_test import mean_square_displacement, zero_one_test, zero_one_test_of_section
+from gearsig.phase.lock import constant_period_lock
+from gearsig.phase.section import locked_section
+from gearsig.phase.types import PhasePortrait
+from tests.phase.systems import DUFFING_PERIOD_S, duffing, henon, logistic, lorenz, quasi_periodic, rossler
+
+
+def test_displacement_by_correlation_equals_the_definition():
+    phi, c, n_cut = logistic(400), 1.234, 40
+    j = np.arange(1, len(phi) + 1)
+    z = np.cumsum(phi * np.exp(1j * c * j))
+    base = len(phi) - n_cut
+    wanted = [np.mean(np.abs(z[n : n + base] - z[:base]) ** 2) for n in range(1, n_cut + 1)]
+    np.testing.assert_allclose(mean_square_displacement(phi, c, n_cut), wanted, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("values", "verdict"),
+    [
+        (logistic(3000, 4.0), "irregular"),
+        (logistic(3000, 3.97), "irregular"),  # the value the test's authors use
+        (logistic(3000, 3.55), "regular"),
+        (henon(3000), "irregular"),
+        (quasi_periodic(3000, period=4.7), "regular"),
+        (np.random.default_rng(0).normal(size=3000), "irregular"),  # noise too, as stated
+    ],
+    ids=["logistic 4", "logistic 3.97", "logistic 3.55", "henon", "quasi-periodic", "noise"],
+)
+def test_maps_and_sampled_motion(values, verdict):
+    found = zero_one_test(values)
+    assert found.verdict == verdict
+    assert abs(found.k - (verdict == "irregular")) < 0.05
+
+
+def test_transition_of_the_logistic_map_follows_its_exponent():
+    """K and the sign of the exact exponent (mean of ln|r(1 - 2x)|) agree outside the weakly chaotic band."""
+    for r in np.linspace(3.5, 4.0, 26):
+        x = logistic(5000, r)
+        exponent = float(np.mean(np.log(np.abs(r * (1 - 2 * x)) + 1e-300)))
+        if abs(exponent) > 0.15:
+            assert zero_one_test(x).k == pytest.approx(float(exponent > 0), abs=0.15), r
+
+
+@pytest.mark.parametrize(("force", "verdict"), [(0.2, "regular"), (0.28, "regular"), (0.5, "irregular")])
+def test_sections_of_a_forced_oscillator(force, verdict):
+    states = duffing(force, 1500)
+    path = PhasePortrait(states, 64 / DUFFING_PERIOD_S, ("x", "v"), ("m", "m/s"), "states", "duffing")
+    section = locked_section(path, constant_period_lock(DUFFING_PERIOD_S, path.end_s))
+    assert zero_one_test_of_section(section).verdict == verdict
+
+
+def test_a_fine_sampled_signal_is_flagged_and_thinned():
+    x = lorenz(20_000, 0.02)[:, 0]
+    fine = zero_one_test(x)
+    assert fine.oversampled
+    assert fine.k < 0.2
+    thinned = zero_one_test(x, every=None)
+    assert not thinned.oversampled
+    assert thinned.k > 0.95
+    assert zero_one_test(rossler(20_000, 0.15)[:, 0], every=None).k > 0.7
+
+
+def test_damping_keeps_noise_on_regular_motion_from_being_read_as_chaos():
+    clean = quasi_periodic(20_000, period=4.7)[:3000]
+    noisy = clean + 0.1 * np.random.default_rng(1).normal(size=3000)
+    plain, damped = zero_one_test(noisy).k, zero_one_test(noisy, damping=2.5).k
+    assert damped < plain
+    assert damped < 0.4
+    assert zero_one_test(logistic(3000), damping=2.5).k > 0.95
+
+
+def test_offset_scale_float32_and_odd_length_do_not_matter():
+    x = henon(3001)
+    k = [zero_one_test(v).k for v in (x, 1e6 * x - 3e6, x.astype(np.float32), x[:-1])]
+    np.testing.assert_allclose(k, k[0], atol=2e-3)
+
+
+def test_bad_input():
+    with pytest.raises(InputError, match="199 sample"):
+        zero_one_test(np.arange(199.0))
+    with pytest.raises(InputError, match="100 values are left"):
+        zero_one_test(henon(1000), every=10)
+    with pytest.raises(RefusalError, match="constant"):
+        zero_one_test(np.ones(500))
+    with pytest.raises(InputError, match="NaN"):
+        zero_one_test(np.where(np.arange(500) == 3, np.nan, 1.0))
+    with pytest.raises(InputError, match="damping"):
+        zero_one_test(henon(500), damping=-1.0)
