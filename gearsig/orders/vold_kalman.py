@@ -38,6 +38,7 @@ def track_vold_kalman(
     n_poles: int = 2,
     generation: Generation = "second",
     coupled: bool = True,
+    mirror: bool = True,
     shaft_angle: ShaftAngle | None = None,
 ) -> OrderSeparation:
     """Return orders of a recording as waveforms and complex envelopes over time, and what is left without them.
@@ -61,6 +62,9 @@ def track_vold_kalman(
         The first has two poles and a fixed shape; take the second unless results are to be compared.
     coupled : bool
         Solve for all orders together, so that crossing and close ones share the signal between them. False: one by one.
+    mirror : bool
+        Of the second generation: count each order's mirror image at negative frequency as part of the signal, which it
+        is. False leaves it out, as most textbooks do: faster, but amplitudes near the ends are off by some percent.
     shaft_angle : ShaftAngle, optional
         Default: from the recording's speed source, as `find_shaft_angle`. Not needed for frequency tracks alone.
 
@@ -99,7 +103,7 @@ def track_vold_kalman(
     tracks = tracks_of_orders(orders, angle, recording.rig, len(y), rate)
     unit = recording.channels[recording.index(channel)].unit
     widths = bandwidths_of(tracks, bandwidth_hz, bandwidth_orders)
-    return _separated(y, rate, tracks, widths, n_poles, generation, coupled, unit, channel)
+    return _separated(y, rate, tracks, widths, n_poles, generation, coupled, mirror, unit, channel)
 
 
 def separate_frequencies(
@@ -111,6 +115,7 @@ def separate_frequencies(
     n_poles: int = 2,
     generation: Generation = "second",
     coupled: bool = True,
+    mirror: bool = True,
 ) -> OrderSeparation:
     """Return components of a plain signal, each known by its frequency at every sample.
 
@@ -120,7 +125,7 @@ def separate_frequencies(
     sampling_rate_hz : float
     frequencies_hz : arrays, (n,)
         One per component.
-    bandwidth_hz, n_poles, generation, coupled
+    bandwidth_hz, n_poles, generation, coupled, mirror
         As in `track_vold_kalman`.
 
     Returns
@@ -136,7 +141,7 @@ def separate_frequencies(
     given = [FrequencyTrack(f"component {k}", f) for k, f in enumerate(frequencies_hz, start=1)]
     tracks = tracks_of_orders(given, None, None, len(y), rate)
     widths = bandwidths_of(tracks, bandwidth_hz, None)
-    return _separated(y, rate, tracks, widths, n_poles, generation, coupled, "", "")
+    return _separated(y, rate, tracks, widths, n_poles, generation, coupled, mirror, "", "")
 
 
 def _separated(
@@ -147,6 +152,7 @@ def _separated(
     n_poles: int,
     generation: Generation,
     coupled: bool,
+    mirror: bool,
     unit: str,
     source: str,
 ) -> OrderSeparation:
@@ -155,12 +161,12 @@ def _separated(
     p = checked_poles(n_poles) if generation == "second" else 2
     if len(y) < FEWEST_SAMPLES:
         raise InputError(f"the signal has {len(y)} samples", allowed=f"at least {FEWEST_SAMPLES}")
-    valid = valid_parts(tracks, widths, rate)
+    valid = valid_parts(tracks, widths, rate, generation)
     check_record_length(tracks, widths, valid, rate)
     check_distinct(tracks, valid)
     used = _continued(widths, valid) / rate
     groups = [np.arange(len(valid))] if coupled else [np.array([k]) for k in range(len(valid))]
-    envelopes, waveforms = _solved(y, tracks.cycles, valid, used, p, generation, groups)
+    envelopes, waveforms = _solved(y, tracks.cycles, valid, used, p, generation, groups, mirror)
     errors = [
         accuracy_of(used[g], p) if generation == "second" else waveform_accuracy_of(tracks.cycles[g], valid[g], used[g])
         for g in groups
@@ -201,6 +207,7 @@ def _solved(
     p: int,
     generation: Generation,
     groups: list[np.ndarray[tuple[int], np.dtype[np.intp]]],
+    mirror: bool,
 ) -> tuple[ComplexArray, FloatArray]:
     """Return envelopes (nan where not valid) and waveforms (0 there), group by group."""
     envelopes = np.empty(cycles.shape, np.complex128)
@@ -208,7 +215,7 @@ def _solved(
     for g in groups:
         active = None if valid[g].all() else valid[g]
         if generation == "second":
-            envelopes[g] = solve_envelopes(y, cycles[g], active, bandwidths[g], p)
+            envelopes[g] = solve_envelopes(y, cycles[g], active, bandwidths[g], p, mirror=mirror)
             for k in g:
                 waveforms[k] = (envelopes[k] * phasors_of(cycles[k : k + 1])[0]).real
         else:

@@ -23,12 +23,20 @@ SMALLEST_CELL = 4
 
 
 def solve_envelopes(
-    y: FloatArray, cycles: FloatArray, active: BoolArray | None, bandwidths: FloatArray, p: int
+    y: FloatArray,
+    cycles: FloatArray,
+    active: BoolArray | None,
+    bandwidths: FloatArray,
+    p: int,
+    *,
+    mirror: bool = True,
 ) -> ComplexArray:
     """Return the complex envelopes of the second generation, jointly for all orders.
 
-    Data equation y_n = Σ_k a_kn e^{2πi c_kn} + η_n, structural equation ∇^p a_kn = ε_kn, minimised as
-    Σ|η_n|² + Σ r_kn² |ε_kn|². Envelopes are 2 a_k: peak amplitudes of cosines, y ≈ Σ Re(2 a_k e^{2πi c_k}).
+    Data equation y_n = Σ_k (x_kn e^{2πi c_kn} + x_kn* e^{-2πi c_kn}) + η_n, structural equation ∇^p x_kn = ε_kn and its
+    conjugate, minimised as Σ|η_n|² + 2 Σ r_kn² |ε_kn|². Envelopes are 2 x_k: y ≈ Σ Re(2 x_k e^{2πi c_k}). Textbooks
+    leave the conjugate terms out, though the signal is real; the order's mirror image at -f then passes with the gain
+    at 2f, and with several percent near the ends.
 
     Parameters
     ----------
@@ -41,6 +49,8 @@ def solve_envelopes(
         -3 dB, in cycles per sample.
     p : int
         Poles, 1 to 3.
+    mirror : bool
+        False: without the conjugate terms, as the textbooks.
 
     Returns
     -------
@@ -62,14 +72,10 @@ def solve_envelopes(
     weights = envelope_weight(_of_rows(bandwidths, n, p), p)
     d = cell_of(bandwidths, p)
     if d:
-        a = solve_by_splines(y, cycles, active, weights, p, d)
-    else:
-        stencil = [(-1.0) ** (p - i) * comb(p, i) for i in range(p + 1)]
-        stencils = np.broadcast_to(stencil, (len(cycles), n - p, p + 1))
-        weights = np.broadcast_to(weights, (len(cycles), n - p))
-        a = _solved_sample_by_sample(y, cycles, active, weights, stencils)
-    a *= 2.0
-    return a
+        return solve_by_splines(y, cycles, active, weights, p, d, mirror=mirror)
+    weights = np.broadcast_to(weights, (len(cycles), n - p))
+    solve = _solved_with_mirror_images if mirror else _solved_as_in_textbooks
+    return solve(y, cycles, active, weights, p)
 
 
 def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None, bandwidths: FloatArray) -> FloatArray:
@@ -81,7 +87,7 @@ def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None,
     Parameters
     ----------
     y, cycles, active, bandwidths
-        As in `solve_envelopes`. Half the bandwidth lies below the frequency, also where an order is not active.
+        As in `solve_envelopes`.
 
     Returns
     -------
@@ -97,7 +103,7 @@ def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None,
     frequency = (cycles[:, 2:] - cycles[:, :-2]) / 2.0
     width = np.broadcast_to(_of_rows(bandwidths, n, 2), frequency.shape)
     # Outside the active part the order may stand still: any finite weight does there.
-    inside = np.clip(frequency, 0.6 * width, 0.5 - 0.6 * width)
+    inside = np.clip(frequency, 0.75 * width, 0.5 - 0.75 * width)
     stencils = np.ones((*frequency.shape, 3))
     stencils[:, :, 1] = -2.0 * np.cos(2.0 * np.pi * frequency)
     data = np.ones(cycles.shape) if active is None else active.astype(np.float64)
@@ -152,10 +158,27 @@ def phasors_of(cycles: FloatArray) -> ComplexArray:
     return phasors
 
 
-def _solved_sample_by_sample(
-    y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, stencils: FloatArray
+def _solved_with_mirror_images(
+    y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, p: int
 ) -> ComplexArray:
-    """One order is demodulated first: its problem is real, with a complex right-hand side."""
+    """Sample by sample, for the real coefficients u, v of cos and -sin: u + iv = 2x, with weight r/√2 each."""
+    from gearsig.orders.vold_kalman_rotations import solve_by_rotations
+
+    data = np.empty((2 * len(cycles), len(y)))
+    for k in range(len(cycles)):
+        phasor = phasors_of(cycles[k : k + 1])[0]
+        data[2 * k], data[2 * k + 1] = phasor.real, -phasor.imag
+    if active is not None:
+        data *= np.repeat(active, 2, axis=0)
+    weights = np.repeat(weights, 2, axis=0) / 2**0.5
+    x = solve_by_rotations(data, y.astype(np.float64), weights, _differences(weights, p))
+    return np.asarray(x[::2] + 1j * x[1::2], dtype=np.complex128)
+
+
+def _solved_as_in_textbooks(
+    y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, p: int
+) -> ComplexArray:
+    """Sample by sample. One order is demodulated first: its problem is real, with a complex right-hand side."""
     from gearsig.orders.vold_kalman_rotations import solve_by_rotations
 
     data: NDArray[Any] = phasors_of(cycles)
@@ -165,7 +188,14 @@ def _solved_sample_by_sample(
         data = np.ones(cycles.shape)
     if active is not None:
         data = data * active
-    return solve_by_rotations(data, observed, weights, stencils)
+    x = solve_by_rotations(data, observed, weights, _differences(weights, p))
+    return np.asarray(2.0 * x, dtype=np.complex128)
+
+
+def _differences(weights: FloatArray, p: int) -> FloatArray:
+    """Return the stencil of the p-th difference for every row, without copies."""
+    stencil = [(-1.0) ** (p - i) * comb(p, i) for i in range(p + 1)]
+    return np.broadcast_to(stencil, (*weights.shape, p + 1))
 
 
 def _of_rows(bandwidths: FloatArray, n: int, p: int) -> FloatArray:

@@ -49,9 +49,12 @@ def expected_error(lowest_bandwidth: float, highest_bandwidth: float, d: int, p:
 
 
 def solve_by_splines(
-    y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, p: int, d: int
+    y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, p: int, d: int, *, mirror: bool
 ) -> ComplexArray:
     """Minimise Σ_n |y_n - Σ_k x_kn e^{2πi c_kn}|² + Σ_k Σ_n r_kn² |∇^p x_kn|² over splines with knots d samples apart.
+
+    With mirror images, x_k* e^{-2πi c_k} is part of the data equation as well, and of the second sum. The unknowns are
+    then the real coefficients of cos and -sin: u + iv = 2x, with weight r/√2 each.
 
     Parameters
     ----------
@@ -64,11 +67,12 @@ def solve_by_splines(
         r, of each row of the structural equation or constant.
     p, d : int
         Poles; samples per cell, at least p + 1.
+    mirror : bool
 
     Returns
     -------
     array, (n_orders, n), complex
-        x.
+        2x.
 
     Raises
     ------
@@ -76,12 +80,14 @@ def solve_by_splines(
         If the orders cannot be told apart.
     """
     basis, differences = sampled_basis(d, p)
-    matrix, right = _data_terms(y, cycles, active, basis)
-    _add_structure(matrix, weights, differences, len(y), p)
+    matrix, right = _data_terms(y, cycles, active, basis, mirror)
+    unknown_weights = np.repeat(weights, 2, axis=0) / 2**0.5 if mirror else weights
+    _add_structure(matrix, unknown_weights, differences, len(y), p)
     # A last knot at the last sample leaves a spline that vanishes on all samples.
     n_splines = -(-(len(y) - 1) // d) + DEGREE
     coefficients = _solved(matrix[:, :n_splines], right[:n_splines])
-    return _sampled(coefficients, basis, len(y), len(right))
+    envelope = np.asarray(coefficients.view(np.complex128) if mirror else 2.0 * coefficients, dtype=np.complex128)
+    return _sampled(envelope, basis, len(y), len(right))
 
 
 def sampled_basis(d: int, p: int) -> tuple[FloatArray, FloatArray]:
@@ -114,24 +120,32 @@ def _pairs(basis: FloatArray) -> tuple[list[tuple[int, int]], FloatArray]:
 
 
 def _data_terms(
-    y: FloatArray, cycles: FloatArray, active: BoolArray | None, basis: FloatArray
-) -> tuple[NDArray[Any], ComplexArray]:
+    y: FloatArray, cycles: FloatArray, active: BoolArray | None, basis: FloatArray, mirror: bool
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the data equation's part of the normal equations of the coefficients.
 
-    matrix[o, i, k, l] couples coefficient i + o of order k to coefficient i of order l; right[i, k].
-    Real for one order: its own phasor cancels.
+    matrix[o, i, k, l] couples coefficient i + o of unknown k to coefficient i of unknown l; right[i, k]. The unknowns
+    are x_k, or with mirror images the coefficients of cos and -sin of each order in turn. The matrix is real for one
+    order: its own phasor cancels.
     """
     n_orders, n = cycles.shape
     d = len(basis)
     n_cells = -(-n // d)
     pairs, products = _pairs(basis)
-    matrix = np.zeros((PIECES + 1, n_cells + PIECES, n_orders, n_orders), np.complex128 if n_orders > 1 else np.float64)
-    right = np.zeros((n_cells + PIECES, n_orders), np.complex128)
+    n_unknowns = 2 * n_orders if mirror else n_orders
+    matrix = np.zeros(
+        (PIECES + 1, n_cells + PIECES, n_unknowns, n_unknowns),
+        np.float64 if mirror or n_orders == 1 else np.complex128,
+    )
+    right = np.zeros((n_cells + PIECES, n_unknowns), np.float64 if mirror else np.complex128)
     per_chunk = max(1, CHUNK_SAMPLES // d)
     for first in range(0, n_cells, per_chunk):
         cells = slice(first, min(first + per_chunk, n_cells))
         samples = slice(cells.start * d, min(cells.stop * d, n))
         values, phasors = _padded_chunk(y, cycles, active, samples, (cells.stop - cells.start, d))
+        if mirror:
+            _add_real_terms(matrix, right, cells, values, phasors, basis, pairs, products)
+            continue
         for k, (c_k, s_k) in enumerate(phasors):
             projected = (values * c_k) @ basis - 1j * ((values * s_k) @ basis)
             for s in range(PIECES):
@@ -141,6 +155,26 @@ def _data_terms(
                 coupling = (c_k * c_m + s_k * s_m) @ products + 1j * ((c_k * s_m - s_k * c_m) @ products)
                 _add(matrix, k, m, cells, pairs, coupling)
     return matrix, right
+
+
+def _add_real_terms(
+    matrix: NDArray[Any],
+    right: NDArray[Any],
+    cells: slice,
+    values: FloatArray,
+    phasors: list[tuple[FloatArray, FloatArray]],
+    basis: FloatArray,
+    pairs: list[tuple[int, int]],
+    products: FloatArray,
+) -> None:
+    """Add a chunk's part for the real unknowns: Re(a e^{iΘ}) = u cos Θ - v sin Θ."""
+    regressors = [part for c, s in phasors for part in (c, -s)]
+    for k, of_k in enumerate(regressors):
+        projected = (values * of_k) @ basis
+        for s in range(PIECES):
+            right[cells.start + s : cells.stop + s, k] += projected[:, s]
+        for m, of_m in enumerate(regressors[: k + 1]):
+            _add(matrix, k, m, cells, pairs, (of_k * of_m) @ products)
 
 
 def _padded_chunk(
@@ -192,8 +226,11 @@ def _add_structure(matrix: NDArray[Any], weights: FloatArray, differences: Float
             _add(matrix, k, k, cells, pairs, grams)
 
 
-def _solved(matrix: NDArray[Any], right: ComplexArray) -> ComplexArray:
-    """Solve the Hermitian banded system by Cholesky's method; unknowns ordered by spline, then by order."""
+def _solved(matrix: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
+    """Solve the Hermitian banded system by Cholesky's method; unknowns ordered by spline, then by order.
+
+    A real matrix takes real and imaginary part of the right-hand side as two.
+    """
     from scipy.linalg import LinAlgError, solveh_banded
 
     n_offsets, n_splines, n_orders, _ = matrix.shape
@@ -203,17 +240,14 @@ def _solved(matrix: NDArray[Any], right: ComplexArray) -> ComplexArray:
             for m in range(n_orders):
                 if (below := offset * n_orders + k - m) >= 0:
                     band[below, m::n_orders] = matrix[offset, :, k, m]
-    b = right.reshape(-1)
-    real = matrix.dtype == np.float64
+    b = right.reshape(-1).view(matrix.dtype).reshape(n_splines * n_orders, -1)
     try:
-        x = solveh_banded(
-            band, b.view(np.float64).reshape(-1, 2) if real else b, lower=True, overwrite_ab=True, check_finite=False
-        )
+        x = solveh_banded(band, b, lower=True, overwrite_ab=True, check_finite=False)
     except LinAlgError:
         raise RefusalError(
             "the orders cannot be told apart in this recording", remedy="leave one of them out or record longer"
         ) from None
-    return np.ascontiguousarray(x).view(np.complex128).reshape(n_splines, n_orders)
+    return np.ascontiguousarray(x).view(right.dtype).reshape(n_splines, n_orders)
 
 
 def _sampled(coefficients: ComplexArray, basis: FloatArray, n: int, n_splines: int) -> ComplexArray:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from gearsig.angle.types import ShaftAngle
 from gearsig.checks import FloatArray, positive
 from gearsig.errors import InputError, RefusalError
-from gearsig.orders.vold_kalman_types import FrequencyTrack
+from gearsig.orders.vold_kalman_types import FrequencyTrack, Generation
+from gearsig.orders.vold_kalman_weight import lowest_frequency
 from gearsig.rig.types import Rig
 
 BoolArray = NDArray[np.bool_]
@@ -91,7 +92,7 @@ def bandwidths_of(
     return np.asarray(tracks.frequency_hz * (widths / tracks.orders)[:, None])
 
 
-def valid_parts(tracks: Tracks, bandwidth_hz: FloatArray, sampling_rate_hz: float) -> BoolArray:
+def valid_parts(tracks: Tracks, bandwidth_hz: FloatArray, sampling_rate_hz: float, generation: Generation) -> BoolArray:
     """Return where each order's whole band lies between zero and half the sampling rate, (n_orders, n).
 
     Raises
@@ -100,9 +101,10 @@ def valid_parts(tracks: Tracks, bandwidth_hz: FloatArray, sampling_rate_hz: floa
         If an order has no such part.
     """
     f = tracks.frequency_hz
-    above = f + bandwidth_hz / 2 >= sampling_rate_hz / 2
-    # The margin keeps the first generation's band, which is not quite symmetric, above zero as well.
-    below = f <= bandwidth_hz * 0.51
+    margin: FloatArray = bandwidth_hz / 2
+    if generation == "first":
+        margin = sampling_rate_hz * lowest_frequency(np.minimum(bandwidth_hz / sampling_rate_hz, 0.5))
+    above, below = f + margin >= sampling_rate_hz / 2, f <= margin
     valid: BoolArray = ~(above | below) & tracks.known
     for k, name in enumerate(tracks.names):
         if valid[k].any():
@@ -147,7 +149,7 @@ def _ratio(angle: ShaftAngle, shaft: str, rig: Rig | None) -> float:
     """Return revolutions of `shaft` per revolution of the angle's shaft."""
     if shaft == angle.shaft:
         return 1.0
-    ratio = rig.ratio(angle.shaft, to=shaft) if rig is not None and rig.shafts else None
+    ratio = rig.ratio(shaft, to=angle.shaft) if rig is not None and rig.shafts else None
     if ratio is None:
         raise InputError(
             f"the ratio of shaft {shaft!r} to {angle.shaft!r} is not known",

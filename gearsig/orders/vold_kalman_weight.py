@@ -97,14 +97,13 @@ def waveform_weight_of_bandwidth(bandwidth_hz: float, frequency_hz: float, sampl
     Raises
     ------
     InputError
-        If half the bandwidth reaches down to zero frequency or up to half the sampling rate.
+        If a -3 dB point would lie below zero frequency or above half the sampling rate.
     """
     rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
-    half = positive(bandwidth_hz, "bandwidth_hz", "Hz") / 2.0
-    within(
-        frequency_hz, "frequency_hz", half * (1 + 1e-9), rate / 2 - half * (1 + 1e-9), "Hz", remedy="narrow the band"
-    )
-    return float(waveform_weight(np.array([2 * half / rate]), np.array([frequency_hz / rate]))[0])
+    width = within(positive(bandwidth_hz, "bandwidth_hz", "Hz"), "bandwidth_hz", 0.0, rate / 2, "Hz")
+    lowest = float(lowest_frequency(np.array([width / rate]))[0]) * rate
+    within(frequency_hz, "frequency_hz", lowest * (1 + 1e-9), rate / 2 - lowest, "Hz", remedy="narrow the band")
+    return float(waveform_weight(np.array([width / rate]), np.array([frequency_hz / rate]))[0])
 
 
 def envelope_weight(bandwidth: FloatArray, p: int) -> FloatArray:
@@ -119,6 +118,15 @@ def waveform_weight(bandwidth: FloatArray, frequency: FloatArray) -> FloatArray:
     # sin²ω - sin²h as a product: no digits are lost where the band nearly touches zero frequency.
     r: FloatArray = HALF_POWER / (2.0 * np.tan(h) * np.sqrt(np.sin(omega - h) * np.sin(omega + h)))
     return r
+
+
+def lowest_frequency(bandwidth: FloatArray) -> FloatArray:
+    """Return the frequency below which the first generation's band reaches zero; both in cycles per sample.
+
+    cos ω = cos² h: about 0.71 bandwidths, for the band is not symmetric. The same holds below half the sampling rate.
+    """
+    f: FloatArray = np.arccos(np.cos(np.pi * bandwidth) ** 2) / (2.0 * np.pi)
+    return f
 
 
 def checked_poles(n_poles: int) -> int:

@@ -100,7 +100,7 @@ def test_the_closed_form_solves_the_textbook_matrix(p):
 def test_constant_bandwidth(p, bandwidth_hz, n):
     y, cycles, z = modulated_order(n)
     r = weight_of_bandwidth(bandwidth_hz, RATE_HZ, p)
-    x = solve_envelopes(y, cycles[None], None, np.array([[bandwidth_hz / RATE_HZ]]), p)[0]
+    x = solve_envelopes(y, cycles[None], None, np.array([[bandwidth_hz / RATE_HZ]]), p, mirror=False)[0]
     assert abs(x - 2 * exact_envelope(z, r, p)).max() < 3e-7
 
 
@@ -119,7 +119,7 @@ def test_any_length(p, n):
     y, cycles, z = modulated_order(n)
     bandwidth_hz = {2: 7.4, 3: 32.0}[p]
     assert samples_per_cell(bandwidth_hz / RATE_HZ, bandwidth_hz / RATE_HZ, p) in {19, 20}
-    x = solve_envelopes(y, cycles[None], None, np.array([[bandwidth_hz / RATE_HZ]]), p)[0]
+    x = solve_envelopes(y, cycles[None], None, np.array([[bandwidth_hz / RATE_HZ]]), p, mirror=False)[0]
     assert abs(x - 2 * exact_envelope(z, weight_of_bandwidth(bandwidth_hz, RATE_HZ, p), p)).max() < 3e-7
 
 
@@ -149,19 +149,36 @@ def test_rotations_against_a_dense_solve(p):
 
 @pytest.mark.parametrize("p", [2, 3])
 @pytest.mark.parametrize("n", [4000, 4001])
-def test_splines_against_rotations(p, n):
-    """Two independent solvers: crossing orders, varying bandwidth, parts left out."""
+@pytest.mark.parametrize("mirror", [False, True])
+def test_splines_against_rotations(p, n, mirror):
+    """Two independent solvers: crossing orders, varying bandwidth, parts left out; mirror images as further orders."""
     y, cycles = crossing(n)
     active = np.ones((2, n), dtype=bool)
     active[0, :300] = active[1, 3100:3300] = False
     bandwidths = np.stack([np.linspace(1, 3, n), np.full(n, 1.5)]) * 1e-3
     weights = envelope_weight(bandwidths[:, p // 2 : n - p + p // 2], p)
-    expected = solve_by_rotations(np.exp(2j * np.pi * cycles) * active, y + 0j, weights, differences(p, weights.shape))
-    x = solve_envelopes(y, cycles, active, bandwidths, p)
-    assert np.abs(x - 2 * expected)[active].max() < 1e-6
+    data = np.exp(2j * np.pi * cycles) * active
+    if mirror:
+        data, weights = np.concatenate([data, data.conj()]), np.concatenate([weights, weights])
+    expected = solve_by_rotations(data, y + 0j, weights, differences(p, weights.shape))
+    x = solve_envelopes(y, cycles, active, bandwidths, p, mirror=mirror)
+    assert np.abs(x - 2 * expected[:2])[active].max() < 1e-6
     d = samples_per_cell(1e-3, 3e-3, p)
     assert d >= 4
-    assert np.array_equal(x, 2 * solve_by_splines(y, cycles, active, weights, p, d))
+    assert np.array_equal(x, solve_by_splines(y, cycles, active, weights[:2], p, d, mirror=mirror))
+
+
+@pytest.mark.parametrize("p", [1, 2, 3])
+def test_mirror_images_sample_by_sample(p):
+    """A wide band, where no coarse grid is used."""
+    y, cycles = crossing(500)
+    active = np.ones((2, 500), dtype=bool)
+    active[0, :30] = False
+    data = np.exp(2j * np.pi * cycles) * active
+    weights = np.full((4, 500 - p), envelope_weight(np.array([0.05]), p)[0])
+    expected = solve_by_rotations(np.concatenate([data, data.conj()]), y + 0j, weights, differences(p, weights.shape))
+    x = solve_envelopes(y, cycles, active, np.full((2, 1), 0.05), p)
+    assert np.abs(x - 2 * expected[:2])[active].max() < 1e-9
 
 
 def test_first_generation_against_a_dense_solve():
