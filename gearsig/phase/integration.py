@@ -43,8 +43,8 @@ def integrate_band(
     Returns
     -------
     array, (n_samples,)
-        Within `n_unsettled` samples of either end the result is disturbed; the caller leaves that out. Beyond, the error
-        is below 5e-4 of the amplitude of displacement for a line anywhere between the low cut and 75 times it.
+        Within `n_unsettled` samples of either end the result is disturbed; the caller leaves that out. Beyond, the
+        error is below 5e-4 of the amplitude of displacement for a line anywhere between the low cut and 75 times it.
 
     Notes
     -----

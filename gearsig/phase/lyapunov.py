@@ -38,8 +38,8 @@ def largest_lyapunov_exponent(
     The fit goes from the embedding's length (d-1)τ, before which the stretches still share values, to where S first
     comes within 2 of its saturation, or to the last step. Saturation is the mean logarithm of the distance of unrelated
     points, or the end of the curve where that lies lower and the curve has risen by 3 or more (phase-coherent motion
-    parts fully only much later). The uncertainty joins two parts: the jackknife over 12 stretches of the signal, and half the span of the slopes found in
-    either half of the fit and with 1.5 and 2.5 in place of 2.
+    parts fully only much later). The uncertainty joins two parts: the jackknife over 12 stretches of the signal, and
+    half the span of the slopes found in either half of the fit and with 1.5 and 2.5 in place of 2.
 
     Parameters
     ----------
@@ -69,8 +69,8 @@ def largest_lyapunov_exponent(
     Notes
     -----
     The estimate presumes determinism: check the signal with `embedding_dimension` first. Noise lifts the start of the
-    curve. With 1 % of the standard deviation the Lorenz system's exponent comes out 5 % low, with 2 % 12 % low; with 5 %
-    no stretch is left but across the path ("transverse", "undecided"); with 10 % there is no answer.
+    curve. With 1 % of the standard deviation the Lorenz system's exponent comes out 5 % low, with 2 % 12 % low; with
+    5 % no stretch is left but across the path ("transverse", "undecided"); with 10 % there is no answer.
 
     Source: M. T. Rosenstein, J. J. Collins, C. J. De Luca, Physica D 65 (1993); H. Kantz, Physics Letters A 185 (1994).
     """

@@ -43,8 +43,8 @@ def phase_plane(
     recording : Recording
     channel : str
     low_cut_hz : float or None
-        Lowest frequency kept in full; a quarter of it and less is gone. Needed for acceleration and velocity: integration
-        magnifies whatever is slow. None for a displacement keeps everything slow, the mean included.
+        Lowest frequency kept in full; a quarter of it and less is gone. Needed for acceleration and velocity:
+        integration magnifies whatever is slow. None for a displacement keeps everything slow, the mean included.
     high_cut_hz : float or None
         Highest frequency kept in full; None: 0.4 of the sampling rate.
     quantity : str or None

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import ceil, floor
 from typing import Literal
 
 import numpy as np
@@ -73,6 +74,23 @@ class PhasePortrait:
         """Standard deviation along each axis, (n_axes,): the size that distances are compared with."""
         deviation: FloatArray = np.std(self.points, axis=0, dtype=np.float64)
         return deviation
+
+    def between(self, start_s: float, end_s: float) -> PhasePortrait:
+        """Return the samples from `start_s` to `end_s`, both included.
+
+        Raises
+        ------
+        InputError
+            If fewer than two lie there.
+        """
+        first = max(0, ceil((start_s - self.start_s) * self.sampling_rate_hz - 1e-6))
+        last = min(self.n_points - 1, floor((end_s - self.start_s) * self.sampling_rate_hz + 1e-6))
+        if last <= first:
+            raise InputError(
+                f"there are no samples from {start_s:g} to {end_s:g} s", allowed=f"{self.start_s:g} to {self.end_s:g} s"
+            )
+        start = self.start_s + first / self.sampling_rate_hz
+        return replace(self, points=self.points[first : last + 1], start_s=start)
 
 
 @dataclass(frozen=True)

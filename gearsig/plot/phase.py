@@ -1,0 +1,234 @@
+"""Motion in phase space: portraits with their Poincaré points, bifurcations, recurrences, delays and dimensions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearsig.checks import count
+from gearsig.errors import InputError
+from gearsig.phase.measures import (
+    EmbeddingDimension,
+    LyapunovExponent,
+    MutualInformation,
+    RecurrenceMeasures,
+    RecurrencePlot,
+)
+from gearsig.phase.types import BifurcationDiagram, PhasePortrait, PoincareSection
+from gearsig.plot import series, style
+from gearsig.plot.display import with_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOST_PATH_POINTS = 20_000
+"""A path of more points is a blot; the last so many are drawn, and the figure says so."""
+SIDE_IN, LEFT_IN, BOTTOM_IN, TOP_IN, GAP_IN = 3.55, 0.85, 0.55, 0.42, 0.95
+
+
+def phase_portrait_figure(
+    portrait: PhasePortrait,
+    section: PoincareSection | None = None,
+    *,
+    axes: tuple[int, int] = (0, 1),
+    n_points: int = MOST_PATH_POINTS,
+    title: str = "",
+) -> Figure:
+    """Draw two axes of a path against each other; with a section, its points on the path and alone beside it.
+
+    Parameters
+    ----------
+    portrait : PhasePortrait
+    section : PoincareSection or None
+        Of the same axes.
+    axes : (int, int)
+        Which are drawn.
+    n_points : int
+        The last so many of the path are drawn.
+    title : str
+
+    Raises
+    ------
+    InputError
+        If an axis is missing, or the section's axes are others.
+    """
+    count(n_points, "n_points", minimum=2)
+    if not all(0 <= axis < portrait.n_axes for axis in axes):
+        raise InputError(f"axes is {axes}", allowed=f"two of 0 to {portrait.n_axes - 1}")
+    if section is not None and section.axis_names != portrait.axis_names:
+        raise InputError(f"the section's axes are {section.axis_names}", allowed=f"{portrait.axis_names}")
+    figure = style.new_figure(TOP_IN + SIDE_IN + BOTTOM_IN)
+    path, points = _two_panels(figure)
+    x, y = (np.asarray(portrait.points[-n_points:, axis]) for axis in axes)
+    path.plot(x, y, color=style.MEASURED, linewidth=0.5, alpha=0.6 if len(x) < 5000 else 0.3)
+    names = [with_unit(portrait.axis_names[axis], portrait.units[axis]) for axis in axes]
+    style.label_axes(path, names[0], names[1], title or portrait.source)
+    if portrait.n_points > n_points:
+        style.note(path, f"last {n_points / portrait.sampling_rate_hz:.4g} s")
+    if section is None:
+        points.set_axis_off()
+    else:
+        _draw_points(path, section, axes, 2.2)
+        _draw_points(points, section, axes, 2.8)
+        style.label_axes(points, names[0], names[1], f"{section.n_points} points")
+        style.note(points, f"once per {section.section}" if section.kind == "locked" else section.section)
+        _keep_apart(points, section, axes)
+    for panel in (path, points):
+        style.no_offset(panel)
+        panel.locator_params(nbins=5)
+    return figure
+
+
+def bifurcation_figure(diagram: BifurcationDiagram, *, title: str = "", height_in: float = 4.2) -> Figure:
+    """Draw every Poincaré point over the parameter; values whose section repeats are named by their period above."""
+    figure = style.new_figure(height_in)
+    axes = style.panel(figure, top_in=0.62)
+    axes.plot(
+        diagram.parameter,
+        diagram.points,
+        linestyle="none",
+        marker=".",
+        markersize=2.0 if len(diagram.points) < 20_000 else 1.0,
+        markeredgewidth=0.0,
+        color=style.MEASURED,
+        alpha=0.6,
+        rasterized=len(diagram.points) > 20_000,
+    )
+    style.label_axes(
+        axes,
+        with_unit(diagram.parameter_name, diagram.parameter_unit),
+        with_unit(diagram.axis_name, diagram.unit),
+    )
+    for start, stop, period in _runs_of_equal_period(diagram):
+        series.write(axes, 0.5 * (start + stop), 1.02, f"{period}×", colour=style.QUIET)
+    series.headline(figure, title or f"{diagram.axis_name} once per {diagram.section}, over {diagram.parameter_name}")
+    style.no_offset(axes)
+    return figure
+
+
+def recurrence_figure(plot: RecurrencePlot, measures: RecurrenceMeasures | None = None, *, title: str = "") -> Figure:
+    """Draw recurrent pairs as dots over both times; with measures, their values beside."""
+    from matplotlib.colors import ListedColormap
+
+    figure = style.new_figure(TOP_IN + 4.4 + BOTTOM_IN)
+    axes = style.panel(figure, left_in=LEFT_IN, right_in=style.WIDTH_IN - LEFT_IN - 4.4, top_in=TOP_IN)
+    axes.grid(visible=False)
+    limits = (float(plot.times_s[0]), float(plot.times_s[-1]))
+    axes.imshow(
+        plot.recurrent,
+        origin="lower",
+        extent=(*limits, *limits),
+        cmap=ListedColormap(["white", style.MEASURED]),
+        interpolation="nearest",
+        aspect="equal",
+    )
+    style.label_axes(axes, "time (s)", "time (s)", title or plot.source or "recurrence plot")
+    style.no_offset(axes)
+    rows = [f"radius {plot.radius:.3g} standard deviations"]
+    if plot.stride > 1:
+        rows.append(f"every {plot.stride}. point")
+    for i, text in enumerate(rows + (_measure_texts(measures) if measures is not None else [])):
+        figure.text(
+            (LEFT_IN + 4.4 + 0.35) / style.WIDTH_IN,
+            1.0 - (TOP_IN + 0.2 + 0.24 * i) / float(figure.get_size_inches()[1]),
+            text,
+            fontsize=style.TEXT_PT,
+            color=style.INK,
+            va="center",
+            parse_math=False,
+        )
+    return figure
+
+
+def embedding_figure(information: MutualInformation, dimension: EmbeddingDimension, *, title: str = "") -> Figure:
+    """Draw mutual information over delay and false neighbours over dimension, with what was chosen from them."""
+    figure = style.new_figure(TOP_IN + SIDE_IN + BOTTOM_IN)
+    left, right = _two_panels(figure)
+    left.plot(information.delays_s, information.information_nats, color=style.MEASURED, linewidth=1.2)
+    left.axvline(information.delay_s, color=style.FAULT, linewidth=1.0)
+    left.set_ylim(0.0)
+    left.set_xlim(0.0, float(information.delays_s[-1]))
+    style.label_axes(left, "delay (s)", "mutual information (nats)", title or information.source)
+    style.note(left, f"{information.delay_s:.4g} s: {information.rule}")
+    d = np.asarray(dimension.dimensions)
+    lines = [
+        *right.plot(d, dimension.false_fraction, "o-", color=style.MEASURED, markersize=4, label="false neighbours"),
+        *right.plot(d[:-1], dimension.growth, "s--", color=style.MESH, markersize=3.5, linewidth=0.9, label="Cao E1"),
+        *right.plot(d[:-1], dimension.determinism, "^:", color=style.SHAFT, markersize=3.5, linewidth=0.9, label="E2"),
+    ]
+    right.axhline(dimension.threshold, color=style.FLOOR, linewidth=0.8)
+    if dimension.dimension:
+        right.axvline(dimension.dimension, color=style.FAULT, linewidth=1.0)
+    right.set_ylim(-0.03, float(np.clip(1.1 * dimension.determinism.max(), 1.1, 3.0)))
+    style.label_axes(right, "dimension", "share, ratio")
+    style.note(right, f"dimension {dimension.dimension}" if dimension.dimension else "no dimension: stochastic")
+    legend = right.legend(handles=lines, fontsize=style.SMALL_PT, frameon=False, labelcolor=style.INK)
+    legend.set_zorder(3)
+    return figure
+
+
+def divergence_figure(exponent: LyapunovExponent, *, title: str = "", height_in: float = 3.4) -> Figure:
+    """Draw the divergence curve with its fitted stretch, line and saturation."""
+    figure = style.new_figure(height_in)
+    axes = style.panel(figure, top_in=TOP_IN)
+    axes.plot(exponent.times_s, exponent.log_distance, color=style.MEASURED, linewidth=1.2)
+    axes.axhline(exponent.saturation_log_distance, color=style.FLOOR, linewidth=0.8, linestyle="--")
+    series.shade(axes, exponent.fit_s)
+    inside = (exponent.times_s >= exponent.fit_s[0]) & (exponent.times_s <= exponent.fit_s[1])
+    t, s = exponent.times_s[inside], exponent.log_distance[inside]
+    axes.plot(t, s.mean() + exponent.exponent_per_s * (t - t.mean()), color=style.FAULT, linewidth=1.2)
+    style.label_axes(axes, "time (s)", "mean ln distance", title or exponent.source or "divergence of neighbours")
+    style.note(axes, f"λ = {exponent.exponent_per_s:.4g} ± {exponent.uncertainty_per_s:.2g} 1/s, {exponent.verdict}")
+    style.no_offset(axes)
+    return figure
+
+
+def _two_panels(figure: Figure) -> tuple[Axes, Axes]:
+    second = LEFT_IN + SIDE_IN + GAP_IN
+    left = style.panel(figure, left_in=LEFT_IN, right_in=style.WIDTH_IN - LEFT_IN - SIDE_IN, top_in=TOP_IN)
+    right = style.panel(figure, left_in=second, right_in=style.WIDTH_IN - second - SIDE_IN + 0.1, top_in=TOP_IN)
+    return left, right
+
+
+def _draw_points(axes: Axes, section: PoincareSection, which: tuple[int, int], size: float) -> None:
+    x, y = (section.points[:, axis] for axis in which)
+    axes.plot(x, y, "o", color=style.FAULT, markersize=size, markeredgewidth=0.0, zorder=3)
+
+
+def _keep_apart(axes: Axes, section: PoincareSection, which: tuple[int, int]) -> None:
+    """Show at least a twentieth of the path's size: one point must not be blown up to a cloud of rounding."""
+    limits = []
+    for axis in which:
+        values = section.points[:, axis]
+        middle, half = 0.5 * float(values.max() + values.min()), 0.58 * float(np.ptp(values))
+        half = max(half, 0.05 * float(section.extent[axis])) or 1.0
+        limits.append((middle - half, middle + half))
+    axes.set_xlim(limits[0])
+    axes.set_ylim(limits[1])
+
+
+def _runs_of_equal_period(diagram: BifurcationDiagram) -> list[tuple[float, float, int]]:
+    """Stretches of neighbouring values with one period, those that repeat and are wide enough to be named."""
+    width = float(np.ptp(diagram.values))
+    runs: list[tuple[float, float, int]] = []
+    for value, period in zip(diagram.values, diagram.periods, strict=True):
+        if runs and runs[-1][2] == period:
+            runs[-1] = (runs[-1][0], float(value), period)
+        else:
+            runs.append((float(value), float(value), period))
+    return [run for run in runs if run[2] and run[1] - run[0] >= 0.03 * width]
+
+
+def _measure_texts(measures: RecurrenceMeasures) -> list[str]:
+    return [
+        "",
+        f"recurrence rate {measures.recurrence_rate:.3f}",
+        f"determinism {measures.determinism:.3f}",
+        f"mean line {measures.mean_line_s:.4g} s",
+        f"longest line {measures.longest_line_s:.4g} s",
+        f"entropy {measures.entropy_nats:.3g} nats",
+        f"laminarity {measures.laminarity:.3f}",
+        f"trapping time {measures.trapping_time_s:.4g} s",
+    ]

@@ -1,0 +1,132 @@
+"""Figures of motion in phase space: what is drawn is what was given."""
+
+from io import BytesIO
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+
+from gearsig.errors import InputError
+from gearsig.phase.measures import (
+    EmbeddingDimension,
+    LyapunovExponent,
+    MutualInformation,
+    RecurrenceMeasures,
+    RecurrencePlot,
+)
+from gearsig.phase.types import BifurcationDiagram, PhasePortrait, PoincareSection
+from gearsig.plot.phase import (
+    bifurcation_figure,
+    divergence_figure,
+    embedding_figure,
+    phase_portrait_figure,
+    recurrence_figure,
+)
+
+T = 2 * np.pi * np.arange(2000) / 50.0
+PORTRAIT = PhasePortrait(
+    np.column_stack([np.cos(T), np.sin(T)]), 50.0, ("displacement", "velocity"), ("m", "m/s"), "phase plane", "a1 <$x$>"
+)
+
+
+def _section(points):
+    return PoincareSection(
+        points,
+        np.arange(len(points)),
+        PORTRAIT.axis_names,
+        PORTRAIT.units,
+        PORTRAIT.extent,
+        "locked",
+        "mesh of stage",
+        "a1",
+    )
+
+
+def _texts(figure):
+    figure.savefig(BytesIO(), format="png", dpi=40)
+    return [text.get_text() for text in figure.findobj(Text) if text.get_text()]
+
+
+def test_portrait_with_its_points():
+    points = PORTRAIT.points[::50] + 1e-12
+    figure = phase_portrait_figure(PORTRAIT, _section(points))
+    path, alone = figure.axes
+    np.testing.assert_array_equal(path.lines[0].get_ydata(), PORTRAIT.points[:, 1])
+    for axes in (path, alone):
+        np.testing.assert_array_equal(axes.lines[-1].get_xdata(), points[:, 0])
+    # One point stays a point: the panel does not shrink to its rounding.
+    assert np.ptp(alone.get_xlim()) > 0.05
+    assert {"displacement (m)", "velocity (m/s)", "40 points", "once per mesh of stage", "a1 <$x$>"} <= set(
+        _texts(figure)
+    )
+
+
+def test_long_paths_are_cut_and_say_so():
+    figure = phase_portrait_figure(PORTRAIT, n_points=500, axes=(1, 0), title="T")
+    np.testing.assert_array_equal(figure.axes[0].lines[0].get_xdata(), PORTRAIT.points[-500:, 1])
+    assert {"last 10 s", "T"} <= set(_texts(figure))
+
+
+def test_portrait_refuses_other_axes():
+    with pytest.raises(InputError, match="axes is"):
+        phase_portrait_figure(PORTRAIT, axes=(0, 2))
+    other = PoincareSection(np.ones((3, 1)), np.arange(3), ("x",), ("",), np.ones(1), "locked", "s", "a")
+    with pytest.raises(InputError, match="section's axes"):
+        phase_portrait_figure(PORTRAIT, other)
+
+
+def test_bifurcation_draws_all_points_and_names_periods():
+    values = np.linspace(1000.0, 2000.0, 21)
+    parameter, points = np.repeat(values, 4), np.arange(84.0)
+    periods = (1,) * 8 + (2,) * 8 + (0,) * 5
+    diagram = BifurcationDiagram(
+        parameter, points, "speed", "rpm", "displacement", "m", values, periods, "revolution of in"
+    )
+    figure = bifurcation_figure(diagram)
+    np.testing.assert_array_equal(figure.axes[0].lines[0].get_xdata(), parameter)
+    np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), points)
+    texts = _texts(figure)
+    assert {"1×", "2×", "speed (rpm)", "displacement (m)"} <= set(texts)
+    assert "0×" not in texts
+
+
+def test_recurrence_shows_the_matrix_over_time_and_the_measures():
+    matrix = np.eye(50, dtype=bool)
+    plot = RecurrencePlot(matrix, np.arange(50) * 0.1, 0.3, 7, "a1")
+    measures = RecurrenceMeasures(0.05, 0.9, 1.0, 2.0, 1.5, 0.4, 0.2, 0.3, 2, 5, 7, 50, "a1")
+    figure = recurrence_figure(plot, measures)
+    np.testing.assert_array_equal(figure.axes[0].images[0].get_array(), matrix)
+    assert figure.axes[0].images[0].get_extent() == pytest.approx([0.0, 4.9, 0.0, 4.9])
+    assert {"determinism 0.900", "every 7. point", "longest line 2 s"} <= set(_texts(figure))
+
+
+@pytest.mark.parametrize(("dimension", "words"), [(3, "dimension 3"), (0, "no dimension: stochastic")])
+def test_embedding_marks_what_was_chosen(dimension, words):
+    information = MutualInformation(np.linspace(3.0, 0.5, 30), 2, 1000.0, 16, "first minimum", 20, "a1")
+    false = EmbeddingDimension(
+        (1, 2, 3, 4),
+        np.array([0.9, 0.2, 0.0, 0.0]),
+        np.array([0.1, 0.8, 1.0]),
+        np.array([0.2, 0.9, 1.1]),
+        dimension,
+        "deterministic" if dimension else "stochastic",
+        0.02,
+        16,
+        "a1",
+    )
+    figure = embedding_figure(information, false)
+    delays, dimensions = figure.axes
+    np.testing.assert_allclose(delays.lines[0].get_xdata(), np.arange(30) * 0.002)
+    assert delays.lines[1].get_xdata()[0] == pytest.approx(0.016)
+    np.testing.assert_array_equal(dimensions.lines[0].get_ydata(), false.false_fraction)
+    assert {words, "0.016 s: first minimum", "false neighbours"} <= set(_texts(figure))
+
+
+def test_divergence_draws_the_fitted_line_on_the_curve():
+    s = -3.0 + 0.5 * np.arange(40) * 0.1
+    found = LyapunovExponent(0.5, 0.02, s, 0.1, (0.5, 2.0), 0.0, "diverging", "rosenstein", 100, 5, "a1")
+    figure = divergence_figure(found)
+    line = figure.axes[0].lines[-1]
+    np.testing.assert_allclose(line.get_ydata(), -3.0 + 0.5 * line.get_xdata())
+    assert line.get_xdata()[[0, -1]] == pytest.approx([0.5, 2.0])
+    assert "λ = 0.5 ± 0.02 1/s, diverging" in _texts(figure)
