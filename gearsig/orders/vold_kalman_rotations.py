@@ -1,8 +1,10 @@
-"""The Vold–Kalman least-squares problem by Givens rotations, sample by sample.
+"""Forward pass of a banded least-squares problem by Givens rotations, sample by sample.
 
 Rows of the data equation and of the structural equation are rotated one after the other into a banded triangle (the
-square-root information filter); substitution backwards gives the smoothed solution. The normal equations, whose
-condition is the square of this problem's, are never formed: the error is about r times the rounding error, not r².
+square-root information filter). The normal equations, whose condition is the square of this problem's, are never
+formed: the error is about r times the rounding error, not r².
+
+J. A. George, M. T. Heath, "Solution of sparse linear least squares problems using Givens rotations", 1980.
 """
 
 from __future__ import annotations
@@ -14,79 +16,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from gearsig.errors import RefusalError
 
 Array = NDArray[Any]
-TRIANGLE_BYTES = 256 * 2**20
-"""Memory for the triangle. Longer problems keep it in parts only and compute each part a second time, backwards."""
-
-
-def solve_by_rotations(
-    data: Array, observed: Array, weights: FloatArray, stencils: FloatArray, *, triangle_bytes: int = TRIANGLE_BYTES
-) -> Array:
-    """Minimise Σ_n |b_n - Σ_k d_kn x_kn|² + Σ_k Σ_n w_kn² |Σ_i s_kni x_k(n+i)|².
-
-    Parameters
-    ----------
-    data : array, (n_orders, n), real or complex
-        d.
-    observed : array, (n,)
-        b; the solution has its type.
-    weights : array, (n_orders, n - p)
-        w.
-    stencils : array, (n_orders, n - p, p + 1)
-        s.
-    triangle_bytes : int
-
-    Returns
-    -------
-    array, (n_orders, n)
-
-    Raises
-    ------
-    RefusalError
-        If the orders cannot be told apart.
-
-    References
-    ----------
-    J. A. George, M. T. Heath, "Solution of sparse linear least squares problems using Givens rotations", 1980.
-    """
-    n_orders, n = data.shape
-    p = stencils.shape[2] - 1
-    width = (p + 1) * n_orders
-    per_part = max(p + 1, int(triangle_bytes / (n_orders * width * data.itemsize)))
-    starts = np.arange(0, n, per_part)
-    rows = (min(per_part, n) + p) * n_orders
-    triangle, right = np.empty((rows, width), data.dtype), np.empty(rows, observed.dtype)
-    heads = np.zeros((len(starts) + 1, p * n_orders, width), data.dtype)
-    head_rights = np.zeros((len(starts) + 1, p * n_orders), observed.dtype)
-    for i, start in enumerate(starts):
-        stop = min(start + per_part, n)
-        _enter(triangle, right, heads[i], head_rights[i])
-        _rotate(triangle, right, start, stop, data, observed, weights, stencils)
-        used = (stop - start) * n_orders
-        heads[i + 1], head_rights[i + 1] = triangle[used : used + p * n_orders], right[used : used + p * n_orders]
-    x = np.zeros((n + p, n_orders), observed.dtype)
-    for i in range(len(starts) - 1, -1, -1):
-        start, stop = starts[i], min(starts[i] + per_part, n)
-        if i < len(starts) - 1:
-            _enter(triangle, right, heads[i], head_rights[i])
-            _rotate(triangle, right, start, stop, data, observed, weights, stencils)
-        if not _substitute(triangle, right, x.reshape(-1)[start * n_orders :], (stop - start) * n_orders):
-            raise RefusalError("the orders cannot be told apart in this recording", remedy="leave one of them out")
-    return np.ascontiguousarray(x[:n].T)
-
-
-def _enter(triangle: Array, right: Array, head: Array, head_right: Array) -> None:
-    """Begin a part with the rows that the part before left over; an empty row is zero."""
-    triangle[:] = 0
-    right[:] = 0
-    triangle[: len(head)] = head
-    right[: len(head)] = head_right
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _rotate(
+def rotate(
     triangle: Array,
     right: Array,
     start: int,
@@ -95,7 +30,7 @@ def _rotate(
     observed: Array,
     weights: FloatArray,
     stencils: FloatArray,
-) -> None:
+) -> bool:
     """Rotate the data row and the structural rows of each sample from start to stop into the triangle."""
     n_orders, n = data.shape
     p = stencils.shape[2] - 1
@@ -114,6 +49,7 @@ def _rotate(
             for i in range(p + 1):
                 row[i * n_orders + k] = weights[k, t] * stencils[k, t, i]
             _insert(triangle, right, first, row, nothing)
+    return True
 
 
 @njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator,unused-ignore]
@@ -144,17 +80,3 @@ def _insert(triangle: Array, right: Array, first: int, row: Array, value: Any) -
         value = cosine * value - sine * old_right
         if diagonal == 0.0:
             return
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _substitute(triangle: Array, right: Array, x: Array, n: int) -> bool:
-    """Solve the triangle backwards for x[:n], given x[n:]; False if a diagonal is zero."""
-    width = triangle.shape[1]
-    for j in range(n - 1, -1, -1):
-        if triangle[j, 0].real == 0.0:
-            return False
-        rest = right[j]
-        for m in range(1, min(width, len(x) - j)):
-            rest -= triangle[j, m] * x[j + m]
-        x[j] = rest / triangle[j, 0].real
-    return True

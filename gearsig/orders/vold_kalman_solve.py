@@ -16,10 +16,12 @@ from gearsig.orders.vold_kalman_splines import (
     samples_per_cell,
     solve_by_splines,
 )
-from gearsig.orders.vold_kalman_weight import envelope_weight, waveform_weight
+from gearsig.orders.vold_kalman_weight import HALF_POWER, envelope_weight, waveform_weight
 
-SMALLEST_CELL = 4
-"""Samples. Below, the band is so wide that the coarse grid saves nothing, and rotations lose no digits."""
+STRONGEST_ELIMINATED = 1.5e5
+"""r·|D| up to which the normal equations are solved: their rounding error is 1e-7 there, more where orders are alike."""
+SMALLEST_CELL = 3
+"""Samples. Below, the band is so wide that the coarse grid saves nothing, and elimination loses no digits."""
 
 
 def solve_envelopes(
@@ -97,17 +99,30 @@ def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None,
     ----------
     H. Vold, J. Leuridan, "High resolution order tracking at extreme slew rates, using Kalman tracking filters", 1993.
     """
-    from gearsig.orders.vold_kalman_rotations import solve_by_rotations
-
     n = len(y)
     frequency = (cycles[:, 2:] - cycles[:, :-2]) / 2.0
-    width = np.broadcast_to(_of_rows(bandwidths, n, 2), frequency.shape)
+    width = _of_rows(bandwidths, n, 2)
     # Outside the active part the order may stand still: any finite weight does there.
     inside = np.clip(frequency, 0.75 * width, 0.5 - 0.75 * width)
     stencils = np.ones((*frequency.shape, 3))
     stencils[:, :, 1] = -2.0 * np.cos(2.0 * np.pi * frequency)
     data = np.ones(cycles.shape) if active is None else active.astype(np.float64)
-    return solve_by_rotations(data, y.astype(np.float64), waveform_weight(width, inside), stencils)
+    return solve_sample_by_sample(data, y.astype(np.float64), waveform_weight(width, inside), stencils)
+
+
+def solve_sample_by_sample(
+    data: NDArray[Any], observed: NDArray[Any], weights: FloatArray, stencils: FloatArray
+) -> NDArray[Any]:
+    """Solve a banded least-squares problem: the fast way where r is small enough, the exact way elsewhere."""
+    from gearsig.orders.vold_kalman_band import solve_band
+    from gearsig.orders.vold_kalman_elimination import eliminate
+    from gearsig.orders.vold_kalman_rotations import rotate
+
+    # |D|, the largest gain of the stencil, is 2^p for differences and for the first generation at most that.
+    strength = 2.0 ** (stencils.shape[2] - 1) * float(weights.max())
+    return solve_band(
+        data, observed, weights, stencils, forward=eliminate if strength <= STRONGEST_ELIMINATED else rotate
+    )
 
 
 def cell_of(bandwidths: FloatArray, p: int) -> int:
@@ -121,15 +136,20 @@ def accuracy_of(bandwidths: FloatArray, p: int) -> float:
     d = cell_of(bandwidths, p)
     if d:
         return expected_error(float(bandwidths.min()), float(bandwidths.max()), d, p)
-    return 1e-15 * float(envelope_weight(bandwidths.min()[None], p)[0])
+    return _error_of_strength(2.0**p * float(envelope_weight(bandwidths.min()[None], p)[0]))
 
 
 def waveform_accuracy_of(cycles: FloatArray, active: BoolArray, bandwidths: FloatArray) -> float:
-    """Return the expected error of `solve_waveforms`: rounding times the root of its condition, about 4 r."""
+    """Return the expected error of `solve_waveforms`, relative to the largest component of the signal."""
     frequency = np.abs(np.diff(cycles, axis=1))[active[:, 1:] & active[:, :-1]]
     narrowest = np.pi * float(bandwidths.min())
     sine = min(np.sin(2 * np.pi * float(frequency.min())), np.sin(2 * np.pi * float(frequency.max())))
-    return float(1e-15 / (narrowest * max(sine, narrowest)))
+    return _error_of_strength(4.0 * float(HALF_POWER) / (2.0 * narrowest * max(sine, narrowest)))
+
+
+def _error_of_strength(strength: float) -> float:
+    """Return the rounding error for r·|D|: ε times its square by elimination, with a factor found in trials; or once."""
+    return 2e-17 * strength**2 if strength <= STRONGEST_ELIMINATED else 1e-15 * strength
 
 
 def envelopes_of_waveforms(x: FloatArray, cycles: FloatArray) -> ComplexArray:
@@ -162,8 +182,6 @@ def _solved_with_mirror_images(
     y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, p: int
 ) -> ComplexArray:
     """Sample by sample, for the real coefficients u, v of cos and -sin: u + iv = 2x, with weight r/√2 each."""
-    from gearsig.orders.vold_kalman_rotations import solve_by_rotations
-
     data = np.empty((2 * len(cycles), len(y)))
     for k in range(len(cycles)):
         phasor = phasors_of(cycles[k : k + 1])[0]
@@ -171,7 +189,7 @@ def _solved_with_mirror_images(
     if active is not None:
         data *= np.repeat(active, 2, axis=0)
     weights = np.repeat(weights, 2, axis=0) / 2**0.5
-    x = solve_by_rotations(data, y.astype(np.float64), weights, _differences(weights, p))
+    x = solve_sample_by_sample(data, y.astype(np.float64), weights, _differences(weights, p))
     return np.asarray(x[::2] + 1j * x[1::2], dtype=np.complex128)
 
 
@@ -179,8 +197,6 @@ def _solved_as_in_textbooks(
     y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, p: int
 ) -> ComplexArray:
     """Sample by sample. One order is demodulated first: its problem is real, with a complex right-hand side."""
-    from gearsig.orders.vold_kalman_rotations import solve_by_rotations
-
     data: NDArray[Any] = phasors_of(cycles)
     observed = y.astype(np.complex128)
     if len(cycles) == 1:
@@ -188,7 +204,7 @@ def _solved_as_in_textbooks(
         data = np.ones(cycles.shape)
     if active is not None:
         data = data * active
-    x = solve_by_rotations(data, observed, weights, _differences(weights, p))
+    x = solve_sample_by_sample(data, observed, weights, _differences(weights, p))
     return np.asarray(2.0 * x, dtype=np.complex128)
 
 

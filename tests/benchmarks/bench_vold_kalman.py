@@ -1,9 +1,10 @@
 """Vold–Kalman beside scipy's sparse solve of the same textbook problem, on 10⁶ samples at 20 kHz.
 
-Run: python tests/benchmarks/bench_vold_kalman.py. One core; ratios of the best of interleaved rounds. Errors against the
-exact solution: in closed form for one order, by orthogonal rotations sample by sample for two.
+Run: python tests/benchmarks/bench_vold_kalman.py. One core; ratios of the best of interleaved rounds. Errors against
+the exact solution: in closed form for one order, by orthogonal rotations sample by sample for two.
 """
 
+# ruff: noqa: E402 - the number of threads is fixed before numpy is loaded
 import os
 
 for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
@@ -22,10 +23,16 @@ from scipy.sparse.linalg import spsolve
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from gearsig.orders.vold_kalman_rotations import solve_by_rotations
 from gearsig.orders.vold_kalman_solve import solve_envelopes, solve_waveforms
 from gearsig.orders.vold_kalman_weight import waveform_weight, weight_of_bandwidth
-from tests.orders.test_vold_kalman_exact import RATE_HZ, differences, exact_envelope, modulated_order, textbook_matrix
+from tests.orders.test_vold_kalman_exact import (
+    RATE_HZ,
+    differences,
+    exact_envelope,
+    modulated_order,
+    solve_by_rotations,
+    textbook_matrix,
+)
 
 N = 10**6
 ROUNDS = 3
