@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from gearsig.checks import FloatArray, count, frozen_array, not_negative, one_of, positive
 from gearsig.errors import InputError
 
-StartName = Literal["uniform", "zero", "random"]
+StartName = Literal["uniform", "zero", "random", "peaks"]
+STARTS = get_args(StartName)
 ModeAxis = Literal["frequency", "order"]
 
 REFERENCE_ITERATIONS = 499
@@ -35,7 +36,8 @@ class VmdSettings:
         Whether the first mode's centre is kept at zero, so that it takes the mean and slow drift [DC].
     start : str or tuple of float
         First centre frequencies [init]: "uniform" over the spectrum [1], "zero" [0], "random" on a logarithmic scale
-        [2], or one per mode, in the result's axis (Hz or orders).
+        [2], at the "peaks" of the spectrum (no such thing there), or one per mode, in the result's axis (Hz or orders).
+        The modes found depend on it: from a uniform start, two modes may settle on one component and miss another.
     tolerance : float or None
         Iterations end when the modes' energy (sum over samples of the squared change) moves by less than this [tol].
         It carries the signal's unit squared and grows with its length. None: `RELATIVE_TOLERANCE` of the signal's own
@@ -65,7 +67,7 @@ class VmdSettings:
         if self.tolerance is not None:
             not_negative(self.tolerance, "tolerance")
         if isinstance(self.start, str):
-            one_of(self.start, "start", ("uniform", "zero", "random"))
+            one_of(self.start, "start", STARTS)
             return
         object.__setattr__(self, "start", tuple(float(f) for f in self.start))
         if len(self.start) != self.n_modes:

@@ -64,7 +64,7 @@ def variational_modes(
     mirrored signal has nothing, with its neighbour's value (an alternating ±|û|/2n, mostly invisible). vmdpy drops
     the last sample of an odd length; here all samples are kept, and the line at half the sampling rate is empty.
 
-    Memory is about (3 n_modes + 3) × 8 bytes per sample. For signals beyond that see `modes_in_blocks`.
+    Memory is about (3 n_modes + 3) × 8 bytes per sample. For signals beyond that see `modes_by_block`.
 
     When not to use it: for broad-band impulses, whose spectrum is no narrow band (take their envelope, or a band);
     for speeds that vary by more than a mode's width (resample over angle first).
@@ -83,7 +83,7 @@ def variational_modes(
     x = checked_signal(values, minimum=8)
     fs = positive(sampling_rate, "sampling_rate", "Hz" if axis == "frequency" else "per revolution")
     check_supported(x, settings.n_modes)
-    solution = _solve(x.astype(np.float64), first_centres(settings, fs, len(x), rng), settings)
+    solution = _solve(x.astype(np.float64), fs, settings, rng)
     centres, bandwidths = fs * solution.history[-1], fs * _bandwidths(solution)
     waveforms = _waveforms(solution.lines)
     residual = np.asarray(x - waveforms.sum(axis=0))
@@ -116,7 +116,7 @@ class _Solution:
     converged: bool
 
 
-def _solve(x: FloatArray, start: FloatArray, settings: VmdSettings) -> _Solution:
+def _solve(x: FloatArray, fs: float, settings: VmdSettings, rng: np.random.Generator | None) -> _Solution:
     from scipy.fft import dct
 
     from gearsig.decompose.vmd_kernel import iterate
@@ -125,6 +125,7 @@ def _solve(x: FloatArray, start: FloatArray, settings: VmdSettings) -> _Solution
     scale = 2.0 ** np.floor(np.log2(np.abs(x).max()))
     spectrum = dct(x / scale, type=2, workers=1)
     energy = float(np.dot(x / scale, x / scale))
+    start = first_centres(settings, fs, spectrum, rng)
     threshold = _threshold(settings.tolerance, energy, scale)
     history = np.empty((settings.max_iterations + 1, settings.n_modes))
     grid, told = _grid(len(x)), (settings.penalty, settings.dual_step, settings.zero_mode)

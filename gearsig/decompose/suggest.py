@@ -1,0 +1,185 @@
+"""How many modes a signal supports, and at which penalty."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gearsig.checks import FloatArray, count, positive
+from gearsig.decompose.mode_checks import SAMPLES_PER_MODE, check_supported, half_gain_distance
+from gearsig.decompose.suggestion import ModeSuggestion, ModeTrial
+from gearsig.decompose.types import ModeAxis, Modes, VmdSettings
+from gearsig.decompose.vmd import variational_modes
+from gearsig.errors import InputError, RefusalError
+from gearsig.spectra.blocks import checked_signal
+
+PENALTIES = (500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0)
+USUAL_PENALTY = 2000.0
+NOISE_LIKE = 0.75
+"""Modes wider than this share of white noise's width hold no component that stands out of the noise."""
+NARROWEST_LIMIT = 0.3
+"""With few lines in a mode's reach the width of noise scatters, and the limit goes down to this."""
+LEAST_SHARE = 1e-4
+"""Modes with less of the signal's energy hold leftovers of their neighbours."""
+
+
+def suggest_modes(
+    values: FloatArray,
+    sampling_rate: float,
+    *,
+    most_modes: int = 8,
+    penalties: Sequence[float] = PENALTIES,
+    longest: int = 2**15,
+    axis: ModeAxis = "frequency",
+    source: str = "",
+) -> ModeSuggestion:
+    """Return the number of modes and the penalty that separate a signal's components.
+
+    Every number of modes up to `most_modes` is tried at every penalty, from uniform starts and, where that does not do,
+    from the spectrum's peaks. A trial is refused where two centres lie closer
+    than the distance at which a mode's gain is one half (the modes share lines), where a mode is as wide as white noise
+    alone would make it, or where a mode is all but empty. Of the others, the one with most modes wins; at equal
+    numbers the penalty nearest to 2000.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+    sampling_rate : float
+        Samples per second, or per revolution where `axis` is "order".
+    most_modes : int
+    penalties : sequence of float
+    longest : int
+        A longer signal is tried on this many samples from its middle.
+    axis, source : str
+
+    Returns
+    -------
+    ModeSuggestion
+
+    Raises
+    ------
+    InputError
+        On NaN, a constant, or too few samples.
+    RefusalError
+        If no trial separates anything: noise, broad-band impulses.
+
+    Notes
+    -----
+    White noise between the neighbours of a mode with gain g(x) = 1/(1 + x²), x in half-gain distances, |x| ≤ R, has the
+    root mean square width √[(atan R - R/(1+R²)) / (atan R + R/(1+R²))] half-gain distances; R is half the mean distance
+    of the modes. A suggestion is a start, not a proof: look at the modes.
+    """
+    x = checked_signal(values, minimum=8)
+    fs = positive(sampling_rate, "sampling_rate")
+    count(most_modes, "most_modes")
+    alphas = sorted({positive(p, "penalties") for p in penalties})
+    if not alphas:
+        raise InputError("penalties is empty", allowed="one or more values above zero")
+    part = _middle(x, count(longest, "longest", minimum=64))
+    check_supported(part, 1)
+    most = min(most_modes, len(part) // SAMPLES_PER_MODE)
+    trials = tuple(_better_trial(part, fs, k, p) for p in alphas for k in range(1, most + 1))
+    good = [t for t in trials if not t.objection]
+    if not good:
+        raise RefusalError(
+            f"none of {len(trials)} trials separates a component: {_commonest(trials)}",
+            remedy="choose a frequency band first (its envelope for impulses), or set n_modes and penalty by hand",
+        )
+    chosen = max(good, key=lambda t: (t.n_modes, -abs(np.log(t.penalty / USUAL_PENALTY))))
+    reasons = _reasons(chosen, trials, fs, axis)
+    if len(part) < len(x):
+        reasons = (*reasons, f"Tried on {len(part)} of {len(x)} samples, from the middle.")
+    return ModeSuggestion(chosen, trials, reasons, axis, source)
+
+
+def noise_width(penalty: float, n_modes: int) -> float:
+    """Return the root mean square width of a mode that holds white noise, in half-gain distances (see Notes above)."""
+    reach = 0.25 * np.sqrt(penalty) / n_modes
+    angle, fall = np.arctan(reach), reach / (1.0 + reach * reach)
+    return float(np.sqrt((angle - fall) / (angle + fall)))
+
+
+def noise_limit(penalty: float, n_samples: int) -> float:
+    """Return the share of white noise's width up to which a mode counts as a component.
+
+    The width of noise over M = 2n/√penalty lines scatters by about 1/√M; a mode that was started at the highest of many
+    places is narrower than most by several times that.
+    """
+    n_lines = 2.0 * n_samples / np.sqrt(penalty)
+    return float(np.clip(1.0 - 6.0 / np.sqrt(n_lines), NARROWEST_LIMIT, NOISE_LIKE))
+
+
+def _middle(x: FloatArray, longest: int) -> FloatArray:
+    start = max(0, (len(x) - longest) // 2)
+    return x[start : start + longest]
+
+
+def _better_trial(x: FloatArray, fs: float, n_modes: int, penalty: float) -> ModeTrial:
+    """Return the trial from uniform starts, or from the spectrum's peaks if only that one meets no objection."""
+    uniform = _trial(x, fs, VmdSettings(n_modes, penalty))
+    if not uniform.objection:
+        return uniform
+    peaks = _trial(x, fs, VmdSettings(n_modes, penalty, start="peaks"))
+    return uniform if peaks.objection else peaks
+
+
+def _trial(x: FloatArray, fs: float, settings: VmdSettings) -> ModeTrial:
+    modes = variational_modes(x, fs, settings)
+    order = np.array(modes.by_centre())
+    centres, widths = modes.centres[order], modes.bandwidths[order]
+    half_gain = half_gain_distance(settings.penalty, fs)
+    gaps = np.diff(centres) / half_gain
+    relative = widths / (half_gain * noise_width(settings.penalty, settings.n_modes))
+    shares = modes.rms**2 / np.mean(np.square(x, dtype=np.float64))
+    return ModeTrial(
+        settings=settings,
+        centres=tuple(centres.tolist()),
+        bandwidths=tuple(widths.tolist()),
+        reconstruction_error=modes.reconstruction_error,
+        separation=float(gaps.min(initial=np.inf)),
+        widest=float(relative.max()),
+        smallest_share=float(shares.min()),
+        n_iterations=modes.n_iterations,
+        converged=modes.converged,
+        objection=_objection(modes, gaps, relative, shares),
+    )
+
+
+def _objection(modes: Modes, gaps: FloatArray, relative_widths: FloatArray, shares: FloatArray) -> str:
+    if len(gaps) and gaps.min() < 1.0:
+        return "two modes share the same lines"
+    if shares.min() < LEAST_SHARE:
+        return "a mode is all but empty"
+    if relative_widths.max() > noise_limit(modes.settings.penalty, len(modes.residual)):
+        return "a mode is as wide as noise"
+    return "" if modes.converged else "not converged"
+
+
+def _commonest(trials: Sequence[ModeTrial]) -> str:
+    texts = [t.objection for t in trials]
+    best = max(set(texts), key=texts.count)
+    return f"in {texts.count(best)} of them {best}"
+
+
+def _reasons(chosen: ModeTrial, trials: Sequence[ModeTrial], fs: float, axis: ModeAxis) -> tuple[str, ...]:
+    unit = "Hz" if axis == "frequency" else "orders"
+    same = {t.n_modes: t for t in trials if t.penalty == chosen.penalty}
+    reasons = [
+        f"{chosen.n_modes} mode(s) at penalty {chosen.penalty:g}: all narrower than noise, none shares its lines.",
+        f"The modes leave {100 * chosen.reconstruction_error:.2g} % of the signal's rms in the residual.",
+    ]
+    if chosen.n_modes > 1:
+        reasons.append(
+            f"The closest centres are {chosen.separation * half_gain_distance(chosen.penalty, fs):.4g} {unit} apart, "
+            f"{chosen.separation:.3g} times the distance at which a mode's gain is one half."
+        )
+    following = same.get(chosen.n_modes + 1)
+    if following is None:
+        reasons.append("No larger number was tried: the signal may hold more modes.")
+    else:
+        reasons.append(f"With {following.n_modes} modes {following.objection}.")
+    usual = [t for t in trials if t.penalty == USUAL_PENALTY and t.n_modes == chosen.n_modes]
+    if chosen.penalty != USUAL_PENALTY and usual:
+        reasons.append(f"At the usual penalty of {USUAL_PENALTY:g} {usual[0].objection}.")
+    return tuple(reasons)

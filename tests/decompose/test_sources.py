@@ -1,0 +1,75 @@
+"""Modes of channels, of signals over angle, of envelopes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearsig.angle.types import AngleSignal, ShaftAngle
+from gearsig.decompose.sources import angle_modes, channel_envelope_modes, channel_modes, envelope_modes
+from gearsig.decompose.types import VmdSettings
+from gearsig.errors import InputError
+from gearsig.recording.read import read_recording
+from gearsig.recording.types import Channel, Recording
+from gearsig.spectra.envelope import band_envelope
+
+FS = 10_000.0
+TIME = np.arange(20_000) / FS
+MODULATION = 1 + 0.5 * np.cos(2 * np.pi * 20 * TIME) + 0.3 * np.cos(2 * np.pi * 90 * TIME)
+MODULATED = 2.0 * MODULATION * np.cos(2 * np.pi * 3000 * TIME)
+DATA = Path(__file__).parents[3] / "shared" / "data" / "bearing_races"
+
+
+def _recording(*rows: np.ndarray) -> Recording:
+    names = [Channel(f"a{i + 1}", "acceleration", "g") for i in range(len(rows))]
+    return Recording(np.stack(rows), FS, tuple(names))
+
+
+def test_a_channels_modes_carry_its_name_and_unit():
+    x = np.cos(2 * np.pi * 200 * TIME) + 0.5 * np.cos(2 * np.pi * 2000 * TIME)
+    modes = channel_modes(_recording(MODULATED, x), "a2", VmdSettings(2))
+    assert modes.centre_frequencies_hz == pytest.approx([200.0, 2000.0], abs=1.0)
+    assert (modes.source, modes.unit, modes.sampling_rate) == ("a2", "g", FS)
+    assert modes.rms == pytest.approx([0.707, 0.354], abs=0.01)
+    assert modes.positions[-1] == pytest.approx(TIME[-1])
+
+
+def test_over_angle_the_centres_are_orders():
+    n = 256 * 80
+    revolutions = np.arange(n) / 256
+    x = np.cos(2 * np.pi * 23 * revolutions) + 0.5 * np.cos(2 * np.pi * 4 * revolutions)
+    angle = ShaftAngle("input", np.array([0.0, 10.0]), np.array([0.0, 80.0]), np.array([4.0, 12.0]), "constant")
+    signal = AngleSignal(x[None, :], 256, angle, 0.0, ("a1",), ("m/s^2",), 100.0)
+    modes = angle_modes(signal, "a1", VmdSettings(2, start=(4.0, 23.0)))
+    assert modes.centres == pytest.approx([4.0, 23.0], abs=0.05)
+    assert (modes.axis, modes.shaft, modes.unit) == ("order", "input", "m/s^2")
+    assert "order" in modes.describe()
+    with pytest.raises(InputError, match="orders"):
+        _ = modes.centre_frequencies_hz
+
+
+def test_modes_of_the_envelope_are_its_modulations():
+    modes = channel_envelope_modes(_recording(MODULATED), "a1", (2700, 3300), VmdSettings(2, start="peaks"))
+    assert modes.centre_frequencies_hz == pytest.approx([20.0, 90.0], abs=0.5)
+    assert modes.rms * np.sqrt(2) == pytest.approx([1.0, 0.6], abs=0.02)
+    assert modes.offset == pytest.approx(2.0, abs=1e-6)
+    assert "envelope" in modes.source
+
+
+def test_envelope_modes_sum_with_residual_and_offset_to_the_envelope():
+    envelope = band_envelope(MODULATED, FS, (2700, 3300), unit="g")
+    modes = envelope_modes(envelope, VmdSettings(3))
+    total = modes.waveforms.sum(axis=0) + modes.residual + modes.offset
+    assert total == pytest.approx(envelope.values, abs=1e-12)
+
+
+@pytest.mark.skipif(not DATA.exists(), reason="no measured data beside the checkout")
+def test_the_outer_race_shows_in_a_mode_of_the_measured_envelope():
+    path = next(p for p in sorted(DATA.iterdir()) if "outer" in p.name.lower())
+    recording = read_recording(path)
+    name = recording.vibration_names()[0]
+    settings = VmdSettings(4, penalty=20_000.0, start="peaks")
+    modes = channel_envelope_modes(recording, name, (2000, 2600), settings, kind="magnitude")
+    assert np.abs(modes.centres - 81.125).min() < 4.0
