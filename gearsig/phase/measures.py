@@ -222,6 +222,9 @@ class RecurrenceMeasures:
     radius : float
         In standard deviations of the axes.
     shortest_line, theiler_points, stride, n_points : int
+        In points taken; every `stride`-th sample was.
+    duration_s : float
+        Length of the stretch.
     source : str
     """
 
@@ -237,4 +240,5 @@ class RecurrenceMeasures:
     theiler_points: int
     stride: int
     n_points: int
+    duration_s: float
     source: str

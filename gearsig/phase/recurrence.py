@@ -21,6 +21,7 @@ def recurrence_plot(
     recurrence_rate: float = 0.05,
     radius: float | None = None,
     n_points: int = 1_000,
+    stride: int | None = None,
 ) -> RecurrencePlot:
     """Return which points lie closer to each other than a radius: R(i, j) = |x(i) - x(j)| < ε.
 
@@ -32,7 +33,10 @@ def recurrence_plot(
     radius : float or None
         In standard deviations of the axes; wins over `recurrence_rate`.
     n_points : int
-        At most so many points, evenly spread over the path (2 to 3000): the matrix never grows with the signal.
+        At most so many points from the start of the path (2 to 3000): the matrix never grows with the signal. For
+        another stretch see `PhasePortrait.between`.
+    stride : int or None
+        Every so-many-th point is taken; None: as many as leave 16 in a mean period.
 
     Raises
     ------
@@ -47,12 +51,12 @@ def recurrence_plot(
     from gearsig.phase.recurrence_kernel import recurrence_matrix
 
     within(count(n_points, "n_points", minimum=2), "n_points", 2, MOST_PLOT_POINTS)
-    points, stride = _taken(portrait, n_points)
+    points, step = _taken(portrait, n_points, stride)
     limit = _radius(points, recurrence_rate, radius, 0)
     matrix = np.empty((len(points), len(points)), dtype=np.bool_)
     recurrence_matrix(points, limit, matrix)
-    times = portrait.start_s + np.arange(len(points)) * (stride / portrait.sampling_rate_hz)
-    return RecurrencePlot(matrix, times, limit, stride, portrait.source)
+    times = portrait.start_s + np.arange(len(points)) * (step / portrait.sampling_rate_hz)
+    return RecurrencePlot(matrix, times, limit, step, portrait.source)
 
 
 def recurrence_measures(
@@ -63,6 +67,7 @@ def recurrence_measures(
     shortest_line: int = 2,
     theiler_samples: int | None = None,
     n_points: int = 5_000,
+    stride: int | None = None,
 ) -> RecurrenceMeasures:
     """Return recurrence rate, determinism, line lengths, entropy, laminarity and trapping time.
 
@@ -80,13 +85,15 @@ def recurrence_measures(
     theiler_samples : int or None
         None: one mean period, and at least one point taken.
     n_points : int
-        At most so many points, evenly spread (100 to 20 000). Time grows with its square, memory does not: the matrix
-        is never held.
+        At most so many points from the start of the path (100 to 20 000). Time grows with its square, memory does not:
+        the matrix is never held. For another stretch see `PhasePortrait.between`.
+    stride : int or None
+        Every so-many-th point is taken; None: as many as leave 16 in a mean period. A coarser one loses lines.
 
     Returns
     -------
     RecurrenceMeasures
-        Lengths in seconds. Where the path is thinned (`stride` > 1), short lines are lost and the shares fall.
+        Lengths in seconds.
 
     Raises
     ------
@@ -104,8 +111,8 @@ def recurrence_measures(
 
     within(count(n_points, "n_points", minimum=100), "n_points", 100, MOST_MEASURE_POINTS)
     count(shortest_line, "shortest_line", minimum=2)
-    points, stride = _taken(portrait, n_points)
-    window = _theiler(portrait, theiler_samples, stride)
+    points, taken = _taken(portrait, n_points, stride)
+    window = _theiler(portrait, theiler_samples, taken)
     if len(points) < 2 * window + 20:
         raise RefusalError(
             f"{len(points)} points are too few for a Theiler window of {window}", remedy="record longer or lower it"
@@ -113,7 +120,7 @@ def recurrence_measures(
     limit = _radius(points, recurrence_rate, radius, window)
     diagonal, vertical = np.zeros(len(points) + 1, dtype=np.int64), np.zeros(len(points) + 1, dtype=np.int64)
     line_lengths(points, limit, window, diagonal, vertical)
-    step = stride / portrait.sampling_rate_hz
+    step = taken / portrait.sampling_rate_hz
     n_apart = len(points) - window - 1
     recurrent = float(np.dot(np.arange(len(diagonal)), diagonal))
     determinism, mean_line, longest, entropy = _lines(diagonal, shortest_line)
@@ -129,8 +136,9 @@ def recurrence_measures(
         radius=limit,
         shortest_line=shortest_line,
         theiler_points=window,
-        stride=stride,
+        stride=taken,
         n_points=len(points),
+        duration_s=len(points) * step,
         source=portrait.source,
     )
 
@@ -148,21 +156,26 @@ def _lines(counts: np.ndarray, shortest: int) -> tuple[float, float, float, floa
     return on_lines / total, on_lines / float(n), float(long[n_long > 0].max()), float(-np.sum(share * np.log(share)))
 
 
-def _taken(portrait: PhasePortrait, n_points: int) -> tuple[FloatArray, int]:
-    """Return evenly spread points, in standard deviations of the axes, and their stride."""
-    stride = -(-portrait.n_points // n_points)
+def _taken(portrait: PhasePortrait, n_points: int, stride: int | None) -> tuple[FloatArray, int]:
+    """Return the first points at the stride, in standard deviations of the axes, and the stride."""
     extent = portrait.extent
     if not bool((extent > 0.0).any()):
         raise RefusalError("the path does not move", remedy="take a channel that vibrates")
-    points = portrait.points[::stride] / np.where(extent > 0.0, extent, 1.0)
-    return np.ascontiguousarray(points, dtype=np.float64), stride
+    step = max(1, int(_period(portrait) / 16.0)) if stride is None else count(stride, "stride")
+    points = portrait.points[::step][:n_points] / np.where(extent > 0.0, extent, 1.0)
+    return np.ascontiguousarray(points, dtype=np.float64), step
 
 
 def _theiler(portrait: PhasePortrait, asked: int | None, stride: int) -> int:
     if asked is not None:
         return -(-count(asked, "theiler_samples", minimum=0) // stride)
-    period = mean_period_samples(np.ascontiguousarray(portrait.points[:, 0], dtype=np.float64))
-    return max(1, round(period / stride))
+    return max(1, round(_period(portrait) / stride))
+
+
+def _period(portrait: PhasePortrait) -> float:
+    """Mean period along the first axis that moves, in samples."""
+    axis = int(np.argmax(portrait.extent > 0.0))
+    return mean_period_samples(np.ascontiguousarray(portrait.points[:, axis], dtype=np.float64))
 
 
 def _radius(points: FloatArray, rate: float, radius: float | None, theiler: int) -> float:

@@ -106,26 +106,28 @@ def geometric_section(
 def section_period(section: PoincareSection, *, longest: int = 16, tolerance: float = 0.05) -> int:
     """Return after how many crossings the section repeats itself; 0 if it does not within `longest`.
 
-    The smallest p with median |xᵢ₊ₚ - xᵢ| / size ≤ tolerance, distances in standard deviations of the path's axes.
+    The smallest p with median |xᵢ₊ₚ - xᵢ| / size ≤ tolerance, distances in standard deviations of the path's axes, that
+    still holds (within twice the tolerance) over half of the section: quasi-periodic motion that nearly closes creeps.
 
     Parameters
     ----------
     section : PoincareSection
-        At least 2·longest points, or fewer for a shorter search.
+        Of a steady operating condition; at least 2·longest points, or fewer for a shorter search.
     longest : int
     tolerance : float
         Above the scatter from noise, below the distance of the branches that are to be told apart.
-
-    Notes
-    -----
-    Slow quasi-periodic motion creeps: below `tolerance` per cycle it counts as repeating.
     """
     count(longest, "longest")
     x = section.points / np.where(section.extent > 0.0, section.extent, 1.0)
-    for p in range(1, min(longest, section.n_points // 2) + 1):
-        if float(np.median(np.linalg.norm(x[p:] - x[:-p], axis=1))) <= tolerance:
+    half = section.n_points // 2
+    for p in range(1, min(longest, half) + 1):
+        if _return_distance(x, p) <= tolerance and _return_distance(x, half // p * p) <= 2.0 * tolerance:
             return p
     return 0
+
+
+def _return_distance(x: FloatArray, lag: int) -> float:
+    return float(np.median(np.linalg.norm(x[lag:] - x[:-lag], axis=1)))
 
 
 def _interpolated(points: FloatArray, positions: FloatArray) -> FloatArray:

@@ -49,7 +49,7 @@ def test_measures_equal_brute_force(n, theiler, shortest, radius, seed):
     rng = np.random.default_rng(seed)
     points = np.cumsum(rng.normal(size=(n, 2)), axis=0) % 5.0
     found = recurrence_measures(
-        _path(points), radius=radius, theiler_samples=theiler, shortest_line=shortest, n_points=200
+        _path(points), radius=radius, theiler_samples=theiler, shortest_line=shortest, n_points=200, stride=1
     )
     wanted = _brute_force(points, radius, theiler, shortest)
     assert found.recurrence_rate == pytest.approx(wanted["rr"])
@@ -62,7 +62,7 @@ def test_measures_equal_brute_force(n, theiler, shortest, radius, seed):
 def test_independent_samples_have_the_determinism_of_chance():
     """Entries along a diagonal are independent: a share 1 - (1 - r)² of them touches another one."""
     x = np.random.default_rng(0).normal(size=5000)
-    found = recurrence_measures(_path(x), recurrence_rate=0.05, theiler_samples=1)
+    found = recurrence_measures(_path(x), recurrence_rate=0.05, theiler_samples=1, stride=1)
     r = found.recurrence_rate
     assert r == pytest.approx(0.05, rel=0.03)
     assert found.determinism == pytest.approx(2 * r - r * r, rel=0.04)
@@ -70,7 +70,8 @@ def test_independent_samples_have_the_determinism_of_chance():
 
 def test_a_periodic_path_is_all_lines():
     x = np.sin(2 * np.pi * np.arange(3000) / 50.0)
-    found = recurrence_measures(delay_embedding(x, 100.0, delay_samples=12, dimension=2), radius=0.1)
+    portrait = delay_embedding(x, 100.0, delay_samples=12, dimension=2)
+    found = recurrence_measures(portrait, radius=0.1, stride=1)
     assert found.determinism == 1.0
     # The longest line is the first multiple of the period outside the Theiler window of one period.
     assert found.longest_line_s == pytest.approx((3000 - 12 - 100) / 100.0)
@@ -79,13 +80,13 @@ def test_a_periodic_path_is_all_lines():
 def test_plot_is_symmetric_bounded_and_has_the_rate_asked_for():
     portrait = delay_embedding(lorenz(20_001, 0.02)[:, 0], 50.0, delay_samples=8, dimension=3)
     plot = recurrence_plot(portrait, recurrence_rate=0.1, n_points=500)
-    assert plot.recurrent.shape[0] <= 500
-    assert plot.stride == 40
+    assert plot.recurrent.shape == (500, 500)
+    assert plot.stride in (4, 5)  # about 80 samples are a mean period
     np.testing.assert_array_equal(plot.recurrent, plot.recurrent.T)
     assert plot.recurrent.mean() == pytest.approx(0.1, rel=0.05)
     assert plot.times_s[-1] <= portrait.end_s
     assert not plot.recurrent.flags.writeable
-    taken = portrait.points[:: plot.stride] / portrait.extent
+    taken = portrait.points[:: plot.stride][:500] / portrait.extent
     assert plot.recurrent[3, 9] == (np.linalg.norm(taken[3] - taken[9]) < plot.radius)
 
 
@@ -100,6 +101,20 @@ def test_bad_input():
     with pytest.raises(InputError, match="shortest_line"):
         recurrence_measures(portrait, shortest_line=1)
     with pytest.raises(RefusalError, match="Theiler window of 300"):
-        recurrence_measures(portrait, theiler_samples=300)
+        recurrence_measures(portrait, theiler_samples=300, stride=1)
     with pytest.raises(RefusalError, match="does not move"):
         recurrence_plot(_path(np.ones(500)))
+
+
+def test_long_paths_cost_no_more_and_another_stretch_can_be_asked_for():
+    x = lorenz(100_000, 0.02)[:, 0]
+    portrait = delay_embedding(x, 50.0, delay_samples=8, dimension=3)
+    late = portrait.between(1000.0, 1600.0)
+    assert (late.start_s, late.n_points) == (1000.0, 30_001)
+    np.testing.assert_array_equal(late.points[0], portrait.points[50_000])
+    one, two = recurrence_measures(portrait), recurrence_measures(late)
+    assert one.n_points == two.n_points == 5_000
+    assert one.duration_s == pytest.approx(5_000 * one.stride / 50.0)
+    assert two.determinism == pytest.approx(one.determinism, abs=0.02)
+    with pytest.raises(InputError, match="no samples from 5000"):
+        portrait.between(5000.0, 6000.0)

@@ -208,3 +208,14 @@ def test_a_diagram_of_nothing_or_of_unlike_sections_is_refused():
         bifurcation_diagram([(1.0, _map_section(np.ones(9)))], parameter="r", axis=3)
     with pytest.raises(InputError, match="the series lasts"):
         bifurcation_of_runs(lambda _: (np.ones(5), 1.0), [1.0], 1.0, parameter="r", transient_s=10.0)
+
+
+def test_a_motion_that_nearly_closes_is_not_called_periodic():
+    """√2/1.1 is 9/7 within 7e-5: after seven cycles the section is back but for a creep."""
+    t = np.arange(30_000) / 1000.0
+    w = 2 * np.pi * 20.0
+    x = np.sin(w * t) + 0.6 * np.sin(np.sqrt(2.0) / 1.1 * w * t)
+    plane = phase_plane_of(x, 1000.0, quantity="displacement")
+    assert section_period(locked_section(plane, constant_period_lock(0.05, 30.0))) == 0
+    closed = phase_plane_of(np.sin(w * t) + 0.6 * np.sin(9 / 7 * w * t), 1000.0, quantity="displacement")
+    assert section_period(locked_section(closed, constant_period_lock(0.05, 30.0))) == 7

@@ -93,7 +93,7 @@ def test_bifurcation_draws_all_points_and_names_periods():
 def test_recurrence_shows_the_matrix_over_time_and_the_measures():
     matrix = np.eye(50, dtype=bool)
     plot = RecurrencePlot(matrix, np.arange(50) * 0.1, 0.3, 7, "a1")
-    measures = RecurrenceMeasures(0.05, 0.9, 1.0, 2.0, 1.5, 0.4, 0.2, 0.3, 2, 5, 7, 50, "a1")
+    measures = RecurrenceMeasures(0.05, 0.9, 1.0, 2.0, 1.5, 0.4, 0.2, 0.3, 2, 5, 7, 50, 35.0, "a1")
     figure = recurrence_figure(plot, measures)
     np.testing.assert_array_equal(figure.axes[0].images[0].get_array(), matrix)
     assert figure.axes[0].images[0].get_extent() == pytest.approx([0.0, 4.9, 0.0, 4.9])

@@ -1,0 +1,72 @@
+"""The kind of motion, from a model's states and from one measured channel."""
+
+import numpy as np
+import pytest
+
+from gearsig.errors import RefusalError
+from gearsig.phase.kind import kind_of_motion
+from gearsig.phase.lock import constant_period_lock
+from gearsig.phase.plane import phase_plane_of
+from gearsig.phase.types import PhasePortrait
+from tests.phase.systems import DUFFING_PERIOD_S, duffing, quasi_periodic
+
+RATE = 64 / DUFFING_PERIOD_S
+
+
+def _duffing(force, n_periods=1500, noise=0.0):
+    states = duffing(force, n_periods)
+    states += noise * states.std(axis=0) * np.random.default_rng(0).normal(size=states.shape)
+    path = PhasePortrait(states, RATE, ("x", "v"), ("m", "m/s"), "states", "duffing")
+    return path, constant_period_lock(DUFFING_PERIOD_S, path.end_s, "forcing period")
+
+
+@pytest.mark.parametrize(
+    ("force", "noise", "kind", "period"),
+    [
+        (0.20, 0.0, "periodic", 1),
+        (0.20, 0.02, "periodic", 1),
+        (0.28, 0.0, "subharmonic", 2),
+        (0.28, 0.02, "subharmonic", 2),
+        (0.29, 0.0, "subharmonic", 4),
+        (0.50, 0.0, "chaotic", 0),
+    ],
+)
+def test_forced_oscillator(force, noise, kind, period):
+    found = kind_of_motion(*_duffing(force, noise=noise))
+    assert (found.kind, found.period) == (kind, period)
+    assert found.evidence
+
+
+def test_from_measured_acceleration_alone():
+    path, lock = _duffing(0.5)
+    x, v = path.points.T
+    t = np.arange(len(x)) / RATE
+    acceleration = 0.5 * np.cos(1.2 * t) - 0.3 * v + x - x**3
+    plane = phase_plane_of(acceleration, RATE, quantity="acceleration", low_cut_hz=0.02, unit="m/s^2")
+    assert kind_of_motion(plane, lock).kind == "chaotic"
+
+
+def test_two_frequencies_are_quasi_periodic():
+    x = quasi_periodic(30_000)
+    plane = phase_plane_of(x, 1000.0, quantity="displacement")
+    found = kind_of_motion(plane, constant_period_lock(50.3 / 1000.0, 30.0))
+    assert found.kind == "quasi-periodic"
+    assert found.chaos_test.k < 0.1
+    assert abs(found.exponent.exponent_per_s) < 0.05  # per second, of a motion with 20 cycles per second
+
+
+def test_noise_is_called_stochastic():
+    noise = np.random.default_rng(0).normal(size=(20_000, 2))
+    path = PhasePortrait(noise, 1000.0, ("x", "v"), ("m", "m/s"), "states", "noise")
+    found = kind_of_motion(path, constant_period_lock(0.02, 20.0))
+    assert found.kind == "stochastic"
+    assert any("no dimension" in sentence for sentence in found.evidence)
+
+
+def test_what_cannot_be_answered_is_said():
+    noise = np.random.default_rng(0).normal(size=(1500, 2))
+    path = PhasePortrait(noise, 1000.0, ("x", "v"), ("m", "m/s"), "states", "noise")
+    found = kind_of_motion(path, constant_period_lock(0.02, 1.5))
+    assert any(sentence.startswith("0–1 test: values has") for sentence in found.evidence)
+    with pytest.raises(RefusalError, match="no whole cycle"):
+        kind_of_motion(path, constant_period_lock(5.0, 10.0))
