@@ -19,7 +19,7 @@ from gearsig.orders.vold_kalman_splines import (
 from gearsig.orders.vold_kalman_weight import HALF_POWER, envelope_weight, waveform_weight
 
 STRONGEST_ELIMINATED = 1.5e5
-"""r·|D| up to which the normal equations are solved: their rounding error is 1e-7 there, more where orders are alike."""
+"""r·|D| up to which the normal equations are solved: their rounding error is 1e-7 there, more if orders are alike."""
 SMALLEST_CELL = 3
 """Samples. Below, the band is so wide that the coarse grid saves nothing, and elimination loses no digits."""
 
@@ -148,7 +148,7 @@ def waveform_accuracy_of(cycles: FloatArray, active: BoolArray, bandwidths: Floa
 
 
 def _error_of_strength(strength: float) -> float:
-    """Return the rounding error for r·|D|: ε times its square by elimination, with a factor found in trials; or once."""
+    """Return the rounding error for r·|D|: it grows with the square by elimination (factor from trials)."""
     return 2e-17 * strength**2 if strength <= STRONGEST_ELIMINATED else 1e-15 * strength
 
 

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
+from gearsig.orders.vold_kalman_assembly import add_products, add_projections
+from gearsig.orders.vold_kalman_phasor import cosine_and_sine
 
 ComplexArray = NDArray[np.complex128]
 BoolArray = NDArray[np.bool_]
@@ -112,11 +114,10 @@ def sampled_basis(d: int, p: int) -> tuple[FloatArray, FloatArray]:
     return np.ascontiguousarray(cells(spline)[:, 1:-1]), np.ascontiguousarray(cells(difference)[:, 1:])
 
 
-def _pairs(basis: FloatArray) -> tuple[list[tuple[int, int]], FloatArray]:
-    """Return all pairs s <= t of columns, and their products, (d, n_pairs)."""
-    pairs = list(combinations_with_replacement(range(basis.shape[1]), 2))
-    products = np.stack([basis[:, s] * basis[:, t] for s, t in pairs], axis=1)
-    return pairs, products
+def _pairs(basis: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+    """Return all pairs s <= t of columns, (n_pairs, 2), and their products, (d, n_pairs)."""
+    pairs = np.array(list(combinations_with_replacement(range(basis.shape[1]), 2)), dtype=np.int64)
+    return pairs, basis[:, pairs[:, 0]] * basis[:, pairs[:, 1]]
 
 
 def _data_terms(
@@ -138,51 +139,65 @@ def _data_terms(
         np.float64 if mirror or n_orders == 1 else np.complex128,
     )
     right = np.zeros((n_cells + PIECES, n_unknowns), np.float64 if mirror else np.complex128)
+    add = _add_real_terms if mirror else _add_complex_terms
     per_chunk = max(1, CHUNK_SAMPLES // d)
     for first in range(0, n_cells, per_chunk):
-        cells = slice(first, min(first + per_chunk, n_cells))
-        samples = slice(cells.start * d, min(cells.stop * d, n))
-        values, phasors = _padded_chunk(y, cycles, active, samples, (cells.stop - cells.start, d))
-        if mirror:
-            _add_real_terms(matrix, right, cells, values, phasors, basis, pairs, products)
-            continue
-        for k, (c_k, s_k) in enumerate(phasors):
-            projected = (values * c_k) @ basis - 1j * ((values * s_k) @ basis)
-            for s in range(PIECES):
-                right[cells.start + s : cells.stop + s, k] += projected[:, s]
-            _add(matrix, k, k, cells, pairs, (c_k * c_k + s_k * s_k) @ products)
-            for m, (c_m, s_m) in enumerate(phasors[:k]):
-                coupling = (c_k * c_m + s_k * s_m) @ products + 1j * ((c_k * s_m - s_k * c_m) @ products)
-                _add(matrix, k, m, cells, pairs, coupling)
+        last = min(first + per_chunk, n_cells)
+        samples = slice(first * d, min(last * d, n))
+        values, phasors = _padded_chunk(y, cycles, active, samples, (last - first, d))
+        # Where cos² + sin² is 1 throughout, its products are the same in every cell.
+        whole = np.tile(products.sum(axis=0), (last - first, 1)) if active is None and last * d <= n else None
+        add(matrix, right, first, values, phasors, basis, pairs, products, whole)
     return matrix, right
+
+
+def _add_complex_terms(
+    matrix: NDArray[Any],
+    right: NDArray[Any],
+    first: int,
+    values: FloatArray,
+    phasors: list[tuple[FloatArray, FloatArray]],
+    basis: FloatArray,
+    pairs: NDArray[np.int64],
+    products: FloatArray,
+    whole: FloatArray | None,
+) -> None:
+    """Add a chunk's part for the complex unknowns: e_k* y on the right, e_k* e_m in the matrix."""
+    for k, (c_k, s_k) in enumerate(phasors):
+        add_projections(right, k, first, (values * c_k) @ basis - 1j * ((values * s_k) @ basis))
+        own = whole if whole is not None else (c_k * c_k + s_k * s_k) @ products
+        add_products(matrix, k, k, first, pairs, own)
+        for m, (c_m, s_m) in enumerate(phasors[:k]):
+            coupling = (c_k * c_m + s_k * s_m) @ products + 1j * ((c_k * s_m - s_k * c_m) @ products)
+            add_products(matrix, k, m, first, pairs, coupling)
 
 
 def _add_real_terms(
     matrix: NDArray[Any],
     right: NDArray[Any],
-    cells: slice,
+    first: int,
     values: FloatArray,
     phasors: list[tuple[FloatArray, FloatArray]],
     basis: FloatArray,
-    pairs: list[tuple[int, int]],
+    pairs: NDArray[np.int64],
     products: FloatArray,
+    whole: FloatArray | None,
 ) -> None:
     """Add a chunk's part for the real unknowns: Re(a e^{iΘ}) = u cos Θ - v sin Θ."""
     regressors = [part for c, s in phasors for part in (c, -s)]
+    own: FloatArray = np.zeros(0)
     for k, of_k in enumerate(regressors):
-        projected = (values * of_k) @ basis
-        for s in range(PIECES):
-            right[cells.start + s : cells.stop + s, k] += projected[:, s]
-        for m, of_m in enumerate(regressors[: k + 1]):
-            _add(matrix, k, m, cells, pairs, (of_k * of_m) @ products)
+        add_projections(right, k, first, (values * of_k) @ basis)
+        for m, of_m in enumerate(regressors[:k]):
+            add_products(matrix, k, m, first, pairs, (of_k * of_m) @ products)
+        own = whole - own if whole is not None and k % 2 else (of_k * of_k) @ products
+        add_products(matrix, k, k, first, pairs, own)
 
 
 def _padded_chunk(
     y: FloatArray, cycles: FloatArray, active: BoolArray | None, samples: slice, shape: tuple[int, int]
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
     """Return the signal and each order's (cosine, sine) as (cell, sample in it); zero past the end, where inactive."""
-    from gearsig.orders.vold_kalman_phasor import cosine_and_sine
-
     length = samples.stop - samples.start
     values: FloatArray = np.zeros(shape)
     values.reshape(-1)[:length] = y[samples]
@@ -197,15 +212,6 @@ def _padded_chunk(
     return values, phasors
 
 
-def _add(matrix: NDArray[Any], k: int, m: int, cells: slice, pairs: list[tuple[int, int]], grams: NDArray[Any]) -> None:
-    """Add each cell's products of pieces to the splines they belong to, for orders k and m and, conjugate, m and k."""
-    for i, (s, t) in enumerate(pairs):
-        at = slice(cells.start + s, cells.stop + s)
-        matrix[t - s, at, k, m] += grams[:, i]
-        if m != k:
-            matrix[t - s, at, m, k] += np.conj(grams[:, i])
-
-
 def _add_structure(matrix: NDArray[Any], weights: FloatArray, differences: FloatArray, n: int, p: int) -> None:
     """Add r²·(∇^p φ_i)(∇^p φ_j), summed over the rows that lie wholly inside the signal."""
     d = len(differences)
@@ -215,15 +221,15 @@ def _add_structure(matrix: NDArray[Any], weights: FloatArray, differences: Float
     whole = products.sum(axis=0)
     for k, r in enumerate(weights):
         for first in range(0, n_cells, per_chunk):
-            cells = slice(first, min(first + per_chunk, n_cells))
-            rows = slice(cells.start * d, min(cells.stop * d, n_rows))
-            if len(r) == 1 and rows.stop == cells.stop * d:
-                grams = np.broadcast_to(r[0] ** 2 * whole, (cells.stop - cells.start, len(whole)))
+            last = min(first + per_chunk, n_cells)
+            rows = slice(first * d, min(last * d, n_rows))
+            if len(r) == 1 and rows.stop == last * d:
+                grams = np.tile(r[0] ** 2 * whole, (last - first, 1))
             else:
-                squares = np.zeros((cells.stop - cells.start) * d)
+                squares = np.zeros((last - first) * d)
                 squares[: max(0, rows.stop - rows.start)] = (r if len(r) == 1 else r[rows]) ** 2
                 grams = squares.reshape(-1, d) @ products
-            _add(matrix, k, k, cells, pairs, grams)
+            add_products(matrix, k, k, first, pairs, grams)
 
 
 def _solved(matrix: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:

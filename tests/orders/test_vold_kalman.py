@@ -130,7 +130,7 @@ def test_crossing_orders(generation):
 
 
 def test_close_orders_of_two_shafts():
-    """46 teeth on one shaft, 45 on another, 0.02 orders apart: less than the bandwidth. They beat every few seconds."""
+    """Two shafts at 25 and 24.5 Hz, half a bandwidth apart: they beat every two seconds."""
     rig = Rig(
         shafts=(Shaft("in"), Shaft("out")), pairs=(GearPair("p", "in", "out", 49, 50),), speed=ConstantSpeed(1500.0)
     )
