@@ -81,7 +81,8 @@ def embedding_dimension(
         )
     x = (x - x.mean()) / x.std()
     library, references = spaced(n, N_LIBRARY), spaced(n, N_REFERENCES)
-    steps = [_step(x, tau, d, library, references, window) for d in range(1, largest + 1)]
+    finest = _resolution(x[library])
+    steps = [_step(x, tau, d, library, references, window, finest) for d in range(1, largest + 1)]
     false_fraction = np.array([step[0] for step in steps])
     growth, determinism = _ratios([step[1] for step in steps]), _ratios([step[2] for step in steps])
     below = np.flatnonzero(false_fraction <= threshold)
@@ -106,19 +107,28 @@ def _step(
     library: np.ndarray,
     references: np.ndarray,
     window: int,
+    finest: float,
 ) -> tuple[float, float, float]:
-    """Return the share of false neighbours, Cao's E and E* at dimension d; x has a standard deviation of one."""
+    """Return the share of false neighbours, Cao's E and E* at dimension d; x has a standard deviation of one.
+
+    Distances below the signal's resolution are taken as that: a coarse converter makes many points equal.
+    """
     vectors = delay_vectors(x, tau, d)
-    distance, near = nearest_apart(vectors, library, references, window)
+    distance, near = nearest_apart(vectors, library, references, window, equal_counts=True)
     found = near >= 0
-    here, there, r = references[found], near[found], distance[found]
+    here, there, r = references[found], near[found], np.maximum(distance[found], finest)
     step = np.abs(x[here + d * tau] - x[there + d * tau])
     false = (step > DISTANCE_RATIO * r) | (np.hypot(r, step) > SIZE_RATIO)
-    largest, near = nearest_apart(vectors, library, references, window, norm=np.inf)
+    largest, near = nearest_apart(vectors, library, references, window, np.inf, equal_counts=True)
     found = near >= 0
-    here, there, r = references[found], near[found], largest[found]
+    here, there, r = references[found], near[found], np.maximum(largest[found], finest)
     change = np.abs(x[here + d * tau] - x[there + d * tau])
     return float(false.mean()), float(np.mean(np.maximum(r, change) / r)), float(change.mean())
+
+
+def _resolution(x: FloatArray) -> float:
+    """Return the smallest step between different values."""
+    return float(np.diff(np.unique(x)).min())
 
 
 def _ratios(values: list[float]) -> FloatArray:

@@ -107,7 +107,7 @@ def section_period(section: PoincareSection, *, longest: int = 16, tolerance: fl
     """Return after how many crossings the section repeats itself; 0 if it does not within `longest`.
 
     The smallest p with median |xᵢ₊ₚ - xᵢ| / size ≤ tolerance, distances in standard deviations of the path's axes, that
-    still holds (within twice the tolerance) over half of the section: quasi-periodic motion that nearly closes creeps.
+    holds over half of the section as well: quasi-periodic motion that nearly closes creeps.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def section_period(section: PoincareSection, *, longest: int = 16, tolerance: fl
     x = section.points / np.where(section.extent > 0.0, section.extent, 1.0)
     half = section.n_points // 2
     for p in range(1, min(longest, half) + 1):
-        if _return_distance(x, p) <= tolerance and _return_distance(x, half // p * p) <= 2.0 * tolerance:
+        if _return_distance(x, p) <= tolerance and _return_distance(x, half // p * p) <= tolerance:
             return p
     return 0
 

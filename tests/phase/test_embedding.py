@@ -62,8 +62,8 @@ def test_delay(x, delay, rule):
         (logistic(N), 1),
         (quasi_periodic(N), 3),
         (lorenz(N, 0.01)[:, 0] + 0.03 * 8.0 * _noise(), 3),
-        (_noise(), 0),
-        (lfilter([1.0], [1.0, -0.9], _noise()), 0),
+        (_noise(6000), 0),
+        (lfilter([1.0], [1.0, -0.9], _noise(6000)), 0),
     ],
     ids=["lorenz", "rossler", "henon", "logistic", "quasi", "lorenz with 3 % noise", "white noise", "coloured noise"],
 )
@@ -73,7 +73,7 @@ def test_dimension(x, dimension):
     assert found.verdict == ("deterministic" if dimension else "stochastic")
 
 
-@pytest.mark.parametrize("n", [300, 1000, 5000])
+@pytest.mark.parametrize("n", [300, 1000, 3000])
 def test_white_noise_of_any_length_is_called_stochastic_and_not_embedded(n):
     found = embedding_dimension(_noise(n, n), 1.0)
     assert found.verdict == "stochastic"
@@ -145,3 +145,21 @@ def test_embeddings_that_do_not_fit_are_refused():
 def test_narrow_band_noise_is_not_told_apart_by_false_neighbours_alone():
     """A stated limit: the Lyapunov exponent's refusal is what catches it (see test_lyapunov)."""
     assert embedding_dimension(narrow_band_noise(N, np.random.default_rng(0)), 1.0).dimension > 3
+
+
+@pytest.mark.parametrize("n_levels", [256, 4096])
+def test_a_coarse_converter_does_not_change_the_dimension(n_levels):
+    x = lorenz(N, 0.02)[:, 0]
+    step = np.ptp(x) / n_levels
+    assert embedding_dimension(np.round(x / step) * step, 50.0).dimension == 3
+
+
+def test_exact_repetition_is_named():
+    x = np.tile(np.random.default_rng(0).normal(size=10), 200)
+    points = delay_vectors(x, 1, 3)
+    library, references = np.arange(len(points)), np.arange(0, len(points), 7)
+    with pytest.raises(RefusalError, match="exactly the same points"):
+        nearest_apart(points, library, references, 10)
+    distance, index = nearest_apart(points, library, references, 10, equal_counts=True)
+    assert not distance.any()
+    assert np.all((index - references) % 10 == 0)

@@ -56,9 +56,9 @@ def test_two_frequencies_are_quasi_periodic():
 
 
 def test_noise_is_called_stochastic():
-    noise = np.random.default_rng(0).normal(size=(20_000, 2))
+    noise = np.random.default_rng(0).normal(size=(8_000, 2))
     path = PhasePortrait(noise, 1000.0, ("x", "v"), ("m", "m/s"), "states", "noise")
-    found = kind_of_motion(path, constant_period_lock(0.02, 20.0))
+    found = kind_of_motion(path, constant_period_lock(0.02, 8.0))
     assert found.kind == "stochastic"
     assert any("no dimension" in sentence for sentence in found.evidence)
 
