@@ -20,6 +20,8 @@ NOISE_LIKE = 0.75
 """Modes wider than this share of white noise's width hold no component that stands out of the noise."""
 NARROWEST_LIMIT = 0.3
 """With few lines in a mode's reach the width of noise scatters, and the limit goes down to this."""
+GIVE_UP_AFTER = 3
+"""Refused trials in a row at one penalty, after which no larger number of modes is tried there."""
 LEAST_SHARE = 1e-4
 """Modes with less of the signal's energy hold leftovers of their neighbours."""
 
@@ -30,14 +32,14 @@ def suggest_modes(
     *,
     most_modes: int = 8,
     penalties: Sequence[float] = PENALTIES,
-    longest: int = 2**15,
+    longest: int = 2**14,
     axis: ModeAxis = "frequency",
     source: str = "",
 ) -> ModeSuggestion:
     """Return the number of modes and the penalty that separate a signal's components.
 
-    Every number of modes up to `most_modes` is tried at every penalty, from uniform starts and, where that does not do,
-    from the spectrum's peaks. A trial is refused where two centres lie closer
+    Every number of modes up to `most_modes` is tried at every penalty until three in a row are refused, from uniform
+    starts and, where that does not do, from the spectrum's peaks. A trial is refused where two centres lie closer
     than the distance at which a mode's gain is one half (the modes share lines), where a mode is as wide as white noise
     alone would make it, or where a mode is all but empty. Of the others, the one with most modes wins; at equal
     numbers the penalty nearest to 2000.
@@ -79,7 +81,7 @@ def suggest_modes(
     part = _middle(x, count(longest, "longest", minimum=64))
     check_supported(part, 1)
     most = min(most_modes, len(part) // SAMPLES_PER_MODE)
-    trials = tuple(_better_trial(part, fs, k, p) for p in alphas for k in range(1, most + 1))
+    trials = tuple(trial for penalty in alphas for trial in _trials(part, fs, most, penalty))
     good = [t for t in trials if not t.objection]
     if not good:
         raise RefusalError(
@@ -113,6 +115,15 @@ def noise_limit(penalty: float, n_samples: int) -> float:
 def _middle(x: FloatArray, longest: int) -> FloatArray:
     start = max(0, (len(x) - longest) // 2)
     return x[start : start + longest]
+
+
+def _trials(x: FloatArray, fs: float, most_modes: int, penalty: float) -> list[ModeTrial]:
+    trials: list[ModeTrial] = []
+    for n_modes in range(1, most_modes + 1):
+        trials.append(_better_trial(x, fs, n_modes, penalty))
+        if len(trials) >= GIVE_UP_AFTER and all(t.objection for t in trials[-GIVE_UP_AFTER:]):
+            break
+    return trials
 
 
 def _better_trial(x: FloatArray, fs: float, n_modes: int, penalty: float) -> ModeTrial:

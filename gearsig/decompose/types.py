@@ -151,14 +151,13 @@ class Modes:
     @property
     def rms(self) -> FloatArray:
         """Root mean square of each mode, (n_modes,)."""
-        energy = np.einsum("ij,ij->i", self.waveforms, self.waveforms, dtype=np.float64)
-        return np.asarray(np.sqrt(energy / len(self.residual)))
+        return np.array([_root_mean_square(waveform) for waveform in self.waveforms])
 
     @property
     def reconstruction_error(self) -> float:
         """Root mean square of the residual over that of the signal (without `offset`)."""
         signal = self.waveforms.sum(axis=0) + self.residual
-        return float(np.linalg.norm(self.residual) / np.linalg.norm(signal))
+        return _root_mean_square(self.residual) / _root_mean_square(signal)
 
     def by_centre(self) -> tuple[int, ...]:
         """Return the modes' indices by rising centre."""
@@ -178,3 +177,9 @@ class Modes:
             f"{i + 1:>4} {self.centres[i]:>16.6g} {self.bandwidths[i]:>18.4g} {rms[i]:>16.4g}" for i in self.by_centre()
         ]
         return "\n".join([*lines, *self.notes])
+
+
+def _root_mean_square(x: FloatArray) -> float:
+    """Divide by the largest value first: squares of very small or large values leave the range of numbers."""
+    largest = float(np.abs(x).max(initial=0.0))
+    return largest * float(np.sqrt(np.mean(np.square(x / largest)))) if largest > 0.0 else 0.0

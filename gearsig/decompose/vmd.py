@@ -64,7 +64,7 @@ def variational_modes(
     mirrored signal has nothing, with its neighbour's value (an alternating ±|û|/2n, mostly invisible). vmdpy drops
     the last sample of an odd length; here all samples are kept, and the line at half the sampling rate is empty.
 
-    Memory is about (3 n_modes + 3) × 8 bytes per sample. For signals beyond that see `modes_by_block`.
+    Memory is about 3 × 8 bytes per sample and mode. For signals beyond that see `modes_by_block`.
 
     When not to use it: for broad-band impulses, whose spectrum is no narrow band (take their envelope, or a band);
     for speeds that vary by more than a mode's width (resample over angle first).
@@ -124,7 +124,7 @@ def _solve(x: FloatArray, fs: float, settings: VmdSettings, rng: np.random.Gener
     # A power of two leaves every digit as it is, and keeps squares of very small or large values in range.
     scale = 2.0 ** np.floor(np.log2(np.abs(x).max()))
     spectrum = dct(x / scale, type=2, workers=1)
-    energy = float(np.dot(x / scale, x / scale))
+    energy = float(np.square(x / scale).sum())  # no scalar product: threads of BLAS cost more than they save here
     start = first_centres(settings, fs, spectrum, rng)
     threshold = _threshold(settings.tolerance, energy, scale)
     history = np.empty((settings.max_iterations + 1, settings.n_modes))
@@ -173,8 +173,10 @@ def _waveforms(lines: FloatArray) -> FloatArray:
 def _bandwidths(solution: _Solution) -> FloatArray:
     """Return √(Σ (ω - ω_k)² û_k² / Σ û_k²) in cycles per sample, (n_modes,)."""
     frequency = _grid(solution.lines.shape[1])
-    widths = [
-        np.sqrt(np.dot(np.square(frequency - centre), power := np.square(line)) / power.sum())
-        for line, centre in zip(solution.lines, solution.history[-1], strict=True)
-    ]
-    return np.array(widths)
+    widths = np.empty(len(solution.lines))
+    for k, (line, centre) in enumerate(zip(solution.lines, solution.history[-1], strict=True)):
+        power = np.square(line)
+        total = power.sum()
+        power *= np.square(frequency - centre)
+        widths[k] = np.sqrt(power.sum() / total)
+    return widths

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ROW_IN = 1.15
-HEAD_IN, FOOT_IN = 0.4, 0.55
+HEAD_IN, FOOT_IN = 0.12, 0.55
 LEFT_IN, GAP_IN, RIGHT_IN = 0.85, 0.75, 0.2
 WAVEFORM_SHARE = 0.55
 MOST_MODES = 12
@@ -128,8 +128,13 @@ def _title(modes: Modes, k: int) -> str:
     if k == modes.n_modes:
         return f"residual, {100 * modes.reconstruction_error:.2g} % of the rms"
     unit = "Hz" if modes.axis == "frequency" else "orders"
-    text = f"mode {k + 1}: {modes.centres[k]:.4g} ± {modes.bandwidths[k]:.2g} {unit}"
+    text = f"mode {k + 1}: {_digits(modes.centres[k], 4)} ± {_digits(modes.bandwidths[k], 2)} {unit}"
     return f"{text}, {plain(modes.source, 40)}" if modes.source else text
+
+
+def _digits(value: float, n: int) -> str:
+    """Write `n` significant digits without an exponent."""
+    return np.format_float_positional(value, precision=n, unique=False, fractional=False, trim="-")
 
 
 def _time_label(modes: Modes) -> str:

@@ -127,6 +127,8 @@ def test_the_unit_does_not_matter(factor):
     a, b = (variational_modes(v, 1.0, VmdSettings(3)) for v in (x, factor * x))
     assert a.n_iterations == b.n_iterations
     assert b.waveforms / factor == pytest.approx(a.waveforms, abs=1e-12)
+    assert b.rms / abs(factor) == pytest.approx(a.rms)
+    assert b.reconstruction_error == pytest.approx(a.reconstruction_error)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
