@@ -19,6 +19,7 @@ CHAIN = (
     "decompose",
     "phase",
     "indicators",
+    "severity",
     "diagnosis",
     "gap",
     "plot",

@@ -1,0 +1,129 @@
+"""From the features of simulated cracks to a model of their depth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.severity.features import FEATURES, RISING
+from gearsig.severity.model import LEAST_SPREAD, DepthModel
+
+FALSE_ALARMS = 0.02
+"""Part of the sound gear pairs whose score lies above the threshold."""
+
+CLEAR_MM = 1.0
+"""Cracks at least so deep teach the detection what to look for."""
+
+OUTSIDE = 0.01
+"""Part of the calibration's own cracks that count as unlike a crack."""
+
+_RIDGE = 3.0
+_COVERAGE = (0.05, 0.95)
+
+
+@dataclass(frozen=True)
+class Cases:
+    """Cracks with their features, and sound gears.
+
+    Parameters
+    ----------
+    features : array, (n, n_features)
+        Of the cracked gear.
+    percent, depth_mm : arrays, (n,)
+    sound : array, (n_sound, 2, n_features)
+        Of both gears of sound pairs.
+    held_out : array of bool, (n,)
+        Which cracks are not fitted but make the intervals.
+    """
+
+    features: FloatArray
+    percent: FloatArray
+    depth_mm: FloatArray
+    sound: FloatArray
+    held_out: np.ndarray
+
+
+def fit_model(cases: Cases) -> DepthModel:
+    """Fit detection, depth and spread on the one part of the cases, and quantiles on the other."""
+    mean, scale = cases.features.mean(axis=0), cases.features.std(axis=0)
+    z = (cases.features - mean) / scale
+    sound = (cases.sound - mean) / scale
+    detection = _detection_weights(z[cases.depth_mm >= CLEAR_MM], sound.reshape(-1, z.shape[1]))
+    sound_scores = np.sort((sound @ detection).max(axis=1))
+    threshold = float(np.quantile(sound_scores, 1.0 - FALSE_ALARMS))
+    seen = z @ detection >= threshold
+    fitted, kept = seen & ~cases.held_out, seen & cases.held_out
+    y = np.log(cases.percent)
+    intercept, coefficients = _depth_weights(z[fitted], y[fitted])
+    error = y - intercept - z @ coefficients
+    spread = _spread_weights(z[fitted], np.abs(error[fitted]))
+    sigma = np.maximum(spread[0] + z @ spread[1:], LEAST_SPREAD)
+    precision = np.linalg.inv(np.cov(z[seen].T) + 1e-3 * np.eye(z.shape[1]))
+    distances = np.sqrt(np.einsum("ij,jk,ik->i", z[seen], precision, z[seen]))
+    return DepthModel(
+        mean=mean,
+        scale=scale,
+        intercept=intercept,
+        coefficients=coefficients,
+        spread=spread,
+        quantiles=_conformal(error[kept] / sigma[kept]),
+        detection=detection,
+        threshold=threshold,
+        sound_scores=sound_scores,
+        precision=precision,
+        largest_distance=float(np.quantile(distances, 1.0 - OUTSIDE)),
+        lowest=cases.features[seen].min(axis=0),
+        highest=cases.features[seen].max(axis=0),
+        percent_range=(float(cases.percent[seen].min()), float(cases.percent[seen].max())),
+    )
+
+
+def _detection_weights(cracked: FloatArray, sound: FloatArray) -> FloatArray:
+    """Logistic regression, crack against none, on what a crack raises; weights are not negative."""
+    from scipy.optimize import minimize
+
+    used = [FEATURES.index(name) for name in ("band_excess", "prominence", "pattern_excess")]
+    x = np.vstack([cracked[:, used], sound[:, used]])
+    sign = np.r_[np.ones(len(cracked)), -np.ones(len(sound))]
+    share = np.r_[np.full(len(cracked), 0.5 / len(cracked)), np.full(len(sound), 0.5 / len(sound))]
+
+    def loss(w: FloatArray) -> float:
+        return float(share @ np.logaddexp(0.0, -sign * (x @ w[:-1] + w[-1])) + 0.003 * np.sum(w[:-1] ** 2))
+
+    start = np.r_[np.ones(len(used)), 0.0]
+    best = minimize(loss, start, bounds=[(0.0, None)] * len(used) + [(None, None)]).x
+    weights = np.zeros(len(FEATURES))
+    weights[used] = best[:-1]
+    return weights
+
+
+def _depth_weights(z: FloatArray, y: FloatArray) -> tuple[float, FloatArray]:
+    """Ridge regression with weights that are not negative where a deeper crack raises the feature."""
+    from scipy.optimize import lsq_linear
+
+    n = z.shape[1]
+    rows = np.vstack([np.c_[np.ones(len(z)), z], np.c_[np.zeros(n), np.sqrt(_RIDGE) * np.eye(n)]])
+    low = np.r_[-np.inf, [0.0 if name in RISING else -np.inf for name in FEATURES]]
+    result = lsq_linear(rows, np.r_[y, np.zeros(n)], bounds=(low, np.full(n + 1, np.inf)))
+    return float(result.x[0]), np.asarray(result.x[1:])
+
+
+def _spread_weights(z: FloatArray, error: FloatArray) -> FloatArray:
+    """Linear model of the size of errors over excess and prominence, σ where the error is √(2/π) σ on the mean."""
+    used = [FEATURES.index(name) for name in ("band_excess", "prominence")]
+    rows = np.c_[np.ones(len(z)), z[:, used]]
+    ridge = 10.0 * np.diag([0.0, 1.0, 1.0])
+    best = np.linalg.solve(rows.T @ rows + ridge, rows.T @ error) * np.sqrt(np.pi / 2)
+    spread = np.zeros(len(FEATURES) + 1)
+    spread[[0, *(1 + i for i in used)]] = best
+    return spread
+
+
+def _conformal(scaled: FloatArray) -> tuple[float, float]:
+    """Quantiles of n held-out errors for a new case: the k-th of n + 1, rounded outwards."""
+    ordered, n = np.sort(scaled), len(scaled)
+    low = int(np.floor(_COVERAGE[0] * (n + 1))) - 1
+    high = int(np.ceil(_COVERAGE[1] * (n + 1))) - 1
+    return float(ordered[max(low, 0)]), float(ordered[min(high, n - 1)])

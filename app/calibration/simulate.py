@@ -1,0 +1,105 @@
+"""A drawn gearbox, sound or with its crack, as a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from app.calibration.rigs import DrawnRig
+from gearsig.recording.types import Recording
+from sims.cracked.build import build_rig
+from sims.cracked.respond import draw_roughness
+from sims.cracked.simulate import simulate_machine
+from sims.cracked.simulator import CrackedPair
+from sims.effects import EffectSetting
+from sims.machine import Machine
+from sims.machine.operation import Operation
+from sims.measure import MeasuredChannel, ModalPath, PathMode
+
+SAMPLING_RATE_HZ = 20480.0
+
+
+def simulate_rig(
+    drawn: DrawnRig,
+    *,
+    effect: str = "root_crack",
+    severity: float | None = None,
+    run: int = 0,
+    speed_factor: float = 1.0,
+    torque_factor: float = 1.0,
+    options: Mapping[str, float | str] | None = None,
+) -> Recording:
+    """Simulate one recording.
+
+    Parameters
+    ----------
+    drawn : DrawnRig
+    effect : str
+    severity : float or None
+        None: the drawn depth of the crack; 0: a sound gearbox.
+    run : int
+        Another run has other noise and begins at another place of the driven shaft; the flanks stay the same.
+    speed_factor, torque_factor : float
+    options : mapping or None
+        Of the effect, besides or instead of the drawn gear and tooth.
+    """
+    operation = Operation.steady(drawn.speed_rpm * speed_factor, drawn.torque_nm * torque_factor)
+    size = drawn.depth_mm if severity is None else severity
+    chosen = {"gear": drawn.gear, "tooth": float(drawn.tooth), **(options or {})}
+    settings = [EffectSetting(effect, size, chosen)] if size > 0 else []
+    ready = CrackedPair().prepare(
+        drawn.parameters, settings, operation, np.random.default_rng(drawn.seed), sampling_rate_hz=SAMPLING_RATE_HZ
+    )
+    machine = _with_path(_with_fixed_flanks(ready.machine, drawn.seed), drawn)
+    rng = np.random.default_rng([drawn.seed, run])
+    lead_rev = float(rng.integers(0, 8))
+    lead_s = lead_rev * 60.0 / drawn.speed_rpm
+    recording = simulate_machine(
+        machine,
+        operation,
+        rng=rng,
+        sampling_rate_hz=SAMPLING_RATE_HZ,
+        duration_s=drawn.duration_s + (lead_s if run else 0.0),
+        rig=build_rig(machine, operation, name="drawn"),
+        truth={"depth_mm": size, "effect": effect if size else "", **chosen},
+    )
+    return _cut(recording, round(lead_s * SAMPLING_RATE_HZ)) if run else recording
+
+
+def _with_fixed_flanks(machine: Machine, seed: int) -> Machine:
+    """Draw the flanks' profiles now: they belong to the gears, and are the same in each run."""
+    machine, _ = draw_roughness(machine, np.random.default_rng([seed, 77]))
+    return replace(machine, roughness=replace(machine.roughness, locked_to="none"))
+
+
+def _with_path(machine: Machine, drawn: DrawnRig) -> Machine:
+    """Replace the housing's modes by the drawn ones; the sensors stay at bearings 1 and 3."""
+    channels = tuple(
+        _with_modes(channel, bearing, drawn) for channel, bearing in zip(machine.chain.channels, (1, 3), strict=True)
+    )
+    return replace(machine, chain=replace(machine.chain, channels=channels))
+
+
+def _with_modes(channel: MeasuredChannel, bearing: int, drawn: DrawnRig) -> MeasuredChannel:
+    gain = drawn.sensor_gain
+    x, y = (channel.path.direct[f"bearing {bearing} {axis}"] for axis in "xy")
+    modes = tuple(
+        PathMode(
+            mode.frequency_hz,
+            mode.damping_ratio,
+            {
+                f"bearing {i + 1} {axis}": gain * mode.gain * mode.shape[bearing - 1] * mode.shape[i] * direction
+                for i in range(4)
+                for axis, direction in (("x", x), ("y", y))
+            },
+        )
+        for mode in drawn.modes
+    )
+    direct = {name: gain * value for name, value in channel.path.direct.items()}
+    return replace(channel, path=ModalPath(direct, modes))
+
+
+def _cut(recording: Recording, first: int) -> Recording:
+    return replace(recording, samples=recording.samples[:, first:])

@@ -1,0 +1,199 @@
+"""How deep a crack in a tooth root is, from one recording and, far better, a reference of the sound gears."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import exp, log
+
+from gearsig.errors import RefusalError
+from gearsig.recording.types import Recording
+from gearsig.rig.types import Rig
+from gearsig.severity.calibration import ALONE, WITH_REFERENCE, Calibration, load_calibration
+from gearsig.severity.evidence import GearEvidence, gear_evidence, pair_lines
+from gearsig.severity.features import FEATURES
+from gearsig.severity.machine import PairFacts, acceleration_channels, pair_facts
+from gearsig.severity.model import DepthModel
+from gearsig.severity.tooth_root import percent_per_mm
+from gearsig.severity.types import CrackEstimate, NoCrackSeen
+
+SMALLEST_AGREEMENT = 0.4
+"""Of the teeth's pattern with the reference's: strange gears reach 0.38 once in a hundred, the right ones fall below it
+only where a deep crack rules the pattern."""
+
+CLEARLY_LARGER = log(1.3)
+"""Difference of the prominence on both gears from which the gear counts as certain."""
+
+
+def estimate_crack(
+    recording: Recording,
+    rig: Rig | None = None,
+    *,
+    reference: Recording | None = None,
+    torque_nm: float | None = None,
+    channels: Sequence[str] = (),
+    calibration: Calibration | None = None,
+) -> CrackEstimate | NoCrackSeen:
+    """Estimate the depth of a crack in a tooth root of a spur gear pair.
+
+    The synchronous average of either shaft (with a reference: its difference from that of the sound gears) is searched
+    for the tooth that stands out most. Ratios of its energy to that of the mesh harmonics in the same bands go into a
+    linear model of ln(depth), fitted to simulated machines; its interval is a conformal one.
+
+    Parameters
+    ----------
+    recording : Recording
+        Acceleration at steady speed; 13 revolutions of either shaft at least, better a hundred.
+    rig : Rig or None
+        Where the recording carries none. Teeth, module, face width and torque must be known.
+    reference : Recording or None
+        Of the same gears, sensors, speed and load before there was a crack. Without it, what teeth differ by from
+        birth hides all but deep cracks.
+    torque_nm : float or None
+        Instead of the rig's operating point.
+    channels : sequence of str
+        Default: all acceleration channels.
+    calibration : Calibration or None
+        Default: the one that comes with this version.
+
+    Returns
+    -------
+    CrackEstimate or NoCrackSeen
+
+    Raises
+    ------
+    RefusalError
+        If the calibration does not reach the machine, the record is too short, the reference does not fit, or what
+        stands out is unlike a crack.
+    InputError
+        If a channel is not there, or the speed source is malformed.
+
+    Notes
+    -----
+    Not for helical gears, planetary sets, cracks over a part of the face width, or to tell a crack from a chipped or
+    spalled tooth.
+
+    References
+    ----------
+    P. D. McFadden, "Examination of a technique for the early detection of failure in gears by signal processing of the
+    time domain average of the meshing vibration", 1987. J. Lei, M. G'Sell, A. Rinaldo, R. J. Tibshirani,
+    L. Wasserman, "Distribution-free predictive inference for regression", 2018 (locally weighted split conformal).
+    """
+    if recording.rig is None and rig is not None:
+        recording = recording.with_rig(rig)
+    known = recording.rig or Rig()
+    facts = pair_facts(known, torque_nm)
+    used = calibration or load_calibration()
+    names = acceleration_channels(recording, tuple(channels))
+    now = pair_lines(recording, known, facts.pair, names)
+    used.check_reach(reach_of(facts, now[0].order_hz * facts.driver_teeth))
+    sound = None
+    if reference is not None:
+        described = reference if reference.rig is not None else reference.with_rig(known)
+        acceleration_channels(described, names)
+        sound = pair_lines(described, described.rig or known, facts.pair, names)
+    found = gear_evidence(now, sound, facts.module_mm, facts.load_mpa)
+    model = used.models[ALONE if reference is None else WITH_REFERENCE]
+    return judge(found, model, used, facts)
+
+
+def reach_of(facts: PairFacts, mesh_hz: float) -> dict[str, float]:
+    """Return the quantities whose range limits the calibration."""
+    return {
+        "module_mm": facts.module_mm,
+        "load_mpa": facts.load_mpa,
+        "mesh_hz": mesh_hz,
+        "fewer_teeth": float(min(facts.driver_teeth, facts.driven_teeth)),
+        "more_teeth": float(max(facts.driver_teeth, facts.driven_teeth)),
+    }
+
+
+def judge(
+    found: Sequence[GearEvidence], model: DepthModel, calibration: Calibration, facts: PairFacts
+) -> CrackEstimate | NoCrackSeen:
+    """Decide whether the clearest event is a crack, and how deep it is or may be."""
+    scores = [model.score(evidence.features) for evidence in found]
+    best = max(range(len(found)), key=lambda i: scores[i])
+    clear = scores[best] >= model.threshold
+    if clear and _strange_reference(found):  # then its pattern is in the difference: ask for as much as without it
+        alone = calibration.models[ALONE]
+        clear = alone.score(found[best].features) >= alone.threshold
+    return _seen(found, best, model, calibration, facts) if clear else _none_seen(found, best, model, facts)
+
+
+def _strange_reference(found: Sequence[GearEvidence]) -> bool:
+    return any(e.agreement is not None and e.agreement < SMALLEST_AGREEMENT for e in found)
+
+
+def _none_seen(found: Sequence[GearEvidence], best: int, model: DepthModel, facts: PairFacts) -> NoCrackSeen:
+    if _strange_reference(found):
+        weakest = min(found, key=lambda e: e.agreement if e.agreement is not None else 1.0)
+        raise RefusalError(
+            f"the teeth's own pattern on shaft {weakest.shaft.shaft!r} agrees with that of the reference by "
+            f"{weakest.agreement:.2f} only",
+            remedy="take a reference of the same gears, same sensors, same speed and load; or leave it out",
+        )
+    limits = []
+    for evidence in found:
+        percent = exp(model.log_interval(model.at_threshold(evidence.features))[1])
+        limits.append((percent / percent_per_mm(evidence.shaft.teeth, facts.module_mm), percent))
+    below_mm, below_percent = max(limits)
+    if below_percent > model.percent_range[1]:
+        raise RefusalError(
+            "no crack stands out, and even a deep one may hide among the teeth's own differences",
+            remedy="give a reference of the same gears, or record at a higher load",
+        )
+    features = found[best].features
+    return NoCrackSeen(
+        below_mm,
+        below_percent,
+        model.p_value(model.score(features)),
+        found[best].agreement is not None,
+        dict(zip(FEATURES, features.tolist(), strict=True)),
+        (_reference_text(found[best]),),
+    )
+
+
+def _seen(
+    found: Sequence[GearEvidence], best: int, model: DepthModel, calibration: Calibration, facts: PairFacts
+) -> CrackEstimate:
+    evidence = found[best]
+    unlike = model.unlike(evidence.features)
+    if unlike:
+        raise RefusalError(
+            f"one tooth stands out on shaft {evidence.shaft.shaft!r}, but unlike the calibration's cracks: {unlike}",
+            remedy="look at the tooth: it may be chipped or spalled, or the machine is unlike the calibration's",
+        )
+    low, high = model.percent_range
+    centre, reasons = exp(model.log_percent(evidence.features)), [_reference_text(evidence)]
+    if not low <= centre <= high:
+        reasons.append(f"The estimate of {centre:.0f} % lies beyond the calibration's {low:.0f} to {high:.0f} %.")
+    percent = min(max(centre, low), high)
+    bounds = tuple(exp(bound) for bound in model.log_interval(evidence.features))
+    interval = min(bounds[0], percent), max(min(bounds[1], 100.0), percent)
+    per_mm = percent_per_mm(evidence.shaft.teeth, facts.module_mm)
+    place = (evidence.event.centre_rev - calibration.lag_pitches / evidence.shaft.teeth) % 1.0
+    others = [e.event.prominence for e in found if e is not evidence]
+    if not evidence.shaft.has_mark:
+        reasons.append("There is no mark on this shaft: the angle holds for this record only, and names no tooth.")
+    reasons.append("It supposes a crack through the whole face width; a chipped or spalled tooth may look alike.")
+    return CrackEstimate(
+        shaft=evidence.shaft.shaft,
+        gear=f"{facts.pair.name}/{evidence.shaft.shaft}",
+        tooth=int(place * evidence.shaft.teeth) % evidence.shaft.teeth + 1 if evidence.shaft.has_mark else None,
+        angle_deg=360.0 * place,
+        gear_is_certain=all(log(evidence.event.prominence / other) >= CLEARLY_LARGER for other in others),
+        depth_mm=percent / per_mm,
+        depth_percent=percent,
+        interval_mm=(interval[0] / per_mm, interval[1] / per_mm),
+        interval_percent=interval,
+        p_value=model.p_value(model.score(evidence.features)),
+        with_reference=evidence.agreement is not None,
+        features=dict(zip(FEATURES, evidence.features.tolist(), strict=True)),
+        reasons=tuple(reasons),
+    )
+
+
+def _reference_text(evidence: GearEvidence) -> str:
+    if evidence.agreement is None:
+        return "Without a reference of the sound gears, what every tooth differs by hides all but deep cracks."
+    return f"Compared with a reference; the teeth's own pattern agrees by {evidence.agreement:.2f}."

@@ -1,0 +1,90 @@
+"""From a recording to what it says of each gear of its pair: the most conspicuous tooth and its features."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.errors import RefusalError
+from gearsig.recording.types import Recording
+from gearsig.rig.types import GearPair, Rig
+from gearsig.severity.event import ToothEvent, find_event, n_bands
+from gearsig.severity.features import Conditions, feature_vector, mesh_energies
+from gearsig.severity.reference import difference_lines
+from gearsig.severity.shaft_lines import ShaftLines, shaft_lines
+
+LEAST_HARMONICS = 4
+"""Mesh harmonics below the highest order: with fewer, one resonance decides."""
+
+
+@dataclass(frozen=True)
+class GearEvidence:
+    """What stands out on one gear.
+
+    Parameters
+    ----------
+    shaft : ShaftLines
+    event : ToothEvent
+    features : array
+        See `gearsig.severity.features.FEATURES`.
+    agreement : float or None
+        Of the teeth's pattern with the reference's; None without one.
+    """
+
+    shaft: ShaftLines
+    event: ToothEvent
+    features: FloatArray
+    agreement: float | None = None
+
+
+def pair_lines(recording: Recording, rig: Rig, pair: GearPair, channels: Sequence[str]) -> tuple[ShaftLines, ...]:
+    """Return the lines of both shafts, the driver's first."""
+    from gearsig.angle.shaft import find_shaft_angle
+
+    angle = find_shaft_angle(recording, rig).between(0.0, recording.duration_s)
+    return tuple(shaft_lines(recording, rig, pair, shaft, angle, channels) for shaft in (pair.driver, pair.driven))
+
+
+def gear_evidence(
+    now: Sequence[ShaftLines], sound: Sequence[ShaftLines] | None, module_mm: float, load_mpa: float
+) -> tuple[GearEvidence, ...]:
+    """Return the most conspicuous tooth of either gear, in what differs from the sound gear where there is one.
+
+    Mesh energies that the event is compared with are the geometric mean of both recordings'.
+    """
+    return tuple(
+        _one_gear(now, sound, i, Conditions(module_mm, load_mpa, shaft.order_hz * shaft.teeth))
+        for i, shaft in enumerate(now)
+    )
+
+
+def _one_gear(
+    now: Sequence[ShaftLines], sound: Sequence[ShaftLines] | None, i: int, conditions: Conditions
+) -> GearEvidence:
+    shaft = now[i]
+    _check_harmonics(shaft)
+    if sound is None:
+        event = find_event(shaft)
+        mesh = mesh_energies(shaft, n_bands(shaft))
+        return GearEvidence(shaft, event, feature_vector(shaft, shaft, mesh, event, conditions))
+    marked = any(a.has_mark and b.has_mark for a, b in zip(now, sound, strict=True))
+    difference, agreement = difference_lines(shaft, sound[i], whole_teeth=marked)
+    _check_harmonics(difference)
+    n = n_bands(difference)
+    mesh = np.sqrt(mesh_energies(shaft, n) * mesh_energies(sound[i], n))
+    event = find_event(difference)
+    return GearEvidence(shaft, event, feature_vector(difference, sound[i], mesh, event, conditions), agreement)
+
+
+def _check_harmonics(shaft: ShaftLines) -> None:
+    if n_bands(shaft) < LEAST_HARMONICS:
+        raise RefusalError(
+            f"{n_bands(shaft)} mesh harmonics of the {shaft.teeth} teeth lie in the recording's band, "
+            f"{LEAST_HARMONICS} are needed",
+            remedy="a higher sampling rate or a lower speed",
+        )
+    if not np.all(mesh_energies(shaft, LEAST_HARMONICS) > 0):
+        raise RefusalError("a channel holds no mesh vibration at all", remedy="leave the dead channel out")

@@ -1,0 +1,125 @@
+"""Crack severity on a simulated gearbox without noise: monotone, placed, bounded, or refused with the reason."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearsig.errors import InputError, RefusalError
+from gearsig.recording.types import Recording
+from gearsig.rig.types import GearPair, OperatingPoint, Rig, Shaft
+from gearsig.severity.estimate import estimate_crack
+from gearsig.severity.types import CrackEstimate, NoCrackSeen
+from tests.severity.gearbox import SPEED_RPM, Record
+
+DEPTHS_MM = (1.0, 2.0, 3.0)
+
+
+def crack(answer: CrackEstimate | NoCrackSeen) -> CrackEstimate:
+    assert isinstance(answer, CrackEstimate), answer
+    return answer
+
+
+def with_pair(recording: Recording, **changes: object) -> Recording:
+    assert recording.rig is not None
+    pair = replace(recording.rig.pairs[0], **changes)  # type: ignore[arg-type]  # names of fields
+    return replace(recording, rig=replace(recording.rig, pairs=(pair,)))
+
+
+def test_estimates_rise_with_the_depth(record: Record, sound: Recording) -> None:
+    found = [crack(estimate_crack(record(depth), reference=sound)) for depth in DEPTHS_MM]
+    depths = [f.depth_mm for f in found]
+    assert depths == sorted(depths)
+    assert len(set(depths)) == len(depths)
+    for depth, answer in zip(DEPTHS_MM, found, strict=True):
+        assert answer.interval_mm[0] <= depth <= answer.interval_mm[1]
+        assert answer.depth_percent / answer.depth_mm == pytest.approx(found[0].depth_percent / found[0].depth_mm)
+
+
+def test_gear_and_tooth_are_named(record: Record, sound: Recording) -> None:
+    answer = crack(estimate_crack(record(2.0), reference=sound))
+    assert (answer.gear, answer.tooth, answer.gear_is_certain) == ("stage 1/input", 12, True)
+    assert int(answer.angle_deg / 360 * 29) == 11
+    assert "tooth 12 of stage 1/input" in answer.text
+    assert answer.p_value < 0.05
+
+
+def test_driven_gear_has_an_angle_but_no_tooth(record: Record, sound: Recording) -> None:
+    answer = crack(estimate_crack(record(2.5, gear="driven"), reference=sound))
+    assert (answer.shaft, answer.tooth) == ("output", None)
+    assert any("no mark on this shaft" in reason for reason in answer.reasons)
+
+
+def test_sound_gears_are_bounded(record: Record, sound: Recording) -> None:
+    answer = estimate_crack(record(0.0), reference=sound)
+    assert isinstance(answer, NoCrackSeen)
+    assert 0 < answer.below_mm < 3
+    assert "No crack seen: below" in answer.text
+
+
+def test_float32_and_another_length_say_the_same(record: Record, sound: Recording) -> None:
+    whole = record(2.0)
+    expected = crack(estimate_crack(whole, reference=sound))
+    single = replace(whole, samples=whole.samples.astype(np.float32))
+    shorter = replace(whole, samples=whole.samples[:, :-1])
+    for other in (single, shorter):
+        answer = crack(estimate_crack(other, reference=sound))
+        assert answer.depth_mm == pytest.approx(expected.depth_mm, rel=1e-3)
+        assert answer.tooth == expected.tooth
+
+
+def test_gain_does_not_matter(record: Record, sound: Recording) -> None:
+    def louder(recording: Recording) -> Recording:
+        samples = np.array(recording.samples)
+        samples[:2] *= 7.0
+        return replace(recording, samples=samples)
+
+    expected = crack(estimate_crack(record(2.0), reference=sound))
+    answer = crack(estimate_crack(louder(record(2.0)), reference=louder(sound)))
+    assert answer.depth_mm == pytest.approx(expected.depth_mm, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"module_mm": None}, "module_mm"),
+        ({"face_width_mm": None}, "face_width_mm"),
+        ({"module_mm": 30.0, "face_width_mm": 2.0}, "does not reach"),
+        ({"face_width_mm": 500.0}, "load_mpa"),
+        ({"pressure_angle_deg": 25.0}, "pressure angle"),
+    ],
+)
+def test_rigs_beyond_the_calibration_are_refused(record: Record, changes: dict[str, float], reason: str) -> None:
+    with pytest.raises(RefusalError, match=reason):
+        estimate_crack(with_pair(record(2.0), **changes))
+
+
+def test_a_missing_torque_is_asked_for_and_may_be_given(record: Record, sound: Recording) -> None:
+    recording = record(2.0)
+    assert recording.rig is not None
+    bare = replace(recording, rig=replace(recording.rig, operating_point=OperatingPoint("input", SPEED_RPM)))
+    with pytest.raises(RefusalError, match="torque_nm"):
+        estimate_crack(bare)
+    torque = recording.rig.operating_point.torque_nm
+    assert estimate_crack(bare, reference=sound, torque_nm=torque) == estimate_crack(recording, reference=sound)
+
+
+def test_short_slow_and_other_recordings_are_refused(record: Record) -> None:
+    recording = record(2.0)
+    short = replace(recording, samples=recording.samples[:, : recording.n_samples // 2])
+    with pytest.raises(RefusalError, match="revolutions of shaft 'output'"):
+        estimate_crack(short)
+    fast = record(0.0, speed_rpm=SPEED_RPM / 0.95)
+    with pytest.raises(RefusalError, match=r"speed 5\.0 % off"):
+        estimate_crack(recording, reference=fast)
+    two_stages = Rig(
+        shafts=(Shaft("input"), Shaft("output"), Shaft("last")),
+        pairs=(GearPair("a", "input", "output", 29, 47), GearPair("b", "output", "last", 20, 60)),
+    )
+    with pytest.raises(RefusalError, match="2 gear pairs"):
+        estimate_crack(replace(recording, rig=two_stages))
+
+
+def test_a_channel_that_is_not_there_is_named(record: Record) -> None:
+    with pytest.raises(InputError, match="tacho"):
+        estimate_crack(record(2.0), channels=("tacho",))
