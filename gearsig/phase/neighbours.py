@@ -84,18 +84,22 @@ def nearest_apart(
         if k >= most:
             break
         k = min(6 * k, most)
-    if np.count_nonzero(index >= 0) < 0.5 * len(references):
-        if n_equal > len(open_) // 2:
-            raise RefusalError(
-                "the path comes back to exactly the same points: it is periodic, or its resolution is too coarse",
-                remedy="look at its Poincaré section: no neighbours can part here",
-            )
-        raise RefusalError(
-            f"{np.mean(index < 0):.0%} of the points have no neighbour but those within {theiler} samples in time: the "
-            "path does not come back to where it was",
-            remedy="record longer, take the trend out of the signal, or lower the Theiler window",
-        )
+    if len(open_) > 0.5 * len(references):
+        raise _no_return(len(open_) / len(references), theiler, exact=n_equal > len(open_) // 2)
     return distance, index
+
+
+def _no_return(share: float, theiler: int, *, exact: bool) -> RefusalError:
+    if exact:
+        return RefusalError(
+            "the path comes back to exactly the same points: it is periodic, or its resolution is too coarse",
+            remedy="look at its Poincaré section: no neighbours can part here",
+        )
+    return RefusalError(
+        f"{share:.0%} of the points have no neighbour but those within {theiler} samples in time: the path does not "
+        "come back to where it was",
+        remedy="record longer, take the trend out of the signal, or lower the Theiler window",
+    )
 
 
 def _query(tree: Any, points: FloatArray, k: int, norm: float) -> tuple[FloatArray, IndexArray]:

@@ -36,7 +36,8 @@ def phase_plane(
     """Return displacement and velocity of a channel that measures acceleration, velocity or displacement.
 
     Acceleration is integrated twice and once, velocity once and not at all; displacement (and transmission error) is
-    differentiated. All within the band from `low_cut_hz` to `high_cut_hz`, in the frequency domain, without phase.
+    differentiated. All within the band from `low_cut_hz` to `high_cut_hz`, in the frequency domain, with no phase
+    shift.
 
     Parameters
     ----------

@@ -61,20 +61,22 @@ def phase_portrait_figure(
         raise InputError(f"the section's axes are {section.axis_names}", allowed=f"{portrait.axis_names}")
     figure = style.new_figure(TOP_IN + SIDE_IN + BOTTOM_IN)
     path, points = _two_panels(figure)
-    x, y = (np.asarray(portrait.points[-n_points:, axis]) for axis in axes)
+    shown = [_display_unit(portrait.units[axis], float(portrait.extent[axis])) for axis in axes]
+    x, y = (portrait.points[-n_points:, axis] * factor for axis, (factor, _) in zip(axes, shown, strict=True))
     path.plot(x, y, color=style.MEASURED, linewidth=0.5, alpha=0.6 if len(x) < 5000 else 0.3)
-    names = [with_unit(portrait.axis_names[axis], portrait.units[axis]) for axis in axes]
+    names = [with_unit(portrait.axis_names[axis], unit) for axis, (_, unit) in zip(axes, shown, strict=True)]
+    factors = (shown[0][0], shown[1][0])
     style.label_axes(path, names[0], names[1], title or portrait.source)
     if portrait.n_points > n_points:
         style.note(path, f"last {n_points / portrait.sampling_rate_hz:.4g} s")
     if section is None:
         points.set_axis_off()
     else:
-        _draw_points(path, section, axes, 2.2)
-        _draw_points(points, section, axes, 2.8)
+        _draw_points(path, section, axes, factors, 2.2)
+        _draw_points(points, section, axes, factors, 2.8)
         style.label_axes(points, names[0], names[1], f"{section.n_points} points")
         style.note(points, f"once per {section.section}" if section.kind == "locked" else section.section)
-        _keep_apart(points, section, axes)
+        _keep_apart(points, section, axes, factors)
     for panel in (path, points):
         style.no_offset(panel)
         panel.locator_params(nbins=5)
@@ -85,9 +87,10 @@ def bifurcation_figure(diagram: BifurcationDiagram, *, title: str = "", height_i
     """Draw every Poincaré point over the parameter; values whose section repeats are named by their period above."""
     figure = style.new_figure(height_in)
     axes = style.panel(figure, top_in=0.62)
+    factor, unit = _display_unit(diagram.unit, float(np.abs(diagram.points).max()))
     axes.plot(
         diagram.parameter,
-        diagram.points,
+        diagram.points * factor,
         linestyle="none",
         marker=".",
         markersize=2.0 if len(diagram.points) < 20_000 else 1.0,
@@ -99,7 +102,7 @@ def bifurcation_figure(diagram: BifurcationDiagram, *, title: str = "", height_i
     style.label_axes(
         axes,
         with_unit(diagram.parameter_name, diagram.parameter_unit),
-        with_unit(diagram.axis_name, diagram.unit),
+        with_unit(diagram.axis_name, unit),
     )
     for start, stop, period in _runs_of_equal_period(diagram):
         series.write(axes, 0.5 * (start + stop), 1.02, f"{period}×", colour=style.QUIET)
@@ -192,18 +195,29 @@ def _two_panels(figure: Figure) -> tuple[Axes, Axes]:
     return left, right
 
 
-def _draw_points(axes: Axes, section: PoincareSection, which: tuple[int, int], size: float) -> None:
-    x, y = (section.points[:, axis] for axis in which)
+def _display_unit(unit: str, size: float) -> tuple[float, str]:
+    """Return the factor and unit in which a length or velocity of that size is read without powers of ten."""
+    base, _, rest = unit.partition("/")
+    if base != "m" or size >= 0.5:
+        return 1.0, unit
+    prefix, factor = ("m", 1e3) if size >= 5e-4 else ("µ", 1e6)
+    return factor, prefix + "m" + (f"/{rest}" if rest else "")
+
+
+def _draw_points(
+    axes: Axes, section: PoincareSection, which: tuple[int, int], factors: tuple[float, float], size: float
+) -> None:
+    x, y = (section.points[:, axis] * factor for axis, factor in zip(which, factors, strict=True))
     axes.plot(x, y, "o", color=style.FAULT, markersize=size, markeredgewidth=0.0, zorder=3)
 
 
-def _keep_apart(axes: Axes, section: PoincareSection, which: tuple[int, int]) -> None:
+def _keep_apart(axes: Axes, section: PoincareSection, which: tuple[int, int], factors: tuple[float, float]) -> None:
     """Show at least a twentieth of the path's size: one point must not be blown up to a cloud of rounding."""
     limits = []
-    for axis in which:
-        values = section.points[:, axis]
+    for axis, factor in zip(which, factors, strict=True):
+        values = section.points[:, axis] * factor
         middle, half = 0.5 * float(values.max() + values.min()), 0.58 * float(np.ptp(values))
-        half = max(half, 0.05 * float(section.extent[axis])) or 1.0
+        half = max(half, 0.05 * factor * float(section.extent[axis])) or 1.0
         limits.append((middle - half, middle + half))
     axes.set_xlim(limits[0])
     axes.set_ylim(limits[1])

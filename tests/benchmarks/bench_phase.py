@@ -105,7 +105,7 @@ def main() -> None:
     # Compiling is not timed.
     information = average_mutual_information(x, 50.0)
     largest_lyapunov_exponent(portrait)
-    recurrence_measures(small, radius=0.5, theiler_samples=20)
+    recurrence_measures(small, radius=0.5, theiler_samples=20, stride=1)
     print(f"load of the machine (1 min): {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     cases = [
         (
@@ -120,7 +120,7 @@ def main() -> None:
         ),
         (
             "recurrence measures, 4000 points | whole matrix, scipy cdist",
-            lambda: recurrence_measures(small, radius=0.5, theiler_samples=20),
+            lambda: recurrence_measures(small, radius=0.5, theiler_samples=20, stride=1),
             lambda: _plain_recurrence(points, 0.5),
         ),
     ]

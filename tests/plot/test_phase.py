@@ -130,3 +130,18 @@ def test_divergence_draws_the_fitted_line_on_the_curve():
     np.testing.assert_allclose(line.get_ydata(), -3.0 + 0.5 * line.get_xdata())
     assert line.get_xdata()[[0, -1]] == pytest.approx([0.5, 2.0])
     assert "λ = 0.5 ± 0.02 1/s, diverging" in _texts(figure)
+
+
+def test_small_motion_is_read_in_small_units():
+    small = PhasePortrait(
+        PORTRAIT.points * [1e-6, 1e-2], 50.0, ("displacement", "velocity"), ("m", "m/s"), "phase plane", "a1"
+    )
+    section = PoincareSection(
+        small.points[::50] * 1.1, np.arange(40), small.axis_names, small.units, small.extent, "locked", "in", "a1"
+    )
+    figure = phase_portrait_figure(small, section)
+    path, alone = figure.axes
+    np.testing.assert_allclose(path.lines[0].get_xdata(), PORTRAIT.points[:, 0])
+    np.testing.assert_allclose(path.lines[0].get_ydata(), 10.0 * PORTRAIT.points[:, 1])
+    np.testing.assert_allclose(alone.lines[-1].get_ydata(), 11.0 * PORTRAIT.points[::50, 1], atol=1e-12)
+    assert {"displacement (µm)", "velocity (mm/s)"} <= set(_texts(figure))
