@@ -118,14 +118,28 @@ def plan_group(
 
 def pieces(values: FloatArray, group: Group, edges: Edges, *, derivatives: bool = False) -> Iterator[Piece]:
     """Yield the coefficients of a group, block after block."""
+    space = workspace(group)
     for start in group.starts(len(values)):
-        yield from block_pieces(values, group, start, edges, derivatives=derivatives)
+        yield from block_pieces(values, group, start, edges, space, derivatives=derivatives)
+
+
+def workspace(group: Group) -> ComplexArray:
+    """Return room for the coefficients of a piece and their derivatives: asking for it each time costs more."""
+    most = max(_rows_at_once(batch, group) * group.n_block // batch.step for batch in group.batches)
+    return np.empty((2, most), dtype=np.complex64)
+
+
+def _rows_at_once(batch: Batch, group: Group) -> int:
+    return min(len(batch.lines), max(1, _CACHE_SAMPLES * batch.step // group.n_block))
 
 
 def block_pieces(
-    values: FloatArray, group: Group, start: int, edges: Edges, *, derivatives: bool = False
+    values: FloatArray, group: Group, start: int, edges: Edges, space: ComplexArray, *, derivatives: bool = False
 ) -> Iterator[Piece]:
-    """Yield the coefficients of a group in the block whose valid part begins at `start`."""
+    """Yield the coefficients of a group in the block whose valid part begins at `start`.
+
+    They lie in `space` (from `workspace`) and hold until the next piece is asked for.
+    """
     from scipy.fft import rfft
 
     margin, length = group.n_margin, min(group.n_core, len(values) - start)
@@ -135,21 +149,22 @@ def block_pieces(
         X = spectrum[batch.first : batch.first + batch.response.shape[1]].astype(np.complex64)
         dX = (X * (1j * batch.omega)).astype(np.complex64) if derivatives else X[:0]
         cut = slice(margin // batch.step, margin // batch.step - (-length // batch.step))
-        n_rows = max(1, _CACHE_SAMPLES * batch.step // group.n_block)
+        n_rows = _rows_at_once(batch, group)
         for row in range(0, len(batch.lines), n_rows):
             rows = slice(row, row + n_rows)
-            W = _coefficients(X, batch, rows)[:, cut]
-            dW = _coefficients(dX, batch, rows)[:, cut] if derivatives else W[:0]
+            W = _coefficients(X, batch, rows, space[0])[:, cut]
+            dW = _coefficients(dX, batch, rows, space[1])[:, cut] if derivatives else W[:0]
             yield Piece(batch.lines[rows], start, batch.step, W, dW)
 
 
-def _coefficients(X: ComplexArray, batch: Batch, rows: slice) -> ComplexArray:
+def _coefficients(X: ComplexArray, batch: Batch, rows: slice, space: ComplexArray) -> ComplexArray:
     from scipy.fft import ifft
 
     from gearsig.timefreq.bank_kernel import fill
 
     low, high = batch.low[rows], batch.high[rows]
-    turned = np.empty((len(low), batch.n_bins, batch.twiddle.shape[1]), dtype=np.complex64)
+    shape = (len(low), batch.n_bins, batch.twiddle.shape[1])
+    turned = space[: np.prod(shape)].reshape(shape)
     fill(X, batch.response[rows], low, high, batch.twiddle, batch.first, turned)
     result: ComplexArray = ifft(turned, axis=1, overwrite_x=True)
     return result.reshape(len(low), -1)
@@ -195,7 +210,8 @@ def stretch(values: FloatArray, start: int, n: int, edges: Edges) -> FloatArray:
         result[max(0, -start) : max(0, -start) + len(inside)] = inside
         return result
     index = np.abs(np.arange(start, start + n)) % (2 * n_samples - 2)
-    return values[np.minimum(index, 2 * n_samples - 2 - index)].astype(np.float64)
+    result[:] = values[np.minimum(index, 2 * n_samples - 2 - index)]
+    return result
 
 
 def _power_of_two(n: int) -> int:

@@ -10,8 +10,9 @@ from numba import njit
 def fill(X, H, low, high, twiddle, first, out):  # type: ignore[no-untyped-def]
     """out[j, k mod M, r] = X[k] H[j, k] twiddle[k, r]: the bins of line j, ready for M-point inverse FFTs over k.
 
-    Bin k of the block has index k - `first` in X, H and twiddle. Bins of line j run from low[j] to high[j] (excluded),
-    at most M of them; the others are zero.
+    Bin k of the block has index k - `first` in X, H and twiddle. Bins of line j run from low[j] to high[j] (excluded).
+    Where they are fewer than M, the others are zero; where they are more, they add up: samples are then farther apart
+    than the band asks, and still exact.
     """
     M, n_r = out.shape[1], out.shape[2]
     for j in range(out.shape[0]):
@@ -21,6 +22,10 @@ def fill(X, H, low, high, twiddle, first, out):  # type: ignore[no-untyped-def]
         for k in range(low[j], high[j]):
             i, place = k - first, k % M
             value = X[i] * H[j, i]
+            if k >= low[j] + M:
+                for r in range(n_r):
+                    out[j, place, r] += value * twiddle[i, r]
+                continue
             for r in range(n_r):  # indices written out: only so is this loop turned into vector instructions
                 out[j, place, r] = value * twiddle[i, r]
 

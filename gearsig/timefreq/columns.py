@@ -30,8 +30,8 @@ class Columns:
 
     @property
     def largest_step(self) -> int:
-        """Largest power of two that leaves a coefficient in every stretch."""
-        return 1 << min(20, self.n_per_column.bit_length() - 1)
+        """Largest power of two that leaves at least eight coefficients in every stretch, if it has as many samples."""
+        return 1 << min(20, max(0, self.n_per_column.bit_length() - 4))
 
     def middles(self, signal: UniformSignal) -> FloatArray:
         """Return the middle of each stretch in seconds or revolutions."""

@@ -44,7 +44,8 @@ class FramePlan:
     def gains(self) -> FloatArray:
         """Factors that make a unit sine read 1; the lines at zero and half the rate have no twin."""
         k = np.arange(self.first, self.last)
-        return np.where((k == 0) | (2 * k == self.n_fft), 1.0, 2.0) / self.window.sum()
+        twins: FloatArray = np.where((k == 0) | (2 * k == self.n_fft), 1.0, 2.0)
+        return twins / float(self.window.sum())
 
     @property
     def weight(self) -> float:
@@ -55,7 +56,7 @@ class FramePlan:
     def n_reach(self) -> int:
         """Lines from a component's middle to where its power has fallen to e⁻²."""
         spread = float(np.sum(self.slope**2) / np.sum(self.window**2)) ** 0.5  # rms width, rad per sample
-        return max(2, round(2.0 * spread / (2 * np.pi) * self.n_fft))
+        return max(2, int(np.rint(spread / np.pi * self.n_fft)))
 
 
 def plan_frames(

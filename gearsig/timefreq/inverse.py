@@ -25,9 +25,11 @@ def inverse(
     Returns
     -------
     complex array, (n_columns,)
-        Peak amplitude in the coefficients' unit. Whole signals come back, as largest error over rms: from the STFT with
-        all lines to 1e-6; from the CWT and the squeezed transforms to 1e-4 for what lies between the lines'
-        outermost ones, a wavelet's bandwidth away from them; what lies outside, the mean included, is lost.
+        Peak amplitude in the coefficients' unit. Whole signals come back, as error over amplitude: from the STFT
+        with all lines to 1e-6, ends included; from the CWT to 1e-4 away from the ends for frequencies that lie √2 or
+        more inside the outermost lines (the default wavelet), 1e-2 next to them; from the squeezed transforms to 1e-4
+        rms, with single samples 1e-2 off where components cancel. What lies outside the lines, the mean
+        included, is lost.
 
     Raises
     ------

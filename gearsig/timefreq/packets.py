@@ -69,7 +69,7 @@ class WaveletPackets:
 
 
 def wavelet_packets(
-    signal: Source, channel: str | None = None, *, wavelet: str = "db10", level: int = 6
+    signal: Source, channel: str | None = None, *, wavelet: str = "sym12", level: int = 6
 ) -> WaveletPackets:
     """Return the wavelet packet coefficients of 2^level bands of equal width.
 
@@ -79,7 +79,8 @@ def wavelet_packets(
         Over time, bands are of frequencies; over angle, of orders.
     channel : str or None
     wavelet : str
-        An orthogonal wavelet of PyWavelets. Long ones (db10, sym12, dmey) separate bands better.
+        An orthogonal wavelet of PyWavelets. Long ones separate bands better. Nearly symmetric ones
+        (sym12, dmey) show an event when it was; db10 scatters it over bands by several coefficients.
     level : int
         1 to 12.
 
@@ -157,7 +158,7 @@ def wavelet_packet_map(
     signal: Source,
     channel: str | None = None,
     *,
-    wavelet: str = "db10",
+    wavelet: str = "sym12",
     level: int = 6,
     n_columns: int = 1000,
     reduction: Reduction = "mean",

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearsig.checks import FloatArray, count, one_of
-from gearsig.timefreq.bank import Edges, block_pieces, pieces, plan_group, plan_groups
+from gearsig.timefreq.bank import Edges, block_pieces, pieces, plan_group, plan_groups, workspace
 from gearsig.timefreq.columns import ColumnPowers, Form, plan_columns
 from gearsig.timefreq.cwt import EDGES, check_size, largest_power_of_two_in, n_reach
 from gearsig.timefreq.lines import logarithmic_lines, lowest_possible
@@ -200,10 +200,11 @@ def _blocks(
     step = _step(cycles[chosen[-1]] * (v_high - v_low), largest_step)
     group = plan_group(chosen, cycles, wavelet, x.n_samples, step=step)
     weights = np.full(len(chosen), plan.weight, dtype=np.float32)
+    space = workspace(group)
     for start in group.starts(x.n_samples):
         length = -(-min(group.n_core, x.n_samples - start) // step)
         T = np.zeros((len(part), length), dtype=np.complex64)
-        for piece in block_pieces(x.values, group, start, edges, derivatives=True):
+        for piece in block_pieces(x.values, group, start, edges, space, derivatives=True):
             squeeze(piece.values, piece.derivatives, weights, plan.smallest, table.borders, table.lookup, T, 0)
         yield start, step, T
 

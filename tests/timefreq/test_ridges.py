@@ -1,0 +1,149 @@
+"""Ridges against closed forms, through crossings above all."""
+
+import numpy as np
+import pytest
+
+from gearsig.errors import InputError, RefusalError
+from gearsig.timefreq.crossings import meetings, untangled
+from gearsig.timefreq.cwt import cwt, cwt_map
+from gearsig.timefreq.ridge_path import NOT_HIDDEN, best_path
+from gearsig.timefreq.ridges import NOT_HIDDEN as NOT_HIDDEN_AGAIN
+from gearsig.timefreq.ridges import ridges
+from gearsig.timefreq.squeezed_cwt import squeezed_cwt_map
+from gearsig.timefreq.squeezed_stft import squeezed_stft_map
+from gearsig.timefreq.stft import stft_map
+from gearsig.timefreq.types import Ridge
+from gearsig.timefreq.uniform import UniformSignal
+from gearsig.timefreq.wavelets import Morse
+
+MAPS = {
+    "CWT": lambda s: cwt_map(s, lowest=50, highest=800, wavelet=Morse(60.0), n_per_octave=32),
+    "CWT coefficients": lambda s: cwt(s, lowest=50, highest=800, wavelet=Morse(60.0), n_per_octave=32, step=20),
+    "squeezed CWT": lambda s: squeezed_cwt_map(s, lowest=50, highest=800, wavelet=Morse(60.0)),
+    "STFT": lambda s: stft_map(s, window_length=0.2),
+    "squeezed STFT": lambda s: squeezed_stft_map(s, window_length=0.2),
+}
+MIDDLE = slice(40, -40)
+
+
+@pytest.mark.parametrize("kind", MAPS)
+def test_chirp_and_its_frequency_error(crossing, kind):
+    signal, (rising, _) = crossing(second=0.0)
+    (ridge,) = ridges(MAPS[kind](signal))
+    assert not ridge.shared.any()
+    error = (ridge.positions - rising(ridge.at))[MIDDLE]
+    assert np.abs(error).max() < 0.012 * 400  # a line is 2 % wide in the CWT
+    assert np.sqrt(np.mean(error**2)) < 1.6
+    if kind in {"STFT", "CWT"}:
+        assert np.sqrt(np.mean(error**2)) < 0.25  # the parabola reads between the lines
+
+
+@pytest.mark.parametrize("kind", MAPS)
+@pytest.mark.parametrize(("second", "noise", "seed"), [(1.0, 0.0, 0), (0.3, 0.0, 0), (1.0, 0.5, 1), (3.0, 0.5, 2)])
+def test_crossing_chirps_do_not_change_over(crossing, kind, second, noise, seed):
+    signal, both = crossing(second, noise, seed)
+    found = ridges(MAPS[kind](signal), 2)
+    taken = set()
+    for ridge in found:
+        errors = [np.abs(ridge.positions - f(ridge.at))[MIDDLE].max() for f in both]
+        which = int(np.argmin(errors))
+        taken.add(which)
+        assert errors[which] < 40.0  # they are 300 Hz apart at the ends
+        assert ridge.shared[MIDDLE].any()
+        assert not ridge.shared[:100].any()
+    assert taken == {0, 1}
+
+
+def test_three_crossing_components():
+    t = np.arange(20_001) / 2000.0
+    f = [lambda at: 150 + 40 * at, lambda at: 500 - 30 * at, lambda at: 350 + 0 * at]
+    phases = [150 * t + 20 * t**2, 500 * t - 15 * t**2, 350 * t]
+    x = sum(a * np.cos(2 * np.pi * p) for a, p in zip((1.0, 0.7, 0.5), phases, strict=True))
+    found = ridges(stft_map(UniformSignal(x, 2000.0), window_length=0.2), 3)
+    errors = [[np.abs(r.positions - g(r.at))[MIDDLE].max() for g in f] for r in found]
+    assert {int(np.argmin(e)) for e in errors} == {0, 1, 2}
+    assert max(min(e) for e in errors) < 15.0
+
+
+def test_modulated_frequency_is_followed():
+    t = np.arange(20_001) / 2000.0
+    x = np.cos(2 * np.pi * (300 * t) + 40 * np.sin(2 * np.pi * 0.4 * t))
+    (ridge,) = ridges(stft_map(UniformSignal(x, 2000.0), window_length=0.1))
+    error = ridge.positions - (300 + 16 * np.cos(2 * np.pi * 0.4 * ridge.at))
+    assert np.abs(error[MIDDLE]).max() < 1.0
+
+
+@pytest.mark.parametrize("kind", ["CWT", "STFT"])
+def test_amplitude_of_a_modulated_component(kind):
+    t = np.arange(20_001) / 2000.0
+    amplitude = 2.0 + 0.6 * np.cos(2 * np.pi * 0.5 * t)
+    x = amplitude * np.cos(2 * np.pi * 200 * t + 10 * np.sin(2 * np.pi * 0.3 * t))
+    signal = UniformSignal(x, 2000.0, unit="g")
+    fine = {"CWT": MAPS["CWT"], "STFT": lambda s: stft_map(s, window_length=0.2, zero_padding=2)}
+    (ridge,) = ridges(fine[kind](signal))
+    expected = np.interp(ridge.at, t, amplitude)
+    assert ridge.amplitude[MIDDLE] == pytest.approx(expected[MIDDLE], rel=0.02)
+    assert ridge.unit == "g"
+
+
+def test_order_ridge(swept_angle_signal):
+    (ridge,) = ridges(squeezed_cwt_map(swept_angle_signal, "a", lowest=1, highest=20))
+    assert ridge.axis == "order"
+    assert ridge.positions[MIDDLE] == pytest.approx(7.0, rel=0.011)
+
+
+def test_path_prefers_going_straight():
+    scores = np.zeros((40, 160))
+    columns = np.arange(160)
+    scores[np.round(5 + 0.18 * columns).astype(int), columns] = 1.0
+    scores[np.round(35 - 0.18 * columns).astype(int), columns] = 1.0
+    hidden = np.full(scores.shape, NOT_HIDDEN, dtype=np.int16)
+    path = best_path(scores, hidden, 2.0, 1.0)
+    slopes = np.diff(path[::40])
+    assert np.all(slopes > 0) or np.all(slopes < 0)
+    assert NOT_HIDDEN == NOT_HIDDEN_AGAIN
+
+
+def test_tails_are_exchanged_only_where_that_is_smoother():
+    t = np.arange(200.0)
+    level = [np.zeros(200), np.zeros(200)]
+    up, down = 0.3 * t, 60 - 0.3 * t
+    bounced = [np.minimum(up, down), np.maximum(up, down)]
+    a, b = untangled(bounced, level, 6.0, 3.0)
+    assert a == pytest.approx(up, abs=0.5)
+    assert b == pytest.approx(down, abs=0.5)
+    a, b = untangled([up, down], level, 6.0, 3.0)
+    assert np.array_equal(a, up)
+    assert np.array_equal(b, down)
+    assert [(m.start, m.stop) for m in meetings(up, down, 6.0)] == [(90, 111)]
+
+
+def test_level_decides_where_shape_does_not():
+    t = np.arange(200.0)
+    near = [30 + 2 / np.cosh((t - 100) / 12), 30 - 2 / np.cosh((t - 100) / 12)]
+    wide = [p + np.where(np.abs(t - 100) > 40, 1, 0) * s * 8 for p, s in zip(near, (1, -1), strict=True)]
+    weak_then_strong = np.where(t < 100, -2.0, 0.0)
+    a, _ = untangled(wide, [weak_then_strong, weak_then_strong[::-1]], 6.0, 30.0)
+    assert a[0] > 30 > a[-1]
+
+
+def test_fewer_ridges_than_asked_where_there_are_no_more():
+    t = np.arange(20_001) / 2000.0
+    assert len(ridges(stft_map(UniformSignal(np.cos(2 * np.pi * 200 * t), 2000.0)), 3)) == 1
+
+
+def test_nothing_is_found_in_silence():
+    with pytest.raises(RefusalError, match="no ridge"):
+        ridges(stft_map(UniformSignal(np.zeros(4000), 100.0)))
+
+
+def test_wrong_input_is_named(crossing):
+    levels = stft_map(crossing()[0])
+    with pytest.raises(InputError, match="n_ridges"):
+        ridges(levels, 0)
+    with pytest.raises(InputError, match="steepest"):
+        ridges(levels, steepest=0)
+    with pytest.raises(RefusalError, match="fewer than three"):
+        ridges(levels, lowest=100, highest=101)
+    with pytest.raises(InputError, match="differ in length"):
+        Ridge(np.zeros(3), np.zeros(2), np.zeros(3), np.zeros(3, bool), "frequency", "")
