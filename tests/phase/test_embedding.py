@@ -86,7 +86,8 @@ def test_white_noise_of_any_length_is_called_stochastic_and_not_embedded(n):
 def test_float32_odd_length_and_one_sample_more_give_the_same():
     x = lorenz(6000, 0.02)[:, 0]
     found = [embedding_dimension(v, 50.0, largest=5) for v in (x, x[:-1], x.astype(np.float32), 5.0 * x - 3.0)]
-    assert {(f.dimension, f.delay_samples) for f in found} == {(3, 8)} or len({f.dimension for f in found}) == 1
+    assert {f.dimension for f in found} == {3}
+    assert {f.delay_samples for f in found} <= {7, 8, 9}
     np.testing.assert_allclose(found[2].false_fraction, found[0].false_fraction, atol=5e-3)
     np.testing.assert_allclose(found[3].false_fraction, found[0].false_fraction, atol=5e-3)
 
