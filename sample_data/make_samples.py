@@ -73,7 +73,7 @@ def main(folder: Path) -> None:
 
 def workshop_samples() -> list[Made]:
     """The 29/47 gearbox: in good order, three faults, and a run-up."""
-    spall = EffectSetting("tooth_spall", 3.0, {"tooth": DAMAGED_TOOTH, "width_percent": 80.0})
+    spall = EffectSetting("tooth_spall", 80.0, {"tooth": DAMAGED_TOOTH, "length_mm": 3.0})
     eccentric = EffectSetting("eccentricity", 100.0, {"gear": "driven", "angle_deg": 60.0})
     race = EffectSetting("bearing_outer_race", 0.2)
     run_up = Operation(Course.of([0.0, 8.0], [600.0, 3000.0]), Course.constant(50.0))

@@ -1,10 +1,11 @@
 """The four bearings as arrays: springs, clearance, and what rolling elements do as they pass.
 
-A rolling element over a spall carries less, and the shaft sinks towards it. The element can lose no more than its own
-load: with Q its static load and k the bearing's stiffness, the shaft sinks by s (1 − exp(−h/s)), s = Q/k, h the depth
-to which an element of that diameter sinks between the spall's edges. Q falls off with the angle ψ from the load's
-direction as cos^1.5 ψ (Stribeck's distribution for a bearing without clearance). The sinking is a displacement of the
-spring's foot, (x_b − d), with edges as long as a contact ellipse is wide.
+A rolling element over a spall carries less, and the shaft sinks towards it. Between the edges an element of radius R
+that follows them is h = x²/2R deep, x its distance from the nearer edge. It can lose no more than its own load: with Q
+its load at this time and k the bearing's stiffness, the shaft sinks by s (1 − exp(−h/s)), s = Q/k. Knocks grow with the
+load, and with the spall only up to half a millimetre or so. Q falls off with the angle ψ from the load's direction as
+cos^1.5 ψ (Stribeck's distribution for a bearing without clearance). The sinking is a displacement of the spring's foot,
+(x_b − d).
 
 With clearance, fewer elements share the load, and the shaft falls and rises as they pass: the difference from the
 bearing without clearance is found from the static balance of all elements (F = K δ^1.5) at 32 places of the cage.
@@ -12,18 +13,21 @@ bearing without clearance is found from the static balance of all elements (F = 
 
 from __future__ import annotations
 
-from math import pi, sqrt
+from math import pi
 from typing import Any
 
 import numpy as np
 
 from gearsig.checks import FloatArray
+from gearsig.errors import InputError, RefusalError
 from sims.machine import BearingSupport, Machine
 
-EDGE_MM = 0.1
-"""Half the length over which an element enters or leaves a spall; a usual contact is 0.1 to 0.3 mm wide."""
+EDGES_MM = 0.3
+"""Beyond either edge of a spall, where an element begins to feel it."""
 N_HARMONICS = 4
 """Of the motion at the rolling elements' passing."""
+LEFT_OVER = 1e-8
+"""Part of the load that may be out of balance."""
 N_PLACES = 1024
 """Rolling elements whose place in the cage is drawn; then they repeat (the cage's own ones, spread by skidding)."""
 
@@ -38,8 +42,9 @@ BEARING_FIELDS: list[tuple[str, type, tuple[int, ...]]] = [
     ("race", np.int64, (4,)),  # 0 none, 1 outer, 2 inner
     ("race_order", np.float64, (4,)),  # passings per revolution of the shaft
     ("race_length", np.float64, (4,)),  # in element spacings
-    ("race_edge", np.float64, (4,)),  # in element spacings
-    ("race_sink", np.float64, (4,)),  # greatest sinking in m
+    ("race_spacing", np.float64, (4,)),  # of the elements along the race, in m
+    ("race_radius", np.float64, (4,)),  # of the elements, in m
+    ("race_share", np.float64, (4,)),  # share of the heaviest loaded element in the load
     ("race_angle", np.float64, (4,)),
     ("load_angle", np.float64, (4,)),  # from +x counter-clockwise
     ("places", np.float64, (4, N_PLACES)),  # of the elements in the cage, off their even spacing
@@ -53,11 +58,11 @@ def bearing_fields(machine: Machine, mesh_force_n: float, rng: np.random.Generat
     """Values of `BEARING_FIELDS` at the set mesh force; draws the elements' places."""
     supports = machine.bearings
     loads = bearing_loads_n(machine, mesh_force_n)
-    defects = [_defect(b, load) for b, load in zip(supports, loads, strict=True)]
+    defects = [_defect(b) for b in supports]
     places = np.zeros((4, N_PLACES))
-    for row, support in enumerate(supports):
+    for row, (support, own) in enumerate(zip(supports, rng.spawn(4), strict=True)):
         if support.defect is not None and support.defect.spacing_jitter > 0:
-            places[row] = np.clip(rng.standard_normal(N_PLACES), -3, 3) * support.defect.spacing_jitter
+            places[row] = np.clip(own.standard_normal(N_PLACES), -3, 3) * support.defect.spacing_jitter
     return {
         "bearing_mass": np.array([b.mass_kg for b in supports]),
         "per_bearing_mass": 1.0 / np.array([b.mass_kg for b in supports]),
@@ -68,8 +73,9 @@ def bearing_fields(machine: Machine, mesh_force_n: float, rng: np.random.Generat
         "race": np.array([d[0] for d in defects], dtype=np.int64),
         "race_order": np.array([d[1] for d in defects]),
         "race_length": np.array([d[2] for d in defects]),
-        "race_edge": np.array([d[3] for d in defects]),
-        "race_sink": np.array([d[4] for d in defects]),
+        "race_spacing": np.array([d[3] for d in defects]),
+        "race_radius": np.array([5e-4 * (b.bearing.rolling_element_diameter_mm or 1.0) for b in supports]),
+        "race_share": np.array([4.37 / (b.bearing.n_rolling_elements or 1) for b in supports]),
         "load_angle": np.arctan2(loads[:, 1], loads[:, 0]),
         "race_angle": np.array([np.radians(b.defect.angle_deg) if b.defect else 0.0 for b in supports]),
         "places": places,
@@ -90,23 +96,26 @@ def bearing_loads_n(machine: Machine, mesh_force_n: float) -> FloatArray:
     return loads
 
 
-def _defect(support: BearingSupport, load_n: FloatArray) -> tuple[int, float, float, float, float]:
-    """(race, order, length and edge in element spacings, greatest sinking in m)."""
+def _defect(support: BearingSupport) -> tuple[int, float, float, float]:
+    """(race, order, length in element spacings, spacing in m)."""
     defect, bearing = support.defect, support.bearing
     if defect is None:
-        return 0, 0.0, 0.0, 1.0, 0.0
+        return 0, 0.0, 0.0, 1.0
     ball, pitch = bearing.rolling_element_diameter_mm or 0.0, bearing.pitch_diameter_mm or 0.0
     n = bearing.n_rolling_elements or 1
     outer = defect.race == "outer"
     spacing = pi * (pitch + ball if outer else pitch - ball) / n
-    reach = min(defect.length_mm, ball)
-    depth = 1e-3 * (ball / 2 - sqrt(ball**2 / 4 - reach**2 / 4))
-    share = 4.37 / n * float(np.hypot(*load_n)) / support.stiffness_n_per_m
-    sink = share * (1.0 - np.exp(-depth / share)) if share > 0 else 0.0
+    taken = (defect.length_mm + 2.0 * EDGES_MM) / spacing + 6.0 * defect.spacing_jitter
+    if taken > 1.0:
+        longest = spacing * (1.0 - 6.0 * defect.spacing_jitter) - 2.0 * EDGES_MM
+        raise InputError(
+            f"length_mm of the defect in {bearing.name!r} is {defect.length_mm:g} mm: it holds two elements at once",
+            allowed=f"at most {longest:.3g} mm with this scatter of the elements",
+        )
     order = bearing.orders()["BPFO" if outer else "BPFI"]
     # A cage that slips falls behind: fewer passings outside, more inside, as n = BPFO + BPFI.
     order += -defect.slip * order if outer else defect.slip * (n - order)
-    return (1 if outer else 2), order, defect.length_mm / spacing, EDGE_MM / spacing, float(sink)
+    return (1 if outer else 2), order, defect.length_mm / spacing, 1e-3 * spacing
 
 
 def _sway(support: BearingSupport, load_n: FloatArray) -> FloatArray:
@@ -120,8 +129,6 @@ def _sway(support: BearingSupport, load_n: FloatArray) -> FloatArray:
 
 def _carried_place(support: BearingSupport, load_n: FloatArray, clearance_m: float, n_angles: int = 32) -> FloatArray:
     """Where the shaft stands, x and y in m, at even places of the cage over one element spacing, (n_angles, 2)."""
-    from scipy.optimize import root
-
     n, load = support.bearing.n_rolling_elements or 1, float(np.hypot(*load_n))
     toward = np.array(load_n) / load
     deflection = load / support.stiffness_n_per_m
@@ -133,14 +140,39 @@ def _carried_place(support: BearingSupport, load_n: FloatArray, clearance_m: flo
     for i in range(n_angles):
         angles = 2 * pi * (np.arange(n) + i / n_angles) / n
         radial = np.column_stack((np.cos(angles), np.sin(angles)))
-
-        def out_of_balance(place: FloatArray, radial: FloatArray = radial) -> FloatArray:
-            forces = contact * np.maximum(radial @ (place * 1e-6) - clearance_m, 0.0) ** 1.5
-            result: FloatArray = (forces @ radial - load_n) / load
-            return result
-
-        solved = root(out_of_balance, guess * 1e6, method="hybr")
-        guess = np.asarray(solved.x) * 1e-6
-        places[i] = guess
+        places[i] = guess = _balanced(radial, contact, clearance_m, load_n, guess)
     swing: FloatArray = places - places.mean(axis=0)
     return swing
+
+
+def _balanced(
+    radial: FloatArray, contact: float, clearance_m: float, load_n: FloatArray, guess: FloatArray
+) -> FloatArray:
+    """Least of the energy Σ K δ^2.5/2.5 − W·p, which is convex: Newton's method, its steps halved until it falls.
+
+    radial : (n, 2) directions of the elements. Lengths are scaled so that the curvature is about 1.
+    """
+    load = float(np.hypot(*load_n))
+    unit = (load / contact) ** (2.0 / 3.0)
+    toward, gap, p = load_n / load, clearance_m / unit, guess / unit
+
+    def energy(place: FloatArray) -> float:
+        return float(np.sum(np.maximum(radial @ place - gap, 0.0) ** 2.5) / 2.5 - toward @ place)
+
+    for _ in range(200):
+        depth = np.maximum(radial @ p - gap, 0.0)
+        slope = (depth**1.5) @ radial - toward
+        if np.hypot(*slope) < LEFT_OVER:
+            place: FloatArray = p * unit
+            return place
+        curvature = (radial.T * (1.5 * np.sqrt(depth))) @ radial + 1e-9 * np.eye(2)
+        step = np.linalg.solve(curvature, slope)
+        step *= min(1.0, (1.0 + gap) / float(np.hypot(*step)))
+        part, now = 1.0, energy(p)
+        while energy(p - part * step) > now - 1e-4 * part * float(slope @ step) and part > 1e-12:
+            part /= 2.0
+        p = p - part * step
+    raise RefusalError(
+        f"the static balance of a bearing's rolling elements was not found (out of balance by {np.hypot(*slope):.1g})",
+        remedy="take another clearance or load",
+    )

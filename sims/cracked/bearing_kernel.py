@@ -8,26 +8,38 @@ from math import cos, exp, floor, log1p, pi, sin, sqrt
 from numba import njit
 
 LEAST_LOAD = 1e-12
+EDGE_M = 5e-5
+"""Length over which an edge is rounded: a contact is some 0.2 mm wide."""
+FAR = 12.0
+"""Edge lengths outside a spall beyond which nothing is felt."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def foot(k, row, theta):
-    """(d_x, d_y) in m: sinking over a race defect, and the sway of a bearing with clearance. `theta`: shaft angle."""
+def foot(k, row, theta, x, y):
+    """(d_x, d_y) in m: sinking over a race defect, and the sway of a bearing with clearance.
+
+    `theta`: shaft angle. `x`, `y`: place of the shaft in the bearing, whose direction is that of the load now.
+    """
     dx, dy = 0.0, 0.0
     if k.race[row] > 0:
-        passed = k.race_order[row] * theta / (2.0 * pi)
+        # At angle 0 the defect lies half way between two elements: nothing starts with a blow.
+        passed = k.race_order[row] * theta / (2.0 * pi) + 0.5
         element = floor(passed + 0.5)
         along = passed - element - k.places[row, int(element) % k.places.shape[1]]
-        half, edge = 0.5 * k.race_length[row], k.race_edge[row]
-        shape = _step((along + half) / edge) * _step((half - along) / edge)
-        if shape > 0.0:
+        inside = (0.5 * k.race_length[row] - abs(along)) * k.race_spacing[row]
+        if inside > -FAR * EDGE_M:
+            reach = EDGE_M * _softplus(inside / EDGE_M)
+            depth = reach * reach / (2.0 * k.race_radius[row])
             direction = k.race_angle[row] + (k.load_angle[row] if k.race[row] == 1 else theta)
             # The driven shaft turns clockwise: its angle counts the other way in the frame.
             if k.race[row] == 2 and row >= 2:
                 direction = -direction
-            facing = cos(direction - k.load_angle[row])
+            r = sqrt(x * x + y * y)
+            carried = r - k.clearance[row]
+            facing = (x * cos(direction) + y * sin(direction)) / r if carried > 0.0 else 0.0
             if facing > 0.0:
-                sink = k.race_sink[row] * facing * sqrt(facing) * shape
+                share = k.race_share[row] * carried
+                sink = share * (1.0 - exp(-depth / share)) * facing * sqrt(facing)
                 dx += sink * cos(direction)
                 dy += sink * sin(direction)
     if k.clearance[row] > 0.0:
@@ -61,14 +73,3 @@ def carried_part(k, row, x, y):
 def _softplus(x):
 
     return x + log1p(exp(-x)) if x > 0.0 else log1p(exp(x))
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _step(t):
-    """Quintic step from 0 at t = −1 to 1 at t = 1."""
-    if t <= -1.0:
-        return 0.0
-    if t >= 1.0:
-        return 1.0
-    u = 0.5 * (t + 1.0)
-    return u * u * u * (u * (6.0 * u - 15.0) + 10.0)

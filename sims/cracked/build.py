@@ -59,7 +59,7 @@ def build_machine(values: Values, *, sampling_rate_hz: float = 20480.0) -> Machi
         roughness=Roughness(
             wanted.number("roughness_um"), wanted.word("roughness_locked_to"), wanted.number("roughness_dimension")
         ),
-        drive=Drive(wanted.number("governor_nm_s_per_rad")),
+        drive=Drive(wanted.optional("governor_nm_s_per_rad")),
         gravity_mps2=wanted.number("gravity_mps2"),
         line_of_action_deg=line_deg,
     )

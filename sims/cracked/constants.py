@@ -15,6 +15,7 @@ from sims.cracked.bearing import BEARING_FIELDS, bearing_fields
 from sims.cracked.contact_kernel import MOST_LATE
 from sims.machine import Machine
 from sims.machine.operation import Operation
+from sims.machine.parts import RECOVERY_S
 from sims.mesh import back_stiffness_n_per_m, mesh_stiffness, mesh_table
 from sims.mesh.friction import reduced_modulus_pa
 from sims.mesh.friction_kernel import oil_terms
@@ -24,6 +25,9 @@ DAMPING_RAMP_M = 2e-7
 """Depth over which the contact's damping comes in."""
 MOST_LINES = 8
 """Torque ripples, or speed swings, at once."""
+STICKING, STICKING_S = 0.1, 1e-5
+"""Friction coefficient, and time within which it must not turn a gear's sliding round: near standstill the smoothed
+sign is as stiff as a spring, and a fixed step would chatter."""
 SIGN_THRESHOLD = 0.01
 """Sliding speed below which the sign of friction is smoothed, over the mesh's greatest sliding speed."""
 
@@ -44,6 +48,7 @@ SCALARS = (
     "back_stiffness",
     "late_x",
     "late_y",
+    "turn_x",
     "cos_back",
     "sin_back",
     "friction_factor",
@@ -169,6 +174,7 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
         # Base pitches per metre that the gears stand apart along their line of centres, (cos α, sin α).
         "late_x": cos(alpha) / (sin(alpha) * pair.base_pitch_mm * 1e-3),
         "late_y": 1.0 / (pair.base_pitch_mm * 1e-3),
+        "turn_x": base_radius[0] / (pair.action_length_mm * pair.base_pitch_mm * 1e-6),
         "cos_back": cos(2.0 * alpha),
         "sin_back": sin(2.0 * alpha),
         "friction": machine.lubrication.friction,
@@ -177,7 +183,9 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
         "reduced_modulus": reduced_modulus_pa(*moduli),
         "log10_oil": log10_oil,
         "oil_constant": oil_constant,
-        "sign_threshold": max(SIGN_THRESHOLD * greatest_sliding_mps(machine, omega), 1e-6),
+        "sign_threshold": max(
+            SIGN_THRESHOLD * greatest_sliding_mps(machine, omega), STICKING * force * STICKING_S / min(mass), 1e-6
+        ),
         "mass": mass,
         "inertia": inertia,
         "per_mass": 1.0 / mass,
@@ -197,8 +205,8 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
         "hooke_force": hooke_rad / np.array([2.0 * s.bearing_distance_m for s in machine.shafts]),
         "gravity_x": -machine.gravity_mps2 * sin(beta),
         "gravity_y": -machine.gravity_mps2 * cos(beta),
-        "governor": machine.drive.governor_nm_s_per_rad,
-        "governor_spring": machine.drive.governor_nm_s_per_rad**2 / (4.0 * total_inertia_kg_m2(machine)),
+        "governor": governor_nm_s_per_rad(machine),
+        "governor_spring": governor_nm_s_per_rad(machine) ** 2 / (4.0 * total_inertia_kg_m2(machine)),
         "total_inertia": total_inertia_kg_m2(machine),
         "ratio": machine.ratio,
     }
@@ -231,6 +239,12 @@ def total_inertia_kg_m2(machine: Machine) -> float:
     (input_shaft, output_shaft), (driver, driven) = machine.shafts, machine.wheels
     far = driven.inertia_kg_m2 + output_shaft.rotor_inertia_kg_m2
     return input_shaft.rotor_inertia_kg_m2 + driver.inertia_kg_m2 + far / machine.ratio**2
+
+
+def governor_nm_s_per_rad(machine: Machine) -> float:
+    """G of the drive; an ordinary one suits what it turns."""
+    given = machine.drive.governor_nm_s_per_rad
+    return 2.0 * total_inertia_kg_m2(machine) / RECOVERY_S if given is None else given
 
 
 def greatest_sliding_mps(machine: Machine, omega_rad_s: float) -> float:

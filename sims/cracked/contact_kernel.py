@@ -6,10 +6,12 @@ action that gives the driver a torque −∂U/∂c · ∂c/∂θ1, as stiffness 
 pair would take energy from the drive that appears nowhere (Oh, Grosh, Barber 2005). ∂u/∂C at constant d is −n²/2
 whatever the contact's law is.
 
-Gears that move apart by Δa make a pair enter late, by Δa/(p_b sin α_w) base pitches, as the path of contact begins at
-the driven gear's tip: run-out changes the contact ratio once per revolution. The force −∂U/∂Δa is left out: it would
-follow from the width that is assumed for the ramp, where the geometry of a corner contact gives a tenth of it, and it
-works over the run-out alone.
+Gears that move apart by Δa stretch the line between their base circles by Δa/sin α_w: a pair enters late by that, as
+the path of contact begins at the driven gear's tip. The line also turns, by Δx/(a sin α_w) where Δx is how far the
+driven gear has moved off the line of action, and with it all contacts shift by r_b1 times that. So run-out changes
+contact ratio and phase once per revolution. The forces −∂U/∂(Δx, Δy) are left out: they would follow from the width
+that is assumed for the ramp, where the geometry of a corner contact gives a tenth of it, and they work over the run-out
+alone.
 """
 
 # mypy: allow-untyped-defs, allow-untyped-calls
@@ -23,7 +25,7 @@ from sims.mesh.load_sharing_kernel import cubic, pair_force
 
 MOST_CYCLES = 1e12
 """Mesh cycles beyond which a run has burst; until then, single cycles are resolved to 1e-4."""
-MOST_LATE = 0.05
+MOST_LATE = 0.12
 """Base pitches by which an entry may be late or early; the places of gears that move further count as that far."""
 
 

@@ -11,13 +11,13 @@ from sims.cracked.contact_kernel import back_flank_force, late_entry, stored_ene
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def potential_energy(k, curves, rows, pitch, q, late, rough):
-    """Springs, tooth pairs and weight, in J; `late` as for `contact_forces`."""
+def potential_energy(k, curves, rows, pitch, q, late, turned, rough):
+    """Springs, tooth pairs and weight, in J; `late`, `turned`: see `place_of_entry`."""
     cx1, cy1 = k.runout[0] * cos(q[1] + k.runout_angle[0]), k.runout[0] * sin(q[1] + k.runout_angle[0])
     cx2, cy2 = k.runout[1] * cos(q[2] + k.runout_angle[1]), -k.runout[1] * sin(q[2] + k.runout_angle[1])
     error = k.base_radius[0] * q[1] - k.base_radius[1] * q[2]
     dx, dy = q[4] + cx1 - q[6] - cx2, q[5] + cy1 - q[7] - cy2
-    total = stored_energy(k, curves, rows, pitch, error + dy, late, k.cycles_per_rad * q[1], rough)
+    total = stored_energy(k, curves, rows, pitch, error + dy, late, k.cycles_per_rad * q[1] - turned, rough)
     total += back_flank_force(k, -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough, 0.0)[1]
     for side in range(2):
         g, b1, b2 = 4 + 2 * side, 8 + 4 * side, 10 + 4 * side
@@ -39,10 +39,10 @@ def potential_energy(k, curves, rows, pitch, q, late, rough):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def place_of_entry(k, q):
-    """Late entry of pairs, in base pitches, at the places q."""
+    """Late entry of pairs, and shift of all contacts, in base pitches, at the places q."""
     dx = q[4] + k.runout[0] * cos(q[1] + k.runout_angle[0]) - q[6] - k.runout[1] * cos(q[2] + k.runout_angle[1])
     dy = q[5] + k.runout[0] * sin(q[1] + k.runout_angle[0]) - q[7] + k.runout[1] * sin(q[2] + k.runout_angle[1])
-    return late_entry(k, dx, dy)
+    return late_entry(k, dx, dy), k.turn_x * dx
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

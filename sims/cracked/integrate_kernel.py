@@ -14,7 +14,7 @@ from sims.mesh.roughness_kernel import advance, height_now
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def integrate(
+def integrate(  # noqa: PLR0915  four stages written out
     k, curves, rows, pitch, q, v, set_angle, start, step, n_steps, stride, speed, torque, rough, select, found, energies
 ):
     """Run `n_steps` steps from time `start`; fill `found` with the selected signals at every `stride`-th step.
@@ -60,9 +60,9 @@ def integrate(
             for i in range(select.shape[0]):
                 found[n_rows, i] = signals[select[i]]
             if energies.shape[0] > 0:
-                energies[n_rows] = potential_energy(
-                    k, curves, rows, pitch, q, place_of_entry(k, q), h0
-                ) + kinetic_energy(k, v, q)
+                late, turned = place_of_entry(k, q)
+                energies[n_rows] = potential_energy(k, curves, rows, pitch, q, late, turned, h0)
+                energies[n_rows] += kinetic_energy(k, v, q)
             if not np.isfinite(a[1] + a[5] + a[7] + a[2]):
                 return n_rows
             n_rows += 1

@@ -89,7 +89,14 @@ _SHAFTS = (
     _number("rotor_inertia_input_kg_m2", "kg m^2", "moment of inertia of the motor", 1e-7, 1e5, 2e-3),
     _number("rotor_inertia_output_kg_m2", "kg m^2", "moment of inertia of the load", 1e-7, 1e5, 1e-2),
     _number("bearing_distance_mm", "mm", "between the two bearings of a shaft", 5, 10000, 100.0),
-    _number("governor_nm_s_per_rad", "N m s/rad", "of the drive; it holds the mean speed", 1e-6, 1e5, 0.5),
+    _number(
+        "governor_nm_s_per_rad",
+        "N m s/rad",
+        "of the drive; it holds the mean speed; none: recovers in 0.06 s",
+        1e-6,
+        1e5,
+        None,
+    ),
     _number("gravity_mps2", "m/s^2", "gravity", 0, 100, 9.81),
     _number(
         "line_of_action_deg",

@@ -72,10 +72,11 @@ class Prepared:
 
 def prepare(machine: Machine, operation: Operation, rng: np.random.Generator, start_s: float = 0.0) -> Prepared:
     """Draw what is random, tabulate the machine, find the first state."""
-    machine, roughness = draw_roughness(machine, rng)
+    rough_rng, bearing_rng = rng.spawn(2)  # each keeps what it draws, whatever the other does
+    machine, roughness = draw_roughness(machine, rough_rng)
     q, v = start_state(machine, operation, start_s)
     return Prepared(
-        constants(machine, operation, rng),
+        constants(machine, operation, bearing_rng),
         q,
         v,
         _points(operation.speed_rpm, pi / 30.0),

@@ -50,7 +50,7 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
         delta,
         delta_rate,
         late,
-        k.cycles_per_rad * q[1],
+        k.cycles_per_rad * q[1] - k.turn_x * dx,
         k.cycles_per_rad * v[1],
         v[1],
         v[2],
@@ -59,14 +59,13 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
         rough_rate,
     )
     back = 0.0
-    if delta < 0.0:
-        depth = -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough
-        if depth > 0.0:
-            # Velocities of the pitch circles' centres: θ̇ times their places turned by a quarter.
-            vx = v[4] - cy1 * v[1] - v[6] - cy2 * v[2]
-            vy = v[5] + cx1 * v[1] - v[7] + cx2 * v[2]
-            rate = -rb1 * v[1] + rb2 * v[2] - k.cos_back * vy + k.sin_back * vx - rough_rate
-            back, _ = back_flank_force(k, depth, rate)
+    depth = -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough
+    if depth > 0.0:  # also while the driving flanks touch: run-out may take up all play
+        # Velocities of the pitch circles' centres: θ̇ times their places turned by a quarter.
+        vx = v[4] - cy1 * v[1] - v[6] - cy2 * v[2]
+        vy = v[5] + cx1 * v[1] - v[7] + cx2 * v[2]
+        rate = -rb1 * v[1] + rb2 * v[2] - k.cos_back * vy + k.sin_back * vx - rough_rate
+        back, _ = back_flank_force(k, depth, rate)
     fx1, fy1 = -friction - k.sin_back * back, -normal + k.cos_back * back
     fx2, fy2 = friction + k.sin_back * back, normal - k.cos_back * back
     t1 = -arm1 * normal + k.cycles_per_rad * along + moment_1
@@ -94,12 +93,13 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
         twist_rate = rotor_rate - (v[1] if side == 0 else v[2])
         carried = k.torsional_stiffness[side] * twist + k.torsional_damping[side] * twist_rate
         if k.hooke[side] > 0.0:
-            push_x, push_y = k.hooke_force[side] * carried * (1.0 + c2), k.hooke_force[side] * carried * s2
+            push_x = k.hooke_force[side] * carried * (1.0 + c2)
+            push_y = k.hooke_force[side] * carried * (s2 if side == 0 else -s2)  # the driven shaft turns the other way
         for row, b, sign in ((2 * side, b1, 1.0), (2 * side + 1, b2, -1.0)):
             x, y = q[b], q[b + 1]
             part = 1.0
             if k.special[row] > 0:
-                foot_x, foot_y = foot(k, row, theta)
+                foot_x, foot_y = foot(k, row, theta, x, y)
                 x, y = x - foot_x, y - foot_y
                 part = carried_part(k, row, x, y)
             kb, cb, per_mass = part * k.bearing_stiffness[row], k.bearing_damping[row], k.per_bearing_mass[row]

@@ -12,7 +12,7 @@ import numpy as np
 from gearsig.checks import positive
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
-from sims.cracked.constants import total_inertia_kg_m2
+from sims.cracked.constants import governor_nm_s_per_rad, total_inertia_kg_m2
 from sims.cracked.layout import POSITIONS
 from sims.cracked.linear import default_step_s, eigenfrequencies_hz
 from sims.cracked.respond import Response, respond
@@ -108,7 +108,7 @@ def simulate_with_motion(
     longest = default_step_s(machine, operation) if step_s is None else positive(step_s, "step_s", "s")
     wanted_hz = motion_rate_hz(chain)
     per_sample = ceil(max(1.0 / longest, wanted_hz) / rate - 1e-9)
-    lead = lead_in_s(machine, chain)
+    lead = ceil(lead_in_s(machine, chain) * rate) / rate  # so that time 0 of the courses is a sample
     machine_rng, chain_rng = rng.spawn(2)
     positions = used_positions(chain)
     measured = (*ANGLES, *(f"{name} acceleration" for name in positions))
@@ -151,9 +151,8 @@ def simulate_with_motion(
 
 def lead_in_s(machine: Machine, chain: MeasurementChain) -> float:
     """Time ahead of the recording: filters, the drive's governor, and the least damped start-up ringing settle."""
-    return max(
-        chain.lead_in_s, SETTLING * 2.0 * total_inertia_kg_m2(machine) / machine.drive.governor_nm_s_per_rad, 0.1
-    )
+    recovery = 2.0 * total_inertia_kg_m2(machine) / governor_nm_s_per_rad(machine)
+    return max(chain.lead_in_s, SETTLING * recovery, 0.1)
 
 
 def motion_rate_hz(chain: MeasurementChain) -> float:

@@ -21,11 +21,12 @@ EFFECT = Effect(
     name="bearing_inner_race",
     group="bearing",
     title="spall on an inner race",
-    severity=Severity("length_mm", "mm", 0.0, 10.0, 2.0, "along the raceway; no longer than the elements' spacing"),
+    severity=Severity("length_mm", "mm", 0.0, 4.0, 0.3, "along the raceway; no longer than the elements' spacing"),
     changes="Rolling elements sink into a gap of the turning race and strike its far edge, hardest in the load zone.",
-    signature="Knocks at n(1 + d cos α/D)/2 per revolution of the bearing's shaft less slip, strong while the defect "
-    "turns through the load zone and weak outside: envelope lines of that order and its multiples with sidebands of "
-    "one shaft order, and order 1 itself. Slightly random, so that a synchronous average takes it away.",
+    signature="Knocks at n(1 + d cos α/D)/2 per revolution of the bearing's shaft, a little more with slip, strong "
+    "while the defect turns through the load zone and weak outside: envelope lines of that order and its multiples "
+    "with sidebands of one shaft order, and order 1 itself. Slightly random, so that a synchronous average takes it "
+    "away.",
     shows_in=("envelope_orders", "resonances", "broadband"),
     change=change,
     options=RACE_OPTIONS,

@@ -21,8 +21,9 @@ EFFECT = Effect(
     name="bearing_outer_race",
     group="bearing",
     title="spall on an outer race",
-    severity=Severity("length_mm", "mm", 0.0, 10.0, 2.0, "along the raceway; no longer than the elements' spacing"),
-    changes="Rolling elements sink into a gap of the standing race and strike its far edge.",
+    severity=Severity("length_mm", "mm", 0.0, 4.0, 0.3, "along the raceway; no longer than the elements' spacing"),
+    changes="Rolling elements sink into a gap of the standing race and strike its far edge. From about 0.5 mm on they "
+    "carry nothing there, and the knocks grow no more; they last longer.",
     signature="A knock for every element that passes, n(1 − d cos α/D)/2 per revolution of the bearing's shaft less "
     "slip: lines of that order and its multiples in the envelope about a resonance, all nearly as strong as the load "
     "zone does not move; not a multiple of any shaft order, and slightly random, so that a synchronous average takes "

@@ -36,7 +36,8 @@ EFFECT = Effect(
     "factor that grows by severity/100; a model without friction starts at factor 0. Starved, thinned or aged oil.",
     signature="Mesh harmonics, above all across the line of action, where friction is the only force: it turns over "
     "at the pitch point and jumps where pairs come and go, so the second and higher harmonics gain. No sidebands, "
-    "nothing at one tooth. The speed at a given torque falls a little: more power is lost. It grows with the load.",
+    "nothing at one tooth. The drive gives a little more torque at the same load: more power is lost. It grows with "
+    "the load.",
     shows_in=("mesh_harmonics",),
     change=change,
 )

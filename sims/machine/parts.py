@@ -231,6 +231,10 @@ class SpeedSwing:
         _finite(self.phase_rad, "phase_rad of the speed swing")
 
 
+RECOVERY_S = 0.06
+"""Time in which an ordinary drive makes up for a deviation of its speed."""
+
+
 @dataclass(frozen=True)
 class Drive:
     """What turns the input rotor.
@@ -241,18 +245,19 @@ class Drive:
 
     Parameters
     ----------
-    governor_nm_s_per_rad : float
-        g, above 0. 2J/g is the time in which a deviation of the speed dies out.
+    governor_nm_s_per_rad : float or None
+        g, above 0; 2J/g is the time in which a deviation of the speed dies out. None: such that it is `RECOVERY_S`.
     ripples : tuple of TorqueRipple
     swings : tuple of SpeedSwing
     """
 
-    governor_nm_s_per_rad: float = 0.5
+    governor_nm_s_per_rad: float | None = None
     ripples: tuple[TorqueRipple, ...] = ()
     swings: tuple[SpeedSwing, ...] = ()
 
     def __post_init__(self) -> None:
-        positive(self.governor_nm_s_per_rad, "governor_nm_s_per_rad", "N m s/rad")
+        if self.governor_nm_s_per_rad is not None:
+            positive(self.governor_nm_s_per_rad, "governor_nm_s_per_rad", "N m s/rad")
         count(len(self.ripples), "number of torque ripples", minimum=0)
 
 

@@ -64,6 +64,13 @@ class Accelerometer:
             if not np.isfinite(getattr(self, name)):
                 raise InputError(f"{name} of the accelerometer is {getattr(self, name)}", allowed="a finite number")
 
+    @property
+    def settling_s(self) -> float:
+        """Time until a blow has rung down to 1e-4 in the mounted sensor; its coupling begins settled."""
+        if self.resonance_hz is None:
+            return 0.0
+        return float(np.log(1e4) / (self.damping_ratio * 2 * np.pi * self.resonance_hz))
+
     def dynamics(self, acceleration_mps2: FloatArray, step_s: float) -> FloatArray:
         """Apply the resonance and the coupling, (n_steps,)."""
         x = acceleration_mps2

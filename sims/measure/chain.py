@@ -91,7 +91,7 @@ class MeasurementChain:
     @property
     def lead_in_s(self) -> float:
         """Simulated time ahead of the recording: filters and modes have forgotten the start to 1e-4."""
-        settling = max(channel.path.settling_s for channel in self.channels)
+        settling = max(channel.path.settling_s + channel.accelerometer.settling_s for channel in self.channels)
         return settling + self.anti_alias.reach_s(self.sampling_rate_hz)
 
     def simulated_s(self, duration_s: float, lead_in_s: float | None = None) -> float:
@@ -117,7 +117,7 @@ class MeasurementChain:
         ----------
         motion : Motion
         rng : numpy.random.Generator
-            Draws the channels' noise in their order, then the tachometer's.
+            Gives sensors, background and tachometer a stream each: the background is the same at another motion rate.
         rig : Rig or None
             Goes with the recording; its reference shaft is that of angle sensors without a shaft of their own.
         duration_s : float or None
@@ -144,9 +144,10 @@ class MeasurementChain:
         first, n_samples = self._span(motion, lead, duration_s)
         start_s = first / self.sampling_rate_hz
         time_s = np.arange(n_samples) / self.sampling_rate_hz
-        rows = list(self._vibration(motion, first, time_s, rng))
+        sensor_rng, background_rng, tacho_rng = rng.spawn(3)
+        rows = list(self._vibration(motion, first, time_s, sensor_rng, background_rng))
         channels = [Channel(c.name, "acceleration", "m/s^2", c.position) for c in self.channels]
-        speed = self._speed(motion, rig, start_s, time_s, rng, rows, channels)
+        speed = self._speed(motion, rig, start_s, time_s, tacho_rng, rows, channels)
         return Recording(
             np.vstack(rows),
             self.sampling_rate_hz,
@@ -174,17 +175,22 @@ class MeasurementChain:
         return first, wanted
 
     def _vibration(
-        self, motion: Motion, first: int, time_s: FloatArray, rng: np.random.Generator
+        self,
+        motion: Motion,
+        first: int,
+        time_s: FloatArray,
+        sensor_rng: np.random.Generator,
+        background_rng: np.random.Generator,
     ) -> tuple[FloatArray, ...]:
         fine_s = motion.time_s(first / self.sampling_rate_hz)
         readings = []
         for channel in self.channels:
             at_sensor = channel.path.apply(motion.accelerations_mps2, motion.positions, motion.step_s)
-            readings.append(channel.accelerometer.read(at_sensor, fine_s, rng))
+            readings.append(channel.accelerometer.read(at_sensor, fine_s, sensor_rng))
         sampled = self.anti_alias.sample(np.vstack(readings), motion.step_s, self.sampling_rate_hz, first, len(time_s))
         rows = []
         for channel, values in zip(self.channels, sampled, strict=True):
-            noise = channel.background.draw(len(time_s), self.sampling_rate_hz, rng)
+            noise = channel.background.draw(len(time_s), self.sampling_rate_hz, background_rng)
             total = values + channel.hum.values(time_s) + noise
             rows.append(total if channel.converter is None else channel.converter.convert(total))
         return tuple(rows)

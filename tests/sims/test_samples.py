@@ -133,6 +133,12 @@ def test_the_damaged_tooth_is_found():
     assert (first.code, first.where.shaft, first.where.tooth) == ("tooth-local-damage", "input", tooth + 1)
 
 
+def test_the_deepest_crack_is_found_in_one_recording():
+    first = analyze(read(FOLDER, "root_crack_4mm.h5")).findings[0]
+    assert first.kind is Kind.FAULT
+    assert (first.code, first.where.shaft, first.where.tooth) == ("tooth-local-damage", "input", 21)
+
+
 def test_the_outer_race_is_named():
     first = analyze(read(FOLDER, "outer_race.mat")).findings[0]
     assert (first.code, first.where.shaft) == ("bearing-outer-race", "input")

@@ -44,7 +44,7 @@ def one_lasting_pair(k: Constants) -> Constants:
     return Constants(k.record, curves, k.rows, k.pitch)
 
 
-FIXED_CENTRES = {"late_x": 0.0, "late_y": 0.0}
+FIXED_CENTRES = {"late_x": 0.0, "late_y": 0.0, "turn_x": 0.0}
 """Tooth pairs enter as if the gears' centres stood still: the force that belongs to it is no part of the model."""
 
 

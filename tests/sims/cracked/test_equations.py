@@ -67,15 +67,15 @@ def test_forces_are_the_slope_of_the_energy(contact_law: str, delta_m: float) ->
     for _ in range(12):
         q = moving_state(rng, delta_m=delta_m, base_radii_m=ready.constants.record["base_radius"])
         inertial = mass_matrix(machine, q) @ accelerations(machine, q, np.zeros(16))
-        late = place_of_entry(arguments[0], q)  # its own force is left out of the model
+        fixed = place_of_entry(arguments[0], q)  # the forces that belong to it are left out of the model
         slope = np.empty(16)
         for i, h in enumerate(scale):
             up, down = q.copy(), q.copy()
             up[i] += h
             down[i] -= h
-            slope[i] = (potential_energy(*arguments, up, late, 0.0) - potential_energy(*arguments, down, late, 0.0)) / (
-                2 * h
-            )
+            slope[i] = (
+                potential_energy(*arguments, up, *fixed, 0.0) - potential_energy(*arguments, down, *fixed, 0.0)
+            ) / (2 * h)
         # The governor's share at rest: g ω on the input rotor, 1e-12 of it.
         np.testing.assert_allclose(inertial, -slope, atol=2e-4 * np.abs(slope).max(), rtol=2e-4)
 

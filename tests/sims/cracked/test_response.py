@@ -230,7 +230,7 @@ def change_per_cycle(machine: Machine, depth_mm: float, name: str) -> NDArray[np
     """Greatest change that a crack in the driver's tooth 0 makes, in each of the 55 mesh cycles of a revolution."""
     sound, faulty = (by_angle(run(m, (name, "driver angle"), 0.5), name) for m in (machine, cracked(machine, depth_mm)))
     n = min(len(sound), len(faulty)) // 5500 * 5500
-    change = (faulty - sound)[:n].reshape(-1, 55, 100)
+    change = (faulty[:n] - sound[:n]).reshape(-1, 55, 100)
     return np.abs(change - np.median(change)).max(axis=(0, 2)) / np.ptp(sound)
 
 
@@ -264,7 +264,7 @@ def test_crack_of_one_tooth_leaves_the_other_gear_alone() -> None:
     sound, struck = (by_angle(run(m, signals, 0.8), signals[0]) for m in (machine, faulty))
     n = min(len(sound), len(struck)) // 7500 * 7500
     first = int(np.ceil(55 * run(machine, ("driver angle",), 0.01)["driver angle"][0] / (2 * np.pi) / 55)) * 55
-    change = np.roll((struck - sound)[:n].reshape(-1, 75, 100), first, axis=1)
+    change = np.roll((struck[:n] - sound[:n]).reshape(-1, 75, 100), first, axis=1)
     peaks = np.abs(change).max(axis=(0, 2))
     assert set(np.argsort(peaks)[-2:]) == {0, 1}
 

@@ -26,7 +26,7 @@ ERROR, FORCE = "transmission_error_m", "mesh_force_n"
 ACCELERATION = "bearing 1 y acceleration"
 CONTACT_RATIO = spur_pair_machine().mesh.pair.contact_ratio
 BPFO, BPFI = (9 / 2 * (1 - 7.94 / 39.04), 9 / 2 * (1 + 7.94 / 39.04))
-TOOTH_LOCAL = [("root_crack", 3.0), ("tooth_spall", 2.0), ("chipped_tooth", 1.5)]
+TOOTH_LOCAL = [("root_crack", 3.0), ("tooth_spall", 60.0), ("chipped_tooth", 1.5)]
 TOOTH = 20
 FLOOR = 1e-5
 """m/s², above the sound machine's lines off the mesh harmonics."""

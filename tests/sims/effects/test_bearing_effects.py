@@ -49,11 +49,11 @@ def test_spacing_of_the_elements_on_either_race() -> None:
 
 
 def test_a_defect_is_no_longer_than_the_spacing() -> None:
-    small = Bearing("bearing 1", "input", 12, 3.0, 20.0)
+    small = Bearing("bearing 1", "input", 16, 2.5, 18.0)
     machine = with_bearing(spur_pair_machine(), 0, bearing=small)
-    with pytest.raises(InputError, match=r"inner race of 'bearing 1' is 5 mm \(allowed: 0 to 4.45059 mm\)"):
-        apply(machine, "bearing_inner_race", 5.0)
-    assert apply(machine, "bearing_outer_race", 5.0).bearings[0].defect is not None
+    with pytest.raises(InputError, match=r"inner race of 'bearing 1' is 3.5 mm \(allowed: 0 to 3.04342 mm\)"):
+        apply(machine, "bearing_inner_race", 3.5)
+    assert apply(machine, "bearing_outer_race", 3.5).bearings[0].defect is not None
 
 
 @pytest.mark.parametrize("name", ["bearing_outer_race", "bearing_inner_race", "bearing_clearance"])
