@@ -15,6 +15,7 @@ from gearsig.spectra.blocks import checked_signal
 
 RELATIVE_TOLERANCE = 1e-9
 """Of the signal's energy; where `VmdSettings.tolerance` is None."""
+_MUCH_MEMORY = 2**23
 
 
 def variational_modes(
@@ -64,7 +65,7 @@ def variational_modes(
     mirrored signal has nothing, with its neighbour's value (an alternating ±|û|/2n, mostly invisible). vmdpy drops
     the last sample of an odd length; here all samples are kept, and the line at half the sampling rate is empty.
 
-    Memory is about 3 × 8 bytes per sample and mode. For signals beyond that see `modes_by_block`.
+    Memory is about 4 × 8 bytes per sample and mode. For signals beyond that see `modes_by_block`.
 
     When not to use it: for broad-band impulses, whose spectrum is no narrow band (take their envelope, or a band);
     for speeds that vary by more than a mode's width (resample over angle first).
@@ -119,7 +120,7 @@ class _Solution:
 def _solve(x: FloatArray, fs: float, settings: VmdSettings, rng: np.random.Generator | None) -> _Solution:
     from scipy.fft import dct
 
-    from gearsig.decompose.vmd_kernel import iterate
+    from gearsig.decompose.vmd_kernel import iterate, working_space
 
     # A power of two leaves every digit as it is, and keeps squares of very small or large values in range.
     scale = 2.0 ** np.floor(np.log2(np.abs(x).max()))
@@ -128,8 +129,9 @@ def _solve(x: FloatArray, fs: float, settings: VmdSettings, rng: np.random.Gener
     start = first_centres(settings, fs, spectrum, rng)
     threshold = _threshold(settings.tolerance, energy, scale)
     history = np.empty((settings.max_iterations + 1, settings.n_modes))
-    grid, told = _grid(len(x)), (settings.penalty, settings.dual_step, settings.zero_mode)
-    lines, n_done, change = iterate(spectrum, grid, start, *told, threshold, len(history) - 1, history)
+    grid, space = _grid(len(x)), working_space(settings.n_modes, len(x))
+    told = (settings.penalty, settings.dual_step, settings.zero_mode)
+    lines, n_done, change = iterate(spectrum, grid, space, start, *told, threshold, len(history) - 1, history)
     if n_done < 2:
         raise InputError(
             f"tolerance is {settings.tolerance:g}, more than the modes' energy changes in the first iteration",
@@ -158,13 +160,14 @@ def _threshold(tolerance: float | None, energy: float, scale: float) -> float:
 
 
 def _waveforms(lines: FloatArray) -> FloatArray:
-    """Transform each mode back, in place; even lengths get the reference programs' line at half the sampling rate."""
+    """Transform each mode back; even lengths get the reference programs' line at half the sampling rate."""
     from scipy.fft import idct
 
     n = lines.shape[1]
     # The line's phase there is (-1)^m cos(π/2n) after the mirrored part is cut off; odd lengths have none.
     alternating = lines[:, -1:] * (np.cos(0.5 * np.pi / n) / (2 * n) if n % 2 == 0 else 0.0)
-    u: FloatArray = idct(lines, type=2, axis=1, overwrite_x=True, workers=1)
+    # In place is quicker, but the result then holds on to the solver's memory, which only matters for long signals.
+    u: FloatArray = idct(lines, type=2, axis=1, overwrite_x=lines.nbytes < _MUCH_MEMORY, workers=1)
     u[:, ::2] -= alternating
     u[:, 1::2] += alternating
     return u

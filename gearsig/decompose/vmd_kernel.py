@@ -12,6 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from gearsig.checks import FloatArray
+
 # Reordering sums lets the compiler use vector instructions; divisions stay exact.
 _REORDER = {"contract", "reassoc", "nsz"}
 _BLOCK = 512
@@ -20,19 +22,25 @@ _NEARLY = 4.0
 """From this multiple of the tolerance on, the modes before an iteration are kept: it may be the last one."""
 
 
+def working_space(n_modes: int, n_lines: int) -> FloatArray:
+    """Return memory for `iterate`; numpy asks the system for large pages, which fresh memory is quicker in."""
+    return np.empty((2, -(-n_lines // _BLOCK), n_modes, _BLOCK))
+
+
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
-def iterate(C, grid, omega, alpha, tau, fixed_zero, tolerance, max_iterations, history):  # type: ignore[no-untyped-def]
+def iterate(C, grid, space, omega, alpha, tau, fixed_zero, tolerance, max_iterations, history):  # type: ignore[no-untyped-def]
     """Iterate until the modes' energy changes by no more than `tolerance`.
 
     Returns the modes' real spectra before the last iteration (see `variational_modes`), the number of iterations and
     the last change of energy. Row m of `history` (max_iterations + 1, K) receives the centres after m iterations.
+    The spectra lie in `space`, which comes from `working_space`.
     """
     n_limit = max_iterations
-    shape = (-(-len(C) // _BLOCK), len(omega), _BLOCK)
-    before = np.empty(shape)
+    modes, before = space[0], space[1]
     nearly = _NEARLY * tolerance
     while True:
-        modes, dual = np.zeros(shape), np.zeros(len(C) if tau != 0.0 else 0)
+        modes[:] = 0.0
+        dual = np.zeros(len(C) if tau != 0.0 else 0)
         history[0] = omega
         n_done, change, kept = 0, np.inf, False
         while n_done < n_limit and (change > tolerance or n_done == 0):

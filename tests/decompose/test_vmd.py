@@ -58,6 +58,17 @@ def test_equals_vmdpy_where_it_does_not_converge():
     _assert_equal(_signal(300), VmdSettings(6, tolerance=0.0))
 
 
+def test_equals_vmdpy_where_it_stops_all_of_a_sudden():
+    # A lone tone's change falls ten-thousandfold per iteration: the solver sees its last iteration only afterwards.
+    x = np.cos(0.2 * np.arange(1000)) + 0.1 * np.random.default_rng(0).normal(size=1000)
+    s = VmdSettings(1, start="zero", tolerance=1e-5)
+    before = variational_modes(x, 1.0, VmdSettings(1, start="zero", tolerance=0.0, max_iterations=3))
+    _assert_equal(x, s)
+    after = variational_modes(x, 1.0, s)
+    assert before.last_change > 4 * 1e-5 / float(np.sum(x**2)) > 4 * after.last_change
+    assert after.n_iterations == 4
+
+
 def test_equals_vmdpy_from_random_starts():
     np.random.seed(5)  # noqa: NPY002 - the reference program draws from numpy's global state
     twister = np.random.MT19937()
