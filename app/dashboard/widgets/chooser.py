@@ -54,7 +54,7 @@ def _choose_sample() -> Chosen:
     sample: Sample = st.selectbox(
         "Sample", found, index=first, format_func=_sample_name, key=state.SAMPLE, persist_state="session"
     )
-    st.caption("Simulated, with a known answer: made by a signal model, not measured.")
+    st.caption("Simulated, not measured: what is in it is known.")
     name, digest = sample.recording.name, sha256_of(sample.recording)
     return Chosen(_request(name, digest, sample.rig.name, sample.rig.read_text("utf-8")), sample.recording)
 
