@@ -10,16 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import ifft, rfft
 
 from gearsig.checks import FloatArray
+from gearsig.timefreq.bank_kernel import fill, turns
+from gearsig.timefreq.ends import Edges, stretch
 from gearsig.timefreq.types import ComplexArray
 from gearsig.timefreq.wavelets import Wavelet, band, half_support
 
-Edges = Literal["reflect", "zero"]
 IntArray = NDArray[np.int64]
 
 _SMALLEST_BLOCK = 1 << 13
@@ -140,8 +141,6 @@ def block_pieces(
 
     They lie in `space` (from `workspace`) and hold until the next piece is asked for.
     """
-    from scipy.fft import rfft
-
     margin, length = group.n_margin, min(group.n_core, len(values) - start)
     # In double precision: rounding in strong parts of the spectrum must not reach the weak ones.
     spectrum = rfft(stretch(values, start - margin, group.n_block, edges))
@@ -158,10 +157,6 @@ def block_pieces(
 
 
 def _coefficients(X: ComplexArray, batch: Batch, rows: slice, space: ComplexArray) -> ComplexArray:
-    from scipy.fft import ifft
-
-    from gearsig.timefreq.bank_kernel import fill
-
     low, high = batch.low[rows], batch.high[rows]
     shape = (len(low), batch.n_bins, batch.twiddle.shape[1])
     turned = space[: np.prod(shape)].reshape(shape)
@@ -180,8 +175,6 @@ def _batch(
     low: IntArray,
     high: IntArray,
 ) -> Batch:
-    from gearsig.timefreq.bank_kernel import turns
-
     n_bins = min(n_bins, n_block // step)
     first, k = int(low.min()), np.arange(int(low.min()), int(high.max()))
     response = wavelet.response((k / n_block)[None, :] / cycles[lines][:, None]) * (n_bins / n_block)
@@ -197,21 +190,6 @@ def _batch(
         (2 * np.pi / n_block * k).astype(np.float32),
         twiddle,
     )
-
-
-def stretch(values: FloatArray, start: int, n: int, edges: Edges) -> FloatArray:
-    """Return n samples from `start` on, in double precision, with what is assumed beyond the ends."""
-    n_samples = len(values)
-    inside = values[max(0, start) : max(0, start + n)]
-    if len(inside) == n:
-        return inside.astype(np.float64)
-    result: FloatArray = np.zeros(n)
-    if edges == "zero":
-        result[max(0, -start) : max(0, -start) + len(inside)] = inside
-        return result
-    index = np.abs(np.arange(start, start + n)) % (2 * n_samples - 2)
-    result[:] = values[np.minimum(index, 2 * n_samples - 2 - index)]
-    return result
 
 
 def _power_of_two(n: int) -> int:

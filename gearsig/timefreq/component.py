@@ -8,8 +8,8 @@ import numpy as np
 
 from gearsig.checks import FloatArray, frozen_array, one_of, within
 from gearsig.errors import InputError
-from gearsig.timefreq.bank import Edges, pieces, plan_groups
-from gearsig.timefreq.cwt import EDGES
+from gearsig.timefreq.bank import pieces, plan_groups
+from gearsig.timefreq.ends import EDGES, Edges
 from gearsig.timefreq.squeezed_cwt import Analysis, analysis
 from gearsig.timefreq.types import ComplexArray, Ridge
 from gearsig.timefreq.uniform import Source, UniformSignal, uniform

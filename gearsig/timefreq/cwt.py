@@ -6,16 +6,14 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count, one_of
 from gearsig.errors import InputError
-from gearsig.timefreq.bank import Edges, pieces, plan_groups
+from gearsig.timefreq.bank import pieces, plan_groups
 from gearsig.timefreq.columns import ColumnPowers, Form, plan_columns
+from gearsig.timefreq.ends import EDGES, Edges
 from gearsig.timefreq.lines import given_lines, logarithmic_lines
+from gearsig.timefreq.size import check_size
 from gearsig.timefreq.types import Coefficients, Reduction, Spacing, TimeFrequencyMap
 from gearsig.timefreq.uniform import Source, UniformSignal, uniform
 from gearsig.timefreq.wavelets import DEFAULT, Wavelet, admissibility, half_support
-
-EDGES = ("reflect", "zero")
-MOST_COEFFICIENTS = 1 << 28
-"""Complex coefficients that are held at once: 2 GB."""
 
 
 def cwt(
@@ -174,17 +172,6 @@ def inverse_weights(lines: FloatArray, wavelet: Wavelet) -> FloatArray:
     if len(lines) < 2:
         return np.ones(len(lines))
     return 2.0 * np.gradient(np.log(lines)) / admissibility(wavelet)
-
-
-def check_size(n_lines: int, n_columns: int) -> None:
-    """Raise if the coefficients would take more than 2 GB."""
-    if n_lines * n_columns > MOST_COEFFICIENTS:
-        raise InputError(
-            f"{n_lines} lines × {n_columns} columns make {8e-9 * n_lines * n_columns:.3g} GB of coefficients",
-            where="step",
-            allowed=f"at most {8e-9 * MOST_COEFFICIENTS:.2g} GB",
-            remedy=f"set step to {-(-n_lines * n_columns // MOST_COEFFICIENTS)} times as much, or take the map",
-        )
 
 
 def largest_power_of_two_in(step: int) -> int:

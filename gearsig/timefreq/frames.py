@@ -9,7 +9,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count, one_of, positive
 from gearsig.errors import InputError, RefusalError
-from gearsig.timefreq.bank import Edges, stretch
+from gearsig.timefreq.ends import Edges, stretch
 from gearsig.timefreq.types import ComplexArray
 from gearsig.timefreq.uniform import UniformSignal
 

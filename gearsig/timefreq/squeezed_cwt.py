@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearsig.checks import FloatArray, count, one_of
-from gearsig.timefreq.bank import Edges, block_pieces, pieces, plan_group, plan_groups, workspace
+from gearsig.timefreq.bank import block_pieces, pieces, plan_group, plan_groups, workspace
 from gearsig.timefreq.columns import ColumnPowers, Form, plan_columns
-from gearsig.timefreq.cwt import EDGES, check_size, largest_power_of_two_in, n_reach
+from gearsig.timefreq.cwt import largest_power_of_two_in, n_reach
+from gearsig.timefreq.ends import EDGES, Edges
 from gearsig.timefreq.lines import logarithmic_lines, lowest_possible
+from gearsig.timefreq.size import check_size
 from gearsig.timefreq.squeeze_lines import SqueezeLines, squeeze_lines
 from gearsig.timefreq.types import Coefficients, ComplexArray, Reduction, TimeFrequencyMap
 from gearsig.timefreq.uniform import Source, UniformSignal, uniform

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from gearsig.checks import count, one_of
-from gearsig.timefreq.bank import Edges
 from gearsig.timefreq.columns import ColumnPowers, plan_columns
-from gearsig.timefreq.cwt import EDGES, check_size
+from gearsig.timefreq.ends import EDGES, Edges
 from gearsig.timefreq.frames import FramePlan, plan_frames, spectra
+from gearsig.timefreq.size import check_size
 from gearsig.timefreq.squeeze_lines import squeeze_lines
 from gearsig.timefreq.squeezed_cwt import LEAST_SHARE
 from gearsig.timefreq.stft import form

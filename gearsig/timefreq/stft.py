@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from gearsig.checks import count, one_of
-from gearsig.timefreq.bank import Edges
 from gearsig.timefreq.columns import ColumnPowers, Form, plan_columns
-from gearsig.timefreq.cwt import EDGES, check_size
+from gearsig.timefreq.ends import EDGES, Edges
 from gearsig.timefreq.frames import FramePlan, plan_frames, spectra
+from gearsig.timefreq.size import check_size
 from gearsig.timefreq.types import Coefficients, Reduction, TimeFrequencyMap
 from gearsig.timefreq.uniform import Source, UniformSignal, uniform
 

@@ -1,0 +1,63 @@
+"""A measured run-up: orders sweep over time and stand still over angle."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import wavfile
+
+from gearsig.angle.resample import resample_to_angle
+from gearsig.angle.types import ShaftAngle
+from gearsig.recording.types import Channel, Recording
+from gearsig.timefreq.component import component
+from gearsig.timefreq.ridges import ridges
+from gearsig.timefreq.squeezed_cwt import squeezed_cwt_map
+from gearsig.timefreq.stft import stft_map
+
+FOLDER = Path(__file__).parents[3] / "shared" / "data" / "car_run_up"
+FULL_SCALE_RPM = 4821.4287
+
+pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="the measured recordings are not here")
+
+
+@pytest.fixture(scope="module")
+def run_up():
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", wavfile.WavFileWarning)  # the vendor's own metadata chunk
+        rate, samples = wavfile.read(FOLDER / "accel_with_rpm.wav")
+    rpm = samples[:, 1] / 32768 * FULL_SCALE_RPM
+    t = np.arange(len(rpm)) / rate
+    revolutions = np.concatenate([[0.0], np.cumsum(rpm[1:] + rpm[:-1]) / 120 / rate])
+    angle = ShaftAngle("crankshaft", t, revolutions, rpm / 60, "speed channel")
+    pressure = samples[:, 0] / 32768
+    return Recording(pressure[None, :], float(rate), (Channel("p", "sound_pressure", "Pa"),)), angle
+
+
+@pytest.fixture(scope="module")
+def over_angle(run_up):
+    return resample_to_angle(*run_up, samples_per_revolution=64)
+
+
+def test_firing_order_stands_still_over_angle(over_angle):
+    levels = squeezed_cwt_map(over_angle, "p", lowest=1, highest=8, n_columns=500)
+    (ridge,) = ridges(levels, lowest=1.5, highest=2.8)
+    assert np.median(ridge.positions) == pytest.approx(2.0, rel=0.01)
+    assert np.mean(np.abs(ridge.positions / 2.0 - 1) < 0.08) > 0.9  # it fades into the noise in between
+
+
+def test_firing_order_follows_the_speed_over_time(run_up):
+    recording, angle = run_up
+    levels = stft_map(recording, "p", window_length=0.25, zero_padding=2, highest=300)
+    (ridge,) = ridges(levels, lowest=20, highest=200)
+    order = ridge.positions / (angle.speed_rpm_at(ridge.at) / 60)
+    assert np.median(order) == pytest.approx(2.0, rel=0.01)
+    assert np.mean(np.abs(order / 2.0 - 1) < 0.05) > 0.9
+
+
+def test_waveform_of_the_firing_order(over_angle):
+    levels = squeezed_cwt_map(over_angle, "p", lowest=1, highest=8, n_columns=500)
+    (ridge,) = ridges(levels, lowest=1.5, highest=2.8)
+    found = component(over_angle, ridge, "p", squeezed=False)
+    turns = np.unwrap(np.angle(found.analytic)) / (2 * np.pi)
+    assert turns[-1] - turns[0] == pytest.approx(2 * over_angle.n_revolutions, rel=0.03)  # slips where it fades
