@@ -75,7 +75,9 @@ def ridges(
 
     Notes
     -----
-    Not for components that touch and part again at equal slope and level: which is which is then not in the data.
+    Not for components that touch and part again at equal slope and level: which is which is then not in the data. A
+    ridge runs through the whole transform: one that begins or ends within it is carried on along what is
+    nearest, so cut the recording, or look at `amplitude`.
 
     Source: R. A. Carmona, W. L. Hwang, B. Torrésani, *Multiridge detection and time-frequency reconstruction*, IEEE
     Transactions on Signal Processing 47 (1999), for ridges as penalised paths; the state with slope and the
@@ -186,8 +188,9 @@ def _ridge(
     places, peak = _centres(grid, path) if grid.squeezed else _parabolas(power, path)
     alone = ~shared
     if alone.any() and shared.any():
-        columns = np.arange(len(path))
-        places = np.where(alone, places, np.interp(columns, columns[alone], places[alone]))
+        columns, known = np.arange(len(path)), np.flatnonzero(alone)
+        between = shared & (columns > known[0]) & (columns < known[-1])  # what meets until an end stays as it was read
+        places = np.where(between, np.interp(columns, known, places[known]), places)
     lines = transform.positions[part]
     index = np.arange(len(lines))
     if transform.spacing == "logarithmic":

@@ -147,3 +147,16 @@ def test_wrong_input_is_named(crossing):
         ridges(levels, lowest=100, highest=101)
     with pytest.raises(InputError, match="differ in length"):
         Ridge(np.zeros(3), np.zeros(2), np.zeros(3), np.zeros(3, bool), "frequency", "")
+
+
+def test_a_meeting_that_lasts_to_the_end_is_read_and_not_drawn_flat():
+    t = np.arange(20_001) / 2000.0
+    # The second comes down to 20 Hz above the first and stays there, within reach of it.
+    above = 20 + 200 * np.clip(1 - t / 6, 0, None)
+    first = 200 + 15 * t
+    phase = 2 * np.pi * np.cumsum(first) / 2000.0
+    x = np.cos(phase) + 0.8 * np.cos(phase + 2 * np.pi * np.cumsum(above) / 2000.0)
+    found = ridges(stft_map(UniformSignal(x, 2000.0), window_length=0.1, zero_padding=2), 2)
+    for ridge in found:
+        rising = ridge.positions[-60] - ridge.positions[-300]
+        assert rising == pytest.approx(15 * (ridge.at[-60] - ridge.at[-300]), rel=0.5)
