@@ -60,10 +60,10 @@ class Observed:
     reach: dict[str, float]
 
 
-def draw_case(seed: int, index: int, *, for_the_check: bool) -> Case | None:
+def draw_case(seed: int, index: int, *, for_the_check: bool, even: bool = False) -> Case | None:
     """Draw and simulate a case; None where the drawn gears cannot be made (undercut, a crack past the tooth)."""
     rng = np.random.default_rng([seed, index, int(for_the_check)])
-    drawn = draw_rig(rng, for_the_check=for_the_check)
+    drawn = draw_rig(rng, for_the_check=for_the_check, even=even)
     speed = float(rng.uniform(1.0 - SPEED_DIFFERENCE, 1.0 + SPEED_DIFFERENCE))
     torque = float(rng.uniform(1.0 - TORQUE_DIFFERENCE, 1.0 + TORQUE_DIFFERENCE))
     try:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.severity.features import FEATURES, RISING
-from gearsig.severity.model import LEAST_SPREAD, DepthModel
+from gearsig.severity.features import FEATURES, RISING, SHAPED
+from gearsig.severity.model import LEAST_SPREAD, DepthModel, segments
 
 FALSE_ALARMS = 0.02
 """Part of the sound gear pairs whose score lies above the threshold."""
@@ -20,7 +20,10 @@ OUTSIDE = 0.01
 """Part of the calibration's own cracks that count as unlike a crack."""
 
 _RIDGE = 3.0
+_KNOTS = (1 / 3, 2 / 3)
 _COVERAGE = (0.05, 0.95)
+_SHAPED = [FEATURES.index(name) for name in SHAPED]
+_REST = [i for i, name in enumerate(FEATURES) if name not in RISING]
 
 
 @dataclass(frozen=True)
@@ -56,8 +59,9 @@ def fit_model(cases: Cases) -> DepthModel:
     seen = z @ detection >= threshold
     fitted, kept = seen & ~cases.held_out, seen & cases.held_out
     y = np.log(cases.percent)
-    intercept, coefficients = _depth_weights(z[fitted], y[fitted])
-    error = y - intercept - z @ coefficients
+    knots = np.quantile(z[seen][:, _SHAPED], _KNOTS, axis=0).T
+    intercept, coefficients, slopes = _depth_weights(z[fitted], y[fitted], knots)
+    error = y - intercept - z @ coefficients - _curves(z, knots) @ slopes.ravel()
     spread = _spread_weights(z[fitted], np.abs(error[fitted]))
     sigma = np.maximum(spread[0] + z @ spread[1:], LEAST_SPREAD)
     precision = np.linalg.inv(np.cov(z[seen].T) + 1e-3 * np.eye(z.shape[1]))
@@ -67,6 +71,8 @@ def fit_model(cases: Cases) -> DepthModel:
         scale=scale,
         intercept=intercept,
         coefficients=coefficients,
+        knots=knots,
+        slopes=slopes,
         spread=spread,
         quantiles=_conformal(error[kept] / sigma[kept]),
         detection=detection,
@@ -99,15 +105,24 @@ def _detection_weights(cracked: FloatArray, sound: FloatArray) -> FloatArray:
     return weights
 
 
-def _depth_weights(z: FloatArray, y: FloatArray) -> tuple[float, FloatArray]:
-    """Ridge regression with weights that are not negative where a deeper crack raises the feature."""
+def _curves(z: FloatArray, knots: FloatArray) -> FloatArray:
+    """Columns of the rising curves, three per shaped feature."""
+    return np.hstack([segments(z[:, i], pair) for i, pair in zip(_SHAPED, knots, strict=True)])
+
+
+def _depth_weights(z: FloatArray, y: FloatArray, knots: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    """Ridge regression: rising curves of what the depth is read from, and straight lines of the rest."""
     from scipy.optimize import lsq_linear
 
-    n = z.shape[1]
-    rows = np.vstack([np.c_[np.ones(len(z)), z], np.c_[np.zeros(n), np.sqrt(_RIDGE) * np.eye(n)]])
-    low = np.r_[-np.inf, [0.0 if name in RISING else -np.inf for name in FEATURES]]
-    result = lsq_linear(rows, np.r_[y, np.zeros(n)], bounds=(low, np.full(n + 1, np.inf)))
-    return float(result.x[0]), np.asarray(result.x[1:])
+    columns = np.c_[np.ones(len(z)), _curves(z, knots), z[:, _REST]]
+    n, n_curves = columns.shape[1], knots.size // 2 * 3
+    rows = np.vstack([columns, np.sqrt(_RIDGE) * np.eye(n)[1:]])
+    low = np.full(n, -np.inf)
+    low[1 : 1 + n_curves] = 0.0
+    result = lsq_linear(rows, np.r_[y, np.zeros(n - 1)], bounds=(low, np.full(n, np.inf))).x
+    coefficients = np.zeros(z.shape[1])
+    coefficients[_REST] = result[1 + n_curves :]
+    return float(result[0]), coefficients, np.maximum(result[1 : 1 + n_curves], 0.0).reshape(-1, 3)
 
 
 def _spread_weights(z: FloatArray, error: FloatArray) -> FloatArray:

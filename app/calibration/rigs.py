@@ -83,8 +83,16 @@ def is_for_the_check(teeth: tuple[int, int]) -> bool:
     return sum(teeth) % 3 == 0
 
 
-def draw_rig(rng: np.random.Generator, *, for_the_check: bool) -> DrawnRig:
-    """Draw a gearbox; those of the check have other teeth and modules than those of the calibration."""
+def draw_rig(rng: np.random.Generator, *, for_the_check: bool, even: bool = False) -> DrawnRig:
+    """Draw a gearbox; those of the check have other teeth and modules than those of the calibration.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    for_the_check : bool
+    even : bool
+        Teeth that hardly differ, as those of the demonstration machines and of master gears; and lower loads.
+    """
     teeth = _teeth(rng, for_the_check)
     module = float(rng.choice(OTHER_MODULES_MM if for_the_check else CALIBRATION_MODULES_MM))
     width = module * rng.uniform(6.0, 12.0)
@@ -98,6 +106,9 @@ def draw_rig(rng: np.random.Generator, *, for_the_check: bool) -> DrawnRig:
     depth = rng.uniform(least, min(most, DEEPEST_SHARE * deepest_crack_mm(GearGeometry(z, module))))
     sound = rng.uniform() < (SOUND_SHARE_OF_THE_CHECK if for_the_check else SOUND_SHARE)
     parameters = _gears(rng, teeth, module, width, load) | _rest(rng, module, teeth)
+    if even:
+        parameters |= _even_teeth(rng)
+        torque *= rng.uniform(0.4, 1.0)
     return DrawnRig(
         parameters,
         _modes(rng),
@@ -156,6 +167,17 @@ def _gears(
         "unbalance_driven_g_mm": rng.uniform(0.0, 50.0),
         "unbalance_angle_driver_deg": rng.uniform(0.0, 360.0),
         "unbalance_angle_driven_deg": rng.uniform(0.0, 360.0),
+    }
+
+
+def _even_teeth(rng: np.random.Generator) -> dict[str, ParameterValue]:
+    locked_to = str(rng.choice(("time", "flank")))
+    return {
+        "pitch_deviation_um": _log_uniform(rng, 0.01, 0.1),
+        "roughness_locked_to": locked_to,
+        "roughness_um": _log_uniform(rng, 0.05, 0.5) if locked_to == "time" else _log_uniform(rng, 0.005, 0.05),
+        "runout_driver_um": rng.uniform(0.0, 2.0),
+        "runout_driven_um": rng.uniform(0.0, 2.0),
     }
 
 

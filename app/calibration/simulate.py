@@ -70,6 +70,8 @@ def simulate_rig(
 
 def _with_fixed_flanks(machine: Machine, seed: int) -> Machine:
     """Draw the flanks' profiles now: they belong to the gears, and are the same in each run."""
+    if machine.roughness.locked_to != "flank":
+        return machine
     machine, _ = draw_roughness(machine, np.random.default_rng([seed, 77]))
     return replace(machine, roughness=replace(machine.roughness, locked_to="none"))
 

@@ -37,7 +37,7 @@ def estimate_crack(
 
     The synchronous average of either shaft (with a reference: its difference from that of the sound gears) is searched
     for the tooth that stands out most. Ratios of its energy to that of the mesh harmonics in the same bands go into a
-    linear model of ln(depth), fitted to simulated machines; its interval is a conformal one.
+    model of ln(depth) that never falls with them, fitted to simulated machines; its interval is a conformal one.
 
     Parameters
     ----------

@@ -28,8 +28,12 @@ FEATURES = (
 )
 """Order of the entries of a feature vector; see `feature_vector`."""
 
-RISING = ("band_excess", "line_excess", "prominence", "pattern_excess")
-"""Features that a deeper crack raises, all else the same; the estimate must not fall with them."""
+SHAPED = ("band_excess", "line_excess", "prominence")
+"""Features that the depth is read from, by curves that never fall."""
+
+RISING = (*SHAPED, "pattern_excess")
+"""Features that a deeper crack raises, all else the same. The last one serves to detect only: how much teeth differ
+from birth must not decide on a depth."""
 
 GATE_PITCHES = 4.0
 _SUB_BANDS = 4

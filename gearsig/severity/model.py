@@ -10,7 +10,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError
-from gearsig.severity.features import FEATURES, RISING
+from gearsig.severity.features import FEATURES, RISING, SHAPED
 
 RANGE_MARGIN = 0.05
 """Of a feature's range in the calibration, by which it may lie beyond."""
@@ -19,9 +19,27 @@ LEAST_SPREAD = 0.1
 """Of ln percent: no machine is known better than to ten percent."""
 
 
+def segments(values: FloatArray, knots: FloatArray) -> FloatArray:
+    """Return how far values lie below the first knot, between both, and above the second; (…, 3).
+
+    Examples
+    --------
+    >>> segments(np.array([-2.0, 0.5, 4.0]), np.array([0.0, 1.0])).tolist()
+    [[-2.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 1.0, 3.0]]
+    """
+    first, second = knots
+    parts = (
+        np.minimum(values, first) - first,
+        np.clip(values, first, second) - first,
+        np.maximum(values, second) - second,
+    )
+    result: FloatArray = np.stack(parts, axis=-1)
+    return result
+
+
 @dataclass(frozen=True)
 class DepthModel:
-    """ln percent = c + Σ b_i (f_i − m_i)/s_i, and what belongs to it.
+    """ln percent = c + Σ b_i z_i + Σ_j g_j(z_j), z = (f − m)/s, with rising curves g_j; and what belongs to it.
 
     Parameters
     ----------
@@ -29,7 +47,9 @@ class DepthModel:
         m and s.
     intercept : float
     coefficients : array, (n_features,)
-        b; not negative for the features that rise with the depth.
+        b; 0 for the features that rise with the depth.
+    knots, slopes : arrays, (n_shaped, 2) and (n_shaped, 3)
+        Of the curves g of the features `SHAPED`: straight below, between and above the knots. Slopes are not negative.
     spread : array, (n_features + 1,)
         Of ln percent: σ = max(spread[0] + Σ spread[i] (f_i − m_i)/s_i, 0.1).
     quantiles : tuple of two floats
@@ -54,6 +74,8 @@ class DepthModel:
     scale: FloatArray
     intercept: float
     coefficients: FloatArray
+    knots: FloatArray
+    slopes: FloatArray
     spread: FloatArray
     quantiles: tuple[float, float]
     detection: FloatArray
@@ -74,9 +96,13 @@ class DepthModel:
                 raise InputError(f"{name} of the model has {len(array)} entries", allowed=str(length))
             object.__setattr__(self, name, array)
         object.__setattr__(self, "sound_scores", frozen_array(self.sound_scores, "sound_scores", ndim=1))
-        object.__setattr__(self, "precision", frozen_array(self.precision, "precision", ndim=2))
+        for name in ("precision", "knots", "slopes"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=2))
+        if self.knots.shape != (len(SHAPED), 2) or self.slopes.shape != (len(SHAPED), 3):
+            raise InputError(f"the curves of the model have shapes {self.knots.shape} and {self.slopes.shape}")
         rising = [FEATURES.index(name) for name in RISING]
-        if np.any(self.scale <= 0) or np.any(self.coefficients[rising] < 0) or np.any(self.detection < 0):
+        falls = np.any(self.coefficients[rising] < 0) or np.any(self.slopes < 0) or np.any(self.detection < 0)
+        if np.any(self.scale <= 0) or np.any(np.diff(self.knots) <= 0) or falls:
             raise InputError("the model of crack depth would fall with a rising excess", remedy="fit it again")
 
     @classmethod
@@ -95,6 +121,8 @@ class DepthModel:
             scale=array("scale"),
             intercept=float(values["intercept"]),
             coefficients=array("coefficients"),
+            knots=array("knots"),
+            slopes=array("slopes"),
             spread=array("spread"),
             quantiles=two("quantiles"),
             detection=array("detection"),
@@ -114,7 +142,12 @@ class DepthModel:
 
     def log_percent(self, features: FloatArray) -> float:
         """Return the predicted ln of the depth in percent of the root's thickness."""
-        return self.intercept + float(self.standardised(features) @ self.coefficients)
+        z = self.standardised(features)
+        curves = [
+            segments(z[FEATURES.index(name)], knots) @ slopes
+            for name, knots, slopes in zip(SHAPED, self.knots, self.slopes, strict=True)
+        ]
+        return self.intercept + float(z @ self.coefficients) + float(sum(curves))
 
     def log_interval(self, features: FloatArray) -> tuple[float, float]:
         """Return the 90 % interval of ln percent."""

@@ -12,7 +12,8 @@ N_ORDERS = 8 * TEETH
 
 def flat_pulse(centre_rev: float, size: float) -> np.ndarray:
     """Lines of a short pulse: all of the same size, in phase at its angle."""
-    return size * np.exp(-2j * np.pi * np.arange(N_ORDERS + 1) * centre_rev)
+    lines: np.ndarray = size * np.exp(-2j * np.pi * np.arange(N_ORDERS + 1) * centre_rev)
+    return lines
 
 
 def mesh_lines(levels: tuple[float, ...] = (3.0, 2.0, 1.5, 1.0, 0.8, 0.6, 0.5)) -> np.ndarray:

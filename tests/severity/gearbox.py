@@ -28,7 +28,7 @@ def _record(depth_mm: float, gear: str, speed_rpm: float, duration_s: float, too
 
 
 def record_gearbox(
-    depth_mm: float, *, gear: str = "driver", speed_rpm: float = SPEED_RPM, duration_s: float = 1.2, tooth: int = 11
+    depth_mm: float, *, gear: str = "driver", speed_rpm: float = SPEED_RPM, duration_s: float = 1.0, tooth: int = 11
 ) -> Recording:
     """Simulate the workshop gearbox; the same arguments give the same recording."""
     return _record(depth_mm, gear, speed_rpm, duration_s, tooth)

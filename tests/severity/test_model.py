@@ -76,7 +76,7 @@ def test_what_is_unlike_the_calibration_is_named() -> None:
 
 def test_a_falling_model_is_refused() -> None:
     values = json.loads(FILE.read_text(encoding="utf-8"))
-    values["models"][ALONE]["coefficients"][0] = -1.0
+    values["models"][ALONE]["slopes"][0][1] = -1.0
     with pytest.raises(InputError, match="would fall"):
         Calibration.from_mapping(values)
 
