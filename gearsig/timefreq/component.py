@@ -116,6 +116,8 @@ def component(
     width = float(usual) if half_width is None else within(half_width, "half_width", 1e-6, 0.5)
     at = x.instants(1)
     path = ridge.position_at(at)
+    if float(path.min()) <= 0.0:
+        raise InputError("the ridge touches zero", where="ridge", remedy="look for it between lines above zero")
     low, high = path / (1.0 + width), path * (1.0 + width)
     top = min(float(high.max()), x.highest_valid)
     plan = analysis(x, wavelet, float(low.min()), top, n_per_octave)

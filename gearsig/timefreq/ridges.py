@@ -104,7 +104,7 @@ def _lines_between(positions: FloatArray, lowest: float | None, highest: float |
     high = len(positions) if highest is None else int(np.searchsorted(positions, highest, side="right"))
     if high - low < 3:
         raise RefusalError(
-            f"{max(high - low, 0)} lines of the transform lie between {lowest} and {highest}, fewer than three",
+            f"fewer than three of the transform's {len(positions)} lines are looked at",
             remedy="widen the range or compute more lines",
         )
     return slice(low, high)

@@ -12,6 +12,8 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.recording.types import Recording
 from gearsig.timefreq.types import Axis
 
+SMALLEST, LARGEST = 1e-12, 1e15
+"""Largest values of a signal, in its unit, between which single precision holds its weak coefficients' squares."""
 N_FEWEST = 16
 """Samples below which there is nothing to lay out over time and frequency."""
 
@@ -37,7 +39,7 @@ class UniformSignal:
     Raises
     ------
     InputError
-        On values that are not finite, a wrong shape or rate.
+        On values that are not finite or beyond 1e-12 to 1e15, a wrong shape or rate.
     RefusalError
         If there are fewer than 16 samples.
     """
@@ -57,6 +59,14 @@ class UniformSignal:
         if len(self.values) < N_FEWEST:
             raise RefusalError(
                 f"the signal has {len(self.values)} samples, fewer than {N_FEWEST}", remedy="record longer"
+            )
+        largest = float(max(abs(self.values.max()), abs(self.values.min())))
+        if largest and not SMALLEST <= largest <= LARGEST:
+            raise InputError(
+                f"the largest value is {largest:.3g} {self.unit}".rstrip(),
+                where=self.source or "signal",
+                allowed=f"{SMALLEST:g} to {LARGEST:g}, or all zero",
+                remedy="give the signal in another unit",
             )
 
     @property

@@ -79,6 +79,12 @@ def test_order_component(swept_angle_signal):
         component(UniformSignal(np.zeros(1000), 1.0), ridge)
 
 
+def test_a_ridge_at_zero_has_no_waveform():
+    ridge = Ridge(T[[0, -1]], np.array([0.0, 40.0]), np.ones(2), np.zeros(2, bool), "frequency", "")
+    with pytest.raises(InputError, match="touches zero"):
+        component(UniformSignal(CHIRP.real, 2000.0), ridge)
+
+
 def test_half_width_has_limits():
     signal = UniformSignal(CHIRP.real, 2000.0)
     ridge = Ridge(T[[0, -1]], np.array([100.0, 400.0]), np.ones(2), np.zeros(2, bool), "frequency", "")

@@ -188,6 +188,12 @@ def test_values_that_are_not_finite_are_named(bad):
         UniformSignal(x, 1.0)
 
 
+@pytest.mark.parametrize("size", [1e-300, 1e300])
+def test_values_beyond_single_precision_are_named(size):
+    with pytest.raises(InputError, match="another unit"):
+        UniformSignal(np.full(100, size), 1.0)
+
+
 def test_signal_shorter_than_the_wavelet_is_refused_with_the_remedy():
     signal = UniformSignal(np.random.default_rng(0).normal(size=1000), 1000.0)
     lowest = footprint_periods(Morse()) / 1.0
