@@ -88,6 +88,8 @@ def _channel(
             lower_limit_hz=0.5,
             range_mps2=range_mps2,
             noise_mps2_per_sqrt_hz=wanted.number("sensor_noise_mps2_per_sqrt_hz"),
+            bias_mps2=wanted.number("sensor_bias_mps2"),
+            drift_mps2_per_s=wanted.number("sensor_drift_mps2_per_s"),
         ),
         MainsHum((hum, 0.3 * hum, 0.2 * hum) if hum else (), wanted.number("hum_frequency_hz")),
         ColouredNoise(wanted.number("noise_mps2"), wanted.number("noise_slope")),

@@ -128,6 +128,8 @@ _CHAIN = (
     _number("noise_slope", "", "power density of it goes as 1/f^slope: 0 white, 1 pink, 2 red", -2, 3, 0.0),
     _number("sensor_noise_mps2_per_sqrt_hz", "m/s^2/√Hz", "white noise of the accelerometers", 0, 10, 2e-4),
     _number("sensor_resonance_hz", "Hz", "of the mounted accelerometers; 0: flat", 0, 1e5, 25000.0),
+    _number("sensor_bias_mps2", "m/s^2", "offset of the accelerometers at the recording's start", -1e3, 1e3, 0.0),
+    _number("sensor_drift_mps2_per_s", "m/s^2/s", "change of that offset, as from warming up", -1e3, 1e3, 0.0),
     _number("sensor_range_mps2", "m/s^2", "range of accelerometers and converter, either way", 0.1, 1e6, 500.0),
     _number("converter_bits", "", "bits of the converter", 8, 32, 24, whole=True),
     _number(

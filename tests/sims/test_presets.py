@@ -27,7 +27,8 @@ PRESETS = tuple(presets("cracked"))
 SUFFIXES = {
     "mm": "_mm", "um": "_um", "us": "_us", "deg": "_deg", "kg": "_kg", "kg m^2": "_kg_m2", "GPa": "_gpa",
     "kg/m^3": "_kg_m3", "cP": "_cp", "%": "_percent", "g mm": "_g_mm", "N/m": "_n_per_m", "N s/m": "_n_s_per_m",
-    "N m/rad": "_nm_per_rad", "N m s/rad": "_nm_s_per_rad", "m/s^2": "_mps2", "m/s^2/√Hz": "_mps2_per_sqrt_hz",
+    "N m/rad": "_nm_per_rad", "N m s/rad": "_nm_s_per_rad", "m/s^2": "_mps2",
+    "m/s^2/s": "_mps2_per_s", "m/s^2/√Hz": "_mps2_per_sqrt_hz",
     "Hz": "_hz",
 }  # fmt: skip
 
@@ -273,3 +274,13 @@ def test_a_sound_machine_does_not_overdrive_its_sensors(name: str) -> None:
 
 def test_defaults_alone_make_a_machine() -> None:
     assert build_machine(complete_values(PARAMETERS)).mesh.pair.driver.teeth == 29
+
+
+def test_a_drifting_sensor_drifts() -> None:
+    """Offset and drift pass the anti-alias filter and the converter unchanged."""
+    values = {"sensor_bias_mps2": 3.0, "sensor_drift_mps2_per_s": 2.0}
+    drifting, steady = (
+        simulate("cracked", preset="workshop_29_47", parameters=v, duration_s=0.5, seed=1) for v in (values, {})
+    )
+    difference = drifting.samples[0] - steady.samples[0]
+    np.testing.assert_allclose(difference, 3.0 + 2.0 * drifting.time_s(), atol=2e-3)
