@@ -64,7 +64,7 @@ def fit_model(cases: Cases) -> DepthModel:
     error = y - intercept - z @ coefficients - _curves(z, knots) @ slopes.ravel()
     spread = _spread_weights(z[fitted], np.abs(error[fitted]))
     sigma = np.maximum(spread[0] + z @ spread[1:], LEAST_SPREAD)
-    precision = np.linalg.inv(np.cov(z[seen].T) + 1e-3 * np.eye(z.shape[1]))
+    precision = _precision(z[seen])
     distances = np.sqrt(np.einsum("ij,jk,ik->i", z[seen], precision, z[seen]))
     return DepthModel(
         mean=mean,
@@ -134,6 +134,14 @@ def _spread_weights(z: FloatArray, error: FloatArray) -> FloatArray:
     spread = np.zeros(len(FEATURES) + 1)
     spread[[0, *(1 + i for i in used)]] = best
     return spread
+
+
+def _precision(z: FloatArray) -> FloatArray:
+    """Inverse covariance of the features that the depth is read from; 0 for the others."""
+    used = sorted([*_SHAPED, *_REST])
+    precision = np.zeros((z.shape[1], z.shape[1]))
+    precision[np.ix_(used, used)] = np.linalg.inv(np.cov(z[:, used].T) + 1e-3 * np.eye(len(used)))
+    return precision
 
 
 def _conformal(scaled: FloatArray) -> tuple[float, float]:

@@ -173,7 +173,9 @@ def _seen(
     per_mm = percent_per_mm(evidence.shaft.teeth, facts.module_mm)
     place = (evidence.event.centre_rev - calibration.lag_pitches / evidence.shaft.teeth) % 1.0
     others = [e.event.prominence for e in found if e is not evidence]
-    if not evidence.shaft.has_mark:
+    if evidence.shaft.has_mark:
+        reasons.append("Teeth count from 1 at the mark, as they engage; the place is good to about one tooth.")
+    else:
         reasons.append("There is no mark on this shaft: the angle holds for this record only, and names no tooth.")
     reasons.append("It supposes a crack through the whole face width; a chipped or spalled tooth may look alike.")
     return CrackEstimate(

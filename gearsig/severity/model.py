@@ -61,7 +61,7 @@ class DepthModel:
     sound_scores : array, (n_sound,)
         Scores of sound gear pairs, rising: the higher one of either gear.
     precision : array, (n_features, n_features)
-        Inverse covariance of the features (f_i − m_i)/s_i.
+        Inverse covariance of the features (f_i − m_i)/s_i; 0 for those that the depth is not read from.
     largest_distance : float
         Mahalanobis distance beyond which a feature vector is unlike the calibration's.
     lowest, highest : arrays, (n_features,)
@@ -177,6 +177,7 @@ class DepthModel:
         """Say in which way a feature vector is unlike the calibration's cracks; empty if it is not."""
         margin = RANGE_MARGIN * (self.highest - self.lowest)
         beyond = np.maximum(self.lowest - margin - features, features - self.highest - margin)
+        beyond[np.diag(self.precision) == 0] = 0.0  # a clearer event than any in the calibration is no harm
         i = int(np.argmax(beyond))
         if beyond[i] > 0:
             allowed = f"{self.lowest[i]:.2f} to {self.highest[i]:.2f}"
