@@ -1,10 +1,10 @@
-"""What follows from teeth and module of a standard spur gear: thickness of the tooth root, and the contact ratio."""
+"""How thick the root of a standard spur gear's tooth is, and which part of it a crack takes away."""
 
 from __future__ import annotations
 
-from math import cos, pi, radians, sin, sqrt, tan
+from math import cos, pi, radians, sin, tan
 
-ADDENDUM, DEDENDUM, TOOL_TIP_RADIUS = 1.0, 1.25, 0.38
+DEDENDUM, TOOL_TIP_RADIUS = 1.25, 0.38
 """Of the standard rack, in modules (ISO 53, profile A)."""
 
 CRACK_ANGLE_DEG = 45.0
@@ -52,19 +52,3 @@ def root_thickness_mm(teeth: int, module_mm: float, pressure_angle_deg: float = 
 def percent_per_mm(teeth: int, module_mm: float, pressure_angle_deg: float = 20.0) -> float:
     """Return the percentage of the root's thickness that 1 mm of a crack at 45° takes away."""
     return 100.0 * sin(radians(CRACK_ANGLE_DEG)) / root_thickness_mm(teeth, module_mm, pressure_angle_deg)
-
-
-def contact_ratio(teeth: int, other_teeth: int, pressure_angle_deg: float = 20.0) -> float:
-    """Return ε = (√(ra1² − rb1²) + √(ra2² − rb2²) − a sin α)/p_b of a standard pair without profile shift.
-
-    Examples
-    --------
-    >>> round(contact_ratio(50, 50), 3)
-    1.755
-    """
-    alpha = radians(pressure_angle_deg)
-    length = -0.5 * (teeth + other_teeth) * sin(alpha)
-    for z in (teeth, other_teeth):
-        tip, base = 0.5 * z + ADDENDUM, 0.5 * z * cos(alpha)
-        length += sqrt(tip**2 - base**2)
-    return length / (pi * cos(alpha))
