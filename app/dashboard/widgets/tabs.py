@@ -12,6 +12,7 @@ from app.dashboard.widgets import views
 from app.dashboard.widgets.average import show_average
 from app.dashboard.widgets.channels import show_channels
 from app.dashboard.widgets.indicators import show_indicators
+from app.dashboard.widgets.methods.menu import show_methods
 from app.dashboard.widgets.order_map import show_order_map
 from app.dashboard.widgets.report import show_report
 from app.dashboard.widgets.speed import show_speed
@@ -24,6 +25,7 @@ OF_CHANNEL: dict[str, views.ChannelView] = {
     "Order map": show_order_map,
     "Envelope": views.show_envelope,
     "Synchronous average": show_average,
+    "More methods": show_methods,
 }
 
 

@@ -1,0 +1,142 @@
+"""The further methods of the analysis page, run without a browser."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from streamlit.testing.v1 import AppTest
+
+from app.dashboard import state
+from app.dashboard.widgets.methods.menu import METHODS
+from tests.app.test_dashboard import SAMPLES, opened, shown_text, upload
+
+TAB = "More methods"
+
+
+def opened_at(method: str, sample: str = "damaged_tooth") -> AppTest:
+    page = opened()
+    if sample != "damaged_tooth":
+        page.sidebar.selectbox(key=state.SAMPLE).set_value(SAMPLES[sample])
+    page.session_state[state.TAB] = TAB
+    page.run()
+    return choose(page, "Method", method)
+
+
+def choose(page: AppTest, label: str, value: str) -> AppTest:
+    next(w for w in page.segmented_control if w.label == label).set_value(value).run()
+    assert not page.exception
+    return page
+
+
+def curves(page: AppTest) -> dict[str, np.ndarray]:
+    """Return the values of all named curves of the page, those of the first chart where names return."""
+    from base64 import b64decode
+
+    found = {}
+    for chart in page.get("plotly_chart"):
+        for line in json.loads(chart.proto.spec)["data"]:
+            y = line["y"]
+            values = np.frombuffer(b64decode(y["bdata"]), y["dtype"]) if isinstance(y, dict) else np.array(y, float)
+            found.setdefault(line.get("name", ""), values)
+    return found
+
+
+@pytest.mark.parametrize("sample", ["run_up", "two_stage", "no_tachometer"])
+def test_every_method_answers_for_samples_of_every_kind(sample: str) -> None:
+    page = opened_at("Time–frequency", sample)
+    for method in METHODS:
+        choose(page, "Method", method)
+        assert not page.error, shown_text(page)
+        assert len(page.get("plotly_chart")) + len(page.get("image")) > 0
+        assert "Analysed: 0 to" in shown_text(page)
+
+
+def test_only_the_chosen_method_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise AssertionError
+
+    for name in METHODS:
+        if name != "Time–frequency":
+            monkeypatch.setitem(METHODS, name, (fail, ""))
+    page = opened_at("Time–frequency")
+    assert not page.exception
+    for tab in ("Spectrum", "Channels"):
+        monkeypatch.setitem(METHODS, "Time–frequency", (fail, ""))
+        page.session_state[state.TAB] = tab
+        page.run()
+        assert not page.exception
+
+
+def test_every_transform_draws_its_map() -> None:
+    page = opened_at("Time–frequency", "run_up")
+    for over in ("Time", "Shaft angle"):
+        choose(page, "Over", over)
+        for transform in ("Fourier", "Wavelet", "Squeezed Fourier", "Squeezed wavelet"):
+            choose(page, "Transform", transform)
+            assert not page.error
+            assert len(page.get("image")) == 1
+    page.select_slider[0].set_value(page.select_slider[0].options[-3:-1]).run()
+    assert not page.exception
+    assert not page.error
+
+
+def test_a_stretch_of_a_recording_is_what_is_analysed() -> None:
+    page = opened_at("Time–frequency")
+    next(s for s in page.slider if s.label.startswith("Stretch")).set_value((1.0, 2.0)).run()
+    assert not page.error
+    assert "Analysed: 1 to 2 s of 5 s, 12800 samples" in shown_text(page)
+
+
+def machine(rate_hz: float = 2000.0, duration_s: float = 8.0) -> tuple[bytes, str]:
+    """Return a recording whose order 5 has amplitude 3 and order 5.5 amplitude 1, and its rig."""
+    time = np.arange(round(rate_hz * duration_s)) / rate_hz
+    turns = 10.0 * time
+    x = 3.0 * np.cos(2 * np.pi * 5.0 * turns) + np.cos(2 * np.pi * 5.5 * turns)
+    x += 0.05 * np.random.default_rng(3).standard_normal(len(x))
+    rows = "\n".join(f"{t:.6f};{value:.9g}" for t, value in zip(time, x, strict=True))
+    rig = (
+        '[[shaft]]\nname = "input"\n[speed]\nsource = "constant"\nshaft = "input"\nspeed_rpm = 600\n'
+        '[[sensor]]\nchannel = "a1"\nquantity = "acceleration"\nunit = "m/s^2"\n'
+    )
+    return f"time (s);a1\n{rows}\n".encode(), rig
+
+
+def opened_machine(method: str) -> AppTest:
+    content, rig = machine()
+    page = upload(opened(), "orders.csv", content, rig)
+    page.session_state[state.TAB] = TAB
+    page.run()
+    return choose(page, "Method", method)
+
+
+def test_orders_have_the_amplitudes_that_were_put_in() -> None:
+    page = opened_machine("Orders (Vold–Kalman)")
+    page.multiselect[0].set_value(["5", "5.5"]).run()
+    assert not page.error, shown_text(page)
+    for name, amplitude in (("5", 3.0), ("5.5", 1.0)):
+        middle = curves(page)[name]
+        middle = middle[len(middle) // 4 : -len(middle) // 4]
+        np.testing.assert_allclose(middle, amplitude, rtol=0.03)
+    assert np.abs(curves(page)["what is left without all chosen orders"]).max() < 0.5
+    choose(page, "Levels over", "Speed")
+    assert not page.error
+
+
+def test_orders_that_make_no_sense_are_one_message() -> None:
+    page = opened_machine("Orders (Vold–Kalman)")
+    for orders in (["five"], [], ["5", "5.0"], ["-2"], ["1e9"], ["nan"]):
+        page.multiselect[0].set_value(orders).run()
+        assert not page.exception
+        assert len(page.error) == 1, (orders, shown_text(page))
+    page.multiselect[0].set_value(["5"]).run()
+    assert not page.error
+
+
+def test_a_bandwidth_that_is_too_narrow_is_one_message() -> None:
+    page = opened_machine("Orders (Vold–Kalman)")
+    choose(page, "Bandwidth in", "Hz")
+    next(n for n in page.number_input if n.label == "Bandwidth (Hz)").set_value(0.01).run()
+    assert not page.exception
+    assert len(page.error) == 1
