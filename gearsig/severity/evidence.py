@@ -11,13 +11,16 @@ from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.recording.types import Recording
 from gearsig.rig.types import GearPair, Rig
-from gearsig.severity.event import ToothEvent, find_event, n_bands
+from gearsig.severity.event import ToothEvent, find_event, n_bands, without_regular_lines
 from gearsig.severity.features import Conditions, feature_vector, mesh_energies
 from gearsig.severity.reference import difference_lines
 from gearsig.severity.shaft_lines import ShaftLines, shaft_lines
 
 LEAST_HARMONICS = 4
 """Mesh harmonics below the highest order: with fewer, one resonance decides."""
+
+SMALLEST_DIFFERENCE = 1e-9
+"""Of the largest line: two measurements never agree so well."""
 
 
 @dataclass(frozen=True)
@@ -71,12 +74,22 @@ def _one_gear(
         mesh = mesh_energies(shaft, n_bands(shaft))
         return GearEvidence(shaft, event, feature_vector(shaft, shaft, mesh, event, conditions))
     marked = any(a.has_mark and b.has_mark for a, b in zip(now, sound, strict=True))
+    _check_harmonics(sound[i])
     difference, agreement = difference_lines(shaft, sound[i], whole_teeth=marked)
-    _check_harmonics(difference)
+    _check_differs(difference, shaft)
     n = n_bands(difference)
     mesh = np.sqrt(mesh_energies(shaft, n) * mesh_energies(sound[i], n))
     event = find_event(difference)
     return GearEvidence(shaft, event, feature_vector(difference, sound[i], mesh, event, conditions), agreement)
+
+
+def _check_differs(difference: ShaftLines, shaft: ShaftLines) -> None:
+    largest = np.max(np.abs(shaft.lines), axis=1)
+    if not np.all(np.max(np.abs(without_regular_lines(difference)), axis=1) > SMALLEST_DIFFERENCE * largest):
+        raise RefusalError(
+            "the reference holds the same samples as the recording",
+            remedy="give a recording that was taken before the crack",
+        )
 
 
 def _check_harmonics(shaft: ShaftLines) -> None:

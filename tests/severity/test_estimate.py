@@ -120,6 +120,18 @@ def test_short_slow_and_other_recordings_are_refused(record: Record) -> None:
         estimate_crack(replace(recording, rig=two_stages))
 
 
+def test_the_recording_itself_is_no_reference(record: Record) -> None:
+    with pytest.raises(RefusalError, match="same samples"):
+        estimate_crack(record(2.0), reference=record(2.0))
+
+
+def test_a_dead_channel_is_refused(record: Record) -> None:
+    samples = np.array(record(2.0).samples)
+    samples[1] = 0.0
+    with pytest.raises(RefusalError, match="no mesh vibration"):
+        estimate_crack(replace(record(2.0), samples=samples))
+
+
 def test_a_channel_that_is_not_there_is_named(record: Record) -> None:
     with pytest.raises(InputError, match="tacho"):
         estimate_crack(record(2.0), channels=("tacho",))
