@@ -94,7 +94,7 @@ def machine(rate_hz: float = 2000.0, duration_s: float = 8.0) -> tuple[bytes, st
     time = np.arange(round(rate_hz * duration_s)) / rate_hz
     turns = 10.0 * time
     x = 3.0 * np.cos(2 * np.pi * 5.0 * turns) + np.cos(2 * np.pi * 5.5 * turns)
-    x += 0.05 * np.random.default_rng(3).standard_normal(len(x))
+    x += 0.01 * np.random.default_rng(3).standard_normal(len(x))
     rows = "\n".join(f"{t:.6f};{value:.9g}" for t, value in zip(time, x, strict=True))
     rig = (
         '[[shaft]]\nname = "input"\n[speed]\nsource = "constant"\nshaft = "input"\nspeed_rpm = 600\n'
@@ -140,3 +140,85 @@ def test_a_bandwidth_that_is_too_narrow_is_one_message() -> None:
     next(n for n in page.number_input if n.label == "Bandwidth (Hz)").set_value(0.01).run()
     assert not page.exception
     assert len(page.error) == 1
+
+
+def press(page: AppTest, label: str) -> AppTest:
+    next(b for b in page.button if b.label == label).click().run()
+    assert not page.exception
+    return page
+
+
+def test_suggested_modes_are_taken_over() -> None:
+    page = press(opened_machine("Modes"), "Suggest K and penalty")
+    told = shown_text(page).split("Suggested: ")[1]
+    n_modes, penalty = int(told.split("**")[1].split()[0]), int(told.split("**")[3])
+    assert len(page.dataframe[0].value) >= 3
+    k = next(s for s in page.slider if s.label == "Modes K")
+    k.set_value(9 if n_modes != 9 else 8).run()
+    press(page, "Use it")
+    assert next(s for s in page.slider if s.label == "Modes K").value == n_modes
+    assert next(s for s in page.select_slider if s.label.startswith("Penalty")).value == penalty
+    assert "onverged after" in shown_text(page)
+
+
+def test_modes_that_share_their_lines_are_warned_of() -> None:
+    """Two modes on tones of 50 and 55 Hz at a small penalty reach over each other."""
+    page = opened_machine("Modes")
+    next(s for s in page.slider if s.label == "Modes K").set_value(2).run()
+    next(s for s in page.select_slider if s.label.startswith("Penalty")).set_value(50).run()
+    choose(page, "Start", "zero")
+    assert any("share the same lines" in w.value for w in page.warning)
+
+
+def test_modes_of_envelopes_and_over_angle() -> None:
+    page = opened_at("Modes")
+    for kind in ("Envelope", "Over angle"):
+        choose(page, "Modes of", kind)
+        assert not page.error
+        assert len(page.get("image")) == 1
+    assert any(s.label == "Orders shown" for s in page.slider)
+
+
+def test_denoised_and_removed_make_the_signal() -> None:
+    page = opened_at("Denoising")
+    shown = curves(page)
+    np.testing.assert_allclose(shown["without noise"] + shown["removed"], shown["signal"], atol=1e-9)
+    assert np.std(shown["removed"]) > 0.0
+    choose(page, "Threshold", "bayes")
+    choose(page, "Noise", "Coloured")
+    assert not page.error
+    assert np.std(curves(page)["removed"]) < np.std(shown["removed"])
+
+
+def test_the_phase_plane_says_that_a_tone_repeats() -> None:
+    page = opened_machine("Phase plane")
+    assert not page.error, shown_text(page)
+    press(page, "What kind of motion is it?")
+    # 5.5 cycles per revolution: the motion returns after two revolutions
+    told = shown_text(page)
+    assert "Kind of motion: **subharmonic** after 2 cycles" in told, told[-900:]
+
+
+def test_the_lowest_frequency_is_half_the_slowest_shaft_or_what_the_stretch_allows() -> None:
+    page = opened_machine("Phase plane")
+    low = next(n for n in page.number_input if n.label.startswith("Lowest"))
+    assert low.placeholder.startswith("5, half")
+    next(s for s in page.slider if s.label.startswith("Stretch")).set_value((0.0, 1.0)).run()
+    low = next(n for n in page.number_input if n.label.startswith("Lowest"))
+    assert low.placeholder.startswith("14.7, as low as")
+    assert not page.error
+    low.set_value(1.0).run()
+    assert not page.exception
+    assert len(page.error) == 1
+    assert "the lowest frequency" in shown_text(page)
+
+
+def test_a_constant_channel_is_one_message_in_every_method() -> None:
+    rows = "\n".join(f"{i / 1000:g};1.5;{(i * 37) % 101}" for i in range(3000))
+    page = upload(opened(), "dead.csv", f"time (s);a1;a2\n{rows}\n".encode())
+    page.session_state[state.TAB] = TAB
+    page.run()
+    assert not page.exception
+    for method in METHODS:
+        choose(page, "Method", method)
+        assert len(page.error) <= 1

@@ -29,6 +29,7 @@ def choose_one(
         label,
         list(options),
         default=first,
+        format_func=_capitalised,
         key=key,
         help=about or None,
         label_visibility="visible" if named else "collapsed",
@@ -36,3 +37,7 @@ def choose_one(
         required=True,
     )
     return str(chosen or first)
+
+
+def _capitalised(text: str) -> str:
+    return text[:1].upper() + text[1:]

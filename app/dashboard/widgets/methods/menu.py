@@ -7,7 +7,10 @@ import streamlit as st
 from app.dashboard import state
 from app.dashboard.widgets.errors import show_error
 from app.dashboard.widgets.methods.choice import choose_one
+from app.dashboard.widgets.methods.denoising import show_denoising
+from app.dashboard.widgets.methods.modes import show_modes
 from app.dashboard.widgets.methods.order_tracking import show_order_tracking
+from app.dashboard.widgets.methods.phase_plane import show_phase_plane
 from app.dashboard.widgets.methods.time_frequency import show_time_frequency
 from app.dashboard.widgets.views import ChannelView
 from gearsig.diagnosis.types import Analysis, ChannelAnalysis
@@ -21,6 +24,18 @@ METHODS: dict[str, tuple[ChannelView, str]] = {
     "Orders (Vold–Kalman)": (
         show_order_tracking,
         "Takes single orders out of the signal as waveforms, also where they cross or lie close together.",
+    ),
+    "Modes": (
+        show_modes,
+        "Takes the signal apart into a few narrow-band parts whose frequencies need not be known (VMD).",
+    ),
+    "Denoising": (
+        show_denoising,
+        "Takes out noise by thresholds on wavelet coefficients, and shows what was taken out.",
+    ),
+    "Phase plane": (
+        show_phase_plane,
+        "Velocity over displacement, with a point once per mesh cycle or revolution: does the motion repeat?",
     ),
 }
 METHOD = "method"

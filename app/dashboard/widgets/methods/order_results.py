@@ -39,8 +39,8 @@ def show_separation(
     tracks: Sequence[TrackedOrder],
 ) -> None:
     """Show levels, waveforms, table and notes."""
-    show_notes(separation.notes)
     _show_levels(analysis, stretch, names, separation, tracks)
+    show_notes(separation.notes, quiet=True)
     _show_table(stretch, names, separation)
     _show_waveforms(analysis, stretch, names, separation)
 

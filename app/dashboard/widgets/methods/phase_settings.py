@@ -1,0 +1,116 @@
+"""What a phase plane needs: the band that is integrated, and what the section is locked to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, cast
+
+import streamlit as st
+
+from app.dashboard import state
+from app.dashboard.as_typed import one_line
+from app.dashboard.widgets.methods.choice import choose_one
+from app.dashboard.widgets.methods.stretch import Stretch
+from gearsig.diagnosis.types import Analysis
+
+if TYPE_CHECKING:
+    from gearsig.phase.lock import CycleLock
+    from gearsig.phase.plane import MotionQuantity
+    from gearsig.rig.types import Rig
+
+QUANTITIES = ("acceleration", "velocity", "displacement")
+MEASURED = (*QUANTITIES, "transmission_error")
+WITHOUT_SPEED_HZ = 10.0
+"""Low cut suggested where no shaft's frequency is known."""
+SPARE = 1.05
+
+
+@dataclass(frozen=True)
+class PhaseSettings:
+    """What `phase_plane` is told."""
+
+    low_cut_hz: float | None
+    high_cut_hz: float | None
+    quantity: MotionQuantity | None
+
+
+def choose_band(analysis: Analysis, stretch: Stretch) -> PhaseSettings:
+    """Let the user choose the band, and say what the channel measures where the recording does not."""
+    left, right = st.columns(2)
+    known = stretch.recording.channels[0].quantity
+    quantity: MotionQuantity | None = None
+    if known not in MEASURED:
+        with right:
+            chosen = choose_one("The channel measures", QUANTITIES, _key(f"quantity {stretch.channel}", analysis))
+            quantity = cast("MotionQuantity", chosen)
+    measured = quantity or known
+    with left:
+        low = _choose_low_cut(analysis, stretch) if measured in ("acceleration", "velocity") else None
+        if low is None:
+            st.caption("A displacement is differentiated: nothing slow needs to be cut off.")
+    half = stretch.recording.sampling_rate_hz / 2.0
+    high = right.number_input(
+        "Highest frequency (Hz)",
+        value=None,
+        placeholder=f"{0.8 * half:.5g}",
+        key=_key("high", analysis),
+        help=f"Up to {half:.5g} Hz. A lower one shows the slower motion alone, without resonances.",
+        persist_state="session",
+    )
+    return PhaseSettings(low, None if high is None else float(high), quantity)
+
+
+def _choose_low_cut(analysis: Analysis, stretch: Stretch) -> float | None:
+    suggested, why = suggested_low_cut_hz(analysis, stretch)
+    low = st.number_input(
+        "Lowest frequency (Hz)",
+        value=None,
+        placeholder=f"{suggested:.4g}, {why}",
+        key=_key("low", analysis),
+        help="Integration magnifies whatever is slow. Too low, noise turns into drift; too high, slow motion is bent.",
+        persist_state="session",
+    )
+    return suggested if low is None else float(low)
+
+
+def suggested_low_cut_hz(analysis: Analysis, stretch: Stretch) -> tuple[float, str]:
+    """Return half of the slowest shaft's lowest frequency, or what the stretch allows if that is higher, and why."""
+    from gearsig.phase.integration import SETTLING_PERIODS
+    from gearsig.phase.plane import LEAST_PERIODS
+
+    possible = SPARE * (2.0 * SETTLING_PERIODS + LEAST_PERIODS) / stretch.recording.duration_s
+    if stretch.angle is None:
+        wanted, why = WITHOUT_SPEED_HZ, "as no shaft's frequency is known"
+    else:
+        slowest = min(_ratios(analysis.rig))
+        wanted, why = 0.5 * slowest * stretch.angle.speed_range_rpm[0] / 60.0, "half of the slowest shaft's frequency"
+    return (wanted, why) if wanted >= possible else (float(f"{possible:.3g}"), "as low as the stretch allows")
+
+
+def _ratios(rig: Rig | None) -> list[float]:
+    ratios = [] if rig is None else [rig.ratio(name) for name in rig.shaft_names]
+    return [ratio for ratio in ratios if ratio] or [1.0]
+
+
+def choose_lock(analysis: Analysis, stretch: Stretch) -> CycleLock | None:
+    """Return what gives a point per cycle; None where the speed is not known."""
+    from gearsig.phase.lock import find_lock
+
+    if stretch.angle is None:
+        st.info("There is no Poincaré section: it takes a shaft angle, and the speed is not known.")
+        return None
+    choices: dict[str, tuple[str, str]] = {}
+    rig = analysis.rig
+    if rig is not None:
+        choices |= {f"mesh cycle of {one_line(pair.name)}": (pair.name, "") for pair in rig.pairs}
+        choices |= {f"revolution of {one_line(name)}": ("", name) for name in rig.shaft_names}
+    if not choices:
+        choices = {"revolution of the shaft": ("", "")}
+    key = _key(f"lock {list(choices)}", analysis)
+    chosen = st.selectbox("A point once per", list(choices), key=key, persist_state="session")
+    pair, shaft = choices[chosen]
+    return find_lock(stretch.recording, pair=pair, shaft=shaft, rig=rig, angle=stretch.angle)
+
+
+def _key(name: str, analysis: Analysis) -> str:
+    return state.view_key(f"phase plane {name}", analysis)
