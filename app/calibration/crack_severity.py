@@ -1,4 +1,4 @@
-"""Make the calibration of crack severity: `python -m app.calibration.crack_severity [--cases N] [--to FILE]`.
+"""Make the calibration of crack severity: `python -m app.calibration.crack_severity [--cases N] [--to FILE] [--state COMMIT]`.
 
 Draws and simulates gearboxes one after the other (some 1.5 s each on one core), fits the two models, and writes the
 JSON file that the library reads. Three fifths of the cases are fitted; the rest makes the intervals.
@@ -39,9 +39,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=N_CASES)
     parser.add_argument("--to", type=Path, default=FILE)
+    parser.add_argument("--state", default="", help="the simulator's commit, for the provenance")
     given = parser.parse_args()
     observed = observe_all(range(given.cases))
-    text = json.dumps(calibration_of(observed, given.cases), indent=1)
+    text = json.dumps(calibration_of(observed, given.cases, given.state), indent=1)
     given.to.write_text(text + "\n", encoding="utf-8")
     typer.echo(f"{len(observed)} of {given.cases} cases; written to {given.to}")
 
@@ -61,7 +62,7 @@ def observe_all(indices: Sequence[int]) -> list[tuple[int, Observed]]:
     return found
 
 
-def calibration_of(observed: Sequence[tuple[int, Observed]], n_drawn: int) -> dict[str, Any]:
+def calibration_of(observed: Sequence[tuple[int, Observed]], n_drawn: int, simulator_state: str) -> dict[str, Any]:
     """Return the calibration as JSON-like values."""
     models = {name: fit_model(cases_of(observed, name)) for name in ("with_reference", "alone")}
     return {
@@ -69,7 +70,7 @@ def calibration_of(observed: Sequence[tuple[int, Observed]], n_drawn: int) -> di
         "lag_pitches": round(_median_lag(observed, models[WITH_REFERENCE]), 3),
         "reach": _reach([o for _, o in observed]),
         "models": {WITH_REFERENCE: _plain(models["with_reference"]), ALONE: _plain(models["alone"])},
-        "provenance": _provenance(observed, n_drawn),
+        "provenance": _provenance(observed, n_drawn, simulator_state),
     }
 
 
@@ -114,7 +115,7 @@ def _plain(model: DepthModel) -> dict[str, Any]:
     return values
 
 
-def _provenance(observed: Sequence[tuple[int, Observed]], n_drawn: int) -> dict[str, Any]:
+def _provenance(observed: Sequence[tuple[int, Observed]], n_drawn: int, simulator_state: str) -> dict[str, Any]:
     from importlib.metadata import version
 
     cracked = [o for _, o in observed if o.percent > 0]
@@ -122,6 +123,7 @@ def _provenance(observed: Sequence[tuple[int, Observed]], n_drawn: int) -> dict[
         "made_by": "python -m app.calibration.crack_severity",
         "version": version("gearsig"),
         "simulator": "sims.cracked: spur gear pair, 16 degrees of freedom",
+        "simulator_state": simulator_state,
         "seed": SEED,
         "n_drawn": n_drawn,
         "n_used": len(observed),
