@@ -1,4 +1,4 @@
-"""Make the calibration of crack severity: `python -m app.calibration.crack_severity [--cases N] [--to FILE] [--state COMMIT]`.
+"""Make the calibration of crack severity: `python -m app.calibration.crack_severity [--cases N] [--to FILE]`.
 
 Draws and simulates gearboxes one after the other (some 1.5 s each on one core), fits the two models, and writes the
 JSON file that the library reads. Three fifths of the cases are fitted; the rest makes the intervals.
