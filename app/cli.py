@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import typer
 
 from app.commands.analyze import analyze
+from app.commands.crack import crack
 from app.commands.dashboard import dashboard
 from app.commands.demo import demo
 from app.commands.report import report
@@ -32,6 +33,7 @@ app = typer.Typer(
     A rig file says what is known of the machine: **gearsig rig example** prints one to start from.""",
 )
 app.command()(analyze)
+app.command()(crack)
 app.command()(report)
 app.add_typer(rig_app, name="rig")
 app.command()(simulate)

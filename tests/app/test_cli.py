@@ -186,3 +186,21 @@ def test_a_report_that_cannot_be_written(capsys: pytest.CaptureFixture[str], tmp
     code, _, err = run(capsys, "report", sample("healthy"), "-o", occupied)
     assert code == 2
     assert "pages" in err
+
+
+def test_crack_against_a_reference_names_tooth_and_depth(capsys: pytest.CaptureFixture[str]) -> None:
+    depths = []
+    for depth in (1, 3):
+        reference = ("--reference", sample("root_crack_0mm"))
+        code, out, _ = run(capsys, "crack", sample(f"root_crack_{depth}mm"), *reference)
+        assert code == 0
+        assert "tooth 21 of stage 1/input" in out
+        depths.append(float(out.split("Crack of ")[1].split(" mm")[0]))
+    assert depths[0] == pytest.approx(1.0, abs=0.8)
+    assert depths[1] == pytest.approx(3.0, abs=0.8)
+
+
+def test_crack_refuses_a_torque_in_millimetres(capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = run(capsys, "crack", sample("root_crack_3mm"), "--torque", "3mm")
+    assert code == 2
+    assert "give it in N m" in err
