@@ -1,16 +1,20 @@
 """Spectral coherence: closed forms of modulated noise, brute force, cyclic periodograms, noise's own level."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
+from gearsig.recording.read import read_recording
 from gearsig.recording.types import Channel, Recording
 from gearsig.spectra.coherence import channel_coherence, spectral_coherence
 from gearsig.spectra.coherence_types import enhanced_envelope
 
 FS = 10_000.0
+DATA = Path(__file__).parents[3] / "shared" / "data" / "bearing_races"
 
 
 def modulated_noise(n: int, alpha_hz: float, depth: float, seed: int = 0) -> np.ndarray:
@@ -139,3 +143,15 @@ def test_bad_input_names_the_remedy():
         c.level(0.0)
     recording = Recording(x[None, :], FS, (Channel("a", "acceleration", "m/s^2"),))
     assert channel_coherence(recording, "a", highest_alpha_hz=100.0, n_bands=8).unit == "(m/s^2)^2/Hz"
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="the measured recordings are not here")
+@pytest.mark.parametrize(
+    ("file", "race_hz", "other_hz"),
+    [("InnerRaceFault_vload_3.mat", 118.875, 81.125), ("OuterRaceFault_vload_4.mat", 81.125, 118.875)],
+)
+def test_bearing_race_is_the_strongest_line_of_the_enhanced_envelope(file, race_hz, other_hz):
+    e = enhanced_envelope(channel_coherence(read_recording(DATA / file), "gs", highest_alpha_hz=600.0))
+    assert e.spectrum.positions[np.argmax(e.spectrum.values)] == pytest.approx(race_hz, rel=0.02)
+    race, other = (e.spectrum.largest_near(hz, 0.02 * hz)[1] for hz in (race_hz, other_hz))
+    assert race > 20 * max(other, e.level)
