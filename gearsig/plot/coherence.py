@@ -44,7 +44,8 @@ def coherence_figure(
     -------
     Figure
         Colours are logarithmic and begin at the level that noise exceeds in one cell of 1000. Where there are more
-        cells than pixels, the largest in a pixel is shown. The dashed line is noise's level at the mean's own probability.
+        cells than pixels, the largest in a pixel is shown. The dashed line is noise's level at the mean's own
+        probability.
 
     Raises
     ------

@@ -10,6 +10,7 @@ from gearsig.recording.types import Recording
 from gearsig.spectra.blocks import ComplexArray, checked_signal, scaled_unit
 from gearsig.spectra.coherence_bands import FIRST_LINE, CarrierBands, lay_bands
 from gearsig.spectra.coherence_types import SpectralCoherence
+from gearsig.spectra.kurtogram_preparation import Preparation, prepared_signal
 from gearsig.spectra.window import make_window
 
 
@@ -89,17 +90,25 @@ def spectral_coherence(
 
 
 def channel_coherence(
-    recording: Recording, channel: str, *, highest_alpha_hz: float, n_bands: int = 64
+    recording: Recording,
+    channel: str,
+    *,
+    highest_alpha_hz: float,
+    n_bands: int = 64,
+    preparation: Preparation = "none",
 ) -> SpectralCoherence:
-    """Return the spectral coherence of a recording's channel, see `spectral_coherence`."""
-    unit = recording.channels[recording.index(channel)].unit
+    """Return the spectral coherence of a recording's channel, see `spectral_coherence`.
+
+    Of the signal as it is, with its steady "tones removed" (gears), or "whitened"; see `prepared_signal`.
+    """
+    unit = recording.channels[recording.index(channel)].unit if preparation != "whitened" else ""
     return spectral_coherence(
-        recording.values(channel),
+        prepared_signal(recording.values(channel), recording.sampling_rate_hz, preparation),
         recording.sampling_rate_hz,
         highest_alpha_hz=highest_alpha_hz,
         n_bands=n_bands,
         unit=unit,
-        source=channel,
+        source=channel if preparation == "none" else f"{channel}, {preparation}",
     )
 
 

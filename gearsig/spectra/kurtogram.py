@@ -105,13 +105,13 @@ def kurtogram(
     fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
     n_levels = _checked_levels(len(x), n_levels)
     x = prepared_signal(x, fs, preparation)
-    mean, largest = float(np.mean(x, dtype=np.float64)), float(np.abs(x).max())
-    spread = max(float(x.max()) - mean, mean - float(x.min()))
-    if spread <= 1e-7 * largest or spread == 0.0:
+    low, high, mean = float(x.min()), float(x.max()), float(np.mean(x, dtype=np.float64))
+    spread = max(high - mean, mean - low)
+    if spread <= 1e-7 * max(-low, high) or spread == 0.0:
         raise RefusalError("the signal is constant: it has no impulses", remedy="check the channel")
     rows = [_row_of_bands(fs, *row) for row in tree_moments(x, n_levels, mean, spread)]
-    low, high, level, kurtosis, error, share, n = (np.concatenate(column) for column in zip(*rows, strict=True))
-    return Kurtogram(low, high, level, kurtosis, error, share, n, preparation, source or "signal")
+    lows, highs, level, kurtosis, error, share, n = (np.concatenate(column) for column in zip(*rows, strict=True))
+    return Kurtogram(lows, highs, level, kurtosis, error, share, n, preparation, source or "signal")
 
 
 def best_band(

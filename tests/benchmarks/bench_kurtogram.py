@@ -118,9 +118,7 @@ def _coherence(x: np.ndarray) -> None:
         start = time.process_time()
         some_alphas()
         theirs = min(theirs, (time.process_time() - start) * n_alphas / 20)
-    print(
-        f"coherence, {n_alphas} × {n_bands} cells: {theirs / ours:5.1f} times as fast as one sum per α (20 of them timed)"
-    )
+    print(f"coherence, {n_alphas} × {n_bands} cells: {theirs / ours:5.1f} times as fast as one sum per α (20 timed)")
 
 
 if __name__ == "__main__":

@@ -155,3 +155,17 @@ def test_bearing_race_is_the_strongest_line_of_the_enhanced_envelope(file, race_
     assert e.spectrum.positions[np.argmax(e.spectrum.values)] == pytest.approx(race_hz, rel=0.02)
     race, other = (e.spectrum.largest_near(hz, 0.02 * hz)[1] for hz in (race_hz, other_hz))
     assert race > 20 * max(other, e.level)
+
+
+def test_tones_are_coherent_with_each_other_until_removed():
+    n = 60_000
+    t = np.arange(n) / FS
+    tones = sum(np.cos(2 * np.pi * f * t) for f in (1000.0, 1100.0))
+    x = 0.5 * np.random.default_rng(6).normal(size=n) + tones
+    recording = Recording(x[None, :], FS, (Channel("a", "acceleration", "m/s^2"),))
+    raw = channel_coherence(recording, "a", highest_alpha_hz=150.0, n_bands=32)
+    cleaned = channel_coherence(recording, "a", highest_alpha_hz=150.0, n_bands=32, preparation="tones removed")
+    at = int(np.argmin(np.abs(raw.alpha - 100.0)))
+    assert raw.coherence_squared[at].max() > 0.5
+    assert cleaned.coherence_squared[at].max() < cleaned.level(1e-4)
+    assert "tones removed" in cleaned.source
