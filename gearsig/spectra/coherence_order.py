@@ -75,7 +75,7 @@ def order_coherence(
     -----
     Since the power at f - α is taken from the whitened signal's mean, γ² may pass 1 by chance where few products are
     averaged. The level of noise holds for a level that is steady over the run; a level that rises with speed
-    averages over fewer independent products than stated.
+    averages over fewer independent products than stated, and its slow change shows as coherence at the lowest orders.
 
     References
     ----------
