@@ -222,3 +222,16 @@ def test_a_constant_channel_is_one_message_in_every_method() -> None:
     for method in METHODS:
         choose(page, "Method", method)
         assert len(page.error) <= 1
+
+
+def test_a_channel_that_is_no_motion_is_one_message_and_an_unknown_one_is_asked_about() -> None:
+    content, rig = machine()
+    for quantity, n_errors in (("sound_pressure", 1), ("unknown", 0), ("displacement", 0)):
+        page = upload(opened(), "other.csv", content, rig.replace('"acceleration"', f'"{quantity}"'))
+        page.session_state[state.TAB] = TAB
+        page.run()
+        choose(page, "Method", "Phase plane")
+        assert len(page.error) == n_errors, quantity
+        asked = [w for w in page.segmented_control if w.label == "The channel measures"]
+        assert len(asked) == (quantity == "unknown")
+    assert "correct its quantity" not in shown_text(page)

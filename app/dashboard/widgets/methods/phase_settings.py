@@ -12,6 +12,7 @@ from app.dashboard.as_typed import one_line
 from app.dashboard.widgets.methods.choice import choose_one
 from app.dashboard.widgets.methods.stretch import Stretch
 from gearsig.diagnosis.types import Analysis
+from gearsig.errors import InputError
 
 if TYPE_CHECKING:
     from gearsig.phase.lock import CycleLock
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from gearsig.rig.types import Rig
 
 QUANTITIES = ("acceleration", "velocity", "displacement")
-MEASURED = (*QUANTITIES, "transmission_error")
+OF_MOTION = (*QUANTITIES, "transmission_error", "unknown")
 WITHOUT_SPEED_HZ = 10.0
 """Low cut suggested where no shaft's frequency is known."""
 SPARE = 1.05
@@ -35,11 +36,24 @@ class PhaseSettings:
 
 
 def choose_band(analysis: Analysis, stretch: Stretch) -> PhaseSettings:
-    """Let the user choose the band, and say what the channel measures where the recording does not."""
-    left, right = st.columns(2)
+    """Let the user choose the band, and say what the channel measures where the recording does not.
+
+    Raises
+    ------
+    InputError
+        If the channel measures something else than motion.
+    """
     known = stretch.recording.channels[0].quantity
+    if known not in OF_MOTION:
+        raise InputError(
+            f"channel {stretch.channel!r} measures {known.replace('_', ' ')}: displacement and velocity do not follow "
+            "from it",
+            allowed="acceleration, velocity, displacement",
+            remedy="choose another channel, or correct its quantity in the rig's [[sensor]] table",
+        )
+    left, right = st.columns(2)
     quantity: MotionQuantity | None = None
-    if known not in MEASURED:
+    if known == "unknown":
         with right:
             chosen = choose_one("The channel measures", QUANTITIES, _key(f"quantity {stretch.channel}", analysis))
             quantity = cast("MotionQuantity", chosen)
