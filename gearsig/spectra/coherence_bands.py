@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,7 @@ class CarrierBands:
     weight: FloatArray
 
     @property
-    def centres(self) -> FloatArray:
+    def centres(self) -> np.ndarray[tuple[int], np.dtype[np.signedinteger[Any]]]:
         """Middle lines, (n_bands,)."""
         return (self.first + np.arange(self.n_bands)) * self.half
 

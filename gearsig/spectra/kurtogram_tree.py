@@ -52,12 +52,12 @@ def tree_moments(x: FloatArray, n_levels: int, mean: float, scale: float) -> lis
         power = piece * piece
         whole += (power.sum(), float(np.dot(power, power)), 0.0)
         whole[2] = max(whole[2], float(power.max()))
-        band = np.zeros((1, 2, len(piece)))
+        band: FloatArray = np.zeros((1, 2, len(piece)))
         band[0, 0] = piece
         for half, third in zip(halves, thirds, strict=True):
             third.push(band)
             band = half.push(band)
-    rows = [(1, whole[None, :], len(x))]
+    rows: list[tuple[int, FloatArray, int]] = [(1, whole[None, :], len(x))]
     for half, third in zip(halves, thirds, strict=True):
         rows += [(len(stage.moments), stage.moments, stage.n_outputs) for stage in (half, third)]
     return rows
