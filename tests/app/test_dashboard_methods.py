@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -235,3 +236,27 @@ def test_a_channel_that_is_no_motion_is_one_message_and_an_unknown_one_is_asked_
         asked = [w for w in page.segmented_control if w.label == "The channel measures"]
         assert len(asked) == (quantity == "unknown")
     assert "correct its quantity" not in shown_text(page)
+
+
+def test_a_longer_stretch_than_can_be_answered_soon_is_cut_and_this_is_said() -> None:
+    page = opened_at("Orders (Vold–Kalman)", "run_up")
+    orders = page.multiselect[0]
+    orders.set_value(list(orders.options[:5])).run()
+    assert not page.error
+    assert "Analysed: 0 to 5.12 s of 8 s, 65536 samples; a longer one would take too long." in shown_text(page)
+
+
+def test_names_from_files_are_shown_as_typed_in_every_method() -> None:
+    content, rig = machine()
+    names = ("<script>alert(1)</script>", "**x** $y$ :smile:")
+    rig = rig.replace('"input"', f'"{names[1]}"').replace('"a1"', f'"{names[0]}"')
+    page = upload(opened(), "names.csv", content.replace(b";a1", f";{names[0]}".encode()), rig)
+    page.session_state[state.TAB] = TAB
+    page.run()
+    for method in METHODS:
+        choose(page, "Method", method)
+        assert not page.error
+        raw = "\n".join(part.value for part in [*page.markdown, *page.caption, *page.info, *page.warning])
+        for markup in ("<script", "**x**", "$y$", ":smile:"):
+            assert not re.search(r"(?<!\\)" + re.escape(markup), raw), (method, markup)
+        assert all("<script" not in chart.proto.spec for chart in page.get("plotly_chart"))

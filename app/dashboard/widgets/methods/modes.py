@@ -19,7 +19,7 @@ from gearsig.diagnosis.types import Analysis, ChannelAnalysis
 if TYPE_CHECKING:
     from gearsig.decompose.types import Modes, StartName, VmdSettings
 
-N_FIRST = 2**16
+N_FIRST, N_MOST = 2**16, 2**19
 MOST_MODES = 10
 PENALTIES = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000, 200_000)
 """A logarithmic scale that holds whatever is suggested."""
@@ -34,7 +34,7 @@ def show_modes(analysis: Analysis, channel: ChannelAnalysis) -> None:
     """Show the modes of one channel."""
     left, right = st.columns(2)
     with right:
-        stretch = choose_stretch(analysis, channel, "modes", n_first=N_FIRST)
+        stretch = choose_stretch(analysis, channel, "modes", n_first=N_FIRST, n_most=N_MOST)
     with left:
         signal = choose_signal(analysis, channel, stretch)
     settings = _choose_settings(analysis)

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from gearsig.orders.types import TrackedOrder
     from gearsig.orders.vold_kalman_types import Generation, OrderSeparation
 
-N_FIRST = 100_000
+N_FIRST = 250_000
+N_FEWEST, N_EFFORT = 2**16, 1_600_000
+"""Coupled orders take time as their number squared: so many samples times orders squared, but not less than that."""
 MOST_ORDERS = 6
 KINDS = ("mesh", "shaft", "bearing", "sideband")
 N_KEPT = 4
@@ -51,8 +53,9 @@ def show_order_tracking(analysis: Analysis, channel: ChannelAnalysis) -> None:
     left, right = st.columns(2)
     with left:
         named = _choose_orders(analysis)
+    n_most = max(N_FEWEST, N_EFFORT // max(2, len(named)) ** 2)
     with right:
-        stretch = choose_stretch(analysis, channel, "order tracking", n_first=N_FIRST)
+        stretch = choose_stretch(analysis, channel, "order tracking", n_first=N_FIRST, n_most=n_most)
     settings = _choose_settings(analysis, tuple(named.values()))
     if stretch.angle is None:
         st.info("The shaft's angle is not known in this stretch.")
@@ -66,9 +69,9 @@ def show_order_tracking(analysis: Analysis, channel: ChannelAnalysis) -> None:
 
 
 def _choose_orders(analysis: Analysis) -> dict[str, float]:
-    """Return chosen orders of the reference shaft by name; the first meshes at first."""
+    """Return chosen orders of the reference shaft by name; the first two at first."""
     known = _known_orders(analysis)
-    first = list(known)[: 2 if analysis.rig is not None and analysis.rig.pairs else 1]
+    first = list(known)[:2]
     chosen = st.multiselect(
         "Orders",
         list(known),

@@ -64,7 +64,7 @@ def choose_stretch(
     n_first : int
         Samples from the start that are chosen at first.
     n_most : int
-        A longer choice is cut to so many, which is said.
+        Samples that can be analysed in a few seconds: a longer choice is cut, which is said.
     """
     recording = analysis.recording
     rate = recording.sampling_rate_hz
@@ -76,7 +76,7 @@ def choose_stretch(
     found = stretch_of(analysis, channel.channel, start, min(stop, start + n_most))
     n = found.recording.n_samples
     said = f"Analysed: {found.start_s:.4g} to {found.end_s:.4g} s of {recording.duration_s:.4g} s, {n} samples"
-    st.caption(said + (f"; the choice is cut to {n_most}, which take a few seconds." if cut else "."))
+    st.caption(said + ("; a longer one would take too long." if cut else "."))
     return found
 
 

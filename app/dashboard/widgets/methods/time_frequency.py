@@ -13,6 +13,7 @@ from app.dashboard.widgets.methods.choice import choose_one
 from app.dashboard.widgets.methods.stretch import Stretch, choose_stretch
 from app.dashboard.widgets.picture import show_picture
 from gearsig.diagnosis.types import Analysis, ChannelAnalysis
+from gearsig.report.lines import highest_order_of_interest
 
 if TYPE_CHECKING:
     from gearsig.timefreq.types import Reduction, TimeFrequencyMap
@@ -57,7 +58,7 @@ def show_time_frequency(analysis: Analysis, channel: ChannelAnalysis) -> None:
         return
     signal = signal_of(stretch, over_angle=over_angle)
     with right:
-        limits = _choose_limits(analysis, signal, of_wavelet=transform in OF_WAVELETS)
+        limits = _choose_limits(analysis, channel, signal, of_wavelet=transform in OF_WAVELETS)
     settings, span_db = _choose_settings(analysis, signal, transform, limits)
     with st.spinner("Computing the map …", show_time=True):
         levels = level_map(stretch.key, settings, signal)
@@ -101,16 +102,20 @@ def _choose_settings(
     return MapSettings(transform, signal.axis, limits, REDUCTIONS[each], length), float(span_db)
 
 
-def _choose_limits(analysis: Analysis, signal: UniformSignal, *, of_wavelet: bool) -> tuple[float, float]:
+def _choose_limits(
+    analysis: Analysis, channel: ChannelAnalysis, signal: UniformSignal, *, of_wavelet: bool
+) -> tuple[float, float]:
     """Return the lines that are shown; wavelets have no line at zero, and their limits go in octaves."""
-    top = float(signal.highest_valid)
-    low = top / 2**OCTAVES_SHOWN if of_wavelet else 0.0
+    end = float(signal.highest_valid)
+    low, top = (end / 2**OCTAVES_SHOWN if of_wavelet else 0.0), end
+    if signal.axis == "order" and channel.order_spectrum is not None:
+        top = min(end, highest_order_of_interest(analysis, channel.order_spectrum))
     octaves = np.linspace(OCTAVES_SHOWN + 4.0, 0.0, 193)
-    options = top / 2**octaves if of_wavelet else np.linspace(low, top, 201)
+    options = end / 2**octaves if of_wavelet else np.linspace(0.0, end, 401)
     texts = [f"{value:.4g}" for value in options]
-    first = texts[int(np.argmin(np.abs(options - low)))], texts[-1]
+    first = texts[int(np.argmin(np.abs(options - low)))], texts[int(np.argmin(np.abs(options - top)))]
     label = "Orders" if signal.axis == "order" else "Frequencies (Hz)"
-    key = _key(f"limits {signal.axis} {of_wavelet} {top!r}", analysis)
+    key = _key(f"limits {signal.axis} {of_wavelet} {end!r}", analysis)
     chosen = st.select_slider(label, texts, value=first, key=key, persist_state="session")
     i, j = (texts.index(text) for text in chosen)
     if i == j:
