@@ -18,6 +18,8 @@ def effect_settings(effects: Mapping[str, float] | Sequence[EffectSetting] | Non
     """Return settings, given as such or as name → severity."""
     if effects is None:
         return ()
+    if isinstance(effects, (str, bytes)):  # type: ignore[unreachable]  # what a caller may give all the same
+        raise InputError(f"effects is {effects!r}", allowed='name and severity, e.g. {"root_crack": 2.0}')
     if isinstance(effects, Mapping):
         return tuple(EffectSetting(name, severity) for name, severity in effects.items())
     return tuple(effects)

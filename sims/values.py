@@ -53,8 +53,10 @@ def _hint(name: str, names: Sequence[str]) -> str:
     return f"there are {', '.join(n for n in names if n.partition('_')[0] == words[0])}"
 
 
-def checked_value(wanted: Parameter, value: object) -> ParameterValue:
-    """Return a value that the parameter may have; a number as float."""
+def checked_value(wanted: Parameter, value: object) -> ParameterValue | None:
+    """Return a value that the parameter may have; a number as float; None or "none" where it may follow from others."""
+    if wanted.default is None and (value is None or value == "none"):
+        return None
     if wanted.choices:
         return one_of(str(value), wanted.name, wanted.choices)
     if isinstance(value, bool):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -38,6 +38,18 @@ def dashboard(
     # main.py lists the pages. Streamlit would take a folder called "pages" for a list of its own until main.py has run
     # once, and show that instead to who opens a page by its address first.
     PagesManager.uses_pages_directory = False
+    _without_advertisement()
     own = (f"server.port={port}", f"server.headless={str(not browser).lower()}")
     sys.argv = ["streamlit", "run", str(MAIN_PAGE), *(f"--{option}" for option in (*OPTIONS, *own))]
     sys.exit(streamlit_cli.main())
+
+
+def _without_advertisement() -> None:
+    """Keep Streamlit from offering its own add-ons over the page; older versions have no such module."""
+    from importlib import import_module
+    from importlib.util import find_spec
+
+    if find_spec("streamlit.web.skills") is not None:
+        skills: Any = import_module("streamlit.web.skills")
+        skills.nudge_suppression_reason = lambda *_: "not for the users of an application"
+        skills.are_skills_installed = lambda *_, **__: True

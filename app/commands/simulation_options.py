@@ -102,7 +102,8 @@ def read_parameter(chosen: Simulator, text: str) -> tuple[str, ParameterValue]:
 
     name, value = _split(text, "--set", "crack_depth_mm=2mm")
     wanted = parameter(chosen.parameters, name)
-    return name, (value if wanted.choices else quantity(value, wanted.unit, name))
+    by_word = wanted.choices or (wanted.default is None and value == "none")
+    return name, (value if by_word else quantity(value, wanted.unit, name))
 
 
 def read_effect(text: str) -> EffectSetting:

@@ -175,7 +175,7 @@ def respond(
             raise RefusalError(
                 f"the solution grows beyond all bounds after {(first + filled * every) * step:.3g} s "
                 f"at a step of {step:.3g} s",
-                remedy="take a shorter step_s, or the default",
+                remedy="look for stiffness, damping and inertia that do not go together, or give a shorter step_s",
             )
         if on_progress is not None:
             on_progress((first + n) / n_steps)

@@ -127,7 +127,7 @@ def check_crack(gear: GearGeometry, crack: RootCrack) -> None:
         raise InputError(
             f"depth_mm of the crack is {crack.depth_mm:g} mm at {crack.angle_deg:g}°: it goes past the tooth",
             allowed=f"above 0 to {deepest:.3g} mm ({crack_percent(gear, deepest, crack.angle_deg):.0f} % of the root)",
-            remedy="take a shallower crack, or a missing tooth",
+            remedy="take a shallower crack, or a chipped tooth",
         )
     if crack.width_mm is not None:
         within(crack.width_mm, "width_mm of the crack", 0.0, gear.face_width_mm, "mm")

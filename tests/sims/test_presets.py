@@ -284,3 +284,16 @@ def test_a_drifting_sensor_drifts() -> None:
     )
     difference = drifting.samples[0] - steady.samples[0]
     np.testing.assert_allclose(difference, 3.0 + 2.0 * drifting.time_s(), atol=2e-3)
+
+
+def test_none_clears_what_a_preset_gives() -> None:
+    assert machine("published_55_75").mesh.pair.driver.bore_mm == 17.5
+    free = machine("published_55_75", bore_radius_driver_mm="none").mesh.pair.driver
+    assert free.bore_mm == pytest.approx(0.35 * free.root_radius_mm)
+    with pytest.raises(InputError, match="teeth_driver is 'none'"):
+        machine("published_55_75", teeth_driver="none")
+
+
+def test_effects_as_a_word_are_refused_with_what_is_allowed() -> None:
+    with pytest.raises(InputError, match="name and severity"):
+        simulate("cracked", effects="root_crack")  # type: ignore[arg-type]

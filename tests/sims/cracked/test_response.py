@@ -119,6 +119,14 @@ def test_step_follows_the_stiffness() -> None:
     assert default_step_s(machine, fast) < 0.5 * default_step_s(machine, slow)
 
 
+def test_step_follows_heavy_dampers() -> None:
+    """A damper of 1e6 N s/m on 0.3 kg is as stiff as a spring: the run stands it."""
+    base = spur_pair_machine()
+    machine = replace(base, bearings=tuple(replace(b, damping_n_s_per_m=1e6) for b in base.bearings))
+    assert default_step_s(machine, STEADY) < 0.1 * default_step_s(base, STEADY)
+    assert np.isfinite(respond(machine, STEADY, duration_s=0.005, rng=np.random.default_rng(1))["driver y"]).all()
+
+
 def test_the_same_as_an_adaptive_integrator() -> None:
     """DOP853 on the same equations at 1e-10: the same motion over 5 ms of tooth passages with friction."""
     from scipy.integrate import solve_ivp
