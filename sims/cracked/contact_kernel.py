@@ -21,33 +21,12 @@ import numpy as np
 from numba import njit
 
 from sims.mesh.friction_kernel import contact_friction_n
-from sims.mesh.load_sharing_kernel import cubic, pair_force
+from sims.mesh.load_sharing_kernel import cubic, engagement_and_slope, pair_force
 
 MOST_CYCLES = 1e12
 """Mesh cycles beyond which a run has burst; until then, single cycles are resolved to 1e-4."""
 MOST_LATE = 0.12
 """Base pitches by which an entry may be late or early; the places of gears that move further count as that far."""
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def engagement(progress, late, contact_ratio, ramp):
-    """(w, ∂w/∂ζ): as `sims.mesh.load_sharing_kernel.engagement`, with an entry `late` base pitches late."""
-    if ramp <= 0.0:
-        inside = late <= progress <= contact_ratio
-        return (1.0 if inside else 0.0), 0.0
-    rise, rise_slope = _smooth_step((progress - late) / ramp + 0.5)
-    fall, fall_slope = _smooth_step((contact_ratio - progress) / ramp + 0.5)
-    return rise * fall, (rise_slope * fall - rise * fall_slope) / ramp
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _smooth_step(t):
-    """6t⁵ − 15t⁴ + 10t³ between 0 and 1, and its slope."""
-    if t <= 0.0:
-        return 0.0, 0.0
-    if t >= 1.0:
-        return 1.0, 0.0
-    return t * t * t * (t * (6.0 * t - 15.0) + 10.0), 30.0 * t * t * (t - 1.0) * (t - 1.0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -75,7 +54,7 @@ def contact_forces(  # noqa: PLR0915  one pass over the pairs: no part of it sta
     for slot in range(k.n_slots):
         pair = newest - slot
         progress = cycles - pair
-        weight, weight_slope = engagement(progress, late, k.contact_ratio, k.ramp)
+        weight, weight_slope = engagement_and_slope(progress, late, k.contact_ratio, k.ramp)
         if weight <= 0.0:
             continue
         # By floats: the remainder of whole numbers takes several times as long.
@@ -157,7 +136,7 @@ def stored_energy(k, curves, rows, pitch, delta, late, cycles, rough):
     for slot in range(k.n_slots):
         pair = newest - slot
         progress = cycles - pair
-        weight = engagement(progress, late, k.contact_ratio, k.ramp)[0]
+        weight = engagement_and_slope(progress, late, k.contact_ratio, k.ramp)[0]
         one, two = pair % k.teeth[0], pair % k.teeth[1]
         compliance = cubic(curves[rows[0, one]], k.table_start, k.table_step, progress)
         compliance += cubic(curves[rows[1, two]], k.table_start, k.table_step, progress)

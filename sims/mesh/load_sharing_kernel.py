@@ -10,17 +10,27 @@ from gearsig.checks import FloatArray
 @njit(cache=True)
 def engagement(progress: float, contact_ratio: float, ramp: float) -> float:
     """Part of its stiffness a pair has: 0 outside, 1 inside, with a quintic step of width `ramp` at either end."""
+    return float(engagement_and_slope(progress, 0.0, contact_ratio, ramp)[0])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def engagement_and_slope(progress: float, late: float, contact_ratio: float, ramp: float) -> tuple[float, float]:
+    """(w, ∂w/∂ζ) of `engagement`, for a pair that enters `late` base pitches late."""
     if ramp <= 0.0:
-        return 1.0 if 0.0 <= progress <= contact_ratio else 0.0
-    rise = min(max(progress / ramp + 0.5, 0.0), 1.0)
-    fall = min(max((contact_ratio - progress) / ramp + 0.5, 0.0), 1.0)
-    return float(_smooth(rise) * _smooth(fall))
+        return (1.0 if late <= progress <= contact_ratio else 0.0), 0.0
+    rise, rise_slope = _smooth((progress - late) / ramp + 0.5)
+    fall, fall_slope = _smooth((contact_ratio - progress) / ramp + 0.5)
+    return rise * fall, (rise_slope * fall - rise * fall_slope) / ramp
 
 
-@njit(cache=True)
-def _smooth(t: float) -> float:
-    """6t⁵ − 15t⁴ + 10t³: two continuous derivatives at 0 and 1."""
-    return float(t * t * t * (t * (6.0 * t - 15.0) + 10.0))
+@njit(cache=True, nogil=True, error_model="numpy")
+def _smooth(t: float) -> tuple[float, float]:
+    """6t⁵ − 15t⁴ + 10t³ between 0 and 1, with two continuous derivatives, and its slope."""
+    if t <= 0.0:
+        return 0.0, 0.0
+    if t >= 1.0:
+        return 1.0, 0.0
+    return t * t * t * (t * (6.0 * t - 15.0) + 10.0), 30.0 * t * t * (t - 1.0) * (t - 1.0)
 
 
 @njit(cache=True)
