@@ -77,6 +77,7 @@ def test_names_from_a_file_are_text(page: playwright.Page) -> None:
     name = "<b>n</b> :smile: **r**.csv"
     open_files(page, {"name": name, "mimeType": "text/csv", "buffer": content})
     page.get_by_role("tab", name="Channels").wait_for()
+    settle(page)  # the tab stands before what is in it
     text = page.locator("[data-testid=stMain]").inner_text().replace("\u2060", "")
     for shown in (name, *HOSTILE):
         assert shown in text
