@@ -28,6 +28,7 @@ def coherence_figure(
     mean: EnhancedEnvelope | None = None,
     *,
     marked: Sequence[float] = (),
+    limits: tuple[float, float] | None = None,
     height_in: float = 5.2,
 ) -> Figure:
     """Draw the squared coherence as a map, and above it its mean over the carriers.
@@ -39,6 +40,9 @@ def coherence_figure(
         The upper panel; None takes the mean over all carriers. The range of its carriers is drawn beside the map.
     marked : sequence of float
         Cyclic frequencies or orders expected of a fault.
+    limits : (float, float) or None
+        Cyclic frequencies or orders that are drawn; None: all.
+    height_in : float
 
     Returns
     -------
@@ -50,7 +54,7 @@ def coherence_figure(
     Raises
     ------
     InputError
-        If the mean belongs to another axis of cyclic frequencies.
+        If the mean belongs to another axis of cyclic frequencies, or the limits hold fewer than two of them.
     """
     mean = enhanced_envelope(coherence) if mean is None else mean
     if len(mean.spectrum.positions) != len(coherence.alpha) or mean.spectrum.axis != coherence.alpha_axis:
@@ -62,8 +66,9 @@ def coherence_figure(
     )
     above = style.panel(figure, left_in=LEFT_IN, right_in=RIGHT_IN, bottom_in=split, top_in=TOP_IN, sharex=below)
     below.grid(visible=False)
-    _draw_map(figure, below, coherence, height_in, split)
-    _draw_mean(above, mean, coherence.frequency_hz)
+    shown = _between(coherence.alpha, limits)
+    _draw_map(figure, below, coherence, shown, height_in, split)
+    _draw_mean(above, mean, coherence.frequency_hz, shown)
     for position in marked:
         for axes in (above, below):
             axes.axvline(position, color=style.BEARING, linewidth=0.8, linestyle=(0, (2, 3)))
@@ -77,10 +82,22 @@ def coherence_figure(
     return figure
 
 
-def _draw_map(figure: Figure, axes: Axes, coherence: SpectralCoherence, height_in: float, split: float) -> None:
+def _between(alpha: FloatArray, limits: tuple[float, float] | None) -> slice:
+    low, high = (-np.inf, np.inf) if limits is None else limits
+    first, last = (int(i) for i in (np.searchsorted(alpha, low), np.searchsorted(alpha, high, side="right")))
+    if last - first < 2:
+        raise InputError(
+            f"limits are {low:g} to {high:g}", allowed=f"ascending, two of {alpha[0]:g} to {alpha[-1]:g} between them"
+        )
+    return slice(first, last)
+
+
+def _draw_map(
+    figure: Figure, axes: Axes, coherence: SpectralCoherence, shown: slice, height_in: float, split: float
+) -> None:
     from matplotlib.colors import LogNorm
 
-    values, alpha = _coarse(coherence.coherence_squared, coherence.alpha)
+    values, alpha = _coarse(coherence.coherence_squared[shown], coherence.alpha[shown])
     low = coherence.level(1e-3)
     high = max(float(values.max()), 2.0 * low)
     x, y = _borders(alpha), _borders(coherence.frequency_hz)
@@ -105,8 +122,8 @@ def _plain_ticks(bar: Axes) -> None:
     bar.yaxis.set_minor_formatter(NullFormatter())
 
 
-def _draw_mean(axes: Axes, mean: EnhancedEnvelope, carriers: FloatArray) -> None:
-    at, _, high = thinned(mean.spectrum.positions, mean.spectrum.values, 1200)
+def _draw_mean(axes: Axes, mean: EnhancedEnvelope, carriers: FloatArray, shown: slice) -> None:
+    at, _, high = thinned(mean.spectrum.positions[shown], mean.spectrum.values[shown], 1200)
     axes.plot(at, high, color=style.MEASURED, linewidth=0.9)
     axes.axhline(mean.level, color=style.FLOOR, linewidth=1.0, linestyle=(0, (4, 3)))
     axes.set_ylim(0.0, 1.08 * max(float(high.max()), 1.5 * mean.level))

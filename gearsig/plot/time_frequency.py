@@ -29,6 +29,7 @@ def time_frequency_figure(
     *,
     dynamic_range_db: float = DYNAMIC_RANGE_DB,
     height_in: float = 4.6,
+    numbered: bool = False,
 ) -> Figure:
     """Draw levels over time (or angle) and frequency (or order), with ridges as lines.
 
@@ -39,13 +40,16 @@ def time_frequency_figure(
         Dashed where two of them share their place.
     dynamic_range_db : float
         Span of the colours below the largest level.
+    height_in : float
+    numbered : bool
+        Number the ridges from 1, at their right ends.
 
     Returns
     -------
     Figure
         The frequency axis is logarithmic where the lines are. Where there are more cells than pixels, the largest of
-        the cells in a pixel is shown. Between the dashed
-        lines and the ends, a level depends on what was assumed outside of the signal.
+        the cells in a pixel is shown. Between the dashed lines and the ends, a level depends on what was assumed
+        outside of the signal.
     """
     positive(dynamic_range_db, "dynamic_range_db", "dB")
     figure = style.new_figure(height_in)
@@ -57,8 +61,10 @@ def time_frequency_figure(
     mesh = _draw_levels(axes, levels, dynamic_range_db, logarithmic=logarithmic)
     _colour_bar(figure, mesh, f"dB re 1 {unit_text(levels.unit)}".strip(), height_in)
     _draw_edges(axes, levels)
-    for ridge in ridges:
+    for i, ridge in enumerate(ridges, start=1):
         _draw_ridge(axes, ridge)
+        if numbered:
+            _number(axes, ridge, i)
     style.label_axes(axes, levels.at_label, levels.axis_label, levels.source)
     style.note(axes, f"{levels.method}; {'mean power' if levels.reduction == 'mean' else 'largest'} per column")
     if logarithmic:
@@ -93,6 +99,14 @@ def _draw_ridge(axes: Axes, ridge: Ridge) -> None:
     together = np.where(ridge.shared, ridge.positions, np.nan)
     axes.plot(ridge.at, alone, color=style.FAULT, linewidth=1.2)
     axes.plot(ridge.at, together, color=style.FAULT, linewidth=1.2, linestyle=(0, (3, 2)))
+
+
+def _number(axes: Axes, ridge: Ridge, number: int) -> None:
+    """Write a ridge's number on a light disc at nine tenths of its course: numbers of ridges that meet stay apart."""
+    i = round((0.94 - 0.04 * (number % 3)) * (len(ridge.at) - 1))
+    disc = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": style.FAULT, "linewidth": 0.8}
+    place = float(ridge.at[i]), float(ridge.positions[i])
+    axes.text(*place, str(number), ha="center", va="center", fontsize=style.SMALL_PT, color=style.FAULT, bbox=disc)
 
 
 def _plain_ticks(axes: Axes) -> None:

@@ -148,8 +148,9 @@ def kurtogram_envelope(
     highest_hz: float | None = None,
     highest_modulation_hz: float | None = None,
     kind: EnvelopeKind = "squared",
+    band_hz: tuple[float, float] | None = None,
 ) -> ChosenBand:
-    """Return the envelope spectrum in the band that the channel's own kurtogram chooses.
+    """Return the envelope spectrum in the band that the channel's own kurtogram chooses, or in a given one.
 
     Parameters
     ----------
@@ -163,21 +164,53 @@ def kurtogram_envelope(
         Lines of the envelope spectrum above it are left out; the band is at least three times as wide.
     kind : str
         Of the envelope, "squared" or "magnitude".
+    band_hz : (float, float) or None
+        Overrides the choice; `narrowest_hz`, `lowest_hz` and `highest_hz` then mean nothing.
 
     Returns
     -------
     ChosenBand
+
+    Raises
+    ------
+    InputError
+        As `kurtogram`; also if `band_hz` lies outside of the spectrum.
+    RefusalError
+        As `kurtogram`; also if no band is allowed.
     """
     fs, unit = recording.sampling_rate_hz, recording.channels[recording.index(channel)].unit
     x = prepared_signal(recording.values(channel), fs, preparation)
     grid = kurtogram(x, fs, n_levels=n_levels, source=f"{channel}, {preparation}" if preparation != "none" else channel)
     if highest_modulation_hz is not None:
         narrowest_hz = max(narrowest_hz, 3.0 * positive(highest_modulation_hz, "highest_modulation_hz", "Hz"))
-    band = grid.best_band(narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
+    if band_hz is None:
+        band = grid.best_band(narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
+    else:
+        band = given_band(x, fs, band_hz)
     unit = "" if preparation == "whitened" else unit
     envelope = band_envelope(x, fs, band.band_hz, kind=kind, unit=unit, source=channel)
     spectrum = envelope_spectrum(envelope, highest_hz=highest_modulation_hz)
     return ChosenBand(band, grid, envelope, spectrum, grid.remarks(band))
+
+
+def given_band(values: FloatArray, sampling_rate_hz: float, band_hz: tuple[float, float]) -> BandCandidate:
+    """Return the kurtosis of a band that was not chosen from the tree, see `Kurtogram` for its definition.
+
+    Raises
+    ------
+    InputError
+        If the band lies outside of the spectrum or holds fewer than three lines.
+    RefusalError
+        If there is nothing in the band.
+    """
+    square = band_envelope(values, sampling_rate_hz, band_hz, kind="squared").values
+    mean = float(np.mean(square))
+    if mean <= 0.0:
+        raise RefusalError("there is no signal in the band", remedy="choose another band")
+    n_bands = sampling_rate_hz / 2.0 / (band_hz[1] - band_hz[0])
+    kurtosis = float(np.mean(np.square(square / mean))) - 2.0
+    error = kurtosis_error(2, max(1, round(len(values) / n_bands)))
+    return BandCandidate(float(band_hz[0]), float(band_hz[1]), float(np.log2(n_bands)), kurtosis, error)
 
 
 def _checked_levels(n_samples: int, n_levels: int | None) -> int:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, count, frozen_array, one_of
 from gearsig.errors import InputError, RefusalError
@@ -61,11 +62,58 @@ class WaveletPackets:
         """In Hz or orders."""
         return self.rate / 2 / self.n_bands
 
+    @property
+    def level(self) -> int:
+        """How often the signal was split."""
+        return self.n_bands.bit_length() - 1
+
+    @property
+    def energies(self) -> FloatArray:
+        """Sum of squares of each band, (n_bands,): they add up to that of the signal."""
+        result: FloatArray = np.einsum("ij,ij->i", self.values, self.values)
+        return result
+
+    def limits_of(self, band: int) -> tuple[float, float]:
+        """Return the lower and upper border of a band in Hz or orders; its filter's skirts reach beyond."""
+        return band * self.band_width, (band + 1) * self.band_width
+
     def band_of(self, position: float) -> int:
         """Return the index of the band that holds a frequency or order."""
         if not 0.0 <= position <= self.rate / 2:
             raise InputError(f"position is {position:g}", allowed=f"0 to {self.rate / 2:g}")
         return min(int(position / self.band_width), self.n_bands - 1)
+
+
+def node_path(band: int, level: int) -> str:
+    """Return which filters lead to a band: "a" low-pass, "d" high-pass, the first split first.
+
+    A high-pass branch comes out mirrored in frequency, so that paths run through the bands in Gray's code.
+
+    Examples
+    --------
+    >>> [node_path(band, 2) for band in range(4)]
+    ['aa', 'ad', 'dd', 'da']
+    """
+    if not 0 <= band < 1 << count(level, "level"):
+        raise InputError(f"band {band} is not there", where="band", allowed=f"0 to {(1 << level) - 1}")
+    return f"{band ^ (band >> 1):0{level}b}".replace("0", "a").replace("1", "d")
+
+
+def natural_order(n_bands: int) -> NDArray[np.int64]:
+    """Return the bands in the order of the filter tree (Paley's): by path, "a" before "d".
+
+    Parameters
+    ----------
+    n_bands : int
+        2^level.
+
+    Returns
+    -------
+    array, (n_bands,)
+        Indices into rows that run upwards in frequency.
+    """
+    bands = np.arange(n_bands, dtype=np.int64)
+    return np.argsort(bands ^ (bands >> 1), kind="stable").astype(np.int64)
 
 
 def wavelet_packets(

@@ -50,7 +50,9 @@ def test_every_method_answers_for_samples_of_every_kind(sample: str) -> None:
     for method in METHODS:
         choose(page, "Method", method)
         assert not page.error, shown_text(page)
-        assert len(page.get("plotly_chart")) + len(page.get("image")) > 0
+        drawn = len(page.get("plotly_chart")) + len(page.get("image"))
+        told = method == "Crack severity" and len(page.info) + len(page.success) == 1
+        assert drawn > 0 or told
         assert "Analysed: 0 to" in shown_text(page)
 
 

@@ -44,8 +44,8 @@ def show_spectrum(
     marked: Sequence[float] = (),
     shown: tuple[float, float] | None = None,
     scale: str = "Logarithmic",
-) -> None:
-    """Show a spectrum and what can be changed about its view.
+) -> tuple[float, float]:
+    """Show a spectrum and what can be changed about its view; return the stretch that is shown.
 
     Parameters
     ----------
@@ -83,6 +83,7 @@ def show_spectrum(
     limits = choose_range(f"{unit}", analysis, float(spectrum.positions[-1]), shown=shown, name=name)
     shown_cursors = [_first_if_found(cursor, marked) for cursor in cursors if cursor.kind in chosen]
     _draw(analysis, spectrum, SCALES[label or scale], limits, shown_cursors, marked, name)
+    return limits
 
 
 def _first_if_found(cursor: Cursor, marked: Sequence[float]) -> Cursor:

@@ -4,27 +4,22 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.widgets.line_chart import Axes
 from app.dashboard.widgets.methods.choice import choose_one
-from app.dashboard.widgets.methods.curves import Curve, show_curves
+from app.dashboard.widgets.methods.downloads import offer_downloads
 from app.dashboard.widgets.methods.stretch import Stretch, choose_stretch
-from app.dashboard.widgets.range_slider import choose_range
+from app.dashboard.widgets.methods.waveforms import Waveforms, choose_window, show_waveforms, waveforms_of
 from gearsig.diagnosis.types import Analysis, ChannelAnalysis
-from gearsig.plot.display import unit_text, with_unit
-from gearsig.plot.thin import thin
+from gearsig.plot.display import unit_text
 from gearsig.report.numbers import readable
 
 if TYPE_CHECKING:
     from gearsig.decompose.wavelet_types import Denoised, DenoiseSettings
 
-N_FIRST = 200_000
+N_FIRST, N_MOST = 200_000, 4_000_000
 N_KEPT = 4
-N_SHOWN = 3000
-"""Samples of the waveforms at first."""
 WAVELETS = ("sym8", "sym4", "db4", "db8", "coif3", "haar")
 THRESHOLDS = {
     "universal": "next to no noise is left",
@@ -38,12 +33,15 @@ def show_denoising(analysis: Analysis, channel: ChannelAnalysis) -> None:
     settings = _choose_settings(analysis)
     left, right = st.columns(2)
     with left:
-        stretch = choose_stretch(analysis, channel, "denoising", n_first=N_FIRST)
+        stretch = choose_stretch(analysis, channel, "denoising", n_first=N_FIRST, n_most=N_MOST)
     with st.spinner("Removing the noise …", show_time=True):
         found = denoised(stretch.key, settings, stretch)
+    waveforms = denoised_waveforms(stretch, found)
     with right:
-        limits = _choose_window(analysis, stretch)
-    _show_waveforms(analysis, stretch, found, limits)
+        limits = choose_window(analysis, waveforms, "denoising")
+    looks = {"signal": -1, "without noise": 0}
+    show_waveforms(analysis, waveforms, limits, looks, "denoising", last=False)
+    show_waveforms(analysis, waveforms, limits, {"removed": 1}, "denoising removed", label="removed", height_px=180)
     unit = unit_text(stretch.unit)
     st.markdown(
         f"Removed: **{100.0 * found.removed_share:.3g} %** of the energy. Estimated noise on the finest level: "
@@ -54,6 +52,18 @@ def show_denoising(analysis: Analysis, channel: ChannelAnalysis) -> None:
         "gathered by a spectrum or a synchronous average."
     )
     _show_levels(found, unit)
+    offer_downloads(analysis, "denoising", waveforms)
+
+
+def denoised_waveforms(stretch: Stretch, found: Denoised) -> Waveforms:
+    """Return the signal, what is left of it, and what was removed."""
+    told = found.settings
+    columns = {
+        "signal": stretch.recording.values(stretch.channel),
+        "without noise": found.values,
+        "removed": found.removed,
+    }
+    return waveforms_of(stretch, columns, f"{told.threshold} {told.rule} thresholds, {told.wavelet}")
 
 
 def _choose_settings(analysis: Analysis) -> DenoiseSettings:
@@ -89,30 +99,6 @@ def denoised(key: str, settings: DenoiseSettings, _stretch: Stretch) -> Denoised
 
     del key
     return denoise_channel(_stretch.recording, _stretch.channel, settings)
-
-
-def _choose_window(analysis: Analysis, stretch: Stretch) -> tuple[float, float]:
-    rate = stretch.recording.sampling_rate_hz
-    shown = (stretch.start_s, min(stretch.end_s, stretch.start_s + N_SHOWN / rate))
-    return choose_range(
-        "Waveforms shown (s)", analysis, stretch.end_s, start=stretch.start_s, shown=shown, name="denoising"
-    )
-
-
-def _show_waveforms(analysis: Analysis, stretch: Stretch, found: Denoised, limits: tuple[float, float]) -> None:
-    rate = found.sampling_rate_hz
-    start = max(0, int((limits[0] - stretch.start_s) * rate))
-    part = slice(start, start + max(2, int(np.ceil((limits[1] - limits[0]) * rate)) + 1))
-    time = stretch.start_s + np.arange(len(found.values))[part] / rate
-    signal = stretch.recording.values(stretch.channel)[part]
-    curves = [
-        Curve(*thin(time, signal), "signal", -1),
-        Curve(*thin(time, found.values[part]), "without noise", 0),
-    ]
-    show_curves(curves, Axes("", with_unit("signal", stretch.unit), limits), _key("signal", analysis), height_px=240)
-    removed = [Curve(*thin(time, found.removed[part]), "removed", 1)]
-    axes = Axes("time (s)", with_unit("removed", stretch.unit), limits)
-    show_curves(removed, axes, _key("removed", analysis), height_px=180)
 
 
 def _show_levels(found: Denoised, unit: str) -> None:

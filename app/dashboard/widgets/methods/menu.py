@@ -7,10 +7,15 @@ import streamlit as st
 from app.dashboard import state
 from app.dashboard.widgets.errors import show_error
 from app.dashboard.widgets.methods.choice import choose_one
+from app.dashboard.widgets.methods.coherence import show_coherence
+from app.dashboard.widgets.methods.crack import show_crack
 from app.dashboard.widgets.methods.denoising import show_denoising
+from app.dashboard.widgets.methods.kurtogram import show_kurtogram
 from app.dashboard.widgets.methods.modes import show_modes
 from app.dashboard.widgets.methods.order_tracking import show_order_tracking
+from app.dashboard.widgets.methods.packets import show_packets
 from app.dashboard.widgets.methods.phase_plane import show_phase_plane
+from app.dashboard.widgets.methods.ridges import show_ridges
 from app.dashboard.widgets.methods.time_frequency import show_time_frequency
 from app.dashboard.widgets.views import ChannelView
 from gearsig.diagnosis.types import Analysis, ChannelAnalysis
@@ -20,6 +25,22 @@ METHODS: dict[str, tuple[ChannelView, str]] = {
     "Time–frequency": (
         show_time_frequency,
         "Levels over time and frequency, or over shaft angle and order: shows what comes and goes, and what sweeps.",
+    ),
+    "Ridges": (
+        show_ridges,
+        "Follows components along their momentary frequency or order, and gives each one's waveform.",
+    ),
+    "Wavelet packets": (
+        show_packets,
+        "Splits the signal into bands of equal width, says how the energy spreads over them, and gives any of them.",
+    ),
+    "Kurtogram": (
+        show_kurtogram,
+        "Finds the band that carries impacts, and what rhythm they have: the spectrum of its envelope.",
+    ),
+    "Cyclic coherence": (
+        show_coherence,
+        "Finds rhythms in noise and in which band they are, also where no band stands out: for bearings and wear.",
     ),
     "Orders (Vold–Kalman)": (
         show_order_tracking,
@@ -36,6 +57,10 @@ METHODS: dict[str, tuple[ChannelView, str]] = {
     "Phase plane": (
         show_phase_plane,
         "Velocity over displacement, with a point once per mesh cycle or revolution: does the motion repeat?",
+    ),
+    "Crack severity": (
+        show_crack,
+        "How deep a crack in a tooth root is, in mm with an interval; best beside a recording of the sound gears.",
     ),
 }
 METHOD = "method"

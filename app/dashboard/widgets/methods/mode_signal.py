@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from app.dashboard import state
 from app.dashboard.widgets.methods.choice import choose_one
 from app.dashboard.widgets.methods.stretch import Stretch
+from app.dashboard.widgets.methods.uniform_signal import signal_of
 from app.dashboard.widgets.range_slider import choose_range
 from gearsig.checks import FloatArray
 from gearsig.diagnosis.types import Analysis, ChannelAnalysis
@@ -22,7 +23,7 @@ USUAL_BAND = (0.5, 0.9)
 
 @dataclass(frozen=True)
 class ModeSignal:
-    """Samples at equal steps of time or angle; `key` stands for all of it."""
+    """Samples at equal steps of time or angle, the first at `start`; `key` stands for all of it."""
 
     values: FloatArray
     rate: float
@@ -32,6 +33,8 @@ class ModeSignal:
     key: str
     shaft: str = ""
     offset: float = 0.0
+    start: float = 0.0
+    quantity: str = "unknown"
 
 
 def choose_signal(analysis: Analysis, channel: ChannelAnalysis, stretch: Stretch) -> ModeSignal:
@@ -44,8 +47,16 @@ def choose_signal(analysis: Analysis, channel: ChannelAnalysis, stretch: Stretch
     if kind == "Over angle" and stretch.angle is not None:
         return _over_angle(stretch)
     recording = stretch.recording
-    values = recording.values(stretch.channel)
-    return ModeSignal(values, recording.sampling_rate_hz, "frequency", stretch.unit, stretch.channel, stretch.key)
+    return ModeSignal(
+        recording.values(stretch.channel),
+        recording.sampling_rate_hz,
+        "frequency",
+        stretch.unit,
+        stretch.channel,
+        stretch.key,
+        start=stretch.start_s,
+        quantity=recording.channels[0].quantity,
+    )
 
 
 def _envelope(analysis: Analysis, channel: ChannelAnalysis, stretch: Stretch) -> ModeSignal:
@@ -65,20 +76,28 @@ def _envelope(analysis: Analysis, channel: ChannelAnalysis, stretch: Stretch) ->
     mean = float(envelope.values.mean())
     key = f"{stretch.key} envelope {band!r}"
     values = envelope.values - mean
-    return ModeSignal(values, envelope.sampling_rate_hz, "frequency", envelope.unit, envelope.source, key, offset=mean)
+    return ModeSignal(
+        values,
+        envelope.sampling_rate_hz,
+        "frequency",
+        envelope.unit,
+        envelope.source,
+        key,
+        offset=mean,
+        start=stretch.start_s,
+    )
 
 
 def _over_angle(stretch: Stretch) -> ModeSignal:
-    from gearsig.angle.resample import resample_to_angle
-
-    assert stretch.angle is not None  # noqa: S101 - the caller's condition, said to the type checker
-    signal = resample_to_angle(stretch.recording, stretch.angle, channels=[stretch.channel])
+    signal = signal_of(stretch, over_angle=True)
     return ModeSignal(
-        signal.values(stretch.channel),
-        float(signal.samples_per_revolution),
+        signal.values,
+        signal.rate,
         "order",
         stretch.unit,
         stretch.channel,
         f"{stretch.key} angle",
-        signal.shaft_angle.shaft,
+        signal.shaft,
+        start=signal.start,
+        quantity=stretch.recording.channels[0].quantity,
     )

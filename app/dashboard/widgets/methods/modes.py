@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, cast
 
 import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.widgets.methods.choice import choose_one
+from app.dashboard.widgets.methods.downloads import offer_downloads
 from app.dashboard.widgets.methods.mode_signal import ModeSignal, choose_signal
 from app.dashboard.widgets.methods.mode_suggestion import show_suggestion
 from app.dashboard.widgets.methods.notes import show_notes
 from app.dashboard.widgets.methods.stretch import choose_stretch
+from app.dashboard.widgets.methods.waveforms import Waveforms
 from app.dashboard.widgets.picture import show_picture
 from app.dashboard.widgets.range_slider import choose_range
 from gearsig.diagnosis.types import Analysis, ChannelAnalysis
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from gearsig.decompose.types import Modes, StartName, VmdSettings
 
 N_FIRST, N_MOST = 2**16, 2**19
@@ -48,6 +53,32 @@ def show_modes(analysis: Analysis, channel: ChannelAnalysis) -> None:
         f"{end} after {modes.n_iterations} iterations. Marked in each spectrum: the mode's centre, and its width to "
         "both sides. Grey: what is left."
     )
+    offer_downloads(analysis, "modes", mode_waveforms(signal, modes), tables={"Modes": lambda: mode_columns(modes)})
+
+
+def mode_waveforms(signal: ModeSignal, modes: Modes) -> Waveforms:
+    """Return the modes by rising centre, and the residual."""
+    unit = "Hz" if modes.axis == "frequency" else "orders"
+    columns = {f"mode {k + 1}, {modes.centres[k]:.5g} {unit}": modes.waveforms[k] for k in modes.by_centre()} | {
+        "residual": modes.residual
+    }
+    told = modes.settings
+    step = f"{modes.n_modes} variational modes, penalty {told.penalty:g}, of {modes.source} less {modes.offset:g}"
+    return Waveforms(
+        columns, modes.sampling_rate, signal.start, modes.unit, signal.quantity, step, modes.axis, modes.shaft
+    )
+
+
+def mode_columns(modes: Modes) -> Mapping[str, ArrayLike]:
+    """Return number, centre, bandwidth and rms of each mode, by rising centre."""
+    order = list(modes.by_centre())
+    unit = "Hz" if modes.axis == "frequency" else "orders"
+    return {
+        "mode": [k + 1 for k in order],
+        f"centre ({unit})": modes.centres[order],
+        f"bandwidth ({unit})": modes.bandwidths[order],
+        f"rms ({modes.unit or 1})": modes.rms[order],
+    }
 
 
 def _choose_settings(analysis: Analysis) -> VmdSettings:

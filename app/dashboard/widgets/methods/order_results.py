@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,23 +12,26 @@ from app.dashboard import state
 from app.dashboard.widgets.line_chart import Axes
 from app.dashboard.widgets.methods.choice import choose_one
 from app.dashboard.widgets.methods.curves import Curve, show_curves
+from app.dashboard.widgets.methods.downloads import offer_downloads
 from app.dashboard.widgets.methods.notes import show_notes
 from app.dashboard.widgets.methods.stretch import Stretch
-from app.dashboard.widgets.range_slider import choose_range
+from app.dashboard.widgets.methods.waveforms import Waveforms, choose_window, show_waveforms, waveforms_of
 from gearsig.checks import FloatArray
 from gearsig.diagnosis.types import Analysis
 from gearsig.plot.display import unit_text, with_unit
-from gearsig.plot.thin import thin
 from gearsig.report.lines import speed_is_constant
 from gearsig.report.numbers import readable
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from gearsig.orders.types import TrackedOrder
     from gearsig.orders.vold_kalman_types import OrderSeparation, SeparatedOrder
 
 N_POINTS = 2000
 REVOLUTIONS_SHOWN = 3.0
 """Of the waveforms at first."""
+REST = "what is left without all chosen orders"
 
 
 def show_separation(
@@ -121,38 +124,34 @@ def _row(name: str, values: FloatArray, median: float) -> tuple[str, float, floa
 
 
 def _show_waveforms(analysis: Analysis, stretch: Stretch, names: Sequence[str], separation: OrderSeparation) -> None:
-    name = st.selectbox("Waveform of", list(names), key=_key(f"waveform of {list(names)}", analysis))
-    order = separation.orders[list(names).index(name)]
-    limits = _choose_window(analysis, stretch, order)
-    rate = separation.sampling_rate_hz
-    start = int((limits[0] - stretch.start_s) * rate)
-    part = slice(max(0, start), max(start, 0) + max(2, int(np.ceil((limits[1] - limits[0]) * rate)) + 1))
-    time = stretch.start_s + separation.time_s()[part]
-    signal = stretch.recording.values(stretch.channel)
-    axes = Axes("time (s)", with_unit("signal", stretch.unit), limits)
-    curves = [
-        Curve(*thin(time, signal[part]), "signal", -1),
-        Curve(*thin(time, order.waveform[part]), name, 0),
-    ]
-    show_curves(curves, axes, _key("waveforms", analysis), height_px=240)
-    left_over = [Curve(*thin(time, separation.residual[part]), "what is left without all chosen orders", 1)]
-    axes = Axes("time (s)", with_unit("what is left", stretch.unit), limits)
-    show_curves(left_over, axes, _key("residual", analysis), height_px=180)
-
-
-def _choose_window(analysis: Analysis, stretch: Stretch, order: SeparatedOrder) -> tuple[float, float]:
-    """Return the time that is shown, a few revolutions from the middle at first."""
+    waveforms = order_waveforms(stretch, names, separation)
+    chosen = st.selectbox("Waveform of", list(names), key=_key(f"waveform of {list(names)}", analysis))
+    order = separation.orders[list(names).index(chosen)]
     speed = float(np.median(order.frequency_hz)) / order.order
-    half = min(REVOLUTIONS_SHOWN / max(speed, 1e-9), stretch.recording.duration_s) / 2.0
-    middle = (stretch.start_s + stretch.end_s) / 2.0
-    return choose_range(
-        "Waveforms shown (s)",
-        analysis,
-        stretch.end_s,
-        start=stretch.start_s,
-        shown=(middle - half, middle + half),
-        name="order tracking",
-    )
+    shown = REVOLUTIONS_SHOWN / max(speed, 1e-9)
+    limits = choose_window(analysis, waveforms, "order tracking", shown=shown, in_middle=True)
+    show_waveforms(analysis, waveforms, limits, {"signal": -1, chosen: 0}, "order signal", last=False)
+    show_waveforms(analysis, waveforms, limits, {REST: 1}, "order rest", label="what is left", height_px=180)
+    tables = {"Levels": lambda: level_columns(stretch, names, separation)}
+    offer_downloads(analysis, "orders", waveforms, tables=tables)
+
+
+def order_waveforms(stretch: Stretch, names: Sequence[str], separation: OrderSeparation) -> Waveforms:
+    """Return the signal, each order, and what is left."""
+    orders = {name: order.waveform for name, order in _pairs(names, separation)}
+    columns = {"signal": stretch.recording.values(stretch.channel), **orders, REST: separation.residual}
+    return waveforms_of(stretch, columns, f"Vold-Kalman orders {', '.join(names)}")
+
+
+def level_columns(stretch: Stretch, names: Sequence[str], separation: OrderSeparation) -> Mapping[str, ArrayLike]:
+    """Return time, speed, and the amplitude of each order, at every sample."""
+    columns: dict[str, ArrayLike] = {
+        "time (s)": stretch.start_s + separation.time_s(),
+        "speed of the reference shaft (rpm)": _speed_rpm(separation.orders[0]),
+    }
+    for name, order in _pairs(names, separation):
+        columns[with_unit(f"{name}, amplitude peak", stretch.unit)] = order.amplitude
+    return columns
 
 
 def _key(name: str, analysis: Analysis) -> str:
