@@ -42,6 +42,10 @@ app.command()(demo)
 app.command()(dashboard)
 
 
+USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
+"""Base of all errors of Typer's parser, which it does not export; since version 0.20 it is no longer Click's."""
+
+
 def _show_version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"gearsig {__version__}")
@@ -58,16 +62,27 @@ def _root(
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; an error of the user's input is one line on standard error and exit code 2."""
     try:
-        app(args=list(arguments) if arguments is not None else None)
+        sys.exit(app(args=list(arguments) if arguments is not None else None, standalone_mode=False))
+    except USAGE_ERROR as error:  # a wrong option or argument: left alone, Typer draws a frame of several lines
+        typer.echo(_usage_text(error), err=True, nl=bool(_usage_text(error)))
+        sys.exit(EXIT_INPUT_ERROR)
     except (InputError, RefusalError) as error:
         typer.echo(f"gearsig: {error}", err=True)
         sys.exit(EXIT_INPUT_ERROR)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, typer.Abort):
         typer.echo("gearsig: stopped", err=True)
         sys.exit(EXIT_INTERRUPTED)
     except BrokenPipeError:  # the reader of our output has gone, e.g. `| head`
         sys.stderr.close()
         sys.exit(0)
+
+
+def _usage_text(error: Exception) -> str:
+    """Return an error of the parser in one line; empty where it has printed the help instead."""
+    what = " ".join(str(getattr(error, "format_message", error.__str__)()).rstrip(".").split())
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context is not None else "gearsig"
+    return f"gearsig: {what}{' See' if what.endswith('?') else '; see'} {command} --help" if what else ""
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from gearsig.errors import GearsigError, InputError
 
 if TYPE_CHECKING:
+    from gearsig.recording.types import Recording
     from gearsig.report.entry import Entry, Failure
     from gearsig.rig.speed import SpeedSource
     from gearsig.rig.types import Rig
@@ -55,6 +56,8 @@ class _Job:
     sampling_rate_hz: float | None
     speed: SpeedSource | None
     command: str
+    reference: Path | None = None
+    torque_nm: float | None = None
 
 
 def report_many(
@@ -68,6 +71,8 @@ def report_many(
     executor: Executor | None = None,
     on_progress: Progress | None = None,
     command: str = "",
+    reference: str | Path | None = None,
+    torque_nm: float | None = None,
 ) -> BatchResult:
     """Analyse recordings and write a page for each, and an index that compares them.
 
@@ -94,6 +99,10 @@ def report_many(
         Called as ``on_progress(n_done, n_total, result)`` with an `Entry` or a `Failure`, in the order of completion.
     command : str
         The command that makes the report again, for the pages.
+    reference : str, Path or None
+        Recording of the same machine when it was sound; all are compared with it but itself.
+    torque_nm : float or None
+        For the depth of cracks, instead of the rig's operating point.
 
     Returns
     -------
@@ -113,7 +122,11 @@ def report_many(
         raise InputError("there are no recordings to report on", remedy="name at least one file")
     workers = min(len(files), _n_processors()) if n_processes is None else count(n_processes, "n_processes")
     folder = _made(Path(output_folder))
-    jobs = _jobs(files, folder, rig, sampling_rate_hz, speed, command)
+    sound = Path(reference) if reference is not None else None
+    jobs = [
+        replace(job, reference=None if sound is None or _is_same_file(job.path, sound) else sound, torque_nm=torque_nm)
+        for job in _jobs(files, folder, rig, sampling_rate_hz, speed, command)
+    ]
     results: dict[int, Entry | Failure] = {}
     try:
         with closing(_run(jobs, min(workers, len(jobs)), executor)) as running:
@@ -233,14 +246,32 @@ def _report_one(job: _Job) -> Entry | Failure:
     try:
         beside = rig_file_beside(job.path) if job.rig is None else None
         rig = read_rig(beside) if beside is not None else job.rig
-        recording = read_recording(job.path, rig=rig, sampling_rate_hz=job.sampling_rate_hz, speed=job.speed)
-        analysis = analyze(recording)
+        analysis = analyze(
+            read_recording(job.path, rig=rig, sampling_rate_hz=job.sampling_rate_hz, speed=job.speed),
+            reference=_reference_of(job, rig),
+            torque_nm=job.torque_nm,
+        )
         write_page(analysis, job.page, command=job.command, index="index.html")
         return entry_of(analysis, job.name, job.page.name)
     except GearsigError as error:
         return _failure(job, str(error))
     except Exception as error:  # noqa: BLE001 - one broken file must not stop the rest; the reason is passed on
         return _failure(job, f"unexpected error, please report: {type(error).__name__}: {' '.join(str(error).split())}")
+
+
+def _reference_of(job: _Job, rig: Rig | None) -> Recording | None:
+    """Read the recording of the sound machine; pulse times would belong to the other one."""
+    from gearsig.recording.read import read_recording
+    from gearsig.rig.speed import PulseTimes
+
+    if job.reference is None:
+        return None
+    speed = None if isinstance(job.speed, PulseTimes) else job.speed
+    return read_recording(job.reference, rig=rig, sampling_rate_hz=job.sampling_rate_hz, speed=speed)
+
+
+def _is_same_file(one: Path, other: Path) -> bool:
+    return one.exists() and other.exists() and one.samefile(other)
 
 
 def _failure(job: _Job, reason: str) -> Failure:

@@ -32,6 +32,17 @@ TachometerTimesOption = Annotated[
     Path | None, typer.Option("--tach-times", metavar="FILE", help="File with the times of the tachometer pulses in s.")
 ]
 PulsesOption = Annotated[int, typer.Option("--pulses-per-revolution", help="Pulses per revolution in --tach-times.")]
+ReferenceOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--reference",
+        metavar="FILE",
+        help="Recording of the same machine when it was sound: same sensors, speed and load.",
+    ),
+]
+TorqueOption = Annotated[
+    str | None, typer.Option("--torque", help="Of the input shaft, e.g. 110Nm, where the rig file does not say it.")
+]
 
 
 def open_rig(path: Path | None, recording: Path | None = None) -> Rig | None:
@@ -67,3 +78,19 @@ def open_recording(
     from gearsig.recording.read import read_recording
 
     return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+
+
+def open_reference(
+    path: Path | None, rig: Rig | None, sampling_rate_hz: float | None, speed_rpm: float | None
+) -> Recording | None:
+    """Read the recording of the sound machine, if one is given; pulse times belong to the other recording."""
+    if path is None:
+        return None
+    return open_recording(path, rig, sampling_rate_hz, stated_speed(speed_rpm, None, 1))
+
+
+def torque_of(text: str | None) -> float | None:
+    """Return the torque that the option states, in N m."""
+    from app.quantities import quantity
+
+    return quantity(text, "N m", "--torque") if text else None

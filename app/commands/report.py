@@ -5,11 +5,26 @@ from __future__ import annotations
 import shlex
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.options import RigOption, SamplingRateOption, SpeedOption, open_rig, stated_speed
+from app.commands.options import (
+    PulsesOption,
+    ReferenceOption,
+    RigOption,
+    SamplingRateOption,
+    SpeedOption,
+    TachometerTimesOption,
+    TorqueOption,
+    open_rig,
+    stated_speed,
+    torque_of,
+)
+from gearsig.errors import InputError
+
+if TYPE_CHECKING:
+    from gearsig.rig.speed import SpeedSource
 
 EXIT_SOME_FAILED = 1
 EXIT_NONE_READ = 2
@@ -21,16 +36,28 @@ def report(
     rig: RigOption = None,
     fs: SamplingRateOption = None,
     speed_rpm: SpeedOption = None,
+    tach_times: TachometerTimesOption = None,
+    pulses_per_revolution: PulsesOption = 1,
+    reference: ReferenceOption = None,
+    torque: TorqueOption = None,
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one per processor.")] = None,
 ) -> None:
     """Write one self-contained HTML page per recording, and an index page that compares them.
 
     A file that cannot be read does not stop the others: the index lists it with its reason, and the exit code is 1
-    (2 if no file could be read).
+    (2 if no file could be read). With --reference, all recordings are compared with that one.
 
     Example: gearsig report monday.csv tuesday.csv --rig gearbox.toml -o report
     """
-    failed = make_report(files, output, rig, fs, speed_rpm, jobs, command="gearsig " + shlex.join(sys.argv[1:]))
+    if tach_times is not None and len(files) > 1:
+        raise InputError(
+            f"--tach-times belong to one recording, and there are {len(files)}", remedy="make a report for each"
+        )
+    speed = stated_speed(speed_rpm, tach_times, pulses_per_revolution)
+    command = "gearsig " + shlex.join(sys.argv[1:])
+    failed = make_report(
+        files, output, rig, fs, speed, jobs, command=command, reference=reference, torque_nm=torque_of(torque)
+    )
     if failed:
         raise typer.Exit(EXIT_NONE_READ if failed == len(files) else EXIT_SOME_FAILED)
 
@@ -40,9 +67,11 @@ def make_report(
     output: Path,
     rig: Path | None,
     fs: float | None,
-    speed_rpm: float | None,
+    speed: SpeedSource | None,
     jobs: int | None,
     command: str,
+    reference: Path | None = None,
+    torque_nm: float | None = None,
 ) -> int:
     """Write the pages with a progress bar; return how many files failed."""
     from rich.console import Console
@@ -59,10 +88,12 @@ def make_report(
             output,
             rig=open_rig(rig),
             sampling_rate_hz=fs,
-            speed=stated_speed(speed_rpm, None, 1),
+            speed=speed,
             n_processes=jobs,
             on_progress=lambda *_: progress.advance(task),
             command=command,
+            reference=reference,
+            torque_nm=torque_nm,
         )
     for entry in result.entries:
         typer.echo(f"{entry.name}: {entry.verdict}")

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 
+import numpy as np
+
 from gearsig.angle.types import ShaftAngle
+from gearsig.diagnosis.comparison import beside_reference
+from gearsig.diagnosis.crack import crack_depth, with_crack
 from gearsig.diagnosis.detectors.bearing import detect_bearings
 from gearsig.diagnosis.detectors.lines import detect_lines
 from gearsig.diagnosis.detectors.mesh import detect_mesh
@@ -29,7 +34,15 @@ LARGEST_VALUE = 1e60
 """Beyond it, fourth powers leave the range of floating point numbers; no unit makes vibration so large."""
 
 
-def analyze(recording: Recording, rig: Rig | None = None, settings: AnalysisSettings | None = None) -> Analysis:
+def analyze(
+    recording: Recording,
+    rig: Rig | None = None,
+    settings: AnalysisSettings | None = None,
+    *,
+    reference: Recording | None = None,
+    torque_nm: float | None = None,
+    on_stage: Callable[[str], object] | None = None,
+) -> Analysis:
     """Diagnose one recording.
 
     Parameters
@@ -39,6 +52,13 @@ def analyze(recording: Recording, rig: Rig | None = None, settings: AnalysisSett
     rig : Rig or None
         Used where the recording carries none.
     settings : AnalysisSettings or None
+    reference : Recording or None
+        Of the same machine when it was sound, same sensors, speed and load: cracks of a millimetre show against it,
+        and indicators are compared with it.
+    torque_nm : float or None
+        For the depth of a crack, instead of the rig's operating point.
+    on_stage : callable or None
+        Called with a few words as each stage begins.
 
     Returns
     -------
@@ -48,13 +68,18 @@ def analyze(recording: Recording, rig: Rig | None = None, settings: AnalysisSett
     Raises
     ------
     InputError
-        If there is no vibration channel, or the record is shorter than 256 samples.
+        If there is no vibration channel, the record is shorter than 256 samples, or the reference has other channels or
+        is the recording itself.
     """
     settings = settings or AnalysisSettings()
+    tell = on_stage or (lambda _: None)
     if recording.rig is None and rig is not None:
         recording = recording.with_rig(rig)
     known = recording.rig or Rig()
     _check_size(recording)
+    if reference is not None:
+        _check_reference(recording, reference)
+    tell("finding the speed")
     findings, dead = detect_data_problems(recording)
     names = [name for name in recording.vibration_names() if name not in dead]
     angle = _angle_of(recording, known)
@@ -64,10 +89,19 @@ def analyze(recording: Recording, rig: Rig | None = None, settings: AnalysisSett
         order = ranked(findings)
         return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings))
     usable = angle if not isinstance(angle, CannotTell) else None
+    tell("averages and spectra")
     signals = compute_signals(recording.select(names), known, usable, settings)
+    tell("envelopes")
     envelopes = list(band_envelopes(signals))
+    tell("gears, bearings and shafts")
     findings += _detect(signals, envelopes)
-    order = ranked(findings)
+    then = None
+    if reference is not None:
+        tell("the reference")
+        then = analyze(reference, known if recording.rig is not None else None, settings)
+        findings = beside_reference(findings, then)
+    crack = crack_depth(recording, known, reference, torque_nm)
+    order = ranked(with_crack(findings, crack, known))
     return Analysis(
         recording=recording,
         rig=recording.rig,
@@ -77,6 +111,8 @@ def analyze(recording: Recording, rig: Rig | None = None, settings: AnalysisSett
         findings=order,
         verdict=verdict_of(order),
         settings=asdict(settings),
+        crack=crack,
+        reference=then,
     )
 
 
@@ -135,6 +171,17 @@ def _check_size(recording: Recording) -> None:
             where=where,
             remedy="name the channel's quantity with a [[sensor]] in the rig file",
         )
+
+
+def _check_reference(recording: Recording, reference: Recording) -> None:
+    where = reference.provenance.source or "reference"
+    if np.array_equal(recording.samples, reference.samples):
+        remedy = "give one that was taken when the machine was sound"
+        raise InputError("the reference is the recording itself", where=where, remedy=remedy)
+    missing = [name for name in recording.vibration_names() if name not in reference.channel_names]
+    if missing:
+        found = ", ".join(reference.channel_names)
+        raise InputError(f"the reference has no channel {missing[0]!r}", where=where, allowed=f"same channels: {found}")
 
 
 def _channel(

@@ -7,10 +7,14 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from gearsig.angle.types import ShaftAngle
+from gearsig.checks import FloatArray
 from gearsig.indicators.types import Indicator
 from gearsig.orders.types import OrderMap, SynchronousAverage
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
+from gearsig.severity.types import CrackEstimate, NoCrackSeen
+from gearsig.spectra.band_choice import BandCandidate
+from gearsig.spectra.kurtogram_types import Kurtogram
 from gearsig.spectra.types import Spectrum
 
 
@@ -34,7 +38,7 @@ class Outcome(Enum):
     NO_FAULT = "no fault"
 
 
-EXAMINED = ("no-tooth-local-damage", "no-bearing-damage")
+EXAMINED = ("no-tooth-local-damage", "no-crack-seen", "no-bearing-damage")
 """Codes of findings that say that something was examined that would have shown a fault."""
 
 HINDERING = ("channel-clipped", "channel-stuck", "channel-dead")
@@ -116,6 +120,49 @@ class CannotTell:
 
 
 @dataclass(frozen=True)
+class OrderLevel:
+    """The level of one order over speed, as a Vold–Kalman filter takes it out of a run-up or run-down.
+
+    Parameters
+    ----------
+    name : str
+        "mesh of stage 1" with its harmonic, or "order 2".
+    order : float
+        Of the reference shaft.
+    speed_rpm : array, (n,)
+        Of the reference shaft, ascending; middles of equal steps.
+    amplitude : array, (n,)
+        Peak amplitude, root mean square over the times at that speed.
+    unit : str
+    bandwidth_orders : float
+        Of the filter.
+    pair, harmonic
+        Of a mesh; empty and 0 for another order.
+    """
+
+    name: str
+    order: float
+    speed_rpm: FloatArray
+    amplitude: FloatArray
+    unit: str
+    bandwidth_orders: float
+    pair: str = ""
+    harmonic: int = 0
+
+    @property
+    def frequency_hz(self) -> FloatArray:
+        """Where the order lies at each speed."""
+        frequency: FloatArray = self.speed_rpm / 60.0 * self.order
+        return frequency
+
+    @property
+    def largest(self) -> tuple[float, float, float]:
+        """Largest amplitude, its speed in rpm and its frequency in Hz."""
+        i = int(self.amplitude.argmax())
+        return float(self.amplitude[i]), float(self.speed_rpm[i]), float(self.frequency_hz[i])
+
+
+@dataclass(frozen=True)
 class ChannelAnalysis:
     """The signals and spectra of one vibration channel.
 
@@ -135,6 +182,12 @@ class ChannelAnalysis:
         Only where the speed varies.
     averages : mapping
         (shaft, kind) → SynchronousAverage.
+    kurtogram : Kurtogram or None
+        Of the channel without its tones, where impacts of a bearing were found in its own band.
+    kurtogram_band : BandCandidate or None
+        The band it chooses.
+    order_levels : tuple of OrderLevel
+        Only where the speed runs through a range.
     """
 
     channel: str
@@ -145,6 +198,9 @@ class ChannelAnalysis:
     order_spectrum: Spectrum | None = None
     order_map: OrderMap | None = None
     averages: Mapping[tuple[str, str], SynchronousAverage] = field(default_factory=dict)
+    kurtogram: Kurtogram | None = None
+    kurtogram_band: BandCandidate | None = None
+    order_levels: tuple[OrderLevel, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -166,6 +222,10 @@ class Analysis:
         One sentence.
     settings : mapping
         The parameters that were in force, for the report.
+    crack : CrackEstimate, NoCrackSeen, CannotTell or None
+        Depth of a root crack; None where nobody asked and none is clear.
+    reference : Analysis or None
+        Of the recording of the sound machine that was given to compare with.
     """
 
     recording: Recording
@@ -176,6 +236,8 @@ class Analysis:
     findings: tuple[Finding, ...]
     verdict: str
     settings: Mapping[str, str | float | int | None] = field(default_factory=dict)
+    crack: CrackEstimate | NoCrackSeen | CannotTell | None = None
+    reference: Analysis | None = None
 
     @property
     def outcome(self) -> Outcome:

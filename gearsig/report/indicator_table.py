@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from gearsig.diagnosis.comparison import Change
 from gearsig.indicators.types import Indicator
 from gearsig.plot.display import unit_text
 from gearsig.report.numbers import readable
 from gearsig.report.sections import named
 
 Key = tuple[str, str, str, str]
+Compared = tuple[Indicator, Change | None]
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,7 @@ class IndicatorRow:
     band: str
     values: tuple[str, ...]
     note: str
+    references: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -34,11 +37,11 @@ class IndicatorTable:
     rows: tuple[IndicatorRow, ...]
 
 
-def indicator_tables(indicators: Iterable[Indicator]) -> tuple[IndicatorTable, ...]:
-    """Group indicators by what they belong to; each row then compares the channels."""
-    places: dict[str, list[Indicator]] = {}
-    for indicator in indicators:
-        places.setdefault(_place(indicator), []).append(indicator)
+def indicator_tables(indicators: Sequence[Indicator], then: Sequence[Change | None] = ()) -> tuple[IndicatorTable, ...]:
+    """Group indicators by what they belong to; each row then compares the channels, and these with the reference."""
+    places: dict[str, list[Compared]] = {}
+    for indicator, change in zip(indicators, then or [None] * len(indicators), strict=True):
+        places.setdefault(_place(indicator), []).append((indicator, change))
     return tuple(_table(title, items) for title, items in places.items())
 
 
@@ -54,20 +57,31 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:] if text.startswith(("gear ", "bearing ", "shaft ")) else text
 
 
-def _table(title: str, items: list[Indicator]) -> IndicatorTable:
-    channels = tuple(dict.fromkeys(item.channel for item in items))
-    rows: dict[Key, dict[str, Indicator]] = {}
-    for item in items:
-        rows.setdefault((item.name, item.unit, item.computed_on, item.band), {})[item.channel] = item
+def _table(title: str, items: list[Compared]) -> IndicatorTable:
+    channels = tuple(dict.fromkeys(item.channel for item, _ in items))
+    rows: dict[Key, dict[str, Compared]] = {}
+    for item, change in items:
+        rows.setdefault((item.name, item.unit, item.computed_on, item.band), {})[item.channel] = item, change
     return IndicatorTable(title, channels, tuple(_row(key, row, channels) for key, row in rows.items()))
 
 
-def _row(key: Key, row: dict[str, Indicator], channels: tuple[str, ...]) -> IndicatorRow:
-    values = tuple(readable(row[channel].value) if channel in row else "" for channel in channels)
+def _row(key: Key, row: dict[str, Compared], channels: tuple[str, ...]) -> IndicatorRow:
+    values = tuple(readable(row[channel][0].value) if channel in row else "" for channel in channels)
+    references = tuple(_reference_text(row[channel][1]) if channel in row else "" for channel in channels)
     notes: dict[str, list[str]] = {}
-    for channel, item in row.items():
+    for channel, (item, _) in row.items():
         if item.note:
             notes.setdefault(item.note, []).append(channel)
     texts = [note if len(named) == len(row) else f"{', '.join(named)}: {note}" for note, named in notes.items()]
     name, unit, computed_on, band = key
-    return IndicatorRow(name, unit_text(unit), computed_on, band, values, "; ".join(texts))
+    return IndicatorRow(name, unit_text(unit), computed_on, band, values, "; ".join(texts), references)
+
+
+def _reference_text(change: Change | None) -> str:
+    if change is None:
+        return ""
+    text = f"was {readable(change.reference_value)}"
+    if change.change_db is None:
+        return text
+    sign = "+" if change.change_db >= 0 else "−"
+    return f"{text}, {sign}{abs(change.change_db):.1f} dB"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
+from gearsig.diagnosis.comparison import changes
 from gearsig.diagnosis.types import Analysis
 from gearsig.report.files import write_text
 from gearsig.report.indicator_table import indicator_tables
@@ -15,6 +16,7 @@ from gearsig.report.sections import (
     finding_card,
     machine_rows,
     provenance_rows,
+    reference_text,
     speed_rows,
     truth_rows,
 )
@@ -68,7 +70,8 @@ def page_html(analysis: Analysis, *, command: str = "", index: str = "", date: d
         warnings=[text for text in recording.warnings if text not in {f.title for f in analysis.findings}],
         speed=speed_rows(analysis.shaft_angle),
         gallery=gallery(analysis),
-        tables=indicator_tables(analysis.indicators),
+        tables=indicator_tables(analysis.indicators, changes(analysis)),
+        reference=reference_text(analysis.reference),
         truth=truth_rows(recording.truth),
         provenance=provenance_rows(analysis, command, date or datetime.now().astimezone()),
         index=index,

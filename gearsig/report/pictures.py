@@ -10,6 +10,7 @@ from gearsig.diagnosis.types import Analysis, ChannelAnalysis, Kind
 from gearsig.orders.types import SynchronousAverage
 from gearsig.plot.cursors import Cursor
 from gearsig.plot.embed import Picture, embed
+from gearsig.report.crack_picture import crack_picture
 from gearsig.report.lines import (
     bearing_cursors,
     highest_order_of_interest,
@@ -52,8 +53,11 @@ class Gallery:
 def gallery(analysis: Analysis) -> Gallery:
     """Make the pictures of a page: the recording, then each channel, those with findings first and in most detail."""
     groups = [Group("Recording", tuple(_recording_pictures(analysis)))]
+    crack = crack_picture(analysis)
+    if crack is not None:
+        groups.insert(0, Group("The cracked tooth", (crack,)))
     left_out: list[str] = []
-    n_bytes = _size(groups[0])
+    n_bytes = sum(_size(group) for group in groups)
     detailed = _detailed_channels(analysis)
     for channel in sorted(analysis.channels, key=lambda c: c.channel not in detailed):
         if n_bytes > MOST_BYTES:

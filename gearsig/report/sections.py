@@ -185,6 +185,16 @@ def _setting(value: str | float | int | None) -> str:
     return "none" if value is None else str(value)
 
 
+def reference_text(reference: Analysis | None) -> str:
+    """Return which recording was compared with; empty without one. A reference that is not sound itself is told."""
+    if reference is None:
+        return ""
+    text = f"Compared with {reference.recording.provenance.source or 'a reference'}"
+    if reference.outcome in (Outcome.FAULT, Outcome.SUSPICION):
+        return f"{text}, which is not sound itself: {reference.verdict}"
+    return f"{text}."
+
+
 def truth_rows(truth: Mapping[str, object] | None) -> Rows:
     """Return what a simulator put in, for simulated recordings."""
     return tuple((name, str(value)[:200]) for name, value in (truth or {}).items())

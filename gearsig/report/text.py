@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from textwrap import fill
 
+from gearsig.diagnosis.comparison import Change, changes
 from gearsig.diagnosis.types import Analysis, Finding, Kind
-from gearsig.indicators.types import Indicator
-from gearsig.report.sections import strength_text, where_texts
+from gearsig.report.sections import reference_text, strength_text, where_texts
 
 WIDTH = 100
 _SHORT = (Kind.NOTICE, Kind.INFORMATION)
@@ -23,6 +23,7 @@ def analysis_text(analysis: Analysis, *, with_indicators: bool = False) -> str:
     size = f"{len(recording.channels)} channel(s), {recording.duration_s:.6g} s at {recording.sampling_rate_hz:.6g} Hz"
     lines = [
         f"{recording.provenance.source or 'recording'}: {size}, {machine}",
+        *([_paragraph(compared, "", first="")] if (compared := reference_text(analysis.reference)) else []),
         "",
         fill(analysis.verdict, WIDTH),
         "",
@@ -30,7 +31,7 @@ def analysis_text(analysis: Analysis, *, with_indicators: bool = False) -> str:
     for number, finding in enumerate(analysis.findings, 1):
         lines += _finding_lines(number, finding)
     if with_indicators:
-        lines += ["", *_indicator_lines(analysis.indicators)]
+        lines += ["", *_indicator_lines(analysis)]
     return "\n".join(lines)
 
 
@@ -58,9 +59,18 @@ def _paragraph(text: str, indent: str = "      ", *, first: str | None = None) -
     return fill(text, WIDTH, initial_indent="    " if first is None else first, subsequent_indent=indent)
 
 
-def _indicator_lines(indicators: tuple[Indicator, ...]) -> list[str]:
-    lines = [f"{'indicator':<24} {'value':>12} {'unit':<10} {'channel':<12} {'of':<20} computed on"]
-    for i in indicators:
+def _indicator_lines(analysis: Analysis) -> list[str]:
+    compared = analysis.reference is not None
+    more = f" {'reference':>12} {'dB':>6}" if compared else ""
+    lines = [f"{'indicator':<24} {'value':>12}{more} {'unit':<10} {'channel':<12} {'of':<20} computed on"]
+    for i, change in zip(analysis.indicators, changes(analysis), strict=True):
         of = i.gear or i.bearing or i.shaft or i.band
-        lines.append(f"{i.name:<24} {i.value:>12.5g} {i.unit:<10} {i.channel:<12} {of:<20} {i.computed_on}")
+        more = f" {_change_text(change):<19}" if compared else ""
+        lines.append(f"{i.name:<24} {i.value:>12.5g}{more} {i.unit:<10} {i.channel:<12} {of:<20} {i.computed_on}")
     return lines
+
+
+def _change_text(change: Change | None) -> str:
+    if change is None:
+        return ""
+    return f"{change.reference_value:>12.5g} " + (f"{change.change_db:>+6.1f}" if change.change_db is not None else "")

@@ -12,13 +12,18 @@ not defined is null. Members may be added within a version, never renamed or rem
 - ``speed``: ``known``; if true ``shaft``, ``method``, ``mean_rpm``, ``lowest_rpm``, ``highest_rpm``,
   ``relative_uncertainty``, ``quality``, ``n_revolutions``, ``notes``; if false ``question``, ``reason``, ``remedy``
 - ``indicators``: each with ``name``, ``value``, ``unit``, ``channel``, ``computed_on``, ``shaft``, ``gear``,
-  ``band``, ``note``
+  ``band``, ``note``; ``reference_value`` and ``change_db``, null where there is no reference or it lacks the indicator
 - ``recording``: ``source``, ``sha256``, ``reader``, ``history``, ``warnings``, ``sampling_rate_hz``, ``n_samples``,
   ``duration_s``, ``channels``, ``speed_source``
 - ``rig``: what is known of the machine, or null
 - ``channels``: per analysed channel the description of its spectra and averages; arrays as their
-  ``{"shape": […]}``, or as lists where they were asked for
+  ``{"shape": […]}``, or as lists where they were asked for; ``order_levels`` always with their
+  numbers, and ``largest``, ``largest_at_rpm``, ``largest_at_hz``
 - ``settings``: the parameters that were in force
+- ``crack``: null where nobody asked and none is clear; else ``answer`` ("crack", "none seen", "cannot tell") with
+  ``text``, ``shaft``, ``gear``, ``tooth``, ``angle_deg``, ``depth_mm``, ``interval_mm`` and the like; with
+  ``below_mm``; or with ``reason`` and ``remedy``
+- ``reference``: null, or ``source``, ``sha256``, ``outcome``, ``verdict`` of the recording that was compared with
 """
 
 from __future__ import annotations
@@ -34,11 +39,13 @@ import numpy as np
 
 from gearsig import __version__
 from gearsig.angle.types import ShaftAngle
+from gearsig.diagnosis.comparison import changes
 from gearsig.diagnosis.types import Analysis, CannotTell, ChannelAnalysis
 from gearsig.recording.types import Recording
 from gearsig.report.files import write_text
 from gearsig.report.numbers import rounded
 from gearsig.rig.speed import SpeedSource
+from gearsig.severity.types import CrackEstimate, NoCrackSeen
 
 SCHEMA, SCHEMA_VERSION = "gearsig.analysis", 1
 Json = dict[str, Any]
@@ -66,11 +73,13 @@ def analysis_to_dict(analysis: Analysis, *, arrays: bool = False) -> Json:
         "verdict": analysis.verdict,
         "findings": [_plain(finding, arrays=False) for finding in analysis.findings],
         "speed": _speed(analysis.shaft_angle, arrays=arrays),
-        "indicators": [_plain(indicator, arrays=False) for indicator in analysis.indicators],
+        "indicators": _indicators(analysis),
         "recording": _recording(analysis.recording),
         "rig": _plain(analysis.rig, arrays=False),
         "channels": [_channel(channel, arrays=arrays) for channel in analysis.channels],
         "settings": _plain(analysis.settings, arrays=False),
+        "crack": _crack(analysis.crack),
+        "reference": _reference(analysis.reference),
     }
 
 
@@ -126,9 +135,43 @@ def _speed(angle: ShaftAngle | CannotTell, *, arrays: bool) -> Json:
     return result
 
 
+def _indicators(analysis: Analysis) -> list[Json]:
+    nothing: Json = {"reference_value": None, "change_db": None}
+    return [
+        _plain(indicator, arrays=False) | (nothing if change is None else _plain(change, arrays=False))
+        for indicator, change in zip(analysis.indicators, changes(analysis), strict=True)
+    ]
+
+
+def _crack(answer: CrackEstimate | NoCrackSeen | CannotTell | None) -> Json | None:
+    if answer is None:
+        return None
+    if isinstance(answer, CannotTell):
+        return {"answer": "cannot tell", **_plain(answer, arrays=False)}
+    kind = "crack" if isinstance(answer, CrackEstimate) else "none seen"
+    return {"answer": kind, "text": answer.text, **_plain(answer, arrays=False)}
+
+
+def _reference(reference: Analysis | None) -> Json | None:
+    if reference is None:
+        return None
+    origin = reference.recording.provenance
+    return {
+        "source": origin.source,
+        "sha256": origin.sha256,
+        "outcome": reference.outcome.value,
+        "verdict": reference.verdict,
+    }
+
+
 def _channel(channel: ChannelAnalysis, *, arrays: bool) -> Json:
     result: Json = _plain(channel, arrays=arrays)
     result["averages"] = [_plain(average, arrays=arrays) for average in channel.averages.values()]
+    result["order_levels"] = [
+        _plain(level, arrays=True)
+        | dict(zip(("largest", "largest_at_rpm", "largest_at_hz"), map(rounded, level.largest), strict=True))
+        for level in channel.order_levels
+    ]
     return result
 
 

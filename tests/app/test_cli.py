@@ -200,6 +200,75 @@ def test_crack_against_a_reference_names_tooth_and_depth(capsys: pytest.CaptureF
     assert depths[1] == pytest.approx(3.0, abs=0.8)
 
 
+def test_analyze_against_a_reference_names_the_crack_once(capsys: pytest.CaptureFixture[str]) -> None:
+    reference = ("--reference", sample("root_crack_0mm"))
+    code, out, _ = run(capsys, "analyze", sample("root_crack_4mm"), *reference, "--json")
+    assert code == 0
+    result = json.loads(out)
+    faults = [f for f in result["findings"] if f["kind"] == "fault"]
+    assert [f["where"]["tooth"] for f in faults] == [21]
+    assert result["crack"]["depth_mm"] == pytest.approx(4.0, abs=0.8)
+    assert f"{result['crack']['depth_mm']:.1f} mm" in faults[0]["title"]
+    assert any(i["change_db"] is not None for i in result["indicators"])
+    assert run(capsys, "analyze", sample("root_crack_1mm"), *reference)[1].count("tooth 21 of stage 1/input") == 2
+
+
+def test_the_recording_itself_is_no_reference(capsys: pytest.CaptureFixture[str]) -> None:
+    same = sample("root_crack_0mm")
+    code, _, err = run(capsys, "analyze", same, "--reference", same)
+    assert code == 2
+    assert "itself" in err
+
+
+def test_report_with_a_reference_compares_all_but_itself(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    reference, cracked = sample("root_crack_0mm"), sample("root_crack_2mm")
+    code, out, _ = run(capsys, "report", reference, cracked, "--reference", reference, "-o", tmp_path, "-j", 1)
+    assert code == 0
+    assert "root_crack_2mm.h5: Fault: Crack of" in out
+    page = (tmp_path / "root_crack_2mm.html").read_text()
+    assert "The cracked tooth" in page
+    assert "Compared with root_crack_0mm.h5" in page
+    assert "The cracked tooth" not in (tmp_path / "root_crack_0mm.html").read_text()
+
+
+def test_report_with_pulse_times_is_of_one_recording(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    pulses = csv(tmp_path, "\n".join(f"{0.04 * k:.6f}" for k in range(1, 99)), "pulses.csv")
+    both = sample("no_tachometer"), sample("healthy")
+    code, _, err = run(capsys, "report", *both, "--tach-times", pulses, "-o", tmp_path / "pages")
+    assert code == 2
+    assert "one recording" in err
+    code, _, _ = run(capsys, "report", both[0], "--tach-times", pulses, "-o", tmp_path / "pages", "-j", 1)
+    assert code == 0
+    assert "from tachometer pulses" in (tmp_path / "pages" / "no_tachometer.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("analyze", "x.csv", "--nonsense"), "--nonsense"),
+        (("analyze", "x.csv", "--fs", "fast"), "--fs"),
+        (("analyze",), "recording"),
+        (("analyse", "x.csv"), "analyze"),
+        (("report", "x.csv"), "--output"),
+        (("rig", "chek", "x"), "check"),
+    ],
+)
+def test_wrong_options_are_one_line(capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], text: str) -> None:
+    code, out, err = run(capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("gearsig: ")
+    assert text in err
+    assert "--help" in err
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_without_a_command_the_help_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys)
+    assert code == 2
+    assert "analyze" in out
+    assert err == ""
+
+
 def test_crack_refuses_a_torque_in_millimetres(capsys: pytest.CaptureFixture[str]) -> None:
     code, _, err = run(capsys, "crack", sample("root_crack_3mm"), "--torque", "3mm")
     assert code == 2

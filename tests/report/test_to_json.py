@@ -11,7 +11,7 @@ from gearsig.report.to_json import analysis_to_dict, analysis_to_json, write_jso
 
 MEMBERS = [
     "schema", "schema_version", "gearsig_version", "outcome", "verdict", "findings", "speed", "indicators", "recording",
-    "rig", "channels", "settings",
+    "rig", "channels", "settings", "crack", "reference",
 ]  # fmt: skip
 FINDING = ["code", "kind", "title", "where", "strength", "confidence", "confidence_basis", "evidence", "surer"]
 RECORDING = [

@@ -213,8 +213,12 @@ def _nothing_found(signals: Signals, examined: list[_Examined]) -> list[Finding]
                 surer=_surer(signals),
             )
         )
-    if blunt:
-        findings.append(_undecided(blunt, "noise would hide an event of half the average's size"))
+    noisy = [e for e in blunt if _is_noise(e.event)]
+    uneven = [e for e in blunt if e not in noisy]
+    if noisy:
+        findings.append(_undecided(noisy, "noise would hide an event of half the average's size"))
+    if uneven:
+        findings.append(_undecided(uneven, "they differ so much from each other that damage may hide among them"))
     return findings
 
 
@@ -226,8 +230,14 @@ def _undecided(examined: list[_Examined], reason: str) -> Finding:
         f"Nothing shows at the teeth of shaft(s) {shafts}, but {reason}.",
         Where(channels=tuple(examined[0].shaft.separated)),
         evidence=tuple(_visible_text(e) for e in examined),
-        surer="More revolutions, a sensor nearer to the gears, a higher load; and certain data of the machine.",
+        surer="A recording of the same gears when they were sound as the reference (--reference): what teeth are made "
+        "with cancels. More revolutions, a sensor nearer to the gears, a higher load; certain data of the machine.",
     )
+
+
+def _is_noise(event: LocalEvent) -> bool:
+    """Whether the median tooth's part of the difference signal is mostly noise that the average has left."""
+    return event.median_rms <= SMALLEST_SIGNIFICANCE * event.error_rms
 
 
 def _smallest_visible(event: LocalEvent) -> float:

@@ -1,0 +1,100 @@
+"""Depth of a root crack beside the other findings: one statement per tooth, and silence where nobody asked."""
+
+from dataclasses import replace
+
+import pytest
+
+from gearsig.diagnosis.crack import crack_depth, with_crack
+from gearsig.diagnosis.types import CannotTell, Finding, Kind, Outcome, Where, outcome_of
+from gearsig.diagnosis.verdict import ranked
+from gearsig.rig.types import GearPair, Rig, Shaft
+from gearsig.severity.types import CrackEstimate, NoCrackSeen
+from tests.diagnosis.machines import RIG, record
+
+PAIR = Rig(shafts=(Shaft("in"), Shaft("out")), pairs=(GearPair("stage", "in", "out", 20, 40),))
+CRACK = CrackEstimate(
+    shaft="in",
+    gear="stage/in",
+    tooth=5,
+    angle_deg=81.0,
+    gear_is_certain=True,
+    depth_mm=2.0,
+    depth_percent=30.0,
+    interval_mm=(1.5, 2.5),
+    interval_percent=(22.0, 38.0),
+    p_value=0.01,
+    with_reference=True,
+    reasons=("Compared with a reference.",),
+)
+TOOTH = Finding(
+    "tooth-local-damage",
+    Kind.FAULT,
+    "Local tooth damage at 75°.",
+    Where(("a1",), shaft="in", gear="stage/in", angle_deg=75.0, tooth=5),
+    confidence=0.86,
+    evidence=("It comes back.",),
+)
+UNDECIDED = Finding("tooth-damage-undecided", Kind.CANNOT_TELL, "Nothing shows, but noise would hide it.")
+NOTHING = Finding("no-tooth-local-damage", Kind.INFORMATION, "Nothing shows.", Where(shaft="in"))
+GOOD_BEARINGS = Finding("no-bearing-damage", Kind.INFORMATION, "No damage shows in the bearings.")
+
+
+def none_seen(below_percent: float) -> NoCrackSeen:
+    return NoCrackSeen(below_percent / 15.0, below_percent, 0.4, True)
+
+
+def codes(findings: list[Finding]) -> list[str]:
+    return [f.code for f in findings]
+
+
+def test_a_tooth_found_both_ways_is_one_fault_with_its_depth() -> None:
+    found = with_crack([TOOTH, GOOD_BEARINGS], CRACK, PAIR)
+    assert codes(found) == ["tooth-local-damage", "no-bearing-damage"]
+    assert "2.0 mm (1.5 to 2.5 mm)" in found[0].title
+    assert "tooth 5" in found[0].title
+    assert found[0].kind is Kind.FAULT
+    assert found[0].confidence >= TOOTH.confidence
+    assert {"It comes back.", "Compared with a reference."} <= set(found[0].evidence)
+
+
+def test_two_damaged_teeth_stay_two_findings() -> None:
+    elsewhere = replace(TOOTH, where=replace(TOOTH.where, angle_deg=200.0))
+    assert codes(with_crack([elsewhere], CRACK, PAIR)) == ["tooth-local-damage", "root-crack"]
+
+
+def test_a_crack_put_down_to_the_mate_of_the_damaged_gear_is_the_same_where_both_show_it_alike() -> None:
+    on_mate = replace(TOOTH, where=replace(TOOTH.where, shaft="out"))
+    assert len(with_crack([on_mate], replace(CRACK, gear_is_certain=False), PAIR)) == 1
+    assert len(with_crack([on_mate], CRACK, PAIR)) == 2
+
+
+def test_a_crack_takes_back_that_nothing_shows_at_its_teeth() -> None:
+    assert codes(with_crack([NOTHING, UNDECIDED], CRACK, PAIR)) == ["root-crack"]
+    other = replace(NOTHING, where=Where(shaft="out"))
+    assert codes(with_crack([other], CRACK, PAIR)) == ["no-tooth-local-damage", "root-crack"]
+
+
+def test_an_unlikely_crack_is_a_suspicion_with_a_reference_and_nothing_without() -> None:
+    unlikely = replace(CRACK, p_value=0.1)
+    assert with_crack([], unlikely, PAIR)[0].kind is Kind.SUSPICION
+    assert with_crack([NOTHING], replace(unlikely, with_reference=False), PAIR) == [NOTHING]
+
+
+def test_assumed_data_make_no_fault() -> None:
+    assert with_crack([], CRACK, replace(PAIR, assumed=("module",)))[0].kind is Kind.SUSPICION
+
+
+@pytest.mark.parametrize(("below_percent", "outcome"), [(20.0, Outcome.NO_FAULT), (80.0, Outcome.CANNOT_TELL)])
+def test_teeth_without_a_crack_are_settled_only_if_one_would_have_shown(below_percent: float, outcome: Outcome) -> None:
+    found = with_crack([UNDECIDED, GOOD_BEARINGS], none_seen(below_percent), PAIR)
+    assert outcome_of(ranked(found)) is outcome
+    assert any(f"({below_percent:.0f} % of the root)" in f.title for f in found)
+
+
+def test_a_refusal_is_told_only_to_who_asked() -> None:
+    recording = record()  # its rig gives no module, face width or torque
+    assert crack_depth(recording, RIG, None, None) is None
+    answer = crack_depth(recording, RIG, record(seed=1), None)
+    assert isinstance(answer, CannotTell)
+    assert "module_mm" in answer.reason
+    assert with_crack([], answer, RIG)[0].kind is Kind.CANNOT_TELL
