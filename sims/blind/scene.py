@@ -1,0 +1,276 @@
+"""One run of a rig: everything the march needs, open to be changed before it starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import pi, sin
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from sims.blind import kernel as kn
+from sims.blind.geometry import N_PATH, REACH
+from sims.blind.rig import BlindRig, Resonance
+from sims.blind.structure import Matrix, Modes, modes_of, static_shape, step_coefficients
+
+WARM_UP_S = 0.5
+GRID_S = 1e-3
+SUB_STEPS = 4
+"""Steps per sample; every second one is kept, and the filter before the sampling takes the rest."""
+Rows = list[tuple[float, ...]]
+Stage = Callable[["Motion", FloatArray, np.random.Generator], FloatArray]
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Where a rig runs: as stated, and as it is."""
+
+    stated_rpm: float
+    stated_nm: float
+    true_rpm: float
+    true_nm: float
+    duration_s: float
+    seed: int
+    mount_seed: int
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a run gave, at twice the sampling rate."""
+
+    rate_hz: float
+    bearing_n: FloatArray
+    casing: FloatArray
+    theta: FloatArray
+    squeeze_m: FloatArray
+    mesh_n: FloatArray
+
+
+@dataclass(frozen=True)
+class Train:
+    """Half-sine pulses at angles of a shaft: kind 0 or 1 a bearing's force, 2 a torque at that shaft's end."""
+
+    shaft: int
+    kind: int
+    angle: FloatArray
+    force: FloatArray
+    turn: FloatArray
+    width_s: float
+
+
+@dataclass
+class Scene:
+    """A run before it starts; changes act on this. Lists of rows are as `kernel.march` describes them."""
+
+    rig: BlindRig
+    condition: Condition
+    rng: np.random.Generator
+    gap_m: list[FloatArray]
+    weak: list[FloatArray]
+    base_gap_m: FloatArray
+    pair_stiffness: FloatArray
+    slip: FloatArray
+    runout: Rows
+    wobble: Rows
+    torque: Rows
+    unbalance: list[tuple[float, float]]
+    wedge_m: float
+    backlash_m: float
+    clearance_m: list[float]
+    ball_ripple: float
+    speed: Matrix
+    offsets: tuple[int, int]
+    start: float
+    sway: Rows = field(default_factory=list)
+    trains: list[Train] = field(default_factory=list)
+    paths: list[list[Resonance]] = field(default_factory=list)
+    stages: list[Stage] = field(default_factory=list)
+    late_stages: list[Stage] = field(default_factory=list)
+    reference_rms: float = 0.0
+
+    @property
+    def omega(self) -> tuple[float, float]:
+        """Mean speeds of both shafts, rad/s."""
+        w = self.condition.true_rpm * pi / 30
+        return w, w * self.rig.pair.z1 / self.rig.pair.z2
+
+    @property
+    def mesh_force_n(self) -> float:
+        """Mean force along the line of action."""
+        return self.condition.true_nm / self.rig.pair.base_radii_m[0]
+
+    @property
+    def turns(self) -> tuple[float, float]:
+        """Revolutions of both shafts in the run, generously."""
+        n = (self.condition.duration_s + WARM_UP_S + 1) * 1.2 * self.omega[0] / (2 * pi)
+        return n, n * self.rig.pair.z1 / self.rig.pair.z2
+
+
+def friction_table(rig: BlindRig, omega_1: float, force_n: float) -> FloatArray:
+    """Signed friction coefficient over the path, positive in approach.
+
+    μ = 0.0127 · 1.13/(1.13 − S) · log10(29700 w / (η v_s v_t²)); Coulomb's law with the sign of the sliding speed.
+
+    Source: G. H. Benedict and B. W. Kelley, Instantaneous coefficients of gear tooth friction,
+    *ASLE Trans.* 4 (1961), with S in µm, w in N/mm, η in cP, speeds in m/s.
+    """
+    pair = rig.pair
+    rho1, rho2 = pair.rho_m(pair.path)
+    ratio = pair.z1 / pair.z2
+    sliding, rolling = omega_1 * (rho2 * ratio - rho1), omega_1 * np.abs(rho2 * ratio + rho1)
+    floor = 0.05 * rolling
+    load = max(force_n / pair.face_mm, 1.0)
+    argument = 29700 * load / (rig.viscosity_cp * np.maximum(np.abs(sliding), floor) * rolling**2)
+    mu = 0.0127 * 1.13 / (1.13 - rig.finish_um) * np.log10(np.maximum(argument, 1.0))
+    return np.asarray(np.clip(mu, 0.01, 0.2) * np.tanh(sliding / floor))
+
+
+def relief_gap(rig: BlindRig) -> FloatArray:
+    """Tip relief of both gears over the path, (N_PATH,)."""
+    pair = rig.pair
+    s = pair.path / pair.contact_ratio
+    start = rig.relief_start
+    end = np.clip((s - (1 - start)) / start, 0, None) ** 1.5 * rig.relief_m[0]
+    return np.asarray(end + np.clip((start - s) / start, 0, None) ** 1.5 * rig.relief_m[1])
+
+
+def scene_of(rig: BlindRig, condition: Condition) -> Scene:
+    """The rig in good order at a condition; all chance in it comes from the condition's seed."""
+    rng = np.random.default_rng(condition.seed)
+    made, pair = rig.tolerances, rig.pair
+    omega_1 = condition.true_rpm * pi / 30
+    force_n = condition.true_nm / pair.base_radii_m[0]
+    speed = _speed_course(rig, condition, omega_1, rng)
+    torque = [
+        (where, order, share * rig.rated_nm * (pair.z2 / pair.z1 if where else 1.0), phase)
+        for where, order, share, phase in made.torque_share
+    ]
+    return Scene(
+        rig=rig,
+        condition=condition,
+        rng=rng,
+        gap_m=[np.array(g) for g in made.gap_m],
+        weak=[np.zeros((z, N_PATH)) for z in (pair.z1, pair.z2)],
+        base_gap_m=pair.end_gap_m() + relief_gap(rig),
+        pair_stiffness=pair.pair_stiffness_n_per_m() * rig.stiffness_factor,
+        slip=friction_table(rig, omega_1, force_n),
+        runout=list(made.runout),
+        wobble=list(made.wobble),
+        torque=list(torque),
+        unbalance=list(made.unbalance),
+        wedge_m=made.wedge_m,
+        backlash_m=rig.backlash_m,
+        clearance_m=list(rig.clearance_m),
+        ball_ripple=0.02,
+        speed=speed,
+        offsets=(0, int(rng.integers(pair.z2))),
+        start=rng.uniform(0, 2 * pi),
+        paths=_mounted_paths(rig, condition),
+    )
+
+
+def _mounted_paths(rig: BlindRig, condition: Condition) -> list[list[Resonance]]:
+    """The paths of this mounting: each time sensors go on, frequencies shift by some 0.3 %, gains by 2 %."""
+    rng = np.random.default_rng(condition.mount_seed)
+    return [
+        [
+            Resonance(m.frequency_hz * (1 + rng.normal(0, 0.003)), m.damping_ratio, m.mass_kg * (1 + rng.normal(0, 0.02)))
+            for m in chain.path
+        ]
+        for chain in rig.chains
+    ]
+
+
+def _speed_course(rig: BlindRig, condition: Condition, omega_1: float, rng: np.random.Generator) -> Matrix:
+    """Reference speed and its rate of change, (n, 2), every GRID_S: a slow wander."""
+    t = np.arange(0, condition.duration_s + WARM_UP_S + 1, GRID_S)
+    course, later = np.ones_like(t), rng.uniform(0, 20)
+    for frequency_hz, share, phase in rig.wander:
+        course += share * np.sin(2 * pi * frequency_hz * (t + later) + phase)
+    return np.column_stack([omega_1 * course, np.gradient(omega_1 * course, GRID_S)])
+
+
+def with_course(scene: Scene, factor: Callable[[FloatArray], FloatArray]) -> None:
+    """Multiply the reference speed by a function of time."""
+    t = np.arange(len(scene.speed)) * GRID_S
+    omega = scene.speed[:, 0] * factor(t)
+    scene.speed = np.column_stack([omega, np.gradient(omega, GRID_S)])
+
+
+def run(scene: Scene, *, sub_steps: int = SUB_STEPS) -> Motion:
+    """March the scene through its warm-up and its duration."""
+    rig, condition = scene.rig, scene.condition
+    rate_hz = 2 * rig.sampling_rate_hz
+    step_s = 1 / (rig.sampling_rate_hz * sub_steps)
+    modes = modes_of(rig.parts)
+    q, p, steady = _start(scene, modes)
+    n_out = 2 * round(condition.duration_s * rig.sampling_rate_hz)
+    trains = scene.trains or [Train(0, 0, np.array([1e12]), np.zeros(1), np.zeros(1), 1e-9)]
+    out = kn.march(
+        n_out, round(WARM_UP_S * rate_hz), sub_steps // 2, step_s, _numbers(scene), step_coefficients(modes, step_s),
+        modes.shapes, modes.seen, modes.omega, modes.zeta, q, p, steady, np.array(rig.parts.bearing_n_per_m),
+        np.array(scene.clearance_m), scene.base_gap_m, scene.pair_stiffness, scene.slip, scene.gap_m[0],
+        scene.gap_m[1], scene.weak[0], scene.weak[1], REACH, np.array(scene.offsets), _rows(scene.runout, 4),
+        _rows(scene.wobble, 4), _rows(scene.torque, 4), _rows(scene.sway, 5), np.array(scene.unbalance), scene.speed,
+        _padded([t.angle for t in trains], 1e12), _padded([t.force for t in trains], 0.0),
+        _padded([t.turn for t in trains], 0.0), np.array([[float(t.shaft), float(t.kind)] for t in trains]),
+        np.array([t.width_s for t in trains]),
+    )  # fmt: skip
+    return Motion(rate_hz, out[:, :4].T, out[:, 4:7].T, out[:, 7:9].T, out[:, 9], out[:, 10])
+
+
+def _start(scene: Scene, modes: Modes) -> tuple[Matrix, Matrix, Matrix]:
+    """Modal displacements and velocities in steady rotation under load, and the steady forces (weight)."""
+    rig = scene.rig
+    w1, w2 = float(scene.speed[0, 0]), float(scene.speed[0, 0]) * rig.pair.z1 / rig.pair.z2
+    steady = np.zeros(len(modes.omega))
+    steady[[5, 7]] = [-9.81 * m for m in rig.parts.rotor_mass_kg]
+    forces = steady.copy()
+    forces[[0, 3]] += scene.condition.true_nm, -scene.condition.true_nm * rig.pair.z2 / rig.pair.z1
+    u = static_shape(modes, rig.mesh_stiffness_n_per_m(), forces)
+    turn = np.zeros_like(u)
+    turn[[0, 1]], turn[[2, 3]] = 1.0, rig.pair.z1 / rig.pair.z2
+    into = modes.shapes.T @ modes.mass
+    velocity = np.zeros_like(u)
+    velocity[[0, 1]], velocity[[2, 3]] = w1, w2
+    return into @ (u + scene.start * turn), into @ velocity, steady
+
+
+def _numbers(scene: Scene) -> Matrix:
+    rig, pair, parts = scene.rig, scene.rig.pair, scene.rig.parts
+    j = parts.inertia_kgm2
+    ratio = pair.z1 / pair.z2
+    line_inertia = j[0] + j[1] + (j[2] + j[3]) * ratio**2
+    effective = 1 / (pair.base_radii_m[0] ** 2 / j[1] + pair.base_radii_m[1] ** 2 / j[2])
+    number = np.zeros(kn.N_NUMBERS)
+    number[[kn.RB_1, kn.RB_2]] = pair.base_radii_m
+    number[[kn.LINE_X, kn.LINE_Y]] = np.cos(parts.line_angle), np.sin(parts.line_angle)
+    number[[kn.BASE_PITCH, kn.CONTACT_RATIO]] = pair.base_pitch_m, pair.contact_ratio
+    number[[kn.RHO_START, kn.RHO_SUM]] = pair.rho_start_m, pair.centre_distance_m * sin(pair.alpha)
+    number[[kn.SOFT_M, kn.WEDGE_M, kn.BACKLASH_M]] = rig.soft_m, scene.wedge_m, scene.backlash_m
+    number[kn.MESH_DAMPING] = 2 * rig.mesh_damping_ratio * np.sqrt(effective / rig.mesh_stiffness_n_per_m())
+    number[kn.BACK_STIFFNESS] = rig.mesh_stiffness_n_per_m()
+    number[kn.LOAD_NM] = scene.condition.true_nm / ratio
+    number[kn.LOAD_SLOPE] = rig.load_slope * scene.condition.true_nm / ratio / scene.omega[1]
+    number[kn.MOTOR_NM], number[kn.LINE_INERTIA] = scene.condition.true_nm, line_inertia
+    number[kn.MOTOR_GAIN] = line_inertia / rig.motor_time_s
+    number[kn.GRID_S] = GRID_S
+    number[[kn.OMEGA_1, kn.OMEGA_2]] = scene.omega
+    for i, (cage, balls) in enumerate(((kn.CAGE_RATIO_1, kn.N_BALLS_1), (kn.CAGE_RATIO_2, kn.N_BALLS_2))):
+        number[cage], number[balls] = rig.bearing(i).orders()["FTF"], rig.bearings[i][0]
+    number[kn.BALL_RIPPLE] = scene.ball_ripple
+    number[kn.PHASE_2] = 2 * pi * scene.offsets[1] / pair.z2
+    number[[kn.SEAT_1, kn.SEAT_2]], number[kn.HEIGHT] = parts.seat_x_m, parts.height_m
+    return number
+
+
+def _rows(rows: Rows, width: int) -> Matrix:
+    return np.array(rows, dtype=float).reshape(len(rows), width)
+
+
+def _padded(arrays: list[FloatArray], fill: float) -> Matrix:
+    found = np.full((len(arrays), max(len(a) for a in arrays)), fill)
+    for row, values in zip(found, arrays, strict=True):
+        row[: len(values)] = values
+    return found
