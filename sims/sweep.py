@@ -130,7 +130,7 @@ class Sweep:
         """Run one point."""
         import sims
 
-        own = self._with(point)
+        own = self.at(point)
         return sims.simulate(
             own.model,
             preset=own.preset,
@@ -167,8 +167,8 @@ class Sweep:
             return self.seed
         return int(np.random.SeedSequence([self.seed, index]).generate_state(1, np.uint32)[0])
 
-    def _with(self, point: Point) -> Sweep:
-        """The same with a point's values in place."""
+    def at(self, point: Point) -> Sweep:
+        """Return the same with a point's values in place."""
         from sims.effects import effects as known_effects
 
         parameters, settings = dict(self.parameters), list(self.effects)

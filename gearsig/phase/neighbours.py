@@ -33,8 +33,8 @@ def nearest_apart(
     """Return distance and index of each reference's nearest library point more than `theiler` samples away.
 
     Neighbours in time are close because the path is smooth, not because it returned: they are passed over. The k-d tree
-    is asked for a few neighbours first, and for more where all of those were neighbours in time. Equal points are
-    passed over too unless `equal_counts`: a distance of zero has no logarithm.
+    is asked for a few neighbours; where all of those are neighbours in time, it is walked through for one that is not.
+    Equal points are passed over too unless `equal_counts`: a distance of zero has no logarithm.
 
     Parameters
     ----------
@@ -63,30 +63,82 @@ def nearest_apart(
     tree = cKDTree(np.ascontiguousarray(points[library]), balanced_tree=False, compact_nodes=False)
     distance = np.full(len(references), np.inf)
     index = np.full(len(references), -1, dtype=np.intp)
-    open_ = np.arange(len(references))
-    per_step = len(library) / max(1, int(library[-1]) - int(library[0]) + 1)
-    # So many neighbours in time there can be; one more is apart.
-    most = min(len(library), _LARGEST_LOOK, int(2 * theiler * per_step) + 3)
-    k = min(_FIRST_LOOK, most)
+    found_d, found_i = _query(tree, points[references], min(_FIRST_LOOK, len(library)), norm)
+    times = library[np.minimum(found_i, len(library) - 1)]
+    apart = (np.abs(times - references[:, None]) > theiler) & np.isfinite(found_d)
+    if not equal_counts:
+        apart &= found_d > 0.0
+    first, rows = apart.argmax(axis=1), np.flatnonzero(apart.any(axis=1))
+    distance[rows], index[rows] = found_d[rows, first[rows]], times[rows, first[rows]]
+    open_ = np.flatnonzero(index < 0)
     n_equal = 0
-    while len(open_):
-        found_d, found_i = _query(tree, points[references[open_]], k, norm)
-        times = library[np.minimum(found_i, len(library) - 1)]
-        apart = (np.abs(times - references[open_][:, None]) > theiler) & np.isfinite(found_d)
-        if not equal_counts:
-            n_equal = int(np.count_nonzero((apart & (found_d == 0.0)).any(axis=1)))
-            apart &= found_d > 0.0
-        first, has = apart.argmax(axis=1), apart.any(axis=1)
-        rows = np.flatnonzero(has)
-        distance[open_[rows]] = found_d[rows, first[rows]]
-        index[open_[rows]] = times[rows, first[rows]]
-        open_ = open_[~has]
-        if k >= most:
-            break
-        k = min(6 * k, most)
+    if len(open_) and len(library) > _FIRST_LOOK:
+        distance[open_], index[open_], n_equal = _walked(
+            tree, library, points[references[open_]], references[open_], theiler, norm, equal_counts=equal_counts
+        )
+        open_ = np.flatnonzero(index < 0)
     if len(open_) > 0.5 * len(references):
         raise _no_return(len(open_) / len(references), theiler, exact=n_equal > len(open_) // 2)
     return distance, index
+
+
+def _walked(
+    tree: Any,
+    library: IndexArray,
+    points: FloatArray,
+    now: IndexArray,
+    theiler: int,
+    norm: float,
+    *,
+    equal_counts: bool,
+) -> tuple[FloatArray, IndexArray, int]:
+    """Return distance and index as `nearest_apart`, and how many points met nothing but an equal one."""
+    from gearsig.phase.neighbours_kernel import fill_boxes, nearest
+
+    # So many neighbours in time there can be; one more is apart.
+    n_near = int(2 * theiler * len(library) / max(1, int(library[-1]) - int(library[0]) + 1)) + 3
+    nodes, places = _flat(tree)
+    held, times = np.ascontiguousarray(tree.data[places]), library[places]
+    low, high = np.empty((len(nodes), held.shape[1])), np.empty((len(nodes), held.shape[1]))
+    first, last = np.empty(len(nodes), dtype=np.intp), np.empty(len(nodes), dtype=np.intp)
+    fill_boxes(held, times, nodes, low, high, first, last)
+    distance, place = np.empty(len(now)), np.empty(len(now), dtype=np.intp)
+    equal = np.zeros(len(now), dtype=np.bool_)
+    nearest(
+        held,
+        times,
+        nodes,
+        low,
+        high,
+        first,
+        last,
+        np.ascontiguousarray(points, dtype=np.float64),
+        now,
+        theiler,
+        norm == np.inf,
+        equal_counts,
+        n_near >= _LARGEST_LOOK,
+        min(n_near, _LARGEST_LOOK),
+        distance,
+        place,
+        equal,
+    )
+    found = np.where(place >= 0, times[place], -1)
+    return distance, found, int(np.count_nonzero(equal & (place < 0)))
+
+
+def _flat(tree: Any) -> tuple[IndexArray, IndexArray]:
+    """Return a k-d tree's nodes as rows (start, end, children or -1), the root first, and the order they count in."""
+    rows, waiting = [[0, len(tree.indices), -1, -1]], [(0, tree.tree)]
+    while waiting:
+        row, node = waiting.pop()
+        if node.split_dim < 0:
+            continue
+        for place, child in ((2, node.lesser), (3, node.greater)):
+            rows[row][place] = len(rows)
+            waiting.append((len(rows), child))
+            rows.append([child.start_idx, child.end_idx, -1, -1])
+    return np.array(rows, dtype=np.intp), np.asarray(tree.indices, dtype=np.intp)
 
 
 def _no_return(share: float, theiler: int, *, exact: bool) -> RefusalError:

@@ -5,9 +5,15 @@ from __future__ import annotations
 from math import pi, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from sims.cracked.constants import governor_nm_s_per_rad, mean_stiffness_n_per_m, mesh_mass_kg
+from sims.cracked.constants import (
+    governor_nm_s_per_rad,
+    mean_stiffness_n_per_m,
+    mesh_mass_kg,
+    total_inertia_kg_m2,
+)
 from sims.cracked.layout import N_COORDINATES
 from sims.machine import Machine
 from sims.machine.operation import Operation
@@ -84,11 +90,24 @@ def _frequencies_hz(m: FloatArray, k: FloatArray) -> FloatArray:
 
 def _fastest_rate_per_s(m: FloatArray, k: FloatArray, c: FloatArray) -> float:
     """Largest magnitude of an eigenvalue of the damped machine: heavy dampers are as stiff as springs to a solver."""
+    return float(np.max(np.abs(_eigenvalues_per_s(m, k, c))))
+
+
+def _eigenvalues_per_s(m: FloatArray, k: FloatArray, c: FloatArray) -> NDArray[np.complex128]:
     n, per_mass = N_COORDINATES, 1.0 / np.diag(m)[:, None]
     state = np.zeros((2 * n, 2 * n))
     state[:n, n:] = np.eye(n)
     state[n:, :n], state[n:, n:] = -per_mass * k, -per_mass * c
-    return float(np.max(np.abs(np.linalg.eigvals(state))))
+    return np.linalg.eigvals(state).astype(np.complex128)
+
+
+def slowest_decay_s(machine: Machine, operation: Operation) -> float:
+    """Time in which the least damped motion falls to 1/e: of the vibrations, or of the speed that the drive holds."""
+    force = operation.torque_nm.largest / (machine.mesh.pair.driver.base_radius_mm * 1e-3)
+    found = _eigenvalues_per_s(*matrices(machine, force))
+    ringing = found[np.abs(found.imag) > 1.0]
+    recovery = 2.0 * total_inertia_kg_m2(machine) / governor_nm_s_per_rad(machine)
+    return max(recovery, 1.0 / max(float(-ringing.real.max()), 1e-3) if len(ringing) else 0.0)
 
 
 def default_step_s(machine: Machine, operation: Operation) -> float:

@@ -27,6 +27,23 @@ STEPS_PER_CALL = 200_000
 
 
 @dataclass(frozen=True)
+class State:
+    """Where a machine is: what a later run needs to go on from there.
+
+    Parameters
+    ----------
+    q, v : array, (16,)
+        Coordinates and velocities, see `sims.cracked.layout.COORDINATES`.
+    set_angle_rad : float
+        Angle at which the drive wants its rotor to be.
+    """
+
+    q: FloatArray
+    v: FloatArray
+    set_angle_rad: float
+
+
+@dataclass(frozen=True)
 class Response:
     """Signals of a run on an even grid of time.
 
@@ -39,6 +56,8 @@ class Response:
         Of the integrator.
     energy_j : array
         Potential, kinetic and gravitational energy, (n,), or empty where it was not asked for.
+    last : State or None
+        At the end of the last step: one step after the last point where every step is kept.
     """
 
     start_s: float
@@ -46,6 +65,7 @@ class Response:
     signals: Mapping[str, FloatArray]
     step_s: float
     energy_j: FloatArray
+    last: State | None = None
 
     @property
     def time_s(self) -> FloatArray:
@@ -96,9 +116,10 @@ def respond(
     step_s: float | None = None,
     stride: int = 1,
     with_energy: bool = False,
+    first: State | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Response:
-    """Integrate the sixteen coordinates from the static balance on.
+    """Integrate the sixteen coordinates from the static balance on, or from where another run ended.
 
     Parameters
     ----------
@@ -117,6 +138,8 @@ def respond(
     stride : int
         Every how many steps a point is kept.
     with_energy : bool
+    first : State or None
+        `Response.last` of another run; None: the static balance at `start_s`.
     on_progress : callable or None
         Called now and then with the part that is done, 0 to 1.
 
@@ -146,21 +169,21 @@ def respond(
         )
     every = count(stride, "stride")
     ready = prepare(machine, operation, rng, start_s)
+    q, v, set_angle = _first_state(ready, first)
     rows = np.empty((-(-n_steps // every), len(signals)))
     energies = np.empty(len(rows) if with_energy else 0)
     select = np.array([_place(name) for name in signals], dtype=np.int64)
     phasors = ready.roughness.phasors(step / 2.0)
-    set_angle = ready.q[:1].copy()
     per_call = every * max(STEPS_PER_CALL // every, 1)
-    for first in range(0, n_steps, per_call):
-        n = min(per_call, n_steps - first)
-        part = slice(first // every, first // every + -(-n // every))
+    for begun in range(0, n_steps, per_call):
+        n = min(per_call, n_steps - begun)
+        part = slice(begun // every, begun // every + -(-n // every))
         filled = integrate(
             *ready.constants.arguments,
-            ready.q,
-            ready.v,
+            q,
+            v,
             set_angle,
-            start_s + first * step,
+            start_s + begun * step,
             step,
             n,
             every,
@@ -173,13 +196,25 @@ def respond(
         )
         if filled < len(rows[part]) or not np.isfinite(rows[part][-1]).all():
             raise RefusalError(
-                f"the solution grows beyond all bounds after {(first + filled * every) * step:.3g} s "
+                f"the solution grows beyond all bounds after {(begun + filled * every) * step:.3g} s "
                 f"at a step of {step:.3g} s",
                 remedy="look for stiffness, damping and inertia that do not go together, or give a shorter step_s",
             )
         if on_progress is not None:
-            on_progress((first + n) / n_steps)
-    return Response(start_s, step * every, dict(zip(signals, rows.T, strict=True)), step, energies)
+            on_progress((begun + n) / n_steps)
+    last = State(q, v, float(set_angle[0]))
+    return Response(start_s, step * every, dict(zip(signals, rows.T, strict=True)), step, energies, last)
+
+
+def _first_state(ready: Prepared, given: State | None) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return copies, which the kernel overwrites, of coordinates, velocities and the set angle."""
+    if given is None:
+        return ready.q, ready.v, ready.q[:1].copy()
+    if given.q.shape != ready.q.shape or given.v.shape != ready.v.shape:
+        raise InputError(
+            f"a state of {given.q.size} coordinates", where="first", allowed=f"{ready.q.size}: another run's last"
+        )
+    return given.q.copy(), given.v.copy(), np.array([given.set_angle_rad])
 
 
 def draw_roughness(machine: Machine, rng: np.random.Generator) -> tuple[Machine, TimeLockedRoughness]:

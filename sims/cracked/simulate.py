@@ -15,7 +15,7 @@ from gearsig.rig.types import Rig
 from sims.cracked.constants import governor_nm_s_per_rad, total_inertia_kg_m2
 from sims.cracked.layout import POSITIONS
 from sims.cracked.linear import default_step_s, eigenfrequencies_hz
-from sims.cracked.respond import Response, respond
+from sims.cracked.respond import Response, State, respond
 from sims.machine import Machine
 from sims.machine.operation import Operation
 from sims.measure.chain import MeasurementChain
@@ -70,6 +70,7 @@ def simulate_with_motion(
     truth: Mapping[str, Any] | None = None,
     step_s: float | None = None,
     also: Sequence[str] = (),
+    first: State | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> tuple[Recording, Response]:
     """Simulate the sixteen coordinates and measure them; return the recording and the motion behind it.
@@ -92,6 +93,8 @@ def simulate_with_motion(
         interval.
     also : sequence of str
         Signals of `sims.cracked.layout.SIGNALS` wanted in the motion besides those that are measured.
+    first : State or None
+        Where the lead-in starts; None: at the static balance.
     on_progress : callable or None
         Called now and then with the part of the motion that is done, 0 to 1.
 
@@ -121,6 +124,7 @@ def simulate_with_motion(
         start_s=-lead,
         step_s=1.0 / (rate * per_sample),
         stride=max(floor(rate * per_sample / wanted_hz + 1e-9), 1),
+        first=first,
         on_progress=on_progress,
     )
     motion = Motion(
