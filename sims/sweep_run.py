@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 from gearsig.checks import count
 from gearsig.errors import GearsigError, InputError
@@ -84,7 +85,7 @@ def run_sweep(
         If the folder cannot be made, holds other things, or another sweep.
     """
     workers = n_processors() if n_processes is None else count(n_processes, "n_processes")
-    target = _claimed(Path(folder), sweep)
+    target = claimed(Path(folder), sweep.definition())
     points = sweep.points()
     missing = [p for p in points if not recording_path(sweep, target, p).exists()]
     n_found = len(points) - len(missing)
@@ -112,18 +113,35 @@ def n_complete(sweep: Sweep, folder: str | Path) -> int:
     return sum(recording_path(sweep, Path(folder), point).exists() for point in sweep.points())
 
 
-def _claimed(folder: Path, sweep: Sweep) -> Path:
-    """Make the folder or accept it; leave the definition in it."""
-    text = json.dumps(sweep.definition(), indent=2, ensure_ascii=False) + "\n"
-    definition = folder / DEFINITION
+def claimed(folder: Path, definition: Mapping[str, Any], name: str = DEFINITION, kind: str = "sweep") -> Path:
+    """Make the folder or accept it; leave the definition in it.
+
+    Parameters
+    ----------
+    folder : Path
+    definition : mapping
+        Plain values that decide the results.
+    name : str
+        Of its file.
+    kind : str
+        What it defines, for the errors.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made, holds other things, or was begun by another definition.
+    """
+    text = json.dumps(definition, indent=2, ensure_ascii=False) + "\n"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        if definition.exists():
-            _check_same(definition, text)
+        if (folder / name).exists():
+            _check_same(folder / name, text, kind)
         elif any(folder.iterdir()):
-            raise InputError("holds files that belong to no sweep", where=str(folder), remedy="choose another with -o")
+            raise InputError(
+                f"holds files that belong to no {kind}", where=str(folder), remedy="choose another with -o"
+            )
         else:
-            _write(definition, text)
+            written(folder / name, text)
     except OSError as error:
         raise InputError(
             f"cannot be written ({error.strerror or error})", where=str(folder), remedy="choose another with -o"
@@ -131,17 +149,17 @@ def _claimed(folder: Path, sweep: Sweep) -> Path:
     return folder
 
 
-def _check_same(definition: Path, text: str) -> None:
+def _check_same(definition: Path, text: str, kind: str) -> None:
     try:
         there, wanted = json.loads(definition.read_text(encoding="utf-8")), json.loads(text)
     except ValueError:
         raise InputError(
-            "is not the definition of a sweep", where=str(definition), remedy="choose another folder"
+            f"is not the definition of a {kind}", where=str(definition), remedy="choose another folder"
         ) from None
     if there != wanted:
         differing = [key for key in wanted if not isinstance(there, dict) or there.get(key) != wanted[key]]
         raise InputError(
-            f"holds another sweep: {', '.join(differing) or 'its definition'} differs",
+            f"holds another {kind}: {', '.join(differing) or 'its definition'} differs",
             where=str(definition.parent),
             remedy="choose another folder, or give the same options as before",
         )
@@ -199,10 +217,10 @@ def _write_index(sweep: Sweep, folder: Path, points: Sequence[Point], done: dict
         table.writerow(
             [point.index, *(f"{v:.12g}" for v in point.values), point.seed, path.name if path.exists() else "", reason]
         )
-    return _write(folder / INDEX, text.getvalue())
+    return written(folder / INDEX, text.getvalue())
 
 
-def _write(path: Path, text: str) -> Path:
+def written(path: Path, text: str) -> Path:
     """Write a text whole or not at all."""
     part = path.with_name(f".{path.name}.part")
     part.write_text(text, encoding="utf-8")

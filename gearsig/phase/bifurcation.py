@@ -8,14 +8,17 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count, frozen_array, not_negative, one_of
 from gearsig.errors import InputError
-from gearsig.phase.lock import constant_period_lock, find_lock
+from gearsig.phase.lock import CycleLock, constant_period_lock, find_lock
 from gearsig.phase.plane import phase_plane
 from gearsig.phase.section import locked_section, section_period
 from gearsig.phase.types import BifurcationDiagram, PhasePortrait, PoincareSection
 from gearsig.recording.types import Recording
 
-Run = Callable[[float], tuple[FloatArray, float]]
-"""From a value of the parameter to a time series, (n,) or (n, n_axes), and the period in seconds."""
+Run = Callable[[float], tuple[FloatArray, float | CycleLock]]
+"""From a value of the parameter to a time series, (n,) or (n, n_axes), and the period in s or what it is locked to."""
+
+DIFFERS = 0.1
+"""Two branches are apart where their sizes differ by more than this share."""
 
 
 def bifurcation_diagram(
@@ -48,7 +51,7 @@ def bifurcation_diagram(
         If there is no section, an axis is missing, or the sections' axes or units differ.
     """
     count(most_points, "most_points")
-    kept: list[tuple[float, FloatArray, int]] = []
+    kept: list[tuple[float, FloatArray, int, float]] = []
     first: PoincareSection | None = None
     for value, section in sections:
         first = section if first is None else first
@@ -56,20 +59,21 @@ def bifurcation_diagram(
         if not np.isfinite(value):
             raise InputError(f"{parameter} is {value}", allowed="finite numbers")
         period = section_period(section, tolerance=tolerance)
-        kept.append((float(value), np.array(section.points[-most_points:, axis]), period))
+        kept.append((float(value), np.array(section.points[-most_points:, axis]), period, float(section.extent[axis])))
     if first is None:
         raise InputError("there are no sections", remedy="give at least one value of the parameter")
     kept.sort(key=lambda entry: entry[0])
     return BifurcationDiagram(
-        parameter=np.concatenate([np.full(len(points), value) for value, points, _ in kept]),
-        points=np.concatenate([points for _, points, _ in kept]),
+        parameter=np.concatenate([np.full(len(points), value) for value, points, _, _ in kept]),
+        points=np.concatenate([points for _, points, _, _ in kept]),
         parameter_name=parameter,
         parameter_unit=unit,
         axis_name=first.axis_names[axis],
         unit=first.units[axis],
-        values=np.array([value for value, _, _ in kept]),
-        periods=tuple(period for _, _, period in kept),
+        values=np.array([value for value, _, _, _ in kept]),
+        periods=tuple(period for _, _, period, _ in kept),
         section=first.section if first.kind == "geometric" else first.section.split(" of ")[0],
+        extents=np.array([extent for _, _, _, extent in kept]),
     )
 
 
@@ -132,7 +136,7 @@ def bifurcation_of_runs(
     Parameters
     ----------
     run : callable
-        value → (series, period_s); the series (n,) or (n, n_axes) starts at time zero. Called in the order of
+        value → (series, period_s or lock); the series (n,) or (n, n_axes) starts at time zero. Called in the order of
         `direction`, so that one that goes on from its last state shows hysteresis.
     values : iterable of float
     sampling_rate_hz : float
@@ -154,14 +158,42 @@ def bifurcation_of_runs(
 
     def sections() -> Iterable[tuple[float, PoincareSection]]:
         for value in ordered:
-            series, period_s = run(value)
+            series, period = run(value)
             portrait = _steady(series, sampling_rate_hz, transient_s, axis_names, units)
-            lock = constant_period_lock(period_s, portrait.end_s + 1.0 / sampling_rate_hz)
+            end_s = portrait.end_s + 1.0 / sampling_rate_hz
+            lock = period if isinstance(period, CycleLock) else constant_period_lock(period, end_s)
             yield value, locked_section(portrait, lock)
 
     return bifurcation_diagram(
         sections(), parameter=parameter, unit=unit, axis=axis, most_points=most_points, tolerance=tolerance
     )
+
+
+def values_apart(up: BifurcationDiagram, down: BifurcationDiagram, *, differs: float = DIFFERS) -> FloatArray:
+    """Return the values at which two branches hold different motions, (n,): coexisting attractors, hysteresis.
+
+    |s_up − s_down| > 0.1 max(s_up, s_down), with s the standard deviation of the path along the drawn axis.
+
+    Parameters
+    ----------
+    up, down : BifurcationDiagram
+        Of the same parameter; values that only one of them has are passed over.
+    differs : float
+        The share.
+
+    Raises
+    ------
+    InputError
+        If the extents are not known, or the diagrams are of different things.
+    """
+    if (up.parameter_name, up.axis_name, up.unit) != (down.parameter_name, down.axis_name, down.unit):
+        raise InputError(f"diagrams of {up.axis_name} and {down.axis_name}", allowed="two of the same quantity")
+    if len(up.extents) != len(up.values) or len(down.extents) != len(down.values):
+        raise InputError("a diagram without extents", remedy="make it with bifurcation_diagram")
+    values, one, other = np.intersect1d(up.values, down.values, return_indices=True)
+    a, b = up.extents[one], down.extents[other]
+    apart: FloatArray = values[np.abs(a - b) > differs * np.maximum(a, b)]
+    return apart
 
 
 def _steady(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import ceil, floor
 from typing import Literal
 
@@ -149,6 +149,8 @@ class BifurcationDiagram:
     periods : tuple of int, (n_values,)
         Cycles after which the section repeats at each value; 0 where it does not repeat within the longest looked for.
     section : str
+    extents : array, (n_values,)
+        Standard deviation of the whole path along the drawn axis at each value; empty where it is not known.
     """
 
     parameter: FloatArray
@@ -160,9 +162,12 @@ class BifurcationDiagram:
     values: FloatArray
     periods: tuple[int, ...]
     section: str
+    extents: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
-        for name in ("parameter", "points", "values"):
+        for name in ("parameter", "points", "values", "extents"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
         if len(self.parameter) != len(self.points) or len(self.values) != len(self.periods):
             raise InputError(f"{len(self.parameter)} parameter values for {len(self.points)} points")
+        if len(self.extents) not in (0, len(self.values)):
+            raise InputError(f"{len(self.extents)} extents for {len(self.values)} values")

@@ -1,4 +1,4 @@
-"""Motion in phase space: portraits with their Poincaré points, bifurcations, recurrences, delays and dimensions."""
+"""Motion in phase space: portraits with their Poincaré points, recurrences, delays and dimensions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gearsig.phase.measures import (
     RecurrenceMeasures,
     RecurrencePlot,
 )
-from gearsig.phase.types import BifurcationDiagram, PhasePortrait, PoincareSection
+from gearsig.phase.types import PhasePortrait, PoincareSection
 from gearsig.plot import series, style
 from gearsig.plot.display import with_unit
 
@@ -61,7 +61,7 @@ def phase_portrait_figure(
         raise InputError(f"the section's axes are {section.axis_names}", allowed=f"{portrait.axis_names}")
     figure = style.new_figure(TOP_IN + SIDE_IN + BOTTOM_IN)
     path, points = _two_panels(figure)
-    shown = [_display_unit(portrait.units[axis], float(portrait.extent[axis])) for axis in axes]
+    shown = [display_unit(portrait.units[axis], float(portrait.extent[axis])) for axis in axes]
     x, y = (portrait.points[-n_points:, axis] * factor for axis, (factor, _) in zip(axes, shown, strict=True))
     path.plot(x, y, color=style.MEASURED, linewidth=0.5, alpha=0.6 if len(x) < 5000 else 0.3)
     names = [with_unit(portrait.axis_names[axis], unit) for axis, (_, unit) in zip(axes, shown, strict=True)]
@@ -80,34 +80,6 @@ def phase_portrait_figure(
     for panel in (path, points):
         style.no_offset(panel)
         panel.locator_params(nbins=5)
-    return figure
-
-
-def bifurcation_figure(diagram: BifurcationDiagram, *, title: str = "", height_in: float = 4.2) -> Figure:
-    """Draw every Poincaré point over the parameter; values whose section repeats are named by their period above."""
-    figure = style.new_figure(height_in)
-    axes = style.panel(figure, top_in=0.62)
-    factor, unit = _display_unit(diagram.unit, float(np.abs(diagram.points).max()))
-    axes.plot(
-        diagram.parameter,
-        diagram.points * factor,
-        linestyle="none",
-        marker=".",
-        markersize=2.0 if len(diagram.points) < 20_000 else 1.0,
-        markeredgewidth=0.0,
-        color=style.MEASURED,
-        alpha=0.6,
-        rasterized=len(diagram.points) > 20_000,
-    )
-    style.label_axes(
-        axes,
-        with_unit(diagram.parameter_name, diagram.parameter_unit),
-        with_unit(diagram.axis_name, unit),
-    )
-    for start, stop, period in _runs_of_equal_period(diagram):
-        series.write(axes, 0.5 * (start + stop), 1.02, f"{period}×", colour=style.QUIET)
-    series.headline(figure, title or f"{diagram.axis_name} once per {diagram.section}, over {diagram.parameter_name}")
-    style.no_offset(axes)
     return figure
 
 
@@ -195,7 +167,7 @@ def _two_panels(figure: Figure) -> tuple[Axes, Axes]:
     return left, right
 
 
-def _display_unit(unit: str, size: float) -> tuple[float, str]:
+def display_unit(unit: str, size: float) -> tuple[float, str]:
     """Return the factor and unit in which a length or velocity of that size is read without powers of ten."""
     base, _, rest = unit.partition("/")
     if base != "m" or size >= 0.5:
@@ -221,18 +193,6 @@ def _keep_apart(axes: Axes, section: PoincareSection, which: tuple[int, int], fa
         limits.append((middle - half, middle + half))
     axes.set_xlim(limits[0])
     axes.set_ylim(limits[1])
-
-
-def _runs_of_equal_period(diagram: BifurcationDiagram) -> list[tuple[float, float, int]]:
-    """Stretches of neighbouring values with one period, those that repeat and are wide enough to be named."""
-    width = float(np.ptp(diagram.values))
-    runs: list[tuple[float, float, int]] = []
-    for value, period in zip(diagram.values, diagram.periods, strict=True):
-        if runs and runs[-1][2] == period:
-            runs[-1] = (runs[-1][0], float(value), period)
-        else:
-            runs.append((float(value), float(value), period))
-    return [run for run in runs if run[2] and run[1] - run[0] >= 0.03 * width]
 
 
 def _measure_texts(measures: RecurrenceMeasures) -> list[str]:

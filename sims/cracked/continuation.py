@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from math import pi
 
@@ -16,6 +15,7 @@ from sims.cracked.linear import default_step_s, slowest_decay_s
 from sims.cracked.respond import Response, State, respond
 from sims.cracked.simulate import LEAST_MOTION_HZ, simulate_with_motion
 from sims.cracked.simulator import NAME, CrackedPair, Prepared
+from sims.machine import Machine
 from sims.machine.operation import Course, Operation
 from sims.request import operation_of
 from sims.sweep import Sweep
@@ -33,6 +33,15 @@ _ANGLE = ("driver angle", "driver angle velocity")
 
 
 @dataclass(frozen=True)
+class End:
+    """Where a run ended: the state, and the speed and torque it was steady at."""
+
+    state: State
+    speed_rpm: float
+    torque_nm: float
+
+
+@dataclass(frozen=True)
 class SteadyRun:
     """The machine at one value, its transient left out.
 
@@ -40,26 +49,37 @@ class SteadyRun:
     ----------
     value : float
         Of what is varied.
-    machine_teeth : int
-        Of the driver: mesh cycles per revolution of the input shaft.
+    machine : Machine
+        With its effects.
     response : Response
         From time 0 on: driver angle, transmission error, mesh force and what was asked for.
     recording : Recording or None
         Where a channel of the measurement chain was asked for; on the same time axis.
     settled_s : float
         Time that was left out ahead.
-    last : State
+    end : End
         What the next run goes on from.
-    operation : Operation
     """
 
     value: float
-    machine_teeth: int
+    machine: Machine
     response: Response
     recording: Recording | None
     settled_s: float
-    last: State
-    operation: Operation
+    end: End
+
+    @property
+    def rate_of_transmission_error_mps(self) -> FloatArray:
+        """Rate of r_b1 θ1 − r_b2 θ2."""
+        pair, response = self.machine.mesh.pair, self.response
+        one = pair.driver.base_radius_mm * response["driver angle velocity"]
+        rate: FloatArray = 1e-3 * (one - pair.driven.base_radius_mm * response["driven angle velocity"])
+        return rate
+
+    @property
+    def separated_share(self) -> float:
+        """Share of the time without a tooth in contact."""
+        return float(np.mean(self.response["mesh_force_n"] == 0.0))
 
 
 @dataclass(frozen=True)
@@ -99,43 +119,29 @@ class Branch:
         """What the parameter is set to, ascending."""
         return tuple(sorted(self.sweep.axes[0].values))
 
-    def runs(self, values: tuple[float, ...], begin: SteadyRun | None = None) -> Iterator[SteadyRun]:
-        """Run the values in the order given, each from where the last one ended.
+    def run(self, value: float, before: End | None = None) -> SteadyRun:
+        """Run one value, from where another run ended or from the static balance.
 
-        Parameters
-        ----------
-        values : tuple of float
-        begin : SteadyRun or None
-            The run before the first; None: the first starts from the static balance.
+        Left out ahead are `DECAYS` time constants of the machine's slowest decay.
         """
-        for value in values:
-            begin = self.run(value, begin)
-            yield begin
-
-    def run(self, value: float, before: SteadyRun | None = None) -> SteadyRun:
-        """Run one value, from the end of another run or from the static balance."""
         rng = np.random.default_rng(self.sweep.seed)
         ready = self._prepared(value, rng)
         machine, operation = ready.machine, ready.operation
         speed = operation.speed_rpm.largest
         if speed <= 0.0:
             raise InputError("speed_rpm is 0", allowed="> 0 rpm: a shaft at rest has no cycles")
-        cycle_s = 60.0 / speed / self._per_revolution(machine.mesh.pair.driver.teeth)
-        settle_s = DECAYS * slowest_decay_s(machine, operation)
-        first = _ramped(ready, before, self.sweep.seed)
+        cycle_s = 60.0 / speed / (machine.mesh.pair.driver.teeth if self.section == "mesh" else 1)
         duration_s = (self.n_cycles + 2 * SPARE_CYCLES) * cycle_s
-        recording = None
+        settle_s = DECAYS * slowest_decay_s(machine, operation)
+        first, recording = _ramped(ready, before, self.sweep.seed), None
         if self.signal in SIGNALS:
             response = self._settled(ready, rng, first, settle_s, duration_s, cycle_s)
         else:
             state = self._settled(ready, np.random.default_rng(self.sweep.seed), first, settle_s, cycle_s, cycle_s).last
             recording, response = self._measured(ready, rng, state, duration_s)
         assert response.last is not None  # noqa: S101 - said to the type checker: `respond` always leaves one
-        teeth = machine.mesh.pair.driver.teeth
-        return SteadyRun(value, teeth, _from_zero(response), recording, settle_s, response.last, operation)
-
-    def _per_revolution(self, teeth: int) -> int:
-        return teeth if self.section == "mesh" else 1
+        end = End(response.last, speed, operation.torque_nm.largest)
+        return SteadyRun(value, machine, _from_zero(response), recording, settle_s, end)
 
     def _prepared(self, value: float, rng: np.random.Generator) -> Prepared:
         point = self.sweep.points()[self.sweep.axes[0].values.index(value)]
@@ -201,21 +207,14 @@ class Branch:
         )
 
 
-def rate_of_transmission_error(ready_teeth: tuple[float, float], response: Response) -> FloatArray:
-    """Rate of r_b1 θ1 − r_b2 θ2, in m/s, for base radii in m."""
-    r1, r2 = ready_teeth
-    rate: FloatArray = r1 * response["driver angle velocity"] - r2 * response["driven angle velocity"]
-    return rate
-
-
-def _ramped(ready: Prepared, before: SteadyRun | None, seed: int) -> State | None:
+def _ramped(ready: Prepared, before: End | None, seed: int) -> State | None:
     """Go from one operation to the next slowly."""
     if before is None:
         return None
-    one, two = before.operation, ready.operation
-    pairs = [(a.largest, b.largest) for a, b in ((one.speed_rpm, two.speed_rpm), (one.torque_nm, two.torque_nm))]
+    now = ready.operation
+    pairs = ((before.speed_rpm, now.speed_rpm.largest), (before.torque_nm, now.torque_nm.largest))
     if all(a == b for a, b in pairs):
-        return before.last
+        return before.state
     speed, torque = (Course.of((0.0, RAMP_S), pair) for pair in pairs)
     response = respond(
         ready.machine,
@@ -224,7 +223,7 @@ def _ramped(ready: Prepared, before: SteadyRun | None, seed: int) -> State | Non
         rng=np.random.default_rng(seed).spawn(2)[0],
         signals=("driver angle",),
         stride=1000,
-        first=before.last,
+        first=before.state,
     )
     return response.last
 

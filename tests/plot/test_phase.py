@@ -15,8 +15,8 @@ from gearsig.phase.measures import (
     RecurrencePlot,
 )
 from gearsig.phase.types import BifurcationDiagram, PhasePortrait, PoincareSection
+from gearsig.plot.bifurcation import bifurcation_figure
 from gearsig.plot.phase import (
-    bifurcation_figure,
     divergence_figure,
     embedding_figure,
     phase_portrait_figure,
