@@ -11,14 +11,23 @@ from app.calibration.simulate import simulate_rig
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording.types import Recording
+from gearsig.severity.calibration import ALONE, WITH_REFERENCE
 from gearsig.severity.estimate import reach_of
 from gearsig.severity.evidence import GearEvidence, gear_evidence, pair_lines
+from gearsig.severity.kind import CHIPPED, CRACKED, SPALLED
 from gearsig.severity.machine import pair_facts
+from gearsig.severity.shaft_lines import ShaftLines
 from gearsig.severity.tooth_root import percent_per_mm
 
 SPEED_DIFFERENCE = 0.01
 TORQUE_DIFFERENCE = 0.03
 """Largest ones between a recording and its reference: nobody meets a speed and a load exactly."""
+
+RELIEF_ERROR = 0.2
+"""Largest one of the tip relief that the estimator is told, relative: tips are never ground as they were drawn."""
+
+CHIP_HEIGHT_MODULES = (0.25, 1.5)
+SPALL_WIDTH_PERCENT, SPALL_LENGTH_MODULES = (20.0, 90.0), (0.3, 1.2)
 
 
 @dataclass(frozen=True)
@@ -28,6 +37,29 @@ class Case:
     drawn: DrawnRig
     recording: Recording
     reference: Recording
+
+
+@dataclass(frozen=True)
+class OtherFault:
+    """A chip or spall on the tooth that has the crack otherwise, as its size was drawn.
+
+    Parameters
+    ----------
+    kind : str
+        "chipped" or "spalled".
+    recording : Recording
+    """
+
+    kind: str
+    recording: Recording
+
+
+@dataclass(frozen=True)
+class Looks:
+    """What one gear shows: its features, and its event's shape; arrays, (n_features,) and (n_shape,)."""
+
+    features: FloatArray
+    shape: FloatArray
 
 
 @dataclass(frozen=True)
@@ -43,6 +75,8 @@ class Observed:
         Depth of the crack in percent of the root; 0: none.
     with_reference, alone, sound : arrays, (2, n_features)
         Of both gears: the recording against its reference, by itself, and the reference by itself.
+    looks : mapping
+        (kind, "with_reference" or "alone") → Looks of the cracked gear, and of the gear with the other fault.
     lag_pitches : float
         By how much the event, with a reference, follows the middle of the cracked tooth's engagement; nan where no
         mark tells.
@@ -56,6 +90,7 @@ class Observed:
     with_reference: FloatArray
     alone: FloatArray
     sound: FloatArray
+    looks: dict[tuple[str, str], Looks]
     lag_pitches: float
     reach: dict[str, float]
 
@@ -76,19 +111,53 @@ def draw_case(seed: int, index: int, *, for_the_check: bool, even: bool = False)
         return None
 
 
-def observe(case: Case) -> Observed:
-    """Return what a case shows, without any fitted model."""
+def draw_other_fault(drawn: DrawnRig, rng: np.random.Generator) -> OtherFault | None:
+    """Draw and simulate a chip or a spall instead of the crack; None where the gears do not allow its size."""
+    module = float(drawn.parameters["module_mm"])
+    if rng.uniform() < 0.5:
+        kind, effect = CHIPPED, "chipped_tooth"
+        severity = module * float(np.exp(rng.uniform(*np.log(CHIP_HEIGHT_MODULES))))
+        options = {"width_percent": 100.0 if rng.uniform() < 0.4 else float(rng.uniform(30.0, 90.0))}
+    else:
+        kind, effect = SPALLED, "tooth_spall"
+        severity = float(rng.uniform(*SPALL_WIDTH_PERCENT))
+        options = {"length_mm": module * float(rng.uniform(*SPALL_LENGTH_MODULES)), "depth_um": 100.0}
+    try:
+        return OtherFault(kind, simulate_rig(drawn, effect=effect, severity=severity, options=options))
+    except (InputError, RefusalError):
+        return None
+
+
+def observe(case: Case, other: OtherFault | None = None, relief_error: float = 0.0) -> Observed:
+    """Return what a case shows, without any fitted model.
+
+    Parameters
+    ----------
+    case : Case
+    other : OtherFault or None
+    relief_error : float
+        Of the tip relief that the estimator is told, relative.
+    """
     drawn, rig = case.drawn, case.recording.rig
     if rig is None:
         raise InputError("a simulated recording has no rig")
     facts = pair_facts(rig, None)
-    channels = case.recording.vibration_names()
-    now = pair_lines(case.recording, rig, facts.pair, channels)
-    sound = pair_lines(case.reference, rig, facts.pair, channels)
-    compared = gear_evidence(now, sound, facts.module_mm, facts.load_mpa)
-    alone = gear_evidence(now, None, facts.module_mm, facts.load_mpa)
-    good = gear_evidence(sound, None, facts.module_mm, facts.load_mpa)
+    relief_um = float(drawn.parameters["tip_relief_um"]) * (1.0 + relief_error)
+
+    def lines(recording: Recording) -> tuple[ShaftLines, ...]:
+        return pair_lines(recording, rig, facts.pair, case.recording.vibration_names())
+
+    def seen(a: tuple[ShaftLines, ...], b: tuple[ShaftLines, ...] | None) -> tuple[GearEvidence, ...]:
+        return gear_evidence(a, b, facts.module_mm, facts.load_mpa, relief_um)
+
+    now, sound = lines(case.recording), lines(case.reference)
+    compared, alone, good = seen(now, sound), seen(now, None), seen(sound, None)
     gear = ("driver", "driven").index(drawn.gear)
+    looks = {(CRACKED, WITH_REFERENCE): _looks(compared[gear]), (CRACKED, ALONE): _looks(alone[gear])}
+    if other is not None:
+        damaged = lines(other.recording)
+        looks[other.kind, WITH_REFERENCE] = _looks(seen(damaged, sound)[gear])
+        looks[other.kind, ALONE] = _looks(seen(damaged, None)[gear])
     return Observed(
         drawn=drawn,
         gear=gear,
@@ -96,9 +165,14 @@ def observe(case: Case) -> Observed:
         with_reference=np.stack([e.features for e in compared]),
         alone=np.stack([e.features for e in alone]),
         sound=np.stack([e.features for e in good]),
+        looks=looks,
         lag_pitches=_lag(compared[gear], drawn.tooth),
         reach=reach_of(facts, now[0].order_hz * facts.driver_teeth),
     )
+
+
+def _looks(evidence: GearEvidence) -> Looks:
+    return Looks(evidence.features, evidence.shape)
 
 
 def _lag(evidence: GearEvidence, tooth: int) -> float:

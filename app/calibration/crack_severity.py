@@ -1,14 +1,17 @@
 """Make the calibration of crack severity: `python -m app.calibration.crack_severity [--cases N] [--to FILE]`.
 
-Draws and simulates gearboxes one after the other (some 1.5 s each on one core), fits the two models, and writes the
-JSON file that the library reads. Three fifths of the cases are fitted; the rest makes the intervals.
+Draws and simulates gearboxes (some 2.5 s each on one core), each with its crack, sound, and with a chip or spall; fits
+the models, and writes the JSON file that the library reads. Three fifths of the cases are fitted; the rest makes the
+intervals.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import pickle
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -16,16 +19,28 @@ import numpy as np
 import typer
 
 from app.calibration import rigs
-from app.calibration.cases import Observed, draw_case, observe
+from app.calibration.cases import (
+    CHIP_HEIGHT_MODULES,
+    RELIEF_ERROR,
+    SPALL_LENGTH_MODULES,
+    SPALL_WIDTH_PERCENT,
+    Observed,
+    draw_case,
+    draw_other_fault,
+    observe,
+)
 from app.calibration.fit import FALSE_ALARMS, Cases, fit_model
+from app.calibration.fit_kind import fit_kind
 from gearsig.errors import RefusalError
-from gearsig.severity.calibration import ALONE, FILE, WITH_REFERENCE
+from gearsig.severity.calibration import ALONE, FILE, RELIEF_KNOWN, WITH_REFERENCE
 from gearsig.severity.features import FEATURES
+from gearsig.severity.kind import CRACKED, KindModel, kind_vector
 from gearsig.severity.model import DepthModel
+from gearsig.severity.shape import SHAPE
 
 SEED = 2611
-N_CASES = 520
-FIRST_EVEN = 420
+N_CASES = 540
+FIRST_EVEN = 430
 """Cases from here on have teeth that hardly differ."""
 
 HELD_OUT = (3, 4)
@@ -38,38 +53,63 @@ def main() -> None:
     """Simulate, fit, write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=N_CASES)
+    parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--to", type=Path, default=FILE)
     parser.add_argument("--state", default="", help="the simulator's commit, for the provenance")
+    parser.add_argument("--observed", type=Path, help="what the cases show: read from there, or kept there")
     given = parser.parse_args()
-    observed = observe_all(range(given.cases))
+    if given.observed and given.observed.exists():
+        observed = pickle.loads(given.observed.read_bytes())  # noqa: S301  # a file of one's own
+    else:
+        observed = observe_all(range(given.cases), given.processes)
+    if given.observed:
+        given.observed.write_bytes(pickle.dumps(observed))
     text = json.dumps(calibration_of(observed, given.cases, given.state), indent=1)
     given.to.write_text(text + "\n", encoding="utf-8")
     typer.echo(f"{len(observed)} of {given.cases} cases; written to {given.to}")
 
 
-def observe_all(indices: Sequence[int]) -> list[tuple[int, Observed]]:
+def observe_all(indices: Sequence[int], n_processes: int) -> list[tuple[int, Observed]]:
     """Return what the drawn cases show, by their index; some cannot be made, or show too few mesh harmonics."""
     found = []
-    for index in indices:
-        case = draw_case(SEED, index, for_the_check=False, even=index >= FIRST_EVEN)
-        if case is not None:
-            try:
-                found.append((index, observe(case)))
-            except RefusalError as refusal:
-                typer.echo(f"case {index}: {refusal}")
-        if index % 25 == 24:
-            typer.echo(f"{index + 1} cases drawn")
+    with ProcessPoolExecutor(n_processes) as pool:
+        for index, answer in zip(indices, pool.map(observe_one, indices, chunksize=5), strict=True):
+            if isinstance(answer, Observed):
+                found.append((index, answer))
+            elif answer:
+                typer.echo(f"case {index}: {answer}")
+            if index % 25 == 24:
+                typer.echo(f"{index + 1} cases drawn")
     return found
+
+
+def observe_one(index: int) -> Observed | str:
+    """Return what one case shows, or why it shows nothing."""
+    case = draw_case(SEED, index, for_the_check=False, even=index >= FIRST_EVEN)
+    if case is None:
+        return ""
+    rng = np.random.default_rng([SEED, index, 0, 1])
+    relief_error = float(rng.uniform(-RELIEF_ERROR, RELIEF_ERROR))
+    try:
+        return observe(case, draw_other_fault(case.drawn, rng), relief_error)
+    except RefusalError as refusal:
+        return str(refusal)
 
 
 def calibration_of(observed: Sequence[tuple[int, Observed]], n_drawn: int, simulator_state: str) -> dict[str, Any]:
     """Return the calibration as JSON-like values."""
-    models = {name: fit_model(cases_of(observed, name)) for name in ("with_reference", "alone")}
+    models = {
+        name + ending: fit_model(cases_of(observed, name), relief_known=bool(ending))
+        for name in (WITH_REFERENCE, ALONE)
+        for ending in ("", RELIEF_KNOWN)
+    }
     return {
         "features": list(FEATURES),
+        "shape": list(SHAPE),
         "lag_pitches": round(_median_lag(observed, models[WITH_REFERENCE]), 3),
         "reach": _reach([o for _, o in observed]),
-        "models": {WITH_REFERENCE: _plain(models["with_reference"]), ALONE: _plain(models["alone"])},
+        "models": {name: _plain(model) for name, model in models.items()},
+        "kinds": {name: _plain(kind_of(observed, name, models[name])) for name in (WITH_REFERENCE, ALONE)},
         "provenance": _provenance(observed, n_drawn, simulator_state),
     }
 
@@ -89,6 +129,17 @@ def cases_of(observed: Sequence[tuple[int, Observed]], kind: str) -> Cases:
     )
 
 
+def kind_of(observed: Sequence[tuple[int, Observed]], way: str, model: DepthModel) -> KindModel:
+    """Return the model of the kind, from the events that are seen."""
+    seen = [
+        (kind, kind_vector(looks.features, looks.shape))
+        for _, o in observed
+        for (kind, name), looks in o.looks.items()
+        if name == way and (kind != CRACKED or o.percent > 0) and model.score(looks.features) >= model.threshold
+    ]
+    return fit_kind(np.array([vector for _, vector in seen]), [kind for kind, _ in seen])
+
+
 def _median_lag(observed: Sequence[tuple[int, Observed]], model: DepthModel) -> float:
     seen = [
         o.lag_pitches
@@ -106,7 +157,7 @@ def _reach(observed: Sequence[Observed]) -> dict[str, list[float]]:
     }
 
 
-def _plain(model: DepthModel) -> dict[str, Any]:
+def _plain(model: DepthModel | KindModel) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for name, value in vars(model).items():
         array = np.asarray(value, dtype=np.float64)
@@ -133,6 +184,10 @@ def _provenance(observed: Sequence[tuple[int, Observed]], n_drawn: int, simulato
         "false_alarms": FALSE_ALARMS,
         "depths_mm": list(rigs.DEPTHS_MM),
         "modules_mm": list(rigs.CALIBRATION_MODULES_MM),
+        "tip_relief_error": RELIEF_ERROR,
+        "chip_height_modules": list(CHIP_HEIGHT_MODULES),
+        "spall_width_percent": list(SPALL_WIDTH_PERCENT),
+        "spall_length_modules": list(SPALL_LENGTH_MODULES),
         "crack": "straight, 45 degrees, through the whole face width",
         "teeth": "18 to 100, no pair whose teeth add up to a multiple of three",
         "least_revolutions": rigs.LEAST_REVOLUTIONS,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.severity.features import FEATURES, RISING, SHAPED
+from gearsig.severity.features import FEATURES, RELIEF, RISING, SHAPED
 from gearsig.severity.model import LEAST_SPREAD, DepthModel, segments
 
 FALSE_ALARMS = 0.02
@@ -23,7 +23,6 @@ _RIDGE = 3.0
 _KNOTS = (1 / 3, 2 / 3)
 _COVERAGE = (0.05, 0.95)
 _SHAPED = [FEATURES.index(name) for name in SHAPED]
-_REST = [i for i, name in enumerate(FEATURES) if name not in RISING]
 
 
 @dataclass(frozen=True)
@@ -48,8 +47,9 @@ class Cases:
     held_out: np.ndarray
 
 
-def fit_model(cases: Cases) -> DepthModel:
+def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
     """Fit detection, depth and spread on the one part of the cases, and quantiles on the other."""
+    rest = [i for i, name in enumerate(FEATURES) if name not in RISING and (relief_known or name not in RELIEF)]
     mean, scale = cases.features.mean(axis=0), cases.features.std(axis=0)
     z = (cases.features - mean) / scale
     sound = (cases.sound - mean) / scale
@@ -60,11 +60,11 @@ def fit_model(cases: Cases) -> DepthModel:
     fitted, kept = seen & ~cases.held_out, seen & cases.held_out
     y = np.log(cases.percent)
     knots = np.quantile(z[seen][:, _SHAPED], _KNOTS, axis=0).T
-    intercept, coefficients, slopes = _depth_weights(z[fitted], y[fitted], knots)
+    intercept, coefficients, slopes = _depth_weights(z[fitted], y[fitted], knots, rest)
     error = y - intercept - z @ coefficients - _curves(z, knots) @ slopes.ravel()
     spread = _spread_weights(z[fitted], np.abs(error[fitted]))
     sigma = np.maximum(spread[0] + z @ spread[1:], LEAST_SPREAD)
-    precision = _precision(z[seen])
+    precision = _precision(z[seen], rest)
     distances = np.sqrt(np.einsum("ij,jk,ik->i", z[seen], precision, z[seen]))
     return DepthModel(
         mean=mean,
@@ -110,18 +110,20 @@ def _curves(z: FloatArray, knots: FloatArray) -> FloatArray:
     return np.hstack([segments(z[:, i], pair) for i, pair in zip(_SHAPED, knots, strict=True)])
 
 
-def _depth_weights(z: FloatArray, y: FloatArray, knots: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+def _depth_weights(
+    z: FloatArray, y: FloatArray, knots: FloatArray, rest: list[int]
+) -> tuple[float, FloatArray, FloatArray]:
     """Ridge regression: rising curves of what the depth is read from, and straight lines of the rest."""
     from scipy.optimize import lsq_linear
 
-    columns = np.c_[np.ones(len(z)), _curves(z, knots), z[:, _REST]]
+    columns = np.c_[np.ones(len(z)), _curves(z, knots), z[:, rest]]
     n, n_curves = columns.shape[1], knots.size // 2 * 3
     rows = np.vstack([columns, np.sqrt(_RIDGE) * np.eye(n)[1:]])
     low = np.full(n, -np.inf)
     low[1 : 1 + n_curves] = 0.0
     result = lsq_linear(rows, np.r_[y, np.zeros(n - 1)], bounds=(low, np.full(n, np.inf))).x
     coefficients = np.zeros(z.shape[1])
-    coefficients[_REST] = result[1 + n_curves :]
+    coefficients[rest] = result[1 + n_curves :]
     return float(result[0]), coefficients, np.maximum(result[1 : 1 + n_curves], 0.0).reshape(-1, 3)
 
 
@@ -136,9 +138,9 @@ def _spread_weights(z: FloatArray, error: FloatArray) -> FloatArray:
     return spread
 
 
-def _precision(z: FloatArray) -> FloatArray:
+def _precision(z: FloatArray, rest: list[int]) -> FloatArray:
     """Inverse covariance of the features that the depth is read from; 0 for the others."""
-    used = sorted([*_SHAPED, *_REST])
+    used = sorted([*_SHAPED, *rest])
     precision = np.zeros((z.shape[1], z.shape[1]))
     precision[np.ix_(used, used)] = np.linalg.inv(np.cov(z[:, used].T) + 1e-3 * np.eye(len(used)))
     return precision

@@ -1,4 +1,4 @@
-"""The calibration that is kept with the product: two models, and the machines they were made from."""
+"""The calibration that is kept with the product: its models, and the machines they were made from."""
 
 from __future__ import annotations
 
@@ -11,10 +11,14 @@ from typing import Any
 
 from gearsig.errors import InputError, RefusalError
 from gearsig.severity.features import FEATURES
+from gearsig.severity.kind import KindModel
 from gearsig.severity.model import DepthModel
+from gearsig.severity.shape import SHAPE
 
 FILE = Path(__file__).with_name("calibration.json")
 WITH_REFERENCE, ALONE = "with_reference", "alone"
+RELIEF_KNOWN = "_relief_known"
+"""Ending of the names of the models that know the tip relief."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +28,9 @@ class Calibration:
     Parameters
     ----------
     models : mapping
-        "with_reference" and "alone" → DepthModel.
+        "with_reference" and "alone", also with the ending "_relief_known" → DepthModel.
+    kinds : mapping
+        "with_reference" and "alone" → KindModel.
     reach : mapping
         Quantity → (lowest, highest) value among the calibration's machines.
     lag_pitches : float
@@ -34,6 +40,7 @@ class Calibration:
     """
 
     models: Mapping[str, DepthModel]
+    kinds: Mapping[str, KindModel]
     reach: Mapping[str, tuple[float, float]]
     lag_pitches: float
     provenance: Mapping[str, Any]
@@ -47,7 +54,7 @@ class Calibration:
         InputError
             If it belongs to other features than this version computes.
         """
-        if tuple(values["features"]) != FEATURES:
+        if (tuple(values["features"]), tuple(values.get("shape", ()))) != (FEATURES, SHAPE):
             raise InputError(
                 "the calibration of crack severity belongs to other features than this version computes",
                 where=str(FILE.name),
@@ -55,6 +62,7 @@ class Calibration:
             )
         return cls(
             {name: DepthModel.from_mapping(model) for name, model in values["models"].items()},
+            {name: KindModel.from_mapping(model) for name, model in values["kinds"].items()},
             {name: (float(low), float(high)) for name, (low, high) in values["reach"].items()},
             float(values["lag_pitches"]),
             values["provenance"],

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import exp, log
 
+from gearsig.checks import not_negative
 from gearsig.errors import RefusalError
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
-from gearsig.severity.calibration import ALONE, WITH_REFERENCE, Calibration, load_calibration
+from gearsig.severity.calibration import ALONE, RELIEF_KNOWN, WITH_REFERENCE, Calibration, load_calibration
 from gearsig.severity.evidence import GearEvidence, gear_evidence, pair_lines
 from gearsig.severity.features import FEATURES
+from gearsig.severity.kind import kind_vector
 from gearsig.severity.machine import PairFacts, acceleration_channels, pair_facts
 from gearsig.severity.model import DepthModel
+from gearsig.severity.shape import reach_cycles
+from gearsig.severity.squeezed import squeezed_rise_db
 from gearsig.severity.tooth_root import percent_per_mm
 from gearsig.severity.types import CrackEstimate, NoCrackSeen
 
@@ -30,6 +34,7 @@ def estimate_crack(
     *,
     reference: Recording | None = None,
     torque_nm: float | None = None,
+    tip_relief_um: float | None = None,
     channels: Sequence[str] = (),
     calibration: Calibration | None = None,
 ) -> CrackEstimate | NoCrackSeen:
@@ -50,6 +55,9 @@ def estimate_crack(
         birth hides all but deep cracks.
     torque_nm : float or None
         Instead of the rig's operating point.
+    tip_relief_um : float or None
+        Metal taken off at the tips of either gear, from the drawing, 0 if there is none; None: not known. It decides
+        how strong the mesh is that the crack is compared with: knowing it to 20 % makes the depth surer.
     channels : sequence of str
         Default: all acceleration channels.
     calibration : Calibration or None
@@ -91,9 +99,11 @@ def estimate_crack(
         described = reference if reference.rig is not None else reference.with_rig(known)
         acceleration_channels(described, names)
         sound = pair_lines(described, described.rig or known, facts.pair, names)
-    found = gear_evidence(now, sound, facts.module_mm, facts.load_mpa)
-    model = used.models[ALONE if reference is None else WITH_REFERENCE]
-    return judge(found, model, used, facts)
+    if tip_relief_um is not None:
+        not_negative(tip_relief_um, "tip_relief_um", "µm")
+    found = gear_evidence(now, sound, facts.module_mm, facts.load_mpa, tip_relief_um)
+    way = ALONE if reference is None else WITH_REFERENCE
+    return judge(found, used.models[way + ("" if tip_relief_um is None else RELIEF_KNOWN)], used, facts)
 
 
 def reach_of(facts: PairFacts, mesh_hz: float) -> dict[str, float]:
@@ -177,7 +187,9 @@ def _seen(
         reasons.append("Teeth count from 1 at the mark, as they engage; the place is good to about one tooth.")
     else:
         reasons.append("There is no mark on this shaft: the angle holds for this record only, and names no tooth.")
-    reasons.append("It supposes a crack through the whole face width; a chipped or spalled tooth may look alike.")
+    reasons.append("The depth supposes a crack through the whole face width.")
+    way = ALONE if evidence.agreement is None else WITH_REFERENCE
+    kinds = calibration.kinds[way].probabilities(kind_vector(evidence.features, evidence.shape))
     return CrackEstimate(
         shaft=evidence.shaft.shaft,
         gear=f"{facts.pair.name}/{evidence.shaft.shaft}",
@@ -192,6 +204,9 @@ def _seen(
         with_reference=evidence.agreement is not None,
         features=dict(zip(FEATURES, evidence.features.tolist(), strict=True)),
         reasons=tuple(reasons),
+        kind_probabilities=kinds,
+        reach_cycles=reach_cycles(evidence.searched, evidence.event),
+        squeezed_rise_db=squeezed_rise_db(evidence.searched, evidence.event),
     )
 
 

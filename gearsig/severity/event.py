@@ -60,7 +60,7 @@ def find_event(shaft: ShaftLines) -> ToothEvent:
     envelopes = band_envelopes(shaft)
     n = envelopes.shape[-1]
     width = round(WINDOW_PITCHES * n / shaft.teeth)
-    energy = _sliding_mean(envelopes, width)
+    energy = sliding_mean(envelopes, width)
     median = np.median(energy, axis=-1, keepdims=True)
     relative = np.divide(energy, median, out=np.ones_like(energy), where=median > 0).mean(axis=(0, 1))
     start = int(np.argmax(relative))
@@ -99,7 +99,7 @@ def without_regular_lines(shaft: ShaftLines) -> np.ndarray:
     return lines
 
 
-def _sliding_mean(values: FloatArray, width: int) -> FloatArray:
+def sliding_mean(values: FloatArray, width: int) -> FloatArray:
     """Return the mean over the window that starts at each sample of a periodic signal."""
     doubled = np.concatenate([np.zeros((*values.shape[:-1], 1)), values, values[..., :width]], axis=-1).cumsum(axis=-1)
     mean: FloatArray = (doubled[..., width:-1] - doubled[..., : values.shape[-1]]) / width

@@ -15,6 +15,7 @@ from gearsig.severity.event import ToothEvent, find_event, n_bands, without_regu
 from gearsig.severity.features import Conditions, feature_vector, mesh_energies
 from gearsig.severity.reference import difference_lines
 from gearsig.severity.shaft_lines import ShaftLines, shaft_lines
+from gearsig.severity.shape import event_shape
 
 LEAST_HARMONICS = 4
 """Mesh harmonics below the highest order: with fewer, one resonance decides."""
@@ -33,6 +34,10 @@ class GearEvidence:
     event : ToothEvent
     features : array
         See `gearsig.severity.features.FEATURES`.
+    searched : ShaftLines
+        What the event was found in: the average, or its difference from the sound gear's.
+    shape : array
+        See `gearsig.severity.shape.SHAPE`.
     agreement : float or None
         Of the teeth's pattern with the reference's; None without one.
     """
@@ -40,6 +45,8 @@ class GearEvidence:
     shaft: ShaftLines
     event: ToothEvent
     features: FloatArray
+    searched: ShaftLines
+    shape: FloatArray
     agreement: float | None = None
 
 
@@ -52,14 +59,18 @@ def pair_lines(recording: Recording, rig: Rig, pair: GearPair, channels: Sequenc
 
 
 def gear_evidence(
-    now: Sequence[ShaftLines], sound: Sequence[ShaftLines] | None, module_mm: float, load_mpa: float
+    now: Sequence[ShaftLines],
+    sound: Sequence[ShaftLines] | None,
+    module_mm: float,
+    load_mpa: float,
+    tip_relief_um: float | None = None,
 ) -> tuple[GearEvidence, ...]:
     """Return the most conspicuous tooth of either gear, in what differs from the sound gear where there is one.
 
     Mesh energies that the event is compared with are the geometric mean of both recordings'.
     """
     return tuple(
-        _one_gear(now, sound, i, Conditions(module_mm, load_mpa, shaft.order_hz * shaft.teeth))
+        _one_gear(now, sound, i, Conditions(module_mm, load_mpa, shaft.order_hz * shaft.teeth, tip_relief_um))
         for i, shaft in enumerate(now)
     )
 
@@ -72,7 +83,8 @@ def _one_gear(
     if sound is None:
         event = find_event(shaft)
         mesh = mesh_energies(shaft, n_bands(shaft))
-        return GearEvidence(shaft, event, feature_vector(shaft, shaft, mesh, event, conditions))
+        shape = event_shape(shaft, shaft, event, driver=i == 0)
+        return GearEvidence(shaft, event, feature_vector(shaft, shaft, mesh, event, conditions), shaft, shape)
     marked = any(a.has_mark and b.has_mark for a, b in zip(now, sound, strict=True))
     _check_harmonics(sound[i])
     difference, agreement = difference_lines(shaft, sound[i], whole_teeth=marked)
@@ -80,7 +92,9 @@ def _one_gear(
     n = n_bands(difference)
     mesh = np.sqrt(mesh_energies(shaft, n) * mesh_energies(sound[i], n))
     event = find_event(difference)
-    return GearEvidence(shaft, event, feature_vector(difference, sound[i], mesh, event, conditions), agreement)
+    features = feature_vector(difference, sound[i], mesh, event, conditions)
+    shape = event_shape(difference, sound[i], event, driver=i == 0)
+    return GearEvidence(shaft, event, features, difference, shape, agreement)
 
 
 def _check_differs(difference: ShaftLines, shaft: ShaftLines) -> None:

@@ -25,6 +25,8 @@ FEATURES = (
     "log_other_teeth",
     "log_mesh_hz",
     "log_module",
+    "relief_share",
+    "relief_share_squared",
 )
 """Order of the entries of a feature vector; see `feature_vector`."""
 
@@ -34,6 +36,15 @@ SHAPED = ("band_excess", "line_excess", "prominence")
 RISING = (*SHAPED, "pattern_excess")
 """Features that a deeper crack raises, all else the same. The last one serves to detect only: how much teeth differ
 from birth must not decide on a depth."""
+
+RELIEF = ("relief_share", "relief_share_squared")
+"""Of the models that know the tip relief only; 0 where it is not known."""
+
+MOST_RELIEF_SHARE = 2.0
+"""Beyond, the tips never touch: more relief changes nothing."""
+
+STIFFNESS_N_PER_MM_UM = 14.0
+"""Usual stiffness of a pair of steel gears per face width: by this, teeth yield load × module / 14."""
 
 GATE_PITCHES = 4.0
 _SUB_BANDS = 4
@@ -54,11 +65,20 @@ class Conditions:
     load_mpa : float
         Tangential force per face width and module.
     mesh_hz : float
+    tip_relief_um : float or None
+        Metal taken off at the tips of either gear; None: not known.
     """
 
     module_mm: float
     load_mpa: float
     mesh_hz: float
+    tip_relief_um: float | None = None
+
+    @property
+    def relief_share(self) -> float:
+        """Tip relief over what the teeth yield under the load, at most 2; 0 where the relief is not known."""
+        yield_um = self.load_mpa * self.module_mm / STIFFNESS_N_PER_MM_UM
+        return min((self.tip_relief_um or 0.0) / yield_um, MOST_RELIEF_SHARE)
 
 
 def feature_vector(
@@ -75,6 +95,8 @@ def feature_vector(
       reference); mean over bands and channels. What resonances multiply cancels entirely.
     - event_slope, mesh_slope: change of the logarithms per mesh harmonic; event_spread, mesh_spread: their standard
       deviations over the bands.
+    - relief_share: tip relief over the teeth's deflection, see `Conditions`; it decides how strong the mesh is that the
+      event is compared with.
     - the rest are logarithms of what the rig file and the speed say.
 
     Parameters
@@ -108,6 +130,8 @@ def feature_vector(
             np.log(shaft.other_teeth),
             np.log(conditions.mesh_hz),
             np.log(conditions.module_mm),
+            conditions.relief_share,
+            conditions.relief_share**2,
         ]
     )
 

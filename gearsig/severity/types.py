@@ -6,16 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from gearsig.errors import InputError
+from gearsig.severity.kind import CRACKED
 
 COVERAGE = 0.90
 """Part of the cases in which the interval is meant to hold the true depth."""
 
+LIKELY = 0.7
+"""Probability from which a kind is stated; between 1 - it and it, it is left open."""
+
 
 @dataclass(frozen=True)
 class CrackEstimate:
-    """A crack was seen; how deep it is.
-
-    The statement supposes that what was seen is a crack: another fault of one tooth may look alike.
+    """A damaged tooth was seen; whether it is cracked, and how deep the crack is, if it is one.
 
     Parameters
     ----------
@@ -41,6 +43,14 @@ class CrackEstimate:
         Name → value of what the estimate rests on; see `gearsig.severity.features`.
     reasons : tuple of str
         What the reader should know, one sentence each.
+    kind_probabilities : mapping
+        "cracked", "chipped", "spalled" → probability, if cracks are as frequent as chips and spalls together.
+    reach_cycles : float
+        For how many mesh cycles after its middle the event has four times the middling tooth's energy. It hangs on
+        damping and resonances as much as on the depth; the estimate does not rest on it.
+    squeezed_rise_db : float
+        Synchrosqueezed energy at high orders near the tooth over that elsewhere; see
+        `gearsig.severity.squeezed`. The estimate does not rest on it.
     """
 
     shaft: str
@@ -56,6 +66,9 @@ class CrackEstimate:
     with_reference: bool
     features: Mapping[str, float] = field(default_factory=dict)
     reasons: tuple[str, ...] = ()
+    kind_probabilities: Mapping[str, float] = field(default_factory=dict)
+    reach_cycles: float = 0.0
+    squeezed_rise_db: float = 0.0
 
     def __post_init__(self) -> None:
         low, high = self.interval_mm
@@ -63,14 +76,27 @@ class CrackEstimate:
             raise InputError(f"the interval {low:g} to {high:g} mm does not hold the depth {self.depth_mm:g} mm")
 
     @property
+    def kind(self) -> str:
+        """What the event looks like: "cracked", "chipped or spalled", or "undecided"."""
+        cracked = self.kind_probabilities.get(CRACKED, 1.0)
+        if cracked >= LIKELY:
+            return CRACKED
+        return "chipped or spalled" if cracked <= 1.0 - LIKELY else "undecided"
+
+    @property
     def text(self) -> str:
-        """The statement in one sentence."""
+        """The statement in one sentence, or two."""
         where = f"tooth {self.tooth}" if self.tooth is not None else f"at {self.angle_deg:.0f}°"
         doubt = "" if self.gear_is_certain else " (or its mate)"
-        return (
-            f"Crack of {self.depth_mm:.1f} mm ({self.interval_mm[0]:.1f} to {self.interval_mm[1]:.1f} mm), "
-            f"{self.depth_percent:.0f} % of the root, {where} of {self.gear}{doubt}."
-        )
+        size = f"{self.depth_mm:.1f} mm ({self.interval_mm[0]:.1f} to {self.interval_mm[1]:.1f} mm)"
+        place = f"{where} of {self.gear}{doubt}"
+        other = 100.0 * (1.0 - self.kind_probabilities.get(CRACKED, 1.0))
+        if self.kind == "chipped or spalled":
+            return (
+                f"Damage at {place}, chipped or spalled rather than cracked ({other:.0f} %); a crack would be {size}."
+            )
+        text = f"Crack of {size}, {self.depth_percent:.0f} % of the root, {place}."
+        return text if self.kind == CRACKED else f"{text} Or it is chipped or spalled ({other:.0f} %)."
 
 
 @dataclass(frozen=True)
