@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import typer
 
 from app.commands.analyze import analyze
+from app.commands.bifurcation import bifurcation
 from app.commands.crack import crack
 from app.commands.dashboard import dashboard
 from app.commands.demo import demo
@@ -38,6 +39,7 @@ app.command()(report)
 app.add_typer(rig_app, name="rig")
 app.command()(simulate)
 app.command()(sweep)
+app.command()(bifurcation)
 app.command()(demo)
 app.command()(dashboard)
 

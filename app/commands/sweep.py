@@ -74,7 +74,7 @@ def sweep(
     Example: gearsig sweep cracked --vary speed=300..1500rpm:10 --vary root_crack=0..4mm:10 --duration 1s -o grid
     """
     request = read_request(model, preset, settings, effects, speed, torque, duration, fs, seed)
-    wanted = _sweep_of(request, vary, common_seed, f".{extension.lstrip('.')}")
+    wanted = sweep_of(request, vary, common_seed, f".{extension.lstrip('.')}")
     result = _run(wanted, output, jobs)
     for failure in result.failures[:MOST_REASONS]:
         typer.echo(f"point {failure.point.index}: {failure.reason}", err=True)
@@ -87,7 +87,8 @@ def sweep(
         raise typer.Exit(EXIT_SOME_FAILED if n_made + result.n_found else EXIT_NONE_MADE)
 
 
-def _sweep_of(request: Request, vary: Sequence[str], common_seed: bool, extension: str) -> Sweep:
+def sweep_of(request: Request, vary: Sequence[str], common_seed: bool, extension: str) -> Sweep:
+    """Return the sweep that the options ask for."""
     from sims.registry import simulator
     from sims.sweep import Sweep
 
