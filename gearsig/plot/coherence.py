@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 N_COLUMNS = 500  # of the map: a line of one cell must be wider than a pixel to be seen
 LEFT_IN, RIGHT_IN, BOTTOM_IN, GAP_IN, TOP_IN = 0.85, 1.0, 0.55, 0.12, 0.55
 LINES_IN = 1.3
+LOWEST_SHARE = 0.02
 
 
 def coherence_figure(
@@ -126,7 +127,8 @@ def _draw_mean(axes: Axes, mean: EnhancedEnvelope, carriers: FloatArray, shown: 
     at, _, high = thinned(mean.spectrum.positions[shown], mean.spectrum.values[shown], 1200)
     axes.plot(at, high, color=style.MEASURED, linewidth=0.9)
     axes.axhline(mean.level, color=style.FLOOR, linewidth=1.0, linestyle=(0, (4, 3)))
-    axes.set_ylim(0.0, 1.08 * max(float(high.max()), 1.5 * mean.level))
+    # A slow change of level stands at the first lines: it must not squeeze the others.
+    axes.set_ylim(0.0, 1.08 * max(float(high[int(LOWEST_SHARE * len(high)) :].max()), 1.5 * mean.level))
     low, top = mean.band_hz
     if (low, top) != (float(carriers[0]), float(carriers[-1])):
         where = f"carriers {low:.5g} to {top:.5g} Hz"

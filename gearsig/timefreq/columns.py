@@ -10,7 +10,8 @@ import numpy as np
 from gearsig.checks import FloatArray, count, one_of
 from gearsig.spectra.blocks import scaled_unit
 from gearsig.spectra.types import Scaling
-from gearsig.timefreq.types import ComplexArray, Reduction, Spacing, TimeFrequencyMap
+from gearsig.timefreq.size import check_size
+from gearsig.timefreq.types import Coefficients, ComplexArray, Reduction, Spacing, TimeFrequencyMap
 from gearsig.timefreq.uniform import UniformSignal
 
 SCALINGS = ("amplitude peak", "power")
@@ -49,7 +50,7 @@ def plan_columns(signal: UniformSignal, n_columns: int) -> Columns:
 
 @dataclass(frozen=True)
 class Form:
-    """What a map says about its transform; fields as in `TimeFrequencyMap`."""
+    """What maps and coefficients say about their transform; fields as in `TimeFrequencyMap`."""
 
     lines: FloatArray
     spacing: Spacing
@@ -57,6 +58,36 @@ class Form:
     edge: FloatArray
     n_reach: int
     squeezed: bool = False
+
+    def coefficients(self, values: ComplexArray, signal: UniformSignal, step: int, weights: FloatArray) -> Coefficients:
+        """Return the complex values of every `step`-th sample; the weights give the signal back."""
+        return Coefficients(
+            values,
+            self.lines,
+            signal.instants(step),
+            signal.axis,
+            self.spacing,
+            signal.unit,
+            self.method,
+            weights,
+            self.n_reach,
+            self.squeezed,
+            signal.source,
+            signal.shaft,
+        )
+
+
+def room_for(n_lines: int, signal: UniformSignal, step: int) -> ComplexArray:
+    """Return zeros for the coefficients of every `step`-th sample.
+
+    Raises
+    ------
+    InputError
+        If the step is no count, or they would take more than 2 GB.
+    """
+    n_columns = -(-signal.n_samples // count(step, "step"))
+    check_size(n_lines, n_columns)
+    return np.zeros((n_lines, n_columns), dtype=np.complex64)
 
 
 class ColumnPowers:

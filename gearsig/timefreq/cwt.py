@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, one_of
+from gearsig.checks import FloatArray, one_of
 from gearsig.errors import InputError
 from gearsig.timefreq.bank import pieces, plan_groups
-from gearsig.timefreq.columns import ColumnPowers, Form, plan_columns
+from gearsig.timefreq.columns import ColumnPowers, Form, plan_columns, room_for
 from gearsig.timefreq.ends import EDGES, Edges
 from gearsig.timefreq.lines import given_lines, logarithmic_lines
-from gearsig.timefreq.size import check_size
 from gearsig.timefreq.types import Coefficients, Reduction, Spacing, TimeFrequencyMap
 from gearsig.timefreq.uniform import Source, UniformSignal, uniform
 from gearsig.timefreq.wavelets import DEFAULT, Wavelet, admissibility, half_support
@@ -65,31 +64,15 @@ def cwt(
 
     Source: S. Mallat, *A Wavelet Tour of Signal Processing*, 3rd ed. (2009), chapter 4.
     """
-    x = uniform(signal, channel)
-    lines, spacing = chosen_lines(x, wavelet, positions, lowest, highest, n_per_octave)
-    one_of(edges, "edges", EDGES)
-    n_columns = -(-x.n_samples // count(step, "step"))
-    check_size(len(lines), n_columns)
-    W = np.empty((len(lines), n_columns), dtype=np.complex64)
+    x, form = _prepared(signal, channel, wavelet, positions, lowest, highest, n_per_octave, edges)
+    W = room_for(len(form.lines), x, step)
     own = largest_power_of_two_in(step)
-    for group in plan_groups(lines / x.rate, wavelet, x.n_samples, step=own):
+    for group in plan_groups(form.lines / x.rate, wavelet, x.n_samples, step=own):
         for piece in pieces(x.values, group, edges):
             column = -(-piece.start // step)
             thinned = piece.values[:, (column * step - piece.start) // own :: step // own]
             W[piece.lines, column : column + thinned.shape[1]] = thinned
-    return Coefficients(
-        W,
-        lines,
-        x.instants(step),
-        x.axis,
-        spacing,
-        x.unit,
-        f"CWT, {wavelet.name}",
-        inverse_weights(lines, wavelet),
-        n_reach(lines, wavelet),
-        source=x.source,
-        shaft=x.shaft,
-    )
+    return form.coefficients(W, x, step, inverse_weights(form.lines, wavelet))
 
 
 def cwt_map(
@@ -129,17 +112,30 @@ def cwt_map(
     InputError, RefusalError
         As in `cwt`.
     """
+    x, form = _prepared(signal, channel, wavelet, positions, lowest, highest, n_per_octave, edges)
+    columns = plan_columns(x, n_columns)
+    powers = ColumnPowers(columns, len(form.lines), reduction)
+    for group in plan_groups(form.lines / x.rate, wavelet, x.n_samples, step=columns.largest_step, follow_band=True):
+        for piece in pieces(x.values, group, edges):
+            powers.add(piece.lines, piece.start, piece.step, piece.values)
+    return powers.finished(x, form, scaling)
+
+
+def _prepared(
+    signal: Source,
+    channel: str | None,
+    wavelet: Wavelet,
+    positions: FloatArray | None,
+    lowest: float | None,
+    highest: float | None,
+    n_per_octave: int,
+    edges: Edges,
+) -> tuple[UniformSignal, Form]:
+    """Check what both functions are given, and lay the lines."""
     x = uniform(signal, channel)
     lines, spacing = chosen_lines(x, wavelet, positions, lowest, highest, n_per_octave)
     one_of(edges, "edges", EDGES)
-    columns = plan_columns(x, n_columns)
-    powers = ColumnPowers(columns, len(lines), reduction)
-    for group in plan_groups(lines / x.rate, wavelet, x.n_samples, step=columns.largest_step, follow_band=True):
-        for piece in pieces(x.values, group, edges):
-            powers.add(piece.lines, piece.start, piece.step, piece.values)
-    edge = half_support(wavelet) / 2 / lines  # half of the support carries all but a thousandth
-    form = Form(lines, spacing, f"CWT, {wavelet.name}", edge, n_reach(lines, wavelet))
-    return powers.finished(x, form, scaling)
+    return x, Form(lines, spacing, f"CWT, {wavelet.name}", edge_of(lines, wavelet), n_reach(lines, wavelet))
 
 
 def chosen_lines(
@@ -158,6 +154,11 @@ def chosen_lines(
     lines = given_lines(positions, x, wavelet)
     even = len(lines) < 3 or bool(np.ptp(np.diff(lines)) < 1e-6 * (lines[1] - lines[0]))
     return lines, "linear" if even else "logarithmic"
+
+
+def edge_of(lines: FloatArray, wavelet: Wavelet) -> FloatArray:
+    """Return how far the ends reach into each line: half of the support carries all but a thousandth."""
+    return half_support(wavelet) / 2 / lines
 
 
 def n_reach(lines: FloatArray, wavelet: Wavelet) -> int:

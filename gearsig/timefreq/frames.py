@@ -35,6 +35,11 @@ class FramePlan:
         """Samples in the window."""
         return len(self.window)
 
+    @property
+    def n_lines(self) -> int:
+        """Lines that are kept."""
+        return self.last - self.first
+
     def lines(self, rate: float) -> FloatArray:
         """Frequencies or orders of the lines that are kept."""
         result: FloatArray = np.arange(self.first, self.last) * (rate / self.n_fft)

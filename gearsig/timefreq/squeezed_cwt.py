@@ -7,17 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, one_of
+from gearsig.checks import FloatArray, one_of
 from gearsig.timefreq.bank import block_pieces, pieces, plan_group, plan_groups, workspace
-from gearsig.timefreq.columns import ColumnPowers, Form, plan_columns
-from gearsig.timefreq.cwt import largest_power_of_two_in, n_reach
+from gearsig.timefreq.columns import ColumnPowers, Form, plan_columns, room_for
+from gearsig.timefreq.cwt import edge_of, largest_power_of_two_in, n_reach
 from gearsig.timefreq.ends import EDGES, Edges
 from gearsig.timefreq.lines import logarithmic_lines, lowest_possible
-from gearsig.timefreq.size import check_size
 from gearsig.timefreq.squeeze_lines import SqueezeLines, squeeze_lines
 from gearsig.timefreq.types import Coefficients, ComplexArray, Reduction, TimeFrequencyMap
 from gearsig.timefreq.uniform import Source, UniformSignal, uniform
-from gearsig.timefreq.wavelets import DEFAULT, Wavelet, admissibility, band, half_support
+from gearsig.timefreq.wavelets import DEFAULT, Wavelet, admissibility, band
 
 LEAST_SHARE = 1e-6
 """Coefficients below this share of the signal's rms are rounding: they have no frequency."""
@@ -87,28 +86,10 @@ def squeezed_cwt(
     Source: I. Daubechies, J. Lu, H.-T. Wu, *Synchrosqueezed wavelet transforms: an empirical mode decomposition-like
     tool*, Applied and Computational Harmonic Analysis 30 (2011).
     """
-    x = uniform(signal, channel)
-    plan = analysis(x, wavelet, lowest, highest, n_per_octave)
-    one_of(edges, "edges", EDGES)
-    n_columns = -(-x.n_samples // count(step, "step"))
-    check_size(len(plan.lines), n_columns)
-    T = np.zeros((len(plan.lines), n_columns), dtype=np.complex64)
+    x, plan, form = _prepared(signal, channel, wavelet, lowest, highest, n_per_octave, edges)
+    T = room_for(len(plan.lines), x, step)
     _fill(T, x, plan, wavelet, step, edges)
-    method = f"synchrosqueezed CWT, {wavelet.name}"
-    return Coefficients(
-        T,
-        plan.lines,
-        x.instants(step),
-        x.axis,
-        "logarithmic",
-        x.unit,
-        method,
-        np.ones(len(plan.lines)),
-        n_reach(plan.lines, wavelet),
-        squeezed=True,
-        source=x.source,
-        shaft=x.shaft,
-    )
+    return form.coefficients(T, x, step, np.ones(len(plan.lines)))
 
 
 def squeezed_cwt_map(
@@ -143,9 +124,7 @@ def squeezed_cwt_map(
     InputError, RefusalError
         As in `squeezed_cwt`.
     """
-    x = uniform(signal, channel)
-    plan = analysis(x, wavelet, lowest, highest, n_per_octave)
-    one_of(edges, "edges", EDGES)
+    x, plan, form = _prepared(signal, channel, wavelet, lowest, highest, n_per_octave, edges)
     columns = plan_columns(x, n_columns)
     powers = ColumnPowers(columns, len(plan.lines), reduction)
     octave = np.floor(np.log2(plan.lines[-1] / plan.lines) + 1e-9)
@@ -153,10 +132,25 @@ def squeezed_cwt_map(
         part = np.flatnonzero(octave == o)
         for start, step, T in _blocks(x, plan, wavelet, part, columns.largest_step, edges):
             powers.add(part, start, step, T)
-    edge = half_support(wavelet) / 2 / plan.lines
-    method, reach = f"synchrosqueezed CWT, {wavelet.name}", n_reach(plan.lines, wavelet)
-    form = Form(plan.lines, "logarithmic", method, edge, reach, squeezed=True)
     return powers.finished(x, form, scaling)
+
+
+def _prepared(
+    signal: Source,
+    channel: str | None,
+    wavelet: Wavelet,
+    lowest: float | None,
+    highest: float | None,
+    n_per_octave: int,
+    edges: Edges,
+) -> tuple[UniformSignal, Analysis, Form]:
+    """Check what both functions are given, and lay lines and wavelets."""
+    x = uniform(signal, channel)
+    plan = analysis(x, wavelet, lowest, highest, n_per_octave)
+    one_of(edges, "edges", EDGES)
+    lines, method = plan.lines, f"synchrosqueezed CWT, {wavelet.name}"
+    form = Form(lines, "logarithmic", method, edge_of(lines, wavelet), n_reach(lines, wavelet), squeezed=True)
+    return x, plan, form
 
 
 def analysis(

@@ -6,16 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gearsig.checks import count, one_of
-from gearsig.timefreq.columns import ColumnPowers, plan_columns
-from gearsig.timefreq.ends import EDGES, Edges
-from gearsig.timefreq.frames import FramePlan, plan_frames, spectra
-from gearsig.timefreq.size import check_size
+from gearsig.timefreq.columns import ColumnPowers, plan_columns, room_for
+from gearsig.timefreq.ends import Edges
+from gearsig.timefreq.frames import FramePlan, spectra
 from gearsig.timefreq.squeeze_lines import squeeze_lines
 from gearsig.timefreq.squeezed_cwt import LEAST_SHARE
-from gearsig.timefreq.stft import form
+from gearsig.timefreq.stft import prepared
 from gearsig.timefreq.types import Coefficients, ComplexArray, Reduction, TimeFrequencyMap
-from gearsig.timefreq.uniform import Source, UniformSignal, uniform
+from gearsig.timefreq.uniform import Source, UniformSignal
 
 
 def squeezed_stft(
@@ -57,28 +55,13 @@ def squeezed_stft(
     Source: G. Thakur, H.-T. Wu, *Synchrosqueezing-based recovery of instantaneous frequency from nonuniform samples*,
     SIAM Journal on Mathematical Analysis 43 (2011).
     """
-    x = uniform(signal, channel)
-    plan = plan_frames(x, window, window_length, zero_padding, lowest, highest)
-    one_of(edges, "edges", EDGES)
-    lines, at = plan.lines(x.rate), x.instants(count(step, "step"))
-    check_size(len(lines), len(at))
-    T = np.empty((len(lines), len(at)), dtype=np.complex64)
+    x, plan, form = prepared(
+        signal, channel, window, window_length, zero_padding, lowest, highest, edges, squeezed=True
+    )
+    T = room_for(plan.n_lines, x, step)
     for frame, part in _squeezed(x, plan, step, edges):
         T[:, frame : frame + part.shape[1]] = part
-    return Coefficients(
-        T,
-        lines,
-        at,
-        x.axis,
-        "linear",
-        x.unit,
-        f"synchrosqueezed STFT, {plan.name}",
-        np.ones(len(lines)),
-        plan.n_reach,
-        squeezed=True,
-        source=x.source,
-        shaft=x.shaft,
-    )
+    return form.coefficients(T, x, step, np.ones(plan.n_lines))
 
 
 def squeezed_stft_map(
@@ -113,17 +96,16 @@ def squeezed_stft_map(
     InputError, RefusalError
         As in `stft`.
     """
-    x = uniform(signal, channel)
-    plan = plan_frames(x, window, window_length, zero_padding, lowest, highest)
-    one_of(edges, "edges", EDGES)
+    x, plan, form = prepared(
+        signal, channel, window, window_length, zero_padding, lowest, highest, edges, squeezed=True
+    )
     columns = plan_columns(x, n_columns)
-    powers = ColumnPowers(columns, plan.last - plan.first, reduction)
+    powers = ColumnPowers(columns, plan.n_lines, reduction)
     step = max(1, min(columns.n_per_column, plan.n_window // 16))
-    everything = np.arange(plan.last - plan.first)
+    everything = np.arange(plan.n_lines)
     for frame, part in _squeezed(x, plan, step, edges):
         powers.add(everything, frame * step, step, part)
-    method = f"synchrosqueezed STFT, {plan.name}"
-    return powers.finished(x, form(x, plan, method, squeezed=True), scaling)
+    return powers.finished(x, form, scaling)
 
 
 def _squeezed(x: UniformSignal, plan: FramePlan, step: int, edges: Edges) -> Iterator[tuple[int, ComplexArray]]:

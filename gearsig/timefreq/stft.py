@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearsig.checks import count, one_of
-from gearsig.timefreq.columns import ColumnPowers, Form, plan_columns
+from gearsig.checks import one_of
+from gearsig.timefreq.columns import ColumnPowers, Form, plan_columns, room_for
 from gearsig.timefreq.ends import EDGES, Edges
 from gearsig.timefreq.frames import FramePlan, plan_frames, spectra
-from gearsig.timefreq.size import check_size
 from gearsig.timefreq.types import Coefficients, Reduction, TimeFrequencyMap
 from gearsig.timefreq.uniform import Source, UniformSignal, uniform
 
@@ -65,28 +64,11 @@ def stft(
 
     Source: L. Cohen, *Time-Frequency Analysis* (1995), chapter 7.
     """
-    x = uniform(signal, channel)
-    plan = plan_frames(x, window, window_length, zero_padding, lowest, highest)
-    one_of(edges, "edges", EDGES)
-    lines, at = plan.lines(x.rate), x.instants(count(step, "step"))
-    check_size(len(lines), len(at))
-    V = np.empty((len(lines), len(at)), dtype=np.complex64)
+    x, plan, form = prepared(signal, channel, window, window_length, zero_padding, lowest, highest, edges)
+    V = room_for(plan.n_lines, x, step)
     for frame, part, _ in spectra(x, plan, step, edges):
         V[:, frame : frame + len(part)] = (part * plan.gains).T
-    weights = np.full(len(lines), plan.weight)
-    return Coefficients(
-        V,
-        lines,
-        at,
-        x.axis,
-        "linear",
-        x.unit,
-        f"STFT, {plan.name}",
-        weights,
-        plan.n_reach,
-        source=x.source,
-        shaft=x.shaft,
-    )
+    return form.coefficients(V, x, step, np.full(plan.n_lines, plan.weight))
 
 
 def stft_map(
@@ -122,21 +104,32 @@ def stft_map(
     InputError, RefusalError
         As in `stft`.
     """
+    x, plan, form = prepared(signal, channel, window, window_length, zero_padding, lowest, highest, edges)
+    columns = plan_columns(x, n_columns)
+    powers = ColumnPowers(columns, plan.n_lines, reduction)
+    step = max(1, min(columns.n_per_column, plan.n_window // 8))
+    everything = np.arange(plan.n_lines)
+    for frame, part, _ in spectra(x, plan, step, edges):
+        powers.add(everything, frame * step, step, (part * plan.gains).T)
+    return powers.finished(x, form, scaling)
+
+
+def prepared(
+    signal: Source,
+    channel: str | None,
+    window: str,
+    window_length: float | None,
+    zero_padding: int,
+    lowest: float | None,
+    highest: float | None,
+    edges: Edges,
+    *,
+    squeezed: bool = False,
+) -> tuple[UniformSignal, FramePlan, Form]:
+    """Check what all transforms by frames are given, and plan the frames."""
     x = uniform(signal, channel)
     plan = plan_frames(x, window, window_length, zero_padding, lowest, highest)
     one_of(edges, "edges", EDGES)
-    columns = plan_columns(x, n_columns)
-    lines = plan.lines(x.rate)
-    powers = ColumnPowers(columns, len(lines), reduction)
-    step = max(1, min(columns.n_per_column, plan.n_window // 8))
-    everything = np.arange(len(lines))
-    for frame, part, _ in spectra(x, plan, step, edges):
-        powers.add(everything, frame * step, step, (part * plan.gains).T)
-    return powers.finished(x, form(x, plan, f"STFT, {plan.name}"), scaling)
-
-
-def form(x: UniformSignal, plan: FramePlan, method: str, *, squeezed: bool = False) -> Form:
-    """Return what a map says about a transform by frames."""
-    lines = plan.lines(x.rate)
-    edge = np.full(len(lines), plan.n_window / 2 / x.rate)
-    return Form(lines, "linear", method, edge, plan.n_reach, squeezed)
+    method = f"{'synchrosqueezed ' if squeezed else ''}STFT, {plan.name}"
+    edge = np.full(plan.n_lines, plan.n_window / 2 / x.rate)
+    return x, plan, Form(plan.lines(x.rate), "linear", method, edge, plan.n_reach, squeezed)

@@ -44,6 +44,7 @@ def show_spectrum(
     marked: Sequence[float] = (),
     shown: tuple[float, float] | None = None,
     scale: str = "Logarithmic",
+    quantity: str = "",
 ) -> tuple[float, float]:
     """Show a spectrum and what can be changed about its view; return the stretch that is shown.
 
@@ -61,6 +62,8 @@ def show_spectrum(
         Stretch shown at first.
     scale : str
         Chosen at first, one of `SCALES`.
+    quantity : str
+        Name of the values; empty: by their scaling.
     """
     kinds = [kind for kind in KIND_NAMES if any(cursor.kind == kind for cursor in cursors)]
     left, right = st.columns((2, 3), vertical_alignment="bottom")
@@ -82,7 +85,7 @@ def show_spectrum(
     unit = {"frequency": "Frequency shown (Hz)", "order": "Orders shown"}.get(spectrum.axis, "Quefrency shown (s)")
     limits = choose_range(f"{unit}", analysis, float(spectrum.positions[-1]), shown=shown, name=name)
     shown_cursors = [_first_if_found(cursor, marked) for cursor in cursors if cursor.kind in chosen]
-    _draw(analysis, spectrum, SCALES[label or scale], limits, shown_cursors, marked, name)
+    _draw(analysis, spectrum, SCALES[label or scale], limits, shown_cursors, marked, name, quantity)
     return limits
 
 
@@ -100,6 +103,7 @@ def _draw(
     cursors: Sequence[Cursor],
     marked: Sequence[float],
     name: str,
+    quantity: str,
 ) -> None:
     start, stop = spectrum.index_of(limits[0]), spectrum.index_of(limits[1]) + 1
     values = _displayed(spectrum, scale)
@@ -112,7 +116,9 @@ def _draw(
     y_limits = _value_limits(high[n_offset:], scale)
     show_lines(
         [Line(at, top, spectrum.source, (low, top) if thinned else None)],
-        Axes(spectrum.axis_label, _value_label(spectrum, scale), limits, y_limits, logarithmic=scale == "log"),
+        Axes(
+            spectrum.axis_label, _value_label(spectrum, scale, quantity), limits, y_limits, logarithmic=scale == "log"
+        ),
         state.view_key(f"{name} chart", analysis),
         cursors=cursors,
         marked=points,
@@ -139,8 +145,8 @@ def _value_limits(values: FloatArray, scale: Scale) -> tuple[float, float]:
     return max(low, high - 160) - 6, high + 6
 
 
-def _value_label(spectrum: Spectrum, scale: Scale) -> str:
-    name = "value" if spectrum.scaling == "dimensionless" else spectrum.scaling
+def _value_label(spectrum: Spectrum, scale: Scale, quantity: str) -> str:
+    name = quantity or ("value" if spectrum.scaling == "dimensionless" else spectrum.scaling)
     if scale == "decibel":
         return f"{name} (dB re 1 {unit_text(spectrum.unit)}".rstrip() + ")"
     return with_unit(name, spectrum.unit)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
 
 import streamlit as st
 
 from app.dashboard import state
+from app.dashboard.as_typed import as_typed
 from app.dashboard.widgets.methods.choice import choose_one
 from app.dashboard.widgets.methods.downloads import offer_downloads
 from app.dashboard.widgets.methods.kurtogram import PREPARATIONS, spectrum_columns
@@ -15,12 +17,13 @@ from app.dashboard.widgets.methods.modulation_lines import highest_of_interest, 
 from app.dashboard.widgets.methods.stretch import Stretch, choose_stretch
 from app.dashboard.widgets.picture import show_picture
 from app.dashboard.widgets.range_slider import choose_range
-from app.dashboard.widgets.spectrum import show_spectrum
+from app.dashboard.widgets.spectrum import FOUND_SHARE, show_spectrum
 from gearsig.diagnosis.types import Analysis, ChannelAnalysis
 from gearsig.errors import InputError
 from gearsig.report.lines import marked_positions, speed_is_constant
 
 if TYPE_CHECKING:
+    from gearsig.plot.cursors import Cursor
     from gearsig.spectra.coherence_types import EnhancedEnvelope, SpectralCoherence
     from gearsig.spectra.kurtogram_preparation import Preparation
 
@@ -47,41 +50,41 @@ class CoherenceSettings:
 
 def show_coherence(analysis: Analysis, channel: ChannelAnalysis) -> None:
     """Show the coherence of one channel as a map, and its mean over the carriers."""
-    left, right = st.columns(2)
-    with left:
-        stretch = choose_stretch(analysis, channel, VIEW, n_first=N_FIRST, n_most=N_MOST)
-    with right:
-        settings = _choose_settings(analysis, stretch)
+    stretch = choose_stretch(analysis, channel, VIEW, n_first=N_FIRST, n_most=N_MOST)
+    settings = _choose_settings(analysis, stretch)
     _check_size(stretch, settings)
     with st.spinner("Computing the coherence …", show_time=True):
         found = coherence_of(stretch.key, settings, stretch)
     mean = _choose_mean(analysis, found)
     cursors = modulation_cursors(analysis, stretch, mean.spectrum)
     marked = marked_positions(of_stretch(analysis, stretch), mean.spectrum, channel.channel, of_bearings=True)
+    name = f"{VIEW} {found.alpha_axis}"
     limits = show_spectrum(
-        analysis, mean.spectrum, cursors, f"{VIEW} {found.alpha_axis}", marked=marked, scale="Linear"
+        analysis, mean.spectrum, cursors, name, marked=marked, scale="Linear", quantity="mean squared coherence"
     )
     st.caption(
         f"Mean squared coherence over the carriers from {mean.band_hz[0]:.5g} to {mean.band_hz[1]:.5g} Hz. "
         f"Stationary noise exceeds **{mean.level:.3g}** in 1 line of {1 / mean.probability:.5g}."
     )
-    _show_map(found, mean, [c.position for c in cursors if c.kind in MARKED_KINDS], limits)
+    _show_map(found, mean, _standing_out(cursors, mean), limits)
     offer_downloads(analysis, VIEW, tables={"Enhanced spectrum": lambda: spectrum_columns(mean.spectrum)})
 
 
 def _choose_settings(analysis: Analysis, stretch: Stretch) -> CoherenceSettings:
+    three, one, two, four = st.columns((3, 2, 2, 4))
     over_orders = False
     if stretch.angle is not None:
         about = "Over orders, modulation that is locked to the shaft stays on one line when the speed changes."
         names = ("Cyclic frequency", "Cyclic order")
         first = names[0] if speed_is_constant(of_stretch(analysis, stretch)) else names[1]
-        over_orders = choose_one("Over", names, _key("over", analysis), default=first, about=about) == names[1]
+        with three:
+            over_orders = choose_one("Over", names, _key("over", analysis), default=first, about=about) == names[1]
     prepared = next(iter(PREPARATIONS))
     if not over_orders:
         about = "Steady tones are coherent with each other: remove them, or mesh harmonics fill the picture."
         key = _key("preparation", analysis)
-        prepared = choose_one("Signal", list(PREPARATIONS), key, default="Tones removed", about=about)
-    one, two = st.columns(2)
+        with four:
+            prepared = choose_one("Signal", list(PREPARATIONS), key, default="Tones removed", about=about)
     usual = float(f"{highest_of_interest(analysis, stretch, of_orders=over_orders):.3g}")
     highest = one.number_input(
         f"Highest cyclic {'order' if over_orders else 'frequency (Hz)'}",
@@ -148,19 +151,34 @@ def _choose_mean(analysis: Analysis, found: SpectralCoherence) -> EnhancedEnvelo
     return enhanced_envelope(found, band, probability=PROBABILITIES[odds])
 
 
+def _standing_out(cursors: Sequence[Cursor], mean: EnhancedEnvelope) -> list[Cursor]:
+    """Return the lines of shafts and bearings at which the mean is above noise's level, within a bearing's slip."""
+    end = float(mean.spectrum.positions[-1])
+    inside = [c for c in cursors if c.kind in MARKED_KINDS and float(mean.spectrum.positions[0]) <= c.position <= end]
+    slack = {c: FOUND_SHARE * c.position if c.kind == "bearing" else 0.0 for c in inside}
+    return [
+        c for c in inside if mean.spectrum.largest_near(c.position, slack[c] + mean.spectrum.resolution)[1] > mean.level
+    ]
+
+
 def _show_map(
-    found: SpectralCoherence, mean: EnhancedEnvelope, marked: list[float], limits: tuple[float, float]
+    found: SpectralCoherence, mean: EnhancedEnvelope, marked: Sequence[Cursor], limits: tuple[float, float]
 ) -> None:
     from gearsig.plot.coherence import coherence_figure
 
     low, high = limits
-    inside = [position for position in marked if low <= position <= high]
+    inside = [cursor for cursor in marked if low <= cursor.position <= high]
     step = found.alpha_resolution
     around = (min(low, high - 2.5 * step), max(high, float(found.alpha[0]) + 2.5 * step))
-    figure = coherence_figure(found, mean, marked=inside, limits=around, height_in=HEIGHT_IN)
+    positions = [cursor.position for cursor in inside]
+    figure = coherence_figure(found, mean, marked=positions, limits=around, height_in=HEIGHT_IN)
     show_picture(figure, f"Squared coherence of {found.source} over {found.alpha_label} and carrier frequency")
-    if inside:
-        st.caption("Dotted: lines of shafts and bearings.")
+    names = ", ".join(dict.fromkeys(f"{cursor.label} ({cursor.position:.5g})" for cursor in inside))
+    st.caption(
+        f"Dotted, lines that stand above noise's level: {as_typed(names)}."
+        if inside
+        else "No line of a shaft or bearing stands above noise's level."
+    )
 
 
 def _key(name: str, analysis: Analysis) -> str:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 N_KEPT = 8
 EVERY_CHANNEL = "All accelerations"
+SETTLED_PERCENT = 50.0
+"""Of the root: that no deeper crack is there is no good news."""
 
 
 def show_crack(analysis: Analysis, channel: ChannelAnalysis) -> None:
@@ -98,10 +100,13 @@ def _show_refusal(refusal: RefusalError) -> None:
 
 def _show_answer(found: CrackEstimate | NoCrackSeen) -> None:
     if isinstance(found, NoCrackSeen):
-        st.success(as_typed(found.text), icon=":material/check_circle:")
+        if found.below_percent <= SETTLED_PERCENT:
+            st.success(as_typed(found.text), icon=":material/check_circle:")
+        else:
+            st.info(as_typed(found.text), icon=":material/help:")
         st.caption(
-            "In 95 of 100 cases a deeper crack would have been seen. A chance as clear as the clearest tooth's event "
-            f"has a probability of {found.p_value:.2g} on sound gears."
+            "In 95 of 100 cases a deeper crack would have been seen. The chance of as clear an event as the clearest "
+            f"one here is {found.p_value:.2g} on sound gears."
         )
     else:
         st.error(as_typed(found.text), icon=":material/error:")

@@ -8,7 +8,6 @@ import numpy as np
 
 from gearsig.errors import RefusalError
 from gearsig.plot.crack import crack_comparison_figure
-from gearsig.plot.display import plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,7 +53,6 @@ def crack_figure(recording: Recording, reference: Recording | None, found: Crack
         impacts_rev=[turn + entry for turn in range(N_TURNS)],
         n_teeth=n_teeth,
         change_mps2={name: np.tile(values, N_TURNS) for name, values in change.items()} or None,
-        title=plain(found.text, 100),
     )
 
 

@@ -13,6 +13,8 @@ from app.dashboard.widgets.line_chart import CONFIG, Axes
 from gearsig.checks import FloatArray
 
 LEGEND_PX = 40
+LEFT_PX = 76
+"""The same for all charts, so that those below each other share their axis."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +56,17 @@ def show_curves(curves: Sequence[Curve], axes: Axes, key: str, *, height_px: int
         )
     figure.update_layout(
         height=height_px + LEGEND_PX,
-        margin={"l": 8, "r": 8, "t": 8, "b": 8},
+        margin={"l": LEFT_PX, "r": 8, "t": 8, "b": 8},
         hovermode="closest",
         showlegend=len(curves) > 1,
         legend={"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0, "xanchor": "left"},
         xaxis={"title": as_plot_text(axes.x), "range": axes.x_limits, "exponentformat": "none"},
-        yaxis={"title": as_plot_text(axes.y), "range": axes.y_limits, "exponentformat": "e", "minexponent": 4},
+        yaxis={
+            "title": as_plot_text(axes.y),
+            "range": axes.y_limits,
+            "exponentformat": "e",
+            "minexponent": 4,
+            "automargin": False,
+        },
     )
     st.plotly_chart(figure, width="stretch", key=key, config=CONFIG, alt=as_typed(f"{axes.y} over {axes.x}"))

@@ -50,11 +50,8 @@ class BandSettings:
 
 def show_kurtogram(analysis: Analysis, channel: ChannelAnalysis) -> None:
     """Show the kurtogram of one channel, the chosen band and its envelope spectrum."""
-    left, right = st.columns(2)
-    with left:
-        stretch = choose_stretch(analysis, channel, VIEW, n_first=N_FIRST, n_most=N_MOST)
-    with right:
-        settings = _choose_settings(analysis, stretch)
+    stretch = choose_stretch(analysis, channel, VIEW, n_first=N_FIRST, n_most=N_MOST)
+    settings = _choose_settings(analysis, stretch)
     with st.spinner("Computing the kurtogram …", show_time=True):
         found = band_of(stretch.key, settings, stretch)
     _show_choice(found, settings, stretch)
@@ -79,8 +76,9 @@ def _choose_settings(analysis: Analysis, stretch: Stretch) -> BandSettings:
         "Tones removed: steady lines, such as mesh harmonics, are cut down to the floor. Whitened: every line is made "
         "equally strong, which takes out resonances as well."
     )
-    prepared = choose_one("Signal", list(PREPARATIONS), _key("preparation", analysis), about=about)
-    one, two = st.columns(2)
+    zero, one, two, three = st.columns((4, 2, 2.6, 3))
+    with zero:
+        prepared = choose_one("Signal", list(PREPARATIONS), _key("preparation", analysis), about=about)
     most = max(1, int(np.log2(max(stretch.recording.n_samples / 512.0, 2.0))))
     about = "The spectrum is cut into up to 2 to the power of it bands, and into thirds of these."
     key = _key(f"levels {most}", analysis)
@@ -97,7 +95,8 @@ def _choose_settings(analysis: Analysis, stretch: Stretch) -> BandSettings:
         help="The fastest rhythm sought. Bands must be three times as wide, and the envelope's spectrum ends there.",
         persist_state="session",
     )
-    band = choose_one("Band", BANDS, _key("band", analysis))
+    with three:
+        band = choose_one("Band", BANDS, _key("band", analysis))
     own = None
     if band == BANDS[1]:
         top = stretch.recording.sampling_rate_hz / 2.0

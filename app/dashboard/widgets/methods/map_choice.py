@@ -78,7 +78,13 @@ class MapChoice:
 
 
 def choose_map(
-    analysis: Analysis, channel: ChannelAnalysis, view: str, *, first: str = "Wavelet", n_most: int | None = None
+    analysis: Analysis,
+    channel: ChannelAnalysis,
+    view: str,
+    *,
+    first: str = "Wavelet",
+    periods: float = 2.5,
+    n_most: int | None = None,
 ) -> MapChoice:
     """Let the user choose stretch, transform and parameters.
 
@@ -90,6 +96,8 @@ def choose_map(
         For the keys.
     first : str
         Transform chosen at first.
+    periods : float
+        In the wavelet, at first.
     n_most : int or None
         Most samples, where fewer than the transform allows.
 
@@ -111,24 +119,18 @@ def choose_map(
     signal = signal_of(stretch, over_angle=over_angle)
     with right:
         limits = _choose_limits(analysis, channel, signal, view, of_wavelet=transform in OF_WAVELETS)
-    settings, span_db = _choose_settings(analysis, signal, view, transform, limits)
-    return MapChoice(stretch, signal, settings, span_db)
-
-
-def _choose_settings(
-    analysis: Analysis, signal: UniformSignal, view: str, transform: str, limits: tuple[float, float]
-) -> tuple[MapSettings, float]:
-    """Return the settings, and the span of the colours in dB."""
-    left, middle, right = st.columns((2, 2, 1))
-    of_wavelet = transform in OF_WAVELETS
-    with left:
-        length = _choose_periods(analysis, view) if of_wavelet else _choose_window(analysis, signal, view)
-    key = _key(view, "span", analysis)
-    span_db = middle.slider("Colours span (dB)", 20, 120, 60, step=5, key=key, persist_state="session")
-    with right:
+    one, two, three = st.columns((2, 2, 1))
+    with one:
+        of_wavelet = transform in OF_WAVELETS
+        length = _choose_periods(analysis, view, periods) if of_wavelet else _choose_window(analysis, signal, view)
+    with two:
+        key = _key(view, "span", analysis)
+        span_db = st.slider("Colours span (dB)", 20, 120, 60, step=5, key=key, persist_state="session")
+    with three:
         about = "A column holds many samples: their mean power, or the largest one, which keeps the height of impacts."
         each = choose_one("Each column", list(REDUCTIONS), _key(view, "reduction", analysis), about=about)
-    return MapSettings(transform, signal.axis, limits, REDUCTIONS[each], length), float(span_db)
+    settings = MapSettings(transform, signal.axis, limits, REDUCTIONS[each], length)
+    return MapChoice(stretch, signal, settings, float(span_db))
 
 
 def _choose_limits(
@@ -152,10 +154,12 @@ def _choose_limits(
     return float(options[i]), float(options[j])
 
 
-def _choose_periods(analysis: Analysis, view: str) -> float:
+def _choose_periods(analysis: Analysis, view: str, first: float) -> float:
     about = "More periods tell close frequencies apart, fewer show impacts sharper in time."
     key = _key(view, "periods", analysis)
-    chosen = st.slider("Periods in the wavelet", 1.5, 16.0, 2.5, step=0.5, key=key, help=about, persist_state="session")
+    chosen = st.slider(
+        "Periods in the wavelet", 1.5, 16.0, first, step=0.5, key=key, help=about, persist_state="session"
+    )
     return float(chosen)
 
 

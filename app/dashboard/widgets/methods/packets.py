@@ -43,11 +43,11 @@ def show_packets(analysis: Analysis, channel: ChannelAnalysis) -> None:
         found = packets_of(f"{stretch.key} {over_angle}", wavelet, level, signal)
         levels = packet_map(f"{stretch.key} {over_angle}", wavelet, level, signal)
     show_energies(analysis, found, ordering)
-    nodes = _choose_nodes(analysis, found, ordering)
     from gearsig.plot.time_frequency import time_frequency_figure
 
     words = f"Levels of the wavelet packets of {stretch.channel}: {levels.axis_label} over {levels.at_label}"
     show_picture(time_frequency_figure(levels, height_in=HEIGHT_IN), words)
+    nodes = _choose_nodes(analysis, found, ordering)
     _show_nodes(analysis, stretch, signal, found, nodes)
 
 

@@ -43,7 +43,7 @@ class Search:
 
 def show_ridges(analysis: Analysis, channel: ChannelAnalysis) -> None:
     """Show ridges on their map, their course, and the waveform along one of them."""
-    choice = choose_map(analysis, channel, VIEW, first="Squeezed wavelet", n_most=N_MOST)
+    choice = choose_map(analysis, channel, VIEW, first="Squeezed wavelet", periods=5.0, n_most=N_MOST)
     search = _choose_search(analysis)
     levels = choice.levels()
     with st.spinner("Looking for ridges …", show_time=True):
