@@ -72,6 +72,10 @@ def solve_envelopes(
     n = len(y)
     # A row of the structural equation holds p + 1 samples; its weight is that of the middle one.
     weights = envelope_weight(_of_rows(bandwidths, n, p), p)
+    if len(cycles) == 1:
+        from gearsig.orders.vold_kalman_alone import envelope_alone
+
+        return envelope_alone(y, cycles[0], None if active is None else active[0], weights[0], p, mirror=mirror)[None]
     d = cell_of(bandwidths, p)
     if d:
         return solve_by_splines(y, cycles, active, weights, p, d, mirror=mirror)
@@ -99,9 +103,12 @@ def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None,
     ----------
     H. Vold, J. Leuridan, "High resolution order tracking at extreme slew rates, using Kalman tracking filters", 1993.
     """
-    n = len(y)
+    width = _of_rows(bandwidths, len(y), 2)
+    if len(cycles) == 1:
+        from gearsig.orders.vold_kalman_alone import waveform_alone
+
+        return waveform_alone(y, cycles[0], None if active is None else active[0], width[0])[None]
     frequency = (cycles[:, 2:] - cycles[:, :-2]) / 2.0
-    width = _of_rows(bandwidths, n, 2)
     # Outside the active part the order may stand still: any finite weight does there.
     inside = np.clip(frequency, 0.75 * width, 0.5 - 0.75 * width)
     stencils = np.ones((*frequency.shape, 3))
@@ -133,6 +140,8 @@ def cell_of(bandwidths: FloatArray, p: int) -> int:
 
 def accuracy_of(bandwidths: FloatArray, p: int) -> float:
     """Return the expected error of `solve_envelopes`, relative to the largest component of the signal."""
+    if len(bandwidths) == 1:
+        return error_alone(bandwidths)
     d = cell_of(bandwidths, p)
     if d:
         return expected_error(float(bandwidths.min()), float(bandwidths.max()), d, p)
@@ -141,10 +150,17 @@ def accuracy_of(bandwidths: FloatArray, p: int) -> float:
 
 def waveform_accuracy_of(cycles: FloatArray, active: BoolArray, bandwidths: FloatArray) -> float:
     """Return the expected error of `solve_waveforms`, relative to the largest component of the signal."""
+    if len(bandwidths) == 1:
+        return error_alone(bandwidths)
     frequency = np.abs(np.diff(cycles, axis=1))[active[:, 1:] & active[:, :-1]]
     narrowest = np.pi * float(bandwidths.min())
     sine = min(np.sin(2 * np.pi * float(frequency.min())), np.sin(2 * np.pi * float(frequency.max())))
     return _error_of_strength(4.0 * float(HALF_POWER) / (2.0 * narrowest * max(sine, narrowest)))
+
+
+def error_alone(bandwidths: FloatArray) -> float:
+    """Return the rounding error for one order: a rounding step per sample, as far as the filter's memory reaches."""
+    return 1e-12 + 1e-15 / float(bandwidths.min())
 
 
 def _error_of_strength(strength: float) -> float:
@@ -170,11 +186,11 @@ def envelopes_of_waveforms(x: FloatArray, cycles: FloatArray) -> ComplexArray:
 
 def phasors_of(cycles: FloatArray) -> ComplexArray:
     """Return e^{2πi c}, (n_orders, n)."""
-    from gearsig.orders.vold_kalman_phasor import cosine_and_sine
+    from gearsig.orders.vold_kalman_phasor import write_phasors
 
     phasors = np.empty(cycles.shape, np.complex128)
     for row, angle in zip(phasors, cycles, strict=True):
-        cosine_and_sine(np.ascontiguousarray(angle), row.real, row.imag)
+        write_phasors(np.ascontiguousarray(angle), row)
     return phasors
 
 
@@ -196,15 +212,11 @@ def _solved_with_mirror_images(
 def _solved_as_in_textbooks(
     y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, p: int
 ) -> ComplexArray:
-    """Sample by sample. One order is demodulated first: its problem is real, with a complex right-hand side."""
+    """Sample by sample, for the complex x."""
     data: NDArray[Any] = phasors_of(cycles)
-    observed = y.astype(np.complex128)
-    if len(cycles) == 1:
-        observed *= data[0].conj()
-        data = np.ones(cycles.shape)
     if active is not None:
-        data = data * active
-    x = solve_sample_by_sample(data, observed, weights, _differences(weights, p))
+        data *= active
+    x = solve_sample_by_sample(data, y.astype(np.complex128), weights, _differences(weights, p))
     return np.asarray(2.0 * x, dtype=np.complex128)
 
 

@@ -12,8 +12,8 @@ from scipy.sparse.linalg import spsolve
 from gearsig.orders.vold_kalman_band import solve_band
 from gearsig.orders.vold_kalman_elimination import eliminate
 from gearsig.orders.vold_kalman_rotations import rotate
-from gearsig.orders.vold_kalman_solve import accuracy_of, solve_envelopes, solve_waveforms
-from gearsig.orders.vold_kalman_splines import samples_per_cell, solve_by_splines
+from gearsig.orders.vold_kalman_solve import solve_envelopes, solve_waveforms
+from gearsig.orders.vold_kalman_splines import expected_error, samples_per_cell, solve_by_splines
 from gearsig.orders.vold_kalman_weight import envelope_weight, waveform_weight, weight_of_bandwidth
 
 RATE_HZ = 20_000.0
@@ -107,7 +107,7 @@ def test_constant_bandwidth(p, bandwidth_hz, n):
     y, cycles, z = modulated_order(n)
     r = weight_of_bandwidth(bandwidth_hz, RATE_HZ, p)
     x = solve_envelopes(y, cycles[None], None, np.array([[bandwidth_hz / RATE_HZ]]), p, mirror=False)[0]
-    assert abs(x - 2 * exact_envelope(z, r, p)).max() < 3e-7
+    assert abs(x - 2 * exact_envelope(z, r, p)).max() < 1e-10
 
 
 @pytest.mark.parametrize("bandwidth_hz", [0.5, 2.0])
@@ -124,9 +124,11 @@ def test_any_length(p, n):
     """The last cell of the coarse grid may hold one sample or all."""
     y, cycles, z = modulated_order(n)
     bandwidth_hz = {2: 7.4, 3: 32.0}[p]
-    assert samples_per_cell(bandwidth_hz / RATE_HZ, bandwidth_hz / RATE_HZ, p) in {19, 20}
-    x = solve_envelopes(y, cycles[None], None, np.array([[bandwidth_hz / RATE_HZ]]), p, mirror=False)[0]
-    assert abs(x - 2 * exact_envelope(z, weight_of_bandwidth(bandwidth_hz, RATE_HZ, p), p)).max() < 3e-7
+    d = samples_per_cell(bandwidth_hz / RATE_HZ, bandwidth_hz / RATE_HZ, p)
+    assert d in {19, 20}
+    r = weight_of_bandwidth(bandwidth_hz, RATE_HZ, p)
+    x = solve_by_splines(y, cycles[None], None, np.array([[r]]), p, d, mirror=False)[0]
+    assert abs(x - 2 * exact_envelope(z, r, p)).max() < 3e-7
 
 
 def crossing(n):
@@ -192,16 +194,18 @@ def test_mirror_images_sample_by_sample(p):
 
 @pytest.mark.parametrize(("p", "ratio"), [(2, 1.0), (2, 30.0), (3, 10.0)])
 def test_expected_error(p, ratio):
-    """Widths that differ by `ratio` along the signal: the estimate holds, and is not above a hundredfold."""
+    """Widths that differ by `ratio` along the signal: the splines' estimate holds, and is not above a hundredfold."""
     y, cycles, z = modulated_order(60_000)
     widths = np.linspace(1.0, ratio, len(y))[None] * 1e-4
     weights = envelope_weight(widths[:, p // 2 : len(y) - p + p // 2], p)
     expected = solve_by_rotations(np.ones((1, len(y))), z, weights, differences(p, weights.shape))
-    x = solve_envelopes(y, cycles[None], None, widths, p, mirror=False)
+    d = samples_per_cell(widths.min(), widths.max(), p)
+    x = solve_by_splines(y, cycles[None], None, weights, p, d, mirror=False)
     # Rotations have an error of their own, some rounding steps times r·2^p.
     error = np.abs(x - 2 * expected).max() - 5e-17 * weights.max() * 2**p
-    assert error < 2 * accuracy_of(widths, p)
-    assert accuracy_of(widths, p) < {1.0: 1e-7, 10.0: 1e-5, 30.0: 2e-5}[ratio]
+    allowed = expected_error(widths.min(), widths.max(), d, p)
+    assert error < 2 * allowed
+    assert allowed < {1.0: 1e-7, 10.0: 1e-5, 30.0: 2e-5}[ratio]
 
 
 def test_first_generation_against_a_dense_solve():
