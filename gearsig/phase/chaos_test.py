@@ -94,6 +94,30 @@ def zero_one_test_of_section(section: PoincareSection, *, axis: int = 0, damping
     return zero_one_test(values, damping=damping, source=source)
 
 
+def translation_walk(values: FloatArray, c_rad: float, *, every: int = 1) -> FloatArray:
+    """Return the walk (p, q) that the 0–1 test rests on, (n_values, 2): bounded for regular motion, Brownian for chaos.
+
+    p(n) + i q(n) = Σ_{j≤n} (φ(j) - ⟨φ⟩) e^{icj} / σ.
+
+    Parameters
+    ----------
+    values : array, (n_values,)
+        As in `zero_one_test`.
+    c_rad : float
+        One of `ChaosTest.c_rad`.
+    every : int
+        Every so-many-th value is used.
+
+    Notes
+    -----
+    The mean is taken off: it would turn the walk round a circle that says nothing of the motion.
+    """
+    x = checked_series(values, minimum=200)
+    phi = x[:: count(every, "every")][:MOST_VALUES]
+    z = np.cumsum((phi - phi.mean()) / phi.std() * np.exp(1j * c_rad * np.arange(1, len(phi) + 1)))
+    return np.column_stack([z.real, z.imag])
+
+
 def _k(phi: FloatArray, c: float, alpha: float) -> float:
     n_cut = len(phi) // 10
     n = np.arange(1, n_cut + 1)

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from gearsig.checks import FloatArray, count, one_of
-from gearsig.errors import RefusalError
+from gearsig.errors import InputError, RefusalError
 from gearsig.phase.checked_series import checked_series, mean_period_samples
 from gearsig.phase.divergence import Divergence, kantz, rosenstein
 from gearsig.phase.measures import LyapunovExponent
@@ -32,6 +32,7 @@ def largest_lyapunov_exponent(
     method: Method = "rosenstein",
     theiler_samples: int | None = None,
     n_steps: int | None = None,
+    fit_s: tuple[float, float] | None = None,
 ) -> LyapunovExponent:
     """Return the rate at which neighbouring stretches of a path part: λ = dS/dt of the divergence curve S.
 
@@ -53,6 +54,8 @@ def largest_lyapunov_exponent(
         Neighbours nearer in time do not count; None: one mean period, at least the embedding's length.
     n_steps : int or None
         Steps followed; None: 30 mean periods, at most a quarter of the path.
+    fit_s : (float, float) or None
+        Stretch of the curve to be fitted instead of the one that the rule finds.
 
     Returns
     -------
@@ -88,7 +91,10 @@ def largest_lyapunov_exponent(
     )
     rate = portrait.sampling_rate_hz
     curve = replace(curve, saturation=_saturation(curve, memory))
-    first, stop = fit_limits(curve, memory, max(LEAST_STEPS, round(0.25 * period)))
+    if fit_s is None:
+        first, stop = fit_limits(curve, memory, max(LEAST_STEPS, round(0.25 * period)))
+    else:
+        first, stop = _asked_limits(fit_s, rate, len(curve.log_distance))
     slope, uncertainty = slope_of(curve, first, stop)
     return LyapunovExponent(
         exponent_per_s=slope * rate,
@@ -124,6 +130,16 @@ def fit_limits(curve: Divergence, memory: int, n_least: int, room: float = ROOM)
         "exponential growth can be seen",
         remedy="the signal looks stochastic or too noisy; filter it, record longer, or embed it with fewer dimensions",
     )
+
+
+def _asked_limits(fit_s: tuple[float, float], rate: float, n_steps: int) -> tuple[int, int]:
+    first, stop = round(fit_s[0] * rate), round(fit_s[1] * rate) + 1
+    if first < 0 or not first + LEAST_STEPS <= stop <= n_steps:
+        raise InputError(
+            f"fit_s goes from {fit_s[0]:g} to {fit_s[1]:g} s",
+            allowed=f"at least {LEAST_STEPS} steps of {1.0 / rate:.3g} s within 0 to {(n_steps - 1) / rate:.4g} s",
+        )
+    return first, stop
 
 
 def _saturation(curve: Divergence, memory: int) -> float:

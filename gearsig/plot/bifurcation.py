@@ -26,13 +26,17 @@ NAMED = 0.03
 """Share of the axis that a stretch of one period takes at least to be named."""
 
 
+BRANCHES = (("rising", style.MEASURED, 5.5), ("falling", style.FAULT, 2.8))
+"""Names, colours, sizes of points: where both branches hold the same motion, either is seen."""
+
+
 def bifurcation_figure(
     diagram: BifurcationDiagram, down: BifurcationDiagram | None = None, *, title: str = ""
 ) -> Figure:
     """Draw every Poincaré point over the parameter, and the standard deviation of the motion below.
 
-    Stretches whose section repeats are named by their period above. With a second branch both are drawn; where they
-    hold different motions is shaded.
+    Stretches whose section repeats are named by their period in cycles above. With a second branch both are drawn;
+    where they hold different motions is shaded.
 
     Parameters
     ----------
@@ -56,13 +60,13 @@ def bifurcation_figure(
     axes = style.panel(figure, top_in=TOP_IN, bottom_in=BOTTOM_IN + below)
     factor, unit = display_unit(diagram.unit, max(float(np.abs(branch.points).max()) for branch in branches))
     lines = [
-        _draw_points(axes, branch, factor, colour, name)
-        for branch, colour, name in zip(branches, (style.MEASURED, style.FAULT), ("rising", "falling"), strict=False)
+        _draw_points(axes, branch, factor, colour, name, size)
+        for branch, (name, colour, size) in zip(branches, BRANCHES, strict=False)
     ]
     parameter = with_unit(diagram.parameter_name, diagram.parameter_unit)
     style.label_axes(axes, "" if with_size else parameter, with_unit(diagram.axis_name, unit))
     for start, stop, period in _runs_of_equal_period(diagram):
-        series.write(axes, 0.5 * (start + stop), 1.02, f"{period}×", colour=style.QUIET)
+        series.write(axes, 0.5 * (start + stop), 1.02, f"period {period}", colour=style.QUIET)
     panels = [axes]
     if with_size:
         panels.append(_draw_sizes(figure, axes, branches))
@@ -77,20 +81,22 @@ def bifurcation_figure(
     return figure
 
 
-def _draw_points(axes: Axes, branch: BifurcationDiagram, factor: float, colour: str, name: str) -> Line2D:
-    (line,) = axes.plot(
+def _draw_points(axes: Axes, branch: BifurcationDiagram, factor: float, colour: str, name: str, size: float) -> Line2D:
+    """Draw one branch; return what names it in the legend."""
+    from matplotlib.lines import Line2D
+
+    axes.plot(
         branch.parameter,
         branch.points * factor,
         linestyle="none",
         marker=".",
-        markersize=2.4 if len(branch.points) < MANY else 1.2,
+        markersize=size if len(branch.points) < MANY else 0.4 * size,
         markeredgewidth=0.0,
         color=colour,
         alpha=0.6,
         rasterized=len(branch.points) > MANY,
-        label=name,
     )
-    return line
+    return Line2D([], [], linestyle="none", marker="o", markersize=5.0, markeredgewidth=0.0, color=colour, label=name)
 
 
 def _draw_sizes(figure: Figure, above: Axes, branches: Sequence[BifurcationDiagram]) -> Axes:
@@ -98,8 +104,8 @@ def _draw_sizes(figure: Figure, above: Axes, branches: Sequence[BifurcationDiagr
     axes = style.panel(figure, top_in=TOP_IN + POINTS_IN + GAP_IN, bottom_in=BOTTOM_IN, sharex=above)
     above.tick_params(labelbottom=False)
     factor, unit = display_unit(branches[0].unit, max(float(branch.extents.max()) for branch in branches))
-    for branch, colour in zip(branches, (style.MEASURED, style.FAULT), strict=False):
-        axes.plot(branch.values, branch.extents * factor, ".-", color=colour, markersize=4.0, linewidth=0.9)
+    for branch, (_, colour, size) in zip(branches, BRANCHES, strict=False):
+        axes.plot(branch.values, branch.extents * factor, ".-", color=colour, markersize=1.6 * size, linewidth=0.9)
     axes.set_ylim(0.0)
     axes.set_ylabel(unit)
     axes.locator_params(axis="y", nbins=4)

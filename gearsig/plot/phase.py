@@ -1,4 +1,4 @@
-"""Motion in phase space: portraits with their Poincaré points, recurrences, delays and dimensions."""
+"""Motion in phase space: portraits with their Poincaré points, recurrences, delays, dimensions, chaos."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearsig.checks import count
+from gearsig.checks import FloatArray, count
 from gearsig.errors import InputError
 from gearsig.phase.measures import (
+    ChaosTest,
     EmbeddingDimension,
     LyapunovExponent,
     MutualInformation,
@@ -157,6 +158,26 @@ def divergence_figure(exponent: LyapunovExponent, *, title: str = "", height_in:
     style.label_axes(axes, "time (s)", "mean ln distance", title or exponent.source or "divergence of neighbours")
     style.note(axes, f"λ = {exponent.exponent_per_s:.4g} ± {exponent.uncertainty_per_s:.2g} 1/s, {exponent.verdict}")
     style.no_offset(axes)
+    return figure
+
+
+def chaos_test_figure(test: ChaosTest, walk: FloatArray, c_rad: float, *, title: str = "") -> Figure:
+    """Draw K over c with its median, and beside it the walk in the plane of p and q at one c, (n, 2)."""
+    figure = style.new_figure(TOP_IN + SIDE_IN + BOTTOM_IN)
+    left, right = _two_panels(figure)
+    order = np.argsort(test.c_rad)
+    left.plot(test.c_rad[order], test.k_of_c[order], ".-", color=style.MEASURED, markersize=4, linewidth=0.7)
+    left.axhline(test.k, color=style.FAULT, linewidth=1.0)
+    left.axvline(c_rad, color=style.FLOOR, linewidth=0.8)
+    left.set_ylim(-1.05, 1.05)
+    style.label_axes(left, "c (rad)", "K", title or test.source or "0–1 test")
+    style.note(left, f"K = {test.k:.2f}, {test.verdict}, {test.n_values} values")
+    right.plot(walk[:, 0], walk[:, 1], color=style.MEASURED, linewidth=0.6)
+    right.set_aspect("equal", adjustable="datalim")
+    style.label_axes(right, "p", "q")
+    style.note(right, f"walk at c = {c_rad:.3f} rad")
+    for panel in (left, right):
+        style.no_offset(panel)
     return figure
 
 

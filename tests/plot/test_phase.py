@@ -86,8 +86,8 @@ def test_bifurcation_draws_all_points_and_names_periods():
     np.testing.assert_array_equal(figure.axes[0].lines[0].get_xdata(), parameter)
     np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), points)
     texts = _texts(figure)
-    assert {"1×", "2×", "speed (rpm)", "displacement (m)"} <= set(texts)
-    assert "0×" not in texts
+    assert {"period 1", "period 2", "speed (rpm)", "displacement (m)"} <= set(texts)
+    assert "period 0" not in texts
 
 
 def test_recurrence_shows_the_matrix_over_time_and_the_measures():

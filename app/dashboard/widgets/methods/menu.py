@@ -14,6 +14,7 @@ from app.dashboard.widgets.methods.kurtogram import show_kurtogram
 from app.dashboard.widgets.methods.modes import show_modes
 from app.dashboard.widgets.methods.order_tracking import show_order_tracking
 from app.dashboard.widgets.methods.packets import show_packets
+from app.dashboard.widgets.methods.phase_embedding import show_embedding
 from app.dashboard.widgets.methods.phase_plane import show_phase_plane
 from app.dashboard.widgets.methods.ridges import show_ridges
 from app.dashboard.widgets.methods.time_frequency import show_time_frequency
@@ -57,6 +58,10 @@ METHODS: dict[str, tuple[ChannelView, str]] = {
     "Phase plane": (
         show_phase_plane,
         "Velocity over displacement, with a point once per mesh cycle or revolution: does the motion repeat?",
+    ),
+    "Embedding and chaos": (
+        show_embedding,
+        "The motion's path from this one channel: delay, dimension, section, Lyapunov exponent, recurrences, 0–1 test.",
     ),
     "Crack severity": (
         show_crack,

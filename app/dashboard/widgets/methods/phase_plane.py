@@ -8,6 +8,7 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.as_typed import as_typed
+from app.dashboard.widgets.methods.phase_motion import show_verdict
 from app.dashboard.widgets.methods.phase_settings import PhaseSettings, choose_band, choose_lock
 from app.dashboard.widgets.methods.stretch import Stretch, choose_stretch
 from app.dashboard.widgets.picture import show_picture
@@ -95,7 +96,7 @@ def _show_portrait(portrait: PhasePortrait, lock: CycleLock | None, phase: float
 def _show_kind(
     analysis: Analysis, stretch: Stretch, settings: PhaseSettings, portrait: PhasePortrait, lock: CycleLock
 ) -> None:
-    """Say what kind of motion it is once that is asked for: it takes several seconds."""
+    """Say what kind of motion it is once that is asked for: it takes some seconds."""
     asked, question = _key("kind asked", analysis), (stretch.key, settings, lock.name, lock.cycles_per_revolution)
     if st.session_state.get(asked) != question:
         st.button(
@@ -105,19 +106,12 @@ def _show_kind(
             on_click=_ask,
             args=(asked, question),
             help="Looks whether the section repeats, for the largest Lyapunov exponent, and the 0–1 test for chaos: "
-            "some ten seconds.",
+            "some seconds.",
         )
         return
     with st.spinner("Looking at section, exponent and 0–1 test …", show_time=True):
         kind = kind_of(stretch.key, settings, lock.name, lock.cycles_per_revolution, portrait, lock)
-    with st.container(border=True):
-        after = f" after {kind.period} cycles" if kind.kind == "subharmonic" else ""
-        st.markdown(f"Kind of motion: **{kind.kind}**{after}")
-        st.markdown("\n".join(f"- {as_typed(sentence)}" for sentence in kind.evidence))
-        st.caption(
-            "Measured gear vibration is periodic with noise and modulation in most cases: “stochastic” and “undecided” "
-            "are then the right answers."
-        )
+    show_verdict(kind)
 
 
 def _ask(asked: str, question: tuple[object, ...]) -> None:
