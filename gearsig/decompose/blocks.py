@@ -35,6 +35,7 @@ class ModeStretch:
         Root mean square difference of both blocks' modes over the seam, over the modes' own there; 0 for the first
         stretch. Small: the mode goes on. Near 1 or above: it is another one from here on.
     converged : bool
+    n_iterations : int
     """
 
     start: int
@@ -44,6 +45,7 @@ class ModeStretch:
     n_fade: int
     seam_mismatch: FloatArray
     converged: bool
+    n_iterations: int = 0
 
 
 def modes_by_block(
@@ -137,6 +139,7 @@ def _stretches(
             n_fade=n_fade if start else 0,
             seam_mismatch=mismatch,
             converged=modes.converged,
+            n_iterations=modes.n_iterations,
         )
         if following is not None:
             previous, done = waveforms[:, following - start :].copy(), end

@@ -21,6 +21,8 @@ from gearsig.spectra.types import Spectrum
 FEWEST_SAMPLES = 512
 """Of a finest band's envelope: below it the kurtosis of noise alone scatters by more than 0.1."""
 DEFAULT_LEVELS = 7
+FEWEST_LINES = 8
+"""Of an envelope's spectrum."""
 
 
 @dataclass(frozen=True)
@@ -182,7 +184,7 @@ def kurtogram_envelope(
     x = prepared_signal(recording.values(channel), fs, preparation)
     grid = kurtogram(x, fs, n_levels=n_levels, source=f"{channel}, {preparation}" if preparation != "none" else channel)
     if highest_modulation_hz is not None:
-        narrowest_hz = max(narrowest_hz, 3.0 * positive(highest_modulation_hz, "highest_modulation_hz", "Hz"))
+        narrowest_hz = max(narrowest_hz, 3.0 * _checked_modulation(highest_modulation_hz, fs, len(x)))
     if band_hz is None:
         band = grid.best_band(narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
     else:
@@ -191,6 +193,16 @@ def kurtogram_envelope(
     envelope = band_envelope(x, fs, band.band_hz, kind=kind, unit=unit, source=channel)
     spectrum = envelope_spectrum(envelope, highest_hz=highest_modulation_hz)
     return ChosenBand(band, grid, envelope, spectrum, grid.remarks(band))
+
+
+def _checked_modulation(highest_hz: float, fs: float, n: int) -> float:
+    least = FEWEST_LINES * fs / n
+    if not least <= positive(highest_hz, "highest_modulation_hz", "Hz") <= fs / 6.0:
+        raise InputError(
+            f"highest_modulation_hz is {highest_hz:g} Hz",
+            allowed=f"{least:.4g} Hz, {FEWEST_LINES} over the length, to {fs / 6.0:.4g} Hz, a third of the spectrum",
+        )
+    return highest_hz
 
 
 def given_band(values: FloatArray, sampling_rate_hz: float, band_hz: tuple[float, float]) -> BandCandidate:

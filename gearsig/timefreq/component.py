@@ -10,6 +10,7 @@ from gearsig.checks import FloatArray, frozen_array, one_of, within
 from gearsig.errors import InputError
 from gearsig.timefreq.bank import pieces, plan_groups
 from gearsig.timefreq.ends import EDGES, Edges
+from gearsig.timefreq.lines import lowest_possible
 from gearsig.timefreq.squeezed_cwt import Analysis, analysis
 from gearsig.timefreq.types import ComplexArray, Ridge
 from gearsig.timefreq.uniform import Source, UniformSignal, uniform
@@ -119,8 +120,10 @@ def component(
     if float(path.min()) <= 0.0:
         raise InputError("the ridge touches zero", where="ridge", remedy="look for it between lines above zero")
     low, high = path / (1.0 + width), path * (1.0 + width)
+    # Where the signal is just long enough for the ridge, the band's lower half is cut rather than refused.
+    bottom = max(float(low.min()), min(float(path.min()), lowest_possible(x, wavelet)))
     top = min(float(high.max()), x.highest_valid)
-    plan = analysis(x, wavelet, float(low.min()), top, n_per_octave)
+    plan = analysis(x, wavelet, bottom, top, n_per_octave)
     z = _gathered(x, plan, wavelet, (low, high), edges, squeezed=squeezed)
     if not squeezed:
         z /= _held_share(wavelet, width)

@@ -13,6 +13,13 @@ _PLACES = {
     "low_cut_hz": "the lowest frequency",
     "high_cut_hz": "the highest frequency",
     "n_modes": "K",
+    "n_levels": "the number of levels",
+    "highest_modulation_hz": "the highest modulation",
+    "highest_alpha_hz": "the highest cyclic frequency",
+    "highest_order": "the highest cyclic order",
+    "window_length": "the window",
+    "half_width": "the band around the ridge",
+    "set lowest to": "set the lowest line shown to",
 }
 """What the page calls the options of the command line and of functions that messages name."""
 
@@ -22,7 +29,8 @@ def show_error(error: GearsigError) -> None:
     if not isinstance(error, InputError):
         st.error(as_typed(_in_words_of_the_page(str(error))), icon=":material/help:")
         return
-    lines = [f"**{as_typed(error.where)}**: {as_typed(error.what)}" if error.where else as_typed(error.what)]
+    what = as_typed(_in_words_of_the_page(error.what))
+    lines = [f"**{as_typed(_PLACES.get(error.where, error.where))}**: {what}" if error.where else what]
     if error.allowed:
         lines.append(f"Allowed: {as_typed(error.allowed)}")
     if error.remedy:

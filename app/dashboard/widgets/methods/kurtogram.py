@@ -36,6 +36,8 @@ PREPARATIONS = {"As recorded": "none", "Tones removed": "tones removed", "Whiten
 BANDS = ("The kurtogram's", "My own")
 N_KEPT = 4
 HEIGHT_IN = 3.8
+OF_ENVELOPE_RATE = 0.4
+"""A narrow band's envelope has a low sampling rate, and resampling needs some room below half of it."""
 
 
 @dataclass(frozen=True)
@@ -165,6 +167,7 @@ def order_spectrum_of(found: ChosenBand, stretch: Stretch, highest_hz: float) ->
     assert angle is not None  # noqa: S101 - the caller's condition, said to the type checker
     values = envelope.values - envelope.values.mean()
     alone = Recording(values[None, :], envelope.sampling_rate_hz, (Channel(envelope.source, "unknown", envelope.unit),))
+    highest_hz = min(highest_hz, OF_ENVELOPE_RATE * envelope.sampling_rate_hz)
     highest = 60.0 * highest_hz / max(angle.mean_speed_rpm, 1e-9)
     signal = resample_to_angle(alone, angle, channels=[envelope.source], highest_order=highest)
     return order_spectrum(signal, envelope.source)

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 
     from gearsig.decompose.types import Modes, StartName, VmdSettings
 
-N_FIRST, N_MOST = 2**16, 2**19
+N_FIRST, N_MOST = 2**16, 2**21
+N_PER_BLOCK = 2**18
+"""Longer stretches are taken block by block."""
 MOST_MODES = 10
 PENALTIES = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000, 200_000)
 """A logarithmic scale that holds whatever is suggested."""
@@ -49,9 +51,11 @@ def show_modes(analysis: Analysis, channel: ChannelAnalysis) -> None:
     show_notes(modes.notes)
     _show_figure(analysis, modes)
     end = "Converged" if modes.converged else "Stopped"
+    n_blocks = len(modes.centre_history) - 1
+    blocks = f" in {n_blocks} overlapping blocks" if len(modes.residual) > N_PER_BLOCK else ""
     st.caption(
-        f"{end} after {modes.n_iterations} iterations. Marked in each spectrum: the mode's centre, and its width to "
-        "both sides. Grey: what is left."
+        f"{end} after {modes.n_iterations} iterations{blocks}. Marked in each spectrum: the mode's centre, and its "
+        "width to both sides. Grey: what is left."
     )
     offer_downloads(analysis, "modes", mode_waveforms(signal, modes), tables={"Modes": lambda: mode_columns(modes)})
 
@@ -102,8 +106,25 @@ def _choose_settings(analysis: Analysis) -> VmdSettings:
         persist_state="session",
     )
     most = four.select_slider("Iterations", ITERATIONS, key=_key("iterations", analysis), persist_state="session")
-    first = cast("StartName", start)
-    return VmdSettings(int(n_modes), float(penalty), zero_mode=bool(zero_mode), start=first, max_iterations=int(most))
+    with st.expander("More settings"):
+        dual_step = st.columns(3)[0].number_input(
+            "Dual step τ",
+            min_value=0.0,
+            value=0.0,
+            step=0.1,
+            format="%g",
+            key=_key("dual step", analysis),
+            help="Above 0 the modes must sum to the signal, noise included; 0 leaves noise in the residual.",
+            persist_state="session",
+        )
+    return VmdSettings(
+        int(n_modes),
+        float(penalty),
+        dual_step=float(dual_step),
+        zero_mode=bool(zero_mode),
+        start=cast("StartName", start),
+        max_iterations=int(most),
+    )
 
 
 @st.cache_resource(max_entries=N_KEPT, show_spinner=False)
@@ -111,10 +132,10 @@ def modes_of(key: str, settings: VmdSettings, _signal: ModeSignal) -> Modes:
     """Return the modes; `key` stands for the signal. They are frozen, so that sessions may share them."""
     from dataclasses import replace
 
-    from gearsig.decompose.vmd import variational_modes
+    from gearsig.decompose.long_signal import long_modes
 
     del key
-    modes = variational_modes(
+    modes = long_modes(
         _signal.values,
         _signal.rate,
         settings,
@@ -122,6 +143,7 @@ def modes_of(key: str, settings: VmdSettings, _signal: ModeSignal) -> Modes:
         unit=_signal.unit,
         source=_signal.source,
         shaft=_signal.shaft,
+        n_per_block=N_PER_BLOCK,
     )
     return replace(modes, offset=_signal.offset)
 
