@@ -40,12 +40,13 @@ from gearsig.severity.shape import SHAPE
 
 SEED = 2611
 N_CASES = 540
-FIRST_EVEN = 430
-"""Cases from here on have teeth that hardly differ."""
+EVEN_EVERY = 6
+"""The last of so many cases has teeth that hardly differ."""
 
 HELD_OUT = (3, 4)
 """Cases whose index leaves one of these, divided by 5, are not fitted but make the intervals."""
 
+BATCH = 20
 _DIGITS = 7
 
 
@@ -56,36 +57,32 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--to", type=Path, default=FILE)
     parser.add_argument("--state", default="", help="the simulator's commit, for the provenance")
-    parser.add_argument("--observed", type=Path, help="what the cases show: read from there, or kept there")
+    parser.add_argument("--observed", type=Path, help="keeps what the cases show; a run goes on from there")
     given = parser.parse_args()
-    if given.observed and given.observed.exists():
-        observed = pickle.loads(given.observed.read_bytes())  # noqa: S301  # a file of one's own
-    else:
-        observed = observe_all(range(given.cases), given.processes)
-    if given.observed:
-        given.observed.write_bytes(pickle.dumps(observed))
+    observed = observe_all(given.cases, given.processes, given.observed)
     text = json.dumps(calibration_of(observed, given.cases, given.state), indent=1)
     given.to.write_text(text + "\n", encoding="utf-8")
     typer.echo(f"{len(observed)} of {given.cases} cases; written to {given.to}")
 
 
-def observe_all(indices: Sequence[int], n_processes: int) -> list[tuple[int, Observed]]:
+def observe_all(n_cases: int, n_processes: int, kept: Path | None) -> list[tuple[int, Observed]]:
     """Return what the drawn cases show, by their index; some cannot be made, or show too few mesh harmonics."""
-    found = []
+    found: list[tuple[int, Observed | str]] = []
+    if kept and kept.exists():
+        found = pickle.loads(kept.read_bytes())  # noqa: S301  # a file of one's own
     with ProcessPoolExecutor(n_processes) as pool:
-        for index, answer in zip(indices, pool.map(observe_one, indices, chunksize=5), strict=True):
-            if isinstance(answer, Observed):
-                found.append((index, answer))
-            elif answer:
-                typer.echo(f"case {index}: {answer}")
-            if index % 25 == 24:
-                typer.echo(f"{index + 1} cases drawn")
-    return found
+        for first in range(len(found), n_cases, BATCH):
+            indices = range(first, min(first + BATCH, n_cases))
+            found += zip(indices, pool.map(observe_one, indices), strict=True)
+            typer.echo(f"{len(found)} cases drawn")
+            if kept:
+                kept.write_bytes(pickle.dumps(found))
+    return [(index, answer) for index, answer in found[:n_cases] if isinstance(answer, Observed)]
 
 
 def observe_one(index: int) -> Observed | str:
     """Return what one case shows, or why it shows nothing."""
-    case = draw_case(SEED, index, for_the_check=False, even=index >= FIRST_EVEN)
+    case = draw_case(SEED, index, for_the_check=False, even=index % EVEN_EVERY == EVEN_EVERY - 1)
     if case is None:
         return ""
     rng = np.random.default_rng([SEED, index, 0, 1])
@@ -179,7 +176,7 @@ def _provenance(observed: Sequence[tuple[int, Observed]], n_drawn: int, simulato
         "n_drawn": n_drawn,
         "n_used": len(observed),
         "n_cracked": len(cracked),
-        "first_even": FIRST_EVEN,
+        "even_every": EVEN_EVERY,
         "held_out_remainders_of_5": list(HELD_OUT),
         "false_alarms": FALSE_ALARMS,
         "depths_mm": list(rigs.DEPTHS_MM),

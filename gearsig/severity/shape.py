@@ -73,7 +73,7 @@ def _relative_energy(searched: ShaftLines, event: ToothEvent) -> FloatArray:
     relative = np.divide(envelopes, median, out=np.ones_like(envelopes), where=median > 0).mean(axis=(0, 1))
     width = round(len(relative) / searched.teeth)
     energy = sliding_mean(relative, width)
-    shift = len(energy) // 2 - int(event.centre_rev * len(energy)) + width // 2
+    shift = len(energy) // 2 - round(event.centre_rev * len(energy)) + width // 2
     middled: FloatArray = np.roll(energy / np.median(energy), shift)
     return middled
 
@@ -115,7 +115,7 @@ def band_signal(searched: ShaftLines, lowest: float, highest: float, centre_rev:
     spectrum = np.zeros((len(lines), n // 2 + 1), dtype=complex)
     used = orders[(orders >= lowest * z) & (orders <= highest * z) & (orders < n // 2)]
     spectrum[:, used] = lines[:, used]
-    signal: FloatArray = np.roll(np.fft.irfft(spectrum, n, axis=1) * n / 2, n // 2 - int(centre_rev * n), axis=1)
+    signal: FloatArray = np.roll(np.fft.irfft(spectrum, n, axis=1) * n / 2, n // 2 - round(centre_rev * n), axis=1)
     return signal
 
 

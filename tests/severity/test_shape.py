@@ -1,0 +1,83 @@
+"""An event's shape: short or long, where in the pitch, how far it is felt; gains and starts do not matter."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gearsig.severity.event import find_event, n_bands, sliding_mean
+from gearsig.severity.shaft_lines import ShaftLines
+from gearsig.severity.shape import SHAPE, band_signal, event_shape, reach_cycles
+from gearsig.severity.squeezed import squeezed_rise_db
+from tests.severity.averages import N_ORDERS, TEETH, flat_pulse, mesh_lines, shaft, teeth_pattern
+
+
+def shape_of(average: ShaftLines, *, driver: bool = True) -> dict[str, float]:
+    values = event_shape(average, average, find_event(average), driver=driver)
+    return dict(zip(SHAPE, values.tolist(), strict=True))
+
+
+def long_pulse(centre_rev: float, size: float, pitches: float) -> np.ndarray:
+    """Lines of a burst between two mesh harmonics that lasts."""
+    orders = np.arange(N_ORDERS + 1)
+    return flat_pulse(centre_rev, size) * np.exp(-0.5 * ((orders - 2.5 * TEETH) * pitches * np.pi / TEETH) ** 2)
+
+
+def test_a_longer_event_is_longer_and_lower() -> None:
+    averages = [shaft(mesh_lines() + teeth_pattern(1, 1e-3) + long_pulse(0.4, 1.0, p)) for p in (1.0, 2.0)]
+    short, long = (shape_of(average) for average in averages)
+    assert long["duration"] > short["duration"] + 0.2
+    assert long["peak"] < short["peak"] - 0.3
+
+
+@settings(max_examples=25)
+@given(st.floats(0.01, 100.0), st.integers(0, TEETH - 1))
+def test_neither_gain_nor_start_matters(gain: float, teeth: int) -> None:
+    plain = mesh_lines() + teeth_pattern(2) + flat_pulse(10.3 / TEETH, 0.2)
+    start = np.exp(-2j * np.pi * np.arange(N_ORDERS + 1) * teeth / TEETH)
+    expected, found = shape_of(shaft(plain)), shape_of(shaft(gain * plain * start))
+    assert list(found.values()) == pytest.approx(list(expected.values()), rel=1e-6, abs=1e-6)
+
+
+@settings(max_examples=25)
+@given(st.floats(-0.45, 0.45))
+def test_phase_against_the_mesh_says_where_in_the_pitch(part: float) -> None:
+    # A pulse at `part` of a pitch after the mesh's own maximum is behind it by 2π k part at harmonic k.
+    shape = shape_of(shaft(mesh_lines() + teeth_pattern(3, 1e-6) + flat_pulse((7 + part) / TEETH, 0.1)))
+    for k in (1, 2, 3):
+        assert shape[f"in_phase_{k}"] == pytest.approx(np.cos(2 * np.pi * k * part), abs=0.1)
+        assert shape[f"behind_{k}"] == pytest.approx(-np.sin(2 * np.pi * k * part), abs=0.1)
+
+
+def test_the_driven_gear_is_the_drivers_mirror_image() -> None:
+    average = shaft(mesh_lines() + teeth_pattern(3) + flat_pulse(7.2 / TEETH, 0.1))
+    one, two = shape_of(average), shape_of(average, driver=False)
+    assert [two[name] for name in SHAPE] == [-one[n] if n.startswith("behind") else one[n] for n in SHAPE]
+
+
+def test_ringing_reaches_further() -> None:
+    orders = np.arange(N_ORDERS + 1)
+    decaying = [flat_pulse(0.3, 1.0) / (1.0 + 1j * (orders - 3.4 * TEETH) / (0.1 * TEETH / t)) for t in (0.3, 2.0)]
+    averages = [shaft(mesh_lines() + teeth_pattern(4, 2e-3) + lines) for lines in decaying]
+    reaches = [reach_cycles(a, find_event(a)) for a in averages]
+    assert 0.3 < reaches[0] < reaches[1] < TEETH / 2
+
+
+def test_squeezed_energy_rises_with_the_event() -> None:
+    averages = [shaft(mesh_lines() + teeth_pattern(5, 0.02) + flat_pulse(0.6, size)) for size in (0.01, 0.03, 0.1)]
+    rises = [squeezed_rise_db(average, find_event(average)) for average in averages]
+    assert rises[1] > rises[0] + 3.0
+    assert rises[2] > rises[1] + 3.0
+    # The whole plane's energy is the signal's: near the tooth it stands out as far as the signal itself does.
+    signal = band_signal(averages[2], 3.5, n_bands(averages[2]) + 0.5, find_event(averages[2]).centre_rev)
+    energy = sliding_mean(signal[0] ** 2, 128)
+    assert rises[2] == pytest.approx(10 * np.log10(energy[signal.size // 2 - 64] / np.median(energy)), abs=4.0)
+
+
+def test_the_band_signal_holds_the_energy_of_its_lines() -> None:
+    average = shaft(teeth_pattern(6))
+    signal = band_signal(average, 0.5, n_bands(average) + 0.5, 0.25)
+    orders = np.arange(N_ORDERS + 1)
+    near = np.abs((orders + TEETH // 2) % TEETH - TEETH // 2) <= 2
+    kept = (orders >= 0.5 * TEETH) & (orders <= (n_bands(average) + 0.5) * TEETH) & ~near
+    assert np.mean(signal**2) == pytest.approx(0.5 * np.sum(np.abs(average.lines[0, kept]) ** 2), rel=1e-9)
