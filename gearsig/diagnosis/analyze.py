@@ -8,20 +8,24 @@ from dataclasses import asdict
 import numpy as np
 
 from gearsig.angle.types import ShaftAngle
+from gearsig.diagnosis.channel_analysis import Material, channel_analysis
 from gearsig.diagnosis.comparison import beside_reference
 from gearsig.diagnosis.crack import crack_depth, with_crack
 from gearsig.diagnosis.detectors.bearing import detect_bearings
 from gearsig.diagnosis.detectors.lines import detect_lines
 from gearsig.diagnosis.detectors.mesh import detect_mesh
 from gearsig.diagnosis.detectors.quality import detect_data_problems
+from gearsig.diagnosis.detectors.resonance import detect_resonances
 from gearsig.diagnosis.detectors.sidebands import detect_sidebands
 from gearsig.diagnosis.detectors.tooth import detect_tooth_damage
-from gearsig.diagnosis.envelopes import BandEnvelope, band_envelopes
+from gearsig.diagnosis.envelopes import band_envelopes
 from gearsig.diagnosis.indicator_table import indicator_table
+from gearsig.diagnosis.own_band import own_bands
+from gearsig.diagnosis.run_up import order_levels
 from gearsig.diagnosis.settings import AnalysisSettings
-from gearsig.diagnosis.signals import Signals, compute_signals
+from gearsig.diagnosis.signals import compute_signals
 from gearsig.diagnosis.speed import determine_angle, speed_finding
-from gearsig.diagnosis.types import Analysis, CannotTell, ChannelAnalysis, Finding, Kind
+from gearsig.diagnosis.types import Analysis, CannotTell, Finding, Kind
 from gearsig.diagnosis.verdict import ranked, verdict_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording.types import Recording
@@ -89,12 +93,9 @@ def analyze(
         order = ranked(findings)
         return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings))
     usable = angle if not isinstance(angle, CannotTell) else None
-    tell("averages and spectra")
-    signals = compute_signals(recording.select(names), known, usable, settings)
-    tell("envelopes")
-    envelopes = list(band_envelopes(signals))
+    material = _material(recording.select(names), known, usable, settings, tell)
     tell("gears, bearings and shafts")
-    findings += _detect(signals, envelopes)
+    findings += _detect(material)
     then = None
     if reference is not None:
         tell("the reference")
@@ -106,14 +107,30 @@ def analyze(
         recording=recording,
         rig=recording.rig,
         shaft_angle=angle,
-        channels=tuple(_channel(signals, name, envelopes, order) for name in names),
-        indicators=indicator_table(signals, envelopes),
+        channels=tuple(channel_analysis(material, name, order) for name in names),
+        indicators=indicator_table(material.signals, material.envelopes),
         findings=order,
         verdict=verdict_of(order),
         settings=asdict(settings),
         crack=crack,
         reference=then,
     )
+
+
+def _material(
+    recording: Recording,
+    rig: Rig,
+    angle: ShaftAngle | None,
+    settings: AnalysisSettings,
+    tell: Callable[[str], object],
+) -> Material:
+    """Compute everything that is looked at."""
+    tell("averages and spectra")
+    signals = compute_signals(recording, rig, angle, settings)
+    tell("envelopes")
+    envelopes, own = list(band_envelopes(signals)), own_bands(signals)
+    tell("levels over speed")
+    return Material(signals, envelopes, own, order_levels(signals))
 
 
 def _angle_of(recording: Recording, rig: Rig) -> ShaftAngle | CannotTell:
@@ -129,14 +146,16 @@ def _angle_of(recording: Recording, rig: Rig) -> ShaftAngle | CannotTell:
         raise InputError(error.what, where=where, allowed=error.allowed, remedy=error.remedy) from None
 
 
-def _detect(signals: Signals, envelopes: list[BandEnvelope]) -> list[Finding]:
+def _detect(material: Material) -> list[Finding]:
+    signals = material.signals
     return [
         *_nothing_to_examine(signals.rig),
         *detect_mesh(signals),
         *detect_tooth_damage(signals),
-        *detect_bearings(signals, envelopes),
+        *detect_bearings(signals, material.envelopes, material.own_bands),
         *detect_sidebands(signals),
         *detect_lines(signals),
+        *detect_resonances(material.order_levels),
     ]
 
 
@@ -182,40 +201,3 @@ def _check_reference(recording: Recording, reference: Recording) -> None:
     if missing:
         found = ", ".join(reference.channel_names)
         raise InputError(f"the reference has no channel {missing[0]!r}", where=where, allowed=f"same channels: {found}")
-
-
-def _channel(
-    signals: Signals, name: str, envelopes: list[BandEnvelope], findings: tuple[Finding, ...]
-) -> ChannelAnalysis:
-    from gearsig.spectra.density import channel_density
-
-    envelope = _shown_envelope(name, envelopes, findings)
-    averages = {}
-    for shaft in signals.shafts:
-        averages[shaft.shaft, "average"] = shaft.averages[name]
-        if name in shaft.separated:
-            parts = shaft.separated[name]
-            for part in (parts.residual, parts.difference, parts.regular):
-                averages[shaft.shaft, part.kind] = part
-    return ChannelAnalysis(
-        channel=name,
-        spectrum=signals.spectra[name],
-        power_density=channel_density(signals.recording, name),
-        envelope_spectrum=envelope.excess.spectrum if envelope else None,
-        envelope_band_hz=envelope.band_hz if envelope else None,
-        order_spectrum=signals.order_excess[name].spectrum if name in signals.order_excess else None,
-        order_map=signals.order_maps.get(name),
-        averages=averages,
-    )
-
-
-def _shown_envelope(name: str, envelopes: list[BandEnvelope], findings: tuple[Finding, ...]) -> BandEnvelope | None:
-    """Return the envelope in which the surest family of impacts was found, else the one whose lines stand out most."""
-    own = [e for e in envelopes if e.channel == name]
-    if not own:
-        return None
-    for finding in findings:
-        for envelope in own:
-            if finding.where.band_hz == envelope.band_hz and name in finding.where.channels:
-                return envelope
-    return max(own, key=lambda e: float(e.excess.scores().sum()))

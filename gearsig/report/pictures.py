@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from gearsig.angle.types import ShaftAngle
-from gearsig.diagnosis.types import Analysis, ChannelAnalysis, Kind
+from gearsig.diagnosis.types import Analysis, ChannelAnalysis, Kind, OrderLevel
 from gearsig.orders.types import SynchronousAverage
 from gearsig.plot.cursors import Cursor
+from gearsig.plot.display import unit_text
 from gearsig.plot.embed import Picture, embed
 from gearsig.report.crack_picture import crack_picture
 from gearsig.report.lines import (
@@ -19,6 +20,7 @@ from gearsig.report.lines import (
     mesh_windows,
     speed_is_constant,
 )
+from gearsig.report.numbers import readable
 
 MOST_BYTES = 2_500_000
 """Of all pictures of a page, as text: the page stays below 3 MB."""
@@ -124,7 +126,7 @@ def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:
 def _channel_group(analysis: Analysis, channel: ChannelAnalysis, *, detailed: bool) -> Group:
     makers: list[Callable[[Analysis, ChannelAnalysis], Iterator[Picture]]] = [_order_or_frequency]
     if detailed:
-        makers += [_whole_spectrum, _mesh_zooms, _envelope, _map, _averages]
+        makers += [_order_levels, _whole_spectrum, _mesh_zooms, _envelope, _kurtogram, _map, _averages]
     wide = tuple(picture for maker in makers for picture in maker(analysis, channel))
     return Group(f"Channel {channel.channel}", wide, tuple(_polar(analysis, channel)))
 
@@ -219,6 +221,48 @@ def _envelope(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]
         "Equally spaced lines at a shaft's order mean one impact per turn; at a bearing's, a damaged race.",
         f"Envelope spectrum of {channel.channel}{where} with shaft and bearing lines.",
     )
+
+
+def _kurtogram(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
+    from gearsig.plot.kurtogram import kurtogram_figure
+
+    del analysis  # a maker of pictures is given it, and this one needs none of it
+    if channel.kurtogram is None or channel.kurtogram_band is None:
+        return
+    low, high = channel.kurtogram_band.band_hz
+    yield embed(
+        kurtogram_figure(channel.kurtogram, channel.kurtogram_band),
+        f"How impulsive each band is. The outlined one, {low:.0f} to {high:.0f} Hz, is the most impulsive that is wide "
+        "enough for the bearing's harmonics; its envelope bears the finding out.",
+        f"Kurtogram of {channel.channel} with its best band.",
+    )
+
+
+def _order_levels(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
+    from gearsig.plot.order_levels import order_levels_figure
+
+    if not channel.order_levels:
+        return
+    found = [f.where for f in analysis.findings if f.code == "resonance" and channel.channel in f.where.channels]
+    resonances = [where.frequency_hz for where in found if where.frequency_hz is not None]
+    largest = "; ".join(_largest_text(level) for level in channel.order_levels)
+    look = (
+        "A peak is a speed at which that order excites something; orders that peak at one frequency show a resonance."
+    )
+    yield embed(
+        order_levels_figure(
+            channel.order_levels, resonances_hz=resonances, title=f"Levels over speed, {channel.channel}"
+        ),
+        f"{look} Largest: {largest}.",
+        f"Amplitudes of {len(channel.order_levels)} orders of {channel.channel} over speed.",
+        vector=True,
+    )
+
+
+def _largest_text(level: OrderLevel) -> str:
+    amplitude, rpm, hertz = level.largest
+    unit = f" {unit_text(level.unit)}" if level.unit else ""
+    return f"{level.name} {readable(amplitude, 3)}{unit} at {rpm:.0f} rpm ({hertz:.4g} Hz)"
 
 
 def _map(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from gearsig.diagnosis.confidence import WITH_ASSUMED_DATA, from_p_value, p_text
@@ -20,6 +21,7 @@ from gearsig.diagnosis.detectors.bearing_family import (
 from gearsig.diagnosis.detectors.bearing_limit import CLEAR_MODULATION
 from gearsig.diagnosis.detectors.impact_trains import slower_train
 from gearsig.diagnosis.envelopes import BandEnvelope
+from gearsig.diagnosis.own_band import OwnBand, witness_text
 from gearsig.diagnosis.signals import Signals
 from gearsig.diagnosis.types import Finding, Kind, Strength, Where
 from gearsig.rig.orders import hunting_tooth_order
@@ -42,15 +44,21 @@ WORTH_A_SUSPICION = 0.3
 """Below this confidence a family at a part's order is worth a notice: other causes are more likely together."""
 
 
-def detect_bearings(signals: Signals, envelopes: list[BandEnvelope]) -> list[Finding]:
-    """Name the race where the rig gives the bearing; else report families that nothing known explains."""
-    cleaned = [replace(e, excess=without_synchronous(signals, e.excess)) for e in envelopes]
+def detect_bearings(
+    signals: Signals, envelopes: Sequence[BandEnvelope], own_bands: Sequence[OwnBand] = ()
+) -> list[Finding]:
+    """Name the race where the rig gives the bearing; else report families that nothing known explains.
+
+    The bands that the kurtograms choose are searched like the others, and say what they show of a race found.
+    """
+    searched = [*envelopes, *(own.envelope for own in own_bands)]
+    cleaned = [replace(e, excess=without_synchronous(signals, e.excess)) for e in searched]
     if signals.angle is None:
         return _over_frequency(signals, cleaned)
     if signals.angle.n_revolutions < signals.settings.minimum_revolutions:
         return [_too_short(signals)] if signals.rig.bearings else []
     families = find_families(signals, cleaned)
-    findings = [_named_finding(signals, c, len(families.named)) for c in families.named]
+    findings = [_with_witness(_named_finding(signals, c, len(families.named)), own_bands) for c in families.named]
     findings += [
         _unnamed_finding(signals, c) if c.bearing is None else _named_finding(signals, c, 1) for c in families.trains
     ]
@@ -58,6 +66,14 @@ def detect_bearings(signals: Signals, envelopes: list[BandEnvelope]) -> list[Fin
     if not claimed and signals.rig.bearings and cleaned:
         findings += none_found(signals, cleaned, families)
     return findings
+
+
+def _with_witness(finding: Finding, own_bands: Sequence[OwnBand]) -> Finding:
+    where = finding.where
+    if where.order is None or where.band_hz is None:
+        return finding
+    text = witness_text(own_bands, where.channels[0], where.band_hz, where.order)
+    return replace(finding, evidence=(*finding.evidence, *text))
 
 
 def _named_finding(signals: Signals, candidate: Candidate, n_parts: int) -> Finding:
