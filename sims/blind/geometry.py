@@ -128,12 +128,14 @@ class SpurPair:
         pb, place = self.base_pitch_m, self.path
         gap = np.zeros(N_PATH)
         early, late = place < 0, place > self.contact_ratio
-        gap[early] = self._corner_gap(0, -place[early] * pb)
-        gap[late] = self._corner_gap(1, (place[late] - self.contact_ratio) * pb)
+        gap[early] = self.corner_gap_m(0, -place[early] * pb)
+        gap[late] = self.corner_gap_m(1, (place[late] - self.contact_ratio) * pb)
         return gap
 
-    def _corner_gap(self, flank: int, distance_m: FloatArray) -> FloatArray:
+    def corner_gap_m(self, flank: int, distance_m: FloatArray, tip_loss_m: float = 0.0) -> FloatArray:
         """Gap along the base circle of gear `flank` to the other's tip corner, that far from the path's end.
+
+        A tip that lost `tip_loss_m` of its height ends the path earlier.
 
         Own centre at 0, the other at (a, 0). The flank's involute starts at the polar angle β = α − ρ/r_b; the
         corner at polar angle ψ and radius r touches an involute with β = ψ − inv(r). The gap is r_b times the
@@ -141,6 +143,7 @@ class SpurPair:
         """
         other = 1 - flank
         rb, rb_other, ra_other = self.base_radii_m[flank], self.base_radii_m[other], self.tip_radii_m[other]
+        ra_other -= tip_loss_m
         a, alpha = self.centre_distance_m, self.alpha
         rho_other = sqrt(ra_other**2 - rb_other**2)
         rho = a * sin(alpha) - rho_other

@@ -14,8 +14,9 @@ N_OUT = 11
     RB_1, RB_2, LINE_X, LINE_Y, BASE_PITCH, CONTACT_RATIO, RHO_START, RHO_SUM, SOFT_M, BACKLASH_M, MESH_DAMPING,
     BACK_STIFFNESS, LOAD_NM, LOAD_SLOPE, MOTOR_NM, MOTOR_GAIN, LINE_INERTIA, WEDGE_M, GRID_S, OMEGA_1, OMEGA_2,
     CAGE_RATIO_1, CAGE_RATIO_2, N_BALLS_1, N_BALLS_2, BALL_RIPPLE, PHASE_2, SEAT_1, SEAT_2, HEIGHT,
-) = range(30)  # fmt: skip
-N_NUMBERS = 30
+    MOTOR_MEMORY,
+) = range(31)  # fmt: skip
+N_NUMBERS = 31
 
 
 @njit(cache=True)
@@ -103,7 +104,7 @@ def march(
     z1, z2, n_path = gap_1.shape[0], gap_2.shape[0], gap_0.shape[0]
     pb, ratio = number[BASE_PITCH], number[CONTACT_RATIO]
     per_place = (n_path - 1) / (ratio + 2.0 * reach)
-    force, n_steps = 0.0, (n_before + n_out) * stride
+    force, behind, n_steps = 0.0, 0.0, (n_before + n_out) * stride
     for step in range(n_steps + 1):
         # What the forces depend on, at the new point with the forces held.
         for m in range(n):
@@ -128,7 +129,9 @@ def march(
         gain = speed[cell, 1] + part * (speed[cell + 1, 1] - speed[cell, 1])
         for m in range(n):
             physical[m] = steady[m]
-        physical[0] += number[MOTOR_NM] + number[LINE_INERTIA] * gain + number[MOTOR_GAIN] * (wanted - v[7])
+        behind += (wanted - v[7]) * step_s
+        physical[0] += number[MOTOR_NM] + number[LINE_INERTIA] * gain
+        physical[0] += number[MOTOR_GAIN] * (wanted - v[7] + behind * number[MOTOR_MEMORY])
         physical[3] -= number[LOAD_NM] + number[LOAD_SLOPE] * (v[8] - number[OMEGA_2])
         for r in range(torque.shape[0]):
             if torque[r, 0] == 0.0:

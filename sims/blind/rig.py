@@ -23,7 +23,14 @@ MODULES_MM: dict[str, tuple[float, ...]] = {
 }
 LARGEST_CENTRE_M = 0.25
 SHEAR_LIMIT_PA = 30e6
-BEARING_SERIES = ((8, 7.938, 33.5), (9, 7.94, 39.04), (8, 9.525, 39.5), (9, 12.7, 52.0), (11, 10.3, 58.6), (10, 15.08, 70.1))
+BEARING_SERIES = (
+    (8, 7.938, 33.5),
+    (9, 7.94, 39.04),
+    (8, 9.525, 39.5),
+    (9, 12.7, 52.0),
+    (11, 10.3, 58.6),
+    (10, 15.08, 70.1),
+)
 """Elements, their diameter and the pitch diameter in mm, of usual deep-groove sizes."""
 
 
@@ -113,7 +120,13 @@ class BlindRig:
             shafts=(Shaft("input", "ccw"), Shaft("output", "cw")),
             pairs=(
                 GearPair(
-                    "stage 1", *SHAFTS, pair.z1, pair.z2, pair.module_mm, pair.pressure_angle_deg, round(pair.face_mm, 1)
+                    "stage 1",
+                    *SHAFTS,
+                    pair.z1,
+                    pair.z2,
+                    pair.module_mm,
+                    pair.pressure_angle_deg,
+                    round(pair.face_mm, 1),
                 ),
             ),
             bearings=tuple(b for i, second in same for b in (self.bearing(i), second)),
@@ -132,7 +145,7 @@ def draw_rig(rng: np.random.Generator, role: str) -> BlindRig:
     rated_nm = rng.uniform(40, 60) * pair.face_mm * pair.module_mm * pair.pitch_radii_m[0]
     force_n = rated_nm / pair.base_radii_m[0]
     deflection_m = force_n / pair.mean_stiffness_n_per_m()
-    tolerances = _draw_tolerances(rng, pair)
+    tolerances = _draw_tolerances(rng, pair, float(np.clip(deflection_m / 10e-6, 0.4, 1.2)))
     is_relieved = rng.random() < 0.6
     relief = rng.uniform(0.4, 1.2, 2) * deflection_m * is_relieved
     small = rng.integers(0, 3) if pair.module_mm < 3 else rng.integers(2, 5)
@@ -145,7 +158,7 @@ def draw_rig(rng: np.random.Generator, role: str) -> BlindRig:
         rated_nm=rated_nm,
         parts=parts,
         stiffness_factor=rng.uniform(0.85, 1.15),
-        mesh_damping_ratio=rng.uniform(0.03, 0.09),
+        mesh_damping_ratio=rng.uniform(0.04, 0.1),
         soft_m=rng.uniform(0.03, 0.12) * deflection_m,
         backlash_m=rng.uniform(0.02, 0.05) * pair.module_mm / 1000,
         clearance_m=(rng.uniform(0.5e-6, 3e-6), rng.uniform(0.5e-6, 3e-6)),
@@ -182,9 +195,7 @@ def _draw_parts(rng: np.random.Generator, pair: SpurPair, rated_nm: float) -> Pa
     torques = rated_nm, rated_nm * pair.z2 / pair.z1
     shaft_d = [(16 * t / (pi * SHEAR_LIMIT_PA)) ** (1 / 3) for t in torques]
     length = [d * rng.uniform(8, 15) for d in shaft_d]
-    mass = [
-        pair.gear_mass_kg(i) * rng.uniform(0.7, 1) + 7850 * pi / 4 * shaft_d[i] ** 2 * length[i] for i in range(2)
-    ]
+    mass = [pair.gear_mass_kg(i) * rng.uniform(0.7, 1) + 7850 * pi / 4 * shaft_d[i] ** 2 * length[i] for i in range(2)]
     inertia = [pair.gear_inertia_kgm2(i) * rng.uniform(0.7, 1) for i in range(2)]
     twist = [8e10 * pi * shaft_d[i] ** 4 / (32 * length[i]) for i in range(2)]
     force_n = rated_nm / pair.base_radii_m[0]
@@ -211,7 +222,9 @@ def _draw_parts(rng: np.random.Generator, pair: SpurPair, rated_nm: float) -> Pa
     )
 
 
-def texture(rng: np.random.Generator, pair: SpurPair, n_teeth: int, rms_m: float, shortest_mm: float = 0.2) -> FloatArray:
+def texture(
+    rng: np.random.Generator, pair: SpurPair, n_teeth: int, rms_m: float, shortest_mm: float = 0.2
+) -> FloatArray:
     """Random flank heights along the path, (n_teeth, N_PATH), smoothed over the width of the Hertzian contact."""
     from scipy.ndimage import gaussian_filter1d
 
@@ -220,20 +233,21 @@ def texture(rng: np.random.Generator, pair: SpurPair, n_teeth: int, rms_m: float
     return np.asarray(rough * rms_m / rough.std())
 
 
-def _draw_tolerances(rng: np.random.Generator, pair: SpurPair) -> Tolerances:
+def _draw_tolerances(rng: np.random.Generator, pair: SpurPair, fineness: float) -> Tolerances:
+    """Draw errors of a quality that suits the load: `fineness` scales what stands on the flanks."""
     gaps, runout, wobble = [], [], []
     s = np.clip(pair.path / pair.contact_ratio, 0, 1) - 0.5
     for shaft, z in enumerate((pair.z1, pair.z2)):
-        pitch = rng.normal(0, rng.uniform(0.4e-6, 1.6e-6), (z, 1))
+        pitch = rng.normal(0, rng.uniform(0.2e-6, 0.9e-6), (z, 1))
         form = rng.normal(0, 1.5e-6) * s + rng.uniform(0, 3e-6) * 4 * s**2
-        gaps.append(pitch + form + texture(rng, pair, z, rng.uniform(0.1e-6, 0.35e-6)))
+        gaps.append(fineness * (pitch + form + texture(rng, pair, z, rng.uniform(0.03e-6, 0.12e-6))))
         for order, largest in ((1.0, 5e-6), (2.0, 1e-6), (3.0, 0.5e-6)):
-            runout.append((float(shaft), order, rng.uniform(0.2, 1) * largest, rng.uniform(0, 2 * pi)))
+            runout.append((float(shaft), order, fineness * rng.uniform(0.2, 1) * largest, rng.uniform(0, 2 * pi)))
         wobble.append((float(shaft), 1.0, rng.uniform(0, 1.5e-6), rng.uniform(0, 2 * pi)))
     masses = [pair.gear_mass_kg(i) * 1.5 for i in range(2)]
     unbalance = [(m * 10 ** rng.uniform(-5.7, -5), rng.uniform(0, 2 * pi)) for m in masses]
     torque = [
-        (float(rng.integers(0, 2)), float(order), 10 ** rng.uniform(-3.2, -2.3), rng.uniform(0, 2 * pi))
+        (float(rng.integers(0, 2)), float(order), 10 ** rng.uniform(-3.0, -2.0), rng.uniform(0, 2 * pi))
         for order in (1, 2, int(rng.choice([3, 4, 5, 6])))
     ]
     return Tolerances(

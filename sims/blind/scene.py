@@ -87,7 +87,8 @@ class Scene:
     paths: list[list[Resonance]] = field(default_factory=list)
     stages: list[Stage] = field(default_factory=list)
     late_stages: list[Stage] = field(default_factory=list)
-    reference_rms: float = 0.0
+    reference_rms: tuple[float, ...] = ()
+    reference_peak: tuple[float, ...] = ()
 
     @property
     def omega(self) -> tuple[float, float]:
@@ -175,7 +176,9 @@ def _mounted_paths(rig: BlindRig, condition: Condition) -> list[list[Resonance]]
     rng = np.random.default_rng(condition.mount_seed)
     return [
         [
-            Resonance(m.frequency_hz * (1 + rng.normal(0, 0.003)), m.damping_ratio, m.mass_kg * (1 + rng.normal(0, 0.02)))
+            Resonance(
+                m.frequency_hz * (1 + rng.normal(0, 0.003)), m.damping_ratio, m.mass_kg * (1 + rng.normal(0, 0.02))
+            )
             for m in chain.path
         ]
         for chain in rig.chains
@@ -237,6 +240,15 @@ def _start(scene: Scene, modes: Modes) -> tuple[Matrix, Matrix, Matrix]:
     return into @ (u + scene.start * turn), into @ velocity, steady
 
 
+def _friction_nm(scene: Scene) -> float:
+    """Mean torque that friction takes from the driver: the motor knows it roughly, its controller does the rest."""
+    pair = scene.rig.pair
+    inside = (pair.path >= 0) & (pair.path <= pair.contact_ratio)
+    rho1, rho2 = pair.rho_m(pair.path)
+    lever = (scene.slip * (rho2 * pair.z1 / pair.z2 - rho1))[inside]
+    return float(scene.mesh_force_n * lever.mean())
+
+
 def _numbers(scene: Scene) -> Matrix:
     rig, pair, parts = scene.rig, scene.rig.pair, scene.rig.parts
     j = parts.inertia_kgm2
@@ -253,7 +265,8 @@ def _numbers(scene: Scene) -> Matrix:
     number[kn.BACK_STIFFNESS] = rig.mesh_stiffness_n_per_m()
     number[kn.LOAD_NM] = scene.condition.true_nm / ratio
     number[kn.LOAD_SLOPE] = rig.load_slope * scene.condition.true_nm / ratio / scene.omega[1]
-    number[kn.MOTOR_NM], number[kn.LINE_INERTIA] = scene.condition.true_nm, line_inertia
+    number[kn.MOTOR_NM], number[kn.LINE_INERTIA] = scene.condition.true_nm + _friction_nm(scene), line_inertia
+    number[kn.MOTOR_MEMORY] = 0.5 / rig.motor_time_s
     number[kn.MOTOR_GAIN] = line_inertia / rig.motor_time_s
     number[kn.GRID_S] = GRID_S
     number[[kn.OMEGA_1, kn.OMEGA_2]] = scene.omega

@@ -86,14 +86,14 @@ def measure(scene: Scene, motion: Motion) -> Recording:
         signal = stage(motion, signal, np.random.default_rng([scene.condition.seed, 2]))
     signal = np.asarray(resample_poly(signal, 1, 2, axis=1))
     signal = sosfilt(butter(2, 1.0, "highpass", fs=rig.sampling_rate_hz, output="sos"), signal, axis=1)
-    level = scene.reference_rms or float(signal.std())
+    level = scene.reference_rms or tuple(float(x.std()) for x in signal)
     n = signal.shape[1]
     t = np.arange(n) / rig.sampling_rate_hz
     hum = np.sin(2 * pi * 50.0 * t + rng.uniform(0, 2 * pi))
     rows = [
-        (x + level * (chain.noise_share * coloured_noise(rng, n, rig.sampling_rate_hz, chain.noise_colour)))
-        + level * rig.hum_share * hum
-        for x, chain in zip(signal, rig.chains, strict=True)
+        (x + level[i] * (chain.noise_share * coloured_noise(rng, n, rig.sampling_rate_hz, chain.noise_colour)))
+        + level[i] * rig.hum_share * hum
+        for i, (x, chain) in enumerate(zip(signal, rig.chains, strict=True))
     ]
     tacho = tachometer(scene, motion, rng)
     signal = np.array([row * chain.gain for row, chain in zip(rows, rig.chains, strict=True)])

@@ -1,0 +1,210 @@
+"""Cases: a rig, where it runs, what is wrong with it, and its twin with nothing wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from gearsig.checks import count, one_of, within
+from gearsig.errors import InputError
+from gearsig.recording.types import Recording
+from sims.blind.changes.catalogue import CATALOGUE, EVERY, MECHANICAL, OUTSIDE
+from sims.blind.rig import BlindRig, draw_rig
+from sims.blind.scene import Condition, run, scene_of
+from sims.blind.sensing import measure
+
+Kind = Literal["none", "single", "unknown", "pair"]
+KINDS: tuple[Kind, ...] = ("none", "single", "unknown", "pair")
+KIND_SHARES = (0.2, 0.5, 0.2, 0.1)
+FEWEST_MESH_HARMONICS = 3
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing wrong: its name, severity in its own unit, level in its span (0 weak, 1 strong), seed of its choices."""
+
+    name: str
+    severity: float
+    level: float
+    seed: int
+
+
+@dataclass(frozen=True)
+class Case:
+    """What to record. Conditions and references are paired: reference i runs where condition i does."""
+
+    role: str
+    kind: str
+    rig: BlindRig
+    conditions: tuple[Condition, ...]
+    references: tuple[Condition, ...]
+    faults: tuple[Fault, ...]
+
+
+@dataclass(frozen=True)
+class CaseRecordings:
+    """Recordings of a case, its healthy references (or none), its twins, and where each fault sits."""
+
+    conditions: tuple[Recording, ...]
+    references: tuple[Recording, ...]
+    twins: tuple[Recording, ...]
+    places: tuple[Mapping[str, str | int | float], ...]
+
+
+def draw_case(
+    rng: np.random.Generator,
+    role: str = "development",
+    *,
+    kind: str | None = None,
+    effect: str | None = None,
+    level: float | None = None,
+    n_conditions: int | None = None,
+    with_reference: bool | None = None,
+) -> Case:
+    """Draw a case; what is not given is drawn too.
+
+    The rig, its conditions, lengths and noise come from the generator before and apart from the fault: the same
+    generator state with another kind or effect gives the same rig. Only ``backlash`` chooses where it runs, since it
+    has no meaning without a light load: its first condition is always one.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    role : str
+        "development", "calibration" or "evaluation"; no tooth number and no module is shared between them.
+    kind : str or None
+        "none", "single", "unknown" (outside the catalogue) or "pair" (two of the catalogue).
+    effect : str or None
+        Name for "single" or "unknown"; it decides the kind if that is not given.
+    level : float or None
+        0 (barely noticeable) to 1 (strong), for every fault of the case; None: even between.
+    n_conditions : int or None
+        1 or 2.
+    with_reference : bool or None
+        Whether each condition has a healthy recording of the same rig.
+
+    Raises
+    ------
+    InputError
+        If a name does not exist or a value is outside what is allowed.
+    """
+    seeds = [int(s) for s in rng.integers(2**62, size=4)]
+    drawn = str(np.random.default_rng(seeds[3]).choice(KINDS, p=KIND_SHARES))
+    chosen = _kind(kind, effect, drawn)
+    if n_conditions is not None and count(n_conditions, "n_conditions") > 2:
+        raise InputError(f"n_conditions is {n_conditions}", allowed="1 or 2")
+    rig = draw_rig(np.random.default_rng(seeds[0]), role)
+    faults = _draw_faults(np.random.default_rng(seeds[1]), rig, chosen, effect, level)
+    is_light = any(f.name == "backlash" for f in faults)
+    conditions, references = _draw_conditions(
+        np.random.default_rng(seeds[2]), rig, n_conditions, with_reference, starts_light=is_light
+    )
+    return Case(role, chosen, rig, conditions, references, faults)
+
+
+def record_case(case: Case) -> CaseRecordings:
+    """Run a case: recordings, references and twins.
+
+    A twin is the same run from the same seeds without the fault; a case with no fault is its own twin. Noise and a
+    clipping converter's range are set by the first condition's twin, so that no recording tells by its noise.
+    """
+    first = scene_of(case.rig, case.conditions[0])
+    first_twin = measure(first, run(first))
+    n = len(case.rig.chains)
+    rms = tuple(float(x.std()) / c.gain for x, c in zip(first_twin.samples[:n], case.rig.chains, strict=True))
+    peak = tuple(float(np.abs(x).max()) for x in first_twin.samples[:n])
+
+    def recorded(condition: Condition, faults: tuple[Fault, ...] = ()) -> tuple[Recording, list[Mapping[str, str | int | float]]]:
+        scene = scene_of(case.rig, condition)
+        scene.reference_rms, scene.reference_peak = rms, peak
+        places = [EVERY[f.name].apply(scene, f.severity, np.random.default_rng(f.seed)) for f in faults]
+        return measure(scene, run(scene)), places
+
+    twins = tuple(recorded(c)[0] for c in case.conditions)
+    references = tuple(recorded(c)[0] for c in case.references)
+    if not case.faults:
+        return CaseRecordings(twins, references, twins, ())
+    done = [recorded(c, case.faults) for c in case.conditions]
+    return CaseRecordings(tuple(r for r, _ in done), references, twins, tuple(done[0][1]))
+
+
+
+def _kind(kind: str | None, effect: str | None, drawn: str) -> str:
+    if effect is not None:
+        one_of(effect, "effect", EVERY)
+        own = "unknown" if effect in OUTSIDE else "single"
+        if kind not in (None, own):
+            raise InputError(f"effect {effect!r} does not make a case of kind {kind!r}", allowed=own)
+        return own
+    return one_of(kind, "kind", KINDS) if kind is not None else drawn
+
+
+def _draw_faults(
+    rng: np.random.Generator, rig: BlindRig, kind: str, effect: str | None, level: float | None
+) -> tuple[Fault, ...]:
+    if level is not None:
+        within(level, "level", 0, 1)
+    if kind == "none":
+        return ()
+    if kind == "pair":
+        first = str(rng.choice(MECHANICAL))
+        others = [name for name in CATALOGUE if CATALOGUE[name].group != CATALOGUE[first].group]
+        names = [first, str(rng.choice(others))]
+    elif kind == "unknown":
+        alike = [n for n, c in OUTSIDE.items() if bool(c.resembles) == (rng.random() < 0.5)] or list(OUTSIDE)
+        names = [str(rng.choice(alike))]
+    else:
+        names = [str(rng.choice(list(CATALOGUE)))]
+    faults = []
+    for name in [effect] if effect else names:
+        at = float(rng.uniform(0, 1))
+        at = at if level is None else level
+        faults.append(Fault(name, EVERY[name].severity(rig, at), at, int(rng.integers(2**62))))
+    return tuple(faults)
+
+
+def _draw_conditions(
+    rng: np.random.Generator, rig: BlindRig, n_conditions: int | None, with_reference: bool | None, *, starts_light: bool
+) -> tuple[tuple[Condition, ...], tuple[Condition, ...]]:
+    n_drawn, reference_drawn = int(rng.integers(1, 3)), bool(rng.random() < 0.5)
+    n = n_drawn if n_conditions is None else n_conditions
+    has_reference = reference_drawn if with_reference is None else with_reference
+    fastest = min(3000.0, 60 * 0.45 * rig.sampling_rate_hz / (FEWEST_MESH_HARMONICS * rig.pair.z1))
+    slowest = 600.0
+    load_error, place = rng.uniform(0.85, 1.15), rng.uniform(0, 1)
+    shares, is_light = rng.uniform(0.2, 0.9, 2), rng.random(2) < 0.25
+    light = 10 ** rng.uniform(-2.4, -1.6, 2)
+    if abs(shares[1] - shares[0]) < 0.2:
+        shares[1] = shares[0] + 0.3 if shares[0] < 0.55 else shares[0] - 0.3
+    is_light[1] &= not is_light[0]
+    if starts_light:
+        is_light[:] = True, False
+    speeds = [slowest * (fastest / slowest) ** ((place + k * rng.uniform(0.25, 0.75)) % 1.0) for k in range(2)]
+    mounts = [int(s) for s in rng.integers(2**62, size=2)]
+    conditions, references = [], []
+    for k in range(2):
+        share = float(light[k] if is_light[k] else shares[k])
+        made = Condition(
+            stated_rpm=float(round(speeds[k], 0)),
+            stated_nm=share * rig.rated_nm,
+            true_rpm=speeds[k] * (1 + rng.normal(0, 0.004)),
+            true_nm=share * rig.rated_nm * load_error * (1 + rng.normal(0, 0.02)),
+            duration_s=round(float(rng.uniform(4, 8)), 2),
+            seed=int(rng.integers(2**62)),
+            mount_seed=mounts[0],
+        )
+        conditions.append(made)
+        references.append(
+            replace(
+                made,
+                true_rpm=made.true_rpm * (1 + rng.normal(0, 0.004)),
+                true_nm=made.true_nm * (1 + rng.normal(0, 0.03)),
+                duration_s=round(float(rng.uniform(4, 8)), 2),
+                seed=int(rng.integers(2**62)),
+                mount_seed=mounts[1],
+            )
+        )
+    return tuple(conditions[:n]), tuple(references[:n]) if has_reference else ()

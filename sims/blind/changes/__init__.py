@@ -1,0 +1,1 @@
+"""What may be wrong with the blind rig, one family per file."""
