@@ -45,3 +45,46 @@ def write_phasors(revolutions: FloatArray, out: NDArray[Any]) -> None:
         cosine_and_sine(revolutions[start : start + n], cosine[:n], sine[:n])
         for i in range(n):
             out[start + i] = complex(cosine[i], sine[i])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def write_modulated(envelope: NDArray[Any], revolutions: FloatArray, out: FloatArray) -> None:
+    """Write Re(a e^{2πix})."""
+    cosine, sine = np.empty(BLOCK), np.empty(BLOCK)
+    for start in range(0, len(revolutions), BLOCK):
+        n = min(BLOCK, len(revolutions) - start)
+        cosine_and_sine(revolutions[start : start + n], cosine[:n], sine[:n])
+        for i in range(n):
+            a = envelope[start + i]
+            out[start + i] = a.real * cosine[i] - a.imag * sine[i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def write_envelope(waveform: FloatArray, revolutions: FloatArray, out: NDArray[Any]) -> None:
+    """Write the envelope a of x = Re(a e^{2πic}), taken as constant from a sample to its neighbours.
+
+    They are x(n±1) = x cos α± ∓ q sin α±, α± the phase step; both give the quadrature q by least squares, and
+    a = (x + iq) e^{-2πic}.
+    """
+    n = len(waveform)
+    cosine, sine = np.empty(BLOCK), np.empty(BLOCK)
+    step_cosine, step_sine = np.empty(BLOCK + 1), np.empty(BLOCK + 1)
+    for start in range(0, n, BLOCK):
+        stop = min(start + BLOCK, n)
+        cosine_and_sine(revolutions[start:stop], cosine[: stop - start], sine[: stop - start])
+        first, last = max(start - 1, 0), min(stop, n - 1)  # steps from first to last; none beyond the ends
+        steps = revolutions[first + 1 : last + 1] - revolutions[first:last]
+        cosine_and_sine(steps, step_cosine[: last - first], step_sine[: last - first])
+        for i in range(start, stop):
+            x, q, size = waveform[i], 0.0, 0.0
+            if i > 0:
+                c, s = step_cosine[i - 1 - first], step_sine[i - 1 - first]
+                q += (waveform[i - 1] - x * c) * s
+                size += s * s
+            if i < n - 1:
+                c, s = step_cosine[i - first], step_sine[i - first]
+                q -= (waveform[i + 1] - x * c) * s
+                size += s * s
+            if size > 0.0:
+                q /= size
+            out[i] = complex(x, q) * complex(cosine[i - start], -sine[i - start])

@@ -174,13 +174,11 @@ def envelopes_of_waveforms(x: FloatArray, cycles: FloatArray) -> ComplexArray:
     For constant a the neighbours are x(n±1) = x cos α± ∓ q sin α±, α the phase step; both give the quadrature q by
     least squares, and a = (x + iq) e^{-2πi c}.
     """
-    before, after = _steps(cycles)
-    x_before = np.concatenate([x[:, :1], x[:, :-1]], axis=1)
-    x_after = np.concatenate([x[:, 1:], x[:, -1:]], axis=1)
-    q = (x_before - x * np.cos(before)) * np.sin(before) - (x_after - x * np.cos(after)) * np.sin(after)
-    size = np.sin(before) ** 2 + np.sin(after) ** 2
-    q = np.divide(q, size, out=np.zeros_like(q), where=size > 0.0)
-    a: ComplexArray = (x + 1j * q) * phasors_of(cycles).conj()
+    from gearsig.orders.vold_kalman_phasor import write_envelope
+
+    a = np.empty(x.shape, np.complex128)
+    for waveform, angle, envelope in zip(x, cycles, a, strict=True):
+        write_envelope(np.ascontiguousarray(waveform), np.ascontiguousarray(angle), envelope)
     return a
 
 
@@ -232,10 +230,3 @@ def _of_rows(bandwidths: FloatArray, n: int, p: int) -> FloatArray:
         return bandwidths
     middle = p // 2
     return bandwidths[:, middle : n - p + middle]
-
-
-def _steps(cycles: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the phase steps in rad to the sample before and to the one after, 0 beyond the ends."""
-    step = 2.0 * np.pi * np.diff(cycles, axis=1)
-    none = np.zeros((len(cycles), 1))
-    return np.concatenate([none, step], axis=1), np.concatenate([step, none], axis=1)

@@ -92,8 +92,8 @@ def forward_two(
 ) -> None:
     """Run over a part of both halves: v' = v - κx + ε, x' = x + v', so x_(n+1) - (2 - κ) x_n + x_(n-1) = ε.
 
-    κ = 0: two poles. κ = 2 - 2 cos ω: first generation. As `forward_one`; s holds xx, xv, vv. The gain of x is kept less
-    κ, as the way back needs it.
+    κ = 0: two poles. κ = 2 - 2 cos ω: first generation. As `forward_one`; s holds xx, xv, vv. The gain of x is kept
+    less κ, as the way back needs it.
     """
     a = (s[0, 0], s[0, 1], s[0, 2], g[0, 0], g[0, 1])
     b = (s[1, 0], s[1, 1], s[1, 2], g[1, 0], g[1, 1])

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.angle.types import ShaftAngle
+from gearsig.angle.types import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray, positive
 from gearsig.errors import InputError, RefusalError
+from gearsig.orders.revolutions import times_of_revolutions
 from gearsig.orders.vold_kalman_types import FrequencyTrack, Generation
 from gearsig.orders.vold_kalman_weight import lowest_frequency
 from gearsig.rig.types import Rig
@@ -22,7 +23,11 @@ CHUNK_SAMPLES = 2**17
 
 @dataclass(frozen=True)
 class Tracks:
-    """Phase (cycles) and frequency of each order at the samples, (n_orders, n), and where they are known, (n,)."""
+    """Phase (cycles) and frequency of each order at the samples, (n_orders, n), and where they are known, (n,).
+
+    Over time, frequencies are in Hz and durations in s; over angle, in orders and in revolutions. `speed_rev_per_s` is
+    that of the angle's shaft, (n,), None where it was not asked for.
+    """
 
     names: tuple[str, ...]
     shafts: tuple[str, ...]
@@ -30,6 +35,9 @@ class Tracks:
     cycles: FloatArray
     frequency_hz: FloatArray
     known: BoolArray
+    speed_rev_per_s: FloatArray | None = None
+    unit: str = "Hz"
+    duration_unit: str = "s"
 
 
 def tracks_of_orders(
@@ -48,8 +56,8 @@ def tracks_of_orders(
         if isinstance(wanted, FrequencyTrack):
             cycles[k], frequency[k] = _integrated(wanted, n, sampling_rate_hz)
             names.append(wanted.name)
-            shafts.append("")
-            numbers.append(np.nan)
+            shafts.append(wanted.shaft)
+            numbers.append(wanted.order)
             continue
         if angle is None:
             raise InputError("an order is given without a shaft angle", where="orders", remedy="give frequency tracks")
@@ -64,13 +72,53 @@ def tracks_of_orders(
         names.append(f"{shaft} {number:g}".strip())
         shafts.append(shaft)
         numbers.append(number)
-    return Tracks(tuple(names), tuple(shafts), np.array(numbers), cycles, frequency, known)
+    if turned is None and angle is not None:
+        turned = _sampled_angle(angle, n, sampling_rate_hz)
+    speed = None if turned is None else turned[1]
+    return Tracks(tuple(names), tuple(shafts), np.array(numbers), cycles, frequency, known, speed)
+
+
+def tracks_over_angle(orders: Sequence[OrderLike], signal: AngleSignal) -> Tracks:
+    """Return the tracks of orders in a signal over angle, where all have a constant frequency."""
+    if len(orders) == 0:
+        raise InputError("no orders are given", where="orders", remedy="name at least one")
+    angle, n = signal.shaft_angle, signal.samples.shape[1]
+    numbers = []
+    for wanted in orders:
+        if isinstance(wanted, FrequencyTrack):
+            raise InputError(
+                f"{wanted.name!r} is a frequency over time, the signal is one over angle",
+                where="orders",
+                remedy="give the recording and its shaft angle",
+            )
+        shaft, number = wanted if isinstance(wanted, tuple) else (angle.shaft, wanted)
+        numbers.append(positive(number, f"order {number!r}") * _ratio(angle, shaft, None))
+        if numbers[-1] >= signal.highest_order:
+            raise InputError(
+                f"order {numbers[-1]:g} lies above the signal's highest order",
+                where="orders",
+                allowed=f"below {signal.highest_order:.4g}",
+                remedy="resample with more samples per revolution",
+            )
+    revolutions = signal.start_revolution + np.arange(n) / signal.samples_per_revolution
+    times = times_of_revolutions(angle, signal.start_revolution, 1.0 / signal.samples_per_revolution, n)
+    return Tracks(
+        tuple(f"{angle.shaft} {number:g}".strip() for number in numbers),
+        (angle.shaft,) * len(numbers),
+        np.array(numbers),
+        np.multiply.outer(numbers, revolutions),
+        np.broadcast_to(np.array(numbers)[:, None], (len(numbers), n)),
+        np.ones(n, dtype=bool),
+        np.asarray(angle.speed_rpm_at(times) / 60.0),
+        "orders",
+        "revolutions",
+    )
 
 
 def bandwidths_of(
     tracks: Tracks, hz: float | Sequence[float] | None, in_orders: float | Sequence[float] | None
 ) -> FloatArray:
-    """Return the bandwidths in Hz, (n_orders, 1) if given in Hz, (n_orders, n) if given in orders."""
+    """Return the bandwidths in the unit of the tracks, (n_orders, 1) if constant, else (n_orders, n)."""
     if (hz is None) == (in_orders is None):
         raise InputError("give either bandwidth_hz or bandwidth_orders", where="bandwidth", allowed="one of both")
     n_orders = len(tracks.names)
@@ -79,20 +127,47 @@ def bandwidths_of(
     if given.shape not in {(1,), (n_orders,)}:
         raise InputError(f"{name} has shape {given.shape}", allowed=f"one number, or one for each of {n_orders} orders")
     widths = np.broadcast_to([positive(width, name) for width in given], (n_orders,))
+    over_angle = tracks.unit == "orders"
     if hz is not None:
+        return _over_angle(tracks, widths) if over_angle else widths[:, None].copy()
+    _check_below_order(tracks, widths)
+    if over_angle:
         return widths[:, None].copy()
-    if not np.isfinite(tracks.orders).all():
-        raise InputError("a frequency track has no order", where=name, remedy="give bandwidth_hz")
+    return np.stack([width * _speed_of(tracks, k) for k, width in enumerate(widths)])
+
+
+def _check_below_order(tracks: Tracks, widths: FloatArray) -> None:
+    """Raise InputError if a bandwidth in orders reaches down to order zero."""
     for order, width, label in zip(tracks.orders, widths, tracks.names, strict=True):
         if width >= 2 * order:
             raise InputError(
                 f"bandwidth_orders is {width:g} for order {label!r}: its band reaches down to order zero",
                 allowed=f"below {2 * order:g}",
             )
-    return np.asarray(tracks.frequency_hz * (widths / tracks.orders)[:, None])
 
 
-def valid_parts(tracks: Tracks, bandwidth_hz: FloatArray, sampling_rate_hz: float, generation: Generation) -> BoolArray:
+def _over_angle(tracks: Tracks, widths_hz: FloatArray) -> FloatArray:
+    """Return bandwidths in Hz as orders, for a signal over angle."""
+    speed = tracks.speed_rev_per_s
+    if speed is None or speed.min() <= 0.0:
+        raise InputError("the shaft stands still in between", where="bandwidth_hz", remedy="give bandwidth_orders")
+    return np.asarray(np.divide.outer(widths_hz, speed))
+
+
+def _speed_of(tracks: Tracks, k: int) -> FloatArray:
+    """Return the speed in rev/s of an order's own shaft, or else of the angle's shaft."""
+    if np.isfinite(tracks.orders[k]):
+        return np.asarray(tracks.frequency_hz[k] / tracks.orders[k])
+    if tracks.speed_rev_per_s is None:
+        raise InputError(
+            f"track {tracks.names[k]!r} has no order, and there is no shaft angle",
+            where="bandwidth_orders",
+            remedy="give the track an order, a shaft angle, or bandwidth_hz",
+        )
+    return tracks.speed_rev_per_s
+
+
+def valid_parts(tracks: Tracks, bandwidth: FloatArray, sampling_rate: float, generation: Generation) -> BoolArray:
     """Return where each order's whole band lies between zero and half the sampling rate, (n_orders, n).
 
     Raises
@@ -101,24 +176,24 @@ def valid_parts(tracks: Tracks, bandwidth_hz: FloatArray, sampling_rate_hz: floa
         If an order has no such part.
     """
     f = tracks.frequency_hz
-    margin: FloatArray = bandwidth_hz / 2
+    margin: FloatArray = bandwidth / 2
     if generation == "first":
-        margin = sampling_rate_hz * lowest_frequency(np.minimum(bandwidth_hz / sampling_rate_hz, 0.5))
-    above, below = f + margin >= sampling_rate_hz / 2, f <= margin
+        margin = sampling_rate * lowest_frequency(np.minimum(bandwidth / sampling_rate, 0.5))
+    above, below = f + margin >= sampling_rate / 2, f <= margin
     valid: BoolArray = ~(above | below) & tracks.known
     for k, name in enumerate(tracks.names):
         if valid[k].any():
             continue
-        reach = f"runs from {f[k].min():.4g} to {f[k].max():.4g} Hz"
+        reach = f"runs from {f[k].min():.4g} to {f[k].max():.4g} {tracks.unit}"
         if f[k].max() == 0.0:
             raise RefusalError(f"order {name!r} stands still all the time", remedy="record while the machine turns")
         if above[k].any():
             raise RefusalError(
-                f"order {name!r} {reach}, at or above half the sampling rate of {sampling_rate_hz:g} Hz",
+                f"order {name!r} {reach}, at or above half the sampling rate of {sampling_rate:g} {tracks.unit}",
                 remedy="record at a higher rate",
             )
         raise RefusalError(
-            f"order {name!r} {reach}: its band of {np.max(bandwidth_hz[k]):.4g} Hz reaches down to zero frequency",
+            f"order {name!r} {reach}: its band of {np.max(bandwidth[k]):.4g} {tracks.unit} reaches down to zero",
             remedy="narrow the band",
         )
     return valid

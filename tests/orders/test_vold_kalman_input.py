@@ -58,9 +58,8 @@ def test_nan_and_short_signals():
         FrequencyTrack("f", np.array([1.0, np.nan]))
     with pytest.raises(InputError, match="negative"):
         FrequencyTrack("f", np.array([1.0, -1.0]))
-    tracks = [FrequencyTrack("f", np.full(N, 50.0))]
-    with pytest.raises(InputError, match="give bandwidth_hz"):
-        track_vold_kalman(RECORDING, "a", tracks, bandwidth_orders=0.1)
+    with pytest.raises(InputError, match="order of track 'f'"):
+        FrequencyTrack("f", np.ones(9), order=-2.0)
 
 
 @pytest.mark.parametrize(
