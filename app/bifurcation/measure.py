@@ -14,7 +14,6 @@ from sims.cracked.continuation import TRANSMISSION_ERROR, Branch, SteadyRun
 from sims.cracked.layout import COORDINATES, SIGNALS
 
 if TYPE_CHECKING:
-    from gearsig.phase.kind import MotionKind
     from gearsig.phase.lock import CycleLock
 
 LEAST_FOR_KIND = 400
@@ -55,11 +54,12 @@ class Measured:
 
 def measured(run: SteadyRun, branch: Branch, *, phase_cycles: float = 0.0, with_kind: bool = False) -> Measured:
     """Take the Poincaré points of a steady run and, for some seconds more, the kind of motion."""
+    from gearsig.phase.kind import kind_of_motion
     from gearsig.phase.section import locked_section, section_period
 
     portrait, lock = portrait_of(run, branch), lock_of(run, branch)
     section = locked_section(portrait, lock, phase_cycles=phase_cycles)
-    kind = _kind(portrait, lock) if with_kind else None
+    kind = kind_of_motion(portrait, lock, noise_free=_is_noise_free(run, branch)) if with_kind else None
     return Measured(
         run.value,
         section,
@@ -152,7 +152,7 @@ def _unit(signal: str) -> str:
     return f"{length}/s^2" if signal.endswith("acceleration") else f"{length}/s"
 
 
-def _kind(portrait: PhasePortrait, lock: CycleLock) -> MotionKind:
-    from gearsig.phase.kind import kind_of_motion
-
-    return kind_of_motion(portrait, lock)
+def _is_noise_free(run: SteadyRun, branch: Branch) -> bool:
+    """Whether nothing random acts while the machine runs: no sensor noise, no roughness that never returns."""
+    rough = run.machine.roughness
+    return branch.signal in SIGNALS and not (rough.locked_to == "time" and rough.rms_um > 0.0)

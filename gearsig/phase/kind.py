@@ -48,7 +48,9 @@ class MotionKind:
     chaos_test: ChaosTest | None = None
 
 
-def kind_of_motion(portrait: PhasePortrait, lock: CycleLock, *, tolerance: float = 0.05) -> MotionKind:
+def kind_of_motion(
+    portrait: PhasePortrait, lock: CycleLock, *, tolerance: float = 0.05, noise_free: bool = False
+) -> MotionKind:
     """Return what kind of motion a path is, from its Poincaré section, its Lyapunov exponent and the 0–1 test.
 
     A section that repeats decides alone. Otherwise: no dimension unfolds the first axis → stochastic; neighbours part
@@ -60,6 +62,9 @@ def kind_of_motion(portrait: PhasePortrait, lock: CycleLock, *, tolerance: float
     lock : CycleLock
     tolerance : float
         Of the section, in standard deviations of the path; above its scatter from noise.
+    noise_free : bool
+        Whether the path is known to be deterministic, as a model's: the 0–1 test then needs no damping, and decides
+        alone where the exponent cannot answer.
 
     Raises
     ------
@@ -78,11 +83,13 @@ def kind_of_motion(portrait: PhasePortrait, lock: CycleLock, *, tolerance: float
         )
         return MotionKind("periodic" if period == 1 else "subharmonic", period, (seen,), section)
     evidence = [f"the section of {section.n_points} points does not repeat within 16 cycles of the {lock.name}"]
-    test = _answer(lambda: zero_one_test_of_section(section, damping=1.0), "0–1 test", evidence)
+    test = _answer(lambda: zero_one_test_of_section(section, damping=0.0 if noise_free else 1.0), "0–1 test", evidence)
     if test is not None:
         evidence.append(f"0–1 test of the section: K = {test.k:.2f}, {test.verdict}")
     exponent, stochastic = _exponent(portrait, evidence)
-    return MotionKind(_decide(test, exponent, stochastic), 0, tuple(evidence), section, exponent, test)
+    return MotionKind(
+        _decide(test, exponent, stochastic, noise_free=noise_free), 0, tuple(evidence), section, exponent, test
+    )
 
 
 def _exponent(portrait: PhasePortrait, evidence: list[str]) -> tuple[LyapunovExponent | None, bool]:
@@ -102,7 +109,9 @@ def _exponent(portrait: PhasePortrait, evidence: list[str]) -> tuple[LyapunovExp
     return exponent, False
 
 
-def _decide(test: ChaosTest | None, exponent: LyapunovExponent | None, stochastic: bool) -> Kind:
+def _decide(test: ChaosTest | None, exponent: LyapunovExponent | None, stochastic: bool, *, noise_free: bool) -> Kind:
+    if noise_free and exponent is None and test is not None and test.verdict != "undecided":
+        return "quasi-periodic" if test.verdict == "regular" else "chaotic"
     if stochastic:
         return "stochastic"
     if test is None or exponent is None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import streamlit as st
 
+from app.dashboard.laboratory.bifurcation_view import show_safely
 from app.dashboard.laboratory.mesh_view import show_mesh
 from app.dashboard.laboratory.phase_view import show_phase
 from app.dashboard.laboratory.run import Run
 from app.dashboard.laboratory.spectrum_view import show_amplitude, show_envelope
 from app.dashboard.laboratory.time_view import show_time
 
-NAMES = ("Time", "Spectrum", "Envelope", "Phase portrait", "Mesh")
+NAMES = ("Time", "Spectrum", "Envelope", "Phase portrait", "Bifurcation", "Mesh")
 TAB = "tab of the laboratory"
 
 
@@ -33,5 +34,7 @@ def _show(name: str, healthy: Run, faulty: Run | None, channel: str) -> None:
         show_envelope(healthy, faulty, channel)
     elif name == "Phase portrait":
         show_phase(healthy, faulty)
+    elif name == "Bifurcation":
+        show_safely(healthy, faulty)
     else:
         show_mesh(healthy, faulty)
