@@ -117,14 +117,20 @@ def _show_answer(found: CrackEstimate | NoCrackSeen) -> None:
 def _show_numbers(found: CrackEstimate) -> None:
     low, high = found.interval_mm
     place = f"tooth {found.tooth}" if found.tooth is not None else "not known"
-    numbers = (
-        ("Depth", f"{found.depth_mm:.2f} mm"),
+    kinds = ", ".join(f"{kind} {100.0 * share:.0f} %" for kind, share in found.kind_probabilities.items())
+    _show_row(
+        ("Depth of a crack", f"{found.depth_mm:.2f} mm, {found.depth_percent:.0f} % of the root"),
         ("90 % interval", f"{low:.2f} to {high:.2f} mm"),
-        ("Of the root's thickness", f"{found.depth_percent:.0f} %"),
-        ("Place", f"{place}, {found.angle_deg:.0f}°"),
-        ("Gear", f"{found.gear}{'' if found.gear_is_certain else ' or its mate'}"),
-        ("Chance on sound gears", f"{found.p_value:.2g}"),
+        ("Place", f"{place}, {found.angle_deg:.0f}°, {found.gear}{'' if found.gear_is_certain else ' or its mate'}"),
     )
+    _show_row(
+        ("Looks like", kinds or found.kind),
+        ("Chance of as much on sound gears", f"{found.p_value:.2g}"),
+        ("Felt for; squeezed energy there", f"{found.reach_cycles:.1f} mesh cycles; {found.squeezed_rise_db:+.1f} dB"),
+    )
+
+
+def _show_row(*numbers: tuple[str, str]) -> None:
     for column, (name, text) in zip(st.columns(len(numbers)), numbers, strict=True):
         column.caption(name)
         column.markdown(f"**{as_typed(text)}**")
