@@ -1,0 +1,84 @@
+"""Features of a recording against a healthy reference of the same gears."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.gap.features import Features, once
+from gearsig.gap.frame import DRIVEN, DRIVER
+from gearsig.gap.gathered import Gathered
+from gearsig.gap.gear_lines import SIDES, Feature, average_lines, visible_orders
+from gearsig.gap.tooth import pattern_features, residual_lines
+from gearsig.severity.reference import difference_lines
+from gearsig.severity.shaft_lines import ShaftLines
+
+
+def change_features(now: Gathered, sound: Gathered) -> Features:
+    """Return the differences of all features, and features of the difference of the averages.
+
+    The reference's scatter counts as well: variances of both add.
+    """
+    names, values = changes_once(now, sound)
+    here, before = once(now)[1], once(sound)[1]
+    variance = np.zeros(len(values))
+    for rows in (
+        [_joined(once(part)[1] - before, part, sound) for part in _parts(now)],
+        [_joined(here - once(part)[1], now, part) for part in _parts(sound)],
+    ):
+        variance += (len(rows) - 1.0) * np.var(rows, axis=0)
+    return Features(names, values, np.sqrt(variance))
+
+
+def changes_once(now: Gathered, sound: Gathered) -> tuple[tuple[str, ...], FloatArray]:
+    """Return names and values of the changes, without their scatter."""
+    names, values = once(now)
+    patterns = dict(_patterns(now, sound))
+    return (*names, *patterns), np.concatenate([values - once(sound)[1], list(patterns.values())])
+
+
+def _parts(gathered: Gathered) -> Iterator[Gathered]:
+    return (gathered.without(block) for block in range(gathered.n_blocks))
+
+
+def _joined(differences: FloatArray, now: Gathered, sound: Gathered) -> FloatArray:
+    return np.concatenate([differences, list(dict(_patterns(now, sound)).values())])
+
+
+def _patterns(now: Gathered, sound: Gathered) -> Iterator[Feature]:
+    """Yield the tooth features of the difference of the averages, turned so that the same teeth meet."""
+    for side in (DRIVER, DRIVEN):
+        turned, agreement = difference_lines(
+            shaft_lines(now, side), shaft_lines(sound, side), whole_teeth=now.marks[DRIVER] or now.marks[DRIVEN]
+        )
+        teeth = now.frame.teeth[side]
+        residuals = []
+        for row, name in zip(turned.lines, now.channels, strict=True):
+            lines, noise = average_lines(now.channels[name], side)
+            highest = visible_orders(now, side, len(lines))
+            mesh = float((np.abs(lines[teeth : highest + 1 : teeth]) ** 2).sum() + noise[teeth])
+            full = np.zeros(len(lines), dtype=np.complex128)
+            full[: len(row)] = row
+            residuals.append(residual_lines(full, teeth, turned.highest_order) / np.sqrt(mesh))
+        yield from pattern_features(f"change.{SIDES[side]}", residuals, teeth)
+        yield f"change.{SIDES[side]}.agreement", 10.0 * agreement
+
+
+def shaft_lines(gathered: Gathered, side: int) -> ShaftLines:
+    """Return the averages' lines in the form that the alignment takes."""
+    lines = [average_lines(sums, side)[0] for sums in gathered.channels.values()]
+    highest = visible_orders(gathered, side, min(len(row) for row in lines))
+    frame = gathered.frame
+    return ShaftLines(
+        frame.shafts[side],
+        frame.teeth[side],
+        frame.teeth[1 - side],
+        np.stack([row[: highest + 1] for row in lines]),
+        int(gathered.n_revolutions * frame.shaft_orders[side]),
+        highest,
+        gathered.speed_hz * frame.shaft_orders[side],
+        tuple(gathered.channels),
+        gathered.marks[side],
+    )

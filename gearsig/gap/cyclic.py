@@ -1,0 +1,134 @@
+"""Features of what no shaft repeats: bearings' lines in envelope and spectrum, strange lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.gap.frame import GearFrame
+from gearsig.gap.gathered import ChannelSums, Gathered
+from gearsig.gap.gear_lines import SIDES, Feature, decibel
+
+SLIP = 0.015
+"""Rolling elements slip: their orders are sought within this share of the kinematic ones."""
+N_SLIPS = 13
+N_FAMILY = 4
+N_SHAFT_FAMILY = 6
+FLOOR_WIDTH = 48
+"""Lines whose median is the floor."""
+
+
+def floor_ratio(power: FloatArray) -> FloatArray:
+    """Return each line's power over its neighbourhood's median, lines of noise being exponentially distributed.
+
+    Medians of adjoining stretches are joined by straight lines: a running median costs a hundred times as much.
+    """
+    n_stretches = max(1, power.shape[-1] // FLOOR_WIDTH)
+    width = power.shape[-1] // n_stretches
+    medians = np.median(power[:, : n_stretches * width].reshape(len(power), n_stretches, width), axis=2)
+    middles = (np.arange(n_stretches) + 0.5) * width
+    logs = np.log(np.maximum(medians, 1e-300))
+    floors = np.exp([np.interp(np.arange(power.shape[-1]), middles, row) for row in logs])
+    ratio: FloatArray = power * np.log(2.0) / floors
+    return ratio
+
+
+def cyclic_features(gathered: Gathered, channels: Sequence[ChannelSums]) -> Iterator[Feature]:
+    """Yield excesses in dB of families of envelope lines and of residual lines: the largest over channels and bands."""
+    frame = gathered.frame
+    envelopes = np.stack([floor_ratio(c.envelope_power.mean(axis=0)) for c in channels]).reshape(
+        -1, channels[0].envelope_power.shape[2]
+    )
+    step, levels = gathered.cycle_step, _levels(envelopes)
+    known = _shaft_lines(frame)
+    yield from _families(frame, levels, step, known, "envelope")
+    for side, order in enumerate(frame.shaft_orders):
+        yield f"envelope.{SIDES[side]}_shaft", _family(levels, order, N_SHAFT_FAMILY, step, (), 0.0)
+    yield "envelope.mesh", _family(levels, float(frame.teeth[0]), 1, step, (), 0.0)
+    yield "envelope.strange", _strange(envelopes, step, [*known, *_bearing_lines(frame)], first=0.4)
+    depth = max(float(c.envelope_power.mean(axis=0)[:, 2:].sum(axis=1).max()) for c in channels)
+    yield "envelope.depth", decibel(depth)
+    residuals = floor_ratio(np.stack([c.residual_power.mean(axis=0) for c in channels]))
+    residuals = residuals[:, : int(gathered.highest_order / gathered.order_step)]
+    levels = _levels(residuals)
+    yield from _families(frame, levels, gathered.order_step, known, "line")
+    yield "line.half_mesh", _family(levels, frame.teeth[0] / 2.0, 1, gathered.order_step, (), 0.0)
+    mesh = [k * frame.teeth[0] + s * o for k in range(1, 7) for o in _bearing_lines(frame)[:24] for s in (-1, 1)]
+    every = [*known, *_bearing_lines(frame), *mesh]
+    yield "line.strange", _strange(residuals, gathered.order_step, every, first=0.4)
+
+
+def _families(
+    frame: GearFrame, levels: FloatArray, step: float, known: Sequence[float], name: str
+) -> Iterator[Feature]:
+    for kind, attribute, factor in (
+        ("outer", "outer", 1.0),
+        ("inner", "inner", 1.0),
+        ("ball", "spin", 2.0),
+        ("cage", "cage", 1.0),
+    ):
+        orders = [getattr(b, attribute) * factor for b in frame.bearings]
+        scores = [_family(levels, o, N_FAMILY, step, known, SLIP) for o in orders if np.isfinite(o)]
+        yield f"{name}.{kind}", max(scores, default=0.0)
+
+
+def _family(
+    levels: FloatArray, order: float, n_harmonics: int, step: float, known: Sequence[float], slip: float
+) -> float:
+    """Return the mean excess in dB of a family's lines on the spectrum that shows it best, for the best slip.
+
+    `levels` are excesses in dB, not below 0; the larger of a line and its neighbours counts.
+    """
+    harmonics = np.arange(1, n_harmonics + 1) * order
+    if known:
+        harmonics = harmonics[np.min(np.abs(np.asarray(known) - harmonics[:, None]), axis=1) >= 1.5 * step]
+    harmonics = harmonics[harmonics * (1.0 + slip) / step < levels.shape[1] - 1]
+    if not len(harmonics):
+        return 0.0
+    shifts = np.linspace(-slip, slip, N_SLIPS) if slip else np.zeros(1)
+    places = np.rint(np.outer(1.0 + shifts, harmonics) / step).astype(np.intp)
+    return float(levels[:, places].mean(axis=2).max())
+
+
+def _levels(ratios: FloatArray) -> FloatArray:
+    """Return excesses in dB, not below 0, each the largest of a line and its two neighbours."""
+    from scipy.ndimage import maximum_filter1d
+
+    level: FloatArray = 10.0 * np.log10(np.maximum(maximum_filter1d(ratios, 3, axis=1), 1.0))
+    return level
+
+
+def _strange(ratios: FloatArray, step: float, known: Sequence[float], *, first: float) -> float:
+    """Return the excess in dB of the strongest line that belongs to nothing known."""
+    positions = np.arange(ratios.shape[1]) * step
+    near = np.zeros(len(positions), dtype=bool)
+    for order in known:
+        low = np.searchsorted(positions, order * (1.0 - SLIP) - 2.0 * step)
+        near[low : np.searchsorted(positions, order * (1.0 + SLIP) + 2.0 * step)] = True
+    free = ~near & (positions > first)
+    return max(decibel(float(ratios[:, free].max())), 0.0) if free.any() else 0.0
+
+
+def _shaft_lines(frame: GearFrame) -> list[float]:
+    """Orders of both shafts' first harmonics, and of mesh harmonics with their first sidebands."""
+    shafts = [k * order for order in frame.shaft_orders for k in range(1, 13)]
+    mesh = [k * frame.teeth[0] + j * order for k in (1, 2, 3) for order in frame.shaft_orders for j in range(-3, 4)]
+    return shafts + mesh
+
+
+def _bearing_lines(frame: GearFrame) -> list[float]:
+    """Orders of every bearing's families with their sidebands."""
+    found = []
+    for bearing in frame.bearings:
+        shaft = frame.shaft_orders[bearing.side]
+        for order, side in (
+            (bearing.outer, 0.0),
+            (bearing.inner, shaft),
+            (2.0 * bearing.spin, bearing.cage),
+            (bearing.cage, 0.0),
+        ):
+            if np.isfinite(order):
+                found += [k * order + j * side for k in range(1, N_FAMILY + 1) for j in ((-1, 0, 1) if side else (0,))]
+    return found

@@ -1,0 +1,234 @@
+"""From a recording to its sums over blocks of revolutions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from gearsig.angle.types import AngleSignal, ShaftAngle
+from gearsig.checks import FloatArray
+from gearsig.errors import RefusalError
+from gearsig.gap.frame import GearFrame, gear_frame
+from gearsig.gap.gathered import ChannelSums, Gathered
+from gearsig.gap.hum import mains_lines
+from gearsig.gap.speed import speed_figures
+from gearsig.recording.types import Recording
+from gearsig.rig.speed import PulseTimes, TachometerChannel
+from gearsig.rig.types import Rig
+
+LEAST_REVOLUTIONS = 16
+"""Of the driver and of the driven gear: fewer leave either shaft's orders in the other's average."""
+
+REVOLUTIONS_PER_BLOCK = 20
+MOST_BLOCKS = 8
+"""Blocks long enough to tell bearing orders from shaft orders, and enough of them for a jackknife."""
+
+N_BANDS = 4
+LOWEST_BAND_HZ = 300.0
+HIGHEST_CYCLE = 40.0
+"""Highest modulation order looked at, in orders of the driver."""
+
+NEAR_THE_EXTREME = 0.005
+"""A sample within this share of the largest magnitude counts as close to it."""
+
+
+def gather(recording: Recording, rig: Rig, channels: Sequence[str] = (), angle: ShaftAngle | None = None) -> Gathered:
+    """Reduce a recording to what the features need.
+
+    Parameters
+    ----------
+    recording : Recording
+    rig : Rig
+        With one gear pair.
+    channels : sequence of str
+        Default: all vibration channels.
+    angle : ShaftAngle or None
+        Of the rig's reference shaft; None: found as `analyze` finds it.
+
+    Raises
+    ------
+    RefusalError
+        If the speed cannot be known or there are too few revolutions.
+    """
+    frame = gear_frame(rig)
+    turned = angle if angle is not None else _angle_of(recording, rig)
+    shaft_angles = tuple(_of_shaft(turned, rig, shaft) for shaft in frame.shafts)
+    for own in shaft_angles:
+        if own.n_revolutions < LEAST_REVOLUTIONS:
+            raise RefusalError(
+                f"the record holds {own.n_revolutions:.3g} revolutions of shaft {own.shaft!r}, "
+                f"{LEAST_REVOLUTIONS} are needed",
+                remedy="record longer",
+            )
+    names = tuple(channels) or recording.vibration_names()
+    signals = tuple(_over_angle(recording, own, names) for own in shaft_angles)
+    n_blocks = int(np.clip(shaft_angles[0].n_revolutions // REVOLUTIONS_PER_BLOCK, 2, MOST_BLOCKS))
+    speed_hz = shaft_angles[0].mean_speed_rpm / 60.0
+    bands = _bands(recording.sampling_rate_hz, signals[0].samples_per_revolution * speed_hz)
+    sums, steps = {}, (0.0, 0.0)
+    for i, name in enumerate(names):
+        sums[name], steps = _channel_sums(signals, i, recording.values(name), frame, n_blocks, bands, speed_hz)
+    return Gathered(
+        frame=frame,
+        channels=sums,
+        order_step=steps[0],
+        cycle_step=steps[1],
+        bands_hz=bands,
+        highest_order=signals[0].highest_order,
+        speed_hz=speed_hz,
+        speed=speed_figures(shaft_angles[0]),
+        hum=mains_lines(recording, names, speed_hz, frame),
+        marks=tuple(_has_mark(recording, rig, shaft) for shaft in frame.shafts),  # type: ignore[arg-type]  # two
+        n_revolutions=shaft_angles[0].n_revolutions,
+    )
+
+
+def _angle_of(recording: Recording, rig: Rig) -> ShaftAngle:
+    from gearsig.diagnosis.speed import determine_angle
+    from gearsig.diagnosis.types import CannotTell
+
+    found = determine_angle(recording, rig)
+    if isinstance(found, CannotTell):
+        raise RefusalError(found.reason, remedy=found.remedy)
+    return found.between(0.0, recording.duration_s)
+
+
+def _of_shaft(angle: ShaftAngle, rig: Rig, shaft: str) -> ShaftAngle:
+    ratio = rig.ratio(shaft, to=angle.shaft or rig.reference_shaft)
+    if ratio is None:
+        raise RefusalError(f"the speed of shaft {shaft!r} does not follow from the teeth", remedy="complete the rig")
+    return angle if ratio == 1.0 else angle.of_shaft(shaft, ratio)
+
+
+def _over_angle(recording: Recording, angle: ShaftAngle, names: Sequence[str]) -> AngleSignal:
+    from gearsig.angle.resample import resample_to_angle
+
+    return resample_to_angle(recording, angle, channels=names)
+
+
+def _bands(sampling_rate_hz: float, angle_rate_hz: float) -> tuple[tuple[float, float], ...]:
+    """Bands of equal relative width, then all of them together."""
+    top = 0.42 * min(sampling_rate_hz, angle_rate_hz)
+    low = min(LOWEST_BAND_HZ, top / 8.0)
+    edges = [low * (top / low) ** (i / N_BANDS) for i in range(N_BANDS + 1)]
+    return (*pairwise(edges), (low, top))
+
+
+def _has_mark(recording: Recording, rig: Rig, shaft: str) -> bool:
+    source = recording.speed_source
+    if not isinstance(source, PulseTimes | TachometerChannel) or source.pulses_per_revolution != 1:
+        return False
+    return (source.shaft or rig.reference_shaft) == shaft
+
+
+def _channel_sums(
+    signals: tuple[AngleSignal, ...],
+    channel: int,
+    raw: FloatArray,
+    frame: GearFrame,
+    n_blocks: int,
+    bands: Sequence[tuple[float, float]],
+    speed_hz: float,
+) -> tuple[ChannelSums, tuple[float, float]]:
+    lines, counts, means = [], [], []
+    for signal in signals:
+        revolutions = _whole_revolutions(signal, channel)
+        edges = np.linspace(0, len(revolutions), n_blocks + 1).round().astype(np.intp)
+        averages = np.stack([revolutions[i:j].mean(axis=0) for i, j in pairwise(edges)])
+        lines.append(2.0 * np.fft.rfft(averages, axis=1) / averages.shape[1])
+        counts.append(np.diff(edges).astype(np.float64))
+        means.append(revolutions.mean(axis=0))
+    residual = _residual(signals, channel, means, frame)
+    n = signals[0].samples_per_revolution
+    power, order_step = _segment_power(residual, n, n_blocks)
+    envelopes, moments, cycle_step = _envelopes(residual, n, n_blocks, bands, speed_hz)
+    sums = ChannelSums((lines[0], lines[1]), (counts[0], counts[1]), power, envelopes, moments, _tail(raw, n_blocks))
+    return sums, (order_step, cycle_step)
+
+
+def _whole_revolutions(signal: AngleSignal, channel: int) -> FloatArray:
+    """Return (n_revolutions, n_angles), each from shaft angle 0."""
+    n = signal.samples_per_revolution
+    first = round(-signal.start_revolution * n) % n
+    values = signal.samples[channel]
+    count = (len(values) - first) // n
+    revolutions: FloatArray = values[first : first + count * n].reshape(count, n)
+    return revolutions
+
+
+def _residual(
+    signals: tuple[AngleSignal, ...], channel: int, means: Sequence[FloatArray], frame: GearFrame
+) -> FloatArray:
+    """Return, over the driver's angle, what neither shaft repeats: x(θ) − a1(θ) − a2(θ z1/z2), a2 without the mesh."""
+    from scipy.ndimage import map_coordinates
+
+    driver = signals[0]
+    n, values = driver.samples_per_revolution, driver.samples[channel]
+    place = np.arange(len(values)) + round(driver.start_revolution * n)
+    residual = values - means[0][place % n]
+    lines = np.fft.rfft(means[1])
+    lines[:: frame.teeth[1]] = 0.0  # the mesh belongs to both; the driver's average has it
+    own = np.fft.irfft(lines, len(means[1]))
+    turned = place / n * frame.shaft_orders[1] * len(own)
+    # Angle 0 of both shafts falls together, as one angle was made of the other.
+    residual -= map_coordinates(own, [turned % len(own)], order=3, mode="grid-wrap")
+    return np.asarray(residual, dtype=np.float64)
+
+
+def _segment_power(values: FloatArray, rate: float, n_segments: int) -> tuple[FloatArray, float]:
+    """Return the Hann power spectra (mean square per line) of equal segments and the lines' distance."""
+    from scipy.fft import rfft
+
+    length = len(values) // n_segments
+    segments = values[: length * n_segments].reshape(n_segments, length)
+    window = np.hanning(length + 1)[:-1]
+    spectrum = rfft((segments - segments.mean(axis=1, keepdims=True)) * window, axis=1)
+    power: FloatArray = 2.0 * np.abs(spectrum) ** 2 / (length * np.sum(window**2))
+    return power, rate / length
+
+
+def _envelopes(
+    residual: FloatArray, n_per_rev: int, n_blocks: int, bands: Sequence[tuple[float, float]], speed_hz: float
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return spectra of squared envelopes over their squared mean, the bands' moments, and the spectra's step."""
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    n = len(residual)
+    lines = rfft(residual)
+    m = 2 * next_fast_len(int(min(HIGHEST_CYCLE, 0.4 * n_per_rev) * n / n_per_rev) + 1)
+    powers, moments, step = [], [], 0.0
+    for low, high in bands:
+        first, last = (int(f / speed_hz * n / n_per_rev) for f in (low, high))
+        last = min(last, len(lines) - 1)
+        square = _squared_envelope(lines, first, last, n)
+        # |z|² is low-passed to the modulation orders of interest by keeping its first lines.
+        slow_lines = rfft(square)[: m // 2 + 1] * (m / n)
+        slow = irfft(slow_lines, m)
+        power, step = _segment_power(slow / max(slow.mean(), 1e-300), m / n * n_per_rev, n_blocks)
+        powers.append(power)
+        edges = np.linspace(0, n, n_blocks + 1).astype(np.intp)
+        # With z the analytic signal: E x² = E|z|²/2, E x⁴ = 3/8 E|z|⁴.
+        moments.append([[square[i:j].mean() / 2.0, 0.375 * (square[i:j] ** 2).mean()] for i, j in pairwise(edges)])
+    return np.stack(powers, axis=1), np.asarray(moments).transpose(1, 0, 2), step
+
+
+def _squared_envelope(lines: np.ndarray, first: int, last: int, n: int) -> FloatArray:
+    from scipy.fft import ifft
+
+    band = np.zeros(n, dtype=np.complex128)
+    band[: last - first] = 2.0 * lines[first:last]
+    z = ifft(band, overwrite_x=True)
+    square: FloatArray = z.real**2 + z.imag**2
+    return square
+
+
+def _tail(raw: FloatArray, n_blocks: int) -> FloatArray:
+    values = np.asarray(raw, dtype=np.float64) - float(np.mean(raw))
+    top, bottom = values.max(), values.min()
+    near = (values > top - NEAR_THE_EXTREME * abs(top)) | (values < bottom + NEAR_THE_EXTREME * abs(bottom))
+    edges = np.linspace(0, len(values), n_blocks + 1).astype(np.intp)
+    return np.array(
+        [[(values[i:j] ** 2).mean(), (values[i:j] ** 4).mean(), near[i:j].mean()] for i, j in pairwise(edges)]
+    )

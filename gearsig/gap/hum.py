@@ -1,0 +1,56 @@
+"""Lines of the electric supply, at their frequency whatever the speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.gap.frame import GearFrame
+from gearsig.recording.types import Recording
+
+SUPPLIES_HZ = (50.0, 60.0)
+N_HARMONICS = 3
+_TOLERANCE = 0.002  # how far a supply's frequency wanders
+_NEIGHBOURHOOD_HZ = 8.0
+_N_SHAFT_HARMONICS = 8
+
+
+def mains_lines(recording: Recording, names: Sequence[str], speed_hz: float, frame: GearFrame) -> tuple[float, ...]:
+    """Return, for each supply, the mean excess in dB of its harmonics over the neighbourhood, on the best channel.
+
+    Harmonics that fall on a shaft's are left out; 0 where none is left.
+    """
+    return tuple(
+        max(_excess(recording.values(name), recording, supply, speed_hz, frame) for name in names)
+        for supply in SUPPLIES_HZ
+    )
+
+
+def _excess(values: FloatArray, recording: Recording, supply_hz: float, speed_hz: float, frame: GearFrame) -> float:
+    n = len(values)
+    x = np.asarray(values, dtype=np.float64)
+    power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(n))) ** 2
+    step = recording.sampling_rate_hz / n
+    found = []
+    for k in range(1, N_HARMONICS + 1):
+        frequency = k * supply_hz
+        width = max(2.0 * step, _TOLERANCE * frequency)
+        if frequency + _NEIGHBOURHOOD_HZ > recording.sampling_rate_hz / 2 or _on_a_shaft(
+            frequency, width, speed_hz, frame
+        ):
+            continue
+        positions = np.arange(len(power)) * step
+        line = np.abs(positions - frequency) <= width
+        around = (np.abs(positions - frequency) <= _NEIGHBOURHOOD_HZ) & (np.abs(positions - frequency) > 2.0 * width)
+        found.append(10.0 * np.log10(power[line].max() / max(float(np.median(power[around])), 1e-300)))
+    return float(np.mean(found)) if found else 0.0
+
+
+def _on_a_shaft(frequency_hz: float, width_hz: float, speed_hz: float, frame: GearFrame) -> bool:
+    harmonics = np.arange(1, _N_SHAFT_HARMONICS + 1)
+    return any(
+        float(np.min(np.abs(harmonics * order * speed_hz - frequency_hz))) < 2.0 * width_hz
+        for order in frame.shaft_orders
+    )

@@ -1,0 +1,80 @@
+"""Features of single teeth: what a shaft's average holds besides mesh and smooth modulation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray
+from gearsig.gap.frame import DRIVEN, DRIVER
+from gearsig.gap.gathered import ChannelSums, Gathered
+from gearsig.gap.gear_lines import SIDES, Feature, average_lines, decibel, visible_orders
+
+SMOOTH_SIDEBANDS = 2
+"""Mesh lines and as many sidebands on either side are left out: eccentricity makes those."""
+SMOOTH_SHAFT_ORDERS = 3
+STEPS_PER_TOOTH = 4
+
+
+def residual_lines(lines: NDArray[np.complex128], teeth: int, highest: int) -> NDArray[np.complex128]:
+    """Return the lines without mesh harmonics, their first sidebands and the first shaft orders."""
+    orders = np.arange(len(lines))
+    near = np.abs((orders + teeth // 2) % teeth - teeth // 2) <= SMOOTH_SIDEBANDS
+    out = near | (orders <= SMOOTH_SHAFT_ORDERS) | (orders > highest)
+    return np.where(out, 0.0, lines)
+
+
+def tooth_energy(lines: NDArray[np.complex128], teeth: int) -> FloatArray:
+    """Return the mean square within one pitch, at `STEPS_PER_TOOTH` places per tooth round the revolution."""
+    n = 2 * (len(lines) - 1)
+    wave = np.fft.irfft(lines, n) * (n / 2.0)
+    total = np.concatenate([[0.0], np.cumsum(np.tile(wave**2, 2))])
+    starts = np.arange(teeth * STEPS_PER_TOOTH) / (teeth * STEPS_PER_TOOTH) * n
+    first = starts.astype(np.intp)
+    width = max(1, round(n / teeth))
+    energy: FloatArray = (total[first + width] - total[first]) / width
+    return energy
+
+
+def tooth_features(gathered: Gathered, sums: Sequence[ChannelSums]) -> Iterator[Feature]:
+    """Yield the tooth features of all channels together, since a tooth shows at one angle on all of them."""
+    for side in (DRIVER, DRIVEN):
+        teeth = gathered.frame.teeth[side]
+        found = []
+        for channel in sums:
+            lines, noise = average_lines(channel, side)
+            highest = visible_orders(gathered, side, len(lines))
+            mesh = float((np.abs(lines[teeth : highest + 1 : teeth]) ** 2).sum() + noise[teeth])
+            found.append((residual_lines(lines, teeth, highest) / np.sqrt(mesh), teeth))
+        yield from pattern_features(f"tooth.{SIDES[side]}", [f[0] for f in found], teeth)
+
+
+def pattern_features(name: str, residuals: Sequence[NDArray[np.complex128]], teeth: int) -> Iterator[Feature]:
+    """Yield size, prominence, kurtosis, width, centroid of residuals relative to their mesh."""
+    energy = np.mean([tooth_energy(lines, teeth) for lines in residuals], axis=0)
+    energy = np.maximum(energy, 1e-30)
+    best = int(np.argmax(energy))
+    share = energy / energy.max()
+    width = float(np.count_nonzero(share > 0.5)) / STEPS_PER_TOOTH
+    kurtosis = float(np.mean([_kurtosis(lines) for lines in residuals]))
+    away = np.roll(energy, -best)[2 * STEPS_PER_TOOTH : -2 * STEPS_PER_TOOTH]
+    yield f"{name}.level", decibel(float(energy.mean()))
+    yield f"{name}.elsewhere", decibel(float(np.median(away)))
+    yield f"{name}.peak", decibel(float(energy[best]))
+    yield f"{name}.prominence", decibel(float(energy[best] / np.median(away)))
+    yield f"{name}.second", decibel(float(energy[best] / away.max()))
+    yield f"{name}.kurtosis", 10.0 * float(np.log10(max(kurtosis, 0.1)))
+    yield f"{name}.width", 10.0 * float(np.log10(width))
+    power = np.mean([np.abs(lines) ** 2 for lines in residuals], axis=0)
+    orders = np.arange(len(power)) / teeth
+    total = max(float(power.sum()), 1e-30)
+    yield f"{name}.below_mesh", decibel(float(power[orders < 1.0].sum()) / total)
+    yield f"{name}.centroid", 10.0 * float(np.log10(max(float((orders * power).sum()) / total, 0.01)))
+
+
+def _kurtosis(lines: NDArray[np.complex128]) -> float:
+    wave = np.fft.irfft(lines)
+    square = float(np.mean(wave**2))
+    return float(np.mean(wave**4)) / square**2 if square > 0 else 3.0

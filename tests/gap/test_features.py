@@ -1,0 +1,108 @@
+"""Features against signals of which they are known."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from gearsig.checks import FloatArray
+from gearsig.errors import RefusalError
+from gearsig.gap.change import change_features
+from gearsig.gap.features import Features, features_of
+from gearsig.gap.gather import gather
+from gearsig.gap.gathered import Gathered
+from tests.gap.synthetic import MESH_AMPLITUDES, RATE_HZ, RIG, SPEED_HZ, TEETH, record, ringing
+
+Added = Callable[[FloatArray, FloatArray], FloatArray]
+
+
+def reduced(added: Added | None = None, **settings: float) -> Gathered:
+    return gather(record(added, **settings), RIG)  # type: ignore[arg-type]  # seed is whole
+
+
+def as_dict(features: Features) -> dict[str, float]:
+    return dict(zip(features.names, features.values.tolist(), strict=True))
+
+
+@pytest.fixture(scope="module")
+def sound() -> Gathered:
+    return reduced()
+
+
+def test_mesh_harmonics_and_sidebands_have_their_levels(sound: Gathered) -> None:
+    found = as_dict(features_of(sound))
+    powers = np.square(MESH_AMPLITUDES)
+    for k, power in enumerate(powers, 1):
+        assert found[f"mesh.share.{k}"] == pytest.approx(10 * np.log10(power / powers.sum()), abs=0.05)
+    # Two first sidebands of a hundredth of its amplitude at each of three harmonics; five are looked at.
+    expected = 10 * np.log10(1e-4 / 5)
+    assert found["sideband.driver.1"] == pytest.approx(expected, abs=0.5)
+    assert found["sideband.driven.1"] == pytest.approx(expected, abs=0.5)
+    assert found["sideband.driver.3to5"] < expected - 10.0
+
+
+def test_scatter_is_that_of_repeated_records() -> None:
+    """The jackknife's standard errors agree with the scatter over recordings, in the median over the features."""
+    runs = [features_of(reduced(seed=seed)) for seed in range(1, 9)]
+    spread = np.std([run.values for run in runs], axis=0, ddof=1)
+    stated = np.mean([run.scatter for run in runs], axis=0)
+    alive = spread > 1e-3
+    assert 0.6 < np.median(stated[alive] / spread[alive]) < 1.7
+
+
+@pytest.mark.parametrize(
+    ("family", "order"),
+    [("outer", 9 / 2 * (1 - 7.94 / 39.04)), ("inner", 9 / 2 * (1 + 7.94 / 39.04))],
+)
+def test_a_bearings_train_raises_its_own_family(sound: Gathered, family: str, order: float) -> None:
+    changes = as_dict(change_features(reduced(lambda _, r: 0.6 * ringing(0.99 * order * r), seed=1), sound))
+    families = {name: changes[f"envelope.{name}"] for name in ("outer", "inner", "ball", "cage")}
+    assert families[family] > 10.0
+    assert families[family] > max(v for name, v in families.items() if name != family) + 6.0
+    assert abs(changes["mesh.total"]) < 0.1
+
+
+def test_a_train_of_no_known_order_is_strange(sound: Gathered) -> None:
+    changes = as_dict(change_features(reduced(lambda _, r: 0.6 * ringing(2.37 * r), seed=1), sound))
+    assert changes["envelope.strange"] > 10.0
+
+
+def test_a_knock_at_one_tooth_stands_out_on_its_own_gear(sound: Gathered) -> None:
+    changes = as_dict(change_features(reduced(lambda _, r: 0.5 * ringing(r - 0.4), seed=1), sound))
+    assert changes["change.driver.prominence"] > 20.0
+    assert changes["change.driver.prominence"] > changes["change.driven.prominence"] + 10.0
+    assert changes["change.driver.width"] == pytest.approx(0.0, abs=2.0)  # about one pitch
+
+
+def test_hum_and_swing_are_told_from_the_gears(sound: Gathered) -> None:
+    hum = as_dict(change_features(reduced(lambda t, _: 0.02 * np.sin(2 * np.pi * 50.0 * t), seed=1), sound))
+    assert hum["hum"] > 6.0
+    assert abs(hum["shaft.driver.2"]) < 3.0
+    swing = as_dict(change_features(reduced(seed=1, swing=0.01, swing_hz=1.3), sound))
+    assert swing["speed.swing"] > 20.0
+    assert abs(swing["mesh.total"]) < 0.1
+    assert reduced(seed=1, swing=0.01, swing_hz=1.3).speed[3] == pytest.approx(1.3, abs=0.1)
+
+
+def test_nothing_changes_but_noise(sound: Gathered) -> None:
+    again = change_features(reduced(seed=5), sound)
+    level = [i for i, name in enumerate(again.names) if name.startswith(("mesh.", "sideband.", "floor.band"))]
+    assert np.all(np.abs(again.values[level]) < 4.0 * again.scatter[level] + 0.2)
+
+
+def test_too_few_revolutions_are_refused() -> None:
+    from dataclasses import replace
+
+    whole = record()
+    short = replace(whole, samples=whole.samples[:, : int(RATE_HZ / SPEED_HZ * 12)])
+    with pytest.raises(RefusalError, match="revolutions"):
+        gather(short, RIG)
+
+
+def test_teeth_must_be_known() -> None:
+    from dataclasses import replace
+
+    unknown = replace(RIG, pairs=(replace(RIG.pairs[0], driven_teeth=None),))
+    with pytest.raises(RefusalError, match="teeth"):
+        gather(record(), unknown)
+    assert (RIG.pairs[0].driver_teeth, RIG.pairs[0].driven_teeth) == TEETH
