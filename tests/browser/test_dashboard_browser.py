@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from app.dashboard.widgets.methods.menu import METHODS
 from app.samples import samples
 from gearsig.diagnosis.analyze import analyze
 from gearsig.recording.read import read_recording
@@ -91,22 +90,3 @@ def test_a_broken_file_is_one_message(page: playwright.Page) -> None:
     message.wait_for()
     assert message.count() == 1
     assert "pickle" in message.inner_text()
-
-
-def test_more_methods_draw_and_take_over_what_is_suggested(page: playwright.Page) -> None:
-    page.get_by_role("tab", name="More methods", exact=True).click()
-    settle(page)
-    panel = page.get_by_role("tabpanel").filter(visible=True)
-    for method in METHODS:
-        panel.get_by_test_id("stButtonGroup").first.get_by_text(method, exact=True).click()
-        settle(page)
-        panel.get_by_text("Analysed: 0 to 5 s").wait_for()
-        panel.locator(".js-plotly-plot, img").first.wait_for()
-        assert panel.get_by_test_id("stAlert").count() == 0
-    panel.get_by_test_id("stButtonGroup").first.get_by_text("Modes", exact=True).click()
-    panel.get_by_role("button", name="Suggest K and penalty").click()
-    panel.get_by_role("button", name="Use it").click()
-    settle(page)
-    suggested = panel.get_by_text("Suggested:").inner_text().split()[1]
-    shown = panel.get_by_test_id("stSlider").filter(has_text="Modes K").get_by_test_id("stSliderThumbValue")
-    playwright.expect(shown).to_have_text(suggested)
