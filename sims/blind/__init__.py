@@ -1,0 +1,92 @@
+"""An independent gear-pair rig that makes blind cases for the judging of the gap diagnosis.
+
+Nothing here is shared with the simulators that the diagnosis uses: other degrees of freedom, another stiffness law,
+another integrator, and an own form of every effect. **Whoever works on the diagnosing side reads this page and
+nothing else of this room**; what an effect does is for the recordings to tell.
+
+Making cases
+------------
+>>> import numpy as np
+>>> from sims.blind import draw_case
+>>> case = draw_case(np.random.default_rng(1), role="development", effect="root_crack", level=0.8)
+>>> case.kind, [fault.name for fault in case.faults], case.role
+('single', ['root_crack'], 'development')
+
+`draw_case(rng, role, *, kind, effect, level, n_conditions, with_reference)`
+    Draws a case; whatever is not given is drawn. Roles "development", "calibration", "evaluation" share no tooth
+    number and no module. Kinds: "none" (nothing wrong, only tolerances and a changed mounting), "single" (one of the
+    catalogue's 19), "unknown" (something outside the catalogue, half of it easily mistaken for an effect), "pair"
+    (two of the catalogue, of different groups). Levels run from 0, barely noticeable, to 1, strong, geometric in the
+    effect's unit between. The rig, conditions, lengths and noise do not depend on kind, effect or level; only
+    `backlash` takes care that its first condition is a light load, which a quarter of all others have by chance.
+`record_case(case) -> CaseRecordings`
+    Runs it in memory: `conditions`, `references`, `twins`, `places`. A twin is the same run from the same seeds
+    without the fault, so that the true place and size of the change can be measured.
+`write_case(case, folder, labels_folder)`
+    Writes ``folder`` for the diagnosing side: ``condition_1.h5``, with two conditions ``condition_2.h5``, with
+    references ``reference_1.h5`` (same operating point as ``condition_1.h5``) and so on; each beside a rig file of the
+    same name that states its nominal speed and torque; and ``rig.toml``, which is condition_1's. Channels: ``a1``,
+    perhaps ``a2`` (m/s^2), ``tacho`` (one pulse per turn of the input shaft). Nominal torque is within some 20 %,
+    nominal speed within some 1.5 % of the truth. And ``labels_folder`` for the scoring side: ``labels.json`` and
+    ``twin_1.h5`` …
+
+labels.json
+-----------
+==============  ====================================================================================================
+layout          "gearsig blind labels 1"
+role, kind      as above
+effects         list, empty for "none": name, group ("outside" where the catalogue has none), severity, unit, level,
+                resembles (the catalogue's effect that an outside one is easily taken for, or empty), place (what
+                applies of gear, shaft, tooth, angle_deg after the tachometer's pulse, order, bearing, frequency_hz,
+                channels)
+has_reference   whether there are healthy recordings
+conditions      file, stated_rpm, stated_nm, true_rpm, true_nm (input shaft), load_share of the rated torque
+twins           files of the twins, in the order of the conditions; empty where nothing is wrong
+pair            z1, z2, module_mm
+==============  ====================================================================================================
+
+"Pinion" is the gear on the input shaft, "wheel" that on the output shaft, whichever is larger.
+
+Names: `CATALOGUE` (19), `MECHANICAL` (16 of them), `OUTSIDE` (10).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sims.blind.case import Case, CaseRecordings, Fault, draw_case, record_case
+    from sims.blind.changes.catalogue import CATALOGUE, MECHANICAL, OUTSIDE
+    from sims.blind.rig import ROLES, BlindRig
+    from sims.blind.write import write_case
+
+__all__ = [
+    "CATALOGUE",
+    "MECHANICAL",
+    "OUTSIDE",
+    "ROLES",
+    "BlindRig",
+    "Case",
+    "CaseRecordings",
+    "Fault",
+    "draw_case",
+    "record_case",
+    "write_case",
+]
+_HOMES = {
+    "CATALOGUE": "changes.catalogue",
+    "MECHANICAL": "changes.catalogue",
+    "OUTSIDE": "changes.catalogue",
+    "ROLES": "rig",
+    "BlindRig": "rig",
+    "write_case": "write",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load what is asked for when it is asked for: SciPy and numba stay out of start-up."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module(f"sims.blind.{_HOMES.get(name, 'case')}"), name)

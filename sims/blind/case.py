@@ -24,7 +24,7 @@ FEWEST_MESH_HARMONICS = 3
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing wrong: its name, severity in its own unit, level in its span (0 weak, 1 strong), seed of its choices."""
+    """One thing wrong: name, severity in its own unit, level in its span (0 weak, 1 strong), seed of its choices."""
 
     name: str
     severity: float
@@ -117,7 +117,9 @@ def record_case(case: Case) -> CaseRecordings:
     rms = tuple(float(x.std()) / c.gain for x, c in zip(first_twin.samples[:n], case.rig.chains, strict=True))
     peak = tuple(float(np.abs(x).max()) for x in first_twin.samples[:n])
 
-    def recorded(condition: Condition, faults: tuple[Fault, ...] = ()) -> tuple[Recording, list[Mapping[str, str | int | float]]]:
+    def recorded(
+        condition: Condition, faults: tuple[Fault, ...] = ()
+    ) -> tuple[Recording, list[Mapping[str, str | int | float]]]:
         scene = scene_of(case.rig, condition)
         scene.reference_rms, scene.reference_peak = rms, peak
         places = [EVERY[f.name].apply(scene, f.severity, np.random.default_rng(f.seed)) for f in faults]
@@ -129,7 +131,6 @@ def record_case(case: Case) -> CaseRecordings:
         return CaseRecordings(twins, references, twins, ())
     done = [recorded(c, case.faults) for c in case.conditions]
     return CaseRecordings(tuple(r for r, _ in done), references, twins, tuple(done[0][1]))
-
 
 
 def _kind(kind: str | None, effect: str | None, drawn: str) -> str:
@@ -167,7 +168,12 @@ def _draw_faults(
 
 
 def _draw_conditions(
-    rng: np.random.Generator, rig: BlindRig, n_conditions: int | None, with_reference: bool | None, *, starts_light: bool
+    rng: np.random.Generator,
+    rig: BlindRig,
+    n_conditions: int | None,
+    with_reference: bool | None,
+    *,
+    starts_light: bool,
 ) -> tuple[tuple[Condition, ...], tuple[Condition, ...]]:
     n_drawn, reference_drawn = int(rng.integers(1, 3)), bool(rng.random() < 0.5)
     n = n_drawn if n_conditions is None else n_conditions

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import cos, pi, radians, sin, sqrt
+from math import cos, pi, radians, sin, sqrt, tan
 
 import numpy as np
 
@@ -88,7 +88,7 @@ class SpurPair:
     @property
     def pitch_point(self) -> float:
         """Place of the pitch point on the path."""
-        return (self.base_radii_m[0] * np.tan(self.alpha) - self.rho_start_m) / self.base_pitch_m
+        return (self.base_radii_m[0] * tan(self.alpha) - self.rho_start_m) / self.base_pitch_m
 
     @cached_property
     def path(self) -> FloatArray:
@@ -124,7 +124,7 @@ class SpurPair:
         return np.asarray(self.mean_stiffness_n_per_m() / (0.85 * self.contact_ratio) * shape)
 
     def end_gap_m(self) -> FloatArray:
-        """Separation of an unloaded pair off the path's ends, (N_PATH,): tip corner of one gear against the other's flank."""
+        """Separation of an unloaded pair off the path's ends, (N_PATH,): tip corner against flank."""
         pb, place = self.base_pitch_m, self.path
         gap = np.zeros(N_PATH)
         early, late = place < 0, place > self.contact_ratio

@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 
 from gearsig.checks import FloatArray, one_of
-from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
 from gearsig.rig.speed import TachometerChannel
+from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
 from sims.blind.geometry import N_PATH, SpurPair
 from sims.blind.structure import N_DOF, Parts
 
@@ -36,7 +36,7 @@ BEARING_SERIES = (
 
 def teeth_of(role: str) -> tuple[int, ...]:
     """Tooth numbers of a role: no number from 17 to 70 serves two roles."""
-    place = ROLES.index(one_of(role, "role", ROLES))  # type: ignore[arg-type]
+    place = ROLES.index(one_of(role, "role", ROLES))
     return tuple(z for z in range(17, 71) if (z // 2) % 3 == place)
 
 

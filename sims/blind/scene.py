@@ -9,8 +9,9 @@ from math import pi, sin
 import numpy as np
 
 from gearsig.checks import FloatArray
-from sims.blind import kernel as kn
-from sims.blind.geometry import N_PATH, REACH
+from sims.blind import march_numbers as at
+from sims.blind.geometry import N_PATH
+from sims.blind.kernel import march
 from sims.blind.rig import BlindRig, Resonance
 from sims.blind.structure import Matrix, Modes, modes_of, static_shape, step_coefficients
 
@@ -209,17 +210,22 @@ def run(scene: Scene, *, sub_steps: int = SUB_STEPS) -> Motion:
     modes = modes_of(rig.parts)
     q, p, steady = _start(scene, modes)
     n_out = 2 * round(condition.duration_s * rig.sampling_rate_hz)
-    trains = scene.trains or [Train(0, 0, np.array([1e12]), np.zeros(1), np.zeros(1), 1e-9)]
-    out = kn.march(
-        n_out, round(WARM_UP_S * rate_hz), sub_steps // 2, step_s, _numbers(scene), step_coefficients(modes, step_s),
-        modes.shapes, modes.seen, modes.omega, modes.zeta, q, p, steady, np.array(rig.parts.bearing_n_per_m),
-        np.array(scene.clearance_m), scene.base_gap_m, scene.pair_stiffness, scene.slip, scene.gap_m[0],
-        scene.gap_m[1], scene.weak[0], scene.weak[1], REACH, np.array(scene.offsets), _rows(scene.runout, 4),
-        _rows(scene.wobble, 4), _rows(scene.torque, 4), _rows(scene.sway, 5), np.array(scene.unbalance), scene.speed,
-        _padded([t.angle for t in trains], 1e12), _padded([t.force for t in trains], 0.0),
-        _padded([t.turn for t in trains], 0.0), np.array([[float(t.shaft), float(t.kind)] for t in trains]),
-        np.array([t.width_s for t in trains]),
-    )  # fmt: skip
+    out = march(
+        n_out,
+        round(WARM_UP_S * rate_hz),
+        sub_steps // 2,
+        step_s,
+        _numbers(scene),
+        (step_coefficients(modes, step_s), modes.shapes, modes.seen, modes.omega, modes.zeta),
+        q,
+        p,
+        (steady, np.array(rig.parts.bearing_n_per_m), np.array(scene.clearance_m), np.array(scene.unbalance)),
+        (scene.base_gap_m, scene.pair_stiffness, scene.slip, *scene.gap_m, *scene.weak),
+        np.array(scene.offsets),
+        (_rows(scene.runout, 4), _rows(scene.wobble, 4), _rows(scene.torque, 4), _rows(scene.sway, 5)),
+        scene.speed,
+        _train_arrays(scene),
+    )
     return Motion(rate_hz, out[:, :4].T, out[:, 4:7].T, out[:, 7:9].T, out[:, 9], out[:, 10])
 
 
@@ -255,26 +261,26 @@ def _numbers(scene: Scene) -> Matrix:
     ratio = pair.z1 / pair.z2
     line_inertia = j[0] + j[1] + (j[2] + j[3]) * ratio**2
     effective = 1 / (pair.base_radii_m[0] ** 2 / j[1] + pair.base_radii_m[1] ** 2 / j[2])
-    number = np.zeros(kn.N_NUMBERS)
-    number[[kn.RB_1, kn.RB_2]] = pair.base_radii_m
-    number[[kn.LINE_X, kn.LINE_Y]] = np.cos(parts.line_angle), np.sin(parts.line_angle)
-    number[[kn.BASE_PITCH, kn.CONTACT_RATIO]] = pair.base_pitch_m, pair.contact_ratio
-    number[[kn.RHO_START, kn.RHO_SUM]] = pair.rho_start_m, pair.centre_distance_m * sin(pair.alpha)
-    number[[kn.SOFT_M, kn.WEDGE_M, kn.BACKLASH_M]] = rig.soft_m, scene.wedge_m, scene.backlash_m
-    number[kn.MESH_DAMPING] = 2 * rig.mesh_damping_ratio * np.sqrt(effective / rig.mesh_stiffness_n_per_m())
-    number[kn.BACK_STIFFNESS] = rig.mesh_stiffness_n_per_m()
-    number[kn.LOAD_NM] = scene.condition.true_nm / ratio
-    number[kn.LOAD_SLOPE] = rig.load_slope * scene.condition.true_nm / ratio / scene.omega[1]
-    number[kn.MOTOR_NM], number[kn.LINE_INERTIA] = scene.condition.true_nm + _friction_nm(scene), line_inertia
-    number[kn.MOTOR_MEMORY] = 0.5 / rig.motor_time_s
-    number[kn.MOTOR_GAIN] = line_inertia / rig.motor_time_s
-    number[kn.GRID_S] = GRID_S
-    number[[kn.OMEGA_1, kn.OMEGA_2]] = scene.omega
-    for i, (cage, balls) in enumerate(((kn.CAGE_RATIO_1, kn.N_BALLS_1), (kn.CAGE_RATIO_2, kn.N_BALLS_2))):
+    number = np.zeros(at.N_NUMBERS)
+    number[[at.RB_1, at.RB_2]] = pair.base_radii_m
+    number[[at.LINE_X, at.LINE_Y]] = np.cos(parts.line_angle), np.sin(parts.line_angle)
+    number[[at.BASE_PITCH, at.CONTACT_RATIO]] = pair.base_pitch_m, pair.contact_ratio
+    number[[at.RHO_START, at.RHO_SUM]] = pair.rho_start_m, pair.centre_distance_m * sin(pair.alpha)
+    number[[at.SOFT_M, at.WEDGE_M, at.BACKLASH_M]] = rig.soft_m, scene.wedge_m, scene.backlash_m
+    number[at.MESH_DAMPING] = 2 * rig.mesh_damping_ratio * np.sqrt(effective / rig.mesh_stiffness_n_per_m())
+    number[at.BACK_STIFFNESS] = rig.mesh_stiffness_n_per_m()
+    number[at.LOAD_NM] = scene.condition.true_nm / ratio
+    number[at.LOAD_SLOPE] = rig.load_slope * scene.condition.true_nm / ratio / scene.omega[1]
+    number[at.MOTOR_NM], number[at.LINE_INERTIA] = scene.condition.true_nm + _friction_nm(scene), line_inertia
+    number[at.MOTOR_MEMORY] = 0.5 / rig.motor_time_s
+    number[at.MOTOR_GAIN] = line_inertia / rig.motor_time_s
+    number[at.GRID_S] = GRID_S
+    number[[at.OMEGA_1, at.OMEGA_2]] = scene.omega
+    for i, (cage, balls) in enumerate(((at.CAGE_RATIO_1, at.N_BALLS_1), (at.CAGE_RATIO_2, at.N_BALLS_2))):
         number[cage], number[balls] = rig.bearing(i).orders()["FTF"], rig.bearings[i][0]
-    number[kn.BALL_RIPPLE] = scene.ball_ripple
-    number[kn.PHASE_2] = 2 * pi * scene.offsets[1] / pair.z2
-    number[[kn.SEAT_1, kn.SEAT_2]], number[kn.HEIGHT] = parts.seat_x_m, parts.height_m
+    number[at.BALL_RIPPLE] = scene.ball_ripple
+    number[at.PHASE_2] = 2 * pi * scene.offsets[1] / pair.z2
+    number[[at.SEAT_1, at.SEAT_2]], number[at.HEIGHT] = parts.seat_x_m, parts.height_m
     return number
 
 
@@ -282,8 +288,19 @@ def _rows(rows: Rows, width: int) -> Matrix:
     return np.array(rows, dtype=float).reshape(len(rows), width)
 
 
+def _train_arrays(scene: Scene) -> tuple[Matrix, Matrix, Matrix, Matrix, Matrix]:
+    trains = scene.trains
+    return (
+        _padded([t.angle for t in trains], 1e12),
+        _padded([t.force for t in trains], 0.0),
+        _padded([t.turn for t in trains], 0.0),
+        _rows([(float(t.shaft), float(t.kind)) for t in trains], 2),
+        np.array([t.width_s for t in trains], dtype=float),
+    )
+
+
 def _padded(arrays: list[FloatArray], fill: float) -> Matrix:
-    found = np.full((len(arrays), max(len(a) for a in arrays)), fill)
+    found = np.full((len(arrays), max((len(a) for a in arrays), default=1)), fill)
     for row, values in zip(found, arrays, strict=True):
         row[: len(values)] = values
     return found

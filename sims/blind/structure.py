@@ -119,7 +119,7 @@ def step_coefficients(modes: Modes, step_s: float) -> Matrix:
 
 
 def static_shape(modes: Modes, mesh_n_per_m: float, forces: Matrix) -> Matrix:
-    """Displacements under constant forces that balance over the mesh, (N_DOF,); free rotation is taken out at gear 1."""
+    """Displacements under constant forces that balance over the mesh, (N_DOF,); gear 1 is kept from turning."""
     mesh = np.linalg.lstsq(modes.shapes.T, modes.seen[0], rcond=None)[0]
     k = modes.stiffness + mesh_n_per_m * np.outer(mesh, mesh)
     k[GEAR_1, GEAR_1] += 1e-3 * mesh_n_per_m * mesh[GEAR_1] ** 2

@@ -51,7 +51,7 @@ GEARS = ("pinion", "wheel")
 
 def steady(low: float, high: float) -> Span:
     """Give the same span for every rig."""
-    return lambda rig: (low, high)
+    return lambda _rig: (low, high)
 
 
 def deflection_um(rig: BlindRig) -> float:
