@@ -40,7 +40,7 @@ PRESET = preset("cracked", "published_55_75")
 RPM, TORQUE_NM = PRESET.speed_rpm, PRESET.torque_nm
 ROUGHNESS_UM = (0.0, 0.45, 0.84, 1.40)
 CRACKS_MM = (0, 1, 2, 3, 4)
-CRACKED_TOOTH = 20
+CRACKED_TOOTH = 20  # from 0, as mesh cycles count; the parameter counts from 1
 SEED = 1
 SETTLING_S = 0.5
 FELT = 0.01
@@ -59,7 +59,7 @@ def rough(roughness_um: float) -> Machine:
 
 def cracked(depth_mm: float) -> Machine:
     """Return it with a crack in one tooth of the pinion."""
-    return machine(crack_depth_mm=depth_mm, crack_tooth=CRACKED_TOOTH)
+    return machine(crack_depth_mm=depth_mm, crack_tooth=CRACKED_TOOTH + 1)
 
 
 def named(depth_mm: float) -> str:

@@ -53,8 +53,8 @@ CHANNELS = ("a1", "tacho")
 SPECIMEN_SEED = 11
 """Of the flanks' roughness: all recordings of a machine are of the same gears."""
 CRACKS_MM = (0, 1, 2, 3, 4)
-CRACKED_TOOTH = 20
-DAMAGED_TOOTH = 11
+CRACKED_TOOTH = 21
+DAMAGED_TOOTH = 12
 
 
 def main(folder: Path) -> None:

@@ -47,7 +47,7 @@ def simulate_rig(
     """
     operation = Operation.steady(drawn.speed_rpm * speed_factor, drawn.torque_nm * torque_factor)
     size = drawn.depth_mm if severity is None else severity
-    chosen = {"gear": drawn.gear, "tooth": float(drawn.tooth), **(options or {})}
+    chosen = {"gear": drawn.gear, "tooth": drawn.tooth + 1.0, **(options or {})}
     settings = [EffectSetting(effect, size, chosen)] if size > 0 else []
     ready = CrackedPair().prepare(
         drawn.parameters, settings, operation, np.random.default_rng(drawn.seed), sampling_rate_hz=SAMPLING_RATE_HZ

@@ -52,7 +52,7 @@ def simulate(
     Beside FILE stand its rig file (NAME.toml) and what was put in (NAME.truth.json). Everything else in gearsig reads
     the recording as it reads a measured one.
 
-    Example: gearsig simulate cracked --preset published_55_75 --effect root_crack=2mm,tooth=20 -o crack.h5
+    Example: gearsig simulate cracked --preset published_55_75 --effect root_crack=2mm,tooth=21 -o crack.h5
     """
     if listing:
         typer.echo(_listing(model, preset))

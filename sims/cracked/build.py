@@ -7,6 +7,7 @@ from math import degrees
 
 import numpy as np
 
+from gearsig.checks import within
 from gearsig.errors import InputError
 from gearsig.rig.speed import EncoderChannel, SpeedSource, TachometerChannel
 from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
@@ -150,7 +151,8 @@ def _cracks(wanted: Wanted, side: int) -> tuple[RootCrack, ...]:
     if depth_mm == 0.0 or wanted.word("crack_gear") != _SIDES[side]:
         return ()
     width_mm = None if percent == 100.0 else percent / 100.0 * wanted.number("face_width_mm")
-    return (RootCrack(depth_mm, wanted.number("crack_angle_deg"), wanted.whole("crack_tooth"), width_mm),)
+    tooth = int(within(wanted.whole("crack_tooth"), "crack_tooth", 1, wanted.whole(f"teeth_{_SIDES[side]}"))) - 1
+    return (RootCrack(depth_mm, wanted.number("crack_angle_deg"), tooth, width_mm),)
 
 
 def _flank(wanted: Wanted, gear: GearGeometry, side: int) -> FlankDeviation:

@@ -69,14 +69,14 @@ _CRACK = (
     _number("crack_depth_mm", "mm", "length of a root crack; 0: none", 0, 100, 0.0),
     _number("crack_angle_deg", "deg", "between the crack and the tooth's centre line", 15, 90, 45.0),
     _word("crack_gear", "gear with the crack", _SIDES, "driver"),
-    _number("crack_tooth", "", "tooth with the crack, from 0", 0, 399, 0, whole=True),
+    _number("crack_tooth", "", "tooth with the crack, from 1 at the mark", 1, 400, 1, whole=True),
     _number("crack_width_percent", "%", "part of the face width that the crack covers", 1, 100, 100.0),
 )
 
 _SHAFTS = (
     _number("runout_driver_um", "um", "eccentricity of the driver (half its run-out)", 0, 2000, 0.0),
     _number("runout_driven_um", "um", "eccentricity of the driven gear (half its run-out)", 0, 2000, 0.0),
-    _number("runout_angle_driver_deg", "deg", "where the driver's eccentricity lies, from tooth 0", -360, 360, 0.0),
+    _number("runout_angle_driver_deg", "deg", "where the driver's eccentricity lies, from tooth 1", -360, 360, 0.0),
     _number("runout_angle_driven_deg", "deg", "where the driven gear's eccentricity lies", -360, 360, 0.0),
     _number("unbalance_driver_g_mm", "g mm", "unbalance of the driver", 0, 1e6, 0.0),
     _number("unbalance_driven_g_mm", "g mm", "unbalance of the driven gear", 0, 1e6, 0.0),
@@ -135,7 +135,7 @@ _CHAIN = (
     _number(
         "tachometer_pulses",
         "",
-        "pulses per revolution of the input shaft, the first where tooth 0 comes in; 0: none",
+        "pulses per revolution of the input shaft, the first where tooth 1 comes in; 0: none",
         0,
         1024,
         1,

@@ -12,7 +12,7 @@ from sims.machine import Machine
 
 
 def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
-    """Return the machine with the defect; the angle counts from tooth 0 at time 0."""
+    """Return the machine with the defect; the angle counts from tooth 1 at time 0."""
     del rng  # the places of the rolling elements are drawn by the simulator
     return with_race_defect(machine, "inner", severity, options)
 

@@ -80,7 +80,7 @@ class Option:
 
 GEAR_OPTION = Option("gear", "driver", "which gear", choices=("driver", "driven"))
 """Most tooth and wheel effects have it."""
-TOOTH_OPTION = Option("tooth", 0.0, "which tooth, from 0", low=0.0, high=4999.0, whole=True)
+TOOTH_OPTION = Option("tooth", 1.0, "which tooth, from 1 at the mark", low=1.0, high=5000.0, whole=True)
 """Tooth-local effects have it."""
 
 Change = Callable[[Machine, float, Mapping[str, OptionValue], np.random.Generator], Machine]

@@ -26,10 +26,10 @@ def gear_geometry(machine: Machine, index: int) -> GearGeometry:
 
 
 def tooth_number(machine: Machine, options: Mapping[str, OptionValue]) -> int:
-    """Return the chosen tooth, checked against the number of teeth."""
+    """Return the chosen tooth, checked against the number of teeth; people count from 1, the model from 0."""
     index = gear_index(options)
-    last = gear_geometry(machine, index).teeth - 1
-    return int(within(float(options["tooth"]), f"tooth of the {GEARS[index]} gear", 0, last))
+    teeth = gear_geometry(machine, index).teeth
+    return int(within(float(options["tooth"]), f"tooth of the {GEARS[index]} gear", 1, teeth)) - 1
 
 
 def part_of_width_mm(machine: Machine, options: Mapping[str, OptionValue]) -> float | None:
@@ -60,7 +60,7 @@ def with_tooth_fault(machine: Machine, faults: str, index: int, fault: RootCrack
     if any(other.tooth == fault.tooth for other in present):
         word = faults.removesuffix("s")
         raise InputError(
-            f"tooth {fault.tooth} of the {GEARS[index]} gear already has a {word}",
+            f"tooth {fault.tooth + 1} of the {GEARS[index]} gear already has a {word}",
             allowed=f"one {word} per tooth",
             remedy="choose another tooth, or take away what the model's own parameters give",
         )

@@ -11,7 +11,7 @@ import numpy as np
 from sims.effects.effect import Option, OptionValue
 
 ANGLE_OPTION = Option(
-    "angle_deg", None, "where it lies, from the middle of tooth 0 the way the gear turns", "deg", -360.0, 360.0
+    "angle_deg", None, "where it lies, from the middle of tooth 1 the way the gear turns", "deg", -360.0, 360.0
 )
 """Drawn where it is not given."""
 

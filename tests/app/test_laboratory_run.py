@@ -42,7 +42,7 @@ def healthy() -> Run:
 
 @pytest.fixture(scope="module")
 def cracked() -> Run:
-    return run_setup(with_effect("root_crack", 1.5, tooth=7.0))
+    return run_setup(with_effect("root_crack", 1.5, tooth=8.0))
 
 
 def test_the_recording_is_that_of_the_command_line(cracked: Run) -> None:
@@ -140,7 +140,7 @@ def test_files_hold_recording_rig_and_truth(tmp_path: Path, cracked: Run) -> Non
     recording = read_recording(tmp_path / f"{stem}.h5", rig=read_rig(tmp_path / f"{stem}.toml"))
     assert np.array_equal(recording.samples, cracked.recording.samples)
     truth = json.loads((tmp_path / f"{stem}.truth.json").read_text(encoding="utf-8"))
-    assert [(e["name"], e["severity"], e["options"]["tooth"]) for e in truth["effects"]] == [("root_crack", 1.5, 7.0)]
+    assert [(e["name"], e["severity"], e["options"]["tooth"]) for e in truth["effects"]] == [("root_crack", 1.5, 8.0)]
 
 
 def test_a_healthy_setup_is_written_once() -> None:

@@ -188,7 +188,7 @@ BAD = [
     (("cracked", "-o", "a.h5", "--effect", "root_crack=8mm"), "goes past the tooth"),
     (("cracked", "-o", "a.h5", "--effect", "root_crack=2mm,geer=driven"), "did you mean gear"),
     (("cracked", "-o", "a.h5", "--effect", "root_crack=2mm,gear=wheel"), "driver, driven"),
-    (("cracked", "-o", "a.h5", "--effect", "root_crack=2mm,tooth=55"), "54"),
+    (("cracked", "-o", "a.h5", "--effect", "root_crack=2mm,tooth=56"), "1 to 55"),
     (("cracked", "-o", "a.h5", "--speed", "-5rpm"), "0 rpm"),
     (("cracked", "-o", "a.h5", "--speed", "500Nm"), "give it in rpm"),
     (("cracked", "-o", "a.h5", "--speed", "1e9"), "30000 rpm"),

@@ -18,7 +18,7 @@ def _record(depth_mm: float, gear: str, speed_rpm: float, duration_s: float, too
         parameters={
             "crack_depth_mm": depth_mm,
             "crack_gear": gear,
-            "crack_tooth": tooth,
+            "crack_tooth": tooth + 1,
             "noise_mps2": 0.0,
             "sensor_noise_mps2_per_sqrt_hz": 0.0,
         },

@@ -147,12 +147,13 @@ def test_half_a_pitch_after_the_tachometers_edge_tooth_0_is_half_through_its_con
     assert float(pair.contact_radii_mm(cycles, pair=0)[0]) == pytest.approx(middle, rel=1e-12)
 
 
-@pytest.mark.parametrize("tooth", [17, 54])
+@pytest.mark.parametrize("tooth", [18, 55])
 def test_the_diagnosis_names_the_cracked_tooth(tooth: int) -> None:
-    """Teeth are counted from 1 in diagnoses, from 0 here."""
+    """Tooth 1 is the one that engages after the mark, for the simulator and for the diagnosis."""
     cracked = [EffectSetting("root_crack", 3.0, {"tooth": float(tooth)})]
     recording = simulate("cracked", preset="published_55_75", effects=cracked, seed=1, duration_s=4.0)
-    assert f"tooth {tooth + 1} of 55, of shaft input" in analyze(recording).verdict
+    first = analyze(recording).findings[0]
+    assert (first.code, first.where.gear, first.where.tooth) == ("tooth-local-damage", "stage 1/input", tooth)
 
 
 def rig_of(ready: Prepared) -> Rig:
@@ -181,7 +182,7 @@ def test_parameters_reach_the_machine() -> None:
         "workshop_29_47", crack_depth_mm=1.5, crack_gear="driven", crack_tooth=5, crack_width_percent=50, friction="off"
     )
     (crack,) = built.mesh.cracks_2
-    assert (crack.depth_mm, crack.tooth, crack.width_mm) == (1.5, 5, 10.0)
+    assert (crack.depth_mm, crack.tooth, crack.width_mm) == (1.5, 4, 10.0)
     assert built.mesh.cracks_1 == ()
     assert not built.lubrication.friction
     without = machine(tachometer_pulses=0, encoder_counts=1024).chain
@@ -208,7 +209,7 @@ def test_tolerances_are_those_of_one_specimen() -> None:
         ({"friction": "sometimes"}, "on, off"),
         ({"contact_law": "load-dependant"}, "did you mean load-dependent"),
         ({"crack_depth_mm": 9.0}, "goes past the tooth"),
-        ({"crack_depth_mm": 1.0, "crack_tooth": 60.0}, "0 to 54"),
+        ({"crack_depth_mm": 1.0, "crack_tooth": 60.0}, "1 to 55"),
         ({"teeth_driver": 8.0}, "undercuts"),
         ({"n_balls": 40.0}, "do not fit"),
         ({"bore_radius_driver_mm": 60.0}, "bore_radius_mm"),
@@ -243,7 +244,7 @@ def test_effects_change_the_machine_and_stand_in_the_truth() -> None:
     settings = [EffectSetting("root_crack", 1.0, {"tooth": 4.0})]
     ready = CrackedPair().prepare({}, settings, None, rng, preset_name="published_55_75")
     sound = CrackedPair().prepare({}, [], None, other, preset_name="published_55_75")
-    assert ready.machine.mesh.cracks_1[0].tooth == 4
+    assert ready.machine.mesh.cracks_1[0].tooth == 3  # the model counts from 0
     assert sound.machine.mesh.cracks_1 == ()
     assert rng.random() == other.random()  # healthy and faulty runs go on with the same random numbers
     (entry,) = ready.truth()["effects"]

@@ -81,7 +81,7 @@ def bearing_lines_hz(run: Run) -> dict[str, float]:
 
 
 def faulty_teeth(setup: Setup) -> tuple[tuple[str, int], ...]:
-    """Return (side, tooth) of the effects that concern one tooth."""
+    """Return (side, tooth from 1) of the effects that concern one tooth; tooth k of the driver enters at k - 1."""
     local = [s for s in setup.effects if effect(s.name).group == "tooth-local" and s.severity > 0]
     return tuple(dict.fromkeys((str(s.options["gear"]), round(float(s.options["tooth"]))) for s in local))
 
@@ -92,7 +92,7 @@ def entries(run: Run) -> tuple[Cursor, ...]:
     found = []
     for side, tooth in faulty_teeth(run.setup):
         n_teeth = pair.driver.teeth if side == "driver" else pair.driven.teeth
-        first = np.ceil((cycles[0] - tooth) / n_teeth) * n_teeth + tooth
+        first = np.ceil((cycles[0] - (tooth - 1)) / n_teeth) * n_teeth + tooth - 1
         times = times_of(run, cycles, np.arange(first, cycles[-1], n_teeth))
         found += [Cursor(float(t), "finding", f"{side} tooth {tooth} enters", i) for i, t in enumerate(times)]
     return tuple(found)

@@ -22,7 +22,7 @@ def show_mesh(healthy: Run, faulty: Run | None) -> None:
     runs = [healthy] if faulty is None else [healthy, faulty]
     shown, marks = _stretch(runs[-1])
     cycles = np.linspace(*shown, round((shown[1] - shown[0]) * POINTS_PER_CYCLE) + 1)
-    x = "mesh cycles (tooth k of the driver enters at k)"
+    x = "mesh cycles (tooth k of the driver enters at k − 1)"
     st.markdown("**Mesh stiffness** of the tooth pairs in contact")
     if runs[0].setup.torque_nm > 0:
         curves = [stiffness(run, cycles) * 1e-8 for run in runs]
@@ -56,7 +56,7 @@ def _stretch(run: Run) -> tuple[tuple[float, float], list[Cursor]]:
         return (first - BEFORE, first + AFTER), []
     side, tooth = teeth[0]
     n_teeth = pair.driver.teeth if side == "driver" else pair.driven.teeth
-    enters = tooth + float(np.ceil((first - tooth) / n_teeth)) * n_teeth
+    enters = tooth - 1 + float(np.ceil((first - tooth + 1) / n_teeth)) * n_teeth
     return (enters - BEFORE, enters + AFTER), [Cursor(enters, "finding", f"{side} tooth {tooth} enters")]
 
 

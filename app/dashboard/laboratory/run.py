@@ -65,7 +65,7 @@ class Run:
 
     @cached_property
     def mesh_cycles(self) -> FloatArray:
-        """Mesh cycles at each point of the motion: tooth k of the driver enters at k, and once per revolution again."""
+        """Mesh cycles at each point of the motion: tooth k of the driver enters at k - 1 and every revolution."""
         cycles: FloatArray = self.response["driver angle"] * self.machine.mesh.pair.driver.teeth / (2.0 * np.pi)
         return cycles
 

@@ -25,7 +25,7 @@ def test_a_crack_goes_where_it_is_told() -> None:
     ).mesh
     (crack,) = mesh.cracks_2
     assert mesh.cracks_1 == ()
-    assert (crack.depth_mm, crack.angle_deg, crack.tooth, crack.width_mm) == (1.5, 60.0, 7, 10.0)
+    assert (crack.depth_mm, crack.angle_deg, crack.tooth, crack.width_mm) == (1.5, 60.0, 6, 10.0)
 
 
 def test_a_crack_past_the_tooth_is_refused_with_what_is_allowed() -> None:
@@ -43,22 +43,22 @@ def test_one_of_a_kind_per_tooth(name: str, word: str) -> None:
     machine = apply(spur_pair_machine(), name, 1.0, tooth=3)
     with pytest.raises(InputError, match=f"tooth 3 of the driver gear already has a {word}"):
         apply(machine, name, 2.0, tooth=3)
-    assert [f.tooth for f in getattr(apply(machine, name, 2.0, tooth=4).mesh, f"{word}s_1")] == [3, 4]
-    assert [f.tooth for f in getattr(apply(machine, name, 2.0, gear="driven", tooth=3).mesh, f"{word}s_2")] == [3]
+    assert [f.tooth for f in getattr(apply(machine, name, 2.0, tooth=4).mesh, f"{word}s_1")] == [2, 3]
+    assert [f.tooth for f in getattr(apply(machine, name, 2.0, gear="driven", tooth=3).mesh, f"{word}s_2")] == [2]
 
 
 @pytest.mark.parametrize(("name", "word"), TOOTH_FAULTS)
 def test_a_tooth_that_is_not_there(name: str, word: str) -> None:
-    with pytest.raises(InputError, match=r"tooth of the driver gear is 55 \(allowed: 0 to 54\)"):
-        apply(spur_pair_machine(), name, 0.5, tooth=55)
-    assert getattr(apply(spur_pair_machine(), name, 0.5, gear="driven", tooth=74).mesh, f"{word}s_2")
+    with pytest.raises(InputError, match=r"tooth of the driver gear is 56 \(allowed: 1 to 55\)"):
+        apply(spur_pair_machine(), name, 0.5, tooth=56)
+    assert getattr(apply(spur_pair_machine(), name, 0.5, gear="driven", tooth=75).mesh, f"{word}s_2")
 
 
 def test_three_kinds_of_damage_on_one_tooth() -> None:
     machine = spur_pair_machine()
     for name, _ in TOOTH_FAULTS:
         machine = apply(machine, name, 1.0, tooth=5)
-    assert machine.mesh.cracks_1[0].tooth == machine.mesh.spalls_1[0].tooth == machine.mesh.chips_1[0].tooth == 5
+    assert machine.mesh.cracks_1[0].tooth == machine.mesh.spalls_1[0].tooth == machine.mesh.chips_1[0].tooth == 4
 
 
 def test_a_spall_longer_than_the_flank_is_refused_with_what_is_allowed() -> None:
