@@ -110,7 +110,8 @@ def _exponent(portrait: PhasePortrait, evidence: list[str]) -> tuple[LyapunovExp
 
 
 def _decide(test: ChaosTest | None, exponent: LyapunovExponent | None, stochastic: bool, *, noise_free: bool) -> Kind:
-    if noise_free and exponent is None and test is not None and test.verdict != "undecided":
+    silent = exponent is None or exponent.verdict == "undecided"
+    if noise_free and silent and test is not None and test.verdict != "undecided":
         return "quasi-periodic" if test.verdict == "regular" else "chaotic"
     if stochastic:
         return "stochastic"

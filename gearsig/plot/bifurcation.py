@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-POINTS_IN, SIZE_IN, TOP_IN, BOTTOM_IN, GAP_IN = 3.2, 1.25, 0.85, 0.55, 0.3
+POINTS_IN, SIZE_IN, BOTTOM_IN, GAP_IN = 3.2, 1.25, 0.55, 0.3
+TOP_IN, TOP_OF_TWO_IN = 0.6, 0.85
 MANY = 20_000
 """So many points are drawn smaller, and as pixels in a vector file."""
 NAMED = 0.03
@@ -56,8 +57,9 @@ def bifurcation_figure(
         raise InputError(f"branches of {diagram.axis_name} and {down.axis_name}", allowed="two of the same quantity")
     with_size = all(len(branch.extents) for branch in branches)
     below = SIZE_IN + GAP_IN if with_size else 0.0
-    figure = style.new_figure(TOP_IN + POINTS_IN + below + BOTTOM_IN)
-    axes = style.panel(figure, top_in=TOP_IN, bottom_in=BOTTOM_IN + below)
+    top = TOP_IN if down is None else TOP_OF_TWO_IN
+    figure = style.new_figure(top + POINTS_IN + below + BOTTOM_IN)
+    axes = style.panel(figure, top_in=top, bottom_in=BOTTOM_IN + below)
     factor, unit = display_unit(diagram.unit, max(float(np.abs(branch.points).max()) for branch in branches))
     lines = [
         _draw_points(axes, branch, factor, colour, name, size)
@@ -69,7 +71,7 @@ def bifurcation_figure(
         series.write(axes, 0.5 * (start + stop), 1.02, f"period {period}", colour=style.QUIET)
     panels = [axes]
     if with_size:
-        panels.append(_draw_sizes(figure, axes, branches))
+        panels.append(_draw_sizes(figure, axes, branches, top))
         style.label_axes(panels[1], parameter, with_unit("std", panels[1].get_ylabel()))
     if down is not None:
         series.legend_row(figure, lines, left_in=0.85, top_in=series.NAMES_AT_IN, heading=diagram.parameter_name)
@@ -99,14 +101,15 @@ def _draw_points(axes: Axes, branch: BifurcationDiagram, factor: float, colour: 
     return Line2D([], [], linestyle="none", marker="o", markersize=5.0, markeredgewidth=0.0, color=colour, label=name)
 
 
-def _draw_sizes(figure: Figure, above: Axes, branches: Sequence[BifurcationDiagram]) -> Axes:
+def _draw_sizes(figure: Figure, above: Axes, branches: Sequence[BifurcationDiagram], top_in: float) -> Axes:
     """Draw the sizes on axes of their own; their unit is left as the label of y."""
-    axes = style.panel(figure, top_in=TOP_IN + POINTS_IN + GAP_IN, bottom_in=BOTTOM_IN, sharex=above)
+    axes = style.panel(figure, top_in=top_in + POINTS_IN + GAP_IN, bottom_in=BOTTOM_IN, sharex=above)
     above.tick_params(labelbottom=False)
-    factor, unit = display_unit(branches[0].unit, max(float(branch.extents.max()) for branch in branches))
+    largest = max(float(branch.extents.max()) for branch in branches)
+    factor, unit = display_unit(branches[0].unit, largest)
     for branch, (_, colour, size) in zip(branches, BRANCHES, strict=False):
         axes.plot(branch.values, branch.extents * factor, ".-", color=colour, markersize=1.6 * size, linewidth=0.9)
-    axes.set_ylim(0.0)
+    axes.set_ylim(0.0, 1.1 * factor * largest or 1.0)
     axes.set_ylabel(unit)
     axes.locator_params(axis="y", nbins=4)
     return axes

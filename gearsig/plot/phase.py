@@ -126,6 +126,7 @@ def embedding_figure(information: MutualInformation, dimension: EmbeddingDimensi
     left.axvline(information.delay_s, color=style.FAULT, linewidth=1.0)
     left.set_ylim(0.0)
     left.set_xlim(0.0, float(information.delays_s[-1]))
+    left.locator_params(axis="x", nbins=5)
     style.label_axes(left, "delay (s)", "mutual information (nats)", title or information.source)
     style.note(left, f"{information.delay_s:.4g} s: {information.rule}")
     d = np.asarray(dimension.dimensions)

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase.chaos_test import mean_square_displacement, zero_one_test, zero_one_test_of_section
+from gearsig.phase.chaos_test import (
+    mean_square_displacement,
+    translation_walk,
+    zero_one_test,
+    zero_one_test_of_section,
+)
 from gearsig.phase.lock import constant_period_lock
 from gearsig.phase.section import locked_section
 from gearsig.phase.types import PhasePortrait
@@ -92,3 +97,17 @@ def test_bad_input():
         zero_one_test(np.where(np.arange(500) == 3, np.nan, 1.0))
     with pytest.raises(InputError, match="damping"):
         zero_one_test(henon(500), damping=-1.0)
+
+
+def test_walk_is_bounded_for_regular_motion_and_wanders_for_chaos():
+    regular, chaotic = quasi_periodic(4000), logistic(4000)
+    size = {name: np.abs(translation_walk(x, 1.3)).max() for name, x in (("regular", regular), ("chaos", chaotic))}
+    assert size["regular"] < 15.0
+    assert size["chaos"] > 2.0 * size["regular"]
+
+
+def test_walk_is_the_sum_that_defines_it():
+    x, c = logistic(300), 1.1
+    step = (x - x.mean()) / x.std()
+    expected = [sum(step[j] * np.cos(c * (j + 1)) for j in range(n + 1)) for n in (0, 10, 299)]
+    np.testing.assert_allclose(translation_walk(x, c)[[0, 10, 299], 0], expected, atol=1e-10)

@@ -1,15 +1,22 @@
 """Poincaré sections, locked and geometric, and the diagrams made of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from gearsig.angle.types import ShaftAngle
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase.bifurcation import bifurcation_diagram, bifurcation_of_recordings, bifurcation_of_runs
+from gearsig.phase.bifurcation import (
+    bifurcation_diagram,
+    bifurcation_of_recordings,
+    bifurcation_of_runs,
+    values_apart,
+)
 from gearsig.phase.lock import CycleLock, constant_period_lock, find_lock
 from gearsig.phase.plane import phase_plane, phase_plane_of
 from gearsig.phase.section import geometric_section, locked_section, section_period
-from gearsig.phase.types import PhasePortrait, PoincareSection
+from gearsig.phase.types import BifurcationDiagram, PhasePortrait, PoincareSection
 from gearsig.recording.types import Channel, Recording
 from gearsig.rig.speed import ConstantSpeed
 from gearsig.rig.types import GearPair, Rig, Shaft
@@ -181,6 +188,51 @@ def test_bifurcation_of_a_model_called_for_each_value():
         lambda force: (duffing(force, 60, PER_PERIOD)[:, 0], DUFFING_PERIOD_S), (0.2, 0.28), DUFFING_RATE, parameter="f"
     )
     assert one_channel.periods == (1, 2)
+
+
+def test_branches_that_go_on_from_their_last_state_show_hysteresis():
+    """The forced oscillator with a bow-shaped resonance curve: two motions at one frequency, by the way there."""
+    state = {}
+
+    def run(frequency, branch):
+        steps, w = 400, 2 * np.pi * frequency
+        h = 1.0 / frequency / steps
+        path, (x, v) = np.empty((60 * steps, 2)), state.get(branch, (0.0, 0.0))
+        for i in range(60 * steps):  # x'' + 0.1 x' + x + x³ = 0.4 cos ωt, by the symplectic Euler method
+            path[i] = x, v
+            v += h * (0.4 * np.cos(w * i * h) - 0.1 * v - x - x**3)
+            x += h * v
+        state[branch] = (x, v)
+        return path[::5], constant_period_lock(1.0 / frequency, 60.0 / frequency)
+
+    values = tuple(np.arange(16, 36, 2) / 100.0)
+    sizes = {}
+    for branch in ("up", "down"):
+        for f in values if branch == "up" else values[::-1]:
+            diagram = bifurcation_of_runs(
+                lambda value, b=branch: run(value, b), [f], 80.0 * f, parameter="f", transient_s=35.0 / f
+            )
+            sizes[branch, f] = float(diagram.extents[0])
+    up, down = (
+        BifurcationDiagram(np.array(values), s, "f", "Hz", "x", "m", np.array(values), (1,) * 10, "period", s)
+        for s in (np.array([sizes[branch, f] for f in values]) for branch in ("up", "down"))
+    )
+    apart = values_apart(up, down)
+    # One harmonic: the small motion exists where (ω² - 1)³ > 27/4 · 3/4 F², the large one up to ω² = 1 + 3/4 (F/cω)².
+    lowest, highest = np.sqrt(1.0 + (81.0 / 16.0 * 0.4**2) ** (1.0 / 3.0)) / (2 * np.pi), 2.0 / (2 * np.pi)
+    assert len(apart) >= 2
+    assert lowest - 0.01 < apart.min() <= apart.max() < highest + 0.01
+    assert all(sizes["up", f] > 2.0 * sizes["down", f] for f in apart)  # a hardening spring
+
+
+def test_apart_needs_two_diagrams_of_the_same_with_extents():
+    diagram = bifurcation_diagram([(1.0, _map_section(np.ones(9)))], parameter="r")
+    assert diagram.extents.tolist() == [0.2]
+    assert values_apart(diagram, diagram).tolist() == []
+    with pytest.raises(InputError, match="without extents"):
+        values_apart(diagram, replace(diagram, extents=np.empty(0)))
+    with pytest.raises(InputError, match="diagrams of x and y"):
+        values_apart(diagram, replace(diagram, axis_name="y"))
 
 
 def test_bifurcation_of_recordings_over_load():

@@ -8,6 +8,7 @@ from matplotlib.text import Text
 
 from gearsig.errors import InputError
 from gearsig.phase.measures import (
+    ChaosTest,
     EmbeddingDimension,
     LyapunovExponent,
     MutualInformation,
@@ -17,6 +18,7 @@ from gearsig.phase.measures import (
 from gearsig.phase.types import BifurcationDiagram, PhasePortrait, PoincareSection
 from gearsig.plot.bifurcation import bifurcation_figure
 from gearsig.plot.phase import (
+    chaos_test_figure,
     divergence_figure,
     embedding_figure,
     phase_portrait_figure,
@@ -88,6 +90,36 @@ def test_bifurcation_draws_all_points_and_names_periods():
     texts = _texts(figure)
     assert {"period 1", "period 2", "speed (rpm)", "displacement (m)"} <= set(texts)
     assert "period 0" not in texts
+
+
+def test_two_branches_shade_where_they_are_apart():
+    values = np.linspace(1000.0, 2000.0, 11)
+    one = np.full(11, 1.0)
+    other = np.where(values < 1350.0, 3.0, 1.0)
+    up, down = (
+        BifurcationDiagram(values, size, "speed", "rpm", "x", "m", values, (1,) * 11, "mesh cycle", size)
+        for size in (one, other)
+    )
+    figure = bifurcation_figure(up, down)
+    points, sizes = figure.axes
+    np.testing.assert_array_equal(points.lines[1].get_ydata(), other)
+    np.testing.assert_array_equal(sizes.lines[1].get_ydata(), other)
+    shaded = [patch.get_extents().transformed(points.transData.inverted()) for patch in points.patches]
+    assert min(box.x0 for box in shaded) == pytest.approx(1000.0)
+    assert max(box.x1 for box in shaded) == pytest.approx(1350.0)
+    assert {"rising", "falling"} <= {text.get_text() for text in figure.legends[0].get_texts()}
+    other_axis = BifurcationDiagram(values, one, "speed", "rpm", "y", "m", values, (1,) * 11, "mesh cycle", one)
+    with pytest.raises(InputError, match="branches of x and y"):
+        bifurcation_figure(up, other_axis)
+
+
+def test_chaos_test_draws_k_and_the_walk():
+    test = ChaosTest(0.9, np.array([0.8, 1.0]), np.array([2.0, 1.0]), 0.0, 500, "irregular", False, "a1")
+    walk = np.column_stack([T, -T])
+    figure = chaos_test_figure(test, walk, 1.5)
+    np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), [1.0, 0.8])  # in the order of c
+    np.testing.assert_array_equal(figure.axes[1].lines[0].get_ydata(), -T)
+    assert {"K = 0.90, irregular, 500 values", "walk at c = 1.500 rad", "p", "q"} <= set(_texts(figure))
 
 
 def test_recurrence_shows_the_matrix_over_time_and_the_measures():

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from time import monotonic
+
 import streamlit as st
 
 from app.bifurcation.folder import Wanted, run_value
 from app.bifurcation.kept import Kept
-from app.bifurcation.measure import CYCLES
 from app.bifurcation.results import NAMES, figure_of, measured_of, points_csv
 from app.dashboard.as_typed import as_typed
 from app.dashboard.laboratory.bifurcation_setup import Range, branch_of, choose_range, motion_s, parameters_of
@@ -19,7 +20,10 @@ from sims.cracked.continuation import SECTIONS
 MOST_VALUES, FIRST_VALUES = 80, 25
 MOST_MOTION_S = 240.0
 """Motion that is simulated at most: a minute or two of waiting."""
-DIRECTIONS = {"both": "up and down", "up": "up", "down": "down", "rest": "each from rest"}
+DIRECTIONS = {"both": "up and down", "up": "up", "down": "down", "rest": "from rest"}
+SECTION_WORDS = {"mesh": "mesh cycle", "shaft": "revolution"}
+PASS_S = 2.5
+"""A fragment hears of a click only when it has run: it runs for so long, shows what there is, and goes on."""
 ASKED, FOUND = "bifurcation asked", "bifurcation found"
 Found = dict[str, list[Kept]]
 
@@ -31,12 +35,12 @@ def show_bifurcation(healthy: Run, faulty: Run | None) -> None:
     first, *numbers = st.columns((3, 2, 2, 2))
     name = first.selectbox("Varied", list(names), format_func=names.__getitem__, key="bifurcation varied")
     chosen = choose_range(run, name, numbers, most=MOST_VALUES, first=FIRST_VALUES)
-    left, middle, right = st.columns(3)
+    left, middle, right = st.columns((2, 3, 2))
     section = left.segmented_control(
         "A point once per",
         SECTIONS,
         default="mesh",
-        format_func=CYCLES.__getitem__,
+        format_func=SECTION_WORDS.__getitem__,
         key="bifurcation section",
         required=True,
     )
@@ -57,7 +61,7 @@ def show_bifurcation(healthy: Run, faulty: Run | None) -> None:
 
 
 def _run_and_show(run: Run, wanted: Wanted, chosen: Range) -> None:
-    """Run what is missing if that was asked for; a click anywhere stops it, and what is complete stays."""
+    """Run what is missing if that was asked for, showing it as it comes; what is complete stays when it is stopped."""
     question = repr(wanted.definition())
     with st.container(horizontal=True):
         st.button("Draw", type="primary", icon=":material/play_arrow:", on_click=_ask, args=(question,))
@@ -65,27 +69,34 @@ def _run_and_show(run: Run, wanted: Wanted, chosen: Range) -> None:
     known, found = st.session_state.get(FOUND, ("", {}))
     if known != question:
         found = {name: [] for name in wanted.branches}
+    more = False
     if st.session_state.get(ASKED) == question:
         _check(run, wanted)
         st.session_state[FOUND] = (question, found)
-        _fill(wanted, found)
+        more = _fill(wanted, found)
     if any(measured_of(values) for values in found.values()):
         _show(wanted, found, chosen)
     else:
         st.caption("Nothing is drawn yet: a value takes about half a second, in either direction.")
+    if more:
+        st.rerun(scope="fragment")
 
 
-def _fill(wanted: Wanted, found: Found) -> None:
-    n, bar = wanted.n_values, st.progress(0.0, "Simulating …")
+def _fill(wanted: Wanted, found: Found) -> bool:
+    """Run values for a while; return whether some are left."""
+    n, bar, until = wanted.n_values, st.progress(0.0, "Simulating …"), monotonic() + PASS_S
     for name in wanted.branches:
         values = wanted.branch.values[:: -1 if name == "down" else 1]
         for value in values[len(found[name]) :]:
             done = sum(len(kept) for kept in found.values())
             bar.progress(done / n, f"{NAMES[name]}: {value:.5g} ({done} of {n} values)")
+            if monotonic() > until:
+                return True
             ends = [one.end for one in found[name] if one.end is not None]
             before = ends[-1] if ends and name != "rest" else None
             found[name].append(run_value(wanted, value, before))
     bar.empty()
+    return False
 
 
 def _show(wanted: Wanted, found: Found, chosen: Range) -> None:
@@ -94,7 +105,7 @@ def _show(wanted: Wanted, found: Found, chosen: Range) -> None:
     st.caption(
         "Upper panel: one point per cycle; a single point is a motion that repeats each cycle, two a motion that takes "
         "two cycles, a smear one that never repeats. Lower panel: how large the motion is. Shaded: two motions are "
-        "possible." + ("" if n_done == wanted.n_values else f" Stopped after {n_done} of {wanted.n_values} values.")
+        "possible." + ("" if n_done == wanted.n_values else f" So far {n_done} of {wanted.n_values} values.")
     )
     reasons = [one for kept in found.values() for one in kept if one.reason]
     if reasons:
