@@ -14,7 +14,7 @@ from gearsig.orders.revolutions import times_of_revolutions, unit_of
 from gearsig.orders.vold_kalman_ends import end_notes, settled_parts
 from gearsig.orders.vold_kalman_groups import Coupling, coupling_notes, grouped
 from gearsig.orders.vold_kalman_neighbours import check_distinct, check_record_length, mask_notes, neighbours_of
-from gearsig.orders.vold_kalman_solve import accuracy_of, waveform_accuracy_of
+from gearsig.orders.vold_kalman_solve import accuracy_of, cheap_together, waveform_accuracy_of
 from gearsig.orders.vold_kalman_splines import BoolArray
 from gearsig.orders.vold_kalman_sweeps import Problem, solve_groups
 from gearsig.orders.vold_kalman_tracks import (
@@ -68,7 +68,8 @@ def track_vold_kalman(
         The first has two poles and a fixed shape; take the second unless results are to be compared.
     coupled : "automatic", True, False, or groups
         Which orders are solved for together, so that crossing and close ones share the signal between them. Automatic:
-        those of which more than 1e-4 would pass through each other's bands at any time; the notes give the reason.
+        those of which more than 1e-4 would pass through each other's bands at any time, the groups in turn on what the
+        others leave; or all, where bands are so narrow that this is faster. The notes give the reason.
         True: all. False: one by one. Groups: as positions in `orders`, e.g. [[0, 2]]; the others are solved for alone.
     mirror : bool
         Of the second generation: count each order's mirror image at negative frequency as part of the signal, which it
@@ -195,8 +196,9 @@ def _separated(
     check_record_length(tracks, widths, valid, rate)
     neighbours = neighbours_of(tracks, widths, valid, skirt_poles)
     check_distinct(neighbours, tracks)
-    groups = grouped(coupled, neighbours, len(valid))
     used = _continued(widths, valid) / rate
+    cheap = generation == "second" and cheap_together(used, p)
+    groups = grouped(coupled, neighbours, len(valid), cheap=cheap)
     problem = Problem(tracks.cycles, valid, used, p, generation, mirror)
     envelopes, waveforms, left = solve_groups(y, problem, groups, share=isinstance(coupled, str))
     settled = settled_parts(widths, valid, rate, skirt_poles)

@@ -21,8 +21,14 @@ def fold(values: Array, first: int, last: int, out: FloatArray) -> None:
 
     Beyond its ends, `values` continues with its first and last one.
     """
-    highest = len(values) - 1
-    for i in range(out.shape[1]):
+    highest, n = len(values) - 1, out.shape[1]
+    if first >= 0 and first + n <= highest + 1 and last <= highest and last + 1 >= n:  # plain copies: several at once
+        for i in range(n):
+            out[0, i] = values[first + i]
+        for i in range(n):
+            out[1, i] = values[last - i]
+        return
+    for i in range(n):
         out[0, i] = values[min(max(first + i, 0), highest)]
         out[1, i] = values[min(max(last - i, 0), highest)]
 

@@ -19,13 +19,13 @@ LARGEST_LEAK = 1e-4
 NOTED_LEAK = 0.03
 
 
-def grouped(coupled: Coupling, neighbours: Sequence[Neighbours], n_orders: int) -> list[Group]:
+def grouped(coupled: Coupling, neighbours: Sequence[Neighbours], n_orders: int, *, cheap: bool) -> list[Group]:
     """Return the positions of the orders solved for together; each order is in one group.
 
     "automatic": orders are in one group if, at any time, more than `LARGEST_LEAK` of one would pass through the band of
-    the other, and with them those that either is grouped with.
+    the other, and with them those that either is grouped with. Where that is `cheap`, all are.
     """
-    if coupled is True:
+    if coupled is True or (cheap and isinstance(coupled, str) and coupled == "automatic"):
         return [np.arange(n_orders)]
     if coupled is False:
         return [np.array([k]) for k in range(n_orders)]
@@ -58,6 +58,8 @@ def coupling_notes(groups: Sequence[Group], neighbours: Sequence[Neighbours], tr
             )
     apart = [k for k in range(len(tracks.names)) if len(groups[group_of[k]]) == 1]
     leaks = [p.leak for p in neighbours if group_of[p.k] != group_of[p.m]]
+    if len(groups) == 1 and len(tracks.names) > 1 and not notes:
+        notes.append("all orders are solved for together, though they lie far apart")
     if len(groups) > 1 and apart and max(leaks, default=1.0) <= LARGEST_LEAK:
         names = ", ".join(repr(tracks.names[k]) for k in apart)
         notes.append(

@@ -23,6 +23,10 @@ STRONGEST_ELIMINATED = 1.5e5
 SMALLEST_CELL = 3
 """Samples. Below, the band is so wide that the coarse grid saves nothing, and elimination loses no digits."""
 
+CHEAP_CELL, MOST_TOGETHER = 16, 8
+"""Samples per cell from which, and orders up to which, the coarse grid is faster than several solutions (trials)."""
+ACCURATE = 1e-7
+
 
 def solve_envelopes(
     y: FloatArray,
@@ -146,6 +150,12 @@ def accuracy_of(bandwidths: FloatArray, p: int) -> float:
     if d:
         return expected_error(float(bandwidths.min()), float(bandwidths.max()), d, p)
     return _error_of_strength(2.0**p * float(envelope_weight(bandwidths.min()[None], p)[0]))
+
+
+def cheap_together(bandwidths: FloatArray, p: int) -> bool:
+    """Return whether one solution of the second generation for all orders takes less time than several for groups."""
+    few = 1 < len(bandwidths) <= MOST_TOGETHER
+    return few and cell_of(bandwidths, p) >= CHEAP_CELL and accuracy_of(bandwidths, p) <= ACCURATE
 
 
 def waveform_accuracy_of(cycles: FloatArray, active: BoolArray, bandwidths: FloatArray) -> float:

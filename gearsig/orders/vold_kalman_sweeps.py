@@ -17,8 +17,8 @@ from gearsig.orders.vold_kalman_types import Generation
 
 Rows = Group | slice
 MOST_SWEEPS = 20
-ENOUGH = 1e-6
-"""Change of any waveform, as a share of the signal's largest value, below which another sweep is not worth it."""
+ENOUGH = 2e-7
+"""Change of any waveform by a further sweep, as a share of the signal's largest value, that is not worth it."""
 
 
 @dataclass(frozen=True)
