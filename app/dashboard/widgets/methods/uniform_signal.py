@@ -65,6 +65,7 @@ def signal_of(stretch: Stretch, *, over_angle: bool) -> UniformSignal:
 @st.cache_resource(max_entries=4, show_spinner=False)
 def _over_angle(key: str, _stretch: Stretch) -> UniformSignal:
     """Resample once; the answer is frozen, so that sessions may share it."""
+    from gearsig.angle.interpolation import PASSBAND
     from gearsig.angle.resample import resample_to_angle
     from gearsig.timefreq.uniform import uniform
 
@@ -73,7 +74,11 @@ def _over_angle(key: str, _stretch: Stretch) -> UniformSignal:
         raise RefusalError(
             "the shaft's angle is not known in this stretch", remedy="choose another stretch, or look over time"
         )
-    return uniform(resample_to_angle(_stretch.recording, _stretch.angle, channels=[_stretch.channel]), _stretch.channel)
+    # As many samples as there are at the highest speed: what goes beyond at lower ones is not valid at all speeds.
+    fastest = max(_stretch.angle.speed_range_rpm[1] / 60.0, 1e-9)
+    highest = PASSBAND * _stretch.recording.sampling_rate_hz / fastest
+    signal = resample_to_angle(_stretch.recording, _stretch.angle, channels=[_stretch.channel], highest_order=highest)
+    return uniform(signal, _stretch.channel)
 
 
 def waveforms_over(signal: UniformSignal, stretch: Stretch, columns: Mapping[str, FloatArray], step: str) -> Waveforms:
