@@ -68,3 +68,15 @@ def test_mean_over_a_band_is_named_and_must_belong_to_the_map():
     other = spectral_coherence(_signal(9000), FS, highest_alpha_hz=200.0, n_bands=16)
     with pytest.raises(InputError, match="does not belong"):
         coherence_figure(other, band)
+
+
+def test_coherence_may_be_drawn_between_limits():
+    found = spectral_coherence(_signal(30_001), FS, highest_alpha_hz=200)
+    below, above, *_ = coherence_figure(found, limits=(20.0, 60.0)).axes
+    low, high = below.get_xlim()
+    assert (low, high) == pytest.approx((20.0, 60.0), abs=found.alpha_resolution)
+    x = above.lines[0].get_xdata()
+    assert 20.0 <= min(x) <= max(x) <= 60.0
+    for limits in ((60.0, 20.0), (300.0, 400.0)):
+        with pytest.raises(InputError, match="limits are"):
+            coherence_figure(found, limits=limits)

@@ -72,3 +72,14 @@ def test_colours_span_the_asked_range(levels_of):
     assert mesh.get_clim() == pytest.approx((-40.0, 0.0))
     with pytest.raises(InputError, match="dynamic_range_db"):
         time_frequency_figure(levels_of(values), dynamic_range_db=0)
+
+
+def test_ridges_may_be_numbered(levels_of):
+    levels = levels_of(np.ones((50, 20)))
+    alone = np.zeros(50, dtype=bool)
+    found = [Ridge(levels.at, np.full(50, place), np.ones(50), alone, "frequency", "g") for place in (5.0, 12.0)]
+    numbers = [
+        text for text in time_frequency_figure(levels, found, numbered=True).axes[0].texts if text.get_bbox_patch()
+    ]
+    assert [(text.get_text(), text.get_position()[1]) for text in numbers] == [("1", 5.0), ("2", 12.0)]
+    assert not any(text.get_bbox_patch() for text in time_frequency_figure(levels, found).axes[0].texts)

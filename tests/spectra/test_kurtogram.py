@@ -208,3 +208,28 @@ def test_bearing_race_is_named_through_the_kurtograms_own_band(file, race_hz, ot
     largest = chosen.spectrum.positions[10 + np.argmax(chosen.spectrum.values[10:])]
     assert over_floor(race_hz) > max(8.0, 2.5 * over_floor(other_hz))
     assert min(abs(largest / race_hz - h) / h for h in (1, 2, 3, 4)) < 0.02
+
+
+def test_a_band_may_be_given_and_has_the_kurtosis_of_the_tree_there():
+    x = knocks(200_000, np.random.default_rng(1))
+    chosen = kurtogram_envelope(recording_of(x), "a")
+    given_one = kurtogram_envelope(recording_of(x), "a", band_hz=chosen.band.band_hz)
+    assert given_one.band.band_hz == chosen.band.band_hz
+    assert given_one.band.level == pytest.approx(chosen.band.level)
+    assert given_one.band.kurtosis == pytest.approx(chosen.band.kurtosis, rel=0.25)  # the filters' skirts differ
+    assert given_one.band.standard_error == pytest.approx(chosen.band.standard_error, rel=0.02)
+    np.testing.assert_array_equal(given_one.spectrum.values, chosen.spectrum.values)
+
+
+@pytest.mark.parametrize("band_hz", [(3000.0, 11_000.0), (4000.0, 3000.0), (0.0, 0.01), (float("nan"), 3000.0)])
+def test_a_band_outside_of_the_spectrum_is_refused(band_hz):
+    x = np.random.default_rng(2).normal(size=20_000)
+    with pytest.raises(InputError, match="band"):
+        kurtogram_envelope(recording_of(x), "a", band_hz=band_hz)
+
+
+@pytest.mark.parametrize("highest_hz", [1e-9, 4000.0, 0.0, float("nan")])
+def test_a_modulation_that_no_envelope_shows_is_refused(highest_hz):
+    x = np.random.default_rng(2).normal(size=20_000)
+    with pytest.raises(InputError, match="highest_modulation_hz is"):
+        kurtogram_envelope(recording_of(x), "a", highest_modulation_hz=highest_hz)

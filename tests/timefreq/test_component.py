@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from gearsig.errors import InputError
+from gearsig.errors import InputError, RefusalError
 from gearsig.timefreq.component import component
 from gearsig.timefreq.cwt import cwt, cwt_map
 from gearsig.timefreq.inverse import inverse
+from gearsig.timefreq.lines import lowest_possible
 from gearsig.timefreq.ridges import ridges
 from gearsig.timefreq.stft import stft
 from gearsig.timefreq.types import Ridge
@@ -90,3 +91,16 @@ def test_half_width_has_limits():
     ridge = Ridge(T[[0, -1]], np.array([100.0, 400.0]), np.ones(2), np.zeros(2, bool), "frequency", "")
     with pytest.raises(InputError, match="half_width"):
         component(signal, ridge, half_width=0.6)
+
+
+def test_a_ridge_at_the_lowest_line_has_a_component():
+    """The band's lower half would need a longer signal; the upper half is there."""
+    n = 1000
+    signal = UniformSignal(np.cos(2 * np.pi * 8.0 * np.arange(n) / 2000.0), 2000.0)
+    lowest = lowest_possible(signal, Morse())
+    at = np.array([0.0, n / 2000.0])
+    ridge = Ridge(at, np.full(2, max(lowest, 8.0)), np.ones(2), np.zeros(2, dtype=bool), "frequency", "")
+    assert np.isfinite(component(signal, ridge).values).all()
+    below = Ridge(at, np.full(2, 0.5 * lowest), np.ones(2), np.zeros(2, dtype=bool), "frequency", "")
+    with pytest.raises(RefusalError, match="shorter than the wavelet"):
+        component(signal, below)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.timefreq.packets import packet_inverse, wavelet_packet_map, wavelet_packets
+from gearsig.timefreq.packets import natural_order, node_path, packet_inverse, wavelet_packet_map, wavelet_packets
 from gearsig.timefreq.uniform import UniformSignal
 
 
@@ -61,6 +61,31 @@ def test_order_bands(swept_angle_signal):
     levels = wavelet_packet_map(swept_angle_signal, "a", level=4)
     assert levels.axis == "order"
     assert levels.positions[np.argmax(levels.values.mean(axis=0))] == pytest.approx(7.0)
+
+
+@pytest.mark.parametrize("level", [1, 3, 5])
+def test_nodes_have_the_paths_and_orders_of_pywavelets(level):
+    x = np.random.default_rng(4).normal(size=32 * 32)
+    packets = wavelet_packets(UniformSignal(x, 1000.0), wavelet="db2", level=level)
+    tree = pywt.WaveletPacket(x, "db2", mode="periodization", maxlevel=level)
+    bands = range(packets.n_bands)
+    assert [node_path(band, level) for band in bands] == [node.path for node in tree.get_level(level, order="freq")]
+    natural = [node.path for node in tree.get_level(level, order="natural")]
+    assert [node_path(int(band), level) for band in natural_order(packets.n_bands)] == natural
+    for band in bands:
+        np.testing.assert_allclose(packets.values[band], tree[node_path(band, level)].data, atol=1e-12)
+
+
+def test_energies_of_the_nodes_add_up_to_the_signal(swept_angle_signal):
+    packets = wavelet_packets(swept_angle_signal, "a", level=4)
+    assert packets.level == 4
+    assert packets.energies.sum() == pytest.approx(np.square(swept_angle_signal.values("a")).sum())
+    assert packets.limits_of(int(np.argmax(packets.energies))) == (6.0, 8.0)
+
+
+def test_a_node_that_is_not_there_is_named():
+    with pytest.raises(InputError, match="band 4 is not there"):
+        node_path(4, 2)
 
 
 def test_wrong_input_is_named():
