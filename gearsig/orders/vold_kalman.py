@@ -3,34 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 
 from gearsig.angle.types import AngleSignal, ShaftAngle
-from gearsig.checks import FloatArray, frozen_array, one_of, positive
+from gearsig.checks import FloatArray, frozen_array, positive
 from gearsig.errors import InputError
-from gearsig.orders.revolutions import times_of_revolutions, unit_of
-from gearsig.orders.vold_kalman_ends import end_notes, settled_parts
-from gearsig.orders.vold_kalman_groups import Coupling, coupling_notes, grouped
-from gearsig.orders.vold_kalman_neighbours import check_distinct, check_record_length, mask_notes, neighbours_of
-from gearsig.orders.vold_kalman_solve import accuracy_of, cheap_together, waveform_accuracy_of
-from gearsig.orders.vold_kalman_splines import BoolArray
-from gearsig.orders.vold_kalman_sweeps import Problem, solve_groups
-from gearsig.orders.vold_kalman_tracks import (
-    OrderLike,
-    Tracks,
-    bandwidths_of,
-    tracks_of_orders,
-    tracks_over_angle,
-    valid_parts,
-)
-from gearsig.orders.vold_kalman_types import FrequencyTrack, Generation, OrderSeparation, SeparatedOrder
-from gearsig.orders.vold_kalman_weight import checked_poles
+from gearsig.orders.revolutions import unit_of
+from gearsig.orders.vold_kalman_groups import Coupling
+from gearsig.orders.vold_kalman_separate import Method, separated
+from gearsig.orders.vold_kalman_tracks import OrderLike, bandwidths_of, tracks_of_orders, tracks_over_angle
+from gearsig.orders.vold_kalman_types import FrequencyTrack, Generation, OrderSeparation
 from gearsig.recording.types import Recording
-
-FEWEST_SAMPLES = 16
-NOTED_ERROR = 1e-5
 
 
 def track_vold_kalman(
@@ -93,12 +77,11 @@ def track_vold_kalman(
 
     Notes
     -----
-    Numerical error: about 1e-11 of the largest component for an order solved for alone, below 1e-6 for narrow bands
-    solved for together, see `expected_error`.
-    Not for transients shorter than 1/B, and not where only levels over speed are asked for: `track_order_bands` is
-    enough. Close orders are told apart only over times in which they beat, about one over their distance. Near
-    standstill an order meets its own mirror image: the part where the band reaches zero is left out. Memory: about 80
-    bytes per sample and order, and up to 0.5 GB.
+    Numerical error: about 1e-11 of the largest component for an order solved for alone, below 1e-6 for several, see
+    `expected_error`. Not for transients shorter than 1/B, and not where only levels over speed are asked for:
+    `track_order_bands` is enough. Close orders are told apart only over times in which they beat, about one over their
+    distance. Near standstill an order meets its own mirror image: the part where the band reaches zero is left out.
+    Memory: about 80 bytes per sample and order, and up to 0.3 GB.
 
     References
     ----------
@@ -106,28 +89,24 @@ def track_vold_kalman(
     C. Feldbauer, R. Höldrich, "Realization of a Vold-Kalman tracking filter – a least squares problem", 2000.
     J. Tůma, "Setting the passband width in the Vold-Kalman order tracking filter", 2005.
     """
-    options = (n_poles, generation, coupled, mirror)
+    method = Method(n_poles, generation, coupled, mirror)
+    y = recording.values(channel)
     if isinstance(recording, AngleSignal):
         if shaft_angle is not None:
             raise InputError("a signal over angle has its own shaft angle", where="shaft_angle", remedy="leave it out")
         tracks = tracks_over_angle(orders, recording)
         widths = bandwidths_of(tracks, bandwidth_hz, bandwidth_orders)
         rate = float(recording.samples_per_revolution)
-        times = times_of_revolutions(
-            recording.shaft_angle, recording.start_revolution, 1.0 / rate, recording.samples.shape[1]
-        )
-        source = (unit_of(recording, channel), channel)
-        return _separated(recording.values(channel), rate, times, tracks, widths, *options, *source)
-    y, rate = recording.values(channel), recording.sampling_rate_hz
-    angle = shaft_angle
+        return separated(y, rate, tracks, widths, method, unit=unit_of(recording, channel), source=channel)
+    rate, angle = recording.sampling_rate_hz, shaft_angle
     if angle is None and _needs_angle(orders, bandwidth_orders is not None):
         from gearsig.angle.shaft import find_shaft_angle
 
         angle = find_shaft_angle(recording)
     tracks = tracks_of_orders(orders, angle, recording.rig, len(y), rate)
     widths = bandwidths_of(tracks, bandwidth_hz, bandwidth_orders)
-    source = (recording.channels[recording.index(channel)].unit, channel)
-    return _separated(y, rate, recording.time_s(), tracks, widths, *options, *source)
+    unit = recording.channels[recording.index(channel)].unit
+    return separated(y, rate, tracks, widths, method, unit=unit, source=channel)
 
 
 def separate_frequencies(
@@ -165,100 +144,9 @@ def separate_frequencies(
     given = [FrequencyTrack(f"component {k}", f) for k, f in enumerate(frequencies_hz, start=1)]
     tracks = tracks_of_orders(given, None, None, len(y), rate)
     widths = bandwidths_of(tracks, bandwidth_hz, None)
-    return _separated(y, rate, np.arange(len(y)) / rate, tracks, widths, n_poles, generation, coupled, mirror, "", "")
+    return separated(y, rate, tracks, widths, Method(n_poles, generation, coupled, mirror))
 
 
 def _needs_angle(orders: Sequence[OrderLike], in_orders: bool) -> bool:
     """Return whether any order, or a bandwidth in orders, cannot be told without the shaft's angle."""
     return any(not isinstance(wanted, FrequencyTrack) or (in_orders and np.isnan(wanted.order)) for wanted in orders)
-
-
-def _separated(
-    y: FloatArray,
-    rate: float,
-    time_s: FloatArray,
-    tracks: Tracks,
-    widths: FloatArray,
-    n_poles: int,
-    generation: Generation,
-    coupled: Coupling,
-    mirror: bool,
-    unit: str,
-    source: str,
-) -> OrderSeparation:
-    """Check, solve and wrap; widths in the unit of the tracks."""
-    one_of(generation, "generation", ("first", "second"))
-    p = checked_poles(n_poles) if generation == "second" else 2
-    skirt_poles = p if generation == "second" else 1
-    if len(y) < FEWEST_SAMPLES:
-        raise InputError(f"the signal has {len(y)} samples", allowed=f"at least {FEWEST_SAMPLES}")
-    valid = valid_parts(tracks, widths, rate, generation)
-    check_record_length(tracks, widths, valid, rate)
-    neighbours = neighbours_of(tracks, widths, valid, skirt_poles)
-    check_distinct(neighbours, tracks)
-    used = _continued(widths, valid) / rate
-    cheap = generation == "second" and cheap_together(used, p)
-    groups = grouped(coupled, neighbours, len(valid), cheap=cheap)
-    problem = Problem(tracks.cycles, valid, used, p, generation, mirror)
-    envelopes, waveforms, left = solve_groups(y, problem, groups, share=isinstance(coupled, str))
-    settled = settled_parts(widths, valid, rate, skirt_poles)
-    error = left + max(_expected_error(tracks.cycles[g], valid[g], used[g], p, generation) for g in groups)
-    notes = [
-        *mask_notes(tracks, valid),
-        *end_notes(tracks, widths, settled, skirt_poles),
-        *coupling_notes(groups, neighbours, tracks),
-        *_error_notes(error),
-    ]
-    to_hz = tracks.speed_rev_per_s if tracks.unit == "orders" else None
-    separated = tuple(
-        SeparatedOrder(
-            name=tracks.names[k],
-            shaft=tracks.shafts[k],
-            order=float(tracks.orders[k]),
-            envelope=envelopes[k],
-            waveform=waveforms[k],
-            frequency_hz=tracks.frequency_hz[k] if to_hz is None else tracks.frequency_hz[k] * to_hz,
-            bandwidth_hz=widths[k] if to_hz is None else widths[k] * to_hz,
-            valid=valid[k],
-            settled=settled[k],
-            time_s=time_s,
-            unit=unit,
-            source=source,
-        )
-        for k in range(len(valid))
-    )
-    residual = y.astype(np.float64)
-    for waveform in waveforms:
-        residual -= waveform
-    members = tuple(tuple(int(k) for k in group) for group in groups)
-    axis: Literal["time", "angle"] = "time" if to_hz is None else "angle"
-    return OrderSeparation(separated, residual, rate, axis, generation, p, members, error, tuple(notes))
-
-
-def _expected_error(
-    cycles: FloatArray, valid: BoolArray, bandwidths: FloatArray, p: int, generation: Generation
-) -> float:
-    """Return that of one group; bandwidths in cycles per sample."""
-    return accuracy_of(bandwidths, p) if generation == "second" else waveform_accuracy_of(cycles, valid, bandwidths)
-
-
-def _error_notes(error: float) -> list[str]:
-    if error <= NOTED_ERROR:
-        return []
-    return [
-        (
-            f"rounding may reach {error:.1g} of the largest component: the band is too narrow for this rate, or the "
-            "bandwidths differ too much for one solution"
-        )
-    ]
-
-
-def _continued(widths: FloatArray, valid: BoolArray) -> FloatArray:
-    """Return the bandwidths, those outside the valid part limited to those inside it: zero width has no weight."""
-    if widths.shape[1] == 1:
-        return widths
-    out = np.empty_like(widths)
-    for k, width in enumerate(widths):
-        inside = width[valid[k]]
-        out[k] = np.clip(width, inside.min(), inside.max())
-    return out

@@ -101,13 +101,13 @@ def _step_two(form: State, x: Array, data: FloatArray, q: FloatArray, gains: Flo
     gain_x = _scaled(q[row, i], xv_r)
     _store_symmetric(gains, row, i, r)
     _store_at(gains, row, i, 3, gain_x)
-    xx = _difference(xx, _product(gain_x, _transposed(xv)))
+    xx = _upper(_difference(xx, _product(gain_x, _transposed(xv))))
     g_x -= _applied(gain_x, g_v)
     g_v = _applied(r, g_v)
     x[i] = q[row, i] * g_v
     # x = x' - v'
     xv = _difference(xv_r, xx)
-    return xx, xv, _difference(_difference(vv, _transposed(xv_r)), xv), g_x, g_v - g_x
+    return xx, xv, _upper(_difference(_difference(vv, _transposed(xv_r)), xv)), g_x, g_v - g_x
 
 
 @njit(cache=True, nogil=True, fastmath=FINITE, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
@@ -167,16 +167,16 @@ def _step_three(form: State, x: Array, data: FloatArray, q: FloatArray, gains: F
     _store_at(gains, row, i, 3, gain_x)
     _store_at(gains, row, i, 7, gain_v)
     to_a, to_v = _transposed(xa), _transposed(va)
-    xx, xv = _difference(xx, _product(gain_x, to_a)), _difference(xv, _product(gain_x, to_v))
-    vv = _difference(vv, _product(gain_v, to_v))
+    xx, xv = _upper(_difference(xx, _product(gain_x, to_a))), _difference(xv, _product(gain_x, to_v))
+    vv = _upper(_difference(vv, _product(gain_v, to_v)))
     g_x, g_v, g_a = g_x - _applied(gain_x, g_a), g_v - _applied(gain_v, g_a), _applied(r, g_a)
     x[i] = q[row, i] * g_a
     # v = v' - a'
     xa, va = _difference(xa_r, xv), _difference(va_r, vv)
-    aa = _difference(_difference(aa, _transposed(va_r)), va)
+    aa = _upper(_difference(_difference(aa, _transposed(va_r)), va))
     # x = x' - v'
     va, x_v = _difference(va, xa), _difference(xv, xx)
-    vv = _difference(_difference(vv, _transposed(xv)), x_v)
+    vv = _upper(_difference(_difference(vv, _transposed(xv)), x_v))
     return (xx, x_v, xa, vv, va, aa), (g_x, g_v - g_x, g_a - g_v)
 
 
@@ -238,6 +238,12 @@ def _difference(a: Block, b: Block) -> Block:
 @njit(cache=True, nogil=True, fastmath=FINITE, error_model="numpy", forceinline=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _transposed(a: Block) -> Block:
     return a[0], a[2], a[1], a[3]
+
+
+@njit(cache=True, nogil=True, fastmath=FINITE, error_model="numpy", forceinline=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _upper(a: Block) -> Block:
+    """Return a symmetric block from its upper triangle: what is below is then not computed at all."""
+    return a[0], a[1], a[1], a[3]
 
 
 @njit(cache=True, nogil=True, fastmath=FINITE, error_model="numpy", forceinline=True)  # type: ignore[untyped-decorator,unused-ignore]

@@ -35,6 +35,7 @@ class Tracks:
     cycles: FloatArray
     frequency_hz: FloatArray
     known: BoolArray
+    time_s: FloatArray
     speed_rev_per_s: FloatArray | None = None
     unit: str = "Hz"
     duration_unit: str = "s"
@@ -75,7 +76,8 @@ def tracks_of_orders(
     if turned is None and angle is not None:
         turned = _sampled_angle(angle, n, sampling_rate_hz)
     speed = None if turned is None else turned[1]
-    return Tracks(tuple(names), tuple(shafts), np.array(numbers), cycles, frequency, known, speed)
+    time_s = np.arange(n) / sampling_rate_hz
+    return Tracks(tuple(names), tuple(shafts), np.array(numbers), cycles, frequency, known, time_s, speed)
 
 
 def tracks_over_angle(orders: Sequence[OrderLike], signal: AngleSignal) -> Tracks:
@@ -109,6 +111,7 @@ def tracks_over_angle(orders: Sequence[OrderLike], signal: AngleSignal) -> Track
         np.multiply.outer(numbers, revolutions),
         np.broadcast_to(np.array(numbers)[:, None], (len(numbers), n)),
         np.ones(n, dtype=bool),
+        times,
         np.asarray(angle.speed_rpm_at(times) / 60.0),
         "orders",
         "revolutions",
