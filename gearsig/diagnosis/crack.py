@@ -10,6 +10,7 @@ from gearsig.diagnosis.types import CannotTell, Finding, Kind, Where
 from gearsig.errors import RefusalError
 from gearsig.recording.types import Recording
 from gearsig.rig.types import GearPair, Rig
+from gearsig.severity.kind import CRACKED
 from gearsig.severity.types import CrackEstimate, NoCrackSeen
 
 SAME_PLACE_PITCHES = 1.5
@@ -29,6 +30,9 @@ LIMIT_WITH_REFERENCE = 0.98
 
 SETTLED_PERCENT = 50.0
 """If a crack through half of the root would have shown against the reference, the teeth count as examined."""
+
+OTHER_DAMAGE = "chipped or spalled"
+"""Kind of an estimate that is no crack's."""
 
 _INTERVAL = "90 % of simulated cracks lie within such intervals"
 
@@ -88,7 +92,7 @@ def _merged(found: Finding, crack: CrackEstimate, rig: Rig) -> Finding:
     return replace(
         found,
         kind=min(found.kind, own.kind, key=list(Kind).index),
-        title=f"Local tooth damage at {place} of {crack.gear}{_mate(crack)}: as a root crack {_depth(crack)}.",
+        title=f"Local tooth damage at {place} of {crack.gear}{_mate(crack)}{_what(crack)}.",
         where=replace(own.where, channels=found.where.channels),
         confidence=max(found.confidence, own.confidence),
         confidence_basis=f"{found.confidence_basis}; {_INTERVAL}",
@@ -105,14 +109,14 @@ def _seen(crack: CrackEstimate, rig: Rig) -> Finding:
     confidence *= WITH_ASSUMED_DATA if rig.assumed else 1.0
     tooth = crack.tooth
     return Finding(
-        "root-crack",
+        "root-crack" if crack.kind != OTHER_DAMAGE else "tooth-local-damage",
         Kind.FAULT if confidence >= CLEAR else Kind.SUSPICION,
         crack.text,
         Where(shaft=crack.shaft, gear=crack.gear, angle_deg=crack.angle_deg, tooth=tooth),
         confidence=confidence,
         confidence_basis="chance of as clear a change on sound gears "
         f"{p_text(crack.p_value)}, by simulation; {_INTERVAL}",
-        evidence=(_share_text(crack), *crack.reasons),
+        evidence=(_share_text(crack), *_kind_text(crack), *crack.reasons),
         surer="Look at the tooth." if crack.with_reference else "A recording of the same gears when they were sound.",
     )
 
@@ -175,10 +179,23 @@ def _depth(crack: CrackEstimate) -> str:
     return f"{crack.depth_mm:.1f} mm ({crack.interval_mm[0]:.1f} to {crack.interval_mm[1]:.1f} mm)"
 
 
+def _what(crack: CrackEstimate) -> str:
+    if crack.kind == OTHER_DAMAGE:
+        return f", {OTHER_DAMAGE} rather than cracked"
+    doubt = "; or it is chipped or spalled" if crack.kind != CRACKED else ""
+    return f": as a root crack {_depth(crack)}{doubt}"
+
+
+def _kind_text(crack: CrackEstimate) -> tuple[str, ...]:
+    if not crack.kind_probabilities:
+        return ()
+    shares = ", ".join(f"{kind} {100 * share:.0f} %" for kind, share in crack.kind_probabilities.items())
+    return (f"By its shape it is {shares}, if cracks are as frequent as chips and spalls together.",)
+
+
 def _share_text(crack: CrackEstimate) -> str:
     low, high = crack.interval_percent
-    share = f"it takes {crack.depth_percent:.0f} % of the root away ({low:.0f} to {high:.0f} %)"
-    return f"Depth {_depth(crack)}: {share}."
+    return f"A crack of {_depth(crack)} takes {crack.depth_percent:.0f} % of the root ({low:.0f} to {high:.0f} %)."
 
 
 def _mate(crack: CrackEstimate) -> str:

@@ -57,7 +57,7 @@ def gallery(analysis: Analysis) -> Gallery:
     groups = [Group("Recording", tuple(_recording_pictures(analysis)))]
     crack = crack_picture(analysis)
     if crack is not None:
-        groups.insert(0, Group("The cracked tooth", (crack,)))
+        groups.insert(0, Group("The damaged tooth", (crack,)))
     left_out: list[str] = []
     n_bytes = sum(_size(group) for group in groups)
     detailed = _detailed_channels(analysis)

@@ -226,9 +226,9 @@ def test_report_with_a_reference_compares_all_but_itself(capsys: pytest.CaptureF
     assert code == 0
     assert "root_crack_2mm.h5: Fault: Crack of" in out
     page = (tmp_path / "root_crack_2mm.html").read_text()
-    assert "The cracked tooth" in page
+    assert "The damaged tooth" in page
     assert "Compared with root_crack_0mm.h5" in page
-    assert "The cracked tooth" not in (tmp_path / "root_crack_0mm.html").read_text()
+    assert "The damaged tooth" not in (tmp_path / "root_crack_0mm.html").read_text()
 
 
 def test_report_with_pulse_times_is_of_one_recording(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

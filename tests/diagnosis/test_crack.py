@@ -57,6 +57,16 @@ def test_a_tooth_found_both_ways_is_one_fault_with_its_depth() -> None:
     assert {"It comes back.", "Compared with a reference."} <= set(found[0].evidence)
 
 
+def test_a_chipped_tooth_is_not_called_cracked() -> None:
+    chipped = replace(CRACK, kind_probabilities={"cracked": 0.1, "chipped": 0.7, "spalled": 0.2})
+    merged = with_crack([TOOTH], chipped, PAIR)[0]
+    assert "chipped or spalled rather than cracked" in merged.title
+    assert any("chipped 70 %" in text for text in merged.evidence)
+    assert codes(with_crack([], chipped, PAIR)) == ["tooth-local-damage"]
+    undecided = replace(CRACK, kind_probabilities={"cracked": 0.5, "chipped": 0.3, "spalled": 0.2})
+    assert "or it is chipped or spalled" in with_crack([TOOTH], undecided, PAIR)[0].title
+
+
 def test_two_damaged_teeth_stay_two_findings() -> None:
     elsewhere = replace(TOOTH, where=replace(TOOTH.where, angle_deg=200.0))
     assert codes(with_crack([elsewhere], CRACK, PAIR)) == ["tooth-local-damage", "root-crack"]

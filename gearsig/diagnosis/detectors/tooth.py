@@ -230,8 +230,8 @@ def _undecided(examined: list[_Examined], reason: str) -> Finding:
         f"Nothing shows at the teeth of shaft(s) {shafts}, but {reason}.",
         Where(channels=tuple(examined[0].shaft.separated)),
         evidence=tuple(_visible_text(e) for e in examined),
-        surer="A recording of the same gears when they were sound as the reference (--reference): what teeth are made "
-        "with cancels. More revolutions, a sensor nearer to the gears, a higher load; certain data of the machine.",
+        surer="A recording of the same gears when they were sound, given with --reference: what teeth are made with "
+        "cancels. Or more revolutions, a sensor nearer to the gears, a higher load; certain data of the machine.",
     )
 
 
