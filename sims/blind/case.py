@@ -182,12 +182,12 @@ def _draw_conditions(
     slowest = 600.0
     load_error, place = rng.uniform(0.85, 1.15), rng.uniform(0, 1)
     shares, is_light = rng.uniform(0.2, 0.9, 2), rng.random(2) < 0.25
-    light = 10 ** rng.uniform(-2.4, -1.6, 2)
+    light = 10 ** rng.uniform(-2.8, -1.9, 2)
     if abs(shares[1] - shares[0]) < 0.2:
         shares[1] = shares[0] + 0.3 if shares[0] < 0.55 else shares[0] - 0.3
     is_light[1] &= not is_light[0]
     if starts_light:
-        is_light[:] = True, False
+        is_light[:], light[0] = (True, False), 0.4 * light[0]
     speeds = [slowest * (fastest / slowest) ** ((place + k * rng.uniform(0.25, 0.75)) % 1.0) for k in range(2)]
     mounts = [int(s) for s in rng.integers(2**62, size=2)]
     conditions, references = [], []

@@ -24,6 +24,8 @@ from sims.blind.march_numbers import (
     SEAT_1,
 )
 
+ACROSS = 1.22
+"""Angle from the line of action to the line of centres, 70°."""
 TORQUE = 2.0
 """Kind of a train that twists a shaft's far end; 0 and 1 push the bearing of that number."""
 
@@ -35,6 +37,17 @@ def waves(rows: np.ndarray, theta_1: float, theta_2: float) -> float:
     for r in range(rows.shape[0]):
         theta = theta_1 if rows[r, 0] == 0.0 else theta_2
         total += rows[r, 2] * cos(rows[r, 1] * theta + rows[r, 3])
+    return total
+
+
+@njit(cache=True)
+def centre_opening(runout: np.ndarray, theta_1: float, theta_2: float) -> float:
+    """Growth of the centre distance by eccentricity: the run-outs of order 1, seen across the line of action."""
+    total = 0.0
+    for r in range(runout.shape[0]):
+        if runout[r, 1] == 1.0:
+            theta = theta_1 if runout[r, 0] == 0.0 else theta_2
+            total += runout[r, 2] * cos(theta + runout[r, 3] + ACROSS)
     return total
 
 

@@ -132,6 +132,14 @@ class SpurPair:
         gap[late] = self.corner_gap_m(1, (place[late] - self.contact_ratio) * pb)
         return gap
 
+    def end_shift_per_m(self) -> tuple[float, float]:
+        """Base pitches by which the path's ends A and E move per metre of growth in centre distance.
+
+        ρ1 grows by 1/sin α at A and not at E; the line of action turns by cot α / a, which gear 1 has to follow.
+        """
+        turn = self.base_radii_m[0] / tan(self.alpha) / self.centre_distance_m
+        return (1 / sin(self.alpha) - turn) / self.base_pitch_m, -turn / self.base_pitch_m
+
     def corner_gap_m(self, flank: int, distance_m: FloatArray, tip_loss_m: float = 0.0) -> FloatArray:
         """Gap along the base circle of gear `flank` to the other's tip corner, that far from the path's end.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sims.blind.forces_kernel import bearings, drive, sways, trains, waves
+from sims.blind.forces_kernel import bearings, centre_opening, drive, sways, trains, waves
 from sims.blind.march_numbers import LINE_X, LINE_Y, PHASE_2, RHO_SUM, SOFT_M, WEDGE_M
 from sims.blind.mesh_kernel import CARRIED, MOST_PAIRS, RHO, SLIP, Tables, mesh_force, pairs_in_reach
 
@@ -111,9 +111,9 @@ def march(
         bearings(push, held, number, u, theta_1, theta_2, bearing_k, clearance, unbalance)
         sways(push, sway, theta_1, theta_2)
         trains(push, held, number, theta_1, theta_2, pointers, all_trains)
-        shift = waves(runout, theta_1, theta_2)
+        shift, opening = waves(runout, theta_1, theta_2), centre_opening(runout, theta_1, theta_2)
         h = number[SOFT_M] + 0.5 * abs(number[WEDGE_M] + waves(wobble, theta_1, theta_2))
-        n_pairs = pairs_in_reach(pairs, number, theta_1, shift, offsets, tables)
+        n_pairs = pairs_in_reach(pairs, number, theta_1, shift, opening, offsets, tables)
         # Everything but the mesh is known now; its force follows from the compression it leaves.
         x_free, v_free = u[0], v[0]
         for m in range(n):

@@ -34,5 +34,7 @@ from __future__ import annotations
     SEAT_1,
     SEAT_2,
     HEIGHT,
-) = range(31)
-N_NUMBERS = 31
+    END_A,
+    END_E,
+) = range(33)
+N_NUMBERS = 33

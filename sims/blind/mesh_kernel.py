@@ -13,6 +13,8 @@ from sims.blind.march_numbers import (
     BACKLASH_M,
     BASE_PITCH,
     CONTACT_RATIO,
+    END_A,
+    END_E,
     MESH_DAMPING,
     RB_1,
     RHO_START,
@@ -34,11 +36,26 @@ def soft(x: float, h: float) -> tuple[float, float]:
 
 
 @njit(cache=True)
+def _at(table: np.ndarray, spot: float) -> float:
+    """Interpolate between the points of a table, its ends held."""
+    spot = min(max(spot, 0.0), table.shape[0] - 1.001)
+    i = int(spot)
+    return float(table[i] + (spot - i) * (table[i + 1] - table[i]))
+
+
+@njit(cache=True)
 def pairs_in_reach(
-    pairs: np.ndarray, number: np.ndarray, theta_1: float, shift: float, offsets: np.ndarray, tables: Tables
+    pairs: np.ndarray,
+    number: np.ndarray,
+    theta_1: float,
+    shift: float,
+    opening: float,
+    offsets: np.ndarray,
+    tables: Tables,
 ) -> int:
     """Fill gap, stiffness, friction and curvature radius of all pairs that may touch; return how many there are.
 
+    `shift` is a separation of all pairs; `opening` a growth of the centre distance, which moves both ends of the path.
     Pair j stands at r_b1 θ1 / p_b − j on the path; a pair whose compliance is 1 + w times the sound one has 1/(1 + w)
     of its stiffness.
     """
@@ -56,9 +73,10 @@ def pairs_in_reach(
         b = spot - i
         a = 1.0 - b
         t1, t2 = (j + offsets[0]) % z1, (j + offsets[1]) % z2
-        before, after = gap_0[i] + gap_1[t1, i] + gap_2[t2, i], gap_0[i + 1] + gap_1[t1, i + 1] + gap_2[t2, i + 1]
+        moved = number[END_A] if cycle - j < 0.5 * ratio else number[END_E]
+        base = _at(gap_0, spot - opening * moved * per_place)
         weak = a * (weak_1[t1, i] + weak_2[t2, i]) + b * (weak_1[t1, i + 1] + weak_2[t2, i + 1])
-        pairs[n, GAP] = a * before + b * after + shift
+        pairs[n, GAP] = base + a * (gap_1[t1, i] + gap_2[t2, i]) + b * (gap_1[t1, i + 1] + gap_2[t2, i + 1]) + shift
         pairs[n, STIFFNESS] = (a * pair_k[i] + b * pair_k[i + 1]) / (1.0 + weak)
         pairs[n, SLIP] = a * slip[i] + b * slip[i + 1]
         pairs[n, RHO] = number[RHO_START] + (cycle - j) * pb

@@ -201,7 +201,7 @@ def _draw_parts(rng: np.random.Generator, pair: SpurPair, rated_nm: float) -> Pa
     force_n = rated_nm / pair.base_radii_m[0]
     support = [float(np.clip(force_n / rng.uniform(4e-6, 12e-6), 8e7, 8e8)) for _ in range(2)]
     bearing = [(k * rng.uniform(0.75, 1.25), k * rng.uniform(0.75, 1.25)) for k in support]
-    casing = sum(mass) * rng.uniform(5, 12)
+    casing = max(sum(mass) * rng.uniform(5, 12), rng.uniform(20, 45))
     a = pair.centre_distance_m
     rocking = casing * a**2 * rng.uniform(0.3, 0.8)
     stand = [casing * (2 * pi * rng.uniform(18, 70)) ** 2 for _ in range(2)]
@@ -247,9 +247,11 @@ def _draw_tolerances(rng: np.random.Generator, pair: SpurPair, fineness: float) 
     masses = [pair.gear_mass_kg(i) * 1.5 for i in range(2)]
     unbalance = [(m * 10 ** rng.uniform(-5.7, -5), rng.uniform(0, 2 * pi)) for m in masses]
     torque = [
-        (float(rng.integers(0, 2)), float(order), 10 ** rng.uniform(-3.0, -2.0), rng.uniform(0, 2 * pi))
+        (float(rng.integers(0, 2)), float(order), 10 ** rng.uniform(-3.0, -2.3), rng.uniform(0, 2 * pi))
         for order in (1, 2, int(rng.choice([3, 4, 5, 6])))
     ]
+    # The brake pulls unevenly: without load the teeth may be thrown from flank to flank.
+    torque.append((1.0, float(rng.integers(1, 3)), 10 ** rng.uniform(-2.1, -1.6), rng.uniform(0, 2 * pi)))
     return Tolerances(
         gap_m=(gaps[0], gaps[1]),
         runout=tuple(runout),
@@ -263,7 +265,7 @@ def _draw_tolerances(rng: np.random.Generator, pair: SpurPair, fineness: float) 
 def _draw_chain(rng: np.random.Generator, casing_kg: float) -> SensorChain:
     n_modes = int(rng.integers(2, 7))
     path = tuple(
-        Resonance(10 ** rng.uniform(log10(500), log10(9000)), rng.uniform(0.01, 0.05), casing_kg * rng.uniform(0.3, 2))
+        Resonance(10 ** rng.uniform(log10(500), log10(9000)), rng.uniform(0.01, 0.05), casing_kg * rng.uniform(0.15, 1.0))
         for _ in range(n_modes)
     )
     return SensorChain(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import pi, sin
+from typing import Any
 
 import numpy as np
 
@@ -204,14 +205,18 @@ def with_course(scene: Scene, factor: Callable[[FloatArray], FloatArray]) -> Non
 
 def run(scene: Scene, *, sub_steps: int = SUB_STEPS) -> Motion:
     """March the scene through its warm-up and its duration."""
+    out = march(*march_arguments(scene, sub_steps))
+    return Motion(2 * scene.rig.sampling_rate_hz, out[:, :4].T, out[:, 4:7].T, out[:, 7:9].T, out[:, 9], out[:, 10])
+
+
+def march_arguments(scene: Scene, sub_steps: int) -> tuple[Any, ...]:
+    """Return what `march` takes, in its order; `sub_steps` steps per sample, an even number."""
     rig, condition = scene.rig, scene.condition
-    rate_hz = 2 * rig.sampling_rate_hz
-    step_s = 1 / (rig.sampling_rate_hz * sub_steps)
+    rate_hz, step_s = 2 * rig.sampling_rate_hz, 1 / (rig.sampling_rate_hz * sub_steps)
     modes = modes_of(rig.parts)
     q, p, steady = _start(scene, modes)
-    n_out = 2 * round(condition.duration_s * rig.sampling_rate_hz)
-    out = march(
-        n_out,
+    return (
+        2 * round(condition.duration_s * rig.sampling_rate_hz),
         round(WARM_UP_S * rate_hz),
         sub_steps // 2,
         step_s,
@@ -226,7 +231,6 @@ def run(scene: Scene, *, sub_steps: int = SUB_STEPS) -> Motion:
         scene.speed,
         _train_arrays(scene),
     )
-    return Motion(rate_hz, out[:, :4].T, out[:, 4:7].T, out[:, 7:9].T, out[:, 9], out[:, 10])
 
 
 def _start(scene: Scene, modes: Modes) -> tuple[Matrix, Matrix, Matrix]:
@@ -278,6 +282,7 @@ def _numbers(scene: Scene) -> Matrix:
     number[[at.OMEGA_1, at.OMEGA_2]] = scene.omega
     for i, (cage, balls) in enumerate(((at.CAGE_RATIO_1, at.N_BALLS_1), (at.CAGE_RATIO_2, at.N_BALLS_2))):
         number[cage], number[balls] = rig.bearing(i).orders()["FTF"], rig.bearings[i][0]
+    number[[at.END_A, at.END_E]] = pair.end_shift_per_m()
     number[at.BALL_RIPPLE] = scene.ball_ripple
     number[at.PHASE_2] = 2 * pi * scene.offsets[1] / pair.z2
     number[[at.SEAT_1, at.SEAT_2]], number[at.HEIGHT] = parts.seat_x_m, parts.height_m

@@ -10,7 +10,7 @@ from sims.blind.geometry import SpurPair
 from sims.blind.rig import texture
 from sims.blind.scene import Scene
 
-SMOOTHED = 0.12
+SMOOTHED = 0.2
 """Part of a rough flank's height that is left after averaging over the contact."""
 
 
@@ -62,7 +62,7 @@ def _roughness(scene: Scene, severity: float, choice: np.random.Generator) -> Pl
     for gear in range(2):
         rough = texture(choice, pair, len(scene.gap_m[gear]), severity * 1e-6 * SMOOTHED / np.sqrt(2))
         scene.gap_m[gear] = scene.gap_m[gear] + rough
-    healthy, rough_um = scene.rig.finish_um, min(severity, 0.8)
+    healthy, rough_um = scene.rig.finish_um, min(severity, 0.5)
     scene.slip = scene.slip * max((1.13 - healthy) / (1.13 - rough_um), 1.0)
     return {"gear": "both"}
 
@@ -74,8 +74,8 @@ def _friction(scene: Scene, severity: float, choice: np.random.Generator) -> Pla
 
 
 CHANGES = (
-    Change("tooth_wear", "flank", "um", lambda rig: (0.12 * deflection_um(rig), 5 * deflection_um(rig)), _wear),
+    Change("tooth_wear", "flank", "um", lambda rig: (0.12 * deflection_um(rig), 3 * deflection_um(rig)), _wear),
     Change("pitch_error", "flank", "um", lambda rig: (0.12 * deflection_um(rig), 2.5 * deflection_um(rig)), _pitch),
     Change("surface_roughness", "flank", "um", steady(0.5, 5.0), _roughness),
-    Change("sliding_friction", "flank", "1", steady(0.07, 0.22), _friction),
+    Change("sliding_friction", "flank", "1", steady(0.06, 0.18), _friction),
 )
