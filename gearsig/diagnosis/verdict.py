@@ -30,8 +30,14 @@ def verdict_of(findings: tuple[Finding, ...]) -> str:
     said = [f.title for f in findings if f.code in EXAMINED]
     if outcome is Outcome.CANNOT_TELL:
         why = " ".join(f.title for f in gaps[:2]) or "Nothing was examined that would show a fault."
-        return " ".join(["Cannot tell.", why, *said])
+        return " ".join(["Cannot tell.", why, *said, *_remedy(gaps)])
     return " ".join(["No fault shows.", *said, "Damage of many teeth would only show against an earlier recording."])
+
+
+def _remedy(gaps: list[Finding]) -> list[str]:
+    """Return what would settle the most important of the open questions, in one sentence."""
+    surer = next((finding.surer for finding in gaps if finding.surer), "")
+    return [f"Surer with: {surer.partition('. ')[0].rstrip('.')}."] if surer else []
 
 
 def _first_and_number(findings: list[Finding]) -> str:

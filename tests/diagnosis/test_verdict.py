@@ -34,6 +34,11 @@ def test_no_fault_is_only_said_where_one_would_have_shown(findings: list[Finding
     assert verdict_of(tuple(findings)).startswith(start)
 
 
+def test_an_open_question_comes_with_what_would_settle_it() -> None:
+    gap = Finding("x", Kind.CANNOT_TELL, "Noise hides it.", surer="A longer recording. Or another sensor.")
+    assert verdict_of((gap,)) == "Cannot tell. Noise hides it. Surer with: A longer recording."
+
+
 def test_confidence_falls_with_the_p_value_and_is_bounded() -> None:
     values = [from_p_value(p) for p in (1e-9, 1e-4, 1e-3, 1e-2, 0.05, 0.3, 1.0)]
     assert values == sorted(values, reverse=True)
