@@ -191,6 +191,12 @@ def test_denoised_and_removed_make_the_signal() -> None:
     choose(page, "Noise", "Coloured")
     assert not page.error
     assert np.std(curves(page)["removed"]) < np.std(shown["removed"])
+    levels = next(s for s in page.select_slider if s.label == "Levels")
+    levels.set_value("3").run()
+    assert len(page.dataframe[0].value) == 3
+    levels.set_value("14").run()
+    assert not page.exception
+    assert len(page.error) == 1  # the stretch is too short for so many
 
 
 def test_the_phase_plane_says_that_a_tone_repeats() -> None:

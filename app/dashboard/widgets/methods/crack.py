@@ -58,9 +58,12 @@ def _choose_settings(analysis: Analysis, channel: ChannelAnalysis) -> tuple[floa
     )
     if torque is not None and torque <= 0.0:
         raise InputError(f"the torque is {torque:g} N m", where="Torque", allowed="above 0")
-    names = (EVERY_CHANNEL, "The channel above")
-    with right:
-        chosen = choose_one("Channels", names, state.view_key("crack channels", analysis))
+    n_accelerations = sum(c.quantity == "acceleration" for c in analysis.recording.channels)
+    chosen = EVERY_CHANNEL
+    if n_accelerations > 1:
+        names = (EVERY_CHANNEL, "The chosen channel")
+        with right:
+            chosen = choose_one("Channels", names, state.view_key("crack channels", analysis))
     return torque, () if chosen == EVERY_CHANNEL else (channel.channel,)
 
 

@@ -19,8 +19,10 @@ if TYPE_CHECKING:
     from gearsig.decompose.wavelet_types import Denoised, DenoiseSettings
 
 N_FIRST, N_MOST = 200_000, 4_000_000
-N_KEPT = 4
+N_KEPT = 2
+"""Answers are several times as long as the stretch."""
 WAVELETS = ("sym8", "sym4", "db4", "db8", "coif3", "haar")
+LEVELS = ("automatic", *(str(n) for n in range(1, 15)))
 THRESHOLDS = {
     "universal": "next to no noise is left",
     "sure": "least estimated risk of each level",
@@ -70,7 +72,7 @@ def _choose_settings(analysis: Analysis) -> DenoiseSettings:
     from gearsig.decompose.wavelet_types import DenoiseSettings
 
     one, two, three = st.columns(3)
-    four, five, _ = st.columns(3)
+    four, five, six = st.columns(3)
     about = "; ".join(f"{name}: {text}" for name, text in THRESHOLDS.items())
     with one:
         threshold = choose_one("Threshold", list(THRESHOLDS), _key("threshold", analysis), about=about)
@@ -83,10 +85,14 @@ def _choose_settings(analysis: Analysis) -> DenoiseSettings:
         noise = choose_one("Noise", ("White", "Coloured"), _key("noise", analysis), about=about)
     about = "Cycle spinning: the mean over shifts of the signal against the wavelet's grid. 1 is none."
     n_shifts = five.slider("Shifts", 1, 16, 8, key=_key("shifts", analysis), help=about, persist_state="session")
+    about = "How often the signal is halved in frequency; what lies below the coarsest level is kept as it is."
+    key = _key("levels", analysis)
+    levels = six.select_slider("Levels", LEVELS, key=key, help=about, persist_state="session")
     return DenoiseSettings(
         threshold,  # type: ignore[arg-type] # checked there
         rule,  # type: ignore[arg-type] # checked there
         wavelet=str(wavelet),
+        n_levels=None if levels == LEVELS[0] else int(levels),
         noise="finest level" if noise == "White" else "each level",
         n_shifts=int(n_shifts),
     )

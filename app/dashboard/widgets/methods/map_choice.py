@@ -33,7 +33,7 @@ N_MOST = {"Fourier": 20_000_000, "Wavelet": 10_000_000, "Squeezed Fourier": 4_00
 OF_WAVELETS = ("Wavelet", "Squeezed wavelet")
 REDUCTIONS: dict[str, Reduction] = {"Mean": "mean", "Largest": "max"}
 N_FIRST = 200_000
-N_MAPS = 8
+N_MAPS = 6
 OCTAVES_SHOWN = 8.0
 """Of wavelet maps at first; lower lines are mostly the ends' doing."""
 
@@ -184,9 +184,9 @@ def _length_text(length: float, axis: str) -> str:
     return f"{1e3 * length:.3g} ms" if axis == "frequency" else f"{length:.3g} revolutions"
 
 
-@st.cache_data(max_entries=N_MAPS, show_spinner=False)
+@st.cache_resource(max_entries=N_MAPS, show_spinner=False)
 def level_map(key: str, settings: MapSettings, _signal: UniformSignal) -> TimeFrequencyMap:
-    """Return the map; `key` and the settings' axis stand for the signal.
+    """Return the map; `key` and the settings' axis stand for the signal. It is frozen: sessions may share it.
 
     Raises
     ------

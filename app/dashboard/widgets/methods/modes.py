@@ -32,7 +32,8 @@ PENALTIES = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000, 100_00
 """A logarithmic scale that holds whatever is suggested."""
 ITERATIONS = (499, 1000, 2000, 5000)
 STARTS = ("uniform", "peaks", "zero")
-N_KEPT = 4
+N_KEPT = 2
+"""Answers are several times as long as the stretch."""
 SHOWN = 2000
 """Samples of the waveforms at first."""
 

@@ -30,7 +30,7 @@ VIEW = "wavelet packets"
 N_FIRST, N_MOST = 200_000, 4_000_000
 WAVELETS = ("sym12", "sym8", "db4", "db10", "db20", "coif3", "dmey", "haar")
 DEEPEST = 8
-N_KEPT = 4
+N_KEPT = 2
 HEIGHT_IN = 3.8
 
 
@@ -74,7 +74,7 @@ def packets_of(key: str, wavelet: str, level: int, _signal: UniformSignal) -> Wa
     return wavelet_packets(_signal, wavelet=wavelet, level=level)
 
 
-@st.cache_data(max_entries=N_KEPT, show_spinner=False)
+@st.cache_resource(max_entries=N_KEPT, show_spinner=False)
 def packet_map(key: str, wavelet: str, level: int, _signal: UniformSignal) -> TimeFrequencyMap:
     """Return the levels over time or angle; `key` stands for the signal."""
     from gearsig.timefreq.packets import wavelet_packet_map

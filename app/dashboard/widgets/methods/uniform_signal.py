@@ -62,7 +62,7 @@ def signal_of(stretch: Stretch, *, over_angle: bool) -> UniformSignal:
     )
 
 
-@st.cache_resource(max_entries=4, show_spinner=False)
+@st.cache_resource(max_entries=2, show_spinner=False)
 def _over_angle(key: str, _stretch: Stretch) -> UniformSignal:
     """Resample once; the answer is frozen, so that sessions may share it."""
     from gearsig.angle.interpolation import PASSBAND
