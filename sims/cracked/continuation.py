@@ -24,7 +24,7 @@ SECTIONS = ("mesh", "shaft")
 TRANSMISSION_ERROR = "transmission_error_m"
 DECAYS = 8.0
 """Time constants of the slowest decay that are left out at each value: 0.03 % of what a change stirs up is left."""
-RAMP_S = 0.05
+RAMP_S = 0.1
 """Time over which speed and torque go from one value to the next: no blow throws the motion off its branch."""
 SPARE_CYCLES = 2
 LEAST_PER_CYCLE = 16

@@ -5,6 +5,7 @@ from __future__ import annotations
 from time import monotonic
 
 import streamlit as st
+from streamlit.errors import StreamlitAPIException
 
 from app.bifurcation.folder import Wanted, run_value
 from app.bifurcation.kept import Kept
@@ -79,7 +80,15 @@ def _run_and_show(run: Run, wanted: Wanted, chosen: Range) -> None:
     else:
         st.caption("Nothing is drawn yet: a value takes about half a second, in either direction.")
     if more:
+        _go_on()
+
+
+def _go_on() -> None:
+    """Run again: the view alone, or the page where the page is what ran (after a change of tab)."""
+    try:
         st.rerun(scope="fragment")
+    except StreamlitAPIException:
+        st.rerun()
 
 
 def _fill(wanted: Wanted, found: Found) -> bool:

@@ -1,0 +1,96 @@
+"""Embedding and chaos on the analysis page, bifurcations in the laboratory; run without a browser."""
+
+import pytest
+
+from app.dashboard.laboratory import bifurcation_view
+from app.dashboard.laboratory.views import TAB
+from app.dashboard.widgets.methods.phase_embedding import VIEWS
+from app.dashboard.widgets.methods.phase_numbers import two_numbers
+from gearsig.errors import InputError
+from tests.app.test_dashboard import shown_text
+from tests.app.test_dashboard_methods import choose, opened_at
+from tests.app.test_laboratory import opened
+
+METHOD = "Embedding and chaos"
+
+
+def number(page, label):
+    return next(w for w in page.number_input if w.label.startswith(label))
+
+
+def test_every_view_answers_or_says_why_not():
+    page = opened_at(METHOD)
+    for view in VIEWS:
+        choose(page, "View", view)
+        if view == "Lyapunov exponent":
+            assert "looks stochastic or too noisy" in page.error[0].value.replace("\\", "")
+        elif view == "Kind of motion":
+            assert "Kind of motion:" in shown_text(page)
+        else:
+            assert len(page.get("image")) == 1, view
+            assert not page.error
+
+
+def test_the_path_is_shown_in_space_with_its_own_dimension():
+    page = opened_at(METHOD)
+    number(page, "Dimension").set_value(2)
+    choose(page, "View", "Portrait and section")
+    choose(page, "Drawn in", "space")
+    assert "give at least 3" in shown_text(page)
+    number(page, "Dimension").set_value(4).run()
+    assert len(page.get("plotly_chart")) == 1
+
+
+def test_a_stretch_to_fit_is_taken_or_refused():
+    assert two_numbers("") is None
+    assert two_numbers("0.001; 2e-3") == (0.001, 0.002)
+    for wrong in ("1", "a, b", "1, 2, 3"):
+        with pytest.raises(InputError, match="two numbers in s"):
+            two_numbers(wrong)
+
+
+def at_bifurcation():
+    page = opened("small_30_25")
+    page.session_state[TAB] = "Bifurcation"
+    page.session_state["bifurcation values"] = 3
+    return page.run()
+
+
+def button(page, label):
+    return next(b for b in page.button if b.label == label)
+
+
+def test_a_bifurcation_is_drawn_on_demand():
+    page = at_bifurcation()
+    assert not page.get("image")
+    assert "Nothing is drawn yet" in shown_text(page)
+    button(page, "Draw").click().run()
+    assert not page.exception
+    assert not page.error
+    assert len(page.get("image")) == 1
+    assert any(b.proto.label == "Points (CSV)" for b in page.get("download_button"))
+
+
+def test_stopped_it_keeps_what_is_complete(monkeypatch):
+    page = at_bifurcation()
+    monkeypatch.setattr(bifurcation_view, "PASS_S", -1.0)  # the time is always up
+
+    monkeypatch.setattr(bifurcation_view, "_go_on", lambda: None)
+    button(page, "Draw").click().run()
+    assert not page.get("image")
+    button(page, "Stop").click().run()
+    assert page.session_state[bifurcation_view.ASKED] == ""
+
+
+def test_too_much_is_refused_with_the_remedy(monkeypatch):
+    monkeypatch.setattr(bifurcation_view, "MOST_MOTION_S", 1.0)
+    page = at_bifurcation()
+    button(page, "Draw").click().run()
+    assert "of motion" in page.error[0].value
+    assert "command line" in page.error[0].value
+
+
+def test_a_range_must_ascend():
+    page = at_bifurcation()
+    number(page, "From").set_value(9000.0).run()
+    assert "the range goes from" in page.error[0].value
