@@ -65,12 +65,12 @@ def waveform_alone(
     y: FloatArray, cycles: FloatArray, active: BoolArray | None, bandwidth: FloatArray, *, gain_bytes: int = GAIN_BYTES
 ) -> FloatArray:
     """Return the waveform of one order, as `solve_waveforms` does for several; bandwidth (n - 2,) or (1,)."""
-    steps = _oscillator_steps(y, active, *oscillator(cycles, bandwidth))
+    steps = _oscillator_steps(y, cycles, active, bandwidth)
     return smoothed_halves(len(y), 2, 2, *steps, middle_q=0.0, dtype=np.float64, gain_bytes=gain_bytes)
 
 
 def _oscillator_steps(
-    y: FloatArray, active: BoolArray | None, kappa: FloatArray, q: FloatArray
+    y: FloatArray, cycles: FloatArray, active: BoolArray | None, bandwidth: FloatArray
 ) -> tuple[Forward, Backward]:
     """Return how a block of the first generation is filtered, and how it is smoothed."""
     n = len(y)
@@ -79,7 +79,12 @@ def _oscillator_steps(
         level, signal = _levels(active, n, i, j), _of_samples(y, n, i, j)
         np.multiply(level[0], signal[0], out=front)
         np.multiply(level[1], signal[1], out=back)
-        states.forward_two(front, back, level, _of_steps(q, n, 2, i, j), _of_steps(kappa, n, 2, i, j), gains, s, g)
+        around = _of_samples(cycles, n, i - 1, j + 1)
+        widths = [bandwidth] * 2 if len(bandwidth) == 1 else _of_steps(bandwidth, n, 2, i, j)
+        kappa, q = np.empty((2, j - i)), np.empty((2, j - i))
+        for row in range(2):
+            oscillator(around[row], widths[row], kappa[row], q[row])
+        states.forward_two(front, back, level, q, kappa, gains, s, g)
 
     return forward, states.backward_two
 

@@ -41,31 +41,31 @@ def demodulate(signal: FloatArray, cosine: FloatArray, sine: FloatArray, out: Ar
 
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
-def oscillator(cycles: FloatArray, bandwidth: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return κ = 2 - 2 cos ω and q = 1/r² of each row of the first generation's structural equation, (n - 2,).
+def oscillator(cycles: FloatArray, bandwidth: FloatArray, kappa: FloatArray, q: FloatArray) -> None:
+    """Write κ = 2 - 2 cos ω and q = 1/r² of each row of the first generation's structural equation.
 
     q = 4 tan² h sin(ω - h) sin(ω + h)/(√2 - 1), h half the bandwidth in rad. Where the band comes close to zero or half
     the sampling rate (the order is no part of the data there), q stays at what 3/4 of a bandwidth from there gives.
 
     Parameters
     ----------
-    cycles : array, (n,)
-    bandwidth : array, (n - 2,) or (1,)
+    cycles : array, (n + 2,)
+        Phase of the order, in either direction of time.
+    bandwidth : array, (n,) or (1,)
         -3 dB, in cycles per sample.
+    kappa, q : arrays, (n,)
     """
-    n = len(cycles) - 2
+    n = len(kappa)
     cos_half, sin_half = np.empty(n), np.empty(n)
     cosine_and_sine((cycles[2:] - cycles[:-2]) / 4.0, cos_half, sin_half)
     cos_h, sin_h = np.empty(len(bandwidth)), np.empty(len(bandwidth))
     cosine_and_sine(bandwidth / 2.0, cos_h, sin_h)
-    kappa, q = np.empty(n), np.empty(n)
+    step = 0 if len(bandwidth) == 1 else 1
     for i in range(n):
-        c, s = (cos_h[0], sin_h[0]) if len(bandwidth) == 1 else (cos_h[i], sin_h[i])
-        tangent = s / c
+        c, s = cos_h[step * i], sin_h[step * i]
         cos_omega, sin_omega = 1.0 - 2.0 * sin_half[i] * sin_half[i], 2.0 * sin_half[i] * cos_half[i]
         product = (sin_omega * c - cos_omega * s) * (sin_omega * c + cos_omega * s)
         # sin(h/2) sin(5h/2) = (cos 2h - cos 3h)/2
         least = 0.5 * (2.0 * c * c - 1.0 - c * (4.0 * c * c - 3.0))
         kappa[i] = 4.0 * sin_half[i] * sin_half[i]
-        q[i] = 4.0 * tangent * tangent * max(product, least) / (HALF_POWER * HALF_POWER)
-    return kappa, q
+        q[i] = 4.0 * s * s * max(product, least) / (c * c * HALF_POWER * HALF_POWER)

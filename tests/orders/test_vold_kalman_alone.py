@@ -6,7 +6,7 @@ import pytest
 from gearsig.errors import RefusalError
 from gearsig.orders import vold_kalman_halves
 from gearsig.orders.vold_kalman_alone import envelope_alone, waveform_alone
-from gearsig.orders.vold_kalman_fold import oscillator
+from gearsig.orders.vold_kalman_fold import oscillator as write_oscillator
 from gearsig.orders.vold_kalman_solve import error_alone
 from gearsig.orders.vold_kalman_weight import envelope_weight, waveform_weight
 from tests.orders.test_vold_kalman_exact import (
@@ -18,13 +18,19 @@ from tests.orders.test_vold_kalman_exact import (
 )
 
 
+def oscillator(cycles, bandwidth):
+    kappa, q = np.empty(len(cycles) - 2), np.empty(len(cycles) - 2)
+    write_oscillator(cycles, bandwidth, kappa, q)
+    return kappa, q
+
+
 def noisy_order(n, cycles_per_sample=0.11):
     cycles = cycles_per_sample * np.arange(n) + 1e-4 * np.arange(n) ** 2
     return np.cos(2 * np.pi * cycles) + 0.3 * np.random.default_rng(4).normal(size=n), cycles
 
 
 @pytest.mark.parametrize("p", [1, 2, 3])
-@pytest.mark.parametrize("n", [16, 17, 99, 100])
+@pytest.mark.parametrize("n", [16, 17, 49, 50])
 @pytest.mark.parametrize("mirror", [False, True])
 @pytest.mark.parametrize("gaps", [False, True])
 def test_envelope_against_a_dense_solve(p, n, mirror, gaps):
@@ -43,7 +49,7 @@ def test_envelope_against_a_dense_solve(p, n, mirror, gaps):
     assert np.abs(x - expected).max() < 1e-9 * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("n", [16, 17, 99, 100])
+@pytest.mark.parametrize("n", [16, 17, 49, 50])
 @pytest.mark.parametrize("cycles_per_sample", [0.02, 0.25, 0.45])
 @pytest.mark.parametrize("gaps", [False, True])
 def test_waveform_against_a_dense_solve(n, cycles_per_sample, gaps):
