@@ -20,6 +20,7 @@ OUTSIDE = 0.01
 """Part of the calibration's own cracks that count as unlike a crack."""
 
 _RIDGE = 3.0
+_FOLDS = 10
 _KNOTS = (1 / 3, 2 / 3)
 _COVERAGE = (0.05, 0.95)
 _SHAPED = [FEATURES.index(name) for name in SHAPED]
@@ -36,19 +37,16 @@ class Cases:
     percent, depth_mm : arrays, (n,)
     sound : array, (n_sound, 2, n_features)
         Of both gears of sound pairs.
-    held_out : array of bool, (n,)
-        Which cracks are not fitted but make the intervals.
     """
 
     features: FloatArray
     percent: FloatArray
     depth_mm: FloatArray
     sound: FloatArray
-    held_out: np.ndarray
 
 
 def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
-    """Fit detection, depth and spread on the one part of the cases, and quantiles on the other."""
+    """Fit detection, depth and spread to all cases, and quantiles to errors of models that did not see the case."""
     rest = [i for i, name in enumerate(FEATURES) if name not in RISING and (relief_known or name not in RELIEF)]
     mean, scale = cases.features.mean(axis=0), cases.features.std(axis=0)
     z = (cases.features - mean) / scale
@@ -57,13 +55,10 @@ def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
     sound_scores = np.sort((sound @ detection).max(axis=1))
     threshold = float(np.quantile(sound_scores, 1.0 - FALSE_ALARMS))
     seen = z @ detection >= threshold
-    fitted, kept = seen & ~cases.held_out, seen & cases.held_out
     y = np.log(cases.percent)
     knots = np.quantile(z[seen][:, _SHAPED], _KNOTS, axis=0).T
-    intercept, coefficients, slopes = _depth_weights(z[fitted], y[fitted], knots, rest)
-    error = y - intercept - z @ coefficients - _curves(z, knots) @ slopes.ravel()
-    spread = _spread_weights(z[fitted], np.abs(error[fitted]))
-    sigma = np.maximum(spread[0] + z @ spread[1:], LEAST_SPREAD)
+    depth, spread = _depth_and_spread(z[seen], y[seen], knots, rest)
+    intercept, coefficients, slopes = depth
     precision = _precision(z[seen], rest)
     distances = np.sqrt(np.einsum("ij,jk,ik->i", z[seen], precision, z[seen]))
     return DepthModel(
@@ -74,7 +69,7 @@ def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
         knots=knots,
         slopes=slopes,
         spread=spread,
-        quantiles=_conformal(error[kept] / sigma[kept]),
+        quantiles=_conformal(_errors_of_others(z[seen], y[seen], knots, rest)),
         detection=detection,
         threshold=threshold,
         sound_scores=sound_scores,
@@ -84,6 +79,34 @@ def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
         highest=cases.features[seen].max(axis=0),
         percent_range=(float(cases.percent[seen].min()), float(cases.percent[seen].max())),
     )
+
+
+def _depth_and_spread(
+    z: FloatArray, y: FloatArray, knots: FloatArray, rest: list[int]
+) -> tuple[tuple[float, FloatArray, FloatArray], FloatArray]:
+    depth = _depth_weights(z, y, knots, rest)
+    return depth, _spread_weights(z, np.abs(y - _predicted(depth, z, knots)))
+
+
+def _predicted(depth: tuple[float, FloatArray, FloatArray], z: FloatArray, knots: FloatArray) -> FloatArray:
+    intercept, coefficients, slopes = depth
+    predicted: FloatArray = intercept + z @ coefficients + _curves(z, knots) @ slopes.ravel()
+    return predicted
+
+
+def _errors_of_others(z: FloatArray, y: FloatArray, knots: FloatArray, rest: list[int]) -> FloatArray:
+    """Return (y − ŷ)/σ of each case by the model fitted to the other nine tenths of the cases.
+
+    R. F. Barber, E. J. Candès, A. Ramdas, R. J. Tibshirani, "Predictive inference with the jackknife+", 2021 (CV+).
+    """
+    scaled = np.empty(len(y))
+    fold = np.arange(len(y)) % _FOLDS
+    for k in range(_FOLDS):
+        out = fold == k
+        depth, spread = _depth_and_spread(z[~out], y[~out], knots, rest)
+        sigma = np.maximum(spread[0] + z[out] @ spread[1:], LEAST_SPREAD)
+        scaled[out] = (y[out] - _predicted(depth, z[out], knots)) / sigma
+    return scaled
 
 
 def _detection_weights(cracked: FloatArray, sound: FloatArray) -> FloatArray:
@@ -147,7 +170,7 @@ def _precision(z: FloatArray, rest: list[int]) -> FloatArray:
 
 
 def _conformal(scaled: FloatArray) -> tuple[float, float]:
-    """Quantiles of n held-out errors for a new case: the k-th of n + 1, rounded outwards."""
+    """Quantiles of n errors for a new case: the k-th of n + 1, rounded outwards."""
     ordered, n = np.sort(scaled), len(scaled)
     low = int(np.floor(_COVERAGE[0] * (n + 1))) - 1
     high = int(np.ceil(_COVERAGE[1] * (n + 1))) - 1

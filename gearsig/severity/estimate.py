@@ -84,7 +84,7 @@ def estimate_crack(
     ----------
     P. D. McFadden, "Examination of a technique for the early detection of failure in gears by signal processing of the
     time domain average of the meshing vibration", 1987. J. Lei, M. G'Sell, A. Rinaldo, R. J. Tibshirani,
-    L. Wasserman, "Distribution-free predictive inference for regression", 2018 (locally weighted split conformal).
+    L. Wasserman, "Distribution-free predictive inference for regression", 2018 (locally weighted conformal intervals).
     """
     if recording.rig is None and rig is not None:
         recording = recording.with_rig(rig)
@@ -205,8 +205,8 @@ def _seen(
         features=dict(zip(FEATURES, evidence.features.tolist(), strict=True)),
         reasons=tuple(reasons),
         kind_probabilities=kinds,
-        reach_cycles=reach_cycles(evidence.searched, evidence.event),
-        squeezed_rise_db=squeezed_rise_db(evidence.searched, evidence.event),
+        reach_cycles=reach_cycles(evidence.searched, evidence.sound, evidence.event),
+        squeezed_rise_db=squeezed_rise_db(evidence.searched, evidence.sound, evidence.event),
     )
 
 

@@ -36,6 +36,8 @@ class GearEvidence:
         See `gearsig.severity.features.FEATURES`.
     searched : ShaftLines
         What the event was found in: the average, or its difference from the sound gear's.
+    sound : ShaftLines
+        The sound gear's average, or the average itself where there is no reference.
     shape : array
         See `gearsig.severity.shape.SHAPE`.
     agreement : float or None
@@ -46,6 +48,7 @@ class GearEvidence:
     event: ToothEvent
     features: FloatArray
     searched: ShaftLines
+    sound: ShaftLines
     shape: FloatArray
     agreement: float | None = None
 
@@ -84,7 +87,7 @@ def _one_gear(
         event = find_event(shaft)
         mesh = mesh_energies(shaft, n_bands(shaft))
         shape = event_shape(shaft, shaft, event, driver=i == 0)
-        return GearEvidence(shaft, event, feature_vector(shaft, shaft, mesh, event, conditions), shaft, shape)
+        return GearEvidence(shaft, event, feature_vector(shaft, shaft, mesh, event, conditions), shaft, shaft, shape)
     marked = any(a.has_mark and b.has_mark for a, b in zip(now, sound, strict=True))
     _check_harmonics(sound[i])
     difference, agreement = difference_lines(shaft, sound[i], whole_teeth=marked)
@@ -94,7 +97,7 @@ def _one_gear(
     event = find_event(difference)
     features = feature_vector(difference, sound[i], mesh, event, conditions)
     shape = event_shape(difference, sound[i], event, driver=i == 0)
-    return GearEvidence(shaft, event, features, difference, shape, agreement)
+    return GearEvidence(shaft, event, features, difference, sound[i], shape, agreement)
 
 
 def _check_differs(difference: ShaftLines, shaft: ShaftLines) -> None:

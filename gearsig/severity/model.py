@@ -53,7 +53,7 @@ class DepthModel:
     spread : array, (n_features + 1,)
         Of ln percent: σ = max(spread[0] + Σ spread[i] (f_i − m_i)/s_i, 0.1).
     quantiles : tuple of two floats
-        5 % and 95 % quantiles of (ln true percent − predicted)/σ, from rigs that were not fitted.
+        5 % and 95 % quantiles of (ln true percent − predicted)/σ, each by a model that was not fitted to that rig.
     detection : array, (n_features,)
         Weights of the detection score.
     threshold : float

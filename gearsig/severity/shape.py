@@ -57,9 +57,18 @@ def event_shape(searched: ShaftLines, sound: ShaftLines, event: ToothEvent, *, d
     )
 
 
-def reach_cycles(searched: ShaftLines, event: ToothEvent) -> float:
-    """Return for how many mesh cycles after its middle the event has four times the middling tooth's energy."""
-    energy = _relative_energy(searched, event)
+def reach_cycles(searched: ShaftLines, sound: ShaftLines, event: ToothEvent) -> float:
+    """Return for how many mesh cycles after its middle the event has four times the energy of a middling sound tooth.
+
+    Parameters
+    ----------
+    searched : ShaftLines
+        The average, or its difference from the sound gear's.
+    sound : ShaftLines
+        The sound gear's average, or the average itself: whose middling tooth is compared with.
+    event : ToothEvent
+    """
+    energy = _energy_over(searched, sound, event)
     after = energy[len(energy) // 2 :]
     below = np.flatnonzero(after < REACH_LEVEL)
     steps = len(energy) / searched.teeth
@@ -68,13 +77,19 @@ def reach_cycles(searched: ShaftLines, event: ToothEvent) -> float:
 
 def _relative_energy(searched: ShaftLines, event: ToothEvent) -> FloatArray:
     """Return the energy in windows of one pitch over the middling one, the event in the middle."""
-    envelopes = band_envelopes(searched)
-    median = np.median(envelopes, axis=-1, keepdims=True)
+    energy = _energy_over(searched, searched, event)
+    relative: FloatArray = energy / np.median(energy)
+    return relative
+
+
+def _energy_over(searched: ShaftLines, sound: ShaftLines, event: ToothEvent) -> FloatArray:
+    envelopes, others = band_envelopes(searched), band_envelopes(sound)[: n_bands(searched) + 1]
+    median = np.median(others, axis=-1, keepdims=True)
     relative = np.divide(envelopes, median, out=np.ones_like(envelopes), where=median > 0).mean(axis=(0, 1))
     width = round(len(relative) / searched.teeth)
     energy = sliding_mean(relative, width)
     shift = len(energy) // 2 - round(event.centre_rev * len(energy)) + width // 2
-    middled: FloatArray = np.roll(energy / np.median(energy), shift)
+    middled: FloatArray = np.roll(energy, shift)
     return middled
 
 

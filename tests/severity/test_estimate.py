@@ -36,6 +36,27 @@ def test_estimates_rise_with_the_depth(record: Record, sound: Recording) -> None
         assert answer.depth_percent / answer.depth_mm == pytest.approx(found[0].depth_percent / found[0].depth_mm)
 
 
+def test_neither_estimate_nor_bound_falls_from_half_a_millimetre_on(record: Record, sound: Recording) -> None:
+    answers = [estimate_crack(record(depth), reference=sound) for depth in (0.5, 1.0, 2.0, 3.0, 4.0)]
+    sizes = [(a.depth_mm, a.interval_mm[1]) if isinstance(a, CrackEstimate) else (0.0, 0.0) for a in answers]
+    assert [size for size, _ in sizes] == sorted(size for size, _ in sizes)
+    assert [bound for _, bound in sizes] == sorted(bound for _, bound in sizes)
+    rises = [a.squeezed_rise_db for a in answers if isinstance(a, CrackEstimate)]
+    assert len(rises) >= 4
+    assert rises == sorted(rises)
+
+
+def test_knowing_the_tip_relief_changes_depth_not_place(record: Record, sound: Recording) -> None:
+    unknown, known = (
+        crack(estimate_crack(record(2.0), reference=sound, tip_relief_um=relief)) for relief in (None, 12.0)
+    )
+    assert known.tooth == unknown.tooth
+    assert known.features["relief_share"] > 0 == unknown.features["relief_share"]
+    assert known.depth_mm != unknown.depth_mm
+    with pytest.raises(InputError, match="tip_relief_um"):
+        estimate_crack(record(2.0), reference=sound, tip_relief_um=-1.0)
+
+
 def test_gear_and_tooth_are_named(record: Record, sound: Recording) -> None:
     answer = crack(estimate_crack(record(2.0), reference=sound))
     assert (answer.gear, answer.tooth, answer.gear_is_certain) == ("stage 1/input", 12, True)
