@@ -13,6 +13,10 @@ from gearsig.severity.model import LEAST_SPREAD, DepthModel, segments
 FALSE_ALARMS = 0.02
 """Part of the sound gear pairs whose score lies above the threshold."""
 
+TAUGHT = 0.10
+"""Part of the sound gear pairs whose score lies above that of the least crack that the depth is learned from: those just
+below the threshold tell as well, and without a reference few are above."""
+
 CLEAR_MM = 1.0
 """Cracks at least so deep teach the detection what to look for."""
 
@@ -54,13 +58,13 @@ def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
     detection = _detection_weights(z[cases.depth_mm >= CLEAR_MM], sound.reshape(-1, z.shape[1]))
     sound_scores = np.sort((sound @ detection).max(axis=1))
     threshold = float(np.quantile(sound_scores, 1.0 - FALSE_ALARMS))
-    seen = z @ detection >= threshold
+    taught = z @ detection >= np.quantile(sound_scores, 1.0 - TAUGHT)
     y = np.log(cases.percent)
-    knots = np.quantile(z[seen][:, _SHAPED], _KNOTS, axis=0).T
-    depth, spread = _depth_and_spread(z[seen], y[seen], knots, rest)
+    knots = np.quantile(z[taught][:, _SHAPED], _KNOTS, axis=0).T
+    depth, spread = _depth_and_spread(z[taught], y[taught], knots, rest)
     intercept, coefficients, slopes = depth
-    precision = _precision(z[seen], rest)
-    distances = np.sqrt(np.einsum("ij,jk,ik->i", z[seen], precision, z[seen]))
+    precision = _precision(z[taught], rest)
+    distances = np.sqrt(np.einsum("ij,jk,ik->i", z[taught], precision, z[taught]))
     return DepthModel(
         mean=mean,
         scale=scale,
@@ -69,15 +73,15 @@ def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
         knots=knots,
         slopes=slopes,
         spread=spread,
-        quantiles=_conformal(_errors_of_others(z[seen], y[seen], knots, rest)),
+        quantiles=_conformal(_errors_of_others(z[taught], y[taught], knots, rest)),
         detection=detection,
         threshold=threshold,
         sound_scores=sound_scores,
         precision=precision,
         largest_distance=float(np.quantile(distances, 1.0 - OUTSIDE)),
-        lowest=cases.features[seen].min(axis=0),
-        highest=cases.features[seen].max(axis=0),
-        percent_range=(float(cases.percent[seen].min()), float(cases.percent[seen].max())),
+        lowest=cases.features[taught].min(axis=0),
+        highest=cases.features[taught].max(axis=0),
+        percent_range=(float(cases.percent[taught].min()), float(cases.percent[taught].max())),
     )
 
 
@@ -154,7 +158,7 @@ def _spread_weights(z: FloatArray, error: FloatArray) -> FloatArray:
     """Linear model of the size of errors over excess and prominence, σ where the error is √(2/π) σ on the mean."""
     used = [FEATURES.index(name) for name in ("band_excess", "prominence")]
     rows = np.c_[np.ones(len(z)), z[:, used]]
-    ridge = 10.0 * np.diag([0.0, 1.0, 1.0])
+    ridge = 30.0 * np.diag([0.0, 1.0, 1.0])
     best = np.linalg.solve(rows.T @ rows + ridge, rows.T @ error) * np.sqrt(np.pi / 2)
     spread = np.zeros(len(FEATURES) + 1)
     spread[[0, *(1 + i for i in used)]] = best
