@@ -24,6 +24,9 @@ MOST_ORDERS = 6
 BELOW_MESH = 0.5
 """Of the lowest mesh order: other orders above it are of teeth that differ, or sidebands."""
 
+MOST_MULTIPLES = 48
+"""Of half a shaft order: those above are seldom a shaft's own."""
+
 CLEAR_DB = 15.0
 """Of a line of the order spectrum over its floor, for an order that is no mesh's."""
 
@@ -124,7 +127,7 @@ def _wanted(signals: Signals, channel: str) -> list[_Wanted]:
         if h * mesh < highest
     ]
     below = min(highest, min((BELOW_MESH * order for _, order, _, _ in meshes), default=highest))
-    others = _strongest(signals, signals.order_excess[channel], below)[: MOST_ORDERS - len(meshes)]
+    others = _strongest(signals, signals.order_excess[channel], below)[: max(0, MOST_ORDERS - len(meshes))]
     shafts = signals.known_shaft_orders.values()
     sidebands = [order + side * shaft for _, order, _, _ in meshes for shaft in shafts for side in (-1, 1)]
     every = [*(order for _, order, _, _ in meshes), *others, *sidebands]
@@ -149,7 +152,8 @@ def _strongest(signals: Signals, excess: LineExcess, highest: float) -> list[flo
     lines: dict[float, float] = {}
     strongest = float(spectrum.values.max())
     for shaft in signals.known_shaft_orders.values():
-        for order in np.arange(1, int(min(highest, spectrum.positions[-1]) / (shaft / 2)) + 1) * shaft / 2:
+        n_orders = min(MOST_MULTIPLES, int(min(highest, spectrum.positions[-1]) / (shaft / 2)))
+        for order in np.arange(1, n_orders + 1) * shaft / 2:
             found, amplitude = spectrum.largest_near(order, max(WITHIN_ORDERS, 1.5 * spectrum.resolution))
             around = spectrum.largest_near(order, max(AROUND_ORDERS, 6 * spectrum.resolution))[1]
             least = max(excess.floor[spectrum.index_of(found)] * 10 ** (CLEAR_DB / 20), STRONG * strongest)

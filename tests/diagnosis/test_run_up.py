@@ -11,6 +11,7 @@ from gearsig.diagnosis.detectors.resonance import detect_resonances
 from gearsig.diagnosis.types import Analysis, OrderLevel
 from gearsig.report.page import page_html
 from gearsig.report.to_json import analysis_to_json
+from gearsig.rig.types import GearPair, Rig, Shaft
 from sims.kinematic import (
     ColouredNoise,
     KinematicModel,
@@ -106,6 +107,26 @@ def test_report_and_json_carry_the_levels(resonant: Analysis) -> None:
     page = page_html(resonant)
     assert "over speed" in page
     assert "1× mesh of stage" in page
+
+
+def test_of_two_stages_both_meshes_are_followed_and_nothing_else() -> None:
+    rig = Rig(
+        shafts=(Shaft("in"), Shaft("middle"), Shaft("out")),
+        pairs=(GearPair("first", "in", "middle", 27, 43), GearPair("second", "middle", "out", 17, 61)),
+    )
+    model = KinematicModel(
+        speed=LinearRamp(600.0, 1800.0, 8.0),
+        meshes=(MeshHarmonics("first", AMPLITUDES), MeshHarmonics("second", AMPLITUDES)),
+        channels=(SensorChannel("a1", noise=ColouredNoise(0.5)),),
+        tachometer=Tachometer("in"),
+    )
+    rng = np.random.default_rng(0)
+    analysis = analyze(simulate_kinematic(rig, model, sampling_rate_hz=10240.0, duration_s=8.0, rng=rng))
+    levels = analysis.channels[0].order_levels
+    assert [(level.pair, level.harmonic) for level in levels] == [
+        (p, h) for p in ("first", "second") for h in (1, 2, 3, 4)
+    ]
+    assert page_html(analysis)
 
 
 def test_a_run_up_too_short_for_the_filter_is_analysed_all_the_same() -> None:
