@@ -81,7 +81,7 @@ def test_coherence_names_the_lines_that_stand_out() -> None:
     at, values = measured_line(page)
     assert near(values, at, OUTER_RACE_HZ, 1.0) > 0.3
     assert "stand above noise's level" in shown_text(page)
-    assert "BPFO bearing" in shown_text(page).split("stand above noise's level")[1]
+    assert "BPFO bearing" in shown_text(page).split("for their slip: ")[1]
     choose(page, "Over", "Cyclic order")
     assert not page.error
     labelled(page, "number_input", "Highest cyclic order").set_value(1e9).run()

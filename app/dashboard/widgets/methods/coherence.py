@@ -71,22 +71,23 @@ def show_coherence(analysis: Analysis, channel: ChannelAnalysis) -> None:
 
 
 def _choose_settings(analysis: Analysis, stretch: Stretch) -> CoherenceSettings:
-    three, one, two, four = st.columns((3, 2, 2, 4))
+    one, two = st.columns(2)
+    three, four = st.columns(2)
     over_orders = False
     if stretch.angle is not None:
         about = "Over orders, modulation that is locked to the shaft stays on one line when the speed changes."
         names = ("Cyclic frequency", "Cyclic order")
         first = names[0] if speed_is_constant(of_stretch(analysis, stretch)) else names[1]
-        with three:
+        with one:
             over_orders = choose_one("Over", names, _key("over", analysis), default=first, about=about) == names[1]
     prepared = next(iter(PREPARATIONS))
     if not over_orders:
         about = "Steady tones are coherent with each other: remove them, or mesh harmonics fill the picture."
         key = _key("preparation", analysis)
-        with four:
+        with two:
             prepared = choose_one("Signal", list(PREPARATIONS), key, default="Tones removed", about=about)
     usual = float(f"{highest_of_interest(analysis, stretch, of_orders=over_orders):.3g}")
-    highest = one.number_input(
+    highest = three.number_input(
         f"Highest cyclic {'order' if over_orders else 'frequency (Hz)'}",
         value=usual,
         step=usual / 10.0,
@@ -97,7 +98,7 @@ def _choose_settings(analysis: Analysis, stretch: Stretch) -> CoherenceSettings:
     )
     about = "Fewer bands average more and find weaker modulation; more show better where its carrier is."
     key = _key("bands", analysis)
-    n_bands = two.select_slider("Carrier bands", BANDS, value=64, key=key, help=about, persist_state="session")
+    n_bands = four.select_slider("Carrier bands", BANDS, value=64, key=key, help=about, persist_state="session")
     preparation = cast("Preparation", PREPARATIONS[prepared])
     return CoherenceSettings(over_orders, float(highest), int(n_bands), preparation)
 
@@ -175,7 +176,7 @@ def _show_map(
     show_picture(figure, f"Squared coherence of {found.source} over {found.alpha_label} and carrier frequency")
     names = ", ".join(dict.fromkeys(f"{cursor.label} ({cursor.position:.5g})" for cursor in inside))
     st.caption(
-        f"Dotted, lines that stand above noise's level: {as_typed(names)}."
+        f"Dotted, lines that stand above noise's level, bearings' within 1 % for their slip: {as_typed(names)}."
         if inside
         else "No line of a shaft or bearing stands above noise's level."
     )

@@ -78,17 +78,18 @@ def _choose_settings(analysis: Analysis, stretch: Stretch) -> BandSettings:
         "Tones removed: steady lines, such as mesh harmonics, are cut down to the floor. Whitened: every line is made "
         "equally strong, which takes out resonances as well."
     )
-    zero, one, two, three = st.columns((4, 2, 2.6, 3))
-    with zero:
+    one, two = st.columns(2)
+    three, four = st.columns(2)
+    with one:
         prepared = choose_one("Signal", list(PREPARATIONS), _key("preparation", analysis), about=about)
     most = max(1, int(np.log2(max(stretch.recording.n_samples / 512.0, 2.0))))
     about = "The spectrum is cut into up to 2 to the power of it bands, and into thirds of these."
     key = _key(f"levels {most}", analysis)
     n_levels = most
     if most > 1:
-        n_levels = one.slider("Levels", 1, most, min(7, most), key=key, help=about, persist_state="session")
+        n_levels = three.slider("Levels", 1, most, min(7, most), key=key, help=about, persist_state="session")
     usual = float(f"{highest_of_interest(analysis, stretch, of_orders=False):.3g}")
-    highest = two.number_input(
+    highest = four.number_input(
         "Highest modulation (Hz)",
         value=usual,
         step=usual / 10.0,
@@ -97,7 +98,7 @@ def _choose_settings(analysis: Analysis, stretch: Stretch) -> BandSettings:
         help="The fastest rhythm sought. Bands must be three times as wide, and the envelope's spectrum ends there.",
         persist_state="session",
     )
-    with three:
+    with two:
         band = choose_one("Band", BANDS, _key("band", analysis))
     own = None
     if band == BANDS[1]:

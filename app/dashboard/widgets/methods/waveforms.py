@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -155,8 +155,3 @@ def _part(waveforms: Waveforms, limits: tuple[float, float]) -> slice:
     start = max(0, int((limits[0] - waveforms.start) * waveforms.rate))
     start = min(start, max(0, waveforms.n_samples - 2))
     return slice(start, start + max(2, int(np.ceil((limits[1] - limits[0]) * waveforms.rate)) + 1))
-
-
-def colours(names: Sequence[str]) -> dict[str, int]:
-    """Return a look for each of several waveforms: the place in the list."""
-    return {name: i for i, name in enumerate(names)}
