@@ -114,7 +114,7 @@ def _decide(test: ChaosTest | None, exponent: LyapunovExponent | None, stochasti
     if noise_free and silent and test is not None and test.verdict != "undecided":
         return "quasi-periodic" if test.verdict == "regular" else "chaotic"
     if stochastic:
-        return "stochastic"
+        return "undecided" if noise_free else "stochastic"
     if test is None or exponent is None:
         return "undecided"
     if exponent.verdict == "diverging" and test.verdict == "irregular":

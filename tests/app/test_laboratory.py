@@ -17,7 +17,7 @@ from sims.effects import EffectSetting, effects
 from sims.presets import presets
 
 FOLDER = Path(app.dashboard.__file__).parent
-CHARTS = {"Time": 3, "Spectrum": 1, "Envelope": 1, "Phase portrait": 2, "Mesh": 2}
+CHARTS = {"Time": 3, "Spectrum": 1, "Envelope": 1, "Phase portrait": 2, "Bifurcation": 0, "Mesh": 2}
 
 
 def opened(preset: str = "small_30_25") -> AppTest:
