@@ -14,8 +14,8 @@ FALSE_ALARMS = 0.02
 """Part of the sound gear pairs whose score lies above the threshold."""
 
 TAUGHT = 0.10
-"""Part of the sound gear pairs whose score lies above that of the least crack that the depth is learned from: those just
-below the threshold tell as well, and without a reference few are above."""
+"""Part of the sound gear pairs whose score lies above the least one of a crack that the depth is learned from: cracks
+just below the threshold tell as well, and without a reference few are above."""
 
 CLEAR_MM = 1.0
 """Cracks at least so deep teach the detection what to look for."""
