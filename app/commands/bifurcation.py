@@ -110,7 +110,9 @@ def wanted_of(
 
     n = n_points if n_points is not None else LEAST_FOR_KIND if with_kind else 100
     sweep = sweep_of(request, [vary], common_seed=True, extension=".h5")
-    return Wanted(Branch(sweep, signal, section, n), direction, phase, with_kind)
+    wanted = Wanted(Branch(sweep, signal, section, n), direction, phase, with_kind)
+    wanted.branch.check_signal()
+    return wanted
 
 
 def _run(wanted: Wanted, output: Path, jobs: int | None) -> Found:

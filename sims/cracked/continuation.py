@@ -119,6 +119,19 @@ class Branch:
         """What the parameter is set to, ascending."""
         return tuple(sorted(self.sweep.axes[0].values))
 
+    def check_signal(self) -> None:
+        """Refuse a signal that neither the model nor its measurement chain has."""
+        if self.signal in SIGNALS:
+            return
+        machine = self._prepared(self.values[0], np.random.default_rng(self.sweep.seed)).machine
+        names = [channel.name for channel in machine.chain.channels]
+        if self.signal not in names:
+            raise InputError(
+                f"there is no signal or channel {self.signal!r}",
+                allowed=f"{', '.join((*names, TRANSMISSION_ERROR, 'driver y'))} and more, see sims.cracked.layout",
+                remedy=closest_match_hint(self.signal, (*names, *SIGNALS)),
+            )
+
     def run(self, value: float, before: End | None = None) -> SteadyRun:
         """Run one value, from where another run ended or from the static balance.
 
@@ -189,13 +202,6 @@ class Branch:
     def _measured(
         self, ready: Prepared, rng: np.random.Generator, first: State | None, duration_s: float
     ) -> tuple[Recording, Response]:
-        names = [channel.name for channel in ready.machine.chain.channels]
-        if self.signal not in names:
-            raise InputError(
-                f"there is no signal or channel {self.signal!r}",
-                allowed=f"{', '.join((*names, TRANSMISSION_ERROR, 'driver y'))} and more, see sims.cracked.layout",
-                remedy=closest_match_hint(self.signal, (*names, *SIGNALS)),
-            )
         return simulate_with_motion(
             ready.machine,
             ready.operation,

@@ -144,7 +144,7 @@ def test_an_effect_may_be_varied_and_a_channel_looked_at():
 )
 def test_what_cannot_be_run_is_refused(change, words):
     with pytest.raises(InputError, match=words):
-        branch("torque_nm", (10.0,), **change).run(10.0)
+        branch("torque_nm", (10.0,), **change).check_signal()
 
 
 def test_a_branch_needs_one_axis_and_steady_speed():
