@@ -61,7 +61,7 @@ def _show_levels(
     curves = []
     for i, (name, order) in enumerate(zip(names, separation.orders, strict=True)):
         x = _speed_rpm(order)[::step] if over == "Speed" else stretch.start_s + separation.time_s()[::step]
-        curves.append(Curve(x, order.amplitude[::step], name, i))
+        curves.append(Curve(x, _known_amplitude(order)[::step], name, i))
     for i, track in enumerate(tracks):
         x = track.speed_rpm if over == "Speed" else stretch.start_s + track.time_s
         curves.append(Curve(x, track.amplitude, f"{names[i]}, resampled", i, dotted=True))
@@ -70,11 +70,18 @@ def _show_levels(
     limits = float(shown.min()), float(shown.max())
     axes = Axes(label, with_unit("amplitude peak", stretch.unit), limits, _level_limits(curves))
     show_curves(curves, axes, _key("levels", analysis))
+    st.caption("Levels end where the filter has not settled yet: at the ends, and where an order begins or ends.")
     if tracks:
         st.caption(
             "Solid: Vold–Kalman. Dotted: resampled over the shaft's angle, in blocks of "
             f"{_block_length(tracks[0]):.3g} revolutions, about {tracks[0].bandwidth_orders:.3g} orders wide."
         )
+
+
+def _known_amplitude(order: SeparatedOrder) -> FloatArray:
+    """Return the amplitude where the filter has settled; where it nowhere has, all of it."""
+    shown: FloatArray = np.where(order.settled, order.amplitude, np.nan) if order.settled.any() else order.amplitude
+    return shown
 
 
 def _level_limits(curves: Sequence[Curve]) -> tuple[float, float]:

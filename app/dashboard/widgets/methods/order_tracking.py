@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import streamlit as st
 
@@ -25,6 +25,7 @@ N_FEWEST, N_EFFORT = 2**16, 1_600_000
 """Coupled orders take time as their number squared: so many samples times orders squared, but not less than that."""
 MOST_ORDERS = 6
 KINDS = ("mesh", "shaft", "bearing", "sideband")
+COUPLINGS: dict[str, bool | Literal["automatic"]] = {"Automatic": "automatic", "All": True, "None": False}
 N_KEPT = 4
 """Separations hold several arrays as long as the stretch for every order."""
 HANN_BANDWIDTH = 1.5
@@ -42,7 +43,7 @@ class OrderSettings:
     bandwidth_orders: float | None
     n_poles: int
     generation: Generation
-    coupled: bool
+    coupled: bool | Literal["automatic"]
 
 
 def show_order_tracking(analysis: Analysis, channel: ChannelAnalysis) -> None:
@@ -129,17 +130,13 @@ def _choose_settings(analysis: Analysis, orders: tuple[float, ...]) -> OrderSett
     with three:
         about = "More poles: steeper skirts, longer settling. The first generation has two."
         poles = choose_one("Poles", ("1", "2", "3"), _key("poles", analysis), default="2", about=about)
-    coupled = five.toggle(
-        "Coupled",
-        value=True,
-        key=_key("coupled", analysis),
-        help="Solve for all orders together, so that crossing and close ones share the signal between them.",
-        persist_state="session",
-    )
+    with five:
+        about = "Orders solved for together share the signal where they cross or lie close: automatic where it matters."
+        coupling = choose_one("Coupling", tuple(COUPLINGS), _key("coupling", analysis), about=about)
     in_hz = unit == "Hz"
     name: Generation = "second" if generation == "Second" else "first"
     return OrderSettings(
-        orders, float(width) if in_hz else None, None if in_hz else float(width), int(poles), name, bool(coupled)
+        orders, float(width) if in_hz else None, None if in_hz else float(width), int(poles), name, COUPLINGS[coupling]
     )
 
 
