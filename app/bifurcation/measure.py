@@ -20,6 +20,8 @@ LEAST_FOR_KIND = 400
 """Cycles that the 0–1 test and the exponent need to say something."""
 CYCLES = {"mesh": "mesh cycle", "shaft": "revolution of the input shaft"}
 N_ROTATING = 4
+UNITS = {"um": "µm", "N m": "N·m", "g mm": "g·mm", "deg": "°"}
+"""Units of the catalogue as people read them; the others are read as they are."""
 
 
 @dataclass(frozen=True)
@@ -89,13 +91,13 @@ def parameter_words(branch: Branch) -> tuple[str, str]:
 
     name = branch.sweep.axes[0].name
     if name in ("speed_rpm", "torque_nm"):
-        return {"speed_rpm": ("speed", "rpm"), "torque_nm": ("torque", "N m")}[name]
+        return {"speed_rpm": ("speed", "rpm"), "torque_nm": ("torque", "N·m")}[name]
     if name in known_effects():
         severity = effect(name).severity
-        return f"{name.replace('_', ' ')}: {severity.name.replace('_', ' ')}", severity.unit
+        return f"{name.replace('_', ' ')}: {severity.name.replace('_', ' ')}", UNITS.get(severity.unit, severity.unit)
     unit = parameter(simulator(branch.sweep.model).parameters, name).unit
     ending = "_" + unit.replace(" ", "_").replace("/", "_per_").replace("^", "").lower()
-    return (name.removesuffix(ending) if unit else name).replace("_", " "), unit
+    return (name.removesuffix(ending) if unit else name).replace("_", " "), UNITS.get(unit, unit)
 
 
 def portrait_of(run: SteadyRun, branch: Branch) -> PhasePortrait:

@@ -143,7 +143,7 @@ def test_a_value_on_disk_is_what_was_saved(tmp_path):
     ("name", "words"),
     [
         ("speed_rpm", ("speed", "rpm")),
-        ("half_backlash_um", ("half backlash", "um")),
+        ("half_backlash_um", ("half backlash", "µm")),
         ("mesh_damping_ratio", ("mesh damping ratio", "")),
         ("bending_stiffness_n_per_m", ("bending stiffness", "N/m")),
     ],
