@@ -125,7 +125,7 @@ def march(
                 x_free += seen[0, m] * steps[5, m] * (a - f[m])
                 v_free += seen[0, m] * steps[7, m] * (a - f[m])
         first = 1.0 if step > 0 else 0.0
-        force = mesh_force(force, first * gamma, first * gamma_v, x_free, v_free, h, n_pairs, pairs, number)
+        force = mesh_force(force, first * gamma, first * gamma_v, x_free - shift, v_free, h, n_pairs, pairs, number)
         add_mesh(f_new, force, n_pairs, pairs, number, shapes, seen)
         for m in range(n):
             if step > 0:

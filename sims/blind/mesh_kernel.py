@@ -55,7 +55,9 @@ def pairs_in_reach(
 ) -> int:
     """Fill gap, stiffness, friction and curvature radius of all pairs that may touch; return how many there are.
 
-    `shift` is a separation of all pairs; `opening` a growth of the centre distance, which moves both ends of the path.
+    `shift` is a separation of all teeth by run-out: gear 2 lags by it, and with gear 2's tips the path's start A; its
+    end E belongs to gear 1. `opening` is a growth of the centre distance, which moves both ends.
+
     Pair j stands at r_b1 θ1 / p_b − j on the path; a pair whose compliance is 1 + w times the sound one has 1/(1 + w)
     of its stiffness.
     """
@@ -73,10 +75,10 @@ def pairs_in_reach(
         b = spot - i
         a = 1.0 - b
         t1, t2 = (j + offsets[0]) % z1, (j + offsets[1]) % z2
-        moved = number[END_A] if cycle - j < 0.5 * ratio else number[END_E]
-        base = _at(gap_0, spot - opening * moved * per_place)
+        moved = opening * number[END_A] + shift / pb if cycle - j < 0.5 * ratio else opening * number[END_E]
+        base = _at(gap_0, spot - moved * per_place)
         weak = a * (weak_1[t1, i] + weak_2[t2, i]) + b * (weak_1[t1, i + 1] + weak_2[t2, i + 1])
-        pairs[n, GAP] = base + a * (gap_1[t1, i] + gap_2[t2, i]) + b * (gap_1[t1, i + 1] + gap_2[t2, i + 1]) + shift
+        pairs[n, GAP] = base + a * (gap_1[t1, i] + gap_2[t2, i]) + b * (gap_1[t1, i + 1] + gap_2[t2, i + 1])
         pairs[n, STIFFNESS] = (a * pair_k[i] + b * pair_k[i + 1]) / (1.0 + weak)
         pairs[n, SLIP] = a * slip[i] + b * slip[i + 1]
         pairs[n, RHO] = number[RHO_START] + (cycle - j) * pb
@@ -91,7 +93,8 @@ def mesh_force(
 ) -> float:  # fmt: skip
     """Solve F = Σ F_i(x − γF, v − γ_v F) by Newton's method from `force`; the pairs receive what they carry.
 
-    F_i = k_i (s(x − E_i) + c s' v), never a pull; the back flanks carry as one, at mean stiffness.
+    F_i = k_i (s(x − E_i) + c s' v), never a pull; the back flanks carry as one, at mean stiffness. x has the run-out
+    taken off, which moves both flanks of a tooth.
     """
     damping, back = number[MESH_DAMPING], number[BACK_STIFFNESS]
     for _ in range(8):

@@ -265,7 +265,9 @@ def _draw_tolerances(rng: np.random.Generator, pair: SpurPair, fineness: float) 
 def _draw_chain(rng: np.random.Generator, casing_kg: float) -> SensorChain:
     n_modes = int(rng.integers(2, 7))
     path = tuple(
-        Resonance(10 ** rng.uniform(log10(500), log10(9000)), rng.uniform(0.01, 0.05), casing_kg * rng.uniform(0.15, 1.0))
+        Resonance(
+            10 ** rng.uniform(log10(500), log10(9000)), rng.uniform(0.015, 0.07), casing_kg * rng.uniform(0.25, 1.5)
+        )
         for _ in range(n_modes)
     )
     return SensorChain(

@@ -22,6 +22,7 @@ def draw(seed: int, role: str = "development", **wishes: object) -> Case:
 
 def short(case: Case) -> Case:
     """The same case with recordings of one second."""
+
     def cut(conditions: tuple) -> tuple:
         return tuple(replace(c, duration_s=1.0) for c in conditions)
 

@@ -46,7 +46,7 @@ def test_one_mode_under_a_ramp_is_exact() -> None:
             lambda t, y, w=w, z=z: [y[1], f0 + (f1 - f0) * t / h - 2 * z * w * y[1] - w * w * y[0]],
             (0, h), [q0, p0], "DOP853", rtol=1e-12, atol=1e-15,
         ).y[:, -1]  # fmt: skip
-        ours = [c[0, i] * q0 + c[1, i] * p0 + c[4, i] * f0 + c[5, i] * f1, c[2, i] * q0 + c[3, i] * p0 + c[6, i] * f0 + c[7, i] * f1]  # fmt: skip
+        ours = [c[k, i] * q0 + c[k + 1, i] * p0 + c[k + 4, i] * f0 + c[k + 5, i] * f1 for k in (0, 2)]
         np.testing.assert_allclose(ours, exact, rtol=1e-8)
 
 
@@ -104,7 +104,7 @@ def energy_swing(sub_steps: int) -> float:
     steady, bearing_k, clearance, unbalance = args[SUPPORTS]
     args[SUPPORTS] = (zero(steady), bearing_k, zero(clearance), zero(unbalance))
     args[LINES] = tuple(np.zeros((0, rows.shape[1])) for rows in args[LINES])
-    steps, _, seen, omega, _ = args[MODAL]
+    _, _, seen, omega, _ = args[MODAL]
     h, k, backlash = number[at.SOFT_M], base.mesh_stiffness_n_per_m(), number[at.BACKLASH_M]
 
     def stored(x: float) -> float:
@@ -133,7 +133,7 @@ def test_energy_is_conserved_at_second_order() -> None:
 
 
 def test_forces_balance() -> None:
-    """Mean mesh force is torque over base radius; mean bearing forces are it and the weight, along the line of action."""
+    """Mean mesh force is torque over base radius; mean bearing forces are it, along the line of action, and the weight."""
     base = rig(4)
     runs = condition(base, 1500.0, 0.7, 2.0)
     motion = run(scene_of(base, runs))

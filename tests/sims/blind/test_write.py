@@ -30,7 +30,9 @@ def short_case(seed: int, **wishes: object) -> Case:
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Case, Path, Path]]:
     made = []
-    for i, wishes in enumerate(({"kind": "none"}, {"effect": "root_crack"}, {"effect": "coupling_knock"}, {"effect": "clipping"})):
+    for i, wishes in enumerate(
+        ({"kind": "none"}, {"effect": "root_crack"}, {"effect": "coupling_knock"}, {"effect": "clipping"})
+    ):
         case = short_case(5, **wishes)
         base = tmp_path_factory.mktemp("cases")
         made.append((case, *write_case(case, base / "seen" / f"{i}", base / "hidden" / f"{i}")))
