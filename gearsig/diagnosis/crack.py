@@ -32,6 +32,9 @@ LIMIT_WITH_REFERENCE = 0.98
 SETTLED_PERCENT = 50.0
 """If a crack through half of the root would have shown against the reference, the teeth count as examined."""
 
+DOUBTS = ("tooth-damage-undecided", "tooth-not-examined")
+"""Codes of findings about teeth that a comparison with the reference settles; it looks at both gears of the one pair."""
+
 OTHER_DAMAGE = "chipped or spalled"
 """Kind of an estimate that is no crack's."""
 
@@ -147,7 +150,7 @@ def _cannot_tell(answer: CannotTell) -> Finding:
 def _unsettled(findings: Sequence[Finding], answer: NoCrackSeen, rig: Rig) -> list[Finding]:
     """Return the findings without the doubt about teeth that the comparison with the reference settles."""
     settled = answer.with_reference and answer.below_percent <= SETTLED_PERCENT and not rig.assumed
-    return [f for f in findings if not (settled and f.code == "tooth-damage-undecided")]
+    return [f for f in findings if not (settled and f.code in DOUBTS)]
 
 
 def _is_doubt(finding: Finding, crack: CrackEstimate, rig: Rig) -> bool:
