@@ -77,8 +77,19 @@ def estimate_crack(
 
     Notes
     -----
-    Not for helical gears, planetary sets, cracks over a part of the face width, or to tell a crack from a chipped or
-    spalled tooth.
+    Not for helical gears, planetary sets, or cracks over a part of the face width.
+
+    On 90 simulated gearboxes with other teeth and modules than the calibration's (`tests/benchmarks/severity_cases.py`,
+    seed 9153; depths 0.5 to 4 mm): with a reference, the median error is 0.31 mm (90 %: 0.19 to 0.41 mm; 0.30 mm where
+    the tip relief is known), and the 90 % interval held the depth in 47 of 48 cases. Seen were 5 of 9 cracks below 1 mm
+    and 43 of 51 above; 2 of 30 sound gearboxes got a crack. Without a reference 10 of 60 were seen, with a median error
+    of 0.61 mm.
+
+    The kind is an opinion: with a reference, of 48 cracks 32 were called cracked and 4 chipped or spalled; of 36 chips
+    20 and 6 the other way round, of 31 spalls 13 and 5. The rest stayed undecided; 22 more of these were refused.
+
+    What did not make the depth surer on simulated machines: squeezed energy at high orders, reach in mesh cycles,
+    phases against the mesh, two loads or two speeds (what two recordings get wrong, they mostly get wrong alike).
 
     References
     ----------
