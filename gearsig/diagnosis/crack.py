@@ -33,7 +33,12 @@ SETTLED_PERCENT = 50.0
 """If a crack through half of the root would have shown against the reference, the teeth count as examined."""
 
 DOUBTS = ("tooth-damage-undecided", "tooth-not-examined")
-"""Codes of findings about teeth that a comparison with the reference settles; it looks at both gears of the one pair."""
+"""Codes of findings about teeth that a comparison with the reference settles: it looks at both gears of the pair."""
+
+BESIDE_ANOTHER_FAULT = 0.5
+"""Factor where a damaged bearing knocks as well: what it leaves in an average changes single teeth, too."""
+
+WORTH_A_SUSPICION = 0.35
 
 OTHER_DAMAGE = "chipped or spalled"
 """Kind of an estimate that is no crack's."""
@@ -83,10 +88,20 @@ def with_crack(findings: Sequence[Finding], answer: Answer | None, rig: Rig) -> 
     same = next((f for f in findings if _is_same_tooth(f, answer, rig)), None)
     if same is not None:
         return [_merged(same, answer, rig) if f is same else f for f in findings if not _is_doubt(f, answer, rig)]
-    own = _seen(answer, rig)
+    own = _beside_others(_seen(answer, rig), findings)
     if not answer.with_reference and own.confidence < CLEAR:
         return list(findings)
     return [*(f for f in findings if not _is_doubt(f, answer, rig)), own]
+
+
+def _beside_others(own: Finding, findings: Sequence[Finding]) -> Finding:
+    """Return the finding of a crack, less sure where a fault of a bearing explains a small change as well."""
+    if not any(f.kind is Kind.FAULT and f.where.bearing for f in findings):
+        return own
+    confidence = BESIDE_ANOTHER_FAULT * own.confidence
+    kind = Kind.SUSPICION if confidence >= WORTH_A_SUSPICION else Kind.NOTICE
+    text = "Knocks of the damaged bearing may have made the change as well."
+    return replace(own, kind=kind, confidence=confidence, evidence=(*own.evidence, text))
 
 
 def _merged(found: Finding, crack: CrackEstimate, rig: Rig) -> Finding:

@@ -90,6 +90,12 @@ def test_an_unlikely_crack_is_a_suspicion_with_a_reference_and_nothing_without()
     assert with_crack([NOTHING], replace(unlikely, with_reference=False), PAIR) == [NOTHING]
 
 
+def test_a_damaged_bearing_makes_a_small_change_no_crack() -> None:
+    bearing = Finding("bearing-outer-race", Kind.FAULT, "Damage at the outer race.", Where(bearing="front"))
+    kinds = [with_crack([bearing], replace(CRACK, p_value=p), PAIR)[1].kind for p in (0.01, 0.04)]
+    assert kinds == [Kind.SUSPICION, Kind.NOTICE]
+
+
 def test_assumed_data_make_no_fault() -> None:
     assert with_crack([], CRACK, replace(PAIR, assumed=("module",)))[0].kind is Kind.SUSPICION
 
