@@ -15,7 +15,10 @@ from gearsig.severity.shape import SHAPE
 
 CRACKED, CHIPPED, SPALLED = KINDS = ("cracked", "chipped", "spalled")
 
-_USED = [i for i, name in enumerate(FEATURES) if name not in RELIEF]
+_OF_THE_SOUND_TEETH = ("prominence", "pattern_excess")
+"""How far the event stands out hangs on how even the sound teeth are, which says nothing of the damage."""
+
+_USED = [i for i, name in enumerate(FEATURES) if name not in (*RELIEF, *_OF_THE_SOUND_TEETH)]
 KIND_FEATURES = (*(FEATURES[i] for i in _USED), *SHAPE)
 
 

@@ -11,8 +11,9 @@ from gearsig.severity.kind import CRACKED
 COVERAGE = 0.90
 """Part of the cases in which the interval is meant to hold the true depth."""
 
-LIKELY = 0.7
-"""Probability from which a kind is stated; between 1 - it and it, it is left open."""
+CRACKED_FROM, OTHER_UP_TO = 0.7, 0.1
+"""Probabilities of a crack from which it is called cracked, and up to which chipped or spalled; between, it is left
+open. Very even gears, as in the demonstrations, let deep cracks look like chips: the second needs more evidence."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +80,9 @@ class CrackEstimate:
     def kind(self) -> str:
         """What the event looks like: "cracked", "chipped or spalled", or "undecided"."""
         cracked = self.kind_probabilities.get(CRACKED, 1.0)
-        if cracked >= LIKELY:
+        if cracked >= CRACKED_FROM:
             return CRACKED
-        return "chipped or spalled" if cracked <= 1.0 - LIKELY else "undecided"
+        return "chipped or spalled" if cracked <= OTHER_UP_TO else "undecided"
 
     @property
     def text(self) -> str:
