@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -12,6 +11,7 @@ from gearsig.checks import count, one_of, within
 from gearsig.errors import InputError
 from gearsig.recording.types import Recording
 from sims.blind.changes.catalogue import CATALOGUE, EVERY, MECHANICAL, OUTSIDE
+from sims.blind.changes.change import Place
 from sims.blind.rig import BlindRig, draw_rig
 from sims.blind.scene import Condition, run, scene_of
 from sims.blind.sensing import measure
@@ -51,7 +51,7 @@ class CaseRecordings:
     conditions: tuple[Recording, ...]
     references: tuple[Recording, ...]
     twins: tuple[Recording, ...]
-    places: tuple[Mapping[str, str | int | float], ...]
+    places: tuple[Place, ...]
 
 
 def draw_case(
@@ -112,20 +112,19 @@ def record_case(case: Case) -> CaseRecordings:
     clipping converter's range are set by the first condition's twin, so that no recording tells by its noise.
     """
     first = scene_of(case.rig, case.conditions[0])
-    first_twin = measure(first, run(first))
-    n = len(case.rig.chains)
-    rms = tuple(float(x.std()) / c.gain for x, c in zip(first_twin.samples[:n], case.rig.chains, strict=True))
-    peak = tuple(float(np.abs(x).max()) for x in first_twin.samples[:n])
+    motion = run(first)
+    bare, n = measure(first, motion), len(case.rig.chains)
+    rms = tuple(float(x.std()) / c.gain for x, c in zip(bare.samples[:n], case.rig.chains, strict=True))
+    peak = tuple(float(np.abs(x).max()) for x in bare.samples[:n])
 
-    def recorded(
-        condition: Condition, faults: tuple[Fault, ...] = ()
-    ) -> tuple[Recording, list[Mapping[str, str | int | float]]]:
+    def recorded(condition: Condition, faults: tuple[Fault, ...] = ()) -> tuple[Recording, list[Place]]:
         scene = scene_of(case.rig, condition)
         scene.reference_rms, scene.reference_peak = rms, peak
         places = [EVERY[f.name].apply(scene, f.severity, np.random.default_rng(f.seed)) for f in faults]
         return measure(scene, run(scene)), places
 
-    twins = tuple(recorded(c)[0] for c in case.conditions)
+    first.reference_rms, first.reference_peak = rms, peak
+    twins = (measure(first, motion), *(recorded(c)[0] for c in case.conditions[1:]))
     references = tuple(recorded(c)[0] for c in case.references)
     if not case.faults:
         return CaseRecordings(twins, references, twins, ())

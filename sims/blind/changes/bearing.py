@@ -30,7 +30,7 @@ def load_direction(scene: Scene, body: int) -> float:
 def blow_n(scene: Scene, severity_mm: float) -> float:
     """Force of a blow: grows with the defect and with the bearing's load, which the weight keeps above nothing."""
     load_n = scene.mesh_force_n / 2 + 9.81 * max(scene.rig.parts.rotor_mass_kg)
-    return float(0.12 * severity_mm**0.8 * load_n)
+    return float(0.06 * severity_mm**0.8 * load_n)
 
 
 def add_blows(

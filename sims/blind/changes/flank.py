@@ -10,7 +10,7 @@ from sims.blind.geometry import SpurPair
 from sims.blind.rig import texture
 from sims.blind.scene import Scene
 
-SMOOTHED = 0.2
+SMOOTHED = 0.12
 """Part of a rough flank's height that is left after averaging over the contact."""
 
 

@@ -163,9 +163,13 @@ def _warm(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 
 def _stain(scene: Scene, severity: float, choice: np.random.Generator) -> Place:  # noqa: ARG001 - nothing to choose
-    """Two teeth that marked each other at standstill and hit the mark whenever they meet again."""
+    """Teeth that marked each other at standstill and hit the mark whenever they meet again.
+
+    Where that is rare, the machine stood still more often: a mark at least every eight turns.
+    """
     pair = scene.rig.pair
-    period = lcm(pair.z1, pair.z2) / pair.z1
+    meeting = lcm(pair.z1, pair.z2) // pair.z1
+    period = meeting / -(-meeting // 8)
     n = int(scene.turns[0] / period) + 2
     angle = 2 * pi * period * (scene.rng.random() + np.arange(n))
     for shaft, way in ((0, scene.rig.parts.line_angle + pi), (1, scene.rig.parts.line_angle)):
@@ -193,9 +197,9 @@ CHANGES = (
     Change("ball_defect", OUTSIDE, "mm", steady(0.2, 4.0), _ball, "bearing_inner_race"),
     Change("electromagnetic_line", OUTSIDE, "m/s^2", steady(0.03, 5.0), _field, "mains_hum"),
     Change("temperature_shift", OUTSIDE, "%", steady(1.5, 20.0), _warm, "transfer_path"),
-    Change("hunting_stain", OUTSIDE, "N", _by_load(0.05, 2.0), _stain, "tooth_spall"),
-    Change("ghost_component", OUTSIDE, "um", lambda rig: (0.01 * deflection_um(rig), 0.3 * deflection_um(rig)), _ghost),
-    Change("pump_cavitation", OUTSIDE, "m/s^2", steady(0.1, 10.0), _cavitation),
-    Change("belt_line", OUTSIDE, "N", _by_load(0.005, 0.3), _belt),
+    Change("hunting_stain", OUTSIDE, "N", _by_load(0.02, 0.6), _stain, "tooth_spall"),
+    Change("ghost_component", OUTSIDE, "um", lambda rig: (0.02 * deflection_um(rig), 0.8 * deflection_um(rig)), _ghost),
+    Change("pump_cavitation", OUTSIDE, "m/s^2", steady(0.05, 3.0), _cavitation),
+    Change("belt_line", OUTSIDE, "N", _by_load(0.002, 0.06), _belt),
     Change("loose_cable", OUTSIDE, "bursts/s", steady(0.2, 8.0), _cable),
 )

@@ -87,7 +87,7 @@ def _chip(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 def _crack_span(rig: BlindRig) -> tuple[float, float]:
     chord_mm = ROOT_MODULES * rig.pair.module_mm / sin(CRACK_ANGLE)
-    return 0.07 * chord_mm, 0.55 * chord_mm
+    return 0.12 * chord_mm, 0.62 * chord_mm
 
 
 CHANGES = (

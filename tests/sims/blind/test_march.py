@@ -133,7 +133,7 @@ def test_energy_is_conserved_at_second_order() -> None:
 
 
 def test_forces_balance() -> None:
-    """Mean mesh force is torque over base radius; mean bearing forces are it, along the line of action, and the weight."""
+    """Mean mesh force is torque over base radius; bearings carry it along the line of action, and the weight."""
     base = rig(4)
     runs = condition(base, 1500.0, 0.7, 2.0)
     motion = run(scene_of(base, runs))
