@@ -13,7 +13,7 @@ from gearsig.recording.types import Recording
 from sims.blind.changes.catalogue import CATALOGUE, EVERY, MECHANICAL, OUTSIDE
 from sims.blind.changes.change import Place
 from sims.blind.rig import BlindRig, draw_rig
-from sims.blind.scene import Condition, run, scene_of
+from sims.blind.scene import Condition, Scene, run, scene_of
 from sims.blind.sensing import measure
 
 Kind = Literal["none", "single", "unknown", "pair"]
@@ -108,23 +108,25 @@ def draw_case(
 def record_case(case: Case) -> CaseRecordings:
     """Run a case: recordings, references and twins.
 
-    A twin is the same run from the same seeds without the fault; a case with no fault is its own twin. Noise and a
-    clipping converter's range are set by the first condition's twin, so that no recording tells by its noise.
+    A twin is the same run from the same seeds without the fault; a case with no fault is its own twin. Noise is set by
+    the quietest twin and a clipping converter's range by the loudest, so that no recording tells by its noise.
     """
-    first = scene_of(case.rig, case.conditions[0])
-    motion = run(first)
-    bare, n = measure(first, motion), len(case.rig.chains)
-    rms = tuple(float(x.std()) / c.gain for x, c in zip(bare.samples[:n], case.rig.chains, strict=True))
-    peak = tuple(float(np.abs(x).max()) for x in bare.samples[:n])
+    runs = [(scene, run(scene)) for scene in (scene_of(case.rig, c) for c in case.conditions)]
+    n, gains = len(case.rig.chains), np.array([c.gain for c in case.rig.chains])
+    bare = [measure(scene, motion).samples[:n] for scene, motion in runs]
+    rms = tuple(np.min([x.std(axis=1) for x in bare], axis=0) / gains)
+    peak = tuple(np.max([np.abs(x).max(axis=1) for x in bare], axis=0))
+
+    def levelled(scene: Scene) -> Scene:
+        scene.reference_rms, scene.reference_peak = rms, peak
+        return scene
 
     def recorded(condition: Condition, faults: tuple[Fault, ...] = ()) -> tuple[Recording, list[Place]]:
-        scene = scene_of(case.rig, condition)
-        scene.reference_rms, scene.reference_peak = rms, peak
+        scene = levelled(scene_of(case.rig, condition))
         places = [EVERY[f.name].apply(scene, f.severity, np.random.default_rng(f.seed)) for f in faults]
         return measure(scene, run(scene)), places
 
-    first.reference_rms, first.reference_peak = rms, peak
-    twins = (measure(first, motion), *(recorded(c)[0] for c in case.conditions[1:]))
+    twins = tuple(measure(levelled(scene), motion) for scene, motion in runs)
     references = tuple(recorded(c)[0] for c in case.references)
     if not case.faults:
         return CaseRecordings(twins, references, twins, ())

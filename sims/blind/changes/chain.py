@@ -52,7 +52,7 @@ def _hum(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 
 def _clip(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """Hold the signal at a limit, a share below the first healthy recording's peak."""
+    """Hold the signal at a limit, a share below the loudest healthy recording's peak."""
     channels = _channels(scene, choice)
 
     def stage(motion: Motion, signal: FloatArray, rng: np.random.Generator) -> FloatArray:  # noqa: ARG001 - a stage's form
