@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import pickle
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -39,7 +38,7 @@ from gearsig.severity.model import DepthModel
 from gearsig.severity.shape import SHAPE
 
 SEED = 2611
-N_CASES = 200
+N_CASES = 540
 EVEN_EVERY = 6
 """The last of so many cases has teeth that hardly differ."""
 
@@ -54,27 +53,23 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--to", type=Path, default=FILE)
     parser.add_argument("--state", default="", help="the simulator's commit, for the provenance")
-    parser.add_argument("--observed", type=Path, help="keeps what the cases show; a run goes on from there")
     given = parser.parse_args()
-    observed = observe_all(given.cases, given.processes, given.observed)
+    observed = observe_all(given.cases, given.processes)
     text = json.dumps(calibration_of(observed, given.cases, given.state), indent=1)
     given.to.write_text(text + "\n", encoding="utf-8")
     typer.echo(f"{len(observed)} of {given.cases} cases; written to {given.to}")
 
 
-def observe_all(n_cases: int, n_processes: int, kept: Path | None) -> list[tuple[int, Observed]]:
+def observe_all(n_cases: int, n_processes: int) -> list[tuple[int, Observed]]:
     """Return what the drawn cases show, by their index; some cannot be made, or show too few mesh harmonics."""
-    found: list[tuple[int, Observed | str]] = []
-    if kept and kept.exists():
-        found = pickle.loads(kept.read_bytes())  # noqa: S301  # a file of one's own
+    found: list[tuple[int, Observed]] = []
     with ProcessPoolExecutor(n_processes) as pool:
-        for first in range(len(found), n_cases, BATCH):
+        for first in range(0, n_cases, BATCH):
             indices = range(first, min(first + BATCH, n_cases))
-            found += zip(indices, pool.map(observe_one, indices), strict=True)
-            typer.echo(f"{len(found)} cases drawn")
-            if kept:
-                kept.write_bytes(pickle.dumps(found))
-    return [(index, answer) for index, answer in found[:n_cases] if isinstance(answer, Observed)]
+            answers = zip(indices, pool.map(observe_one, indices), strict=True)
+            found += [(index, answer) for index, answer in answers if isinstance(answer, Observed)]
+            typer.echo(f"{indices.stop} of {n_cases} cases drawn")
+    return found
 
 
 def observe_one(index: int) -> Observed | str:

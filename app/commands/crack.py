@@ -21,6 +21,7 @@ from app.commands.options import (
     stated_speed,
     torque_of,
 )
+from app.quantities import quantity
 
 
 def crack(
@@ -28,6 +29,10 @@ def crack(
     rig: RigOption = None,
     reference: ReferenceOption = None,
     torque: TorqueOption = None,
+    tip_relief: Annotated[
+        str | None,
+        typer.Option("--tip-relief", help="Metal taken off at the tips, e.g. 15um, where the drawing says it: surer."),
+    ] = None,
     fs: SamplingRateOption = None,
     speed_rpm: SpeedOption = None,
     tach_times: TachometerTimesOption = None,
@@ -36,8 +41,8 @@ def crack(
     """Estimate the depth of a crack in a tooth root, in mm and % of the root, with a 90 % interval.
 
     It says "no crack seen, below … mm" where none stands out, and refuses machines that its calibration (by
-    simulation) does not reach. With --reference it is much surer, and cracks of a millimetre show. A chipped or spalled
-    tooth looks alike.
+    simulation) does not reach. With --reference it is much surer, and cracks of a millimetre show. It also says whether
+    the tooth may be chipped or spalled instead.
 
     Example: gearsig crack sample_data/root_crack_3mm.h5 --reference sample_data/root_crack_0mm.h5
     """
@@ -49,6 +54,7 @@ def crack(
         open_recording(recording, machine, fs, speed),
         reference=open_reference(reference, machine, fs, speed_rpm),
         torque_nm=torque_of(torque),
+        tip_relief_um=quantity(tip_relief, "um", "--tip-relief") if tip_relief else None,
     )
     typer.echo(estimate.text)
     for reason in estimate.reasons:

@@ -86,7 +86,7 @@ def _one_gear(
     if sound is None:
         event = find_event(shaft)
         mesh = mesh_energies(shaft, n_bands(shaft))
-        shape = event_shape(shaft, shaft, event, driver=i == 0)
+        shape = event_shape(shaft, event)
         return GearEvidence(shaft, event, feature_vector(shaft, shaft, mesh, event, conditions), shaft, shaft, shape)
     marked = any(a.has_mark and b.has_mark for a, b in zip(now, sound, strict=True))
     _check_harmonics(sound[i])
@@ -96,7 +96,7 @@ def _one_gear(
     mesh = np.sqrt(mesh_energies(shaft, n) * mesh_energies(sound[i], n))
     event = find_event(difference)
     features = feature_vector(difference, sound[i], mesh, event, conditions)
-    shape = event_shape(difference, sound[i], event, driver=i == 0)
+    shape = event_shape(difference, event)
     return GearEvidence(shaft, event, features, difference, sound[i], shape, agreement)
 
 

@@ -8,16 +8,7 @@ from gearsig.checks import FloatArray
 from gearsig.severity.event import ToothEvent, band_envelopes, n_bands, sliding_mean, without_regular_lines
 from gearsig.severity.shaft_lines import ShaftLines
 
-PHASED_HARMONICS = (1, 2, 3)
-SHAPE = (
-    "lead",
-    "tail",
-    "duration",
-    "kurtosis",
-    "peak",
-    "window_slope",
-    *(f"{part}_{k}" for k in PHASED_HARMONICS for part in ("in_phase", "behind")),
-)
+SHAPE = ("lead", "tail", "duration", "kurtosis", "peak", "window_slope")
 """Order of the entries of `event_shape`."""
 
 REACH_LEVEL = 4.0
@@ -29,32 +20,26 @@ _MOST_HARMONICS = 8
 _LEAST = 1e-12
 
 
-def event_shape(searched: ShaftLines, sound: ShaftLines, event: ToothEvent, *, driver: bool) -> FloatArray:
+def event_shape(searched: ShaftLines, event: ToothEvent) -> FloatArray:
     """Return the numbers in the order of `SHAPE`.
 
     - lead, tail: ln of the energy one to three pitches before and after the event over its largest.
     - duration: ln of the energy's standard deviation about its middle, in pitches; kurtosis: ln of it; peak: ln of the
       largest energy density. A spall is short, a crack lasts as long as its tooth is in mesh.
     - window_slope: change of the window's ln energy per mesh harmonic.
-    - in_phase_k, behind_k: cosine and sine of the phase of the event in the band about the k-th mesh harmonic against
-      the mesh itself, mean over channels: what path and resonances turn, they turn in both. A chipped driver lets go
-      early in the pitch, a chipped driven gear takes up late: its sine is turned round.
+
+    The event's phase against the mesh is left out: it tells chips apart on machines like those of the calibration, and
+    misleads where the mesh harmonics pass a resonance.
 
     Parameters
     ----------
     searched : ShaftLines
         The average, or its difference from the sound gear's.
-    sound : ShaftLines
-        The sound gear's average, or the average itself: whose mesh is compared with.
     event : ToothEvent
-    driver : bool
-        Whether the gear drives.
     """
     levels = np.log(np.maximum(event.window, _LEAST * event.window.max())).mean(axis=1)
     slope = float(np.polyfit(np.arange(len(levels)), levels, 1)[0])
-    return np.array(
-        [*_around(searched, event), *_durations(searched, event), slope, *_phases(searched, sound, event, driver)]
-    )
+    return np.array([*_around(searched, event), *_durations(searched, event), slope])
 
 
 def reach_cycles(searched: ShaftLines, sound: ShaftLines, event: ToothEvent) -> float:
@@ -132,16 +117,3 @@ def band_signal(searched: ShaftLines, lowest: float, highest: float, centre_rev:
     spectrum[:, used] = lines[:, used]
     signal: FloatArray = np.roll(np.fft.irfft(spectrum, n, axis=1) * n / 2, n // 2 - round(centre_rev * n), axis=1)
     return signal
-
-
-def _phases(searched: ShaftLines, sound: ShaftLines, event: ToothEvent, driver: bool) -> list[float]:
-    z, lines = searched.teeth, without_regular_lines(searched)
-    parts: list[float] = []
-    for k in PHASED_HARMONICS:
-        n = np.arange(-(z // 2), z // 2 + 1)
-        weights = np.sinc(n / z) * np.exp(2j * np.pi * n * event.centre_rev)  # mean over the event's pitch
-        ratio = (lines[:, k * z + n] @ weights) * np.conj(sound.lines[:, k * z])
-        size = np.abs(ratio)
-        turn = complex(np.mean(np.divide(ratio, size, out=np.zeros_like(ratio), where=size > 0)))
-        parts += [turn.real, turn.imag if driver else -turn.imag]
-    return parts

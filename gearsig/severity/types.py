@@ -87,7 +87,7 @@ class CrackEstimate:
     @property
     def text(self) -> str:
         """The statement in one sentence, or two."""
-        where = f"tooth {self.tooth}" if self.tooth is not None else f"at {self.angle_deg:.0f}°"
+        where = f"tooth {self.tooth}" if self.tooth is not None else f"{self.angle_deg:.0f}°"
         doubt = "" if self.gear_is_certain else " (or its mate)"
         size = f"{self.depth_mm:.1f} mm ({self.interval_mm[0]:.1f} to {self.interval_mm[1]:.1f} mm)"
         place = f"{where} of {self.gear}{doubt}"
@@ -96,7 +96,7 @@ class CrackEstimate:
             return (
                 f"Damage at {place}, chipped or spalled rather than cracked ({other:.0f} %); a crack would be {size}."
             )
-        text = f"Crack of {size}, {self.depth_percent:.0f} % of the root, {place}."
+        text = f"Crack of {size}, {self.depth_percent:.0f} % of the root, at {place}."
         return text if self.kind == CRACKED else f"{text} Or it is chipped or spalled ({other:.0f} %)."
 
 
