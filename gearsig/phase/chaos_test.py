@@ -7,17 +7,17 @@ import numpy as np
 from gearsig.checks import FloatArray, count, not_negative
 from gearsig.errors import InputError
 from gearsig.phase.checked_series import checked_series
-from gearsig.phase.measures import ChaosTest
+from gearsig.phase.measures import ChaosTest, ChaosVerdict
 from gearsig.phase.types import PoincareSection
 
-MOST_VALUES = 20_000
+LEAST_VALUES, MOST_VALUES = 200, 20_000
 LOWEST_C, HIGHEST_C = np.pi / 5.0, 4.0 * np.pi / 5.0
 REGULAR, IRREGULAR = 0.2, 0.8
 GOLDEN = 0.6180339887498949
 
 
 def zero_one_test(
-    values: FloatArray, *, damping: float = 0.0, n_frequencies: int = 100, every: int | None = 1, source: str = ""
+    values: FloatArray, *, damping: float = 0.0, n_frequencies: int = 100, every: int | None = None, source: str = ""
 ) -> ChaosTest:
     """Return the 0–1 test of a series: K near 0 for regular motion, near 1 for chaos.
 
@@ -28,15 +28,16 @@ def zero_one_test(
     Parameters
     ----------
     values : array, (n_values,)
-        At least 200. Best the points of a Poincaré section, or a map; a finely sampled signal needs `every`.
-        Of more than 20 000 values the first 20 000 are used.
+        At least 200. Best the points of a Poincaré section, or a map. Of more than 20 000 the first 20 000 are used.
     damping : float
         α, 0 and more. The term keeps a weakly growing M, from measurement noise on regular motion, from being read as
         chaos; weak chaos is then missed as well. About 1 to 2.5 for noise of some percent.
     n_frequencies : int
         Values of c, spread by the golden ratio so that few of them resonate with the motion.
     every : int or None
-        Every so-many-th value is used; None: the first minimum of the mutual information.
+        Every so-many-th value is used; None: the first minimum of the mutual information, 1 for a map, less where
+        fewer than 200 values would be left. Where the values used still lie too close to each other, the verdict is
+        "undecided", and `ChaosTest.reason` says so.
     source : str
 
     Returns
@@ -59,26 +60,31 @@ def zero_one_test(
     """
     alpha = not_negative(damping, "damping")
     count(n_frequencies, "n_frequencies", minimum=10)
-    x = checked_series(values, minimum=200)
+    x = checked_series(values, minimum=LEAST_VALUES)
     step = _step(x) if every is None else count(every, "every")
     phi = x[::step][:MOST_VALUES]
-    if len(phi) < 200:
+    if len(phi) < LEAST_VALUES:
         raise InputError(
-            f"{len(phi)} values are left when every {step}-th is taken", allowed="at least 200", remedy="record longer"
+            f"{len(phi)} values are left when every {step}-th is taken",
+            allowed=f"at least {LEAST_VALUES}",
+            remedy="record longer",
         )
     c = LOWEST_C + (HIGHEST_C - LOWEST_C) * ((np.arange(n_frequencies) + 0.5) * GOLDEN % 1.0)
     scale = float(phi.std())
     k_of_c = np.array([_k(phi / scale, float(one), alpha) for one in c])
     k = float(np.median(k_of_c))
+    verdict, reason = _verdict(k, _oversampled(phi), step)
     return ChaosTest(
         k=k,
         k_of_c=k_of_c,
         c_rad=c,
         damping=alpha,
         n_values=len(phi),
-        verdict="regular" if k < REGULAR else "irregular" if k > IRREGULAR else "undecided",
+        verdict=verdict,
         oversampled=_oversampled(phi),
         source=source,
+        every=step,
+        reason=reason,
     )
 
 
@@ -91,7 +97,8 @@ def zero_one_test_of_section(section: PoincareSection, *, axis: int = 0, damping
     source = f"{section.source}, section {section.section}"
     if section.n_points >= 2 and float(np.std(values)) < 1e-6 * float(section.extent[axis]):
         return ChaosTest(0.0, np.zeros(1), np.array([LOWEST_C]), damping, section.n_points, "regular", False, source)
-    return zero_one_test(values, damping=damping, source=source)
+    every = None if _oversampled(values) else 1  # a section is a map already, unless it drifts slowly
+    return zero_one_test(values, damping=damping, every=every, source=source)
 
 
 def translation_walk(values: FloatArray, c_rad: float, *, every: int = 1) -> FloatArray:
@@ -112,7 +119,7 @@ def translation_walk(values: FloatArray, c_rad: float, *, every: int = 1) -> Flo
     -----
     The mean is taken off: it would turn the walk round a circle that says nothing of the motion.
     """
-    x = checked_series(values, minimum=200)
+    x = checked_series(values, minimum=LEAST_VALUES)
     phi = x[:: count(every, "every")][:MOST_VALUES]
     z = np.cumsum((phi - phi.mean()) / phi.std() * np.exp(1j * c_rad * np.arange(1, len(phi) + 1)))
     return np.column_stack([z.real, z.imag])
@@ -150,7 +157,19 @@ def _oversampled(phi: FloatArray) -> bool:
     return float(np.ptp(phi)) > 10.0 * float(np.mean(np.abs(np.diff(phi))))
 
 
+def _verdict(k: float, oversampled: bool, step: int) -> tuple[ChaosVerdict, str]:
+    if oversampled:
+        taken = "each value" if step == 1 else f"every {step}-th value"
+        return "undecided", (
+            f"with {taken} taken, neighbours lie too close: chaos would look regular, and noise on regular motion "
+            "irregular; take fewer values (every=None chooses), or record longer"
+        )
+    if k < REGULAR:
+        return "regular", ""
+    return ("irregular", "") if k > IRREGULAR else ("undecided", f"K lies between {REGULAR:g} and {IRREGULAR:g}")
+
+
 def _step(x: FloatArray) -> int:
     from gearsig.phase.embedding import chosen_delay
 
-    return chosen_delay(x, 1.0)
+    return min(chosen_delay(x, 1.0), len(x) // LEAST_VALUES)

@@ -85,7 +85,8 @@ def kind_of_motion(
     evidence = [f"the section of {section.n_points} points does not repeat within 16 cycles of the {lock.name}"]
     test = _answer(lambda: zero_one_test_of_section(section, damping=0.0 if noise_free else 1.0), "0–1 test", evidence)
     if test is not None:
-        evidence.append(f"0–1 test of the section: K = {test.k:.2f}, {test.verdict}")
+        why = f" ({test.reason})" if test.reason else ""
+        evidence.append(f"0–1 test of the section: K = {test.k:.2f}, {test.verdict}{why}")
     exponent, stochastic = _exponent(portrait, evidence)
     return MotionKind(
         _decide(test, exponent, stochastic, noise_free=noise_free), 0, tuple(evidence), section, exponent, test

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray, frozen_array
 
 BoolArray = NDArray[np.bool_]
+ChaosVerdict = Literal["regular", "irregular", "undecided"]
 
 
 @dataclass(frozen=True)
@@ -152,10 +153,14 @@ class ChaosTest:
         Weight of the term that keeps weak noise from being read as chaos; 0: the plain modified test.
     n_values : int
     verdict : str
-        "regular" (k < 0.2), "irregular" (k > 0.8), "undecided" between.
+        "regular" (k < 0.2), "irregular" (k > 0.8), "undecided" between and where the values are oversampled.
     oversampled : bool
         Whether neighbouring values are so close that the test would read chaos as regular motion.
     source : str
+    every : int
+        Every so-many-th value was used.
+    reason : str
+        Why it is undecided; empty otherwise.
     """
 
     k: float
@@ -163,9 +168,11 @@ class ChaosTest:
     c_rad: FloatArray
     damping: float
     n_values: int
-    verdict: Literal["regular", "irregular", "undecided"]
+    verdict: ChaosVerdict
     oversampled: bool
     source: str
+    every: int = 1
+    reason: str = ""
 
     def __post_init__(self) -> None:
         for name in ("k_of_c", "c_rad"):

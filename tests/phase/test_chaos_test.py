@@ -60,15 +60,33 @@ def test_sections_of_a_forced_oscillator(force, verdict):
     assert zero_one_test_of_section(section).verdict == verdict
 
 
-def test_a_fine_sampled_signal_is_flagged_and_thinned():
+def test_a_fine_sampled_signal_is_thinned_unless_told_otherwise():
     x = lorenz(20_000, 0.02)[:, 0]
-    fine = zero_one_test(x)
-    assert fine.oversampled
+    fine = zero_one_test(x, every=1)
     assert fine.k < 0.2
-    thinned = zero_one_test(x, every=None)
-    assert not thinned.oversampled
-    assert thinned.k > 0.95
-    assert zero_one_test(rossler(20_000, 0.15)[:, 0], every=None).k > 0.7
+    assert fine.oversampled
+    assert (fine.verdict, fine.every) == ("undecided", 1)
+    assert "neighbours lie too close" in fine.reason
+    thinned = zero_one_test(x)
+    assert (thinned.verdict, thinned.oversampled, thinned.reason) == ("irregular", False, "")
+    assert thinned.every > 1
+    assert zero_one_test(rossler(20_000, 0.15)[:, 0]).verdict == "irregular"
+
+
+def test_noise_on_a_finely_sampled_sine_is_not_called_irregular():
+    noise = 0.1 * np.random.default_rng(0).normal(size=20_000)
+    x = np.sin(2.0 * np.pi * 0.5 * np.arange(20_000) / 50.0) + noise
+    assert zero_one_test(x).k < 0.4
+    fine = zero_one_test(x, every=1)
+    assert fine.k > 0.8
+    assert fine.verdict == "undecided"
+
+
+def test_a_map_is_taken_whole_and_a_short_signal_not_thinned_away():
+    assert zero_one_test(henon(3000)).every == 1
+    short = zero_one_test(lorenz(500, 0.02)[:, 0])
+    assert short.n_values >= 200
+    assert short.verdict == "undecided"
 
 
 def test_damping_keeps_noise_on_regular_motion_from_being_read_as_chaos():

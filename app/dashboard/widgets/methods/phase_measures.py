@@ -140,7 +140,7 @@ def show_recurrence(analysis: Analysis, stretch: Stretch, path: PhasePortrait) -
 
 def show_chaos_test(analysis: Analysis, stretch: Stretch, path: PhasePortrait) -> None:
     """Show K of the 0–1 test, and the walk it rests on."""
-    from gearsig.phase.chaos_test import translation_walk, zero_one_test
+    from gearsig.phase.chaos_test import translation_walk, zero_one_test, zero_one_test_of_section
     from gearsig.phase.section import locked_section
     from gearsig.plot.phase import chaos_test_figure
 
@@ -156,30 +156,32 @@ def show_chaos_test(analysis: Analysis, stretch: Stretch, path: PhasePortrait) -
         help="Keeps noise on regular motion from being read as chaos; 0 is the plain test.",
         persist_state="session",
     )
-    every: int | None = 1
+    every: int | None = None
     if of == SECTION:
         with columns[2]:
             lock = choose_lock(analysis, stretch)
         if lock is None:
             return
-        values = np.ascontiguousarray(locked_section(path, lock).points[:, 0])
+        section = locked_section(path, lock)
+        values = np.ascontiguousarray(section.points[:, 0])
     else:
-        values = np.ascontiguousarray(path.points[:, 0])
-        every = (
-            whole_number(columns[2], "Every so-many-th sample", "every", analysis, "the delay") or path.delay_samples
-        )
+        section, values = None, np.ascontiguousarray(path.points[:, 0])
+        every = whole_number(columns[2], "Every so-many-th sample", "every", analysis, "from the mutual information")
     c = columns[3].slider(
         "Walk at c (rad)", 0.63, 2.51, 1.2, step=0.01, key=path_key("c", analysis), persist_state="session"
     )
-    test = zero_one_test(values, damping=float(damping), every=every, source=path.source)
-    walk = translation_walk(values, float(c), every=every or 1)
+    if section is not None:
+        test = zero_one_test_of_section(section, damping=float(damping))
+    else:
+        test = zero_one_test(values, damping=float(damping), every=every, source=path.source)
+    walk = translation_walk(values, float(c), every=test.every)
     show_picture(chaos_test_figure(test, walk, float(c)), f"K of the 0–1 test over c, and its walk, {path.source}")
     st.caption(
         "K near 0: regular, a bounded walk. K near 1: chaos or noise, a walk like Brownian motion; only the false "
-        "neighbours tell these two apart."
+        "neighbours tell these two apart." + (f" Every {test.every}-th value is used." if test.every > 1 else "")
     )
-    if test.oversampled:
-        st.warning("Neighbouring values are too close: the test would call chaos regular. Take every n-th sample.")
+    if test.reason:
+        st.warning(f"Undecided: {as_typed(test.reason)}.")
 
 
 ABOUT_METHODS = (
