@@ -162,7 +162,7 @@ def _verdict(k: float, oversampled: bool, step: int) -> tuple[ChaosVerdict, str]
         taken = "each value" if step == 1 else f"every {step}-th value"
         return "undecided", (
             f"with {taken} taken, neighbours lie too close: chaos would look regular, and noise on regular motion "
-            "irregular; take fewer values (every=None chooses), or record longer"
+            "irregular; take fewer of them, or record longer"
         )
     if k < REGULAR:
         return "regular", ""

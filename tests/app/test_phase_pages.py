@@ -26,6 +26,7 @@ def test_every_view_answers_or_says_why_not():
             assert "looks stochastic or too noisy" in page.error[0].value.replace("\\", "")
         elif view == "Kind of motion":
             assert "Kind of motion:" in shown_text(page)
+            assert "the signal as measured" in shown_text(page)
         else:
             assert len(page.get("image")) == 1, view
             assert not page.error
@@ -39,6 +40,16 @@ def test_the_path_is_shown_in_space_with_its_own_dimension():
     assert "give at least 3" in shown_text(page)
     number(page, "Dimension").set_value(4).run()
     assert len(page.get("plotly_chart")) == 1
+
+
+def test_a_run_up_is_warned_of():
+    assert "at a steady speed" in shown_text(opened_at("Phase plane", "run_up"))
+    assert "at a steady speed" not in shown_text(opened_at("Phase plane"))
+
+
+def test_the_lowest_frequency_lies_below_the_mesh():
+    page = opened_at("Phase plane")
+    assert "a third of the slowest mesh frequency" in number(page, "Lowest frequency").placeholder
 
 
 def test_a_stretch_to_fit_is_taken_or_refused():

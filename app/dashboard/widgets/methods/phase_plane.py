@@ -8,7 +8,7 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.as_typed import as_typed
-from app.dashboard.widgets.methods.phase_motion import show_verdict
+from app.dashboard.widgets.methods.phase_motion import OF_DISPLACEMENT, show_verdict
 from app.dashboard.widgets.methods.phase_settings import PhaseSettings, choose_band, choose_lock
 from app.dashboard.widgets.methods.stretch import Stretch, choose_stretch
 from app.dashboard.widgets.picture import show_picture
@@ -111,7 +111,7 @@ def _show_kind(
         return
     with st.spinner("Looking at section, exponent and 0–1 test …", show_time=True):
         kind = kind_of(stretch.key, settings, lock.name, lock.cycles_per_revolution, portrait, lock)
-    show_verdict(kind)
+    show_verdict(kind, OF_DISPLACEMENT.format(portrait.source))
 
 
 def _ask(asked: str, question: tuple[object, ...]) -> None:

@@ -15,6 +15,7 @@ from gearsig.diagnosis.types import Analysis
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
+    from gearsig.angle.types import ShaftAngle
     from gearsig.phase.lock import CycleLock
     from gearsig.phase.plane import MotionQuantity
     from gearsig.rig.types import Rig
@@ -24,6 +25,8 @@ OF_MOTION = (*QUANTITIES, "transmission_error", "unknown")
 WITHOUT_SPEED_HZ = 10.0
 """Low cut suggested where no shaft's frequency is known."""
 SPARE = 1.05
+STEADY = 0.05
+"""Share of the mean by which the speed may vary while a section is still one of one motion."""
 
 
 @dataclass(frozen=True)
@@ -88,17 +91,32 @@ def _choose_low_cut(analysis: Analysis, stretch: Stretch) -> float | None:
 
 
 def suggested_low_cut_hz(analysis: Analysis, stretch: Stretch) -> tuple[float, str]:
-    """Return half of the slowest shaft's lowest frequency, or what the stretch allows if that is higher, and why."""
+    """Return a frequency below the slowest mesh, or else shaft, or what the stretch allows if that is higher, and why.
+
+    Far below the mesh, integrated noise outgrows the motion of the teeth and makes a cloud of the section.
+    """
     from gearsig.phase.integration import SETTLING_PERIODS
     from gearsig.phase.plane import LEAST_PERIODS
 
     possible = SPARE * (2.0 * SETTLING_PERIODS + LEAST_PERIODS) / stretch.recording.duration_s
+    meshes = _mesh_orders(analysis.rig)
     if stretch.angle is None:
         wanted, why = WITHOUT_SPEED_HZ, "as no shaft's frequency is known"
+    elif meshes:
+        wanted, why = min(meshes) * _lowest_hz(stretch.angle) / 3.0, "a third of the slowest mesh frequency"
     else:
         slowest = min(_ratios(analysis.rig))
-        wanted, why = 0.5 * slowest * stretch.angle.speed_range_rpm[0] / 60.0, "half of the slowest shaft's frequency"
+        wanted, why = 0.5 * slowest * _lowest_hz(stretch.angle), "half of the slowest shaft's frequency"
     return (wanted, why) if wanted >= possible else (float(f"{possible:.3g}"), "as low as the stretch allows")
+
+
+def _lowest_hz(angle: ShaftAngle) -> float:
+    return angle.speed_range_rpm[0] / 60.0
+
+
+def _mesh_orders(rig: Rig | None) -> list[float]:
+    orders = [] if rig is None else [rig.mesh_order(pair) for pair in rig.pairs]
+    return [order for order in orders if order]
 
 
 def _ratios(rig: Rig | None) -> list[float]:
@@ -113,6 +131,12 @@ def choose_lock(analysis: Analysis, stretch: Stretch) -> CycleLock | None:
     if stretch.angle is None:
         st.info("There is no Poincaré section: it takes a shaft angle, and the speed is not known.")
         return None
+    lowest, highest = stretch.angle.speed_range_rpm
+    if highest - lowest > STEADY * stretch.angle.mean_speed_rpm:
+        st.warning(
+            f"The speed runs from {lowest:.4g} to {highest:.4g} rpm here: a Poincaré section shows one motion only at "
+            "a steady speed. Its points smear, and what is said of them does not hold; choose a steady stretch."
+        )
     choices: dict[str, tuple[str, str]] = {}
     rig = analysis.rig
     if rig is not None:
