@@ -73,7 +73,9 @@ def separated(
     problem = Problem(
         tracks.cycles, valid, _continued(widths, valid) / rate, method.p, method.generation, method.mirror
     )
-    cheap = method.generation == "second" and cheap_together(problem.bandwidths, method.p)
+    cheap = method.generation == "second" and cheap_together(
+        problem.cycles, problem.valid, problem.bandwidths, method.p
+    )
     groups = grouped(method.coupled, neighbours, len(valid), cheap=cheap)
     envelopes, waveforms, left = solve_groups(y, problem, groups, share=isinstance(method.coupled, str))
     settled = settled_parts(widths, valid, rate, method.skirt_poles)
@@ -131,7 +133,7 @@ def _expected_error(problem: Problem, group: Group) -> float:
     """Return the rounding error of one group's solution."""
     widths = problem.bandwidths[group]
     if problem.generation == "second":
-        return accuracy_of(widths, problem.p)
+        return accuracy_of(problem.cycles[group], problem.valid[group], widths, problem.p)
     return waveform_accuracy_of(problem.cycles[group], problem.valid[group], widths)
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from math import comb
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.orders.vold_kalman_closeness import closeness
 from gearsig.orders.vold_kalman_splines import (
     BoolArray,
     ComplexArray,
@@ -18,14 +19,18 @@ from gearsig.orders.vold_kalman_splines import (
 )
 from gearsig.orders.vold_kalman_weight import HALF_POWER, envelope_weight, waveform_weight
 
+Way = Literal["splines", "elimination", "rotations"]
+
 STRONGEST_ELIMINATED = 1.5e5
-"""r·|D| up to which the normal equations are solved: their rounding error is 1e-7 there, more if orders are alike."""
+"""r·|D| up to which the normal equations are solved: their rounding error is below 5e-7 there."""
 SMALLEST_CELL = 3
 """Samples. Below, the band is so wide that the coarse grid saves nothing, and elimination loses no digits."""
 
 CHEAP_CELL, MOST_TOGETHER = 16, 8
 """Samples per cell from which, and orders up to which, the coarse grid is faster than several solutions (trials)."""
 ACCURATE = 1e-7
+ENOUGH = 5e-7
+"""Expected error up to which the fastest way is taken."""
 
 
 def solve_envelopes(
@@ -80,12 +85,12 @@ def solve_envelopes(
         from gearsig.orders.vold_kalman_alone import envelope_alone
 
         return envelope_alone(y, cycles[0], None if active is None else active[0], weights[0], p, mirror=mirror)[None]
-    d = cell_of(bandwidths, p)
-    if d:
-        return solve_by_splines(y, cycles, active, weights, p, d, mirror=mirror)
+    way, _ = chosen_way(bandwidths, p, closeness(cycles, active, bandwidths, p))
+    if way == "splines":
+        return solve_by_splines(y, cycles, active, weights, p, cell_of(bandwidths, p), mirror=mirror)
     weights = np.broadcast_to(weights, (len(cycles), n - p))
     solve = _solved_with_mirror_images if mirror else _solved_as_in_textbooks
-    return solve(y, cycles, active, weights, p)
+    return solve(y, cycles, active, weights, p, way)
 
 
 def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None, bandwidths: FloatArray) -> FloatArray:
@@ -118,22 +123,21 @@ def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None,
     stencils = np.ones((*frequency.shape, 3))
     stencils[:, :, 1] = -2.0 * np.cos(2.0 * np.pi * frequency)
     data = np.ones(cycles.shape) if active is None else active.astype(np.float64)
-    return solve_sample_by_sample(data, y.astype(np.float64), waveform_weight(width, inside), stencils)
+    weights = waveform_weight(width, inside)
+    # |D|, the largest gain of the stencil, is 2^p for differences and for the first generation at most that.
+    way = _sample_by_sample(4.0 * float(weights.max()), closeness(cycles, active, bandwidths, 2))[0]
+    return solve_sample_by_sample(data, y.astype(np.float64), weights, stencils, way)
 
 
 def solve_sample_by_sample(
-    data: NDArray[Any], observed: NDArray[Any], weights: FloatArray, stencils: FloatArray
+    data: NDArray[Any], observed: NDArray[Any], weights: FloatArray, stencils: FloatArray, way: Way
 ) -> NDArray[Any]:
-    """Solve a banded least-squares problem: the fast way where r is small enough, the exact way elsewhere."""
+    """Solve a banded least-squares problem by elimination or rotations."""
     from gearsig.orders.vold_kalman_band import solve_band
     from gearsig.orders.vold_kalman_elimination import eliminate
     from gearsig.orders.vold_kalman_rotations import rotate
 
-    # |D|, the largest gain of the stencil, is 2^p for differences and for the first generation at most that.
-    strength = 2.0 ** (stencils.shape[2] - 1) * float(weights.max())
-    return solve_band(
-        data, observed, weights, stencils, forward=eliminate if strength <= STRONGEST_ELIMINATED else rotate
-    )
+    return solve_band(data, observed, weights, stencils, forward=eliminate if way == "elimination" else rotate)
 
 
 def cell_of(bandwidths: FloatArray, p: int) -> int:
@@ -142,20 +146,37 @@ def cell_of(bandwidths: FloatArray, p: int) -> int:
     return d if d >= SMALLEST_CELL else 0
 
 
-def accuracy_of(bandwidths: FloatArray, p: int) -> float:
+def chosen_way(bandwidths: FloatArray, p: int, close: float) -> tuple[Way, float]:
+    """Return how several orders of the second generation are solved for, and the expected error.
+
+    Relative to the largest component of the signal; `close` is the factor of `closeness`.
+    """
+    d = cell_of(bandwidths, p)
+    ways = [_sample_by_sample(2.0**p * float(envelope_weight(bandwidths.min()[None], p)[0]), close)]
+    if d:
+        ways.insert(0, ("splines", close * expected_error(float(bandwidths.min()), float(bandwidths.max()), d, p)))
+    return next((way for way in ways if way[1] <= ENOUGH), min(ways, key=lambda way: way[1]))
+
+
+def _sample_by_sample(strength: float, close: float) -> tuple[Way, float]:
+    """Return elimination or rotations and their error for r·|D|, the former's growing with its square (trials)."""
+    elimination, rotations = 2e-17 * strength**2 * close, 1e-15 * strength * close**0.5
+    if strength <= STRONGEST_ELIMINATED and elimination <= max(ENOUGH, rotations):
+        return "elimination", elimination
+    return "rotations", rotations
+
+
+def accuracy_of(cycles: FloatArray, active: BoolArray | None, bandwidths: FloatArray, p: int) -> float:
     """Return the expected error of `solve_envelopes`, relative to the largest component of the signal."""
     if len(bandwidths) == 1:
         return error_alone(bandwidths)
-    d = cell_of(bandwidths, p)
-    if d:
-        return expected_error(float(bandwidths.min()), float(bandwidths.max()), d, p)
-    return _error_of_strength(2.0**p * float(envelope_weight(bandwidths.min()[None], p)[0]))
+    return chosen_way(bandwidths, p, closeness(cycles, active, bandwidths, p))[1]
 
 
-def cheap_together(bandwidths: FloatArray, p: int) -> bool:
+def cheap_together(cycles: FloatArray, active: BoolArray | None, bandwidths: FloatArray, p: int) -> bool:
     """Return whether one solution of the second generation for all orders takes less time than several for groups."""
     few = 1 < len(bandwidths) <= MOST_TOGETHER
-    return few and cell_of(bandwidths, p) >= CHEAP_CELL and accuracy_of(bandwidths, p) <= ACCURATE
+    return few and cell_of(bandwidths, p) >= CHEAP_CELL and accuracy_of(cycles, active, bandwidths, p) <= ACCURATE
 
 
 def waveform_accuracy_of(cycles: FloatArray, active: BoolArray, bandwidths: FloatArray) -> float:
@@ -165,17 +186,13 @@ def waveform_accuracy_of(cycles: FloatArray, active: BoolArray, bandwidths: Floa
     frequency = np.abs(np.diff(cycles, axis=1))[active[:, 1:] & active[:, :-1]]
     narrowest = np.pi * float(bandwidths.min())
     sine = min(np.sin(2 * np.pi * float(frequency.min())), np.sin(2 * np.pi * float(frequency.max())))
-    return _error_of_strength(4.0 * float(HALF_POWER) / (2.0 * narrowest * max(sine, narrowest)))
+    strength = 4.0 * float(HALF_POWER) / (2.0 * narrowest * max(sine, narrowest))
+    return _sample_by_sample(strength, closeness(cycles, active, bandwidths, 2))[1]
 
 
 def error_alone(bandwidths: FloatArray) -> float:
     """Return the rounding error for one order: a rounding step per sample, as far as the filter's memory reaches."""
     return 1e-12 + 1e-15 / float(bandwidths.min())
-
-
-def _error_of_strength(strength: float) -> float:
-    """Return the rounding error for r·|D|: it grows with the square by elimination (factor from trials)."""
-    return 2e-17 * strength**2 if strength <= STRONGEST_ELIMINATED else 1e-15 * strength
 
 
 def envelopes_of_waveforms(x: FloatArray, cycles: FloatArray) -> ComplexArray:
@@ -203,7 +220,7 @@ def phasors_of(cycles: FloatArray) -> ComplexArray:
 
 
 def _solved_with_mirror_images(
-    y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, p: int
+    y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, p: int, way: Way
 ) -> ComplexArray:
     """Sample by sample, for the real coefficients u, v of cos and -sin: u + iv = 2x, with weight r/√2 each."""
     data = np.empty((2 * len(cycles), len(y)))
@@ -213,18 +230,18 @@ def _solved_with_mirror_images(
     if active is not None:
         data *= np.repeat(active, 2, axis=0)
     weights = np.repeat(weights, 2, axis=0) / 2**0.5
-    x = solve_sample_by_sample(data, y.astype(np.float64), weights, _differences(weights, p))
+    x = solve_sample_by_sample(data, y.astype(np.float64), weights, _differences(weights, p), way)
     return np.asarray(x[::2] + 1j * x[1::2], dtype=np.complex128)
 
 
 def _solved_as_in_textbooks(
-    y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, p: int
+    y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, p: int, way: Way
 ) -> ComplexArray:
     """Sample by sample, for the complex x."""
     data: NDArray[Any] = phasors_of(cycles)
     if active is not None:
         data *= active
-    x = solve_sample_by_sample(data, y.astype(np.complex128), weights, _differences(weights, p))
+    x = solve_sample_by_sample(data, y.astype(np.complex128), weights, _differences(weights, p), way)
     return np.asarray(2.0 * x, dtype=np.complex128)
 
 

@@ -171,11 +171,13 @@ def test_splines_against_rotations(p, n, mirror):
     if mirror:
         data, weights = np.concatenate([data, data.conj()]), np.concatenate([weights, weights])
     expected = solve_by_rotations(data, y + 0j, weights, differences(p, weights.shape))
-    x = solve_envelopes(y, cycles, active, bandwidths, p, mirror=mirror)
-    assert np.abs(x - 2 * expected[:2])[active].max() < 1e-6
     d = samples_per_cell(1e-3, 3e-3, p)
     assert d >= 4
-    assert np.array_equal(x, solve_by_splines(y, cycles, active, weights[:2], p, d, mirror=mirror))
+    x = solve_by_splines(y, cycles, active, weights[:2], p, d, mirror=mirror)
+    assert np.abs(x - 2 * expected[:2])[active].max() < 1e-6
+    # They stay close for long: the splines' error grows, and rotations may be taken instead.
+    chosen = solve_envelopes(y, cycles, active, bandwidths, p, mirror=mirror)
+    assert np.abs(chosen - 2 * expected[:2])[active].max() < 1e-7
 
 
 @pytest.mark.parametrize("p", [1, 2, 3])
