@@ -18,7 +18,6 @@ NOT_HIDDEN = -(1 << 14)
 """Mark of cells that no path covers, as in `ridge_path`; written here so that its compiler loads only on use."""
 MOST_COLUMNS = 4000
 """Columns that the search for a path works on; longer transforms are pooled."""
-_MEETING = 3.0  # two paths turn back this many times farther apart than components can be told apart
 _LEAST_SCORE = 0.25  # mean score of a path: below, it hops between maxima of noise
 
 
@@ -44,9 +43,10 @@ def ridges(
     """Return the `n_ridges` clearest ridges, which go straight on where they cross.
 
     Paths are found one after the other by dynamic programming over place and slope, with a price on changes of slope;
-    what a path covers is taken out before the next one. Where two of them meet, they are then looked at together: tails
-    are exchanged if place, slope and level go on more evenly so. Places between lines come from a parabola through the
-    logarithm of the power (or its centre of gravity where the transform is squeezed).
+    what a path covers is taken out before the next one. Where two of them meet, they are then looked at together: if
+    the power shows a valley all through the meeting, they part again; otherwise tails are exchanged if place, slope and
+    level go on more evenly so. Places between lines come from a parabola through the logarithm of the power (or its
+    centre of gravity where the transform is squeezed).
 
     Parameters
     ----------
@@ -75,9 +75,10 @@ def ridges(
 
     Notes
     -----
-    Not for components that touch and part again at equal slope and level: which is which is then not in the data. A
-    ridge runs through the whole transform: one that begins or ends within it is carried on along what is
-    nearest, so cut the recording, or look at `amplitude`.
+    Two components that come closer than the transform tells them apart, and turn back, look like two that cross: which
+    is which is then not in the data, and the ridges cross. See `shared`, and take a longer wavelet or window. A ridge
+    runs through the whole transform: one that begins or ends within it is carried on along what is nearest, so cut the
+    recording, or look at `amplitude`.
 
     Source: R. A. Carmona, W. L. Hwang, B. Torrésani, *Multiridge detection and time-frequency reconstruction*, IEEE
     Transactions on Signal Processing 47 (1999), for ridges as penalised paths; the state with slope and the
@@ -149,17 +150,19 @@ def _paths(grid: _Grid, n_ridges: int, steepest: float, stiffness: float) -> tup
             break
         paths.append(path)
     if len(paths) > 1:
-        paths = _settled(paths, power, grid.n_reach)
+        paths = _settled(paths, grid, power)
         for i in range(len(paths)):  # once more, now that each knows where the others go
             hidden = _hidden(scores.shape, paths[:i] + paths[i + 1 :], grid.n_reach)
             paths[i] = best_path(scores, hidden, steepest, stiffness)
-        paths = _settled(paths, power, grid.n_reach)
+        paths = _settled(paths, grid, power)
     return paths, power
 
 
-def _settled(paths: list[FloatArray], power: FloatArray, n_reach: int) -> list[FloatArray]:
+def _settled(paths: list[FloatArray], grid: _Grid, power: FloatArray) -> list[FloatArray]:
+    """Return the paths, read between the lines, each going on as what it was before it met another one."""
+    paths = [_read(grid, power, p)[0] for p in paths]
     levels: list[FloatArray] = [np.log(np.maximum(_along(power, p), np.finfo(np.float64).tiny)) / 2 for p in paths]
-    return untangled(paths, levels, _MEETING * 2 * n_reach, float(n_reach))
+    return untangled(paths, levels, 2.0 * grid.n_reach, float(grid.n_reach), power)
 
 
 def _hidden(shape: tuple[int, ...], paths: list[FloatArray], n_cover: int) -> NDArray[np.int16]:
@@ -185,7 +188,7 @@ def _ridge(
     path: FloatArray,
     shared: np.ndarray[tuple[int], np.dtype[np.bool_]],
 ) -> Ridge:
-    places, peak = _centres(grid, path) if grid.squeezed else _parabolas(power, path)
+    places, peak = _read(grid, power, path)
     alone = ~shared
     if alone.any() and shared.any():
         columns, known = np.arange(len(path)), np.flatnonzero(alone)
@@ -200,6 +203,11 @@ def _ridge(
     return Ridge(
         grid.at, positions, np.sqrt(peak), shared, transform.axis, _unit(transform), transform.source, transform.shaft
     )
+
+
+def _read(grid: _Grid, power: FloatArray, path: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return place, between the lines, and peak power next to a path."""
+    return _centres(grid, path) if grid.squeezed else _parabolas(power, path)
 
 
 def _parabolas(power: FloatArray, path: FloatArray) -> tuple[FloatArray, FloatArray]:

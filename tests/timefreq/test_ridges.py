@@ -54,6 +54,46 @@ def test_crossing_chirps_do_not_change_over(crossing, kind, second, noise, seed)
     assert taken == {0, 1}
 
 
+USUAL = {"CWT": cwt_map, "squeezed CWT": squeezed_cwt_map, "STFT": stft_map, "squeezed STFT": squeezed_stft_map}
+FAR_APART_S = np.array([1.0, 2.0, 6.0, 7.0])
+
+
+def _branches(rate, least_hz):
+    """Return a chirp and a tone that cross after 4 s, or the two hyperbolas between them if kept apart."""
+    t = np.arange(int(8 * rate)) / rate
+    chirp, tone = 100 + 50 * t, 300 + 0 * t
+    if least_hz == 0:
+        return t, (chirp, tone)
+    half = np.sqrt((chirp - tone) ** 2 + least_hz**2) / 2
+    return t, ((chirp + tone) / 2 + half, (chirp + tone) / 2 - half)
+
+
+def _followed(kind, least_hz, amplitudes, phase=0.7):
+    t, both = _branches(2048.0, least_hz)
+    phases = [2 * np.pi * np.cumsum(f) / 2048.0 for f in both]
+    x = amplitudes[0] * np.cos(phases[0]) + amplitudes[1] * np.cos(phases[1] + phase)
+    found = ridges(USUAL[kind](UniformSignal(x, 2048.0)), 2)
+    truth = [np.interp(FAR_APART_S, t, f) for f in both]
+    errors = [[np.abs(r.position_at(FAR_APART_S) - f).max() for f in truth] for r in found]
+    assert {int(np.argmin(e)) for e in errors} == {0, 1}
+    assert max(min(e) for e in errors) < 20.0  # at 2 s and 6 s, the wavelets' footprints still overlap
+
+
+@pytest.mark.parametrize("kind", USUAL)
+@pytest.mark.parametrize("amplitudes", [(1.0, 1.0), (1.0, 0.7), (0.7, 1.0)])
+def test_a_chirp_crosses_a_tone_with_usual_settings(kind, amplitudes):
+    _followed(kind, 0, amplitudes)
+    _followed(kind, 0, amplitudes, phase=0.7 + np.pi)
+
+
+@pytest.mark.parametrize(
+    ("kind", "least_hz"), [("CWT", 100), ("squeezed CWT", 100), ("STFT", 60), ("squeezed STFT", 60), ("STFT", 40)]
+)
+@pytest.mark.parametrize("amplitudes", [(1.0, 1.0), (1.0, 0.7), (0.7, 1.0)])
+def test_components_that_can_be_told_apart_turn_back(kind, least_hz, amplitudes):
+    _followed(kind, least_hz, amplitudes)
+
+
 def test_three_crossing_components():
     t = np.arange(20_001) / 2000.0
     f = [lambda at: 150 + 40 * at, lambda at: 500 - 30 * at, lambda at: 350 + 0 * at]
