@@ -25,8 +25,9 @@ def refined_waveforms(y: FloatArray, cycles: FloatArray, bandwidth: float, p: in
     r = float(envelope_weight(np.full((1, 1), bandwidth), p)[0, 0]) / np.sqrt(2.0)
     turns = np.exp(2j * np.pi * cycles)
     data = [sp.diags(part) for turn in turns for part in (turn.real, -turn.imag)]
-    smooth = [[r * difference if i == j else None for j in range(n_unknowns)] for i in range(n_unknowns)]
-    a: Any = sp.bmat([data, *smooth])
+    smooth: list[Any] = [[r * difference if i == j else None for j in range(n_unknowns)] for i in range(n_unknowns)]
+    rows: list[Any] = [data, *smooth]
+    a: Any = sp.bmat(rows)
     m = sp.bmat([[sp.eye(a.shape[0]), a], [a.T, None]]).tocoo()
     solver = splu(m.tocsc())
     right = np.zeros(m.shape[0], np.longdouble)
