@@ -11,7 +11,7 @@ from typing import Any
 
 from app.bifurcation.kept import Kept, load, save
 from app.bifurcation.measure import measured
-from gearsig.checks import count, one_of
+from gearsig.checks import count, one_of, within
 from gearsig.errors import GearsigError
 from sims.cracked.continuation import Branch, End
 from sims.processes import n_processors, process_pool
@@ -46,6 +46,7 @@ class Wanted:
 
     def __post_init__(self) -> None:
         one_of(self.direction, "direction", DIRECTIONS)
+        within(self.phase_cycles, "phase", 0.0, 1.0, remedy="it is a share of a cycle")
 
     @property
     def branches(self) -> tuple[str, ...]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from io import StringIO
+from itertools import groupby
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +28,7 @@ POINTS, SUMMARY, FIGURE = "points.csv", "bifurcation.json", "bifurcation.png"
 DOTS_PER_INCH = 160
 NAMES = {"up": "rising", "down": "falling", "rest": "from rest"}
 TRANSIENT = f"{DECAYS:g} time constants of the machine's slowest decay are left out at each value"
+BOUNDED = "known at the values tried only; a range that begins or ends where the sweep does may go on beyond it"
 
 Found = Mapping[str, Sequence[Kept]]
 
@@ -89,6 +92,7 @@ def points_csv(branch: Branch, found: Found) -> str:
 def summary(wanted: Wanted, found: Found) -> dict[str, Any]:
     """Return the values of each branch, and where branches are apart."""
     from gearsig.phase.bifurcation import values_apart
+    from gearsig.phase.coexistence import coexistence_ranges, step_of
 
     drawn = diagrams(wanted.branch, found)
     result: dict[str, Any] = {
@@ -97,8 +101,43 @@ def summary(wanted: Wanted, found: Found) -> dict[str, Any]:
         "branches": {name: [_row(one) for one in kept] for name, kept in found.items()},
     }
     if {"up", "down"} <= drawn.keys():
-        result["coexisting_at"] = values_apart(drawn["up"], drawn["down"]).tolist()
+        up, down = drawn["up"], drawn["down"]
+        result["coexisting_at"] = values_apart(up, down).tolist()
+        result["coexisting_ranges"] = [asdict(one) for one in coexistence_ranges(up, down)]
+        result["coexisting_step"] = step_of(up, down)
+        result["coexisting_note"] = BOUNDED
     return result
+
+
+def coexistence_lines(result: Mapping[str, Any], unit: str) -> list[str]:
+    """Return in words where two motions coexist, from a summary; empty where they do nowhere."""
+    ranges = result.get("coexisting_ranges", [])
+    if not ranges:
+        return []
+    seen = ", ".join(_range_text(one["first"], one["last"]) for one in ranges)
+    step = f"{result['coexisting_step']:g} {unit}".strip()
+    return [f"Two motions coexist at {seen} {unit}".rstrip() + f"; values tried are {step} apart.", f"  ({BOUNDED})"]
+
+
+def motion_lines(kept: Sequence[Kept], unit: str) -> list[str]:
+    """Return the kind of motion over ranges of neighbouring values; empty where it was not looked for."""
+    lines: list[str] = []
+    for motion, group in groupby((one for one in measured_of(kept) if one.motion), key=lambda one: one.motion):
+        values = list(group)
+        text = f"{_range_text(values[0].value, values[-1].value)} {unit}".rstrip() + f": {motion}"
+        exponents = [one.exponent_per_s for one in values if isfinite(one.exponent_per_s)]
+        tests = [one.k for one in values if isfinite(one.k)]
+        more = [
+            *([f"K {_range_text(min(tests), max(tests), '.2f')}"] if tests else []),
+            *([f"exponent {_range_text(min(exponents), max(exponents), '.3g')} 1/s"] if exponents else []),
+        ]
+        lines.append(text + (f" ({', '.join(more)})" if more else ""))
+    return lines
+
+
+def _range_text(low: float, high: float, form: str = "g") -> str:
+    first, last = format(low, form), format(high, form)
+    return first if first == last else f"{first} to {last}"
 
 
 def _row(kept: Kept) -> dict[str, Any]:

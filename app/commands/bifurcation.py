@@ -71,7 +71,8 @@ def bifurcation(
     kind: Annotated[
         bool,
         typer.Option(
-            "--kind", help="Also the kind of motion at each value: Lyapunov exponent, 0–1 test. Takes longer."
+            "--kind",
+            help="Also the kind of motion at each value, told over ranges: Lyapunov exponent, 0–1 test. Takes longer.",
         ),
     ] = False,
     fs: RateOption = "20480Hz",
@@ -141,7 +142,8 @@ def _run(wanted: Wanted, output: Path, jobs: int | None) -> Found:
 
 
 def _tell(wanted: Wanted, found: Found, output: Path) -> None:
-    from app.bifurcation.results import NAMES, measured_of, summary, write_results
+    from app.bifurcation.measure import parameter_words
+    from app.bifurcation.results import NAMES, coexistence_lines, measured_of, motion_lines, summary, write_results
 
     paths = write_results(wanted, found, output)
     reasons = [(name, one) for name, kept in found.items() for one in kept if one.reason]
@@ -149,14 +151,15 @@ def _tell(wanted: Wanted, found: Found, output: Path) -> None:
         typer.echo(f"{NAMES[name]}, {one.value:g}: {one.reason}", err=True)
     if len(reasons) > MOST_REASONS:
         typer.echo(f"… and {len(reasons) - MOST_REASONS} more: see {paths[2].name}", err=True)
-    axis = wanted.branch.sweep.axes[0].name
+    unit = parameter_words(wanted.branch)[1]
     for name, kept in found.items():
         values = measured_of(kept)
         periods = sorted({one.period for one in values})
         seen = ", ".join("none within 16 cycles" if p == 0 else str(p) for p in periods)
         most = max((one.separated_share for one in values), default=0.0)
         typer.echo(f"{NAMES[name]}: {len(values)} values; periods in cycles: {seen}; teeth apart up to {most:.0%}")
-    apart = summary(wanted, found).get("coexisting_at", [])
-    if apart:
-        typer.echo(f"Two motions coexist at {len(apart)} values of {axis}, from {min(apart):g} to {max(apart):g}.")
+        for line in motion_lines(kept, unit):
+            typer.echo(f"  {line}")
+    for line in coexistence_lines(summary(wanted, found), unit):
+        typer.echo(line)
     typer.echo(f"{paths[0]} (figure), {paths[1].name} (points), {paths[2].name} (values).")

@@ -8,9 +8,11 @@ import pytest
 
 from app.bifurcation.folder import Wanted, run_folder, value_path
 from app.bifurcation.kept import Kept, load, save
-from app.bifurcation.measure import measured, parameter_words
+from app.bifurcation.measure import Measured, measured, parameter_words
+from app.bifurcation.results import coexistence_lines, motion_lines
 from app.cli import main
 from gearsig.errors import InputError
+from gearsig.phase.types import PoincareSection
 from sims.cracked.continuation import Branch
 from sims.sweep import Axis, Sweep
 
@@ -49,6 +51,24 @@ def test_figure_table_and_summary(tmp_path, capsys):
     assert error[1] > 1.5 * error[0]
     picture = (tmp_path / "out" / "bifurcation.png").read_bytes()
     assert picture.startswith(b"\x89PNG")
+
+
+def test_kinds_are_told_over_ranges_and_two_motions_with_their_bounds():
+    points = PoincareSection(np.zeros((4, 1)), np.arange(4.0), ("x",), ("m",), np.ones(1), "locked", "mesh", "")
+    found = [
+        Measured(v, points, 1, 0.1, 0.0, "periodic" if v < 3 else "chaotic", 2.0 * v, 0.9) for v in (1.0, 2.0, 3.0)
+    ]
+    lines = motion_lines([Kept(one.value, one, None) for one in found], "rpm")
+    assert lines == [
+        "1 to 2 rpm: periodic (K 0.90, exponent 2 to 4 1/s)",
+        "3 rpm: chaotic (K 0.90, exponent 6 1/s)",
+    ]
+    assert motion_lines([Kept(1.0, None, None, "no")], "rpm") == []
+    ranges = [{"first": 1.0, "last": 2.0}, {"first": 4.0, "last": 4.0}]
+    told = coexistence_lines({"coexisting_ranges": ranges, "coexisting_step": 0.5}, "rpm")
+    assert told[0] == "Two motions coexist at 1 to 2, 4 rpm; values tried are 0.5 rpm apart."
+    assert "may go on beyond" in told[1]
+    assert coexistence_lines({}, "rpm") == []
 
 
 def test_what_is_there_is_not_run_again(tmp_path, monkeypatch):
@@ -116,6 +136,7 @@ def test_values_that_cannot_be_run_are_named_and_stop_nothing(tmp_path, capsys):
         (("--vary", "torque=5..9Nm:3", "--direction", "sideways"), "direction is 'sideways'"),
         (("--vary", "torque=5..9Nm:3", "--signal", "a7"), "there is no signal or channel 'a7'"),
         (("--vary", "torque=5..9Nm:3", "--section", "tooth"), "section is 'tooth'"),
+        (("--vary", "torque=5..9Nm:3", "--phase", "1.5"), "phase is 1.5 (allowed: 0 to 1)"),
         (("--vary", "torque=5..9Nm:3", "--speed", "300..900rpm"), "speed_rpm changes with time"),
     ],
 )

@@ -13,6 +13,7 @@ from gearsig.phase.bifurcation import (
     bifurcation_of_runs,
     values_apart,
 )
+from gearsig.phase.coexistence import TwoMotions, coexistence_ranges
 from gearsig.phase.lock import CycleLock, constant_period_lock, find_lock
 from gearsig.phase.plane import phase_plane, phase_plane_of
 from gearsig.phase.section import geometric_section, locked_section, section_period
@@ -233,6 +234,24 @@ def test_apart_needs_two_diagrams_of_the_same_with_extents():
         values_apart(diagram, replace(diagram, extents=np.empty(0)))
     with pytest.raises(InputError, match="diagrams of x and y"):
         values_apart(diagram, replace(diagram, axis_name="y"))
+
+
+def _branch(values, sizes):
+    return BifurcationDiagram(values, sizes, "speed", "rpm", "x", "m", values, (1,) * len(values), "mesh cycle", sizes)
+
+
+def test_ranges_of_two_motions_end_half_a_step_from_where_they_are_seen():
+    values = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 14.0, 15.0])
+    one = _branch(values, np.ones(7))
+    first, second, last = coexistence_ranges(one, _branch(values, np.array([3.0, 1.0, 3.0, 1.0, 3.0, 1.0, 3.0])))[:3]
+    assert first == TwoMotions(0.0, 0.0, 0.0, 0.5, True, False)
+    assert second == TwoMotions(2.0, 2.0, 1.5, 2.5, False, False)
+    assert last == TwoMotions(4.0, 4.0, 3.5, 4.5, False, False)  # not half way over the gap to 14
+    whole = coexistence_ranges(one, _branch(values, np.full(7, 3.0)))
+    assert whole == (TwoMotions(0.0, 15.0, 0.0, 15.0, True, True),)
+    assert coexistence_ranges(one, one) == ()
+    single = _branch(values[:1], np.ones(1)), _branch(values[:1], np.full(1, 3.0))
+    assert coexistence_ranges(*single) == (TwoMotions(0.0, 0.0, 0.0, 0.0, True, True),)
 
 
 def test_bifurcation_of_recordings_over_load():

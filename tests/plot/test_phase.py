@@ -107,10 +107,24 @@ def test_two_branches_shade_where_they_are_apart():
     shaded = [patch.get_extents().transformed(points.transData.inverted()) for patch in points.patches]
     assert min(box.x0 for box in shaded) == pytest.approx(1000.0)
     assert max(box.x1 for box in shaded) == pytest.approx(1350.0)
-    assert {"rising", "falling"} <= {text.get_text() for text in figure.legends[0].get_texts()}
+    assert {"rising", "falling", "shaded: two motions"} <= {text.get_text() for text in figure.legends[0].get_texts()}
+    assert "two motions at the values tried, step 100 rpm; they may go on beyond the sweep" in _texts(figure)
     other_axis = BifurcationDiagram(values, one, "speed", "rpm", "y", "m", values, (1,) * 11, "mesh cycle", one)
     with pytest.raises(InputError, match="branches of x and y"):
         bifurcation_figure(up, other_axis)
+
+
+def test_periods_are_named_for_each_branch_in_its_colour():
+    values = np.linspace(1000.0, 2000.0, 11)
+    up, down = (
+        BifurcationDiagram(values, values, "speed", "rpm", "x", "m", values, (period,) * 11, "mesh cycle", values)
+        for period in (1, 2)
+    )
+    figure = bifurcation_figure(up, down)
+    colours = {text.get_text(): text.get_color() for text in figure.axes[0].texts}
+    assert colours["period 1"] == figure.axes[0].lines[0].get_color()
+    assert colours["period 2"] == figure.axes[0].lines[1].get_color()
+    assert not figure.axes[0].patches
 
 
 def test_chaos_test_draws_k_and_the_walk():

@@ -114,7 +114,8 @@ def _show(wanted: Wanted, found: Found, chosen: Range) -> None:
     st.caption(
         "Upper panel: one point per cycle; a single point is a motion that repeats each cycle, two a motion that takes "
         "two cycles, a smear one that never repeats. Lower panel: how large the motion is. Shaded: two motions are "
-        "possible." + ("" if n_done == wanted.n_values else f" So far {n_done} of {wanted.n_values} values.")
+        "possible, as far as the values tried tell: a range that begins or ends where the sweep does may go on."
+        + ("" if n_done == wanted.n_values else f" So far {n_done} of {wanted.n_values} values.")
     )
     reasons = [one for kept in found.values() for one in kept if one.reason]
     if reasons:
