@@ -96,7 +96,7 @@ def recurrence_figure(plot: RecurrencePlot, measures: RecurrenceMeasures | None 
         plot.recurrent,
         origin="lower",
         extent=(*limits, *limits),
-        cmap=ListedColormap(["white", style.MEASURED]),
+        cmap=ListedColormap(["white", style.INK]),
         interpolation="nearest",
         aspect="equal",
     )

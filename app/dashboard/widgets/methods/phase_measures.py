@@ -73,8 +73,14 @@ def show_divergence(analysis: Analysis, stretch: Stretch, path: PhasePortrait) -
 
     del stretch
     columns = st.columns(4)
-    with columns[0]:
-        method = choose_one("Method", METHODS, path_key("lyapunov", analysis), about=ABOUT_METHODS)
+    method = columns[0].selectbox(
+        "Method",
+        METHODS,
+        format_func=str.capitalize,
+        key=path_key("lyapunov", analysis),
+        help=ABOUT_METHODS,
+        persist_state="session",
+    )
     theiler = whole_number(columns[1], "Theiler window (samples)", "theiler", analysis, "one mean period")
     steps = whole_number(columns[2], "Steps followed", "steps", analysis, "30 mean periods")
     asked = columns[3].text_input(
