@@ -15,10 +15,10 @@ from gearsig.severity.shape import SHAPE
 
 CRACKED, CHIPPED, SPALLED = KINDS = ("cracked", "chipped", "spalled")
 
-_OF_THE_SOUND_TEETH = ("prominence", "pattern_excess")
-"""How far the event stands out hangs on how even the sound teeth are, which says nothing of the damage."""
+_OF_SIZE = ("band_excess", "line_excess", "prominence", "pattern_excess")
+"""How large the event is and how far it stands out: a deep crack is no chip for being large."""
 
-_USED = [i for i, name in enumerate(FEATURES) if name not in (*RELIEF, *_OF_THE_SOUND_TEETH)]
+_USED = [i for i, name in enumerate(FEATURES) if name not in (*RELIEF, *_OF_SIZE)]
 KIND_FEATURES = (*(FEATURES[i] for i in _USED), *SHAPE)
 
 
