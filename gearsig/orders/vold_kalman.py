@@ -141,6 +141,8 @@ def separate_frequencies(
         As `track_vold_kalman`.
     """
     y, rate = frozen_array(signal, "signal", ndim=1), positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    if len(y) == 0:
+        raise InputError("the signal is empty", where="signal", remedy="give samples")
     given = [FrequencyTrack(f"component {k}", f) for k, f in enumerate(frequencies_hz, start=1)]
     tracks = tracks_of_orders(given, None, None, len(y), rate)
     widths = bandwidths_of(tracks, bandwidth_hz, None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,10 +127,10 @@ def bandwidths_of(
         raise InputError("give either bandwidth_hz or bandwidth_orders", where="bandwidth", allowed="one of both")
     n_orders = len(tracks.names)
     name = "bandwidth_orders" if hz is None else "bandwidth_hz"
-    given = np.atleast_1d(np.asarray(in_orders if hz is None else hz, dtype=np.float64))
+    given = np.atleast_1d(np.asarray(in_orders if hz is None else hz, dtype=object))
     if given.shape not in {(1,), (n_orders,)}:
         raise InputError(f"{name} has shape {given.shape}", allowed=f"one number, or one for each of {n_orders} orders")
-    widths = np.broadcast_to([positive(width, name) for width in given], (n_orders,))
+    widths = np.broadcast_to([_width(width, name) for width in given], (n_orders,))
     over_angle = tracks.unit == "orders"
     if hz is not None:
         return _over_angle(tracks, widths) if over_angle else widths[:, None].copy()
@@ -137,6 +138,14 @@ def bandwidths_of(
     if over_angle:
         return widths[:, None].copy()
     return np.stack([width * _speed_of(tracks, k) for k, width in enumerate(widths)])
+
+
+def _width(given: object, name: str) -> float:
+    """Return a bandwidth as float; a text is no number, even one that could be read as such."""
+    unit = name.removeprefix("bandwidth_").replace("hz", "Hz")
+    if isinstance(given, str):
+        raise InputError(f"{name} is {given!r}", allowed=f"a number above 0, in {unit}", remedy="leave the unit out")
+    return positive(cast("float", given), name, unit)
 
 
 def _check_below_order(tracks: Tracks, widths: FloatArray) -> None:
@@ -190,16 +199,22 @@ def valid_parts(tracks: Tracks, bandwidth: FloatArray, sampling_rate: float, gen
         reach = f"runs from {f[k].min():.4g} to {f[k].max():.4g} {tracks.unit}"
         if f[k].max() == 0.0:
             raise RefusalError(f"order {name!r} stands still all the time", remedy="record while the machine turns")
-        if above[k].any():
+        if f[k].min() >= sampling_rate / 2:
             raise RefusalError(
                 f"order {name!r} {reach}, at or above half the sampling rate of {sampling_rate:g} {tracks.unit}",
                 remedy="record at a higher rate",
             )
-        raise RefusalError(
-            f"order {name!r} {reach}: its band of {np.max(bandwidth[k]):.4g} {tracks.unit} reaches down to zero",
-            remedy="narrow the band",
-        )
+        raise RefusalError(_no_room(f"order {name!r} {reach}", f[k], bandwidth[k], sampling_rate, tracks.unit))
     return valid
+
+
+def _no_room(order: str, f: FloatArray, bandwidth: FloatArray, sampling_rate: float, unit: str) -> str:
+    """Return that a band does not fit between zero and half the sampling rate, and which one would."""
+    room = 2.0 * float(np.minimum(f, sampling_rate / 2 - f).max())
+    return (
+        f"{order}: its band of {np.max(bandwidth):.4g} {unit} reaches down to zero or up to half the sampling rate of "
+        f"{sampling_rate:g} {unit} all the time; narrow the bandwidth below {room:.4g} {unit}"
+    )
 
 
 def _sampled_angle(angle: ShaftAngle, n: int, sampling_rate_hz: float) -> tuple[FloatArray, FloatArray]:

@@ -35,6 +35,8 @@ def test_the_speed_source_of_the_recording_is_used():
         ({"bandwidth_hz": 0.0}, "bandwidth_hz is 0"),
         ({"bandwidth_hz": np.nan}, "bandwidth_hz is nan"),
         ({"bandwidth_hz": [1.0, 2.0]}, "one number, or one for each"),
+        ({"bandwidth_hz": "4Hz"}, "bandwidth_hz is '4Hz' .allowed: a number"),
+        ({"bandwidth_hz": ["a"]}, "bandwidth_hz is 'a'"),
         ({"bandwidth_hz": None}, "either bandwidth_hz or bandwidth_orders"),
         ({"bandwidth_orders": 1.0}, "either bandwidth_hz or bandwidth_orders"),
         ({"bandwidth_hz": None, "bandwidth_orders": 4.0}, "reaches down to order zero"),
@@ -52,6 +54,8 @@ def test_wrong_input(changes, message):
 def test_nan_and_short_signals():
     with pytest.raises(InputError, match="NaN"):
         separate_frequencies(np.full(N, np.nan), RATE_HZ, [np.full(N, 50.0)], bandwidth_hz=2.0)
+    with pytest.raises(InputError, match="signal is empty"):
+        separate_frequencies(np.array([]), RATE_HZ, [np.array([])], bandwidth_hz=2.0)
     with pytest.raises(InputError, match="at least 16"):
         separate_frequencies(np.ones(15), RATE_HZ, [np.full(15, 50.0)], bandwidth_hz=90.0)
     with pytest.raises(InputError, match="NaN"):
@@ -97,3 +101,9 @@ def test_bandwidths_too_different_for_one_solution_are_noted():
         RECORDING.values("a"), RATE_HZ, [np.full(N, 50.0), np.full(N, 200.0)], bandwidth_hz=[0.3, 150.0], n_poles=3
     )
     assert any("rounding" in note for note in found.notes) == (found.expected_error > 1e-5)
+
+
+@pytest.mark.parametrize(("frequency_hz", "width_hz", "room"), [(50.0, 600.0, "100 Hz"), (450.0, 120.0, "100 Hz")])
+def test_a_bandwidth_wider_than_the_room_is_named(frequency_hz, width_hz, room):
+    with pytest.raises(RefusalError, match=f"narrow the bandwidth below {room}"):
+        separate_frequencies(np.ones(N), RATE_HZ, [np.full(N, frequency_hz)], bandwidth_hz=width_hz)
