@@ -15,6 +15,7 @@ from gearsig.severity.features import FEATURES
 from gearsig.severity.kind import kind_vector
 from gearsig.severity.machine import PairFacts, acceleration_channels, pair_facts
 from gearsig.severity.model import DepthModel
+from gearsig.severity.same_machine import check_same_level, check_same_rig, share_of_the_recording
 from gearsig.severity.shape import reach_cycles
 from gearsig.severity.squeezed import squeezed_rise_db
 from gearsig.severity.tooth_root import percent_per_mm
@@ -23,6 +24,10 @@ from gearsig.severity.types import CrackEstimate, NoCrackSeen
 SMALLEST_AGREEMENT = 0.4
 """Of the teeth's pattern with the reference's: strange gears reach 0.38 once in a hundred, the right ones fall below it
 only where a deep crack rules the pattern."""
+
+CLEARLY_OF_THE_REFERENCE, STANDARD_ERRORS = -0.2, 1.5
+"""Share of the recording in what stands out, and by how many standard errors it is below zero. On 75 simulated machines
+with a crack that is seen, none came so low; with recording and reference exchanged, nine in ten did."""
 
 CLEARLY_LARGER = log(1.3)
 """Difference of the prominence on both gears from which the gear counts as certain."""
@@ -110,7 +115,9 @@ def estimate_crack(
     if reference is not None:
         described = reference if reference.rig is not None else reference.with_rig(known)
         acceleration_channels(described, names)
+        check_same_rig(known, described.rig or known)
         sound = pair_lines(described, described.rig or known, facts.pair, names)
+        check_same_level(now, sound)
     if tip_relief_um is not None:
         not_negative(tip_relief_um, "tip_relief_um", "µm")
     found = gear_evidence(now, sound, facts.module_mm, facts.load_mpa, tip_relief_um)
@@ -152,7 +159,8 @@ def _none_seen(found: Sequence[GearEvidence], best: int, model: DepthModel, fact
         raise RefusalError(
             f"the teeth's own pattern on shaft {weakest.shaft.shaft!r} agrees with that of the reference by "
             f"{weakest.agreement:.2f} only",
-            remedy="take a reference of the same gears, same sensors, same speed and load; or leave it out",
+            remedy="take a reference of the same gears, same sensors, same speed and load; or leave it out. Teeth that "
+            "hardly differ have no pattern to agree by: then a longer recording may help",
         )
     limits = []
     for evidence in found:
@@ -179,6 +187,8 @@ def _seen(
     found: Sequence[GearEvidence], best: int, model: DepthModel, calibration: Calibration, facts: PairFacts
 ) -> CrackEstimate:
     evidence = found[best]
+    if evidence.agreement is not None:
+        _check_direction(evidence)
     unlike = model.unlike(evidence.features)
     if unlike:
         raise RefusalError(
@@ -222,7 +232,21 @@ def _seen(
     )
 
 
+def _check_direction(evidence: GearEvidence) -> None:
+    share, error = share_of_the_recording(evidence.shaft, evidence.searched, evidence.event)
+    if share < CLEARLY_OF_THE_REFERENCE and share < -STANDARD_ERRORS * error:
+        raise RefusalError(
+            f"what stands out at one tooth of shaft {evidence.shaft.shaft!r} is in the reference, not in the recording",
+            remedy="swap both if they were exchanged, or take a reference of sound gears",
+        )
+
+
 def _reference_text(evidence: GearEvidence) -> str:
     if evidence.agreement is None:
         return "Without a reference of the sound gears, what every tooth differs by hides all but deep cracks."
+    if evidence.agreement < SMALLEST_AGREEMENT:
+        return (
+            f"Be careful with the reference: the teeth's own pattern agrees by {evidence.agreement:.2f} only. It may "
+            "be of other gears or another load, or the teeth hardly differ."
+        )
     return f"Compared with a reference; the teeth's own pattern agrees by {evidence.agreement:.2f}."

@@ -72,6 +72,15 @@ def find_event(shaft: ShaftLines) -> ToothEvent:
     )
 
 
+def event_windows(shaft: ShaftLines, event: ToothEvent) -> tuple[FloatArray, FloatArray]:
+    """Return each band's mean square envelope in the event's window and the median one, (n_bands + 1, n_channels)."""
+    envelopes = band_envelopes(shaft)
+    n = envelopes.shape[-1]
+    width = round(WINDOW_PITCHES * n / shaft.teeth)
+    energy = sliding_mean(envelopes, width)
+    return energy[:, :, round(event.centre_rev * n - width / 2) % n], np.median(energy, axis=-1)
+
+
 def band_envelopes(shaft: ShaftLines) -> FloatArray:
     """Return squared envelopes over one revolution, (n_bands + 1, n_channels, 32 z).
 

@@ -89,7 +89,7 @@ def _one_gear(
         shape = event_shape(shaft, event)
         return GearEvidence(shaft, event, feature_vector(shaft, shaft, mesh, event, conditions), shaft, shaft, shape)
     marked = any(a.has_mark and b.has_mark for a, b in zip(now, sound, strict=True))
-    _check_harmonics(sound[i])
+    _check_harmonics(sound[i], "the reference's")
     difference, agreement = difference_lines(shaft, sound[i], whole_teeth=marked)
     _check_differs(difference, shaft)
     n = n_bands(difference)
@@ -109,10 +109,10 @@ def _check_differs(difference: ShaftLines, shaft: ShaftLines) -> None:
         )
 
 
-def _check_harmonics(shaft: ShaftLines) -> None:
+def _check_harmonics(shaft: ShaftLines, whose: str = "the recording's") -> None:
     if n_bands(shaft) < LEAST_HARMONICS:
         raise RefusalError(
-            f"{n_bands(shaft)} mesh harmonics of the {shaft.teeth} teeth lie in the recording's band, "
+            f"{n_bands(shaft)} mesh harmonics of the {shaft.teeth} teeth lie in {whose} band, "
             f"{LEAST_HARMONICS} are needed",
             remedy="a higher sampling rate or a lower speed",
         )

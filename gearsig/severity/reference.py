@@ -44,12 +44,7 @@ def difference_lines(now: ShaftLines, sound: ShaftLines, *, whole_teeth: bool) -
     RefusalError
         If the speeds differ too much.
     """
-    change = abs(now.order_hz / sound.order_hz - 1.0)
-    if change > LARGEST_SPEED_DIFFERENCE:
-        raise RefusalError(
-            f"the reference was taken at a speed {100 * change:.1f} % off",
-            remedy=f"take it within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of the same speed, at the same load",
-        )
+    check_same_speed(now, sound)
     highest = min(now.highest_order, sound.highest_order)
     orders = np.arange(highest + 1)
     x, r = now.lines[:, : highest + 1], sound.lines[:, : highest + 1]
@@ -60,6 +55,18 @@ def difference_lines(now: ShaftLines, sound: ShaftLines, *, whole_teeth: bool) -
     agreement = float(scores[best] / np.abs(cross).sum()) if np.any(cross) else 0.0
     turned = r * np.exp(-2j * np.pi * orders * shifts[best])
     return replace(now, lines=x - _matched(turned, x, now.teeth), highest_order=highest), agreement
+
+
+def check_same_speed(now: ShaftLines, sound: ShaftLines) -> None:
+    """Refuse a reference at another speed."""
+    change = abs(now.order_hz / sound.order_hz - 1.0)
+    if change > LARGEST_SPEED_DIFFERENCE:
+        rpm = tuple(60.0 * shaft.order_hz for shaft in (sound, now))
+        raise RefusalError(
+            f"the reference was taken at a speed {100 * change:.1f} % off: shaft {now.shaft!r} turns at {rpm[0]:.5g} "
+            f"rpm there, at {rpm[1]:.5g} rpm in the recording",
+            remedy=f"take it within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of the same speed, at the same load",
+        )
 
 
 def _matched(reference: np.ndarray, x: np.ndarray, teeth: int) -> np.ndarray:

@@ -100,6 +100,33 @@ def test_gain_does_not_matter(record: Record, sound: Recording) -> None:
     assert answer.depth_mm == pytest.approx(expected.depth_mm, rel=1e-6)
 
 
+@pytest.mark.parametrize("gain", [0.5, 2.0, 1 / 9.81])
+def test_a_reference_with_another_gain_is_refused_and_makes_no_crack(
+    record: Record, sound: Recording, gain: float
+) -> None:
+    samples = np.array(sound.samples)
+    samples[1] *= gain
+    side = "above" if gain < 1 else "below"
+    with pytest.raises(RefusalError, match=f"dB {side} that of the reference in channel '{sound.channel_names[1]}'"):
+        estimate_crack(record(0.0), reference=replace(sound, samples=samples))
+
+
+@pytest.mark.parametrize("depth", [1.0, 3.0])
+def test_exchanged_recordings_make_no_crack(record: Record, sound: Recording, depth: float) -> None:
+    with pytest.raises(RefusalError, match="in the reference, not in the recording"):
+        estimate_crack(sound, reference=record(depth))
+
+
+def test_a_reference_of_another_machine_or_load_is_named_first(record: Record, sound: Recording) -> None:
+    assert sound.rig is not None
+    with pytest.raises(RefusalError, match=r"another machine: its teeth are 20/47.*29/47"):
+        estimate_crack(record(2.0), reference=with_pair(sound, driver_teeth=20))
+    point = sound.rig.operating_point
+    other = replace(point, torque_nm=1.2 * (point.torque_nm or 0.0))
+    with pytest.raises(RefusalError, match="N m, the recording at"):
+        estimate_crack(record(2.0), reference=replace(sound, rig=replace(sound.rig, operating_point=other)))
+
+
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
