@@ -128,7 +128,7 @@ def _seen(crack: CrackEstimate, rig: Rig) -> Finding:
     confidence *= WITH_ASSUMED_DATA if rig.assumed else 1.0
     tooth = crack.tooth
     return Finding(
-        "root-crack" if crack.kind != OTHER_DAMAGE else "tooth-local-damage",
+        "tooth-local-damage" if crack.likelier_other else "root-crack",
         Kind.FAULT if confidence >= CLEAR else Kind.SUSPICION,
         crack.text,
         Where(shaft=crack.shaft, gear=crack.gear, angle_deg=crack.angle_deg, tooth=tooth),
@@ -201,6 +201,8 @@ def _depth(crack: CrackEstimate) -> str:
 def _what(crack: CrackEstimate) -> str:
     if crack.kind == OTHER_DAMAGE:
         return f", {OTHER_DAMAGE} rather than cracked"
+    if crack.likelier_other:
+        return f": {OTHER_DAMAGE}, or a root crack of {_depth(crack)}"
     doubt = "; or it is chipped or spalled" if crack.kind != CRACKED else ""
     return f": as a root crack {_depth(crack)}{doubt}"
 

@@ -85,6 +85,11 @@ class CrackEstimate:
         return "chipped or spalled" if cracked <= OTHER_UP_TO else "undecided"
 
     @property
+    def likelier_other(self) -> bool:
+        """Whether it is likelier chipped or spalled than cracked."""
+        return self.kind_probabilities.get(CRACKED, 1.0) < 0.5
+
+    @property
     def text(self) -> str:
         """The statement in one sentence, or two."""
         where = f"tooth {self.tooth}" if self.tooth is not None else f"{self.angle_deg:.0f}°"
@@ -96,6 +101,8 @@ class CrackEstimate:
             return (
                 f"Damage at {place}, chipped or spalled rather than cracked ({other:.0f} %); a crack would be {size}."
             )
+        if self.likelier_other:
+            return f"Damage at {place}: chipped or spalled ({other:.0f} %), or a crack of {size}."
         text = f"Crack of {size}, {self.depth_percent:.0f} % of the root, at {place}."
         return text if self.kind == CRACKED else f"{text} Or it is chipped or spalled ({other:.0f} %)."
 
