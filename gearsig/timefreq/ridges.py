@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, count, not_negative, positive
-from gearsig.errors import RefusalError
+from gearsig.errors import InputError, RefusalError
 from gearsig.timefreq.crossings import shared_columns, untangled
 from gearsig.timefreq.ridge_scores import SQUEEZED_REACH, ridge_power, ridge_scores
 from gearsig.timefreq.types import Coefficients, Ridge, TimeFrequencyMap
@@ -18,6 +18,8 @@ NOT_HIDDEN = -(1 << 14)
 """Mark of cells that no path covers, as in `ridge_path`; written here so that its compiler loads only on use."""
 MOST_COLUMNS = 4000
 """Columns that the search for a path works on; longer transforms are pooled."""
+_SPARE = 8
+"""Ridges looked for beyond those asked, of which the strongest are kept: the clearest need not be strong."""
 _LEAST_SCORE = 0.25  # mean score of a path: below, it hops between maxima of noise
 
 
@@ -40,10 +42,11 @@ def ridges(
     lowest: float | None = None,
     highest: float | None = None,
 ) -> tuple[Ridge, ...]:
-    """Return the `n_ridges` clearest ridges, which go straight on where they cross.
+    """Return the `n_ridges` strongest of the clear ridges, which go straight on where they cross.
 
     Paths are found one after the other by dynamic programming over place and slope, with a price on changes of slope;
-    what a path covers is taken out before the next one. Where two of them meet, they are then looked at together: if
+    what a path covers is taken out before the next one. Eight more than asked are looked for, and those of most power
+    kept. Where two of them meet, they are then looked at together: if
     the power shows a valley all through the meeting, they part again; otherwise tails are exchanged if place, slope and
     level go on more evenly so. Places between lines come from a parabola through the logarithm of the power (or its
     centre of gravity where the transform is squeezed).
@@ -64,12 +67,12 @@ def ridges(
     Returns
     -------
     tuple of Ridge
-        The strongest first; fewer than asked where the rest of the map shows no further ridge.
+        The largest rms amplitude first; fewer than asked where the rest of the map shows no further ridge.
 
     Raises
     ------
     InputError
-        On numbers out of range.
+        On numbers out of range; also on more ridges than lie side by side within the lines.
     RefusalError
         If the map holds no ridge at all.
 
@@ -88,6 +91,7 @@ def ridges(
     positive(steepest, "steepest")
     not_negative(stiffness, "stiffness")
     part = _lines_between(transform.positions, lowest, highest)
+    _check_room(n_ridges, part, transform.n_reach)
     grid = _grid(transform, part)
     paths, power = _paths(grid, n_ridges, steepest, stiffness)
     if not paths:
@@ -109,6 +113,17 @@ def _lines_between(positions: FloatArray, lowest: float | None, highest: float |
             remedy="widen the range or compute more lines",
         )
     return slice(low, high)
+
+
+def _check_room(n_ridges: int, part: slice, n_reach: int) -> None:
+    """Raise InputError if so many ridges cannot be told apart on the lines."""
+    most = max(1, (part.stop - part.start) // (2 * n_reach + 1))
+    if n_ridges > most:
+        raise InputError(
+            f"n_ridges is {n_ridges} on {part.stop - part.start} lines, each ridge covering {2 * n_reach + 1} of them",
+            allowed=f"1 to {most}",
+            remedy="ask for fewer, or compute more lines",
+        )
 
 
 def _grid(transform: Coefficients | TimeFrequencyMap, part: slice) -> _Grid:
@@ -141,18 +156,23 @@ def _paths(grid: _Grid, n_ridges: int, steepest: float, stiffness: float) -> tup
 
     power = ridge_power(grid.power, squeezed=grid.squeezed)
     scores = ridge_scores(power, grid.n_reach)
-    paths: list[FloatArray] = []
-    for _ in range(n_ridges):
-        hidden = _hidden(scores.shape, paths, grid.n_reach)
+    found: list[FloatArray] = []
+    strengths: list[float] = []
+    for _ in range(n_ridges + _SPARE):
+        hidden = _hidden(scores.shape, found, grid.n_reach)
         path = best_path(scores, hidden, steepest, stiffness)
         seen = _along(hidden, path) == NOT_HIDDEN
         if not seen.any() or float(_along(scores, path)[seen].mean()) < _LEAST_SCORE:
             break
-        paths.append(path)
+        found.append(path)
+        strengths.append(float(_along(power, path)[seen].mean()))
+    strongest = sorted(range(len(found)), key=lambda i: -strengths[i])[:n_ridges]
+    paths = [found[i] for i in sorted(strongest)]
+    others = [found[i] for i in range(len(found)) if i not in strongest]
     if len(paths) > 1:
         paths = _settled(paths, grid, power)
         for i in range(len(paths)):  # once more, now that each knows where the others go
-            hidden = _hidden(scores.shape, paths[:i] + paths[i + 1 :], grid.n_reach)
+            hidden = _hidden(scores.shape, others + paths[:i] + paths[i + 1 :], grid.n_reach)
             paths[i] = best_path(scores, hidden, steepest, stiffness)
         paths = _settled(paths, grid, power)
     return paths, power

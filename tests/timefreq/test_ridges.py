@@ -172,6 +172,21 @@ def test_fewer_ridges_than_asked_where_there_are_no_more():
     assert len(ridges(stft_map(UniformSignal(np.cos(2 * np.pi * 200 * t), 2000.0)), 3)) == 1
 
 
+def test_the_strongest_are_kept_not_the_clearest():
+    t = np.arange(20_001) / 2000.0
+    noise = np.random.default_rng(3).normal(size=len(t))
+    # Four strong lines with noise around them, and weak ones where there is none.
+    strong = sum(3.0 * np.cos(2 * np.pi * f * t) for f in (600.0, 700.0, 800.0, 900.0))
+    around = np.convolve(noise, np.sinc(np.arange(-60, 61) / 2.5) * np.cos(np.pi * 0.75 * np.arange(-60, 61)), "same")
+    weak = sum(0.3 * np.cos(2 * np.pi * f * t) for f in (100.0, 200.0, 300.0, 400.0))
+    levels = stft_map(UniformSignal(strong + 0.3 * around + weak, 2000.0), window_length=0.1)
+    for n in (2, 4):
+        found = ridges(levels, n)
+        assert all(np.median(r.positions) > 500 for r in found)
+    powers = [float(np.mean(r.amplitude**2)) for r in found]
+    assert powers == sorted(powers, reverse=True)
+
+
 def test_nothing_is_found_in_silence():
     with pytest.raises(RefusalError, match="no ridge"):
         ridges(stft_map(UniformSignal(np.zeros(4000), 100.0)))
@@ -181,6 +196,8 @@ def test_wrong_input_is_named(crossing):
     levels = stft_map(crossing()[0])
     with pytest.raises(InputError, match="n_ridges"):
         ridges(levels, 0)
+    with pytest.raises(InputError, match=r"n_ridges is 500 on .*allowed: 1 to"):
+        ridges(levels, 500)
     with pytest.raises(InputError, match="steepest"):
         ridges(levels, steepest=0)
     with pytest.raises(RefusalError, match="fewer than three"):
