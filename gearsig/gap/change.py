@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.gap.features import Features, once
+from gearsig.gap.features import Features, once, whole_record_variance
 from gearsig.gap.frame import DRIVEN, DRIVER
 from gearsig.gap.gathered import Gathered
-from gearsig.gap.gear_lines import SIDES, Feature, average_lines, visible_orders
-from gearsig.gap.tooth import pattern_features, residual_lines
+from gearsig.gap.gear_lines import NOMINAL_REVOLUTIONS, SIDES, Feature, average_lines, visible_orders
+from gearsig.gap.tooth import mesh_power, pattern_features, residual_lines
 from gearsig.severity.reference import difference_lines
 from gearsig.severity.shaft_lines import ShaftLines
 
@@ -23,7 +23,7 @@ def change_features(now: Gathered, sound: Gathered) -> Features:
     """
     names, values = changes_once(now, sound)
     here, before = once(now)[1], once(sound)[1]
-    variance = np.zeros(len(values))
+    variance = 2.0 * whole_record_variance(names)
     for rows in (
         [_joined(once(part)[1] - before, part, sound) for part in _parts(now)],
         [_joined(here - once(part)[1], now, part) for part in _parts(sound)],
@@ -51,22 +51,25 @@ def _patterns(now: Gathered, sound: Gathered) -> Iterator[Feature]:
     """Yield the tooth features of the difference of the averages, turned so that the same teeth meet."""
     for side in (DRIVER, DRIVEN):
         turned, agreement = difference_lines(
-            shaft_lines(now, side), shaft_lines(sound, side), whole_teeth=now.marks[DRIVER] or now.marks[DRIVEN]
+            lines_of_shaft(now, side), lines_of_shaft(sound, side), whole_teeth=now.marks[DRIVER] or now.marks[DRIVEN]
         )
         teeth = now.frame.teeth[side]
-        residuals = []
+        residuals, noises = [], []
         for row, name in zip(turned.lines, now.channels, strict=True):
-            lines, noise = average_lines(now.channels[name], side)
-            highest = visible_orders(now, side, len(lines))
-            mesh = float((np.abs(lines[teeth : highest + 1 : teeth]) ** 2).sum() + noise[teeth])
-            full = np.zeros(len(lines), dtype=np.complex128)
+            full = np.zeros(now.channels[name].lines[side].shape[1], dtype=np.complex128)
             full[: len(row)] = row
-            residuals.append(residual_lines(full, teeth, turned.highest_order) / np.sqrt(mesh))
-        yield from pattern_features(f"change.{SIDES[side]}", residuals, teeth)
+            scale = mesh_power(now, now.channels[name], side)
+            residuals.append(residual_lines(full, teeth, turned.highest_order) / np.sqrt(scale))
+            both = average_lines(now.channels[name], side)[1][: len(row)]
+            both = both + average_lines(sound.channels[name], side)[1][: len(row)]
+            noises.append(both[residuals[-1][: len(row)] != 0].sum() / 2.0 / scale)
+        shorter = min(float(g.channels[n].counts[side].sum()) for g in (now, sound) for n in now.channels)
+        longer = max(1.0, shorter / NOMINAL_REVOLUTIONS)
+        yield from pattern_features(f"change.{SIDES[side]}", residuals, teeth, float(np.mean(noises)), longer)
         yield f"change.{SIDES[side]}.agreement", 10.0 * agreement
 
 
-def shaft_lines(gathered: Gathered, side: int) -> ShaftLines:
+def lines_of_shaft(gathered: Gathered, side: int) -> ShaftLines:
     """Return the averages' lines in the form that the alignment takes."""
     lines = [average_lines(sums, side)[0] for sums in gathered.channels.values()]
     highest = visible_orders(gathered, side, min(len(row) for row in lines))

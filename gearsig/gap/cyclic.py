@@ -13,9 +13,11 @@ from gearsig.gap.gear_lines import SIDES, Feature, decibel
 
 SLIP = 0.015
 """Rolling elements slip: their orders are sought within this share of the kinematic ones."""
-N_SLIPS = 13
+MOST_SLIPS = 201
 N_FAMILY = 4
 N_SHAFT_FAMILY = 6
+USED_OF_BAND = 0.7
+"""Of a band's width, the modulation that its envelope carries well."""
 FLOOR_WIDTH = 48
 """Lines whose median is the floor."""
 
@@ -38,9 +40,7 @@ def floor_ratio(power: FloatArray) -> FloatArray:
 def cyclic_features(gathered: Gathered, channels: Sequence[ChannelSums]) -> Iterator[Feature]:
     """Yield excesses in dB of families of envelope lines and of residual lines: the largest over channels and bands."""
     frame = gathered.frame
-    envelopes = np.stack([floor_ratio(c.envelope_power.mean(axis=0)) for c in channels]).reshape(
-        -1, channels[0].envelope_power.shape[2]
-    )
+    envelopes = np.concatenate([_envelope_ratios(gathered, c) for c in channels])
     step, levels = gathered.cycle_step, _levels(envelopes)
     known = _shaft_lines(frame)
     yield from _families(frame, levels, step, known, "envelope")
@@ -58,6 +58,15 @@ def cyclic_features(gathered: Gathered, channels: Sequence[ChannelSums]) -> Iter
     mesh = [k * frame.teeth[0] + s * o for k in range(1, 7) for o in _bearing_lines(frame)[:24] for s in (-1, 1)]
     every = [*known, *_bearing_lines(frame), *mesh]
     yield "line.strange", _strange(residuals, gathered.order_step, every, first=0.4)
+
+
+def _envelope_ratios(gathered: Gathered, sums: ChannelSums) -> FloatArray:
+    """Return the lines of each band's envelope over their floor; 1 beyond the band's width, where there is nothing."""
+    ratios = floor_ratio(sums.envelope_power.mean(axis=0))
+    cycles = np.arange(ratios.shape[1]) * gathered.cycle_step
+    for row, (low, high) in zip(ratios, gathered.bands_hz, strict=True):
+        row[cycles > USED_OF_BAND * (high - low) / gathered.speed_hz] = 1.0
+    return ratios
 
 
 def _families(
@@ -87,7 +96,8 @@ def _family(
     harmonics = harmonics[harmonics * (1.0 + slip) / step < levels.shape[1] - 1]
     if not len(harmonics):
         return 0.0
-    shifts = np.linspace(-slip, slip, N_SLIPS) if slip else np.zeros(1)
+    n_slips = min(MOST_SLIPS, 2 * int(np.ceil(slip * harmonics.max() / step)) + 1)  # a line apart at the highest
+    shifts = np.linspace(-slip, slip, n_slips)
     places = np.rint(np.outer(1.0 + shifts, harmonics) / step).astype(np.intp)
     return float(levels[:, places].mean(axis=2).max())
 

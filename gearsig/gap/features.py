@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,9 @@ from gearsig.gap.cyclic import cyclic_features
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.gear_lines import line_features
 from gearsig.gap.tooth import tooth_features
+
+WHOLE_RECORD_DB = {"hum": 1.3, "speed.drift": 3.0, "speed.swing": 1.0, "speed.swing_line": 2.0}
+"""Standard errors of features that no block can be left out of, from repeated synthetic records."""
 
 
 @dataclass(frozen=True)
@@ -38,10 +42,14 @@ def features_of(gathered: Gathered) -> Features:
     SE² = (B − 1)/B Σ_b (f_(b) − mean)², f_(b) without block b.
     """
     names, values = once(gathered)
-    n = gathered.n_blocks
-    without = np.stack([once(gathered.without(b))[1] for b in range(n)]) if n > 2 else np.stack([values, values])
-    scatter = np.sqrt((len(without) - 1.0) * without.var(axis=0))
-    return Features(names, values, scatter)
+    without = np.stack([once(gathered.without(b))[1] for b in range(gathered.n_blocks)])
+    variance = (len(without) - 1.0) * without.var(axis=0) + whole_record_variance(names)
+    return Features(names, values, np.sqrt(variance))
+
+
+def whole_record_variance(names: Sequence[str]) -> FloatArray:
+    """Return the variance of what is taken from the whole record at once, and 0 for all else."""
+    return np.array([WHOLE_RECORD_DB.get(name, 0.0) ** 2 for name in names])
 
 
 def once(gathered: Gathered) -> tuple[tuple[str, ...], FloatArray]:

@@ -22,13 +22,13 @@ LEAST_REVOLUTIONS = 16
 """Of the driver and of the driven gear: fewer leave either shaft's orders in the other's average."""
 
 REVOLUTIONS_PER_BLOCK = 20
-MOST_BLOCKS = 8
+FEWEST_BLOCKS, MOST_BLOCKS = 3, 8
 """Blocks long enough to tell bearing orders from shaft orders, and enough of them for a jackknife."""
 
 N_BANDS = 4
 LOWEST_BAND_HZ = 300.0
-HIGHEST_CYCLE = 40.0
-"""Highest modulation order looked at, in orders of the driver."""
+HIGHEST_CYCLE, BEYOND_THE_MESH = 40.0, 5.0
+"""Modulation orders are looked at up to here, in orders of the driver, or to so many beyond the mesh order."""
 
 NEAR_THE_EXTREME = 0.005
 """A sample within this share of the largest magnitude counts as close to it."""
@@ -64,7 +64,7 @@ def gather(recording: Recording, rig: Rig, channels: Sequence[str] = (), angle: 
             )
     names = tuple(channels) or recording.vibration_names()
     signals = tuple(_over_angle(recording, own, names) for own in shaft_angles)
-    n_blocks = int(np.clip(shaft_angles[0].n_revolutions // REVOLUTIONS_PER_BLOCK, 2, MOST_BLOCKS))
+    n_blocks = int(np.clip(shaft_angles[0].n_revolutions // REVOLUTIONS_PER_BLOCK, FEWEST_BLOCKS, MOST_BLOCKS))
     speed_hz = shaft_angles[0].mean_speed_rpm / 60.0
     bands = _bands(recording.sampling_rate_hz, signals[0].samples_per_revolution * speed_hz)
     sums, steps = {}, (0.0, 0.0)
@@ -143,7 +143,8 @@ def _channel_sums(
     residual = _residual(signals, channel, means, frame)
     n = signals[0].samples_per_revolution
     power, order_step = _segment_power(residual, n, n_blocks)
-    envelopes, moments, cycle_step = _envelopes(residual, n, n_blocks, bands, speed_hz)
+    highest_cycle = min(max(HIGHEST_CYCLE, frame.teeth[0] + BEYOND_THE_MESH), 0.4 * n)
+    envelopes, moments, cycle_step = _envelopes(residual, n, n_blocks, bands, speed_hz, highest_cycle)
     sums = ChannelSums((lines[0], lines[1]), (counts[0], counts[1]), power, envelopes, moments, _tail(raw, n_blocks))
     return sums, (order_step, cycle_step)
 
@@ -162,19 +163,35 @@ def _residual(
     signals: tuple[AngleSignal, ...], channel: int, means: Sequence[FloatArray], frame: GearFrame
 ) -> FloatArray:
     """Return, over the driver's angle, what neither shaft repeats: x(θ) − a1(θ) − a2(θ z1/z2), a2 without the mesh."""
+    driver, driven = signals
+    ratio = frame.shaft_orders[1]
+    place = _places(driver)
+    residual = driver.samples[channel] - _periodic(means[0], place)
+    # What the driver repeats leaks into the driven gear's average, as its revolutions are no whole number of those.
+    revolutions = _whole_revolutions(driven, channel)
+    first = round(-driven.start_revolution * driven.samples_per_revolution) % driven.samples_per_revolution
+    turned = _places(driven)[first : first + revolutions.size]
+    leaked = _periodic(means[0], turned / ratio).reshape(revolutions.shape).mean(axis=0)
+    lines = np.fft.rfft(means[1] - leaked)
+    lines[:: frame.teeth[1]] = 0.0  # the mesh belongs to both; the driver's average has it
+    # Angle 0 of both shafts falls together, as one angle was made of the other.
+    return np.asarray(residual - _periodic(np.fft.irfft(lines, len(means[1])), place * ratio), dtype=np.float64)
+
+
+def _places(signal: AngleSignal) -> FloatArray:
+    """Return the shaft's angle at each sample, in revolutions."""
+    n = signal.samples_per_revolution
+    places: FloatArray = (np.arange(signal.samples.shape[1]) + round(signal.start_revolution * n)) / n
+    return places
+
+
+def _periodic(revolution: FloatArray, place_rev: FloatArray) -> FloatArray:
+    """Return a periodic waveform at any angles, by cubic splines."""
     from scipy.ndimage import map_coordinates
 
-    driver = signals[0]
-    n, values = driver.samples_per_revolution, driver.samples[channel]
-    place = np.arange(len(values)) + round(driver.start_revolution * n)
-    residual = values - means[0][place % n]
-    lines = np.fft.rfft(means[1])
-    lines[:: frame.teeth[1]] = 0.0  # the mesh belongs to both; the driver's average has it
-    own = np.fft.irfft(lines, len(means[1]))
-    turned = place / n * frame.shaft_orders[1] * len(own)
-    # Angle 0 of both shafts falls together, as one angle was made of the other.
-    residual -= map_coordinates(own, [turned % len(own)], order=3, mode="grid-wrap")
-    return np.asarray(residual, dtype=np.float64)
+    n = len(revolution)
+    values: FloatArray = map_coordinates(revolution, [place_rev * n % n], order=3, mode="grid-wrap")
+    return values
 
 
 def _segment_power(values: FloatArray, rate: float, n_segments: int) -> tuple[FloatArray, float]:
@@ -190,14 +207,19 @@ def _segment_power(values: FloatArray, rate: float, n_segments: int) -> tuple[Fl
 
 
 def _envelopes(
-    residual: FloatArray, n_per_rev: int, n_blocks: int, bands: Sequence[tuple[float, float]], speed_hz: float
+    residual: FloatArray,
+    n_per_rev: int,
+    n_blocks: int,
+    bands: Sequence[tuple[float, float]],
+    speed_hz: float,
+    highest_cycle: float,
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return spectra of squared envelopes over their squared mean, the bands' moments, and the spectra's step."""
     from scipy.fft import irfft, next_fast_len, rfft
 
     n = len(residual)
     lines = rfft(residual)
-    m = 2 * next_fast_len(int(min(HIGHEST_CYCLE, 0.4 * n_per_rev) * n / n_per_rev) + 1)
+    m = 2 * next_fast_len(int(highest_cycle * n / n_per_rev) + 1)
     powers, moments, step = [], [], 0.0
     for low, high in bands:
         first, last = (int(f / speed_hz * n / n_per_rev) for f in (low, high))

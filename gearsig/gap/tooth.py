@@ -10,7 +10,16 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.gap.frame import DRIVEN, DRIVER
 from gearsig.gap.gathered import ChannelSums, Gathered
-from gearsig.gap.gear_lines import SIDES, Feature, average_lines, decibel, visible_orders
+from gearsig.gap.gear_lines import (
+    N_MESH_HARMONICS,
+    NOMINAL_REVOLUTIONS,
+    SIDES,
+    Feature,
+    average_lines,
+    decibel,
+    line_power,
+    visible_orders,
+)
 
 SMOOTH_SIDEBANDS = 2
 """Mesh lines and as many sidebands on either side are left out: eccentricity makes those."""
@@ -42,19 +51,33 @@ def tooth_features(gathered: Gathered, sums: Sequence[ChannelSums]) -> Iterator[
     """Yield the tooth features of all channels together, since a tooth shows at one angle on all of them."""
     for side in (DRIVER, DRIVEN):
         teeth = gathered.frame.teeth[side]
-        found = []
+        residuals, noises = [], []
         for channel in sums:
             lines, noise = average_lines(channel, side)
-            highest = visible_orders(gathered, side, len(lines))
-            mesh = float((np.abs(lines[teeth : highest + 1 : teeth]) ** 2).sum() + noise[teeth])
-            found.append((residual_lines(lines, teeth, highest) / np.sqrt(mesh), teeth))
-        yield from pattern_features(f"tooth.{SIDES[side]}", [f[0] for f in found], teeth)
+            scale = mesh_power(gathered, channel, side)
+            residuals.append(residual_lines(lines, teeth, visible_orders(gathered, side, len(lines))) / np.sqrt(scale))
+            noises.append(np.where(residuals[-1] != 0, noise, 0.0).sum() / 2.0 / scale)
+        longer = max(1.0, float(sums[0].counts[side].sum()) / NOMINAL_REVOLUTIONS)
+        yield from pattern_features(f"tooth.{SIDES[side]}", residuals, teeth, float(np.mean(noises)), longer)
 
 
-def pattern_features(name: str, residuals: Sequence[NDArray[np.complex128]], teeth: int) -> Iterator[Feature]:
-    """Yield size, prominence, kurtosis, width, centroid of residuals relative to their mesh."""
+def mesh_power(gathered: Gathered, channel: ChannelSums, side: int) -> float:
+    """Return the power of the mesh harmonics in a shaft's average."""
+    power = line_power(channel, side)
+    teeth = gathered.frame.teeth[side]
+    highest = visible_orders(gathered, side, len(power))
+    return float(power[teeth : N_MESH_HARMONICS * teeth + 1 : teeth][: highest // teeth].sum())
+
+
+def pattern_features(
+    name: str, residuals: Sequence[NDArray[np.complex128]], teeth: int, noise: float, longer: float
+) -> Iterator[Feature]:
+    """Yield size, prominence, kurtosis, width, centroid of residuals relative to their mesh.
+
+    `noise` is the energy that noise leaves in them; `longer` times it is put under what exceeds it.
+    """
     energy = np.mean([tooth_energy(lines, teeth) for lines in residuals], axis=0)
-    energy = np.maximum(energy, 1e-30)
+    energy = np.maximum(np.maximum(energy - noise, 0.0) + longer * noise, 1e-30)
     best = int(np.argmax(energy))
     share = energy / energy.max()
     width = float(np.count_nonzero(share > 0.5)) / STEPS_PER_TOOTH
