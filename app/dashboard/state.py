@@ -14,7 +14,7 @@ TAB, CHANNEL = "tab", "channel"
 ANALYSIS_PAGE = Path(__file__).parent / "pages" / "analysis.py"
 OF_LABORATORY = "Laboratory"
 """Origin of a recording that the laboratory made."""
-_CHOSEN, _SIMULATED, _UPLOAD = "chosen", "simulated", "upload"
+_CHOSEN, _SIMULATED, _UPLOAD, _REFERENCE = "chosen", "simulated", "upload", "kept reference"
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,10 @@ class Request:
         A rig file; an empty text for none.
     sampling_rate_hz, speed_rpm : float or None
         What the user states of a file that does not.
+    reference_name, reference_sha256 : str
+        Of the recording that is compared with; empty for none.
+    torque_nm : float or None
+        What the user states where the rig does not.
     """
 
     name: str
@@ -39,14 +43,18 @@ class Request:
     rig_text: str = ""
     sampling_rate_hz: float | None = None
     speed_rpm: float | None = None
+    reference_name: str = ""
+    reference_sha256: str = ""
+    torque_nm: float | None = None
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """A request, and where its bytes are: a file of this machine (a sample), or in memory (an upload)."""
+    """A request, and where its bytes are: files of this machine (samples), or in memory (uploads)."""
 
     request: Request
     content: Path | memoryview
+    reference: Path | memoryview | None = None
 
 
 @dataclass(frozen=True)
@@ -91,6 +99,17 @@ def keep_upload(upload: Upload | None) -> None:
 def kept_upload() -> Upload | None:
     """Return the upload that was open when this session last saw the analysis page."""
     found: Upload | None = st.session_state.get(_UPLOAD)
+    return found
+
+
+def keep_reference(source: str, upload: Upload | None) -> None:
+    """Keep the reference of one recording while another page is shown."""
+    st.session_state[source_key(_REFERENCE, source)] = upload
+
+
+def kept_reference(source: str) -> Upload | None:
+    """Return the reference that was given last to that recording."""
+    found: Upload | None = st.session_state.get(source_key(_REFERENCE, source))
     return found
 
 

@@ -4,6 +4,7 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from streamlit.testing.v1 import AppTest
 
@@ -194,3 +195,40 @@ def test_names_from_files_are_shown_as_typed() -> None:
     page.run()
     for name in names:
         assert name in shown_text(page)
+
+
+def test_a_reference_changes_verdict_and_indicators_as_on_the_command_line() -> None:
+    from app.dashboard.cached import read_and_analyze
+    from app.dashboard.state import Request
+    from app.dashboard.widgets.verdict import headline_of
+
+    page = opened()
+    page.session_state[state.TAB] = "Indicators"
+    page.sidebar.selectbox(key=state.SAMPLE).set_value(SAMPLES["root_crack_1mm"]).run()
+    assert "reference" not in page.dataframe[0].value.columns
+    next(w for w in page.sidebar.selectbox if w.label == "Compared with").set_value("Root crack 0mm").run()
+    assert not page.exception
+    assert not page.error, shown_text(page)
+    assert "Compared with root_crack_0mm.h5" in shown_text(page)
+    table = page.dataframe[0].value
+    rms = table[table["indicator"] == "rms"]
+    assert len(rms)
+    np.testing.assert_allclose(rms["change (dB)"], 20.0 * np.log10(rms["value"] / rms["reference"]), atol=1e-6)
+    sample, sound = SAMPLES["root_crack_1mm"], SAMPLES["root_crack_0mm"]
+    request = Request("now.h5", "1", sample.rig.name, sample.rig.read_text(), reference_name="sound.h5")
+    same = read_and_analyze(
+        request, memoryview(sample.recording.read_bytes()), memoryview(sound.recording.read_bytes())
+    )
+    assert headline_of(same.verdict)[0] in shown_text(page)
+
+
+def test_an_uploaded_reference_that_does_not_fit_is_one_message() -> None:
+    page = opened()
+    next(w for w in page.sidebar.selectbox if w.label == "Compared with").set_value("Own file").run()
+    assert not page.error
+    sound = page.sidebar.file_uploader[0]
+    sound.upload("other.csv", b"time (s);b\n" + b"\n".join(b"%g;%d" % (i / 1000, i * 37 % 101) for i in range(3000)))
+    page.run()
+    assert not page.exception
+    assert len(page.error) == 1
+    assert "the reference has no channel" in shown_text(page)

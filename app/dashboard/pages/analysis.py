@@ -23,7 +23,7 @@ def show() -> None:
         show_welcome()
         return
     with st.spinner("Reading and analysing …", show_time=True):
-        analysis = analysis_of(chosen.request, chosen.content)
+        analysis = analysis_of(chosen.request, chosen.content, chosen.reference)
     show_verdict(analysis)
     show_findings(analysis)
     show_tabs(analysis, chosen.request)

@@ -13,6 +13,7 @@ from app.dashboard import state
 from app.dashboard.as_typed import as_typed
 from app.dashboard.cached import sha256_of_upload
 from app.dashboard.state import Chosen, Request, Upload
+from app.dashboard.widgets.comparison import choose_comparison, sample_name
 from app.samples import Sample, samples
 from gearsig.errors import InputError
 
@@ -43,7 +44,7 @@ def choose_recording() -> Chosen | None:
 def _choose_simulated(made: Chosen) -> Chosen:
     st.caption(f"{as_typed(made.request.name)}, from the fault laboratory.")
     request = made.request
-    return Chosen(_request(request.name, request.sha256, request.rig_name, request.rig_text), made.content)
+    return _described(request.name, request.sha256, request.rig_name, request.rig_text, made.content)
 
 
 def _choose_sample() -> Chosen:
@@ -52,15 +53,11 @@ def _choose_sample() -> Chosen:
     found = samples()
     first = next((i for i, s in enumerate(found) if s.rig.stem == "damaged_tooth"), 0)
     sample: Sample = st.selectbox(
-        "Sample", found, index=first, format_func=_sample_name, key=state.SAMPLE, persist_state="session"
+        "Sample", found, index=first, format_func=sample_name, key=state.SAMPLE, persist_state="session"
     )
     st.caption("Simulated, not measured: what is in it is known.")
     name, digest = sample.recording.name, sha256_of(sample.recording)
-    return Chosen(_request(name, digest, sample.rig.name, sample.rig.read_text("utf-8")), sample.recording)
-
-
-def _sample_name(sample: Sample) -> str:
-    return sample.rig.stem.replace("_", " ").capitalize()
+    return _described(name, digest, sample.rig.name, sample.rig.read_text("utf-8"), sample.recording)
 
 
 def _choose_file() -> Chosen | None:
@@ -88,7 +85,7 @@ def _choose_file() -> Chosen | None:
     if rig_file is not None:
         upload = replace(upload, rig_name=rig_file.name, rig_text=_text_of(rig_file))
     state.keep_upload(upload)
-    return Chosen(_request(upload.name, upload.sha256, upload.rig_name, upload.rig_text), upload.content)
+    return _described(upload.name, upload.sha256, upload.rig_name, upload.rig_text, upload.content)
 
 
 def _from_before() -> Upload | None:
@@ -108,8 +105,8 @@ def _text_of(file: UploadedFile) -> str:
         raise InputError("is not text in UTF-8", where=file.name, remedy="save the rig file as UTF-8") from None
 
 
-def _request(name: str, digest: str, rig_name: str, rig_text: str) -> Request:
-    """Let the user change the rig and state what the file does not."""
+def _described(name: str, digest: str, rig_name: str, rig_text: str, content: Path | memoryview) -> Chosen:
+    """Let the user change the rig, state what the file does not, and give a reference."""
     source = f"{digest} {sha256(rig_text.encode()).hexdigest()}"
     with st.expander("Rig", icon=":material/account_tree:"):
         rig_text = _edit_rig(rig_name, rig_text, source)
@@ -130,7 +127,9 @@ def _request(name: str, digest: str, rig_name: str, rig_text: str) -> Request:
             persist_state="session",
             help="Of the reference shaft, if it held still and is known well. It is refined where the signal shows it.",
         )
-    return Request(name, digest, rig_name, rig_text, rate, speed)
+    then = choose_comparison(name, digest)
+    request = Request(name, digest, rig_name, rig_text, rate, speed, then.name, then.sha256, then.torque_nm)
+    return Chosen(request, content, then.content)
 
 
 def _edit_rig(name: str, text: str, source: str) -> str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from math import nan
 from typing import TYPE_CHECKING
 
 import streamlit as st
 
 from app.dashboard import state
+from gearsig.diagnosis.comparison import Change, changes
 from gearsig.diagnosis.types import Analysis
 from gearsig.indicators.types import Indicator
 from gearsig.plot.display import unit_text
@@ -22,7 +24,7 @@ def show_indicators(analysis: Analysis) -> None:
     if not analysis.indicators:
         st.info("There are no indicators: no vibration channel could be analysed.")
         return
-    table = indicator_frame(analysis.indicators)
+    table = indicator_frame(analysis.indicators, changes(analysis) if analysis.reference is not None else ())
     words, channel, place = st.columns(3, vertical_alignment="bottom")
     text = words.text_input("Name contains", key=state.view_key("indicator words", analysis))
     channels = channel.multiselect(
@@ -38,7 +40,8 @@ def show_indicators(analysis: Analysis) -> None:
         kept = kept[kept["channel"].isin(channels)]
     if places:
         kept = kept[kept["of"].isin(places)]
-    config = {"value": st.column_config.NumberColumn(format="%.5g")}
+    number = st.column_config.NumberColumn(format="%.5g")
+    config = {"value": number, "reference": number, "change (dB)": st.column_config.NumberColumn(format="%+.1f")}
     st.dataframe(kept, hide_index=True, width="stretch", height=520, column_config=config)
     left, right = st.columns((3, 1), vertical_alignment="center")
     left.caption(f"{len(kept)} of {len(table)} indicators")
@@ -53,8 +56,8 @@ def show_indicators(analysis: Analysis) -> None:
     )
 
 
-def indicator_frame(indicators: tuple[Indicator, ...]) -> DataFrame:
-    """Return indicators as a table, one per line."""
+def indicator_frame(indicators: tuple[Indicator, ...], compared: tuple[Change | None, ...] = ()) -> DataFrame:
+    """Return indicators as a table, one per line; with changes also what they were in the reference."""
     from pandas import DataFrame
 
     rows = [
@@ -70,7 +73,13 @@ def indicator_frame(indicators: tuple[Indicator, ...]) -> DataFrame:
         }
         for i in indicators
     ]
-    return DataFrame(rows)
+    table = DataFrame(rows)
+    if compared:
+        then = [nan if change is None else change.reference_value for change in compared]
+        moved = [nan if change is None or change.change_db is None else change.change_db for change in compared]
+        table.insert(2, "reference", then)
+        table.insert(3, "change (dB)", moved)
+    return table
 
 
 def csv_text(table: DataFrame) -> str:

@@ -8,6 +8,7 @@ import streamlit as st
 
 from app.dashboard.as_typed import as_typed
 from gearsig.diagnosis.types import Analysis, Kind, Outcome
+from gearsig.report.sections import reference_text
 
 Colour = Literal["red", "orange", "violet", "gray", "blue", "green"]
 COLOURS: dict[Kind | Outcome, Colour] = {
@@ -57,6 +58,8 @@ def show_verdict(analysis: Analysis) -> None:
     with st.container(horizontal=True, vertical_alignment="center"):
         show_kind(analysis.outcome)
         st.markdown(" · ".join(facts), width="content")
+    if analysis.reference is not None:
+        st.caption(as_typed(reference_text(analysis.reference)))
 
 
 def headline_of(verdict: str) -> tuple[str, str]:

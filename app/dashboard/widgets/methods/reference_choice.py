@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from gearsig.recording.types import Recording
     from gearsig.rig.types import Rig
 
-NONE, OWN, SAMPLE = "None", "Own file", "Sample"
+NONE, OWN, SAMPLE, SIDEBAR = "None", "Own file", "Sample", "As in the sidebar"
 N_KEPT = 2
 
 
@@ -42,7 +42,13 @@ def choose_reference(analysis: Analysis) -> Reference:
     left, right = st.columns(2, vertical_alignment="bottom")
     with left:
         about = "The same gears, sensors, speed and load when they were sound. Without it only deep cracks show."
-        origin = choose_one("Reference", (NONE, OWN, SAMPLE), state.view_key("reference origin", analysis), about=about)
+        given = () if analysis.reference is None else (SIDEBAR,)
+        origin = choose_one(
+            "Reference", (*given, NONE, OWN, SAMPLE), state.view_key("reference origin", analysis), about=about
+        )
+    if origin == SIDEBAR and analysis.reference is not None:
+        recording = analysis.reference.recording
+        return Reference(recording, f"{recording.provenance.sha256} {recording.sampling_rate_hz!r} {analysis.rig!r}")
     with right:
         if origin == OWN:
             return _own(analysis)
