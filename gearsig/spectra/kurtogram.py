@@ -38,6 +38,8 @@ class ChosenBand:
         Of the envelope, over modulation frequency.
     remarks : tuple of str
         What speaks against the choice; empty if nothing does.
+    reason : str
+        Why the band was chosen; empty if it was given.
     """
 
     band: BandCandidate
@@ -45,6 +47,7 @@ class ChosenBand:
     envelope: Envelope
     spectrum: Spectrum
     remarks: tuple[str, ...]
+    reason: str = ""
 
 
 def kurtogram(
@@ -185,14 +188,28 @@ def kurtogram_envelope(
     grid = kurtogram(x, fs, n_levels=n_levels, source=f"{channel}, {preparation}" if preparation != "none" else channel)
     if highest_modulation_hz is not None:
         narrowest_hz = max(narrowest_hz, 3.0 * _checked_modulation(highest_modulation_hz, fs, len(x)))
+    reason = ""
     if band_hz is None:
         band = grid.best_band(narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
+        reason = _reason(grid, band, narrowest_hz, of_modulation=highest_modulation_hz is not None)
     else:
         band = given_band(x, fs, band_hz)
     unit = "" if preparation == "whitened" else unit
     envelope = band_envelope(x, fs, band.band_hz, kind=kind, unit=unit, source=channel)
     spectrum = envelope_spectrum(envelope, highest_hz=highest_modulation_hz)
-    return ChosenBand(band, grid, envelope, spectrum, grid.remarks(band))
+    return ChosenBand(band, grid, envelope, spectrum, grid.remarks(band), reason)
+
+
+def _reason(grid: Kurtogram, band: BandCandidate, narrowest_hz: float, *, of_modulation: bool) -> str:
+    """Return why a band was chosen, above all where others have more kurtosis."""
+    text = "It has the largest kurtosis"
+    if narrowest_hz > 0.0:
+        text += f" of the bands at least {narrowest_hz:.4g} Hz wide"
+        text += ", three times the highest modulation" if of_modulation else ""
+    narrower = grid.kurtosis[grid.bandwidth_hz < narrowest_hz * (1.0 - 1e-9)]
+    if narrower.size and float(narrower.max()) > band.kurtosis:
+        text += f". Narrower ones reach {narrower.max():.3g}, but their envelopes are too slow to show so fast a rhythm"
+    return text + "."
 
 
 def _checked_modulation(highest_hz: float, fs: float, n: int) -> float:

@@ -14,6 +14,9 @@ from gearsig.spectra.kurtogram_noise import noise_limit
 LARGE_SHARE = 0.2
 """Share of the fourth moment from which on a single envelope sample makes a kurtosis a doubtful guide."""
 
+WEAK_KURTOSIS = 0.3
+"""Kurtosis that is more than chance in long signals, yet no sign of impacts: slow changes of level do as much."""
+
 
 @dataclass(frozen=True)
 class Kurtogram:
@@ -120,6 +123,8 @@ class Kurtogram:
                 f"kurtosis {band.kurtosis:.2g} is what noise alone reaches ({limit:.2g} in one kurtogram of 20): "
                 "no band stands out"
             )
+        elif band.kurtosis <= max(2.0 * limit, WEAK_KURTOSIS):
+            remarks.append(f"kurtosis {band.kurtosis:.2g} is small: the band hardly stands out from noise")
         if band.standard_error > 0.1:
             remarks.append(
                 f"rests on {n} envelope samples: noise alone scatters by {band.standard_error:.2g}; record longer or "

@@ -56,7 +56,8 @@ def show_kurtogram(analysis: Analysis, channel: ChannelAnalysis) -> None:
     settings = _choose_settings(analysis, stretch)
     with st.spinner("Computing the kurtogram …", show_time=True):
         found = band_of(stretch.key, settings, stretch)
-    _show_choice(found, settings, stretch)
+    varies = stretch.angle is not None and not speed_is_constant(of_stretch(analysis, stretch))
+    _show_choice(found, settings, stretch, varies=varies)
     spectrum = _show_envelope(analysis, channel, stretch, found, settings)
     envelope = Waveforms(
         {found.envelope.source: found.envelope.values},
@@ -123,7 +124,7 @@ def band_of(key: str, settings: BandSettings, _stretch: Stretch) -> ChosenBand:
     )
 
 
-def _show_choice(found: ChosenBand, settings: BandSettings, stretch: Stretch) -> None:
+def _show_choice(found: ChosenBand, settings: BandSettings, stretch: Stretch, *, varies: bool) -> None:
     from gearsig.plot.kurtogram import kurtogram_figure
 
     figure = kurtogram_figure(found.kurtogram, found.band, height_in=HEIGHT_IN)
@@ -133,6 +134,14 @@ def _show_choice(found: ChosenBand, settings: BandSettings, stretch: Stretch) ->
         f"{who}: **{band.low_hz:.5g} to {band.high_hz:.5g} Hz**, spectral kurtosis **{band.kurtosis:.3g}** "
         f"(of noise alone: 0 ± {band.standard_error:.2g})"
     )
+    caption = f"{found.reason} " if found.reason else ""
+    if varies:
+        caption += (
+            "The speed changes in this stretch: mesh harmonics that pass resonances raise the kurtosis too, without "
+            "any impact. Trust a rhythm in the envelope over order, or choose a stretch of even speed."
+        )
+    if caption:
+        st.caption(caption)
     show_notes(found.remarks)
 
 
