@@ -66,7 +66,7 @@ def show_coherence(analysis: Analysis, channel: ChannelAnalysis) -> None:
         f"Mean squared coherence over the carriers from {mean.band_hz[0]:.5g} to {mean.band_hz[1]:.5g} Hz. "
         f"Stationary noise exceeds **{mean.level:.3g}** in 1 line of {1 / mean.probability:.5g}."
     )
-    _show_map(found, mean, _standing_out(cursors, mean), limits)
+    _show_map(found, mean, _standing_out(cursors, mean), _of_shafts(cursors, mean), limits)
     offer_downloads(analysis, VIEW, tables={"Enhanced spectrum": lambda: spectrum_columns(mean.spectrum)})
 
 
@@ -156,14 +156,29 @@ def _standing_out(cursors: Sequence[Cursor], mean: EnhancedEnvelope) -> list[Cur
     """Return the lines of shafts and bearings at which the mean is above noise's level, within a bearing's slip."""
     end = float(mean.spectrum.positions[-1])
     inside = [c for c in cursors if c.kind in MARKED_KINDS and float(mean.spectrum.positions[0]) <= c.position <= end]
-    slack = {c: FOUND_SHARE * c.position if c.kind == "bearing" else 0.0 for c in inside}
-    return [
-        c for c in inside if mean.spectrum.largest_near(c.position, slack[c] + mean.spectrum.resolution)[1] > mean.level
-    ]
+    return [c for c in inside if _peak(c, mean)[1] > mean.level]
+
+
+def _peak(cursor: Cursor, mean: EnhancedEnvelope) -> tuple[float, float]:
+    """Return place and height of the largest value at a line, a bearing's within its slip."""
+    slack = FOUND_SHARE * cursor.position if cursor.kind == "bearing" else 0.0
+    return mean.spectrum.largest_near(cursor.position, slack + mean.spectrum.resolution)
+
+
+def _of_shafts(cursors: Sequence[Cursor], mean: EnhancedEnvelope) -> set[Cursor]:
+    """Return the bearing lines whose peak lies on a multiple of a shaft's speed, as meshes and their sidebands do."""
+    speeds = [c.position / c.number for c in cursors if c.kind == "shaft"]
+    peaks = {c: _peak(c, mean)[0] for c in _standing_out(cursors, mean) if c.kind == "bearing"}
+    near = mean.spectrum.resolution
+    return {c for c, at in peaks.items() if any(abs(at - max(1, round(at / f)) * f) <= near for f in speeds)}
 
 
 def _show_map(
-    found: SpectralCoherence, mean: EnhancedEnvelope, marked: Sequence[Cursor], limits: tuple[float, float]
+    found: SpectralCoherence,
+    mean: EnhancedEnvelope,
+    marked: Sequence[Cursor],
+    of_shafts: set[Cursor],
+    limits: tuple[float, float],
 ) -> None:
     from gearsig.plot.coherence import coherence_figure
 
@@ -174,12 +189,27 @@ def _show_map(
     positions = [cursor.position for cursor in inside]
     figure = coherence_figure(found, mean, marked=positions, limits=around, height_in=HEIGHT_IN)
     show_picture(figure, f"Squared coherence of {found.source} over {found.alpha_label} and carrier frequency")
-    names = ", ".join(dict.fromkeys(f"{cursor.label} ({cursor.position:.5g})" for cursor in inside))
-    st.caption(
-        f"Dotted, lines that stand above noise's level, bearings' within 1 % for their slip: {as_typed(names)}."
-        if inside
-        else "No line of a shaft or bearing stands above noise's level."
-    )
+    st.caption(_in_words(inside, of_shafts) if inside else "No line of a shaft or bearing stands above noise's level.")
+
+
+def _in_words(inside: Sequence[Cursor], of_shafts: set[Cursor]) -> str:
+    """Name the lines that stand out, those that gears may cause as well last."""
+    own, shared = ([c for c in inside if (c in of_shafts) == either] for either in (False, True))
+    text = "Above noise's level means that there is modulation, not that there is damage: sound gears modulate too. "
+    if own:
+        text += (
+            "Dotted, lines that stand above noise's level, bearings' within 1 % for their slip: " + _names(own) + ". "
+        )
+    if shared:
+        text += (
+            "Bearing lines whose peak lies on a multiple of a shaft's speed, which meshes and shafts cause as well: "
+        )
+        text += _names(shared) + "."
+    return text
+
+
+def _names(cursors: Sequence[Cursor]) -> str:
+    return as_typed(", ".join(dict.fromkeys(f"{cursor.label} ({cursor.position:.5g})" for cursor in cursors)))
 
 
 def _key(name: str, analysis: Analysis) -> str:
