@@ -97,7 +97,11 @@ def _show_map(choice: MapChoice, levels: TimeFrequencyMap, found: Sequence[Ridge
     fewer = f"The map shows only {len(found)} of {n_asked} ridges. " if len(found) < n_asked else ""
     shared = any(bool(ridge.shared.any()) for ridge in found)
     dashed = "Dashed: another ridge is so near that both share their level. " if shared else ""
-    st.caption(f"{fewer}{dashed}Ridge 1 is the strongest. Each runs through the whole stretch, also where it fades.")
+    st.caption(
+        f"{fewer}{dashed}Ridge 1 has the largest rms of its amplitude. Each runs through the whole stretch, also where "
+        "it fades. Only what stands out clearly on this map is looked for: the strongest line of the spectrum may lie "
+        "above it, or be too unsteady."
+    )
 
 
 def _show_course(analysis: Analysis, found: Sequence[Ridge]) -> None:
