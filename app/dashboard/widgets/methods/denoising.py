@@ -9,6 +9,7 @@ import streamlit as st
 from app.dashboard import state
 from app.dashboard.widgets.methods.choice import choose_one
 from app.dashboard.widgets.methods.downloads import offer_downloads
+from app.dashboard.widgets.methods.mesh_cycles import length_shown
 from app.dashboard.widgets.methods.stretch import Stretch, choose_stretch
 from app.dashboard.widgets.methods.waveforms import Waveforms, choose_window, show_waveforms, waveforms_of
 from gearsig.diagnosis.types import Analysis, ChannelAnalysis
@@ -40,7 +41,8 @@ def show_denoising(analysis: Analysis, channel: ChannelAnalysis) -> None:
         found = denoised(stretch.key, settings, stretch)
     waveforms = denoised_waveforms(stretch, found)
     with right:
-        limits = choose_window(analysis, waveforms, "denoising")
+        shown = length_shown(analysis, stretch, over_angle=False)
+        limits = choose_window(analysis, waveforms, "denoising", shown=shown)
     looks = {"signal": -1, "without noise": 0}
     show_waveforms(analysis, waveforms, limits, looks, "denoising", last=False)
     show_waveforms(analysis, waveforms, limits, {"removed": 1}, "denoising removed", label="removed", height_px=180)

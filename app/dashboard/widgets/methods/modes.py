@@ -10,10 +10,11 @@ import streamlit as st
 from app.dashboard import state
 from app.dashboard.widgets.methods.choice import choose_one
 from app.dashboard.widgets.methods.downloads import offer_downloads
+from app.dashboard.widgets.methods.mesh_cycles import length_shown
 from app.dashboard.widgets.methods.mode_signal import ModeSignal, choose_signal
 from app.dashboard.widgets.methods.mode_suggestion import show_suggestion
 from app.dashboard.widgets.methods.notes import show_notes
-from app.dashboard.widgets.methods.stretch import choose_stretch
+from app.dashboard.widgets.methods.stretch import Stretch, choose_stretch
 from app.dashboard.widgets.methods.waveforms import Waveforms
 from app.dashboard.widgets.picture import show_picture
 from app.dashboard.widgets.range_slider import choose_range
@@ -50,7 +51,7 @@ def show_modes(analysis: Analysis, channel: ChannelAnalysis) -> None:
     with st.spinner("Finding the modes …", show_time=True):
         modes = modes_of(signal.key, settings, signal)
     show_notes(modes.notes)
-    _show_figure(analysis, modes)
+    _show_figure(analysis, modes, _length_shown(analysis, stretch, signal))
     end = "Converged" if modes.converged else "Stopped"
     n_blocks = len(modes.centre_history) - 1
     blocks = f" in {n_blocks} overlapping blocks" if len(modes.residual) > N_PER_BLOCK else ""
@@ -146,17 +147,32 @@ def modes_of(key: str, settings: VmdSettings, _signal: ModeSignal) -> Modes:
         shaft=_signal.shaft,
         n_per_block=N_PER_BLOCK,
     )
-    return replace(modes, offset=_signal.offset)
+    order = list(modes.by_centre())  # the first mode shown is number 1
+    return replace(
+        modes,
+        waveforms=modes.waveforms[order],
+        centres=modes.centres[order],
+        bandwidths=modes.bandwidths[order],
+        centre_history=modes.centre_history[:, order],
+        offset=_signal.offset,
+    )
 
 
-def _show_figure(analysis: Analysis, modes: Modes) -> None:
+def _length_shown(analysis: Analysis, stretch: Stretch, signal: ModeSignal) -> float:
+    """Return how much of the waveforms is drawn at first, in s or revolutions; an envelope's rhythms are slow."""
+    is_envelope = signal.axis == "frequency" and signal.source != stretch.channel
+    shown = length_shown(analysis, stretch, over_angle=signal.axis == "order", of_mesh=not is_envelope)
+    return SHOWN / signal.rate if shown is None else shown
+
+
+def _show_figure(analysis: Analysis, modes: Modes, length: float) -> None:
     from gearsig.plot.modes import modes_figure
 
     left, right = st.columns(2)
     end = float(modes.positions[-1])
     unit = "s from the stretch's start" if modes.axis == "frequency" else "revolutions"
     with left:
-        shown = (0.0, min(end, SHOWN / modes.sampling_rate))
+        shown = (0.0, min(end, length))
         limits = choose_range(f"Waveforms shown ({unit})", analysis, end, shown=shown, name="modes")
     top = modes.sampling_rate / 2.0
     with right:

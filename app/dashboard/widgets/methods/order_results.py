@@ -13,6 +13,7 @@ from app.dashboard.widgets.line_chart import Axes
 from app.dashboard.widgets.methods.choice import choose_one
 from app.dashboard.widgets.methods.curves import Curve, show_curves
 from app.dashboard.widgets.methods.downloads import offer_downloads
+from app.dashboard.widgets.methods.mesh_cycles import N_CYCLES
 from app.dashboard.widgets.methods.notes import show_notes
 from app.dashboard.widgets.methods.stretch import Stretch
 from app.dashboard.widgets.methods.waveforms import Waveforms, choose_window, show_waveforms, waveforms_of
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
     from gearsig.orders.vold_kalman_types import OrderSeparation, SeparatedOrder
 
 N_POINTS = 2000
-REVOLUTIONS_SHOWN = 3.0
-"""Of the waveforms at first."""
 REST = "what is left without all chosen orders"
 
 
@@ -134,8 +133,7 @@ def _show_waveforms(analysis: Analysis, stretch: Stretch, names: Sequence[str], 
     waveforms = order_waveforms(stretch, names, separation)
     chosen = st.selectbox("Waveform of", list(names), key=_key(f"waveform of {list(names)}", analysis))
     order = separation.orders[list(names).index(chosen)]
-    speed = float(np.median(order.frequency_hz)) / order.order
-    shown = REVOLUTIONS_SHOWN / max(speed, 1e-9)
+    shown = N_CYCLES / max(float(np.median(order.frequency_hz)), 1e-9)
     limits = choose_window(analysis, waveforms, "order tracking", shown=shown, in_middle=True)
     show_waveforms(analysis, waveforms, limits, {"signal": -1, chosen: 0}, "order signal", last=False)
     show_waveforms(analysis, waveforms, limits, {REST: 1}, "order rest", label="what is left", height_px=180)

@@ -110,7 +110,8 @@ def _number(text: str) -> float:
 
 
 def _choose_settings(analysis: Analysis, orders: tuple[float, ...]) -> OrderSettings:
-    one, two, three, four, five = st.columns((3, 3, 3, 4, 3))
+    one, two, three = st.columns(3)
+    four, five, _ = st.columns(3)
     with one:
         unit = choose_one("Bandwidth in", ("Orders", "Hz"), _key("unit", analysis))
     first = 0.5 if unit == "Orders" else 5.0

@@ -11,6 +11,7 @@ import streamlit as st
 from app.dashboard import state
 from app.dashboard.widgets.methods.choice import choose_one
 from app.dashboard.widgets.methods.downloads import offer_downloads
+from app.dashboard.widgets.methods.mesh_cycles import length_shown
 from app.dashboard.widgets.methods.packet_energies import ORDERINGS, node_order, show_energies
 from app.dashboard.widgets.methods.stretch import Stretch, choose_stretch
 from app.dashboard.widgets.methods.uniform_signal import choose_over_angle, signal_of, waveforms_over
@@ -120,7 +121,8 @@ def _show_nodes(
     values = packet_inverse(found, nodes)
     columns = {"signal": signal.values, name: values, "what is left": signal.values - values}
     waveforms = waveforms_over(signal, stretch, columns, f"wavelet packets, {found.wavelet}, {name}")
-    limits = choose_window(analysis, waveforms, VIEW)
+    shown = length_shown(analysis, stretch, over_angle=signal.axis == "order")
+    limits = choose_window(analysis, waveforms, VIEW, shown=shown)
     show_waveforms(analysis, waveforms, limits, {"signal": -1, name: 0}, VIEW)
     st.caption(
         "Near the ends, within the wavelet's length, nodes mix both ends of the stretch: it is taken as periodic."

@@ -10,6 +10,7 @@ import streamlit as st
 from app.dashboard import state
 from app.dashboard.widgets.methods.choice import choose_one
 from app.dashboard.widgets.methods.map_choice import MapChoice
+from app.dashboard.widgets.methods.mesh_cycles import length_shown
 from app.dashboard.widgets.methods.uniform_signal import waveforms_over
 from app.dashboard.widgets.methods.waveforms import Waveforms, choose_window, show_waveforms
 from gearsig.diagnosis.types import Analysis
@@ -42,7 +43,8 @@ def show_components(analysis: Analysis, choice: MapChoice, ridges: Sequence[Ridg
         gathered = choose_one("Gathered", GATHERED, _key("gathered", analysis), about=about)
     half_width = None if width == USUAL else float(str(width).split()[1]) / 100.0
     waveforms = _waveforms(choice, ridges, half_width, squeezed=gathered == GATHERED[0])
-    limits = choose_window(analysis, waveforms, VIEW, in_middle=True)
+    shown = length_shown(analysis, choice.stretch, over_angle=choice.signal.axis == "order")
+    limits = choose_window(analysis, waveforms, VIEW, shown=shown, in_middle=True)
     show_waveforms(analysis, waveforms, limits, {"signal": -1, chosen: 0}, f"{VIEW} signal", last=False)
     show_waveforms(analysis, waveforms, limits, {REST: 1}, f"{VIEW} rest", label="what is left", height_px=180)
     st.caption(
