@@ -28,6 +28,9 @@ MOST_PATH_POINTS = 20_000
 """A path of more points is a blot; the last so many are drawn, and the figure says so."""
 SIDE_IN, LEFT_IN, BOTTOM_IN, TOP_IN, GAP_IN = 3.55, 0.85, 0.55, 0.42, 0.95
 
+RECURRENCE_IN = 5.5
+"""Side of a recurrence plot: a thousand points a side get a pixel each on the page."""
+
 
 def phase_portrait_figure(
     portrait: PhasePortrait,
@@ -88,8 +91,8 @@ def recurrence_figure(plot: RecurrencePlot, measures: RecurrenceMeasures | None 
     """Draw recurrent pairs as dots over both times; with measures, their values beside."""
     from matplotlib.colors import ListedColormap
 
-    figure = style.new_figure(TOP_IN + 4.4 + BOTTOM_IN)
-    axes = style.panel(figure, left_in=LEFT_IN, right_in=style.WIDTH_IN - LEFT_IN - 4.4, top_in=TOP_IN)
+    figure = style.new_figure(TOP_IN + RECURRENCE_IN + BOTTOM_IN)
+    axes = style.panel(figure, left_in=LEFT_IN, right_in=style.WIDTH_IN - LEFT_IN - RECURRENCE_IN, top_in=TOP_IN)
     axes.grid(visible=False)
     limits = (float(plot.times_s[0]), float(plot.times_s[-1]))
     axes.imshow(
@@ -107,7 +110,7 @@ def recurrence_figure(plot: RecurrencePlot, measures: RecurrenceMeasures | None 
         rows.append(f"every {plot.stride}. point")
     for i, text in enumerate(rows + (_measure_texts(measures) if measures is not None else [])):
         figure.text(
-            (LEFT_IN + 4.4 + 0.35) / style.WIDTH_IN,
+            (LEFT_IN + RECURRENCE_IN + 0.35) / style.WIDTH_IN,
             1.0 - (TOP_IN + 0.2 + 0.24 * i) / float(figure.get_size_inches()[1]),
             text,
             fontsize=style.TEXT_PT,
@@ -172,7 +175,8 @@ def chaos_test_figure(test: ChaosTest, walk: FloatArray, c_rad: float, *, title:
     left.axvline(c_rad, color=style.FLOOR, linewidth=0.8)
     left.set_ylim(-1.05, 1.05)
     style.label_axes(left, "c (rad)", "K", title or test.source or "0–1 test")
-    style.note(left, f"K = {test.k:.2f}, {test.verdict}, {test.n_values} values")
+    words = f"K = {test.k:.2f}, {test.verdict}, {test.n_values} values"
+    series.write(left, 0.5 * sum(left.get_xlim()), 0.05 if test.k > 0.0 else 0.95, words)
     right.plot(walk[:, 0], walk[:, 1], color=style.MEASURED, linewidth=0.6)
     right.set_aspect("equal", adjustable="datalim")
     style.label_axes(right, "p", "q")

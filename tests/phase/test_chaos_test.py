@@ -82,6 +82,12 @@ def test_noise_on_a_finely_sampled_sine_is_not_called_irregular():
     assert fine.verdict == "undecided"
 
 
+def test_impacts_on_a_map_are_not_taken_for_close_sampling():
+    x = np.random.default_rng(3).normal(size=2000)
+    x[::400] += 30.0
+    assert not zero_one_test(x).oversampled
+
+
 def test_a_map_is_taken_whole_and_a_short_signal_not_thinned_away():
     assert zero_one_test(henon(3000)).every == 1
     short = zero_one_test(lorenz(500, 0.02)[:, 0])
