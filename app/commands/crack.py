@@ -40,9 +40,9 @@ def crack(
 ) -> None:
     """Estimate the depth of a crack in a tooth root, in mm and % of the root, with a 90 % interval.
 
-    It says "no crack seen, below … mm" where none stands out, and refuses machines that its calibration (by
-    simulation) does not reach. With --reference it is much surer, and cracks of a millimetre show. It also says whether
-    the tooth may be chipped or spalled instead.
+    It says "no crack seen, below … mm" where none stands out and one through half of the root would have; it refuses
+    machines that its calibration (by simulation) does not reach. With --reference it is much surer, and cracks of a
+    millimetre show. It also says whether the tooth may be chipped or spalled instead.
 
     Example: gearsig crack sample_data/root_crack_3mm.h5 --reference sample_data/root_crack_0mm.h5
     """

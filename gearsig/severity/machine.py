@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from gearsig.checks import positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording.types import Recording
 from gearsig.rig.types import GearPair, Rig
@@ -44,9 +45,18 @@ def pair_facts(rig: Rig, torque_nm: float | None) -> PairFacts:
 
     Raises
     ------
+    InputError
+        If the torque is not above zero.
     RefusalError
         If there is not exactly one pair, something is missing, or the pressure angle is another one.
     """
+    if torque_nm is not None:
+        positive(torque_nm, "torque_nm", "N m")
+    if not rig.pairs:
+        raise RefusalError(
+            "no rig file describes a gear pair: teeth, module, face width and torque are needed",
+            remedy="give a rig file; `gearsig rig example` prints one to start from",
+        )
     if len(rig.pairs) != 1:
         raise RefusalError(
             f"the rig has {len(rig.pairs)} gear pairs; crack severity is calibrated for one",
@@ -91,3 +101,13 @@ def acceleration_channels(recording: Recording, wanted: tuple[str, ...]) -> tupl
             remedy="name the channel's quantity with a [[sensor]] in the rig file",
         )
     return wanted or found
+
+
+def check_alive(recording: Recording, names: tuple[str, ...], whose: str = "") -> None:
+    """Refuse channels that hold one value only."""
+    rows = {name: recording.samples[recording.channel_names.index(name)] for name in names}
+    dead = [name for name, row in rows.items() if float(row.max()) == float(row.min())]
+    if dead:
+        raise RefusalError(
+            f"channel {dead[0]!r} {whose}is dead: it holds one value only", remedy="check the sensor, or leave it out"
+        )

@@ -63,6 +63,9 @@ def test_a_chipped_tooth_is_not_called_cracked() -> None:
     assert "chipped or spalled rather than cracked" in merged.title
     assert any("chipped 70 %" in text for text in merged.evidence)
     assert codes(with_crack([], chipped, PAIR)) == ["tooth-local-damage"]
+    likelier = replace(CRACK, kind_probabilities={"cracked": 0.25, "chipped": 0.7, "spalled": 0.05})
+    assert likelier.text.startswith("Damage at tooth 5 of stage/in: chipped or spalled (75 %), or a crack of 2.0 mm")
+    assert ": chipped or spalled, or a root crack of 2.0 mm" in with_crack([TOOTH], likelier, PAIR)[0].title
     undecided = replace(CRACK, kind_probabilities={"cracked": 0.5, "chipped": 0.3, "spalled": 0.2})
     assert "or it is chipped or spalled" in with_crack([TOOTH], undecided, PAIR)[0].title
 

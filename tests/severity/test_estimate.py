@@ -111,7 +111,7 @@ def test_a_reference_with_another_gain_is_refused_and_makes_no_crack(
         estimate_crack(record(0.0), reference=replace(sound, samples=samples))
 
 
-@pytest.mark.parametrize("depth", [1.0, 3.0])
+@pytest.mark.parametrize("depth", [1.0, 4.0])
 def test_exchanged_recordings_make_no_crack(record: Record, sound: Recording, depth: float) -> None:
     with pytest.raises(RefusalError, match="in the reference, not in the recording"):
         estimate_crack(sound, reference=record(depth))
@@ -176,8 +176,24 @@ def test_the_recording_itself_is_no_reference(record: Record) -> None:
 def test_a_dead_channel_is_refused(record: Record) -> None:
     samples = np.array(record(2.0).samples)
     samples[1] = 0.0
-    with pytest.raises(RefusalError, match="no mesh vibration"):
+    with pytest.raises(RefusalError, match="is dead"):
         estimate_crack(replace(record(2.0), samples=samples))
+
+
+def test_a_bound_above_half_of_the_root_is_no_answer(record: Record) -> None:
+    with pytest.raises(RefusalError, match=r"one of up to .* % of the root\) might hide.*give a reference"):
+        estimate_crack(record(0.0))
+
+
+@pytest.mark.parametrize("options", [{"torque_nm": 0.0}, {"torque_nm": -50.0}, {"tip_relief_um": 15e3}])
+def test_impossible_torques_and_reliefs_are_named(record: Record, options: dict[str, float]) -> None:
+    with pytest.raises(InputError, match=next(iter(options))):
+        estimate_crack(record(0.0), **options)  # type: ignore[arg-type]  # names of parameters
+
+
+def test_without_a_rig_it_says_what_is_needed(record: Record) -> None:
+    with pytest.raises(RefusalError, match="no rig file describes a gear pair: teeth, module"):
+        estimate_crack(replace(record(0.0), rig=None))
 
 
 def test_a_channel_that_is_not_there_is_named(record: Record) -> None:
