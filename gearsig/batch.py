@@ -261,13 +261,15 @@ def _report_one(job: _Job) -> Entry | Failure:
 
 def _reference_of(job: _Job, rig: Rig | None) -> Recording | None:
     """Read the recording of the sound machine; pulse times would belong to the other one."""
+    from gearsig.diagnosis.comparison import rig_of_reference
     from gearsig.recording.read import read_recording
     from gearsig.rig.speed import PulseTimes
 
     if job.reference is None:
         return None
     speed = None if isinstance(job.speed, PulseTimes) else job.speed
-    return read_recording(job.reference, rig=rig, sampling_rate_hz=job.sampling_rate_hz, speed=speed)
+    own = rig_of_reference(job.reference, rig)
+    return read_recording(job.reference, rig=own, sampling_rate_hz=job.sampling_rate_hz, speed=speed)
 
 
 def _is_same_file(one: Path, other: Path) -> bool:

@@ -86,11 +86,14 @@ def open_reference(
     """Read the recording of the sound machine, if one is given; pulse times belong to the other recording."""
     if path is None:
         return None
-    return open_recording(path, rig, sampling_rate_hz, stated_speed(speed_rpm, None, 1))
+    from gearsig.diagnosis.comparison import rig_of_reference
+
+    return open_recording(path, rig_of_reference(path, rig), sampling_rate_hz, stated_speed(speed_rpm, None, 1))
 
 
 def torque_of(text: str | None) -> float | None:
     """Return the torque that the option states, in N m."""
     from app.quantities import quantity
+    from gearsig.checks import positive
 
-    return quantity(text, "N m", "--torque") if text else None
+    return positive(quantity(text, "N m", "--torque"), "--torque", "N m") if text else None

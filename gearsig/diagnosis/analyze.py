@@ -142,7 +142,7 @@ def _angle_of(recording: Recording, rig: Rig) -> ShaftAngle | CannotTell:
     except RefusalError as refusal:
         return CannotTell("What is the speed of the shafts?", refusal.reason, refusal.remedy)
     except InputError as error:  # it names the channel; which file it is in is known here
-        where = ": ".join(part for part in (source, error.where) if part)
+        where = error.where if error.where.startswith(source) else f"{source}: {error.where}".removesuffix(": ")
         raise InputError(error.what, where=where, allowed=error.allowed, remedy=error.remedy) from None
 
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from math import isfinite, log10
+from pathlib import Path
 
 from gearsig.diagnosis.types import Analysis, Finding, Kind
+from gearsig.errors import InputError
 from gearsig.indicators.types import Indicator
+from gearsig.rig.types import Rig
 
 SAME_ORDER = 0.02
 """Relative: a bearing's slip differs from day to day."""
@@ -28,6 +31,31 @@ class Change:
 
     reference_value: float
     change_db: float | None
+
+
+def rig_of_reference(path: str | Path, rig: Rig | None) -> Rig | None:
+    """Return the recording's rig for its reference, with the torque that the rig file beside the reference states.
+
+    Raises
+    ------
+    InputError
+        If that rig file has gears with other teeth.
+    """
+    from gearsig.rig.toml import read_rig, rig_file_beside
+
+    beside = rig_file_beside(path)
+    own = read_rig(beside) if beside is not None else None
+    if own is None or rig is None or not own.pairs:
+        return rig
+    teeth, others = (", ".join(f"{p.driver_teeth}/{p.driven_teeth}" for p in r.pairs) for r in (rig, own))
+    if teeth != others:
+        raise InputError(
+            f"the reference is of another machine: its rig file says teeth {others}, the recording's {teeth}",
+            where=Path(path).name,
+            remedy="give a recording of the same machine when it was sound",
+        )
+    point, then = rig.operating_point, own.operating_point
+    return replace(rig, operating_point=replace(point, torque_nm=then.torque_nm)) if then.shaft == point.shaft else rig
 
 
 def changes(analysis: Analysis) -> tuple[Change | None, ...]:

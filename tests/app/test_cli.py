@@ -201,6 +201,30 @@ def test_crack_against_a_reference_names_tooth_and_depth(capsys: pytest.CaptureF
     assert depths[1] == pytest.approx(3.0, abs=0.8)
 
 
+@pytest.mark.parametrize("command", ["crack", "analyze"])
+def test_a_reference_of_another_machine_is_named(capsys: pytest.CaptureFixture[str], command: str) -> None:
+    code, out, err = run(capsys, command, sample("root_crack_3mm"), "--reference", sample("damaged_tooth"))
+    assert (code, out) == (2, "")
+    assert "another machine: its rig file says teeth 29/47, the recording's 55/75" in err
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "text"),
+    [("--torque", "-110Nm", "--torque is -110"), ("--torque", "0", "--torque is 0"), ("--tip-relief", "15mm", "0 to ")],
+)
+def test_impossible_loads_and_reliefs(capsys: pytest.CaptureFixture[str], option: str, value: str, text: str) -> None:
+    code, _, err = run(capsys, "crack", sample("root_crack_3mm"), option, value)
+    assert code == 2
+    assert text in err
+
+
+def test_the_file_without_a_tachometer_is_named_once(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    const = csv(tmp_path, "a1\n" + "1\n" * 2000, "const.csv")
+    code, _, err = run(capsys, "analyze", sample("root_crack_3mm"), "--reference", const, "--fs", 12800)
+    assert code == 2
+    assert err.count("const.csv") == 1
+
+
 def test_analyze_against_a_reference_names_the_crack_once(capsys: pytest.CaptureFixture[str]) -> None:
     reference = ("--reference", sample("root_crack_0mm"))
     code, out, _ = run(capsys, "analyze", sample("root_crack_4mm"), *reference, "--json")

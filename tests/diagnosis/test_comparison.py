@@ -2,14 +2,17 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from gearsig.diagnosis.analyze import analyze
-from gearsig.diagnosis.comparison import changes
+from gearsig.diagnosis.comparison import changes, rig_of_reference
 from gearsig.diagnosis.types import Analysis, Kind
+from gearsig.errors import InputError
+from gearsig.rig.toml import write_rig
 from sims.kinematic import BearingFault
-from tests.diagnosis.machines import GOOD, codes, finding, record
+from tests.diagnosis.machines import GOOD, RIG, codes, finding, record, teeth
 
 
 @pytest.fixture(scope="module")
@@ -49,3 +52,16 @@ def test_a_fault_says_whether_the_reference_shows_it() -> None:
     assert "The reference does not show it." in finding(new, "bearing-outer-race").evidence
     old = analyze(record(damaged), reference=record(damaged, seed=1))
     assert any(t.startswith("The reference shows it as well") for t in finding(old, "bearing-outer-race").evidence)
+
+
+def test_a_reference_whose_own_rig_file_has_other_teeth_is_of_another_machine(tmp_path: Path) -> None:
+    recording = tmp_path / "then.csv"
+    recording.touch()
+    assert rig_of_reference(recording, RIG) is RIG
+    write_rig(teeth(20, 40), tmp_path / "then.toml")
+    with pytest.raises(InputError, match="another machine: its rig file says teeth 20/40, the recording's 27/43"):
+        rig_of_reference(recording, RIG)
+    write_rig(replace(RIG, operating_point=replace(RIG.operating_point, torque_nm=70.0)), tmp_path / "then.toml")
+    rig = rig_of_reference(recording, RIG)
+    assert rig is not None
+    assert rig.operating_point.torque_nm == 70.0
