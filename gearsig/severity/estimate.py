@@ -26,8 +26,8 @@ SMALLEST_AGREEMENT = 0.4
 only where a deep crack rules the pattern."""
 
 CLEARLY_OF_THE_REFERENCE, STANDARD_ERRORS = -0.2, 2.0
-"""Share of the recording in what stands out, and by how many standard errors it is below zero. Of 106 simulated machines
-with a crack that is seen, two came so low; with recording and reference exchanged, nine in ten did."""
+"""Share of the recording in what stands out, and by how many standard errors it is below zero. Of 106 simulated
+machines with a crack that is seen, two came so low; with recording and reference exchanged, nine in ten did."""
 
 LARGEST_BOUND_PERCENT = 50.0
 """Of the root: "no crack seen, below 70 %" would be no answer."""
