@@ -58,6 +58,7 @@ class _Job:
     command: str
     reference: Path | None = None
     torque_nm: float | None = None
+    is_reference: bool = False
 
 
 def report_many(
@@ -124,7 +125,7 @@ def report_many(
     folder = _made(Path(output_folder))
     sound = Path(reference) if reference is not None else None
     jobs = [
-        replace(job, reference=None if sound is None or _is_same_file(job.path, sound) else sound, torque_nm=torque_nm)
+        _compared(replace(job, torque_nm=torque_nm), sound)
         for job in _jobs(files, folder, rig, sampling_rate_hz, speed, command)
     ]
     results: dict[int, Entry | Failure] = {}
@@ -139,6 +140,12 @@ def report_many(
     entries, failures = _sorted_out(results)
     index = write_index(entries, folder / "index.html", failures=failures, command=command)
     return BatchResult(entries, failures, index)
+
+
+def _compared(job: _Job, sound: Path | None) -> _Job:
+    """Return the job with the recording of the sound machine, unless it is its own."""
+    is_reference = sound is not None and _is_same_file(job.path, sound)
+    return replace(job, reference=None if is_reference else sound, is_reference=is_reference)
 
 
 def _jobs(
@@ -252,7 +259,7 @@ def _report_one(job: _Job) -> Entry | Failure:
             torque_nm=job.torque_nm,
         )
         write_page(analysis, job.page, command=job.command, index="index.html")
-        return entry_of(analysis, job.name, job.page.name)
+        return replace(entry_of(analysis, job.name, job.page.name), is_reference=job.is_reference)
     except GearsigError as error:
         return _failure(job, str(error))
     except Exception as error:  # noqa: BLE001 - one broken file must not stop the rest; the reason is passed on

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 EXIT_SOME_FAILED = 1
 EXIT_NONE_READ = 2
+EXIT_INTERRUPTED = 130
 
 
 def report(
@@ -81,23 +82,44 @@ def make_report(
 
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("analysing", total=len(files))
-        result = report_many(
-            files,
-            output,
-            rig=open_rig(rig),
-            sampling_rate_hz=fs,
-            speed=speed,
-            n_processes=jobs,
-            on_progress=lambda *_: progress.advance(task),
-            command=command,
-            reference=reference,
-            torque_nm=torque_nm,
-        )
+    before, n_done = output.exists(), 0
+
+    def advance(*_: object) -> None:
+        nonlocal n_done
+        n_done += 1
+        progress.advance(task)
+
+    try:
+        with Progress(*columns, console=console, transient=True) as progress:
+            task = progress.add_task("analysing", total=len(files))
+            result = report_many(
+                files,
+                output,
+                rig=open_rig(rig),
+                sampling_rate_hz=fs,
+                speed=speed,
+                n_processes=jobs,
+                on_progress=advance,
+                command=command,
+                reference=reference,
+                torque_nm=torque_nm,
+            )
+    except KeyboardInterrupt:
+        typer.echo(f"gearsig: stopped after {n_done} of {len(files)} files; {_kept(output, before)}", err=True)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
     for entry in result.entries:
         typer.echo(f"{entry.name}: {entry.verdict}")
     for failure in result.failures:
         typer.echo(f"{failure.name}: not analysed: {failure.reason}", err=True)
     typer.echo(f"Open {result.index_path} in a browser.")
     return len(result.failures)
+
+
+def _kept(output: Path, was_there: bool) -> str:
+    """Say what an interrupted report left; a new folder without pages is taken away."""
+    n_pages = len(list(output.glob("*.html"))) if output.is_dir() else 0
+    if n_pages:
+        return f"pages in {output} are whole, the index is not made anew"
+    if not was_there and output.is_dir() and not any(output.iterdir()):
+        output.rmdir()
+    return "nothing was kept"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from gearsig.diagnosis.types import Analysis, Kind, Outcome
 from gearsig.indicators.types import Indicator
+from gearsig.severity.types import CrackEstimate
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,10 @@ class Entry:
     ratio_db : float or None
         Of that finding over its floor.
     indicators : tuple of Indicator
+    crack_mm : float or None
+        Depth of the crack, where one was seen.
+    is_reference : bool
+        Whether the other recordings were compared with this one.
     """
 
     name: str
@@ -34,6 +39,8 @@ class Entry:
     confidence: float | None = None
     ratio_db: float | None = None
     indicators: tuple[Indicator, ...] = ()
+    crack_mm: float | None = None
+    is_reference: bool = False
 
 
 @dataclass(frozen=True)
@@ -56,9 +63,11 @@ def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
         top.confidence if top is not None else None,
         top.strength.ratio_db if top is not None and top.strength is not None else None,
         analysis.indicators,
+        analysis.crack.depth_mm if isinstance(analysis.crack, CrackEstimate) else None,
     )
 
 
-def by_severity(entry: Entry) -> tuple[int, float, float, str]:
-    """Key that sorts the most important first: outcome, then confidence, then strength."""
-    return list(Outcome).index(entry.outcome), -(entry.confidence or 0.0), -(entry.ratio_db or 0.0), entry.name
+def by_severity(entry: Entry) -> tuple[int, float, float, float, str]:
+    """Key that sorts the most important first: outcome, then depth of a crack, then confidence, then strength."""
+    place = list(Outcome).index(entry.outcome)
+    return place, -(entry.crack_mm or 0.0), -(entry.confidence or 0.0), -(entry.ratio_db or 0.0), entry.name

@@ -111,11 +111,18 @@ def _rows(entries: Sequence[Entry], columns: Sequence[str]) -> list[IndexRow]:
             css_class(entry.outcome),
             quote(entry.page),
             f"{100 * entry.confidence:.0f} %" if entry.confidence is not None else "",
-            f"{readable(entry.ratio_db, 3)} dB" if entry.ratio_db is not None else "",
+            _size(entry),
             tuple(_cell(values[i], values) for values in largest.values()),
         )
         for i, entry in enumerate(entries)
     ]
+
+
+def _size(entry: Entry) -> str:
+    """Return the depth of a crack, or how far a finding is over its floor."""
+    if entry.crack_mm is not None:
+        return f"{entry.crack_mm:.1f} mm"
+    return f"{readable(entry.ratio_db, 3)} dB" if entry.ratio_db is not None else "–"
 
 
 def _largest(entry: Entry, name: str) -> Indicator | None:

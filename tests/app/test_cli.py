@@ -3,6 +3,7 @@
 import json
 import pickle
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -254,6 +255,26 @@ def test_report_with_a_reference_compares_all_but_itself(capsys: pytest.CaptureF
     assert "The damaged tooth" in page
     assert "Compared with root_crack_0mm.h5" in page
     assert "The damaged tooth" not in (tmp_path / "root_crack_0mm.html").read_text()
+    assert (tmp_path / "index.html").read_text().count("(the reference)") == 1
+
+
+@pytest.mark.parametrize("n_done", [0, 1])
+def test_an_interrupted_report_says_what_was_kept(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, n_done: int
+) -> None:
+    def interrupted(_files: list[Path], output: Path, *, on_progress: Callable[..., None], **_: object) -> None:
+        output.mkdir()
+        for _number in range(n_done):
+            (output / "page.html").touch()
+            on_progress()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gearsig.batch.report_many", interrupted)
+    code, _, err = run(capsys, "report", sample("healthy"), sample("run_up"), "-o", tmp_path / "pages")
+    assert code == 130
+    assert len(err.strip().splitlines()) == 1
+    assert f"stopped after {n_done} of 2 files; {'pages in' if n_done else 'nothing was kept'}" in err
+    assert (tmp_path / "pages").exists() == bool(n_done)
 
 
 def test_report_with_pulse_times_is_of_one_recording(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

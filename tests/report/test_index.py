@@ -77,3 +77,19 @@ def test_entry_sums_up_the_most_important_finding(gearbox):
     shuffled = replace(gearbox, findings=gearbox.findings[::-1])
     entry = entry_of(shuffled, "n", "n.html")
     assert (entry.outcome, entry.confidence, entry.ratio_db) == (Outcome.FAULT, 0.93, 18.6)
+
+
+def test_cracks_are_sorted_by_depth_and_the_reference_is_marked(write):
+    html = write(
+        [
+            _entry("shallow", Outcome.FAULT, confidence=0.9, crack_mm=1.3),
+            _entry("deep", Outcome.FAULT, confidence=0.8, crack_mm=3.3),
+            _entry("sound", Outcome.NO_FAULT, is_reference=True),
+        ]
+    )
+    order = [html.index(f"verdict of {name}") for name in ("deep", "shallow", "sound")]
+    assert order == sorted(order)
+    assert '<td class="number">3.3 mm</td>' in html
+    assert '<td class="number">–</td>' in html
+    assert html.count("(the reference)") == 1
+    assert html.index("(the reference)") > html.index("verdict of shallow")
