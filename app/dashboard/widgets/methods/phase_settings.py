@@ -82,7 +82,7 @@ def _choose_low_cut(analysis: Analysis, stretch: Stretch) -> float | None:
     low = st.number_input(
         "Lowest frequency (Hz)",
         value=None,
-        placeholder=f"{suggested:.4g}, {why}",
+        placeholder=f"{suggested:.3g}, {why}",
         key=_key("low", analysis),
         help="Integration magnifies whatever is slow. Too low, noise turns into drift; too high, slow motion is bent.",
         persist_state="session",
@@ -107,7 +107,8 @@ def suggested_low_cut_hz(analysis: Analysis, stretch: Stretch) -> tuple[float, s
     else:
         slowest = min(_ratios(analysis.rig))
         wanted, why = 0.5 * slowest * _lowest_hz(stretch.angle), "half of the slowest shaft's frequency"
-    return (wanted, why) if wanted >= possible else (float(f"{possible:.3g}"), "as low as the stretch allows")
+    low, why = (wanted, why) if wanted >= possible else (possible, "as low as the stretch allows")
+    return float(f"{low:.3g}"), why
 
 
 def _lowest_hz(angle: ShaftAngle) -> float:
