@@ -76,12 +76,44 @@ def test_the_user_may_choose_another_band() -> None:
     assert not page.exception
 
 
+def test_bearing_lines_on_multiples_of_a_shaft_are_named_apart() -> None:
+    page = opened_at("Cyclic coherence", "root_crack_3mm")
+    apart = shown_text(page).split("multiple of a shaft's speed")[1].split(": ")[1]
+    assert "BSF" in apart
+    assert "1× input" not in apart
+
+
+def test_waveforms_open_with_five_mesh_cycles() -> None:
+    """The crack's pair has 55 teeth on a shaft of 8.3128 Hz."""
+    for method in ("Denoising", "Wavelet packets", "Ridges", "Modes"):
+        page = opened_at(method, "root_crack_3mm")
+        low, high = labelled(page, "slider", "Waveforms shown").value
+        assert (high - low) * 55 * 8.3128 == pytest.approx(5.0, rel=0.01), method
+
+
+def test_modes_are_numbered_by_rising_centre() -> None:
+    from app.dashboard.widgets.methods.mode_signal import ModeSignal
+    from app.dashboard.widgets.methods.modes import modes_of
+    from gearsig.decompose.types import VmdSettings
+
+    t = np.arange(8000) / 1000.0
+    x = np.cos(2 * np.pi * 300 * t) + 0.5 * np.cos(2 * np.pi * 60 * t)
+    signal = ModeSignal(x, 1000.0, "frequency", "g", "a", "two tones")
+    modes = modes_of("two tones", VmdSettings(2, 2000.0, start="peaks"), signal)
+    assert modes.by_centre() == (0, 1)
+    assert modes.centres == pytest.approx([60.0, 300.0], abs=2.0)
+    assert modes.rms == pytest.approx([0.5 / np.sqrt(2), 1 / np.sqrt(2)], rel=0.05)
+    assert modes.centre_history[-1, 0] < modes.centre_history[-1, 1]
+
+
 def test_coherence_names_the_lines_that_stand_out() -> None:
     page = opened_at("Cyclic coherence", "outer_race")
     at, values = measured_line(page)
     assert near(values, at, OUTER_RACE_HZ, 1.0) > 0.3
     assert "stand above noise's level" in shown_text(page)
-    assert "BPFO bearing" in shown_text(page).split("for their slip: ")[1]
+    named = shown_text(page).split("for their slip: ")[1].split("Bearing lines whose peak")[0]
+    assert "BPFO bearing" in named
+    assert "not that there is damage" in shown_text(page)
     choose(page, "Over", "Cyclic order")
     assert not page.error
     labelled(page, "number_input", "Highest cyclic order").set_value(1e9).run()

@@ -233,3 +233,24 @@ def test_a_modulation_that_no_envelope_shows_is_refused(highest_hz):
     x = np.random.default_rng(2).normal(size=20_000)
     with pytest.raises(InputError, match="highest_modulation_hz is"):
         kurtogram_envelope(recording_of(x), "a", highest_modulation_hz=highest_hz)
+
+
+def test_the_reason_names_narrower_bands_of_more_kurtosis():
+    x = knocks(2**17, np.random.default_rng(5))
+    narrow = kurtogram_envelope(recording_of(x), "a")
+    assert narrow.reason == "It has the largest kurtosis."
+    x += 30.0 * (np.arange(len(x)) % 40_000 < 4000) * np.cos(2 * np.pi * 2000.0 / FS * np.arange(len(x)))
+    wide = kurtogram_envelope(recording_of(x), "a", highest_modulation_hz=FS / 12)
+    best = wide.kurtogram.best_band()
+    assert best.kurtosis > wide.band.kurtosis
+    assert f"Narrower ones reach {best.kurtosis:.3g}" in wide.reason
+    assert f"at least {FS / 4:.4g} Hz wide, three times the highest modulation" in wide.reason
+    assert kurtogram_envelope(recording_of(x), "a", band_hz=(1000.0, 3000.0)).reason == ""
+
+
+def test_a_slow_change_of_level_hardly_stands_out():
+    rng = np.random.default_rng(6)
+    n = 2**18
+    x = rng.normal(size=n) * (1.0 + 0.2 * np.cos(2 * np.pi * 3.0 * np.arange(n) / FS))
+    k = kurtogram(x, FS, n_levels=3)
+    assert any("hardly stands out" in remark for remark in k.remarks(k.best_band()))
