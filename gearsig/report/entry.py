@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gearsig.diagnosis.types import Analysis, Kind, Outcome
+from gearsig.diagnosis.types import Analysis, Finding, Kind, Outcome
 from gearsig.indicators.types import Indicator
 from gearsig.severity.types import CrackEstimate
 
@@ -27,7 +27,7 @@ class Entry:
         Of that finding over its floor.
     indicators : tuple of Indicator
     crack_mm : float or None
-        Depth of the crack, where one was seen.
+        Depth of the crack, where the verdict is about one.
     is_reference : bool
         Whether the other recordings were compared with this one.
     """
@@ -63,8 +63,16 @@ def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
         top.confidence if top is not None else None,
         top.strength.ratio_db if top is not None and top.strength is not None else None,
         analysis.indicators,
-        analysis.crack.depth_mm if isinstance(analysis.crack, CrackEstimate) else None,
+        _crack_mm(analysis, top),
     )
+
+
+def _crack_mm(analysis: Analysis, top: Finding | None) -> float | None:
+    """Return the depth of a crack, where it is what the verdict is about."""
+    crack = analysis.crack
+    if not isinstance(crack, CrackEstimate) or crack.likelier_other or top is None:
+        return None
+    return crack.depth_mm if top.where.gear == crack.gear and top.where.angle_deg == crack.angle_deg else None
 
 
 def by_severity(entry: Entry) -> tuple[int, float, float, float, str]:
