@@ -63,8 +63,8 @@ def kind_of_motion(
     tolerance : float
         Of the section, in standard deviations of the path; above its scatter from noise.
     noise_free : bool
-        Whether the path is known to be deterministic, as a model's: the 0–1 test then needs no damping, and decides
-        alone where the exponent cannot answer.
+        Whether the path is known to be deterministic, as a model's: the 0–1 test then needs no damping, and a regular
+        one decides alone where the exponent cannot answer.
 
     Raises
     ------
@@ -112,8 +112,9 @@ def _exponent(portrait: PhasePortrait, evidence: list[str]) -> tuple[LyapunovExp
 
 def _decide(test: ChaosTest | None, exponent: LyapunovExponent | None, stochastic: bool, *, noise_free: bool) -> Kind:
     silent = exponent is None or exponent.verdict == "undecided"
-    if noise_free and silent and test is not None and test.verdict != "undecided":
-        return "quasi-periodic" if test.verdict == "regular" else "chaotic"
+    if noise_free and silent and test is not None and test.verdict == "regular":
+        return "quasi-periodic"
+    # Irregular without neighbours that part is not chaos: teeth that differ repeat after the hunting period only.
     if stochastic:
         return "undecided" if noise_free else "stochastic"
     if test is None or exponent is None:
