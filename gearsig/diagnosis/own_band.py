@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from gearsig.diagnosis.comb import Comb, best_comb
 from gearsig.diagnosis.envelopes import BandEnvelope, envelopes_in
 from gearsig.diagnosis.signals import Signals
@@ -22,6 +24,9 @@ SHOWS = 0.01
 """p-value of a family at a given order in this one band, from which on it bears the other bands out."""
 
 FEWEST_LINES = 3
+
+ROUNDING = 1e-9
+"""Of the signal: what is left without its tones and lies below is no vibration."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +96,10 @@ def _own_band(signals: Signals, channel: str, narrowest_hz: float) -> OwnBand | 
     from gearsig.spectra.kurtogram_preparation import prepared_signal
 
     fs = signals.recording.sampling_rate_hz
-    x = prepared_signal(signals.recording.values(channel), fs, "tones removed")
+    recorded = signals.recording.values(channel)
+    x = prepared_signal(recorded, fs, "tones removed")
+    if np.std(x) < ROUNDING * np.std(recorded):
+        return None  # a model's tones are all there is: what is left of them are the rounding errors of their removal
     try:
         grid = kurtogram(x, fs, source=f"{channel}, tones removed")
         band = grid.best_band(narrowest_hz=narrowest_hz)
