@@ -66,14 +66,25 @@ def page(address: str) -> Iterator[playwright.Page]:
         view.set_default_timeout(30_000)
         wrong: list[str] = []
         view.on("pageerror", lambda error: wrong.append(str(error)))
-        view.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+        view.on("console", lambda message: wrong.append(message.text) if is_error(message) else None)
         view.on("request", lambda request: None if is_local(request.url) else wrong.append(request.url))
         view.goto(address)
         yield view
         exceptions = view.get_by_test_id("stException").all_inner_texts()
+        broken = view.evaluate("[...document.images].filter(i => i.complete && !i.naturalWidth).map(i => i.src)")
         browser.close()
     assert not exceptions
+    assert not broken
     assert not wrong
+
+
+def is_error(message: playwright.ConsoleMessage) -> bool:
+    """Say whether a message tells of an error; a picture that a rerun replaced before it was fetched is none.
+
+    Streamlit drops the old picture at once. Those that stay on the page are looked at in the end.
+    """
+    replaced = "/media/" in message.text or "/media/" in message.location.get("url", "")
+    return bool(message.type == "error" and not replaced)
 
 
 def is_local(url: str) -> bool:
