@@ -21,30 +21,27 @@ def change_features(now: Gathered, sound: Gathered) -> Features:
 
     The reference's scatter counts as well: variances of both add.
     """
-    names, values = changes_once(now, sound)
-    here, before = once(now)[1], once(sound)[1]
+    (names, here), before = once(now), once(sound)[1]
+    names, values = _joined(names, here - before, now, sound)
     variance = 2.0 * whole_record_variance(names)
     for rows in (
-        [_joined(once(part)[1] - before, part, sound) for part in _parts(now)],
-        [_joined(here - once(part)[1], now, part) for part in _parts(sound)],
+        [_joined(names, once(part)[1] - before, part, sound)[1] for part in _parts(now)],
+        [_joined(names, here - once(part)[1], now, part)[1] for part in _parts(sound)],
     ):
         variance += (len(rows) - 1.0) * np.var(rows, axis=0)
     return Features(names, values, np.sqrt(variance))
-
-
-def changes_once(now: Gathered, sound: Gathered) -> tuple[tuple[str, ...], FloatArray]:
-    """Return names and values of the changes, without their scatter."""
-    names, values = once(now)
-    patterns = dict(_patterns(now, sound))
-    return (*names, *patterns), np.concatenate([values - once(sound)[1], list(patterns.values())])
 
 
 def _parts(gathered: Gathered) -> Iterator[Gathered]:
     return (gathered.without(block) for block in range(gathered.n_blocks))
 
 
-def _joined(differences: FloatArray, now: Gathered, sound: Gathered) -> FloatArray:
-    return np.concatenate([differences, list(dict(_patterns(now, sound)).values())])
+def _joined(
+    names: tuple[str, ...], differences: FloatArray, now: Gathered, sound: Gathered
+) -> tuple[tuple[str, ...], FloatArray]:
+    """Return names and values of the differences and of the patterns' features behind them."""
+    patterns = dict(_patterns(now, sound))
+    return (*names, *patterns), np.concatenate([differences, list(patterns.values())])
 
 
 def _patterns(now: Gathered, sound: Gathered) -> Iterator[Feature]:

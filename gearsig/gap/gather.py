@@ -15,8 +15,8 @@ from gearsig.gap.gathered import ChannelSums, Gathered
 from gearsig.gap.hum import mains_lines
 from gearsig.gap.speed import speed_figures
 from gearsig.recording.types import Recording
-from gearsig.rig.speed import PulseTimes, TachometerChannel
 from gearsig.rig.types import Rig
+from gearsig.severity.shaft_lines import has_mark
 
 LEAST_REVOLUTIONS = 16
 """Of the driver and of the driven gear: fewer leave either shaft's orders in the other's average."""
@@ -80,7 +80,7 @@ def gather(recording: Recording, rig: Rig, channels: Sequence[str] = (), angle: 
         speed_hz=speed_hz,
         speed=speed_figures(shaft_angles[0]),
         hum=mains_lines(recording, names, speed_hz, frame),
-        marks=tuple(_has_mark(recording, rig, shaft) for shaft in frame.shafts),  # type: ignore[arg-type]  # two
+        marks=tuple(has_mark(recording, rig, shaft) for shaft in frame.shafts),  # type: ignore[arg-type]  # two
         n_revolutions=shaft_angles[0].n_revolutions,
     )
 
@@ -114,13 +114,6 @@ def _bands(sampling_rate_hz: float, angle_rate_hz: float) -> tuple[tuple[float, 
     low = min(LOWEST_BAND_HZ, top / 8.0)
     edges = [low * (top / low) ** (i / N_BANDS) for i in range(N_BANDS + 1)]
     return (*pairwise(edges), (low, top))
-
-
-def _has_mark(recording: Recording, rig: Rig, shaft: str) -> bool:
-    source = recording.speed_source
-    if not isinstance(source, PulseTimes | TachometerChannel) or source.pulses_per_revolution != 1:
-        return False
-    return (source.shaft or rig.reference_shaft) == shaft
 
 
 def _channel_sums(

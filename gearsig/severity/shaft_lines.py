@@ -87,11 +87,12 @@ def shaft_lines(
         highest,
         turned.mean_speed_rpm / 60.0,
         tuple(channels),
-        _has_mark(recording, rig, shaft),
+        has_mark(recording, rig, shaft),
     )
 
 
-def _has_mark(recording: Recording, rig: Rig, shaft: str) -> bool:
+def has_mark(recording: Recording, rig: Rig, shaft: str) -> bool:
+    """Say whether angle 0 of a shaft is a mark on that very shaft: one pulse per revolution."""
     source = recording.speed_source
     if not isinstance(source, PulseTimes | TachometerChannel) or source.pulses_per_revolution != 1:
         return False
