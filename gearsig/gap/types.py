@@ -1,0 +1,366 @@
+"""What a gap diagnosis answers: where the gap lies, which effect causes it, how far it shrinks; or why it cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from gearsig.checks import FloatArray
+from gearsig.gap.simulator import Added, Point
+
+NONE, UNKNOWN = "none", "unknown"
+"""Names of the two causes that are no effect: no gap beyond the floor; a gap that nothing in the catalogue explains."""
+
+
+class GapOutcome(Enum):
+    """What a diagnosis comes to."""
+
+    NO_GAP = "no gap"
+    EFFECT = "effect"
+    CANNOT_SEPARATE = "cannot separate"
+    UNKNOWN = "unknown"
+
+
+class PlaceKind(Enum):
+    """In which way a place of the gap is meant."""
+
+    MESH = "mesh harmonics"
+    SIDEBANDS = "sidebands"
+    SHAFT = "shaft orders"
+    TOOTH = "angle of rotation"
+    ENVELOPE = "envelope orders"
+    LINE = "line that belongs to no shaft"
+    BAND = "frequency band"
+    SPEED = "time and speed"
+    TAIL = "amplitudes"
+
+
+@dataclass(frozen=True)
+class GapPlace:
+    """One place at which the recording differs from what it is compared with.
+
+    Parameters
+    ----------
+    kind : PlaceKind
+    title : str
+        The statement in one sentence.
+    change_db : float
+        Recording over simulation (or over reference), of the strongest part.
+    repeatability, structural : float
+        The change over both floors, 1: as large as a floor.
+    share : float
+        Of the whole gap, 0 to 1.
+    shaft : str
+    orders : tuple of float
+        Of the driver's shaft, where it is largest.
+    band_hz : (float, float) or None
+    angle_deg : float or None
+        Of the shaft.
+    tooth : int or None
+        From 1 at the mark; None where there is no mark.
+    channel : str
+        Where it is strongest; empty: on all.
+    """
+
+    kind: PlaceKind
+    title: str
+    change_db: float
+    repeatability: float
+    structural: float
+    share: float
+    shaft: str = ""
+    orders: tuple[float, ...] = ()
+    band_hz: tuple[float, float] | None = None
+    angle_deg: float | None = None
+    tooth: int | None = None
+    channel: str = ""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value with its 90 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Shrinkage:
+    """How far the gap shrinks once an effect is added, on data that its severity was not fitted to.
+
+    Parameters
+    ----------
+    before, after : Interval
+        Root mean square of the gap on the effect's own features, in structural floors.
+    shrink : Interval
+        1 − after²/before², what exceeds the floors; 1: all of it is explained.
+    slope : float
+        Of the observed change over the predicted one; 1: sign and size are right.
+    placebo : float
+        The largest shrink that the same effect gets at a wrong order, gear or tooth, or by other effects' predictions.
+    held_out : str
+        What it was scored on: "another operating condition" or "other revolutions of the same recordings".
+    """
+
+    before: Interval
+    after: Interval
+    shrink: Interval
+    slope: float
+    placebo: float
+    held_out: str
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """One predicted change beside the observed one.
+
+    Parameters
+    ----------
+    feature : str
+        In words, e.g. "sidebands of the driver's shaft, 6 to 12 orders away".
+    predicted_db, observed_db, floor_db : float
+    speaks_for : bool
+    """
+
+    feature: str
+    predicted_db: float
+    observed_db: float
+    floor_db: float
+    speaks_for: bool
+
+
+@dataclass(frozen=True)
+class GapCause:
+    """A candidate with its probability; the first is the likeliest.
+
+    Parameters
+    ----------
+    name : str
+        Of an effect, or "none" or "unknown".
+    group, title, unit : str
+    probability : float
+        Calibrated, over all causes.
+    severity : Interval or None
+        In the effect's unit.
+    fitted : Added or None
+        The setting that fits best.
+    place : str
+        "tooth 7 of the driver", "bearing 2", "order 6"; empty where it has none.
+    shrinkage : Shrinkage or None
+    evidence : tuple of Evidence
+        Strongest first, for and against.
+    is_nuisance : bool
+    """
+
+    name: str
+    group: str
+    title: str
+    unit: str
+    probability: float
+    severity: Interval | None = None
+    fitted: Added | None = None
+    place: str = ""
+    shrinkage: Shrinkage | None = None
+    evidence: tuple[Evidence, ...] = ()
+    is_nuisance: bool = False
+
+
+@dataclass(frozen=True)
+class GapStep:
+    """One bar of the waterfall: what is left of the whole gap once `label` is added, on held-out data."""
+
+    label: str
+    left: Interval
+
+
+@dataclass(frozen=True)
+class NextRecording:
+    """A recording that would separate the two likeliest causes.
+
+    Parameters
+    ----------
+    point : Point
+    separates : (str, str)
+    standard_deviations : float
+        Distance of both predictions there, in structural floors; `now` at the points there are.
+    now : float
+    text : str
+    """
+
+    point: Point
+    separates: tuple[str, str]
+    standard_deviations: float
+    now: float
+    text: str
+
+
+@dataclass(frozen=True)
+class SpectrumCurves:
+    """Order spectra of one shaft's average or of the residual, measured against simulated.
+
+    Parameters
+    ----------
+    label, unit : str
+    orders : array, (n,)
+        Of the driver's shaft.
+    measured, before, after : arrays, (n,)
+        Peak amplitudes; `after` is with the likeliest effect, empty where there is none.
+    floor : array, (n,)
+        Repeatability.
+    """
+
+    label: str
+    unit: str
+    orders: FloatArray
+    measured: FloatArray
+    before: FloatArray
+    after: FloatArray
+    floor: FloatArray
+
+
+@dataclass(frozen=True)
+class AngleCurves:
+    """The residual synchronous average of one shaft over its angle, measured against simulated.
+
+    Parameters
+    ----------
+    shaft, unit : str
+    teeth : int
+    has_mark : bool
+        Whether angle 0 is a mark, so that teeth have numbers.
+    angle_deg : array, (n,)
+    measured, before, after : arrays, (n,)
+        Energy within one pitch, over the middling tooth's; `after` may be empty.
+    """
+
+    shaft: str
+    unit: str
+    teeth: int
+    has_mark: bool
+    angle_deg: FloatArray
+    measured: FloatArray
+    before: FloatArray
+    after: FloatArray
+
+
+@dataclass(frozen=True)
+class ConditionFacts:
+    """One recording that was diagnosed.
+
+    Parameters
+    ----------
+    name : str
+    point : Point
+        Nominal torque; measured speed.
+    n_revolutions : float
+        Of the driver.
+    duration_s, sampling_rate_hz : float
+    """
+
+    name: str
+    point: Point
+    n_revolutions: float
+    duration_s: float
+    sampling_rate_hz: float
+
+
+@dataclass(frozen=True)
+class GapReport:
+    """The answer.
+
+    Parameters
+    ----------
+    rig, simulator : str
+    conditions : tuple of ConditionFacts
+    references : tuple of str
+        Names of the healthy recordings that were compared with; empty: the simulation itself is compared with.
+    outcome : GapOutcome
+    size : Interval
+        Of the whole gap in structural floors (the largest that healthy machines reach once in twenty is 1).
+    repeatability : float
+        The same in repeatability floors.
+    places : tuple of GapPlace
+        Largest share first.
+    causes : tuple of GapCause
+        Likeliest first; their probabilities add up to 1.
+    groups : mapping
+        Group → probability.
+    inseparable : (str, str) or None
+        The two causes that these recordings cannot tell apart.
+    steps : tuple of GapStep
+        Before, with each effect, what is left.
+    next_recordings : tuple of NextRecording
+        Best first.
+    spectra : tuple of SpectrumCurves
+    angles : tuple of AngleCurves
+    notices : tuple of str
+        What the reader should know.
+    twin_toml : str
+        The simulator with the effect fitted, as a preset; empty where none is named.
+    """
+
+    rig: str
+    simulator: str
+    conditions: tuple[ConditionFacts, ...]
+    references: tuple[str, ...]
+    outcome: GapOutcome
+    size: Interval
+    repeatability: float
+    places: tuple[GapPlace, ...]
+    causes: tuple[GapCause, ...]
+    groups: Mapping[str, float]
+    inseparable: tuple[str, str] | None = None
+    steps: tuple[GapStep, ...] = ()
+    next_recordings: tuple[NextRecording, ...] = ()
+    spectra: tuple[SpectrumCurves, ...] = ()
+    angles: tuple[AngleCurves, ...] = ()
+    notices: tuple[str, ...] = ()
+    twin_toml: str = field(default="", repr=False)
+
+    @property
+    def verdict(self) -> tuple[str, str, str, str]:
+        """Where, which, how far, and what to record next: one line each."""
+        return self._where(), self._which(), self._how_far(), self._next()
+
+    def _where(self) -> str:
+        if self.outcome is GapOutcome.NO_GAP:
+            return f"Where: nowhere beyond the floor; the gap is {self.size.value:.2g} structural floors."
+        if not self.places:
+            return f"Where: spread over all orders and bands, {self.size.value:.2g} structural floors."
+        first = self.places[0]
+        return f"Where: {first.title} ({100 * first.share:.0f} % of a gap of {self.size.value:.2g} structural floors)."
+
+    def _which(self) -> str:
+        first = self.causes[0]
+        odds = f"{100 * first.probability:.0f} %"
+        if self.outcome is GapOutcome.NO_GAP:
+            return f"Which: none ({odds}); what differs is no more than between healthy machines and the simulator."
+        if self.outcome is GapOutcome.UNKNOWN:
+            return "Which: unknown; nothing in the catalogue explains it well enough."
+        if self.outcome is GapOutcome.CANNOT_SEPARATE and self.inseparable is not None:
+            a, b = (self._titled(name) for name in self.inseparable)
+            return f"Which: {a} or {b}; these recordings cannot tell them apart."
+        size = f", {first.severity.value:.3g} {first.unit}".rstrip() if first.severity is not None else ""
+        place = f" at {first.place}" if first.place else ""
+        return f"Which: {first.title}{place}{size} ({odds})."
+
+    def _titled(self, name: str) -> str:
+        cause = next(c for c in self.causes if c.name == name)
+        return f"{cause.title} ({100 * cause.probability:.0f} %)"
+
+    def _how_far(self) -> str:
+        shrinkage = self.causes[0].shrinkage
+        if self.outcome in (GapOutcome.NO_GAP, GapOutcome.UNKNOWN) or shrinkage is None:
+            return "How far: no effect was added."
+        s = shrinkage.shrink
+        return (
+            f"How far: the gap on its own features shrinks by {100 * s.value:.0f} % ({100 * s.low:.0f} to "
+            f"{100 * s.high:.0f} %) on {shrinkage.held_out}."
+        )
+
+    def _next(self) -> str:
+        if not self.next_recordings:
+            return "Next: no further recording that the model can run would tell more."
+        return f"Next: {self.next_recordings[0].text}"
