@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 
@@ -93,7 +93,7 @@ def analyze(
         order = ranked(findings)
         return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings))
     usable = angle if not isinstance(angle, CannotTell) else None
-    material = _material(recording.select(names), known, usable, settings, tell)
+    material = _material(recording.select(names), known, usable, settings, tell, has_reference=reference is not None)
     tell("gears, bearings and shafts")
     findings += _detect(material)
     then = None
@@ -110,7 +110,7 @@ def analyze(
         channels=tuple(channel_analysis(material, name, order) for name in names),
         indicators=indicator_table(material.signals, material.envelopes),
         findings=order,
-        verdict=verdict_of(order),
+        verdict=verdict_of(order, has_reference=reference is not None),
         settings=asdict(settings),
         crack=crack,
         reference=then,
@@ -123,10 +123,12 @@ def _material(
     angle: ShaftAngle | None,
     settings: AnalysisSettings,
     tell: Callable[[str], object],
+    *,
+    has_reference: bool,
 ) -> Material:
     """Compute everything that is looked at."""
     tell("averages and spectra")
-    signals = compute_signals(recording, rig, angle, settings)
+    signals = replace(compute_signals(recording, rig, angle, settings), has_reference=has_reference)
     tell("envelopes")
     envelopes, own = list(band_envelopes(signals)), own_bands(signals)
     tell("levels over speed")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from math import isfinite, log10
 from pathlib import Path
 
-from gearsig.diagnosis.types import Analysis, Finding, Kind
+from gearsig.diagnosis.types import Analysis, Finding, Kind, Where
 from gearsig.errors import InputError
 from gearsig.indicators.types import Indicator
 from gearsig.rig.types import Rig
@@ -73,21 +73,89 @@ def beside_reference(findings: Iterable[Finding], reference: Analysis) -> list[F
 
 
 def _then(finding: Finding, reference: Analysis) -> str:
-    old = next((f for f in reference.findings if _is_same(f, finding)), None)
-    if old is None:
-        return "The reference does not show it."
-    if old.strength is None or finding.strength is None or not 0 < old.strength.value < float("inf"):
-        return "The reference shows it as well."
-    change = 20 * log10(finding.strength.value / old.strength.value) if finding.strength.value > 0 else 0.0
-    return f"The reference shows it as well; since then it has changed by {change:+.1f} dB."
+    alike = [f for f in reference.findings if _is_alike(f, finding, reference.rig)]
+    same = [f for f in alike if _has_same_witness(f, finding)]
+    if same:
+        return _as_well(same[0], finding)
+    if alike and _is_placed(finding):  # the bearing or gear is the same; levels elsewhere are of another size
+        return f"The reference shows it as well, but in {_seen_in(alike[0])}: the levels do not compare."
+    return "The reference does not show it."
 
 
-def _is_same(old: Finding, new: Finding) -> bool:
-    if (old.code, old.where.gear, old.where.bearing) != (new.code, new.where.gear, new.where.bearing):
+def _as_well(old: Finding, new: Finding) -> str:
+    change = _change_db(old, new)
+    if new.where.angle_deg is not None and not _names_tooth(old, new):
+        since = "" if change is None else f", {change:+.1f} dB since then"
+        return f"The reference shows such an event on that shaft{since}; whether at the same tooth, no mark tells."
+    since = "." if change is None else f"; since then it has changed by {change:+.1f} dB."
+    return f"The reference shows it as well{since}"
+
+
+def _change_db(old: Finding, new: Finding) -> float | None:
+    if old.strength is None or new.strength is None or old.strength.unit != new.strength.unit:
+        return None
+    then, now = old.strength.value, new.strength.value
+    return 20 * log10(now / then) if 0 < then < float("inf") and 0 < now < float("inf") else None
+
+
+def _is_alike(old: Finding, new: Finding, rig: Rig | None) -> bool:
+    """Whether two findings say the same of the same part: shaft, gear, tooth, bearing, order or frequency."""
+    then, now = old.where, new.where
+    if (old.code, then.shaft, then.gear, then.bearing) != (new.code, now.shaft, now.gear, now.bearing):
         return False
-    if old.where.order is None or new.where.order is None:
-        return old.where.order is new.where.order
-    return abs(old.where.order - new.where.order) <= SAME_ORDER * abs(new.where.order)
+    if not _is_near(then.order, now.order):
+        return False
+    if now.order is None and not _is_near(then.frequency_hz, now.frequency_hz):
+        return False
+    return not _names_tooth(old, new) or _is_same_tooth(then, now, rig)
+
+
+def _has_same_witness(old: Finding, new: Finding) -> bool:
+    """Whether two findings rest on the same channel and band, so that their levels compare.
+
+    What a mesh's sidebands say is a ratio, the median of all channels: of them the channel is no witness.
+    """
+    then, now = old.where, new.where
+    if (then.band_hz is None) != (now.band_hz is None):
+        return False
+    if then.band_hz is not None and now.band_hz is not None and not _overlap(then.band_hz, now.band_hz):
+        return False
+    rests_on_channel = now.band_hz is not None or now.angle_deg is not None or not _is_placed(new)
+    return not rests_on_channel or then.channels == now.channels or bool(set(then.channels) & set(now.channels))
+
+
+def _is_placed(finding: Finding) -> bool:
+    return bool(finding.where.gear or finding.where.bearing or finding.where.shaft)
+
+
+def _is_near(then: float | None, now: float | None) -> bool:
+    if then is None or now is None:
+        return then is now
+    return abs(then - now) <= SAME_ORDER * abs(now)
+
+
+def _overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    return max(one[0], other[0]) < min(one[1], other[1])
+
+
+def _names_tooth(old: Finding, new: Finding) -> bool:
+    """Whether both count teeth from a mark; without one, an angle holds for its own record only."""
+    return old.where.tooth is not None and new.where.tooth is not None
+
+
+def _is_same_tooth(then: Where, now: Where, rig: Rig | None) -> bool:
+    """Whether two teeth are the same or neighbours: either place is good to about one tooth."""
+    off = abs((then.tooth or 0) - (now.tooth or 0))
+    teeth = next(
+        (pair.teeth(now.shaft) for pair in (rig.pairs if rig else ()) if now.gear == f"{pair.name}/{now.shaft}"), None
+    )
+    return min(off, teeth - off if teeth is not None else off) <= 1
+
+
+def _seen_in(finding: Finding) -> str:
+    where = finding.where
+    channels = ", ".join(where.channels) or "another channel"
+    return channels + (f", {where.band_hz[0]:.0f} to {where.band_hz[1]:.0f} Hz" if where.band_hz else "")
 
 
 def _key(i: Indicator) -> tuple[str, ...]:

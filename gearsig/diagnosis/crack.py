@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from gearsig.diagnosis.confidence import WITH_ASSUMED_DATA, WITHOUT_REFERENCE, from_p_value, p_text
 from gearsig.diagnosis.types import CannotTell, Finding, Kind, Where
+from gearsig.diagnosis.verdict import DEPTH_UNKNOWN
 from gearsig.errors import RefusalError
 from gearsig.recording.types import Recording
 from gearsig.rig.types import GearPair, Rig
@@ -51,6 +52,8 @@ Answer = CrackEstimate | NoCrackSeen | CannotTell
 def crack_depth(recording: Recording, rig: Rig, reference: Recording | None, torque_nm: float | None) -> Answer | None:
     """Return the depth of a crack, that none is seen, or why it cannot be told; None where nobody asked and none is.
 
+    Nobody asks for a crack of a machine that is described without gears.
+
     Parameters
     ----------
     recording : Recording
@@ -68,6 +71,8 @@ def crack_depth(recording: Recording, rig: Rig, reference: Recording | None, tor
     """
     from gearsig.severity.estimate import estimate_crack
 
+    if rig.bearings and not rig.pairs:
+        return None
     try:
         answer = estimate_crack(recording, rig, reference=reference, torque_nm=torque_nm)
     except RefusalError as refusal:
@@ -155,7 +160,7 @@ def _none_seen(answer: NoCrackSeen, rig: Rig) -> Finding:
 
 def _cannot_tell(answer: CannotTell) -> Finding:
     return Finding(
-        "crack-depth-unknown",
+        DEPTH_UNKNOWN,
         Kind.CANNOT_TELL,
         f"The depth of a root crack cannot be told: {answer.reason}.",
         surer=answer.remedy[:1].upper() + answer.remedy[1:] + "." if answer.remedy else "",

@@ -73,6 +73,8 @@ class Signals:
         Shafts of known order with enough revolutions.
     order_maps : mapping
         Channel → map along speed, where the speed varies.
+    has_reference : bool
+        Whether a recording of the sound machine was given: then none is asked for.
     """
 
     recording: Recording
@@ -83,6 +85,7 @@ class Signals:
     order_excess: Mapping[str, LineExcess]
     shafts: tuple[ShaftSignals, ...]
     order_maps: Mapping[str, OrderMap]
+    has_reference: bool = False
 
     @property
     def known_shaft_orders(self) -> dict[str, float]:

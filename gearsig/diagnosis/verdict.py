@@ -6,6 +6,12 @@ from collections.abc import Iterable
 
 from gearsig.diagnosis.types import EXAMINED, HINDERING, Finding, Kind, Outcome, outcome_of
 
+DEPTH_UNKNOWN = "crack-depth-unknown"
+"""Code of the finding that a given reference did not tell the depth of a crack."""
+
+WITHOUT_REFERENCE = "Damage of many teeth would only show against an earlier recording."
+WITH_REFERENCE = "Damage of many teeth would only show in how the indicators have changed since the reference."
+
 _RANK = {kind: i for i, kind in enumerate(Kind)}
 
 
@@ -19,25 +25,38 @@ def ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(findings, key=key))
 
 
-def verdict_of(findings: tuple[Finding, ...]) -> str:
-    """Return the sentence a hurried reader takes away."""
+def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) -> str:
+    """Return the sentence a hurried reader takes away; why a given reference did not help is always part of it."""
     outcome = outcome_of(findings)
-    gaps = [f for f in findings if f.code in HINDERING or f.kind is Kind.CANNOT_TELL]
-    if outcome is Outcome.FAULT:
-        return "Fault: " + _first_and_number([f for f in findings if f.kind is Kind.FAULT])
-    if outcome is Outcome.SUSPICION:
-        return "Suspicion: " + _first_and_number([f for f in findings if f.kind is Kind.SUSPICION])
+    unused = [f for f in findings if f.code == DEPTH_UNKNOWN]
+    if outcome in (Outcome.FAULT, Outcome.SUSPICION):
+        kind = Kind.FAULT if outcome is Outcome.FAULT else Kind.SUSPICION
+        claims = _first_and_number([f for f in findings if f.kind is kind])
+        return " ".join(
+            [f"{kind.value.capitalize()}: {_ended(claims) if unused else claims}", *(f.title for f in unused)]
+        )
     said = [f.title for f in findings if f.code in EXAMINED]
     if outcome is Outcome.CANNOT_TELL:
+        others = [f for f in findings if f not in unused and (f.code in HINDERING or f.kind is Kind.CANNOT_TELL)]
+        gaps = [*unused, *others]
         why = " ".join(f.title for f in gaps[:2]) or "Nothing was examined that would show a fault."
         return " ".join(["Cannot tell.", why, *said, *_remedy(gaps)])
-    return " ".join(["No fault shows.", *said, "Damage of many teeth would only show against an earlier recording."])
+    return " ".join(["No fault shows.", *said, WITH_REFERENCE if has_reference else WITHOUT_REFERENCE])
 
 
 def _remedy(gaps: list[Finding]) -> list[str]:
     """Return what would settle the most important of the open questions, in one sentence."""
-    surer = next((finding.surer for finding in gaps if finding.surer), "")
-    return [f"Surer with: {surer.partition('. ')[0].rstrip('.')}."] if surer else []
+    first = next((finding for finding in gaps if finding.surer), None)
+    if first is None:
+        return []
+    surer = first.surer.partition(". ")[0].rstrip(".")
+    if first.code == DEPTH_UNKNOWN:  # says what to do, not what to have
+        return [f"What would help: {surer[:1].lower()}{surer[1:]}."]
+    return [f"Surer with: {surer}."]
+
+
+def _ended(sentence: str) -> str:
+    return sentence if sentence.endswith(".") else f"{sentence}."
 
 
 def _first_and_number(findings: list[Finding]) -> str:

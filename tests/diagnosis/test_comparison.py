@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from gearsig.diagnosis.analyze import analyze
-from gearsig.diagnosis.comparison import changes, rig_of_reference
-from gearsig.diagnosis.types import Analysis, Kind
+from gearsig.diagnosis.comparison import beside_reference, changes, rig_of_reference
+from gearsig.diagnosis.types import Analysis, Finding, Kind, Strength, Where
 from gearsig.errors import InputError
 from gearsig.rig.toml import write_rig
 from sims.kinematic import BearingFault
@@ -65,3 +65,91 @@ def test_a_reference_whose_own_rig_file_has_other_teeth_is_of_another_machine(tm
     rig = rig_of_reference(recording, RIG)
     assert rig is not None
     assert rig.operating_point.torque_nm == 70.0
+
+
+TEETH = replace(RIG, bearings=())
+TOOTH = Finding(
+    "tooth-local-damage",
+    Kind.FAULT,
+    "Damage.",
+    Where(("a1",), shaft="in", gear="stage/in", angle_deg=6.7, tooth=1),
+    Strength(2.0, "m/s^2", 0.1, "floor"),
+)
+RACE = Finding(
+    "bearing-outer-race",
+    Kind.FAULT,
+    "Damage.",
+    Where(("a1",), shaft="in", bearing="front", order=3.6, band_hz=(1000.0, 2000.0)),
+    Strength(0.2, "", 0.01, "floor"),
+)
+IMPACTS = replace(RACE, code="non-synchronous-impacts", where=replace(RACE.where, shaft="", bearing=""))
+SIDEBANDS = Finding(
+    "mesh-modulated",
+    Kind.SUSPICION,
+    "Modulated.",
+    Where(("a1",), shaft="in", gear="stage/in", order=1.0),
+    Strength(0.4, "sideband/carrier", 0.1, "common"),
+)
+NOT_THERE = "The reference does not show it."
+AS_WELL = "The reference shows it as well; since then it has changed by +6.0 dB."
+
+
+def told(then: Finding, now: Finding) -> str:
+    """Return what is said of a finding beside a reference with another, half as strong."""
+    assert then.strength is not None
+    half = replace(then, strength=replace(then.strength, value=0.5 * then.strength.value))
+    reference = replace(analyze(record(seconds=1.0)), rig=TEETH, findings=(half,))
+    return beside_reference([now], reference)[0].evidence[-1]
+
+
+def moved(finding: Finding, **where: object) -> Finding:
+    return replace(finding, where=replace(finding.where, **where))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("finding", [TOOTH, RACE, IMPACTS, SIDEBANDS])
+def test_the_same_finding_is_recognised_with_its_change(finding: Finding) -> None:
+    assert told(finding, finding) == AS_WELL
+
+
+@pytest.mark.parametrize(("then", "now"), [(1, 27), (27, 1), (5, 6), (6, 5)])
+def test_neighbouring_teeth_are_the_same_also_across_the_mark(then: int, now: int) -> None:
+    assert told(moved(TOOTH, tooth=then), moved(TOOTH, tooth=now)) == AS_WELL
+
+
+@pytest.mark.parametrize("tooth", [3, 14, 26])
+def test_another_tooth_is_another_damage(tooth: int) -> None:
+    assert told(moved(TOOTH, tooth=tooth), TOOTH) == NOT_THERE
+
+
+def test_without_a_mark_nobody_knows_whether_it_is_the_same_tooth() -> None:
+    turned = moved(TOOTH, tooth=None, angle_deg=200.0)
+    assert told(turned, moved(TOOTH, tooth=None)).startswith("The reference shows such an event on that shaft, +6.0 dB")
+
+
+@pytest.mark.parametrize("band", [(3000.0, 5000.0), (2000.0, 3000.0)])
+def test_levels_of_another_band_are_not_compared(band: tuple[float, float]) -> None:
+    text = told(moved(RACE, band_hz=band), RACE)
+    assert text == (
+        f"The reference shows it as well, but in a1, {band[0]:.0f} to {band[1]:.0f} Hz: the levels do not compare."
+    )
+    assert told(moved(RACE, band_hz=(1500.0, 3000.0)), RACE) == AS_WELL
+
+
+@pytest.mark.parametrize("where", [{"channels": ("a2",)}, {"band_hz": (3000.0, 5000.0)}])
+def test_impacts_of_no_known_part_are_known_by_channel_and_band(where: dict[str, object]) -> None:
+    assert told(moved(IMPACTS, **where), IMPACTS) == NOT_THERE
+
+
+def test_a_tooth_seen_by_another_sensor_has_no_change_in_db() -> None:
+    assert "but in a2: the levels do not compare" in told(moved(TOOTH, channels=("a2",)), TOOTH)
+
+
+def test_sidebands_are_a_ratio_of_all_channels() -> None:
+    assert told(moved(SIDEBANDS, channels=("a2",)), SIDEBANDS) == AS_WELL
+    assert told(moved(SIDEBANDS, shaft="out"), SIDEBANDS) == NOT_THERE
+    assert told(moved(SIDEBANDS, gear="other/in"), SIDEBANDS) == NOT_THERE
+
+
+def test_another_part_or_order_is_another_finding() -> None:
+    for other in ({"bearing": "rear"}, {"shaft": "out"}, {"order": 3.8}, {"order": None}):
+        assert told(moved(RACE, **other), RACE) == NOT_THERE

@@ -39,6 +39,36 @@ def test_an_open_question_comes_with_what_would_settle_it() -> None:
     assert verdict_of((gap,)) == "Cannot tell. Noise hides it. Surer with: A longer recording."
 
 
+UNUSED = Finding(
+    "crack-depth-unknown",
+    Kind.CANNOT_TELL,
+    "The depth of a root crack cannot be told: the reference was taken at 50 N m, the recording at 70 N m.",
+    surer="Take it within 10 % of the same torque.",
+)
+
+
+@pytest.mark.parametrize("kind", [Kind.FAULT, Kind.SUSPICION, Kind.CANNOT_TELL, Kind.INFORMATION])
+def test_why_a_reference_was_of_no_use_is_always_said(kind: Kind) -> None:
+    gaps = [Finding(f"gap {i}", Kind.CANNOT_TELL, f"Gap {i}.", surer=f"Thing {i}.") for i in range(4)]
+    verdict = verdict_of(ranked([*gaps, Finding("x", kind, "it is odd"), UNUSED]), has_reference=True)
+    assert UNUSED.title in verdict
+    assert "odd" in verdict or kind in (Kind.CANNOT_TELL, Kind.INFORMATION)
+
+
+def test_what_kind_of_reference_would_do_comes_before_other_wishes() -> None:
+    gap = Finding("tooth-damage-undecided", Kind.CANNOT_TELL, "They differ.", surer="More revolutions.")
+    verdict = verdict_of((gap, UNUSED), has_reference=True)
+    assert verdict.endswith("What would help: take it within 10 % of the same torque.")
+    assert "They differ." in verdict
+
+
+def test_a_reference_that_was_given_is_not_asked_for() -> None:
+    sound = (Finding("no-tooth-local-damage", Kind.INFORMATION, "Teeth look alike."),)
+    assert "against an earlier recording" in verdict_of(sound)
+    assert "since the reference" in verdict_of(sound, has_reference=True)
+    assert "earlier recording" not in verdict_of(sound, has_reference=True)
+
+
 def test_confidence_falls_with_the_p_value_and_is_bounded() -> None:
     values = [from_p_value(p) for p in (1e-9, 1e-4, 1e-3, 1e-2, 0.05, 0.3, 1.0)]
     assert values == sorted(values, reverse=True)

@@ -96,9 +96,11 @@ def _named_finding(signals: Signals, candidate: Candidate, n_parts: int) -> Find
         _strength(candidate),
         confidence,
         f"at most {_percent(confidence)}: chance that lines fall on the order so well {p_text(candidate.p_value)} (all "
-        "parts, bands, channels tried); never above 95 % without a healthy reference",
+        "parts, bands, channels tried); never above 95 %, as one recording is looked at",
         _named_evidence(signals, candidate, n_parts),
-        "A recording of the same bearing when it was good, or another sensor nearer to it.",
+        "Another sensor nearer to it."
+        if signals.has_reference
+        else "A recording of the same bearing when it was good, or another sensor nearer to it.",
     )
 
 

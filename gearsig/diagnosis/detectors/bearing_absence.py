@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from gearsig.diagnosis.confirmation import speed_is_confirmed
 from gearsig.diagnosis.detectors.bearing_family import PARTS, Families, expected_parts, slip_of
@@ -30,7 +31,13 @@ def none_found(signals: Signals, envelopes: Sequence[BandEnvelope], families: Fa
     if not examined:
         why = f"a modulation of {100 * CLEAR_MODULATION:.0f} % would not have stood out at the orders of their races"
         return [_undecided(why, "A longer recording: the floor of the envelope spectrum falls with its root.", where)]
-    return [_no_damage(envelopes, examined, depths, where), *_not_examined(signals, depths, where)]
+    surer = (
+        "Another sensor nearer to the bearings, or a longer recording."
+        if signals.has_reference
+        else "An earlier recording of the same machine: then smaller changes show."
+    )
+    sound = replace(_no_damage(envelopes, examined, depths, where), surer=surer)
+    return [sound, *_not_examined(signals, depths, where)]
 
 
 def _smallest_depths(signals: Signals, envelopes: Sequence[BandEnvelope]) -> dict[tuple[str, str], float]:
@@ -72,7 +79,6 @@ def _no_damage(
             f"Six equal harmonics of {limit} would have shown in half of the bands.",
             f"The most is needed at the {PARTS[name][0]} of {bearing}.",
         ),
-        surer="An earlier recording of the same machine: then smaller changes show.",
     )
 
 

@@ -17,7 +17,7 @@ from gearsig.diagnosis.detectors.other_events import (
 from gearsig.diagnosis.events import LocalEvent, largest_event
 from gearsig.diagnosis.signals import ShaftSignals, Signals
 from gearsig.diagnosis.types import Finding, Kind, Where
-from gearsig.rig.speed import PulseTimes, TachometerChannel
+from gearsig.severity.shaft_lines import has_mark
 
 WORTH_SAYING = (0.01, 8.0)
 CLEAR = (0.001, 10.0)
@@ -45,6 +45,11 @@ CAUSE = 0.9
 
 NEAR_MARK_DEG = 6.0
 
+ASK_FOR_REFERENCE = (
+    "A recording of the same gears when they were sound, given with --reference: what teeth are made with cancels."
+)
+MORE_SURER = "More revolutions, a sensor nearer to the gears, a higher load; certain data of the machine."
+
 
 @dataclass(frozen=True)
 class _Examined:
@@ -68,7 +73,8 @@ def detect_tooth_damage(signals: Signals) -> list[Finding]:
     elif "event-in-some-revolutions" not in codes:  # with it, even the speed is in doubt
         findings += _nothing_found(signals, [e for e, f in found if f is None])
         covered = [e for e, f in found if f is not None]
-        findings += [_undecided(covered, "other local events would cover damage")] if covered else []
+        reason, given = "other local events would cover damage", signals.has_reference
+        findings += [_undecided(covered, reason, has_reference=given)] if covered else []
     return findings + _not_examined(signals, {s.shaft for s in able})
 
 
@@ -145,10 +151,7 @@ def _reaches(level: tuple[float, float], examined: _Examined) -> bool:
 
 def _has_mark(signals: Signals, shaft: ShaftSignals) -> bool:
     """Whether the angle of this very shaft counts from a mark that is there once per revolution."""
-    source = signals.recording.speed_source
-    if not isinstance(source, (PulseTimes, TachometerChannel)) or source.pulses_per_revolution != 1:
-        return False
-    return (source.shaft or signals.rig.reference_shaft) == shaft.shaft
+    return has_mark(signals.recording, signals.rig, shaft.shaft)
 
 
 def _at_mark(signals: Signals, examined: _Examined) -> bool:
@@ -187,15 +190,18 @@ def _evidence(signals: Signals, examined: _Examined) -> tuple[str, ...]:
 def _surer(signals: Signals) -> str:
     if signals.rig.assumed:
         return "Confirm what is assumed of the rig: " + ", ".join(signals.rig.assumed) + "."
+    good = "" if signals.has_reference else ", or of the same gearbox when it was good"
     if signals.angle is not None and signals.angle.method in ("tachless", "constant", "speed channel"):
-        return "A recording with a tachometer, at another load, or of the same gearbox when it was good."
-    return "A recording at another load or speed (damage stays at its tooth), or of the same gearbox when it was good."
+        return f"A recording with a tachometer, or at another load{good}."
+    return f"A recording at another load or speed (damage stays at its tooth){good}."
 
 
 def _nothing_found(signals: Signals, examined: list[_Examined]) -> list[Finding]:
     """State that nothing shows, of those shafts where damage of a useful size would have shown."""
+    given = signals.has_reference
     if examined and signals.rig.assumed:
-        return [_undecided(examined, ", ".join(signals.rig.assumed) + " are assumed: damage may not show")]
+        assumed = ", ".join(signals.rig.assumed)
+        return [_undecided(examined, f"{assumed} are assumed: damage may not show", has_reference=given)]
     sharp = [e for e in examined if _smallest_visible(e.event) <= LARGEST_BLIND_SHARE * e.event.average_rms]
     blunt = [e for e in examined if e not in sharp]
     findings = []
@@ -216,13 +222,15 @@ def _nothing_found(signals: Signals, examined: list[_Examined]) -> list[Finding]
     noisy = [e for e in blunt if _is_noise(e.event)]
     uneven = [e for e in blunt if e not in noisy]
     if noisy:
-        findings.append(_undecided(noisy, "noise would hide an event of half the average's size"))
+        reason = "noise would hide an event of half the average's size"
+        findings.append(_undecided(noisy, reason, has_reference=given))
     if uneven:
-        findings.append(_undecided(uneven, "they differ so much from each other that damage may hide among them"))
+        reason = "they differ so much from each other that damage may hide among them"
+        findings.append(_undecided(uneven, reason, has_reference=given))
     return findings
 
 
-def _undecided(examined: list[_Examined], reason: str) -> Finding:
+def _undecided(examined: list[_Examined], reason: str, *, has_reference: bool) -> Finding:
     shafts = ", ".join(e.shaft.shaft for e in examined)
     return Finding(
         "tooth-damage-undecided",
@@ -230,8 +238,7 @@ def _undecided(examined: list[_Examined], reason: str) -> Finding:
         f"Nothing shows at the teeth of shaft(s) {shafts}, but {reason}.",
         Where(channels=tuple(examined[0].shaft.separated)),
         evidence=tuple(_visible_text(e) for e in examined),
-        surer="A recording of the same gears when they were sound, given with --reference: what teeth are made with "
-        "cancels. Or more revolutions, a sensor nearer to the gears, a higher load; certain data of the machine.",
+        surer=MORE_SURER if has_reference else f"{ASK_FOR_REFERENCE} Or {MORE_SURER[0].lower()}{MORE_SURER[1:]}",
     )
 
 

@@ -1,0 +1,38 @@
+"""Why a reference that was given could not be used is said wherever an analysis is read."""
+
+import json
+
+import pytest
+
+from gearsig.diagnosis.analyze import analyze
+from gearsig.diagnosis.types import Analysis
+from gearsig.report.page import page_html
+from gearsig.report.text import analysis_text
+from gearsig.report.to_json import analysis_to_json
+from tests.diagnosis.machines import record
+
+REASON = "The depth of a root crack cannot be told: the rig file does not give module_mm"
+
+
+@pytest.fixture(scope="module")
+def analysis() -> Analysis:
+    """Analyse a sound gearbox, of whose gears too little is known, against a reference."""
+    return analyze(record(), reference=record(seed=1))
+
+
+def test_terminal_page_and_json_say_why(analysis: Analysis) -> None:
+    assert REASON in analysis.verdict
+    head = " ".join(analysis_text(analysis).partition(" 1. ")[0].split())
+    assert REASON in head
+    assert REASON in page_html(analysis).partition("<h2>")[0]
+    told = json.loads(analysis_to_json(analysis))
+    assert REASON in told["verdict"]
+    assert told["crack"]["reason"].startswith("the rig file does not give module_mm")
+
+
+def test_nobody_asks_for_the_reference_that_was_given(analysis: Analysis) -> None:
+    without = " ".join(f.surer for f in analyze(record()).findings)
+    assert "earlier recording" in without or "gearbox when it was good" in without
+    for text in [analysis.verdict, *(f.surer for f in analysis.findings)]:
+        for wish in ("earlier recording", "when it was good", "when they were sound", "known to be good"):
+            assert wish not in text
