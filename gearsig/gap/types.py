@@ -1,4 +1,4 @@
-"""What a gap diagnosis answers: where the gap lies, which effect causes it, how far it shrinks; or why it cannot tell."""
+"""What a gap diagnosis answers: where the gap lies, which effect causes it, how far it shrinks; or why not."""
 
 from __future__ import annotations
 
