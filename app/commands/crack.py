@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from app.commands.options import (
+    ChannelsOption,
     PulsesOption,
     ReferenceOption,
     RigOption,
@@ -33,6 +34,7 @@ def crack(
         str | None,
         typer.Option("--tip-relief", help="Metal taken off at the tips, e.g. 15um, where the drawing says it: surer."),
     ] = None,
+    channel: ChannelsOption = None,
     fs: SamplingRateOption = None,
     speed_rpm: SpeedOption = None,
     tach_times: TachometerTimesOption = None,
@@ -42,7 +44,8 @@ def crack(
 
     It says "no crack seen, below … mm" where none stands out and one through half of the root would have; it refuses
     machines that its calibration (by simulation) does not reach. With --reference it is much surer, and cracks of a
-    millimetre show. It also says whether the tooth may be chipped or spalled instead.
+    millimetre show. It also says whether the tooth may be chipped or spalled instead. With --channel it looks at some
+    of the accelerations only, e.g. without a dead one.
 
     Example: gearsig crack sample_data/root_crack_3mm.h5 --reference sample_data/root_crack_0mm.h5
     """
@@ -55,6 +58,7 @@ def crack(
         reference=open_reference(reference, machine, fs, speed_rpm),
         torque_nm=torque_of(torque),
         tip_relief_um=quantity(tip_relief, "um", "--tip-relief") if tip_relief else None,
+        channels=tuple(dict.fromkeys(channel or ())),
     )
     typer.echo(estimate.text)
     for reason in estimate.reasons:

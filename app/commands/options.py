@@ -44,6 +44,15 @@ TorqueOption = Annotated[
     str | None, typer.Option("--torque", help="Of the input shaft, e.g. 110Nm, where the rig file does not say it.")
 ]
 
+ChannelsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--channel",
+        metavar="NAME",
+        help="Use this channel only; may be given several times. Default: all accelerations.",
+    ),
+]
+
 
 def open_rig(path: Path | None, recording: Path | None = None) -> Rig | None:
     """Read the rig file that is given, else the one of the same name beside the recording, and say so."""

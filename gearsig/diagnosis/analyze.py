@@ -101,7 +101,7 @@ def analyze(
         tell("the reference")
         then = analyze(reference, known if recording.rig is not None else None, settings)
         findings = beside_reference(findings, then)
-    crack = crack_depth(recording, known, reference, torque_nm)
+    crack = crack_depth(recording, known, reference, torque_nm, dead)
     order = ranked(with_crack(findings, crack, known))
     return Analysis(
         recording=recording,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from gearsig.diagnosis.confidence import WITH_ASSUMED_DATA, WITHOUT_REFERENCE, from_p_value, p_text
@@ -49,7 +49,13 @@ _INTERVAL = "90 % of simulated cracks lie within such intervals"
 Answer = CrackEstimate | NoCrackSeen | CannotTell
 
 
-def crack_depth(recording: Recording, rig: Rig, reference: Recording | None, torque_nm: float | None) -> Answer | None:
+def crack_depth(
+    recording: Recording,
+    rig: Rig,
+    reference: Recording | None,
+    torque_nm: float | None,
+    dead: Collection[str] = (),
+) -> Answer | None:
     """Return the depth of a crack, that none is seen, or why it cannot be told; None where nobody asked and none is.
 
     Nobody asks for a crack of a machine that is described without gears.
@@ -63,6 +69,8 @@ def crack_depth(recording: Recording, rig: Rig, reference: Recording | None, tor
         and that it cannot be told says nothing.
     torque_nm : float or None
         Of the input shaft, instead of the rig's.
+    dead : collection of str
+        Channels to leave out.
 
     Raises
     ------
@@ -73,8 +81,9 @@ def crack_depth(recording: Recording, rig: Rig, reference: Recording | None, tor
 
     if rig.bearings and not rig.pairs:
         return None
+    alive = [c.name for c in recording.channels if c.quantity == "acceleration" and c.name not in dead]
     try:
-        answer = estimate_crack(recording, rig, reference=reference, torque_nm=torque_nm)
+        answer = estimate_crack(recording, rig, reference=reference, torque_nm=torque_nm, channels=alive)
     except RefusalError as refusal:
         if reference is None:
             return None

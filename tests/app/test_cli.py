@@ -4,6 +4,7 @@ import json
 import pickle
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,8 @@ import pytest
 from app.cli import main
 from app.samples import samples
 from gearsig import __version__
+from gearsig.recording.read import read_recording
+from gearsig.recording.write import write_recording
 
 RIG = '[[pair]]\nname = "p"\ndriver = "in"\ndriven = "out"\ndriver_teeth = 23\ndriven_teeth = 47\n'
 
@@ -313,6 +316,36 @@ def test_without_a_command_the_help_is_shown(capsys: pytest.CaptureFixture[str])
     assert code == 2
     assert "analyze" in out
     assert err == ""
+
+
+def with_second_channel(stem: str, gain: float, path: Path) -> Path:
+    """Write a sample with its first channel a second time, as a2, times a gain."""
+    recording = read_recording(sample(stem))
+    channels = (*recording.channels, replace(recording.channels[0], name="a2"))
+    rows = np.vstack([recording.samples, gain * recording.samples[0]])
+    return write_recording(replace(recording, samples=rows, channels=channels), path)
+
+
+def test_crack_leaves_a_dead_channel_out(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    now = with_second_channel("root_crack_3mm", 0.0, tmp_path / "now.h5")
+    then = with_second_channel("root_crack_0mm", 1.0, tmp_path / "then.h5")
+    rig = ("--rig", sample("root_crack_3mm").with_suffix(".toml"), "--reference", then)
+    code, _, err = run(capsys, "crack", now, *rig)
+    assert code == 2
+    assert "channel 'a2' is dead" in err
+    code, out, _ = run(capsys, "crack", now, *rig, "--channel", "a1", "--channel", "a1")
+    assert code == 0
+    reference = ("--reference", sample("root_crack_0mm"))
+    assert out == run(capsys, "crack", sample("root_crack_3mm"), *reference)[1]
+    answer = json.loads(run(capsys, "analyze", now, *rig, "--json")[1])["crack"]  # which leaves it out by itself
+    assert answer["text"] in out
+
+
+def test_crack_names_the_channels_there_are(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "crack", sample("root_crack_3mm"), "--channel", "a1", "--channel", "a 7")
+    assert (code, out) == (2, "")
+    assert "'a 7' is no acceleration channel" in err
+    assert "allowed: a1" in err
 
 
 def test_crack_refuses_a_torque_in_millimetres(capsys: pytest.CaptureFixture[str]) -> None:
