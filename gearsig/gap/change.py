@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.gap.features import Features, once, whole_record_variance
@@ -22,14 +23,31 @@ def change_features(now: Gathered, sound: Gathered) -> Features:
     The reference's scatter counts as well: variances of both add.
     """
     (names, here), before = once(now), once(sound)[1]
-    names, values = _joined(names, here - before, now, sound)
+    joined, values = _joined(names, here - before, now, sound)
+    return _with_scatter(
+        joined,
+        values,
+        np.stack([_joined(names, once(part)[1] - before, part, sound)[1] for part in _parts(now)]),
+        np.stack([_joined(names, here - once(part)[1], now, part)[1] for part in _parts(sound)]),
+    )
+
+
+def difference_features(now: Gathered, simulated: Gathered) -> Features:
+    """Return the differences of all features alone: a simulation's flanks are not this machine's."""
+    (names, here), before = once(now), once(simulated)[1]
+    return _with_scatter(
+        names,
+        here - before,
+        np.stack([once(part)[1] - before for part in _parts(now)]),
+        np.stack([here - once(part)[1] for part in _parts(simulated)]),
+    )
+
+
+def _with_scatter(names: tuple[str, ...], values: FloatArray, *left_out: FloatArray) -> Features:
     variance = 2.0 * whole_record_variance(names)
-    for rows in (
-        [_joined(names, once(part)[1] - before, part, sound)[1] for part in _parts(now)],
-        [_joined(names, here - once(part)[1], now, part)[1] for part in _parts(sound)],
-    ):
+    for rows in left_out:
         variance += (len(rows) - 1.0) * np.var(rows, axis=0)
-    return Features(names, values, np.sqrt(variance))
+    return Features(names, values, np.sqrt(variance), left_out)
 
 
 def _parts(gathered: Gathered) -> Iterator[Gathered]:
@@ -47,23 +65,36 @@ def _joined(
 def _patterns(now: Gathered, sound: Gathered) -> Iterator[Feature]:
     """Yield the tooth features of the difference of the averages, turned so that the same teeth meet."""
     for side in (DRIVER, DRIVEN):
-        turned, agreement = difference_lines(
-            lines_of_shaft(now, side), lines_of_shaft(sound, side), whole_teeth=now.marks[DRIVER] or now.marks[DRIVEN]
-        )
+        turned, agreement = turned_difference(now, sound, side)
         teeth = now.frame.teeth[side]
-        residuals, noises = [], []
-        for row, name in zip(turned.lines, now.channels, strict=True):
-            full = np.zeros(now.channels[name].lines[side].shape[1], dtype=np.complex128)
-            full[: len(row)] = row
-            scale = mesh_power(now, now.channels[name], side)
-            residuals.append(residual_lines(full, teeth, turned.highest_order) / np.sqrt(scale))
-            both = average_lines(now.channels[name], side)[1][: len(row)]
-            both = both + average_lines(sound.channels[name], side)[1][: len(row)]
-            noises.append(both[residuals[-1][: len(row)] != 0].sum() / 2.0 / scale)
+        residuals = difference_residuals(now, turned, side)
+        noises = []
+        for lines, name in zip(residuals, now.channels, strict=True):
+            n = turned.lines.shape[1]
+            both = average_lines(now.channels[name], side)[1][:n] + average_lines(sound.channels[name], side)[1][:n]
+            noises.append(both[lines[:n] != 0].sum() / 2.0 / mesh_power(now, now.channels[name], side))
         shorter = min(float(g.channels[n].counts[side].sum()) for g in (now, sound) for n in now.channels)
         longer = max(1.0, shorter / NOMINAL_REVOLUTIONS)
         yield from pattern_features(f"change.{SIDES[side]}", residuals, teeth, float(np.mean(noises)), longer)
         yield f"change.{SIDES[side]}.agreement", 10.0 * agreement
+
+
+def turned_difference(now: Gathered, sound: Gathered, side: int) -> tuple[ShaftLines, float]:
+    """Return a shaft's lines less the sound ones, turned so that the same teeth meet, and how well they agreed."""
+    return difference_lines(
+        lines_of_shaft(now, side), lines_of_shaft(sound, side), whole_teeth=now.marks[DRIVER] or now.marks[DRIVEN]
+    )
+
+
+def difference_residuals(now: Gathered, turned: ShaftLines, side: int) -> list[NDArray[np.complex128]]:
+    """Return each channel's difference without its smooth lines, over the mesh's amplitude."""
+    residuals = []
+    for row, sums in zip(turned.lines, now.channels.values(), strict=True):
+        full = np.zeros(sums.lines[side].shape[1], dtype=np.complex128)
+        full[: len(row)] = row
+        scale = mesh_power(now, sums, side)
+        residuals.append(residual_lines(full, turned.teeth, turned.highest_order) / np.sqrt(scale))
+    return residuals
 
 
 def lines_of_shaft(gathered: Gathered, side: int) -> ShaftLines:

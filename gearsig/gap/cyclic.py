@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.gap.frame import GearFrame
@@ -20,6 +21,10 @@ USED_OF_BAND = 0.7
 """Of a band's width, the modulation that its envelope carries well."""
 FLOOR_WIDTH = 48
 """Lines whose median is the floor."""
+LOWEST_STRANGE = 0.4
+"""Order of the driver below which a line may be the window's or the speed's."""
+RACES = {"outer": ("outer", 1.0), "inner": ("inner", 1.0), "ball": ("spin", 2.0), "cage": ("cage", 1.0)}
+"""Family → the bearing's order that it counts, and how often; a ball strikes with both sides."""
 
 
 def floor_ratio(power: FloatArray) -> FloatArray:
@@ -40,27 +45,24 @@ def floor_ratio(power: FloatArray) -> FloatArray:
 def cyclic_features(gathered: Gathered, channels: Sequence[ChannelSums]) -> Iterator[Feature]:
     """Yield excesses in dB of families of envelope lines and of residual lines: the largest over channels and bands."""
     frame = gathered.frame
-    envelopes = np.concatenate([_envelope_ratios(gathered, c) for c in channels])
-    step, levels = gathered.cycle_step, _levels(envelopes)
-    known = _shaft_lines(frame)
+    envelopes = np.concatenate([envelope_ratios(gathered, c) for c in channels])
+    step, levels = gathered.cycle_step, excesses(envelopes)
+    known = gear_orders(frame)
     yield from _families(frame, levels, step, known, "envelope")
     for side, order in enumerate(frame.shaft_orders):
         yield f"envelope.{SIDES[side]}_shaft", _family(levels, order, N_SHAFT_FAMILY, step, (), 0.0)
     yield "envelope.mesh", _family(levels, float(frame.teeth[0]), 1, step, (), 0.0)
-    yield "envelope.strange", _strange(envelopes, step, [*known, *_bearing_lines(frame)], first=0.4)
+    yield "envelope.strange", _strange(envelopes, step, [*known, *bearing_orders(frame)], first=LOWEST_STRANGE)
     depth = max(float(c.envelope_power.mean(axis=0)[:, 2:].sum(axis=1).max()) for c in channels)
     yield "envelope.depth", decibel(depth)
-    residuals = floor_ratio(np.stack([c.residual_power.mean(axis=0) for c in channels]))
-    residuals = residuals[:, : int(gathered.highest_order / gathered.order_step)]
-    levels = _levels(residuals)
+    residuals = residual_ratios(gathered, channels)
+    levels = excesses(residuals)
     yield from _families(frame, levels, gathered.order_step, known, "line")
     yield "line.half_mesh", _family(levels, frame.teeth[0] / 2.0, 1, gathered.order_step, (), 0.0)
-    mesh = [k * frame.teeth[0] + s * o for k in range(1, 7) for o in _bearing_lines(frame)[:24] for s in (-1, 1)]
-    every = [*known, *_bearing_lines(frame), *mesh]
-    yield "line.strange", _strange(residuals, gathered.order_step, every, first=0.4)
+    yield "line.strange", _strange(residuals, gathered.order_step, line_orders(frame), first=LOWEST_STRANGE)
 
 
-def _envelope_ratios(gathered: Gathered, sums: ChannelSums) -> FloatArray:
+def envelope_ratios(gathered: Gathered, sums: ChannelSums) -> FloatArray:
     """Return the lines of each band's envelope over their floor; 1 beyond the band's width, where there is nothing."""
     ratios = floor_ratio(sums.envelope_power.mean(axis=0))
     cycles = np.arange(ratios.shape[1]) * gathered.cycle_step
@@ -72,12 +74,7 @@ def _envelope_ratios(gathered: Gathered, sums: ChannelSums) -> FloatArray:
 def _families(
     frame: GearFrame, levels: FloatArray, step: float, known: Sequence[float], name: str
 ) -> Iterator[Feature]:
-    for kind, attribute, factor in (
-        ("outer", "outer", 1.0),
-        ("inner", "inner", 1.0),
-        ("ball", "spin", 2.0),
-        ("cage", "cage", 1.0),
-    ):
+    for kind, (attribute, factor) in RACES.items():
         orders = [getattr(b, attribute) * factor for b in frame.bearings]
         scores = [_family(levels, o, N_FAMILY, step, known, SLIP) for o in orders if np.isfinite(o)]
         yield f"{name}.{kind}", max(scores, default=0.0)
@@ -86,7 +83,13 @@ def _families(
 def _family(
     levels: FloatArray, order: float, n_harmonics: int, step: float, known: Sequence[float], slip: float
 ) -> float:
-    """Return the mean excess in dB of a family's lines on the spectrum that shows it best, for the best slip.
+    return best_of_family(levels, order, n_harmonics, step, known, slip)[0]
+
+
+def best_of_family(
+    levels: FloatArray, order: float, n_harmonics: int, step: float, known: Sequence[float], slip: float
+) -> tuple[float, int, float]:
+    """Return the mean excess in dB of a family's lines, the spectrum that shows it best, and its order with slip.
 
     `levels` are excesses in dB, not below 0; the larger of a line and its neighbours counts.
     """
@@ -95,14 +98,16 @@ def _family(
         harmonics = harmonics[np.min(np.abs(np.asarray(known) - harmonics[:, None]), axis=1) >= 1.5 * step]
     harmonics = harmonics[harmonics * (1.0 + slip) / step < levels.shape[1] - 1]
     if not len(harmonics):
-        return 0.0
+        return 0.0, 0, order
     n_slips = min(MOST_SLIPS, 2 * int(np.ceil(slip * harmonics.max() / step)) + 1)  # a line apart at the highest
     shifts = np.linspace(-slip, slip, n_slips)
     places = np.rint(np.outer(1.0 + shifts, harmonics) / step).astype(np.intp)
-    return float(levels[:, places].mean(axis=2).max())
+    means = levels[:, places].mean(axis=2)
+    row, best = np.unravel_index(int(np.argmax(means)), means.shape)
+    return float(means[row, best]), int(row), order * (1.0 + float(shifts[best]))
 
 
-def _levels(ratios: FloatArray) -> FloatArray:
+def excesses(ratios: FloatArray) -> FloatArray:
     """Return excesses in dB, not below 0, each the largest of a line and its two neighbours."""
     from scipy.ndimage import maximum_filter1d
 
@@ -112,23 +117,35 @@ def _levels(ratios: FloatArray) -> FloatArray:
 
 def _strange(ratios: FloatArray, step: float, known: Sequence[float], *, first: float) -> float:
     """Return the excess in dB of the strongest line that belongs to nothing known."""
-    positions = np.arange(ratios.shape[1]) * step
-    near = np.zeros(len(positions), dtype=bool)
-    for order in known:
-        low = np.searchsorted(positions, order * (1.0 - SLIP) - 2.0 * step)
-        near[low : np.searchsorted(positions, order * (1.0 + SLIP) + 2.0 * step)] = True
-    free = ~near & (positions > first)
+    free = free_lines(ratios.shape[1], step, known, first=first)
     return max(decibel(float(ratios[:, free].max())), 0.0) if free.any() else 0.0
 
 
-def _shaft_lines(frame: GearFrame) -> list[float]:
+def free_lines(n_lines: int, step: float, known: Sequence[float], *, first: float) -> NDArray[np.bool_]:
+    """Return which lines belong to nothing known."""
+    positions = np.arange(n_lines) * step
+    near = np.zeros(n_lines, dtype=bool)
+    for order in known:
+        low = np.searchsorted(positions, order * (1.0 - SLIP) - 2.0 * step)
+        near[low : np.searchsorted(positions, order * (1.0 + SLIP) + 2.0 * step)] = True
+    free: NDArray[np.bool_] = ~near & (positions > first)
+    return free
+
+
+def residual_ratios(gathered: Gathered, channels: Sequence[ChannelSums]) -> FloatArray:
+    """Return the residuals' lines over their floor, one row per channel."""
+    ratios = floor_ratio(np.stack([c.residual_power.mean(axis=0) for c in channels]))
+    return ratios[:, : int(gathered.highest_order / gathered.order_step)]
+
+
+def gear_orders(frame: GearFrame) -> list[float]:
     """Orders of both shafts' first harmonics, and of mesh harmonics with their first sidebands."""
     shafts = [k * order for order in frame.shaft_orders for k in range(1, 13)]
     mesh = [k * frame.teeth[0] + j * order for k in (1, 2, 3) for order in frame.shaft_orders for j in range(-3, 4)]
     return shafts + mesh
 
 
-def _bearing_lines(frame: GearFrame) -> list[float]:
+def bearing_orders(frame: GearFrame) -> list[float]:
     """Orders of every bearing's families with their sidebands."""
     found = []
     for bearing in frame.bearings:
@@ -142,3 +159,10 @@ def _bearing_lines(frame: GearFrame) -> list[float]:
             if np.isfinite(order):
                 found += [k * order + j * side for k in range(1, N_FAMILY + 1) for j in ((-1, 0, 1) if side else (0,))]
     return found
+
+
+def line_orders(frame: GearFrame) -> list[float]:
+    """Orders of everything that the residual may hold: gears, bearings, and bearings about the mesh harmonics."""
+    bearings = bearing_orders(frame)
+    mesh = [k * frame.teeth[0] + s * o for k in range(1, 7) for o in bearings[:24] for s in (-1, 1)]
+    return [*gear_orders(frame), *bearings, *mesh]

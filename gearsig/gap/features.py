@@ -29,11 +29,14 @@ class Features:
         dB, or ten times the decadic logarithm.
     scatter : array, (n,)
         Standard error from leaving out blocks of revolutions, one at a time.
+    left_out : tuple of arrays, (n_blocks, n)
+        The values without each block of the recording, and of what it was compared with.
     """
 
     names: tuple[str, ...]
     values: FloatArray
     scatter: FloatArray
+    left_out: tuple[FloatArray, ...] = ()
 
 
 def features_of(gathered: Gathered) -> Features:
@@ -44,7 +47,7 @@ def features_of(gathered: Gathered) -> Features:
     names, values = once(gathered)
     without = np.stack([once(gathered.without(b))[1] for b in range(gathered.n_blocks)])
     variance = (len(without) - 1.0) * without.var(axis=0) + whole_record_variance(names)
-    return Features(names, values, np.sqrt(variance))
+    return Features(names, values, np.sqrt(variance), (without,))
 
 
 def whole_record_variance(names: Sequence[str]) -> FloatArray:

@@ -1,0 +1,60 @@
+"""Which features say the same thing about which place of the spectrum, angle or signal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+
+from gearsig.gap.gear_lines import SIDES
+from gearsig.gap.types import PlaceKind
+
+Family = tuple[PlaceKind, str]
+"""The kind of place and "driver", "driven" or nothing."""
+
+_PLAIN = {
+    "mesh": PlaceKind.MESH,
+    "envelope": PlaceKind.ENVELOPE,
+    "line": PlaceKind.LINE,
+    "hum": PlaceKind.LINE,
+    "floor": PlaceKind.BAND,
+    "speed": PlaceKind.SPEED,
+    "raw": PlaceKind.TAIL,
+}
+_OF_A_SHAFT = {
+    "sideband": PlaceKind.SIDEBANDS,
+    "shaft": PlaceKind.SHAFT,
+    "tooth": PlaceKind.TOOTH,
+    "change": PlaceKind.TOOTH,
+}
+
+
+def family_of(name: str) -> Family:
+    """Return the family of a feature.
+
+    Examples
+    --------
+    >>> family_of("sideband.driven.3to5")
+    (<PlaceKind.SIDEBANDS: 'sidebands'>, 'driven')
+    """
+    first, _, rest = name.partition(".")
+    if name == "line.half_mesh":
+        return PlaceKind.MESH, ""
+    if first in _PLAIN:
+        return _PLAIN[first], ""
+    side = rest.partition(".")[0]
+    return _OF_A_SHAFT[first], side if side in SIDES else ""
+
+
+def family_members(names: Sequence[str]) -> dict[Family, np.ndarray]:
+    """Return for each family the positions of its features."""
+    return _members(tuple(names))
+
+
+@cache
+def _members(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
+    found: dict[Family, list[int]] = {}
+    for i, name in enumerate(names):
+        found.setdefault(family_of(name), []).append(i)
+    return {family: np.array(members, dtype=np.intp) for family, members in found.items()}

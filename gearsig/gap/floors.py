@@ -1,0 +1,229 @@
+"""How large a gap is: against what repeats, and against what even healthy machines and their simulation differ by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gearsig.checks import FloatArray, frozen_array
+from gearsig.errors import InputError
+from gearsig.gap.families import family_members
+from gearsig.gap.features import Features
+from gearsig.gap.types import Interval
+
+REPEATABLE = 1.96
+"""Standard errors: 19 of 20 repeated records stay below."""
+
+WITHIN, ACROSS = 8, 4
+"""Orders of the means within a family of features, and of the sum over families."""
+
+PRIOR_WEIGHT = 4.0
+"""Degrees of freedom that a family's median scatter counts for beside a feature's own."""
+
+LEAST_SCATTER_DB = 0.05
+
+_TAIL = 0.05
+
+
+@dataclass(frozen=True)
+class StructuralFloor:
+    """How far healthy machines' features lie from what they are compared with.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of features, see `gearsig.gap.features`.
+    values : array, (n,), above 0
+        dB: 19 of 20 healthy machines lie within `centres` ± `values`.
+    centres : array, (n,)
+        dB, the healthy machines' median; default 0. Differences have it at 0; features of a difference of patterns,
+        `change.…`, have not: noise alone has a level and a kurtosis.
+    whole : float or None
+        `soft_size` that one healthy machine in twenty exceeds; None: what independent features would make of it.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    centres: FloatArray | None = None
+    whole: float | None = None
+    _row: Mapping[str, int] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.names)
+        if len(set(self.names)) != n:
+            raise InputError("names of the floor repeat", allowed="each feature once")
+        for name, default in (("values", None), ("centres", np.zeros(n))):
+            given = getattr(self, name)
+            array = frozen_array(default if given is None else given, name, ndim=1)
+            if len(array) != n:
+                raise InputError(f"{name} has {len(array)} numbers for {n} features", allowed="one each")
+            object.__setattr__(self, name, array)
+        if n and float(self.values.min()) <= 0.0:
+            raise InputError("a floor is not above 0", where=self.names[int(np.argmin(self.values))], allowed="above 0")
+        object.__setattr__(self, "_row", {name: i for i, name in enumerate(self.names)})
+
+    @classmethod
+    def of_healthy(cls, names: Sequence[str], rows: FloatArray, *, least_db: float = 0.2) -> StructuralFloor:
+        """Return the floor of a table of healthy changes, (n_machines, n): medians, 95 % of distances, and the whole.
+
+        Parameters
+        ----------
+        names : sequence of str
+        rows : array, (n_machines, n)
+            At least 20 of them say something.
+        least_db : float
+            A feature that never moved in the table still may.
+        """
+        table = np.asarray(rows, dtype=np.float64)
+        centres = np.median(table, axis=0)
+        values = np.maximum(np.quantile(np.abs(table - centres), 1.0 - _TAIL, axis=0), least_db)
+        sizes = [soft_size(names, row) for row in (table - centres) / values]
+        return cls(tuple(names), values, centres, float(np.quantile(sizes, 1.0 - _TAIL)))
+
+    def rows_of(self, names: Sequence[str]) -> np.ndarray:
+        """Return the places of features in the table.
+
+        Raises
+        ------
+        InputError
+            If one is not there.
+        """
+        missing = [name for name in names if name not in self._row]
+        if missing:
+            raise InputError(
+                f"the structural floor knows nothing of {', '.join(missing[:3])}",
+                remedy="make the floor's table with the present features",
+            )
+        return np.array([self._row[name] for name in names], dtype=np.intp)
+
+    def of(self, names: Sequence[str]) -> FloatArray:
+        """Return the floors of features, in dB."""
+        floors: FloatArray = self.values[self.rows_of(names)]
+        return floors
+
+    def from_centre(self, names: Sequence[str], values: FloatArray) -> FloatArray:
+        """Return how far changes lie from the healthy machines' median, in dB."""
+        assert self.centres is not None  # noqa: S101 - set above, said to the type checker
+        distances: FloatArray = values - self.centres[self.rows_of(names)]
+        return distances
+
+    def over(self, change: Features) -> FloatArray:
+        """Return changes in structural floors, with their sign."""
+        return self.from_centre(change.names, change.values) / self.of(change.names)
+
+    def whole_of(self, names: Sequence[str]) -> float:
+        """Return the `soft_size` that is one structural floor."""
+        return independent_whole(tuple(names)) if self.whole is None else self.whole
+
+
+@dataclass(frozen=True)
+class GapSize:
+    """How large the whole gap is; 1: one healthy machine, or one repeated record, in twenty is that far.
+
+    Parameters
+    ----------
+    structural, repeatability : Interval
+    """
+
+    structural: Interval
+    repeatability: Interval
+
+
+def gap_size(change: Features, structural: StructuralFloor) -> GapSize:
+    """Return the size of the whole gap in both floors, with 90 % intervals from the blocks of revolutions.
+
+    s = [Σ_f (mean_{i∈f} |d_i/e_i|⁸)^(4/8)]^(1/4)/s_0, families f, changes d, floors e, s_0 the size that is one floor.
+
+    Root mean squares over all features drown a handful of large changes among a hundred that stayed; the largest alone
+    hangs on one number and its jackknife on chance. Means of high order lie between, and are smooth. Features of one
+    family say nearly the same: their mean counts once however many they are; families add.
+
+    The interval is ± t SE, SE² = (B − 1)/B Σ_b (s_(b) − mean)², s_(b) the size without block b: correlated features
+    change together in it, so that nothing is assumed of them.
+
+    Parameters
+    ----------
+    change : Features
+        With `left_out`.
+    structural : StructuralFloor
+    """
+    scatter = REPEATABLE * pooled_scatter(change)
+    floors = structural.of(change.names)
+    return GapSize(
+        _size(change, structural, floors, structural.whole_of(change.names)),
+        _size(change, structural, scatter, independent_whole(change.names)),
+    )
+
+
+def _size(change: Features, structural: StructuralFloor, floors: FloatArray, whole: float) -> Interval:
+    """Return the size with its interval."""
+
+    def size(values: FloatArray) -> float:
+        return soft_size(change.names, structural.from_centre(change.names, values) / floors) / whole
+
+    value = size(change.values)
+    variance = sum((len(rows) - 1.0) * float(np.var([size(row) for row in rows])) for rows in change.left_out)
+    half = _t_quantile(_degrees(change)) * variance**0.5
+    return Interval(value, max(0.0, value - half), value + half)
+
+
+def _degrees(change: Features) -> int:
+    """Return the degrees of freedom of the jackknife with the fewest blocks."""
+    return min((len(rows) for rows in change.left_out), default=2) - 1
+
+
+def _t_quantile(degrees: int) -> float:
+    from scipy.special import stdtrit
+
+    return float(stdtrit(degrees, 0.95))
+
+
+def soft_size(names: Sequence[str], normalised: FloatArray) -> float:
+    """Return [Σ_f (mean_{i∈f} |u_i|⁸)^(4/8)]^(1/4)."""
+    return float(np.sum([family_size(normalised[m]) ** ACROSS for m in family_members(names).values()]) ** (1 / ACROSS))
+
+
+def family_size(normalised: FloatArray) -> float:
+    """Return (mean |u_i|⁸)^(1/8): nearly the largest; three quarters of it where one of nine moved and no other."""
+    largest = float(np.max(np.abs(normalised), initial=0.0))
+    if largest == 0.0:
+        return 0.0
+    return largest * float(np.mean((np.abs(normalised) / largest) ** WITHIN) ** (1 / WITHIN))
+
+
+def pooled_scatter(change: Features) -> FloatArray:
+    """Return standard errors drawn towards their family's median, as a jackknife over few blocks has some by chance.
+
+    s² = (ν0 s0² + ν s²)/(ν0 + ν).
+
+    Source: G. K. Smyth, *Linear models and empirical Bayes methods for assessing differential expression in microarray
+    experiments* (Statistical Applications in Genetics and Molecular Biology, 2004).
+    """
+    variance = np.maximum(change.scatter, LEAST_SCATTER_DB) ** 2
+    degrees = _degrees(change)
+    pooled = np.empty_like(variance)
+    for members in family_members(change.names).values():
+        typical = float(np.median(variance[members]))
+        pooled[members] = (PRIOR_WEIGHT * typical + degrees * variance[members]) / (PRIOR_WEIGHT + degrees)
+    scatter: FloatArray = np.sqrt(pooled)
+    return scatter
+
+
+_N_DRAWS = 2000
+_known: dict[tuple[str, ...], float] = {}
+
+
+def independent_whole(names: tuple[str, ...]) -> float:
+    """Return the `soft_size` that one in twenty exceeds if features are independent and normal, each at its floor.
+
+    A constant of the features' names, found by counting, so the same numbers are drawn each time.
+    """
+    if names not in _known:
+        draws = np.random.default_rng(0).standard_normal((_N_DRAWS, len(names))) / REPEATABLE
+        total = np.zeros(_N_DRAWS)
+        for members in family_members(names).values():
+            total += np.mean(np.abs(draws[:, members]) ** WITHIN, axis=1) ** (ACROSS / WITHIN)
+        _known[names] = float(np.quantile(total, 1.0 - _TAIL) ** (1 / ACROSS))
+    return _known[names]
