@@ -12,6 +12,7 @@ from app.commands.bifurcation import bifurcation
 from app.commands.crack import crack
 from app.commands.dashboard import dashboard
 from app.commands.demo import demo
+from app.commands.gap import gap
 from app.commands.report import report
 from app.commands.rig import rig_app
 from app.commands.simulate import simulate
@@ -40,6 +41,7 @@ app.add_typer(rig_app, name="rig")
 app.command()(simulate)
 app.command()(sweep)
 app.command()(bifurcation)
+app.command()(gap)
 app.command()(demo)
 app.command()(dashboard)
 

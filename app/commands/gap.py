@@ -1,0 +1,131 @@
+"""`gearsig gap`: where a recording differs from its simulation, which effect causes it, how far it shrinks with it."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.commands.options import SamplingRateOption
+from app.gap.inputs import Asked
+from gearsig.errors import InputError
+
+if TYPE_CHECKING:
+    from gearsig.gap.types import GapReport
+
+TABLE_WIDTH = 110
+"""Columns of the table of effects where it is not printed to a terminal."""
+
+
+def gap(
+    recordings: Annotated[
+        list[Path] | None, typer.Argument(help="Recordings of one rig; more operating conditions tell more.")
+    ] = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            "--rig",
+            help="Rig file (TOML) of all recordings. NAME.toml beside a recording overrides its speed and torque.",
+        ),
+    ] = None,
+    model: Annotated[str, typer.Option("--model", help="Simulator to compare with.")] = "cracked",
+    reference: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--reference", metavar="HEALTHY", help="Recording of the same rig when it was healthy; repeatable."
+        ),
+    ] = None,
+    torque: Annotated[
+        list[str] | None,
+        typer.Option("--torque", metavar="N", help="Of the input shaft, e.g. 60Nm: one for all, or one for each."),
+    ] = None,
+    fs: SamplingRateOption = None,
+    cache: Annotated[
+        Path | None,
+        typer.Option("--cache", metavar="DIR", help="Keeps what is prepared once per rig. Default: your cache folder."),
+    ] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Prepare anew; take nothing from the cache.")] = False,
+    list_effects: Annotated[bool, typer.Option("--list-effects", help="Show the effects that are looked for.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for gap.html, gap.json and twin.toml.")
+    ] = None,
+) -> None:
+    """Say where recordings differ from the simulation of their rig, which effect causes it, how far it shrinks then.
+
+    Give recordings at several speeds and loads if there are any, and recordings of the same rig when it was healthy:
+    both make the answer much surer. The first diagnosis of a rig takes minutes of preparation, which are kept.
+
+    Example: gearsig gap slow.h5 fast.h5 --rig gearbox.toml --reference healthy.h5 -o gap
+    """
+    if list_effects:
+        _print_effects(model)
+        return
+    if output is None:
+        raise InputError("no folder for the results is given", remedy="give -o DIR")
+    from app.gap.results import check_folder, write_results
+
+    asked = Asked(tuple(recordings or ()), tuple(reference or ()), rig, _torques(torque), fs)
+    check_folder(output)
+    report = _diagnosed(asked, model, cache, fresh)
+    written = write_results(report, output, command="gearsig " + shlex.join(sys.argv[1:]))
+    _tell(report, written)
+
+
+def _torques(texts: list[str] | None) -> tuple[float, ...]:
+    from app.commands.options import torque_of
+
+    found = (torque_of(text) for text in texts or ())
+    return tuple(value for value in found if value is not None)
+
+
+def _diagnosed(asked: Asked, model: str, cache: Path | None, fresh: bool) -> GapReport:
+    """Diagnose with a progress bar, which is shown on a terminal only."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+    from app.gap.run import cache_folder, run_gap
+
+    stage = TextColumn("{task.description}", markup=False)  # names of files are no markup
+    columns = (stage, BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("reading", total=1.0)
+        return run_gap(
+            asked,
+            model,
+            cache=None if fresh else cache or cache_folder(),
+            on_stage=lambda what, done: progress.update(task, description=what, completed=done),
+        )
+
+
+def _tell(report: GapReport, written: tuple[Path, ...]) -> None:
+    from gearsig.report.gap_text import gap_text
+
+    typer.echo(gap_text(report))
+    for notice in report.notices:
+        typer.echo(f"Note: {notice}", err=True)
+    page, *others = written
+    typer.echo(f"Open {page} in a browser; beside it: {', '.join(path.name for path in others)}.")
+
+
+def _print_effects(model: str) -> None:
+    """Print the catalogue: group, name, unit of the severity, where it shows."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+
+    from sims.registry import gap_simulator
+
+    table = Table("group", "effect", "severity", "shows in", box=SIMPLE_HEAD, pad_edge=False)
+    found = gap_simulator(model).gap_effects()
+    last = ""
+    for effect in found.values():
+        where = ", ".join(kind.replace("_", " ") for kind in effect.shows_in)
+        group = "" if effect.group == last else effect.group
+        last = effect.group
+        table.add_row(group, f"{effect.name}\n  {effect.title}", effect.unit or "no unit", where)
+    width = None if sys.stdout.isatty() else TABLE_WIDTH
+    Console(markup=False, highlight=False, width=width).print(table)
+    typer.echo(f"{len(found)} effects that have a meaning for the model {model}; also: none, unknown.")

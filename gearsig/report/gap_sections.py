@@ -1,0 +1,280 @@
+"""The texts and tables of a gap page: places, causes with their evidence, steps, recordings to make, facts."""
+
+from __future__ import annotations
+
+import platform
+from dataclasses import dataclass
+from datetime import datetime
+from importlib.metadata import version
+from math import isfinite
+
+from gearsig import __version__
+from gearsig.gap.types import NONE, UNKNOWN, Evidence, GapCause, GapOutcome, GapPlace, GapReport, Interval, Shrinkage
+from gearsig.plot.display import unit_text
+from gearsig.report.gap_text import point_text
+from gearsig.report.numbers import readable
+from gearsig.report.sections import Rows, named
+
+N_DETAILED = 3
+"""Causes whose evidence is shown."""
+MOST_ORDERS = 4
+LEAST_SHOWN = 0.01
+"""Probability below which a cause is only counted."""
+OUTCOME_CLASSES = {"no gap": "no-fault", "effect": "fault", "cannot separate": "suspicion", "unknown": "cannot-tell"}
+_UNITS = {"um": "µm", "deg": "°", "g mm": "g·mm", "N m": "N·m", "1": ""}
+
+
+@dataclass(frozen=True)
+class PlaceRow:
+    """A place of the gap as the page shows it."""
+
+    title: str
+    where: tuple[str, ...]
+    change: str
+    repeatability: str
+    structural: str
+    share: str
+    bar_percent: float
+
+
+@dataclass(frozen=True)
+class EvidenceRow:
+    """A predicted change beside the observed one, in dB."""
+
+    feature: str
+    predicted: str
+    observed: str
+    floor: str
+    speaks_for: bool
+
+
+@dataclass(frozen=True)
+class CauseRow:
+    """A cause as the page shows it; statements and evidence of the first ones only."""
+
+    name: str
+    title: str
+    group: str
+    percent: str
+    bar_percent: float
+    severity: str
+    place: str
+    is_effect: bool
+    statements: tuple[str, ...] = ()
+    evidence: tuple[EvidenceRow, ...] = ()
+
+
+@dataclass(frozen=True)
+class StepRow:
+    """A step of the waterfall: what is left, and how much less than before the step."""
+
+    label: str
+    left: str
+    interval: str
+    taken: str
+
+
+def verdict_rows(report: GapReport) -> Rows:
+    """Return the four lines, the word before the colon apart."""
+    lines = [line.partition(": ") for line in report.verdict]
+    return tuple((word, text[:1].upper() + text[1:]) for word, _, text in lines)
+
+
+def size_text(report: GapReport) -> str:
+    """Return the size of the whole gap against both floors."""
+    return f"{interval_text(report.size)} structural floors, {readable(report.repeatability, 2)} repeatability floors"
+
+
+def place_rows(report: GapReport) -> tuple[PlaceRow, ...]:
+    """Return the places, largest share first."""
+    return tuple(
+        PlaceRow(
+            place.title[:1].upper() + place.title[1:],
+            _where(place),
+            signed_db(place.change_db),
+            readable(place.repeatability, 2),
+            readable(place.structural, 2),
+            percent(place.share),
+            _bar(place.share),
+        )
+        for place in report.places
+    )
+
+
+def _where(place: GapPlace) -> tuple[str, ...]:
+    orders = ", ".join(readable(order) for order in place.orders[:MOST_ORDERS])
+    more = " …" if len(place.orders) > MOST_ORDERS else ""
+    texts = (
+        place.kind.value,
+        named("shaft", place.shaft),
+        f"tooth {place.tooth}" if place.tooth is not None else "",
+        f"at {readable(place.angle_deg)}°" if place.angle_deg is not None else "",
+        f"{'order' if len(place.orders) == 1 else 'orders'} {orders}{more}" if place.orders else "",
+        f"{readable(place.band_hz[0])} to {readable(place.band_hz[1])} Hz" if place.band_hz is not None else "",
+        named("sensor", place.channel),
+    )
+    return tuple(text for text in texts if text)
+
+
+def cause_rows(report: GapReport) -> tuple[CauseRow, ...]:
+    """Return the causes, likeliest first; the first three effects with their evidence, where there is a gap at all."""
+    effects = [cause for cause in report.causes if cause.name not in (NONE, UNKNOWN)]
+    detailed = [] if report.outcome is GapOutcome.NO_GAP else [cause.name for cause in effects[:N_DETAILED]]
+    return tuple(_cause_row(cause, detailed=cause.name in detailed) for cause in report.causes)
+
+
+def _cause_row(cause: GapCause, *, detailed: bool) -> CauseRow:
+    return CauseRow(
+        cause.name,
+        cause.title,
+        cause.group,
+        percent(cause.probability),
+        _bar(cause.probability),
+        severity_text(cause),
+        cause.place,
+        cause.name not in (NONE, UNKNOWN),
+        _statements(cause.shrinkage) if detailed else (),
+        tuple(_evidence_row(one) for one in cause.evidence) if detailed else (),
+    )
+
+
+def severity_text(cause: GapCause) -> str:
+    """Return the fitted severity with its interval; empty where nothing was fitted."""
+    return "" if cause.severity is None else f"{interval_text(cause.severity, unit_of(cause.unit))}"
+
+
+def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
+    if shrinkage is None:
+        return ("It was not fitted: no held-out check.",)
+    before, after = interval_text(shrinkage.before), interval_text(shrinkage.after)
+    taken, low, high = (percent(x) for x in (shrinkage.shrink.value, shrinkage.shrink.low, shrinkage.shrink.high))
+    return (
+        f"Gap on its own features: {before} structural floors without it, {after} with it.",
+        f"It takes away {taken} ({low} to {high}) of what exceeds the floor, checked on {shrinkage.held_out}.",
+        f"In a wrong place (placebo) it takes away at most {percent(shrinkage.placebo)}.",
+        f"The observed change is {readable(shrinkage.slope, 2)} times the predicted one; 1 is right.",
+    )
+
+
+def _evidence_row(one: Evidence) -> EvidenceRow:
+    return EvidenceRow(
+        one.feature,
+        signed_db(one.predicted_db),
+        signed_db(one.observed_db),
+        readable(one.floor_db, 2),
+        one.speaks_for,
+    )
+
+
+def group_texts(report: GapReport) -> tuple[str, ...]:
+    """Return the groups that have a chance, likeliest first."""
+    ranked = sorted(report.groups.items(), key=lambda item: -item[1] if isfinite(item[1]) else 0.0)
+    return tuple(f"{group} {percent(p)}" for group, p in ranked if p >= LEAST_SHOWN)
+
+
+def inseparable_text(report: GapReport) -> str:
+    """Say which causes cannot be told apart; empty where there are none."""
+    if report.inseparable is None:
+        return ""
+    titles = {cause.name: f"{cause.title} ({percent(cause.probability)})" for cause in report.causes}
+    first, second = (titles.get(name, name) for name in report.inseparable)
+    return f"These recordings cannot tell {first} from {second}."
+
+
+def step_rows(report: GapReport) -> tuple[StepRow, ...]:
+    """Return the steps of the waterfall."""
+    before = (None, *(step.left for step in report.steps))
+    return tuple(
+        StepRow(
+            step.label,
+            readable(step.left.value, 2),
+            f"{readable(step.left.low, 2)} to {readable(step.left.high, 2)}",
+            "" if last is None else _difference(last.value, step.left.value),
+        )
+        for step, last in zip(report.steps, before, strict=False)
+    )
+
+
+def next_rows(report: GapReport) -> tuple[tuple[str, str, str, str], ...]:
+    """Return operating point, the pair that it separates, its distance there and now."""
+    titles = {cause.name: cause.title for cause in report.causes}
+    return tuple(
+        (
+            point_text(one.point),
+            " / ".join(titles.get(name, name) for name in one.separates),
+            readable(one.standard_deviations, 2),
+            readable(one.now, 2),
+        )
+        for one in report.next_recordings
+    )
+
+
+def condition_rows(report: GapReport) -> tuple[tuple[str, ...], ...]:
+    """Return name, speed, torque, revolutions, length and sampling rate of each recording."""
+    return tuple(
+        (
+            one.name,
+            readable(one.point.speed_rpm, 5),
+            readable(one.point.torque_nm, 3),
+            readable(one.n_revolutions, 4),
+            readable(one.duration_s, 3),
+            readable(one.sampling_rate_hz, 6),
+        )
+        for one in report.conditions
+    )
+
+
+def fact_rows(report: GapReport, command: str, date: datetime) -> Rows:
+    """Return what the diagnosis rests on, and how to repeat it."""
+    compared = ", ".join(report.references) or "none: compared with the simulation itself"
+    versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy"))
+    rows = (
+        ("rig", report.rig),
+        ("simulator", report.simulator),
+        ("healthy references", compared),
+        ("size of the gap", size_text(report)),
+        ("versions", f"gearsig {__version__}, {versions}, Python {platform.python_version()}"),
+        ("date", date.strftime("%Y-%m-%d %H:%M %Z").strip()),
+        ("command", command),
+    )
+    return tuple((name, text) for name, text in rows if text)
+
+
+def interval_text(interval: Interval, unit: str = "") -> str:
+    """Write a value with its 90 % interval."""
+    value, low, high = (readable(x, 2) for x in (interval.value, interval.low, interval.high))
+    return f"{value}{' ' if unit else ''}{unit} ({low} to {high})"
+
+
+def percent(share: float) -> str:
+    """Write a share in percent: nothing below one is told from another.
+
+    Examples
+    --------
+    >>> percent(0.884), percent(0.003), percent(0.0), percent(float("nan")), percent(-0.1)
+    ('88 %', '< 1 %', '0 %', '–', '−10 %')
+    """
+    if not isfinite(share):
+        return "–"
+    return "< 1 %" if 0 < share < LEAST_SHOWN else f"{100 * share:.0f} %".replace("-", "−")
+
+
+def signed_db(change_db: float) -> str:
+    """Write a change in dB with its sign."""
+    if not isfinite(change_db):
+        return "–"
+    return f"{change_db:+.1f} dB".replace("-", "−")
+
+
+def unit_of(unit: str) -> str:
+    """Write the unit of a severity for people."""
+    return _UNITS.get(unit, unit_text(unit))
+
+
+def _bar(share: float) -> float:
+    return round(100 * min(max(share, 0.0), 1.0), 1) if isfinite(share) else 0.0
+
+
+def _difference(before: float, after: float) -> str:
+    change = after - before
+    return f"+{readable(change, 2)}" if change > 0 else readable(change, 2)

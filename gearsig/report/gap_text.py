@@ -1,0 +1,50 @@
+"""A gap report in a few lines: the verdict, and what a further operating condition would give."""
+
+from __future__ import annotations
+
+from gearsig.gap.simulator import Point
+from gearsig.gap.types import GapOutcome, GapReport
+
+SAME_SPEED, SAME_TORQUE = 0.03, 0.1
+"""Relative: recordings nearer than this to each other are of one operating condition."""
+
+
+def gap_text(report: GapReport) -> str:
+    """Return the verdict in four lines, and in a fifth what a second operating condition would give."""
+    advice = condition_advice(report)
+    return "\n".join([*report.verdict, *([advice] if advice else [])])
+
+
+def condition_advice(report: GapReport) -> str:
+    """Say what a second operating condition would give; empty where there are several, or none would tell more."""
+    if n_conditions(report) > 1:
+        return ""
+    start = "One operating condition: "
+    if report.outcome is GapOutcome.NO_GAP:
+        return start + "whether the machine also agrees at another speed or load was not looked at."
+    checked = "the result could be checked on other revolutions of the same recordings only. "
+    if not report.next_recordings:
+        return f"{start}{checked}A second one would check it at another speed or load."
+    best = report.next_recordings[0]
+    apart = f"{best.standard_deviations:.2g} structural floors apart, against {best.now:.2g} now"
+    return f"{start}{checked}A second one, at {point_text(best.point)}, would put the two likeliest causes {apart}."
+
+
+def n_conditions(report: GapReport) -> int:
+    """Count operating conditions: recordings at nearly the same speed and torque are one."""
+    distinct: list[Point] = []
+    for facts in report.conditions:
+        if not any(_same(facts.point, point) for point in distinct):
+            distinct.append(facts.point)
+    return len(distinct)
+
+
+def point_text(point: Point) -> str:
+    """Write an operating point for people."""
+    return f"{point.speed_rpm:.4g} rpm and {point.torque_nm:.3g} N·m"
+
+
+def _same(one: Point, other: Point) -> bool:
+    speed = abs(one.speed_rpm - other.speed_rpm) <= SAME_SPEED * max(abs(one.speed_rpm), abs(other.speed_rpm))
+    torque = abs(one.torque_nm - other.torque_nm) <= SAME_TORQUE * max(abs(one.torque_nm), abs(other.torque_nm))
+    return speed and torque

@@ -1,0 +1,297 @@
+"""Hand-made gap reports of a 55/75 pair, one for each outcome: pages, figures and files are tried on them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from gearsig.gap.simulator import Added, Point
+from gearsig.gap.types import (
+    AngleCurves,
+    ConditionFacts,
+    Evidence,
+    GapCause,
+    GapOutcome,
+    GapPlace,
+    GapReport,
+    GapStep,
+    Interval,
+    NextRecording,
+    PlaceKind,
+    Shrinkage,
+    SpectrumCurves,
+)
+
+RIG = "Published pair 55/75"
+TWIN = '[about]\nmodel = "cracked"\ntitle = "Twin of Published pair 55/75"\n\n[parameters]\ndriver_teeth = 55\n'
+POINTS = (Point(1504.2, 60.0), Point(1998.7, 60.0))
+
+
+def effect_report(rig: str = RIG, simulator: str = "cracked") -> GapReport:
+    """One effect is named: a root crack, diagnosed from two conditions and a healthy reference."""
+    return GapReport(
+        rig=rig,
+        simulator=simulator,
+        conditions=conditions(2),
+        references=("healthy_1.h5", "healthy_2.h5"),
+        outcome=GapOutcome.EFFECT,
+        size=Interval(7.9, 7.1, 8.8),
+        repeatability=46.0,
+        places=places(),
+        causes=causes(),
+        groups={
+            "tooth-local": 0.93,
+            "flank": 0.04,
+            "shaft": 0.01,
+            "drive and load": 0.005,
+            "bearing": 0.0,
+            "measurement chain": 0.0,
+            "unknown": 0.015,
+        },
+        steps=(
+            GapStep("simulator as it is", Interval(7.9, 7.1, 8.8)),
+            GapStep("housing and sensor resonances", Interval(5.6, 4.9, 6.4)),
+            GapStep("crack in a tooth root", Interval(1.6, 1.2, 2.1)),
+        ),
+        next_recordings=next_recordings(),
+        spectra=(spectrum("residual of sensor a1"), spectrum("residual of sensor a2", seed=1)),
+        angles=(angles("input", 55, tooth=21), angles("output", 75)),
+        notices=("The mean torque is the rig file's; it was not measured.",),
+        twin_toml=TWIN,
+    )
+
+
+def cannot_separate_report() -> GapReport:
+    """Two effects fit alike on the one condition that there is, without a reference."""
+    first, second, third, *_ = causes()
+    shaken = replace(first, probability=0.48, shrinkage=shrinkage(0.58, 0.41, 0.69, held_out=OTHER_REVOLUTIONS))
+    rival = replace(second, probability=0.41, shrinkage=shrinkage(0.55, 0.37, 0.66, held_out=OTHER_REVOLUTIONS))
+    return replace(
+        effect_report(),
+        outcome=GapOutcome.CANNOT_SEPARATE,
+        conditions=conditions(1),
+        references=(),
+        causes=(shaken, rival, replace(third, probability=0.06), GapCause("unknown", "", "unknown", "", 0.05)),
+        inseparable=("root_crack", "tooth_spall"),
+        twin_toml="",
+        angles=(replace(angles("input", 55, tooth=21), has_mark=False),),
+    )
+
+
+def unknown_report() -> GapReport:
+    """A large gap near 5.15 orders that no effect explains."""
+    report = effect_report()
+    place = GapPlace(
+        PlaceKind.LINE,
+        "tones at 5.15 orders of the input shaft, which belong to no shaft and no bearing of the rig",
+        21.4,
+        88.0,
+        9.3,
+        0.71,
+        orders=(5.15, 10.3, 15.45),
+        channel="a1",
+    )
+    unknown = GapCause("unknown", "", "nothing in the catalogue", "", 0.86)
+    rest = tuple(
+        replace(c, probability=p, severity=None) for c, p in zip(causes()[:3], (0.08, 0.04, 0.02), strict=True)
+    )
+    return replace(
+        report,
+        outcome=GapOutcome.UNKNOWN,
+        places=(place, *report.places[1:3]),
+        causes=(unknown, *rest),
+        steps=(report.steps[0],),
+        next_recordings=(),
+        spectra=tuple(replace(s, after=np.zeros(0)) for s in report.spectra),
+        angles=tuple(replace(a, after=np.zeros(0)) for a in report.angles),
+        twin_toml="",
+        notices=("The rig file names no bearing: bearing orders could not be tried.",),
+    )
+
+
+def no_gap_report() -> GapReport:
+    """A machine that differs from the simulator no more than healthy ones do."""
+    report = effect_report()
+    return replace(
+        report,
+        outcome=GapOutcome.NO_GAP,
+        size=Interval(0.6, 0.5, 0.8),
+        repeatability=3.6,
+        places=(),
+        causes=(GapCause("none", "", "no gap beyond the floor", "", 0.94), replace(causes()[1], probability=0.06)),
+        groups={"none": 0.94, "flank": 0.06},
+        steps=(),
+        next_recordings=(),
+        twin_toml="",
+        notices=(),
+        spectra=tuple(replace(s, after=np.zeros(0), measured=1.05 * s.before) for s in report.spectra),
+        angles=tuple(replace(a, after=np.zeros(0), measured=a.before) for a in report.angles),
+    )
+
+
+def all_reports() -> dict[str, GapReport]:
+    """Return one report of each outcome, by the outcome's words."""
+    reports = (effect_report(), cannot_separate_report(), unknown_report(), no_gap_report())
+    return {report.outcome.value: report for report in reports}
+
+
+def conditions(n: int) -> tuple[ConditionFacts, ...]:
+    """Return facts of the first `n` recordings."""
+    return tuple(
+        ConditionFacts(f"condition_{i}.h5", point, point.speed_rpm / 10, 6.0, 20_000.0)
+        for i, point in enumerate(POINTS[:n], 1)
+    )
+
+
+def places() -> tuple[GapPlace, ...]:
+    """Return the places of a root crack, strongest first."""
+    return (
+        GapPlace(
+            PlaceKind.TOOTH,
+            "a burst once per revolution at tooth 21 of the input shaft",
+            14.2,
+            61.0,
+            8.7,
+            0.58,
+            shaft="input",
+            angle_deg=134.2,
+            tooth=21,
+            channel="a1",
+        ),
+        GapPlace(
+            PlaceKind.SIDEBANDS,
+            "low, wide sidebands of the input shaft around the mesh harmonics",
+            9.1,
+            33.0,
+            4.4,
+            0.22,
+            shaft="input",
+            orders=(51.0, 52.0, 58.0, 59.0),
+        ),
+        GapPlace(
+            PlaceKind.ENVELOPE,
+            "envelope lines at multiples of the input shaft",
+            6.8,
+            17.0,
+            2.9,
+            0.12,
+            shaft="input",
+            orders=(1.0, 2.0, 3.0),
+        ),
+        GapPlace(PlaceKind.BAND, "more noise between 2.1 and 3.4 kHz", -3.2, 12.0, 1.6, 0.08, band_hz=(2100.0, 3400.0)),
+    )
+
+
+ANOTHER_CONDITION, OTHER_REVOLUTIONS = "another operating condition", "other revolutions of the same recordings"
+
+
+def shrinkage(
+    value: float, low: float, high: float, *, held_out: str = ANOTHER_CONDITION, placebo: float = 0.06
+) -> Shrinkage:
+    """Return a shrinkage of the crack's size."""
+    return Shrinkage(
+        Interval(6.2, 5.5, 6.9), Interval(1.7, 1.3, 2.2), Interval(value, low, high), 0.96, placebo, held_out
+    )
+
+
+def causes() -> tuple[GapCause, ...]:
+    """Return a crack, what looks like it, a nuisance and the two that are no effect."""
+    return (
+        GapCause(
+            "root_crack",
+            "tooth-local",
+            "crack in a tooth root",
+            "mm",
+            0.88,
+            Interval(2.3, 1.9, 2.8),
+            Added("root_crack", 2.3, {"gear": "driver", "tooth": 21.0}),
+            "tooth 21 of the driver",
+            shrinkage(0.72, 0.64, 0.79),
+            (
+                Evidence("kurtosis of the input shaft's residual average", 11.8, 12.4, 1.1, speaks_for=True),
+                Evidence("sidebands of the input shaft, 1 to 6 orders away", 8.0, 9.1, 1.4, speaks_for=True),
+                Evidence("envelope line at 1 × input shaft", 5.9, 6.8, 1.9, speaks_for=True),
+                Evidence("level of the mesh harmonics", 0.4, 2.3, 1.2, speaks_for=False),
+            ),
+        ),
+        GapCause(
+            "tooth_spall",
+            "tooth-local",
+            "spall on a tooth flank",
+            "mm",
+            0.05,
+            Interval(1.1, 0.7, 1.8),
+            Added("tooth_spall", 1.1, {"gear": "driver", "tooth": 21.0}),
+            "tooth 21 of the driver",
+            shrinkage(0.31, 0.12, 0.44, placebo=0.19),
+            (
+                Evidence("kurtosis of the input shaft's residual average", 6.1, 12.4, 1.1, speaks_for=True),
+                Evidence("band power 4 to 8 kHz", 7.2, 0.9, 1.5, speaks_for=False),
+            ),
+        ),
+        GapCause(
+            "pitch_error",
+            "flank",
+            "pitch error",
+            "um",
+            0.04,
+            Interval(14.0, 6.0, 25.0),
+            Added("pitch_error", 14.0, {"gear": "driver"}),
+            "",
+            shrinkage(0.08, -0.1, 0.2, placebo=0.11),
+            (Evidence("sidebands of the input shaft, 1 to 2 orders away", 6.6, 2.0, 1.4, speaks_for=False),),
+        ),
+        GapCause("transfer_path", "measurement chain", "housing and sensor resonances", "dB", 0.015, is_nuisance=True),
+        GapCause("unknown", "", "nothing in the catalogue", "", 0.01),
+        GapCause("none", "", "no gap beyond the floor", "", 0.005),
+    )
+
+
+def next_recordings() -> tuple[NextRecording, ...]:
+    """Return two recordings that would tell crack from spall."""
+    names = ("root_crack", "tooth_spall")
+    return (
+        NextRecording(
+            Point(900.0, 120.0),
+            names,
+            5.4,
+            1.6,
+            "record at 900 rpm and 120 N m: there a crack in a tooth root and a spall on a tooth flank lie "
+            "5.4 structural floors apart, against 1.6 now.",
+        ),
+        NextRecording(Point(1500.0, 120.0), names, 3.8, 1.6, "record at 1500 rpm and 120 N m."),
+    )
+
+
+def spectrum(label: str, seed: int = 0) -> SpectrumCurves:
+    """Return mesh harmonics with sidebands: more of them measured than simulated before."""
+    rng = np.random.default_rng(seed)
+    orders = np.arange(0.0, 200.0, 0.25)
+    noise = 0.004 * (1 + rng.rayleigh(size=len(orders)))
+    mesh, sidebands = np.zeros_like(orders), np.zeros_like(orders)
+    for harmonic in (1, 2, 3):
+        mesh[4 * 55 * harmonic] = 1.2 / harmonic
+        for side in range(1, 9):
+            for order in (55 * harmonic - side, 55 * harmonic + side):
+                sidebands[4 * order] = 0.14 / harmonic / (1 + 0.2 * side)
+    return SpectrumCurves(
+        label,
+        "m/s^2",
+        orders,
+        noise + 1.1 * mesh + sidebands,
+        noise + mesh + 0.15 * sidebands,
+        noise + mesh + 0.9 * sidebands,
+        np.full_like(orders, 0.006),
+    )
+
+
+def angles(shaft: str, teeth: int, tooth: int | None = None) -> AngleCurves:
+    """Return the energy along one revolution, with a peak at a tooth where one is given."""
+    angle = np.arange(720) / 2.0
+    even = 1 + 0.15 * np.sin(np.radians(3 * angle))
+    peak = np.zeros_like(angle)
+    if tooth is not None:
+        centre = (tooth - 0.5) * 360.0 / teeth
+        peak = 8.0 * np.exp(-(((angle - centre) / 4.0) ** 2))
+    return AngleCurves(shaft, "m/s^2", teeth, True, angle, even + peak, even, even + 0.85 * peak)
