@@ -16,12 +16,17 @@ from gearsig.severity.estimate import reach_of
 from gearsig.severity.evidence import GearEvidence, gear_evidence, pair_lines
 from gearsig.severity.kind import CHIPPED, CRACKED, SPALLED
 from gearsig.severity.machine import pair_facts
+from gearsig.severity.reference import LARGEST_SPEED_DIFFERENCE
+from gearsig.severity.same_machine import LARGEST_TORQUE_CHANGE
 from gearsig.severity.shaft_lines import ShaftLines
 from gearsig.severity.tooth_root import percent_per_mm
 
-SPEED_DIFFERENCE = 0.01
-TORQUE_DIFFERENCE = 0.03
-"""Largest ones between a recording and its reference: nobody meets a speed and a load exactly."""
+SPEED_DIFFERENCE = LARGEST_SPEED_DIFFERENCE
+TORQUE_DIFFERENCE = LARGEST_TORQUE_CHANGE
+"""Between a recording and its reference, relative: as far as the estimator takes them."""
+
+OTHER_FLANKS_SHARE = 0.15
+"""Sound machines whose flanks are others than in the reference: run in, or ground again."""
 
 RELIEF_ERROR = 0.2
 """Largest one of the tip relief that the estimator is told, relative: tips are never ground as they were drawn."""
@@ -32,11 +37,12 @@ SPALL_WIDTH_PERCENT, SPALL_LENGTH_MODULES = (20.0, 90.0), (0.3, 1.2)
 
 @dataclass(frozen=True)
 class Case:
-    """A drawn rig with its two recordings; the reference is of the sound gears."""
+    """A drawn rig with its recording, a reference of the sound gears, and the sound gears once more."""
 
     drawn: DrawnRig
     recording: Recording
     reference: Recording
+    sound: Recording
 
 
 @dataclass(frozen=True)
@@ -73,8 +79,9 @@ class Observed:
         0 or 1: which gear has the crack.
     percent : float
         Depth of the crack in percent of the root; 0: none.
-    with_reference, alone, sound : arrays, (2, n_features)
-        Of both gears: the recording against its reference, by itself, and the reference by itself.
+    with_reference, alone, sound, sound_with_reference : arrays, (2, n_features)
+        Of both gears: the recording against its reference, by itself, the reference by itself, and the sound gears once
+        more against the reference.
     looks : mapping
         (kind, "with_reference" or "alone") → Looks of the cracked gear, and of the gear with the other fault.
     lag_pitches : float
@@ -90,6 +97,7 @@ class Observed:
     with_reference: FloatArray
     alone: FloatArray
     sound: FloatArray
+    sound_with_reference: FloatArray
     looks: dict[tuple[str, str], Looks]
     lag_pitches: float
     reach: dict[str, float]
@@ -101,11 +109,13 @@ def draw_case(seed: int, index: int, *, for_the_check: bool, even: bool = False)
     drawn = draw_rig(rng, for_the_check=for_the_check, even=even)
     speed = float(rng.uniform(1.0 - SPEED_DIFFERENCE, 1.0 + SPEED_DIFFERENCE))
     torque = float(rng.uniform(1.0 - TORQUE_DIFFERENCE, 1.0 + TORQUE_DIFFERENCE))
+    flanks = 1 if rng.uniform() < OTHER_FLANKS_SHARE else 0
     try:
         return Case(
             drawn,
             simulate_rig(drawn),
             simulate_rig(drawn, severity=0.0, run=1, speed_factor=speed, torque_factor=torque),
+            simulate_rig(drawn, severity=0.0, run=2, flanks=flanks),
         )
     except (InputError, RefusalError):
         return None
@@ -165,6 +175,7 @@ def observe(case: Case, other: OtherFault | None = None, relief_error: float = 0
         with_reference=np.stack([e.features for e in compared]),
         alone=np.stack([e.features for e in alone]),
         sound=np.stack([e.features for e in good]),
+        sound_with_reference=np.stack([e.features for e in seen(lines(case.sound), sound)]),
         looks=looks,
         lag_pitches=_lag(compared[gear], drawn.tooth),
         reach=reach_of(facts, now[0].order_hz * facts.driver_teeth),

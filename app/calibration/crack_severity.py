@@ -20,9 +20,12 @@ import typer
 from app.calibration import rigs
 from app.calibration.cases import (
     CHIP_HEIGHT_MODULES,
+    OTHER_FLANKS_SHARE,
     RELIEF_ERROR,
     SPALL_LENGTH_MODULES,
     SPALL_WIDTH_PERCENT,
+    SPEED_DIFFERENCE,
+    TORQUE_DIFFERENCE,
     Observed,
     draw_case,
     draw_other_fault,
@@ -104,11 +107,9 @@ def calibration_of(observed: Sequence[tuple[int, Observed]], n_drawn: int, simul
 
 
 def cases_of(observed: Sequence[tuple[int, Observed]], kind: str) -> Cases:
-    """Return the cases of one model; sound gears by themselves are in each reference, too."""
+    """Return the cases of one model; each machine is there sound, too."""
     cracked = [(i, o) for i, o in observed if o.percent > 0]
-    sound = [getattr(o, kind) for _, o in observed if o.percent == 0]
-    if kind == "alone":
-        sound += [o.sound for _, o in observed]
+    sound = [o.sound if kind == ALONE else o.sound_with_reference for _, o in observed]
     return Cases(
         np.array([getattr(o, kind)[o.gear] for _, o in cracked]),
         np.array([o.percent for _, o in cracked]),
@@ -171,6 +172,9 @@ def _provenance(observed: Sequence[tuple[int, Observed]], n_drawn: int, simulato
         "false_alarms": FALSE_ALARMS,
         "depths_mm": list(rigs.DEPTHS_MM),
         "modules_mm": list(rigs.CALIBRATION_MODULES_MM),
+        "speed_difference": SPEED_DIFFERENCE,
+        "torque_difference": TORQUE_DIFFERENCE,
+        "other_flanks_share": OTHER_FLANKS_SHARE,
         "tip_relief_error": RELIEF_ERROR,
         "chip_height_modules": list(CHIP_HEIGHT_MODULES),
         "spall_width_percent": list(SPALL_WIDTH_PERCENT),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +10,11 @@ import numpy as np
 from app.calibration.rigs import DrawnRig
 from gearsig.recording.types import Recording
 from sims.cracked.build import build_rig
+from sims.cracked.linear import default_step_s
 from sims.cracked.respond import draw_roughness
 from sims.cracked.simulate import simulate_machine
 from sims.cracked.simulator import CrackedPair
-from sims.effects import EffectSetting
+from sims.effects import EffectSetting, with_effects
 from sims.machine import Machine
 from sims.machine.operation import Operation
 from sims.measure import MeasuredChannel, ModalPath, PathMode
@@ -29,7 +30,10 @@ def simulate_rig(
     run: int = 0,
     speed_factor: float = 1.0,
     torque_factor: float = 1.0,
+    flanks: int = 0,
     options: Mapping[str, float | str] | None = None,
+    further: Sequence[EffectSetting] = (),
+    step_angle_rad: float | None = None,
 ) -> Recording:
     """Simulate one recording.
 
@@ -42,17 +46,23 @@ def simulate_rig(
     run : int
         Another run has other noise and begins at another place of the driven shaft; the flanks stay the same.
     speed_factor, torque_factor : float
+    flanks : int
+        Another number draws other profiles of the flanks.
     options : mapping or None
         Of the effect, besides or instead of the drawn gear and tooth.
+    further : sequence of EffectSetting
+        Effects that are switched on as well.
+    step_angle_rad : float or None
+        Step times the greatest angular eigenfrequency; None: the simulator's own, finer than floors need.
     """
     operation = Operation.steady(drawn.speed_rpm * speed_factor, drawn.torque_nm * torque_factor)
     size = drawn.depth_mm if severity is None else severity
     chosen = {"gear": drawn.gear, "tooth": drawn.tooth + 1.0, **(options or {})}
     settings = [EffectSetting(effect, size, chosen)] if size > 0 else []
-    ready = CrackedPair().prepare(
-        drawn.parameters, settings, operation, np.random.default_rng(drawn.seed), sampling_rate_hz=SAMPLING_RATE_HZ
-    )
-    machine = _with_path(_with_fixed_flanks(ready.machine, drawn.seed), drawn)
+    draws = np.random.default_rng(drawn.seed)
+    ready = CrackedPair().prepare(drawn.parameters, [], operation, draws, sampling_rate_hz=SAMPLING_RATE_HZ)
+    machine = with_effects(_with_path(ready.machine, drawn), [*settings, *further], draws)
+    machine = _with_fixed_flanks(machine, [drawn.seed, 77 + flanks])
     rng = np.random.default_rng([drawn.seed, run])
     lead_rev = float(rng.integers(0, 8))
     lead_s = lead_rev * 60.0 / drawn.speed_rpm
@@ -63,16 +73,17 @@ def simulate_rig(
         sampling_rate_hz=SAMPLING_RATE_HZ,
         duration_s=drawn.duration_s + (lead_s if run else 0.0),
         rig=build_rig(machine, operation, name="drawn"),
+        step_s=None if step_angle_rad is None else default_step_s(machine, operation, step_angle_rad),
         truth={"depth_mm": size, "effect": effect if size else "", **chosen},
     )
     return _cut(recording, round(lead_s * SAMPLING_RATE_HZ)) if run else recording
 
 
-def _with_fixed_flanks(machine: Machine, seed: int) -> Machine:
+def _with_fixed_flanks(machine: Machine, seed: list[int]) -> Machine:
     """Draw the flanks' profiles now: they belong to the gears, and are the same in each run."""
     if machine.roughness.locked_to != "flank":
         return machine
-    machine, _ = draw_roughness(machine, np.random.default_rng([seed, 77]))
+    machine, _ = draw_roughness(machine, np.random.default_rng(seed))
     return replace(machine, roughness=replace(machine.roughness, locked_to="none"))
 
 

@@ -244,7 +244,7 @@ def _seen(
         features=dict(zip(FEATURES, evidence.features.tolist(), strict=True)),
         reasons=tuple(reasons),
         kind_probabilities=kinds,
-        reach_cycles=reach_cycles(evidence.searched, evidence.sound, evidence.event),
+        reach_cycles=reach_cycles(evidence.searched, evidence.event),
         squeezed_rise_db=squeezed_rise_db(evidence.searched, evidence.sound, evidence.event),
     )
 

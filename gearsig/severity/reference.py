@@ -10,8 +10,8 @@ from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.severity.shaft_lines import ShaftLines
 
-LARGEST_SPEED_DIFFERENCE = 0.03
-"""Relative; beyond, resonances amplify both recordings differently. The calibration has up to 0.01."""
+LARGEST_SPEED_DIFFERENCE = 0.02
+"""Relative, as in the calibration; beyond, resonances amplify both recordings differently."""
 
 LARGEST_GAIN_CHANGE = 0.15
 

@@ -16,7 +16,7 @@ from gearsig.severity.reference import check_same_speed
 from gearsig.severity.shaft_lines import ShaftLines
 
 LARGEST_TORQUE_CHANGE = 0.10
-"""Relative; the calibration has up to 0.03."""
+"""Relative, as in the calibration."""
 
 LARGEST_LEVEL_CHANGE_DB = 2.5
 """Of the middling mesh harmonic. On 100 simulated machines it is 1.4 dB at most, with the deepest cracks; another

@@ -42,18 +42,16 @@ def event_shape(searched: ShaftLines, event: ToothEvent) -> FloatArray:
     return np.array([*_around(searched, event), *_durations(searched, event), slope])
 
 
-def reach_cycles(searched: ShaftLines, sound: ShaftLines, event: ToothEvent) -> float:
-    """Return for how many mesh cycles after its middle the event has four times the energy of a middling sound tooth.
+def reach_cycles(searched: ShaftLines, event: ToothEvent) -> float:
+    """Return for how many mesh cycles after its middle the event has four times the energy of a middling other tooth.
 
     Parameters
     ----------
     searched : ShaftLines
         The average, or its difference from the sound gear's.
-    sound : ShaftLines
-        The sound gear's average, or the average itself: whose middling tooth is compared with.
     event : ToothEvent
     """
-    energy = _energy_over(searched, sound, event)
+    energy = _relative_energy(searched, event)
     after = energy[len(energy) // 2 :]
     below = np.flatnonzero(after < REACH_LEVEL)
     steps = len(energy) / searched.teeth
@@ -62,20 +60,14 @@ def reach_cycles(searched: ShaftLines, sound: ShaftLines, event: ToothEvent) -> 
 
 def _relative_energy(searched: ShaftLines, event: ToothEvent) -> FloatArray:
     """Return the energy in windows of one pitch over the middling one, the event in the middle."""
-    energy = _energy_over(searched, searched, event)
-    relative: FloatArray = energy / np.median(energy)
-    return relative
-
-
-def _energy_over(searched: ShaftLines, sound: ShaftLines, event: ToothEvent) -> FloatArray:
-    envelopes, others = band_envelopes(searched), band_envelopes(sound)[: n_bands(searched) + 1]
-    median = np.median(others, axis=-1, keepdims=True)
+    envelopes = band_envelopes(searched)
+    median = np.median(envelopes, axis=-1, keepdims=True)
     relative = np.divide(envelopes, median, out=np.ones_like(envelopes), where=median > 0).mean(axis=(0, 1))
     width = round(len(relative) / searched.teeth)
     energy = sliding_mean(relative, width)
     shift = len(energy) // 2 - round(event.centre_rev * len(energy)) + width // 2
-    middled: FloatArray = np.roll(energy, shift)
-    return middled
+    relative_energy: FloatArray = np.roll(energy, shift) / np.median(energy)
+    return relative_energy
 
 
 def _around(searched: ShaftLines, event: ToothEvent) -> tuple[float, float]:

@@ -47,7 +47,7 @@ class CrackEstimate:
     kind_probabilities : mapping
         "cracked", "chipped", "spalled" → probability, if cracks are as frequent as chips and spalls together.
     reach_cycles : float
-        For how many mesh cycles after its middle the event has four times a middling sound tooth's energy. It hangs on
+        For how many mesh cycles after its middle the event has four times a middling other tooth's energy. It hangs on
         damping and resonances as much as on the depth; the estimate does not rest on it.
     squeezed_rise_db : float
         Synchrosqueezed energy at high orders near the tooth over that of a middling sound tooth; see

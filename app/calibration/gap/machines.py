@@ -1,0 +1,71 @@
+"""Gearboxes drawn at random for the population of the gap diagnosis, and how they stand on another day."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from app.calibration.rigs import DrawnRig, HousingMode, draw_rig
+
+LIGHT_SHARE, LIGHT_TORQUE = 0.3, (0.04, 0.3)
+"""Machines that run at light load, and their torque over that of the others."""
+
+DURATION_S = (4.0, 8.0)
+MOUNTED_ANEW_SHARE = 0.6
+"""Recordings between which and their reference the sensors were taken off."""
+
+SPEED_SCATTER, TORQUE_SCATTER = 0.006, 0.06
+GAIN_SCATTER, MODE_SCATTER, MODE_GAIN_SCATTER = 0.10, 0.02, 0.20
+"""Relative standard deviations of what a changed mounting changes; gains are those of each channel and mode."""
+
+NOISE_SCATTER = 0.25
+"""Of the natural logarithm of the sensors' noise."""
+
+
+@dataclass(frozen=True)
+class Day:
+    """How a machine stands and runs on one day.
+
+    Parameters
+    ----------
+    drawn : DrawnRig
+        With that day's path and noise.
+    speed_factor, torque_factor : float
+    gains : tuple of float
+        Of the channels.
+    """
+
+    drawn: DrawnRig
+    speed_factor: float
+    torque_factor: float
+    gains: tuple[float, float]
+
+
+def draw_machine(rng: np.random.Generator) -> DrawnRig:
+    """Draw a sound gearbox, full or lightly loaded, with the length of its recordings."""
+    drawn = draw_rig(rng, for_the_check=False, even=bool(rng.uniform() < 0.1))
+    if rng.uniform() < LIGHT_SHARE:
+        drawn = replace(drawn, torque_nm=drawn.torque_nm * float(np.exp(rng.uniform(*np.log(LIGHT_TORQUE)))))
+    return replace(drawn, depth_mm=0.0, duration_s=float(np.clip(1.2 * drawn.duration_s, *DURATION_S)))
+
+
+def another_day(drawn: DrawnRig, rng: np.random.Generator) -> Day:
+    """Return the machine as it stands on another day: nearly the same point, perhaps with sensors mounted anew."""
+    speed, torque = (1.0 + s * float(rng.standard_normal()) for s in (SPEED_SCATTER, TORQUE_SCATTER))
+    noise = float(drawn.parameters["noise_mps2"]) * float(np.exp(NOISE_SCATTER * rng.standard_normal()))
+    parameters = {**drawn.parameters, "noise_mps2": noise}
+    if rng.uniform() >= MOUNTED_ANEW_SHARE:
+        return Day(replace(drawn, parameters=parameters), speed, torque, (1.0, 1.0))
+    first, second = np.exp(GAIN_SCATTER * rng.standard_normal(2))
+    modes = tuple(_mounted_anew(mode, rng) for mode in drawn.modes)
+    return Day(replace(drawn, parameters=parameters, modes=modes), speed, torque, (float(first), float(second)))
+
+
+def _mounted_anew(mode: HousingMode, rng: np.random.Generator) -> HousingMode:
+    return replace(
+        mode,
+        frequency_hz=mode.frequency_hz * float(np.exp(MODE_SCATTER * rng.standard_normal())),
+        gain=mode.gain * float(np.exp(MODE_GAIN_SCATTER * rng.standard_normal())),
+        damping_ratio=mode.damping_ratio * float(np.exp(MODE_GAIN_SCATTER * rng.standard_normal())),
+    )

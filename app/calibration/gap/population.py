@@ -1,0 +1,214 @@
+"""Simulate the population of the gap diagnosis: `python -m app.calibration.gap.population --rigs N --to FILE`.
+
+Each drawn gearbox is recorded sound as the reference, sound again on other days, with each effect, and with foreign
+vibration; what differs goes into the table, with its label.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import typer
+
+from app.calibration.gap.machines import Day, another_day, draw_machine
+from app.calibration.gap.outside import with_foreign_vibration
+from app.calibration.rigs import DrawnRig
+from app.calibration.simulate import SAMPLING_RATE_HZ, simulate_rig
+from gearsig.checks import FloatArray
+from gearsig.errors import InputError, RefusalError
+from gearsig.gap.change import change_features
+from gearsig.gap.features import features_of
+from gearsig.gap.gather import gather
+from gearsig.gap.gathered import Gathered
+from gearsig.gap.simulator import Point
+from gearsig.gap.types import NONE, UNKNOWN
+from gearsig.recording.types import Recording
+from sims.cracked.twin import STEP_ANGLE_RAD, CrackedTwin
+from sims.cracked.usual import nominal_of
+from sims.effects import EffectSetting, effects
+
+SEED = 4107
+N_SOUND, N_FOREIGN = 3, 6
+MEASUREMENT_CHAIN = "measurement chain"
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One recording, reduced.
+
+    Parameters
+    ----------
+    rig : int
+    label, detail : str
+        Effect, "none" or "unknown"; options or the foreign vibration's name.
+    severity : float
+    torque_nm : float
+    change, change_scatter : arrays, (n_changes,)
+        Against the sound reference.
+    gap, gap_scatter : arrays, (n_changes,)
+        Against the twin that knows the rig file only.
+    alone, alone_scatter : arrays, (n_features,)
+        By itself.
+    """
+
+    rig: int
+    label: str
+    detail: str
+    severity: float
+    torque_nm: float
+    change: FloatArray
+    change_scatter: FloatArray
+    gap: FloatArray
+    gap_scatter: FloatArray
+    alone: FloatArray
+    alone_scatter: FloatArray
+
+
+def main() -> None:
+    """Simulate, reduce, write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rigs", type=int, default=120)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--to", type=Path, required=True)
+    given = parser.parse_args()
+    samples: list[Sample] = []
+    names: tuple[tuple[str, ...], tuple[str, ...]] | None = None
+    with ProcessPoolExecutor(given.processes) as pool:
+        for done, (found, found_names) in enumerate(
+            pool.map(one_rig, range(given.first, given.first + given.rigs)), start=1
+        ):
+            samples += found
+            names = found_names or names
+            if names is not None and (done % 10 == 0 or done == given.rigs):
+                write(given.to, samples, names)
+            typer.echo(f"{done} of {given.rigs} gearboxes, {len(samples)} recordings")
+
+
+def write(path: Path, samples: list[Sample], names: tuple[tuple[str, ...], tuple[str, ...]]) -> None:
+    """Write the table as arrays of numbers and text."""
+    rows = {
+        key: np.array([getattr(s, key) for s in samples]) for key in ("rig", "label", "detail", "severity", "torque_nm")
+    }
+    tables = {
+        key: np.array([getattr(s, key) for s in samples], dtype=np.float32)
+        for key in ("change", "change_scatter", "gap", "gap_scatter", "alone", "alone_scatter")
+    }
+    part = path.with_suffix(".part.npz")
+    np.savez_compressed(
+        part,
+        allow_pickle=False,
+        change_names=np.array(names[0]),
+        alone_names=np.array(names[1]),
+        **rows,
+        **tables,
+    )
+    part.replace(path)
+
+
+def one_rig(index: int) -> tuple[list[Sample], tuple[tuple[str, ...], tuple[str, ...]] | None]:
+    """Return the samples of one drawn gearbox, with the features' names; none where its teeth cannot be made."""
+    rng = np.random.default_rng([SEED, index])
+    drawn = draw_machine(rng)
+    try:
+        reference = simulate_rig(drawn, severity=0.0, step_angle_rad=STEP_ANGLE_RAD)
+    except (InputError, RefusalError):
+        return [], None
+    if reference.rig is None:
+        raise InputError("a simulated recording has no rig")
+    try:
+        twin = CrackedTwin(reference.rig, nominal_of(reference.rig))
+        sound, simulated = gather(reference, reference.rig), gather(_run(twin, drawn, index), reference.rig)
+    except RefusalError:
+        return [], None
+    samples = []
+    for label, detail, severity, recording, torque_nm in _recordings(drawn, twin, rng):
+        try:
+            samples.append(_sample(index, label, detail, severity, torque_nm, recording, (sound, simulated)))
+        except (InputError, RefusalError) as error:
+            typer.echo(f"gearbox {index}, {label}: {error}")
+    names = change_features(sound, sound).names, features_of(sound).names
+    return samples, names
+
+
+def _sample(
+    rig: int,
+    label: str,
+    detail: str,
+    severity: float,
+    torque_nm: float,
+    recording: Recording,
+    others: tuple[Gathered, Gathered],
+) -> Sample:
+    if recording.rig is None:
+        raise InputError("a simulated recording has no rig")
+    now = gather(recording, recording.rig)
+    change, gap = (change_features(now, other) for other in others)
+    alone = features_of(now)
+    return Sample(
+        rig,
+        label,
+        detail,
+        severity,
+        torque_nm,
+        change.values,
+        change.scatter,
+        gap.values,
+        gap.scatter,
+        alone.values,
+        alone.scatter,
+    )
+
+
+def _run(twin: CrackedTwin, drawn: DrawnRig, index: int) -> Recording:
+    point = Point(drawn.speed_rpm, drawn.torque_nm)
+    return twin.run(point, seed=index, duration_s=drawn.duration_s, sampling_rate_hz=SAMPLING_RATE_HZ, noise=1)
+
+
+def _recordings(
+    drawn: DrawnRig, twin: CrackedTwin, rng: np.random.Generator
+) -> Iterator[tuple[str, str, float, Recording, float]]:
+    """Yield label, detail, severity, recording and torque of everything that is recorded of one gearbox."""
+    sound: list[Recording] = []
+    for run in range(1, N_SOUND + 1):
+        day = another_day(drawn, rng)
+        sound.append(_record(day, run))
+        yield NONE, "", 0.0, sound[-1], drawn.torque_nm * day.torque_factor
+    for i in range(N_FOREIGN):
+        recording, name = with_foreign_vibration(sound[i % N_SOUND], rng)
+        yield UNKNOWN, name, 0.0, recording, drawn.torque_nm
+    for run, name in enumerate(effects(), start=N_SOUND + 1):
+        day = another_day(drawn, rng)
+        try:
+            added = twin.draw(name, rng)
+            setting = EffectSetting(name, added.severity, dict(added.options))
+            recording = _record(day, run, setting)
+        except (InputError, RefusalError) as error:
+            typer.echo(f"{name}: {error}")
+            continue
+        detail = ", ".join(f"{k}={v}" for k, v in setting.options.items())
+        yield name, detail, setting.severity, recording, drawn.torque_nm * day.torque_factor
+
+
+def _record(day: Day, run: int, setting: EffectSetting | None = None) -> Recording:
+    recording = simulate_rig(
+        day.drawn,
+        severity=0.0,
+        run=run,
+        speed_factor=day.speed_factor,
+        torque_factor=day.torque_factor,
+        further=[setting] if setting is not None else [],
+        step_angle_rad=STEP_ANGLE_RAD,
+    )
+    gains = iter(day.gains)
+    factors = np.array([next(gains) if c.is_vibration else 1.0 for c in recording.channels])
+    return replace(recording, samples=recording.samples * factors[:, None])
+
+
+if __name__ == "__main__":
+    main()
