@@ -116,6 +116,7 @@ def _print_effects(model: str) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from gearsig.report.gap_sections import unit_of
     from sims.registry import gap_simulator
 
     table = Table("group", "effect", "severity", "shows in", box=SIMPLE_HEAD, pad_edge=False)
@@ -125,7 +126,7 @@ def _print_effects(model: str) -> None:
         where = ", ".join(kind.replace("_", " ") for kind in effect.shows_in)
         group = "" if effect.group == last else effect.group
         last = effect.group
-        table.add_row(group, f"{effect.name}\n  {effect.title}", effect.unit or "no unit", where)
+        table.add_row(group, f"{effect.name}\n  {effect.title}", unit_of(effect.unit) or "–", where)
     width = None if sys.stdout.isatty() else TABLE_WIDTH
     Console(markup=False, highlight=False, width=width).print(table)
     typer.echo(f"{len(found)} effects that have a meaning for the model {model}; also: none, unknown.")
