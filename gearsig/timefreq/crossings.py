@@ -165,7 +165,7 @@ def _largest_near(power: FloatArray, lines: NDArray[np.int64], columns: NDArray[
 
 def _tops_beside(power: FloatArray, parted: list[FloatArray], start: int) -> list[FloatArray]:
     """Return the largest power's line on either side of the middle between two paths that part again."""
-    middle = np.round((parted[0] + parted[1]) / 2).astype(np.int64)
+    middle = np.clip(np.round((parted[0] + parted[1]) / 2), 0, len(power) - 1).astype(np.int64)
     half = np.ceil(np.abs(parted[0] - parted[1])).astype(np.int64)
     result = [p.copy() for p in parted]
     for i in range(len(middle)):

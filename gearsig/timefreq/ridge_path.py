@@ -15,7 +15,9 @@ _MOST_BEND = 4
 
 NOT_HIDDEN = -(1 << 14)
 """Mark of cells that no other path covers."""
-_CREDIT = 0.8  # score of a hidden cell for a path that crosses: what lies there cannot be seen
+CREDIT = 0.3  # score of a hidden cell for a path that crosses: what lies there cannot be seen
+_NOTHING = 0.1  # score below which a cell holds no ridge
+_ASTRAY = 2.0  # columns that a line costs where no ridge is: else paths leap to whatever is clearer for a while
 _LEAST_ANGLE = 2  # lines per node by which slopes must differ to cross
 
 
@@ -24,13 +26,16 @@ def nodes_apart(n_columns: int) -> int:
     return min(_MOST_COLUMNS_PER_NODE, max(1, n_columns // _FEWEST_NODES))
 
 
-def best_path(scores: FloatArray, hidden: NDArray[np.int16], steepest: float, stiffness: float) -> FloatArray:
+def best_path(
+    scores: FloatArray, hidden: NDArray[np.int16], steepest: float, stiffness: float, *, credit: float = CREDIT
+) -> FloatArray:
     """Return the line of the path in each column.
 
     The path is a chain of straight pieces over q columns each (eight, fewer in short tables), each rising by s lines.
     It maximises Σ scores along the path - `stiffness` Σ max(|s' - s| - 1, 0)²: it pays for changes of slope and not for
     slope, so that it goes straight through a crossing instead of turning into the other branch. Changes by one are
-    free, as slopes between whole numbers need them.
+    free, as slopes between whole numbers need them. Where no ridge is, each line that it travels costs two columns: so
+    it waits for a component that fades, and leaps to another one only if that is clearer for long.
 
     Parameters
     ----------
@@ -42,16 +47,18 @@ def best_path(scores: FloatArray, hidden: NDArray[np.int16], steepest: float, st
     steepest : float
         Lines per column.
     stiffness : float
+    credit : float
+        Score of a covered cell for a path that crosses. With one, a path may weave to and fro across another.
     """
     q = nodes_apart(scores.shape[1])
     n_slopes = min(max(1, int(np.ceil(steepest * q))), scores.shape[0] - 1)
     table = np.ascontiguousarray(scores, dtype=np.float32)
-    path: FloatArray = _search(table, hidden, n_slopes, np.float32(stiffness), q).astype(np.float64)
+    path: FloatArray = _search(table, hidden, n_slopes, np.float32(stiffness), np.float32(credit), q).astype(np.float64)
     return path
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _search(scores, hidden, S, stiffness, q):  # type: ignore[no-untyped-def]
+def _search(scores, hidden, S, stiffness, credit, q):  # type: ignore[no-untyped-def]
     """Viterbi recursion over states (line, slope index s + S)."""
     n_lines, n_columns = scores.shape
     n_nodes = (n_columns + q - 1) // q
@@ -71,8 +78,10 @@ def _search(scores, hidden, S, stiffness, q):  # type: ignore[no-untyped-def]
                     line, column = _at(k, i - S, c, q), node * q + c
                     if hidden[line, column] == NOT_HIDDEN:
                         total += scores[line, column]
+                        if scores[line, column] < _NOTHING:
+                            total -= stiffness * _ASTRAY * abs(i - S) / q
                     elif abs(i - S - hidden[line, column]) >= _LEAST_ANGLE:
-                        total += _CREDIT
+                        total += credit
                 moved[to, i] = total
         for k in range(n_lines):
             for i in range(n_s):

@@ -20,6 +20,7 @@ MOST_COLUMNS = 4000
 """Columns that the search for a path works on; longer transforms are pooled."""
 _SPARE = 8
 """Ridges looked for beyond those asked, of which the strongest are kept: the clearest need not be strong."""
+_LEAST_SEEN = 0.6  # share of its columns in which a path is not covered by others
 _LEAST_SCORE = 0.25  # mean score of a path: below, it hops between maxima of noise
 
 
@@ -59,8 +60,8 @@ def ridges(
     steepest : float
         Lines per (pooled) column that a ridge may rise or fall.
     stiffness : float
-        Price of changing the slope by two lines per eight columns, in columns on the ridge; raise it for chirps in
-        noise, lower it for fast modulation.
+        Price of changing the slope by two lines per eight columns, in columns on the ridge; twice that is the price of
+        a line where no ridge is. Raise it for chirps in noise, lower it for fast modulation.
     lowest, highest : float or None
         Hz or orders between which to look.
 
@@ -80,8 +81,9 @@ def ridges(
     -----
     Two components that come closer than the transform tells them apart, and turn back, look like two that cross: which
     is which is then not in the data, and the ridges cross. See `shared`, and take a longer wavelet or window. A ridge
-    runs through the whole transform: one that begins or ends within it is carried on along what is nearest, so cut the
-    recording, or look at `amplitude`.
+    runs through the whole transform: one that begins or ends within it, or that noise covers for long, is carried on
+    along what is nearest, so cut the recording, or look at `amplitude`. A component shows as long as its amplitude is
+    above that of the noise within the wavelet's or window's band; a longer one has a narrower band.
 
     Source: R. A. Carmona, W. L. Hwang, B. Torrésani, *Multiridge detection and time-frequency reconstruction*, IEEE
     Transactions on Signal Processing 47 (1999), for ridges as penalised paths; the state with slope and the
@@ -152,15 +154,13 @@ def _pooled(power: FloatArray, at: FloatArray, transform: TimeFrequencyMap) -> _
 
 def _paths(grid: _Grid, n_ridges: int, steepest: float, stiffness: float) -> tuple[list[FloatArray], FloatArray]:
     """Return paths, and the power of a component at each cell."""
-    from gearsig.timefreq.ridge_path import best_path
-
     power = ridge_power(grid.power, squeezed=grid.squeezed)
     scores = ridge_scores(power, grid.n_reach)
     found: list[FloatArray] = []
     strengths: list[float] = []
     for _ in range(n_ridges + _SPARE):
         hidden = _hidden(scores.shape, found, grid.n_reach)
-        path = best_path(scores, hidden, steepest, stiffness)
+        path = _seen_path(scores, hidden, steepest, stiffness)
         seen = _along(hidden, path) == NOT_HIDDEN
         if not seen.any() or float(_along(scores, path)[seen].mean()) < _LEAST_SCORE:
             break
@@ -173,9 +173,19 @@ def _paths(grid: _Grid, n_ridges: int, steepest: float, stiffness: float) -> tup
         paths = _settled(paths, grid, power)
         for i in range(len(paths)):  # once more, now that each knows where the others go
             hidden = _hidden(scores.shape, others + paths[:i] + paths[i + 1 :], grid.n_reach)
-            paths[i] = best_path(scores, hidden, steepest, stiffness)
+            paths[i] = _seen_path(scores, hidden, steepest, stiffness)
         paths = _settled(paths, grid, power)
     return paths, power
+
+
+def _seen_path(scores: FloatArray, hidden: NDArray[np.int16], steepest: float, stiffness: float) -> FloatArray:
+    """Return the best path; one that hides behind others, by weaving across them, is searched without credit."""
+    from gearsig.timefreq.ridge_path import best_path
+
+    path = best_path(scores, hidden, steepest, stiffness)
+    if float(np.mean(_along(hidden, path) == NOT_HIDDEN)) >= _LEAST_SEEN:
+        return path
+    return best_path(scores, hidden, steepest, stiffness, credit=0.0)
 
 
 def _settled(paths: list[FloatArray], grid: _Grid, power: FloatArray) -> list[FloatArray]:
