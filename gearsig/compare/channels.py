@@ -1,0 +1,117 @@
+"""Which channel of the simulation belongs to which of the recording, and in what unit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from gearsig.errors import InputError
+from gearsig.recording.types import Channel, Recording
+
+_FACTORS = {
+    "acceleration": {"m/s^2": 1.0, "m/s²": 1.0, "m/s2": 1.0, "mm/s^2": 1e-3, "mm/s²": 1e-3, "g": 9.80665},
+    "velocity": {"m/s": 1.0, "mm/s": 1e-3},
+    "displacement": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
+    "transmission_error": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
+    "sound_pressure": {"Pa": 1.0},
+    "force": {"N": 1.0, "kN": 1e3},
+    "torque": {"N m": 1.0, "Nm": 1.0, "N·m": 1.0, "kN m": 1e3},
+}
+"""SI units in the units that files use, by quantity."""
+
+
+@dataclass(frozen=True)
+class ChannelPair:
+    """Two channels that measure the same.
+
+    Parameters
+    ----------
+    simulated, recorded : str
+    quantity : str
+    unit : str
+        The recording's.
+    factor : float
+        The simulation's values times this are in `unit`.
+    levels_compare : bool
+        Whether both units are known.
+    """
+
+    simulated: str
+    recorded: str
+    quantity: str
+    unit: str
+    factor: float
+    levels_compare: bool
+
+
+def pair_channels(
+    simulated: Recording, recorded: Recording, channels: Sequence[tuple[str, str]] = ()
+) -> tuple[ChannelPair, ...]:
+    """Return the channels that are compared: those named, else those of equal names, else the only one of each.
+
+    Raises
+    ------
+    InputError
+        If it is not clear which belong together, or two measure different things.
+    """
+    names = dict.fromkeys(channels) if channels else _by_name(simulated, recorded)
+    return tuple(
+        _pair(simulated.channels[simulated.index(own)], recorded.channels[recorded.index(other)])
+        for own, other in names
+    )
+
+
+def _by_name(simulated: Recording, recorded: Recording) -> list[tuple[str, str]]:
+    own, other = simulated.vibration_names(), recorded.vibration_names()
+    for side, names in (("simulation", own), ("recording", other)):
+        if not names:
+            raise InputError(
+                f"the {side} has no vibration channel",
+                allowed="a channel of acceleration, velocity, displacement, sound pressure, force or torque",
+                remedy="state the quantity in the rig file's [[sensor]] tables",
+            )
+    common = [(name, name) for name in other if name in own]
+    if common:
+        return common
+    if len(own) == len(other) == 1:
+        return [(own[0], other[0])]
+    raise InputError(
+        f"no channel names agree: the simulation has {', '.join(own)}; the recording has {', '.join(other)}",
+        remedy=f'say which belong together, e.g. --channel "{own[0]}={other[0]}"',
+    )
+
+
+def _pair(own: Channel, other: Channel) -> ChannelPair:
+    names = f"channels {own.name!r} of the simulation and {other.name!r} of the recording"
+    for channel in (own, other):
+        if not channel.is_vibration:
+            raise InputError(
+                f"channel {channel.name!r} is a {channel.quantity.replace('_', ' ')}", allowed="a vibration channel"
+            )
+    if "unknown" not in (own.quantity, other.quantity) and own.quantity != other.quantity:
+        raise InputError(
+            f"{names} measure different things: {own.quantity.replace('_', ' ')} and "
+            f"{other.quantity.replace('_', ' ')}",
+            allowed="the same quantity",
+            remedy="compare other channels with --channel, or integrate one of them first",
+        )
+    quantity = other.quantity if other.quantity != "unknown" else own.quantity
+    known = bool(own.unit and other.unit)
+    factor = _factor(own.unit, other.unit, quantity) if known else 1.0
+    if factor is None:
+        raise InputError(
+            f"{names} are in {own.unit} and {other.unit}",
+            allowed="the same unit, or two of one quantity",
+            remedy="state unit and scale in the rig file's [[sensor]] tables",
+        )
+    return ChannelPair(own.name, other.name, quantity, other.unit or own.unit, factor, known)
+
+
+def _factor(own: str, other: str, quantity: str) -> float | None:
+    if own == other:
+        return 1.0
+    for name in (quantity,) if quantity != "unknown" else tuple(_FACTORS):
+        units = _FACTORS.get(name, {})
+        if own in units and other in units:
+            return units[own] / units[other]
+    return None

@@ -1,0 +1,86 @@
+"""What the reader of a comparison should know before believing a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from gearsig.compare.side import LEAST_REVOLUTIONS, Side
+from gearsig.compare.types import Alignment, ChannelComparison
+
+SAME_SPEED, OTHER_SPEED = 0.03, 0.10
+"""Relative differences of speed: not worth a word; and so large that resonances meet other orders."""
+
+STEADY = 0.03
+"""Relative range of speed within one record up to which one average stands for all of it."""
+
+WORTH_SAYING = 0.1
+"""Correlation that a turned mark would gain."""
+
+
+def remarks(
+    own: Side,
+    other: Side,
+    alignments: Sequence[Alignment],
+    channels: Sequence[ChannelComparison],
+    ratios: Mapping[str, float],
+) -> tuple[str, ...]:
+    """Return remarks on speeds, shafts left out, alignment and units."""
+    texts = _speed_texts(own, other)
+    left_out = [shaft for shaft in ratios if shaft not in {a.shaft for a in alignments}]
+    if left_out:
+        texts.append(
+            f"Shaft {', '.join(left_out)} makes fewer than {LEAST_REVOLUTIONS} revolutions in one of the records: its "
+            "average and its lines are left out."
+        )
+    for alignment in alignments:
+        texts += _alignment_texts(alignment)
+    unknown = [channel.name for channel in channels if not channel.levels_compare]
+    if unknown:
+        texts.append(
+            f"The unit of {', '.join(unknown)} is not known on one side: compare shapes and differences of levels "
+            "between lines, not levels."
+        )
+    return tuple(texts)
+
+
+def _speed_texts(own: Side, other: Side) -> list[str]:
+    texts = []
+    simulated, recorded = own.angle.mean_speed_rpm, other.angle.mean_speed_rpm
+    off = simulated / recorded - 1.0
+    if abs(off) > OTHER_SPEED:
+        texts.append(
+            f"The simulation turns at {simulated:.5g} rpm, the recording at {recorded:.5g} rpm ({100 * off:+.0f} %): "
+            "orders are compared all the same, but each meets other resonances, and forces change with the speed."
+        )
+    elif abs(off) > SAME_SPEED:
+        texts.append(
+            f"The simulation turns {abs(100 * off):.1f} % {'faster' if off > 0 else 'slower'} than the recording: "
+            "compared by order; levels near resonances differ for that alone."
+        )
+    for side, name in ((own, "simulation"), (other, "recording")):
+        low, high = side.angle.speed_range_rpm
+        if high - low > STEADY * side.angle.mean_speed_rpm:
+            texts.append(
+                f"The speed of the {name} runs from {low:.5g} to {high:.5g} rpm: levels are means over all of it."
+            )
+    return texts
+
+
+def _alignment_texts(alignment: Alignment) -> list[str]:
+    name = f"of shaft {alignment.shaft}" if alignment.shaft else ""
+    if alignment.method == "marks":
+        if alignment.gain > WORTH_SAYING:
+            text = (
+                f"The averages {name} are aligned by their marks; turned by {alignment.best_shift_deg:.4g}° more they "
+                f"would correlate better by {alignment.gain:.2f}. A simulation's mark need not sit where the rig's "
+                "does: align by correlation then."
+            )
+            return [text]
+        return []
+    if alignment.tooth_is_certain is False:
+        text = (
+            f"No tooth {name} stands out enough to tell which is which: the simulation's average is aligned to a "
+            "whole number of teeth, and differences from tooth to tooth mean nothing."
+        )
+        return [text]
+    return []
