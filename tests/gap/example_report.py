@@ -139,7 +139,7 @@ def all_reports() -> dict[str, GapReport]:
 def conditions(n: int) -> tuple[ConditionFacts, ...]:
     """Return facts of the first `n` recordings."""
     return tuple(
-        ConditionFacts(f"condition_{i}.h5", point, point.speed_rpm / 10, 6.0, 20_000.0)
+        ConditionFacts(f"condition_{i}.h5", point, round(point.speed_rpm / 10, 2), 6.0, 20_000.0)
         for i, point in enumerate(POINTS[:n], 1)
     )
 

@@ -1,0 +1,48 @@
+"""What gap.json says comes back as the report that it was written of."""
+
+from dataclasses import replace
+from math import nan
+
+import numpy as np
+import pytest
+
+from gearsig.errors import InputError
+from gearsig.report.gap_json import gap_to_dict, write_gap_json
+from gearsig.report.gap_reading import gap_from_dict, read_gap_json
+from tests.gap.example_report import all_reports, effect_report
+
+REPORTS = all_reports()
+
+
+@pytest.mark.parametrize("outcome", list(REPORTS))
+def test_there_and_back(outcome, tmp_path):
+    report = REPORTS[outcome]
+    again = read_gap_json(write_gap_json(report, tmp_path / "gap.json"))
+    plain = {"spectra": (), "angles": ()}
+    assert replace(again, **plain) == replace(report, **plain)
+    for one, other in zip((*again.spectra, *again.angles), (*report.spectra, *report.angles), strict=True):
+        np.testing.assert_allclose(one.measured, other.measured, rtol=1e-8)
+        np.testing.assert_allclose(one.after, other.after, rtol=1e-8)
+    assert gap_to_dict(again) == gap_to_dict(report)
+
+
+def test_null_is_nan():
+    again = gap_from_dict(gap_to_dict(replace(effect_report(), repeatability=nan)))
+    assert np.isnan(again.repeatability)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        '{"schema": "gearsig.gap", "schema_version": 2}',
+        '{"schema": "gearsig.gap", "schema_version": 1}',
+    ],
+)
+def test_what_is_no_report_is_refused(tmp_path, text):
+    path = tmp_path / "gap.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"gap\.json"):
+        read_gap_json(path)
