@@ -94,7 +94,8 @@ def _end_with_parent() -> None:
     """Wait for the end of standard input in a thread; then end this process and those that it started."""
 
     def wait() -> None:
-        sys.stdin.buffer.read()
+        while os.read(sys.stdin.fileno(), 1024):  # not through sys.stdin: its lock would be in the way at the end
+            pass
         if hasattr(os, "killpg"):
             os.killpg(os.getpgrp(), signal.SIGTERM)
         os._exit(1)
