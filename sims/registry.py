@@ -10,6 +10,7 @@ import numpy as np
 
 from gearsig.checks import closest_match_hint
 from gearsig.errors import InputError
+from gearsig.gap.simulator import GapSimulator
 from sims.effects.effect import EffectSetting
 from sims.machine.operation import Operation
 from sims.simulator import ParameterValue, Simulator
@@ -30,6 +31,27 @@ def simulator(name: str) -> Simulator:
     if name not in found:
         raise InputError(
             f"there is no model {name!r}", allowed=", ".join(found), remedy=closest_match_hint(name, found)
+        )
+    return found[name]
+
+
+@cache
+def gap_simulators() -> dict[str, GapSimulator]:
+    """Return every simulator that takes part in the gap diagnosis, by its name."""
+    from sims.cracked.twin import CrackedGapSimulator
+
+    found: tuple[GapSimulator, ...] = (CrackedGapSimulator(),)
+    return {simulator.name: simulator for simulator in found}
+
+
+def gap_simulator(name: str) -> GapSimulator:
+    """Return the simulator called `name` as the gap diagnosis takes it."""
+    found = gap_simulators()
+    if name not in found:
+        raise InputError(
+            f"there is no model {name!r} with a gap diagnosis",
+            allowed=", ".join(found),
+            remedy=closest_match_hint(name, found),
         )
     return found[name]
 

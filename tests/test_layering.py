@@ -21,6 +21,7 @@ CHAIN = (
     "indicators",
     "severity",
     "diagnosis",
+    "compare",
     "gap",
     "plot",
     "report",
@@ -58,8 +59,8 @@ def test_the_library_knows_no_simulator_and_no_app() -> None:
     assert not offences(lambda name, m: starts_with(m, "sims", "app") if name.startswith("gearsig/") else set())
 
 
-def test_simulators_use_only_rig_and_recording() -> None:
-    allowed = ("gearsig.rig", "gearsig.recording", "gearsig.checks", "gearsig.errors")
+def test_simulators_use_only_rig_recording_and_the_protocol_of_the_gap_diagnosis() -> None:
+    allowed = ("gearsig.rig", "gearsig.recording", "gearsig.checks", "gearsig.errors", "gearsig.gap.simulator")
 
     def wrong(name: str, modules: set[str]) -> set[str]:
         if not name.startswith("sims/"):

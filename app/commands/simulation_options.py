@@ -17,7 +17,12 @@ if TYPE_CHECKING:
     from sims.simulator import ParameterValue, Simulator
 
 PresetOption = Annotated[
-    str, typer.Option("--preset", metavar="NAME", help="Machine to start from; default: the model's first.")
+    str,
+    typer.Option(
+        "--preset",
+        metavar="NAME",
+        help="Machine to start from, or a preset file, NAME.toml; default: the model's first.",
+    ),
 ]
 SetOption = Annotated[
     list[str] | None,
@@ -76,6 +81,7 @@ def read_request(
 ) -> Request:
     """Return what the options ask for; names and units are checked here, ranges by the simulator."""
     from app.profile import course
+    from sims.presets import is_file
     from sims.presets import preset as preset_named
     from sims.registry import simulator, simulators
 
@@ -85,7 +91,7 @@ def read_request(
     duration_s = quantity(duration, "s", "--duration")
     return Request(
         model,
-        preset_named(model, preset).name,
+        preset if is_file(preset) else preset_named(model, preset).name,
         dict(read_parameter(chosen, text) for text in settings or ()),
         tuple(read_effect(text) for text in effects or ()),
         None if speed is None else course(speed, "speed_rpm", "rpm", duration_s),

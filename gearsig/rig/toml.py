@@ -80,28 +80,28 @@ def rig_from_dict(data: dict[str, Any], where: str = "rig") -> Rig:
         tables = data.get(name, [])
         if not isinstance(tables, list) or not all(isinstance(t, dict) for t in tables):
             raise InputError(f"{name!r} is not a list of tables", where=where, remedy=f"write [[{name}]]")
-        parts[name + "s"] = tuple(_build(kind, t, f"{where}: [[{name}]] {i}") for i, t in enumerate(tables, 1))
+        parts[name + "s"] = tuple(from_table(kind, t, f"{where}: [[{name}]] {i}") for i, t in enumerate(tables, 1))
     parts["shafts"] = _with_implied_shafts(parts["shafts"], parts["pairs"], parts["bearings"])
     if "operating_point" in data:
-        parts["operating_point"] = _build(OperatingPoint, data["operating_point"], f"{where}: [operating_point]")
+        parts["operating_point"] = from_table(OperatingPoint, data["operating_point"], f"{where}: [operating_point]")
     if "speed" in data:
         parts["speed"] = _speed(data["speed"], f"{where}: [speed]")
     plain = {key: data[key] for key in _PLAIN if key in data}
-    return _build(Rig, plain, where, **parts)  # type: ignore[no-any-return]
+    return from_table(Rig, plain, where, **parts)  # type: ignore[no-any-return]
 
 
 def rig_to_dict(rig: Rig) -> dict[str, Any]:
     """Return tables that `rig_from_dict` reads back to the same rig; pulse times are left out: a record's own."""
     data: dict[str, Any] = {key: value for key in _PLAIN if (value := _plain(getattr(rig, key)))}
     for name in _LISTS:
-        items = [_given(item) for item in getattr(rig, name + "s")]
+        items = [to_table(item) for item in getattr(rig, name + "s")]
         if items:
             data[name] = items
     if rig.operating_point != OperatingPoint():
-        data["operating_point"] = _given(rig.operating_point)
+        data["operating_point"] = to_table(rig.operating_point)
     if rig.speed is not None and not isinstance(rig.speed, PulseTimes):
         source = next(name for name, kind in _SPEED_SOURCES.items() if kind is type(rig.speed))
-        data["speed"] = {"source": source} | _given(rig.speed)
+        data["speed"] = {"source": source} | to_table(rig.speed)
     return data
 
 
@@ -131,11 +131,11 @@ def _speed(table: Any, where: str) -> SpeedSource | None:
             allowed=", ".join((*_SPEED_SOURCES, "none")),
             remedy=closest_match_hint(source, _SPEED_SOURCES),
         )
-    return _build(_SPEED_SOURCES[source], rest, where)  # type: ignore[no-any-return]
+    return from_table(_SPEED_SOURCES[source], rest, where)  # type: ignore[no-any-return]
 
 
-def _build(kind: type, table: Any, where: str, **ready: Any) -> Any:
-    """Make one dataclass from a TOML table after checking its keys and the types of its values."""
+def from_table(kind: type, table: Any, where: str, **ready: Any) -> Any:
+    """Make one dataclass from a TOML table after checking its keys and the types of its values; `where` names it."""
     if not isinstance(table, dict):
         raise InputError("is not a table", where=where, allowed="key = value lines")
     known = {f.name: f for f in fields(kind)}
@@ -170,6 +170,8 @@ def _typed(value: Any, hint: Any, where: str) -> Any:
         return value
     if get_args(kind)[:1] == (str,) and isinstance(value, list) and all(isinstance(v, str) for v in value):
         return tuple(value)
+    if get_args(kind)[:1] == (float,) and isinstance(value, list):
+        return tuple(_typed(v, float, where) for v in value)
     names = {float: "a number", int: "a whole number", str: "text in quotes", bool: "true or false"}
     raise InputError(f"is {value!r}", where=where, allowed=names.get(kind, "a list of texts"))
 
@@ -188,8 +190,8 @@ def _with_implied_shafts(
     return (*shafts, *(Shaft(name) for name in new))
 
 
-def _given(item: Any) -> dict[str, Any]:
-    """Fields of a dataclass that differ from their defaults."""
+def to_table(item: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass that differ from their defaults: `from_table` reads them back."""
     return {f.name: _plain(v) for f in fields(item) if (v := getattr(item, f.name)) is not None and v != f.default}
 
 

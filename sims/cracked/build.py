@@ -12,6 +12,7 @@ from gearsig.errors import InputError
 from gearsig.rig.speed import EncoderChannel, SpeedSource, TachometerChannel
 from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
 from sims.cracked.chain import build_chain
+from sims.cracked.installed import Installed
 from sims.cracked.wanted import Wanted
 from sims.machine import BearingSupport, Drive, Lubrication, Machine, Roughness, ShaftLine, Wheel
 from sims.machine.operation import Course, Operation
@@ -30,11 +31,11 @@ from sims.values import Values
 
 _SIDES = ("driver", "driven")
 SHAFTS = ("input", "output")
-"""Names of the driver's and the driven shaft."""
+"""Names of the driver's and the driven shaft where none are given."""
 
 
-def build_machine(values: Values, *, sampling_rate_hz: float = 20480.0) -> Machine:
-    """Return the machine that complete values of `PARAMETERS` describe.
+def build_machine(values: Values, *, sampling_rate_hz: float = 20480.0, installed: Installed | None = None) -> Machine:
+    """Return the machine that complete values of `PARAMETERS` describe, with what is fitted to it.
 
     Raises
     ------
@@ -49,9 +50,14 @@ def build_machine(values: Values, *, sampling_rate_hz: float = 20480.0) -> Machi
     return Machine(
         mesh=mesh,
         wheels=(_wheel(wanted, mesh, 0), _wheel(wanted, mesh, 1)),
-        shafts=(_shaft(wanted, 0), _shaft(wanted, 1)),
-        bearings=(_bearing(wanted, 1), _bearing(wanted, 2), _bearing(wanted, 3), _bearing(wanted, 4)),
-        chain=build_chain(wanted, line_deg, _first_pulse_rev(mesh.pair), sampling_rate_hz),
+        shafts=(_shaft(wanted, 0, installed), _shaft(wanted, 1, installed)),
+        bearings=(
+            _bearing(wanted, 1, installed),
+            _bearing(wanted, 2, installed),
+            _bearing(wanted, 3, installed),
+            _bearing(wanted, 4, installed),
+        ),
+        chain=build_chain(wanted, line_deg, _first_pulse_rev(mesh.pair), sampling_rate_hz, installed),
         mesh_damping_ratio=wanted.number("mesh_damping_ratio"),
         half_backlash_um=wanted.number("half_backlash_um"),
         lubrication=Lubrication(
@@ -123,12 +129,14 @@ def build_rig(machine: Machine, operation: Operation, *, name: str = "", sources
     )
 
 
-def _first_pulse_rev(pair: PairGeometry) -> float:
+def _first_pulse_rev(pair: PairGeometry) -> tuple[float, float]:
     """Angle at which the tachometer's disc is fitted: half a tooth pitch later, tooth 0 is half through its contact.
 
     So tooth 0 is engaged during the first pitch after the edge, tooth 1 during the next: as diagnoses count teeth.
+    One for a disc on the driver's shaft, one for the driven shaft.
     """
-    return (pair.contact_ratio / 2.0 - 0.5) / pair.driver.teeth
+    pitches = pair.contact_ratio / 2.0 - 0.5
+    return pitches / pair.driver.teeth, pitches / pair.driven.teeth
 
 
 def _gear(wanted: Wanted, side: int) -> GearGeometry:
@@ -187,9 +195,9 @@ def _wheel(wanted: Wanted, mesh: GearMesh, side: int) -> Wheel:
     )
 
 
-def _shaft(wanted: Wanted, side: int) -> ShaftLine:
+def _shaft(wanted: Wanted, side: int, installed: Installed | None) -> ShaftLine:
     return ShaftLine(
-        SHAFTS[side],
+        SHAFTS[side] if installed is None else installed.shafts[side],
         wanted.number("bending_stiffness_n_per_m"),
         wanted.number("bending_damping_n_s_per_m"),
         wanted.number("torsional_stiffness_nm_per_rad"),
@@ -199,15 +207,8 @@ def _shaft(wanted: Wanted, side: int) -> ShaftLine:
     )
 
 
-def _bearing(wanted: Wanted, number: int) -> BearingSupport:
-    bearing = Bearing(
-        f"bearing {number}",
-        SHAFTS[(number - 1) // 2],
-        wanted.whole("n_balls"),
-        wanted.number("ball_diameter_mm"),
-        wanted.number("ball_pitch_diameter_mm"),
-        wanted.number("ball_contact_angle_deg"),
-    )
+def _bearing(wanted: Wanted, number: int, installed: Installed | None) -> BearingSupport:
+    bearing = _usual_bearing(wanted, number) if installed is None else installed.bearings[number - 1]
     _check_balls(bearing)
     return BearingSupport(
         bearing,
@@ -215,6 +216,17 @@ def _bearing(wanted: Wanted, number: int) -> BearingSupport:
         wanted.number("bearing_stiffness_n_per_m"),
         wanted.number("bearing_damping_n_s_per_m"),
         wanted.number("bearing_clearance_um"),
+    )
+
+
+def _usual_bearing(wanted: Wanted, number: int) -> Bearing:
+    return Bearing(
+        f"bearing {number}",
+        SHAFTS[(number - 1) // 2],
+        wanted.whole("n_balls"),
+        wanted.number("ball_diameter_mm"),
+        wanted.number("ball_pitch_diameter_mm"),
+        wanted.number("ball_contact_angle_deg"),
     )
 
 

@@ -110,12 +110,12 @@ def slowest_decay_s(machine: Machine, operation: Operation) -> float:
     return max(recovery, 1.0 / max(float(-ringing.real.max()), 1e-3) if len(ringing) else 0.0)
 
 
-def default_step_s(machine: Machine, operation: Operation) -> float:
+def default_step_s(machine: Machine, operation: Operation, step_angle_rad: float = STEP_ANGLE_RAD) -> float:
     """Step that stiffness, damping and tooth passage allow."""
     force = operation.torque_nm.largest / (machine.mesh.pair.driver.base_radius_mm * 1e-3)
     m, k, c = matrices(machine, force)
     fastest = 2.0 * pi * float(_frequencies_hz(m, k)[-1])
-    step = min(STEP_ANGLE_RAD / fastest, STABLE / _fastest_rate_per_s(m, k, c))
+    step = min(step_angle_rad / fastest, STABLE / _fastest_rate_per_s(m, k, c))
     mesh_hz = operation.speed_rpm.largest / 60.0 * machine.mesh.pair.driver.teeth
     if mesh_hz > 0.0 and machine.mesh.ramp > 0.0:
         step = min(step, machine.mesh.ramp / mesh_hz / STEPS_PER_RAMP)

@@ -42,6 +42,7 @@ def simulate_machine(
     rig: Rig | None = None,
     truth: Mapping[str, Any] | None = None,
     step_s: float | None = None,
+    noise_rng: np.random.Generator | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Recording:
     """Simulate the sixteen coordinates and measure them; see `simulate_with_motion`."""
@@ -54,6 +55,7 @@ def simulate_machine(
         rig=rig,
         truth=truth,
         step_s=step_s,
+        noise_rng=noise_rng,
         on_progress=on_progress,
     )
     return recording
@@ -71,6 +73,7 @@ def simulate_with_motion(
     step_s: float | None = None,
     also: Sequence[str] = (),
     first: State | None = None,
+    noise_rng: np.random.Generator | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> tuple[Recording, Response]:
     """Simulate the sixteen coordinates and measure them; return the recording and the motion behind it.
@@ -95,6 +98,8 @@ def simulate_with_motion(
         Signals of `sims.cracked.layout.SIGNALS` wanted in the motion besides those that are measured.
     first : State or None
         Where the lead-in starts; None: at the static balance.
+    noise_rng : numpy.random.Generator or None
+        For the chain, instead of the stream made of `rng`: the same machine with other noise.
     on_progress : callable or None
         Called now and then with the part of the motion that is done, 0 to 1.
 
@@ -142,7 +147,7 @@ def simulate_with_motion(
     }
     recording = chain.record(
         motion,
-        rng=chain_rng,
+        rng=chain_rng if noise_rng is None else noise_rng,
         rig=rig,
         duration_s=duration_s,
         lead_in_s=lead,

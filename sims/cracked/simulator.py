@@ -10,11 +10,12 @@ import numpy as np
 
 from gearsig.checks import within
 from gearsig.recording.types import Recording
+from sims.cracked.installed_table import installed_of
 from sims.cracked.parameters import PARAMETERS
 from sims.effects import EffectSetting, effect, effects, with_effects
 from sims.machine import Machine
 from sims.machine.operation import Course, Operation
-from sims.presets import preset, presets
+from sims.presets import Preset, preset, presets
 from sims.simulator import Parameter, ParameterValue
 from sims.values import Values, complete_values
 
@@ -113,17 +114,8 @@ class CrackedPair:
         sampling_rate_hz: float = 20480.0,
     ) -> Prepared:
         """Build the machine and switch its effects on; one number is drawn from `rng`, with and without effects."""
-        from sims.cracked.build import build_machine
-
         chosen = preset(NAME, preset_name)
-        values = complete_values(PARAMETERS, chosen.parameters, parameters)
-        run = operation or chosen.operation
-        _check_run(run, sampling_rate_hz)
-        complete = tuple(EffectSetting(s.name, s.severity, effect(s.name).complete(s.options)) for s in settings)
-        sound = build_machine(values, sampling_rate_hz=sampling_rate_hz)
-        _check_load(sound, run)
-        machine = with_effects(sound, complete, rng)
-        return Prepared(machine, run, chosen.name, values, complete)
+        return prepare_preset(chosen, parameters, settings, operation, rng, sampling_rate_hz=sampling_rate_hz)
 
     def simulate(
         self,
@@ -178,6 +170,29 @@ class CrackedPair:
 
         ready = self.prepare(parameters, effects, operation, rng, preset_name=preset)
         return check_convergence(ready.machine, ready.operation, rng)
+
+
+def prepare_preset(
+    chosen: Preset,
+    parameters: Mapping[str, ParameterValue],
+    settings: Sequence[EffectSetting],
+    operation: Operation | None,
+    rng: np.random.Generator,
+    *,
+    sampling_rate_hz: float = 20480.0,
+) -> Prepared:
+    """Build a preset's machine and switch on its effects and `settings`; one number is drawn from `rng`."""
+    from sims.cracked.build import build_machine
+
+    values = complete_values(PARAMETERS, chosen.parameters, parameters)
+    run = operation or chosen.operation
+    _check_run(run, sampling_rate_hz)
+    wanted = (*chosen.effects, *settings)
+    complete = tuple(EffectSetting(s.name, s.severity, effect(s.name).complete(s.options)) for s in wanted)
+    installed = installed_of(chosen.installed) if chosen.installed else None
+    sound = build_machine(values, sampling_rate_hz=sampling_rate_hz, installed=installed)
+    _check_load(sound, run)
+    return Prepared(with_effects(sound, complete, rng), run, chosen.name, values, complete)
 
 
 def _check_run(operation: Operation, sampling_rate_hz: float) -> None:

@@ -1,21 +1,28 @@
-"""Reads the presets that come with the simulators."""
+"""Reads presets: those that come with the simulators, and files that people give."""
 
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from gearsig.checks import closest_match_hint
+from gearsig.checks import closest_match_hint, not_negative
 from gearsig.errors import InputError
+from sims.effects.effect import EffectSetting
 from sims.machine.operation import Operation
 from sims.simulator import ParameterValue
 
 _TABLES = ("about", "parameters", "operation")
 _ABOUT = ("model", "title", "sources", "assumed", "does_not_represent")
+_OPERATION = ("speed_rpm", "torque_nm")
+_OPTIONAL = ("effects", "installed")
+_EFFECT = ("name", "severity", "options")
+MOST_BYTES = 1_000_000
+"""A preset is a page or two; anything larger is something else."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +42,10 @@ class Preset:
         What differs from the model's defaults.
     speed_rpm, torque_nm : float
         Of the input shaft.
+    effects : tuple of EffectSetting
+        That the machine has from the start.
+    installed : mapping
+        What is fitted besides the parameters, as its simulator reads it; empty: what is usual.
     """
 
     name: str
@@ -46,6 +57,8 @@ class Preset:
     parameters: MappingProxyType[str, ParameterValue]
     speed_rpm: float
     torque_nm: float
+    effects: tuple[EffectSetting, ...] = ()
+    installed: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def operation(self) -> Operation:
@@ -61,17 +74,24 @@ def presets(model: str) -> dict[str, Preset]:
 
 
 def preset(model: str, name: str) -> Preset:
-    """Return the preset `name` of a model; an empty name is its first."""
+    """Return the preset `name` of a model; an empty name is its first, one that ends in .toml is a file."""
+    if is_file(name):
+        return _of_model(read_preset(Path(name)), model)
     found = presets(model)
     if not name and found:
         return next(iter(found.values()))
     if name not in found:
         raise InputError(
             f"{model} has no preset {name!r}",
-            allowed=", ".join(found) or "none: it has no presets",
+            allowed=", ".join([*found, "or a file, NAME.toml"]),
             remedy=closest_match_hint(name, found),
         )
     return found[name]
+
+
+def is_file(name: str) -> bool:
+    """Say whether a preset is asked for by its file."""
+    return name.lower().endswith(".toml")
 
 
 def read_preset(path: Path) -> Preset:
@@ -80,26 +100,100 @@ def read_preset(path: Path) -> Preset:
     Raises
     ------
     InputError
-        If a table or key is missing or not known. Parameters are checked by their simulator.
+        If the file cannot be read, or a table or key is missing, not known or of another form. Values of parameters,
+        effects and of what is installed are checked by their simulator.
     """
-    data = tomllib.loads(path.read_text(encoding="utf-8"))
-    _check_keys(data, _TABLES, path.name)
-    about, operation = data["about"], data["operation"]
-    _check_keys(about, _ABOUT, f"{path.name}: [about]")
-    _check_keys(operation, ("speed_rpm", "torque_nm"), f"{path.name}: [operation]")
+    data, where = _read(path), path.name
+    _check_keys(data, _TABLES, where, _OPTIONAL)
+    about, operation = (_table(data[name], f"{where}: [{name}]") for name in ("about", "operation"))
+    _check_keys(about, _ABOUT, f"{where}: [about]")
+    _check_keys(operation, _OPERATION, f"{where}: [operation]")
+    sources, assumed, lacking = (_texts(about[name], f"{where}: {name} of [about]") for name in _ABOUT[2:])
+    speed, torque = (not_negative(_number(operation[name], f"{where}: {name}"), name) for name in _OPERATION)
     return Preset(
         name=path.stem,
-        model=about["model"],
-        title=about["title"],
-        sources=tuple(about["sources"]),
-        assumed=tuple(about["assumed"]),
-        does_not_represent=tuple(about["does_not_represent"]),
-        parameters=MappingProxyType(dict(data["parameters"])),
-        speed_rpm=float(operation["speed_rpm"]),
-        torque_nm=float(operation["torque_nm"]),
+        model=_text(about["model"], f"{where}: model of [about]"),
+        title=_text(about["title"], f"{where}: title of [about]"),
+        sources=sources,
+        assumed=assumed,
+        does_not_represent=lacking,
+        speed_rpm=speed,
+        torque_nm=torque,
+        parameters=MappingProxyType(_values(data["parameters"], f"{where}: [parameters]")),
+        effects=_effects(data.get("effects", []), f"{where}: [[effects]]"),
+        installed=MappingProxyType(_table(data.get("installed", {}), f"{where}: [installed]")),
     )
 
 
-def _check_keys(table: dict[str, Any], keys: tuple[str, ...], where: str) -> None:
-    if set(table) != set(keys):
-        raise InputError(f"has the keys {', '.join(table)}", where=where, allowed=", ".join(keys))
+def _of_model(found: Preset, model: str) -> Preset:
+    if found.model != model:
+        raise InputError(f"is a preset of the model {found.model!r}", where=f"{found.name}.toml", allowed=f"{model!r}")
+    return found
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise InputError(f"{path.stat().st_size} bytes", where=path.name, allowed="a preset of up to 1 MB")
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="check the path") from None
+    except UnicodeDecodeError:
+        raise InputError("is not text in UTF-8", where=path.name) from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"is not valid TOML: {error}", where=path.name) from None
+
+
+def _effects(rows: object, where: str) -> tuple[EffectSetting, ...]:
+    if not isinstance(rows, list):
+        raise InputError("is not a list of tables", where=where, allowed="[[effects]] with name, severity, options")
+    found = []
+    for row in rows:
+        table = _table(row, where)
+        _check_keys(table, _EFFECT[:2], where, _EFFECT[2:])
+        options = _values(table.get("options", {}), f"{where}: options")
+        found.append(EffectSetting(_text(table["name"], where), _number(table["severity"], where), options))
+    return tuple(found)
+
+
+def _values(table: object, where: str) -> dict[str, ParameterValue]:
+    found = _table(table, where)
+    for name, value in found.items():
+        if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+            raise InputError(f"{name} is {value!r}", where=where, allowed="a number or a text in quotes")
+    return found
+
+
+def _table(value: object, where: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise InputError("is not a table", where=where, allowed="key = value lines")
+    return value
+
+
+def _texts(value: object, where: str) -> tuple[str, ...]:
+    if not isinstance(value, list):
+        raise InputError(f"is {value!r}", where=where, allowed="a list of texts")
+    return tuple(_text(item, where) for item in value)
+
+
+def _text(value: object, where: str) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"is {value!r}", where=where, allowed="a text in quotes")
+    return value
+
+
+def _number(value: object, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise InputError(f"is {value!r}", where=where, allowed="a number")
+    return float(value)
+
+
+def _check_keys(table: Mapping[str, Any], keys: tuple[str, ...], where: str, optional: tuple[str, ...] = ()) -> None:
+    missing, unknown = [k for k in keys if k not in table], [k for k in table if k not in (*keys, *optional)]
+    if unknown:
+        hint = closest_match_hint(unknown[0], (*keys, *optional))
+        raise InputError(
+            f"there is no key {unknown[0]!r}", where=where, allowed=", ".join((*keys, *optional)), remedy=hint
+        )
+    if missing:
+        raise InputError(f"{', '.join(missing)} must be given", where=where)

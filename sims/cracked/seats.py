@@ -1,0 +1,127 @@
+"""A rig's bearings and sensors at the places that the model has for them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from gearsig.rig.speed import TachometerChannel
+from gearsig.rig.types import Bearing, Rig
+from sims.cracked.installed import HousingMode, Installed, Pickup, SensorSeat
+
+BALLS, BALL_MM, PITCH_MM = 9, 7.94, 39.04
+"""A usual bearing of a machine of size 1."""
+USUAL_SPLIT = 0.4
+"""BPFO over the number of elements, where only one order is known."""
+SEAT_ORDER = (1, 3, 2, 4)
+"""Bearings under the sensors whose place is not told."""
+MOST_SENSORS = 4
+LEAST_PULSES = 4
+"""Per revolution, where the rig's speed is not told by a tachometer: well known speed, but no mark on a tooth."""
+
+
+def installed_of_rig(rig: Rig, size: float, modes: Sequence[HousingMode], used: Sequence[str] = ()) -> Installed:
+    """Return the rig's own shafts, bearings, sensors and tachometer; what it lacks is usual for the size.
+
+    Parameters
+    ----------
+    rig : Rig
+        With one gear pair.
+    size : float
+        See `sims.cracked.usual.Nominal.size`.
+    modes : sequence of HousingMode
+    used : sequence of str
+        Bearings that must have a place: a model's shaft has only two.
+    """
+    pair = rig.pairs[0]
+    shafts = (pair.driver, pair.driven)
+    bearings: list[Bearing] = []
+    for side in range(2):
+        own = sorted(own_bearings(rig, shafts[side]), key=lambda b: b.name not in used)[:2]
+        bearings += [completed(b, size) for b in own]
+        bearings += [_spare(rig, shafts[side], 2 * side + n + 1, size) for n in range(len(own), 2)]
+    pickup = _pickup(rig, shafts)
+    return Installed(
+        shafts,
+        tuple(bearings),  # type: ignore[arg-type]  # four
+        _sensors(rig, bearings, pickup.channel),
+        tuple(modes),
+        pickup,
+    )
+
+
+def own_bearings(rig: Rig, shaft: str) -> list[Bearing]:
+    """Return the bearings of a shaft, in the rig's order."""
+    return [b for b in rig.bearings if b.shaft == shaft]
+
+
+def completed(bearing: Bearing, size: float) -> Bearing:
+    """Return a bearing with a geometry that gives its orders; where nothing is known, a usual one's.
+
+    n = BPFO + BPFI and d/D = (BPFI − BPFO)/n, with contact angle 0.
+    """
+    if bearing.n_rolling_elements is not None:
+        return bearing
+    outer, inner = bearing.bpfo_order, bearing.bpfi_order
+    n, share = BALLS, BALL_MM / PITCH_MM
+    if outer is not None and inner is not None:
+        n = max(round(outer + inner), 3)
+        share = (inner - outer) / n
+    elif outer is not None or inner is not None:
+        n = max(round((outer or 0.0) / USUAL_SPLIT or (inner or 0.0) / (1.0 - USUAL_SPLIT)), 3)
+        share = 1.0 - 2.0 * outer / n if outer is not None else 2.0 * (inner or 0.0) / n - 1.0
+    pitch = PITCH_MM * size
+    ball = min(max(share, 0.05), 0.9 * _closest(n)) * pitch
+    return replace(bearing, n_rolling_elements=n, rolling_element_diameter_mm=ball, pitch_diameter_mm=pitch)
+
+
+def _closest(n: int) -> float:
+    """Diameter at which n balls touch each other, over the pitch diameter."""
+    from math import pi, sin
+
+    return sin(pi / n)
+
+
+def _spare(rig: Rig, shaft: str, number: int, size: float) -> Bearing:
+    """A sound bearing that the rig says nothing of."""
+    name = f"unlisted bearing {number}"
+    while name in {b.name for b in rig.bearings}:
+        name += "'"
+    return Bearing(name, shaft, BALLS, BALL_MM * size, PITCH_MM * size)
+
+
+def _pickup(rig: Rig, shafts: tuple[str, str]) -> Pickup:
+    source = rig.speed
+    shaft = (source.shaft if source is not None else "") or rig.reference_shaft
+    side = shafts.index(shaft) if shaft in shafts else 0
+    if isinstance(source, TachometerChannel):
+        return Pickup(source.channel, side, min(source.pulses_per_revolution, 1024))
+    name = "tacho"
+    while name in {sensor.channel for sensor in rig.sensors}:
+        name += "'"
+    return Pickup(name, side, LEAST_PULSES)
+
+
+def _sensors(rig: Rig, bearings: Sequence[Bearing], tacho: str) -> tuple[SensorSeat, ...]:
+    """Return a seat for each of the rig's accelerometers: where its position says, else one bearing after another."""
+    told = [s for s in rig.sensors if s.quantity == "acceleration" and s.channel != tacho][:MOST_SENSORS]
+    if not told:
+        told_names = {s.channel for s in rig.sensors} | {tacho}
+        names = [n for n in ("a1", "a2", "a3", "a4") if n not in told_names][:2]
+        return tuple(SensorSeat(name, number) for name, number in zip(names, SEAT_ORDER, strict=False))
+    taken: list[tuple[int, str]] = []
+    seats = []
+    for sensor in told:
+        direction = "horizontal" if "horizontal" in sensor.position.lower() else "vertical"
+        likely = [*_near(sensor.position.lower(), bearings), *SEAT_ORDER]
+        number = next((n for n in likely if (n, direction) not in taken), likely[0])
+        taken.append((number, direction))
+        seats.append(SensorSeat(sensor.channel, number, direction, sensor.position))
+    return tuple(seats)
+
+
+def _near(position: str, bearings: Sequence[Bearing]) -> list[int]:
+    """Numbers of the bearings that a sensor's position may mean: by a bearing's name, else by a shaft's."""
+    by_bearing = [n for n, b in enumerate(bearings, 1) if b.name.lower() in position]
+    by_shaft = [n for n, b in enumerate(bearings, 1) if b.shaft.lower() in position]
+    return by_bearing or by_shaft

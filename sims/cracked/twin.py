@@ -1,0 +1,225 @@
+"""The cracked pair set to a rig, for the gap diagnosis: see `gearsig.gap.simulator`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from hashlib import sha256
+from types import MappingProxyType
+
+import numpy as np
+
+from gearsig.checks import count
+from gearsig.errors import InputError, RefusalError
+from gearsig.gap.simulator import Added, GapEffect, Point
+from gearsig.recording.types import Recording
+from gearsig.rig.toml import rig_to_dict
+from gearsig.rig.types import OperatingPoint, Rig
+from sims.cracked.installed_table import table_of
+from sims.cracked.plausible import PLAUSIBLE, Options, Plausible, Surroundings
+from sims.cracked.seats import completed, installed_of_rig
+from sims.cracked.simulator import NAME, prepare_preset
+from sims.cracked.usual import (
+    Nominal,
+    as_plain,
+    nominal_of,
+    specimen_parameters,
+    usual_housing,
+    usual_parameters,
+)
+from sims.effects import EffectSetting, effect, effects
+from sims.presets import Preset, preset_text
+from sims.versions import sources_digest
+
+LONGEST_LEAD_REV = 8.0
+"""Of the driver, that another run starts later."""
+STEP_ANGLE_RAD = 0.9
+"""Step times the greatest angular eigenfrequency: three times that of a single simulation, see `_step_s`."""
+VIBRATION_S = 0.5
+"""Length of the run that tells how strongly the sound machine vibrates."""
+
+
+@dataclass(frozen=True)
+class CrackedTwin:
+    """A rig's twin: its own geometry, the rest usual for its size; a seed is one specimen with its housing.
+
+    Parameters
+    ----------
+    rig : Rig
+    nominal : Nominal
+    """
+
+    rig: Rig
+    nominal: Nominal
+
+    @property
+    def key(self) -> str:
+        """Model, state of its code, and what is known of the rig."""
+        known = {name: value for name, value in rig_to_dict(self.rig).items() if name not in ("name", "sources")}
+        return f"{NAME} {sources_digest()} {sha256(repr(known).encode()).hexdigest()[:16]}"
+
+    def run(
+        self,
+        point: Point,
+        added: Sequence[Added] = (),
+        *,
+        seed: int,
+        duration_s: float,
+        sampling_rate_hz: float,
+        noise: int = 0,
+    ) -> Recording:
+        """Return a recording that carries the rig; another `noise` is another run of the same machine.
+
+        Flanks, tolerances and housing follow from `seed` alone. Sensor noise, tachometer jitter and where the run
+        starts follow from seed and noise; run 0 starts at the driver's first tooth.
+        """
+        from sims.cracked.simulate import simulate_machine
+
+        count(seed, "seed", minimum=0)
+        own = self.preset(point, added, seed=seed)
+        rng = np.random.default_rng(seed)
+        ready = prepare_preset(own, {}, (), None, rng, sampling_rate_hz=sampling_rate_hz)
+        run_rng = np.random.default_rng([seed, count(noise, "noise", minimum=0)])
+        skipped = 0
+        if noise:
+            skipped = round(run_rng.uniform(0.0, LONGEST_LEAD_REV) * 60.0 / point.speed_rpm * sampling_rate_hz)
+        recording = simulate_machine(
+            ready.machine,
+            ready.operation,
+            rng=rng,
+            sampling_rate_hz=sampling_rate_hz,
+            duration_s=duration_s + skipped / sampling_rate_hz,
+            rig=self._rig_at(point),
+            truth={**ready.truth(), "seed": seed, "noise": noise},
+            step_s=self._step_s(own),
+            noise_rng=run_rng if noise else None,
+        )
+        return replace(recording, samples=recording.samples[:, skipped:]) if skipped else recording
+
+    def candidates(self, name: str) -> Sequence[Added]:
+        """Return settings of an effect worth a try, from barely noticeable to strong, for each option that matters."""
+        found = []
+        for options, (low, high) in self._reaches(name):
+            found += [Added(name, float(f"{s:.4g}"), options) for s in np.geomspace(low, high, PLAUSIBLE[name].n)]
+        return found
+
+    def draw(self, name: str, rng: np.random.Generator) -> Added:
+        """Draw a setting from the range of the candidates, its options at random.
+
+        Raises
+        ------
+        RefusalError
+            If the rig lacks what the effect needs: a bearing.
+        """
+        plausible, machine = _plausible(name), self._surroundings
+        if not plausible.choices(machine):
+            raise RefusalError(f"the rig has nothing that {name} could be in", remedy="describe its bearings")
+        options = plausible.drawn(machine, rng)
+        low, high = plausible.reach(name, machine, options)
+        return Added(name, float(np.exp(rng.uniform(np.log(low), np.log(high)))), options)
+
+    def preset(self, point: Point, added: Sequence[Added] = (), *, seed: int = 0, notes: Sequence[str] = ()) -> Preset:
+        """Return the specimen `seed` with its effects as a preset."""
+        drawn = np.random.default_rng([seed, 1])
+        values = usual_parameters(self.nominal) | specimen_parameters(self.nominal, drawn)
+        used = [str(a.options["bearing"]) for a in added if "bearing" in a.options]
+        installed = installed_of_rig(self.rig, self.nominal.size, usual_housing(drawn), used)
+        title = f"Twin of {self.rig.name}" if self.rig.name else "Twin of a rig"
+        return Preset(
+            name="twin",
+            model=NAME,
+            title=f"{title}: {self.nominal.teeth[0]}/{self.nominal.teeth[1]}, module {self.nominal.module_mm:g}",
+            sources=(*self.rig.sources, *notes),
+            assumed=(
+                "usual for its size: masses, inertias, shafts, stiffness and damping, tip relief, tolerances, oil",
+                "transfer path: drawn",
+                f"profiles of the flanks, and angles of its effects: those of seed {seed}",
+                *(f"{name}: usual, the rig does not tell" for name in self.nominal.assumed),
+            ),
+            does_not_represent=("the real machine's own flanks, tolerances and housing",),
+            parameters=MappingProxyType(as_plain(values)),
+            speed_rpm=point.speed_rpm,
+            torque_nm=point.torque_nm,
+            effects=tuple(EffectSetting(a.name, a.severity, dict(a.options)) for a in added),
+            installed=table_of(installed),
+        )
+
+    def preset_toml(self, point: Point, added: Sequence[Added], notes: Sequence[str], *, seed: int = 0) -> str:
+        """Return the machine with the effects as a preset file for `gearsig simulate cracked --preset FILE`."""
+        comments = [f"The flanks' profiles are not in this file: simulate with --seed {seed} for those of the twin."]
+        return preset_text(self.preset(point, added, seed=seed, notes=notes), comments)
+
+    @cached_property
+    def _surroundings(self) -> Surroundings:
+        point = Point(self.nominal.speed_rpm, self.nominal.torque_nm)
+        pair = prepare_preset(self.preset(point), {}, (), None, np.random.default_rng(0)).machine.mesh.pair
+        shafts = (self.rig.pairs[0].driver, self.rig.pairs[0].driven)
+        own = tuple(completed(b, self.nominal.size) for b in self.rig.bearings if b.shaft in shafts)
+        sound = self.run(point, seed=0, duration_s=VIBRATION_S, sampling_rate_hz=20480.0)
+        rms = np.mean([np.std(sound.values(name)) for name in sound.vibration_names()])
+        return Surroundings(self.nominal, (pair.driver, pair.driven), own, float(rms))
+
+    def _reaches(self, name: str) -> list[tuple[Options, tuple[float, float]]]:
+        plausible, machine = _plausible(name), self._surroundings
+        return [(o, plausible.reach(name, machine, o)) for o in plausible.choices(machine)]
+
+    def _step_s(self, own: Preset) -> float:
+        """Step of the integrator: that of the sound machine, so that effects leave the drawn noise as it is.
+
+        It is longer than that of a single simulation; the accelerations miss 2 to 4 parts in a thousand.
+        """
+        from sims.cracked.linear import default_step_s
+
+        sound = prepare_preset(replace(own, effects=()), {}, (), None, np.random.default_rng(0))
+        return default_step_s(sound.machine, sound.operation, STEP_ANGLE_RAD)
+
+    def _rig_at(self, point: Point) -> Rig:
+        own = OperatingPoint(self.rig.pairs[0].driver, point.speed_rpm, torque_nm=point.torque_nm)
+        return replace(self.rig, operating_point=own)
+
+
+@dataclass(frozen=True)
+class CrackedGapSimulator:
+    """The model "cracked" as the gap diagnosis takes it."""
+
+    @property
+    def name(self) -> str:
+        """As on the command line."""
+        return NAME
+
+    def gap_effects(self) -> Mapping[str, GapEffect]:
+        """Return all effects of the catalogue: each has a meaning for this model."""
+        return {
+            e.name: GapEffect(
+                e.name,
+                e.group,
+                e.title,
+                e.severity.name,
+                e.severity.unit,
+                e.signature,
+                e.shows_in,
+                e.group == "measurement chain",
+            )
+            for e in effects().values()
+        }
+
+    def twin_of(self, rig: Rig) -> CrackedTwin:
+        """Return a twin of the rig.
+
+        Raises
+        ------
+        RefusalError
+            If there is not exactly one pair, its teeth or module are not known, or the model cannot have such gears.
+        """
+        twin = CrackedTwin(rig, nominal_of(rig))
+        point = Point(twin.nominal.speed_rpm, twin.nominal.torque_nm)
+        try:
+            prepare_preset(twin.preset(point), {}, (), None, np.random.default_rng(0))
+        except InputError as error:
+            raise RefusalError(f"the model {NAME!r} cannot be set to this rig: {error}") from None
+        return twin
+
+
+def _plausible(name: str) -> Plausible:
+    return PLAUSIBLE[effect(name).name]

@@ -1,0 +1,20 @@
+"""Which state of the simulators' code made a result."""
+
+from __future__ import annotations
+
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+
+_ROOMS = ("cracked", "effects", "machine", "measure", "mesh")
+
+
+@cache
+def sources_digest() -> str:
+    """Return a short hash of the code that simulates: kept results of another state are not taken for this one's."""
+    here = Path(__file__).parent
+    digest = sha256()
+    for room in _ROOMS:
+        for path in sorted((here / room).rglob("*.py")):
+            digest.update(path.relative_to(here).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
