@@ -14,7 +14,7 @@ TAB, CHANNEL = "tab", "channel"
 ANALYSIS_PAGE = Path(__file__).parent / "pages" / "analysis.py"
 OF_LABORATORY = "Laboratory"
 """Origin of a recording that the laboratory made."""
-_CHOSEN, _SIMULATED, _UPLOAD, _REFERENCE = "chosen", "simulated", "upload", "kept reference"
+_CHOSEN, _SIMULATED, _UPLOAD, _REFERENCE, _FILES = "chosen", "simulated", "upload", "kept reference", "kept files"
 
 
 @dataclass(frozen=True)
@@ -99,6 +99,17 @@ def keep_upload(upload: Upload | None) -> None:
 def kept_upload() -> Upload | None:
     """Return the upload that was open when this session last saw the analysis page."""
     found: Upload | None = st.session_state.get(_UPLOAD)
+    return found
+
+
+def keep_files(kind: str, files: tuple[Upload, ...]) -> None:
+    """Keep several uploads of one kind while another page is shown."""
+    st.session_state[source_key(_FILES, kind)] = files
+
+
+def kept_files(kind: str) -> tuple[Upload, ...]:
+    """Return the uploads of one kind that this session keeps."""
+    found: tuple[Upload, ...] = st.session_state.get(source_key(_FILES, kind), ())
     return found
 
 

@@ -1,0 +1,203 @@
+"""The answer on the page: verdict, downloads, where, which, how far, what to record next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import streamlit as st
+
+from app.dashboard.as_typed import as_typed
+from app.dashboard.gap.runner import Finished
+from app.dashboard.widgets.methods.notes import show_notes
+from app.dashboard.widgets.picture import show_picture
+from app.dashboard.widgets.verdict import Colour
+from app.gap.results import JSON, PAGE, TWIN
+from gearsig.gap.types import GapOutcome, GapReport
+from gearsig.report.gap_pictures import GapFigure, Question
+from gearsig.report.gap_sections import (
+    CauseRow,
+    cause_rows,
+    condition_rows,
+    group_texts,
+    inseparable_text,
+    next_rows,
+    place_rows,
+    size_text,
+    step_rows,
+    verdict_rows,
+)
+from gearsig.report.gap_text import condition_advice
+
+LOOKS: dict[GapOutcome, tuple[Colour, str]] = {
+    GapOutcome.NO_GAP: ("green", ":material/check_circle:"),
+    GapOutcome.EFFECT: ("red", ":material/error:"),
+    GapOutcome.CANNOT_SEPARATE: ("orange", ":material/call_split:"),
+    GapOutcome.UNKNOWN: ("gray", ":material/help:"),
+}
+FLOORS = (
+    "A structural floor is what healthy machines differ from this simulator; they exceed 1 once in twenty. A "
+    "repeatability floor is what this machine differs from itself, from one stretch to the next."
+)
+
+
+def show_finished(finished: Finished) -> None:
+    """Show a result."""
+    report = finished.report
+    _show_verdict(report)
+    _show_downloads(finished)
+    titles = ("Where", "Which", "How far", "Next and facts")
+    views = (_show_where, _show_which, _show_how_far, _show_next)
+    for tab, view in zip(st.tabs(titles, key="gap tab", on_change="rerun"), views, strict=True):
+        if tab.open:
+            with tab:
+                view(report, finished.figures)
+
+
+def _show_verdict(report: GapReport) -> None:
+    colour, icon = LOOKS[report.outcome]
+    st.badge(report.outcome.value, icon=icon, color=colour)
+    for word, text in verdict_rows(report):
+        st.markdown(f"**{as_typed(word)}.** {as_typed(text)}")
+    advice = condition_advice(report)
+    if advice:
+        st.caption(as_typed(advice))
+    show_notes(report.notices, quiet=True)
+
+
+def _show_downloads(finished: Finished) -> None:
+    with st.container(horizontal=True):
+        _download("Report (HTML)", finished.page, PAGE, "text/html", primary=True)
+        _download("JSON", finished.json, JSON, "application/json")
+        if finished.twin is not None:
+            _download("Twin (preset)", finished.twin, TWIN, "application/toml")
+
+
+def _download(label: str, data: bytes, name: str, mime: str, *, primary: bool = False) -> None:
+    st.download_button(
+        label,
+        data,
+        file_name=name,
+        mime=mime,
+        on_click="ignore",
+        type="primary" if primary else "secondary",
+        icon=":material/download:",
+    )
+
+
+def _show_where(report: GapReport, figures: Sequence[GapFigure]) -> None:
+    st.markdown(f"The whole gap: {as_typed(size_text(report))}.")
+    st.caption(FLOORS)
+    rows = place_rows(report)
+    if rows:
+        _table(
+            {
+                "place": [row.title for row in rows],
+                "share": [row.bar_percent for row in rows],
+                "change": [row.change for row in rows],
+                "× structural floor": [row.structural for row in rows],
+                "× repeatability floor": [row.repeatability for row in rows],
+                "at": [", ".join(row.where) for row in rows],
+            },
+            bars=("share",),
+        )
+    else:
+        st.markdown("No place stands out of the floor.")
+    _show_figures(figures, "where")
+
+
+def _show_which(report: GapReport, figures: Sequence[GapFigure]) -> None:
+    text = inseparable_text(report)
+    if text:
+        st.warning(as_typed(text), icon=":material/call_split:")
+    rows = cause_rows(report)
+    _table(
+        {
+            "cause": [row.title for row in rows],
+            "probability": [row.bar_percent for row in rows],
+            "group": [row.group for row in rows],
+            "place": [row.place for row in rows],
+            "severity (90 % interval)": [row.severity for row in rows],
+        },
+        bars=("probability",),
+    )
+    groups = group_texts(report)
+    if groups:
+        st.caption(as_typed(f"By group: {', '.join(groups)}."))
+    for place, row in enumerate(row for row in rows if row.statements):
+        with st.expander(as_typed(f"{row.title}, {row.percent}"), expanded=place == 0):
+            _show_evidence(row)
+    _show_figures(figures, "which")
+
+
+def _show_evidence(row: CauseRow) -> None:
+    st.markdown("\n".join(f"- {as_typed(sentence)}" for sentence in row.statements))
+    if row.evidence:
+        _table(
+            {
+                "its own features": [one.feature for one in row.evidence],
+                "predicted": [one.predicted for one in row.evidence],
+                "observed": [one.observed for one in row.evidence],
+                "floor": [f"{one.floor} dB" for one in row.evidence],
+                "speaks": ["✓ for it" if one.speaks_for else "✗ against it" for one in row.evidence],
+            }
+        )
+
+
+def _show_how_far(report: GapReport, figures: Sequence[GapFigure]) -> None:
+    rows = step_rows(report)
+    if len(rows) > 1:
+        st.caption(
+            "What is left of the whole gap as the simulator gets more effects, on data that no severity was fitted to, "
+            "in structural floors."
+        )
+        _table(
+            {
+                "simulator": [row.label if i == 0 else f"+ {row.label}" for i, row in enumerate(rows)],
+                "left": [row.left for row in rows],
+                "90 % interval": [row.interval for row in rows],
+                "change": [row.taken for row in rows],
+            }
+        )
+    else:
+        st.markdown("No effect was added to the simulator. The gap stays as it is.")
+    _show_figures(figures, "how far")
+
+
+def _show_next(report: GapReport, figures: Sequence[GapFigure]) -> None:
+    del figures  # there is none of this
+    rows = next_rows(report)
+    if rows:
+        st.markdown("What to record next, to tell the likeliest causes apart. Distances are in structural floors.")
+        columns = zip(("at", "tells apart", "distance there", "now"), zip(*rows, strict=True), strict=True)
+        _table({name: list(values) for name, values in columns})
+    names = ("recording", "speed (rpm)", "torque (N·m)", "revolutions", "length (s)", "sampling rate (Hz)")
+    facts = condition_rows(report)
+    _table({name: [row[i] for row in facts] for i, name in enumerate(names)})
+    compared = ", ".join(report.references) or "none: compared with the simulation itself"
+    st.caption(as_typed(f"Rig {report.rig}; simulator {report.simulator}; healthy references: {compared}."))
+
+
+def _show_figures(figures: Sequence[GapFigure], question: Question) -> None:
+    chosen = [one for one in figures if one.question == question]
+    for one in chosen:
+        if not one.is_small:
+            _show_figure(one)
+    small = [one for one in chosen if one.is_small]
+    if small:
+        for one, column in zip(small, st.columns(max(2, len(small))), strict=False):
+            with column:
+                _show_figure(one)
+
+
+def _show_figure(one: GapFigure) -> None:
+    show_picture(one.figure, one.shows)
+    st.caption(as_typed(one.look))
+
+
+def _table(columns: dict[str, list[Any]], bars: tuple[str, ...] = ()) -> None:
+    config: dict[str, Any] = {
+        name: st.column_config.ProgressColumn(format="%.0f %%", min_value=0, max_value=100) for name in bars
+    }
+    config[next(iter(columns))] = st.column_config.TextColumn(width="large")
+    st.dataframe(columns, hide_index=True, width="stretch", column_config=config)

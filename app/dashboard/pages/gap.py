@@ -1,0 +1,43 @@
+"""From recordings and a simulator to the effect that is missing in it."""
+
+from __future__ import annotations
+
+import streamlit as st
+
+from app.dashboard.as_typed import as_typed
+from app.dashboard.gap.chooser import choose
+from app.dashboard.gap.runner import show_running
+from app.dashboard.gap.view import show_finished
+from app.dashboard.widgets.errors import show_error
+from gearsig.errors import GearsigError
+
+WELCOME = """
+Give recordings of one rig and its rig file: the page says **where** they differ from the simulation of the rig,
+**which** effect that is not in the simulator causes it, **how far** the gap shrinks with it, and what to record next.
+
+Surest with recordings at several speeds and loads, and with one of the same rig when it was healthy. The first
+diagnosis of a rig takes minutes of preparation, which are kept; after that one takes about a minute.
+"""
+
+
+def show() -> None:
+    """Choose, run, show."""
+    choice = choose()
+    names = ", ".join(one.name for one in choice.recordings)
+    st.subheader("Gap between simulation and recording", anchor=False)
+    if choice.recordings:
+        against = f", against {', '.join(one.name for one in choice.references)}" if choice.references else ""
+        st.caption(as_typed(f"{names}{against}; simulator {choice.model}"))
+    finished = show_running(choice)
+    if finished is None:
+        st.markdown(WELCOME)
+        return
+    if finished.key != choice.key:
+        st.info("This is the answer to what was chosen before. Diagnose again for what is chosen now.")
+    show_finished(finished)
+
+
+try:
+    show()
+except GearsigError as error:
+    show_error(error)
