@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
+import numpy as np
+
 from gearsig.checks import FloatArray
 from gearsig.gap.simulator import Added, Point
 
@@ -209,6 +211,8 @@ class SpectrumCurves:
         Peak amplitudes; `after` is with the likeliest effect, empty where there is none.
     floor : array, (n,)
         Repeatability.
+    structural_db : array, (n,)
+        How far healthy machines lie from what is compared with, line by line; empty: not known.
     """
 
     label: str
@@ -218,6 +222,7 @@ class SpectrumCurves:
     before: FloatArray
     after: FloatArray
     floor: FloatArray
+    structural_db: FloatArray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)

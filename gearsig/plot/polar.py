@@ -61,13 +61,13 @@ def polar_figure(
     _rings(axes, full, average.unit)
     _draw_signal(axes, average, SWING / full)
     if n_teeth:
-        _gear(axes, n_teeth, [mark.angle_deg for mark in marks])
-    _degrees(axes, n_teeth is not None)
+        draw_gear(axes, n_teeth, [mark.angle_deg for mark in marks])
+    draw_degrees(axes, n_teeth is not None)
     for number, mark in enumerate(marks):
-        _mark(axes, mark, n_teeth)
-        _corner(axes, mark.label, 0.985 - number * 0.2 / size_in, style.FAULT, "bold")
-    _corner(axes, f"{average.n_revolutions} revolutions", 0.05, style.QUIET)
-    _corner(axes, average.channel, 0.05 + 0.2 / size_in, style.QUIET)
+        draw_mark(axes, mark, n_teeth)
+        write_corner(axes, mark.label, 0.985 - number * 0.2 / size_in, style.FAULT, "bold")
+    write_corner(axes, f"{average.n_revolutions} revolutions", 0.05, style.QUIET)
+    write_corner(axes, average.channel, 0.05 + 0.2 / size_in, style.QUIET)
     _middle(axes, average)
     axes.set_ylim(0, EDGE)
     return figure
@@ -115,8 +115,8 @@ def _round_below(value: float) -> float:
     return max(step * power for step in (1, 2, 5) if step * power <= value * (1 + 1e-12))
 
 
-def _gear(axes: PolarAxes, n_teeth: int, marked_deg: Sequence[float]) -> None:
-    """Draw the toothed rim; marked teeth in the colour of faults."""
+def draw_gear(axes: PolarAxes, n_teeth: int, marked_deg: Sequence[float], *, numbered: bool = True) -> None:
+    """Draw the toothed rim; marked teeth in the colour of faults. Without a mark on the shaft, teeth have no number."""
     damaged = {int(angle % 360.0 * n_teeth / 360.0) for angle in marked_deg}
     every = next(step for step in (1, 2, 5, 10, 20, 50, 100, 10_000) if n_teeth / step <= MOST_NUMBERS)
     ring = np.linspace(0, 2 * np.pi, 361)
@@ -128,7 +128,7 @@ def _gear(axes: PolarAxes, n_teeth: int, marked_deg: Sequence[float]) -> None:
         hit = tooth in damaged
         colour = style.FAULT if hit else style.FLOOR
         axes.fill(corners, radii, facecolor=colour, alpha=1.0 if hit else 0.35, edgecolor=colour, linewidth=0.6)
-        if (tooth + 1) % every == 0 or tooth == 0 or hit:
+        if numbered and ((tooth + 1) % every == 0 or tooth == 0 or hit):
             axes.text(
                 (tooth + 0.5) * 2 * np.pi / n_teeth,
                 NUMBERS,
@@ -141,7 +141,8 @@ def _gear(axes: PolarAxes, n_teeth: int, marked_deg: Sequence[float]) -> None:
             )
 
 
-def _degrees(axes: PolarAxes, has_teeth: bool) -> None:
+def draw_degrees(axes: PolarAxes, has_teeth: bool) -> None:
+    """Draw rays at every quarter of a revolution and name them."""
     inner, outer, at = (0.32, ROOT, LABELS) if has_teeth else (0.32, ROOT, 1.8)
     for degrees in range(0, 360, 90):
         axes.plot([np.radians(degrees)] * 2, [inner, outer], color=style.RULE, linewidth=0.7, zorder=0)
@@ -150,7 +151,8 @@ def _degrees(axes: PolarAxes, has_teeth: bool) -> None:
         )
 
 
-def _mark(axes: PolarAxes, mark: AngleMark, n_teeth: int | None) -> None:
+def draw_mark(axes: PolarAxes, mark: AngleMark, n_teeth: int | None) -> None:
+    """Shade the marked tooth's sector and draw a ray at its angle."""
     angle = np.radians(mark.angle_deg)
     half = np.pi / n_teeth if n_teeth else np.radians(4.0)
     middle = (floor(mark.angle_deg % 360.0 * n_teeth / 360.0) + 0.5) * 2 * np.pi / n_teeth if n_teeth else angle
@@ -159,7 +161,7 @@ def _mark(axes: PolarAxes, mark: AngleMark, n_teeth: int | None) -> None:
     axes.plot([angle, angle], [0.32, ROOT], color=style.FAULT, linewidth=0.9, linestyle="--", zorder=1.5)
 
 
-def _corner(axes: PolarAxes, text: str, height: float, colour: str, weight: str = "normal") -> None:
+def write_corner(axes: PolarAxes, text: str, height: float, colour: str, weight: str = "normal") -> None:
     """Write into the left corners, where no tooth is."""
     axes.text(
         0.0,

@@ -1,0 +1,226 @@
+"""What is drawn of a gap: order spectra and energy over the angle, measured against simulated before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.gap.cyclic import floor_ratio
+from gearsig.gap.floors import StructuralFloor
+from gearsig.gap.frame import DRIVEN, DRIVER
+from gearsig.gap.gathered import Gathered
+from gearsig.gap.gear_lines import (
+    MOST_SHAFT_ORDERS,
+    N_MESH_HARMONICS,
+    SIDEBANDS,
+    SIDES,
+    average_lines,
+    visible_orders,
+)
+from gearsig.gap.spots import shaft_words
+from gearsig.gap.spots_tooth import changed_pattern, own_pattern
+from gearsig.gap.tooth import STEPS_PER_TOOTH
+from gearsig.gap.types import AngleCurves, SpectrumCurves
+from gearsig.severity.calibration import load_calibration
+
+BEYOND = 0.5
+"""Of a mesh order, past the last harmonic that is shown."""
+
+_RARE = 3.0
+"""Of the noise's power: one line of noise in twenty is stronger (exp(−3) = 0.05)."""
+
+NOTHING: FloatArray = np.zeros(0)
+
+
+def spectrum_curves(
+    now: Gathered,
+    before: Gathered,
+    after: Gathered | None = None,
+    *,
+    structural: StructuralFloor | None = None,
+    unit: str = "m/s^2",
+    channel: str = "",
+) -> tuple[SpectrumCurves, ...]:
+    """Return the order spectra of both shafts' averages and of what neither repeats.
+
+    Parameters
+    ----------
+    now, before : Gathered
+        Measured, and what it is compared with.
+    after : Gathered or None
+        The simulation with the likeliest effect.
+    structural : StructuralFloor or None
+        Of the same comparison; each line gets the floor of the feature that it belongs to.
+    unit : str
+        Of the channels.
+    channel : str
+        Empty: root mean square over all channels.
+    """
+    names = (channel,) if channel else tuple(now.channels)
+    averages = (_of_average(side, now, before, after, names, unit) for side in (DRIVER, DRIVEN))
+    found = (*averages, _of_residual(now, before, after, names, unit))
+    if structural is None:
+        return found
+    features = [average_features(side, now.frame.teeth[side], len(found[side].orders)) for side in (DRIVER, DRIVEN)]
+    features.append(residual_features(now, found[2].orders))
+    return tuple(
+        replace(curves, structural_db=structural.of(belonging))
+        for curves, belonging in zip(found, features, strict=True)
+    )
+
+
+def average_features(side: int, teeth: int, n: int) -> list[str]:
+    """Return for each order of a shaft the feature that it belongs to."""
+    name = SIDES[side]
+    found = []
+    for order in range(n):
+        harmonic, offset = round(order / teeth), abs((order + teeth // 2) % teeth - teeth // 2)
+        if order <= MOST_SHAFT_ORDERS and 2 * order < teeth:
+            found.append(f"shaft.{name}.{max(order, 1)}" if order <= 3 else f"shaft.{name}.low")
+        elif offset == 0 and harmonic <= N_MESH_HARMONICS:
+            found.append(f"mesh.share.{harmonic}")
+        else:
+            near = (label for label, (first, last) in SIDEBANDS.items() if first <= offset <= last)
+            label = next(near, "")
+            found.append(f"sideband.{name}.{label}" if label else f"tooth.{name}.level")
+    return found
+
+
+def residual_features(now: Gathered, orders: FloatArray) -> list[str]:
+    """Return for each order of the residual the feature of its band."""
+    edges = [low for low, _ in now.bands_hz[:-1]]
+    bands = np.searchsorted(edges, orders * now.speed_hz, side="right")
+    return [f"floor.band.{max(int(band), 1)}" for band in bands]
+
+
+def _of_average(
+    side: int, now: Gathered, before: Gathered, after: Gathered | None, names: Sequence[str], unit: str
+) -> SpectrumCurves:
+    runs = [run for run in (now, before, after) if run is not None]
+    powers, noises = zip(*(_average_power(run, side, names) for run in runs), strict=True)
+    last = int((N_MESH_HARMONICS + BEYOND) * now.frame.teeth[side])
+    n = min(last + 1, *(len(power) for power in powers))
+    amplitudes = [np.sqrt(power[:n]) for power in powers]
+    return SpectrumCurves(
+        f"average over {shaft_words(now.frame, side)}",
+        unit,
+        np.arange(n) * now.frame.shaft_orders[side],
+        amplitudes[0],
+        amplitudes[1],
+        amplitudes[2] if after is not None else NOTHING,
+        np.sqrt(_RARE * (noises[0][:n] + noises[1][:n])),
+    )
+
+
+def _average_power(gathered: Gathered, side: int, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+    """Return lines' power, as squares of peaks, and that of their noise: means over channels."""
+    pairs = [average_lines(gathered.channels[name], side) for name in names]
+    n = visible_orders(gathered, side, min(len(lines) for lines, _ in pairs)) + 1
+    power: FloatArray = np.mean([np.abs(lines[:n]) ** 2 for lines, _ in pairs], axis=0)
+    noise: FloatArray = np.mean([noise[:n] for _, noise in pairs], axis=0)
+    return power, noise
+
+
+def _of_residual(
+    now: Gathered, before: Gathered, after: Gathered | None, names: Sequence[str], unit: str
+) -> SpectrumCurves:
+    power = _residual_power(now, names)
+    top = min((N_MESH_HARMONICS + BEYOND) * now.frame.teeth[DRIVER], now.highest_order, before.highest_order)
+    orders = np.arange(min(len(power), int(top / now.order_step) + 1)) * now.order_step
+    measured = power[: len(orders)]
+    others = [
+        np.interp(orders, np.arange(len(values)) * run.order_step, values)
+        for run, values in ((run, _residual_power(run, names)) for run in (before, after) if run is not None)
+    ]
+    # 2: squares of peaks from mean squares.
+    return SpectrumCurves(
+        "what neither shaft repeats",
+        unit,
+        orders,
+        np.sqrt(2.0 * measured),
+        np.sqrt(2.0 * others[0]),
+        np.sqrt(2.0 * others[1]) if after is not None else NOTHING,
+        np.sqrt(2.0 * _RARE * measured / floor_ratio(measured[None])[0]),
+    )
+
+
+def _residual_power(gathered: Gathered, names: Sequence[str]) -> FloatArray:
+    power: FloatArray = np.mean([gathered.channels[name].residual_power.mean(axis=0) for name in names], axis=0)
+    return power
+
+
+def angle_curves(
+    now: Gathered,
+    before: Gathered,
+    after: Gathered | None = None,
+    *,
+    sound: Gathered | None = None,
+    simulated_sound: Gathered | None = None,
+    unit: str = "",
+) -> tuple[AngleCurves, ...]:
+    """Return, for both shafts, the energy within one pitch over that of the measured middling tooth.
+
+    The angle is that at which a tooth engages: the answer's usual lag is taken off. Simulated curves are turned to
+    where they agree best, unless both have a mark on that shaft.
+
+    Parameters
+    ----------
+    now, before, after : Gathered
+        Measured, simulated without and with the likeliest effect.
+    sound, simulated_sound : Gathered or None
+        Where both are given, the curves are those of the differences from them; a simulation that *is* the sound one
+        has none, and its curve is 0.
+    """
+    compared = sound is not None and simulated_sound is not None
+    found = []
+    for side in (DRIVER, DRIVEN):
+        measured = _energy(now, sound if compared else None, side)
+        middling = max(float(np.median(measured)), 1e-300)
+        simulated = [
+            _turned(
+                _energy(run, simulated_sound if compared else None, side), measured, run.marks[side], now.marks[side]
+            )
+            for run in (before, after)
+            if run is not None
+        ]
+        curves = [values / middling for values in (measured, *simulated)]
+        angle, shift = _angles(now.frame.teeth[side])
+        first, second, third = ([np.roll(values, -shift) for values in curves] + [NOTHING])[:3]
+        frame = now.frame
+        found.append(
+            AngleCurves(frame.shafts[side], unit, frame.teeth[side], now.marks[side], angle, first, second, third)
+        )
+    return tuple(found)
+
+
+def _energy(run: Gathered, sound: Gathered | None, side: int) -> FloatArray:
+    """Return the energy at each start of a pitch, mean over channels; 0 for a run compared with itself."""
+    if sound is run:
+        return np.zeros(run.frame.teeth[side] * STEPS_PER_TOOTH)
+    pattern = own_pattern(run, side) if sound is None else changed_pattern(run, sound, side)
+    energy: FloatArray = pattern.energy.mean(axis=0)
+    return energy
+
+
+def _turned(simulated: FloatArray, measured: FloatArray, *marks: bool) -> FloatArray:
+    """Return the curve turned to its best agreement, unless marks fix it."""
+    if all(marks):
+        return simulated
+    agreement = np.fft.irfft(np.fft.rfft(measured) * np.conj(np.fft.rfft(simulated)), len(measured))
+    turned: FloatArray = np.roll(simulated, int(np.argmax(agreement)))
+    return turned
+
+
+def _angles(teeth: int) -> tuple[FloatArray, int]:
+    """Return ascending angles in degrees from 0 to 360, and which place is the first.
+
+    A window that starts at θ has its middle half a pitch on; the tooth engaged `lag_pitches` before.
+    """
+    n = teeth * STEPS_PER_TOOTH
+    middle = (np.arange(n) / STEPS_PER_TOOTH + 0.5 - load_calibration().lag_pitches) / teeth
+    first = int(np.argmin(middle % 1.0))
+    angle: FloatArray = 360.0 * np.roll(middle % 1.0, -first)
+    return angle, first

@@ -1,0 +1,152 @@
+"""Where a recording differs from what it is compared with, place by place, each with its share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.gap.change import change_features, difference_features
+from gearsig.gap.families import Family, family_members
+from gearsig.gap.features import Features
+from gearsig.gap.floors import REPEATABLE, StructuralFloor, family_size, pooled_scatter
+from gearsig.gap.gathered import Gathered
+from gearsig.gap.gear_lines import SIDES
+from gearsig.gap.spots import Comparison, Spot
+from gearsig.gap.spots_cyclic import envelope_spot, line_spot
+from gearsig.gap.spots_gear import mesh_spot, shaft_spot, sideband_spot
+from gearsig.gap.spots_other import band_spot, speed_spot, tail_spot
+from gearsig.gap.spots_tooth import tooth_spot
+from gearsig.gap.types import GapPlace, PlaceKind
+
+LEAST_SHARE = 0.01
+
+REPEATED = ("floor.to_signal", "floor.total", "raw.level")
+"""Features that only repeat what others say of a place."""
+
+
+def gap_places(
+    now: Gathered,
+    other: Gathered,
+    structural: StructuralFloor,
+    *,
+    is_reference: bool,
+    change: Features | None = None,
+) -> tuple[GapPlace, ...]:
+    """Return where a recording differs, largest share first.
+
+    A place is a family of features; its size s_f is their mean of high order over the floors, and its share
+    max(s_f² − 1, 0)/Σ max(s² − 1, 0): what does not exceed both floors together has none.
+
+    Parameters
+    ----------
+    now : Gathered
+    other : Gathered
+        A sound recording of the same machine, or its simulation.
+    structural : StructuralFloor
+    is_reference : bool
+        Whether `other` is a recording of the same machine: the teeth's patterns can then be subtracted.
+    change : Features or None
+        What `change_features` or `difference_features` made of the two; None: made here.
+
+    Raises
+    ------
+    RefusalError
+        If the reference was taken at another speed.
+    """
+    if change is None:
+        change = change_features(now, other) if is_reference else difference_features(now, other)
+    distances = structural.from_centre(change.names, change.values)
+    if is_reference:
+        distances = beyond_the_mesh(change.names, distances)
+    floors = structural.of(change.names), REPEATABLE * pooled_scatter(change)
+    both = distances / np.hypot(*floors)
+    comparison = Comparison(now, other, is_reference, _named(change.names, distances), _named(change.names, both))
+    found = []
+    members = {family: _telling(change.names, rows) for family, rows in family_members(change.names).items()}
+    energies = {family: max(family_size(both[rows]) ** 2 - 1.0, 0.0) for family, rows in members.items()}
+    total = sum(energies.values())
+    for family, energy in energies.items():
+        if energy <= 0.0 or energy < LEAST_SHARE * total:
+            continue
+        structurally, repeatably = (
+            family_size(distances[members[family]] / floor[members[family]]) for floor in floors
+        )
+        found.append(_place(family, _spot(comparison, family), structurally, repeatably, energy / total, now))
+    return tuple(sorted(found, key=lambda place: -place.share))
+
+
+def beyond_the_mesh(names: tuple[str, ...], distances: FloatArray) -> FloatArray:
+    """Return changes of levels as far as they hold both relative to the mesh harmonics and by themselves.
+
+    If the mesh alone falls by 6 dB, all that is counted relative to it rises by as much, and none of it has changed; if
+    a sensor's gain rises, everything does but the ratios. The smaller of both changes counts, none where signs differ.
+    """
+    mesh = dict(zip(names, distances.tolist(), strict=True)).get("mesh.total", 0.0)
+    held = distances.copy()
+    for i, name in enumerate(names):
+        relative = _is_relative(name)
+        if relative or _is_shaft_level(name):
+            another = distances[i] + (mesh if relative else -mesh)
+            smaller = np.sign(distances[i]) * min(abs(distances[i]), abs(another))
+            held[i] = smaller if distances[i] * another > 0 else 0.0
+    return held
+
+
+def _is_relative(name: str) -> bool:
+    """Whether a feature is a level relative to the mesh harmonics."""
+    family, _, rest = name.partition(".")
+    last = rest.rpartition(".")[2]
+    if family == "sideband":
+        return last != "strongest"
+    if family in ("tooth", "change"):
+        return last in ("level", "elsewhere", "peak")
+    return family == "shaft" and last in ("to_mesh", "low")
+
+
+def _is_shaft_level(name: str) -> bool:
+    return name.startswith("shaft.") and name.rpartition(".")[2].isdigit()
+
+
+def _telling(names: tuple[str, ...], rows: np.ndarray) -> np.ndarray:
+    kept = [row for row in rows if names[row] not in REPEATED]
+    return np.array(kept, dtype=np.intp)
+
+
+def _named(names: tuple[str, ...], values: FloatArray) -> Mapping[str, float]:
+    return dict(zip(names, values.tolist(), strict=True))
+
+
+def _spot(comparison: Comparison, family: Family) -> Spot:
+    kind, shaft = family
+    of_a_shaft = {PlaceKind.SIDEBANDS: sideband_spot, PlaceKind.SHAFT: shaft_spot, PlaceKind.TOOTH: tooth_spot}
+    plain = {
+        PlaceKind.MESH: mesh_spot,
+        PlaceKind.ENVELOPE: envelope_spot,
+        PlaceKind.LINE: line_spot,
+        PlaceKind.BAND: band_spot,
+        PlaceKind.SPEED: speed_spot,
+        PlaceKind.TAIL: tail_spot,
+    }
+    return of_a_shaft[kind](comparison, SIDES.index(shaft)) if kind in of_a_shaft else plain[kind](comparison)
+
+
+def _place(
+    family: Family, spot: Spot, structural: float, repeatability: float, share: float, now: Gathered
+) -> GapPlace:
+    kind, side = family
+    return GapPlace(
+        kind,
+        spot.title,
+        spot.change_db,
+        repeatability,
+        structural,
+        share,
+        shaft=now.frame.shafts[SIDES.index(side)] if side else "",
+        orders=spot.orders,
+        band_hz=spot.band_hz,
+        angle_deg=spot.angle_deg,
+        tooth=spot.tooth,
+        channel=spot.channel,
+    )

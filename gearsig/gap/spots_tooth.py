@@ -1,0 +1,82 @@
+"""At which angle and tooth a shaft's average changed: energy tooth by tooth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.gap.change import difference_residuals, lines_of_shaft, turned_difference
+from gearsig.gap.gathered import Gathered
+from gearsig.gap.gear_lines import SIDES, average_lines, visible_orders
+from gearsig.gap.spots import Comparison, Spot, by_decibels, shaft_words
+from gearsig.gap.tooth import mesh_power, residual_lines, tooth_energy
+from gearsig.severity.calibration import load_calibration
+from gearsig.severity.event import find_event
+from gearsig.severity.shaft_lines import ShaftLines
+
+STANDS_OUT = 3.0
+"""Energy within one pitch over the middling pitch's from which on one tooth is named."""
+
+
+@dataclass(frozen=True)
+class ToothPattern:
+    """Energy over a shaft's angle, of what tells its teeth apart.
+
+    Parameters
+    ----------
+    energy : array, (n_channels, n)
+        Mean square within one pitch over the mesh harmonics' power.
+    lines : ShaftLines
+        What it was made of.
+    """
+
+    energy: FloatArray
+    lines: ShaftLines
+
+    @property
+    def prominence(self) -> float:
+        """Largest energy over the median, of all channels together."""
+        mean = self.energy.mean(axis=0)
+        return float(mean.max() / max(float(np.median(mean)), 1e-300))
+
+    @property
+    def place_rev(self) -> float:
+        """Where the tooth engages that stands out, 0 to 1: the answer follows a little later."""
+        centre = find_event(self.lines).centre_rev
+        return (centre - load_calibration().lag_pitches / self.lines.teeth) % 1.0
+
+
+def own_pattern(gathered: Gathered, side: int) -> ToothPattern:
+    """Return the pattern of a recording by itself."""
+    teeth = gathered.frame.teeth[side]
+    rows = []
+    for sums in gathered.channels.values():
+        lines = average_lines(sums, side)[0]
+        residual = residual_lines(lines, teeth, visible_orders(gathered, side, len(lines)))
+        rows.append(tooth_energy(residual, teeth) / mesh_power(gathered, sums, side))
+    return ToothPattern(np.stack(rows), lines_of_shaft(gathered, side))
+
+
+def changed_pattern(now: Gathered, sound: Gathered, side: int) -> ToothPattern:
+    """Return the pattern of the difference from a sound recording, turned so that the same teeth meet."""
+    turned, _ = turned_difference(now, sound, side)
+    residuals = difference_residuals(now, turned, side)
+    return ToothPattern(np.stack([tooth_energy(lines, turned.teeth) for lines in residuals]), turned)
+
+
+def tooth_spot(comparison: Comparison, side: int) -> Spot:
+    """Return the angle and tooth that stands out, or that the teeth's pattern changed all round."""
+    frame, now = comparison.now.frame, comparison.now
+    pattern = changed_pattern(now, comparison.other, side) if comparison.is_reference else own_pattern(now, side)
+    shaft, name = shaft_words(frame, side), list(now.channels)[int(np.argmax(pattern.energy.max(axis=1)))]
+    if pattern.prominence < STANDS_OUT:
+        change = comparison.change_db[f"tooth.{SIDES[side]}.level"]
+        return Spot(f"pattern of the teeth of {shaft} all round, {by_decibels(change)}", change, channel=name)
+    place, teeth = pattern.place_rev, frame.teeth[side]
+    above, angle = 10.0 * float(np.log10(pattern.prominence)), 360.0 * place
+    tooth = int(place * teeth) % teeth + 1 if now.marks[side] else None
+    at = f"tooth {tooth} ({angle:.0f}°)" if tooth else f"one tooth (at {angle:.0f}°; no mark)"
+    title = f"burst once per revolution at {at} of {shaft}, {above:.2g} dB above the other teeth"
+    return Spot(title, above, angle_deg=angle, tooth=tooth, channel=name)

@@ -1,0 +1,122 @@
+"""The gap by order: spectra measured and simulated, and their difference against both floors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.errors import InputError
+from gearsig.gap.types import SpectrumCurves
+from gearsig.plot import series, style
+from gearsig.plot.display import unit_text
+from gearsig.plot.thin import thin
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+TOP_IN, SPECTRA_IN, BETWEEN_IN, GAP_IN, BOTTOM_IN = 0.66, 2.3, 0.5, 1.5, 0.55
+DECADES = 4.5
+"""Below the largest line at most: what lies deeper is noise."""
+N_POINTS = 2000
+LEAST_GAP_DB = 12.0
+"""Of the lower panel's half height: a smaller gap shall look small."""
+
+
+def gap_orders_figure(
+    curves: SpectrumCurves, *, limits: tuple[float, float] | None = None, title: str = "", simulated: str = "simulated"
+) -> Figure:
+    """Draw measured and simulated order spectra, and below them their difference in dB.
+
+    Parameters
+    ----------
+    curves : SpectrumCurves
+    limits : (float, float) or None
+        Orders to show; None: all.
+    title : str
+        Default: the curves' label.
+    simulated : str
+        What is compared with: "simulated", or "sound".
+
+    Returns
+    -------
+    Figure
+        Above: grey is the repeatability floor; lines below it say nothing. Below: lines above that floor, orange where
+        the gap exceeds the structural floor (grey band), quiet where it does not; green dots: what is left with the
+        likeliest effect, where there was a gap.
+
+    Raises
+    ------
+    InputError
+        If the curves' lengths differ.
+    """
+    x = series.checked_axis(curves.orders, "orders")
+    names = ("measured", "before", "floor", *(n for n in ("after", "structural_db") if len(getattr(curves, n))))
+    for name in names:
+        series.checked_values(getattr(curves, name), len(x), name)
+    low, high = limits or (float(x[0]), float(x[-1]))
+    if not np.any((x >= low) & (x <= high)):
+        raise InputError(f"limits {low:g} to {high:g} hold no order", allowed=f"{x[0]:g} to {x[-1]:g}")
+    figure = style.new_figure(TOP_IN + SPECTRA_IN + BETWEEN_IN + GAP_IN + BOTTOM_IN)
+    above = style.panel(figure, bottom_in=BOTTOM_IN + GAP_IN + BETWEEN_IN, top_in=TOP_IN)
+    below = style.panel(figure, bottom_in=BOTTOM_IN, top_in=TOP_IN + SPECTRA_IN + BETWEEN_IN, sharex=above)
+    keys = _draw_spectra(above, x, curves, simulated)
+    _draw_gap(below, x, curves)
+    above.set_xlim(low, high)
+    above.tick_params(labelbottom=False)
+    unit = f" ({unit_text(curves.unit)})" if curves.unit else ""
+    style.label_axes(above, "", f"peak amplitude{unit}")
+    style.label_axes(below, "order of the driver's shaft", "gap (dB)", f"measured over {simulated}, against the floors")
+    style.no_offset(below)
+    series.legend_row(figure, keys, left_in=0.85, top_in=series.NAMES_AT_IN)
+    series.headline(figure, title or curves.label)
+    return figure
+
+
+def _draw_spectra(axes: Axes, x: FloatArray, curves: SpectrumCurves, simulated: str) -> list[Line2D]:
+    top = max(float(curves.measured.max()), float(curves.before.max())) or 1.0
+    bottom = max(top / 10.0**DECADES, 0.3 * float(np.median(curves.floor)))
+    axes.set_yscale("log")
+    axes.set_ylim(bottom, 2.0 * top)
+    axes.fill_between(x, bottom, np.maximum(curves.floor, bottom), color=style.FLOOR, alpha=0.25, linewidth=0)
+    drawn = [
+        (curves.before, style.QUIET, 1.0, f"{simulated} before"),
+        (curves.measured, style.MEASURED, 1.1, "measured"),
+    ]
+    if len(curves.after):
+        drawn.insert(1, (curves.after, style.MESH, 1.0, f"{simulated} with the effect"))
+    lines = []
+    for values, colour, width, label in drawn:
+        points = thin(x, np.maximum(values, bottom), N_POINTS)
+        lines += axes.plot(*points, color=colour, linewidth=width, label=label, alpha=0.9)
+    floor = axes.plot([], [], color=style.FLOOR, alpha=0.4, linewidth=7, label="repeatability floor")
+    return [*lines[::-1], *floor]
+
+
+def gap_db(curves: SpectrumCurves, simulated: FloatArray) -> FloatArray:
+    """Return 20 lg of measured over simulated amplitudes, each lifted to the floor; nan where neither exceeds it."""
+    floor = np.maximum(curves.floor, 1e-300)
+    gap = 20.0 * np.log10(np.maximum(curves.measured, floor) / np.maximum(simulated, floor))
+    return np.where((curves.measured > floor) | (simulated > floor), gap, np.nan)
+
+
+def _draw_gap(axes: Axes, x: FloatArray, curves: SpectrumCurves) -> None:
+    before = gap_db(curves, curves.before)
+    structural = curves.structural_db if len(curves.structural_db) else np.zeros(len(x))
+    beyond = np.abs(np.nan_to_num(before)) > structural
+    largest = 1.15 * max(LEAST_GAP_DB, float(np.max(np.abs(before), initial=0.0, where=np.isfinite(before))))
+    if len(curves.structural_db):
+        band = np.minimum(structural, largest)
+        axes.fill_between(x, -band, band, step="mid", color=style.FLOOR, alpha=0.22, linewidth=0, zorder=1)
+    for chosen, colour, alpha in ((~beyond, style.QUIET, 0.55), (beyond, style.FAULT, 0.95)):
+        here = chosen & np.isfinite(before)
+        axes.vlines(x[here], 0.0, before[here], colors=colour, linewidth=1.0, alpha=alpha, zorder=2)
+    if len(curves.after):
+        left = gap_db(curves, curves.after)
+        here = beyond & np.isfinite(left)
+        axes.plot(x[here], left[here], ".", color=style.MESH, markersize=3.5, zorder=3)
+    axes.axhline(0.0, color=style.QUIET, linewidth=0.8, zorder=1.5)
+    axes.set_ylim(-largest, largest)
