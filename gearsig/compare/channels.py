@@ -29,7 +29,7 @@ class ChannelPair:
     simulated, recorded : str
     quantity : str
     unit : str
-        The recording's.
+        The recording's; empty where either is not known.
     factor : float
         The simulation's values times this are in `unit`.
     levels_compare : bool
@@ -104,7 +104,7 @@ def _pair(own: Channel, other: Channel) -> ChannelPair:
             allowed="the same unit, or two of one quantity",
             remedy="state unit and scale in the rig file's [[sensor]] tables",
         )
-    return ChannelPair(own.name, other.name, quantity, other.unit or own.unit, factor, known)
+    return ChannelPair(own.name, other.name, quantity, other.unit if known else "", factor, known)
 
 
 def _factor(own: str, other: str, quantity: str) -> float | None:

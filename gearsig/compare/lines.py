@@ -93,7 +93,7 @@ def _read(lines: HalvedLines, channel: int, n: int) -> tuple[float, float, bool]
     """Return level, its standard error, and whether the line is seen."""
     amplitudes, noise = np.abs(lines.whole[channel]), lines.noise()[channel, n]
     strongest = float(np.max(amplitudes[1:] ** 2, initial=0.0))
-    seen = bool(amplitudes[n] > SEEN * noise) and amplitudes[n] > 0
+    seen = bool(amplitudes[n] > SEEN * noise)
     # What is not seen is at most the noise: the level is a bound then.
     shown = amplitudes[n] if seen else max(amplitudes[n], noise)
     level = float(decibel(np.array([shown**2]), strongest)[0])
@@ -126,7 +126,8 @@ def other_lines(
     for line in sorted(found):
         if any(abs(line - other) <= 3 for other, _ in levels):
             continue
-        levels.append((line, _other_level(line * step, line, simulated, recorded)))
+        label = other_label(line * step, mesh_orders)
+        levels.append((line, _other_level(label, line * step, line, simulated, recorded)))
     kept = sorted((level for _, level in levels), key=lambda one: -max(one.level.recorded_db, one.level.simulated_db))
     return tuple(kept[: 2 * N_OTHER])
 
@@ -153,6 +154,22 @@ def _strongest(
     return [int(line) for line in lines[np.argsort(-power[lines])][:N_OTHER]]
 
 
+def other_label(order: float, mesh_orders: Sequence[float]) -> str:
+    """Name a line by its order, and by its distance from the mesh harmonic that it may be a sideband of.
+
+    Examples
+    --------
+    >>> other_label(17.86, [23.0]), other_label(5.15, [23.0])
+    ('order 17.86 (1× mesh − 5.14)', 'order 5.15')
+    """
+    near = [(abs(order - k * m), k, m) for m in mesh_orders if (k := round(order / m)) >= 1]
+    if not near:
+        return f"order {order:.5g}"
+    _, k, mesh = min(near)
+    off = order - k * mesh
+    return f"order {order:.5g} ({k}× mesh {'+' if off > 0 else '−'} {abs(off):.4g})"
+
+
 def _strongest_around(power: FloatArray, reach: int) -> FloatArray:
     from scipy.ndimage import maximum_filter1d
 
@@ -160,7 +177,9 @@ def _strongest_around(power: FloatArray, reach: int) -> FloatArray:
     return strongest
 
 
-def _other_level(order: float, line: int, simulated: Sequence[Spectrum], recorded: Sequence[Spectrum]) -> LineLevel:
+def _other_level(
+    label: str, order: float, line: int, simulated: Sequence[Spectrum], recorded: Sequence[Spectrum]
+) -> LineLevel:
     """Read both records at one order; a slightly other speed or slip may move the line by one."""
     levels, errors, seen = [], [], []
     for halves in (simulated, recorded):
@@ -173,4 +192,4 @@ def _other_level(order: float, line: int, simulated: Sequence[Spectrum], recorde
         errors.append(abs(float(a - b)) / 2.0)
         seen.append(bool(10.0 * np.log10(max(peaks.min(), 1e-300) / max(floor, 1e-300)) > OTHER_OVER_FLOOR_DB))
     level = LevelPair(levels[0], levels[1], float(np.hypot(errors[0], errors[1])))
-    return LineLevel(f"order {order:.5g}", "other", order, "", level, seen[0], seen[1])
+    return LineLevel(label, "other", order, "", level, seen[0], seen[1])

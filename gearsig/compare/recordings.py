@@ -16,7 +16,7 @@ from gearsig.compare.one_channel import Material, compare_channel, halved_spectr
 from gearsig.compare.remarks import remarks
 from gearsig.compare.side import Side, make_side
 from gearsig.compare.types import Alignment, Comparison, RecordFacts
-from gearsig.compare.verdict import verdict_of
+from gearsig.compare.verdict import findings_of, verdict_of
 from gearsig.errors import RefusalError
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
@@ -120,6 +120,7 @@ def compare_recordings(
         channels=found,
         notes=(*machine.notes, *remarks(own, other, alignments, found, ratios)),
         verdict=verdict_of(found),
+        findings=findings_of(found),
     )
 
 

@@ -310,7 +310,9 @@ class Comparison:
     notes : tuple of str
         What the reader should know before believing a figure.
     verdict : str
-        What it comes to, in a few sentences.
+        How far the mesh harmonics are apart, one sentence per channel.
+    findings : tuple of str
+        Lines that only one side has, shapes of the averages, energy that turns with the shafts.
     """
 
     simulated: RecordFacts
@@ -323,3 +325,4 @@ class Comparison:
     channels: tuple[ChannelComparison, ...]
     notes: tuple[str, ...]
     verdict: str
+    findings: tuple[str, ...]

@@ -22,8 +22,21 @@ LACKING_DB = 6.0
 
 
 def verdict_of(channels: Sequence[ChannelComparison]) -> str:
-    """Return sentences on mesh harmonics, missing lines, the average's shape and what is locked, channel by channel."""
-    return " ".join(text for channel in channels for text in _channel(channel, named=len(channels) > 1))
+    """Return one sentence per channel on how far the mesh harmonics, or else the shaft orders, are apart."""
+    return " ".join(_head(channel, channels) + _levels_text(channel) for channel in channels)
+
+
+def findings_of(channels: Sequence[ChannelComparison]) -> tuple[str, ...]:
+    """Return sentences on the lines that only one side has, the averages' shapes, and the energy that is locked."""
+    texts = []
+    for channel in channels:
+        if mesh_lines(channel):
+            texts += [_head(channel, channels) + text for text in (*_missing_texts(channel), *_shape_texts(channel))]
+    return tuple(texts)
+
+
+def _head(channel: ChannelComparison, channels: Sequence[ChannelComparison]) -> str:
+    return f"{channel.name}: " if len(channels) > 1 else ""
 
 
 def mesh_lines(channel: ChannelComparison) -> tuple[LineLevel, ...]:
@@ -35,15 +48,12 @@ def mesh_lines(channel: ChannelComparison) -> tuple[LineLevel, ...]:
     return ()
 
 
-def _channel(channel: ChannelComparison, *, named: bool) -> list[str]:
-    head = f"{channel.name}: " if named else ""
+def _levels_text(channel: ChannelComparison) -> str:
     lines = mesh_lines(channel)
     if not lines:
-        return [f"{head}No line of the recording stands above its own noise: only the floors can be compared."]
+        return "No line of the recording stands above its own noise: only the floors can be compared."
     where = "mesh harmonics" if lines[0].kind == "mesh" else "shaft orders"
-    texts = [head + _lines_text(lines, where, levels_compare=channel.levels_compare)]
-    texts += _missing_text(channel)
-    return [*texts, _shape_text(channel)]
+    return _lines_text(lines, where, levels_compare=channel.levels_compare)
 
 
 def _lines_text(lines: Sequence[LineLevel], where: str, *, levels_compare: bool) -> str:
@@ -53,9 +63,10 @@ def _lines_text(lines: Sequence[LineLevel], where: str, *, levels_compare: bool)
     worst = lines[int(np.argmax(np.abs(differences - (gain if not levels_compare else 0.0))))]
     if not levels_compare:
         spread = float(np.max(np.abs(differences - gain)))
+        verb = "agree within" if spread <= WITHIN_DB else "differ by up to"
         return (
-            f"The unit of one side is not known; after a common gain of {-gain:+.1f} dB, simulation and recording "
-            f"agree within {spread:.1f} dB at {n}{_worst(worst, gain) if spread > WITHIN_DB else ''}."
+            f"The unit of one side is not known; after a common gain of {_decibels(-gain)}, simulation and recording "
+            f"{verb} {spread:.1f} dB at {n}{_worst(worst, gain) if spread > WITHIN_DB else ''}."
         )
     largest = float(np.max(np.abs(differences)))
     if not any(line.level.is_beyond for line in lines):
@@ -65,7 +76,7 @@ def _lines_text(lines: Sequence[LineLevel], where: str, *, levels_compare: bool)
     spread = float(np.max(np.abs(differences - gain)))
     text = f"Simulation and recording differ by up to {largest:.1f} dB at {n}{_worst(worst, 0.0)}"
     if len(lines) > 1 and abs(gain) > LARGE_GAIN_DB and spread < largest:
-        text += f"; a common gain of {-gain:+.1f} dB would bring them within {spread:.1f} dB"
+        text += f"; a common gain of {_decibels(-gain)} would bring them within {spread:.1f} dB"
     return f"{text}."
 
 
@@ -74,7 +85,7 @@ def _worst(line: LineLevel, gain: float) -> str:
     return f", the most at {line.label}: {abs(off):.1f} dB too {'weak' if off < 0 else 'strong'}"
 
 
-def _missing_text(channel: ChannelComparison) -> list[str]:
+def _missing_texts(channel: ChannelComparison) -> list[str]:
     """Name the strongest lines that only one of the two shows."""
     texts = []
     for seen, other, words in (
@@ -99,17 +110,27 @@ def _more(n: int) -> str:
     return f" and {n} more lines" if n > 1 else " and one more line" if n == 1 else ""
 
 
-def _shape_text(channel: ChannelComparison) -> str:
-    texts = []
+def _shape_texts(channel: ChannelComparison) -> list[str]:
+    parts = []
     for shaft in channel.shafts:
-        best = float(np.sqrt(shaft.simulated_reliability * shaft.recorded_reliability))
-        texts.append(f"{shaft.correlation.value:.2f}{f' ({shaft.shaft})' if shaft.shaft else ''} of {best:.2f}")
-    locked = channel.locked
-    return (
-        f"The synchronous averages correlate by {', '.join(texts)} possible; "
-        f"{_percent(locked.recorded.value)} of the recording's energy turns with the shafts, "
-        f"{_percent(locked.simulated.value)} of the simulation's."
-    )
+        possible = float(np.sqrt(shaft.simulated_reliability * shaft.recorded_reliability))
+        name = f" of {shaft.shaft}" if shaft.shaft else ""
+        parts.append(f"{_number(shaft.correlation.value)}{name} ({_number(possible)} is possible)")
+    return [
+        f"The synchronous averages correlate by {', '.join(parts)}.",
+        (
+            f"{_percent(channel.locked.recorded.value)} of the recording's energy turns with the shafts, "
+            f"{_percent(channel.locked.simulated.value)} of the simulation's."
+        ),
+    ]
+
+
+def _number(value: float) -> str:
+    return f"{value:.2f}".replace("-", "−")
+
+
+def _decibels(value: float) -> str:
+    return f"{value:+.1f} dB".replace("-", "−")
 
 
 def _percent(share: float) -> str:

@@ -75,6 +75,7 @@ def _palette() -> Image.Image:
     named = {
         *style.CURSOR_COLOURS.values(),
         style.MEASURED,
+        style.SIMULATED,
         style.FAULT,
         style.FLOOR,
         style.INK,

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 # The colours of Okabe and Ito (Color Universal Design, 2008), which stay apart for colour-blind readers.
 MEASURED = "#0072B2"
 FAULT = "#D55E00"
+SIMULATED = "#C98A00"  # their orange, darkened: beside the blue of what was measured
 FLOOR = "#7A7A7A"
 MESH = "#00795A"  # their bluish green, darkened for thin lines and small print
 SHAFT = "#9A6A00"  # their orange, darkened likewise
