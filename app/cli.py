@@ -9,6 +9,7 @@ import typer
 
 from app.commands.analyze import analyze
 from app.commands.bifurcation import bifurcation
+from app.commands.compare import compare
 from app.commands.crack import crack
 from app.commands.dashboard import dashboard
 from app.commands.demo import demo
@@ -36,6 +37,7 @@ app = typer.Typer(
 )
 app.command()(analyze)
 app.command()(crack)
+app.command()(compare)
 app.command()(report)
 app.add_typer(rig_app, name="rig")
 app.command()(simulate)
