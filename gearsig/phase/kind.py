@@ -8,13 +8,15 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
+from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError
 from gearsig.phase.chaos_test import zero_one_test_of_section
+from gearsig.phase.checked_series import mean_period_samples
 from gearsig.phase.dimension import embedding_dimension
 from gearsig.phase.embedding import delay_embedding
 from gearsig.phase.lock import CycleLock
 from gearsig.phase.lyapunov import largest_lyapunov_exponent
-from gearsig.phase.measures import ChaosTest, LyapunovExponent
+from gearsig.phase.measures import ChaosTest, EmbeddingDimension, LyapunovExponent
 from gearsig.phase.section import locked_section, section_period
 from gearsig.phase.types import PhasePortrait, PoincareSection
 
@@ -74,6 +76,9 @@ def kind_of_motion(
     Notes
     -----
     Measured gear vibration is periodic with noise and modulation in most cases; "undecided" is then the right answer.
+
+    "stochastic" says that the motion does not unfold. Clean chaos recorded over fewer than about a hundred cycles may
+    not unfold either: record longer, or state `noise_free` where it is a model's, which makes it "undecided".
     """
     section = locked_section(portrait, lock)
     period = section_period(section, tolerance=tolerance)
@@ -96,11 +101,14 @@ def kind_of_motion(
 def _exponent(portrait: PhasePortrait, evidence: list[str]) -> tuple[LyapunovExponent | None, bool]:
     """Return the exponent, and whether no dimension unfolds the path; say either in the evidence."""
     x, rate = np.ascontiguousarray(portrait.points[:, 0]), portrait.sampling_rate_hz
-    found = _answer(lambda: embedding_dimension(x, rate), "embedding dimension", evidence)
+    found = _answer(lambda: _dimension(x, rate), "embedding dimension", evidence)
     if found is None:
         return None, False
     if found.dimension == 0:
-        evidence.append(f"no dimension up to {found.dimensions[-1]} unfolds the {portrait.axis_names[0]}")
+        evidence.append(
+            f"no dimension up to {found.dimensions[-1]} unfolds the {portrait.axis_names[0]}: noise does this; so does "
+            "clean chaos of a few dozen cycles"
+        )
         return None, True
     path = delay_embedding(x, rate, delay_samples=found.delay_samples, dimension=found.dimension)
     exponent = _answer(lambda: largest_lyapunov_exponent(path), "Lyapunov exponent", evidence)
@@ -108,6 +116,19 @@ def _exponent(portrait: PhasePortrait, evidence: list[str]) -> tuple[LyapunovExp
         size = f"{exponent.exponent_per_s:.3g} ± {exponent.uncertainty_per_s:.2g} 1/s"
         evidence.append(f"largest Lyapunov exponent {size} in {found.dimension} dimensions: {exponent.verdict}")
     return exponent, False
+
+
+def _dimension(x: FloatArray, rate: float) -> EmbeddingDimension:
+    """Return the embedding dimension; where the usual delay unfolds nothing, that at a quarter of the mean period.
+
+    The mutual information of chaos may fall for most of a cycle, in which neighbours part too far. A quarter of the
+    mean period leaves 5 % false neighbours or more of filtered noise; an eighth would make it look deterministic.
+    """
+    usual = embedding_dimension(x, rate)
+    shorter = round(mean_period_samples(x) / 4)
+    if usual.dimension or not 1 <= shorter < usual.delay_samples:
+        return usual
+    return embedding_dimension(x, rate, delay_samples=shorter)
 
 
 def _decide(test: ChaosTest | None, exponent: LyapunovExponent | None, stochastic: bool, *, noise_free: bool) -> Kind:

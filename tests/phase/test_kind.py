@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from gearsig.errors import RefusalError
+from gearsig.phase.dimension import embedding_dimension
 from gearsig.phase.kind import kind_of_motion
 from gearsig.phase.lock import constant_period_lock
 from gearsig.phase.plane import phase_plane_of
@@ -61,6 +63,24 @@ def test_noise_is_called_stochastic():
     found = kind_of_motion(path, constant_period_lock(0.02, 8.0))
     assert found.kind == "stochastic"
     assert any("no dimension" in sentence for sentence in found.evidence)
+
+
+@pytest.mark.parametrize(("per_period", "n_periods"), [(32, 600), (128, 300)])
+def test_clean_chaos_whose_usual_delay_is_too_long_is_not_called_stochastic(per_period, n_periods):
+    rate = per_period / DUFFING_PERIOD_S
+    path = PhasePortrait(duffing(0.5, n_periods, per_period), rate, ("x", "v"), ("m", "m/s"), "states", "duffing")
+    usual = embedding_dimension(np.ascontiguousarray(path.points[:, 0]), rate)
+    assert usual.dimension == 0
+    found = kind_of_motion(path, constant_period_lock(DUFFING_PERIOD_S, path.end_s, "forcing period"))
+    assert found.kind == "chaotic"
+
+
+@pytest.mark.parametrize("smooth", [0.5, 0.95])
+@pytest.mark.parametrize("seed", [0, 2])
+def test_filtered_noise_stays_stochastic(smooth, seed):
+    x = lfilter([1.0], [1.0, -smooth], np.random.default_rng(seed).normal(size=8_000))
+    path = PhasePortrait(np.stack([x, np.gradient(x)], 1), 1000.0, ("x", "v"), ("m", "m/s"), "states", "noise")
+    assert kind_of_motion(path, constant_period_lock(0.0297, 8.0)).kind == "stochastic"
 
 
 def test_what_cannot_be_answered_is_said():
