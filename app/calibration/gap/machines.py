@@ -11,7 +11,7 @@ from app.calibration.rigs import DrawnRig, HousingMode, draw_rig
 LIGHT_SHARE, LIGHT_TORQUE = 0.3, (0.04, 0.3)
 """Machines that run at light load, and their torque over that of the others."""
 
-DURATION_S = (4.0, 8.0)
+DURATION_S = (3.0, 7.0)
 MOUNTED_ANEW_SHARE = 0.6
 """Recordings between which and their reference the sensors were taken off."""
 
