@@ -187,6 +187,7 @@ def _spectrum(curves: SpectrumCurves) -> Json:
         "before": _numbers(curves.before),
         "after": _numbers(curves.after) or None,
         "floor": _numbers(curves.floor),
+        "structural_floor_db": _numbers(curves.structural_db) or None,
     }
 
 

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from typing import TYPE_CHECKING, Any, Literal
 
-from gearsig.gap.types import GapReport
+import numpy as np
+
+from gearsig.gap.types import NONE, UNKNOWN, AngleCurves, GapCause, GapOutcome, GapReport, PlaceKind
 from gearsig.plot.embed import Picture, embed
+from gearsig.plot.marks import AngleMark
+from gearsig.report.numbers import readable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Question = Literal["where", "which", "how far"]
+QUESTIONS: tuple[Question, ...] = ("where", "which", "how far")
+N_DETAILED = 3
+"""Causes whose evidence is shown."""
 
 
 @dataclass(frozen=True)
@@ -25,9 +32,11 @@ class GapFigure:
         "where", "which" or "how far": under which heading it stands.
     figure : Figure
     look : str
-        One sentence on what to look at.
+        What to look at.
     shows : str
         What it shows, for those who do not see it.
+    of : str
+        Name of the cause that it belongs to; empty: to none.
     is_small : bool
         Whether it stands beside others.
     vector : bool
@@ -38,34 +47,126 @@ class GapFigure:
     figure: Figure
     look: str
     shows: str
+    of: str = ""
     is_small: bool = False
     vector: bool = False
 
 
 @dataclass(frozen=True)
 class GapGallery:
-    """The pictures of one question."""
+    """The pictures of one question: one per line, side by side, and by the cause that they belong to."""
 
     wide: tuple[Picture, ...]
     small: tuple[Picture, ...]
-
-
-def gap_figures(report: GapReport) -> Iterator[GapFigure]:
-    """Draw every figure that the report has numbers for, in the order of the page."""
-    yield from ()
+    of: Mapping[str, Picture]
 
 
 def gap_galleries(report: GapReport) -> dict[str, GapGallery]:
     """Return the pictures of a page by question."""
-    drawn = list(gap_figures(report))
+    drawn = [(one, embed(one.figure, one.look, one.shows, vector=one.vector)) for one in gap_figures(report)]
     return {
         question: GapGallery(
-            tuple(_embedded(one) for one in drawn if one.question == question and not one.is_small),
-            tuple(_embedded(one) for one in drawn if one.question == question and one.is_small),
+            tuple(p for one, p in drawn if one.question == question and not one.is_small and not one.of),
+            tuple(p for one, p in drawn if one.question == question and one.is_small),
+            {one.of: p for one, p in drawn if one.question == question and one.of},
         )
-        for question in ("where", "which", "how far")
+        for question in QUESTIONS
     }
 
 
-def _embedded(one: GapFigure) -> Picture:
-    return embed(one.figure, one.look, one.shows, vector=one.vector)
+def gap_figures(report: GapReport) -> Iterator[GapFigure]:
+    """Draw every figure that the report has finite numbers for, in the order of the page.
+
+    Shares of places and probabilities of causes are no figures: page and dashboard write them as lists with bars.
+    """
+    yield from _spectra(report)
+    yield from _teeth(report)
+    yield from _evidence(report)
+    yield from _waterfall(report)
+
+
+def detailed_causes(report: GapReport) -> tuple[GapCause, ...]:
+    """Return the effects whose evidence is shown: the likeliest three, where there is a gap at all."""
+    if report.outcome is GapOutcome.NO_GAP:
+        return ()
+    return tuple(cause for cause in report.causes if cause.name not in (NONE, UNKNOWN))[:N_DETAILED]
+
+
+def _spectra(report: GapReport) -> Iterator[GapFigure]:
+    from gearsig.plot.gap_orders import gap_orders_figure
+
+    for curves in report.spectra:
+        if not len(curves.orders) or not is_finite(curves):
+            continue
+        left = " Green dots: what is left with the likeliest effect." if len(curves.after) else ""
+        yield GapFigure(
+            "where",
+            gap_orders_figure(curves),
+            "Above, lines in the grey repeatability floor say nothing. Below, the gap line by line: orange where it "
+            f"exceeds the structural floor.{left}",
+            f"Order spectrum, {curves.label}: measured, simulated, and their difference in dB.",
+        )
+
+
+def _teeth(report: GapReport) -> Iterator[GapFigure]:
+    from gearsig.plot.gap_teeth import gap_teeth_figure
+
+    for curves in report.angles:
+        if not len(curves.angle_deg) or not is_finite(curves):
+            continue
+        numbers = (
+            "" if curves.has_mark else " The shaft has no mark: teeth have no numbers, and the start is arbitrary."
+        )
+        yield GapFigure(
+            "where",
+            gap_teeth_figure(curves, mark=_mark(report, curves)),
+            f"Shaft {curves.shaft}, tooth by tooth: sound teeth draw an even ring, a damaged one swings out.{numbers}",
+            f"Energy around one revolution of shaft {curves.shaft}, measured and simulated.",
+            is_small=True,
+        )
+
+
+def _mark(report: GapReport, curves: AngleCurves) -> AngleMark | None:
+    """Return the tooth that the gap names on this shaft."""
+    for place in report.places:
+        if place.kind is PlaceKind.TOOTH and place.shaft == curves.shaft and place.angle_deg is not None:
+            label = f"tooth {place.tooth}" if place.tooth is not None else f"{readable(place.angle_deg)}°"
+            return AngleMark(place.angle_deg, label) if np.isfinite(place.angle_deg) else None
+    return None
+
+
+def _evidence(report: GapReport) -> Iterator[GapFigure]:
+    from gearsig.plot.gap_evidence import gap_evidence_figure
+
+    for cause in detailed_causes(report):
+        evidence = [one for one in cause.evidence if is_finite(one)]
+        if evidence:
+            yield GapFigure(
+                "which",
+                gap_evidence_figure(evidence),
+                "Where diamond and bar end together, sign and size are right. Grey: what a healthy machine may change.",
+                f"Predicted and observed changes of the own features of {cause.title}.",
+                of=cause.name,
+                vector=True,
+            )
+
+
+def _waterfall(report: GapReport) -> Iterator[GapFigure]:
+    from gearsig.plot.gap_waterfall import gap_waterfall_figure
+
+    if len(report.steps) > 1 and all(is_finite(step) for step in report.steps):
+        shrinkage = report.causes[0].shrinkage if report.causes else None
+        yield GapFigure(
+            "how far",
+            gap_waterfall_figure(report.steps, held_out=shrinkage.held_out if shrinkage is not None else ""),
+            "What each effect takes away. Within the shaded structural floor there is nothing left to explain.",
+            "The gap before, what each added effect takes away, and what is left.",
+            vector=True,
+        )
+
+
+def is_finite(value: Any) -> bool:
+    """Whether all numbers in a dataclass, however deep, are finite."""
+    if is_dataclass(value):
+        return all(is_finite(getattr(value, field.name)) for field in fields(value))
+    return not isinstance(value, (float, np.ndarray)) or bool(np.isfinite(value).all())

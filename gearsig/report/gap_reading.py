@@ -168,7 +168,7 @@ def _next_recording(found: Json) -> NextRecording:
 
 
 def _spectrum(found: Json) -> SpectrumCurves:
-    curves = (_numbers(found[key]) for key in ("orders", "measured", "before", "after", "floor"))
+    curves = (_numbers(found[key]) for key in ("orders", "measured", "before", "after", "floor", "structural_floor_db"))
     return SpectrumCurves(found["label"], found["unit"], *curves)
 
 

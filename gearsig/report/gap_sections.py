@@ -9,14 +9,13 @@ from importlib.metadata import version
 from math import isfinite
 
 from gearsig import __version__
-from gearsig.gap.types import NONE, UNKNOWN, Evidence, GapCause, GapOutcome, GapPlace, GapReport, Interval, Shrinkage
+from gearsig.gap.types import Evidence, GapCause, GapPlace, GapReport, Interval, Shrinkage
 from gearsig.plot.display import unit_text
+from gearsig.report.gap_pictures import detailed_causes
 from gearsig.report.gap_text import point_text
 from gearsig.report.numbers import readable
 from gearsig.report.sections import Rows, named
 
-N_DETAILED = 3
-"""Causes whose evidence is shown."""
 MOST_ORDERS = 4
 LEAST_SHOWN = 0.01
 """Probability below which a cause is only counted."""
@@ -59,7 +58,6 @@ class CauseRow:
     bar_percent: float
     severity: str
     place: str
-    is_effect: bool
     statements: tuple[str, ...] = ()
     evidence: tuple[EvidenceRow, ...] = ()
 
@@ -91,7 +89,7 @@ def place_rows(report: GapReport) -> tuple[PlaceRow, ...]:
         PlaceRow(
             place.title[:1].upper() + place.title[1:],
             _where(place),
-            signed_db(place.change_db),
+            f"{signed(place.change_db)} dB",
             readable(place.repeatability, 2),
             readable(place.structural, 2),
             percent(place.share),
@@ -117,10 +115,9 @@ def _where(place: GapPlace) -> tuple[str, ...]:
 
 
 def cause_rows(report: GapReport) -> tuple[CauseRow, ...]:
-    """Return the causes, likeliest first; the first three effects with their evidence, where there is a gap at all."""
-    effects = [cause for cause in report.causes if cause.name not in (NONE, UNKNOWN)]
-    detailed = [] if report.outcome is GapOutcome.NO_GAP else [cause.name for cause in effects[:N_DETAILED]]
-    return tuple(_cause_row(cause, detailed=cause.name in detailed) for cause in report.causes)
+    """Return the causes, likeliest first; the first effects with what speaks for and against them."""
+    detailed = detailed_causes(report)
+    return tuple(_cause_row(cause, detailed=cause in detailed) for cause in report.causes)
 
 
 def _cause_row(cause: GapCause, *, detailed: bool) -> CauseRow:
@@ -132,7 +129,6 @@ def _cause_row(cause: GapCause, *, detailed: bool) -> CauseRow:
         _bar(cause.probability),
         severity_text(cause),
         cause.place,
-        cause.name not in (NONE, UNKNOWN),
         _statements(cause.shrinkage) if detailed else (),
         tuple(_evidence_row(one) for one in cause.evidence) if detailed else (),
     )
@@ -159,8 +155,8 @@ def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
 def _evidence_row(one: Evidence) -> EvidenceRow:
     return EvidenceRow(
         one.feature,
-        signed_db(one.predicted_db),
-        signed_db(one.observed_db),
+        signed(one.predicted_db),
+        signed(one.observed_db),
         readable(one.floor_db, 2),
         one.speaks_for,
     )
@@ -189,7 +185,7 @@ def step_rows(report: GapReport) -> tuple[StepRow, ...]:
             step.label,
             readable(step.left.value, 2),
             f"{readable(step.left.low, 2)} to {readable(step.left.high, 2)}",
-            "" if last is None else _difference(last.value, step.left.value),
+            "" if last is None else signed(step.left.value - last.value),
         )
         for step, last in zip(report.steps, before, strict=False)
     )
@@ -259,11 +255,15 @@ def percent(share: float) -> str:
     return "< 1 %" if 0 < share < LEAST_SHOWN else f"{100 * share:.0f} %".replace("-", "−")
 
 
-def signed_db(change_db: float) -> str:
-    """Write a change in dB with its sign."""
-    if not isfinite(change_db):
-        return "–"
-    return f"{change_db:+.1f} dB".replace("-", "−")
+def signed(value: float) -> str:
+    """Write a change with its sign and one decimal.
+
+    Examples
+    --------
+    >>> signed(14.23), signed(-3.0), signed(float("nan"))
+    ('+14.2', '−3.0', '–')
+    """
+    return f"{value:+.1f}".replace("-", "−") if isfinite(value) else "–"
 
 
 def unit_of(unit: str) -> str:
@@ -273,8 +273,3 @@ def unit_of(unit: str) -> str:
 
 def _bar(share: float) -> float:
     return round(100 * min(max(share, 0.0), 1.0), 1) if isfinite(share) else 0.0
-
-
-def _difference(before: float, after: float) -> str:
-    change = after - before
-    return f"+{readable(change, 2)}" if change > 0 else readable(change, 2)

@@ -283,6 +283,7 @@ def spectrum(label: str, seed: int = 0) -> SpectrumCurves:
         noise + mesh + 0.15 * sidebands,
         noise + mesh + 0.9 * sidebands,
         np.full_like(orders, 0.006),
+        np.full_like(orders, 3.0),
     )
 
 

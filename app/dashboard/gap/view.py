@@ -57,8 +57,8 @@ def show_finished(finished: Finished) -> None:
 def _show_verdict(report: GapReport) -> None:
     colour, icon = LOOKS[report.outcome]
     st.badge(report.outcome.value, icon=icon, color=colour)
-    for word, text in verdict_rows(report):
-        st.markdown(f"**{as_typed(word)}.** {as_typed(text)}")
+    lines = (f"**{as_typed(word)}.** {as_typed(text)}" for word, text in verdict_rows(report))
+    st.markdown("  \n".join(lines))  # two spaces: a new line, not a new paragraph
     advice = condition_advice(report)
     if advice:
         st.caption(as_typed(advice))
@@ -95,8 +95,7 @@ def _show_where(report: GapReport, figures: Sequence[GapFigure]) -> None:
                 "place": [row.title for row in rows],
                 "share": [row.bar_percent for row in rows],
                 "change": [row.change for row in rows],
-                "× structural floor": [row.structural for row in rows],
-                "× repeatability floor": [row.repeatability for row in rows],
+                "× floor (structural, repeatability)": [f"{row.structural}, {row.repeatability}" for row in rows],
                 "at": [", ".join(row.where) for row in rows],
             },
             bars=("share",),
@@ -126,19 +125,22 @@ def _show_which(report: GapReport, figures: Sequence[GapFigure]) -> None:
         st.caption(as_typed(f"By group: {', '.join(groups)}."))
     for place, row in enumerate(row for row in rows if row.statements):
         with st.expander(as_typed(f"{row.title}, {row.percent}"), expanded=place == 0):
-            _show_evidence(row)
+            _show_evidence(row, figures)
     _show_figures(figures, "which")
 
 
-def _show_evidence(row: CauseRow) -> None:
+def _show_evidence(row: CauseRow, figures: Sequence[GapFigure]) -> None:
     st.markdown("\n".join(f"- {as_typed(sentence)}" for sentence in row.statements))
+    for one in figures:
+        if one.of == row.name:
+            _show_figure(one)
     if row.evidence:
         _table(
             {
                 "its own features": [one.feature for one in row.evidence],
-                "predicted": [one.predicted for one in row.evidence],
-                "observed": [one.observed for one in row.evidence],
-                "floor": [f"{one.floor} dB" for one in row.evidence],
+                "predicted (dB)": [one.predicted for one in row.evidence],
+                "observed (dB)": [one.observed for one in row.evidence],
+                "floor (dB)": [one.floor for one in row.evidence],
                 "speaks": ["✓ for it" if one.speaks_for else "✗ against it" for one in row.evidence],
             }
         )
@@ -179,7 +181,7 @@ def _show_next(report: GapReport, figures: Sequence[GapFigure]) -> None:
 
 
 def _show_figures(figures: Sequence[GapFigure], question: Question) -> None:
-    chosen = [one for one in figures if one.question == question]
+    chosen = [one for one in figures if one.question == question and not one.of]
     for one in chosen:
         if not one.is_small:
             _show_figure(one)
@@ -199,5 +201,4 @@ def _table(columns: dict[str, list[Any]], bars: tuple[str, ...] = ()) -> None:
     config: dict[str, Any] = {
         name: st.column_config.ProgressColumn(format="%.0f %%", min_value=0, max_value=100) for name in bars
     }
-    config[next(iter(columns))] = st.column_config.TextColumn(width="large")
     st.dataframe(columns, hide_index=True, width="stretch", column_config=config)
