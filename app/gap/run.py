@@ -53,7 +53,9 @@ def run_gap(asked: Asked, model: str, *, cache: Path | None, on_stage: Stage = l
 
 
 def cache_folder() -> Path:
-    """Return the folder of this user for what can be computed again."""
+    """Return the folder of this user for what can be computed again; the variable GEARSIG_CACHE names another."""
+    if os.environ.get("GEARSIG_CACHE"):
+        return Path(os.environ["GEARSIG_CACHE"]) / "gap"
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
     else:

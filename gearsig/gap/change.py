@@ -32,6 +32,12 @@ def change_features(now: Gathered, sound: Gathered) -> Features:
     )
 
 
+def change_once(now: Gathered, sound: Gathered) -> tuple[tuple[str, ...], FloatArray]:
+    """Return names and values of the change features, without their scatter."""
+    (names, here), before = once(now), once(sound)[1]
+    return _joined(names, here - before, now, sound)
+
+
 def difference_features(now: Gathered, simulated: Gathered) -> Features:
     """Return the differences of all features alone: a simulation's flanks are not this machine's."""
     (names, here), before = once(now), once(simulated)[1]

@@ -171,7 +171,7 @@ def _force_share_g_mm(machine: Surroundings, options: Options) -> float:
 
 def _most_g_mm(machine: Surroundings, options: Options) -> float:
     radius = 0.5 * machine.diameter_mm(options)
-    return 0.5 * LARGEST_OFFSET * radius * usual_mass_kg(machine.nominal, _side(options)) * 1e3
+    return 0.8 * LARGEST_OFFSET * radius * usual_mass_kg(machine.nominal, _side(options)) * 1e3
 
 
 def _iso(tolerance: Callable[[float, float], float]) -> Scale:

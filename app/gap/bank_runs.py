@@ -1,0 +1,104 @@
+"""The simulations of a bank, in processes of their own or in this one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import as_completed
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.errors import GearsigError
+from gearsig.gap.gathered import Gathered
+from gearsig.gap.simulator import Added, Point, Twin
+
+
+@dataclass(frozen=True)
+class Run:
+    """What all simulations of a bank share."""
+
+    twin: Twin
+    point: Point
+    duration_s: float
+    sampling_rate_hz: float
+    noise: int
+
+
+@dataclass(frozen=True)
+class Task:
+    """One simulation: a specimen with an effect, or sound."""
+
+    seed: int
+    added: Added | None
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """One simulation's features, of a sound specimen only, and its change against the specimen's sound first run."""
+
+    names: tuple[str, ...]
+    values: FloatArray
+    change_names: tuple[str, ...]
+    change: FloatArray
+
+
+def finished_runs(
+    run: Run, tasks: Sequence[Task], processes: int, on_progress: Callable[[int, int], object]
+) -> list[Reduced | str]:
+    """Return what each task gave, or why it could not be simulated, in the order of the tasks."""
+    from sims.processes import process_pool
+
+    found: list[Reduced | str] = [""] * len(tasks)
+    if processes == 1:
+        known: dict[int, Gathered] = {}
+        for i, task in enumerate(tasks):
+            found[i] = _reduced(run, task, known)
+            on_progress(i + 1, len(tasks))
+        return found
+    with process_pool(processes) as pool:
+        waiting = {pool.submit(reduced_in_worker, run, task): i for i, task in enumerate(tasks)}
+        for done, future in enumerate(as_completed(waiting), 1):
+            found[waiting[future]] = future.result()
+            on_progress(done, len(tasks))
+    return found
+
+
+_KNOWN: dict[int, Gathered] = {}
+"""Sound first runs by seed, of the one bank that a worker works for."""
+
+
+def reduced_in_worker(run: Run, task: Task) -> Reduced | str:
+    """Return what a task gives, in a process that lives for one bank only."""
+    return _reduced(run, task, _KNOWN)
+
+
+def _reduced(run: Run, task: Task, known: dict[int, Gathered]) -> Reduced | str:
+    from gearsig.gap.change import change_once
+    from gearsig.gap.features import once
+
+    try:
+        if task.seed not in known:
+            known[task.seed] = _gathered(run, task.seed, None, 0)
+        sound = known[task.seed]
+        # A sound specimen is measured again with other noise: against itself everything would be zero.
+        now = _gathered(run, task.seed, task.added, run.noise if task.added is not None else max(run.noise, 1))
+        names, values = once(sound) if task.added is None else ((), np.empty(0))
+        return Reduced(names, values, *change_once(now, sound))
+    except GearsigError as error:
+        return str(error)
+
+
+def _gathered(run: Run, seed: int, added: Added | None, noise: int) -> Gathered:
+    from gearsig.gap.gather import gather
+
+    recording = run.twin.run(
+        run.point,
+        () if added is None else (added,),
+        seed=seed,
+        duration_s=run.duration_s,
+        sampling_rate_hz=run.sampling_rate_hz,
+        noise=noise,
+    )
+    assert recording.rig is not None  # noqa: S101  part of the protocol
+    return gather(recording, recording.rig)

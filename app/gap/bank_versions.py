@@ -1,0 +1,29 @@
+"""Which state of the code made the features of a bank."""
+
+from __future__ import annotations
+
+from functools import cache
+from hashlib import sha256
+from importlib.util import find_spec
+from pathlib import Path
+
+_MODULES = (
+    *(f"gearsig.gap.{name}" for name in ("broadband", "change", "cyclic", "features", "frame", "gather", "gathered")),
+    *(f"gearsig.gap.{name}" for name in ("gear_lines", "hum", "speed", "tooth")),
+    "gearsig.severity.reference",
+    "gearsig.angle.pulse_train",
+    "gearsig.angle.resample",
+)
+"""Those whose code changes a feature."""
+
+
+@cache
+def features_digest() -> str:
+    """Return a short hash of the code that makes features of a recording."""
+    digest = sha256()
+    for name in _MODULES:
+        spec = find_spec(name)
+        if spec is None or spec.origin is None:
+            raise ModuleNotFoundError(name)
+        digest.update(name.encode() + b"\0" + Path(spec.origin).read_bytes())
+    return digest.hexdigest()[:16]
