@@ -41,7 +41,11 @@ ReferenceOption = Annotated[
     ),
 ]
 TorqueOption = Annotated[
-    str | None, typer.Option("--torque", help="Of the input shaft, e.g. 110Nm, where the rig file does not say it.")
+    str | None,
+    typer.Option(
+        "--torque",
+        help="E.g. 110Nm, instead of the rig's: of the shaft that its operating point names, else the reference shaft.",
+    ),
 ]
 
 ChannelsOption = Annotated[

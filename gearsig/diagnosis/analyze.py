@@ -60,7 +60,8 @@ def analyze(
         Of the same machine when it was sound, same sensors, speed and load: cracks of a millimetre show against it,
         and indicators are compared with it.
     torque_nm : float or None
-        For the depth of a crack, instead of the rig's operating point.
+        For the depth of a crack, instead of the operating point's: of the shaft that this names, else of the
+        reference shaft.
     on_stage : callable or None
         Called with a few words as each stage begins.
 

@@ -68,7 +68,7 @@ def crack_depth(
         Of the same gears when they were sound. Without it only a crack is an answer: that none is seen says little,
         and that it cannot be told says nothing.
     torque_nm : float or None
-        Of the input shaft, instead of the rig's.
+        Of the operating point's shaft, instead of its own.
     dead : collection of str
         Channels to leave out.
 

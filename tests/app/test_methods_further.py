@@ -181,6 +181,16 @@ def test_the_reference_may_be_an_own_file() -> None:
     assert "tooth 21" in page.error[0].value
 
 
+def test_the_torque_of_a_crack_is_stated_in_one_place() -> None:
+    page = choose(opened_at("Crack severity", "root_crack_3mm"), "Reference", "Sample")
+    assert "Torque 110 N·m, of the rig" in shown_text(page)
+    at_110 = page.error[0].value
+    (torque,) = (w for w in page.number_input if w.label.startswith("Torque"))
+    torque.set_value(60.0).run()
+    assert "Torque 60 N·m, as stated in the sidebar" in shown_text(page)
+    assert not page.error or page.error[0].value != at_110  # a crack's effect grows with the load
+
+
 def test_what_crack_severity_cannot_tell_is_said() -> None:
     page = opened_at("Crack severity", "two_stage")
     assert not page.error

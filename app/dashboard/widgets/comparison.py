@@ -46,7 +46,8 @@ def choose_comparison(name: str, source: str) -> Comparison:
             placeholder="from the rig",
             key=state.source_key("torque", source),
             persist_state="session",
-            help="Of the input shaft, for the depth of a crack, where the rig file does not say it.",
+            help="For the depth of a crack, instead of the rig's: of the shaft that its operating point names, else of "
+            "the reference shaft.",
         )
     return Comparison(name, digest, content, torque or None)
 

@@ -14,7 +14,7 @@ from app.dashboard.widgets.methods.crack_view import crack_figure
 from app.dashboard.widgets.methods.reference_choice import choose_reference
 from app.dashboard.widgets.picture import show_picture
 from gearsig.diagnosis.types import Analysis, ChannelAnalysis
-from gearsig.errors import GearsigError, InputError, RefusalError
+from gearsig.errors import GearsigError, RefusalError
 from gearsig.severity.types import CrackEstimate, NoCrackSeen
 
 if TYPE_CHECKING:
@@ -22,16 +22,17 @@ if TYPE_CHECKING:
 
 N_KEPT = 8
 EVERY_CHANNEL = "All accelerations"
-SETTLED_PERCENT = 50.0
-"""Of the root: that no deeper crack is there is no good news."""
 
 
 def show_crack(analysis: Analysis, channel: ChannelAnalysis) -> None:
     """Show the depth of a crack, or how deep one may be that does not show, or why neither can be told."""
     reference = choose_reference(analysis)
-    torque_nm, channels = _choose_settings(analysis, channel)
+    channels = _choose_channels(analysis, channel)
+    chosen = state.chosen()
+    torque_nm = chosen.request.torque_nm if chosen is not None else None
     recording = analysis.recording
-    st.caption(f"Analysed: 0 to {recording.duration_s:.4g} s, the whole recording.")
+    torque = _torque_text(analysis, torque_nm)
+    st.caption(f"Analysed: 0 to {recording.duration_s:.4g} s, the whole recording. {torque}.")
     try:
         with st.spinner("Looking at every tooth …", show_time=True):
             found = severity(_key_of(analysis), reference.key, torque_nm, channels, recording, reference.recording)
@@ -44,27 +45,22 @@ def show_crack(analysis: Analysis, channel: ChannelAnalysis) -> None:
     _show_features(found)
 
 
-def _choose_settings(analysis: Analysis, channel: ChannelAnalysis) -> tuple[float | None, tuple[str, ...]]:
-    """Return the torque where it is not the rig's, and the channels where they are not all."""
-    left, right = st.columns(2)
+def _choose_channels(analysis: Analysis, channel: ChannelAnalysis) -> tuple[str, ...]:
+    """Return the accelerations that are looked at; none for all of them."""
+    if sum(c.quantity == "acceleration" for c in analysis.recording.channels) < 2:
+        return ()
+    names = (EVERY_CHANNEL, "The chosen channel")
+    chosen = choose_one("Channels", names, state.view_key("crack channels", analysis))
+    return () if chosen == EVERY_CHANNEL else (channel.channel,)
+
+
+def _torque_text(analysis: Analysis, stated_nm: float | None) -> str:
+    """Return the torque that the depth rests on, and where to change it."""
     known = analysis.rig.operating_point.torque_nm if analysis.rig is not None else None
-    torque = left.number_input(
-        "Torque (N m)",
-        value=None,
-        placeholder=f"{known:g}, of the rig" if known is not None else "of the operating point's shaft",
-        key=state.view_key("crack torque", analysis),
-        help="A crack's effect grows with the load. Of the shaft that the rig's operating point names.",
-        persist_state="session",
-    )
-    if torque is not None and torque <= 0.0:
-        raise InputError(f"the torque is {torque:g} N m", where="Torque", allowed="above 0")
-    n_accelerations = sum(c.quantity == "acceleration" for c in analysis.recording.channels)
-    chosen = EVERY_CHANNEL
-    if n_accelerations > 1:
-        names = (EVERY_CHANNEL, "The chosen channel")
-        with right:
-            chosen = choose_one("Channels", names, state.view_key("crack channels", analysis))
-    return torque, () if chosen == EVERY_CHANNEL else (channel.channel,)
+    place = "in the sidebar under “Reference (sound machine)”"
+    if stated_nm is not None:
+        return f"Torque {stated_nm:g} N·m, as stated {place}"
+    return f"Torque {known:g} N·m, of the rig; another one is stated {place}" if known else f"State the torque {place}"
 
 
 def _key_of(analysis: Analysis) -> str:
@@ -103,10 +99,7 @@ def _show_refusal(refusal: RefusalError) -> None:
 
 def _show_answer(found: CrackEstimate | NoCrackSeen) -> None:
     if isinstance(found, NoCrackSeen):
-        if found.below_percent <= SETTLED_PERCENT:
-            st.success(as_typed(found.text), icon=":material/check_circle:")
-        else:
-            st.info(as_typed(found.text), icon=":material/help:")
+        st.success(as_typed(found.text), icon=":material/check_circle:")
         st.caption(
             "In 95 of 100 cases a deeper crack would have been seen. The chance of as clear an event as the clearest "
             f"one here is {found.p_value:.2g} on sound gears."
