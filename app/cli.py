@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import typer
 
 from app.commands.analyze import analyze
+from app.commands.benchmark import benchmark_app
 from app.commands.bifurcation import bifurcation
 from app.commands.compare import compare
 from app.commands.crack import crack
@@ -44,6 +45,7 @@ app.command()(simulate)
 app.command()(sweep)
 app.command()(bifurcation)
 app.command()(gap)
+app.add_typer(benchmark_app, name="benchmark")
 app.command()(demo)
 app.command()(dashboard)
 

@@ -52,15 +52,20 @@ def write_case(case: Case, folder: str | Path, labels_folder: str | Path) -> tup
         if any(place.iterdir()):
             raise InputError("the folder is not empty", where=str(place), remedy="give a new one for each case")
     made = record_case(case)
-    for stem, recordings in (("condition", made.conditions), ("reference", made.references)):
-        for i, recording in enumerate(recordings, 1):
-            _write(recording, seen / f"{stem}_{i}.h5")
-    _write_description(made.conditions[0], seen / "rig.toml")
+    write_seen(made, seen)
     if case.faults:
         for i, twin in enumerate(made.twins, 1):
             _write(twin, hidden / f"twin_{i}.h5")
     (hidden / LABELS_NAME).write_text(json.dumps(labels(case, made), indent=1), encoding="utf-8")
     return seen, hidden
+
+
+def write_seen(made: CaseRecordings, folder: Path) -> None:
+    """Write what the diagnosing side may see, and nothing else."""
+    for stem, recordings in (("condition", made.conditions), ("reference", made.references)):
+        for i, recording in enumerate(recordings, 1):
+            _write(recording, folder / f"{stem}_{i}.h5")
+    _write_description(made.conditions[0], folder / "rig.toml")
 
 
 def labels(case: Case, made: CaseRecordings) -> dict[str, Any]:

@@ -1,0 +1,58 @@
+"""A gap report of nothing but probabilities: what a baseline can say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from gearsig.gap.simulator import Added
+from gearsig.gap.types import NONE, UNKNOWN, GapCause, GapOutcome, GapReport, Interval
+from sims.effects import effects
+
+NUISANCE_GROUP = "measurement chain"
+_NOTHING = Interval(0.0, 0.0, 0.0)
+
+
+def bare_report(
+    simulator: str, probabilities: Mapping[str, float], options: Mapping[str, Mapping[str, str]] | None = None
+) -> GapReport:
+    """Return the report whose outcome is the likeliest cause's.
+
+    Parameters
+    ----------
+    simulator : str
+        Name of the baseline, where a report names its simulator.
+    probabilities : mapping
+        Cause → probability.
+    options : mapping or None
+        Cause → where it is put: gear, bearing.
+    """
+    where = options or {}
+    ranked = sorted(probabilities.items(), key=lambda item: -item[1])
+    outcome = {NONE: GapOutcome.NO_GAP, UNKNOWN: GapOutcome.UNKNOWN}.get(ranked[0][0], GapOutcome.EFFECT)
+    return GapReport(
+        rig="",
+        simulator=simulator,
+        conditions=(),
+        references=(),
+        outcome=outcome,
+        size=_NOTHING,
+        repeatability=0.0,
+        places=(),
+        causes=tuple(_cause(name, p, where.get(name, {})) for name, p in ranked),
+        groups={},
+    )
+
+
+def _cause(name: str, probability: float, options: Mapping[str, str]) -> GapCause:
+    known = effects().get(name)
+    if known is None:
+        return GapCause(name, "", name, "", probability)
+    return GapCause(
+        name,
+        known.group,
+        known.title,
+        known.severity.unit,
+        probability,
+        fitted=Added(name, known.severity.typical, options),
+        is_nuisance=known.group == NUISANCE_GROUP,
+    )

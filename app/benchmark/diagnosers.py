@@ -1,0 +1,56 @@
+"""Diagnosers by name: the gap diagnosis, the baselines, or any function ``module:name`` of the same form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+
+from app.benchmark.seen import Seen
+from gearsig.errors import InputError
+from gearsig.gap.types import GapReport
+
+Diagnoser = Callable[[Seen], GapReport]
+
+GAP, MAJORITY, RULES = "gap", "majority", "rules"
+BASELINES = (MAJORITY, RULES)
+_HOMES = {
+    GAP: "app.benchmark.diagnosers:diagnose",
+    MAJORITY: "app.benchmark.majority:diagnose",
+    RULES: "app.benchmark.rules:diagnose",
+}
+
+
+def diagnoser(name: str) -> Diagnoser:
+    """Return the diagnoser of a name or of ``module:function``.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    module, sign, function = _HOMES.get(name, name).partition(":")
+    try:
+        found = getattr(import_module(module), function) if sign else None
+    except (ImportError, AttributeError):
+        found = None
+    if not callable(found):
+        raise InputError(f"there is no diagnoser {name!r}", allowed=f"{', '.join(_HOMES)} or MODULE:FUNCTION")
+    return found  # type: ignore[no-any-return]  # what a user's function returns shows when it is called
+
+
+def diagnose(seen: Seen) -> GapReport:
+    """Diagnose a case with the product itself; what is kept for its rig lies with the case and goes with it."""
+    from pathlib import Path
+
+    from app.gap.diagnose import diagnose_gap
+    from sims.registry import gap_simulator
+
+    return diagnose_gap(
+        seen.recordings,
+        gap_simulator("cracked"),
+        rigs=seen.rigs,
+        references=seen.references,
+        reference_rigs=seen.reference_rigs,
+        names=seen.names,
+        cache=Path.cwd() / "kept",
+    )

@@ -1,0 +1,281 @@
+"""The benchmark's figures, each from a list of judged cases, with a 90 % interval."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+
+from app.benchmark.scoring.calibration_curve import brier, calibration_error
+from app.benchmark.scoring.intervals import NOTHING, Score, resampled, share
+from app.benchmark.scoring.judged import Row, group_of
+from gearsig.gap.types import GapOutcome
+from sims.blind import MECHANICAL
+
+Rows = Sequence[Row]
+Measure = Callable[[Rows, np.random.Generator], Score]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One line of the table.
+
+    Parameters
+    ----------
+    key : str
+        In scores.json.
+    title : str
+    measure : callable
+        (rows, rng) → Score.
+    is_share : bool
+        Shown in per cent; False: as a number.
+    targets : (float, float) or None
+        Without and with reference, for strong faults.
+    is_least : bool
+        Whether the target is the least (True) or the most that is allowed.
+    """
+
+    key: str
+    title: str
+    measure: Measure
+    is_share: bool = True
+    targets: tuple[float, float] | None = None
+    is_least: bool = True
+
+
+def _counted(of: Callable[[Row], bool], hit: Callable[[Row], bool]) -> Measure:
+    """Return the measure that counts hits among the rows it applies to."""
+
+    def measure(rows: Rows, rng: np.random.Generator) -> Score:  # noqa: ARG001 - all measures have one form
+        own = [row for row in rows if of(row)]
+        return share(sum(hit(row) for row in own), len(own))
+
+    return measure
+
+
+def _resampled(of: Callable[[Row], bool], statistic: Callable[[Rows], float]) -> Measure:
+    def measure(rows: Rows, rng: np.random.Generator) -> Score:
+        return resampled([row for row in rows if of(row)], statistic, rng)
+
+    return measure
+
+
+def _mean(value: Callable[[Row], float]) -> Measure:
+    """Return the mean over the rows that have the value."""
+
+    def measure(rows: Rows, rng: np.random.Generator) -> Score:
+        found = [x for row in rows if isfinite(x := value(row))]
+        return resampled(found, lambda drawn: float(np.mean(drawn)), rng)
+
+    return measure
+
+
+def _median(value: Callable[[Row], float]) -> Measure:
+    def measure(rows: Rows, rng: np.random.Generator) -> Score:
+        found = [x for row in rows if isfinite(x := value(row))]
+        return resampled(found, lambda drawn: float(np.median(drawn)), rng)
+
+    return measure
+
+
+def _of_place(part: str) -> Measure:
+    """Return the share of faults whose place of this kind was found."""
+
+    def at(row: Row) -> bool | None:
+        found: bool | None = getattr(row.located, part)
+        return found
+
+    return _counted(lambda r: r.is_mechanical and at(r) is not None, lambda r: bool(at(r)))
+
+
+def is_one_answer(row: Row) -> bool:
+    """Whether exactly one cause is right, so that a probability can be judged."""
+    return row.kind != "pair" and bool(row.ranked)
+
+
+def macro_f1(rows: Rows) -> float:
+    """Return the mean over the mechanical effects of 2 TP/(2 TP + FP + FN), of the likeliest causes.
+
+    Healthy, unknown and chain cases count as what they are: an effect named there is a false positive. Effects without
+    a case are left out.
+    """
+    true = Counter(name for row in rows for name in row.truths)
+    said = Counter(row.first for row in rows)
+    hits = Counter(row.first for row in rows if row.first in row.truths)
+    found = [2.0 * hits[name] / (true[name] + said[name]) for name in MECHANICAL if true[name]]
+    return sum(found) / len(found) if found else float("nan")
+
+
+def ece(rows: Rows) -> float:
+    """Return the calibration error of the likeliest causes."""
+    return calibration_error([r.answer.causes[0].probability for r in rows], [r.first in r.truths for r in rows])
+
+
+def _brier(row: Row) -> float:
+    if not is_one_answer(row):
+        return float("nan")
+    return brier({c.name: c.probability for c in row.answer.causes}, row.truths[0])
+
+
+def shrink_of(row: Row, name: str) -> float:
+    """Return the held-out shrink of a cause; nan where it was not tried."""
+    cause = row.answer.cause(name)
+    return cause.shrinkage.shrink if cause is not None and cause.shrinkage is not None else float("nan")
+
+
+def _shrink_true(row: Row) -> float:
+    return shrink_of(row, row.effects[0]) if row.is_mechanical else float("nan")
+
+
+def _shrink_named(row: Row) -> float:
+    return shrink_of(row, row.named) if row.named and row.is_mechanical else float("nan")
+
+
+def _placebo(row: Row) -> float:
+    cause = row.answer.cause(row.effects[0]) if row.is_mechanical else None
+    return cause.shrinkage.placebo if cause is not None and cause.shrinkage is not None else float("nan")
+
+
+def _slope(row: Row) -> float:
+    cause = row.answer.cause(row.effects[0]) if row.is_mechanical else None
+    return cause.shrinkage.slope if cause is not None and cause.shrinkage is not None else float("nan")
+
+
+def _regret(row: Row) -> float:
+    """Return by how much the named effect shrinks the gap less than the true one; 0 where it does no worse."""
+    return float(np.maximum(0.0, _shrink_true(row) - _shrink_named(row)))  # nan stays nan
+
+
+FIGURES: tuple[Figure, ...] = (
+    Figure(
+        "top_1",
+        "likeliest cause right (16 mechanical effects)",
+        _counted(lambda r: r.is_mechanical, lambda r: r.first in r.truths),
+        targets=(0.80, 0.90),
+    ),
+    Figure(
+        "top_2",
+        "among the two likeliest",
+        _counted(lambda r: r.is_mechanical, lambda r: r.truths[0] in r.ranked[:2]),
+        targets=(0.92, 0.97),
+    ),
+    Figure(
+        "group",
+        "right group",
+        _counted(lambda r: r.is_mechanical, lambda r: group_of(r.first) == group_of(r.truths[0])),
+        targets=(0.90, 0.96),
+    ),
+    Figure(
+        "top_1_of_16",
+        "likeliest right if only the 16 could be",
+        _counted(lambda r: r.is_mechanical, lambda r: r.first_mechanical in r.truths),
+    ),
+    Figure(
+        "named",
+        "mechanical effect there: one is named",
+        _counted(lambda r: r.is_mechanical, lambda r: bool(r.named)),
+    ),
+    Figure(
+        "macro_f1", "macro-F1 of the 16 (no pairs)", _resampled(lambda r: r.kind != "pair", macro_f1), is_share=False
+    ),
+    Figure(
+        "named_on_none",
+        "healthy: an effect is named",
+        _counted(lambda r: r.kind == "none", lambda r: bool(r.named)),
+        targets=(0.05, 0.05),
+        is_least=False,
+    ),
+    Figure(
+        "named_on_unknown",
+        "unknown: an effect is named all the same",
+        _counted(lambda r: r.kind == "unknown", lambda r: bool(r.named)),
+        targets=(0.20, 0.15),
+        is_least=False,
+    ),
+    Figure(
+        "unknown_recognised",
+        "unknown: recognised",
+        _counted(lambda r: r.kind == "unknown", lambda r: r.answer.outcome == GapOutcome.UNKNOWN.value),
+    ),
+    Figure(
+        "named_on_chain",
+        "measurement chain only: a mechanical effect is named",
+        _counted(lambda r: r.is_nuisance, lambda r: bool(r.named)),
+    ),
+    Figure(
+        "chain_right",
+        "measurement chain only: likeliest cause right",
+        _counted(lambda r: r.is_nuisance, lambda r: r.first in r.truths),
+    ),
+    Figure(
+        "pair_top_1",
+        "two effects: likeliest is one of them",
+        _counted(lambda r: r.kind == "pair", lambda r: r.first in r.truths),
+    ),
+    Figure(
+        "pair_top_2",
+        "two effects: both are the two likeliest",
+        _counted(lambda r: r.kind == "pair", lambda r: set(r.ranked[:2]) == set(r.truths)),
+    ),
+    Figure(
+        "ece",
+        "calibration error, 10 equal bins",
+        _resampled(is_one_answer, ece),
+        is_share=False,
+        targets=(0.06, 0.06),
+        is_least=False,
+    ),
+    Figure("brier", "Brier score (0 to 2)", _mean(_brier), is_share=False),
+    Figure("tooth", "right tooth, within one", _of_place("tooth")),
+    Figure("shaft", "right shaft", _of_place("shaft")),
+    Figure("bearing", "right bearing", _of_place("bearing")),
+    Figure("order", "right order", _of_place("order")),
+    Figure(
+        "shrink_true",
+        "held-out shrink by the true effect, median",
+        _median(_shrink_true),
+        is_share=False,
+        targets=(0.60, 0.70),
+    ),
+    Figure("shrink_named", "held-out shrink by the named effect, median", _median(_shrink_named), is_share=False),
+    Figure(
+        "placebo",
+        "held-out shrink by its placebos, median",
+        _median(_placebo),
+        is_share=False,
+        targets=(0.10, 0.10),
+        is_least=False,
+    ),
+    Figure(
+        "regret",
+        "regret of shrink, mean",
+        _mean(_regret),
+        is_share=False,
+        targets=(0.08, 0.05),
+        is_least=False,
+    ),
+    Figure("slope", "observed over predicted change, median", _median(_slope), is_share=False),
+    Figure("answered", "answered at all", _counted(lambda _: True, lambda r: bool(r.answer.outcome))),
+)
+
+
+def scores(rows: Rows, seed: int) -> dict[str, Score]:
+    """Return every figure of these rows; nothing where no row applies."""
+    return {f.key: f.measure(rows, np.random.default_rng(seed)) if rows else NOTHING for f in FIGURES}
+
+
+def strong_only(rows: Rows, least: float) -> list[Row]:
+    """Return the cases whose fault is this strong, and those without one."""
+    return [row for row in rows if row.kind == "none" or row.strength >= least]
+
+
+def judgement(score: Score, target: float, *, is_least: bool) -> str:
+    """Return "met", "missed", or "open" where the interval holds the target; empty without cases."""
+    if not score.n:
+        return ""
+    if score.low < target < score.high:
+        return "open"
+    return "met" if score.value == target or (score.value > target) == is_least else "missed"

@@ -1,0 +1,98 @@
+"""`gearsig benchmark gap`: how good the gap diagnosis is, on cases whose cause it cannot know."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from app.benchmark.run import Done, Wanted
+
+EXIT_INTERRUPTED = 130
+
+benchmark_app = typer.Typer(no_args_is_help=True, help="Measure how good a diagnosis is.")
+
+
+@benchmark_app.callback()
+def _benchmarks() -> None:
+    """Hold the benchmarks, of which there is one so far."""
+
+
+@benchmark_app.command("gap")
+def gap(
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the report.")],
+    cases: Annotated[int, typer.Option("--cases", help="Blind cases.")] = 200,
+    seed: Annotated[int, typer.Option("--seed", help="Decides the cases.")] = 1,
+    role: Annotated[
+        str, typer.Option("--role", help="evaluation, calibration or development; they share no gear geometry.")
+    ] = "evaluation",
+    reference: Annotated[
+        bool | None,
+        typer.Option(
+            "--with-reference/--without", help="All cases with a healthy reference, or none. Default: half of them."
+        ),
+    ] = None,
+    same_simulator: Annotated[
+        bool,
+        typer.Option("--same-simulator", help="The same cases from the diagnosing simulator as well, and the drop."),
+    ] = False,
+    diagnosers: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--diagnoser",
+            metavar="NAME",
+            help="gap, majority, rules, or MODULE:FUNCTION; the first is judged, more stand beside it. Default: gap.",
+        ),
+    ] = None,
+    longest: Annotated[
+        float | None, typer.Option("--longest", metavar="SECONDS", help="Cut recordings to this; default 4 to 8 s.")
+    ] = None,
+    processes: Annotated[int, typer.Option("--processes", "-j", help="Cases at a time.")] = 2,
+) -> None:
+    """Make blind cases, diagnose each in a process that cannot know its cause, score the answers.
+
+    An independent rig makes the cases: it shares no code with the diagnosing simulator. It can be stopped with Ctrl-C
+    at any time; the same command goes on from the answers it has.
+
+    Example: gearsig benchmark gap --cases 200 --same-simulator -o benchmark
+    """
+    from app.benchmark.diagnosers import BASELINES, GAP
+    from app.benchmark.plan import Plan
+    from app.benchmark.run import Wanted
+    from app.benchmark.scoring.results import TABLE, write_results
+    from app.benchmark.scoring.strata import judge
+
+    wished = "both" if reference is None else "with" if reference else "without"
+    names = tuple(dict.fromkeys([*(diagnosers or [GAP]), *BASELINES]))
+    wanted = Wanted(Plan(cases, seed, role, wished, same_simulator, longest), names)
+    done = _run(wanted, output, processes)
+    page = write_results(judge(wanted, done), done, output, " ".join(["gearsig", *sys.argv[1:]]))
+    typer.echo((output / TABLE).read_text(encoding="utf-8"))
+    typer.echo(f"{page} (report), {TABLE}, scores.json, cases.csv, labels/.")
+
+
+def _run(wanted: Wanted, output: Path, processes: int) -> list[Done]:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from app.benchmark.run import n_answered, run_benchmark
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    console = Console(stderr=True)
+    n_cases = len(wanted.plan.cases())
+    try:
+        with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+            task = progress.add_task("diagnosing", total=n_cases)
+            return run_benchmark(
+                wanted, output, n_processes=processes, on_progress=lambda n: progress.update(task, completed=n)
+            )
+    except KeyboardInterrupt:
+        n = n_answered(output)
+        typer.echo(
+            f"gearsig: stopped; {n} of {n_cases} cases are answered in {output}; the same command goes on from there",
+            err=True,
+        )
+        raise typer.Exit(EXIT_INTERRUPTED) from None

@@ -1,0 +1,202 @@
+"""`gearsig benchmark gap`: what the diagnosing process can see, stopping and going on, the files."""
+
+import csv
+import json
+from collections import Counter
+
+import h5py
+import pytest
+
+from app.benchmark.answer import Answer, AnsweredCause, AnsweredPlace, AnsweredShrinkage, from_text, to_text
+from app.benchmark.diagnosers import diagnoser
+from app.benchmark.make import make_case
+from app.benchmark.plan import BLIND, SAME, Plan, PlannedCase
+from app.benchmark.run import ANSWERS_FOLDER, Wanted, diagnosed, run_benchmark
+from app.benchmark.seen import read_seen
+from app.benchmark.textbook import RULES, USUAL
+from app.cli import main
+from gearsig.errors import InputError
+from gearsig.gap.types import NONE, UNKNOWN
+from sims.blind import CATALOGUE, OUTSIDE
+from sims.effects import effects
+
+SHORT = Plan(n_cases=2, seed=4, role="development", reference="with", longest_s=2.0)
+WORDS = (*CATALOGUE, *OUTSIDE, "single", "pair", "seed", "label", "twin", "development", "evaluation", "blind")
+
+
+def case(kind, effect, source=BLIND):
+    return PlannedCase(7, source, kind, effect, 0.9, with_reference=True, n_conditions=1)
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """Three cases of different kind on the same draw of rig, conditions and noise."""
+    found = {}
+    for kind, effect in (("none", None), ("single", "root_crack"), ("unknown", "coupling_knock")):
+        folder = tmp_path_factory.mktemp("seen")
+        found[kind] = folder, make_case(SHORT, case(kind, effect), folder)
+    return found
+
+
+def everything_but_samples(folder):
+    """Names, sizes, times, and all of each file that is no sample."""
+    found = {}
+    for path in sorted(folder.iterdir()):
+        found[path.name] = path.stat().st_size, path.stat().st_mtime_ns, path.stat().st_mode
+        if path.suffix != ".h5":
+            found[f"{path.name} text"] = path.read_bytes()
+            continue
+        with h5py.File(path) as file:
+            objects = {"/": file}
+            file.visititems(objects.__setitem__)
+            for name, item in objects.items():
+                found[f"{path.name} {name} attributes"] = {key: repr(value) for key, value in item.attrs.items()}
+                if isinstance(item, h5py.Dataset):
+                    found[f"{path.name} {name}"] = item.shape, str(item.dtype), item.compression, item.chunks
+                    if name != "samples":
+                        found[f"{path.name} {name} content"] = bytes(item[()])
+    return found
+
+
+def test_cases_of_different_kind_differ_in_their_samples_only(folders):
+    sound, *others = (everything_but_samples(folder) for folder, _ in folders.values())
+    assert all(other == sound for other in others)
+    values = [read_seen(folder).recordings[0].values("a1") for folder, _ in folders.values()]
+    assert all((values[0] != other).any() for other in values[1:])
+
+
+def test_the_truth_is_returned_and_not_written(folders):
+    for kind, (folder, truth) in folders.items():
+        assert truth.labels["kind"] == kind
+        assert {p.stem.rpartition("_")[0] or p.stem for p in folder.iterdir()} == {"condition", "reference", "rig"}
+    healthy, cracked = folders["none"][1], folders["single"][1]
+    assert healthy.healthy
+    assert healthy.healthy_change
+    assert not healthy.fault_changes
+    assert max(abs(db) for db in cracked.fault_changes[0].values()) > 3.0
+    assert not cracked.healthy
+
+
+def test_the_diagnosing_process_finds_no_label(folders):
+    folder, _ = folders["single"]
+    spy = "tests.app.benchmark_spy:diagnose"
+    before = sorted(p.name for p in folder.iterdir())
+    answers = diagnosed(folder, (spy, "majority", "rules"))
+    found = json.loads(answers[spy].error)
+    assert found["files"] == before
+    assert found["arguments"] == [spy, "majority", "rules"]
+    assert found["recordings"] == ["condition_1.h5"]
+    assert found["truths"] == [None, None]
+    assert not [m for m in found["modules"] if m.startswith("sims.blind")]
+    assert {"app.benchmark.plan", "app.benchmark.make", "app.benchmark.run"}.isdisjoint(found["modules"])
+    # The checkout and the interpreter may lie anywhere: their places are not the case's.
+    own = {k: v for k, v in found["environment"].items() if k not in ("PATH", "HOME", "PYTHONPATH", "VIRTUAL_ENV")}
+    assert own.pop("TMPDIR") == found["folder"] == str(folder)
+    assert not [w for w in WORDS if w in json.dumps(own).lower()]
+    assert answers["majority"].causes[0].name == NONE
+    assert sum(c.probability for c in answers["majority"].causes) == pytest.approx(1.0)
+    assert sum(c.probability for c in answers["rules"].causes) == pytest.approx(1.0)
+
+
+def test_the_diagnosing_simulator_makes_the_same_cases_too(tmp_path):
+    truth = make_case(SHORT, case("single", "eccentricity", SAME), tmp_path)
+    seen = read_seen(tmp_path)
+    assert len(seen.recordings) == len(seen.references) == 1
+    assert seen.recordings[0].truth is None
+    assert [e["name"] for e in truth.labels["effects"]] == ["eccentricity"]
+    largest = max(truth.fault_changes[0], key=lambda name: abs(truth.fault_changes[0][name]))
+    assert largest.startswith(("sideband", "shaft"))
+
+
+def test_a_stopped_run_leaves_answers_and_goes_on(tmp_path, capsys):
+    wanted = Wanted(SHORT, ("rules", "majority"))
+    target = tmp_path / "out"
+
+    def stop(n_done):
+        assert n_done == 1
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_benchmark(wanted, target, n_processes=1, on_progress=stop)
+    kept = {p: p.stat().st_mtime_ns for p in (target / ANSWERS_FOLDER).glob("case_*.json")}
+    assert kept
+    assert {p.name for p in target.iterdir()} == {"benchmark.json", ANSWERS_FOLDER}
+    options = ["--cases", "2", "--seed", "4", "--role", "development", "--with-reference", "--longest", "2"]
+    with pytest.raises(SystemExit) as end:
+        main(["benchmark", "gap", *options, "--diagnoser", "rules", "-j", "2", "-o", str(target)])
+    assert not end.value.code
+    assert all(path.stat().st_mtime_ns == time for path, time in kept.items())
+    told = capsys.readouterr().out
+    assert "Against the targets" in told
+    check_files(target, wanted.plan)
+    with pytest.raises(InputError, match="seed differs"):
+        run_benchmark(Wanted(Plan(2, 5, "development", "with", False, 2.0), wanted.diagnosers), target)
+
+
+def check_files(target, plan):
+    names = {"benchmark.json", "answers", "labels", "report.html", "table.md", "scores.json", "cases.csv"}
+    assert {p.name for p in target.iterdir()} == names
+    labels = [json.loads(p.read_text(encoding="utf-8")) for p in sorted((target / "labels").iterdir())]
+    assert [found["kind"] for found in labels] == [c.kind for c in plan.cases()]
+    with (target / "cases.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert Counter(row["diagnoser"] for row in rows) == {"rules": 2, "majority": 2}
+    found = json.loads((target / "scores.json").read_text(encoding="utf-8"))
+    part = next(
+        p for p in found["parts"] if (p["cases"], p["diagnoser"], p["least_strength"]) == ("all", "majority", 0.0)
+    )
+    assert part["scores"]["answered"] == {
+        "value": 1.0,
+        "low": pytest.approx(2 / (2 + 1.6448536**2)),
+        "high": 1.0,
+        "n": 2,
+    }
+    html = (target / "report.html").read_text(encoding="utf-8")
+    assert "http" not in html.replace("http-equiv", "")
+    assert html.count("<img") == 2
+
+
+def test_the_plan_is_balanced_and_repeats():
+    plan = Plan(200, 3)
+    cases = plan.cases()
+    assert [c.number for c in cases] == list(range(1, 201))
+    assert Counter(c.kind for c in cases) == {"single": 120, "none": 30, "unknown": 30, "pair": 20}
+    singles = Counter(c.effect for c in cases if c.kind == "single")
+    assert set(singles) == set(CATALOGUE)
+    assert set(singles.values()) == {6, 7}
+    assert Counter(c.effect for c in cases if c.kind == "unknown") == dict.fromkeys(OUTSIDE, 3)
+    assert set(Counter((c.with_reference, c.n_conditions) for c in cases).values()) <= set(range(47, 54))
+    cracks = sorted(c.level for c in cases if c.effect == "root_crack")
+    assert all(i / len(cracks) <= level <= (i + 1) / len(cracks) for i, level in enumerate(cracks))
+    assert plan.cases() == cases
+    assert Plan(200, 4).cases() != cases
+    assert not any(c.with_reference for c in Plan(20, reference="without").cases())
+
+
+def test_the_same_simulator_repeats_all_but_the_unknown():
+    cases = Plan(40, same_simulator=True).cases()
+    blind, same = ([c for c in cases if c.source == source] for source in (BLIND, SAME))
+    assert [(c.kind, c.effect, c.level) for c in same] == [
+        (c.kind, c.effect, c.level) for c in blind if c.kind != "unknown"
+    ]
+    assert len({c.number for c in cases}) == len(cases)
+
+
+def test_the_rule_table_names_every_effect_and_known_features_only():
+    assert {rule.cause for rule in RULES} == {*effects(), UNKNOWN}
+    assert {name for rule in RULES for name, _ in rule.signs} == set(USUAL)
+
+
+def test_answers_survive_the_way_through_a_file():
+    shrinkage = AnsweredShrinkage(0.7, 1.1, 0.05, "another operating condition")
+    causes = (AnsweredCause("root_crack", 0.9, {"gear": "driver", "tooth": 3.0}, shrinkage), AnsweredCause("none", 0.1))
+    place = AnsweredPlace("angle of rotation", "input", (1.0, 2.0), 30.0, 3)
+    answer = Answer("effect", causes, ("root_crack", "tooth_spall"), (place,), 4.0, 12.0, 20.0)
+    assert from_text(to_text({"gap": answer})) == {"gap": answer}
+
+
+def test_a_diagnoser_that_is_not_there_is_named():
+    with pytest.raises(InputError, match="no diagnoser 'nothing'"):
+        diagnoser("nothing")
+    with pytest.raises(InputError, match=r"app\.gap:nothing"):
+        diagnoser("app.gap:nothing")
