@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import streamlit as st
 
 from app.dashboard.as_typed import as_typed
 from app.dashboard.gap.choice import Choice, files_of
+from app.dashboard.widgets.picture import picture_bytes
 from app.gap.job import Job, private_folder
 from app.gap.results import JSON, PAGE, TWIN
 from app.gap.run import cache_folder
@@ -29,6 +30,14 @@ class Finished:
     page: bytes
     json: bytes
     twin: bytes | None
+    _drawn: dict[tuple[int, bool], bytes] = field(default_factory=dict, repr=False, compare=False)
+
+    def picture(self, one: GapFigure, *, dark: bool) -> bytes:
+        """Return one of the figures as PNG, drawn once for light and once for dark pages."""
+        key = (self.figures.index(one), dark)
+        if key not in self._drawn:
+            self._drawn[key] = picture_bytes(one.figure, dark=dark)
+        return self._drawn[key]
 
 
 @dataclass

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import streamlit as st
 
 from app.dashboard.as_typed import as_typed
 from app.dashboard.gap.runner import Finished
+from app.dashboard.look import is_dark
 from app.dashboard.widgets.methods.notes import show_notes
-from app.dashboard.widgets.picture import show_picture
 from app.dashboard.widgets.verdict import Colour
 from app.gap.results import JSON, PAGE, TWIN
 from gearsig.gap.types import GapOutcome, GapReport
@@ -51,7 +50,7 @@ def show_finished(finished: Finished) -> None:
     for tab, view in zip(st.tabs(titles, key="gap tab", on_change="rerun"), views, strict=True):
         if tab.open:
             with tab:
-                view(report, finished.figures)
+                view(finished)
 
 
 def _show_verdict(report: GapReport) -> None:
@@ -85,7 +84,8 @@ def _download(label: str, data: bytes, name: str, mime: str, *, primary: bool = 
     )
 
 
-def _show_where(report: GapReport, figures: Sequence[GapFigure]) -> None:
+def _show_where(finished: Finished) -> None:
+    report = finished.report
     st.markdown(f"The whole gap: {as_typed(size_text(report))}.")
     st.caption(FLOORS)
     rows = place_rows(report)
@@ -102,10 +102,11 @@ def _show_where(report: GapReport, figures: Sequence[GapFigure]) -> None:
         )
     else:
         st.markdown("No place stands out of the floor.")
-    _show_figures(figures, "where")
+    _show_figures(finished, "where")
 
 
-def _show_which(report: GapReport, figures: Sequence[GapFigure]) -> None:
+def _show_which(finished: Finished) -> None:
+    report = finished.report
     text = inseparable_text(report)
     if text:
         st.warning(as_typed(text), icon=":material/call_split:")
@@ -125,15 +126,15 @@ def _show_which(report: GapReport, figures: Sequence[GapFigure]) -> None:
         st.caption(as_typed(f"By group: {', '.join(groups)}."))
     for place, row in enumerate(row for row in rows if row.statements):
         with st.expander(as_typed(f"{row.title}, {row.percent}"), expanded=place == 0):
-            _show_evidence(row, figures)
-    _show_figures(figures, "which")
+            _show_evidence(row, finished)
+    _show_figures(finished, "which")
 
 
-def _show_evidence(row: CauseRow, figures: Sequence[GapFigure]) -> None:
+def _show_evidence(row: CauseRow, finished: Finished) -> None:
     st.markdown("\n".join(f"- {as_typed(sentence)}" for sentence in row.statements))
-    for one in figures:
+    for one in finished.figures:
         if one.of == row.name:
-            _show_figure(one)
+            _show_figure(finished, one)
     if row.evidence:
         _table(
             {
@@ -146,7 +147,8 @@ def _show_evidence(row: CauseRow, figures: Sequence[GapFigure]) -> None:
         )
 
 
-def _show_how_far(report: GapReport, figures: Sequence[GapFigure]) -> None:
+def _show_how_far(finished: Finished) -> None:
+    report = finished.report
     rows = step_rows(report)
     if len(rows) > 1:
         st.caption(
@@ -163,11 +165,11 @@ def _show_how_far(report: GapReport, figures: Sequence[GapFigure]) -> None:
         )
     else:
         st.markdown("No effect was added to the simulator. The gap stays as it is.")
-    _show_figures(figures, "how far")
+    _show_figures(finished, "how far")
 
 
-def _show_next(report: GapReport, figures: Sequence[GapFigure]) -> None:
-    del figures  # there is none of this
+def _show_next(finished: Finished) -> None:
+    report = finished.report
     rows = next_rows(report)
     if rows:
         st.markdown("What to record next, to tell the likeliest causes apart. Distances are in structural floors.")
@@ -180,20 +182,20 @@ def _show_next(report: GapReport, figures: Sequence[GapFigure]) -> None:
     st.caption(as_typed(f"Rig {report.rig}; simulator {report.simulator}; healthy references: {compared}."))
 
 
-def _show_figures(figures: Sequence[GapFigure], question: Question) -> None:
-    chosen = [one for one in figures if one.question == question and not one.of]
+def _show_figures(finished: Finished, question: Question) -> None:
+    chosen = [one for one in finished.figures if one.question == question and not one.of]
     for one in chosen:
         if not one.is_small:
-            _show_figure(one)
+            _show_figure(finished, one)
     small = [one for one in chosen if one.is_small]
     if small:
         for one, column in zip(small, st.columns(max(2, len(small))), strict=False):
             with column:
-                _show_figure(one)
+                _show_figure(finished, one)
 
 
-def _show_figure(one: GapFigure) -> None:
-    show_picture(one.figure, one.shows)
+def _show_figure(finished: Finished, one: GapFigure) -> None:
+    st.image(finished.picture(one, dark=is_dark()), width="stretch", alt=as_typed(one.shows))
     st.caption(as_typed(one.look))
 
 

@@ -1,0 +1,187 @@
+"""The gap page without a browser: what it is given becomes files, a run shows and stops, names are never markup."""
+
+import time
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+from streamlit.testing.v1 import AppTest
+
+import app.dashboard
+from app.dashboard.gap.choice import Choice, common_rig, files_of
+from app.dashboard.gap.runner import _FINISHED, _JOB, Finished
+from app.dashboard.state import Upload
+from app.gap.inputs import read_inputs
+from app.samples import sample_folder
+from gearsig.errors import InputError
+from gearsig.report.gap_json import gap_to_json
+from gearsig.report.gap_pictures import gap_figures
+from tests.gap.example_report import all_reports, effect_report
+from tests.gap.stub_diagnosis import OUTCOME, SECONDS, environment
+
+MAIN = Path(app.dashboard.__file__).parent / "main.py"
+SAMPLES = sample_folder()
+CRACKED, HEALTHY = SAMPLES / "root_crack_3mm.h5", SAMPLES / "root_crack_0mm.h5"
+RIG = (SAMPLES / "root_crack_3mm.toml").read_text()
+REPORTS = all_reports()
+EVIL = "<script>*a*</script> :rocket: [x](http://y)"
+
+
+def upload(name: str, content: bytes = b"", text: str = "") -> Upload:
+    return Upload(name, sha256(content).hexdigest(), memoryview(content), name, text)
+
+
+def opened() -> AppTest:
+    return AppTest.from_file(str(MAIN), default_timeout=60).switch_page("pages/gap.py").run()
+
+
+def text_of(page: AppTest) -> str:
+    parts = [*page.markdown, *page.subheader, *page.caption, *page.error, *page.warning, *page.info]
+    return "\n".join(part.value for part in parts).replace("\\", "").replace("\u2060", "")
+
+
+def press(page: AppTest, label: str) -> AppTest:
+    return next(button for button in page.button if button.label == label).click().run()
+
+
+@pytest.fixture
+def stub(tmp_path, monkeypatch):
+    """Let processes that the page starts answer as the test says."""
+
+    def use(**more: str) -> None:
+        for name, value in environment(tmp_path, **more).items():
+            monkeypatch.setenv(name, value)
+
+    return use
+
+
+def wait_for_the_end(page: AppTest) -> AppTest:
+    for _ in range(300):
+        if _JOB not in page.session_state:
+            return page
+        time.sleep(0.1)
+        page.run()
+    pytest.fail("it takes too long")
+
+
+def test_uploads_become_files_with_their_own_rigs(tmp_path) -> None:
+    own = RIG.replace("torque_nm = 110.0", "torque_nm = 55.0")
+    content = CRACKED.read_bytes()
+    choice = Choice(
+        (upload("../a run.h5", content), upload("b.h5", content)),
+        (upload("b.h5", HEALTHY.read_bytes()),),
+        (upload("gearbox.toml", text=RIG), upload("b.toml", text=own)),
+        torque_nm=None,
+    )
+    asked = files_of(choice, tmp_path)
+    assert all(tmp_path in path.parents for path in (*asked.recordings, *asked.references))
+    assert asked.names == ("../a run.h5", "b.h5")
+    inputs = read_inputs(asked)
+    torques = [rig.operating_point.torque_nm for rig in (*inputs.rigs, *inputs.reference_rigs)]
+    assert torques == [110.0, 55.0, 55.0]
+    assert "--rig gearbox.toml" in choice.command
+    assert "'../a run.h5'" in choice.command
+
+
+def test_two_rig_files_for_all_are_refused() -> None:
+    choice = Choice((CRACKED,), rigs=(upload("one.toml", text=RIG), upload("two.toml", text=RIG)))
+    with pytest.raises(InputError, match=r"one\.toml, two\.toml"):
+        common_rig(choice)
+
+
+def test_another_choice_has_another_key() -> None:
+    one = Choice((CRACKED,), (HEALTHY,))
+    others = (
+        Choice((CRACKED,)),
+        Choice((HEALTHY,)),
+        Choice((CRACKED,), (HEALTHY,), torque_nm=3.0),
+        Choice((CRACKED,), (HEALTHY,), (upload("r.toml", text=RIG),)),
+    )
+    assert len({one.key, *(other.key for other in others)}) == 5
+    assert one.key == Choice((CRACKED,), (HEALTHY,)).key
+
+
+def test_a_run_from_the_button_to_the_answer(stub) -> None:
+    stub(**{SECONDS: "1"})
+    page = press(opened(), "Diagnose")
+    assert [button.label for button in page.button if button.disabled] == ["Diagnose"]
+    assert "Give recordings of one rig" in text_of(page)
+    page = wait_for_the_end(page)
+    assert not page.exception
+    text = text_of(page)
+    assert "Crack in a tooth root at tooth 21 of the driver" in text
+    assert "10 mm" not in text
+    labels = [button.label for button in page.get("download_button")]
+    assert labels == ["Report (HTML)", "JSON", "Twin (preset)"]
+    page.sidebar.multiselect(key="gap sample references").set_value([]).run()
+    assert "what was chosen before" in text_of(page)
+
+
+def test_stop_ends_it_and_says_so(stub) -> None:
+    stub(**{SECONDS: "100"})
+    page = press(opened(), "Diagnose")
+    job = page.session_state[_JOB].job
+    assert job.is_running
+    page = press(page, "Stop")
+    assert not job.is_running
+    assert not job.folder.exists()
+    assert "Stopped." in text_of(page)
+    assert not page.exception
+    page.run()
+    assert "Stopped." not in text_of(page)
+
+
+@pytest.mark.parametrize(
+    ("outcome", "said"), [("refusal", "the rig <file> has no teeth"), ("crash", "something nobody thought of")]
+)
+def test_why_there_is_no_answer_is_said(stub, outcome, said) -> None:
+    stub(**{OUTCOME: outcome})
+    page = wait_for_the_end(press(opened(), "Diagnose"))
+    assert not page.exception
+    assert said in text_of(page)
+    assert len(page.error) == 1
+
+
+def finished(report) -> Finished:
+    report = replace(report, spectra=report.spectra[:1], angles=report.angles[:1])  # drawing takes the time
+    data = gap_to_json(report).encode()
+    return Finished("another choice", report, tuple(gap_figures(report)), b"<html>", data, None)
+
+
+@pytest.mark.parametrize("outcome", list(REPORTS))
+def test_every_outcome_shows_in_every_view(outcome) -> None:
+    page = opened()
+    page.session_state[_FINISHED] = finished(REPORTS[outcome])
+    for tab in ("Where", "Which", "How far", "Next and facts"):
+        page.session_state["gap tab"] = tab
+        page.run()
+        assert not page.exception, tab
+        assert not page.error, tab
+    for line in REPORTS[outcome].verdict:
+        assert line.partition(": ")[2][1:] in text_of(page)
+
+
+def test_names_from_files_are_never_markup() -> None:
+    page = opened()
+    page.session_state[_FINISHED] = finished(effect_report(rig=EVIL, simulator=EVIL))
+    page.session_state["gap tab"] = "Next and facts"
+    page.run()
+    assert not page.exception
+    shown = [part.value for part in (*page.markdown, *page.caption) if "script" in part.value]
+    assert shown
+    assert all("<script>" not in text.replace("\\<", "") for text in shown)
+
+
+def test_without_recordings_nothing_can_be_started() -> None:
+    page = opened()
+    page.sidebar.radio(key="gap origin").set_value("Own files").run()
+    assert not page.exception
+    assert all(button.disabled for button in page.button if button.label in ("Diagnose", "Stop"))
+    content = CRACKED.read_bytes()
+    page.sidebar.file_uploader(key="gap recordings").upload("one.h5", content).upload("two.h5", content)
+    page.sidebar.file_uploader(key="gap rigs").upload("rig.toml", RIG.encode())
+    page.run()
+    assert not page.exception
+    assert "one.h5" in text_of(page)
+    assert not next(button for button in page.button if button.label == "Diagnose").disabled
