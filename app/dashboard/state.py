@@ -91,6 +91,15 @@ def simulated() -> Chosen | None:
     return found
 
 
+def carry_over(key: str, default: object = None) -> None:
+    """Let a widget that several pages show keep its value from one to the next.
+
+    On a page that is shown for the first time, Streamlit gives a widget its own default, whatever the session holds.
+    """
+    if key in st.session_state or default is not None:
+        st.session_state[key] = st.session_state.get(key, default)
+
+
 def keep_upload(upload: Upload | None) -> None:
     """Keep an upload while another page is shown: Streamlit forgets what its uploader held."""
     st.session_state[_UPLOAD] = upload

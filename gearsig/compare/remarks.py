@@ -70,9 +70,10 @@ def _alignment_texts(alignment: Alignment) -> list[str]:
     name = f"of shaft {alignment.shaft}" if alignment.shaft else ""
     if alignment.method == "marks":
         if alignment.gain > WORTH_SAYING:
+            turned = f"{alignment.best_shift_deg:+.4g}°".replace("-", "−")
             text = (
-                f"The averages {name} are aligned by their marks; turned by {alignment.best_shift_deg:.4g}° more they "
-                f"would correlate better by {alignment.gain:.2f}. A simulation's mark need not sit where the rig's "
+                f"The averages {name} are aligned by their marks; with the simulation turned by {turned} they would "
+                f"correlate better by {alignment.gain:.2f}. A simulation's mark need not sit where the rig's "
                 "does: align by correlation then."
             )
             return [text]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from gearsig.compare.types import ChannelComparison, Comparison, ShaftComparison
@@ -26,56 +27,84 @@ LOOK_AT_BANDS = (
     "FRAC: how alike the lines in a band are, whatever their gain; 1 is the same shape. A dash is what the complex "
     "one gives by chance, because one line outweighs all others; the dotted line what unrelated magnitudes give."
 )
+LOOK_AT_OCTAVES = "Everything in each band, noise included. At another speed, other orders fall into a band."
+
+
+@dataclass(frozen=True)
+class ComparisonFigure:
+    """A figure, what to look at in it, and what it shows for those who do not see it."""
+
+    figure: Figure
+    look: str
+    shows: str
 
 
 def channel_pictures(comparison: Comparison, channel: ChannelComparison) -> Iterator[Picture]:
     """Yield the pictures of one channel: orders, averages of each shaft, bands."""
-    for figure, caption, alternative in channel_figures(comparison, channel):
-        yield embed(figure, caption, alternative)
+    for figures in FIGURES.values():
+        for one in figures(comparison, channel):
+            yield embed(one.figure, one.look, one.shows)
 
 
-def channel_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[tuple[Figure, str, str]]:
-    """Yield figure, caption and alternative text of each picture of a channel."""
+def order_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[ComparisonFigure]:
+    """Yield both order spectra with the differences of their lines."""
     from gearsig.plot.compare import order_overlay_figure
-    from gearsig.plot.compare_average import average_overlay_figure
+
+    figure = order_overlay_figure(
+        channel.recorded_spectrum,
+        channel.simulated_spectrum,
+        (*channel.lines, *channel.other_lines),
+        mesh_cursors(comparison),
+        limits=(0.0, shown_orders(comparison)),
+        title=f"Order spectra, {channel.name}",
+    )
+    shows = f"Order spectra of {channel.name}, recorded and simulated, and the difference of their lines."
+    yield ComparisonFigure(figure, LOOK_AT_ORDERS, shows)
+
+
+def angle_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[ComparisonFigure]:
+    """Yield the synchronous averages of each shaft."""
+    for shaft in channel.shafts:
+        yield _average(comparison, channel, shaft)
+
+
+def band_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[ComparisonFigure]:
+    """Yield the bands over order, and the third octaves."""
     from gearsig.plot.compare_bands import band_levels_figure
 
-    yield (
-        order_overlay_figure(
-            channel.recorded_spectrum,
-            channel.simulated_spectrum,
-            (*channel.lines, *channel.other_lines),
-            mesh_cursors(comparison),
-            limits=(0.0, shown_orders(comparison)),
-            title=f"Order spectra, {channel.name}",
-        ),
-        LOOK_AT_ORDERS,
-        f"Order spectra of {channel.name}, recorded and simulated, and the difference of their lines.",
-    )
-    for shaft in channel.shafts:
-        name = shaft.shaft or "the shaft"
-        yield (
-            average_overlay_figure(
-                shaft.recorded,
-                shaft.simulated,
-                shaft.tooth_levels,
-                n_teeth=shaft.n_teeth,
-                title=f"Synchronous averages of {name}, {channel.name}: correlation {shaft.correlation.value:.3f}",
-            ),
-            f"One mean revolution of {name}, aligned; below it a piece of it enlarged.{_teeth_text(comparison, shaft)}",
-            f"Synchronous averages of {name}, recorded and simulated, over one revolution.",
-        )
-    yield (
-        band_levels_figure(channel.order_bands, channel.unit, title=f"Bands over order, {channel.name}"),
-        LOOK_AT_BANDS,
-        f"Levels of bands over order of {channel.name}, recorded and simulated, and their agreement.",
-    )
+    del comparison  # a maker of figures is given it, and this one needs none of it
+    figure = band_levels_figure(channel.order_bands, channel.unit, title=f"Bands over order, {channel.name}")
+    shows = f"Levels of bands over order of {channel.name}, recorded and simulated, and their agreement."
+    yield ComparisonFigure(figure, LOOK_AT_BANDS, shows)
     if channel.third_octaves:
-        yield (
-            band_levels_figure(channel.third_octaves, channel.unit, title=f"Third octaves, {channel.name}"),
-            "Everything in each band, noise included. At another speed, other orders fall into a band.",
-            f"Third-octave levels of {channel.name}, recorded and simulated.",
-        )
+        figure = band_levels_figure(channel.third_octaves, channel.unit, title=f"Third octaves, {channel.name}")
+        shows = f"Third-octave levels of {channel.name}, recorded and simulated."
+        yield ComparisonFigure(figure, LOOK_AT_OCTAVES, shows)
+
+
+FIGURES: dict[str, Callable[[Comparison, ChannelComparison], Iterator[ComparisonFigure]]] = {
+    "Orders": order_figures,
+    "Angle": angle_figures,
+    "Bands": band_figures,
+}
+"""Makers of a channel's figures, by what they are over."""
+
+
+def _average(comparison: Comparison, channel: ChannelComparison, shaft: ShaftComparison) -> ComparisonFigure:
+    from gearsig.plot.compare_average import average_overlay_figure
+
+    name = shaft.shaft or "the shaft"
+    correlation = f"{shaft.correlation.value:.3f}".replace("-", "−")
+    figure = average_overlay_figure(
+        shaft.recorded,
+        shaft.simulated,
+        shaft.tooth_levels,
+        n_teeth=shaft.n_teeth,
+        title=f"Synchronous averages of {name}, {channel.name}: correlation {correlation}",
+    )
+    look = f"One mean revolution of {name}, aligned; below it a piece of it enlarged.{_teeth_text(comparison, shaft)}"
+    shows = f"Synchronous averages of {name}, recorded and simulated, over one revolution."
+    return ComparisonFigure(figure, look, shows)
 
 
 def _teeth_text(comparison: Comparison, shaft: ShaftComparison) -> str:

@@ -54,7 +54,8 @@ def alignment_texts(comparison: Comparison) -> list[str]:
             continue
         sure = {None: "", True: ", the same tooth in both", False: ", good to whole teeth only"}[one.tooth_is_certain]
         within = "" if one.tooth_is_certain is False else f" ± {one.repeatability_deg:.2g}°"
-        texts.append(f"{name}by correlation, simulation turned by {one.shift_deg:+.4g}°{within}{sure}")
+        turned = f"{one.shift_deg:+.4g}°".replace("-", "−")
+        texts.append(f"{name}by correlation, simulation turned by {turned}{within}{sure}")
     return texts
 
 

@@ -13,7 +13,7 @@ from app.dashboard import state
 from app.dashboard.as_typed import as_typed
 from app.dashboard.cached import sha256_of_upload
 from app.dashboard.state import Chosen, Request, Upload
-from app.dashboard.widgets.comparison import choose_comparison, sample_name
+from app.dashboard.widgets.comparison import Comparison, choose_comparison, sample_name
 from app.samples import Sample, samples
 from gearsig.errors import InputError
 
@@ -24,8 +24,13 @@ EXAMPLE_RIG = Path(__file__).parents[2] / "commands" / "example_rig.toml"
 ORIGINS = ("Sample", "Own file")
 
 
-def choose_recording() -> Chosen | None:
+def choose_recording(*, with_reference: bool = True) -> Chosen | None:
     """Return what the user chose in the sidebar, None while there is nothing to open.
+
+    Parameters
+    ----------
+    with_reference : bool
+        Whether to ask for a recording of the sound machine as well.
 
     Raises
     ------
@@ -34,33 +39,33 @@ def choose_recording() -> Chosen | None:
     """
     with st.sidebar:
         made = state.simulated()
+        state.carry_over(state.ORIGIN)
         origins = ORIGINS if made is None else (*ORIGINS, state.OF_LABORATORY)
         origin = st.radio("Recording", origins, horizontal=True, key=state.ORIGIN, persist_state="session")
         if origin == state.OF_LABORATORY and made is not None:
-            return _choose_simulated(made)
-        return _choose_sample() if origin == ORIGINS[0] else _choose_file()
+            return _choose_simulated(made, with_reference)
+        return _choose_sample(with_reference) if origin == ORIGINS[0] else _choose_file(with_reference)
 
 
-def _choose_simulated(made: Chosen) -> Chosen:
+def _choose_simulated(made: Chosen, with_reference: bool) -> Chosen:
     st.caption(f"{as_typed(made.request.name)}, from the fault laboratory.")
     request = made.request
-    return _described(request.name, request.sha256, request.rig_name, request.rig_text, made.content)
+    return _described(request.name, request.sha256, request.rig_name, request.rig_text, made.content, with_reference)
 
 
-def _choose_sample() -> Chosen:
+def _choose_sample(with_reference: bool) -> Chosen:
     from gearsig.recording.read import sha256_of
 
     found = samples()
-    first = next((i for i, s in enumerate(found) if s.rig.stem == "damaged_tooth"), 0)
-    sample: Sample = st.selectbox(
-        "Sample", found, index=first, format_func=sample_name, key=state.SAMPLE, persist_state="session"
-    )
+    first = next((sample for sample in found if sample.rig.stem == "damaged_tooth"), found[0])
+    state.carry_over(state.SAMPLE, first)
+    sample: Sample = st.selectbox("Sample", found, format_func=sample_name, key=state.SAMPLE, persist_state="session")
     st.caption("Simulated, not measured: what is in it is known.")
     name, digest = sample.recording.name, sha256_of(sample.recording)
-    return _described(name, digest, sample.rig.name, sample.rig.read_text("utf-8"), sample.recording)
+    return _described(name, digest, sample.rig.name, sample.rig.read_text("utf-8"), sample.recording, with_reference)
 
 
-def _choose_file() -> Chosen | None:
+def _choose_file(with_reference: bool) -> Chosen | None:
     from gearsig.recording.identify import FORMAT_OF_EXTENSION
 
     endings = [*FORMAT_OF_EXTENSION, ".gz"]
@@ -83,9 +88,9 @@ def _choose_file() -> Chosen | None:
     if upload is None:
         return None
     if rig_file is not None:
-        upload = replace(upload, rig_name=rig_file.name, rig_text=_text_of(rig_file))
+        upload = replace(upload, rig_name=rig_file.name, rig_text=text_of_upload(rig_file))
     state.keep_upload(upload)
-    return _described(upload.name, upload.sha256, upload.rig_name, upload.rig_text, upload.content)
+    return _described(upload.name, upload.sha256, upload.rig_name, upload.rig_text, upload.content, with_reference)
 
 
 def _from_before() -> Upload | None:
@@ -98,18 +103,29 @@ def _from_before() -> Upload | None:
     return kept
 
 
-def _text_of(file: UploadedFile) -> str:
+def text_of_upload(file: UploadedFile) -> str:
+    """Return the text of an uploaded file.
+
+    Raises
+    ------
+    InputError
+        If it is not in UTF-8.
+    """
     try:
         return file.getvalue().decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError("is not text in UTF-8", where=file.name, remedy="save the rig file as UTF-8") from None
 
 
-def _described(name: str, digest: str, rig_name: str, rig_text: str, content: Path | memoryview) -> Chosen:
+def _described(
+    name: str, digest: str, rig_name: str, rig_text: str, content: Path | memoryview, with_reference: bool
+) -> Chosen:
     """Let the user change the rig, state what the file does not, and give a reference."""
     source = f"{digest} {sha256(rig_text.encode()).hexdigest()}"
     with st.expander("Rig", icon=":material/account_tree:"):
         rig_text = _edit_rig(rig_name, rig_text, source)
+    for number in ("rate", "speed"):
+        state.carry_over(state.source_key(number, source))
     with st.expander("Not in the file?", icon=":material/tune:"):
         rate = st.number_input(
             "Sampling rate (Hz)",
@@ -127,14 +143,14 @@ def _described(name: str, digest: str, rig_name: str, rig_text: str, content: Pa
             persist_state="session",
             help="Of the reference shaft, if it held still and is known well. It is refined where the signal shows it.",
         )
-    then = choose_comparison(name, digest)
+    then = choose_comparison(name, digest) if with_reference else Comparison()
     request = Request(name, digest, rig_name, rig_text, rate, speed, then.name, then.sha256, then.torque_nm)
     return Chosen(request, content, then.content)
 
 
 def _edit_rig(name: str, text: str, source: str) -> str:
     key = state.source_key("rig text", source)
-    st.session_state.setdefault(key, text)
+    state.carry_over(key, text)
     edited = st.text_area(
         f"Edit {as_typed(name)} for this session",
         key=key,

@@ -1,0 +1,1 @@
+"""The page *Simulation against recording*: what it computes, and its parts."""

@@ -1,0 +1,48 @@
+"""A simulation beside a recording, without looking for causes."""
+
+from __future__ import annotations
+
+import streamlit as st
+
+from app.dashboard.as_typed import as_typed
+from app.dashboard.compare.cached import Both, command_of, compared, page_of, recorded_of, simulated_of
+from app.dashboard.compare.chooser import choose_alignment, choose_pairs, choose_simulation
+from app.dashboard.compare.view import show_comparison, show_downloads
+from app.dashboard.widgets.chooser import choose_recording
+from app.dashboard.widgets.errors import show_error
+from gearsig.errors import GearsigError
+
+WELCOME = """
+Give a **recording** and its rig file, and a **simulation** of the machine: a file of any simulator, or one that is run
+here at the recording's speed. The page lays one over the other by order, band and angle, and says for every difference
+whether the records' own scatter explains it. For the cause of what differs, see the page *Gap*.
+"""
+
+
+def show() -> None:
+    """Choose, read or simulate, compare, show."""
+    st.subheader("Simulation against recording", anchor=False)
+    chosen = choose_recording(with_reference=False)
+    simulation = choose_simulation()
+    align_by = choose_alignment()
+    if chosen is None or simulation is None:
+        st.markdown(WELCOME)
+        return
+    what, content = simulation
+    with st.spinner("Reading the recording …", show_time=True):
+        recorded = recorded_of(chosen.request, chosen.content)
+    with st.spinner("Reading or simulating; a first simulation takes half a minute …", show_time=True):
+        simulated = simulated_of(what, chosen.request, content, recorded)
+    st.caption(as_typed(f"{simulated.provenance.source or 'simulation of this page'} beside {chosen.request.name}"))
+    pairs = choose_pairs(simulated, recorded)
+    with st.spinner("Comparing …", show_time=True):
+        found = compared(chosen.request, what, pairs, align_by, Both(recorded, simulated))
+    command = command_of(chosen.request, what, pairs, align_by)
+    show_downloads(found, lambda: page_of(chosen.request, what, pairs, align_by, command, found), command)
+    show_comparison(found)
+
+
+try:
+    show()
+except GearsigError as error:
+    show_error(error)
