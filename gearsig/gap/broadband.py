@@ -9,6 +9,9 @@ import numpy as np
 from gearsig.gap.gathered import ChannelSums, Gathered
 from gearsig.gap.gear_lines import Feature, decibel
 
+LEAST_SHARE = 1e-6
+"""Below one sample of any record."""
+
 
 def broadband_features(gathered: Gathered, channels: Sequence[ChannelSums]) -> Iterator[Feature]:
     """Yield band levels and kurtosis of the residual, tail figures of the raw signal, in dB; means over channels."""
@@ -23,7 +26,8 @@ def broadband_features(gathered: Gathered, channels: Sequence[ChannelSums]) -> I
     yield "floor.to_signal", float(squares[-1] - 10.0 * np.log10(raw[:, 0]).mean())
     yield "raw.level", float(10.0 * np.log10(raw[:, 0]).mean())
     yield "raw.kurtosis", float((10.0 * np.log10(raw[:, 1] / raw[:, 0] ** 2)).min())
-    yield "raw.near_the_extreme", decibel(float(raw[:, 2].max()))
+    # Without the block that holds the extreme, the share may be 0.
+    yield "raw.near_the_extreme", decibel(max(float(raw[:, 2].max()), LEAST_SHARE))
 
 
 def speed_features(gathered: Gathered) -> Iterator[Feature]:

@@ -32,6 +32,9 @@ BEYOND = 0.5
 _RARE = 3.0
 """Of the noise's power: one line of noise in twenty is stronger (exp(−3) = 0.05)."""
 
+CLOSER_THAN_A_SHAFTS = 0.1
+"""Orders of the driver between lines of a residual; slower driven shafts than this are not built in one stage."""
+
 NOTHING: FloatArray = np.zeros(0)
 
 
@@ -150,6 +153,26 @@ def _of_residual(
 def _residual_power(gathered: Gathered, names: Sequence[str]) -> FloatArray:
     power: FloatArray = np.mean([gathered.channels[name].residual_power.mean(axis=0) for name in names], axis=0)
     return power
+
+
+def gap_by_order(curves: SpectrumCurves, simulated: FloatArray) -> FloatArray:
+    """Return 20 lg of measured over simulated amplitudes, each lifted to the floor; nan where neither exceeds it.
+
+    In the residual, whose lines lie closer than a shaft's, a line that moved to its neighbour is the same line.
+    """
+    floor = np.maximum(curves.floor, 1e-300)
+    a, b = (20.0 * np.log10(np.maximum(values, floor)) for values in (curves.measured, simulated))
+    up, down = a - b, a - b
+    if curves.orders[1] - curves.orders[0] < CLOSER_THAN_A_SHAFTS:
+        up, down = a - _largest_of_three(b), _largest_of_three(a) - b
+    gap = np.maximum(up, 0.0) + np.minimum(down, 0.0)
+    return np.where((curves.measured > floor) | (simulated > floor), gap, np.nan)
+
+
+def _largest_of_three(values: FloatArray) -> FloatArray:
+    padded = np.pad(values, 1, mode="edge")
+    largest: FloatArray = np.maximum(np.maximum(padded[:-2], padded[2:]), values)
+    return largest
 
 
 def angle_curves(

@@ -16,6 +16,8 @@ N_SIDEBAND_HARMONICS = 5
 SIDEBANDS = {"1": (1, 1), "2": (2, 2), "3to5": (3, 5), "6to12": (6, 12)}
 MOST_SHAFT_ORDERS = 30
 NOMINAL_REVOLUTIONS = 64.0
+BY_CHANCE = 0.01
+"""Lines of noise that pass for a shaft's own."""
 SIDES = ("driver", "driven")
 
 Feature = tuple[str, float]
@@ -34,6 +36,22 @@ def average_lines(sums: ChannelSums, side: int) -> tuple[NDArray[np.complex128],
     # A line's own scatter is that of few blocks: its neighbourhood says it better.
     smooth = np.convolve(np.pad(noise, 4, mode="edge"), np.ones(9) / 9.0, mode="valid")
     return lines, np.maximum(smooth, 1e-300)
+
+
+def is_synchronous(sums: ChannelSums, side: int) -> NDArray[np.bool_]:
+    """Return which lines keep their phase from block to block: a shaft's own do, what leaks into its average does not.
+
+    |a|² against the power that the same line's scatter over the blocks leaves of it, an F test with 2 and 2(B − 1)
+    degrees of freedom.
+    """
+    counts, blocks = sums.counts[side], sums.lines[side]
+    lines = (counts / counts.sum()) @ blocks
+    degrees = max(len(counts) - 1, 1)
+    scatter = (np.abs(blocks - lines) ** 2 * counts[:, None]).sum(axis=0) / degrees / counts.sum()
+    # The F distribution with 2 and 2m degrees has P(F > f) = (1 + f/m)^(−m).
+    least = degrees * (BY_CHANCE ** (-1.0 / degrees) - 1.0)
+    held: NDArray[np.bool_] = np.abs(lines) ** 2 > least * scatter
+    return held
 
 
 def line_power(sums: ChannelSums, side: int) -> FloatArray:

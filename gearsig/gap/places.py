@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,7 +38,8 @@ def gap_places(
     """Return where a recording differs, largest share first.
 
     A place is a family of features; its size s_f is their mean of high order over the floors, and its share
-    max(s_f² − 1, 0)/Σ max(s² − 1, 0): what does not exceed both floors together has none.
+    max(s_f² − 1, 0)/Σ max(s² − 1, 0): what does not exceed the larger floor has none. Shares add up to less than 1
+    where some of what changed is no more than noise and leakage in a place, or below 1 % of the whole.
 
     Parameters
     ----------
@@ -61,20 +63,31 @@ def gap_places(
     if is_reference:
         distances = beyond_the_mesh(change.names, distances)
     floors = structural.of(change.names), REPEATABLE * pooled_scatter(change)
-    both = distances / np.hypot(*floors)
+    # Healthy machines' differences hold their scatter already; a shorter record's may be larger.
+    both = distances / np.maximum(*floors)
     comparison = Comparison(now, other, is_reference, _named(change.names, distances), _named(change.names, both))
-    found = []
     members = {family: _telling(change.names, rows) for family, rows in family_members(change.names).items()}
     energies = {family: max(family_size(both[rows]) ** 2 - 1.0, 0.0) for family, rows in members.items()}
     total = sum(energies.values())
+    found = []
     for family, energy in energies.items():
-        if energy <= 0.0 or energy < LEAST_SHARE * total:
-            continue
-        structurally, repeatably = (
-            family_size(distances[members[family]] / floor[members[family]]) for floor in floors
-        )
-        found.append(_place(family, _spot(comparison, family), structurally, repeatably, energy / total, now))
-    return tuple(sorted(found, key=lambda place: -place.share))
+        spot = _spot(comparison, family) if energy > LEAST_SHARE * total else None
+        if spot is not None:
+            sizes = [family_size(distances[members[family]] / floor[members[family]]) for floor in floors]
+            found.append(_place(family, spot, (sizes[0], sizes[1]), energy / total, now))
+    return tuple(sorted(_merged(found), key=lambda place: -place.share))
+
+
+def _merged(places: list[GapPlace]) -> list[GapPlace]:
+    """Return the places with those put together to which two families of features led."""
+    merged: dict[tuple[PlaceKind, str], GapPlace] = {}
+    for place in sorted(places, key=lambda one: -one.share):
+        key = (place.kind, place.shaft)
+        if key in merged:
+            merged[key] = replace(merged[key], share=merged[key].share + place.share)
+        else:
+            merged[key] = place
+    return list(merged.values())
 
 
 def beyond_the_mesh(names: tuple[str, ...], distances: FloatArray) -> FloatArray:
@@ -118,7 +131,7 @@ def _named(names: tuple[str, ...], values: FloatArray) -> Mapping[str, float]:
     return dict(zip(names, values.tolist(), strict=True))
 
 
-def _spot(comparison: Comparison, family: Family) -> Spot:
+def _spot(comparison: Comparison, family: Family) -> Spot | None:
     kind, shaft = family
     of_a_shaft = {PlaceKind.SIDEBANDS: sideband_spot, PlaceKind.SHAFT: shaft_spot, PlaceKind.TOOTH: tooth_spot}
     plain = {
@@ -132,17 +145,15 @@ def _spot(comparison: Comparison, family: Family) -> Spot:
     return of_a_shaft[kind](comparison, SIDES.index(shaft)) if kind in of_a_shaft else plain[kind](comparison)
 
 
-def _place(
-    family: Family, spot: Spot, structural: float, repeatability: float, share: float, now: Gathered
-) -> GapPlace:
+def _place(family: Family, spot: Spot, sizes: tuple[float, float], share: float, now: Gathered) -> GapPlace:
     kind, side = family
     return GapPlace(
-        kind,
+        spot.kind or kind,
         spot.title,
         spot.change_db,
-        repeatability,
-        structural,
-        share,
+        repeatability=sizes[1],
+        structural=sizes[0],
+        share=share,
         shaft=now.frame.shafts[SIDES.index(side)] if side else "",
         orders=spot.orders,
         band_hz=spot.band_hz,

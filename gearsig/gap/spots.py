@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from gearsig.gap.frame import GearFrame
 from gearsig.gap.gathered import Gathered
+from gearsig.gap.types import PlaceKind
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,10 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Spot:
-    """What `GapPlace` says of where; its sizes are added later."""
+    """What `GapPlace` says of where; its sizes are added later.
+
+    `kind` is given where the place turns out to be of another kind than the features that led to it.
+    """
 
     title: str
     change_db: float
@@ -46,6 +50,7 @@ class Spot:
     angle_deg: float | None = None
     tooth: int | None = None
     channel: str = ""
+    kind: PlaceKind | None = None
 
 
 def shaft_words(frame: GearFrame, side: int) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.gap.frame import DRIVER
@@ -14,6 +15,7 @@ from gearsig.gap.gear_lines import (
     N_MESH_HARMONICS,
     N_SIDEBAND_HARMONICS,
     SIDES,
+    is_synchronous,
     line_power,
     visible_orders,
 )
@@ -26,15 +28,18 @@ WORTH_NAMING = 0.25
 MOST_ORDERS = 6
 
 
-def mesh_spot(comparison: Comparison) -> Spot:
+def mesh_spot(comparison: Comparison) -> Spot | None:
     """Return the mesh harmonic that changed most."""
     frame = comparison.now.frame
     if comparison.strongest("mesh", "line.half_mesh") in ("mesh.half", "line.half_mesh"):
         half = comparison.change_db[comparison.strongest("mesh.half", "line.half_mesh")]
         return Spot(f"half the mesh order, {by_decibels(half)}", half, (frame.teeth[0] / 2.0,))
-    now, other = _powers(comparison, DRIVER, relative=not comparison.is_reference)
-    lines = [k * frame.teeth[0] for k in range(1, N_MESH_HARMONICS + 1) if k * frame.teeth[0] < now.shape[1]]
-    row, best, change = _strongest_group(now, other, [[line] for line in lines])
+    both = _powers(comparison, DRIVER, relative=not comparison.is_reference)
+    lines = [k * frame.teeth[0] for k in range(1, N_MESH_HARMONICS + 1) if k * frame.teeth[0] < both[0].shape[1]]
+    strongest = _strongest_group(*both, [[line] for line in lines])
+    if strongest is None:
+        return None
+    row, best, change = strongest
     total = comparison.change_db["mesh.total"]
     alike = comparison.is_reference and abs(total) > 0.7 * abs(change) and total * change > 0
     every = f"mesh harmonics, together {by_decibels(total)}, " if alike else "mesh harmonics, "
@@ -44,9 +49,9 @@ def mesh_spot(comparison: Comparison) -> Spot:
     return Spot(title, change, (float(lines[best]),), channel=_channel(comparison, row))
 
 
-def sideband_spot(comparison: Comparison, side: int) -> Spot:
+def sideband_spot(comparison: Comparison, side: int) -> Spot | None:
     """Return about which mesh harmonic a shaft's sidebands changed most, and which of them."""
-    now, other = _powers(comparison, side, relative=not comparison.is_reference)
+    now, other, own = _powers(comparison, side, relative=not comparison.is_reference)
     frame = comparison.now.frame
     teeth, n = frame.teeth[side], now.shape[1]
     reach = min(FURTHEST_SIDEBAND, teeth // 2)
@@ -55,7 +60,10 @@ def sideband_spot(comparison: Comparison, side: int) -> Spot:
         for k in range(1, N_SIDEBAND_HARMONICS + 1)
         if k * teeth + 1 < n
     ]
-    row, best, change = _strongest_group(now, other, groups)
+    strongest = _strongest_group(now, other, own, groups)
+    if strongest is None:
+        return None
+    row, best, change = strongest
     lines = _largest_lines(now[row] - other[row], groups[best])
     title = f"sidebands of {shaft_words(frame, side)} about {_times(best + 1)}mesh, {by_decibels(change)}"
     carrier = (best + 1) * teeth
@@ -64,42 +72,58 @@ def sideband_spot(comparison: Comparison, side: int) -> Spot:
     return Spot(title, change, orders, channel=_channel(comparison, row))
 
 
-def shaft_spot(comparison: Comparison, side: int) -> Spot:
+def shaft_spot(comparison: Comparison, side: int) -> Spot | None:
     """Return the low order of a shaft that changed most."""
-    now, other = _powers(comparison, side, relative=False)
+    both = _powers(comparison, side, relative=False)
     frame = comparison.now.frame
-    last = min(MOST_SHAFT_ORDERS, frame.teeth[side] - 3, now.shape[1] - 1)
+    last = min(MOST_SHAFT_ORDERS, frame.teeth[side] - 3, both[0].shape[1] - 1)
     name = comparison.strongest(f"shaft.{SIDES[side]}").split(".")[2]
     groups = [[int(name)]] if name.isdigit() else [[order] for order in range(1, last + 1)]
-    row, best, change = _strongest_group(now, other, groups)
+    strongest = _strongest_group(*both, groups)
+    if strongest is None:
+        return None
+    row, best, change = strongest
     order = groups[best][0]
     title = f"order {order} of {shaft_words(frame, side)}, {by_decibels(change)}"
     return Spot(title, change, (order * frame.shaft_orders[side],), channel=_channel(comparison, row))
 
 
-def _powers(comparison: Comparison, side: int, *, relative: bool) -> tuple[FloatArray, FloatArray]:
-    """Return the lines' powers of both, (n_channels, n_orders); `relative` to each channel's mesh harmonics."""
-    both = [_power_of(gathered, comparison, side, relative=relative) for gathered in (comparison.now, comparison.other)]
-    n = min(power.shape[1] for power in both)
-    return both[0][:, :n], both[1][:, :n]
+def _powers(comparison: Comparison, side: int, *, relative: bool) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Return the lines' powers of both, (n_channels, n_orders), and which are a shaft's own in either.
+
+    Powers are `relative` to each channel's mesh harmonics.
+    """
+    names = tuple(comparison.now.channels)
+    both = [_power_of(gathered, names, side, relative=relative) for gathered in (comparison.now, comparison.other)]
+    n = min(power.shape[1] for power, _ in both)
+    return both[0][0][:, :n], both[1][0][:, :n], both[0][1][:, :n] | both[1][1][:, :n]
 
 
-def _power_of(gathered: Gathered, comparison: Comparison, side: int, *, relative: bool) -> FloatArray:
-    sums = [gathered.channels[name] for name in comparison.now.channels]
+def _power_of(
+    gathered: Gathered, names: Sequence[str], side: int, *, relative: bool
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    sums = [gathered.channels[name] for name in names]
     rows = [line_power(one, side) / (mesh_power(gathered, one, side) if relative else 1.0) for one in sums]
     n = visible_orders(gathered, side, min(len(row) for row in rows)) + 1
-    return np.stack([row[:n] for row in rows])
+    own = np.stack([is_synchronous(one, side)[:n] for one in sums])
+    return np.stack([row[:n] for row in rows]), own
 
 
-def _strongest_group(now: FloatArray, other: FloatArray, groups: Sequence[list[int]]) -> tuple[int, int, float]:
+def _strongest_group(
+    now: FloatArray, other: FloatArray, own: NDArray[np.bool_], groups: Sequence[list[int]]
+) -> tuple[int, int, float] | None:
     """Return channel, group and change in dB of the largest ratio among those whose power changed much.
 
-    Channels are weighed by their own largest power: a sensor with a small gain sees the same.
+    Channels are weighed by their own largest power: a sensor with a small gain sees the same. Groups without a line of
+    the shaft's own changed by noise, or by what leaks into its average; None where that is all.
     """
     sums = [np.stack([power[:, group].sum(axis=1) for group in groups], axis=1) for power in (now, other)]
+    heard = np.stack([own[:, group].any(axis=1) for group in groups], axis=1)
     ratio = 10.0 * np.log10(np.maximum(sums[0], 1e-300) / np.maximum(sums[1], 1e-300))
-    moved = np.abs(sums[0] - sums[1])
-    enough = moved >= WORTH_NAMING * moved.max(axis=1, keepdims=True)
+    moved = np.where(heard, np.abs(sums[0] - sums[1]), 0.0)
+    if not moved.any():
+        return None
+    enough = heard & (moved >= WORTH_NAMING * moved.max(axis=1, keepdims=True))
     row, best = np.unravel_index(int(np.argmax(np.where(enough, np.abs(ratio), -1.0))), ratio.shape)
     return int(row), int(best), float(ratio[row, best])
 

@@ -5,6 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from gearsig.gap.spots import Comparison, Spot, band_words, by_decibels
+from gearsig.gap.spots_cyclic import line_within
+
+LEAST_SPEED_CHANGE = 3e-4
+"""Relative; a steadier speed is as good as constant."""
+PILED_UP = 1e-3
+"""Share of samples within half a percent of the extreme; of a vibration with random peaks, some 1e-5 lie there."""
 
 
 def band_spot(comparison: Comparison) -> Spot:
@@ -13,6 +19,9 @@ def band_spot(comparison: Comparison) -> Spot:
     _, kind, number = name.split(".")
     band = comparison.now.bands_hz[int(number) - 1]
     change = comparison.change_db[name]
+    tone = line_within(comparison, band, change) if kind == "band" else None
+    if tone is not None:
+        return tone
     what = "noise" if kind == "band" else "kurtosis of the noise"
     title = f"{what} between {band_words(band).replace(' to ', ' and ')}, {by_decibels(change)}"
     return Spot(title, change, band_hz=band, channel=_loudest(comparison, int(number) - 1, kurtosis=kind != "band"))
@@ -29,11 +38,13 @@ def _loudest(comparison: Comparison, band: int, *, kurtosis: bool) -> str:
     return max(comparison.now.channels, key=change)
 
 
-def speed_spot(comparison: Comparison) -> Spot:
-    """Return what the speed does otherwise."""
+def speed_spot(comparison: Comparison) -> Spot | None:
+    """Return what the speed does otherwise; None where it hardly does anything."""
     name = comparison.strongest("speed.")
     change = comparison.change_db[name]
     drift, swing, _, frequency_hz = comparison.now.speed
+    if max(abs(drift), swing, *(abs(figure) for figure in comparison.other.speed[:2])) < LEAST_SPEED_CHANGE:
+        return None
     if name == "speed.drift":
         return Spot(f"speed drifts by {100 * drift:.2g} % along the record", change)
     orders = (frequency_hz / comparison.now.speed_hz,)

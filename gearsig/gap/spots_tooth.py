@@ -16,8 +16,9 @@ from gearsig.severity.calibration import load_calibration
 from gearsig.severity.event import find_event
 from gearsig.severity.shaft_lines import ShaftLines
 
-STANDS_OUT = 3.0
-"""Energy within one pitch over the middling pitch's from which on one tooth is named."""
+STANDS_OUT = 6.0
+"""Energy within one pitch over the middling pitch's from which on one tooth is named: of teeth that all
+differ by chance, the largest has some 5."""
 
 
 @dataclass(frozen=True)
@@ -72,11 +73,23 @@ def tooth_spot(comparison: Comparison, side: int) -> Spot:
     pattern = changed_pattern(now, comparison.other, side) if comparison.is_reference else own_pattern(now, side)
     shaft, name = shaft_words(frame, side), list(now.channels)[int(np.argmax(pattern.energy.max(axis=1)))]
     if pattern.prominence < STANDS_OUT:
-        change = comparison.change_db[f"tooth.{SIDES[side]}.level"]
-        return Spot(f"pattern of the teeth of {shaft} all round, {by_decibels(change)}", change, channel=name)
+        return _all_round(comparison, side, shaft, name)
     place, teeth = pattern.place_rev, frame.teeth[side]
     above, angle = 10.0 * float(np.log10(pattern.prominence)), 360.0 * place
     tooth = int(place * teeth) % teeth + 1 if now.marks[side] else None
     at = f"tooth {tooth} ({angle:.0f}°)" if tooth else f"one tooth (at {angle:.0f}°; no mark)"
     title = f"burst once per revolution at {at} of {shaft}, {above:.2g} dB above the other teeth"
     return Spot(title, above, angle_deg=angle, tooth=tooth, channel=name)
+
+
+def _all_round(comparison: Comparison, side: int, shaft: str, channel: str) -> Spot:
+    strongest = comparison.strongest(f"tooth.{SIDES[side]}.", f"change.{SIDES[side]}.")
+    level = f"tooth.{SIDES[side]}.level"
+    if abs(comparison.size[level]) > 1.0 or strongest.endswith((".level", ".elsewhere", ".peak")):
+        change = comparison.change_db[level]
+        return Spot(f"pattern of the teeth of {shaft} all round, {by_decibels(change)}", change, channel=channel)
+    return Spot(
+        f"shape of the teeth's pattern of {shaft}, no tooth in particular",
+        comparison.change_db[strongest],
+        channel=channel,
+    )

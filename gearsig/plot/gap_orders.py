@@ -8,6 +8,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
+from gearsig.gap.curves import gap_by_order
 from gearsig.gap.types import SpectrumCurves
 from gearsig.plot import series, style
 from gearsig.plot.display import unit_text
@@ -96,15 +97,8 @@ def _draw_spectra(axes: Axes, x: FloatArray, curves: SpectrumCurves, simulated: 
     return [*lines[::-1], *floor]
 
 
-def gap_db(curves: SpectrumCurves, simulated: FloatArray) -> FloatArray:
-    """Return 20 lg of measured over simulated amplitudes, each lifted to the floor; nan where neither exceeds it."""
-    floor = np.maximum(curves.floor, 1e-300)
-    gap = 20.0 * np.log10(np.maximum(curves.measured, floor) / np.maximum(simulated, floor))
-    return np.where((curves.measured > floor) | (simulated > floor), gap, np.nan)
-
-
 def _draw_gap(axes: Axes, x: FloatArray, curves: SpectrumCurves) -> None:
-    before = gap_db(curves, curves.before)
+    before = gap_by_order(curves, curves.before)
     structural = curves.structural_db if len(curves.structural_db) else np.zeros(len(x))
     beyond = np.abs(np.nan_to_num(before)) > structural
     largest = 1.15 * max(LEAST_GAP_DB, float(np.max(np.abs(before), initial=0.0, where=np.isfinite(before))))
@@ -115,7 +109,7 @@ def _draw_gap(axes: Axes, x: FloatArray, curves: SpectrumCurves) -> None:
         here = chosen & np.isfinite(before)
         axes.vlines(x[here], 0.0, before[here], colors=colour, linewidth=1.0, alpha=alpha, zorder=2)
     if len(curves.after):
-        left = gap_db(curves, curves.after)
+        left = gap_by_order(curves, curves.after)
         here = beyond & np.isfinite(left)
         axes.plot(x[here], left[here], ".", color=style.MESH, markersize=3.5, zorder=3)
     axes.axhline(0.0, color=style.QUIET, linewidth=0.8, zorder=1.5)

@@ -67,7 +67,8 @@ def gap_teeth_figure(
 
 def _decibels(energy: FloatArray, n: int, name: str) -> FloatArray:
     values = series.checked_values(energy, n, name)
-    return 10.0 * np.log10(np.maximum(values, 10.0 ** (LOWEST_DB / 10.0)))
+    decibels: FloatArray = 10.0 * np.log10(np.maximum(values, 10.0 ** (LOWEST_DB / 10.0)))
+    return decibels
 
 
 def _radius(decibels: FloatArray, top: float) -> FloatArray:
