@@ -37,11 +37,14 @@ class Group:
     title : str
     wide, small : tuple of Picture
         One per line, or side by side.
+    is_folded : bool
+        Whether the page shows them only when asked: channels that no finding names look like the others.
     """
 
     title: str
     wide: tuple[Picture, ...]
     small: tuple[Picture, ...] = ()
+    is_folded: bool = False
 
 
 @dataclass(frozen=True)
@@ -128,7 +131,7 @@ def _channel_group(analysis: Analysis, channel: ChannelAnalysis, *, detailed: bo
     if detailed:
         makers += [_order_levels, _whole_spectrum, _mesh_zooms, _envelope, _kurtogram, _map, _averages]
     wide = tuple(picture for maker in makers for picture in maker(analysis, channel))
-    return Group(f"Channel {channel.channel}", wide, tuple(_polar(analysis, channel)))
+    return Group(f"Channel {channel.channel}", wide, tuple(_polar(analysis, channel)), is_folded=not detailed)
 
 
 def _order_or_frequency(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:

@@ -82,6 +82,21 @@ def test_page_is_strict_html5(html):
     html5lib.HTMLParser(strict=True).parse(html)
 
 
+def test_the_answer_comes_first_and_what_repeats_is_folded(html):
+    """Verdict, findings, figures; tables of indicators and channels without a finding open on request."""
+    places = [html.index(text) for text in ("verdict", "<h2>Findings", "<h2>Recording", "<h2>Machine and", "<h2>Indic")]
+    assert places == sorted(places)
+    structure = parsed(html)
+    folds = [attributes for tag, attributes in structure.elements if tag == "details"]
+    assert len(folds) >= 3
+    assert not any("open" in attributes for attributes in folds)
+    assert html.count("<summary>") == len(folds)
+    open_part = re.sub(r"(?s)<details.*?</details>", "", html)
+    assert "computed on" not in open_part
+    assert open_part.count("<article") == html.count("<article")
+    assert 4 < open_part.count("<img") < html.count("<img")
+
+
 def test_page_loads_nothing(html):
     structure = parsed(html)
     tags = {tag for tag, _ in structure.elements}
