@@ -156,7 +156,8 @@ class Alignment:
     repeatability_deg : float
         From the halves of the records; 0 for marks.
     tooth_is_certain : bool or None
-        Whether the halves agree on the tooth, and another tooth fits less well; None where the teeth are not known.
+        Whether the halves agree on the tooth, and what differs from tooth to tooth is alike in both; None where the
+        teeth are not known.
     best_shift_deg : float
         Beyond `shift_deg`, the shift that would raise the correlation most.
     gain : float
