@@ -15,7 +15,7 @@ from gearsig.plot.order_map import colours
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-CELL_IN, LEFT_IN, TOP_IN, BOTTOM_IN = 0.27, 1.75, 0.45, 1.75
+CELL_IN, LEFT_IN, TOP_IN, BOTTOM_IN = 0.27, 1.75, 0.45, 1.5
 CURVE_IN = 4.4
 COLOURS = (style.MEASURED, style.FLOOR, style.SHAFT)
 
@@ -79,7 +79,7 @@ def calibration_figure(
     -------
     Figure
     """
-    figure = style.new_figure(CURVE_IN, 6.2)
+    figure = style.new_figure(CURVE_IN)
     axes = style.panel(figure, left_in=0.75, right_in=0.3, top_in=0.45)
     axes.plot((0, 100), (0, 100), color=style.QUIET, linewidth=0.9, linestyle="--")
     for i, (name, (confidence, right, low, high)) in enumerate(curves.items()):

@@ -127,6 +127,14 @@ def test_resampling_a_mean_gives_its_standard_error():
     assert found.high - found.low == pytest.approx(2 * Z * values.std() / 20.0, rel=0.1)
 
 
+def test_the_interval_of_a_sum_of_errors_holds_its_value():
+    signs = list(np.linspace(-1.0, 1.0, 101))  # of mean 0
+    away = resampled(signs, lambda d: abs(float(np.mean(d))), np.random.default_rng(2))
+    held = resampled(signs, lambda d: abs(float(np.mean(d))), np.random.default_rng(2), centred=True)
+    assert away.value == held.value < 1e-12 < away.low
+    assert held.low <= held.value < held.high < away.high
+
+
 def test_calibration_error_in_closed_form():
     # Two bins: 0.2 with 1 of 4 right, 0.9 with 3 of 4 right: (0.05 + 0.15)/2.
     confidence, right = [0.2] * 4 + [0.9] * 4, [True] + [False] * 3 + [True] * 3 + [False]

@@ -26,13 +26,17 @@ def effects_table(result: Result) -> Table:
     table += [_effect_row(name, [r for r in rows if r.kind == "unknown" and r.effects == (name,)]) for name in OUTSIDE]
     header = (
         "effect",
-        *(f"{name} third of its span" for name, *_ in LEVELS),
-        f"≥ {STRONG:g} floors, without reference",
+        *(name for name, *_ in LEVELS),
+        f"≥ {STRONG:g} floors, without",
         "with reference",
-        "strength, middle (floors)",
+        "strength",
         "most often taken for",
     )
-    note = "Right of all: the likeliest cause is the effect; for those outside the catalogue, “unknown”."
+    note = (
+        "Likeliest cause right, of so many: in the weak, middle and strong third of the effect's span, and from "
+        f"{STRONG:g} structural floors on. Strength: the middle, in structural floors. For effects outside the "
+        "catalogue “unknown” is right."
+    )
     return Table("Effect by effect", note, header, tuple(row for row in table if row))
 
 

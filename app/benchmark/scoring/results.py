@@ -23,7 +23,7 @@ from app.benchmark.scoring.judged import Row
 from app.benchmark.scoring.scores import is_one_answer
 from app.benchmark.scoring.strata import WITH, WITHOUT, Result
 from app.benchmark.scoring.strength import STRONG
-from app.benchmark.scoring.table import Table, beside_table, cost_lines, main_table, markdown, parts_table
+from app.benchmark.scoring.table import Table, beside_table, cost_lines, main_table, markdown, parts_table, same_table
 from app.benchmark.shares import SHARES
 from gearsig import __version__
 from gearsig.plot.embed import Picture, embed
@@ -133,6 +133,7 @@ def page(result: Result, command: str, date: datetime) -> str:
         _section(effects_table(result)),
         _section(parts_table(result)),
         _section(beside_table(result)),
+        *([_section(same)] if (same := same_table(result)) is not None else []),
         _failures(result),
     ]
     return benchmark_html(

@@ -56,9 +56,9 @@ def _counted(of: Callable[[Row], bool], hit: Callable[[Row], bool]) -> Measure:
     return measure
 
 
-def _resampled(of: Callable[[Row], bool], statistic: Callable[[Rows], float]) -> Measure:
+def _resampled(of: Callable[[Row], bool], statistic: Callable[[Rows], float], *, centred: bool = False) -> Measure:
     def measure(rows: Rows, rng: np.random.Generator) -> Score:
-        return resampled([row for row in rows if of(row)], statistic, rng)
+        return resampled([row for row in rows if of(row)], statistic, rng, centred=centred)
 
     return measure
 
@@ -223,7 +223,7 @@ FIGURES: tuple[Figure, ...] = (
     Figure(
         "ece",
         "calibration error, 10 equal bins",
-        _resampled(is_one_answer, ece),
+        _resampled(is_one_answer, ece, centred=True),
         is_share=False,
         targets=(0.06, 0.06),
         is_least=False,

@@ -14,7 +14,7 @@ from app.benchmark.scoring.calibration_curve import error_by_chance
 from app.benchmark.scoring.intervals import Score
 from app.benchmark.scoring.judged import Row, rows_of
 from app.benchmark.scoring.scores import is_one_answer, scores, strong_only
-from app.benchmark.scoring.strength import STRONG, batch_floors
+from app.benchmark.scoring.strength import STRONG, known_floors
 
 WITHOUT, WITH = "without reference", "with reference"
 PARTS: dict[str, Callable[[Row], bool]] = {
@@ -85,8 +85,7 @@ class Result:
 
 def judge(wanted: Wanted, cases: Sequence[Done]) -> Result:
     """Score all answers."""
-    # The floor belongs to the blind rig; the same simulator's own healthy cases lie closer by what it cannot know.
-    floors = batch_floors([done.truth for done in cases if done.planned.source == BLIND])
+    floors = known_floors([done.truth for done in cases if done.planned.source == BLIND])
     rows = {name: rows_of(cases, name, floors) for name in wanted.diagnosers}
     first = rows[wanted.diagnosers[0]]
     parts = [

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from app.benchmark.make import Truth
+from gearsig.errors import InputError
 from gearsig.gap.floors import StructuralFloor, soft_size
 
 STRONG = 3.0
@@ -19,8 +20,19 @@ Floors = Mapping[bool, StructuralFloor | None]
 """With a reference (True) and without (False); None: not known."""
 
 
+def known_floors(truths: Sequence[Truth]) -> Floors:
+    """Return the floors that the diagnosis itself uses, or the batch's own where none come with this version."""
+    from gearsig.gap.population import load_population
+
+    try:
+        population = load_population()
+        return {with_reference: population.floor(with_reference=with_reference) for with_reference in (False, True)}
+    except InputError:
+        return batch_floors(truths)
+
+
 def batch_floors(truths: Sequence[Truth]) -> dict[bool, StructuralFloor | None]:
-    """Return floors from how the batch's own healthy cases scatter, as long as there is no better table.
+    """Return floors from how the batch's own healthy cases scatter.
 
     Without a reference that is the scatter among machines, which is more than between a machine and its simulation:
     the strengths come out low.
