@@ -27,8 +27,8 @@ class Asked:
         None, one for all, or one for each recording.
     sampling_rate_hz : float or None
         Of files that do not state it.
-    names : tuple of str
-        Of the recordings, for people; empty: those of the files.
+    names, reference_names : tuple of str
+        Of recordings and references, for people; empty: those of the files.
     """
 
     recordings: tuple[Path, ...]
@@ -37,17 +37,19 @@ class Asked:
     torques_nm: tuple[float, ...] = ()
     sampling_rate_hz: float | None = None
     names: tuple[str, ...] = ()
+    reference_names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """Recordings and references, each with its rig."""
+    """Recordings and references, each with its rig and its name for people."""
 
     recordings: tuple[Recording, ...]
     rigs: tuple[Rig, ...]
     names: tuple[str, ...]
     references: tuple[Recording, ...] = ()
     reference_rigs: tuple[Rig, ...] = ()
+    reference_names: tuple[str, ...] = ()
 
 
 def read_inputs(asked: Asked, on_file: Callable[[str], object] = lambda _: None) -> Inputs:
@@ -73,8 +75,8 @@ def read_inputs(asked: Asked, on_file: Callable[[str], object] = lambda _: None)
         on_file(path.name)
         recordings.append(_read(path, rig, asked.sampling_rate_hz))
     n = len(asked.recordings)
-    names = asked.names or _names(asked.recordings)
-    return Inputs(tuple(recordings[:n]), rigs[:n], names, tuple(recordings[n:]), rigs[n:])
+    names, references = asked.names or _names(asked.recordings), asked.reference_names or _names(asked.references)
+    return Inputs(tuple(recordings[:n]), rigs[:n], names, tuple(recordings[n:]), rigs[n:], references)
 
 
 def _read(path: Path, rig: Rig, sampling_rate_hz: float | None) -> Recording:

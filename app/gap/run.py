@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -40,7 +41,7 @@ def run_gap(asked: Asked, model: str, *, cache: Path | None, on_stage: Stage = l
 
     simulator = gap_simulator(model)
     inputs = read_inputs(asked, lambda name: on_stage(f"reading {name}", 0.0))
-    return diagnose_gap(
+    report = diagnose_gap(
         inputs.recordings,
         simulator,
         rigs=inputs.rigs,
@@ -50,6 +51,7 @@ def run_gap(asked: Asked, model: str, *, cache: Path | None, on_stage: Stage = l
         cache=cache,
         on_stage=lambda stage, done: on_stage(stage, READING + (1 - READING) * done),
     )
+    return replace(report, references=inputs.reference_names) if report.references else report
 
 
 def cache_folder() -> Path:

@@ -86,6 +86,7 @@ def _request(folder: Path) -> tuple[Asked, str, Path | None, str]:
         tuple(given["torques_nm"]),
         given["sampling_rate_hz"],
         tuple(given["names"]),
+        tuple(given["reference_names"]),
     )
     return asked, found["model"], Path(found["cache"]) if found["cache"] else None, found["command"]
 

@@ -76,7 +76,8 @@ def test_it_prints_the_verdict_and_leaves_three_files(capsys, stub, tmp_path) ->
     assert sorted(p.name for p in folder.iterdir()) == NAMES
     assert sorted(p.name for p in folder.parent.iterdir()) == ["gap"]
     assert (folder / "twin.toml").read_text() == TWIN
-    assert json.loads((folder / "gap.json").read_text())["outcome"] == "effect"
+    found = json.loads((folder / "gap.json").read_text())
+    assert (found["outcome"], found["references"]) == ("effect", [HEALTHY.name])
     assert [r.provenance.source for r in stub.given["recordings"]] == [CRACKED.name]
     assert [r.provenance.source for r in stub.given["references"]] == [HEALTHY.name]
     assert stub.given["simulator"].name == "cracked"

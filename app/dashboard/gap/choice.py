@@ -100,6 +100,7 @@ def files_of(choice: Choice, folder: Path) -> Asked:
         () if choice.torque_nm is None else (choice.torque_nm,),
         choice.sampling_rate_hz,
         tuple(name_of(one) for one in choice.recordings),
+        tuple(name_of(one) for one in choice.references),
     )
 
 
