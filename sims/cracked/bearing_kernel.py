@@ -28,7 +28,9 @@ def foot(k, row, theta, x, y):
         along = passed - element - k.places[row, int(element) % k.places.shape[1]]
         inside = (0.5 * k.race_length[row] - abs(along)) * k.race_spacing[row]
         if inside > -FAR * EDGE_M:
-            reach = EDGE_M * _softplus(inside / EDGE_M)
+            # The rounded corner of the far edge is taken off: a gap of no length is none.
+            across = k.race_length[row] * k.race_spacing[row]
+            reach = EDGE_M * (_softplus(inside / EDGE_M) - _softplus((inside - across) / EDGE_M))
             depth = reach * reach / (2.0 * k.race_radius[row])
             direction = k.race_angle[row] + (k.load_angle[row] if k.race[row] == 1 else theta)
             # The driven shaft turns clockwise: its angle counts the other way in the frame.

@@ -6,7 +6,7 @@ Middles of the ranges from which gearboxes for calibrations are drawn. They are 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi, radians, sin, sqrt
+from math import cos, pi, radians, sin, sqrt, tan
 from typing import Any
 
 import numpy as np
@@ -128,6 +128,7 @@ def usual_parameters(nominal: Nominal) -> dict[str, ParameterValue]:
         "module_mm": m,
         "pressure_angle_deg": nominal.pressure_angle_deg,
         "face_width_mm": nominal.face_width_mm,
+        "tool_tip_radius": _tool_tip_radius(nominal.pressure_angle_deg),
         "profile_shift_driver": shifts[0],
         "profile_shift_driven": shifts[1],
         "contact_law": "load-dependent",
@@ -219,6 +220,12 @@ def _shift(teeth: int, pressure_angle_deg: float) -> float:
     """Least profile shift without undercut, in modules: (z_min − z)/z_min, z_min = 2/sin²α of the rack."""
     least = 2.0 / sin(radians(pressure_angle_deg)) ** 2
     return max(0.0, (least - teeth) / least)
+
+
+def _tool_tip_radius(pressure_angle_deg: float) -> float:
+    """0.38 modules, or what a rack of 1.25 modules dedendum has room for: (π/4 − 1.25 tan α)/(sec α − tan α)."""
+    alpha = radians(pressure_angle_deg)
+    return min(0.38, 0.95 * (pi / 4.0 - 1.25 * tan(alpha)) / (1.0 / cos(alpha) - tan(alpha)))
 
 
 def _spread(rng: np.random.Generator) -> float:

@@ -1,0 +1,177 @@
+"""Bank of the gap diagnosis: what is in it; it is kept whole or not at all; damaged and foreign files do no harm."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.gap.bank import Bank, bank_of, rounded
+from gearsig.errors import InputError, RefusalError
+from gearsig.gap.change import change_once
+from gearsig.gap.features import once
+from gearsig.gap.gather import gather
+from gearsig.gap.simulator import Added, Point
+from gearsig.recording.types import Channel, Recording
+from gearsig.rig.speed import TachometerChannel
+from gearsig.rig.types import GearPair, Rig, Shaft
+
+FS, DURATION_S, TEETH = 4096.0, 2.0, (20, 31)
+POINT = Point(1800.0, 40.0)
+RIG = Rig("r", (Shaft("a"), Shaft("b")), (GearPair("p", "a", "b", *TEETH),))
+STRONG, WEAK = Added("louder", 2.0), Added("louder", 1.1)
+
+
+@dataclass(frozen=True)
+class Sines:
+    """A twin made of mesh harmonics; "louder" multiplies them, "impossible" cannot be simulated."""
+
+    key: str = "sines 1"
+    broken: bool = False
+
+    def run(
+        self,
+        point: Point,
+        added: Sequence[Added] = (),
+        *,
+        seed: int,
+        duration_s: float,
+        sampling_rate_hz: float,
+        noise: int = 0,
+    ) -> Recording:
+        """Return mesh harmonics with a tachometer."""
+        if self.broken or any(a.name == "impossible" for a in added):
+            raise RefusalError("it cannot be")
+        rng = np.random.default_rng([seed, noise])
+        turned = np.arange(round(duration_s * sampling_rate_hz)) / sampling_rate_hz * point.speed_rpm / 60.0
+        gain = np.prod([a.severity for a in added if a.name == "louder"])
+        mesh = sum(np.cos(2 * np.pi * k * TEETH[0] * turned + seed) / k for k in (1, 2))
+        samples = np.vstack([gain * mesh + 0.01 * rng.standard_normal(len(turned)), (turned % 1.0 < 0.2) * 5.0])
+        channels = (Channel("v", "acceleration", "m/s^2"), Channel("t", "tachometer", "V"))
+        return Recording(samples, sampling_rate_hz, channels, speed=TachometerChannel("t", 1, shaft="a"), rig=RIG)
+
+    def candidates(self, effect: str) -> Sequence[Added]:
+        """Two strengths, or one that cannot be simulated."""
+        return {"louder": (WEAK, STRONG), "impossible": (Added("impossible", 1.0),)}[effect]
+
+    def preset_toml(self, point: Point, added: Sequence[Added], notes: Sequence[str]) -> str:
+        """No use here."""
+        raise NotImplementedError
+
+
+def bank(folder: Path | None = None, twin: Sines | None = None, **changed: object) -> Bank:
+    settings: Mapping[str, object] = {
+        "seeds": (0, 1),
+        "duration_s": DURATION_S,
+        "sampling_rate_hz": FS,
+        "folder": folder,
+        "processes": 1,
+        **changed,
+    }
+    return bank_of(twin or Sines(), POINT, ("louder", "impossible"), **settings)  # type: ignore[arg-type]
+
+
+def same(one: Bank, other: Bank) -> bool:
+    arrays = ("sound", "sound_changes", "changes")
+    texts = ("point", "feature_names", "change_names", "added", "left_out")
+    return all(np.array_equal(getattr(one, a), getattr(other, a)) for a in arrays) and all(
+        getattr(one, t) == getattr(other, t) for t in texts
+    )
+
+
+def test_changes_are_those_of_the_features_against_the_same_specimen() -> None:
+    found = bank(n_change_seeds=2, noise=3)
+    assert found.added == (WEAK, STRONG)
+    assert found.changes.shape == (2, 2, len(found.change_names))
+    assert found.change_names[: len(found.feature_names)] == found.feature_names
+    kept, changed = found.of_effect("louder")
+    assert (kept, changed.shape) == (found.added, found.changes.shape)
+
+    def gathered(*added: Added, noise: int = 0):  # type: ignore[no-untyped-def]  # of the features' room
+        run = Sines().run(rounded(POINT), added, seed=1, duration_s=DURATION_S, sampling_rate_hz=FS, noise=noise)
+        return gather(run, RIG)
+
+    np.testing.assert_array_equal(found.sound[1], once(gathered())[1])
+    np.testing.assert_array_equal(found.changes[1, 1], change_once(gathered(STRONG, noise=3), gathered())[1])
+
+
+def test_what_cannot_be_simulated_is_left_out_with_its_reason() -> None:
+    assert bank().left_out == ((Added("impossible", 1.0), "it cannot be"),)
+    with pytest.raises(RefusalError, match="sound machine cannot be simulated: it cannot be"):
+        bank(twin=Sines(broken=True))
+
+
+def test_sound_specimens_change_little_and_candidates_more() -> None:
+    found = bank()
+    size = np.sqrt(np.mean(found.sound_changes[0][: len(found.feature_names)] ** 2))
+    strong = np.sqrt(np.mean(found.changes[1, 0][: len(found.feature_names)] ** 2))
+    assert strong > size
+
+
+def test_it_is_kept_and_found_again(tmp_path: Path) -> None:
+    first = bank(tmp_path)
+    assert [p.suffix for p in tmp_path.iterdir()] == [".npz"]
+    assert same(bank(tmp_path, on_progress=_never), first)
+
+
+def _never(done: int, n: int) -> None:
+    raise AssertionError(f"{done} of {n} runs were made again")
+
+
+@pytest.mark.parametrize(
+    "changed", [{"seeds": (0, 2)}, {"duration_s": 2.5}, {"noise": 2}, {"n_change_seeds": 2}, {"twin": Sines("sines 2")}]
+)
+def test_other_settings_have_another_bank(tmp_path: Path, changed: dict[str, object]) -> None:
+    bank(tmp_path)
+    bank(tmp_path, **changed)  # type: ignore[arg-type]  # one of them is the twin
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_points_that_hardly_differ_share_a_bank() -> None:
+    assert rounded(Point(1486.3, 40.02)) == Point(1490.0, 40.0) == rounded(Point(1491.9, 39.98))
+
+
+@pytest.mark.parametrize("damage", ["cut", "text", "empty", "foreign key", "other arrays", "pickle"])
+def test_a_damaged_or_foreign_file_is_made_again(tmp_path: Path, damage: str) -> None:
+    first = bank(tmp_path)
+    (path,) = tmp_path.iterdir()
+    whole = path.read_bytes()
+    with np.load(path) as data:
+        arrays = dict(data)
+    if damage == "cut":
+        path.write_bytes(whole[: len(whole) // 2])
+    elif damage == "text":
+        path.write_text("not a bank", encoding="utf-8")
+    elif damage == "empty":
+        path.write_bytes(b"")
+    elif damage == "foreign key":
+        np.savez(path, **{**arrays, "about": np.array(str(arrays["about"]).replace("sines 1", "sines 9"))})
+    elif damage == "other arrays":
+        np.savez(path, **{**arrays, "sound": arrays["sound"][:, 1:]})
+    else:
+        np.savez(path, **{**arrays, "sound": np.array([{}], dtype=object)})
+    made = []
+    assert same(bank(tmp_path, on_progress=lambda done, _n: made.append(done)), first)
+    assert made
+    assert same(bank(tmp_path, on_progress=_never), first)
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_a_stop_ends_it_and_leaves_nothing(tmp_path: Path, processes: int) -> None:
+    def stop(done: int, n: int) -> None:
+        raise InterruptedError(f"after {done} of {n}")
+
+    with pytest.raises(InterruptedError, match="after 1 of 5"):
+        bank(tmp_path, processes=processes, on_progress=stop)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_processes_give_the_same_bank() -> None:
+    assert same(bank(processes=2), bank(processes=1))
+
+
+def test_a_folder_that_cannot_be_made_is_named_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(InputError, match="--cache"):
+        bank(tmp_path / "file" / "folder", on_progress=_never)
