@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -105,13 +104,13 @@ def open_simulation(
 
     The recording's rig then gives the gears only: its sensors' scales and its tachometer belong to the measurement.
     """
-    from gearsig.compare.machine import gears_only
+    from gearsig.compare.machine import for_simulation
 
     own = open_rig(rig, path)
     speed = stated_speed(speed_rpm, None, 1)
     if own is not None or machine is None:
         return open_recording(path, own, sampling_rate_hz, speed)
-    return open_recording(path, replace(gears_only(machine), bearings=()), sampling_rate_hz, speed)
+    return open_recording(path, for_simulation(machine), sampling_rate_hz, speed)
 
 
 def read_pair(text: str, simulated: Recording, recorded: Recording) -> tuple[str, str]:

@@ -32,8 +32,8 @@ class Machine:
 def common_machine(simulated: Recording, recorded: Recording, rig: Rig | None) -> Machine:
     """Return the rigs of both sides after checking that they have the same gears.
 
-    A side without a rig takes the other's gears, but neither its sensors nor its speed source: those belong to a
-    measurement.
+    A side without a rig takes the other's gears, but not its sensors and its tachometer: those belong to a measurement.
+    A simulation that states no speed takes the rig's, where that is constant.
 
     Raises
     ------
@@ -48,7 +48,11 @@ def common_machine(simulated: Recording, recorded: Recording, rig: Rig | None) -
             notes.append("The recording has no rig: its gears are taken to be the simulation's.")
         other = gears_only(own, recorded.speed_source) if own is not None else (other or Rig())
     if own is None:
-        own = gears_only(other, simulated.speed_source)
+        own = for_simulation(other, simulated.speed_source)
+    if isinstance(own.speed, ConstantSpeed) and own.speed == other.speed and simulated.speed is None:
+        notes.append(
+            f"The simulation states no speed: it is taken to run at {own.speed.speed_rpm:g} rpm as the rig does."
+        )
     return Machine(own, other, _shaft_names(own, other), tuple(notes))
 
 
@@ -57,6 +61,12 @@ def gears_only(rig: Rig, speed: SpeedSource | None = None) -> Rig:
     if speed is not None and speed.shaft and speed.shaft not in rig.shaft_names:
         speed = None
     return replace(rig, sensors=(), speed=speed, sampling_rate_hz=None)
+
+
+def for_simulation(rig: Rig, speed: SpeedSource | None = None) -> Rig:
+    """Return what the recording's rig says of a simulation without a rig of its own."""
+    stated = rig.speed if isinstance(rig.speed, ConstantSpeed) else None
+    return gears_only(rig, speed if speed is not None else stated)
 
 
 def usable_speed(rig: Rig, recording: Recording) -> SpeedSource | None:

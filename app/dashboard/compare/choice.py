@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from app.dashboard.state import Request
@@ -57,10 +57,10 @@ def read_chosen(request: Request, content: Path | memoryview, rig: Rig | None) -
 
 def read_simulation(request: Request, content: Path | memoryview, machine: Rig | None) -> Recording:
     """Read a simulation with its own rig file; without one it takes the gears of the recording's rig."""
-    from gearsig.compare.machine import gears_only
+    from gearsig.compare.machine import for_simulation
 
     own = read_rig_text(request.rig_text, request.rig_name)
-    gears = replace(gears_only(machine), bearings=()) if machine is not None else None
+    gears = for_simulation(machine) if machine is not None else None
     return read_chosen(request, content, own if own is not None else gears)
 
 

@@ -1,0 +1,83 @@
+"""The page *Simulation against recording*, run without a browser."""
+
+from pathlib import Path
+
+from streamlit.testing.v1 import AppTest
+
+import app.dashboard
+from app.dashboard import state
+from app.dashboard.compare.cached import command_of
+from app.dashboard.compare.choice import TWIN, Run, SimulatedFile, teeth_of
+from app.dashboard.compare.chooser import MACHINE, ORIGIN
+from app.dashboard.state import Request
+from app.samples import samples
+from gearsig.rig.types import GearPair, Rig, Shaft
+
+MAIN = Path(app.dashboard.__file__).parent / "main.py"
+SAMPLES = {sample.rig.stem: sample for sample in samples()}
+
+
+def shown_text(page: AppTest) -> str:
+    parts = [*page.markdown, *page.subheader, *page.caption, *page.error, *page.warning, *page.info]
+    return "\n".join(part.value for part in parts).replace("\\", "").replace("\u2060", "")
+
+
+def opened(recording: str = "root_crack_3mm", simulation: str = "root_crack_0mm") -> AppTest:
+    """Choose a recording on the analysis page's own widgets, then go to the comparison."""
+    page = AppTest.from_file(str(MAIN), default_timeout=300)
+    page.session_state[state.SAMPLE] = SAMPLES[recording]
+    page.run()
+    page.session_state[ORIGIN] = "Sample"
+    page.session_state["simulation sample"] = SAMPLES[simulation]
+    return page.switch_page("pages/compare.py").run()
+
+
+def test_two_samples_are_compared_in_every_view() -> None:
+    page = opened()
+    assert not page.exception
+    assert not page.error
+    text = shown_text(page)
+    assert "root_crack_0mm.h5 beside root_crack_3mm.h5" in text  # what the analysis page had open stays open
+    assert "do not differ by more than the records' own scatter" in text
+    assert [button.label for button in page.get("download_button")] == ["Page (HTML)", "JSON", "Lines (CSV)"]
+    drawn = {}
+    for tab in ("Orders", "Angle", "Bands", "Lines"):
+        page.session_state["comparison tab"] = tab
+        page.run()
+        assert not page.exception
+        drawn[tab] = (len(page.get("image")), len(page.dataframe))
+    assert drawn == {"Orders": (1, 1), "Angle": (2, 1), "Bands": (2, 1), "Lines": (0, 2)}
+    assert "gearsig compare root_crack_0mm.h5 root_crack_3mm.h5" in page.code[0].value
+
+
+def test_records_of_other_gears_are_an_error_on_the_page() -> None:
+    page = opened(simulation="healthy")
+    assert not page.exception
+    assert "other gears" in page.error[0].value
+
+
+def test_a_simulation_is_run_at_the_recordings_speed() -> None:
+    page = opened("healthy")
+    page.session_state["simulation length"] = 2.0
+    page.sidebar.radio(key=ORIGIN).set_value("Simulate now").run()
+    assert not page.exception
+    assert not page.error
+    assert page.sidebar.selectbox(key=MACHINE).value == TWIN
+    assert "Simulation: 2 s, 1495.6" in shown_text(page)
+
+
+def test_a_preset_takes_the_rigs_teeth() -> None:
+    rig = Rig(shafts=(Shaft("a"), Shaft("b")), pairs=(GearPair("p", "a", "b", 23, 46),))
+    assert teeth_of(rig) == {"teeth_driver": 23.0, "teeth_driven": 46.0}
+    assert teeth_of(None) == {}
+
+
+def test_the_command_repeats_the_comparison() -> None:
+    request = Request("my run.csv", "0", "rig.toml", "[[pair]]", speed_rpm=1500.0)
+    file = SimulatedFile(Request("model.h5", "1", "model.toml", "[[pair]]"))
+    words = command_of(request, file, (("a", "b"),), "correlation")
+    assert words == (
+        "gearsig compare model.h5 'my run.csv' --rig rig.toml --speed-rpm 1500 --sim-rig model.toml --channel a=b "
+        "--align correlation -o comparison"
+    )
+    assert command_of(request, Run(TWIN), (), "auto") == ""
