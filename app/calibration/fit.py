@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.severity.features import DISAGREEMENT, FEATURES, RELIEF, RISING, SHAPED
+from gearsig.severity.features import FEATURES, RELIEF, RISING, SHAPED
 from gearsig.severity.model import LEAST_SPREAD, DepthModel, segments
 
 FALSE_ALARMS = 0.02
@@ -51,10 +51,8 @@ class Cases:
 
 def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
     """Fit detection, depth and spread to all cases, and quantiles to errors of models that did not see the case."""
-    left_out = (*RISING, DISAGREEMENT, *(() if relief_known else RELIEF))
-    rest = [i for i, name in enumerate(FEATURES) if name not in left_out]
+    rest = [i for i, name in enumerate(FEATURES) if name not in RISING and (relief_known or name not in RELIEF)]
     mean, scale = cases.features.mean(axis=0), cases.features.std(axis=0)
-    scale[scale == 0.0] = 1.0  # disagreement, without a reference
     z = (cases.features - mean) / scale
     sound = (cases.sound - mean) / scale
     detection = _detection_weights(z[cases.depth_mm >= CLEAR_MM], sound.reshape(-1, z.shape[1]))
@@ -116,10 +114,10 @@ def _errors_of_others(z: FloatArray, y: FloatArray, knots: FloatArray, rest: lis
 
 
 def _detection_weights(cracked: FloatArray, sound: FloatArray) -> FloatArray:
-    """Logistic regression, crack against none, on what a crack raises, less what a strange reference raises too."""
+    """Logistic regression, crack against none, on what a crack raises; weights are not negative."""
     from scipy.optimize import minimize
 
-    used = [FEATURES.index(name) for name in ("band_excess", "prominence", "pattern_excess", DISAGREEMENT)]
+    used = [FEATURES.index(name) for name in ("band_excess", "prominence", "pattern_excess")]
     x = np.vstack([cracked[:, used], sound[:, used]])
     sign = np.r_[np.ones(len(cracked)), -np.ones(len(sound))]
     share = np.r_[np.full(len(cracked), 0.5 / len(cracked)), np.full(len(sound), 0.5 / len(sound))]
@@ -127,9 +125,8 @@ def _detection_weights(cracked: FloatArray, sound: FloatArray) -> FloatArray:
     def loss(w: FloatArray) -> float:
         return float(share @ np.logaddexp(0.0, -sign * (x @ w[:-1] + w[-1])) + 0.003 * np.sum(w[:-1] ** 2))
 
-    start = np.r_[np.ones(len(used) - 1), 0.0, 0.0]
-    bounds = [(0.0, None)] * (len(used) - 1) + [(None, 0.0), (None, None)]
-    best = minimize(loss, start, bounds=bounds).x
+    start = np.r_[np.ones(len(used)), 0.0]
+    best = minimize(loss, start, bounds=[(0.0, None)] * len(used) + [(None, None)]).x
     weights = np.zeros(len(FEATURES))
     weights[used] = best[:-1]
     return weights

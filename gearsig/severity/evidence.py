@@ -95,7 +95,7 @@ def _one_gear(
     n = n_bands(difference)
     mesh = np.sqrt(mesh_energies(shaft, n) * mesh_energies(sound[i], n))
     event = find_event(difference)
-    features = feature_vector(difference, sound[i], mesh, event, conditions, agreement)
+    features = feature_vector(difference, sound[i], mesh, event, conditions)
     shape = event_shape(difference, event)
     return GearEvidence(shaft, event, features, difference, sound[i], shape, agreement)
 

@@ -27,7 +27,6 @@ FEATURES = (
     "log_module",
     "relief_share",
     "relief_share_squared",
-    "disagreement",
 )
 """Order of the entries of a feature vector; see `feature_vector`."""
 
@@ -37,10 +36,6 @@ SHAPED = ("band_excess", "line_excess", "prominence")
 RISING = (*SHAPED, "pattern_excess")
 """Features that a deeper crack raises, all else the same. The last one serves to detect only: how much teeth differ
 from birth must not decide on a depth."""
-
-DISAGREEMENT = "disagreement"
-"""Of the teeth's pattern with the reference's. It serves to detect only: the less both agree, the more of the
-difference is no crack."""
 
 RELIEF = ("relief_share", "relief_share_squared")
 """Of the models that know the tip relief only; 0 where it is not known."""
@@ -58,8 +53,6 @@ _LEAST_SHARE = 0.1
 """What is left of an energy at least when the background's is taken off: a logarithm follows."""
 _N_OTHER_GATES = 6
 _MESH_WEIGHT = 0.25
-_LEAST_DISAGREEMENT = 0.01
-"""Below, noise decides how well two recordings agree."""
 
 
 @dataclass(frozen=True)
@@ -89,12 +82,7 @@ class Conditions:
 
 
 def feature_vector(
-    shaft: ShaftLines,
-    sound: ShaftLines,
-    mesh: FloatArray,
-    event: ToothEvent,
-    conditions: Conditions,
-    agreement: float | None = None,
+    shaft: ShaftLines, sound: ShaftLines, mesh: FloatArray, event: ToothEvent, conditions: Conditions
 ) -> FloatArray:
     """Return the features in the order of `FEATURES`.
 
@@ -109,7 +97,6 @@ def feature_vector(
       deviations over the bands.
     - relief_share: tip relief over the teeth's deflection, see `Conditions`; it decides how strong the mesh is that the
       event is compared with.
-    - disagreement: ln(1 − agreement + 0.01) with the reference; 0 without one.
     - the rest are logarithms of what the rig file and the speed say.
 
     Parameters
@@ -122,8 +109,6 @@ def feature_vector(
         Energies of the mesh lines.
     event : ToothEvent
     conditions : Conditions
-    agreement : float or None
-        Of the teeth's pattern with the reference's, 1 at most; None without one.
     """
     excess, weights = _band_excess(event, mesh)
     positions, event_levels = _gated_levels(shaft, event, len(mesh))
@@ -147,7 +132,6 @@ def feature_vector(
             np.log(conditions.module_mm),
             conditions.relief_share,
             conditions.relief_share**2,
-            0.0 if agreement is None else np.log(max(1.0 - agreement, 0.0) + _LEAST_DISAGREEMENT),
         ]
     )
 

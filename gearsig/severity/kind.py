@@ -10,7 +10,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError
-from gearsig.severity.features import DISAGREEMENT, FEATURES, RELIEF
+from gearsig.severity.features import FEATURES, RELIEF
 from gearsig.severity.shape import SHAPE
 
 CRACKED, CHIPPED, SPALLED = KINDS = ("cracked", "chipped", "spalled")
@@ -18,7 +18,7 @@ CRACKED, CHIPPED, SPALLED = KINDS = ("cracked", "chipped", "spalled")
 _OF_SIZE = ("band_excess", "line_excess", "prominence", "pattern_excess")
 """How large the event is and how far it stands out: a deep crack is no chip for being large."""
 
-_USED = [i for i, name in enumerate(FEATURES) if name not in (*RELIEF, *_OF_SIZE, DISAGREEMENT)]
+_USED = [i for i, name in enumerate(FEATURES) if name not in (*RELIEF, *_OF_SIZE)]
 KIND_FEATURES = (*(FEATURES[i] for i in _USED), *SHAPE)
 
 

@@ -10,15 +10,13 @@ import numpy as np
 
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError
-from gearsig.severity.features import DISAGREEMENT, FEATURES, RISING, SHAPED
+from gearsig.severity.features import FEATURES, RISING, SHAPED
 
 RANGE_MARGIN = 0.05
 """Of a feature's range in the calibration, by which it may lie beyond."""
 
 LEAST_SPREAD = 0.1
 """Of ln percent: no machine is known better than to ten percent."""
-
-_RAISED = [i for i, name in enumerate(FEATURES) if name != DISAGREEMENT]
 
 
 def segments(values: FloatArray, knots: FloatArray) -> FloatArray:
@@ -103,7 +101,7 @@ class DepthModel:
         if self.knots.shape != (len(SHAPED), 2) or self.slopes.shape != (len(SHAPED), 3):
             raise InputError(f"the curves of the model have shapes {self.knots.shape} and {self.slopes.shape}")
         rising = [FEATURES.index(name) for name in RISING]
-        falls = np.any(self.coefficients[rising] < 0) or np.any(self.slopes < 0) or np.any(self.detection[_RAISED] < 0)
+        falls = np.any(self.coefficients[rising] < 0) or np.any(self.slopes < 0) or np.any(self.detection < 0)
         if np.any(self.scale <= 0) or np.any(np.diff(self.knots) <= 0) or falls:
             raise InputError("the model of crack depth would fall with a rising excess", remedy="fit it again")
 
