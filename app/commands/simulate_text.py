@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from sims.effects import Effect
+    from sims.effects import Effect, EffectSetting
     from sims.effects.effect import Option
     from sims.presets import Preset
     from sims.simulator import Parameter, Simulator
@@ -32,8 +32,15 @@ def preset_text(preset: Preset) -> str:
         ("Does not represent", preset.does_not_represent),
     ):
         lines += ["", title, *(_wrapped(text, "  - ", "    ") for text in texts)]
+    if preset.effects:
+        lines += ["", "Effects", *(f"  {_setting(e)}" for e in preset.effects)]
     lines += ["", "Parameters (the others have the model's defaults)"]
     return "\n".join([*lines, *(f"  {name} = {value}" for name, value in preset.parameters.items())])
+
+
+def _setting(setting: EffectSetting) -> str:
+    options = "".join(f", {name} {value}" for name, value in setting.options.items())
+    return f"{setting.name}: {setting.severity:g}{options}"
 
 
 def _model_text(simulator: Simulator) -> str:

@@ -7,7 +7,7 @@ scale with the machine by itself, the range is a share of something that does.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -84,6 +84,8 @@ class Plausible:
         Random options.
     most : callable
         Greatest severity that the machine allows.
+    n : int
+        How many severities are worth a try, at even ratios.
     """
 
     low: float
@@ -93,13 +95,13 @@ class Plausible:
     choices: Callable[[Surroundings], Sequence[Options]] = lambda _m: ({},)
     drawn: Drawn = lambda _m, _rng: {}
     most: Scale = lambda _m, _o: float("inf")
-    n: int = field(default=3)
+    n: int = 3
 
     def reach(self, name: str, machine: Surroundings, options: Options) -> tuple[float, float]:
         """Least and greatest severity with these options; the range keeps its width where the machine cuts it off."""
         scale = self.scale(machine, options)
         top = min(self.high * scale, self.most(machine, options), effect(name).severity.high)
-        return top * min(self.low / self.high, 1.0), top
+        return top * self.low / self.high, top
 
 
 def _side(options: Mapping[str, OptionValue]) -> int:

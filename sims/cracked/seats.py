@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import pi, sin
 
 from gearsig.rig.speed import TachometerChannel
 from gearsig.rig.types import Bearing, Rig
@@ -77,8 +78,6 @@ def completed(bearing: Bearing, size: float) -> Bearing:
 
 def _closest(n: int) -> float:
     """Diameter at which n balls touch each other, over the pitch diameter."""
-    from math import pi, sin
-
     return sin(pi / n)
 
 
