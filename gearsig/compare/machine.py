@@ -50,9 +50,8 @@ def common_machine(simulated: Recording, recorded: Recording, rig: Rig | None) -
     if own is None:
         own = for_simulation(other, simulated.speed_source)
     if isinstance(own.speed, ConstantSpeed) and own.speed == other.speed and simulated.speed is None:
-        notes.append(
-            f"The simulation states no speed: it is taken to run at {own.speed.speed_rpm:g} rpm as the rig does."
-        )
+        rpm = f"{own.speed.speed_rpm:g} rpm"
+        notes.append(f"The simulation has no tachometer: it is taken to run at {rpm}, as the rig file says.")
     return Machine(own, other, _shaft_names(own, other), tuple(notes))
 
 

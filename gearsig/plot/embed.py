@@ -42,6 +42,15 @@ class Picture:
     alternative: str
 
 
+@dataclass(frozen=True)
+class Captioned:
+    """A figure with the words that belong to it; see `Picture`."""
+
+    figure: Figure
+    caption: str
+    alternative: str
+
+
 def embed(figure: Figure, caption: str, alternative: str, *, vector: bool = False) -> Picture:
     """Turn a figure into a picture: PNG, or SVG where `vector` says that it has few lines."""
     width, height = figure.get_size_inches()

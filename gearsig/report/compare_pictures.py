@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from gearsig.compare.types import ChannelComparison, Comparison, ShaftComparison
 from gearsig.plot.cursors import Cursor
-from gearsig.plot.embed import Picture, embed
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from gearsig.plot.embed import Captioned, Picture, embed
 
 MESH_HARMONICS_SHOWN = 5.6
 WITHOUT_MESH = 50.0
@@ -30,23 +25,14 @@ LOOK_AT_BANDS = (
 LOOK_AT_OCTAVES = "Everything in each band, noise included. At another speed, other orders fall into a band."
 
 
-@dataclass(frozen=True)
-class ComparisonFigure:
-    """A figure, what to look at in it, and what it shows for those who do not see it."""
-
-    figure: Figure
-    look: str
-    shows: str
-
-
 def channel_pictures(comparison: Comparison, channel: ChannelComparison) -> Iterator[Picture]:
     """Yield the pictures of one channel: orders, averages of each shaft, bands."""
     for figures in FIGURES.values():
         for one in figures(comparison, channel):
-            yield embed(one.figure, one.look, one.shows)
+            yield embed(one.figure, one.caption, one.alternative)
 
 
-def order_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[ComparisonFigure]:
+def order_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[Captioned]:
     """Yield both order spectra with the differences of their lines."""
     from gearsig.plot.compare import order_overlay_figure
 
@@ -59,30 +45,30 @@ def order_figures(comparison: Comparison, channel: ChannelComparison) -> Iterato
         title=f"Order spectra, {channel.name}",
     )
     shows = f"Order spectra of {channel.name}, recorded and simulated, and the difference of their lines."
-    yield ComparisonFigure(figure, LOOK_AT_ORDERS, shows)
+    yield Captioned(figure, LOOK_AT_ORDERS, shows)
 
 
-def angle_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[ComparisonFigure]:
+def angle_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[Captioned]:
     """Yield the synchronous averages of each shaft."""
     for shaft in channel.shafts:
         yield _average(comparison, channel, shaft)
 
 
-def band_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[ComparisonFigure]:
+def band_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[Captioned]:
     """Yield the bands over order, and the third octaves."""
     from gearsig.plot.compare_bands import band_levels_figure
 
     del comparison  # a maker of figures is given it, and this one needs none of it
     figure = band_levels_figure(channel.order_bands, channel.unit, title=f"Bands over order, {channel.name}")
     shows = f"Levels of bands over order of {channel.name}, recorded and simulated, and their agreement."
-    yield ComparisonFigure(figure, LOOK_AT_BANDS, shows)
+    yield Captioned(figure, LOOK_AT_BANDS, shows)
     if channel.third_octaves:
         figure = band_levels_figure(channel.third_octaves, channel.unit, title=f"Third octaves, {channel.name}")
         shows = f"Third-octave levels of {channel.name}, recorded and simulated."
-        yield ComparisonFigure(figure, LOOK_AT_OCTAVES, shows)
+        yield Captioned(figure, LOOK_AT_OCTAVES, shows)
 
 
-FIGURES: dict[str, Callable[[Comparison, ChannelComparison], Iterator[ComparisonFigure]]] = {
+FIGURES: dict[str, Callable[[Comparison, ChannelComparison], Iterator[Captioned]]] = {
     "Orders": order_figures,
     "Angle": angle_figures,
     "Bands": band_figures,
@@ -90,7 +76,7 @@ FIGURES: dict[str, Callable[[Comparison, ChannelComparison], Iterator[Comparison
 """Makers of a channel's figures, by what they are over."""
 
 
-def _average(comparison: Comparison, channel: ChannelComparison, shaft: ShaftComparison) -> ComparisonFigure:
+def _average(comparison: Comparison, channel: ChannelComparison, shaft: ShaftComparison) -> Captioned:
     from gearsig.plot.compare_average import average_overlay_figure
 
     name = shaft.shaft or "the shaft"
@@ -104,7 +90,7 @@ def _average(comparison: Comparison, channel: ChannelComparison, shaft: ShaftCom
     )
     look = f"One mean revolution of {name}, aligned; below it a piece of it enlarged.{_teeth_text(comparison, shaft)}"
     shows = f"Synchronous averages of {name}, recorded and simulated, over one revolution."
-    return ComparisonFigure(figure, look, shows)
+    return Captioned(figure, look, shows)
 
 
 def _teeth_text(comparison: Comparison, shaft: ShaftComparison) -> str:

@@ -44,8 +44,8 @@ def show_comparison(comparison: Comparison) -> None:
                 _show_lines(channel)
                 continue
             for one in FIGURES[name](comparison, channel):
-                show_picture(one.figure, one.shows)
-                st.caption(as_typed(one.look))
+                show_picture(one.figure, one.alternative)
+                st.caption(as_typed(one.caption))
 
 
 def show_downloads(comparison: Comparison, page: Any, command: str) -> None:
