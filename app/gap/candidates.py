@@ -1,0 +1,145 @@
+"""The likeliest effects, simulated on the rig's twin and fitted to what was observed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from app.gap.bank import Bank, bank_of
+from app.gap.conditions import SEED, Condition, compare, halves, observed
+from gearsig.checks import FloatArray
+from gearsig.errors import RefusalError
+from gearsig.gap.prediction import EffectPath, Fit, Observed, fit_effect, paths_of
+from gearsig.gap.shrinkage import Fold, shrinkage
+from gearsig.gap.simulator import Twin
+from gearsig.gap.types import Shrinkage
+
+PROCESSES = 2
+OTHER_POINT, OTHER_REVOLUTIONS = "another operating condition", "other revolutions of the same recordings"
+
+
+@dataclass(frozen=True)
+class Tried:
+    """One effect as it was tried.
+
+    Parameters
+    ----------
+    name : str
+    paths : tuple of EffectPath
+    fit : Fit
+        To all conditions.
+    shrinkage : Shrinkage
+        On held-out data.
+    """
+
+    name: str
+    paths: tuple[EffectPath, ...]
+    fit: Fit
+    shrinkage: Shrinkage
+
+
+def try_effects(
+    names: Sequence[str],
+    twin: Twin,
+    conditions: Sequence[Condition],
+    cache: Path | None,
+    on_progress: Callable[[str, float], object],
+) -> dict[str, Tried]:
+    """Simulate each effect at every condition, fit it, and score it on data that it was not fitted to.
+
+    Effects that the rig cannot have, for it lacks a bearing, say, are left out.
+    """
+    if not names:
+        return {}
+    folds, held_out = folds_of(conditions)
+    banks = []
+    for k, condition in enumerate(conditions):
+
+        def tell(done: int, of: int, begun: int = k, at: str = condition.facts.name) -> None:
+            on_progress(f"simulating {len(names)} effects at the point of {at}", (begun + done / of) / len(conditions))
+
+        banks.append(_bank(twin, condition, sorted(names), cache, tell))
+    everything = [observed(c, k, n_compared(conditions)) for k, c in enumerate(conditions)]
+    found = {}
+    for name in names:
+        paths = _paths(name, banks, n_compared(conditions))
+        if paths:
+            found[name] = Tried(name, paths, fit_effect(paths, everything), shrinkage(paths, folds, held_out))
+    return found
+
+
+def n_compared(conditions: Sequence[Condition]) -> int:
+    """Return how many features all conditions have: those of patterns need a reference everywhere."""
+    return min(len(c.change.names) for c in conditions)
+
+
+def _bank(
+    twin: Twin, condition: Condition, names: Sequence[str], cache: Path | None, tell: Callable[[int, int], object]
+) -> Bank:
+    return bank_of(
+        twin,
+        condition.facts.point,
+        names,
+        seeds=[SEED],
+        duration_s=float(f"{condition.run_s:.3g}"),
+        sampling_rate_hz=condition.facts.sampling_rate_hz,
+        folder=cache,
+        processes=PROCESSES,
+        on_progress=tell,
+    )
+
+
+def _paths(name: str, banks: Sequence[Bank], n: int) -> tuple[EffectPath, ...]:
+    """Return an effect's paths over the candidates that every condition's bank holds."""
+    kept = [a for a in banks[0].added if a.name == name and all(a in bank.added for bank in banks)]
+    tables = [_distances(bank, n)[[bank.added.index(a) for a in kept]] for bank in banks]
+    return paths_of(banks[0].change_names[:n], kept, tables)
+
+
+def _distances(bank: Bank, n: int) -> FloatArray:
+    """Return each candidate's change less that of a mere second run."""
+    distances: FloatArray = (bank.changes.mean(axis=1) - bank.sound_changes.mean(axis=0))[:, :n]
+    return distances
+
+
+def folds_of(conditions: Sequence[Condition]) -> tuple[list[Fold], str]:
+    """Return what to fit to and what to score on: each condition in turn, or both halves of the only one.
+
+    Raises
+    ------
+    RefusalError
+        If there is one condition and too few blocks of revolutions.
+    """
+    n = n_compared(conditions)
+    if len(conditions) > 1:
+        all_of_them = [observed(c, k, n) for k, c in enumerate(conditions)]
+        return [
+            Fold(
+                tuple(o for o in all_of_them if o is not one), one, _again(conditions[one.condition], one.condition, n)
+            )
+            for one in all_of_them
+        ], OTHER_POINT
+    only = conditions[0]
+    parts = halves(only.now)
+    changes = [compare(part, only.simulated, only.reference) for part in parts]
+    first, second = (observed(only, 0, n, change) for change in changes)
+    again = _again(only, 0, n)
+    return [Fold((first,), second, again), Fold((second,), first, again)], OTHER_REVOLUTIONS
+
+
+def _again(condition: Condition, index: int, n: int) -> tuple[Observed, ...]:
+    base = observed(condition, index, n)
+    rows = condition.change.left_out[0] if condition.change.left_out else np.empty((0, n))
+    shift = rows[:, :n] - condition.change.values[:n]
+    return tuple(replace(base, distances=base.distances + row) for row in shift)
+
+
+def refuse_without_candidates(tried: dict[str, Tried], names: Sequence[str]) -> None:
+    """Refuse where none of the effects could be simulated."""
+    if names and not tried:
+        raise RefusalError(
+            f"none of {', '.join(names)} can be simulated on this rig", remedy="describe the rig more fully"
+        )

@@ -1,0 +1,161 @@
+"""The recordings of a gap diagnosis, reduced, each beside what it is compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from gearsig.errors import InputError, RefusalError
+from gearsig.gap.change import change_features, difference_features
+from gearsig.gap.features import Features
+from gearsig.gap.floors import REPEATABLE, pooled_scatter
+from gearsig.gap.gather import gather
+from gearsig.gap.gathered import Gathered
+from gearsig.gap.population import load_population
+from gearsig.gap.prediction import Observed
+from gearsig.gap.simulator import Added, Point, Twin
+from gearsig.gap.types import ConditionFacts
+from gearsig.recording.types import Recording
+from gearsig.rig.types import Rig
+from gearsig.severity.reference import LARGEST_SPEED_DIFFERENCE
+
+SEED = 0
+"""Of the twin's specimen: its flanks and housing are not the machine's in any case."""
+
+LARGEST_TORQUE_DIFFERENCE = 0.25
+"""Stated torques of a recording and its reference, relative."""
+
+LONGEST_RUN_S, MOST_REVOLUTIONS = 5.0, 24.0
+"""Of a simulation: longer ones say no more; but so many revolutions of the slower shaft at least."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One recording, and what it is compared with.
+
+    Parameters
+    ----------
+    facts : ConditionFacts
+    now, simulated : Gathered
+        The recording, and the sound twin at its point.
+    reference : Gathered or None
+    change : Features
+        Against the reference, or else against the twin.
+    alone : Features
+    """
+
+    facts: ConditionFacts
+    now: Gathered
+    simulated: Gathered
+    reference: Gathered | None
+    change: Features
+    alone: Features
+
+    @property
+    def other(self) -> Gathered:
+        """What it is compared with."""
+        return self.reference if self.reference is not None else self.simulated
+
+    @property
+    def run_s(self) -> float:
+        """Length of a simulation at this point."""
+        return run_length_s(self.now)
+
+
+def run_length_s(now: Gathered) -> float:
+    """Return the length of a simulation that the features can be read from."""
+    slower = min(now.frame.shaft_orders) * now.speed_hz
+    return max(LONGEST_RUN_S, MOST_REVOLUTIONS / slower)
+
+
+def simulated(
+    twin: Twin, facts: ConditionFacts, now: Gathered, added: Sequence[Added] = (), noise: int = 0
+) -> Gathered:
+    """Return the twin's run at a recording's point, reduced."""
+    recording = twin.run(
+        facts.point,
+        added,
+        seed=SEED,
+        duration_s=run_length_s(now),
+        sampling_rate_hz=facts.sampling_rate_hz,
+        noise=noise,
+    )
+    if recording.rig is None:
+        raise InputError("the simulator's recording has no rig", remedy="a twin's recordings must carry the rig")
+    return gather(recording, recording.rig)
+
+
+def compare(now: Gathered, simulation: Gathered, reference: Gathered | None) -> Features:
+    """Return the change against the reference, or else against the simulation."""
+    return difference_features(now, simulation) if reference is None else change_features(now, reference)
+
+
+def facts_of(recording: Recording, rig: Rig, now: Gathered, name: str, usual_torque_nm: float) -> ConditionFacts:
+    """Return what is known of a recording's operating point: measured speed, stated torque of the driver."""
+    return ConditionFacts(
+        name,
+        Point(60.0 * now.speed_hz, torque_of(rig) or usual_torque_nm),
+        now.n_revolutions,
+        recording.duration_s,
+        recording.sampling_rate_hz,
+    )
+
+
+def torque_of(rig: Rig) -> float | None:
+    """Return the driver's torque that a rig states, from either shaft's; None where it states none."""
+    point, pair = rig.operating_point, rig.pairs[0]
+    if point.torque_nm is None:
+        return None
+    if point.shaft in ("", pair.driver) or pair.driver_teeth is None or pair.driven_teeth is None:
+        return abs(point.torque_nm)
+    return abs(point.torque_nm) * pair.driver_teeth / pair.driven_teeth
+
+
+def matching_reference(
+    now: Gathered, rig: Rig, references: Sequence[Gathered], rigs: Sequence[Rig]
+) -> tuple[Gathered | None, str]:
+    """Return the reference at the recording's point, or none and why."""
+    if not references:
+        return None, ""
+    nearest = min(range(len(references)), key=lambda i: _distance(now, rig, references[i], rigs[i]))
+    found = references[nearest]
+    change = now.speed_hz / found.speed_hz - 1.0
+    if abs(change) > LARGEST_SPEED_DIFFERENCE:
+        return None, f"no reference within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of its speed"
+    here, there = torque_of(rig), torque_of(rigs[nearest])
+    if here and there and abs(here / there - 1.0) > LARGEST_TORQUE_DIFFERENCE:
+        return None, f"the reference at its speed has {there:.3g} N m, the recording {here:.3g} N m"
+    if set(found.channels) != set(now.channels):
+        return None, f"the reference has the channels {', '.join(found.channels)}"
+    return found, ""
+
+
+def _distance(now: Gathered, rig: Rig, reference: Gathered, other: Rig) -> float:
+    here, there = torque_of(rig), torque_of(other)
+    torque = abs(here / there - 1.0) if here and there else 0.0
+    return 10.0 * abs(now.speed_hz / reference.speed_hz - 1.0) + torque
+
+
+def observed(condition: Condition, index: int, n: int, change: Features | None = None) -> Observed:
+    """Return a condition's distances and floors of the first `n` features; `change` instead of its own."""
+    used = change or condition.change
+    structural = load_population().floor(with_reference=condition.reference is not None)
+    both = (structural.of(used.names) ** 2 + (REPEATABLE * pooled_scatter(used)) ** 2) ** 0.5
+    return Observed(index, structural.from_centre(used.names, used.values)[:n], both[:n])
+
+
+def halves(gathered: Gathered) -> tuple[Gathered, Gathered]:
+    """Return the blocks of revolutions with even and with odd numbers.
+
+    Raises
+    ------
+    RefusalError
+        If there are too few.
+    """
+    n = gathered.n_blocks
+    if n < 4:
+        raise RefusalError(f"{n} blocks of revolutions cannot be halved", remedy="record longer")
+    first = second = gathered
+    for block in reversed(range(n)):
+        first, second = (first.without(block), second) if block % 2 else (first, second.without(block))
+    return first, second

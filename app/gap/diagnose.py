@@ -1,0 +1,347 @@
+"""The gap diagnosis: where recordings differ from their simulation, which effect causes it, how far it shrinks then."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from app.gap.candidates import Tried, n_compared, refuse_without_candidates, try_effects
+from app.gap.conditions import Condition, compare, facts_of, matching_reference, simulated
+from app.gap.left import steps_of
+from app.gap.next_recording import next_recordings
+from app.gap.placing import place_of
+from gearsig.errors import InputError, RefusalError
+from gearsig.gap.curves import angle_curves, spectrum_curves
+from gearsig.gap.evidence import evidence_of
+from gearsig.gap.features import features_of
+from gearsig.gap.floors import gap_size
+from gearsig.gap.gather import gather
+from gearsig.gap.gathered import Gathered
+from gearsig.gap.places import gap_places
+from gearsig.gap.population import load_population
+from gearsig.gap.posterior import load_gap_calibration, score_of
+from gearsig.gap.recognise import load_recogniser
+from gearsig.gap.simulator import GapEffect, GapSimulator, Twin
+from gearsig.gap.types import (
+    NONE,
+    UNKNOWN,
+    GapCause,
+    GapOutcome,
+    GapPlace,
+    GapReport,
+    NextRecording,
+)
+from gearsig.recording.types import Recording
+from gearsig.rig.types import Rig
+
+MOST_TRIED, LEAST_TRIED_PROBABILITY = 3, 0.06
+"""Effects that are simulated: so many of the likeliest, none less likely than this."""
+
+CLEAR_WITHOUT = 3.0
+"""Structural floors from which a reference that far from the simulator is worth a remark."""
+
+Stage = Callable[[str, float], object]
+
+
+def diagnose_gap(
+    recordings: Sequence[Recording],
+    simulator: GapSimulator,
+    *,
+    rigs: Sequence[Rig] = (),
+    references: Sequence[Recording] = (),
+    reference_rigs: Sequence[Rig] = (),
+    effects: Sequence[str] = (),
+    names: Sequence[str] = (),
+    cache: Path | None = None,
+    on_stage: Stage | None = None,
+) -> GapReport:
+    """Diagnose the gap between recordings of one machine and its simulation.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Of one rig; several operating conditions tell more.
+    simulator : GapSimulator
+    rigs : sequence of Rig
+        One per recording, with its operating point; empty: those that the recordings carry.
+    references : sequence of Recording
+        Of the same rig when it was healthy; each recording is compared with the one at its speed and torque.
+    reference_rigs : sequence of Rig
+    effects : sequence of str
+        Which effects may be named; empty: all that the simulator has.
+    names : sequence of str
+        Of the recordings, for people.
+    cache : Path or None
+        Folder that keeps simulations; None: nothing is kept.
+    on_stage : callable or None
+        Is told what is being done, and which share of the whole is complete.
+
+    Returns
+    -------
+    GapReport
+
+    Raises
+    ------
+    InputError
+        If the lists do not fit each other or an effect does not exist.
+    RefusalError
+        If the rig's data do not suffice, there is no speed, or too few revolutions.
+    """
+    tell = on_stage or (lambda _what, _done: None)
+    known = simulator.gap_effects()
+    _check(recordings, names, effects, known)
+    own_rigs, other_rigs = _rigs(recordings, rigs), _rigs(references, reference_rigs)
+    twin = simulator.twin_of(own_rigs[0])
+    tell("reading the recordings", 0.02)
+    conditions, notices = _conditions(recordings, own_rigs, references, other_rigs, twin, names, tell)
+    tell("recognising", 0.2)
+    forest = _forest(conditions, effects, known)
+    with_reference = all(c.reference is not None for c in conditions)
+    calibration = load_gap_calibration(with_reference=with_reference)
+    likely = _likely(calibration.probabilities(forest, {}), known)
+    tried = try_effects(likely, twin, conditions, cache, lambda what, done: tell(what, 0.25 + 0.55 * done))
+    refuse_without_candidates(tried, likely)
+    scores = {name: score_of(t.shrinkage.shrink.value, t.shrinkage.placebo) for name, t in tried.items()}
+    probabilities = calibration.probabilities(forest, scores)
+    outcome = calibration.outcome(probabilities)
+    tell("placing it", 0.82)
+    clearest = max(conditions, key=_size)
+    places = _places(clearest)
+    causes = tuple(_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items())
+    causes = _in_order(causes, outcome)
+    named = causes[0] if causes[0].fitted is not None and outcome is not GapOutcome.NO_GAP else None
+    after = None if named is None or named.fitted is None else _run(twin, clearest, named)
+    tell("looking for what would tell more", 0.88)
+    pair = _rivals(causes)
+    structural = load_population().floor(with_reference=clearest.reference is not None)
+    size = gap_size(clearest.change, structural)
+    reference = clearest.reference
+    return GapReport(
+        rig=own_rigs[0].name,
+        simulator=simulator.name,
+        conditions=tuple(c.facts for c in conditions),
+        references=tuple(f"reference {i + 1}" for i in range(len(references))) if with_reference else (),
+        outcome=outcome,
+        size=size.structural,
+        repeatability=size.repeatability.value,
+        places=places,
+        causes=causes,
+        groups=_groups(causes),
+        inseparable=pair if outcome is GapOutcome.CANNOT_SEPARATE else None,
+        steps=steps_of(conditions, tried, causes) if named is not None else (),
+        next_recordings=_next(pair, tried, twin, conditions, outcome),
+        spectra=spectrum_curves(
+            clearest.now,
+            clearest.simulated,
+            after,
+            structural=load_population().floor(with_reference=False),
+            unit="m/s^2",
+        ),
+        angles=angle_curves(
+            clearest.now,
+            clearest.simulated,
+            after,
+            sound=reference,
+            simulated_sound=clearest.simulated if reference is not None else None,
+        ),
+        notices=tuple(notices),
+        twin_toml="" if named is None or named.fitted is None else _preset(twin, clearest, named),
+    )
+
+
+def _check(
+    recordings: Sequence[Recording], names: Sequence[str], effects: Sequence[str], known: Mapping[str, GapEffect]
+) -> None:
+    if not recordings:
+        raise InputError("no recording is given", remedy="give one, or better several operating conditions of one rig")
+    if names and len(names) != len(recordings):
+        raise InputError(f"{len(names)} names for {len(recordings)} recordings", allowed="one each")
+    strange = [name for name in effects if name not in known]
+    if strange:
+        raise InputError(f"the simulator has no effect {strange[0]!r}", allowed=", ".join(known))
+
+
+def _rigs(recordings: Sequence[Recording], rigs: Sequence[Rig]) -> tuple[Rig, ...]:
+    if rigs:
+        if len(rigs) != len(recordings):
+            raise InputError(f"{len(rigs)} rigs for {len(recordings)} recordings", allowed="one each")
+        return tuple(rigs)
+    found = tuple(r.rig for r in recordings)
+    if any(rig is None for rig in found):
+        raise InputError("a recording carries no rig", remedy="give rigs, one for each recording")
+    return tuple(rig for rig in found if rig is not None)
+
+
+def _conditions(
+    recordings: Sequence[Recording],
+    rigs: Sequence[Rig],
+    references: Sequence[Recording],
+    reference_rigs: Sequence[Rig],
+    twin: Twin,
+    names: Sequence[str],
+    tell: Stage,
+) -> tuple[list[Condition], list[str]]:
+    found, notices = [], []
+    healthy = [gather(r, rig) for r, rig in zip(references, reference_rigs, strict=True)]
+    for i, (recording, rig) in enumerate(zip(recordings, rigs, strict=True)):
+        name = names[i] if names else f"recording {i + 1}"
+        tell(f"simulating the sound machine at the point of {name}", 0.05 + 0.15 * i / len(recordings))
+        now = gather(recording, rig)
+        facts = facts_of(recording, rig, now, name, _usual_torque_nm(twin))
+        simulation = simulated(twin, facts, now)
+        reference, why = matching_reference(now, rig, healthy, reference_rigs)
+        if why:
+            notices.append(f"{name} is compared with the simulation: {why}.")
+        change = compare(now, simulation, reference)
+        found.append(Condition(facts, now, simulation, reference, change, features_of(now)))
+        if reference is not None:
+            notices += _strange_reference(reference, simulation, name)
+    if len(found) == 1:
+        notices.append("One operating condition: a second speed or load would make the answer surer.")
+    if not references:
+        notices.append("No healthy reference: a recording of the same rig when it was sound would make it much surer.")
+    return found, notices
+
+
+def _strange_reference(reference: Gathered, simulation: Gathered, name: str) -> list[str]:
+    """Say so where the reference itself is far from the simulation of a sound machine."""
+    floor = load_population().simulation_floor
+    size = gap_size(compare(reference, simulation, None), floor).structural.value
+    if size < CLEAR_WITHOUT:
+        return []
+    remark = (
+        f"The reference of {name} is itself {size:.1f} structural floors from the simulation of a sound machine: "
+        "if it was not healthy, only what changed since is seen."
+    )
+    return [remark]
+
+
+def _usual_torque_nm(twin: Twin) -> float:
+    nominal = getattr(twin, "nominal", None)
+    return float(getattr(nominal, "torque_nm", 0.0) or 1.0)
+
+
+def _forest(
+    conditions: Sequence[Condition], effects: Sequence[str], known: Mapping[str, GapEffect]
+) -> dict[str, float]:
+    """Return the forests' joint probabilities: the geometric mean over conditions, over what may be named."""
+    allowed = {NONE, UNKNOWN, *(effects or known)}
+    joint: dict[str, float] = {}
+    for condition in conditions:
+        recogniser = load_recogniser(with_reference=condition.reference is not None)
+        for name, p in recogniser.probabilities(condition.change, condition.alone).items():
+            if name in allowed:
+                joint[name] = joint.get(name, 1.0) * p ** (1.0 / len(conditions))
+    total = sum(joint.values())
+    return {name: p / total for name, p in joint.items()}
+
+
+def _likely(probabilities: dict[str, float], known: Mapping[str, GapEffect]) -> list[str]:
+    """Return the effects that are worth simulating, likeliest first."""
+    mechanical = [(n, p) for n, p in probabilities.items() if n in known]
+    return [name for name, p in mechanical if p >= LEAST_TRIED_PROBABILITY][:MOST_TRIED]
+
+
+def _size(condition: Condition) -> float:
+    structural = load_population().floor(with_reference=condition.reference is not None)
+    return gap_size(condition.change, structural).structural.value
+
+
+def _places(condition: Condition) -> tuple[GapPlace, ...]:
+    structural = load_population().floor(with_reference=condition.reference is not None)
+    try:
+        return gap_places(
+            condition.now,
+            condition.other,
+            structural,
+            is_reference=condition.reference is not None,
+            change=condition.change,
+        )
+    except RefusalError:
+        return ()
+
+
+def _cause(
+    name: str,
+    probability: float,
+    known: Mapping[str, GapEffect],
+    tried: dict[str, Tried],
+    conditions: Sequence[Condition],
+    places: Sequence[GapPlace],
+) -> GapCause:
+    if name not in known:
+        title = "nothing beyond what healthy machines differ by" if name == NONE else "nothing in the catalogue"
+        return GapCause(name, name, title, "", probability)
+    effect = known[name]
+    base = GapCause(name, effect.group, effect.title, effect.unit, probability, is_nuisance=effect.is_nuisance)
+    if name not in tried:
+        return base
+    from app.gap.conditions import observed
+
+    one = tried[name]
+    n = n_compared(conditions)
+    seen = [observed(c, k, n) for k, c in enumerate(conditions)]
+    frame = conditions[0].now.frame
+    return replace(
+        base,
+        severity=one.fit.severity,
+        fitted=one.fit.added,
+        place=place_of(one.fit.added, frame, places),
+        shrinkage=one.shrinkage,
+        evidence=evidence_of(one.fit, seen, frame),
+    )
+
+
+def _in_order(causes: tuple[GapCause, ...], outcome: GapOutcome) -> tuple[GapCause, ...]:
+    """Put first what the outcome says; the rest by probability."""
+    if outcome is GapOutcome.NO_GAP:
+        first = next(c for c in causes if c.name == NONE)
+    elif outcome is GapOutcome.UNKNOWN:
+        first = next(c for c in causes if c.name == UNKNOWN)
+    else:
+        first = next(c for c in causes if c.name not in (NONE, UNKNOWN))
+    return (first, *(c for c in causes if c is not first))
+
+
+def _rivals(causes: Sequence[GapCause]) -> tuple[str, str] | None:
+    names = [c.name for c in causes if c.name not in (NONE, UNKNOWN)]
+    return (names[0], names[1]) if len(names) > 1 else None
+
+
+def _groups(causes: Sequence[GapCause]) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for cause in causes:
+        found[cause.group] = found.get(cause.group, 0.0) + cause.probability
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def _run(twin: Twin, condition: Condition, cause: GapCause) -> Gathered | None:
+    if cause.fitted is None:
+        return None
+    try:
+        return simulated(twin, condition.facts, condition.now, (cause.fitted,))
+    except (InputError, RefusalError):  # a severity beyond the candidates' that the model cannot have
+        return None
+
+
+def _preset(twin: Twin, condition: Condition, cause: GapCause) -> str:
+    if cause.fitted is None or cause.severity is None:
+        return ""
+    note = (
+        f"{cause.title}: {cause.severity.value:.3g} {cause.unit}, 90 % interval {cause.severity.low:.3g} to "
+        f"{cause.severity.high:.3g}; fitted to {condition.facts.name}, probability {cause.probability:.2f}"
+    )
+    return twin.preset_toml(condition.facts.point, (cause.fitted,), (note,))
+
+
+def _next(
+    pair: tuple[str, str] | None,
+    tried: dict[str, Tried],
+    twin: Twin,
+    conditions: Sequence[Condition],
+    outcome: GapOutcome,
+) -> tuple[NextRecording, ...]:
+    if pair is None or outcome is GapOutcome.NO_GAP or any(name not in tried for name in pair):
+        return ()
+    return next_recordings(tried[pair[0]], tried[pair[1]], twin, conditions)

@@ -1,0 +1,60 @@
+"""Which further recording would tell the two likeliest effects apart, by the model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from app.gap.bank_runs import Reduced, Run, Task, finished_runs
+from app.gap.candidates import PROCESSES, Tried, n_compared
+from app.gap.conditions import SEED, Condition
+from gearsig.checks import FloatArray
+from gearsig.gap.families import family_members
+from gearsig.gap.population import load_population
+from gearsig.gap.simulator import Point, Twin
+from gearsig.gap.types import NextRecording
+
+FACTORS = ((1.0, 0.3), (1.0, 0.6), (0.6, 1.0), (1.4, 1.0))
+"""Speeds and torques that are looked at, over those of the first recording."""
+
+ENOUGH = 1.2
+"""Times the distance that there is now, from which a further point is worth naming."""
+
+
+def next_recordings(
+    first: Tried, second: Tried, twin: Twin, conditions: Sequence[Condition]
+) -> tuple[NextRecording, ...]:
+    """Return points at which both effects' predictions lie further apart than at those there are, best first."""
+    base = conditions[0]
+    n = n_compared(conditions)
+    structural = load_population().floor(with_reference=base.reference is not None)
+    names = base.change.names[:n]
+    floors = structural.of(names)
+    now = max(_apart(names, first.fit.at(k) - second.fit.at(k), floors) for k in range(len(conditions)))
+    found = []
+    for speed, torque in FACTORS:
+        point = Point(speed * base.facts.point.speed_rpm, torque * base.facts.point.torque_nm)
+        run = Run(twin, point, base.run_s / min(speed, 1.0), base.facts.sampling_rate_hz, 1)
+        rows = finished_runs(run, [Task(SEED, t.fit.added) for t in (first, second)], PROCESSES, lambda *_: None)
+        a, b = rows
+        if not (isinstance(a, Reduced) and isinstance(b, Reduced)):
+            continue
+        apart = _apart(names, (a.change - b.change)[:n], floors)
+        if apart >= ENOUGH * now:
+            text = (
+                f"record at {point.speed_rpm:.3g} rpm and {point.torque_nm:.3g} N m: there {_words(first.name)} and "
+                f"{_words(second.name)} lie {apart:.2g} structural floors apart, {now:.2g} so far."
+            )
+            found.append(NextRecording(point, (first.name, second.name), apart, now, text))
+    return tuple(sorted(found, key=lambda one: -one.standard_deviations))
+
+
+def _apart(names: Sequence[str], difference: FloatArray, floors: FloatArray) -> float:
+    """Root of the sum over families of the mean squared difference in floors."""
+    squares = (difference / floors) ** 2
+    return float(np.sqrt(sum(float(squares[rows].mean()) for rows in family_members(names).values())))
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")

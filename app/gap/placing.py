@@ -1,0 +1,49 @@
+"""Where on the machine a fitted effect sits, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from gearsig.gap.frame import GearFrame
+from gearsig.gap.gear_lines import SIDES
+from gearsig.gap.simulator import Added
+from gearsig.gap.spots import shaft_words
+from gearsig.gap.types import GapPlace, PlaceKind
+
+
+def place_of(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> str:
+    """Return "tooth 7 of the gear on the input shaft", "bearing 2", "order 6"; empty where the effect has no place.
+
+    The tooth is that of the recording, not of the simulation, which stands for all.
+    """
+    options = added.options
+    if "bearing" in options:
+        return str(options["bearing"])
+    if "order" in options:
+        return _order(frame, places, float(options["order"]))
+    side = options.get("gear", options.get("shaft"))
+    if side not in SIDES:
+        return ""
+    shaft = frame.shafts[SIDES.index(str(side))]
+    words = shaft_words(frame, SIDES.index(str(side)))
+    if "tooth" not in options:
+        return f"the gear on {words}" if "gear" in options else words
+    return _tooth(next((p for p in places if p.kind is PlaceKind.TOOTH and p.shaft == shaft), None), words)
+
+
+def _tooth(found: GapPlace | None, words: str) -> str:
+    if found is None or (found.tooth is None and found.angle_deg is None):
+        return f"one tooth of the gear on {words}"
+    return (
+        f"tooth {found.tooth} of the gear on {words}"
+        if found.tooth is not None
+        else f"{found.angle_deg:.0f}° of {words}"
+    )
+
+
+def _order(frame: GearFrame, places: Sequence[GapPlace], fitted: float) -> str:
+    """Return the order that the recording shows, or else the fitted one."""
+    for place in places:
+        if place.kind is PlaceKind.SHAFT and place.shaft == frame.shafts[0] and place.orders:
+            return f"order {place.orders[0]:.3g}"
+    return f"order {fitted:.3g}"

@@ -1,0 +1,56 @@
+"""What speaks for an effect and what against it: predicted changes beside observed ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gearsig.gap.families import family_members
+from gearsig.gap.frame import GearFrame
+from gearsig.gap.prediction import Fit, Observed
+from gearsig.gap.types import Evidence
+from gearsig.gap.words import feature_words
+
+MOST = 8
+CLEAR = 1.0
+"""Floors from which a change, predicted or observed, says something."""
+
+AGREES = 0.5
+"""Observed over predicted, from here to its inverse, speaks for the effect."""
+
+
+def evidence_of(fit: Fit, observed: Sequence[Observed], frame: GearFrame) -> tuple[Evidence, ...]:
+    """Return the most telling feature of each family, clearest first; of the condition that shows most.
+
+    Parameters
+    ----------
+    fit : Fit
+    observed : sequence of Observed
+        One per condition.
+    frame : GearFrame
+    """
+    clearest = max(observed, key=lambda one: float(np.abs(one.normalised).max()))
+    predicted = fit.at(clearest.condition)
+    sizes = np.maximum(np.abs(predicted), np.abs(clearest.distances)) / clearest.floors
+    best = [int(rows[np.argmax(sizes[rows])]) for rows in family_members(fit.path.names).values()]
+    telling = sorted((i for i in best if sizes[i] >= CLEAR), key=lambda i: -sizes[i])
+    return tuple(
+        Evidence(
+            feature_words(fit.path.names[i], frame),
+            float(predicted[i]),
+            float(clearest.distances[i]),
+            float(clearest.floors[i]),
+            _agrees(float(predicted[i]), float(clearest.distances[i]), float(clearest.floors[i])),
+        )
+        for i in telling[:MOST]
+    )
+
+
+def _agrees(predicted_db: float, observed_db: float, floor_db: float) -> bool:
+    """Whether both are clear, of one sign and of one size; or differ by less than the floor."""
+    if abs(predicted_db) < CLEAR * floor_db:
+        return False  # it was observed, and this effect does not explain it
+    if abs(predicted_db - observed_db) <= floor_db:
+        return True
+    return AGREES <= observed_db / predicted_db <= 1.0 / AGREES

@@ -1,0 +1,91 @@
+"""From what a forest says and how far effects shrink the gap to calibrated probabilities, and what may be said."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearsig.gap.types import NONE, UNKNOWN, GapOutcome
+
+FILE = Path(__file__).with_name("calibration.json")
+
+
+@dataclass(frozen=True)
+class GapCalibration:
+    """p ∝ exp(a ln p_forest + b score + c[kind]), fitted to blind cases kept for that.
+
+    Parameters
+    ----------
+    sharpness : float
+        a.
+    shrink_weight : float
+        b; the score is the held-out shrink less that of placebos, 0 for what was not tried.
+    none_bias, unknown_bias : float
+        c of both causes that are no effect.
+    named_from : float
+        Probability of the machine's effects together from which one is named.
+    apart : float
+        The likeliest effect's share, of the first two together, from which it stands alone.
+    """
+
+    sharpness: float
+    shrink_weight: float
+    none_bias: float
+    unknown_bias: float
+    named_from: float
+    apart: float
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> GapCalibration:
+        """Build it from what a JSON file holds."""
+        names = ("sharpness", "shrink_weight", "none_bias", "unknown_bias", "named_from", "apart")
+        return cls(*(float(values[name]) for name in names))
+
+    def probabilities(self, forest: Mapping[str, float], scores: Mapping[str, float]) -> dict[str, float]:
+        """Return cause → probability, likeliest first.
+
+        Parameters
+        ----------
+        forest : mapping
+            Cause → probability by the forest.
+        scores : mapping
+            Effect → score of those that were tried.
+        """
+        levels = {
+            name: self.sharpness * float(np.log(max(p, 1e-9))) + self.shrink_weight * scores.get(name, 0.0)
+            for name, p in forest.items()
+        }
+        levels[NONE] += self.none_bias
+        levels[UNKNOWN] += self.unknown_bias
+        top = max(levels.values())
+        weights = {name: float(np.exp(level - top)) for name, level in levels.items()}
+        total = sum(weights.values())
+        return {name: w / total for name, w in sorted(weights.items(), key=lambda item: -item[1])}
+
+    def outcome(self, probabilities: Mapping[str, float]) -> GapOutcome:
+        """Return what may be said."""
+        none, unknown = probabilities[NONE], probabilities[UNKNOWN]
+        if 1.0 - none - unknown < self.named_from:
+            return GapOutcome.NO_GAP if none >= unknown else GapOutcome.UNKNOWN
+        first, second = sorted((p for name, p in probabilities.items() if name not in (NONE, UNKNOWN)), reverse=True)[
+            :2
+        ]
+        return GapOutcome.EFFECT if first / (first + second) >= self.apart else GapOutcome.CANNOT_SEPARATE
+
+
+def score_of(shrink: float, placebo: float) -> float:
+    """Return what an effect's held-out shrink says for it: how much more than its placebos', −1 to 1."""
+    return float(np.clip(shrink - max(placebo, 0.0), -1.0, 1.0))
+
+
+@cache
+def load_gap_calibration(*, with_reference: bool) -> GapCalibration:
+    """Return the calibration that comes with this version."""
+    values = json.loads(FILE.read_text(encoding="utf-8"))
+    return GapCalibration.from_mapping(values["with_reference" if with_reference else "without_reference"])

@@ -1,0 +1,96 @@
+"""Which causes changed features look like: a forest of decision trees over the population of drawn machines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.errors import InputError
+from gearsig.gap.features import Features
+from gearsig.gap.floors import REPEATABLE, StructuralFloor
+from gearsig.gap.population import Population, load_population
+
+N_TREES = 500
+FEATURE_SHARE = 0.3
+"""Of the features that each split may choose from."""
+
+LEAST_PROBABILITY = 2e-3
+"""That a forest gives any cause: no tree having voted for it is no proof."""
+
+_SEED = 0
+
+
+@dataclass(frozen=True)
+class Recogniser:
+    """A fitted forest with the floors that its input is measured in.
+
+    Parameters
+    ----------
+    causes : tuple of str
+        Of the probabilities.
+    floor : StructuralFloor
+    forest : sklearn.ensemble.ExtraTreesClassifier
+    feature_names : tuple of str
+    """
+
+    causes: tuple[str, ...]
+    floor: StructuralFloor
+    forest: Any
+    feature_names: tuple[str, ...]
+
+    def probabilities(self, change: Features, alone: Features) -> dict[str, float]:
+        """Return cause → probability, uncalibrated.
+
+        Parameters
+        ----------
+        change : Features
+            Against the reference or against the twin, as the forest was fitted.
+        alone : Features
+            Of the recording by itself.
+        """
+        found = np.maximum(self.forest.predict_proba(self._row(change, alone)[None])[0], LEAST_PROBABILITY)
+        return dict(zip(self.causes, (found / found.sum()).tolist(), strict=True))
+
+    def _row(self, change: Features, alone: Features) -> FloatArray:
+        if change.names != self.floor.names or alone.names != self.feature_names:
+            raise InputError(
+                "the population belongs to other features than this version computes",
+                remedy="make it again: python -m app.calibration.gap.population",
+            )
+        return input_rows(self.floor, change.values, change.scatter, alone.values)
+
+
+def input_rows(floor: StructuralFloor, changes: FloatArray, scatter: FloatArray, features: FloatArray) -> FloatArray:
+    """Return what the forest sees: changes over both floors, large ones compressed, beside the features themselves."""
+    both = np.hypot(floor.of(floor.names), REPEATABLE * scatter)
+    distances = np.arcsinh(2.0 * floor.from_centre(floor.names, changes) / both)
+    rows: FloatArray = np.concatenate([distances, features], axis=-1)
+    return rows
+
+
+def fit_recogniser(population: Population, *, with_reference: bool) -> Recogniser:
+    """Fit a forest to a population.
+
+    Extremely randomised trees: P. Geurts, D. Ernst, L. Wehenkel, "Extremely randomized trees", 2006.
+    """
+    from sklearn.ensemble import ExtraTreesClassifier
+
+    floor = population.floor(with_reference=with_reference)
+    tables = (
+        (population.changes, population.change_scatter) if with_reference else (population.gaps, population.gap_scatter)
+    )
+    forest = ExtraTreesClassifier(
+        N_TREES, max_features=FEATURE_SHARE, class_weight="balanced", n_jobs=2, random_state=_SEED
+    )
+    forest.fit(input_rows(floor, *tables, population.features), population.causes)
+    return Recogniser(tuple(map(str, forest.classes_)), floor, forest, population.feature_names)
+
+
+@cache
+def load_recogniser(*, with_reference: bool) -> Recogniser:
+    """Return the forest over the population that comes with this version; fitted once per process."""
+    return fit_recogniser(load_population(), with_reference=with_reference)

@@ -1,0 +1,95 @@
+"""How far a gap shrinks once an effect is added, on data that the effect was not fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.gap.prediction import FLOOR_IN_DEVIATIONS, EffectPath, Fit, Observed, family_square, fit_effect, fit_path
+from gearsig.gap.types import Interval, Shrinkage
+
+OWN_FROM = 1.5
+"""Floors that an effect must change a feature by for it to be its own."""
+
+_Z = 1.645
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Observations to fit to, and others to score on; `again` are those others with a block of revolutions left out."""
+
+    fitted: tuple[Observed, ...]
+    scored: Observed
+    again: tuple[Observed, ...] = ()
+
+
+def own_features(fit: Fit, observed: Observed) -> FloatArray:
+    """Return 1 for the features that the fitted effect changes, 0 for the others; its strongest one at least."""
+    predicted = np.abs(fit.at(observed.condition) / observed.floors)
+    used: FloatArray = (predicted >= min(OWN_FROM, float(predicted.max()))).astype(np.float64)
+    return used
+
+
+def shrinkage(paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str) -> Shrinkage:
+    """Return the shrinkage of the gap by an effect, mean over folds.
+
+    shrink = 1 − (r² − n²)/(o² − n²) on the effect's own features: o the gap before, r what is left, n what the floors
+    themselves make; the effect's severity and options are fitted to the other part of the data.
+
+    Parameters
+    ----------
+    paths : sequence of EffectPath
+        Of the effect.
+    folds : sequence of Fold
+    held_out : str
+    """
+    scores = [_score(paths, fold) for fold in folds]
+    before, after, shrink, slope, placebo = np.mean([s[:5] for s in scores], axis=0)
+    errors = np.sqrt(np.mean([s[5] for s in scores], axis=0))
+    return Shrinkage(
+        _interval(before, errors[0], 0.0),
+        _interval(after, errors[1], 0.0),
+        _interval(shrink, errors[2], -np.inf),
+        float(slope),
+        float(placebo),
+        held_out,
+    )
+
+
+def _interval(value: float, error: float, least: float) -> Interval:
+    return Interval(float(value), float(max(value - _Z * error, least)), float(value + _Z * error))
+
+
+def _score(paths: Sequence[EffectPath], fold: Fold) -> tuple[float, float, float, float, float, FloatArray]:
+    fit = fit_effect(paths, fold.fitted)
+    used = own_features(fit, fold.scored)
+    before, after, shrink = _before_and_after(fit, fold.scored, used)
+    wrong = [fit_path(path, fold.fitted) for path in paths if path.options != fit.path.options]
+    placebos = [_before_and_after(other, fold.scored, used)[2] for other in wrong]
+    variance = np.zeros(3)
+    if len(fold.again) > 1:
+        rows = np.array([_before_and_after(fit, one, used) for one in fold.again])
+        variance = (len(rows) - 1.0) * rows.var(axis=0)
+    return before, after, shrink, _slope(fit, fold.scored, used), max(placebos, default=0.0), variance
+
+
+def _before_and_after(fit: Fit, scored: Observed, used: FloatArray) -> tuple[float, float, float]:
+    """Return before and after in floors, and the shrink of what exceeds them."""
+    names = fit.path.names
+    n_families = family_square(names, np.ones_like(used) * scored.floors, scored, used) / FLOOR_IN_DEVIATIONS**2
+    left = scored.distances - fit.at(scored.condition)
+    squares = [family_square(names, d, scored, used) / n_families for d in (scored.distances, left)]
+    excess = max(squares[0] - 1.0, 0.1)
+    shrink = (squares[0] - max(squares[1], 1.0)) / excess
+    before, after = (float(np.sqrt(s)) / FLOOR_IN_DEVIATIONS for s in squares)
+    return before, after, float(np.clip(shrink, -1.0, 1.0))
+
+
+def _slope(fit: Fit, scored: Observed, used: FloatArray) -> float:
+    """Return the slope of observed over predicted distances, in floors, through zero."""
+    predicted = used * fit.at(scored.condition) / scored.floors
+    square = float(predicted @ predicted)
+    return float(predicted @ scored.normalised) / square if square > 0 else 0.0

@@ -1,0 +1,81 @@
+"""What features are called in sentences."""
+
+from __future__ import annotations
+
+from gearsig.gap.frame import GearFrame
+from gearsig.gap.gear_lines import SIDES
+from gearsig.gap.spots import shaft_words
+
+_SIDEBANDS = {
+    "1": "first sidebands",
+    "2": "second sidebands",
+    "3to5": "sidebands 3 to 5",
+    "6to12": "sidebands 6 to 12",
+    "strongest": "strongest sideband over the others",
+}
+_SHAFT = {
+    "1": "order 1",
+    "2": "order 2",
+    "3": "order 3",
+    "1.to_mesh": "order 1 over the mesh",
+    "2.to_mesh": "order 2 over the mesh",
+    "3.to_mesh": "order 3 over the mesh",
+    "strongest": "strongest of the orders above 3 over the others",
+    "strongest.to_mesh": "strongest of the orders above 3 over the mesh",
+    "low": "orders above 3",
+}
+_TOOTH = {
+    "level": "energy besides the mesh",
+    "elsewhere": "energy at the middling tooth",
+    "peak": "energy at the strongest tooth",
+    "prominence": "strongest tooth over the middling one",
+    "second": "strongest tooth over the next",
+    "kurtosis": "kurtosis",
+    "width": "number of teeth with half the strongest one's energy",
+    "below_mesh": "part below the mesh order",
+    "centroid": "middle of the spectrum",
+    "agreement": "agreement with the reference",
+}
+_CYCLIC = {
+    "outer": "outer races",
+    "inner": "inner races",
+    "ball": "rolling elements",
+    "cage": "cages",
+    "mesh": "mesh order",
+    "strange": "an order that belongs to nothing known",
+    "depth": "depth of modulation",
+    "half_mesh": "half the mesh order",
+}
+_OTHER = {
+    "mesh.total": "mesh harmonics together",
+    "mesh.half": "half mesh orders",
+    "floor.total": "floor, all bands",
+    "floor.to_signal": "floor over the whole signal",
+    "raw.level": "level of the whole signal",
+    "raw.kurtosis": "kurtosis of the whole signal",
+    "raw.near_the_extreme": "samples close to the extreme",
+    "speed.drift": "drift of the speed",
+    "speed.swing": "swing of the speed",
+    "speed.swing_line": "strongest line of the speed's swing",
+    "hum": "mains lines",
+}
+
+
+def feature_words(name: str, frame: GearFrame) -> str:
+    """Return a feature's name in words, e.g. "input shaft: sidebands 6 to 12"."""
+    if name in _OTHER:
+        return _OTHER[name]
+    first, _, rest = name.partition(".")
+    side, _, detail = rest.partition(".")
+    if first == "mesh":
+        return f"mesh harmonic {detail} over all"
+    if first in ("sideband", "shaft", "tooth", "change") and side in SIDES:
+        table = {"sideband": _SIDEBANDS, "shaft": _SHAFT}.get(first, _TOOTH)
+        what = "change of the average, " if first == "change" else "average, " if first == "tooth" else ""
+        return f"{shaft_words(frame, SIDES.index(side))}: {what}{table[detail]}"
+    if first == "floor":
+        return f"floor, band {detail}" if side == "band" else f"kurtosis of the floor, band {detail}"
+    where = "envelope" if first == "envelope" else "lines"
+    if rest.endswith("_shaft"):
+        return f"{where}: orders of {shaft_words(frame, SIDES.index(rest.removesuffix('_shaft')))}"
+    return f"{where}: {_CYCLIC[rest]}"
