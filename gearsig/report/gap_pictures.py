@@ -130,7 +130,11 @@ def _mark(report: GapReport, curves: AngleCurves) -> AngleMark | None:
     """Return the tooth that the gap names on this shaft."""
     for place in report.places:
         if place.kind is PlaceKind.TOOTH and place.shaft == curves.shaft and place.angle_deg is not None:
-            label = f"tooth {place.tooth}" if place.tooth is not None else f"{readable(place.angle_deg)}°"
+            label = (
+                f"tooth {place.tooth}"
+                if place.tooth is not None and curves.has_mark
+                else f"{readable(place.angle_deg)}°"
+            )
             return AngleMark(place.angle_deg, label) if np.isfinite(place.angle_deg) else None
     return None
 

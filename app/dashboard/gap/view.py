@@ -36,7 +36,8 @@ LOOKS: dict[GapOutcome, tuple[Colour, str]] = {
 }
 FLOORS = (
     "A structural floor is what healthy machines differ from this simulator; they exceed 1 once in twenty. A "
-    "repeatability floor is what this machine differs from itself, from one stretch to the next."
+    "repeatability floor is what this machine differs from itself, from one stretch to the next. "
+    "Changes are given as multiples of both, the structural one first."
 )
 
 
@@ -92,11 +93,11 @@ def _show_where(finished: Finished) -> None:
     if rows:
         _table(
             {
-                "place": [row.title for row in rows],
                 "share": [row.bar_percent for row in rows],
+                "place": [row.title for row in rows],
                 "change": [row.change for row in rows],
-                "× floor (structural, repeatability)": [f"{row.structural}, {row.repeatability}" for row in rows],
-                "at": [", ".join(row.where) for row in rows],
+                "× both floors": [f"{row.structural}, {row.repeatability}" for row in rows],
+                "at": [", ".join(row.where[1:]) for row in rows],  # the title says the kind
             },
             bars=("share",),
         )
@@ -113,8 +114,8 @@ def _show_which(finished: Finished) -> None:
     rows = cause_rows(report)
     _table(
         {
-            "cause": [row.title for row in rows],
             "probability": [row.bar_percent for row in rows],
+            "cause": [row.title for row in rows],
             "group": [row.group for row in rows],
             "place": [row.place for row in rows],
             "severity (90 % interval)": [row.severity for row in rows],
