@@ -182,7 +182,9 @@ def _t_quantile(degrees: int) -> float:
 
 def soft_size(names: Sequence[str], normalised: FloatArray) -> float:
     """Return [Σ_f (mean_{i∈f} |u_i|⁸)^(4/8)]^(1/4)."""
-    return float(np.sum([family_size(normalised[m]) ** ACROSS for m in family_members(names).values()]) ** (1 / ACROSS))
+    sizes = np.array([family_size(normalised[members]) for members in family_members(names).values()])
+    largest = float(sizes.max(initial=0.0))
+    return largest * float(np.sum((sizes / largest) ** ACROSS) ** (1 / ACROSS)) if largest > 0.0 else 0.0
 
 
 def family_size(normalised: FloatArray) -> float:

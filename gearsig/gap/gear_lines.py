@@ -16,7 +16,7 @@ N_SIDEBAND_HARMONICS = 5
 SIDEBANDS = {"1": (1, 1), "2": (2, 2), "3to5": (3, 5), "6to12": (6, 12)}
 MOST_SHAFT_ORDERS = 30
 NOMINAL_REVOLUTIONS = 64.0
-BY_CHANCE = 0.01
+BY_CHANCE = 1e-3
 """Lines of noise that pass for a shaft's own."""
 SIDES = ("driver", "driven")
 

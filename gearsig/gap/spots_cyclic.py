@@ -74,11 +74,10 @@ def envelope_spot(comparison: Comparison) -> Spot:
 
 def line_spot(comparison: Comparison) -> Spot:
     """Return which line of the residual changed most: the supply's, a bearing's, or a strange one."""
-    now = comparison.now
     strongest = comparison.strongest("line.outer", "line.inner", "line.ball", "line.cage", "line.strange", "hum")
     levels, sign = _upwards(_residual_levels(comparison), comparison.size[strongest])
     line = _strongest(comparison, levels, fundamental=False)
-    if strongest == "hum" or (_is_the_supplys(line.orders[0] * now.speed_hz) and comparison.size["hum"] > 1.0):
+    if strongest == "hum" or (_is_the_supplys(comparison, line.orders[0]) and comparison.size["hum"] > 1.0):
         return _hum(comparison)
     return _line(comparison, _told_apart(_best_race(comparison, levels), line), sign)
 
@@ -150,8 +149,9 @@ def _widened(levels: FloatArray) -> FloatArray:
 
 def _told_apart(family: _Found, line: _Found) -> _Found:
     """Return the family if it is heard beside the strongest line, or that line is one of its multiples."""
-    if family.rise_db < LEAST_OF_A_FAMILY_DB:
-        return line
+    harmonic = family.orders[0] / line.orders[0] if family.orders else 0.0
+    if family.rise_db < LEAST_OF_A_FAMILY_DB or (harmonic > 1.5 and abs(harmonic / round(harmonic) - 1.0) < MISSED):
+        return line  # of a lower line's harmonics, the family has but some
     multiple = line.orders[0] / family.orders[0]
     is_one = round(multiple) in range(1, HIGHEST_MULTIPLE + 1) and abs(multiple / round(multiple) - 1.0) < MISSED
     return family if is_one or family.rise_db > A_FAMILY_IS_HEARD * line.rise_db else line
@@ -236,9 +236,11 @@ def _fundamental(level: FloatArray, line: int) -> int:
     return line
 
 
-def _is_the_supplys(frequency_hz: float) -> bool:
-    lines = [k * supply for supply in SUPPLIES_HZ for k in range(1, N_HARMONICS + 1)]
-    return min(abs(frequency_hz / line - 1.0) for line in lines) < _SUPPLY_WANDERS
+def _is_the_supplys(comparison: Comparison, order: float) -> bool:
+    speed_hz = comparison.now.speed_hz
+    lines = np.array([k * supply for supply in SUPPLIES_HZ for k in range(1, N_HARMONICS + 1)])
+    width = np.maximum(_SUPPLY_WANDERS * lines, comparison.now.order_step * speed_hz)
+    return bool((np.abs(order * speed_hz - lines) < width).any())
 
 
 def _hum(comparison: Comparison) -> Spot:

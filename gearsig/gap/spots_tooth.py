@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.gap.change import difference_residuals, lines_of_shaft, turned_difference
 from gearsig.gap.gathered import Gathered
-from gearsig.gap.gear_lines import SIDES, average_lines, visible_orders
+from gearsig.gap.gear_lines import SIDES, average_lines, is_synchronous, visible_orders
 from gearsig.gap.spots import Comparison, Spot, by_decibels, shaft_words
 from gearsig.gap.tooth import mesh_power, residual_lines, tooth_energy
 from gearsig.severity.calibration import load_calibration
@@ -19,6 +21,9 @@ from gearsig.severity.shaft_lines import ShaftLines
 STANDS_OUT = 6.0
 """Energy within one pitch over the middling pitch's from which on one tooth is named: of teeth that all
 differ by chance, the largest has some 5."""
+
+OWN_SHARE = 0.3
+"""Of a pattern's power in the shaft's own lines, below which it is no pattern of teeth."""
 
 
 @dataclass(frozen=True)
@@ -31,10 +36,13 @@ class ToothPattern:
         Mean square within one pitch over the mesh harmonics' power.
     lines : ShaftLines
         What it was made of.
+    own_share : float
+        Of its power, in lines that keep their phase from block to block.
     """
 
     energy: FloatArray
     lines: ShaftLines
+    own_share: float
 
     @property
     def prominence(self) -> float:
@@ -52,26 +60,41 @@ class ToothPattern:
 def own_pattern(gathered: Gathered, side: int) -> ToothPattern:
     """Return the pattern of a recording by itself."""
     teeth = gathered.frame.teeth[side]
-    rows = []
+    residuals = []
     for sums in gathered.channels.values():
         lines = average_lines(sums, side)[0]
         residual = residual_lines(lines, teeth, visible_orders(gathered, side, len(lines)))
-        rows.append(tooth_energy(residual, teeth) / mesh_power(gathered, sums, side))
-    return ToothPattern(np.stack(rows), lines_of_shaft(gathered, side))
+        residuals.append(residual / np.sqrt(mesh_power(gathered, sums, side)))
+    return _pattern(gathered, side, residuals, lines_of_shaft(gathered, side))
 
 
 def changed_pattern(now: Gathered, sound: Gathered, side: int) -> ToothPattern:
     """Return the pattern of the difference from a sound recording, turned so that the same teeth meet."""
     turned, _ = turned_difference(now, sound, side)
-    residuals = difference_residuals(now, turned, side)
-    return ToothPattern(np.stack([tooth_energy(lines, turned.teeth) for lines in residuals]), turned)
+    return _pattern(now, side, difference_residuals(now, turned, side), turned)
 
 
-def tooth_spot(comparison: Comparison, side: int) -> Spot:
-    """Return the angle and tooth that stands out, or that the teeth's pattern changed all round."""
+def _pattern(
+    gathered: Gathered, side: int, residuals: Sequence[NDArray[np.complex128]], lines: ShaftLines
+) -> ToothPattern:
+    powers = [np.abs(residual) ** 2 for residual in residuals]
+    held = [is_synchronous(sums, side) for sums in gathered.channels.values()]
+    own = sum(float(power[own].sum()) for power, own in zip(powers, held, strict=True))
+    whole = sum(float(power.sum()) for power in powers)
+    energy = np.stack([tooth_energy(residual, lines.teeth) for residual in residuals])
+    return ToothPattern(energy, lines, own / max(whole, 1e-300))
+
+
+def tooth_spot(comparison: Comparison, side: int) -> Spot | None:
+    """Return the angle and tooth that stands out, or that the teeth's pattern changed all round.
+
+    None where most of the pattern is noise, or leaks into the average.
+    """
     frame, now = comparison.now.frame, comparison.now
     pattern = changed_pattern(now, comparison.other, side) if comparison.is_reference else own_pattern(now, side)
     shaft, name = shaft_words(frame, side), list(now.channels)[int(np.argmax(pattern.energy.max(axis=1)))]
+    if pattern.own_share < OWN_SHARE:
+        return None
     if pattern.prominence < STANDS_OUT:
         return _all_round(comparison, side, shaft, name)
     place, teeth = pattern.place_rev, frame.teeth[side]

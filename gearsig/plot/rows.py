@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 BAR = 0.56
 """Height of a bar, of its row."""
 _LINE_IN = 0.155
-_CHARACTERS_PER_IN = 15.5
+_CHARACTERS_PER_IN, _BOLD_PER_IN = 15.5, 13.5
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,8 @@ class RowPanel:
 
     def name(self, row: int, text: str, *, below: str = "", colour: str = style.INK, bold: bool = False) -> None:
         """Write left of a row, in two lines at most, and a quiet line below."""
-        lines = _broken(text, self.left_in - 0.25, 1 if below else 2)
+        per_line = int((self.left_in - 0.25) * (_BOLD_PER_IN if bold else _CHARACTERS_PER_IN))
+        lines = _broken(text, per_line, 1 if below else 2)
         top = (len(lines) + bool(below) - 1) / 2.0
         for i, line in enumerate([*lines, *([below] if below else [])]):
             quiet = below and i == len(lines)
@@ -101,8 +102,7 @@ def row_panel(
     return RowPanel(figure, axes, n_rows, left_in, right_in)
 
 
-def _broken(text: str, width_in: float, n_lines: int) -> list[str]:
-    """Return the text in at most `n_lines` lines; a longer one is cut in its middle."""
-    n_max = int(width_in * _CHARACTERS_PER_IN)
+def _broken(text: str, n_max: int, n_lines: int) -> list[str]:
+    """Return the text in at most `n_lines` lines of `n_max` characters; a longer one is cut in its middle."""
     lines = wrap(plain(text, 400), n_max)
     return lines if len(lines) <= n_lines else wrap(plain(text, n_lines * n_max - 6), n_max)[:n_lines] or [""]

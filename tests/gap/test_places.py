@@ -1,0 +1,171 @@
+"""Places of gaps that were put there."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from gearsig.checks import FloatArray
+from gearsig.gap.change import change_features, difference_features
+from gearsig.gap.floors import StructuralFloor
+from gearsig.gap.frame import DRIVEN, DRIVER
+from gearsig.gap.gather import gather
+from gearsig.gap.gathered import Gathered
+from gearsig.gap.gear_lines import is_synchronous
+from gearsig.gap.places import beyond_the_mesh, gap_places
+from gearsig.gap.types import GapPlace, PlaceKind
+from tests.gap.synthetic import RIG, SPEED_HZ, TEETH, record, ringing
+
+Added = Callable[[FloatArray, FloatArray], FloatArray]
+RATIO = TEETH[0] / TEETH[1]
+OUTER = 9 / 2 * (1 - 7.94 / 39.04)
+
+
+@cache
+def sound(seed: int = 0) -> Gathered:
+    return gather(record(seed=seed), RIG)
+
+
+@cache
+def floor(is_reference: bool) -> StructuralFloor:
+    """Healthy records differ by noise here: three times their scatter, 2 dB at least."""
+    compare = change_features if is_reference else difference_features
+    changes = [compare(sound(seed), sound()) for seed in (2, 3, 4)]
+    values = np.stack([one.values for one in changes])
+    centres = np.median(values, axis=0)
+    return StructuralFloor(changes[0].names, np.maximum(3.0 * np.abs(values - centres).max(axis=0), 2.0), centres)
+
+
+def places_of(added: Added | None = None, *, is_reference: bool = True, **settings: float) -> tuple[GapPlace, ...]:
+    now = gather(record(added, seed=1, **settings), RIG)
+    return gap_places(now, sound(), floor(is_reference), is_reference=is_reference)
+
+
+def tone(order: float, amplitude: float) -> Added:
+    return lambda _, r: amplitude * np.cos(2 * np.pi * order * r + 0.3)
+
+
+def test_another_record_of_the_same_machine_differs_nowhere() -> None:
+    assert places_of() == ()
+
+
+@pytest.mark.parametrize(("side", "shaft"), [(DRIVER, "in"), (DRIVEN, "out")])
+@pytest.mark.parametrize("is_reference", [True, False])
+def test_sidebands_are_those_of_their_shaft_and_carrier(side: int, shaft: str, *, is_reference: bool) -> None:
+    order, carrier = (1.0, RATIO)[side], 2 * TEETH[0]
+    first = places_of(
+        lambda t, r: tone(carrier - order, 0.2)(t, r) + tone(carrier + order, 0.2)(t, r), is_reference=is_reference
+    )[0]
+    assert (first.kind, first.shaft) == (PlaceKind.SIDEBANDS, shaft)
+    assert sorted(first.orders) == pytest.approx([carrier - order, carrier + order])
+    assert "about 2 × mesh" in first.title
+    # 0.02 of amplitude on each side before, 0.22 or 0.18 with it: 10 lg of the powers' ratio.
+    assert first.change_db == pytest.approx(20.0, abs=1.5)
+
+
+@pytest.mark.parametrize(("side", "shaft"), [(DRIVER, "in"), (DRIVEN, "out")])
+def test_an_unbalance_is_order_one_of_its_shaft(side: int, shaft: str) -> None:
+    order = (1.0, RATIO)[side]
+    first = places_of(tone(order, 0.3))[0]
+    assert (first.kind, first.shaft) == (PlaceKind.SHAFT, shaft)
+    assert first.orders == pytest.approx((order,))
+
+
+@pytest.mark.parametrize("where", [0.1, 0.4, 0.83])
+@pytest.mark.parametrize("is_reference", [True, False])
+def test_a_knock_is_at_its_tooth(where: float, *, is_reference: bool) -> None:
+    first = places_of(lambda _, r: 1.5 * ringing(r - where), is_reference=is_reference)[0]
+    assert (first.kind, first.shaft) == (PlaceKind.TOOTH, "in")
+    assert first.angle_deg is not None
+    assert first.tooth is not None
+    assert abs((first.angle_deg - 360 * where + 180) % 360 - 180) < 360 / TEETH[0]
+    assert first.tooth == int(first.angle_deg / 360 * TEETH[0]) + 1
+
+
+def test_a_gear_without_a_mark_has_an_angle_and_no_number() -> None:
+    first = places_of(lambda _, r: 1.5 * ringing(RATIO * r - 0.3))[0]
+    assert (first.kind, first.shaft, first.tooth) == (PlaceKind.TOOTH, "out", None)
+    assert first.angle_deg == pytest.approx(108.0, abs=360 / TEETH[1])
+
+
+def test_a_race_is_named_with_its_bearing() -> None:
+    places = places_of(lambda _, r: 0.6 * ringing(0.99 * OUTER * r))
+    envelope = next(place for place in places if place.kind is PlaceKind.ENVELOPE)
+    assert "outer race of bearing b1" in envelope.title
+    assert envelope.orders[0] == pytest.approx(0.99 * OUTER, rel=0.01)
+    assert envelope.structural > 3.0
+
+
+def test_a_strange_train_gets_its_order() -> None:
+    places = places_of(lambda _, r: 0.6 * ringing(2.37 * r))
+    envelope = next(place for place in places if place.kind is PlaceKind.ENVELOPE)
+    assert "belongs to no shaft" in envelope.title
+    assert envelope.orders == pytest.approx((2.37,), abs=0.03)
+
+
+@pytest.mark.parametrize("order", [3.35, 10.3])
+def test_a_strange_tone_gets_its_order(order: float) -> None:
+    first = places_of(tone(order, 0.3))[0]
+    assert first.kind is PlaceKind.LINE
+    assert first.orders == pytest.approx((order,), abs=0.05)
+
+
+def test_a_tone_that_fills_a_band_is_no_noise() -> None:
+    places = places_of(tone(41.41, 1.0))
+    assert places[0].kind is PlaceKind.LINE
+    assert places[0].orders == pytest.approx((41.41,), abs=0.05)
+    assert not [place for place in places if place.kind is PlaceKind.BAND]
+
+
+def test_hum_swing_and_noise_are_named() -> None:
+    hum = places_of(lambda t, _: 0.1 * np.sin(2 * np.pi * 50.0 * t))[0]
+    assert (hum.kind, "50 Hz" in hum.title) == (PlaceKind.LINE, True)
+    assert hum.orders[0] == pytest.approx(50.0 / SPEED_HZ)
+    assert places_of(swing=0.01)[0].kind is PlaceKind.SPEED
+    rng = np.random.default_rng(5)
+    noise = places_of(lambda t, _: 0.3 * rng.standard_normal(len(t)))[0]
+    assert (noise.kind, "noise between" in noise.title) == (PlaceKind.BAND, True)
+
+
+def test_the_mesh_alone_is_the_mesh_alone() -> None:
+    """What is counted relative to the mesh rises when the mesh falls, and is no place of the gap."""
+    mesh = [4.0, 2.0, 1.0]
+    places = places_of(
+        lambda _, r: -0.6 * np.sum([a * np.cos(2 * np.pi * (k + 1) * 23 * r + k) for k, a in enumerate(mesh)], axis=0)
+    )
+    assert [place.kind for place in places] == [PlaceKind.MESH]
+    assert places[0].change_db == pytest.approx(20 * np.log10(0.4), abs=0.2)
+
+
+def test_a_gain_moves_no_ratio() -> None:
+    names = ("mesh.total", "sideband.driver.1", "shaft.driver.1", "shaft.driver.1.to_mesh")
+    assert beyond_the_mesh(names, np.array([6.0, 0.0, 6.0, 0.0])) == pytest.approx([6.0, 0.0, 0.0, 0.0])
+    assert beyond_the_mesh(names, np.array([-6.0, 6.0, 0.0, 6.0])) == pytest.approx([-6.0, 0.0, 0.0, 0.0])
+    assert beyond_the_mesh(names, np.array([1.0, 9.0, 8.0, 7.0])) == pytest.approx([1.0, 9.0, 7.0, 7.0])
+
+
+def test_shares_add_up_to_one_at_most() -> None:
+    places = places_of(lambda t, r: 1.5 * ringing(r - 0.4) + tone(10.3, 0.3)(t, r) + tone(1.0, 0.3)(t, r))
+    assert {PlaceKind.TOOTH, PlaceKind.LINE, PlaceKind.SHAFT} <= {place.kind for place in places}
+    assert 0.9 < sum(place.share for place in places) <= 1.0 + 1e-9
+    assert [place.share for place in places] == sorted((place.share for place in places), reverse=True)
+
+
+def test_what_leaks_into_an_average_is_not_its_own() -> None:
+    leaking = gather(record(tone(7.43, 3.0), seed=1), RIG).channels["a1"]
+    held = is_synchronous(leaking, DRIVER)
+    assert held[TEETH[0]]
+    assert held[TEETH[0] + 1]
+    assert not held[6:9].any()
+
+
+def test_few_lines_of_noise_pass_for_a_shafts_own() -> None:
+    rng = np.random.default_rng(1)
+    sums = sound().channels["a1"]
+    shape = sums.lines[0].shape
+    noise = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+    counts = np.ones(len(noise))
+    held = is_synchronous(replace(sums, lines=(noise, noise), counts=(counts, counts)), DRIVER)
+    assert held.mean() < 0.005

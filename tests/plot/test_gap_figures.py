@@ -1,0 +1,145 @@
+"""Figures of a gap: what is drawn is what was given, and every text lies inside."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from gearsig.errors import InputError
+from gearsig.gap.types import AngleCurves, GapCause, GapStep, Interval, SpectrumCurves
+from gearsig.plot.gap_causes import gap_causes_figure
+from gearsig.plot.gap_evidence import gap_evidence_figure
+from gearsig.plot.gap_orders import gap_orders_figure
+from gearsig.plot.gap_shares import gap_shares_figure
+from gearsig.plot.gap_teeth import INNER, OUTER, gap_teeth_figure
+from gearsig.plot.gap_waterfall import gap_waterfall_figure
+from gearsig.plot.marks import AngleMark
+from tests.gap.example_report import effect_report
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+REPORT = effect_report()
+LONG = (
+    "sidebands of the intermediate shaft of the second stage about 3 × mesh, up by 14 dB, nearest lines only, and more"
+)
+
+
+def texts(figure: "Figure") -> list[str]:
+    from matplotlib.text import Text
+
+    return [t.get_text() for t in figure.findobj(Text) if isinstance(t, Text) and t.get_visible() and t.get_text()]
+
+
+def assert_inside(figure: "Figure") -> None:
+    """Every text lies within the figure, and no two texts beside the rows overlap."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.text import Text
+
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()  # type: ignore[no-untyped-call]  # matplotlib has no type for it
+    width, height = canvas.get_width_height()
+    for text in figure.findobj(Text):
+        if not (isinstance(text, Text) and text.get_visible() and text.get_text()):
+            continue
+        box = text.get_window_extent()
+        assert box.x0 >= -1, text.get_text()
+        assert box.y0 >= -1, text.get_text()
+        assert box.x1 <= width + 1, text.get_text()
+        assert box.y1 <= height + 1, text.get_text()
+
+
+def bars(figure: "Figure") -> list[float]:
+    from matplotlib.patches import Rectangle
+
+    return [float(bar.get_width()) for bar in figure.axes[0].patches if isinstance(bar, Rectangle)]
+
+
+MADE: dict[str, Callable[[], Any]] = {
+    "shares": lambda: gap_shares_figure([replace(REPORT.places[0], title=LONG), *REPORT.places[1:]], title="Where"),
+    "waterfall": lambda: gap_waterfall_figure(REPORT.steps, held_out="another operating condition", title="How far"),
+    "evidence": lambda: gap_evidence_figure(REPORT.causes[0].evidence, title="Predicted against observed"),
+    "causes": lambda: gap_causes_figure(REPORT.causes, title="Which"),
+    "orders": lambda: gap_orders_figure(REPORT.spectra[0], limits=(40.0, 130.0)),
+    "teeth": lambda: gap_teeth_figure(REPORT.angles[0], mark=AngleMark(134.2, "tooth 21, 134°")),
+}
+
+
+@pytest.mark.parametrize("name", list(MADE))
+def test_nothing_is_cut(name: str) -> None:
+    assert_inside(MADE[name]())
+
+
+def test_shares_are_in_percent_with_both_floors() -> None:
+    figure = gap_shares_figure(REPORT.places)
+    assert bars(figure) == pytest.approx([100 * place.share for place in REPORT.places])
+    assert "58 %" in texts(figure)
+    assert "8.7 × structural, 61 × rep." in texts(figure)
+
+
+def test_the_waterfall_goes_from_before_to_what_is_left() -> None:
+    figure = gap_waterfall_figure(REPORT.steps)
+    lengths = bars(figure)[-4:]  # the floor's shading comes first
+    assert lengths == pytest.approx([7.9, 2.3, 4.0, 1.6])
+    assert {"what is left", "−2.3", "−71 % of the gap", "1.2 to 2.1"} <= set(texts(figure))
+    grown = gap_waterfall_figure((GapStep("a", Interval(1, 1, 1)), GapStep("b", Interval(1.5, 1, 2))))
+    assert "+0.5" in texts(grown)
+    assert "+50 % of the gap" in texts(grown)
+
+
+def test_evidence_stands_beside_its_prediction() -> None:
+    figure = gap_evidence_figure(REPORT.causes[0].evidence)
+    axes = figure.axes[0]
+    diamonds = [float(np.asarray(line.get_xdata())[0]) for line in axes.lines if line.get_marker() == "D"]
+    assert diamonds == pytest.approx([one.predicted_db for one in REPORT.causes[0].evidence])
+    assert [t for t in texts(figure) if t in ("for", "against")] == ["for", "for", "for", "against"]
+
+
+def test_unlikely_causes_are_added_up() -> None:
+    many = [GapCause(f"c{i}", "g", f"cause {i}", "mm", 0.1) for i in range(10)]
+    figure = gap_causes_figure(many)
+    assert bars(figure) == pytest.approx([10.0] * 7 + [30.0])
+    assert "3 others together" in texts(figure)
+    assert "pitch error" in texts(gap_causes_figure(REPORT.causes))
+
+
+def test_lines_beyond_the_structural_floor_are_orange() -> None:
+    from matplotlib.collections import LineCollection
+
+    orders = np.arange(10.0)
+    before = np.ones(10)
+    measured = np.where(orders == 4, 10.0, np.where(orders == 7, 1.2, 1.0))
+    curves = SpectrumCurves(
+        "a", "m/s^2", orders, measured, before, np.zeros(0), np.full(10, 0.1), structural_db=np.full(10, 6.0)
+    )
+    figure = gap_orders_figure(curves)
+    quiet, strong = (c for c in figure.axes[1].collections if isinstance(c, LineCollection))
+    assert [segment[0][0] for segment in strong.get_segments()] == [4.0]
+    assert strong.get_segments()[0][1][1] == pytest.approx(20.0)
+    assert len(quiet.get_segments()) == 9
+
+
+def test_the_polar_picture_is_in_decibels_from_the_middling_tooth() -> None:
+    angle = np.arange(0.0, 360.0, 5.0)
+    measured = np.where(angle == 90.0, 100.0, 1.0)
+    curves = AngleCurves("in", "m/s^2", 18, False, angle, measured, np.ones(72), np.zeros(0))
+    axes = gap_teeth_figure(curves).axes[0]
+    drawn = [np.asarray(one.get_xydata()) for one in axes.lines if len(np.asarray(one.get_xdata())) == 73]
+    line = max(drawn, key=lambda points: float(points[:, 1].max()))
+    at = int(np.argmax(line[:, 1]))
+    assert line[at] == pytest.approx([np.pi / 2, OUTER])
+    assert np.median(line[:, 1]) == pytest.approx(INNER + (OUTER - INNER) * 9.0 / 29.0)
+    assert not [t for t in texts(gap_teeth_figure(curves)) if t.isdigit()]  # no mark, no numbers
+    assert "17" in texts(gap_teeth_figure(replace(curves, has_mark=True)))
+
+
+def test_nothing_to_draw_is_an_error() -> None:
+    for draw in (gap_shares_figure, gap_waterfall_figure, gap_evidence_figure, gap_causes_figure):
+        with pytest.raises(InputError):
+            draw([])
+    with pytest.raises(InputError, match="hold no order"):
+        gap_orders_figure(REPORT.spectra[0], limits=(1e6, 2e6))
+    with pytest.raises(InputError, match="points"):
+        gap_orders_figure(replace(REPORT.spectra[0], floor=np.ones(3)))
