@@ -1,0 +1,55 @@
+"""Calibrated probabilities and what may be said of them."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gearsig.gap.posterior import GapCalibration, load_gap_calibration, score_of
+from gearsig.gap.types import NONE, UNKNOWN, GapOutcome
+
+PLAIN = GapCalibration(1.0, 0.0, 0.0, 0.0, 0.5, 0.65)
+FOREST = {"root_crack": 0.5, "eccentricity": 0.2, NONE: 0.2, UNKNOWN: 0.1}
+
+
+def test_without_calibration_probabilities_stay() -> None:
+    assert PLAIN.probabilities(FOREST, {}) == pytest.approx(FOREST)
+
+
+@given(st.floats(0.2, 3.0), st.floats(0.0, 5.0), st.floats(-1.0, 1.0))
+def test_probabilities_add_up_and_are_in_order(sharpness: float, weight: float, score: float) -> None:
+    found = GapCalibration(sharpness, weight, 0.3, -0.2, 0.5, 0.65).probabilities(FOREST, {"eccentricity": score})
+    assert sum(found.values()) == pytest.approx(1.0)
+    assert list(found.values()) == sorted(found.values(), reverse=True)
+
+
+def test_what_shrinks_the_gap_gains() -> None:
+    weighed = GapCalibration(1.0, 3.0, 0.0, 0.0, 0.5, 0.65).probabilities(FOREST, {"eccentricity": 0.9})
+    assert next(iter(weighed)) == "eccentricity"
+
+
+def test_outcomes() -> None:
+    def outcome(**given: float) -> GapOutcome:
+        rest = 1.0 - sum(given.values())
+        return PLAIN.outcome({NONE: 0.0, UNKNOWN: 0.0, "unbalance": rest, **given})
+
+    assert outcome(root_crack=0.8) is GapOutcome.EFFECT
+    assert outcome(root_crack=0.5) is GapOutcome.CANNOT_SEPARATE
+    assert outcome(none=0.7) is GapOutcome.NO_GAP
+    assert outcome(unknown=0.7) is GapOutcome.UNKNOWN
+
+
+def test_a_placebo_that_does_as_well_leaves_no_score() -> None:
+    assert score_of(0.8, 0.8) == 0.0
+    assert score_of(0.8, -0.5) == 0.8
+    assert score_of(-7.0, 0.0) == -1.0
+
+
+@pytest.mark.parametrize("with_reference", [True, False])
+def test_the_shipped_calibration_is_sane(with_reference: bool) -> None:
+    found = load_gap_calibration(with_reference=with_reference)
+    assert found.sharpness > 0
+    assert found.shrink_weight >= 0
+    assert 0 < found.named_from < 1
+    assert 0.5 <= found.apart < 1

@@ -1,0 +1,87 @@
+"""Paths over severity, fits and held-out shrinkage, by closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gearsig.errors import InputError
+from gearsig.gap.prediction import EffectPath, Observed, fit_effect, fit_path, paths_of
+from gearsig.gap.shrinkage import Fold, shrinkage
+from gearsig.gap.simulator import Added
+
+NAMES = ("mesh.total", "mesh.share.1", "sideband.driver.1", "sideband.driven.1", "shaft.driver.1", "hum")
+FLOORS = np.array([2.0, 1.0, 3.0, 3.0, 2.0, 1.0])
+SHAPE = np.array([0.0, 0.0, 12.0, 0.0, 8.0, 0.0])
+SEVERITIES = np.array([1.0, 2.0, 4.0])
+
+
+def path(shape: np.ndarray = SHAPE, n_conditions: int = 1, **options: float | str) -> EffectPath:
+    """An effect whose change is proportional to the logarithm of its severity, from 1 on."""
+    table = np.outer(1.0 + np.log2(SEVERITIES), shape)
+    return EffectPath("eccentricity", options, SEVERITIES, (table,) * n_conditions, NAMES)
+
+
+def seen(distances: np.ndarray, condition: int = 0) -> Observed:
+    return Observed(condition, distances, FLOORS)
+
+
+@given(st.floats(1.0, 4.0))
+def test_a_path_is_straight_over_the_logarithm(severity: float) -> None:
+    assert path().at(severity, 0) == pytest.approx((1.0 + np.log2(severity)) * SHAPE)
+
+
+@given(st.floats(0.01, 1.0))
+def test_below_the_least_simulated_severity_it_is_proportional(severity: float) -> None:
+    assert path().at(severity, 0) == pytest.approx(severity * SHAPE)
+
+
+@given(st.floats(1.0, 4.0))
+def test_the_true_severity_is_found_within_its_interval(severity: float) -> None:
+    fit = fit_path(path(), [seen(path().at(severity, 0))])
+    assert fit.severity.value == pytest.approx(severity, rel=0.05)
+    assert fit.severity.low <= severity * 1.05
+    assert severity <= fit.severity.high * 1.05
+    assert fit.cost < 0.5  # the grid of severities
+
+
+def test_the_right_options_are_found() -> None:
+    driver, driven = path(gear="driver"), path(SHAPE[[0, 1, 3, 2, 4, 5]], gear="driven")
+    fit = fit_effect([driver, driven], [seen(driven.at(3.0, 0))])
+    assert fit.added.options == {"gear": "driven"}
+
+
+def test_no_path_is_an_error() -> None:
+    with pytest.raises(InputError, match="no candidate"):
+        fit_effect([], [seen(SHAPE)])
+
+
+def test_candidates_become_one_path_for_each_set_of_options() -> None:
+    added = [Added("unbalance", s, {"gear": g}) for g in ("driver", "driven") for s in (9.0, 3.0)]
+    table = np.arange(4.0)[:, None] * np.ones(len(NAMES))
+    found = paths_of(NAMES, added, [table])
+    assert [p.options["gear"] for p in found] == ["driver", "driven"]
+    assert found[0].severities.tolist() == [3.0, 9.0]
+    assert found[1].distances[0][:, 0].tolist() == [3.0, 2.0]
+
+
+def test_a_true_effect_shrinks_the_gap_and_its_placebo_does_not() -> None:
+    driver, driven = path(gear="driver"), path(SHAPE[[0, 1, 3, 2, 5, 4]], gear="driven")
+    rng = np.random.default_rng(1)
+    noisy = [seen(driver.at(2.0, 0) + 0.3 * FLOORS * rng.standard_normal(len(NAMES))) for _ in range(3)]
+    result = shrinkage([driver, driven], [Fold((noisy[0],), noisy[1], (noisy[1], noisy[2]))], "other revolutions")
+    assert result.shrink.value > 0.9
+    assert result.slope == pytest.approx(1.0, abs=0.15)
+    assert result.placebo < 0.1
+    assert result.after.value < 1.0 < result.before.value
+    assert result.shrink.low <= result.shrink.value <= result.shrink.high
+
+
+def test_an_effect_that_was_fitted_to_one_condition_and_fails_at_the_other_does_not_shrink_the_gap() -> None:
+    one = path(n_conditions=2)
+    nothing = np.zeros(len(NAMES))
+    result = shrinkage([one], [Fold((seen(one.at(4.0, 0)),), seen(nothing, 1))], "another operating condition")
+    assert result.shrink.value <= 0.0
+    assert result.slope == pytest.approx(0.0)
