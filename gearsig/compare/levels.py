@@ -35,7 +35,8 @@ def power_levels(simulated: FloatArray, recorded: FloatArray, *, smooth: int = 5
 
 
 def _smoothed(errors: FloatArray, n: int) -> FloatArray:
-    width = min(n, len(errors) - (len(errors) + 1) % 2)
+    width = min(n, len(errors))
+    width -= (width + 1) % 2  # odd: as many neighbours on either side
     if width < 2:
         return errors
     padded = np.pad(errors**2, width // 2, mode="reflect")

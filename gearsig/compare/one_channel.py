@@ -87,7 +87,6 @@ def compare_channel(
     limits = order_band_limits(mesh, mesh_name, material.highest_order)
     whole = [(0.5, material.highest_order)]
     totals = [np.stack([band_powers(half, whole) for half in halves]) for halves in densities]
-    rows = [[half[i] for half in time_halves(side.recording)] for side in (own, other)]
     averages = material.lines
     return ChannelComparison(
         simulated_name=pair.simulated,
@@ -109,9 +108,9 @@ def compare_channel(
         ),
         order_bands=order_bands(limits, densities[0], densities[1], averages[material.reference], i),
         third_octaves=third_octaves(
-            (rows[0][0], rows[0][1]),
+            time_halves(own.recording, i),
             own.recording.sampling_rate_hz,
-            (rows[1][0], rows[1][1]),
+            time_halves(other.recording, i),
             other.recording.sampling_rate_hz,
         ),
         shafts=tuple(_shaft(shaft, i, pair, material) for shaft in averages),

@@ -32,8 +32,7 @@ def remarks(
             f"Shaft {', '.join(left_out)} makes fewer than {LEAST_REVOLUTIONS} revolutions in one of the records: its "
             "average and its lines are left out."
         )
-    for alignment in alignments:
-        texts += _alignment_texts(alignment)
+    texts += _alignment_texts(alignments)
     unknown = [channel.name for channel in channels if not channel.levels_compare]
     if unknown:
         texts.append(
@@ -66,22 +65,25 @@ def _speed_texts(own: Side, other: Side) -> list[str]:
     return texts
 
 
-def _alignment_texts(alignment: Alignment) -> list[str]:
-    name = f"of shaft {alignment.shaft}" if alignment.shaft else ""
-    if alignment.method == "marks":
-        if alignment.gain > WORTH_SAYING:
-            turned = f"{alignment.best_shift_deg:+.4g}°".replace("-", "−")
-            text = (
-                f"The averages {name} are aligned by their marks; with the simulation turned by {turned} they would "
-                f"correlate better by {alignment.gain:.2f}. A simulation's mark need not sit where the rig's "
-                "does: align by correlation then."
+def _alignment_texts(alignments: Sequence[Alignment]) -> list[str]:
+    texts = []
+    for one in alignments:
+        if one.method == "marks" and one.gain > WORTH_SAYING:
+            turned = f"{one.best_shift_deg:+.4g}°".replace("-", "−")
+            texts.append(
+                f"The averages{_of([one])} are aligned by their marks; with the simulation turned by {turned} they "
+                f"would correlate better by {one.gain:.2f}. A simulation's mark need not sit where the rig's does: "
+                "align by correlation then."
             )
-            return [text]
-        return []
-    if alignment.tooth_is_certain is False:
-        text = (
-            f"No tooth {name} stands out enough to tell which is which: the simulation's average is aligned to a "
+    loose = [one for one in alignments if one.method != "marks" and one.tooth_is_certain is False]
+    if loose:
+        texts.append(
+            f"No tooth{_of(loose)} stands out enough to tell which is which: the simulation's average is aligned to a "
             "whole number of teeth, and differences from tooth to tooth mean nothing."
         )
-        return [text]
-    return []
+    return texts
+
+
+def _of(alignments: Sequence[Alignment]) -> str:
+    names = [one.shaft for one in alignments if one.shaft]
+    return f" of shaft {' or '.join(names)}" if names else ""

@@ -113,12 +113,12 @@ def halves(signal: AngleSignal) -> tuple[AngleSignal, AngleSignal] | None:
     return first, second
 
 
-def time_halves(recording: Recording) -> tuple[FloatArray, FloatArray]:
-    """Return both halves of the samples, each (n_channels, n_samples // 2), without the record's mean."""
+def time_halves(recording: Recording, row: int) -> tuple[FloatArray, FloatArray]:
+    """Return both halves of a channel's samples, each (n_samples // 2,), without the record's mean."""
     n = recording.n_samples // 2
-    values = np.asarray(recording.samples, dtype=np.float64)
-    values = values - values.mean(axis=1, keepdims=True)
-    return values[:, :n], values[:, n : 2 * n]
+    values = np.asarray(recording.samples[row], dtype=np.float64)
+    values = values - values.mean()
+    return values[:n], values[n : 2 * n]
 
 
 def _angle(recording: Recording, rig: Rig, shaft: str, which: str) -> ShaftAngle:
