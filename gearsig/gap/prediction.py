@@ -16,8 +16,8 @@ from gearsig.gap.types import Interval
 STEPS = 41
 """Severities that are tried."""
 
-BEYOND = 1.5
-"""Times the largest simulated severity that a fit may reach."""
+LEAST_TRIED = 0.3
+"""Times the least simulated severity."""
 
 LARGEST_DISTANCE = 6.0
 """In floors; what is further from a prediction counts no more: one wild feature must not decide."""
@@ -89,8 +89,7 @@ class EffectPath:
 
     def tried(self) -> FloatArray:
         """Return the severities that a fit looks at."""
-        top = self.severities[-1] * (BEYOND if len(self.severities) > 1 else 1.0)
-        return np.geomspace(0.3 * self.severities[0], top, STEPS)
+        return np.geomspace(LEAST_TRIED * self.severities[0], self.severities[-1], STEPS)
 
 
 @dataclass(frozen=True)
