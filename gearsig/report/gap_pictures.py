@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from gearsig.gap.types import NONE, UNKNOWN, AngleCurves, GapCause, GapOutcome, GapReport, PlaceKind
+from gearsig.gap.types import AngleCurves, GapReport, PlaceKind
 from gearsig.plot.embed import Picture, embed
 from gearsig.plot.marks import AngleMark
+from gearsig.report.gap_sections import detailed_causes
 from gearsig.report.numbers import readable
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Question = Literal["where", "which", "how far"]
 QUESTIONS: tuple[Question, ...] = ("where", "which", "how far")
-N_DETAILED = 3
-"""Causes whose evidence is shown."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +27,7 @@ class GapFigure:
     question : str
         "where", "which" or "how far": under which heading it stands.
     figure : Figure
+        Of `gearsig.plot`.
     look : str
         What to look at.
     shows : str
@@ -44,7 +41,7 @@ class GapFigure:
     """
 
     question: Question
-    figure: Figure
+    figure: Any  # the drawing library's type is known in gearsig.plot alone
     look: str
     shows: str
     of: str = ""
@@ -83,13 +80,6 @@ def gap_figures(report: GapReport) -> Iterator[GapFigure]:
     yield from _teeth(report)
     yield from _evidence(report)
     yield from _waterfall(report)
-
-
-def detailed_causes(report: GapReport) -> tuple[GapCause, ...]:
-    """Return the effects whose evidence is shown: the likeliest three, where there is a gap at all."""
-    if report.outcome is GapOutcome.NO_GAP:
-        return ()
-    return tuple(cause for cause in report.causes if cause.name not in (NONE, UNKNOWN))[:N_DETAILED]
 
 
 def _spectra(report: GapReport) -> Iterator[GapFigure]:

@@ -9,16 +9,27 @@ from importlib.metadata import version
 from math import isfinite
 
 from gearsig import __version__
-from gearsig.gap.types import Evidence, GapCause, GapPlace, GapReport, Interval, Shrinkage
+from gearsig.gap.types import (
+    NONE,
+    UNKNOWN,
+    Evidence,
+    GapCause,
+    GapOutcome,
+    GapPlace,
+    GapReport,
+    Interval,
+    Shrinkage,
+)
 from gearsig.plot.display import unit_text
-from gearsig.report.gap_pictures import detailed_causes
 from gearsig.report.gap_text import point_text
 from gearsig.report.numbers import readable
 from gearsig.report.sections import Rows, named
 
+N_DETAILED = 3
+"""Causes whose evidence is shown."""
 MOST_ORDERS = 4
 LEAST_SHOWN = 0.01
-"""Probability below which a cause is only counted."""
+"""Below this a group is left out, and a share is said to be below one percent."""
 OUTCOME_CLASSES = {"no gap": "no-fault", "effect": "fault", "cannot separate": "suspicion", "unknown": "cannot-tell"}
 _UNITS = {"um": "µm", "deg": "°", "g mm": "g·mm", "N m": "N·m", "1": ""}
 
@@ -118,6 +129,13 @@ def cause_rows(report: GapReport) -> tuple[CauseRow, ...]:
     """Return the causes, likeliest first; the first effects with what speaks for and against them."""
     detailed = detailed_causes(report)
     return tuple(_cause_row(cause, detailed=cause in detailed) for cause in report.causes)
+
+
+def detailed_causes(report: GapReport) -> tuple[GapCause, ...]:
+    """Return the effects whose evidence is shown: the likeliest three, where there is a gap at all."""
+    if report.outcome is GapOutcome.NO_GAP:
+        return ()
+    return tuple(cause for cause in report.causes if cause.name not in (NONE, UNKNOWN))[:N_DETAILED]
 
 
 def _cause_row(cause: GapCause, *, detailed: bool) -> CauseRow:
