@@ -15,6 +15,7 @@ import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -60,9 +61,19 @@ class Wanted:
         for name in self.diagnosers:
             diagnoser(name)
 
+    @cached_property
+    def code(self) -> str:
+        """State of the code when it was first asked for."""
+        return state_of_code()
+
     def definition(self) -> dict[str, Any]:
         """What decides the result, as plain values."""
-        return {**self.plan.definition(), "diagnosers": list(self.diagnosers), "version": __version__, "code": _code()}
+        return {
+            **self.plan.definition(),
+            "diagnosers": list(self.diagnosers),
+            "version": __version__,
+            "code": self.code,
+        }
 
 
 @dataclass(frozen=True)
@@ -157,7 +168,7 @@ def environment(folder: Path) -> dict[str, str]:
     return passed_on | dict.fromkeys(_ONE_THREAD, "1") | {"TMPDIR": str(folder), "PYTHONPATH": str(_ROOT)}
 
 
-def _code() -> str:
+def state_of_code() -> str:
     """Return a hash of everything that makes or answers a case: answers of other code are no answers of this one."""
     found = hashlib.sha256()
     for room in ("gearsig", "sims", "app/gap", "app/benchmark"):

@@ -15,7 +15,7 @@ import numpy as np
 from app.benchmark.answer import Answer
 from app.benchmark.diagnosers import BASELINES
 from app.benchmark.plan import BLIND, SAME
-from app.benchmark.run import Done
+from app.benchmark.run import Done, state_of_code
 from app.benchmark.scoring.calibration_curve import bins_of
 from app.benchmark.scoring.effects_table import confusion_counts, confusions_table, effects_table
 from app.benchmark.scoring.intervals import Score, share
@@ -37,6 +37,7 @@ COLUMNS = (
     *("diagnoser", "outcome", "likeliest", "probability", "second", "probability_of_true", "named", "right"),
     *("seconds", "cpu_seconds", "error"),
 )
+CHANGED = "; it changed while the benchmark ran, so that the answers are not all of one state"
 REPORT, TABLE, SCORES, CASES, LABELS = "report.html", "table.md", "scores.json", "cases.csv", "labels"
 
 
@@ -166,7 +167,7 @@ def _provenance(result: Result, command: str) -> list[tuple[str, str]]:
     return [
         ("command", command),
         ("cases", f"{plan.n_cases}, role {plan.role}, seed {plan.seed}; {shares}"),
-        ("code", str(result.wanted.definition()["code"])),
+        ("code", result.wanted.code + ("" if state_of_code() == result.wanted.code else CHANGED)),
         ("blindness", "each case diagnosed by a fresh process that is given recordings and rig files only"),
         ("strength", "change between a case and its twin without the fault, sized like the whole gap"),
         ("one diagnosis", cost_lines(result)[0]),
