@@ -222,6 +222,11 @@ def _strongest(comparison: Comparison, levels: Levels, *, fundamental: bool) -> 
 
 
 def _strange_words(comparison: Comparison, order: float) -> str:
+    """Return whose order it is by itself, without a family of multiples."""
+    for bearing in comparison.now.frame.bearings:
+        for kind, (attribute, factor) in RACES.items():
+            if -SLIP < order / (getattr(bearing, attribute) * factor) - 1.0 < UPWARDS:
+                return f"at order {order:.4g}, that of the {RACE_WORDS[kind]} of {_bearing(bearing.name)}"
     bearing = "and no bearing" if comparison.now.frame.bearings else "(the rig names no bearing)"
     return f"at order {order:.4g}, which belongs to no shaft {bearing}"
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from matplotlib.lines import Line2D
-
 from gearsig.errors import InputError
 from gearsig.gap.types import Evidence
 from gearsig.plot import series, style
@@ -15,6 +13,7 @@ from gearsig.plot.rows import BAR, row_panel
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 MOST_ROWS = 10
 
@@ -69,6 +68,8 @@ def _draw_row(axes: Axes, row: int, one: Evidence) -> None:
 
 
 def _keys() -> list[Line2D]:
+    from matplotlib.lines import Line2D
+
     return [
         Line2D([], [], color=style.MEASURED, linewidth=6, label="observed"),
         Line2D(

@@ -45,9 +45,13 @@ def gap_shares_figure(places: Sequence[GapPlace], *, title: str = "") -> Figure:
         colour = style.FAULT if row == 0 else style.MEASURED
         axes.barh(row, 100.0 * place.share, height=BAR, color=colour, alpha=0.85, linewidth=0)
         panel.name(row, place.title, bold=row == 0)
-        floors = f"{place.structural:.2g} × structural"
-        panel.say(row, f"{100.0 * place.share:.0f} %", below=f"{floors}, {place.repeatability:.2g} × rep.")
+        floors = f"{_times(place.structural)} × structural, {_times(place.repeatability)} × rep."
+        panel.say(row, f"{100.0 * place.share:.0f} %", below=floors)
     axes.set_xlim(0.0, max(100.0 * shown[0].share * 1.02, 10.0))
     style.label_axes(axes, "share of the gap (%)", "", title)
     style.no_offset(axes)
     return panel.figure
+
+
+def _times(size: float) -> str:
+    return f"{size:.0f}" if size >= 9.95 else f"{size:.1f}"
