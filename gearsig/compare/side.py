@@ -153,5 +153,9 @@ def _exact(recording: Recording, rig: Rig, found: ShaftAngle) -> ShaftAngle:
     orders = tuple(k * order for order in meshes for k in range(1, N_PHASE_HARMONICS + 1))
     refined = refine_by_phase(recording, recording.vibration_names(), found, orders)
     return replace(
-        found, time_s=refined.time_s, revolutions=refined.revolutions, speed_rev_per_s=refined.speed_rev_per_s
+        found,
+        time_s=refined.time_s,
+        revolutions=refined.revolutions,
+        speed_rev_per_s=refined.speed_rev_per_s,
+        notes=(*found.notes, "the course of the angle follows the phase of the mesh harmonics"),
     )

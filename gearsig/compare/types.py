@@ -89,11 +89,6 @@ class LineLevel:
         """Whether either record shows it."""
         return self.simulated_is_seen or self.recorded_is_seen
 
-    @property
-    def differs(self) -> bool:
-        """Whether either shows it, and the difference is no noise."""
-        return self.is_seen and self.level.is_beyond
-
 
 @dataclass(frozen=True)
 class Agreement:
