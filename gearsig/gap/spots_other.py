@@ -56,9 +56,10 @@ def tail_spot(comparison: Comparison) -> Spot:
     name = comparison.strongest("raw.near", "raw.kurtosis")
     change = comparison.change_db[name]
     channel = max(comparison.now.channels, key=lambda c: float(comparison.now.channels[c].tail[:, 2].mean()))
-    if name == "raw.near_the_extreme" and change > 0:
-        return Spot(
-            f"samples pile up at the largest amplitude, {by_decibels(change)}: clipping", change, channel=channel
-        )
+    if name == "raw.near_the_extreme":
+        piled = float(comparison.now.channels[channel].tail[:, 2].mean()) > PILED_UP
+        clipping = ", as clipping makes them" if change > 0 and piled else ""
+        title = f"samples close to the largest amplitude{clipping}, {by_decibels(change)}"
+        return Spot(title, change, channel=channel)
     tails = "heavier" if change > 0 else "lighter"
     return Spot(f"{tails} tails of the amplitudes (kurtosis {by_decibels(change)})", change, channel=channel)

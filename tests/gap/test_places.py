@@ -169,3 +169,14 @@ def test_few_lines_of_noise_pass_for_a_shafts_own() -> None:
     counts = np.ones(len(noise))
     held = is_synchronous(replace(sums, lines=(noise, noise), counts=(counts, counts)), DRIVER)
     assert held.mean() < 0.005
+
+
+def test_clipping_is_told_from_a_stray_peak() -> None:
+    from gearsig.gap.spots import Comparison
+    from gearsig.gap.spots_other import tail_spot
+
+    recording = record(seed=1)
+    clipped = gather(replace(recording, samples=np.clip(recording.samples, -4.0, 4.0)), RIG)
+    figures = {"raw.near_the_extreme": 20.0, "raw.kurtosis": -1.0}
+    assert "as clipping makes them" in tail_spot(Comparison(clipped, sound(), True, figures, figures)).title
+    assert "clipping" not in tail_spot(Comparison(sound(), clipped, True, figures, figures)).title
