@@ -108,6 +108,9 @@ def _tell(report: GapReport, written: tuple[Path, ...]) -> None:
         typer.echo(f"Note: {notice}", err=True)
     page, *others = written
     typer.echo(f"Open {page} in a browser; beside it: {', '.join(path.name for path in others)}.")
+    if report.twin_toml:
+        twin = shlex.quote(str(others[-1]))
+        typer.echo(f"Run the simulator with the effect: gearsig simulate {report.simulator} --preset {twin} -o twin.h5")
 
 
 def _print_effects(model: str) -> None:

@@ -71,7 +71,8 @@ def test_it_prints_the_verdict_and_leaves_three_files(capsys, stub, tmp_path) ->
     assert code == 0
     lines = out.splitlines()
     assert lines[:4] == list(effect_report().verdict)
-    assert str(folder / "gap.html") in lines[-1]
+    assert str(folder / "gap.html") in lines[-2]
+    assert f"--preset {folder / 'twin.toml'}" in lines[-1]
     assert "Note: The mean torque is the rig file's" in err
     assert sorted(p.name for p in folder.iterdir()) == NAMES
     assert sorted(p.name for p in folder.parent.iterdir()) == ["gap"]
