@@ -73,9 +73,8 @@ class GapCalibration:
         none, unknown = probabilities[NONE], probabilities[UNKNOWN]
         if 1.0 - none - unknown < self.named_from:
             return GapOutcome.NO_GAP if none >= unknown else GapOutcome.UNKNOWN
-        first, second = sorted((p for name, p in probabilities.items() if name not in (NONE, UNKNOWN)), reverse=True)[
-            :2
-        ]
+        first, *others = sorted((p for name, p in probabilities.items() if name not in (NONE, UNKNOWN)), reverse=True)
+        second = others[0] if others else 0.0
         return GapOutcome.EFFECT if first / (first + second) >= self.apart else GapOutcome.CANNOT_SEPARATE
 
 

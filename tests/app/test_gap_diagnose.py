@@ -1,0 +1,92 @@
+"""The gap diagnosis end to end, on recordings of the twin itself: a small check of the machinery, not of its worth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from app.gap.diagnose import diagnose_gap
+from gearsig.errors import InputError
+from gearsig.gap.simulator import Added, Point
+from gearsig.gap.types import GapOutcome, GapReport
+from gearsig.recording.types import Recording
+from gearsig.rig.types import Rig
+from sims import simulate
+from sims.presets import preset
+from sims.registry import gap_simulator
+
+POINT = Point(1500.0, 60.0)
+SEVERITY_UM = 90.0
+
+
+@cache
+def rig() -> Rig:
+    recording = simulate("cracked", preset="workshop_29_47", duration_s=0.2)
+    assert recording.rig is not None
+    return recording.rig
+
+
+@cache
+def run(*added: Added, noise: int) -> Recording:
+    twin = gap_simulator("cracked").twin_of(rig())
+    return twin.run(POINT, added, seed=5, duration_s=4.0, sampling_rate_hz=20480.0, noise=noise)
+
+
+class Eccentric(Added):
+    """An effect that can be a key."""
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.severity))
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> GapReport:
+    return diagnose_gap(
+        [run(Eccentric("eccentricity", SEVERITY_UM, {"gear": "driven"}), noise=2)],
+        gap_simulator("cracked"),
+        references=[run(noise=1)],
+        effects=["eccentricity"],
+        names=["now"],
+        cache=tmp_path_factory.mktemp("cache"),
+    )
+
+
+def test_the_effect_is_named_placed_and_sized(report: GapReport) -> None:
+    cause = report.causes[0]
+    assert (report.outcome, cause.name) == (GapOutcome.EFFECT, "eccentricity")
+    assert cause.place == "the gear on the output shaft"
+    assert cause.severity is not None
+    assert cause.severity.value == pytest.approx(SEVERITY_UM, rel=0.4)
+    assert sum(c.probability for c in report.causes) == pytest.approx(1.0)
+    assert sum(report.groups.values()) == pytest.approx(1.0)
+
+
+def test_the_gap_shrinks_on_held_out_revolutions(report: GapReport) -> None:
+    shrinkage = report.causes[0].shrinkage
+    assert shrinkage is not None
+    assert shrinkage.shrink.value > 0.6
+    assert shrinkage.placebo < 0.3
+    before, after = (step.left.value for step in report.steps[:2])
+    assert after < before
+
+
+def test_it_says_what_would_make_it_surer_and_keeps_the_twin(report: GapReport, tmp_path: Path) -> None:
+    assert any("One operating condition" in notice for notice in report.notices)
+    file = tmp_path / "twin.toml"
+    file.write_text(report.twin_toml, encoding="utf-8")
+    assert [s.name for s in preset("cracked", str(file)).effects] == ["eccentricity"]
+
+
+def test_lists_that_do_not_fit_are_errors() -> None:
+    simulator, recording = gap_simulator("cracked"), run(noise=1)
+    with pytest.raises(InputError, match="no recording"):
+        diagnose_gap([], simulator)
+    with pytest.raises(InputError, match="2 names for 1 recordings"):
+        diagnose_gap([recording], simulator, names=["a", "b"])
+    with pytest.raises(InputError, match="no effect 'rust'"):
+        diagnose_gap([recording], simulator, effects=["rust"])
+    with pytest.raises(InputError, match="carries no rig"):
+        diagnose_gap([replace(recording, rig=None)], simulator)

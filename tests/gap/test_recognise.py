@@ -1,0 +1,74 @@
+"""The population that is shipped, its floors, and the forest over it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearsig.errors import InputError
+from gearsig.gap.features import Features
+from gearsig.gap.population import Population, load_population
+from gearsig.gap.recognise import Recogniser, fit_recogniser, load_recogniser
+from gearsig.gap.types import NONE, UNKNOWN
+from sims.effects import effects
+
+
+@pytest.fixture(scope="module")
+def population() -> Population:
+    return load_population()
+
+
+@pytest.fixture(scope="module")
+def on_half(population: Population) -> Recogniser:
+    """A forest that has seen the machines of even number only."""
+    return fit_recogniser(some(population, population.rigs % 2 == 0), with_reference=True)
+
+
+def some(population: Population, rows: np.ndarray) -> Population:
+    tables = ("rigs", "causes", "changes", "change_scatter", "gaps", "gap_scatter", "features")
+    return replace(population, **{name: getattr(population, name)[rows] for name in tables})
+
+
+def row(population: Population, i: int) -> tuple[Features, Features]:
+    change = Features(population.change_names, population.changes[i], population.change_scatter[i])
+    return change, Features(population.feature_names, population.features[i], np.zeros(len(population.feature_names)))
+
+
+def test_every_effect_is_in_the_population(population: Population) -> None:
+    assert set(effects()) | {NONE, UNKNOWN} == set(population.causes)
+    assert len(set(population.rigs)) >= 20
+    assert population.change_names[: len(population.feature_names)] == population.feature_names
+
+
+def test_a_reference_lowers_the_floor(population: Population) -> None:
+    names = population.feature_names
+    with_it, without = (population.floor(with_reference=flag).of(names) for flag in (True, False))
+    assert np.median(without / with_it) > 1.5
+
+
+def test_machines_that_the_forest_never_saw_are_recognised_far_above_chance(
+    population: Population, on_half: Recogniser
+) -> None:
+    others = np.flatnonzero(population.rigs % 2 == 1)
+    found = [on_half.probabilities(*row(population, int(i))) for i in others]
+    right = np.mean([max(p, key=p.__getitem__) == population.causes[i] for p, i in zip(found, others, strict=True)])
+    assert right > 0.4
+    assert all(sum(p.values()) == pytest.approx(1.0) for p in found)
+
+
+def test_other_features_than_the_population_has_are_an_error(population: Population, on_half: Recogniser) -> None:
+    change, alone = row(population, 0)
+    with pytest.raises(InputError, match="belongs to other features"):
+        on_half.probabilities(replace(change, names=change.names[::-1]), alone)
+
+
+def test_a_missing_population_says_how_to_make_it(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"python -m app\.calibration\.gap\.population"):
+        load_population(tmp_path / "none.npz")
+
+
+def test_the_forest_is_fitted_once() -> None:
+    assert load_recogniser(with_reference=False) is load_recogniser(with_reference=False)
