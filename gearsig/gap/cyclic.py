@@ -15,6 +15,10 @@ from gearsig.gap.gear_lines import SIDES, Feature, decibel
 SLIP = 0.015
 """Rolling elements slip: their orders are sought within this share of the kinematic ones."""
 MOST_SLIPS = 201
+
+Known = tuple[float, float]
+"""An order, and by how much it may slip."""
+
 N_FAMILY = 4
 N_SHAFT_FAMILY = 6
 USED_OF_BAND = 0.7
@@ -52,14 +56,14 @@ def cyclic_features(gathered: Gathered, channels: Sequence[ChannelSums]) -> Iter
     for side, order in enumerate(frame.shaft_orders):
         yield f"envelope.{SIDES[side]}_shaft", _family(levels, order, N_SHAFT_FAMILY, step, (), 0.0)
     yield "envelope.mesh", _family(levels, float(frame.teeth[0]), 1, step, (), 0.0)
-    yield "envelope.strange", _strange(envelopes, step, [*known, *bearing_orders(frame)], first=LOWEST_STRANGE)
+    yield "envelope.strange", _strange(envelopes, step, known_modulation(frame), first=LOWEST_STRANGE)
     depth = max(float(c.envelope_power.mean(axis=0)[:, 2:].sum(axis=1).max()) for c in channels)
     yield "envelope.depth", decibel(depth)
     residuals = residual_ratios(gathered, channels)
     levels = excesses(residuals)
     yield from _families(frame, levels, gathered.order_step, known, "line")
     yield "line.half_mesh", _family(levels, frame.teeth[0] / 2.0, 1, gathered.order_step, (), 0.0)
-    yield "line.strange", _strange(residuals, gathered.order_step, line_orders(frame), first=LOWEST_STRANGE)
+    yield "line.strange", _strange(residuals, gathered.order_step, known_lines(frame), first=LOWEST_STRANGE)
 
 
 def envelope_ratios(gathered: Gathered, sums: ChannelSums) -> FloatArray:
@@ -115,19 +119,19 @@ def excesses(ratios: FloatArray) -> FloatArray:
     return level
 
 
-def _strange(ratios: FloatArray, step: float, known: Sequence[float], *, first: float) -> float:
+def _strange(ratios: FloatArray, step: float, known: Sequence[Known], *, first: float) -> float:
     """Return the excess in dB of the strongest line that belongs to nothing known."""
     free = free_lines(ratios.shape[1], step, known, first=first)
     return max(decibel(float(ratios[:, free].max())), 0.0) if free.any() else 0.0
 
 
-def free_lines(n_lines: int, step: float, known: Sequence[float], *, first: float) -> NDArray[np.bool_]:
+def free_lines(n_lines: int, step: float, known: Sequence[Known], *, first: float) -> NDArray[np.bool_]:
     """Return which lines belong to nothing known."""
     positions = np.arange(n_lines) * step
     near = np.zeros(n_lines, dtype=bool)
-    for order in known:
-        low = np.searchsorted(positions, order * (1.0 - SLIP) - 2.0 * step)
-        near[low : np.searchsorted(positions, order * (1.0 + SLIP) + 2.0 * step)] = True
+    for order, slip in known:
+        low = np.searchsorted(positions, order - slip - 2.0 * step)
+        near[low : np.searchsorted(positions, order + slip + 2.0 * step)] = True
     free: NDArray[np.bool_] = ~near & (positions > first)
     return free
 
@@ -141,12 +145,24 @@ def residual_ratios(gathered: Gathered, channels: Sequence[ChannelSums]) -> Floa
 def gear_orders(frame: GearFrame) -> list[float]:
     """Orders of both shafts' first harmonics, and of mesh harmonics with their first sidebands."""
     shafts = [k * order for order in frame.shaft_orders for k in range(1, 13)]
-    mesh = [k * frame.teeth[0] + j * order for k in (1, 2, 3) for order in frame.shaft_orders for j in range(-3, 4)]
+    mesh = [k * frame.teeth[0] + j * order for k in range(1, 7) for order in frame.shaft_orders for j in range(-3, 4)]
     return shafts + mesh
 
 
-def bearing_orders(frame: GearFrame) -> list[float]:
-    """Orders of every bearing's families with their sidebands."""
+def known_modulation(frame: GearFrame) -> list[Known]:
+    """Return what modulates the residual: gears, whose orders are exact, and every bearing's families."""
+    return [*((order, 0.0) for order in gear_orders(frame)), *_bearing_orders(frame)]
+
+
+def known_lines(frame: GearFrame) -> list[Known]:
+    """Return everything that the residual may hold: gears, bearings, and bearings about the mesh harmonics."""
+    bearings = _bearing_orders(frame)
+    mesh = [(k * frame.teeth[0] + s * o, slip) for k in range(1, 7) for o, slip in bearings[:24] for s in (-1, 1)]
+    return [*known_modulation(frame), *mesh]
+
+
+def _bearing_orders(frame: GearFrame) -> list[Known]:
+    """Return the orders of every bearing's families with their sidebands; what rolls may slip."""
     found = []
     for bearing in frame.bearings:
         shaft = frame.shaft_orders[bearing.side]
@@ -157,12 +173,6 @@ def bearing_orders(frame: GearFrame) -> list[float]:
             (bearing.cage, 0.0),
         ):
             if np.isfinite(order):
-                found += [k * order + j * side for k in range(1, N_FAMILY + 1) for j in ((-1, 0, 1) if side else (0,))]
+                sidebands = (-1, 0, 1) if side else (0,)
+                found += [(k * order + j * side, SLIP * k * order) for k in range(1, N_FAMILY + 1) for j in sidebands]
     return found
-
-
-def line_orders(frame: GearFrame) -> list[float]:
-    """Orders of everything that the residual may hold: gears, bearings, and bearings about the mesh harmonics."""
-    bearings = bearing_orders(frame)
-    mesh = [k * frame.teeth[0] + s * o for k in range(1, 7) for o in bearings[:24] for s in (-1, 1)]
-    return [*gear_orders(frame), *bearings, *mesh]

@@ -227,8 +227,8 @@ def _strange_words(comparison: Comparison, order: float) -> str:
         for kind, (attribute, factor) in RACES.items():
             if -SLIP < order / (getattr(bearing, attribute) * factor) - 1.0 < UPWARDS:
                 return f"at order {order:.4g}, that of the {RACE_WORDS[kind]} of {_bearing(bearing.name)}"
-    bearing = "and no bearing" if comparison.now.frame.bearings else "(the rig names no bearing)"
-    return f"at order {order:.4g}, which belongs to no shaft {bearing}"
+    nor = "and no bearing" if comparison.now.frame.bearings else "(the rig names no bearing)"
+    return f"at order {order:.4g}, which belongs to no shaft {nor}"
 
 
 def _fundamental(level: FloatArray, line: int) -> int:
