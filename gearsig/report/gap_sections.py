@@ -126,9 +126,17 @@ def _where(place: GapPlace) -> tuple[str, ...]:
 
 
 def cause_rows(report: GapReport) -> tuple[CauseRow, ...]:
-    """Return the causes, likeliest first; the first effects with what speaks for and against them."""
+    """Return the causes that have a chance, likeliest first; the first effects with what speaks for and against."""
     detailed = detailed_causes(report)
-    return tuple(_cause_row(cause, detailed=cause in detailed) for cause in report.causes)
+    shown = [cause for cause in report.causes if not cause.probability < LEAST_SHOWN or cause in detailed]
+    return tuple(_cause_row(cause, detailed=cause in detailed) for cause in shown)
+
+
+def others_text(report: GapReport) -> str:
+    """Name the causes that are not among `cause_rows`; empty where there are none."""
+    shown = {row.name for row in cause_rows(report)}
+    titles = [cause.title for cause in report.causes if cause.name not in shown]
+    return f"Below 1 % each: {', '.join(titles)}." if titles else ""
 
 
 def detailed_causes(report: GapReport) -> tuple[GapCause, ...]:
@@ -265,12 +273,12 @@ def percent(share: float) -> str:
 
     Examples
     --------
-    >>> percent(0.884), percent(0.003), percent(0.0), percent(float("nan")), percent(-0.1)
-    ('88 %', '< 1 %', '0 %', '–', '−10 %')
+    >>> percent(0.884), percent(0.003), percent(0.0), percent(float("nan")), percent(-0.1), percent(-0.001)
+    ('88 %', '< 1 %', '0 %', '–', '−10 %', '0 %')
     """
     if not isfinite(share):
         return "–"
-    return "< 1 %" if 0 < share < LEAST_SHOWN else f"{100 * share:.0f} %".replace("-", "−")
+    return "< 1 %" if 0 < share < LEAST_SHOWN else f"{round(100 * share)} %".replace("-", "−")
 
 
 def signed(value: float) -> str:

@@ -21,6 +21,7 @@ from gearsig.report.gap_sections import (
     group_texts,
     inseparable_text,
     next_rows,
+    others_text,
     place_rows,
     size_text,
     step_rows,
@@ -122,9 +123,8 @@ def _show_which(finished: Finished) -> None:
         },
         bars=("probability",),
     )
-    groups = group_texts(report)
-    if groups:
-        st.caption(as_typed(f"By group: {', '.join(groups)}."))
+    groups = ", ".join(group_texts(report))
+    st.caption(as_typed(f"{others_text(report)} {f'By group: {groups}.' if groups else ''}"))
     for place, row in enumerate(row for row in rows if row.statements):
         with st.expander(as_typed(f"{row.title}, {row.percent}"), expanded=place == 0):
             _show_evidence(row, finished)
