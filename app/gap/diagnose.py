@@ -20,7 +20,7 @@ from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.places import gap_places
 from gearsig.gap.population import load_population
-from gearsig.gap.posterior import load_gap_calibration, score_of
+from gearsig.gap.posterior import is_calibrated, load_gap_calibration, score_of
 from gearsig.gap.recognise import load_recogniser
 from gearsig.gap.simulator import GapEffect, GapSimulator, Twin
 from gearsig.gap.types import (
@@ -40,6 +40,11 @@ MOST_TRIED, LEAST_TRIED_PROBABILITY = 3, 0.06
 
 CLEAR_WITHOUT = 3.0
 """Structural floors from which a reference that far from the simulator is worth a remark."""
+
+UNCALIBRATED = (
+    "The probabilities are not calibrated on blind cases yet, and how often they are right has not been measured: "
+    "take them as a ranking only."
+)
 
 Stage = Callable[[str, float], object]
 
@@ -95,6 +100,8 @@ def diagnose_gap(
     twin = simulator.twin_of(own_rigs[0])
     tell("reading the recordings", 0.02)
     conditions, notices = _conditions(recordings, own_rigs, references, other_rigs, twin, names, tell)
+    if not is_calibrated():
+        notices.insert(0, UNCALIBRATED)
     tell("recognising", 0.2)
     forest = _forest(conditions, effects, known)
     with_reference = all(c.reference is not None for c in conditions)
@@ -110,7 +117,7 @@ def diagnose_gap(
     places = _places(clearest)
     causes = tuple(_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items())
     causes = _in_order(causes, outcome)
-    named = causes[0] if causes[0].fitted is not None and outcome is not GapOutcome.NO_GAP else None
+    named = causes[0] if causes[0].fitted is not None and outcome is GapOutcome.EFFECT else None
     after = None if named is None or named.fitted is None else _run(twin, clearest, named)
     tell("looking for what would tell more", 0.88)
     pair = _rivals(causes)
@@ -129,7 +136,7 @@ def diagnose_gap(
         causes=causes,
         groups=_groups(causes),
         inseparable=pair if outcome is GapOutcome.CANNOT_SEPARATE else None,
-        steps=steps_of(conditions, tried, causes) if named is not None else (),
+        steps=steps_of(conditions, tried, causes) if tried and outcome is not GapOutcome.NO_GAP else (),
         next_recordings=_next(pair, tried, twin, conditions, outcome),
         spectra=spectrum_curves(
             clearest.now,
@@ -197,8 +204,6 @@ def _conditions(
         found.append(Condition(facts, now, simulation, reference, change, features_of(now)))
         if reference is not None:
             notices += _strange_reference(reference, simulation, name)
-    if len(found) == 1:
-        notices.append("One operating condition: a second speed or load would make the answer surer.")
     if not references:
         notices.append("No healthy reference: a recording of the same rig when it was sound would make it much surer.")
     return found, notices

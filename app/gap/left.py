@@ -36,7 +36,7 @@ def steps_of(
             break
         added.append(tried[name])
         title = next(c.title for c in causes if c.name == name)
-        steps.append(GapStep(f"with {title}" if len(added) == 1 else f"and {title}", left))
+        steps.append(GapStep(title, left))
     return tuple(steps)
 
 

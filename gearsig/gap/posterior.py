@@ -86,5 +86,15 @@ def score_of(shrink: float, placebo: float) -> float:
 @cache
 def load_gap_calibration(*, with_reference: bool) -> GapCalibration:
     """Return the calibration that comes with this version."""
-    values = json.loads(FILE.read_text(encoding="utf-8"))
-    return GapCalibration.from_mapping(values["with_reference" if with_reference else "without_reference"])
+    return GapCalibration.from_mapping(_file()["with_reference" if with_reference else "without_reference"])
+
+
+def is_calibrated() -> bool:
+    """Whether the numbers were fitted to blind cases, or are only a start."""
+    return int(_file()["provenance"]["n_cases"]) > 0
+
+
+@cache
+def _file() -> dict[str, Any]:
+    values: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
+    return values
