@@ -12,9 +12,12 @@ from app.gap.bank import Bank, bank_of
 from app.gap.conditions import SEED, Condition, compare, halves, observed
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
+from gearsig.gap.features import once as feature_values
+from gearsig.gap.population import load_population
 from gearsig.gap.prediction import EffectPath, Fit, Observed, fit_effect, paths_of
 from gearsig.gap.shrinkage import Fold, shrinkage
 from gearsig.gap.simulator import Twin
+from gearsig.gap.transplant import transplanted
 from gearsig.gap.types import Shrinkage
 
 PROCESSES = 2
@@ -65,7 +68,7 @@ def try_effects(
     everything = [observed(c, k, n_compared(conditions)) for k, c in enumerate(conditions)]
     found = {}
     for name in names:
-        paths = _paths(name, banks, n_compared(conditions))
+        paths = _paths(name, banks, conditions)
         if paths:
             found[name] = Tried(name, paths, fit_effect(paths, everything), shrinkage(paths, folds, held_out))
     return found
@@ -92,17 +95,31 @@ def _bank(
     )
 
 
-def _paths(name: str, banks: Sequence[Bank], n: int) -> tuple[EffectPath, ...]:
+def _paths(name: str, banks: Sequence[Bank], conditions: Sequence[Condition]) -> tuple[EffectPath, ...]:
     """Return an effect's paths over the candidates that every condition's bank holds."""
+    n = n_compared(conditions)
     kept = [a for a in banks[0].added if a.name == name and all(a in bank.added for bank in banks)]
-    tables = [_distances(bank, n)[[bank.added.index(a) for a in kept]] for bank in banks]
+    tables = [
+        np.array([_distances(bank, bank.added.index(a), condition)[:n] for a in kept]).reshape(len(kept), n)
+        for bank, condition in zip(banks, conditions, strict=True)
+    ]
     return paths_of(banks[0].change_names[:n], kept, tables)
 
 
-def _distances(bank: Bank, n: int) -> FloatArray:
-    """Return each candidate's change less that of a mere second run."""
-    distances: FloatArray = (bank.changes.mean(axis=1) - bank.sound_changes.mean(axis=0))[:, :n]
-    return distances
+def _distances(bank: Bank, row: int, condition: Condition) -> FloatArray:
+    """Return what a candidate would change: on the sound machine's own baseline, where a reference shows it."""
+    n = len(bank.feature_names)
+    change: FloatArray = bank.changes[row].mean(axis=0)
+    change[:n] -= bank.sound_changes.mean(axis=0)[:n]  # a mere second run changes something, too
+    if condition.reference is None:
+        alone: FloatArray = change[:n]
+        return alone
+    floor = load_population().reference_floor
+    centres = -floor.from_centre(floor.names, np.zeros(len(floor.names)))
+    usual = dict(zip(floor.names, centres.tolist(), strict=True))
+    simulated = dict(zip(bank.feature_names, bank.sound.mean(axis=0).tolist(), strict=True))
+    real = dict(zip(*feature_values(condition.reference), strict=True))
+    return transplanted(bank.change_names, change, simulated, real, usual)
 
 
 def folds_of(conditions: Sequence[Condition]) -> tuple[list[Fold], str]:

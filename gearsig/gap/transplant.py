@@ -1,0 +1,118 @@
+"""What an effect that was simulated on a twin would change on the real machine, whose own unevenness is another."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.gap.gear_lines import SIDEBANDS, SIDES
+
+_RELATIVE = (
+    "mesh.half",
+    *(f"sideband.{side}.{label}" for side in SIDES for label in SIDEBANDS),
+    *(f"shaft.{side}.{n}.to_mesh" for side in SIDES for n in (1, 2, 3, "strongest")),
+    *(f"shaft.{side}.low" for side in SIDES),
+    *(f"tooth.{side}.{what}" for side in SIDES for what in ("level", "elsewhere", "peak")),
+)
+"""Powers over that of the mesh."""
+
+_ABSOLUTE = (*(f"shaft.{side}.{n}" for side in SIDES for n in (1, 2, 3)), "floor.total")
+_BANDS = "floor.band."
+_EXCESSES = ("envelope.", "line.")
+_NO_EXCESS = ("envelope.depth",)
+_OF_A_PATTERN = ("prominence", "second", "kurtosis", "width", "below_mesh", "centroid")
+
+
+def transplanted(
+    names: Sequence[str],
+    change: FloatArray,
+    simulated: Mapping[str, float],
+    real: Mapping[str, float],
+    usual: Mapping[str, float],
+) -> FloatArray:
+    """Return the changes that a simulated effect makes on the real machine's own baseline.
+
+    Powers of different causes add: P = P_real + (P_with − P_sound). On a twin whose teeth are rougher than the real
+    ones, or whose floor is lower, the same effect changes the decibels less or more. What falls, and shares of mesh
+    harmonics, change by the same decibels.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the changes, see `gearsig.gap.change`; those of patterns last, or none.
+    change : array, (n,)
+        dB, with the effect less sound, both simulated. `change.…`: the pattern's own value.
+    simulated, real : mapping
+        Feature → value of the sound twin and of the sound machine.
+    usual : mapping
+        `change.…` → what mere repetition gives.
+
+    Returns
+    -------
+    array, (n,)
+        dB; `change.…` from what repetition gives.
+    """
+    given = dict(zip(names, change.tolist(), strict=True))
+    found = dict(given)
+    gain_db = real["mesh.total"] - simulated["mesh.total"]
+    floor_db = real["floor.total"] - simulated["floor.total"] - gain_db
+    for name in names:
+        if name in _RELATIVE:
+            found[name] = _added(given[name], simulated[name], real[name], 0.0)
+        elif name in _ABSOLUTE or name.startswith(_BANDS):
+            found[name] = _added(given[name], simulated[name], real[name], gain_db)
+        elif name.startswith(_EXCESSES) and name not in _NO_EXCESS:
+            found[name] = _added(given[name], simulated[name], real[name], -floor_db)
+    for side in SIDES:
+        found |= _tooth(f"tooth.{side}", found, given, simulated, real)
+        if f"change.{side}.level" in given:
+            found |= _pattern(f"change.{side}", given, usual, real[f"tooth.{side}.level"])
+    return np.array([found[name] for name in names])
+
+
+def _power(decibels: float) -> float:
+    return float(10.0 ** (decibels / 10.0))
+
+
+def _added(change_db: float, simulated_db: float, real_db: float, gain_db: float) -> float:
+    """Return the change that the same added power makes on the real baseline."""
+    if change_db <= 0.0:
+        return change_db
+    more = (_power(simulated_db + change_db) - _power(simulated_db)) * _power(gain_db)
+    return float(10.0 * np.log10(1.0 + more / _power(real_db)))
+
+
+def _tooth(
+    name: str,
+    found: Mapping[str, float],
+    given: Mapping[str, float],
+    simulated: Mapping[str, float],
+    real: Mapping[str, float],
+) -> dict[str, float]:
+    """Return the shape of a shaft's pattern where the effect's own is added to what the real teeth are born with."""
+    peak, elsewhere = found[f"{name}.peak"], found[f"{name}.elsewhere"]
+    part = 1.0 - 1.0 / _power(found[f"{name}.level"]) if found[f"{name}.level"] > 0 else 0.0
+    shapes = {
+        f"{name}.{what}": part * (simulated[f"{name}.{what}"] + given[f"{name}.{what}"] - real[f"{name}.{what}"])
+        for what in ("kurtosis", "width", "below_mesh", "centroid")
+    }
+    born, own = real[f"{name}.second"], simulated[f"{name}.second"] + given[f"{name}.second"]
+    second = min(born + max(peak, 0.0), max(own, born)) - born  # a burst that reaches the next tooth tells no more
+    return {f"{name}.prominence": peak - elsewhere, f"{name}.second": second, **shapes}
+
+
+def _pattern(name: str, given: Mapping[str, float], usual: Mapping[str, float], own_db: float) -> dict[str, float]:
+    """Return how far the pattern of the difference lies from what mere repetition gives."""
+    found = {}
+    for what in ("level", "elsewhere", "peak"):
+        key = f"{name}.{what}"
+        found[key] = float(10.0 * np.log10(1.0 + _power(given[key]) / _power(usual[key])))
+    part = 1.0 - 1.0 / _power(found[f"{name}.level"])
+    for what in _OF_A_PATTERN:
+        key = f"{name}.{what}"
+        found[key] = part * (given[key] - usual[key])
+    agreement = (1.0 + _power(given[f"{name}.level"] - own_db)) ** -0.5
+    found[f"{name}.agreement"] = 10.0 * (agreement - 1.0)
+    return found

@@ -1,0 +1,64 @@
+"""Simulated changes on another machine's baseline, by closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gearsig.gap.population import load_population
+from gearsig.gap.transplant import transplanted
+
+POPULATION = load_population()
+FEATURES, NAMES = POPULATION.feature_names, POPULATION.change_names
+SOUND = dict(zip(FEATURES, POPULATION.features[0].tolist(), strict=True))
+USUAL = dict(zip(NAMES, np.median(POPULATION.changes[POPULATION.causes == "none"], axis=0).tolist(), strict=True))
+ONLY = len(FEATURES)
+
+
+def moved(change: dict[str, float], real: dict[str, float]) -> dict[str, float]:
+    row = np.array([change.get(name, 0.0) for name in FEATURES])
+    return dict(zip(FEATURES, transplanted(FEATURES, row, SOUND, real, USUAL).tolist(), strict=True))
+
+
+@given(st.floats(0.0, 30.0))
+def test_on_its_own_baseline_a_change_of_power_stays(change_db: float) -> None:
+    for name in ("sideband.driven.3to5", "shaft.driver.1", "floor.band.2", "line.outer"):
+        assert moved({name: change_db}, SOUND)[name] == pytest.approx(change_db, abs=1e-9)
+
+
+@given(st.floats(-20.0, 0.0))
+def test_what_falls_falls_alike_on_any_baseline(change_db: float) -> None:
+    name = "sideband.driver.1"
+    assert moved({name: change_db}, {**SOUND, name: SOUND[name] + 12.0})[name] == change_db
+
+
+def test_on_a_quieter_baseline_the_same_power_shows_more() -> None:
+    name = "sideband.driver.6to12"
+    quieter = {**SOUND, name: SOUND[name] - 20.0}
+    # 3 dB more is as much again, which is a hundred times the quieter baseline.
+    assert moved({name: 10 * np.log10(2.0)}, quieter)[name] == pytest.approx(10 * np.log10(101.0))
+
+
+def test_absolute_levels_follow_the_gain_of_the_path() -> None:
+    name = "shaft.driven.1"
+    louder = {**SOUND, "mesh.total": SOUND["mesh.total"] + 10.0, name: SOUND[name] + 10.0}
+    assert moved({name: 6.0}, louder)[name] == pytest.approx(6.0)
+
+
+def test_prominence_is_that_of_the_moved_peak() -> None:
+    quieter = {**SOUND, "tooth.driver.peak": SOUND["tooth.driver.peak"] - 10.0}
+    found = moved({"tooth.driver.peak": 3.0, "tooth.driver.prominence": 3.0}, quieter)
+    assert found["tooth.driver.prominence"] == pytest.approx(found["tooth.driver.peak"])
+    assert found["tooth.driver.peak"] > 9.0
+
+
+def test_nothing_changed_is_nothing_but_repetition() -> None:
+    change = np.array([0.0] * ONLY + [USUAL[name] - 200.0 * name.endswith(("level", "peak")) for name in NAMES[ONLY:]])
+    found = transplanted(NAMES, change, SOUND, SOUND, USUAL)
+    named = dict(zip(NAMES, found.tolist(), strict=True))
+    assert named["change.driver.level"] == pytest.approx(0.0, abs=1e-6)
+    assert named["change.driver.kurtosis"] == pytest.approx(0.0, abs=1e-6)
+    assert named["change.driver.agreement"] == pytest.approx(0.0, abs=1e-6)
+    assert np.abs(found[:ONLY]).max() == 0.0
