@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from app.gap.bank import Bank, bank_of
-from app.gap.conditions import SEED, Condition, compare, halves, observed
+from app.gap.conditions import LEAST_BLOCKS, SEED, Condition, compare, halves, observed
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.gap.features import once as feature_values
@@ -22,6 +22,7 @@ from gearsig.gap.types import Shrinkage
 
 PROCESSES = 2
 OTHER_POINT, OTHER_REVOLUTIONS = "another operating condition", "other revolutions of the same recordings"
+SAME_REVOLUTIONS = "the same revolutions, as there are too few to hold some out"
 
 
 @dataclass(frozen=True)
@@ -123,13 +124,7 @@ def _distances(bank: Bank, row: int, condition: Condition) -> FloatArray:
 
 
 def folds_of(conditions: Sequence[Condition]) -> tuple[list[Fold], str]:
-    """Return what to fit to and what to score on: each condition in turn, or both halves of the only one.
-
-    Raises
-    ------
-    RefusalError
-        If there is one condition and too few blocks of revolutions.
-    """
+    """Return what to fit to and what to score on: each condition in turn, or both halves of the only one."""
     n = n_compared(conditions)
     if len(conditions) > 1:
         all_of_them = [observed(c, k, n) for k, c in enumerate(conditions)]
@@ -140,6 +135,9 @@ def folds_of(conditions: Sequence[Condition]) -> tuple[list[Fold], str]:
             for one in all_of_them
         ], OTHER_POINT
     only = conditions[0]
+    if only.now.n_blocks < LEAST_BLOCKS:
+        whole = observed(only, 0, n)
+        return [Fold((whole,), whole, _again(only, 0, n))], SAME_REVOLUTIONS
     parts = halves(only.now)
     changes = [compare(part, only.simulated, only.reference) for part in parts]
     first, second = (observed(only, 0, n, change) for change in changes)

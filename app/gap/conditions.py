@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gearsig.errors import InputError, RefusalError
+from gearsig.errors import InputError
 from gearsig.gap.change import change_features, difference_features
 from gearsig.gap.features import Features
 from gearsig.gap.floors import REPEATABLE, pooled_scatter
@@ -60,6 +60,10 @@ class Condition:
     def run_s(self) -> float:
         """Length of a simulation at this point."""
         return run_length_s(self.now)
+
+
+LEAST_BLOCKS = 4
+"""Of revolutions that can be halved: the scatter within a half needs two."""
 
 
 def run_length_s(now: Gathered) -> float:
@@ -145,16 +149,8 @@ def observed(condition: Condition, index: int, n: int, change: Features | None =
 
 
 def halves(gathered: Gathered) -> tuple[Gathered, Gathered]:
-    """Return the blocks of revolutions with even and with odd numbers.
-
-    Raises
-    ------
-    RefusalError
-        If there are too few.
-    """
+    """Return the blocks of revolutions with even and with odd numbers; `LEAST_BLOCKS` at least."""
     n = gathered.n_blocks
-    if n < 4:
-        raise RefusalError(f"{n} blocks of revolutions cannot be halved", remedy="record longer")
     first = second = gathered
     for block in reversed(range(n)):
         first, second = (first.without(block), second) if block % 2 else (first, second.without(block))
