@@ -10,7 +10,7 @@ from app.gap.candidates import Tried, n_compared, refuse_without_candidates, try
 from app.gap.conditions import Condition, compare, facts_of, matching_reference, simulated
 from app.gap.left import steps_of
 from app.gap.next_recording import next_recordings
-from app.gap.placing import place_of
+from app.gap.placing import at_its_tooth, place_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap.curves import angle_curves, spectrum_curves
 from gearsig.gap.evidence import evidence_of
@@ -291,7 +291,7 @@ def _cause(
     return replace(
         base,
         severity=one.fit.severity,
-        fitted=one.fit.added,
+        fitted=at_its_tooth(one.fit.added, frame, places),
         place=place_of(one.fit.added, frame, places),
         shrinkage=one.shrinkage,
         evidence=evidence_of(one.fit, seen, frame),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from gearsig.gap.frame import GearFrame
 from gearsig.gap.gear_lines import SIDES
@@ -28,17 +29,25 @@ def place_of(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> str:
     words = shaft_words(frame, SIDES.index(str(side)))
     if "tooth" not in options:
         return f"the gear on {words}" if "gear" in options else words
-    return _tooth(next((p for p in places if p.kind is PlaceKind.TOOTH and p.shaft == shaft), None), words)
-
-
-def _tooth(found: GapPlace | None, words: str) -> str:
+    found = _tooth_place(shaft, places)
     if found is None or (found.tooth is None and found.angle_deg is None):
         return f"one tooth of the gear on {words}"
-    return (
-        f"tooth {found.tooth} of the gear on {words}"
-        if found.tooth is not None
-        else f"{found.angle_deg:.0f}° of {words}"
-    )
+    tooth = f"tooth {found.tooth} of the gear on"
+    return f"{tooth} {words}" if found.tooth is not None else f"{found.angle_deg:.0f}° of {words}"
+
+
+def at_its_tooth(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> Added:
+    """Return the setting with the recording's tooth in place of the simulated one, where a mark gives it a number."""
+    if "tooth" not in added.options:
+        return added
+    found = _tooth_place(frame.shafts[SIDES.index(str(added.options["gear"]))], places)
+    if found is None or found.tooth is None:
+        return added
+    return replace(added, options={**added.options, "tooth": float(found.tooth)})
+
+
+def _tooth_place(shaft: str, places: Sequence[GapPlace]) -> GapPlace | None:
+    return next((p for p in places if p.kind is PlaceKind.TOOTH and p.shaft == shaft), None)
 
 
 def _order(frame: GearFrame, places: Sequence[GapPlace], fitted: float) -> str:
