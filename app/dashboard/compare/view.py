@@ -8,6 +8,7 @@ from typing import Any
 import streamlit as st
 
 from app.dashboard.as_typed import as_typed
+from app.dashboard.widgets.download import download
 from app.dashboard.widgets.methods.notes import show_notes
 from app.dashboard.widgets.picture import show_picture
 from gearsig.compare.types import ChannelComparison, Comparison, LineLevel
@@ -51,24 +52,12 @@ def show_comparison(comparison: Comparison) -> None:
 def show_downloads(comparison: Comparison, page: Any, command: str) -> None:
     """Offer the page, the data and the lines; `page` makes the page's bytes when it is asked for."""
     with st.container(horizontal=True):
-        _download("Page (HTML)", page, "compare.html", "text/html", primary=True)
-        _download("JSON", lambda: comparison_to_json(comparison).encode(), "compare.json", "application/json")
-        _download("Lines (CSV)", lambda: orders_csv(comparison).encode(), "orders.csv", "text/csv")
+        download("Page (HTML)", page, "compare.html", "text/html", primary=True)
+        download("JSON", lambda: comparison_to_json(comparison).encode(), "compare.json", "application/json")
+        download("Lines (CSV)", lambda: orders_csv(comparison).encode(), "orders.csv", "text/csv")
     if command:
         with st.expander("The same from the command line", icon=":material/terminal:"):
             st.code(command, language="bash", wrap_lines=True)
-
-
-def _download(label: str, data: Any, name: str, mime: str, *, primary: bool = False) -> None:
-    st.download_button(
-        label,
-        data,
-        file_name=name,
-        mime=mime,
-        on_click="ignore",
-        type="primary" if primary else "secondary",
-        icon=":material/download:",
-    )
 
 
 def _facts(comparison: Comparison) -> str:

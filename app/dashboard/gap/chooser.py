@@ -12,9 +12,9 @@ from app.dashboard.as_typed import as_typed
 from app.dashboard.cached import sha256_of_upload
 from app.dashboard.gap.choice import Choice, Source
 from app.dashboard.state import Upload
+from app.dashboard.widgets.chooser import text_of_upload
 from app.dashboard.widgets.comparison import sample_name
 from app.samples import Sample, samples
-from gearsig.errors import InputError
 
 if TYPE_CHECKING:
     from streamlit.runtime.uploaded_file_manager import UploadedFile
@@ -135,12 +135,5 @@ def _uploads(label: str, kind: str, endings: list[str], words: str) -> tuple[Upl
 
 def _upload(file: UploadedFile, *, is_rig: bool) -> Upload:
     content = file.getbuffer()
-    text = _text_of(file) if is_rig else ""
+    text = text_of_upload(file) if is_rig else ""
     return Upload(file.name, sha256_of_upload(file.file_id, content), content, file.name, text)
-
-
-def _text_of(file: UploadedFile) -> str:
-    try:
-        return file.getvalue().decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError("is not text in UTF-8", where=file.name, remedy="save the rig file as UTF-8") from None

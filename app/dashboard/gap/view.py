@@ -9,6 +9,7 @@ import streamlit as st
 from app.dashboard.as_typed import as_typed
 from app.dashboard.gap.runner import Finished
 from app.dashboard.look import is_dark
+from app.dashboard.widgets.download import download
 from app.dashboard.widgets.methods.notes import show_notes
 from app.dashboard.widgets.verdict import Colour
 from app.gap.results import JSON, PAGE, TWIN
@@ -68,22 +69,10 @@ def _show_verdict(report: GapReport) -> None:
 
 def _show_downloads(finished: Finished) -> None:
     with st.container(horizontal=True):
-        _download("Report (HTML)", finished.page, PAGE, "text/html", primary=True)
-        _download("JSON", finished.json, JSON, "application/json")
+        download("Report (HTML)", finished.page, PAGE, "text/html", primary=True)
+        download("JSON", finished.json, JSON, "application/json")
         if finished.twin is not None:
-            _download("Twin (preset)", finished.twin, TWIN, "application/toml")
-
-
-def _download(label: str, data: bytes, name: str, mime: str, *, primary: bool = False) -> None:
-    st.download_button(
-        label,
-        data,
-        file_name=name,
-        mime=mime,
-        on_click="ignore",
-        type="primary" if primary else "secondary",
-        icon=":material/download:",
-    )
+            download("Twin (preset)", finished.twin, TWIN, "application/toml")
 
 
 def _show_where(finished: Finished) -> None:
