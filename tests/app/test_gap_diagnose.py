@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from app.gap.conditions import with_channels_of
 from app.gap.diagnose import diagnose_gap
 from gearsig.errors import InputError
+from gearsig.gap.gather import gather
 from gearsig.gap.posterior import is_calibrated
 from gearsig.gap.simulator import Added, Point
 from gearsig.gap.types import GapOutcome, GapReport
@@ -91,3 +93,12 @@ def test_lists_that_do_not_fit_are_errors() -> None:
         diagnose_gap([recording], simulator, effects=["rust"])
     with pytest.raises(InputError, match="carries no rig"):
         diagnose_gap([replace(recording, rig=None)], simulator)
+
+
+def test_a_recording_whose_channels_have_other_names_can_be_simulated() -> None:
+    recording = run(noise=1)
+    gathered = gather(recording, rig())
+    first, *_ = gathered.channels.values()
+    renamed = replace(gathered, channels={"Data1": first, "Data2": first, "Data3": first})
+    assert list(with_channels_of(gathered, renamed).channels) == ["Data1", "Data2", "Data3"]
+    assert list(with_channels_of(gathered, gathered).channels) == list(gathered.channels)
