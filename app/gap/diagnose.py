@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from app.gap.candidates import Tried, n_compared, refuse_without_candidates, try_effects
-from app.gap.conditions import Condition, compare, facts_of, matching_reference, simulated
+from app.gap.candidates import Tried, n_compared
+from app.gap.conditions import Condition, simulated
 from app.gap.left import steps_of
 from app.gap.next_recording import next_recordings
 from app.gap.placing import at_its_tooth, place_of
+from app.gap.prepare import Stage, conditions_of
+from app.gap.weigh import weigh
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap.curves import angle_curves, spectrum_curves
 from gearsig.gap.evidence import evidence_of
-from gearsig.gap.features import features_of
 from gearsig.gap.floors import gap_size
-from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.places import gap_places
 from gearsig.gap.population import load_population
-from gearsig.gap.posterior import is_calibrated, load_gap_calibration, score_of
-from gearsig.gap.recognise import load_recogniser
+from gearsig.gap.posterior import is_calibrated
 from gearsig.gap.simulator import GapEffect, GapSimulator, Twin
 from gearsig.gap.types import (
     NONE,
@@ -35,18 +34,10 @@ from gearsig.gap.types import (
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 
-MOST_TRIED, LEAST_TRIED_PROBABILITY = 3, 0.06
-"""Effects that are simulated: so many of the likeliest, none less likely than this."""
-
-CLEAR_WITHOUT = 3.0
-"""Structural floors from which a reference that far from the simulator is worth a remark."""
-
 UNCALIBRATED = (
     "The probabilities are not calibrated on blind cases yet, and how often they are right has not been measured: "
     "take them as a ranking only."
 )
-
-Stage = Callable[[str, float], object]
 
 
 def diagnose_gap(
@@ -99,19 +90,13 @@ def diagnose_gap(
     own_rigs, other_rigs = _rigs(recordings, rigs), _rigs(references, reference_rigs)
     twin = simulator.twin_of(own_rigs[0])
     tell("reading the recordings", 0.02)
-    conditions, notices = _conditions(recordings, own_rigs, references, other_rigs, twin, names, tell)
+    conditions, notices = conditions_of(recordings, own_rigs, references, other_rigs, twin, names, tell)
     if not is_calibrated():
         notices.insert(0, UNCALIBRATED)
     tell("recognising", 0.2)
-    forest = _forest(conditions, effects, known)
-    with_reference = all(c.reference is not None for c in conditions)
-    calibration = load_gap_calibration(with_reference=with_reference)
-    likely = _likely(calibration.probabilities(forest, {}), known)
-    tried = try_effects(likely, twin, conditions, cache, lambda what, done: tell(what, 0.25 + 0.55 * done))
-    refuse_without_candidates(tried, likely)
-    scores = {name: score_of(t.shrinkage.shrink.value, t.shrinkage.placebo) for name, t in tried.items()}
-    probabilities = calibration.probabilities(forest, scores)
-    outcome = calibration.outcome(probabilities)
+    weighed = weigh(conditions, known, effects, twin, cache, lambda what, done: tell(what, 0.25 + 0.55 * done))
+    tried, probabilities = weighed.tried, weighed.probabilities()
+    outcome = weighed.calibration.outcome(probabilities)
     tell("placing it", 0.82)
     clearest = max(conditions, key=_size)
     places = _places(clearest)
@@ -128,7 +113,7 @@ def diagnose_gap(
         rig=own_rigs[0].name,
         simulator=simulator.name,
         conditions=tuple(c.facts for c in conditions),
-        references=tuple(f"reference {i + 1}" for i in range(len(references))) if with_reference else (),
+        references=tuple(f"reference {i + 1}" for i in range(len(references))) if weighed.with_reference else (),
         outcome=outcome,
         size=size.structural,
         repeatability=size.repeatability.value,
@@ -178,74 +163,6 @@ def _rigs(recordings: Sequence[Recording], rigs: Sequence[Rig]) -> tuple[Rig, ..
     if any(rig is None for rig in found):
         raise InputError("a recording carries no rig", remedy="give rigs, one for each recording")
     return tuple(rig for rig in found if rig is not None)
-
-
-def _conditions(
-    recordings: Sequence[Recording],
-    rigs: Sequence[Rig],
-    references: Sequence[Recording],
-    reference_rigs: Sequence[Rig],
-    twin: Twin,
-    names: Sequence[str],
-    tell: Stage,
-) -> tuple[list[Condition], list[str]]:
-    found, notices = [], []
-    healthy = [gather(r, rig) for r, rig in zip(references, reference_rigs, strict=True)]
-    for i, (recording, rig) in enumerate(zip(recordings, rigs, strict=True)):
-        name = names[i] if names else f"recording {i + 1}"
-        tell(f"simulating the sound machine at the point of {name}", 0.05 + 0.15 * i / len(recordings))
-        now = gather(recording, rig)
-        facts = facts_of(recording, rig, now, name, _usual_torque_nm(twin))
-        simulation = simulated(twin, facts, now)
-        reference, why = matching_reference(now, rig, healthy, reference_rigs)
-        if why:
-            notices.append(f"{name} is compared with the simulation: {why}.")
-        change = compare(now, simulation, reference)
-        found.append(Condition(facts, now, simulation, reference, change, features_of(now)))
-        if reference is not None:
-            notices += _strange_reference(reference, simulation, name)
-    if not references:
-        notices.append("No healthy reference: a recording of the same rig when it was sound would make it much surer.")
-    return found, notices
-
-
-def _strange_reference(reference: Gathered, simulation: Gathered, name: str) -> list[str]:
-    """Say so where the reference itself is far from the simulation of a sound machine."""
-    floor = load_population().simulation_floor
-    size = gap_size(compare(reference, simulation, None), floor).structural.value
-    if size < CLEAR_WITHOUT:
-        return []
-    remark = (
-        f"The reference of {name} is itself {size:.1f} structural floors from the simulation of a sound machine: "
-        "if it was not healthy, only what changed since is seen."
-    )
-    return [remark]
-
-
-def _usual_torque_nm(twin: Twin) -> float:
-    nominal = getattr(twin, "nominal", None)
-    return float(getattr(nominal, "torque_nm", 0.0) or 1.0)
-
-
-def _forest(
-    conditions: Sequence[Condition], effects: Sequence[str], known: Mapping[str, GapEffect]
-) -> dict[str, float]:
-    """Return the forests' joint probabilities: the geometric mean over conditions, over what may be named."""
-    allowed = {NONE, UNKNOWN, *(effects or known)}
-    joint: dict[str, float] = {}
-    for condition in conditions:
-        recogniser = load_recogniser(with_reference=condition.reference is not None)
-        for name, p in recogniser.probabilities(condition.change, condition.alone).items():
-            if name in allowed:
-                joint[name] = joint.get(name, 1.0) * p ** (1.0 / len(conditions))
-    total = sum(joint.values())
-    return {name: p / total for name, p in joint.items()}
-
-
-def _likely(probabilities: dict[str, float], known: Mapping[str, GapEffect]) -> list[str]:
-    """Return the effects that are worth simulating, likeliest first."""
-    mechanical = [(n, p) for n, p in probabilities.items() if n in known]
-    return [name for name, p in mechanical if p >= LEAST_TRIED_PROBABILITY][:MOST_TRIED]
 
 
 def _size(condition: Condition) -> float:

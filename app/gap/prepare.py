@@ -1,0 +1,74 @@
+"""Recordings, references and the twin, reduced and set beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from app.gap.conditions import Condition, compare, facts_of, matching_reference, simulated
+from gearsig.gap.features import features_of
+from gearsig.gap.floors import gap_size
+from gearsig.gap.gather import gather
+from gearsig.gap.gathered import Gathered
+from gearsig.gap.population import load_population
+from gearsig.gap.simulator import Twin
+from gearsig.recording.types import Recording
+from gearsig.rig.types import Rig
+
+CLEAR_WITHOUT = 3.0
+"""Structural floors from which a reference that far from the simulator is worth a remark."""
+
+Stage = Callable[[str, float], object]
+
+
+def conditions_of(
+    recordings: Sequence[Recording],
+    rigs: Sequence[Rig],
+    references: Sequence[Recording],
+    reference_rigs: Sequence[Rig],
+    twin: Twin,
+    names: Sequence[str],
+    tell: Stage,
+) -> tuple[list[Condition], list[str]]:
+    """Return the conditions, and what is worth a remark.
+
+    Raises
+    ------
+    RefusalError
+        If a speed cannot be known or there are too few revolutions.
+    """
+    found, notices = [], []
+    healthy = [gather(r, rig) for r, rig in zip(references, reference_rigs, strict=True)]
+    for i, (recording, rig) in enumerate(zip(recordings, rigs, strict=True)):
+        name = names[i] if names else f"recording {i + 1}"
+        tell(f"simulating the sound machine at the point of {name}", 0.05 + 0.15 * i / len(recordings))
+        now = gather(recording, rig)
+        facts = facts_of(recording, rig, now, name, _usual_torque_nm(twin))
+        simulation = simulated(twin, facts, now)
+        reference, why = matching_reference(now, rig, healthy, reference_rigs)
+        if why:
+            notices.append(f"{name} is compared with the simulation: {why}.")
+        change = compare(now, simulation, reference)
+        found.append(Condition(facts, now, simulation, reference, change, features_of(now)))
+        if reference is not None:
+            notices += _strange_reference(reference, simulation, name)
+    if not references:
+        notices.append("No healthy reference: a recording of the same rig when it was sound would make it much surer.")
+    return found, notices
+
+
+def _strange_reference(reference: Gathered, simulation: Gathered, name: str) -> list[str]:
+    """Say so where the reference itself is far from the simulation of a sound machine."""
+    floor = load_population().simulation_floor
+    size = gap_size(compare(reference, simulation, None), floor).structural.value
+    if size < CLEAR_WITHOUT:
+        return []
+    remark = (
+        f"The reference of {name} is itself {size:.1f} structural floors from the simulation of a sound machine: "
+        "if it was not healthy, only what changed since is seen."
+    )
+    return [remark]
+
+
+def _usual_torque_nm(twin: Twin) -> float:
+    nominal = getattr(twin, "nominal", None)
+    return float(getattr(nominal, "torque_nm", 0.0) or 1.0)
