@@ -41,7 +41,6 @@ class Condition:
     reference : Gathered or None
     change : Features
         Against the reference, or else against the twin.
-    alone : Features
     """
 
     facts: ConditionFacts
@@ -49,7 +48,6 @@ class Condition:
     simulated: Gathered
     reference: Gathered | None
     change: Features
-    alone: Features
 
     @property
     def other(self) -> Gathered:

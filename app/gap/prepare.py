@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from app.gap.conditions import Condition, compare, facts_of, matching_reference, simulated
-from gearsig.gap.features import features_of
 from gearsig.gap.floors import gap_size
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
@@ -48,7 +47,7 @@ def conditions_of(
         if why:
             notices.append(f"{name} is compared with the simulation: {why}.")
         change = compare(now, simulation, reference)
-        found.append(Condition(facts, now, simulation, reference, change, features_of(now)))
+        found.append(Condition(facts, now, simulation, reference, change))
         if reference is not None:
             notices += _strange_reference(reference, simulation, name)
     if not references:

@@ -82,7 +82,7 @@ def _forest(
     joint: dict[str, float] = {}
     for condition in conditions:
         recogniser = load_recogniser(with_reference=condition.reference is not None)
-        for name, p in recogniser.probabilities(condition.change, condition.alone).items():
+        for name, p in recogniser.probabilities(condition.change).items():
             if name in allowed:
                 joint[name] = joint.get(name, 1.0) * p ** (1.0 / len(conditions))
     total = sum(joint.values())

@@ -34,42 +34,40 @@ class Recogniser:
         Of the probabilities.
     floor : StructuralFloor
     forest : sklearn.ensemble.ExtraTreesClassifier
-    feature_names : tuple of str
     """
 
     causes: tuple[str, ...]
     floor: StructuralFloor
     forest: Any
-    feature_names: tuple[str, ...]
 
-    def probabilities(self, change: Features, alone: Features) -> dict[str, float]:
+    def probabilities(self, change: Features) -> dict[str, float]:
         """Return cause → probability, uncalibrated.
 
         Parameters
         ----------
         change : Features
             Against the reference or against the twin, as the forest was fitted.
-        alone : Features
-            Of the recording by itself.
         """
-        found = np.maximum(self.forest.predict_proba(self._row(change, alone)[None])[0], LEAST_PROBABILITY)
+        found = np.maximum(self.forest.predict_proba(self._row(change)[None])[0], LEAST_PROBABILITY)
         return dict(zip(self.causes, (found / found.sum()).tolist(), strict=True))
 
-    def _row(self, change: Features, alone: Features) -> FloatArray:
-        if change.names != self.floor.names or alone.names != self.feature_names:
+    def _row(self, change: Features) -> FloatArray:
+        if change.names != self.floor.names:
             raise InputError(
                 "the population belongs to other features than this version computes",
                 remedy="make it again: python -m app.calibration.gap.population",
             )
-        return input_rows(self.floor, change.values, change.scatter, alone.values)
+        return input_rows(self.floor, change.values, change.scatter)
 
 
-def input_rows(floor: StructuralFloor, changes: FloatArray, scatter: FloatArray, features: FloatArray) -> FloatArray:
-    """Return what the forest sees: changes over both floors, large ones compressed, beside the features themselves."""
+def input_rows(floor: StructuralFloor, changes: FloatArray, scatter: FloatArray) -> FloatArray:
+    """Return what the forest sees: changes over both floors, large ones compressed.
+
+    Not the features themselves: a tachometer that jitters more than any in the population is no hunting speed.
+    """
     both = np.hypot(floor.of(floor.names), REPEATABLE * scatter)
-    distances = np.arcsinh(2.0 * floor.from_centre(floor.names, changes) / both)
-    rows: FloatArray = np.concatenate([distances, features], axis=-1)
-    return rows
+    distances: FloatArray = np.arcsinh(2.0 * floor.from_centre(floor.names, changes) / both)
+    return distances
 
 
 def fit_recogniser(population: Population, *, with_reference: bool) -> Recogniser:
@@ -86,8 +84,8 @@ def fit_recogniser(population: Population, *, with_reference: bool) -> Recognise
     forest = ExtraTreesClassifier(
         N_TREES, max_features=FEATURE_SHARE, class_weight="balanced", n_jobs=2, random_state=_SEED
     )
-    forest.fit(input_rows(floor, *tables, population.features), population.causes)
-    return Recogniser(tuple(map(str, forest.classes_)), floor, forest, population.feature_names)
+    forest.fit(input_rows(floor, *tables), population.causes)
+    return Recogniser(tuple(map(str, forest.classes_)), floor, forest)
 
 
 @cache

@@ -32,9 +32,8 @@ def some(population: Population, rows: np.ndarray) -> Population:
     return replace(population, **{name: getattr(population, name)[rows] for name in tables})
 
 
-def row(population: Population, i: int) -> tuple[Features, Features]:
-    change = Features(population.change_names, population.changes[i], population.change_scatter[i])
-    return change, Features(population.feature_names, population.features[i], np.zeros(len(population.feature_names)))
+def row(population: Population, i: int) -> Features:
+    return Features(population.change_names, population.changes[i], population.change_scatter[i])
 
 
 def test_every_effect_is_in_the_population(population: Population) -> None:
@@ -53,16 +52,16 @@ def test_machines_that_the_forest_never_saw_are_recognised_far_above_chance(
     population: Population, on_half: Recogniser
 ) -> None:
     others = np.flatnonzero(population.rigs % 2 == 1)
-    found = [on_half.probabilities(*row(population, int(i))) for i in others]
+    found = [on_half.probabilities(row(population, int(i))) for i in others]
     right = np.mean([max(p, key=p.__getitem__) == population.causes[i] for p, i in zip(found, others, strict=True)])
     assert right > 0.4
     assert all(sum(p.values()) == pytest.approx(1.0) for p in found)
 
 
 def test_other_features_than_the_population_has_are_an_error(population: Population, on_half: Recogniser) -> None:
-    change, alone = row(population, 0)
+    change = row(population, 0)
     with pytest.raises(InputError, match="belongs to other features"):
-        on_half.probabilities(replace(change, names=change.names[::-1]), alone)
+        on_half.probabilities(replace(change, names=change.names[::-1]))
 
 
 def test_a_missing_population_says_how_to_make_it(tmp_path: Path) -> None:
