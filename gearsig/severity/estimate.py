@@ -252,7 +252,8 @@ def _check_direction(evidence: GearEvidence) -> None:
     share, error = share_of_the_recording(evidence.shaft, evidence.searched, evidence.event)
     if share < CLEARLY_OF_THE_REFERENCE and share < -STANDARD_ERRORS * error:
         raise RefusalError(
-            f"what stands out at one tooth of shaft {evidence.shaft.shaft!r} seems to be in the reference, not in the recording",
+            f"what stands out at one tooth of shaft {evidence.shaft.shaft!r} seems to be in the reference, not in the "
+            "recording",
             remedy="swap both if they were exchanged, or take a reference of sound gears",
         )
 
