@@ -10,8 +10,7 @@ from typing import Any
 from app.benchmark.plan import SAME, Plan, PlannedCase
 from gearsig.errors import RefusalError
 from gearsig.recording.types import Recording
-from sims.blind.case import Case, CaseRecordings, draw_case, record_case
-from sims.blind.write import labels, write_seen
+from sims.blind import Case, CaseRecordings, draw_case, labels, record_case, write_seen
 
 
 @dataclass(frozen=True)

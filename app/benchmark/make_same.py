@@ -14,9 +14,7 @@ import numpy as np
 from app.benchmark.plan import Plan, PlannedCase
 from gearsig.gap.simulator import Added, Point
 from gearsig.recording.types import Recording
-from sims.blind.case import Case, CaseRecordings
-from sims.blind.rig import SHAFTS
-from sims.blind.scene import Condition
+from sims.blind import SHAFTS, Case, CaseRecordings, Condition
 from sims.cracked.twin import CrackedGapSimulator, CrackedTwin
 from sims.effects import effect
 

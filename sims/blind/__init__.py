@@ -47,7 +47,8 @@ pair            z1, z2, module_mm
 
 "Pinion" is the gear on the input shaft, "wheel" that on the output shaft, whichever is larger.
 
-Names: `CATALOGUE` (19), `MECHANICAL` (16 of them), `OUTSIDE` (10).
+Names: `CATALOGUE` (19), `MECHANICAL` (16 of them), `OUTSIDE` (10). For the benchmark's own cases: `Condition`, `SHAFTS`;
+`labels` and `write_seen` are the two halves of `write_case`.
 """
 
 from __future__ import annotations
@@ -57,29 +58,38 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from sims.blind.case import Case, CaseRecordings, Fault, draw_case, record_case
     from sims.blind.changes.catalogue import CATALOGUE, MECHANICAL, OUTSIDE
-    from sims.blind.rig import ROLES, BlindRig
-    from sims.blind.write import write_case
+    from sims.blind.rig import ROLES, SHAFTS, BlindRig
+    from sims.blind.scene import Condition
+    from sims.blind.write import labels, write_case, write_seen
 
 __all__ = [
     "CATALOGUE",
     "MECHANICAL",
     "OUTSIDE",
     "ROLES",
+    "SHAFTS",
     "BlindRig",
     "Case",
     "CaseRecordings",
+    "Condition",
     "Fault",
     "draw_case",
+    "labels",
     "record_case",
     "write_case",
+    "write_seen",
 ]
 _HOMES = {
     "CATALOGUE": "changes.catalogue",
     "MECHANICAL": "changes.catalogue",
     "OUTSIDE": "changes.catalogue",
     "ROLES": "rig",
+    "SHAFTS": "rig",
     "BlindRig": "rig",
+    "Condition": "scene",
+    "labels": "write",
     "write_case": "write",
+    "write_seen": "write",
 }
 
 
