@@ -29,7 +29,7 @@ def test_two_samples_are_compared_and_the_page_is_downloaded(page: playwright.Pa
     for name, n_images in (("Orders", 1), ("Angle", 2), ("Bands", 2), ("Lines", 0)):
         page.get_by_role("tab", name=name, exact=True).click()
         settle(page)
-        assert page.get_by_test_id("stImage").count() == n_images
+        playwright.expect(page.get_by_test_id("stImage")).to_have_count(n_images, timeout=60_000)
     with page.expect_download() as download:
         page.get_by_role("button", name="Page (HTML)").click()
     assert download.value.suggested_filename == "compare.html"
