@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from gearsig.errors import InputError
 from gearsig.gap.change import change_features, difference_features
 from gearsig.gap.features import Features
-from gearsig.gap.floors import REPEATABLE, pooled_scatter
+from gearsig.gap.floors import REPEATABLE, StructuralFloor, pooled_scatter
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.population import load_population
@@ -53,6 +53,11 @@ class Condition:
     def other(self) -> Gathered:
         """What it is compared with."""
         return self.reference if self.reference is not None else self.simulated
+
+    @property
+    def floor(self) -> StructuralFloor:
+        """How far healthy machines lie from what it is compared with."""
+        return load_population().floor(with_reference=self.reference is not None)
 
     @property
     def run_s(self) -> float:
@@ -100,25 +105,15 @@ def compare(now: Gathered, simulation: Gathered, reference: Gathered | None) -> 
     return difference_features(now, simulation) if reference is None else change_features(now, reference)
 
 
-def facts_of(recording: Recording, rig: Rig, now: Gathered, name: str, usual_torque_nm: float) -> ConditionFacts:
+def facts_of(recording: Recording, rig: Rig, now: Gathered, name: str, twin: Twin) -> ConditionFacts:
     """Return what is known of a recording's operating point: measured speed, stated torque of the driver."""
     return ConditionFacts(
         name,
-        Point(60.0 * now.speed_hz, torque_of(rig) or usual_torque_nm),
+        Point(60.0 * now.speed_hz, _torque_nm(rig) or twin.point.torque_nm),
         now.n_revolutions,
         recording.duration_s,
         recording.sampling_rate_hz,
     )
-
-
-def torque_of(rig: Rig) -> float | None:
-    """Return the driver's torque that a rig states, from either shaft's; None where it states none."""
-    point, pair = rig.operating_point, rig.pairs[0]
-    if point.torque_nm is None:
-        return None
-    if point.shaft in ("", pair.driver) or pair.driver_teeth is None or pair.driven_teeth is None:
-        return abs(point.torque_nm)
-    return abs(point.torque_nm) * pair.driver_teeth / pair.driven_teeth
 
 
 def matching_reference(
@@ -132,7 +127,7 @@ def matching_reference(
     change = now.speed_hz / found.speed_hz - 1.0
     if abs(change) > LARGEST_SPEED_DIFFERENCE:
         return None, f"no reference within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of its speed"
-    here, there = torque_of(rig), torque_of(rigs[nearest])
+    here, there = _torque_nm(rig), _torque_nm(rigs[nearest])
     if here and there and abs(here / there - 1.0) > LARGEST_TORQUE_DIFFERENCE:
         return None, f"the reference at its speed has {there:.3g} N m, the recording {here:.3g} N m"
     if set(found.channels) != set(now.channels):
@@ -141,15 +136,19 @@ def matching_reference(
 
 
 def _distance(now: Gathered, rig: Rig, reference: Gathered, other: Rig) -> float:
-    here, there = torque_of(rig), torque_of(other)
+    here, there = _torque_nm(rig), _torque_nm(other)
     torque = abs(here / there - 1.0) if here and there else 0.0
     return 10.0 * abs(now.speed_hz / reference.speed_hz - 1.0) + torque
+
+
+def _torque_nm(rig: Rig) -> float | None:
+    return rig.nominal_torque_nm(rig.pairs[0].driver)
 
 
 def observed(condition: Condition, index: int, n: int, change: Features | None = None) -> Observed:
     """Return a condition's distances and floors of the first `n` features; `change` instead of its own."""
     used = change or condition.change
-    structural = load_population().floor(with_reference=condition.reference is not None)
+    structural = condition.floor
     both = (structural.of(used.names) ** 2 + (REPEATABLE * pooled_scatter(used)) ** 2) ** 0.5
     return Observed(index, structural.from_centre(used.names, used.values)[:n], both[:n])
 

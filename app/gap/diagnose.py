@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from app.gap.candidates import Tried, n_compared
-from app.gap.conditions import Condition, simulated
+from app.gap.conditions import Condition, observed, simulated
 from app.gap.left import steps_of
 from app.gap.next_recording import next_recordings
 from app.gap.placing import at_its_tooth, place_of
@@ -17,11 +17,10 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.gap.curves import angle_curves, spectrum_curves
 from gearsig.gap.evidence import evidence_of
 from gearsig.gap.floors import gap_size
-from gearsig.gap.gathered import Gathered
 from gearsig.gap.places import gap_places
 from gearsig.gap.population import load_population
 from gearsig.gap.posterior import is_calibrated
-from gearsig.gap.simulator import GapEffect, GapSimulator, Twin
+from gearsig.gap.simulator import Added, GapEffect, GapSimulator, Twin
 from gearsig.gap.types import (
     NONE,
     UNKNOWN,
@@ -102,12 +101,11 @@ def diagnose_gap(
     places = _places(clearest)
     causes = tuple(_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items())
     causes = _in_order(causes, outcome)
-    named = causes[0] if causes[0].fitted is not None and outcome is GapOutcome.EFFECT else None
-    after = None if named is None or named.fitted is None else _run(twin, clearest, named)
+    fitted = causes[0].fitted if outcome is GapOutcome.EFFECT else None
+    after = None if fitted is None else simulated(twin, clearest.facts, clearest.now, (fitted,))
     tell("looking for what would tell more", 0.88)
     pair = _rivals(causes)
-    structural = load_population().floor(with_reference=clearest.reference is not None)
-    size = gap_size(clearest.change, structural)
+    size = gap_size(clearest.change, clearest.floor)
     reference = clearest.reference
     return GapReport(
         rig=own_rigs[0].name,
@@ -138,7 +136,7 @@ def diagnose_gap(
             simulated_sound=clearest.simulated if reference is not None else None,
         ),
         notices=tuple(notices),
-        twin_toml="" if named is None or named.fitted is None else _preset(twin, clearest, named),
+        twin_toml="" if fitted is None else _preset(twin, clearest, causes[0], fitted),
     )
 
 
@@ -166,17 +164,15 @@ def _rigs(recordings: Sequence[Recording], rigs: Sequence[Rig]) -> tuple[Rig, ..
 
 
 def _size(condition: Condition) -> float:
-    structural = load_population().floor(with_reference=condition.reference is not None)
-    return gap_size(condition.change, structural).structural.value
+    return gap_size(condition.change, condition.floor).structural.value
 
 
 def _places(condition: Condition) -> tuple[GapPlace, ...]:
-    structural = load_population().floor(with_reference=condition.reference is not None)
     try:
         return gap_places(
             condition.now,
             condition.other,
-            structural,
+            condition.floor,
             is_reference=condition.reference is not None,
             change=condition.change,
         )
@@ -199,8 +195,6 @@ def _cause(
     base = GapCause(name, effect.group, effect.title, effect.unit, probability, is_nuisance=effect.is_nuisance)
     if name not in tried:
         return base
-    from app.gap.conditions import observed
-
     one = tried[name]
     n = n_compared(conditions)
     seen = [observed(c, k, n) for k, c in enumerate(conditions)]
@@ -238,23 +232,13 @@ def _groups(causes: Sequence[GapCause]) -> dict[str, float]:
     return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
-def _run(twin: Twin, condition: Condition, cause: GapCause) -> Gathered | None:
-    if cause.fitted is None:
-        return None
-    try:
-        return simulated(twin, condition.facts, condition.now, (cause.fitted,))
-    except (InputError, RefusalError):  # a severity beyond the candidates' that the model cannot have
-        return None
-
-
-def _preset(twin: Twin, condition: Condition, cause: GapCause) -> str:
-    if cause.fitted is None or cause.severity is None:
-        return ""
+def _preset(twin: Twin, condition: Condition, cause: GapCause, fitted: Added) -> str:
+    within = f"90 % interval {cause.severity.low:.3g} to {cause.severity.high:.3g}; " if cause.severity else ""
     note = (
-        f"{cause.title}: {cause.severity.value:.3g} {cause.unit}, 90 % interval {cause.severity.low:.3g} to "
-        f"{cause.severity.high:.3g}; fitted to {condition.facts.name}, probability {cause.probability:.2f}"
+        f"{cause.title}: {fitted.severity:.3g} {cause.unit}, {within}fitted to {condition.facts.name}, "
+        f"probability {cause.probability:.2f}"
     )
-    return twin.preset_toml(condition.facts.point, (cause.fitted,), (note,))
+    return twin.preset_toml(condition.facts.point, (fitted,), (note,))
 
 
 def _next(

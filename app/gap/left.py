@@ -11,7 +11,6 @@ from app.gap.candidates import Tried, folds_of, n_compared
 from app.gap.conditions import Condition
 from gearsig.checks import FloatArray
 from gearsig.gap.floors import gap_size
-from gearsig.gap.population import load_population
 from gearsig.gap.prediction import Fit, Observed, fit_effect
 from gearsig.gap.shrinkage import Fold
 from gearsig.gap.types import GapCause, GapStep, Interval
@@ -65,7 +64,7 @@ def _without(one: Observed, fits: Sequence[Fit]) -> Observed:
 def _size(condition: Condition, scored: Observed, taken: FloatArray, n: int) -> Interval:
     """Return the size of what a condition's change leaves, with the scored part's own distances."""
     change = condition.change
-    structural = load_population().floor(with_reference=condition.reference is not None)
+    structural = condition.floor
     whole = structural.from_centre(change.names, change.values)
     shift = np.zeros(len(change.names))
     shift[:n] = scored.distances - whole[:n]

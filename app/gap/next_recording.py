@@ -11,7 +11,6 @@ from app.gap.candidates import PROCESSES, Tried, n_compared
 from app.gap.conditions import SEED, Condition
 from gearsig.checks import FloatArray
 from gearsig.gap.families import family_members
-from gearsig.gap.population import load_population
 from gearsig.gap.simulator import Point, Twin
 from gearsig.gap.types import NextRecording
 
@@ -28,9 +27,8 @@ def next_recordings(
     """Return points at which both effects' predictions lie further apart than at those there are, best first."""
     base = conditions[0]
     n = n_compared(conditions)
-    structural = load_population().floor(with_reference=base.reference is not None)
     names = base.change.names[:n]
-    floors = structural.of(names)
+    floors = base.floor.of(names)
     now = max(_apart(names, first.fit.at(k) - second.fit.at(k), floors) for k in range(len(conditions)))
     found = []
     for speed, torque in FACTORS:

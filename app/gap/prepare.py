@@ -41,7 +41,7 @@ def conditions_of(
         name = names[i] if names else f"recording {i + 1}"
         tell(f"simulating the sound machine at the point of {name}", 0.05 + 0.15 * i / len(recordings))
         now = gather(recording, rig)
-        facts = facts_of(recording, rig, now, name, _usual_torque_nm(twin))
+        facts = facts_of(recording, rig, now, name, twin)
         simulation = simulated(twin, facts, now)
         reference, why = matching_reference(now, rig, healthy, reference_rigs)
         if why:
@@ -66,8 +66,3 @@ def _strange_reference(reference: Gathered, simulation: Gathered, name: str) -> 
         "if it was not healthy, only what changed since is seen."
     )
     return [remark]
-
-
-def _usual_torque_nm(twin: Twin) -> float:
-    nominal = getattr(twin, "nominal", None)
-    return float(getattr(nominal, "torque_nm", 0.0) or 1.0)

@@ -71,6 +71,11 @@ class Twin(Protocol):
         """Text that changes whenever a run would come out otherwise: model, version, values."""
         ...
 
+    @property
+    def point(self) -> Point:
+        """The rig's nominal operating point, as is usual for its size where the rig does not tell."""
+        ...
+
     def run(
         self,
         point: Point,

@@ -295,6 +295,17 @@ class Rig:
         ratio = self.ratio(shaft or self.reference_shaft, to=point.shaft or self.reference_shaft)
         return None if ratio is None else point.speed_rpm * ratio
 
+    def nominal_torque_nm(self, shaft: str = "") -> float | None:
+        """Magnitude of the nominal torque as `shaft` (default: the reference shaft) feels it; None if not known.
+
+        The same power everywhere: torque falls as speed rises.
+        """
+        point = self.operating_point
+        if point.torque_nm is None:
+            return None
+        ratio = self.ratio(point.shaft or self.reference_shaft, to=shaft or self.reference_shaft)
+        return None if ratio is None else abs(point.torque_nm) * ratio
+
     def pair(self, name: str) -> GearPair:
         """Return the pair called `name`."""
         for pair in self.pairs:

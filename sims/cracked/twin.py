@@ -59,6 +59,11 @@ class CrackedTwin:
         known = {name: value for name, value in rig_to_dict(self.rig).items() if name not in ("name", "sources")}
         return f"{NAME} {sources_digest()} {sha256(repr(known).encode()).hexdigest()[:16]}"
 
+    @property
+    def point(self) -> Point:
+        """The rig's nominal operating point, as is usual for its size where the rig does not tell."""
+        return Point(self.nominal.speed_rpm, self.nominal.torque_nm)
+
     def run(
         self,
         point: Point,
@@ -156,7 +161,7 @@ class CrackedTwin:
         pair = prepare_preset(self.preset(point), {}, (), None, np.random.default_rng(0)).machine.mesh.pair
         shafts = (self.rig.pairs[0].driver, self.rig.pairs[0].driven)
         own = tuple(completed(b, self.nominal.size) for b in self.rig.bearings if b.shaft in shafts)
-        sound = self.run(point, seed=0, duration_s=VIBRATION_S, sampling_rate_hz=20480.0)
+        sound = self.run(self.point, seed=0, duration_s=VIBRATION_S, sampling_rate_hz=20480.0)
         rms = np.mean([np.std(sound.values(name)) for name in sound.vibration_names()])
         return Surroundings(self.nominal, (pair.driver, pair.driven), own, float(rms))
 

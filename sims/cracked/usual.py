@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from gearsig.errors import RefusalError
-from gearsig.rig.types import GearPair, Rig
+from gearsig.rig.types import Rig
 from sims.cracked.installed import HousingMode
 from sims.simulator import ParameterValue
 
@@ -99,7 +99,7 @@ def nominal_of(rig: Rig) -> Nominal:
         )
     teeth, module = (pair.driver_teeth, pair.driven_teeth), pair.module_mm
     width = pair.face_width_mm or USUAL_WIDTH_MODULES * module
-    torque, speed = _torque_nm(rig, pair), rig.nominal_speed_rpm(pair.driver)
+    torque, speed = rig.nominal_torque_nm(pair.driver), rig.nominal_speed_rpm(pair.driver)
     told = {
         "face_width_mm": pair.face_width_mm,
         "pressure_angle_deg": pair.pressure_angle_deg,
@@ -207,13 +207,6 @@ def usual_mass_kg(nominal: Nominal, side: int) -> float:
     radius = 0.5 * nominal.pitch_diameters_mm[side]
     bore = 0.35 * (radius - 1.25 * nominal.module_mm)
     return 7850e-9 * pi * (radius**2 - bore**2) * nominal.face_width_mm
-
-
-def _torque_nm(rig: Rig, pair: GearPair) -> float | None:
-    """Return the stated torque as felt at the driver: the same power everywhere."""
-    point = rig.operating_point
-    ratio = rig.ratio(point.shaft or rig.reference_shaft, to=pair.driver)
-    return None if point.torque_nm is None or ratio is None else abs(point.torque_nm) * ratio
 
 
 def _shift(teeth: int, pressure_angle_deg: float) -> float:

@@ -62,6 +62,17 @@ def test_speed_follows_the_ratio() -> None:
     )
     assert rig.reference_shaft == "out"
     assert rig.nominal_speed_rpm("in") == 1200
+    assert rig.nominal_torque_nm("in") is None
+
+
+def test_torque_falls_as_speed_rises() -> None:
+    rig = Rig(
+        shafts=(Shaft("in"), Shaft("out")),
+        pairs=(GearPair("p", "in", "out", 20, 80),),
+        operating_point=OperatingPoint("out", 300.0, torque_nm=-80.0),
+    )
+    assert rig.nominal_torque_nm() == 80.0
+    assert rig.nominal_torque_nm("in") == 20.0
 
 
 def test_bearing_orders_of_6205() -> None:
