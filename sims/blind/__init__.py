@@ -21,7 +21,8 @@ Making cases
     `backlash` takes care that its first condition is a light load, which a quarter of all others have by chance.
 `record_case(case) -> CaseRecordings`
     Runs it in memory: `conditions`, `references`, `twins`, `places`. A twin is the same run from the same seeds
-    without the fault, so that the true place and size of the change can be measured.
+    without the fault, so that the true place and size of the change can be measured. All recordings of a case are of
+    one assembly, begun wherever it stood: what is fixed to a shaft turns with it, and teeth keep their partners.
 `write_case(case, folder, labels_folder)`
     Writes ``folder`` for the diagnosing side: ``condition_1.h5``, with two conditions ``condition_2.h5``, with
     references ``reference_1.h5`` (same operating point as ``condition_1.h5``) and so on; each beside a rig file of the

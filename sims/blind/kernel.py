@@ -105,7 +105,10 @@ def march(
         if step > 0:
             predict(steps, q, p, f, q_new, p_new)
         look(seen, q_new, p_new, u, v)
-        theta_1, theta_2 = u[1], u[2] + number[PHASE_2]
+        # Turned to the tooth it meets with, the driven shaft is turned as a whole, from the gear to the brake.
+        u[2] += number[PHASE_2]
+        u[8] += number[PHASE_2]
+        theta_1, theta_2 = u[1], u[2]
         push[:] = steady
         behind += step_s * drive(push, number, u, v, step * step_s, behind, speed, torque)
         bearings(push, held, number, u, theta_1, theta_2, bearing_k, clearance, unbalance)
@@ -133,5 +136,7 @@ def march(
                 p_new[m] += steps[7, m] * (f_new[m] - f[m])
             q[m], p[m], f[m] = q_new[m], p_new[m], f_new[m]
         if step % stride == 0 and step // stride > n_before:
-            keep(out[step // stride - n_before - 1], held, force, modal, q, p, f)
+            row = out[step // stride - n_before - 1]
+            keep(row, held, force, modal, q, p, f)
+            row[8] += number[PHASE_2]
     return out

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import pi, sin
+from math import gcd, pi, sin
 from typing import Any
 
 import numpy as np
 
 from gearsig.checks import FloatArray
 from sims.blind import march_numbers as at
-from sims.blind.geometry import N_PATH
+from sims.blind.geometry import N_PATH, SpurPair
 from sims.blind.kernel import march
 from sims.blind.rig import BlindRig, Resonance
 from sims.blind.structure import Matrix, Modes, modes_of, static_shape, step_coefficients
 
 WARM_UP_S = 0.5
+LEAD_S = 0.15
+"""The end of the warm-up that is kept for what already rings when a recording begins."""
 GRID_S = 1e-3
 SUB_STEPS = 4
 """Steps per sample; every second one is kept, and the filter before the sampling takes the rest."""
@@ -39,9 +41,10 @@ class Condition:
 
 @dataclass(frozen=True)
 class Motion:
-    """What a run gave, at twice the sampling rate."""
+    """What a run gave, at twice the sampling rate; `lead_n` are the bearings' forces just before."""
 
     rate_hz: float
+    lead_n: FloatArray
     bearing_n: FloatArray
     casing: FloatArray
     theta: FloatArray
@@ -167,10 +170,19 @@ def scene_of(rig: BlindRig, condition: Condition) -> Scene:
         clearance_m=list(rig.clearance_m),
         ball_ripple=0.02,
         speed=speed,
-        offsets=(0, int(rng.integers(pair.z2))),
+        offsets=_meeting_teeth(pair, rng),
         start=rng.uniform(0, 2 * pi),
         paths=_mounted_paths(rig, condition),
     )
+
+
+def _meeting_teeth(pair: SpurPair, rng: np.random.Generator) -> tuple[int, int]:
+    """Teeth of either gear that meet first: with a common divisor of the tooth numbers each tooth keeps its partners.
+
+    Nobody takes the gears out of mesh between two recordings of a rig, so only what turning reaches is drawn.
+    """
+    tooth = int(rng.integers(pair.z2))
+    return 0, tooth - tooth % gcd(pair.z1, pair.z2)
 
 
 def _mounted_paths(rig: BlindRig, condition: Condition) -> list[list[Resonance]]:
@@ -205,8 +217,12 @@ def with_course(scene: Scene, factor: Callable[[FloatArray], FloatArray]) -> Non
 
 def run(scene: Scene, *, sub_steps: int = SUB_STEPS) -> Motion:
     """March the scene through its warm-up and its duration."""
-    out = march(*march_arguments(scene, sub_steps))
-    return Motion(2 * scene.rig.sampling_rate_hz, out[:, :4].T, out[:, 4:7].T, out[:, 7:9].T, out[:, 9], out[:, 10])
+    rate_hz = 2 * scene.rig.sampling_rate_hz
+    n_lead = round(LEAD_S * rate_hz)
+    n_out, n_before, *rest = march_arguments(scene, sub_steps)
+    whole = march(n_out + n_lead, n_before - n_lead, *rest)
+    out = whole[n_lead:]
+    return Motion(rate_hz, whole[:n_lead, :4].T, out[:, :4].T, out[:, 4:7].T, out[:, 7:9].T, out[:, 9], out[:, 10])
 
 
 def march_arguments(scene: Scene, sub_steps: int) -> tuple[Any, ...]:

@@ -31,14 +31,16 @@ def path_response(force_n: FloatArray, rate_hz: float, path: list[Resonance]) ->
 def accelerations(scene: Scene, motion: Motion) -> FloatArray:
     """What each sensor's place does, (n_chains, n) at the motion's rate; no noise yet."""
     parts = scene.rig.parts
-    force = motion.bearing_n - motion.bearing_n.mean(axis=1, keepdims=True)
+    n_lead = motion.lead_n.shape[1]
+    force = np.hstack([motion.lead_n, motion.bearing_n]) - motion.bearing_n.mean(axis=1, keepdims=True)
     x_c, y_c, rock = motion.casing
     rows = []
     for i, chain in enumerate(scene.rig.chains):
         c, s = np.cos(chain.angle), np.sin(chain.angle)
         own, other = (c * force[2 * k] + s * force[2 * k + 1] for k in (i, 1 - i))
         body = c * (x_c - parts.height_m * rock) + s * (y_c + parts.seat_x_m[i] * rock)
-        rows.append(body + path_response(own + chain.crosstalk * other, motion.rate_hz, scene.paths[i]))
+        through = path_response(own + chain.crosstalk * other, motion.rate_hz, scene.paths[i])
+        rows.append(body + through[n_lead:])
     return np.array(rows)
 
 

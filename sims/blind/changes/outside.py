@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import lcm, log10, pi
+from math import gcd, lcm, log10, pi
 
 import numpy as np
 
 from gearsig.checks import FloatArray
 from sims.blind.changes.bearing import add_blows, blow_n, load_direction, slipping_angles
 from sims.blind.changes.change import GEARS, Change, Place, Span, deflection_um, steady
+from sims.blind.geometry import SpurPair
 from sims.blind.rig import SHAFTS, Resonance
 from sims.blind.scene import Motion, Scene, Train
 from sims.blind.sensing import coloured_noise, path_response
@@ -100,12 +101,13 @@ def _cavitation(scene: Scene, severity: float, choice: np.random.Generator) -> P
     vanes, shaft = int(choice.integers(5, 10)), int(choice.integers(2))
     ways = [Resonance(10 ** choice.uniform(log10(1500), log10(9000)), choice.uniform(0.05, 0.2), 1.0) for _ in range(4)]
     tone, depth = choice.uniform(0.1, 0.4), choice.uniform(0.3, 0.9)
+    swell_phase = choice.uniform(0, 2 * pi, len(scene.rig.chains))
 
     def stage(motion: Motion, signal: FloatArray, rng: np.random.Generator) -> FloatArray:
         theta = motion.theta[shaft]
         changed = np.array(signal)
         for i in range(signal.shape[0]):
-            swell = 1 + depth * np.cos(vanes * theta + rng.uniform(0, 2 * pi))
+            swell = 1 + depth * np.cos(vanes * theta + swell_phase[i])
             wide = path_response(coloured_noise(rng, len(theta), motion.rate_hz, 0.0) * swell, motion.rate_hz, ways)
             changed[i] += severity * (wide / wide.std() + tone * np.cos(vanes * theta))
         return changed
@@ -162,7 +164,14 @@ def _warm(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
     return {"channels": "all"}
 
 
-def _stain(scene: Scene, severity: float, choice: np.random.Generator) -> Place:  # noqa: ARG001 - nothing to choose
+def _turns_to_tooth(pair: SpurPair, tooth: int) -> int:
+    """Turns of gear 1 after which its tooth 0 meets tooth 0 of gear 2, if now it meets `tooth`."""
+    g = gcd(pair.z1, pair.z2)
+    others = pair.z2 // g
+    return -tooth // g * pow(pair.z1 // g, -1, others) % others
+
+
+def _stain(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
     """Teeth that marked each other at standstill and hit the mark whenever they meet again.
 
     Where that is rare, the machine stood still more often: a mark at least every eight turns.
@@ -171,7 +180,9 @@ def _stain(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
     meeting = lcm(pair.z1, pair.z2) // pair.z1
     period = meeting / -(-meeting // 8)
     n = int(scene.turns[0] / period) + 2
-    angle = 2 * pi * period * (scene.rng.random() + np.arange(n))
+    # The mark is on the same teeth whichever of them met when the recording began.
+    first = (choice.random() * meeting + _turns_to_tooth(pair, scene.offsets[1])) % period
+    angle = 2 * pi * (first + period * np.arange(n))
     for shaft, way in ((0, scene.rig.parts.line_angle + pi), (1, scene.rig.parts.line_angle)):
         # Both trains follow the input shaft's angle, so that the gears are pushed apart at the same instant.
         scene.trains.append(Train(0, shaft, angle, np.full(n, severity), np.full(n, way), 0.3e-3))
