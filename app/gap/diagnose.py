@@ -8,10 +8,12 @@ from pathlib import Path
 
 from app.gap.candidates import Tried, n_compared
 from app.gap.conditions import Condition, observed, simulated
+from app.gap.gearless import diagnose_gearless
 from app.gap.left import steps_of
 from app.gap.next_recording import next_recordings
 from app.gap.placing import at_its_tooth, place_of
 from app.gap.prepare import Stage, conditions_of
+from app.gap.rig_data import is_gearless
 from app.gap.weigh import weigh
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap.curves import angle_curves, spectrum_curves
@@ -53,6 +55,9 @@ def diagnose_gap(
 ) -> GapReport:
     """Diagnose the gap between recordings of one machine and its simulation.
 
+    A rig with bearings and no gear pair cannot be simulated: what stands out of its recordings is named where it is a
+    damaged race, see `app.gap.gearless`.
+
     Parameters
     ----------
     recordings : sequence of Recording
@@ -87,6 +92,9 @@ def diagnose_gap(
     known = simulator.gap_effects()
     _check(recordings, names, effects, known)
     own_rigs, other_rigs = _rigs(recordings, rigs), _rigs(references, reference_rigs)
+    if is_gearless(own_rigs[0]):
+        allowed = {name: effect for name, effect in known.items() if not effects or name in effects}
+        return diagnose_gearless(recordings, own_rigs, references, other_rigs, names, allowed, tell)
     twin = simulator.twin_of(own_rigs[0])
     tell("reading the recordings", 0.02)
     conditions, notices = conditions_of(recordings, own_rigs, references, other_rigs, twin, names, tell)

@@ -33,6 +33,24 @@ class Change:
     change_db: float | None
 
 
+@dataclass(frozen=True)
+class Earlier:
+    """A finding's counterpart in the reference.
+
+    Parameters
+    ----------
+    finding : Finding
+    is_comparable : bool
+        Whether both rest on the same channel and band.
+    change_db : float or None
+        Since then; None where levels do not compare.
+    """
+
+    finding: Finding
+    is_comparable: bool
+    change_db: float | None
+
+
 def rig_of_reference(path: str | Path, rig: Rig | None) -> Rig | None:
     """Return the recording's rig for its reference, with the torque that the rig file beside the reference states.
 
@@ -72,19 +90,27 @@ def beside_reference(findings: Iterable[Finding], reference: Analysis) -> list[F
     return [replace(f, evidence=(*f.evidence, _then(f, reference))) if f.kind in _CLAIMS else f for f in findings]
 
 
-def _then(finding: Finding, reference: Analysis) -> str:
+def in_reference(finding: Finding, reference: Analysis) -> Earlier | None:
+    """Return what the reference shows of the same part, order or frequency; None where it shows nothing."""
     alike = [f for f in reference.findings if _is_alike(f, finding, reference.rig)]
     same = [f for f in alike if _has_same_witness(f, finding)]
     if same:
-        return _as_well(same[0], finding)
-    if alike and _is_placed(finding):  # the bearing or gear is the same; levels elsewhere are of another size
-        return f"The reference shows it as well, but in {_seen_in(alike[0])}: the levels do not compare."
-    return "The reference does not show it."
+        return Earlier(same[0], True, _change_db(same[0], finding))
+    return Earlier(alike[0], False, None) if alike else None  # levels elsewhere are of another size
 
 
-def _as_well(old: Finding, new: Finding) -> str:
-    change = _change_db(old, new)
-    if new.where.angle_deg is not None and not _names_tooth(old, new):
+def _then(finding: Finding, reference: Analysis) -> str:
+    earlier = in_reference(finding, reference)
+    if earlier is None or not (earlier.is_comparable or _is_placed(finding)):
+        return "The reference does not show it."
+    if not earlier.is_comparable:
+        return f"The reference shows it as well, but in {_seen_in(earlier.finding)}: the levels do not compare."
+    return _as_well(earlier, finding)
+
+
+def _as_well(earlier: Earlier, new: Finding) -> str:
+    change = earlier.change_db
+    if new.where.angle_deg is not None and not _names_tooth(earlier.finding, new):
         since = "" if change is None else f", {change:+.1f} dB since then"
         return f"The reference shows such an event on that shaft{since}; whether at the same tooth, no mark tells."
     since = "." if change is None else f"; since then it has changed by {change:+.1f} dB."

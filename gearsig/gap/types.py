@@ -48,11 +48,12 @@ class GapPlace:
     title : str
         The statement in one sentence.
     change_db : float
-        Recording over simulation (or over reference), of the strongest part.
+        Recording over simulation (or over reference), of the strongest part; where nothing was simulated and no
+        reference shows it, lines over the noise beside them.
     repeatability, structural : float
-        The change over both floors, 1: as large as a floor.
+        The change over both floors, 1: as large as a floor; nan where nothing was simulated.
     share : float
-        Of the whole gap, 0 to 1.
+        Of the whole gap, 0 to 1; nan where nothing was simulated.
     shaft : str
     orders : tuple of float
         Of the driver's shaft, where it is largest.
@@ -143,7 +144,7 @@ class GapCause:
         Of an effect, or "none" or "unknown".
     group, title, unit : str
     probability : float
-        Calibrated, over all causes.
+        Calibrated, over all causes; an upper limit where nothing was simulated.
     severity : Interval or None
         In the effect's unit.
     fitted : Added or None
@@ -154,6 +155,8 @@ class GapCause:
     evidence : tuple of Evidence
         Strongest first, for and against.
     is_nuisance : bool
+    remarks : tuple of str
+        What speaks for and against it in words, where no simulation predicts anything.
     """
 
     name: str
@@ -167,6 +170,7 @@ class GapCause:
     shrinkage: Shrinkage | None = None
     evidence: tuple[Evidence, ...] = ()
     is_nuisance: bool = False
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -208,9 +212,10 @@ class SpectrumCurves:
     orders : array, (n,)
         Of the driver's shaft.
     measured, before, after : arrays, (n,)
-        Peak amplitudes; `after` is with the likeliest effect, empty where there is none.
+        Peak amplitudes; `after` is with the likeliest effect, empty where there is none; `before` is empty where
+        nothing was simulated.
     floor : array, (n,)
-        Repeatability.
+        Repeatability; where nothing was simulated, the noise beside the lines.
     structural_db : array, (n,)
         How far healthy machines lie from what is compared with, line by line; empty: not known.
     """
@@ -278,12 +283,14 @@ class GapReport:
     Parameters
     ----------
     rig, simulator : str
+        Names; no simulator where none can be set to the rig.
     conditions : tuple of ConditionFacts
     references : tuple of str
         Names of the healthy recordings that were compared with; empty: the simulation itself is compared with.
     outcome : GapOutcome
     size : Interval
-        Of the whole gap in structural floors (the largest that healthy machines reach once in twenty is 1).
+        Of the whole gap in structural floors (the largest that healthy machines reach once in twenty is 1); nan where
+        nothing was simulated.
     repeatability : float
         The same in repeatability floors.
     places : tuple of GapPlace
@@ -325,47 +332,13 @@ class GapReport:
     twin_toml: str = field(default="", repr=False)
 
     @property
+    def is_simulated(self) -> bool:
+        """Whether a simulator could be set to the rig; without one there are no sizes in floors, no steps, no twin."""
+        return bool(self.simulator)
+
+    @property
     def verdict(self) -> tuple[str, str, str, str]:
         """Where, which, how far, and what to record next: one line each."""
-        return self._where(), self._which(), self._how_far(), self._next()
+        from gearsig.gap.verdict import verdict_lines  # it needs the types of this file
 
-    def _where(self) -> str:
-        if self.outcome is GapOutcome.NO_GAP:
-            return f"Where: nowhere beyond the floor; the gap is {self.size.value:.2g} structural floors."
-        if not self.places:
-            return f"Where: spread over all orders and bands, {self.size.value:.2g} structural floors."
-        first = self.places[0]
-        return f"Where: {first.title} ({100 * first.share:.0f} % of a gap of {self.size.value:.2g} structural floors)."
-
-    def _which(self) -> str:
-        first = self.causes[0]
-        odds = f"{100 * first.probability:.0f} %"
-        if self.outcome is GapOutcome.NO_GAP:
-            return f"Which: none ({odds}); what differs is no more than between healthy machines and the simulator."
-        if self.outcome is GapOutcome.UNKNOWN:
-            return "Which: unknown; nothing in the catalogue explains it well enough."
-        if self.outcome is GapOutcome.CANNOT_SEPARATE and self.inseparable is not None:
-            a, b = (self._titled(name) for name in self.inseparable)
-            return f"Which: {a} or {b}; these recordings cannot tell them apart."
-        size = f", {first.severity.value:.3g} {first.unit}".rstrip() if first.severity is not None else ""
-        place = f" at {first.place}" if first.place else ""
-        return f"Which: {first.title}{place}{size} ({odds})."
-
-    def _titled(self, name: str) -> str:
-        cause = next(c for c in self.causes if c.name == name)
-        return f"{cause.title} ({100 * cause.probability:.0f} %)"
-
-    def _how_far(self) -> str:
-        shrinkage = self.causes[0].shrinkage
-        if self.outcome in (GapOutcome.NO_GAP, GapOutcome.UNKNOWN) or shrinkage is None:
-            return "How far: no effect was added."
-        s = shrinkage.shrink
-        return (
-            f"How far: the gap on its own features shrinks by {100 * s.value:.0f} % ({100 * s.low:.0f} to "
-            f"{100 * s.high:.0f} %) on {shrinkage.held_out}."
-        )
-
-    def _next(self) -> str:
-        if not self.next_recordings:
-            return "Next: no further recording that the model can run would tell more."
-        return f"Next: {self.next_recordings[0].text}"
+        return verdict_lines(self)

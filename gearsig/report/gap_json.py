@@ -139,6 +139,7 @@ def _cause(cause: GapCause) -> Json:
         "place": cause.place,
         "shrinkage": None if cause.shrinkage is None else _shrinkage(cause.shrinkage),
         "evidence": [_evidence(evidence) for evidence in cause.evidence],
+        "remarks": list(cause.remarks),
     }
 
 

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gearsig.gap.types import AngleCurves, GapReport, PlaceKind
+from gearsig.gap.types import AngleCurves, GapReport, PlaceKind, SpectrumCurves
 from gearsig.plot.embed import Picture, embed
 from gearsig.plot.marks import AngleMark
 from gearsig.report.gap_sections import detailed_causes
@@ -88,6 +88,9 @@ def _spectra(report: GapReport) -> Iterator[GapFigure]:
     for curves in report.spectra:
         if not len(curves.orders) or not is_finite(curves):
             continue
+        if not len(curves.before):
+            yield _lines(report, curves)
+            continue
         left = " Green dots: what is left with the likeliest effect." if len(curves.after) else ""
         yield GapFigure(
             "where",
@@ -96,6 +99,20 @@ def _spectra(report: GapReport) -> Iterator[GapFigure]:
             f"exceeds the structural floor.{left}",
             f"Order spectrum, {curves.label}: measured, simulated, and their difference in dB.",
         )
+
+
+def _lines(report: GapReport, curves: SpectrumCurves) -> GapFigure:
+    """Draw an envelope spectrum that there is no simulation beside."""
+    from gearsig.plot.gap_lines import gap_lines_figure
+
+    families = [place.orders[0] for place in report.places if place.kind is PlaceKind.ENVELOPE and place.orders]
+    marks = "Triangles: multiples of the order that was found. " if families else ""
+    return GapFigure(
+        "where",
+        gap_lines_figure(curves, families[0] if families else None),
+        f"{marks}Lines in the grey noise floor say nothing; nothing was simulated beside it.",
+        f"Spectrum, {curves.label}: measured, and the noise floor.",
+    )
 
 
 def _teeth(report: GapReport) -> Iterator[GapFigure]:

@@ -143,6 +143,7 @@ def _cause(found: Json) -> GapCause:
         None if found["shrinkage"] is None else _shrinkage(found["shrinkage"]),
         tuple(_evidence(item) for item in found["evidence"]),
         found["is_nuisance"],
+        tuple(found.get("remarks", ())),  # files of earlier versions of the program have none
     )
 
 

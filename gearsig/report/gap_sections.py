@@ -90,7 +90,9 @@ def verdict_rows(report: GapReport) -> Rows:
 
 
 def size_text(report: GapReport) -> str:
-    """Return the size of the whole gap against both floors."""
+    """Return the size of the whole gap against both floors; empty where nothing was simulated."""
+    if not report.is_simulated:
+        return ""
     return f"{interval_text(report.size)} structural floors, {readable(report.repeatability, 2)} repeatability floors"
 
 
@@ -140,7 +142,12 @@ def others_text(report: GapReport) -> str:
 
 
 def detailed_causes(report: GapReport) -> tuple[GapCause, ...]:
-    """Return the effects whose evidence is shown: the likeliest three, where there is a gap at all."""
+    """Return the effects whose evidence is shown: the likeliest three, where there is a gap at all.
+
+    Without a simulation, the causes of which there is something to say, unknown among them.
+    """
+    if not report.is_simulated:
+        return tuple(cause for cause in report.causes if cause.remarks)
     if report.outcome is GapOutcome.NO_GAP:
         return ()
     return tuple(cause for cause in report.causes if cause.name not in (NONE, UNKNOWN))[:N_DETAILED]
@@ -155,7 +162,7 @@ def _cause_row(cause: GapCause, *, detailed: bool) -> CauseRow:
         _bar(cause.probability),
         severity_text(cause),
         cause.place,
-        _statements(cause.shrinkage) if detailed else (),
+        (cause.remarks or _statements(cause.shrinkage)) if detailed else (),
         tuple(_evidence_row(one) for one in cause.evidence) if detailed else (),
     )
 
@@ -248,18 +255,23 @@ def condition_rows(report: GapReport) -> tuple[tuple[str, ...], ...]:
 
 def fact_rows(report: GapReport, command: str, date: datetime) -> Rows:
     """Return what the diagnosis rests on, and how to repeat it."""
-    compared = ", ".join(report.references) or "none: compared with the simulation itself"
     versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy"))
     rows = (
         ("rig", report.rig),
-        ("simulator", report.simulator),
-        ("healthy references", compared),
+        ("simulator", report.simulator or "none: nothing was simulated"),
+        ("healthy references", references_text(report)),
         ("size of the gap", size_text(report)),
         ("versions", f"gearsig {__version__}, {versions}, Python {platform.python_version()}"),
         ("date", date.strftime("%Y-%m-%d %H:%M %Z").strip()),
         ("command", command),
     )
     return tuple((name, text) for name, text in rows if text)
+
+
+def references_text(report: GapReport) -> str:
+    """Return the names of the references, or what is compared with instead."""
+    instead = "none: compared with the simulation itself" if report.is_simulated else "none"
+    return ", ".join(report.references) or instead
 
 
 def interval_text(interval: Interval, unit: str = "") -> str:

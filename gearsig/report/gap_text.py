@@ -17,7 +17,7 @@ def gap_text(report: GapReport) -> str:
 
 def condition_advice(report: GapReport) -> str:
     """Say what a second operating condition would give; empty where there are several, or none would tell more."""
-    if n_conditions(report) > 1:
+    if not report.is_simulated or n_conditions(report) > 1:
         return ""
     start = "One operating condition: "
     if report.outcome is GapOutcome.NO_GAP:

@@ -130,10 +130,52 @@ def no_gap_report() -> GapReport:
     )
 
 
+def gearless_report() -> GapReport:
+    """A damaged outer race on a rig without gears: nothing was simulated, so there are no sizes, curves and steps."""
+    nan, nothing = float("nan"), np.zeros(0)
+    race = GapPlace(
+        PlaceKind.ENVELOPE,
+        "envelope lines of the outer race of bearing 1 (order 3.21, 80.2 Hz), 35 dB over their floor",
+        34.8,
+        nan,
+        nan,
+        nan,
+        shaft="shaft",
+        orders=(3.21,),
+        band_hz=(614.0, 1255.0),
+        channel="a1",
+    )
+    remarks = ("6 of 6 harmonics of 3.2097 stand out in the envelope of a1.", "At most 81 %: chance of it < 1e-6.")
+    outer = GapCause(
+        "bearing_outer_race", "bearing", "spall on an outer race", "mm", 0.81, place="bearing 1", remarks=remarks
+    )
+    rest = (
+        GapCause("unknown", "unknown", "something else", "", 0.095),
+        GapCause("none", "none", "no damage", "", 0.095),
+    )
+    curves = replace(
+        spectrum("envelope of a1, 610 Hz to 1.3 kHz"), before=nothing, after=nothing, structural_db=nothing
+    )
+    return GapReport(
+        rig="Bearing test rig",
+        simulator="",
+        conditions=(ConditionFacts("outer.mat", Point(1500.0, nan), 75.0, 3.0, 48_828.0),),
+        references=(),
+        outcome=GapOutcome.EFFECT,
+        size=Interval(nan, nan, nan),
+        repeatability=nan,
+        places=(race,),
+        causes=(outer, *rest),
+        groups={"bearing": 0.81, "unknown": 0.095, "none": 0.095},
+        spectra=(curves,),
+        notices=("The rig has no gear pair: nothing was simulated.",),
+    )
+
+
 def all_reports() -> dict[str, GapReport]:
-    """Return one report of each outcome, by the outcome's words."""
+    """Return one report of each outcome, by the outcome's words, and one without a simulation."""
     reports = (effect_report(), cannot_separate_report(), unknown_report(), no_gap_report())
-    return {report.outcome.value: report for report in reports}
+    return {**{report.outcome.value: report for report in reports}, "gearless": gearless_report()}
 
 
 def conditions(n: int) -> tuple[ConditionFacts, ...]:

@@ -24,6 +24,7 @@ from gearsig.report.gap_sections import (
     next_rows,
     others_text,
     place_rows,
+    references_text,
     size_text,
     step_rows,
     verdict_rows,
@@ -40,6 +41,15 @@ FLOORS = (
     "A structural floor is what healthy machines differ from this simulator; they exceed 1 once in twenty. A "
     "repeatability floor is what this machine differs from itself, from one stretch to the next. "
     "Changes are given as multiples of both, the structural one first."
+)
+
+
+WITHOUT_FLOORS = (
+    "Nothing was simulated, so that a gap has no size and no shares. Levels are those of the strongest line over the "
+    "noise beside it, or over the reference where that shows it as well."
+)
+NOT_SIMULATED = (
+    "No simulator could be set to this rig: no effect was added, no severity was fitted, and there is no twin."
 )
 
 
@@ -77,10 +87,16 @@ def _show_downloads(finished: Finished) -> None:
 
 def _show_where(finished: Finished) -> None:
     report = finished.report
-    st.markdown(f"The whole gap: {as_typed(size_text(report))}.")
-    st.caption(FLOORS)
     rows = place_rows(report)
-    if rows:
+    if report.is_simulated:
+        st.markdown(f"The whole gap: {as_typed(size_text(report))}.")
+        st.caption(FLOORS)
+    else:
+        st.caption(WITHOUT_FLOORS)
+    if rows and not report.is_simulated:
+        at = [", ".join(row.where[1:]) for row in rows]
+        _table({"place": [row.title for row in rows], "level": [row.change for row in rows], "at": at})
+    elif rows:
         _table(
             {
                 "share": [row.bar_percent for row in rows],
@@ -140,7 +156,9 @@ def _show_evidence(row: CauseRow, finished: Finished) -> None:
 def _show_how_far(finished: Finished) -> None:
     report = finished.report
     rows = step_rows(report)
-    if len(rows) > 1:
+    if not report.is_simulated:
+        st.markdown(NOT_SIMULATED)
+    elif len(rows) > 1:
         st.caption(
             "What is left of the whole gap as the simulator gets more effects, on data that no severity was fitted to, "
             "in structural floors."
@@ -168,8 +186,8 @@ def _show_next(finished: Finished) -> None:
     names = ("recording", "speed (rpm)", "torque (N·m)", "revolutions", "length (s)", "sampling rate (Hz)")
     facts = condition_rows(report)
     _table({name: [row[i] for row in facts] for i, name in enumerate(names)})
-    compared = ", ".join(report.references) or "none: compared with the simulation itself"
-    st.caption(as_typed(f"Rig {report.rig}; simulator {report.simulator}; healthy references: {compared}."))
+    simulator = report.simulator or "none"
+    st.caption(as_typed(f"Rig {report.rig}; simulator {simulator}; healthy references: {references_text(report)}."))
 
 
 def _show_figures(finished: Finished, question: Question) -> None:

@@ -1,0 +1,86 @@
+"""A gap report in four sentences: where, which, how far, and what to record next."""
+
+from __future__ import annotations
+
+from gearsig.gap.types import GapOutcome, GapReport
+
+
+def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
+    """Return one line for each question."""
+    if report.is_simulated:
+        return _where(report), _which(report), _how_far(report), _next(report)
+    return _where_seen(report), _which_seen(report), NO_SIMULATION, _next_seen(report)
+
+
+NO_SIMULATION = (
+    "How far: cannot be told; the simulators have a gear pair and this rig has none, so nothing was simulated."
+)
+
+
+def _where(report: GapReport) -> str:
+    if report.outcome is GapOutcome.NO_GAP:
+        return f"Where: nowhere beyond the floor; the gap is {report.size.value:.2g} structural floors."
+    if not report.places:
+        return f"Where: spread over all orders and bands, {report.size.value:.2g} structural floors."
+    first = report.places[0]
+    return f"Where: {first.title} ({100 * first.share:.0f} % of a gap of {report.size.value:.2g} structural floors)."
+
+
+def _which(report: GapReport) -> str:
+    first = report.causes[0]
+    odds = f"{100 * first.probability:.0f} %"
+    if report.outcome is GapOutcome.NO_GAP:
+        return f"Which: none ({odds}); what differs is no more than between healthy machines and the simulator."
+    if report.outcome is GapOutcome.UNKNOWN:
+        return "Which: unknown; nothing in the catalogue explains it well enough."
+    if report.outcome is GapOutcome.CANNOT_SEPARATE and report.inseparable is not None:
+        a, b = (_titled(report, name) for name in report.inseparable)
+        return f"Which: {a} or {b}; these recordings cannot tell them apart."
+    size = f", {first.severity.value:.3g} {first.unit}".rstrip() if first.severity is not None else ""
+    place = f" at {first.place}" if first.place else ""
+    return f"Which: {first.title}{place}{size} ({odds})."
+
+
+def _titled(report: GapReport, name: str) -> str:
+    cause = next(c for c in report.causes if c.name == name)
+    return f"{cause.title} ({100 * cause.probability:.0f} %)"
+
+
+def _how_far(report: GapReport) -> str:
+    shrinkage = report.causes[0].shrinkage
+    if report.outcome in (GapOutcome.NO_GAP, GapOutcome.UNKNOWN) or shrinkage is None:
+        return "How far: no effect was added."
+    s = shrinkage.shrink
+    return (
+        f"How far: the gap on its own features shrinks by {100 * s.value:.0f} % ({100 * s.low:.0f} to "
+        f"{100 * s.high:.0f} %) on {shrinkage.held_out}."
+    )
+
+
+def _next(report: GapReport) -> str:
+    if not report.next_recordings:
+        return "Next: no further recording that the model can run would tell more."
+    return f"Next: {report.next_recordings[0].text}"
+
+
+def _where_seen(report: GapReport) -> str:
+    if report.places:
+        return f"Where: {report.places[0].title}."
+    beyond = " beyond the healthy reference" if report.references else ""
+    return f"Where: nothing stands out{beyond} that is not synchronous with a shaft."
+
+
+def _which_seen(report: GapReport) -> str:
+    first = report.causes[0]
+    odds = f"at most {100 * first.probability:.0f} %"
+    if report.outcome is GapOutcome.UNKNOWN:
+        return f"Which: unknown; {first.title}."
+    place = f" at {first.place}" if first.place else ""
+    name = "none; " if report.outcome is GapOutcome.NO_GAP else ""
+    return f"Which: {name}{first.title}{place} ({odds})."
+
+
+def _next_seen(report: GapReport) -> str:
+    if report.references:
+        return "Next: another sensor nearer to the bearings, or a longer recording."
+    return "Next: the same machine when it was sound, at the same speed; then only what has changed since is named."

@@ -1,0 +1,209 @@
+"""The gap of a rig with bearings and no gears: a race is named or nothing is, never a gear effect; no simulation."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from app.cli import main
+from app.gap.diagnose import diagnose_gap
+from gearsig.errors import RefusalError
+from gearsig.gap.types import GapOutcome, GapReport, PlaceKind
+from gearsig.recording.read import read_recording
+from gearsig.recording.types import Channel, Recording
+from gearsig.report.gap_json import gap_schema, gap_to_dict
+from gearsig.report.gap_page import gap_page_html
+from gearsig.rig.speed import ConstantSpeed
+from gearsig.rig.toml import write_rig
+from gearsig.rig.types import Bearing, GearPair, Rig, Shaft
+from sims.registry import gap_simulator
+
+DATA = Path(__file__).parents[3] / "shared" / "data"
+RATE_HZ, SPEED_HZ, LENGTH_S = 20_000.0, 25.0, 4.0
+RIG = Rig(
+    name="bearing test rig",
+    shafts=(Shaft("shaft"),),
+    bearings=(Bearing("test bearing", "shaft", 8, 5.969, 31.623),),  # 0.235 in and 1.245 in: BPFO 3.245, BPFI 4.755
+    speed=ConstantSpeed(60.0 * SPEED_HZ, "shaft"),
+)
+ORDERS = RIG.bearings[0].orders()
+ANSWERS = {"bearing_outer_race", "bearing_inner_race", "unknown", "none"}
+
+
+@cache
+def recording(order: float = 0.0, seed: int = 0) -> Recording:
+    """Return noise with impacts at an order, each 1 % early or late, that ring at 4 kHz; order 0: noise alone."""
+    rng = np.random.default_rng(seed)
+    n = int(LENGTH_S * RATE_HZ)
+    strikes = np.zeros(n)
+    if order:
+        gaps = rng.normal(1.0, 0.01, int(LENGTH_S * SPEED_HZ * order)) / (order * SPEED_HZ)
+        at = np.cumsum(gaps) * RATE_HZ
+        strikes[at[at < n].astype(int)] = 3.0 * rng.normal(1.0, 0.1, int(np.sum(at < n)))
+    time_s = np.arange(200) / RATE_HZ
+    ring = np.exp(-900.0 * time_s) * np.sin(2 * np.pi * 4000.0 * time_s)
+    samples = np.convolve(strikes, ring)[:n] + 0.3 * rng.standard_normal(n)
+    return Recording(samples[None], RATE_HZ, (Channel("a1", "acceleration", "m/s^2"),))
+
+
+def diagnosed(now: Recording, *references: Recording, rig: Rig = RIG, effects: Sequence[str] = ()) -> GapReport:
+    report = diagnose_gap(
+        [now],
+        gap_simulator("cracked"),
+        rigs=[rig],
+        references=references,
+        reference_rigs=[rig] * len(references),
+        effects=effects,
+        names=["now"],
+    )
+    assert {cause.name for cause in report.causes} <= ANSWERS
+    assert sum(cause.probability for cause in report.causes) == pytest.approx(1.0)
+    assert sum(report.groups.values()) == pytest.approx(1.0)
+    assert not report.is_simulated
+    assert (report.steps, report.angles, report.twin_toml) == ((), (), "")
+    assert any("nothing was simulated" in notice for notice in report.notices)
+    jsonschema.Draft202012Validator(gap_schema()).validate(gap_to_dict(report))
+    page = gap_page_html(report)
+    assert "structural floor" not in page
+    assert ">nan" not in page
+    return report
+
+
+@pytest.mark.parametrize(("order", "name"), [("BPFO", "bearing_outer_race"), ("BPFI", "bearing_inner_race")])
+def test_a_damaged_race_is_named_with_its_place(order: str, name: str) -> None:
+    report = diagnosed(recording(ORDERS[order]))
+    cause, place = report.causes[0], report.places[0]
+    assert (report.outcome, cause.name, cause.place) == (GapOutcome.EFFECT, name, "test bearing")
+    assert 0.5 < cause.probability <= 0.95
+    assert (place.kind, place.shaft, place.channel) == (PlaceKind.ENVELOPE, "shaft", "a1")
+    assert place.orders[0] == pytest.approx(ORDERS[order], rel=0.01)
+    assert place.band_hz is not None
+    assert place.band_hz[0] < 4500.0
+    assert place.band_hz[1] > 3500.0
+    assert cause.severity is None
+    assert any("harmonics of" in text for text in cause.remarks)
+    assert "at most" in report.verdict[1]
+    assert report.verdict[2].startswith("How far: cannot be told")
+    assert len(report.spectra[0].before) == 0
+
+
+def test_noise_names_nothing_and_proves_nothing() -> None:
+    report = diagnosed(recording())
+    assert (report.outcome, report.places) == (GapOutcome.UNKNOWN, ())
+    assert "might not have" in report.verdict[1]
+    assert any("cannot be told" in notice and "now:" in notice for notice in report.notices)
+
+
+def test_against_a_healthy_reference_that_is_alike_there_is_no_gap() -> None:
+    report = diagnosed(recording(), recording(seed=1))
+    assert (report.outcome, report.causes[0].name) == (GapOutcome.NO_GAP, "none")
+    assert report.references
+    assert "healthy reference" in report.verdict[0]
+
+
+def test_a_race_that_the_healthy_reference_does_not_show_is_named() -> None:
+    report = diagnosed(recording(ORDERS["BPFO"]), recording(seed=1))
+    assert report.causes[0].name == "bearing_outer_race"
+    assert report.references
+
+
+def test_a_reference_that_is_damaged_itself_is_not_used() -> None:
+    report = diagnosed(recording(ORDERS["BPFO"]), recording(ORDERS["BPFO"], seed=1))
+    assert report.causes[0].name == "bearing_outer_race"
+    assert report.references == ()
+    assert any("not healthy" in notice for notice in report.notices)
+
+
+def test_impacts_of_no_known_part_stay_unknown() -> None:
+    strange = diagnosed(recording(5.9))
+    assert strange.outcome is GapOutcome.UNKNOWN
+    assert strange.places[0].orders[0] == pytest.approx(5.9, rel=0.01)
+    assert "impacts" in strange.verdict[1]
+    same = diagnosed(recording(5.9), recording(5.9, seed=1))
+    assert same.outcome is GapOutcome.NO_GAP  # as strong when the machine was sound
+    louder = replace(recording(5.9), samples=3.0 * recording(5.9).samples)
+    grown = diagnosed(louder, recording(5.9, seed=1))
+    assert grown.outcome is GapOutcome.UNKNOWN
+    assert grown.places[0].change_db == pytest.approx(9.5, abs=2.0)
+    assert "over the reference" in grown.places[0].title
+
+
+def test_a_rolling_element_is_not_in_the_catalogue() -> None:
+    report = diagnosed(recording(2.0 * ORDERS["BSF"]))
+    assert report.outcome is GapOutcome.UNKNOWN
+    assert "rolling element" in report.verdict[1]
+
+
+def test_an_effect_that_was_not_asked_for_is_not_named() -> None:
+    report = diagnosed(recording(ORDERS["BPFO"]), effects=["root_crack", "bearing_inner_race"])
+    assert (report.outcome, report.causes[0].name) == (GapOutcome.UNKNOWN, "unknown")
+    assert "bearing_outer_race" not in [cause.name for cause in report.causes]
+
+
+def test_bearings_of_equal_orders_are_named_together() -> None:
+    twin = replace(RIG.bearings[0], name="other bearing")
+    report = diagnosed(recording(ORDERS["BPFO"]), rig=replace(RIG, bearings=(*RIG.bearings, twin)))
+    assert report.causes[0].place == "test bearing or other bearing"
+
+
+def test_several_recordings_say_which_shows_it() -> None:
+    report = diagnose_gap(
+        [recording(), recording(ORDERS["BPFO"])],
+        gap_simulator("cracked"),
+        rigs=[RIG, RIG],
+        names=["quiet", "loud"],
+    )
+    assert report.causes[0].name == "bearing_outer_race"
+    assert report.places[0].title.endswith(", in loud")
+    assert any(notice.startswith("quiet: no lines of the outer race") for notice in report.notices)
+
+
+@pytest.mark.parametrize(
+    ("rig", "said"),
+    [
+        (Rig("bare", (Shaft("shaft"),), speed=RIG.speed), "neither a gear pair nor a bearing"),
+        (replace(RIG, bearings=(Bearing("b", "shaft"),)), "of no bearing"),
+        (replace(RIG, speed=None), "speed"),
+        (
+            replace(RIG, shafts=(Shaft("shaft"), Shaft("output")), pairs=(GearPair("stage", "shaft", "output", 23),)),
+            "teeth of the driven gear and module of pair 'stage'",
+        ),
+    ],
+)
+def test_what_is_missing_is_said(rig: Rig, said: str) -> None:
+    with pytest.raises(RefusalError, match=said):
+        diagnose_gap([recording()], gap_simulator("cracked"), rigs=[rig])
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="the measured recordings are not here")
+@pytest.mark.parametrize(
+    ("file", "name", "hertz"),
+    [
+        ("InnerRaceFault_vload_3.mat", "bearing_inner_race", 118.875),
+        ("OuterRaceFault_vload_4.mat", "bearing_outer_race", 81.125),
+    ],
+)
+def test_measured_bearings_end_in_their_race(file: str, name: str, hertz: float) -> None:
+    report = diagnosed(read_recording(DATA / "bearing_races" / file, rig=RIG))
+    assert (report.outcome, report.causes[0].name) == (GapOutcome.EFFECT, name)
+    speed_hz = report.conditions[0].point.speed_rpm / 60.0
+    assert report.places[0].orders[0] * speed_hz == pytest.approx(hertz, rel=0.02)
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="the measured recordings are not here")
+def test_two_stages_without_teeth_lack_rig_data(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    shafts = tuple(Shaft(name) for name in ("input", "middle", "output"))
+    pairs = (GearPair("first", "input", "middle"), GearPair("second", "middle", "output"))
+    write_rig(Rig("two stages", shafts, pairs, sampling_rate_hz=4266.7), tmp_path / "rig.toml")
+    file = DATA / "two_stage_gearbox" / "b30hz50.csv.gz"
+    with pytest.raises(SystemExit) as stopped:
+        main(["gap", str(file), "--rig", str(tmp_path / "rig.toml"), "-o", str(tmp_path / "gap")])
+    out, err = capsys.readouterr()
+    assert (stopped.value.code, out) == (2, "")
+    assert "rig data are missing" in err
+    assert "teeth of both gears and module of pair 'first'" in err
+    assert not (tmp_path / "gap").exists()
