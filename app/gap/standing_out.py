@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from gearsig.angle.types import ShaftAngle
 from gearsig.diagnosis.analyze import analyze
 from gearsig.diagnosis.comparison import Earlier, in_reference
+from gearsig.diagnosis.detectors import bearing_family
 from gearsig.diagnosis.types import Analysis, CannotTell, Finding, Kind, Outcome
 from gearsig.errors import RefusalError
 from gearsig.recording.types import Recording
@@ -23,16 +24,8 @@ IMPACTS = ("non-synchronous-impacts", "bearing-rolling-element", "bearing-cage")
 
 LINE = "unexplained-line"
 
-PARTS = {
-    "bearing-outer-race": ("outer race", "BPFO"),
-    "bearing-inner-race": ("inner race", "BPFI"),
-    "bearing-rolling-element": ("rolling element", "BSF"),
-    "bearing-cage": ("cage", "FTF"),
-}
+PARTS = {f"bearing-{part.replace(' ', '-')}": (part, name) for name, (part, _) in bearing_family.PARTS.items()}
 """Code of a finding → part of a bearing, and its order's name."""
-
-SAME_ORDER = 1e-3
-"""Relative: bearings whose orders are nearer than this to each other cannot be told apart, as slip scatters more."""
 
 SAME_EDGE = 0.1
 """Relative, of a band's edges."""
@@ -153,7 +146,7 @@ def bearings_text(finding: Finding, rig: Rig) -> str:
     own = orders.get(finding.where.bearing)
     if not own:
         return ""
-    alike = [other for other, order in orders.items() if abs(order / own - 1.0) < SAME_ORDER]
+    alike = [other for other, order in orders.items() if abs(order / own - 1.0) < bearing_family.SAME_ORDER]
     return named("bearing", " or ".join(alike))
 
 
@@ -164,7 +157,7 @@ def _sureness(one: Standing) -> tuple[float, float]:
 def _rise_db(finding: Finding, earlier: Earlier) -> float | None:
     """Return the rise since then; None where the bands differ, since the level in a band grows with its width."""
     bands = finding.where.band_hz or (), earlier.finding.where.band_hz or ()
-    differ = any(abs(now - then) > SAME_EDGE * max(now, then) for now, then in zip(*bands, strict=True))
+    differ = any(abs(now - then) > SAME_EDGE * max(now, then) for now, then in zip(*bands, strict=False))
     return None if differ else earlier.change_db
 
 

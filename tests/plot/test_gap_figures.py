@@ -11,12 +11,13 @@ from gearsig.errors import InputError
 from gearsig.gap.types import AngleCurves, GapCause, GapStep, Interval, SpectrumCurves
 from gearsig.plot.gap_causes import gap_causes_figure
 from gearsig.plot.gap_evidence import gap_evidence_figure
+from gearsig.plot.gap_lines import gap_lines_figure
 from gearsig.plot.gap_orders import gap_orders_figure
 from gearsig.plot.gap_shares import gap_shares_figure
 from gearsig.plot.gap_teeth import INNER, OUTER, gap_teeth_figure
 from gearsig.plot.gap_waterfall import gap_waterfall_figure
 from gearsig.plot.marks import AngleMark
-from tests.gap.example_report import effect_report
+from tests.gap.example_report import effect_report, gearless_report
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,6 +64,7 @@ MADE: dict[str, Callable[[], Any]] = {
     "evidence": lambda: gap_evidence_figure(REPORT.causes[0].evidence, title="Predicted against observed"),
     "causes": lambda: gap_causes_figure(REPORT.causes, title="Which"),
     "orders": lambda: gap_orders_figure(REPORT.spectra[0], limits=(40.0, 130.0)),
+    "lines": lambda: gap_lines_figure(gearless_report().spectra[0], 3.21),
     "teeth": lambda: gap_teeth_figure(REPORT.angles[0], mark=AngleMark(134.2, "tooth 21, 134°")),
 }
 
@@ -119,6 +121,15 @@ def test_lines_beyond_the_structural_floor_are_orange() -> None:
     assert [segment[0][0] for segment in strong.get_segments()] == [4.0]
     assert strong.get_segments()[0][1][1] == pytest.approx(20.0)
     assert len(quiet.get_segments()) == 9
+
+
+def test_multiples_of_the_found_order_are_marked_without_a_simulation() -> None:
+    curves = gearless_report().spectra[0]
+    lines = {line.get_label(): line for line in gap_lines_figure(curves, 3.21).axes[0].get_lines()}
+    np.testing.assert_allclose(lines["multiples of order 3.21"].get_xdata(), 3.21 * np.arange(1, 7))
+    np.testing.assert_array_equal(lines["measured"].get_ydata(), curves.measured)
+    unmarked = [line.get_label() for line in gap_lines_figure(curves).axes[0].get_lines()]
+    assert not any("multiples" in str(label) for label in unmarked)
 
 
 def test_the_polar_picture_is_in_decibels_from_the_middling_tooth() -> None:

@@ -94,8 +94,8 @@ def _show_where(finished: Finished) -> None:
     else:
         st.caption(WITHOUT_FLOORS)
     if rows and not report.is_simulated:
-        at = [", ".join(row.where[1:]) for row in rows]
-        _table({"place": [row.title for row in rows], "level": [row.change for row in rows], "at": at})
+        sensors = [place.channel for place in report.places]
+        _table({"place": [row.title for row in rows], "level": [row.change for row in rows], "sensor": sensors})
     elif rows:
         _table(
             {
@@ -118,13 +118,14 @@ def _show_which(finished: Finished) -> None:
     if text:
         st.warning(as_typed(text), icon=":material/call_split:")
     rows = cause_rows(report)
+    severities = {"severity (90 % interval)": [row.severity for row in rows]} if report.is_simulated else {}
     _table(
         {
             "probability": [row.bar_percent for row in rows],
             "cause": [row.title for row in rows],
             "group": [row.group for row in rows],
             "place": [row.place for row in rows],
-            "severity (90 % interval)": [row.severity for row in rows],
+            **severities,
         },
         bars=("probability",),
     )
