@@ -30,7 +30,7 @@ def load_direction(scene: Scene, body: int) -> float:
 def blow_n(scene: Scene, severity_mm: float) -> float:
     """Force of a blow: grows with the defect and with the bearing's load, which the weight keeps above nothing."""
     load_n = scene.mesh_force_n / 2 + 9.81 * max(scene.rig.parts.rotor_mass_kg)
-    return float(0.06 * severity_mm**0.8 * load_n)
+    return float(0.3 * severity_mm**0.8 * load_n)
 
 
 def add_blows(
@@ -75,7 +75,7 @@ def _clearance(scene: Scene, severity: float, choice: np.random.Generator) -> Pl
 
 
 CHANGES = (
-    Change("bearing_outer_race", "bearing", "mm", steady(0.1, 4.0), _outer),
-    Change("bearing_inner_race", "bearing", "mm", steady(0.15, 5.0), _inner),
-    Change("bearing_clearance", "bearing", "um", steady(1.0, 50.0), _clearance),
+    Change("bearing_outer_race", "bearing", "mm", steady(0.06, 6.0), _outer),
+    Change("bearing_inner_race", "bearing", "mm", steady(0.08, 6.0), _inner),
+    Change("bearing_clearance", "bearing", "um", steady(3.0, 60.0), _clearance),
 )

@@ -68,7 +68,7 @@ def _clip(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 
 CHANGES = (
-    Change("transfer_path", "measurement chain", "dB", steady(2.0, 26.0), _path),
-    Change("mains_hum", "measurement chain", "m/s^2", steady(0.03, 5.0), _hum),
-    Change("clipping", "measurement chain", "% of peak cut off", steady(12.0, 75.0), _clip),
+    Change("transfer_path", "measurement chain", "dB", steady(8.0, 32.0), _path),
+    Change("mains_hum", "measurement chain", "m/s^2", steady(0.02, 12.0), _hum),
+    Change("clipping", "measurement chain", "% of peak cut off", steady(10.0, 92.0), _clip),
 )

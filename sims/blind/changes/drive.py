@@ -42,7 +42,7 @@ def _backlash(scene: Scene, severity: float, choice: np.random.Generator) -> Pla
 
 
 CHANGES = (
-    Change("torque_ripple", "drive", "% of mean torque", steady(1.0, 40.0), _ripple),
-    Change("speed_fluctuation", "drive", "%", steady(0.25, 5.0), _fluctuation),
-    Change("backlash", "drive", "um", steady(30.0, 600.0), _backlash),
+    Change("torque_ripple", "drive", "% of mean torque", steady(0.5, 50.0), _ripple),
+    Change("speed_fluctuation", "drive", "%", steady(0.6, 12.0), _fluctuation),
+    Change("backlash", "drive", "um", lambda rig: (8 * rig.pair.module_mm, 300 * rig.pair.module_mm), _backlash),
 )

@@ -74,8 +74,8 @@ def _friction(scene: Scene, severity: float, choice: np.random.Generator) -> Pla
 
 
 CHANGES = (
-    Change("tooth_wear", "flank", "um", lambda rig: (0.12 * deflection_um(rig), 3 * deflection_um(rig)), _wear),
-    Change("pitch_error", "flank", "um", lambda rig: (0.12 * deflection_um(rig), 2.5 * deflection_um(rig)), _pitch),
-    Change("surface_roughness", "flank", "um", steady(0.5, 5.0), _roughness),
-    Change("sliding_friction", "flank", "1", steady(0.06, 0.18), _friction),
+    Change("tooth_wear", "flank", "um", lambda rig: (0.3 * deflection_um(rig), 12 * deflection_um(rig)), _wear),
+    Change("pitch_error", "flank", "um", lambda rig: (0.2 * deflection_um(rig), 8 * deflection_um(rig)), _pitch),
+    Change("surface_roughness", "flank", "um", steady(1.0, 20.0), _roughness),
+    Change("sliding_friction", "flank", "1", steady(0.09, 0.5), _friction),
 )

@@ -129,7 +129,7 @@ def _belt(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 def _cable(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
     """A loose cable: now and then the signal jumps, fades and comes back."""
     channel = int(choice.integers(len(scene.rig.chains)))
-    depth, step = choice.uniform(0.4, 0.95), choice.uniform(0.5, 3)
+    depth, step = choice.uniform(0.4, 0.95), choice.uniform(1, 10)
 
     def stage(motion: Motion, signal: FloatArray, rng: np.random.Generator) -> FloatArray:  # noqa: ARG001 - a stage's form
         fs = scene.rig.sampling_rate_hz
@@ -201,16 +201,16 @@ def _ghost(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 
 CHANGES = (
-    Change("foundation_rub", OUTSIDE, "N", _by_load(0.004, 0.15), _rub, "chipped_tooth"),
+    Change("foundation_rub", OUTSIDE, "N", _by_load(0.005, 0.4), _rub, "chipped_tooth"),
     Change(
-        "coupling_knock", OUTSIDE, "N m", lambda rig: (0.004 * rig.rated_nm, 0.12 * rig.rated_nm), _knock, "root_crack"
+        "coupling_knock", OUTSIDE, "N m", lambda rig: (0.006 * rig.rated_nm, 0.4 * rig.rated_nm), _knock, "root_crack"
     ),
-    Change("ball_defect", OUTSIDE, "mm", steady(0.2, 4.0), _ball, "bearing_inner_race"),
-    Change("electromagnetic_line", OUTSIDE, "m/s^2", steady(0.03, 5.0), _field, "mains_hum"),
-    Change("temperature_shift", OUTSIDE, "%", steady(1.5, 20.0), _warm, "transfer_path"),
-    Change("hunting_stain", OUTSIDE, "N", _by_load(0.02, 0.6), _stain, "tooth_spall"),
-    Change("ghost_component", OUTSIDE, "um", lambda rig: (0.02 * deflection_um(rig), 0.8 * deflection_um(rig)), _ghost),
-    Change("pump_cavitation", OUTSIDE, "m/s^2", steady(0.05, 3.0), _cavitation),
-    Change("belt_line", OUTSIDE, "N", _by_load(0.002, 0.06), _belt),
+    Change("ball_defect", OUTSIDE, "mm", steady(0.08, 4.0), _ball, "bearing_inner_race"),
+    Change("electromagnetic_line", OUTSIDE, "m/s^2", steady(0.02, 12.0), _field, "mains_hum"),
+    Change("temperature_shift", OUTSIDE, "%", steady(3.0, 25.0), _warm, "transfer_path"),
+    Change("hunting_stain", OUTSIDE, "N", _by_load(0.02, 0.9), _stain, "tooth_spall"),
+    Change("ghost_component", OUTSIDE, "um", lambda rig: (0.03 * deflection_um(rig), 1.2 * deflection_um(rig)), _ghost),
+    Change("pump_cavitation", OUTSIDE, "m/s^2", steady(0.05, 8.0), _cavitation),
+    Change("belt_line", OUTSIDE, "N", _by_load(0.001, 0.15), _belt),
     Change("loose_cable", OUTSIDE, "bursts/s", steady(0.2, 8.0), _cable),
 )

@@ -47,14 +47,14 @@ def _misalignment(scene: Scene, severity: float, choice: np.random.Generator) ->
 
 CHANGES = (
     Change(
-        "eccentricity", "shaft", "um", lambda rig: (0.8 * deflection_um(rig), 16 * deflection_um(rig)), _eccentricity
+        "eccentricity", "shaft", "um", lambda rig: (30 * rig.pair.module_mm, 150 * rig.pair.module_mm), _eccentricity
     ),
     Change(
         "unbalance",
         "shaft",
         "g mm",
-        lambda rig: (25 * min(rig.parts.rotor_mass_kg), 600 * min(rig.parts.rotor_mass_kg)),
+        lambda rig: (80 * min(rig.parts.rotor_mass_kg), 2400 * min(rig.parts.rotor_mass_kg)),
         _unbalance,
     ),
-    Change("misalignment", "shaft", "um", steady(3.0, 100.0), _misalignment),
+    Change("misalignment", "shaft", "um", steady(4.0, 300.0), _misalignment),
 )
