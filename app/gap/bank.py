@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from app.gap.bank_runs import Reduced, Run, Task, finished_runs
 from app.gap.bank_versions import features_digest
 from gearsig.checks import FloatArray, count, positive
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap.simulator import Added, Point, Twin
+from gearsig.gap.simulator import Added, Point
 
 Progress = Callable[[int, int], object]
 POINT_DIGITS = 3
@@ -24,7 +24,7 @@ POINT_DIGITS = 3
 
 @dataclass(frozen=True)
 class Bank:
-    """Simulated features of the sound machine, and what each candidate changes in them.
+    """Simulated features of the sound machine, and what each candidate of one effect changes in them.
 
     Parameters
     ----------
@@ -55,47 +55,34 @@ class Bank:
     changes: FloatArray
     left_out: tuple[tuple[Added, str], ...] = ()
 
-    def of_effect(self, name: str) -> tuple[tuple[Added, ...], FloatArray]:
-        """Return one effect's candidates and their changes."""
-        rows = [i for i, a in enumerate(self.added) if a.name == name]
-        return tuple(self.added[i] for i in rows), self.changes[rows]
 
-
-def bank_of(
-    twin: Twin,
-    point: Point,
+def banks_of(
+    runs: Sequence[Run],
     effects: Sequence[str],
     *,
     seeds: Sequence[int],
-    duration_s: float,
-    sampling_rate_hz: float,
     folder: Path | None,
     n_change_seeds: int = 1,
-    noise: int = 1,
     processes: int = 2,
     on_progress: Progress = lambda _done, _all: None,
-) -> Bank:
-    """Return the bank from disk, or simulate it and keep it.
+) -> list[dict[str, Bank]]:
+    """Return for each operating point the effects' banks, from disk or simulated and kept.
 
     Parameters
     ----------
-    twin : Twin
-        It must pickle where `processes` is above 1.
-    point : Point
-        Rounded to `POINT_DIGITS` digits.
+    runs : sequence of Run
+        Twin, point, length of what is simulated; the point is rounded to `POINT_DIGITS` digits. Noise 0: candidates
+        have the noise and start of the sound run, so that only the effect differs.
     effects : sequence of str
-        Whose candidates are simulated.
+        Whose candidates are simulated; each has a file of its own.
     seeds : sequence of int
         Specimens of the sound machine.
-    duration_s, sampling_rate_hz : float
     folder : Path or None
-        Where it is kept; None: nowhere.
+        Where they are kept; None: nowhere.
     n_change_seeds : int
         On so many of the specimens, the first ones, each candidate is simulated.
-    noise : int
-        Run of the candidates; 0: with the noise and start of the sound run, so that only the effect differs.
     processes : int
-        1: in this process.
+        1: in this process. Otherwise the twins must pickle.
     on_progress : callable
         Told how many of all runs are done; what it raises stops the work, and nothing is kept.
 
@@ -106,21 +93,41 @@ def bank_of(
     RefusalError
         If the sound machine cannot be simulated or its recording is too short for the features.
     """
-    at = rounded(point)
-    positive(duration_s, "duration_s", "s")
-    within_seeds = seeds[: min(count(n_change_seeds, "n_change_seeds"), len(seeds))]
-    candidates = [added for name in effects for added in twin.candidates(name)]
-    key = bank_key(twin, at, candidates, seeds, within_seeds, duration_s, sampling_rate_hz, noise)
-    path = None if folder is None else _made(folder) / f"bank-{sha256(key.encode()).hexdigest()[:24]}.npz"
-    if path is not None and (found := read_bank(path, key)) is not None:
-        return found
-    tasks = [Task(seed, None) for seed in seeds]
-    tasks += [Task(seed, added) for added in candidates for seed in within_seeds]
-    run = Run(twin, at, duration_s, sampling_rate_hz, noise)
-    bank = _assembled(at, candidates, len(seeds), len(within_seeds), finished_runs(run, tasks, processes, on_progress))
-    if path is not None:
-        write_bank(path, key, bank)
-    return bank
+    within = seeds[: min(count(n_change_seeds, "n_change_seeds"), len(seeds))]
+    wanted = [_Wanted.of(run, name, seeds, within, folder) for run in runs for name in effects]
+    found = {w: read_bank(w.path, w.key) if w.path is not None else None for w in wanted}
+    missing = [w for w in wanted if found[w] is None]
+    sound = {w.run.sound_key: [Task(w.run, seed, None) for seed in seeds] for w in missing}
+    own = {w: [Task(w.run, seed, added) for added in w.candidates for seed in within] for w in missing}
+    tasks = [task for some in (*sound.values(), *own.values()) for task in some]
+    rows = dict(zip(map(id, tasks), finished_runs(tasks, processes, on_progress), strict=True)) if tasks else {}
+    for w in missing:
+        first, others = ([rows[id(task)] for task in some] for some in (sound[w.run.sound_key], own[w]))
+        found[w] = bank = _assembled(w.run.point, w.candidates, len(within), first, others)
+        if w.path is not None:
+            write_bank(w.path, w.key, bank)
+    banks = iter(found[w] for w in wanted)
+    return [{name: bank for name, bank in zip(effects, banks, strict=False) if bank is not None} for _ in runs]
+
+
+@dataclass(frozen=True, eq=False)
+class _Wanted:
+    """One effect's bank at one point, and where it is kept."""
+
+    run: Run
+    candidates: tuple[Added, ...]
+    key: str
+    path: Path | None
+
+    @classmethod
+    def of(cls, run: Run, effect: str, seeds: Sequence[int], within: Sequence[int], folder: Path | None) -> _Wanted:
+        """Return what is wanted, at the rounded point."""
+        positive(run.duration_s, "duration_s", "s")
+        at = replace(run, point=rounded(run.point))
+        candidates = tuple(run.twin.candidates(effect))
+        key = bank_key(at, candidates, seeds, within)
+        path = None if folder is None else _made(folder) / f"bank-{sha256(key.encode()).hexdigest()[:24]}.npz"
+        return cls(at, candidates, key, path)
 
 
 def rounded(point: Point) -> Point:
@@ -128,20 +135,11 @@ def rounded(point: Point) -> Point:
     return Point(*(float(f"{v:.{POINT_DIGITS}g}") for v in (point.speed_rpm, point.torque_nm)))
 
 
-def bank_key(
-    twin: Twin,
-    point: Point,
-    candidates: Sequence[Added],
-    seeds: Sequence[int],
-    change_seeds: Sequence[int],
-    duration_s: float,
-    sampling_rate_hz: float,
-    noise: int,
-) -> str:
+def bank_key(run: Run, candidates: Sequence[Added], seeds: Sequence[int], change_seeds: Sequence[int]) -> str:
     """Return all that a bank's numbers depend on, as text."""
     settings = [[a.name, a.severity, dict(a.options)] for a in candidates]
-    runs = [list(seeds), list(change_seeds), duration_s, sampling_rate_hz, noise]
-    known = [twin.key, features_digest(), [point.speed_rpm, point.torque_nm], settings, runs]
+    runs = [list(seeds), list(change_seeds), run.duration_s, run.sampling_rate_hz, run.noise]
+    known = [run.twin.key, features_digest(), [run.point.speed_rpm, run.point.torque_nm], settings, runs]
     return json.dumps(known, sort_keys=True)
 
 
@@ -156,16 +154,20 @@ def _made(folder: Path) -> Path:
 
 
 def _assembled(
-    point: Point, candidates: Sequence[Added], n_sound: int, n_seeds: int, rows: Sequence[Reduced | str]
+    point: Point,
+    candidates: Sequence[Added],
+    n_seeds: int,
+    sound_rows: Sequence[Reduced | str],
+    rows: Sequence[Reduced | str],
 ) -> Bank:
-    sound = [row for row in rows[:n_sound] if isinstance(row, Reduced)]
-    if len(sound) < n_sound:
-        why = next(row for row in rows[:n_sound] if isinstance(row, str))
+    sound = [row for row in sound_rows if isinstance(row, Reduced)]
+    if len(sound) < len(sound_rows):
+        why = next(row for row in sound_rows if isinstance(row, str))
         raise RefusalError(f"the sound machine cannot be simulated: {why}", remedy="check the rig file")
     first = sound[0]
     kept, changes, left_out = [], [], []
     for i, added in enumerate(candidates):
-        own = rows[n_sound + i * n_seeds : n_sound + (i + 1) * n_seeds]
+        own = rows[i * n_seeds : (i + 1) * n_seeds]
         whole = [row for row in own if isinstance(row, Reduced) and row.change_names == first.change_names]
         if len(whole) == n_seeds:
             kept.append(added)

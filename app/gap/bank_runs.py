@@ -13,10 +13,12 @@ from gearsig.errors import GearsigError
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.simulator import Added, Point, Twin
 
+SoundKey = tuple[Point, float, float]
+
 
 @dataclass(frozen=True)
 class Run:
-    """What all simulations of a bank share."""
+    """Where and how long a twin runs."""
 
     twin: Twin
     point: Point
@@ -24,11 +26,17 @@ class Run:
     sampling_rate_hz: float
     noise: int
 
+    @property
+    def sound_key(self) -> SoundKey:
+        """What the twin's sound runs depend on; twins need not hash."""
+        return self.point, self.duration_s, self.sampling_rate_hz
+
 
 @dataclass(frozen=True)
 class Task:
     """One simulation: a specimen with an effect, or sound."""
 
+    run: Run
     seed: int
     added: Added | None
 
@@ -44,43 +52,46 @@ class Reduced:
 
 
 def finished_runs(
-    run: Run, tasks: Sequence[Task], processes: int, on_progress: Callable[[int, int], object]
+    tasks: Sequence[Task], processes: int, on_progress: Callable[[int, int], object]
 ) -> list[Reduced | str]:
     """Return what each task gave, or why it could not be simulated, in the order of the tasks."""
     from sims.processes import process_pool
 
     found: list[Reduced | str] = [""] * len(tasks)
     if processes == 1:
-        known: dict[int, Gathered] = {}
+        known: Known = {}
         for i, task in enumerate(tasks):
-            found[i] = _reduced(run, task, known)
+            found[i] = _reduced(task, known)
             on_progress(i + 1, len(tasks))
         return found
     with process_pool(processes) as pool:
-        waiting = {pool.submit(reduced_in_worker, run, task): i for i, task in enumerate(tasks)}
+        waiting = {pool.submit(reduced_in_worker, task): i for i, task in enumerate(tasks)}
         for done, future in enumerate(as_completed(waiting), 1):
             found[waiting[future]] = future.result()
             on_progress(done, len(tasks))
     return found
 
 
-_KNOWN: dict[int, Gathered] = {}
-"""Sound first runs by seed, of the one bank that a worker works for."""
+Known = dict[tuple[SoundKey, int], Gathered]
+_KNOWN: Known = {}
+"""Sound first runs by point, length and seed, of the one twin that a worker works for."""
 
 
-def reduced_in_worker(run: Run, task: Task) -> Reduced | str:
-    """Return what a task gives, in a process that lives for one bank only."""
-    return _reduced(run, task, _KNOWN)
+def reduced_in_worker(task: Task) -> Reduced | str:
+    """Return what a task gives, in a process that lives for one twin only."""
+    return _reduced(task, _KNOWN)
 
 
-def _reduced(run: Run, task: Task, known: dict[int, Gathered]) -> Reduced | str:
+def _reduced(task: Task, known: Known) -> Reduced | str:
     from gearsig.gap.change import change_once
     from gearsig.gap.features import once
 
+    run = task.run
+    key = run.sound_key, task.seed
     try:
-        if task.seed not in known:
-            known[task.seed] = _gathered(run, task.seed, None, 0)
-        sound = known[task.seed]
+        if key not in known:
+            known[key] = _gathered(run, task.seed, None, 0)
+        sound = known[key]
         # A sound specimen is measured again with other noise: against itself everything would be zero.
         now = _gathered(run, task.seed, task.added, run.noise if task.added is not None else max(run.noise, 1))
         names, values = once(sound) if task.added is None else ((), np.empty(0))

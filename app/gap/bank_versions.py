@@ -8,8 +8,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 _MODULES = (
-    *(f"gearsig.gap.{name}" for name in ("broadband", "change", "cyclic", "features", "frame", "gather", "gathered")),
-    *(f"gearsig.gap.{name}" for name in ("gear_lines", "hum", "speed", "tooth")),
+    *(f"gearsig.gap.{name}" for name in ("averages", "broadband", "change", "cyclic", "features", "frame")),
+    *(f"gearsig.gap.{name}" for name in ("gather", "gathered", "gear_lines", "hum", "speed", "tooth")),
     "gearsig.severity.reference",
     "gearsig.angle.pulse_train",
     "gearsig.angle.resample",

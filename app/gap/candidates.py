@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from app.gap.bank import Bank, bank_of
+from app.gap.bank import Bank, banks_of
+from app.gap.bank_runs import Run
 from app.gap.conditions import LEAST_BLOCKS, SEED, Condition, compare, halves, observed
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
+from gearsig.gap.change import SURPRISE
 from gearsig.gap.features import once as feature_values
 from gearsig.gap.population import load_population
 from gearsig.gap.prediction import EffectPath, Fit, Observed, fit_effect, paths_of
@@ -59,47 +61,37 @@ def try_effects(
     if not names:
         return {}
     folds, held_out = folds_of(conditions)
-    banks = []
-    for k, condition in enumerate(conditions):
-
-        def tell(done: int, of: int, begun: int = k, at: str = condition.facts.name) -> None:
-            on_progress(f"simulating {len(names)} effects at the point of {at}", (begun + done / of) / len(conditions))
-
-        banks.append(_bank(twin, condition, sorted(names), cache, tell))
+    where = " and ".join(c.facts.name for c in conditions)
+    banks = banks_of(
+        [_run(twin, condition) for condition in conditions],
+        names,
+        seeds=[SEED],
+        folder=cache,
+        processes=PROCESSES,
+        on_progress=lambda done, of: on_progress(f"simulating {len(names)} effects at the point of {where}", done / of),
+    )
     everything = [observed(c, k, n_compared(conditions)) for k, c in enumerate(conditions)]
     found = {}
     for name in names:
-        paths = _paths(name, banks, conditions)
+        paths = _paths([at[name] for at in banks], conditions)
         if paths:
             found[name] = Tried(name, paths, fit_effect(paths, everything), shrinkage(paths, folds, held_out))
     return found
 
 
 def n_compared(conditions: Sequence[Condition]) -> int:
-    """Return how many features all conditions have: those of patterns need a reference everywhere."""
-    return min(len(c.change.names) for c in conditions)
+    """Return how many features all conditions have and a simulation can foretell; those of patterns need references."""
+    return min(sum(not name.startswith(SURPRISE) for name in c.change.names) for c in conditions)
 
 
-def _bank(
-    twin: Twin, condition: Condition, names: Sequence[str], cache: Path | None, tell: Callable[[int, int], object]
-) -> Bank:
-    return bank_of(
-        twin,
-        condition.facts.point,
-        names,
-        seeds=[SEED],
-        duration_s=float(f"{condition.run_s:.3g}"),
-        sampling_rate_hz=condition.facts.sampling_rate_hz,
-        folder=cache,
-        processes=PROCESSES,
-        on_progress=tell,
-    )
+def _run(twin: Twin, condition: Condition) -> Run:
+    return Run(twin, condition.facts.point, float(f"{condition.run_s:.3g}"), condition.facts.sampling_rate_hz, noise=1)
 
 
-def _paths(name: str, banks: Sequence[Bank], conditions: Sequence[Condition]) -> tuple[EffectPath, ...]:
-    """Return an effect's paths over the candidates that every condition's bank holds."""
+def _paths(banks: Sequence[Bank], conditions: Sequence[Condition]) -> tuple[EffectPath, ...]:
+    """Return an effect's paths over the candidates that could be simulated at every condition."""
     n = n_compared(conditions)
-    kept = [a for a in banks[0].added if a.name == name and all(a in bank.added for bank in banks)]
+    kept = [a for a in banks[0].added if all(a in bank.added for bank in banks)]
     tables = [
         np.array([_distances(bank, bank.added.index(a), condition)[:n] for a in kept]).reshape(len(kept), n)
         for bank, condition in zip(banks, conditions, strict=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from gearsig.errors import InputError
 from gearsig.gap.change import change_features, difference_features
@@ -95,9 +95,9 @@ def simulated(
 def with_channels_of(simulation: Gathered, now: Gathered) -> Gathered:
     """Return a simulation with the recording's channels: those of equal name, or else in their order."""
     if set(now.channels) <= set(simulation.channels):
-        return replace(simulation, channels={name: simulation.channels[name] for name in now.channels})
+        return simulation.with_channels({name: simulation.channels[name] for name in now.channels})
     own = list(simulation.channels.values())
-    return replace(simulation, channels={name: own[i % len(own)] for i, name in enumerate(now.channels)})
+    return simulation.with_channels({name: own[i % len(own)] for i, name in enumerate(now.channels)})
 
 
 def compare(now: Gathered, simulation: Gathered, reference: Gathered | None) -> Features:

@@ -30,12 +30,15 @@ def next_recordings(
     names = base.change.names[:n]
     floors = base.floor.of(names)
     now = max(_apart(names, first.fit.at(k) - second.fit.at(k), floors) for k in range(len(conditions)))
+    points = [Point(v * base.facts.point.speed_rpm, t * base.facts.point.torque_nm) for v, t in FACTORS]
+    runs = [
+        Run(twin, p, base.run_s * max(1.0, base.facts.point.speed_rpm / p.speed_rpm), base.facts.sampling_rate_hz, 1)
+        for p in points
+    ]
+    tasks = [Task(run, SEED, tried.fit.added) for run in runs for tried in (first, second)]
+    rows = finished_runs(tasks, PROCESSES, lambda *_: None)
     found = []
-    for speed, torque in FACTORS:
-        point = Point(speed * base.facts.point.speed_rpm, torque * base.facts.point.torque_nm)
-        run = Run(twin, point, base.run_s / min(speed, 1.0), base.facts.sampling_rate_hz, 1)
-        rows = finished_runs(run, [Task(SEED, t.fit.added) for t in (first, second)], PROCESSES, lambda *_: None)
-        a, b = rows
+    for point, a, b in zip(points, rows[::2], rows[1::2], strict=True):
         if not (isinstance(a, Reduced) and isinstance(b, Reduced)):
             continue
         apart = _apart(names, (a.change - b.change)[:n], floors)

@@ -57,8 +57,10 @@ def weigh(
     twin: Twin,
     cache: Path | None,
     on_progress: Callable[[str, float], object],
+    *,
+    most_tried: int = MOST_TRIED,
 ) -> Weighed:
-    """Ask the forests, then simulate, fit and score the likeliest effects.
+    """Ask the forests, then simulate, fit and score the likeliest effects, `most_tried` at most.
 
     Raises
     ------
@@ -68,7 +70,7 @@ def weigh(
     forest = _forest(conditions, effects, known)
     with_reference = all(c.reference is not None for c in conditions)
     first = load_gap_calibration(with_reference=with_reference).probabilities(forest, {})
-    likely = [name for name, p in first.items() if name in known and p >= LEAST_TRIED_PROBABILITY][:MOST_TRIED]
+    likely = [name for name, p in first.items() if name in known and p >= LEAST_TRIED_PROBABILITY][:most_tried]
     tried = try_effects(likely, twin, conditions, cache, on_progress)
     refuse_without_candidates(tried, likely)
     return Weighed(forest, tried, with_reference)

@@ -14,8 +14,6 @@ from gearsig.orders.revolutions import first_whole_sample
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 
-N_PHASE_HARMONICS = 3
-
 LEAST_REVOLUTIONS = 8
 """Of a shaft: four in each half. Fewer leave other shafts' orders in its average, and say nothing of scatter."""
 
@@ -123,13 +121,13 @@ def time_halves(recording: Recording, row: int) -> tuple[FloatArray, FloatArray]
 
 def _angle(recording: Recording, rig: Rig, shaft: str, which: str) -> ShaftAngle:
     """Return the angle of a shaft of this side's rig, found and checked as `analyze` does."""
-    from gearsig.diagnosis.speed import determine_angle
+    from gearsig.diagnosis.speed import determine_angle, exact_angle
     from gearsig.diagnosis.types import CannotTell
 
     found = determine_angle(recording, rig)
     if isinstance(found, CannotTell):
         raise RefusalError(f"the speed of the {which} is not known: {found.reason}", remedy=found.remedy)
-    angle = _exact(recording, rig, found).between(0.0, recording.duration_s)
+    angle = exact_angle(recording, rig, found).between(0.0, recording.duration_s)
     ratio = rig.ratio(shaft, to=angle.shaft) if shaft and angle.shaft else 1.0
     if ratio is None:
         raise RefusalError(
@@ -137,25 +135,3 @@ def _angle(recording: Recording, rig: Rig, shaft: str, which: str) -> ShaftAngle
             remedy="complete the tooth counts",
         )
     return angle if ratio == 1.0 else angle.of_shaft(shaft, ratio)
-
-
-def _exact(recording: Recording, rig: Rig, found: ShaftAngle) -> ShaftAngle:
-    """Let an angle that was estimated from the vibration follow the phase of the mesh harmonics.
-
-    The estimate may hold the speed constant where it wanders by some 10⁻⁴. Over hundreds of revolutions that is half
-    a tooth, and takes decibels from the averages' mesh harmonics.
-    """
-    from gearsig.angle.phase_refinement import refine_by_phase
-
-    if found.method != "tachless":
-        return found
-    meshes = [order for pair in rig.pairs if (order := rig.mesh_order(pair, found.shaft)) is not None]
-    orders = tuple(k * order for order in meshes for k in range(1, N_PHASE_HARMONICS + 1))
-    refined = refine_by_phase(recording, recording.vibration_names(), found, orders)
-    return replace(
-        found,
-        time_s=refined.time_s,
-        revolutions=refined.revolutions,
-        speed_rev_per_s=refined.speed_rev_per_s,
-        notes=(*found.notes, "the course of the angle follows the phase of the mesh harmonics"),
-    )

@@ -22,6 +22,8 @@ STEADY = 0.01
 """Relative range of a speed channel below which the mesh lines are sought at one speed."""
 
 N_SHAFT_HARMONICS = 8
+N_PHASE_HARMONICS = 3
+"""Of the mesh, whose phase an angle may follow."""
 
 MAINS_HZ = (50.0, 60.0)
 """Supplies put their own harmonics, and those of motors, within the slip of a motor's speed."""
@@ -52,6 +54,28 @@ def determine_angle(recording: Recording, rig: Rig) -> ShaftAngle | CannotTell:
     if isinstance(recording.speed_source, SpeedChannel):
         return _rescaled(recording, rig, angle)
     return angle
+
+
+def exact_angle(recording: Recording, rig: Rig, found: ShaftAngle) -> ShaftAngle:
+    """Let an angle that was estimated from the vibration follow the phase of the mesh harmonics.
+
+    The estimate may hold the speed constant where it wanders by some 10⁻⁴. Over hundreds of revolutions that is half
+    a tooth, and takes decibels from the averages' mesh harmonics.
+    """
+    from gearsig.angle.phase_refinement import refine_by_phase
+
+    if found.method != "tachless":
+        return found
+    meshes = [order for pair in rig.pairs if (order := rig.mesh_order(pair, found.shaft)) is not None]
+    orders = tuple(k * order for order in meshes for k in range(1, N_PHASE_HARMONICS + 1))
+    refined = refine_by_phase(recording, recording.vibration_names(), found, orders)
+    return replace(
+        found,
+        time_s=refined.time_s,
+        revolutions=refined.revolutions,
+        speed_rev_per_s=refined.speed_rev_per_s,
+        notes=(*found.notes, "the course of the angle follows the phase of the mesh harmonics"),
+    )
 
 
 def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:

@@ -8,13 +8,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from gearsig.gap.features import Features, once, whole_record_variance
+from gearsig.gap.features import Features, once, whole_and_parts, whole_record_variance
 from gearsig.gap.frame import DRIVEN, DRIVER
 from gearsig.gap.gathered import Gathered
-from gearsig.gap.gear_lines import NOMINAL_REVOLUTIONS, SIDES, Feature, average_lines, visible_orders
+from gearsig.gap.gear_lines import (
+    NOMINAL_REVOLUTIONS,
+    SIDES,
+    Feature,
+    average_lines,
+    smooth_power,
+    visible_orders,
+)
 from gearsig.gap.tooth import mesh_power, pattern_features, residual_lines
 from gearsig.severity.reference import difference_lines
 from gearsig.severity.shaft_lines import ShaftLines
+
+SURPRISE = "surprise."
+"""Of features that are measured in the two recordings' own noise: no simulation can foretell them."""
+
+LEAST_NOISE = 1e-8
+"""Of all lines together over the mesh's power: two gears of equal teeth leave nothing of their own in one average."""
+
+REPEATS = 0.1
+"""Share by which a sound machine's pattern differs on another day, see `surprises`."""
 
 
 def change_features(now: Gathered, sound: Gathered) -> Features:
@@ -22,13 +38,17 @@ def change_features(now: Gathered, sound: Gathered) -> Features:
 
     The reference's scatter counts as well: variances of both add.
     """
-    (names, here), before = once(now), once(sound)[1]
-    joined, values = _joined(names, here - before, now, sound)
+    (names, here), before = whole_and_parts(now), whole_and_parts(sound)[1]
+    joined, values = _joined(names, here[0] - before[0], now, sound)
     return _with_scatter(
         joined,
         values,
-        np.stack([_joined(names, once(part)[1] - before, part, sound)[1] for part in _parts(now)]),
-        np.stack([_joined(names, here - once(part)[1], now, part)[1] for part in _parts(sound)]),
+        np.stack(
+            [_joined(names, v - before[0], part, sound)[1] for v, part in zip(here[1:], _parts(now), strict=True)]
+        ),
+        np.stack(
+            [_joined(names, here[0] - v, now, part)[1] for v, part in zip(before[1:], _parts(sound), strict=True)]
+        ),
     )
 
 
@@ -40,13 +60,8 @@ def change_once(now: Gathered, sound: Gathered) -> tuple[tuple[str, ...], FloatA
 
 def difference_features(now: Gathered, simulated: Gathered) -> Features:
     """Return the differences of all features alone: a simulation's flanks are not this machine's."""
-    (names, here), before = once(now), once(simulated)[1]
-    return _with_scatter(
-        names,
-        here - before,
-        np.stack([once(part)[1] - before for part in _parts(now)]),
-        np.stack([here - once(part)[1] for part in _parts(simulated)]),
-    )
+    (names, here), before = whole_and_parts(now), whole_and_parts(simulated)[1]
+    return _with_scatter(names, here[0] - before[0], here[1:] - before[0], here[0] - before[1:])
 
 
 def _with_scatter(names: tuple[str, ...], values: FloatArray, *left_out: FloatArray) -> Features:
@@ -70,8 +85,8 @@ def _joined(
 
 def _patterns(now: Gathered, sound: Gathered) -> Iterator[Feature]:
     """Yield the tooth features of the difference of the averages, turned so that the same teeth meet."""
-    for side in (DRIVER, DRIVEN):
-        turned, agreement = turned_difference(now, sound, side)
+    differences = [turned_difference(now, sound, side) for side in (DRIVER, DRIVEN)]
+    for side, (turned, agreement) in enumerate(differences):
         teeth = now.frame.teeth[side]
         residuals = difference_residuals(now, turned, side)
         noises = []
@@ -83,6 +98,10 @@ def _patterns(now: Gathered, sound: Gathered) -> Iterator[Feature]:
         longer = max(1.0, shorter / NOMINAL_REVOLUTIONS)
         yield from pattern_features(f"change.{SIDES[side]}", residuals, teeth, float(np.mean(noises)), longer)
         yield f"change.{SIDES[side]}.agreement", 10.0 * agreement
+    for side, (turned, _) in enumerate(differences):
+        yield from pattern_features(
+            f"{SURPRISE}{SIDES[side]}", surprises(now, sound, turned, side), now.frame.teeth[side], 0.0, 0.0
+        )
 
 
 def turned_difference(now: Gathered, sound: Gathered, side: int) -> tuple[ShaftLines, float]:
@@ -99,8 +118,28 @@ def difference_residuals(now: Gathered, turned: ShaftLines, side: int) -> list[N
         full = np.zeros(sums.lines[side].shape[1], dtype=np.complex128)
         full[: len(row)] = row
         scale = mesh_power(now, sums, side)
-        residuals.append(residual_lines(full, turned.teeth, turned.highest_order) / np.sqrt(scale))
+        residuals.append(residual_lines(full, turned.teeth, turned.highest_order, turned.other_teeth) / np.sqrt(scale))
     return residuals
+
+
+def surprises(now: Gathered, sound: Gathered, turned: ShaftLines, side: int) -> list[NDArray[np.complex128]]:
+    """Return each channel's difference, line by line over what noise and a mounting of its own would make of it.
+
+    w[n] = d[n] / √(σ²[n] + (s |r[n]|)²), with σ² the power that noise leaves in both averages, |r|² the sound
+    pattern's power about that order, s = `REPEATS`; scaled so that a sound machine's energy is about 1 all round,
+    whatever the machine. A change counts where it is sure, and not where the vibration is loud.
+    """
+    found = []
+    n = turned.lines.shape[1]
+    own = lines_of_shaft(sound, side).lines
+    for row, born, name in zip(turned.lines, own, now.channels, strict=True):
+        noise = average_lines(now.channels[name], side)[1][:n] + average_lines(sound.channels[name], side)[1][:n]
+        noise += LEAST_NOISE * mesh_power(now, now.channels[name], side) / n
+        full = np.zeros(now.channels[name].lines[side].shape[1], dtype=np.complex128)
+        full[:n] = row / np.sqrt(noise + REPEATS**2 * smooth_power(np.abs(born[:n]) ** 2))
+        kept = residual_lines(full, turned.teeth, turned.highest_order, turned.other_teeth)
+        found.append(kept * np.sqrt(2.0 / max(int(np.count_nonzero(kept)), 1)))
+    return found
 
 
 def lines_of_shaft(gathered: Gathered, side: int) -> ShaftLines:

@@ -27,6 +27,7 @@ _OF_A_SHAFT = {
     "shaft": PlaceKind.SHAFT,
     "tooth": PlaceKind.TOOTH,
     "change": PlaceKind.TOOTH,
+    "surprise": PlaceKind.TOOTH,
 }
 
 

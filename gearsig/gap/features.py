@@ -44,10 +44,19 @@ def features_of(gathered: Gathered) -> Features:
 
     SE² = (B − 1)/B Σ_b (f_(b) − mean)², f_(b) without block b.
     """
-    names, values = once(gathered)
-    without = np.stack([once(gathered.without(b))[1] for b in range(gathered.n_blocks)])
+    names, values = whole_and_parts(gathered)
+    without = values[1:]
     variance = (len(without) - 1.0) * without.var(axis=0) + whole_record_variance(names)
-    return Features(names, values, np.sqrt(variance), (without,))
+    return Features(names, values[0], np.sqrt(variance), (without,))
+
+
+def whole_and_parts(gathered: Gathered) -> tuple[tuple[str, ...], FloatArray]:
+    """Return names and values, (1 + n_blocks, n): of the whole, and without each of its blocks; computed once."""
+    if not gathered.known:
+        names, values = once(gathered)
+        parts = [once(gathered.without(b))[1] for b in range(gathered.n_blocks)]
+        gathered.known.append((names, np.stack([values, *parts])))
+    return gathered.known[0]
 
 
 def whole_record_variance(names: Sequence[str]) -> FloatArray:

@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.angle.types import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
+from gearsig.gap.averages import joint_averages
 from gearsig.gap.frame import GearFrame, gear_frame
 from gearsig.gap.gathered import ChannelSums, Gathered
 from gearsig.gap.hum import mains_lines
@@ -22,7 +24,7 @@ LEAST_REVOLUTIONS = 16
 """Of the driver and of the driven gear: fewer leave either shaft's orders in the other's average."""
 
 REVOLUTIONS_PER_BLOCK = 20
-FEWEST_BLOCKS, MOST_BLOCKS = 3, 8
+FEWEST_BLOCKS, MOST_BLOCKS = 4, 8
 """Blocks long enough to tell bearing orders from shaft orders, and enough of them for a jackknife."""
 
 N_BANDS = 4
@@ -86,13 +88,13 @@ def gather(recording: Recording, rig: Rig, channels: Sequence[str] = (), angle: 
 
 
 def _angle_of(recording: Recording, rig: Rig) -> ShaftAngle:
-    from gearsig.diagnosis.speed import determine_angle
+    from gearsig.diagnosis.speed import determine_angle, exact_angle
     from gearsig.diagnosis.types import CannotTell
 
     found = determine_angle(recording, rig)
     if isinstance(found, CannotTell):
         raise RefusalError(found.reason, remedy=found.remedy)
-    return found.between(0.0, recording.duration_s)
+    return exact_angle(recording, rig, found).between(0.0, recording.duration_s)
 
 
 def _of_shaft(angle: ShaftAngle, rig: Rig, shaft: str) -> ShaftAngle:
@@ -125,66 +127,20 @@ def _channel_sums(
     bands: Sequence[tuple[float, float]],
     speed_hz: float,
 ) -> tuple[ChannelSums, tuple[float, float]]:
-    lines, counts, means = [], [], []
-    for signal in signals:
-        revolutions = _whole_revolutions(signal, channel)
+    joint = joint_averages(signals, channel, frame)
+    lines, counts = [], []
+    for revolutions in joint.revolutions:
         edges = np.linspace(0, len(revolutions), n_blocks + 1).round().astype(np.intp)
         averages = np.stack([revolutions[i:j].mean(axis=0) for i, j in pairwise(edges)])
         lines.append(2.0 * np.fft.rfft(averages, axis=1) / averages.shape[1])
         counts.append(np.diff(edges).astype(np.float64))
-        means.append(revolutions.mean(axis=0))
-    residual = _residual(signals, channel, means, frame)
+    residual = joint.residual
     n = signals[0].samples_per_revolution
     power, order_step = _segment_power(residual, n, n_blocks)
     highest_cycle = min(max(HIGHEST_CYCLE, frame.teeth[0] + BEYOND_THE_MESH), 0.4 * n)
     envelopes, moments, cycle_step = _envelopes(residual, n, n_blocks, bands, speed_hz, highest_cycle)
     sums = ChannelSums((lines[0], lines[1]), (counts[0], counts[1]), power, envelopes, moments, _tail(raw, n_blocks))
     return sums, (order_step, cycle_step)
-
-
-def _whole_revolutions(signal: AngleSignal, channel: int) -> FloatArray:
-    """Return (n_revolutions, n_angles), each from shaft angle 0."""
-    n = signal.samples_per_revolution
-    first = round(-signal.start_revolution * n) % n
-    values = signal.samples[channel]
-    count = (len(values) - first) // n
-    revolutions: FloatArray = values[first : first + count * n].reshape(count, n)
-    return revolutions
-
-
-def _residual(
-    signals: tuple[AngleSignal, ...], channel: int, means: Sequence[FloatArray], frame: GearFrame
-) -> FloatArray:
-    """Return, over the driver's angle, what neither shaft repeats: x(θ) − a1(θ) − a2(θ z1/z2), a2 without the mesh."""
-    driver, driven = signals
-    ratio = frame.shaft_orders[1]
-    place = _places(driver)
-    residual = driver.samples[channel] - _periodic(means[0], place)
-    # What the driver repeats leaks into the driven gear's average, as its revolutions are no whole number of those.
-    revolutions = _whole_revolutions(driven, channel)
-    first = round(-driven.start_revolution * driven.samples_per_revolution) % driven.samples_per_revolution
-    turned = _places(driven)[first : first + revolutions.size]
-    leaked = _periodic(means[0], turned / ratio).reshape(revolutions.shape).mean(axis=0)
-    lines = np.fft.rfft(means[1] - leaked)
-    lines[:: frame.teeth[1]] = 0.0  # the mesh belongs to both; the driver's average has it
-    # Angle 0 of both shafts falls together, as one angle was made of the other.
-    return np.asarray(residual - _periodic(np.fft.irfft(lines, len(means[1])), place * ratio), dtype=np.float64)
-
-
-def _places(signal: AngleSignal) -> FloatArray:
-    """Return the shaft's angle at each sample, in revolutions."""
-    n = signal.samples_per_revolution
-    places: FloatArray = (np.arange(signal.samples.shape[1]) + round(signal.start_revolution * n)) / n
-    return places
-
-
-def _periodic(revolution: FloatArray, place_rev: FloatArray) -> FloatArray:
-    """Return a periodic waveform at any angles, by cubic splines."""
-    from scipy.ndimage import map_coordinates
-
-    n = len(revolution)
-    values: FloatArray = map_coordinates(revolution, [place_rev * n % n], order=3, mode="grid-wrap")
-    return values
 
 
 def _segment_power(values: FloatArray, rate: float, n_segments: int) -> tuple[FloatArray, float]:
@@ -216,25 +172,26 @@ def _envelopes(
     powers, moments, step = [], [], 0.0
     for low, high in bands:
         first, last = (int(f / speed_hz * n / n_per_rev) for f in (low, high))
-        last = min(last, len(lines) - 1)
-        square = _squared_envelope(lines, first, last, n)
+        square = _squared_envelope(lines[first : min(last, len(lines) - 1)], n)
         # |z|² is low-passed to the modulation orders of interest by keeping its first lines.
-        slow_lines = rfft(square)[: m // 2 + 1] * (m / n)
+        slow_lines = np.zeros(m // 2 + 1, dtype=np.complex128)
+        kept = rfft(square)[: m // 2 + 1] * (m / len(square))
+        slow_lines[: len(kept)] = kept
         slow = irfft(slow_lines, m)
         power, step = _segment_power(slow / max(slow.mean(), 1e-300), m / n * n_per_rev, n_blocks)
         powers.append(power)
-        edges = np.linspace(0, n, n_blocks + 1).astype(np.intp)
+        edges = np.linspace(0, len(square), n_blocks + 1).astype(np.intp)
         # With z the analytic signal: E x² = E|z|²/2, E x⁴ = 3/8 E|z|⁴.
         moments.append([[square[i:j].mean() / 2.0, 0.375 * (square[i:j] ** 2).mean()] for i, j in pairwise(edges)])
     return np.stack(powers, axis=1), np.asarray(moments).transpose(1, 0, 2), step
 
 
-def _squared_envelope(lines: np.ndarray, first: int, last: int, n: int) -> FloatArray:
-    from scipy.fft import ifft
+def _squared_envelope(band: NDArray[np.complex128], n: int) -> FloatArray:
+    """Return |z|² of a band of lines of n samples, at just the rate that it needs: twice the band's width."""
+    from scipy.fft import ifft, next_fast_len
 
-    band = np.zeros(n, dtype=np.complex128)
-    band[: last - first] = 2.0 * lines[first:last]
-    z = ifft(band, overwrite_x=True)
+    m = next_fast_len(2 * len(band) + 1)
+    z = ifft(2.0 * band, m) * (m / n)
     square: FloatArray = z.real**2 + z.imag**2
     return square
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,8 @@ class Gathered:
         Whether angle 0 of driver and driven shaft is a mark on that shaft.
     n_revolutions : float
         Of the driver.
+    known : list
+        What `gearsig.gap.features.whole_and_parts` found; it is asked for again and again.
     """
 
     frame: GearFrame
@@ -98,6 +100,7 @@ class Gathered:
     hum: tuple[float, ...]
     marks: tuple[bool, bool]
     n_revolutions: float
+    known: list[tuple[tuple[str, ...], FloatArray]] = field(default_factory=list, compare=False, repr=False)
 
     @property
     def n_blocks(self) -> int:
@@ -106,4 +109,8 @@ class Gathered:
 
     def without(self, block: int) -> Gathered:
         """Return the recording with one block of revolutions left out."""
-        return replace(self, channels={name: sums.without(block) for name, sums in self.channels.items()})
+        return self.with_channels({name: sums.without(block) for name, sums in self.channels.items()})
+
+    def with_channels(self, channels: dict[str, ChannelSums]) -> Gathered:
+        """Return the recording with other sums."""
+        return replace(self, channels=channels, known=[])

@@ -34,8 +34,13 @@ def average_lines(sums: ChannelSums, side: int) -> tuple[NDArray[np.complex128],
     scatter = (np.abs(blocks - lines) ** 2 * counts[:, None]).sum(axis=0) / max(len(counts) - 1, 1)
     noise = scatter / counts.sum()
     # A line's own scatter is that of few blocks: its neighbourhood says it better.
-    smooth = np.convolve(np.pad(noise, 4, mode="edge"), np.ones(9) / 9.0, mode="valid")
-    return lines, np.maximum(smooth, 1e-300)
+    return lines, np.maximum(smooth_power(noise), 1e-300)
+
+
+def smooth_power(power: FloatArray) -> FloatArray:
+    """Return the mean of each line and its four neighbours on either side."""
+    smooth: FloatArray = np.convolve(np.pad(power, 4, mode="edge"), np.ones(9) / 9.0, mode="valid")
+    return smooth
 
 
 def is_synchronous(sums: ChannelSums, side: int) -> NDArray[np.bool_]:
@@ -113,6 +118,8 @@ def _sidebands(power: FloatArray, teeth: int, highest: int, total: float, side: 
         orders = [o for o in orders if 0 < o <= highest and o % teeth]
         lines = float(np.mean(power[orders])) if orders else 1e-300
         yield f"sideband.{side}.{label}", decibel(lines / total)
+    own = [decibel(float(power[c - 1] + power[c + 1]) / max(float(power[c]), 1e-300)) for c in carriers]
+    yield f"sideband.{side}.own", float(np.median(own))
     far = [
         o for c in carriers for o in (*range(c - 12, c - 2), *range(c + 3, c + 13)) if 0 < o <= highest and o % teeth
     ]

@@ -33,8 +33,6 @@ class Population:
         Against a sound recording of the same machine on another day, and standard errors.
     gaps, gap_scatter : arrays, (n, n_features)
         Against the twin that knows the rig file only.
-    features : array, (n, n_features)
-        Of the recording by itself.
     """
 
     rigs: NDArray[np.int64]
@@ -45,7 +43,6 @@ class Population:
     change_scatter: FloatArray
     gaps: FloatArray
     gap_scatter: FloatArray
-    features: FloatArray
 
     @cached_property
     def reference_floor(self) -> StructuralFloor:
@@ -62,6 +59,11 @@ class Population:
     def floor(self, *, with_reference: bool) -> StructuralFloor:
         """Return the floor of one way of comparing."""
         return self.reference_floor if with_reference else self.simulation_floor
+
+    def feature_floor(self, *, with_reference: bool) -> StructuralFloor:
+        """Return the floor of the features alone, without the patterns of a difference."""
+        table = self.changes if with_reference else self.gaps
+        return StructuralFloor.of_healthy(self.feature_names, table[self.causes == NONE][:, : len(self.feature_names)])
 
 
 @cache
@@ -84,7 +86,7 @@ def load_population(path: Path = FILE) -> Population:
         ) from None
     tables = {
         name: np.asarray(arrays[name], dtype=np.float64)
-        for name in ("changes", "change_scatter", "gaps", "gap_scatter", "features")
+        for name in ("changes", "change_scatter", "gaps", "gap_scatter")
     }
     return Population(
         arrays["rigs"],

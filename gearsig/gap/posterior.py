@@ -18,14 +18,16 @@ FILE = Path(__file__).with_name("calibration.json")
 
 @dataclass(frozen=True)
 class GapCalibration:
-    """p ∝ exp(a ln p_forest + b score + c[kind]), fitted to blind cases kept for that.
+    """p ∝ exp(a ln p_forest + b (score − s0) + c[kind]), fitted to blind cases kept for that.
 
     Parameters
     ----------
     sharpness : float
         a.
     shrink_weight : float
-        b; the score is the held-out shrink less that of placebos, 0 for what was not tried.
+        b; the score is the held-out shrink less that of placebos. Only for effects that were tried.
+    neutral_shrink : float
+        s0, the score that says nothing for the effect nor against it.
     none_bias, unknown_bias : float
         c of both causes that are no effect.
     named_from : float
@@ -36,6 +38,7 @@ class GapCalibration:
 
     sharpness: float
     shrink_weight: float
+    neutral_shrink: float
     none_bias: float
     unknown_bias: float
     named_from: float
@@ -44,7 +47,7 @@ class GapCalibration:
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> GapCalibration:
         """Build it from what a JSON file holds."""
-        names = ("sharpness", "shrink_weight", "none_bias", "unknown_bias", "named_from", "apart")
+        names = ("sharpness", "shrink_weight", "neutral_shrink", "none_bias", "unknown_bias", "named_from", "apart")
         return cls(*(float(values[name]) for name in names))
 
     def probabilities(self, forest: Mapping[str, float], scores: Mapping[str, float]) -> dict[str, float]:
@@ -58,7 +61,8 @@ class GapCalibration:
             Effect → score of those that were tried.
         """
         levels = {
-            name: self.sharpness * float(np.log(max(p, 1e-9))) + self.shrink_weight * scores.get(name, 0.0)
+            name: self.sharpness * float(np.log(max(p, 1e-9)))
+            + self.shrink_weight * (scores.get(name, self.neutral_shrink) - self.neutral_shrink)
             for name, p in forest.items()
         }
         levels[NONE] += self.none_bias

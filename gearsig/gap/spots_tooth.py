@@ -63,7 +63,9 @@ def own_pattern(gathered: Gathered, side: int) -> ToothPattern:
     residuals = []
     for sums in gathered.channels.values():
         lines = average_lines(sums, side)[0]
-        residual = residual_lines(lines, teeth, visible_orders(gathered, side, len(lines)))
+        residual = residual_lines(
+            lines, teeth, visible_orders(gathered, side, len(lines)), gathered.frame.teeth[1 - side]
+        )
         residuals.append(residual / np.sqrt(mesh_power(gathered, sums, side)))
     return _pattern(gathered, side, residuals, lines_of_shaft(gathered, side))
 

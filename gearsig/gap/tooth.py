@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import gcd
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,14 +25,25 @@ from gearsig.gap.gear_lines import (
 SMOOTH_SIDEBANDS = 2
 """Mesh lines and as many sidebands on either side are left out: eccentricity makes those."""
 SMOOTH_SHAFT_ORDERS = 3
+FEWEST_APART = 3
+"""Orders between two that both shafts share, for those to be left out."""
+
 STEPS_PER_TOOTH = 4
 
 
-def residual_lines(lines: NDArray[np.complex128], teeth: int, highest: int) -> NDArray[np.complex128]:
-    """Return the lines without mesh harmonics, their first sidebands and the first shaft orders."""
+def residual_lines(
+    lines: NDArray[np.complex128], teeth: int, highest: int, other_teeth: int = 1
+) -> NDArray[np.complex128]:
+    """Return the lines without mesh harmonics, their first sidebands and the first shaft orders.
+
+    Orders that the other shaft has, too, are left out unless those are most: which teeth meet depends on them.
+    """
     orders = np.arange(len(lines))
     near = np.abs((orders + teeth // 2) % teeth - teeth // 2) <= SMOOTH_SIDEBANDS
     out = near | (orders <= SMOOTH_SHAFT_ORDERS) | (orders > highest)
+    apart = teeth // gcd(teeth, other_teeth)
+    if apart >= FEWEST_APART:
+        out |= orders % apart == 0
     return np.where(out, 0.0, lines)
 
 
@@ -55,7 +67,9 @@ def tooth_features(gathered: Gathered, sums: Sequence[ChannelSums]) -> Iterator[
         for channel in sums:
             lines, noise = average_lines(channel, side)
             scale = mesh_power(gathered, channel, side)
-            residuals.append(residual_lines(lines, teeth, visible_orders(gathered, side, len(lines))) / np.sqrt(scale))
+            highest = visible_orders(gathered, side, len(lines))
+            residual = residual_lines(lines, teeth, highest, gathered.frame.teeth[1 - side])
+            residuals.append(residual / np.sqrt(scale))
             noises.append(np.where(residuals[-1] != 0, noise, 0.0).sum() / 2.0 / scale)
         longer = max(1.0, float(sums[0].counts[side].sum()) / NOMINAL_REVOLUTIONS)
         yield from pattern_features(f"tooth.{SIDES[side]}", residuals, teeth, float(np.mean(noises)), longer)

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.gap.bank import Bank, bank_of, rounded
+from app.gap.bank import Bank, banks_of, rounded
+from app.gap.bank_runs import Run
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap.change import change_once
 from gearsig.gap.features import once
@@ -20,12 +21,12 @@ from gearsig.rig.types import GearPair, Rig, Shaft
 FS, DURATION_S, TEETH = 4096.0, 2.0, (20, 31)
 POINT = Point(1800.0, 40.0)
 RIG = Rig("r", (Shaft("a"), Shaft("b")), (GearPair("p", "a", "b", *TEETH),))
-STRONG, WEAK = Added("louder", 2.0), Added("louder", 1.1)
+STRONG, WEAK, IMPOSSIBLE = Added("louder", 2.0), Added("louder", 1.1), Added("louder", 1000.0)
 
 
 @dataclass(frozen=True)
 class Sines:
-    """A twin made of mesh harmonics; "louder" multiplies them, "impossible" cannot be simulated."""
+    """A twin made of mesh harmonics; "louder" multiplies them, a thousand times is too much."""
 
     key: str = "sines 1"
     broken: bool = False
@@ -41,7 +42,7 @@ class Sines:
         noise: int = 0,
     ) -> Recording:
         """Return mesh harmonics with a tachometer."""
-        if self.broken or any(a.name == "impossible" for a in added):
+        if self.broken or IMPOSSIBLE in added:
             raise RefusalError("it cannot be")
         rng = np.random.default_rng([seed, noise])
         turned = np.arange(round(duration_s * sampling_rate_hz)) / sampling_rate_hz * point.speed_rpm / 60.0
@@ -52,24 +53,24 @@ class Sines:
         return Recording(samples, sampling_rate_hz, channels, speed=TachometerChannel("t", 1, shaft="a"), rig=RIG)
 
     def candidates(self, effect: str) -> Sequence[Added]:
-        """Two strengths, or one that cannot be simulated."""
-        return {"louder": (WEAK, STRONG), "impossible": (Added("impossible", 1.0),)}[effect]
+        """Two strengths, and one that cannot be simulated; "louder 2" has the strong one only."""
+        return {"louder": (WEAK, STRONG, IMPOSSIBLE), "louder 2": (STRONG,)}[effect]
 
     def preset_toml(self, point: Point, added: Sequence[Added], notes: Sequence[str]) -> str:
         """No use here."""
         raise NotImplementedError
 
 
-def bank(folder: Path | None = None, twin: Sines | None = None, **changed: object) -> Bank:
-    settings: Mapping[str, object] = {
-        "seeds": (0, 1),
-        "duration_s": DURATION_S,
-        "sampling_rate_hz": FS,
-        "folder": folder,
-        "processes": 1,
-        **changed,
-    }
-    return bank_of(twin or Sines(), POINT, ("louder", "impossible"), **settings)  # type: ignore[arg-type]
+def bank(
+    folder: Path | None = None,
+    twin: Sines | None = None,
+    duration_s: float = DURATION_S,
+    noise: int = 1,
+    **changed: object,
+) -> Bank:
+    settings: Mapping[str, object] = {"seeds": (0, 1), "folder": folder, "processes": 1, **changed}
+    run = Run(twin or Sines(), POINT, duration_s, FS, noise)
+    return banks_of([run], ["louder"], **settings)[0]["louder"]  # type: ignore[arg-type]
 
 
 def same(one: Bank, other: Bank) -> bool:
@@ -85,8 +86,6 @@ def test_changes_are_those_of_the_features_against_the_same_specimen() -> None:
     assert found.added == (WEAK, STRONG)
     assert found.changes.shape == (2, 2, len(found.change_names))
     assert found.change_names[: len(found.feature_names)] == found.feature_names
-    kept, changed = found.of_effect("louder")
-    assert (kept, changed.shape) == (found.added, found.changes.shape)
 
     def gathered(*added: Added, noise: int = 0):  # type: ignore[no-untyped-def]  # of the features' room
         run = Sines().run(rounded(POINT), added, seed=1, duration_s=DURATION_S, sampling_rate_hz=FS, noise=noise)
@@ -97,7 +96,7 @@ def test_changes_are_those_of_the_features_against_the_same_specimen() -> None:
 
 
 def test_what_cannot_be_simulated_is_left_out_with_its_reason() -> None:
-    assert bank().left_out == ((Added("impossible", 1.0), "it cannot be"),)
+    assert bank().left_out == ((IMPOSSIBLE, "it cannot be"),)
     with pytest.raises(RefusalError, match="sound machine cannot be simulated: it cannot be"):
         bank(twin=Sines(broken=True))
 
@@ -169,6 +168,20 @@ def test_a_stop_ends_it_and_leaves_nothing(tmp_path: Path, processes: int) -> No
 
 def test_processes_give_the_same_bank() -> None:
     assert same(bank(processes=2), bank(processes=1))
+
+
+def test_each_effect_at_each_point_has_a_file_and_what_is_there_is_not_made_again(tmp_path: Path) -> None:
+    runs = [Run(Sines(), Point(speed, 40.0), DURATION_S, FS, 1) for speed in (1800.0, 1500.0)]
+    banks_of(runs[:1], ["louder"], seeds=[0], folder=tmp_path, processes=1)
+    made = []
+    both = banks_of(
+        runs, ["louder", "louder 2"], seeds=[0], folder=tmp_path, processes=1, on_progress=lambda *n: made.append(n)
+    )
+    assert len(list(tmp_path.iterdir())) == 4
+    assert len(made) == 2 + 1 + 4  # the sound machine at both points; one candidate at the first, four at the other
+    assert [set(at) for at in both] == [{"louder", "louder 2"}] * 2
+    assert [at["louder"].point for at in both] == [run.point for run in runs]
+    np.testing.assert_array_equal(both[1]["louder"].changes[1], both[1]["louder 2"].changes[0])
 
 
 def test_a_folder_that_cannot_be_made_is_named_before_the_work(tmp_path: Path) -> None:

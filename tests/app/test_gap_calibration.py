@@ -26,7 +26,7 @@ def drawn(n: int, truth: GapCalibration, seed: int = 3) -> list[WeighedCase]:
 
 @pytest.mark.parametrize(("sharpness", "weight"), [(0.6, 2.0), (1.3, 0.5)])
 def test_the_drawn_calibration_is_found(sharpness: float, weight: float) -> None:
-    fitted = fit_calibration(drawn(3000, GapCalibration(sharpness, weight, 0.7, -0.5, 0.5, 0.65)))
+    fitted = fit_calibration(drawn(3000, GapCalibration(sharpness, weight, 0.2, 0.7, -0.5, 0.5, 0.65)))
     assert fitted.sharpness == pytest.approx(sharpness, rel=0.2)
     assert fitted.shrink_weight == pytest.approx(weight, abs=0.3)
     assert fitted.none_bias == pytest.approx(0.7, abs=0.3)
@@ -34,7 +34,7 @@ def test_the_drawn_calibration_is_found(sharpness: float, weight: float) -> None
 
 
 def test_few_healthy_cases_get_an_effect() -> None:
-    cases = drawn(1500, GapCalibration(1.0, 1.0, 0.0, 0.0, 0.5, 0.65))
+    cases = drawn(1500, GapCalibration(1.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.65))
     fitted = fit_calibration(cases)
     found = [fitted.probabilities(c.forest, c.scores) for c in cases if c.truths == (NONE,)]
     named = [1.0 - p[NONE] - p[UNKNOWN] >= fitted.named_from for p in found]

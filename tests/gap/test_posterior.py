@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from gearsig.gap.posterior import GapCalibration, load_gap_calibration, score_of
 from gearsig.gap.types import NONE, UNKNOWN, GapOutcome
 
-PLAIN = GapCalibration(1.0, 0.0, 0.0, 0.0, 0.5, 0.65)
+PLAIN = GapCalibration(1.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.65)
 FOREST = {"root_crack": 0.5, "eccentricity": 0.2, NONE: 0.2, UNKNOWN: 0.1}
 
 
@@ -19,13 +19,13 @@ def test_without_calibration_probabilities_stay() -> None:
 
 @given(st.floats(0.2, 3.0), st.floats(0.0, 5.0), st.floats(-1.0, 1.0))
 def test_probabilities_add_up_and_are_in_order(sharpness: float, weight: float, score: float) -> None:
-    found = GapCalibration(sharpness, weight, 0.3, -0.2, 0.5, 0.65).probabilities(FOREST, {"eccentricity": score})
+    found = GapCalibration(sharpness, weight, 0.1, 0.3, -0.2, 0.5, 0.65).probabilities(FOREST, {"eccentricity": score})
     assert sum(found.values()) == pytest.approx(1.0)
     assert list(found.values()) == sorted(found.values(), reverse=True)
 
 
 def test_what_shrinks_the_gap_gains() -> None:
-    weighed = GapCalibration(1.0, 3.0, 0.0, 0.0, 0.5, 0.65).probabilities(FOREST, {"eccentricity": 0.9})
+    weighed = GapCalibration(1.0, 3.0, 0.0, 0.0, 0.0, 0.5, 0.65).probabilities(FOREST, {"eccentricity": 0.9})
     assert next(iter(weighed)) == "eccentricity"
 
 

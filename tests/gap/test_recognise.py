@@ -28,7 +28,7 @@ def on_half(population: Population) -> Recogniser:
 
 
 def some(population: Population, rows: np.ndarray) -> Population:
-    tables = ("rigs", "causes", "changes", "change_scatter", "gaps", "gap_scatter", "features")
+    tables = ("rigs", "causes", "changes", "change_scatter", "gaps", "gap_scatter")
     return replace(population, **{name: getattr(population, name)[rows] for name in tables})
 
 
@@ -51,7 +51,7 @@ def test_a_reference_lowers_the_floor(population: Population) -> None:
 def test_machines_that_the_forest_never_saw_are_recognised_far_above_chance(
     population: Population, on_half: Recogniser
 ) -> None:
-    others = np.flatnonzero(population.rigs % 2 == 1)
+    others = np.flatnonzero(population.rigs % 2 == 1)[::9]
     found = [on_half.probabilities(row(population, int(i))) for i in others]
     right = np.mean([max(p, key=p.__getitem__) == population.causes[i] for p, i in zip(found, others, strict=True)])
     assert right > 0.4

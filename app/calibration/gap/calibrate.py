@@ -1,13 +1,15 @@
 """Calibrate the gap's probabilities on blind cases: `python -m app.calibration.gap.calibrate --cases N --work FILE`.
 
 Cases of the role "calibration" differ in gear geometry from those that the benchmark judges by. What a case says is
-kept in the work file, a line each, so that a stopped run goes on. A case takes about a minute on two cores.
+kept in the work file, a line each, so that a stopped run goes on. The forests are asked about every case, which takes
+some seconds; effects are tried on the twin for the first `--tried` cases only, a minute each.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ import numpy as np
 import typer
 
 from app.calibration.gap.fit import WeighedCase, fit_calibration
+from app.gap.weigh import MOST_TRIED
 from gearsig.errors import GearsigError
 from gearsig.gap.posterior import FILE
 from gearsig.gap.types import NONE, UNKNOWN
@@ -27,15 +30,17 @@ ROUND = 27
 def main() -> None:
     """Make cases, weigh them, fit, write."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cases", type=int, default=108)
+    parser.add_argument("--cases", type=int, default=162)
+    parser.add_argument("--tried", type=int, default=27)
+    parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--work", type=Path, required=True, help="keeps what the cases say")
     parser.add_argument("--to", type=Path, default=FILE)
     given = parser.parse_args()
     done = _read(given.work)
     missing = [i for i in range(given.cases) if i not in done]
-    with given.work.open("a", encoding="utf-8") as file:
-        for i in missing:
-            rows = weigh_case(i)
+    with given.work.open("a", encoding="utf-8") as file, ProcessPoolExecutor(given.processes) as pool:
+        weighed = pool.map(weigh_case, missing, [MOST_TRIED if i < given.tried else 0 for i in missing])
+        for i, rows in zip(missing, weighed, strict=True):
             file.write(json.dumps({"case": i, "rows": rows}) + "\n")
             file.flush()
             typer.echo(f"case {i}: {', '.join(rows[0]['truths']) if rows else 'refused'}")
@@ -53,7 +58,7 @@ def main() -> None:
     typer.echo(json.dumps(values, indent=1))
 
 
-def weigh_case(index: int) -> list[dict[str, Any]]:
+def weigh_case(index: int, most_tried: int) -> list[dict[str, Any]]:
     """Return what is said of a blind case with its reference and without, and the truth; less where it is refused."""
     from app.gap.prepare import conditions_of
     from app.gap.weigh import weigh
@@ -63,7 +68,7 @@ def weigh_case(index: int) -> list[dict[str, Any]]:
     rng = np.random.default_rng([SEED, index])
     place, names = index % ROUND, list(CATALOGUE)
     kind = "single" if place < len(names) else "none" if place < len(names) + 4 else "unknown"
-    wanted = {"effect": names[place], "level": float(rng.uniform(0.1, 1.0))} if kind == "single" else {}
+    wanted = {"effect": names[place], "level": float(rng.uniform(0.0, 1.0))} if kind == "single" else {}
     case = draw_case(rng, "calibration", kind=kind, with_reference=True, **wanted)  # type: ignore[arg-type]  # as drawn
     truths = [wanted["effect"]] if wanted else [NONE if kind == "none" else UNKNOWN]
     recorded = record_case(case)
@@ -76,7 +81,7 @@ def weigh_case(index: int) -> list[dict[str, Any]]:
             conditions, _ = conditions_of(
                 recorded.conditions, rigs, references, [_rig(r) for r in references], twin, (), lambda *_: None
             )
-            weighed = weigh(conditions, simulator.gap_effects(), (), twin, None, lambda *_: None)
+            weighed = weigh(conditions, simulator.gap_effects(), (), twin, None, lambda *_: None, most_tried=most_tried)
         except GearsigError as error:
             typer.echo(f"case {index}: {error}")
             continue

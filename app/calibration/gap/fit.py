@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,9 +15,10 @@ FALSE_ON_NONE, FALSE_ON_UNKNOWN = 0.05, 0.15
 """Parts of the healthy cases, and of those outside the catalogue, on which an effect may be named."""
 
 APART = 0.65
+_START = np.array([1.0, 0.0, 0.3, 0.0, 0.0])
+_BOUNDS = ((0.1, 5.0), (0.0, 10.0), (-1.0, 1.0), (-4.0, 4.0), (-4.0, 4.0))
 _PRIOR = 0.5
-"""Weight of the start, no calibration at all, beside that of one case."""
-_BOUNDS = ((0.1, 5.0), (0.0, 10.0), (-4.0, 4.0), (-4.0, 4.0))
+"""Weight of the start, at which trials say nothing, beside that of one case."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class WeighedCase:
 
 
 def fit_calibration(cases: Sequence[WeighedCase]) -> GapCalibration:
-    """Fit sharpness, weight of the shrink and both biases by likelihood; then the threshold for naming an effect.
+    """Fit sharpness, what trials say and both biases by likelihood; then the threshold for naming an effect.
 
     J. C. Platt, "Probabilistic outputs for support vector machines", 1999; C. Guo, G. Pleiss, Y. Sun, K. Q. Weinberger,
     "On calibration of modern neural networks", 2017 (one temperature for all classes).
@@ -48,17 +49,17 @@ def fit_calibration(cases: Sequence[WeighedCase]) -> GapCalibration:
     def loss(x: FloatArray) -> float:
         fitted = _calibration(x)
         right = [sum(fitted.probabilities(c.forest, c.scores)[t] for t in c.truths) for c in cases]
-        off = np.array([np.log(x[0]), x[1] - 1.0, x[2], x[3]])
+        off = x - _START
         return float(-np.mean(np.log(np.maximum(right, 1e-9))) + _PRIOR / len(cases) * off @ off)
 
-    best = minimize(loss, [1.0, 1.0, 0.0, 0.0], method="L-BFGS-B", bounds=_BOUNDS).x
-    rounded = np.round(best, 3)
-    return _calibration(rounded, _named_from(_calibration(rounded), cases))
+    best = minimize(loss, _START, method="L-BFGS-B", bounds=_BOUNDS).x
+    fitted = _calibration(np.round(best, 3))
+    return replace(fitted, named_from=_named_from(fitted, cases))
 
 
-def _calibration(x: FloatArray, named_from: float = 0.5) -> GapCalibration:
-    sharpness, weight, none, unknown = (float(v) for v in x)
-    return GapCalibration(sharpness, weight, none, unknown, named_from, APART)
+def _calibration(x: FloatArray) -> GapCalibration:
+    sharpness, weight, neutral, none, unknown = (float(v) for v in x)
+    return GapCalibration(sharpness, weight, neutral, none, unknown, 0.5, APART)
 
 
 def _named_from(fitted: GapCalibration, cases: Sequence[WeighedCase]) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.calibration.rigs import DrawnRig, HousingMode, draw_rig
+from sims.effects import EffectSetting
 
 LIGHT_SHARE, LIGHT_TORQUE = 0.3, (0.04, 0.3)
 """Machines that run at light load, and their torque over that of the others."""
@@ -15,12 +16,15 @@ DURATION_S = (3.0, 7.0)
 MOUNTED_ANEW_SHARE = 0.6
 """Recordings between which and their reference the sensors were taken off."""
 
-SPEED_SCATTER, TORQUE_SCATTER = 0.006, 0.06
-GAIN_SCATTER, MODE_SCATTER, MODE_GAIN_SCATTER = 0.10, 0.02, 0.20
+SPEED_SCATTER, TORQUE_SCATTER = 0.006, 0.05
+GAIN_SCATTER, MODE_SCATTER, MODE_GAIN_SCATTER = 0.10, 0.03, 0.20
 """Relative standard deviations of what a changed mounting changes; gains are those of each channel and mode."""
 
-NOISE_SCATTER = 0.25
+NOISE_SCATTER = 0.12
 """Of the natural logarithm of the sensors' noise."""
+
+WANDER_PERCENT, WANDER_HZ, WANDER_SCATTER = (0.005, 0.1), (0.05, 1.0), 0.3
+"""Of every drive's speed: amplitude and frequency, and by how much the amplitude's logarithm differs on another day."""
 
 
 @dataclass(frozen=True)
@@ -34,12 +38,15 @@ class Day:
     speed_factor, torque_factor : float
     gains : tuple of float
         Of the channels.
+    wander : EffectSetting
+        Of the speed, as every drive's.
     """
 
     drawn: DrawnRig
     speed_factor: float
     torque_factor: float
     gains: tuple[float, float]
+    wander: EffectSetting
 
 
 def draw_machine(rng: np.random.Generator) -> DrawnRig:
@@ -50,16 +57,29 @@ def draw_machine(rng: np.random.Generator) -> DrawnRig:
     return replace(drawn, depth_mm=0.0, duration_s=float(np.clip(1.2 * drawn.duration_s, *DURATION_S)))
 
 
+def first_day(drawn: DrawnRig, rng: np.random.Generator) -> Day:
+    """Return the machine as it was drawn."""
+    return Day(drawn, 1.0, 1.0, (1.0, 1.0), _wander(drawn, rng))
+
+
 def another_day(drawn: DrawnRig, rng: np.random.Generator) -> Day:
     """Return the machine as it stands on another day: nearly the same point, perhaps with sensors mounted anew."""
     speed, torque = (1.0 + s * float(rng.standard_normal()) for s in (SPEED_SCATTER, TORQUE_SCATTER))
     noise = float(drawn.parameters["noise_mps2"]) * float(np.exp(NOISE_SCATTER * rng.standard_normal()))
-    parameters = {**drawn.parameters, "noise_mps2": noise}
+    parameters, wander = {**drawn.parameters, "noise_mps2": noise}, _wander(drawn, rng)
     if rng.uniform() >= MOUNTED_ANEW_SHARE:
-        return Day(replace(drawn, parameters=parameters), speed, torque, (1.0, 1.0))
+        return Day(replace(drawn, parameters=parameters), speed, torque, (1.0, 1.0), wander)
     first, second = np.exp(GAIN_SCATTER * rng.standard_normal(2))
     modes = tuple(_mounted_anew(mode, rng) for mode in drawn.modes)
-    return Day(replace(drawn, parameters=parameters, modes=modes), speed, torque, (float(first), float(second)))
+    return Day(replace(drawn, parameters=parameters, modes=modes), speed, torque, (float(first), float(second)), wander)
+
+
+def _wander(drawn: DrawnRig, rng: np.random.Generator) -> EffectSetting:
+    """Return the drive's wander on one day: its kind belongs to the machine."""
+    own = np.random.default_rng([drawn.seed, 5])
+    percent, frequency_hz = (float(np.exp(own.uniform(*np.log(span)))) for span in (WANDER_PERCENT, WANDER_HZ))
+    today = float(np.exp(WANDER_SCATTER * rng.standard_normal()))
+    return EffectSetting("speed_fluctuation", percent * today, {"frequency_hz": frequency_hz})
 
 
 def _mounted_anew(mode: HousingMode, rng: np.random.Generator) -> HousingMode:

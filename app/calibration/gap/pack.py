@@ -15,7 +15,6 @@ TABLES = {
     "change_scatter": "change_scatter",
     "gaps": "gap",
     "gap_scatter": "gap_scatter",
-    "features": "alone",
 }
 """Name in the library → name in the raw tables."""
 
@@ -27,19 +26,14 @@ def main() -> None:
     parser.add_argument("--to", type=Path, default=FILE)
     given = parser.parse_args()
     raw = [np.load(path, allow_pickle=False) for path in given.raw]
-    n_features = len(raw[0]["alone_names"])
-    tables = {}
-    for name, source in TABLES.items():
-        joined = np.concatenate([one[source] for one in raw])
-        kept = joined[:, :n_features] if name.startswith("gap") else joined  # a simulation's flanks are its own
-        tables[name] = kept.astype(np.float16)
+    tables = {name: np.concatenate([one[key] for one in raw]).astype(np.float16) for name, key in TABLES.items()}
     np.savez_compressed(
         given.to,
         allow_pickle=False,
         rigs=np.concatenate([one["rig"] for one in raw]).astype(np.int64),
         causes=np.concatenate([one["label"] for one in raw]),
         change_names=raw[0]["change_names"],
-        feature_names=raw[0]["alone_names"],
+        feature_names=raw[0]["gap_names"],
         **tables,
     )
     typer.echo(f"{len(tables['changes'])} recordings; {given.to.stat().st_size / 1e6:.1f} MB")

@@ -1,7 +1,7 @@
 """Simulate the population of the gap diagnosis: `python -m app.calibration.gap.population --rigs N --to FILE`.
 
-Each drawn gearbox is recorded sound as the reference, sound again on other days, with each effect, and with foreign
-vibration; what differs goes into the table, with its label.
+Each drawn gearbox is recorded sound as the reference, sound again on other days, with each effect, with foreign
+vibration, and with each effect's signature by hand; what differs goes into the table, with its label.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from pathlib import Path
 import numpy as np
 import typer
 
-from app.calibration.gap.machines import Day, another_day, draw_machine
+from app.calibration.gap.machines import Day, another_day, draw_machine, first_day
 from app.calibration.gap.outside import with_foreign_vibration
+from app.calibration.gap.signatures import HAND_MADE, with_signature
 from app.calibration.rigs import DrawnRig
 from app.calibration.simulate import SAMPLING_RATE_HZ, simulate_rig
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap.change import change_features
-from gearsig.gap.features import features_of
+from gearsig.gap.change import change_features, difference_features
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.simulator import Point
@@ -33,7 +33,7 @@ from sims.cracked.usual import nominal_of
 from sims.effects import EffectSetting, effects
 
 SEED = 4107
-N_SOUND, N_FOREIGN = 3, 6
+N_SOUND, N_FOREIGN, N_BY_HAND = 3, 10, 3
 MEASUREMENT_CHAIN = "measurement chain"
 
 
@@ -50,10 +50,8 @@ class Sample:
     torque_nm : float
     change, change_scatter : arrays, (n_changes,)
         Against the sound reference.
-    gap, gap_scatter : arrays, (n_changes,)
+    gap, gap_scatter : arrays, (n_features,)
         Against the twin that knows the rig file only.
-    alone, alone_scatter : arrays, (n_features,)
-        By itself.
     """
 
     rig: int
@@ -65,8 +63,6 @@ class Sample:
     change_scatter: FloatArray
     gap: FloatArray
     gap_scatter: FloatArray
-    alone: FloatArray
-    alone_scatter: FloatArray
 
 
 def main() -> None:
@@ -97,14 +93,14 @@ def write(path: Path, samples: list[Sample], names: tuple[tuple[str, ...], tuple
     }
     tables = {
         key: np.array([getattr(s, key) for s in samples], dtype=np.float32)
-        for key in ("change", "change_scatter", "gap", "gap_scatter", "alone", "alone_scatter")
+        for key in ("change", "change_scatter", "gap", "gap_scatter")
     }
     part = path.with_suffix(".part.npz")
     np.savez_compressed(
         part,
         allow_pickle=False,
         change_names=np.array(names[0]),
-        alone_names=np.array(names[1]),
+        gap_names=np.array(names[1]),
         **rows,
         **tables,
     )
@@ -116,7 +112,7 @@ def one_rig(index: int) -> tuple[list[Sample], tuple[tuple[str, ...], tuple[str,
     rng = np.random.default_rng([SEED, index])
     drawn = draw_machine(rng)
     try:
-        reference = simulate_rig(drawn, severity=0.0, step_angle_rad=STEP_ANGLE_RAD)
+        reference = _record(first_day(drawn, rng), 0)
     except (InputError, RefusalError):
         return [], None
     if reference.rig is None:
@@ -132,7 +128,7 @@ def one_rig(index: int) -> tuple[list[Sample], tuple[tuple[str, ...], tuple[str,
             samples.append(_sample(index, label, detail, severity, torque_nm, recording, (sound, simulated)))
         except (InputError, RefusalError) as error:
             typer.echo(f"gearbox {index}, {label}: {error}")
-    names = change_features(sound, sound).names, features_of(sound).names
+    names = change_features(sound, sound).names, difference_features(sound, simulated).names
     return samples, names
 
 
@@ -148,8 +144,7 @@ def _sample(
     if recording.rig is None:
         raise InputError("a simulated recording has no rig")
     now = gather(recording, recording.rig)
-    change, gap = (change_features(now, other) for other in others)
-    alone = features_of(now)
+    change, gap = change_features(now, others[0]), difference_features(now, others[1])
     return Sample(
         rig,
         label,
@@ -160,8 +155,6 @@ def _sample(
         change.scatter,
         gap.values,
         gap.scatter,
-        alone.values,
-        alone.scatter,
     )
 
 
@@ -182,6 +175,9 @@ def _recordings(
     for i in range(N_FOREIGN):
         recording, name = with_foreign_vibration(sound[i % N_SOUND], rng)
         yield UNKNOWN, name, 0.0, recording, drawn.torque_nm
+    for i, name in enumerate(HAND_MADE * N_BY_HAND):
+        recording, strength = with_signature(sound[i % N_SOUND], name, rng)
+        yield name, "by hand", strength, recording, drawn.torque_nm
     for run, name in enumerate(effects(), start=N_SOUND + 1):
         day = another_day(drawn, rng)
         try:
@@ -202,7 +198,7 @@ def _record(day: Day, run: int, setting: EffectSetting | None = None) -> Recordi
         run=run,
         speed_factor=day.speed_factor,
         torque_factor=day.torque_factor,
-        further=[setting] if setting is not None else [],
+        further=[day.wander, *([setting] if setting is not None else [])],
         step_angle_rad=STEP_ANGLE_RAD,
     )
     gains = iter(day.gains)

@@ -1,0 +1,382 @@
+"""The catalogue's effects as the literature describes them, put into recordings of sound machines.
+
+The population's own simulator shows each effect in one way, with one balance between its lines, sidebands and noise.
+Machines, and other simulators, agree with it on the signature and not on that balance: where a run-out modulates the
+mesh in one, it shows as a line of the shaft in another. So each effect is also made by hand with its balance drawn
+anew each time, and whoever learns from the population learns what the balances have in common.
+
+Source of the signatures: R. B. Randall, *Vibration-based Condition Monitoring*, 2nd ed., 2021, chapters 2, 5 and 7;
+ISO 13373-2:2016, annexes; P. D. McFadden, "Detecting fatigue cracks in gears by amplitude and phase demodulation of
+the meshing vibration", J. Vib. Acoust. 108 (1986).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from app.calibration.gap.scene import (
+    Scene,
+    band_noise,
+    knocks,
+    log_uniform,
+    passings,
+    ring,
+    scene_of,
+    struck,
+    tone,
+)
+from gearsig.checks import FloatArray
+from gearsig.recording.types import Recording
+
+N_MESH_HARMONICS = 6
+LARGEST_ADVANCE = 0.35
+"""Of a mesh period, by which a tooth comes too early or too late."""
+
+
+@dataclass(frozen=True)
+class Signature:
+    """What an effect does to every vibration channel: y(t) = m(t) x(t + τ(t)) + Σ of what is added.
+
+    Parameters
+    ----------
+    gain : array, (n,), or None
+        m, of the whole vibration.
+    advance_rev : array, (n,), or None
+        τ, in revolutions of the driver.
+    added : tuple of arrays, (n,)
+        In standard deviations of the channel.
+    mesh_gains : tuple of float
+        By which the mesh harmonics are multiplied.
+    """
+
+    gain: FloatArray | None = None
+    advance_rev: FloatArray | None = None
+    added: tuple[FloatArray, ...] = ()
+    mesh_gains: tuple[float, ...] = ()
+
+
+def with_signature(recording: Recording, name: str, rng: np.random.Generator) -> tuple[Recording, float]:
+    """Return the recording with an effect's signature, and how strong it is, 0 to 1."""
+    scene = scene_of(recording)
+    strength = float(rng.uniform())
+    samples = recording.samples.copy()
+    if name == "clipping":
+        most = 10.0 ** (-3.5 + 2.5 * strength)  # share of the samples that are cut
+        for i in _vibrations(recording):
+            low, high = np.quantile(samples[i], (most / 2.0, 1.0 - most / 2.0))
+            samples[i] = np.clip(samples[i], low, high) if rng.uniform() < 0.5 else _cut_at(samples[i], most)
+        return replace(recording, samples=samples), strength
+    signature = SIGNATURES[name](scene, 10.0 ** (-1.6 + 1.6 * strength), rng)
+    for i in _vibrations(recording):
+        samples[i] = _changed(samples[i], signature, scene, rng)
+    return replace(recording, samples=samples), strength
+
+
+def _vibrations(recording: Recording) -> list[int]:
+    return [i for i, channel in enumerate(recording.channels) if channel.is_vibration]
+
+
+def _cut_at(values: FloatArray, share: float) -> FloatArray:
+    limit = float(np.quantile(np.abs(values), 1.0 - share))
+    cut: FloatArray = np.clip(values, -limit, limit)
+    return cut
+
+
+def _changed(values: FloatArray, signature: Signature, scene: Scene, rng: np.random.Generator) -> FloatArray:
+    found, size = values, float(values.std())
+    if signature.advance_rev is not None:
+        speed = np.gradient(scene.revolutions, scene.time_s)
+        found = _at(found, signature.advance_rev / speed * scene.sampling_rate_hz)
+    if signature.gain is not None:
+        found = found * (1.0 + (signature.gain - 1.0) * rng.uniform(0.5, 1.0))
+    if signature.mesh_gains:
+        found = found + _mesh_change(values, signature.mesh_gains, scene)
+    for added in signature.added:
+        found = found + added * size * rng.uniform(0.3, 1.0)
+    return found
+
+
+def _at(values: FloatArray, advance_samples: FloatArray) -> FloatArray:
+    from scipy.ndimage import map_coordinates
+
+    moved: FloatArray = map_coordinates(values, [np.arange(len(values)) + advance_samples], order=3, mode="nearest")
+    return moved
+
+
+def _mesh_change(values: FloatArray, gains: tuple[float, ...], scene: Scene) -> FloatArray:
+    """Return what must be added for the mesh harmonics to be `gains` times as large."""
+    change = np.zeros_like(values)
+    for k, gain in enumerate(gains, start=1):
+        wave = np.exp(2j * np.pi * k * scene.teeth[0] * scene.revolutions)
+        change += (gain - 1.0) * 2.0 * np.real(np.mean(values * np.conj(wave)) * wave)
+    return change
+
+
+def _side(rng: np.random.Generator) -> int:
+    return int(rng.integers(2))
+
+
+def _sign(rng: np.random.Generator) -> float:
+    return float(rng.choice((-1.0, 1.0)))
+
+
+def _balance(rng: np.random.Generator, n: int) -> FloatArray:
+    """Return n weights, the largest 1, any of the others nearly nothing."""
+    weights = 10.0 ** (-rng.uniform(0.0, 1.5, n))
+    weights[rng.uniform(size=n) < 0.25] = 0.0
+    weights[int(rng.integers(n))] = 1.0
+    found: FloatArray = weights
+    return found
+
+
+def _tooth_window(scene: Scene, side: int, width_teeth: float, rng: np.random.Generator) -> tuple[FloatArray, float]:
+    """Return 1 in the middle of one tooth's mesh, 0 away from it, and that tooth's place in revolutions."""
+    place, teeth = float(rng.uniform()), scene.teeth[side]
+    off = (scene.revolutions * scene.shaft_orders[side] - place + 0.5) % 1.0 - 0.5
+    reach = np.clip(off * teeth / width_teeth, -1.0, 1.0)
+    window: FloatArray = 0.5 + 0.5 * np.cos(np.pi * reach)
+    return window, place
+
+
+def _tooth_knocks(
+    scene: Scene, side: int, place: float, scatter: float, rng: np.random.Generator, of: int = 1
+) -> FloatArray:
+    """Return knocks when a tooth meshes, `of` of them a fraction of a pitch apart, in standard deviations at most 1."""
+    answer, order, total = ring(scene, rng), scene.shaft_orders[side], np.zeros(len(scene.time_s))
+    for _ in range(of):
+        at = passings(scene, order, -place - float(rng.uniform(0.0, 0.7)) / scene.teeth[side])
+        total += struck(at, np.maximum(rng.normal(1.0, scatter, len(at)), 0.0) * _sign(rng), scene, answer)
+    return total / max(float(np.abs(total).max()), 1e-12)
+
+
+def _root_crack(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
+    """A softer tooth: it comes late, the mesh swings on for a tooth or two; hardly any blow."""
+    side = _side(rng)
+    window, place = _tooth_window(scene, side, float(rng.uniform(0.8, 2.0)), rng)
+    gain, late, blow = _balance(rng, 3) * (0.8, 1.0, 0.7)
+    knock = _tooth_knocks(scene, side, place, 0.03, rng)
+    return Signature(
+        1.0 + _sign(rng) * gain * size * window, _late(scene, late * size, window, rng), (blow * size * knock,)
+    )
+
+
+def _late(scene: Scene, share: float, window: FloatArray, rng: np.random.Generator) -> FloatArray:
+    late: FloatArray = _sign(rng) * LARGEST_ADVANCE * share / scene.teeth[0] * window
+    return late
+
+
+def _tooth_spall(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
+    """A pit: short blows when the flank enters and leaves it, different each time; the mesh hardly notices."""
+    side = _side(rng)
+    window, place = _tooth_window(scene, side, float(rng.uniform(0.3, 0.8)), rng)
+    blows = _tooth_knocks(scene, side, place, float(rng.uniform(0.05, 0.4)), rng, of=2)
+    return Signature(1.0 + _sign(rng) * 0.4 * size * rng.uniform() * window, None, (4.0 * size * blows,))
+
+
+def _chipped_tooth(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
+    """A missing corner: load is lost, the next tooth takes it with a blow."""
+    side = _side(rng)
+    window, place = _tooth_window(scene, side, float(rng.uniform(0.5, 1.2)), rng)
+    blow = _tooth_knocks(scene, side, place, 0.08, rng)
+    return Signature(
+        1.0 + _sign(rng) * size * rng.uniform(0.3, 1.2) * window,
+        _late(scene, size * rng.uniform(0.3, 1.2), window, rng),
+        (6.0 * size * rng.uniform(0.5, 1.0) * blow,),
+    )
+
+
+def _tooth_wear(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
+    """A profile that is worn away from the pitch line: mesh harmonics grow, the second and higher ones most."""
+    gains = 1.0 + 4.0 * size * np.abs(rng.standard_normal(N_MESH_HARMONICS)) * rng.choice((0.3, 1.0), N_MESH_HARMONICS)
+    noise = 0.4 * size * rng.uniform() * _at_the_mesh(scene, band_noise(scene, rng), rng)
+    return Signature(added=(noise,), mesh_gains=tuple(gains.tolist()))
+
+
+def _at_the_mesh(scene: Scene, noise: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return noise, of unit size, that swells with the mesh more or less."""
+    swelling = 1.0 + rng.uniform(0.0, 0.9) * np.cos(2 * np.pi * scene.teeth[0] * scene.revolutions)
+    found: FloatArray = noise / max(float(noise.std()), 1e-12) * swelling
+    return found
+
+
+def _pitch_error(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
+    """Each tooth comes early or late by its own amount: lines at all orders of its shaft."""
+    side = _side(rng)
+    teeth, turn = scene.teeth[side], scene.revolutions * scene.shaft_orders[side]
+    errors, gains = (rng.standard_normal(teeth) for _ in range(2))
+    at, gain, slow = _balance(rng, 3)
+    place = turn * teeth % teeth
+    nodes = np.arange(teeth + 1)
+    early = np.interp(place, nodes, np.append(errors, errors[0]))
+    louder = np.interp(place, nodes, np.append(gains, gains[0]))
+    run = np.cumsum(errors - errors.mean())
+    low = np.interp(place, nodes, np.append(run, run[0])) / max(float(run.std()), 1e-12)
+    return Signature(
+        np.maximum(1.0 + 0.6 * gain * size * louder, 0.0),
+        0.3 * LARGEST_ADVANCE * at * size / scene.teeth[0] * np.clip(early, -2.5, 2.5),
+        (0.5 * slow * size * low,),
+    )
+
+
+def _surface_roughness(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
+    """Asperities that slide over each other: noise, in bands, more or less with the mesh."""
+    loose, locked = _balance(rng, 2)
+    total = sum(
+        (_at_the_mesh(scene, band_noise(scene, rng), rng) * rng.uniform(0.3, 1.0) for _ in range(3)),
+        np.zeros(len(scene.time_s)),
+    )
+    sides = [_born_with(scene, side, rng) * rng.uniform(0.0, 1.0) for side in (0, 1)]
+    return Signature(added=(0.8 * size * loose * total, 0.8 * size * locked * (sides[0] + sides[1])))
+
+
+def _born_with(scene: Scene, side: int, rng: np.random.Generator) -> FloatArray:
+    """Return a waveform, of unit size, that a gear repeats each turn: lines at all its orders in a broad band."""
+    teeth = scene.teeth[side]
+    low, high = teeth * rng.uniform(0.5, 3.0), teeth * rng.uniform(4.0, 9.0)
+    n = 2 * int(high) + 2
+    orders = np.arange(n // 2 + 1)
+    lines = (rng.standard_normal(len(orders)) + 1j * rng.standard_normal(len(orders))) * (
+        (orders > low) & (orders < high)
+    )
+    wave = np.fft.irfft(lines, 8 * n)
+    places = scene.revolutions * scene.shaft_orders[side] % 1.0 * len(wave)
+    found: FloatArray = np.interp(places, np.arange(len(wave) + 1), np.append(wave, wave[0]))
+    return found / max(float(found.std()), 1e-12)
+
+
+def _sliding_friction(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
+    """A force along the flanks that turns round at the pitch point: twice per mesh, and some noise."""
+    gains = np.ones(N_MESH_HARMONICS)
+    gains += 1.5 * size * rng.standard_normal(N_MESH_HARMONICS) * (0.4, 1.0, 0.6, 1.0, 0.6, 1.0)
+    noise = 0.8 * size * rng.uniform(0.2, 1.0) * _at_the_mesh(scene, band_noise(scene, rng), rng)
+    return Signature(added=(noise,), mesh_gains=tuple(np.maximum(gains, 0.1).tolist()))
+
+
+def _swing(scene: Scene, order: float, size: float, rng: np.random.Generator) -> FloatArray:
+    wave: FloatArray = np.maximum(1.0 + size * tone(order, scene, rng), 0.0)
+    return wave
+
+
+def _eccentricity(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
+    """Run-out: the mesh swings once per turn in size and phase; the shaft's own line, and its second, may show."""
+    order = scene.shaft_orders[_side(rng)]
+    gain, late = 10.0 ** (-rng.uniform(0.0, 0.7, 2))
+    first = float(rng.choice((0.0, 1.0))) * rng.uniform(0.0, 1.0)
+    second = first * rng.uniform(0.0, 0.3)
+    return Signature(
+        _swing(scene, order, 0.8 * gain * size, rng),
+        LARGEST_ADVANCE * late * size / scene.teeth[0] * tone(order, scene, rng),
+        (size * first * tone(order, scene, rng), size * second * tone(2.0 * order, scene, rng)),
+    )
+
+
+def _unbalance(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
+    """A force that turns with the shaft: its line, and hardly a sideband."""
+    order = scene.shaft_orders[_side(rng)]
+    return Signature(
+        _swing(scene, order, 0.04 * size * rng.uniform(), rng), None, (1.5 * size * tone(order, scene, rng),)
+    )
+
+
+def _misalignment(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
+    """Two stiffness swings per turn: the shaft's second line above all, and sidebands of the mesh one and two apart."""
+    order = scene.shaft_orders[_side(rng)]
+    lines, bands = _balance(rng, 2)
+    first, third = rng.uniform(0.0, 0.7, 2)
+    waves = sum(
+        (w * tone(n * order, scene, rng) for n, w in ((1.0, first), (2.0, 1.0), (3.0, third))),
+        np.zeros(len(scene.time_s)),
+    )
+    swing = _swing(scene, 2.0 * order, 0.6 * bands * size, rng)
+    swing = swing * _swing(scene, order, 0.6 * bands * size * rng.uniform(), rng)
+    return Signature(swing, None, (size * max(lines, 0.2) * waves,))
+
+
+def _torque_ripple(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
+    """The drive pulls n times per turn: that line, and sidebands of the mesh so far apart."""
+    shaft = scene.shaft_orders[_side(rng)]
+    order = shaft * (float(rng.integers(2, 15)) if rng.uniform() < 0.75 else float(rng.uniform(1.5, 15.0)))
+    gain, late, line = _balance(rng, 3)
+    return Signature(
+        _swing(scene, order, 0.8 * gain * size, rng),
+        LARGEST_ADVANCE * late * size / scene.teeth[0] * tone(order, scene, rng),
+        (size * max(line, 0.2) * tone(order, scene, rng),),
+    )
+
+
+def _backlash(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
+    """Teeth that part and meet again: blows at the mesh or at its half, scattered, and a mesh of other harmonics."""
+    order = scene.teeth[0] * float(rng.choice((0.5, 1.0)))
+    at = passings(scene, order, rng.uniform())
+    kept = at[rng.uniform(size=len(at)) < rng.uniform(0.3, 1.0)]
+    blows = struck(kept, rng.normal(1.0, rng.uniform(0.1, 0.6), len(kept)), scene, ring(scene, rng))
+    gains = np.exp(1.5 * size * rng.standard_normal(N_MESH_HARMONICS))
+    half = 0.5 * size * rng.uniform() * tone(scene.teeth[0] / 2.0, scene, rng)
+    restless = np.maximum(1.0 + size * rng.uniform(0.0, 1.5) * _slow_noise(scene, rng), 0.0)
+    return Signature(
+        gain=restless,
+        added=(2.0 * size * blows / max(float(blows.std()), 1e-12), half),
+        mesh_gains=tuple(gains.tolist()),
+    )
+
+
+def _slow_noise(scene: Scene, rng: np.random.Generator) -> FloatArray:
+    """Return noise, of unit size, that changes within a fraction of a turn."""
+    turns = scene.revolutions[-1] - scene.revolutions[0]
+    n = int(turns * rng.uniform(2.0, 0.5 * scene.teeth[0])) + 2
+    nodes = np.linspace(scene.revolutions[0], scene.revolutions[-1], n)
+    noise: FloatArray = np.interp(scene.revolutions, nodes, rng.standard_normal(n))
+    return noise
+
+
+def _race(scene: Scene, size: float, rng: np.random.Generator, name: str) -> Signature:
+    """Knocks when elements pass the defect; on the inner race louder in the load zone, that is once per turn."""
+    bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
+    order = bearing[name] * float(rng.uniform(0.985, 1.0))
+    by = bearing["shaft"] if name == "BPFI" else 0.0
+    vibration = knocks(order, log_uniform(rng, 0.001, 0.02), scene, rng, by=by)
+    return Signature(added=(1.5 * size * vibration / max(float(vibration.std()), 1e-12),))
+
+
+def _outer_race(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
+    return _race(scene, size, rng, "BPFO")
+
+
+def _inner_race(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
+    return _race(scene, size, rng, "BPFI")
+
+
+def _bearing_clearance(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
+    """A shaft that is held less: other resonances for the mesh, lines of its turn, of the elements passing."""
+    bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
+    mesh, passing, turn = _balance(rng, 3)
+    gains = np.exp(2.0 * mesh * size * rng.standard_normal(N_MESH_HARMONICS))
+    lines = [
+        0.4 * passing * size / k * tone(k * bearing["BPFO"] * float(rng.uniform(0.99, 1.0)), scene, rng) for k in (1, 2)
+    ]
+    lines += [0.4 * turn * size / k * tone(k * bearing["shaft"], scene, rng) for k in (1, 2, 3)]
+    return Signature(added=tuple(lines), mesh_gains=tuple(gains.tolist()))
+
+
+SIGNATURES: dict[str, Callable[[Scene, float, np.random.Generator], Signature]] = {
+    "root_crack": _root_crack,
+    "tooth_spall": _tooth_spall,
+    "chipped_tooth": _chipped_tooth,
+    "tooth_wear": _tooth_wear,
+    "pitch_error": _pitch_error,
+    "surface_roughness": _surface_roughness,
+    "sliding_friction": _sliding_friction,
+    "eccentricity": _eccentricity,
+    "unbalance": _unbalance,
+    "misalignment": _misalignment,
+    "torque_ripple": _torque_ripple,
+    "backlash": _backlash,
+    "bearing_outer_race": _outer_race,
+    "bearing_inner_race": _inner_race,
+    "bearing_clearance": _bearing_clearance,
+}
+HAND_MADE = (*SIGNATURES, "clipping")
+"""Effects that have a signature here; the others are as the simulator makes them."""

@@ -1,0 +1,56 @@
+"""Signatures by hand: each moves what the literature says it moves, and nothing but the vibration."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.calibration.gap.outside import with_foreign_vibration
+from app.calibration.gap.signatures import HAND_MADE, with_signature
+from gearsig.gap.change import change_once
+from gearsig.gap.gather import gather
+from tests.gap.synthetic import RIG, record
+
+SOUND = record()
+EXPECTED = {
+    "unbalance": ("shaft.driver.1", "shaft.driven.1"),
+    "misalignment": ("shaft.driver.2", "shaft.driven.2"),
+    "eccentricity": ("sideband.driver.1", "sideband.driven.1"),
+    "pitch_error": ("tooth.driver.level", "tooth.driven.level"),
+    "chipped_tooth": ("surprise.driver.peak", "surprise.driven.peak"),
+    "root_crack": ("surprise.driver.peak", "surprise.driven.peak"),
+    "tooth_wear": ("mesh.total",),
+    "bearing_outer_race": ("envelope.outer",),
+    "bearing_inner_race": ("envelope.inner",),
+    "surface_roughness": ("floor.total", "tooth.driver.level", "tooth.driven.level"),
+    "clipping": ("raw.near_the_extreme",),
+}
+
+
+@pytest.mark.parametrize("name", HAND_MADE)
+def test_only_the_vibration_changes_and_a_seed_repeats_it(name: str) -> None:
+    first, again = (with_signature(SOUND, name, np.random.default_rng(5)) for _ in range(2))
+    np.testing.assert_array_equal(first[0].samples, again[0].samples)
+    assert first[1] == again[1]
+    for row, before, channel in zip(first[0].samples, SOUND.samples, SOUND.channels, strict=True):
+        assert np.isfinite(row).all()
+        assert np.array_equal(row, before) is not channel.is_vibration
+
+
+@pytest.mark.parametrize("name", EXPECTED)
+def test_strong_ones_move_their_own_features(name: str) -> None:
+    sound = gather(record(seed=1), RIG)
+    found = []
+    for seed in range(8):
+        now, strength = with_signature(SOUND, name, np.random.default_rng(seed))
+        if strength > 0.6:
+            change = dict(zip(*change_once(gather(now, RIG), sound), strict=True))
+            found.append(max(change[feature] for feature in EXPECTED[name]))
+    assert found
+    assert np.median(found) > 3.0
+
+
+def test_foreign_vibration_has_a_name_and_is_no_effect() -> None:
+    now, name = with_foreign_vibration(SOUND, np.random.default_rng(2))
+    assert name.replace(" ", "_") not in HAND_MADE
+    assert not np.array_equal(now.samples, SOUND.samples)
