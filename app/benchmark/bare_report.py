@@ -13,9 +13,12 @@ _NOTHING = Interval(0.0, 0.0, 0.0)
 
 
 def bare_report(
-    simulator: str, probabilities: Mapping[str, float], options: Mapping[str, Mapping[str, str]] | None = None
+    simulator: str,
+    probabilities: Mapping[str, float],
+    options: Mapping[str, Mapping[str, str]] | None = None,
+    outcome: GapOutcome | None = None,
 ) -> GapReport:
-    """Return the report whose outcome is the likeliest cause's.
+    """Return the report of probabilities.
 
     Parameters
     ----------
@@ -25,16 +28,18 @@ def bare_report(
         Cause → probability.
     options : mapping or None
         Cause → where it is put: gear, bearing.
+    outcome : GapOutcome or None
+        None: the likeliest cause's.
     """
     where = options or {}
     ranked = sorted(probabilities.items(), key=lambda item: -item[1])
-    outcome = {NONE: GapOutcome.NO_GAP, UNKNOWN: GapOutcome.UNKNOWN}.get(ranked[0][0], GapOutcome.EFFECT)
+    likeliest = {NONE: GapOutcome.NO_GAP, UNKNOWN: GapOutcome.UNKNOWN}.get(ranked[0][0], GapOutcome.EFFECT)
     return GapReport(
         rig="",
         simulator=simulator,
         conditions=(),
         references=(),
-        outcome=outcome,
+        outcome=outcome or likeliest,
         size=_NOTHING,
         repeatability=0.0,
         places=(),

@@ -11,10 +11,11 @@ from gearsig.gap.types import GapReport
 
 Diagnoser = Callable[[Seen], GapReport]
 
-GAP, MAJORITY, RULES = "gap", "majority", "rules"
+GAP, FOREST, MAJORITY, RULES = "gap", "forest", "majority", "rules"
 BASELINES = (MAJORITY, RULES)
 _HOMES = {
     GAP: "app.benchmark.diagnosers:diagnose",
+    FOREST: "app.benchmark.forest:diagnose",
     MAJORITY: "app.benchmark.majority:diagnose",
     RULES: "app.benchmark.rules:diagnose",
 }

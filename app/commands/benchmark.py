@@ -44,7 +44,7 @@ def gap(
         typer.Option(
             "--diagnoser",
             metavar="NAME",
-            help="gap, majority, rules, or MODULE:FUNCTION; the first is judged, more stand beside it. Default: gap.",
+            help="gap, forest, majority, rules, or MODULE:FUNCTION; the first is judged, more stand beside it. Default: gap.",
         ),
     ] = None,
     longest: Annotated[
