@@ -132,6 +132,7 @@ def work(job):
 batch._report_one = work
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever runs the tests may ignore Ctrl-C
     result = batch.report_many(sys.argv[2:], sys.argv[1], n_processes=2)
     print([e.name for e in result.entries], [(f.name, f.reason) for f in result.failures])
 """
