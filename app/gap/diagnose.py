@@ -14,6 +14,7 @@ from app.gap.next_recording import next_recordings
 from app.gap.placing import at_its_tooth, place_of
 from app.gap.prepare import Stage, conditions_of
 from app.gap.rig_data import is_gearless
+from app.gap.unexplained import unexplained
 from app.gap.weigh import weigh
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap.curves import angle_curves, spectrum_curves
@@ -111,6 +112,8 @@ def diagnose_gap(
     causes = _in_order(causes, outcome)
     fitted = causes[0].fitted if outcome is GapOutcome.EFFECT else None
     after = None if fitted is None else simulated(twin, clearest.facts, clearest.now, (fitted,))
+    k = conditions.index(clearest)
+    notices += unexplained(recordings[k], own_rigs[k], references, other_rigs, clearest.facts.name)
     tell("looking for what would tell more", 0.88)
     pair = _rivals(causes)
     size = gap_size(clearest.change, clearest.floor)

@@ -11,12 +11,12 @@ from gearsig.gap.gear_lines import SIDEBANDS, SIDES
 
 _RELATIVE = (
     "mesh.half",
-    *(f"sideband.{side}.{label}" for side in SIDES for label in SIDEBANDS),
+    *(f"sideband.{side}.{label}" for side in SIDES for label in (*SIDEBANDS, "own")),
     *(f"shaft.{side}.{n}.to_mesh" for side in SIDES for n in (1, 2, 3, "strongest")),
     *(f"shaft.{side}.low" for side in SIDES),
     *(f"tooth.{side}.{what}" for side in SIDES for what in ("level", "elsewhere", "peak")),
 )
-"""Powers over that of the mesh."""
+"""Powers over that of the mesh, or of its harmonic."""
 
 _ABSOLUTE = (*(f"shaft.{side}.{n}" for side in SIDES for n in (1, 2, 3)), "floor.total")
 _BANDS = "floor.band."

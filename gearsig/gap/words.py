@@ -11,6 +11,7 @@ _SIDEBANDS = {
     "2": "second sidebands",
     "3to5": "sidebands 3 to 5",
     "6to12": "sidebands 6 to 12",
+    "own": "first sidebands over their own mesh harmonic",
     "strongest": "strongest sideband over the others",
 }
 _SHAFT = {
@@ -35,6 +36,13 @@ _TOOTH = {
     "below_mesh": "part below the mesh order",
     "centroid": "middle of the spectrum",
     "agreement": "agreement with the reference",
+}
+_OF_A_SHAFT = {
+    "sideband": ("", _SIDEBANDS),
+    "shaft": ("", _SHAFT),
+    "tooth": ("average, ", _TOOTH),
+    "change": ("change of the average, ", _TOOTH),
+    "surprise": ("change of the average over its noise, ", _TOOTH),
 }
 _CYCLIC = {
     "outer": "outer races",
@@ -69,9 +77,8 @@ def feature_words(name: str, frame: GearFrame) -> str:
     side, _, detail = rest.partition(".")
     if first == "mesh":
         return f"mesh harmonic {detail} over all"
-    if first in ("sideband", "shaft", "tooth", "change") and side in SIDES:
-        table = {"sideband": _SIDEBANDS, "shaft": _SHAFT}.get(first, _TOOTH)
-        what = "change of the average, " if first == "change" else "average, " if first == "tooth" else ""
+    if first in _OF_A_SHAFT and side in SIDES:
+        what, table = _OF_A_SHAFT[first]
         return f"{shaft_words(frame, SIDES.index(side))}: {what}{table[detail]}"
     if first == "floor":
         return f"floor, band {detail}" if side == "band" else f"kurtosis of the floor, band {detail}"

@@ -1,0 +1,16 @@
+"""Features in words."""
+
+from __future__ import annotations
+
+from gearsig.gap.families import family_of
+from gearsig.gap.frame import gear_frame
+from gearsig.gap.population import load_population
+from gearsig.gap.words import feature_words
+from tests.gap.synthetic import RIG
+
+
+def test_every_feature_has_words_of_its_own_and_a_family() -> None:
+    names = load_population().change_names
+    words = [feature_words(name, gear_frame(RIG)) for name in names]
+    assert len(set(words)) == len(names)
+    assert all(family_of(name) for name in names)
