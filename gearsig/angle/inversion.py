@@ -8,6 +8,9 @@ from numba import njit
 # Points per block that start from one cubic guess; short enough for the guess to be good, long enough to pay.
 _BLOCK = 32
 
+# Slope of the inverse, over an interval's length, beyond which the shaft all but stands: no cubic guess follows that.
+_STEEPEST = 1e3
+
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def times_at(knots, angle, speed, k, first, step, out):  # type: ignore[no-untyped-def]
@@ -54,6 +57,8 @@ def _between(a, b, c, low, high, offset, step, start, last, t0, h, out):  # type
         return False
     width = (last - start + 1) * step
     m0, m1, rise = width / slope_low, width / slope_high, high - low
+    if max(m0, m1) > _STEEPEST:
+        return False
     guess_c, guess_b = m0 + m1 - 2.0 * rise, 3.0 * rise - 2.0 * m0 - m1
     per_point = 1.0 / (last - start + 1)
     worst = 0.0
