@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from cmath import phase
 from collections.abc import Mapping
-from math import degrees, radians
+from math import atan2, degrees, radians
 
 import numpy as np
 
@@ -31,7 +30,7 @@ def vector_sum(length: float, angle_deg: float, other_length: float, other_angle
     [5.0, 53.130102354]
     """
     total = _vector(length, angle_deg) + _vector(other_length, other_angle_deg)
-    return abs(total), degrees(phase(total)) % 360.0
+    return abs(total), degrees(atan2(total.imag, total.real)) % 360.0
 
 
 def _vector(length: float, angle_deg: float) -> complex:

@@ -6,7 +6,7 @@ from math import radians
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
@@ -32,6 +32,7 @@ def unbalance(wheel: Wheel) -> complex:
 
 
 @given(lengths, angles, lengths, angles)
+@example(2.0, 0.0, 5e-324, 31.0)  # an angle below what numbers hold
 def test_vectors_add(a: float, alpha: float, b: float, beta: float) -> None:
     length, angle = vector_sum(a, alpha, b, beta)
     expected = rect(a, radians(alpha)) + rect(b, radians(beta))
