@@ -97,7 +97,7 @@ def draw_rig(rng: np.random.Generator, *, for_the_check: bool, even: bool = Fals
     module = float(rng.choice(OTHER_MODULES_MM if for_the_check else CALIBRATION_MODULES_MM))
     width = module * rng.uniform(6.0, 12.0)
     pitch_radius_m = 0.5e-3 * module * teeth[0]
-    load = _log_uniform(rng, 20.0, 120.0)  # N/mm², force per face width and module
+    load = log_uniform(rng, 20.0, 120.0)  # N/mm², force per face width and module
     torque = load * width * module * pitch_radius_m
     speed = _speed_rpm(rng, teeth)
     gear = str(rng.choice(("driver", "driven")))
@@ -112,7 +112,7 @@ def draw_rig(rng: np.random.Generator, *, for_the_check: bool, even: bool = Fals
     return DrawnRig(
         parameters,
         _modes(rng),
-        _log_uniform(rng, 0.3, 3.0),
+        log_uniform(rng, 0.3, 3.0),
         speed,
         torque,
         LEAST_REVOLUTIONS * max(1.0, teeth[1] / teeth[0]) * 60.0 / speed,
@@ -133,7 +133,7 @@ def _teeth(rng: np.random.Generator, for_the_check: bool) -> tuple[int, int]:
 
 def _speed_rpm(rng: np.random.Generator, teeth: tuple[int, int]) -> float:
     while True:
-        speed = _log_uniform(rng, 500.0, 3000.0)
+        speed = log_uniform(rng, 500.0, 3000.0)
         if MESH_HZ[0] <= speed / 60.0 * teeth[0] <= MESH_HZ[1]:
             return speed
 
@@ -155,9 +155,9 @@ def _gears(
         "half_backlash_um": rng.uniform(20.0, 80.0),
         "tip_relief_um": relief,
         "tip_relief_length_mm": module * rng.uniform(0.7, 1.5),
-        "pitch_deviation_um": _log_uniform(rng, 0.1, 1.0),
+        "pitch_deviation_um": log_uniform(rng, 0.1, 1.0),
         "tolerance_seed": int(rng.integers(10**6)),
-        "roughness_um": _log_uniform(rng, 0.03, 0.25),
+        "roughness_um": log_uniform(rng, 0.03, 0.25),
         "viscosity_cp": rng.uniform(10.0, 40.0),
         "runout_driver_um": rng.uniform(0.0, 8.0),
         "runout_driven_um": rng.uniform(0.0, 8.0),
@@ -173,9 +173,9 @@ def _gears(
 def _even_teeth(rng: np.random.Generator) -> dict[str, ParameterValue]:
     locked_to = str(rng.choice(("time", "flank")))
     return {
-        "pitch_deviation_um": _log_uniform(rng, 0.01, 0.1),
+        "pitch_deviation_um": log_uniform(rng, 0.01, 0.1),
         "roughness_locked_to": locked_to,
-        "roughness_um": _log_uniform(rng, 0.05, 0.5) if locked_to == "time" else _log_uniform(rng, 0.005, 0.05),
+        "roughness_um": log_uniform(rng, 0.05, 0.5) if locked_to == "time" else log_uniform(rng, 0.005, 0.05),
         "runout_driver_um": rng.uniform(0.0, 2.0),
         "runout_driven_um": rng.uniform(0.0, 2.0),
     }
@@ -186,17 +186,17 @@ def _rest(rng: np.random.Generator, module: float, teeth: tuple[int, int]) -> di
     size = module / 2.0
     inertia = 2e-3 * size**4 * (sum(teeth) / 80.0) ** 3
     return {
-        "bearing_stiffness_n_per_m": size * _log_uniform(rng, 7e7, 6e8),
-        "bearing_damping_n_s_per_m": size * _log_uniform(rng, 500.0, 3000.0),
-        "bearing_mass_kg": size**2 * _log_uniform(rng, 0.3, 1.5),
-        "bending_stiffness_n_per_m": size * _log_uniform(rng, 7e7, 1e9),
-        "bending_damping_n_s_per_m": size * _log_uniform(rng, 200.0, 2000.0),
-        "torsional_stiffness_nm_per_rad": size**3 * _log_uniform(rng, 2e3, 6e4),
-        "torsional_damping_nm_s_per_rad": size**3 * _log_uniform(rng, 0.4, 6.0),
-        "rotor_inertia_input_kg_m2": inertia * _log_uniform(rng, 0.5, 10.0),
-        "rotor_inertia_output_kg_m2": inertia * _log_uniform(rng, 0.5, 10.0),
-        "governor_nm_s_per_rad": 1.0 * size**4 * _log_uniform(rng, 0.5, 5.0),
-        "noise_mps2": _log_uniform(rng, 0.02, 0.5),
+        "bearing_stiffness_n_per_m": size * log_uniform(rng, 7e7, 6e8),
+        "bearing_damping_n_s_per_m": size * log_uniform(rng, 500.0, 3000.0),
+        "bearing_mass_kg": size**2 * log_uniform(rng, 0.3, 1.5),
+        "bending_stiffness_n_per_m": size * log_uniform(rng, 7e7, 1e9),
+        "bending_damping_n_s_per_m": size * log_uniform(rng, 200.0, 2000.0),
+        "torsional_stiffness_nm_per_rad": size**3 * log_uniform(rng, 2e3, 6e4),
+        "torsional_damping_nm_s_per_rad": size**3 * log_uniform(rng, 0.4, 6.0),
+        "rotor_inertia_input_kg_m2": inertia * log_uniform(rng, 0.5, 10.0),
+        "rotor_inertia_output_kg_m2": inertia * log_uniform(rng, 0.5, 10.0),
+        "governor_nm_s_per_rad": 1.0 * size**4 * log_uniform(rng, 0.5, 5.0),
+        "noise_mps2": log_uniform(rng, 0.02, 0.5),
         "noise_slope": rng.uniform(0.0, 1.0),
         "sensor_range_mps2": 5000.0,
     }
@@ -206,8 +206,8 @@ def _modes(rng: np.random.Generator) -> tuple[HousingMode, ...]:
     n = int(rng.integers(2, 6))
     return tuple(
         HousingMode(
-            _log_uniform(rng, 600.0, 8000.0),
-            _log_uniform(rng, 0.01, 0.05),
+            log_uniform(rng, 600.0, 8000.0),
+            log_uniform(rng, 0.01, 0.05),
             rng.uniform(0.02, 0.08),
             tuple(float(s) for s in rng.uniform(-1.0, 1.0, 4)),  # type: ignore[arg-type]  # four of them
         )
@@ -215,5 +215,6 @@ def _modes(rng: np.random.Generator) -> tuple[HousingMode, ...]:
     )
 
 
-def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """Draw with even chance per decade."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))

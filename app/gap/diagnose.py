@@ -32,6 +32,7 @@ from gearsig.gap.types import (
     GapPlace,
     GapReport,
     NextRecording,
+    group_probabilities,
 )
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
@@ -128,7 +129,7 @@ def diagnose_gap(
         repeatability=size.repeatability.value,
         places=places,
         causes=causes,
-        groups=_groups(causes),
+        groups=group_probabilities(causes),
         inseparable=pair if outcome is GapOutcome.CANNOT_SEPARATE else None,
         steps=steps_of(conditions, tried, causes) if tried and outcome is not GapOutcome.NO_GAP else (),
         next_recordings=_next(pair, tried, twin, conditions, outcome),
@@ -234,13 +235,6 @@ def _in_order(causes: tuple[GapCause, ...], outcome: GapOutcome) -> tuple[GapCau
 def _rivals(causes: Sequence[GapCause]) -> tuple[str, str] | None:
     names = [c.name for c in causes if c.name not in (NONE, UNKNOWN)]
     return (names[0], names[1]) if len(names) > 1 else None
-
-
-def _groups(causes: Sequence[GapCause]) -> dict[str, float]:
-    found: dict[str, float] = {}
-    for cause in causes:
-        found[cause.group] = found.get(cause.group, 0.0) + cause.probability
-    return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
 def _preset(twin: Twin, condition: Condition, cause: GapCause, fitted: Added) -> str:

@@ -12,7 +12,15 @@ from app.gap.standing_out import LINE, PARTS, RACES, Examined, Standing, analyse
 from gearsig.diagnosis.types import Kind
 from gearsig.gap.simulator import GapEffect, Point
 from gearsig.gap.spots import band_words, hertz
-from gearsig.gap.types import ConditionFacts, GapPlace, GapReport, Interval, PlaceKind, SpectrumCurves
+from gearsig.gap.types import (
+    ConditionFacts,
+    GapPlace,
+    GapReport,
+    Interval,
+    PlaceKind,
+    SpectrumCurves,
+    group_probabilities,
+)
 from gearsig.recording.types import Recording
 from gearsig.report.gap_sections import signed
 from gearsig.report.sections import named
@@ -86,7 +94,7 @@ def diagnose_gearless(
         repeatability=NAN,
         places=tuple(_place(one, rigs[0], name=one.recording if len(every) > 1 else "") for one in standing),
         causes=causes,
-        groups=_groups([(cause.group, cause.probability) for cause in causes]),
+        groups=group_probabilities(causes),
         spectra=_spectra(standing, every),
         notices=(
             NOT_SIMULATED,
@@ -157,11 +165,6 @@ def _what(one: Standing, rig: Rig) -> str:
     if code == LINE:
         return "the strongest line of no known shaft or bearing"
     return "envelope lines of impacts that no shaft and no bearing explains"
-
-
-def _groups(shares: Sequence[tuple[str, float]]) -> dict[str, float]:
-    groups = {group: sum(p for other, p in shares if other == group) for group, _ in shares}
-    return dict(sorted(groups.items(), key=lambda item: -item[1]))
 
 
 def _spectra(standing: Sequence[Standing], every: Sequence[Examined]) -> tuple[SpectrumCurves, ...]:

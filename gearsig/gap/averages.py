@@ -9,6 +9,7 @@ import numpy as np
 from gearsig.angle.types import AngleSignal
 from gearsig.checks import FloatArray
 from gearsig.gap.frame import DRIVEN, DRIVER, GearFrame
+from gearsig.orders.revolutions import first_whole_sample
 
 PASSES = 3
 """Each shaft's average less the other's, in turn. Orders of both lie close, and few revolutions tell them apart
@@ -65,7 +66,7 @@ def joint_averages(signals: tuple[AngleSignal, ...], channel: int, frame: GearFr
 def _whole(signal: AngleSignal, values: FloatArray) -> FloatArray:
     """Return (n_revolutions, n_angles), each from shaft angle 0."""
     n = signal.samples_per_revolution
-    first = round(-signal.start_revolution * n) % n
+    first, _ = first_whole_sample(signal)
     count = (len(values) - first) // n
     revolutions: FloatArray = values[first : first + count * n].reshape(count, n)
     return revolutions

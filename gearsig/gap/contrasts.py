@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gearsig.checks import FloatArray
+from gearsig.gap.change import SURPRISE
 from gearsig.gap.gear_lines import N_MESH_HARMONICS, SIDES
 
 _OF_A_SHAFT = (
@@ -73,7 +74,7 @@ def seen_rows(names: Sequence[str], distances: FloatArray) -> FloatArray:
 
 
 def _pairs(place: dict[str, int]) -> list[tuple[str, str]]:
-    of_a_shaft = _OF_A_SHAFT + (_OF_A_DIFFERENCE if any(name.startswith("surprise.") for name in place) else ())
+    of_a_shaft = _OF_A_SHAFT + (_OF_A_DIFFERENCE if any(name.startswith(SURPRISE) for name in place) else ())
     found = [(a.format(side), b.format(side)) for side in SIDES for a, b in of_a_shaft]
     found += [(name.format(SIDES[0]), name.format(SIDES[1])) for name in _BETWEEN_SHAFTS]
     return [*found, *_OF_ALL]

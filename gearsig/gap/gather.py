@@ -134,11 +134,10 @@ def _channel_sums(
         averages = np.stack([revolutions[i:j].mean(axis=0) for i, j in pairwise(edges)])
         lines.append(2.0 * np.fft.rfft(averages, axis=1) / averages.shape[1])
         counts.append(np.diff(edges).astype(np.float64))
-    residual = joint.residual
     n = signals[0].samples_per_revolution
-    power, order_step = _segment_power(residual, n, n_blocks)
+    power, order_step = _segment_power(joint.residual, n, n_blocks)
     highest_cycle = min(max(HIGHEST_CYCLE, frame.teeth[0] + BEYOND_THE_MESH), 0.4 * n)
-    envelopes, moments, cycle_step = _envelopes(residual, n, n_blocks, bands, speed_hz, highest_cycle)
+    envelopes, moments, cycle_step = _envelopes(joint.residual, n, n_blocks, bands, speed_hz, highest_cycle)
     sums = ChannelSums((lines[0], lines[1]), (counts[0], counts[1]), power, envelopes, moments, _tail(raw, n_blocks))
     return sums, (order_step, cycle_step)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -171,6 +171,14 @@ class GapCause:
     evidence: tuple[Evidence, ...] = ()
     is_nuisance: bool = False
     remarks: tuple[str, ...] = ()
+
+
+def group_probabilities(causes: Sequence[GapCause]) -> dict[str, float]:
+    """Return group → probability of its causes together, likeliest first."""
+    found: dict[str, float] = {}
+    for cause in causes:
+        found[cause.group] = found.get(cause.group, 0.0) + cause.probability
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.calibration.rigs import DrawnRig, HousingMode, draw_rig
+from app.calibration.rigs import DrawnRig, HousingMode, draw_rig, log_uniform
 from sims.effects import EffectSetting
 
 LIGHT_SHARE, LIGHT_TORQUE = 0.3, (0.04, 0.3)
@@ -53,7 +53,7 @@ def draw_machine(rng: np.random.Generator) -> DrawnRig:
     """Draw a sound gearbox, full or lightly loaded, with the length of its recordings."""
     drawn = draw_rig(rng, for_the_check=False, even=bool(rng.uniform() < 0.1))
     if rng.uniform() < LIGHT_SHARE:
-        drawn = replace(drawn, torque_nm=drawn.torque_nm * float(np.exp(rng.uniform(*np.log(LIGHT_TORQUE)))))
+        drawn = replace(drawn, torque_nm=drawn.torque_nm * log_uniform(rng, *LIGHT_TORQUE))
     return replace(drawn, depth_mm=0.0, duration_s=float(np.clip(1.2 * drawn.duration_s, *DURATION_S)))
 
 
@@ -77,7 +77,7 @@ def another_day(drawn: DrawnRig, rng: np.random.Generator) -> Day:
 def _wander(drawn: DrawnRig, rng: np.random.Generator) -> EffectSetting:
     """Return the drive's wander on one day: its kind belongs to the machine."""
     own = np.random.default_rng([drawn.seed, 5])
-    percent, frequency_hz = (float(np.exp(own.uniform(*np.log(span)))) for span in (WANDER_PERCENT, WANDER_HZ))
+    percent, frequency_hz = (log_uniform(own, *span) for span in (WANDER_PERCENT, WANDER_HZ))
     today = float(np.exp(WANDER_SCATTER * rng.standard_normal()))
     return EffectSetting("speed_fluctuation", percent * today, {"frequency_hz": frequency_hz})
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.calibration.gap.scene import Scene, band_noise, knocks, log_uniform, ring, scene_of, struck, tone
+from app.calibration.gap.scene import Scene, band_noise, knocks, ring, scene_of, struck, tone
+from app.calibration.rigs import log_uniform
 from gearsig.checks import FloatArray
 from gearsig.recording.types import Recording
 

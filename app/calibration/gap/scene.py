@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.calibration.rigs import log_uniform
 from gearsig.checks import FloatArray
 from gearsig.recording.types import Recording
 
@@ -61,11 +62,6 @@ def scene_of(recording: Recording) -> Scene:
         teeth,
         tuple(bearings),
     )
-
-
-def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """Draw with even chance per decade."""
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def ring(scene: Scene, rng: np.random.Generator) -> FloatArray:

@@ -21,13 +21,13 @@ from app.calibration.gap.scene import (
     Scene,
     band_noise,
     knocks,
-    log_uniform,
     passings,
     ring,
     scene_of,
     struck,
     tone,
 )
+from app.calibration.rigs import log_uniform
 from gearsig.checks import FloatArray
 from gearsig.recording.types import Recording
 
