@@ -1,0 +1,1 @@
+"""Flexible spur gears: three-dimensional finite elements, their reduction, and pairs of reduced gears."""
