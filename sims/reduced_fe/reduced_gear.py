@@ -53,15 +53,16 @@ class FlankGrid(NamedTuple):
 class ReducedGear:
     """Modes and static compliance of a gear at its flanks and hub, in the frame that turns with the gear.
 
-    Axes: z along the shaft, x through the middle of tooth 0, origin in the middle of the bore; tooth k lies at the angle
-    +k·2π/z (ccw about +z). *Push* at a flank point is displacement or force along the normal **into the tooth**, in the
+    Axes: z along the shaft, x through the middle of tooth 0, origin in the middle of the bore; tooth k lies at the
+    angle +k·2π/z (ccw about +z). *Push* at a flank point is displacement or force along the normal **into the tooth**, in the
     transverse plane, so that a contact force N ≥ 0 is a push of +N and the compliance of a point to itself is positive.
     About +z a push of 1 N gives the torque −r_b on flank 0 and +r_b on flank 1.
 
     Any motion of the gear is rigid motion p (6) + elastic modes q + the quasi-static rest:
 
         u_flank(k) = rigid_at(k)ᵀ p + modes_at(k)ᵀ q + Σ_j residual(k, j) N_j,
-        q̈ + 2ζωq̇ + ω²q = Σ_j modes_at(j) N_j + hub_modes · F_hub,   diag(m, m, m, J_d, J_d, J_p) p̈ = Σ_j rigid_at(j) N_j + F_hub
+        q̈ + 2ζωq̇ + ω²q = Σ_j modes_at(j) N_j + hub_modes · F_hub,
+        diag(m, m, m, J_d, J_d, J_p) p̈ = Σ_j rigid_at(j) N_j + F_hub
 
     Modes of nodal diameter 0 < n < z/2 stand in pairs (cosine, sine), one after the other, with the same frequency. By
     one tooth they turn as a pair by the angle 2πn/z: `modes_at` uses this, nothing is lost by it.
@@ -76,8 +77,8 @@ class ReducedGear:
         Degrees of freedom of the full gear's finite-element model.
     spread : str
         What a flank point stands for: "section" (force and motion of the tooth's whole cross-section at that height, no
-        local indentation in it: add Hertz), "patch" (RBE3 over flank nodes around the point: contains the indentation by
-        a uniform strip as wide as the patch) or "node" (one line of nodes: local indentation depends on the mesh).
+        local indentation in it: add Hertz), "patch" (RBE3 over flank nodes around the point: contains the indentation
+        by a uniform strip as wide as the patch) or "node" (one line of nodes: local indentation depends on the mesh).
     mass_kg, polar_inertia_kg_m2, diametral_inertia_kg_m2 : float
         Of the finite-element body, about its centre.
     grid : FlankGrid
@@ -101,8 +102,7 @@ class ReducedGear:
 
     Notes
     -----
-    Linear: no contact, no large rotation, no gyroscopic or centrifugal terms (at 4000 rpm 1.5 % of the lowest
-    frequency of the 50-tooth gear is split, more on thin webs). All teeth are alike.
+    Linear: no contact, no large rotation, no gyroscopic or centrifugal terms. All teeth are alike.
     """
 
     blank: GearBlank
@@ -239,11 +239,12 @@ class ReducedGear:
                 allowed=f"at most {self.n_offsets - 1} apart",
                 remedy="reduce with more offsets",
             )
-        return stored[around] if around >= 0 else stored[-around].T
+        block: FloatArray = stored[around] if around >= 0 else stored[-around].T
+        return block
 
     def _turned(self, modes: FloatArray, tooth: int) -> FloatArray:
         psi = self.nodal_diameters * (tooth * self.blank.pitch_angle_rad)
-        turned = modes * np.cos(psi)[:, None]
+        turned: FloatArray = modes * np.cos(psi)[:, None]
         paired = (self.nodal_diameters > 0) & (2 * self.nodal_diameters < self.blank.n_teeth)
         first = np.flatnonzero(paired)[::2]
         sine = np.sin(psi[first])[:, None]
