@@ -47,7 +47,7 @@ def gap(
         Path | None,
         typer.Option("--cache", metavar="DIR", help="Keeps what is prepared once per rig. Default: your cache folder."),
     ] = None,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Prepare anew; take nothing from the cache.")] = False,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Prepare anew what the cache holds, and keep that.")] = False,
     list_effects: Annotated[bool, typer.Option("--list-effects", help="Show the effects that are looked for.")] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for gap.html, gap.json and twin.toml.")
@@ -69,7 +69,7 @@ def gap(
 
     asked = Asked(tuple(recordings or ()), tuple(reference or ()), rig, _torques(torque), fs)
     check_folder(output)
-    report = _diagnosed(asked, model, cache, fresh)
+    report = _diagnosed(asked, model, cache, fresh=fresh)
     written = write_results(report, output, command="gearsig " + shlex.join(sys.argv[1:]))
     _tell(report, written)
 
@@ -81,7 +81,7 @@ def _torques(texts: list[str] | None) -> tuple[float, ...]:
     return tuple(value for value in found if value is not None)
 
 
-def _diagnosed(asked: Asked, model: str, cache: Path | None, fresh: bool) -> GapReport:
+def _diagnosed(asked: Asked, model: str, cache: Path | None, *, fresh: bool) -> GapReport:
     """Diagnose with a progress bar, which is shown on a terminal only."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
@@ -95,7 +95,8 @@ def _diagnosed(asked: Asked, model: str, cache: Path | None, fresh: bool) -> Gap
         return run_gap(
             asked,
             model,
-            cache=None if fresh else cache or cache_folder(),
+            cache=cache or cache_folder(),
+            fresh=fresh,
             on_stage=lambda what, done: progress.update(task, description=what, completed=done),
         )
 
@@ -119,7 +120,7 @@ def _print_effects(model: str) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from gearsig.report.gap_sections import unit_of
+    from gearsig.gap.words import severity_unit
     from sims.registry import gap_simulator
 
     table = Table("group", "effect", "severity", "shows in", box=SIMPLE_HEAD, pad_edge=False)
@@ -129,7 +130,7 @@ def _print_effects(model: str) -> None:
         where = ", ".join(kind.replace("_", " ") for kind in effect.shows_in)
         group = "" if effect.group == last else effect.group
         last = effect.group
-        table.add_row(group, f"{effect.name}\n  {effect.title}", unit_of(effect.unit) or "–", where)
+        table.add_row(group, f"{effect.name}\n  {effect.title}", severity_unit(effect.unit) or "–", where)
     width = None if sys.stdout.isatty() else TABLE_WIDTH
     Console(markup=False, highlight=False, width=width).print(table)
     typer.echo(f"{len(found)} effects that have a meaning for the model {model}; also: none, unknown.")

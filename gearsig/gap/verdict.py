@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from gearsig.gap.types import GapOutcome, GapReport
+from gearsig.gap.types import GapCause, GapOutcome, GapReport, Interval
+from gearsig.gap.words import severity_unit
 
 
 def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
@@ -15,6 +16,7 @@ def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
 NO_SIMULATION = (
     "How far: cannot be told; the simulators have a gear pair and this rig has none, so nothing was simulated."
 )
+SOUND_MACHINE = "the same machine when it was sound"
 
 
 def _where(report: GapReport) -> str:
@@ -36,14 +38,19 @@ def _which(report: GapReport) -> str:
     if report.outcome is GapOutcome.CANNOT_SEPARATE and report.inseparable is not None:
         a, b = (_titled(report, name) for name in report.inseparable)
         return f"Which: {a} or {b}; these recordings cannot tell them apart."
-    size = f", {first.severity.value:.3g} {first.unit}".rstrip() if first.severity is not None else ""
+    size = "" if first.severity is None else f", {_severity(first, first.severity)}"
     place = f" at {first.place}" if first.place else ""
-    return f"Which: {first.title}{place}{size} ({odds})."
+    return f"Which: {first.title}{place}{size} (probability {odds})."
+
+
+def _severity(cause: GapCause, severity: Interval) -> str:
+    """Write a severity with three digits, without an exponent, and its unit."""
+    return f"{float(f'{severity.value:.3g}'):.12g} {severity_unit(cause.unit)}".rstrip()
 
 
 def _titled(report: GapReport, name: str) -> str:
-    cause = next(c for c in report.causes if c.name == name)
-    return f"{cause.title} ({100 * cause.probability:.0f} %)"
+    cause = {c.name: c for c in report.causes}.get(name)
+    return f"{cause.title} ({100 * cause.probability:.0f} %)" if cause is not None else name.replace("_", " ")
 
 
 def _how_far(report: GapReport) -> str:
@@ -58,9 +65,15 @@ def _how_far(report: GapReport) -> str:
 
 
 def _next(report: GapReport) -> str:
-    if not report.next_recordings:
-        return "Next: no further recording that the model can run would tell more."
-    return f"Next: {report.next_recordings[0].text}"
+    if report.next_recordings:
+        return f"Next: {report.next_recordings[0].text}"
+    if not report.references:
+        return f"Next: {SOUND_MACHINE}, at the same speed and load; then only what has changed since counts."
+    if report.outcome is GapOutcome.NO_GAP:
+        return "Next: nothing is needed; keep these recordings, later ones are best compared with them."
+    if sum(cause.shrinkage is not None for cause in report.causes) < 2:
+        return "Next: another speed or load; no two effects are likely enough to compute which would tell most."
+    return "Next: no other speed or load that was simulated would put the two likeliest effects further apart."
 
 
 def _where_seen(report: GapReport) -> str:
@@ -83,4 +96,4 @@ def _which_seen(report: GapReport) -> str:
 def _next_seen(report: GapReport) -> str:
     if report.references:
         return "Next: another sensor nearer to the bearings, or a longer recording."
-    return "Next: the same machine when it was sound, at the same speed; then only what has changed since is named."
+    return f"Next: {SOUND_MACHINE}, at the same speed; then only what has changed since is named."

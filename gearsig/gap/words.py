@@ -1,10 +1,12 @@
-"""What features are called in sentences."""
+"""What features and units are called in sentences."""
 
 from __future__ import annotations
 
 from gearsig.gap.frame import GearFrame
 from gearsig.gap.gear_lines import SIDES
 from gearsig.gap.spots import shaft_words
+
+_UNITS = {"um": "µm", "deg": "°", "g mm": "g·mm", "N m": "N·m", "m/s^2": "m/s²", "1": ""}
 
 _SIDEBANDS = {
     "1": "first sidebands",
@@ -67,6 +69,17 @@ _OTHER = {
     "speed.swing_line": "strongest line of the speed's swing",
     "hum": "mains lines",
 }
+
+
+def severity_unit(unit: str) -> str:
+    """Write the unit of a severity for people.
+
+    Examples
+    --------
+    >>> severity_unit("um"), severity_unit("mm")
+    ('µm', 'mm')
+    """
+    return _UNITS.get(unit, unit)
 
 
 def feature_words(name: str, frame: GearFrame) -> str:

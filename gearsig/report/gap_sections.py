@@ -20,7 +20,7 @@ from gearsig.gap.types import (
     Interval,
     Shrinkage,
 )
-from gearsig.plot.display import unit_text
+from gearsig.gap.words import severity_unit
 from gearsig.report.gap_text import point_text
 from gearsig.report.numbers import readable
 from gearsig.report.sections import Rows, named
@@ -31,7 +31,6 @@ MOST_ORDERS = 4
 LEAST_SHOWN = 0.01
 """Below this a group is left out, and a share is said to be below one percent."""
 OUTCOME_CLASSES = {"no gap": "no-fault", "effect": "fault", "cannot separate": "suspicion", "unknown": "cannot-tell"}
-_UNITS = {"um": "µm", "deg": "°", "g mm": "g·mm", "N m": "N·m", "1": ""}
 
 
 @dataclass(frozen=True)
@@ -169,7 +168,7 @@ def _cause_row(cause: GapCause, *, detailed: bool) -> CauseRow:
 
 def severity_text(cause: GapCause) -> str:
     """Return the fitted severity with its interval; empty where nothing was fitted."""
-    return "" if cause.severity is None else f"{interval_text(cause.severity, unit_of(cause.unit))}"
+    return "" if cause.severity is None else interval_text(cause.severity, severity_unit(cause.unit))
 
 
 def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
@@ -302,11 +301,6 @@ def signed(value: float) -> str:
     ('+14.2', '−3.0', '–')
     """
     return f"{value:+.1f}".replace("-", "−") if isfinite(value) else "–"
-
-
-def unit_of(unit: str) -> str:
-    """Write the unit of a severity for people."""
-    return _UNITS.get(unit, unit_text(unit))
 
 
 def _bar(share: float) -> float:

@@ -72,7 +72,7 @@ def effect_text(setting: EffectSetting) -> str:
 
 def shown_unit(unit: str) -> str:
     """Write a unit of the catalogue as people read it."""
+    from gearsig.gap.words import severity_unit
     from gearsig.plot.display import unit_text
 
-    words = {"um": "µm", "g mm": "g·mm", "N m": "N·m", "deg": "°"}
-    return words.get(unit, unit_text(unit))
+    return unit_text(severity_unit(unit))

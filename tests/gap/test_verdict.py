@@ -1,0 +1,40 @@
+"""A gap report in four sentences."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from gearsig.gap.types import GapOutcome, Interval
+from tests.gap.example_report import cannot_separate_report, effect_report, no_gap_report, unknown_report
+
+
+def test_a_severity_has_a_unit_for_people_and_no_exponent() -> None:
+    report = effect_report()
+    first = replace(report.causes[0], unit="g mm", severity=Interval(1234.0, 1000.0, 1500.0))
+    assert ", 1230 g·mm (probability 88 %)." in replace(report, causes=(first,)).verdict[1]
+    assert ", 14 µm (" in replace(report, causes=(report.causes[2],)).verdict[1]
+
+
+def test_causes_that_cannot_be_told_apart_are_named_even_if_one_is_not_among_them() -> None:
+    report = replace(cannot_separate_report(), inseparable=("root_crack", "torque_ripple"))
+    assert report.verdict[1] == (
+        "Which: crack in a tooth root (48 %) or torque ripple; these recordings cannot tell them apart."
+    )
+
+
+def test_what_is_next_says_only_what_was_computed() -> None:
+    nothing = replace(effect_report(), next_recordings=())
+    assert "would put the two likeliest effects further apart" in nothing.verdict[3]
+    alone = replace(nothing, causes=(nothing.causes[0], replace(nothing.causes[1], shrinkage=None)))
+    assert "likely enough" in replace(alone, causes=alone.causes[:2]).verdict[3]
+    assert "when it was sound" in replace(nothing, references=()).verdict[3]
+    assert "when it was sound" in replace(unknown_report(), references=()).verdict[3]
+
+
+def test_without_a_gap_nothing_is_asked_for_that_would_separate_causes() -> None:
+    report = no_gap_report()
+    assert report.outcome is GapOutcome.NO_GAP
+    assert report.references
+    assert (
+        report.verdict[3] == "Next: nothing is needed; keep these recordings, later ones are best compared with them."
+    )
