@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +65,7 @@ def banks_of(
     folder: Path | None,
     n_change_seeds: int = 1,
     processes: int = 2,
+    fresh: bool = False,
     on_progress: Progress = lambda _done, _all: None,
 ) -> list[dict[str, Bank]]:
     """Return for each operating point the effects' banks, from disk or simulated and kept.
@@ -83,6 +85,8 @@ def banks_of(
         On so many of the specimens, the first ones, each candidate is simulated.
     processes : int
         1: in this process. Otherwise the twins must pickle.
+    fresh : bool
+        Simulate what is on disk, too, and keep it in its place.
     on_progress : callable
         Told how many of all runs are done; what it raises stops the work, and nothing is kept.
 
@@ -95,15 +99,16 @@ def banks_of(
     """
     within = seeds[: min(count(n_change_seeds, "n_change_seeds"), len(seeds))]
     wanted = [_Wanted.of(run, name, seeds, within, folder) for run in runs for name in effects]
-    found = {w: read_bank(w.path, w.key) if w.path is not None else None for w in wanted}
+    found = {w: read_bank(w.path, w.key) if w.path is not None and not fresh else None for w in wanted}
     missing = [w for w in wanted if found[w] is None]
-    sound = {w.run.sound_key: [Task(w.run, seed, None) for seed in seeds] for w in missing}
-    own = {w: [Task(w.run, seed, added) for added in w.candidates for seed in within] for w in missing}
-    tasks = [task for some in (*sound.values(), *own.values()) for task in some]
-    rows = dict(zip(map(id, tasks), finished_runs(tasks, processes, on_progress), strict=True)) if tasks else {}
+    sound = {w.run.sound_key: w.run for w in missing}
+    tasks = [Task(run, seed, None) for run in sound.values() for seed in seeds]
+    tasks += [Task(w.run, seed, added) for w in missing for added in w.candidates for seed in within]
+    rows = iter(finished_runs(tasks, processes, on_progress) if tasks else ())
+    sound_rows = {key: list(islice(rows, len(seeds))) for key in sound}
     for w in missing:
-        first, others = ([rows[id(task)] for task in some] for some in (sound[w.run.sound_key], own[w]))
-        found[w] = bank = _assembled(w.run.point, w.candidates, len(within), first, others)
+        own = list(islice(rows, len(w.candidates) * len(within)))
+        found[w] = bank = _assembled(w.run.point, w.candidates, len(within), sound_rows[w.run.sound_key], own)
         if w.path is not None:
             write_bank(w.path, w.key, bank)
     banks = iter(found[w] for w in wanted)

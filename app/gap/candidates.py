@@ -53,6 +53,8 @@ def try_effects(
     conditions: Sequence[Condition],
     cache: Path | None,
     on_progress: Callable[[str, float], object],
+    *,
+    fresh: bool = False,
 ) -> dict[str, Tried]:
     """Simulate each effect at every condition, fit it, and score it on data that it was not fitted to.
 
@@ -68,6 +70,7 @@ def try_effects(
         seeds=[SEED],
         folder=cache,
         processes=PROCESSES,
+        fresh=fresh,
         on_progress=lambda done, of: on_progress(f"simulating {len(names)} effects at the point of {where}", done / of),
     )
     everything = [observed(c, k, n_compared(conditions)) for k, c in enumerate(conditions)]

@@ -53,6 +53,7 @@ def diagnose_gap(
     effects: Sequence[str] = (),
     names: Sequence[str] = (),
     cache: Path | None = None,
+    fresh: bool = False,
     on_stage: Stage | None = None,
 ) -> GapReport:
     """Diagnose the gap between recordings of one machine and its simulation.
@@ -76,6 +77,8 @@ def diagnose_gap(
         Of the recordings, for people.
     cache : Path or None
         Folder that keeps simulations; None: nothing is kept.
+    fresh : bool
+        Simulate anew what the folder holds already.
     on_stage : callable or None
         Is told what is being done, and which share of the whole is complete.
 
@@ -103,7 +106,9 @@ def diagnose_gap(
     if not is_calibrated():
         notices.insert(0, UNCALIBRATED)
     tell("recognising", 0.2)
-    weighed = weigh(conditions, known, effects, twin, cache, lambda what, done: tell(what, 0.25 + 0.55 * done))
+    weighed = weigh(
+        conditions, known, effects, twin, cache, lambda what, done: tell(what, 0.25 + 0.55 * done), fresh=fresh
+    )
     tried, probabilities = weighed.tried, weighed.probabilities()
     outcome = weighed.calibration.outcome(probabilities)
     tell("placing it", 0.82)

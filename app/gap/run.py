@@ -19,7 +19,9 @@ READING = 0.03
 Stage = Callable[[str, float], None]
 
 
-def run_gap(asked: Asked, model: str, *, cache: Path | None, on_stage: Stage = lambda *_: None) -> GapReport:
+def run_gap(
+    asked: Asked, model: str, *, cache: Path | None, fresh: bool = False, on_stage: Stage = lambda *_: None
+) -> GapReport:
     """Read the files and diagnose the gap.
 
     Parameters
@@ -29,6 +31,8 @@ def run_gap(asked: Asked, model: str, *, cache: Path | None, on_stage: Stage = l
         Name of the simulator.
     cache : Path or None
         Folder that keeps what is prepared once per rig; None: nothing is kept, nor taken from before.
+    fresh : bool
+        Prepare anew what the folder holds already, and keep that.
     on_stage : callable
         Is told what is being done, and which share of the whole is complete.
 
@@ -49,6 +53,7 @@ def run_gap(asked: Asked, model: str, *, cache: Path | None, on_stage: Stage = l
         reference_rigs=inputs.reference_rigs,
         names=inputs.names,
         cache=cache,
+        fresh=fresh,
         on_stage=lambda stage, done: on_stage(stage, READING + (1 - READING) * done),
     )
     return replace(report, references=inputs.reference_names) if report.references else report

@@ -59,6 +59,7 @@ def weigh(
     on_progress: Callable[[str, float], object],
     *,
     most_tried: int = MOST_TRIED,
+    fresh: bool = False,
 ) -> Weighed:
     """Ask the forests, then simulate, fit and score the likeliest effects, `most_tried` at most.
 
@@ -71,7 +72,7 @@ def weigh(
     with_reference = all(c.reference is not None for c in conditions)
     first = load_gap_calibration(with_reference=with_reference).probabilities(forest, {})
     likely = [name for name, p in first.items() if name in known and p >= LEAST_TRIED_PROBABILITY][:most_tried]
-    tried = try_effects(likely, twin, conditions, cache, on_progress)
+    tried = try_effects(likely, twin, conditions, cache, on_progress, fresh=fresh)
     refuse_without_candidates(tried, likely)
     return Weighed(forest, tried, with_reference)
 

@@ -118,6 +118,16 @@ def _never(done: int, n: int) -> None:
     raise AssertionError(f"{done} of {n} runs were made again")
 
 
+def test_fresh_simulates_again_and_keeps_that(tmp_path: Path) -> None:
+    first = bank(tmp_path)
+    (kept,) = tmp_path.iterdir()
+    kept.write_bytes(b"an earlier one")
+    done: list[int] = []
+    assert same(bank(tmp_path, fresh=True, on_progress=lambda n, _: done.append(n)), first)
+    assert done
+    assert same(bank(tmp_path, on_progress=_never), first)
+
+
 @pytest.mark.parametrize(
     "changed", [{"seeds": (0, 2)}, {"duration_s": 2.5}, {"noise": 2}, {"n_change_seeds": 2}, {"twin": Sines("sines 2")}]
 )

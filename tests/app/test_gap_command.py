@@ -252,14 +252,15 @@ def test_bad_input_is_one_line(capsys, tmp_path, arguments, said) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_cache_is_the_users_own_a_given_one_or_none(capsys, stub, tmp_path, monkeypatch) -> None:
+def test_the_cache_is_the_users_own_or_a_given_one_and_can_be_made_anew(capsys, stub, tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     run(capsys, CRACKED, "-o", tmp_path / "gap")
     assert stub.given["cache"] == cache_folder() == tmp_path / "cache" / "gearsig" / "gap"
+    assert not stub.given["fresh"]
     run(capsys, CRACKED, "-o", tmp_path / "gap", "--cache", tmp_path / "mine")
     assert stub.given["cache"] == tmp_path / "mine"
     run(capsys, CRACKED, "-o", tmp_path / "gap", "--fresh")
-    assert stub.given["cache"] is None
+    assert (stub.given["cache"], stub.given["fresh"]) == (cache_folder(), True)
 
 
 def test_the_catalogue_is_listed(capsys) -> None:
