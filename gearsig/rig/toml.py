@@ -10,6 +10,7 @@ from typing import Any, get_args, get_type_hints
 
 from gearsig.checks import closest_match_hint
 from gearsig.errors import InputError
+from gearsig.rig.contact import ToothContact
 from gearsig.rig.speed import ConstantSpeed, EncoderChannel, PulseTimes, SpeedChannel, SpeedSource, TachometerChannel
 from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
 
@@ -69,7 +70,7 @@ def rig_file_beside(recording: str | Path) -> Path | None:
 
 def rig_from_dict(data: dict[str, Any], where: str = "rig") -> Rig:
     """Build a rig from the tables of a rig file (or of any mapping of the same shape)."""
-    allowed = (*_LISTS, *_PLAIN, "operating_point", "speed")
+    allowed = (*_LISTS, *_PLAIN, "operating_point", "speed", "contact")
     for key in data:
         if key not in allowed:
             raise InputError(
@@ -84,6 +85,8 @@ def rig_from_dict(data: dict[str, Any], where: str = "rig") -> Rig:
     parts["shafts"] = _with_implied_shafts(parts["shafts"], parts["pairs"], parts["bearings"])
     if "operating_point" in data:
         parts["operating_point"] = from_table(OperatingPoint, data["operating_point"], f"{where}: [operating_point]")
+    if "contact" in data:
+        parts["contact"] = from_table(ToothContact, data["contact"], f"{where}: [contact]")
     if "speed" in data:
         parts["speed"] = _speed(data["speed"], f"{where}: [speed]")
     plain = {key: data[key] for key in _PLAIN if key in data}
@@ -99,6 +102,8 @@ def rig_to_dict(rig: Rig) -> dict[str, Any]:
             data[name] = items
     if rig.operating_point != OperatingPoint():
         data["operating_point"] = to_table(rig.operating_point)
+    if rig.contact is not None:
+        data["contact"] = to_table(rig.contact)
     if rig.speed is not None and not isinstance(rig.speed, PulseTimes):
         source = next(name for name, kind in _SPEED_SOURCES.items() if kind is type(rig.speed))
         data["speed"] = {"source": source} | to_table(rig.speed)

@@ -7,6 +7,7 @@ from math import cos, isclose, isfinite, radians
 
 from gearsig.checks import closest_match_hint, count, not_negative, one_of, positive, within
 from gearsig.errors import InputError
+from gearsig.rig.contact import ToothContact
 from gearsig.rig.ratios import shaft_ratios
 from gearsig.rig.speed import SpeedSource
 
@@ -25,6 +26,7 @@ QUANTITIES = (
     "encoder",
     "angle",
     "rotational_speed",
+    "angular_acceleration",
     "temperature",
     "voltage",
     "unknown",
@@ -222,6 +224,8 @@ class Rig:
     assumed : tuple of str
         Names of facts that were inferred or guessed ("teeth", "sampling_rate_hz", …): a diagnosis that rests on
         them is worth less, and says so.
+    contact : ToothContact or None
+        How the teeth of one pair touch, and what turns with them: for forces from measured motion.
     """
 
     name: str = ""
@@ -234,6 +238,7 @@ class Rig:
     sampling_rate_hz: float | None = None
     sources: tuple[str, ...] = ()
     assumed: tuple[str, ...] = ()
+    contact: ToothContact | None = None
 
     def __post_init__(self) -> None:
         for kind, items in (("shaft", self.shafts), ("pair", self.pairs), ("bearing", self.bearings)):
@@ -254,6 +259,8 @@ class Rig:
             self._check_shaft(self.speed.shaft, "speed")
         if self.sampling_rate_hz is not None:
             positive(self.sampling_rate_hz, "sampling_rate_hz", "Hz")
+        if self.contact is not None and self.contact.pair:
+            self.pair(self.contact.pair)  # says so where there is no such pair
         shaft_ratios(self)  # raises where the pairs do not connect or contradict each other
 
     def _check_shaft(self, name: str, user: str) -> None:
