@@ -1,0 +1,143 @@
+"""Stiffness and mass of one sector: 27-node hexahedra of scikit-fem, three Gauss points each way."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from gearsig.checks import FloatArray
+from sims.mesh.material import Material
+from sims.reduced_fe.sector_mesh import SectorMesh
+from sims.reduced_fe.sector_plane import IntArray
+
+GAUSS_ORDER = 5
+"""Integrates polynomials up to this degree exactly: three points each way, exact for the mass of a cell with parallel
+faces and the usual full integration of its stiffness."""
+
+_LAYOUT = np.array([[x, y, z] for x in range(3) for y in range(3) for z in range(3)])
+"""Half steps of the 27 nodes in the order of `SectorMesh.cells`, raveled."""
+
+
+class CellFields(NamedTuple):
+    """Shape functions and their gradients at the Gauss points of each cell, in `SectorMesh`'s order of nodes.
+
+    Attributes
+    ----------
+    values : array, (27, n_points)
+    gradients : array, (n_cells, n_points, 3, 27)
+        1/m.
+    volumes : array, (n_cells, n_points)
+        Weight times Jacobian determinant, m³.
+    determinants : array, (n_cells, n_points)
+        m³ per unit cube.
+    """
+
+    values: FloatArray
+    gradients: FloatArray
+    volumes: FloatArray
+    determinants: FloatArray
+
+
+def cell_fields(points_m: FloatArray, cells: IntArray) -> CellFields:
+    """Evaluate the isoparametric cells at their Gauss points."""
+    local, weights = _gauss()
+    values, slopes = _shape_functions(local)
+    corners = points_m[cells.reshape(len(cells), 27)]
+    jacobian = np.einsum("qin,cnj->cqij", slopes, corners, optimize=True)
+    determinants = np.linalg.det(jacobian)
+    gradients = np.linalg.solve(jacobian, np.broadcast_to(slopes, (len(cells), *slopes.shape)))
+    return CellFields(values, gradients, weights * determinants, determinants)
+
+
+def sector_matrices(mesh: SectorMesh, material: Material | None = None) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Stiffness (N/m) and consistent mass (kg) of one sector in cylindrical components.
+
+    K_e[(a,i),(b,j)] = ∫ λ ∂_i N_a ∂_j N_b + μ (∂_j N_a ∂_i N_b + δ_ij ∇N_a·∇N_b) dV,  M_e = ρ ∫ N_a N_b dV
+
+    Degrees of freedom are 3·node + component; the components of every node are radial, tangential, axial, so that
+    neighbouring sectors have the same matrices.
+
+    Source: T. J. R. Hughes, *The Finite Element Method*, 1987, ch. 2 and 3.
+    """
+    used = mesh.blank.material if material is None else material
+    fields = cell_fields(mesh.points_m, mesh.cells)
+    nodes = mesh.cells.reshape(-1, 27)
+    turn = cylindrical_turn(mesh)
+    stiffness = _assembled(_cell_stiffness(fields, used), nodes, mesh.n_nodes)
+    mass = _assembled(_cell_mass(fields, used.density_kg_m3), nodes, mesh.n_nodes)
+    return sparse.csr_array(turn @ stiffness @ turn.T), sparse.csr_array(turn @ mass @ turn.T)
+
+
+def cylindrical_turn(mesh: SectorMesh) -> sparse.csr_array:
+    """T: cylindrical = T · Cartesian components, for all nodes of the sector."""
+    angle = mesh.angles_rad
+    c, s = np.cos(angle), np.sin(angle)
+    blocks = np.zeros((mesh.n_nodes, 3, 3))
+    blocks[:, 0, 0], blocks[:, 0, 1], blocks[:, 1, 0], blocks[:, 1, 1], blocks[:, 2, 2] = c, s, -s, c, 1.0
+    n = mesh.n_nodes
+    return sparse.csr_array(sparse.bsr_array((blocks, np.arange(n), np.arange(n + 1)), shape=(3 * n, 3 * n)))
+
+
+def lame_pa(material: Material) -> tuple[float, float]:
+    """λ and μ."""
+    e, nu = material.youngs_modulus_pa, material.poisson_ratio
+    return e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu))
+
+
+def _cell_stiffness(fields: CellFields, material: Material) -> FloatArray:
+    lam, mu = lame_pa(material)
+    n = len(fields.volumes)
+    g = fields.gradients  # (cell, point, i, a)
+    weighted = g * fields.volumes[:, :, None, None]
+    flat = g.reshape(n, -1, 81)
+    products = np.matmul(weighted.reshape(n, -1, 81).transpose(0, 2, 1), flat).reshape(n, 3, 27, 3, 27)
+    # products[c, i, a, j, b] = ∫ ∂_i N_a ∂_j N_b
+    trace = np.einsum("ciaib->cab", products)
+    cells = lam * products + mu * products.transpose(0, 3, 2, 1, 4)
+    for i in range(3):
+        cells[:, i, :, i, :] += mu * trace
+    return cells.transpose(0, 2, 1, 4, 3).reshape(n, 81, 81)
+
+
+def _cell_mass(fields: CellFields, density: float) -> FloatArray:
+    n = len(fields.volumes)
+    weighted = density * fields.volumes[:, None, :] * fields.values[None]
+    scalar = weighted @ fields.values.T
+    cells = np.zeros((n, 27, 3, 27, 3))
+    for i in range(3):
+        cells[:, :, i, :, i] = scalar
+    return cells.reshape(n, 81, 81)
+
+
+def _assembled(cell_matrices: FloatArray, nodes: IntArray, n_nodes: int) -> sparse.csr_array:
+    dof = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), 81)
+    rows, columns = np.repeat(dof, 81, axis=1).ravel(), np.tile(dof, (1, 81)).ravel()
+    size = 3 * n_nodes
+    summed = sparse.coo_array((cell_matrices.ravel(), (rows, columns)), shape=(size, size)).tocsr()
+    summed.data[np.abs(summed.data) < 1e-16 * np.abs(summed.data).max()] = 0.0
+    summed.eliminate_zeros()
+    return summed
+
+
+def _gauss() -> tuple[FloatArray, FloatArray]:
+    """Gauss points (3, n) and weights on the unit cube."""
+    from skfem.element import ElementHex2
+    from skfem.quadrature import get_quadrature
+
+    local, weights = get_quadrature(ElementHex2, GAUSS_ORDER)
+    return local, weights
+
+
+def _shape_functions(local: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Values (27, n) and slopes (n, 3, 27) of the shape functions at local points, in the order of the cells' nodes."""
+    from skfem.element import ElementHex2
+
+    element: Any = ElementHex2()
+    values, slopes = np.empty((27, local.shape[1])), np.empty((local.shape[1], 3, 27))
+    for k, place in enumerate(np.rint(2.0 * np.asarray(element.doflocs)).astype(int)):
+        own = int(place @ [9, 3, 1])
+        value, slope = element.lbasis(local, k)
+        values[own], slopes[:, :, own] = value, np.asarray(slope).T
+    return values, slopes
