@@ -137,7 +137,7 @@ def diagnose_gap(
         groups=group_probabilities(causes),
         inseparable=pair if outcome is GapOutcome.CANNOT_SEPARATE else None,
         steps=steps_of(conditions, tried, causes) if tried and outcome is not GapOutcome.NO_GAP else (),
-        next_recordings=_next(pair, tried, twin, conditions, outcome),
+        next_recordings=_next(pair, known, tried, twin, conditions, outcome),
         spectra=spectrum_curves(
             clearest.now,
             clearest.simulated,
@@ -253,6 +253,7 @@ def _preset(twin: Twin, condition: Condition, cause: GapCause, fitted: Added) ->
 
 def _next(
     pair: tuple[str, str] | None,
+    known: Mapping[str, GapEffect],
     tried: dict[str, Tried],
     twin: Twin,
     conditions: Sequence[Condition],
@@ -260,4 +261,5 @@ def _next(
 ) -> tuple[NextRecording, ...]:
     if pair is None or outcome is GapOutcome.NO_GAP or any(name not in tried for name in pair):
         return ()
-    return next_recordings(tried[pair[0]], tried[pair[1]], twin, conditions)
+    first, second = pair
+    return next_recordings(tried[first], tried[second], (known[first].title, known[second].title), twin, conditions)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -11,51 +11,110 @@ from app.gap.candidates import PROCESSES, Tried, n_compared
 from app.gap.conditions import SEED, Condition
 from gearsig.checks import FloatArray
 from gearsig.gap.families import family_members
-from gearsig.gap.simulator import Point, Twin
+from gearsig.gap.simulator import HasFurtherPlaces, Point, Twin
 from gearsig.gap.types import NextRecording
+from gearsig.report.gap_text import point_text, same_condition
 
 FACTORS = ((1.0, 0.3), (1.0, 0.6), (0.6, 1.0), (1.4, 1.0))
-"""Speeds and torques that are looked at, over those of the first recording."""
+"""Speeds and torques that are looked at, over those of the first recording, beside the recordings' own."""
 
 ENOUGH = 1.2
 """Times the distance that there is now, from which a further point is worth naming."""
 
+MOST = 5
+"""Recordings that are named."""
+
+OWN = ""
+"""Stands for the rig's own sensors together among names of channels."""
+
 
 def next_recordings(
-    first: Tried, second: Tried, twin: Twin, conditions: Sequence[Condition]
+    first: Tried, second: Tried, titles: tuple[str, str], twin: Twin, conditions: Sequence[Condition]
 ) -> tuple[NextRecording, ...]:
-    """Return points at which both effects' predictions lie further apart than at those there are, best first."""
-    base = conditions[0]
-    n = n_compared(conditions)
-    names = base.change.names[:n]
-    floors = base.floor.of(names)
-    now = max(_apart(names, first.fit.at(k) - second.fit.at(k), floors) for k in range(len(conditions)))
-    points = [Point(v * base.facts.point.speed_rpm, t * base.facts.point.torque_nm) for v, t in FACTORS]
+    """Return points and places at which both effects lie further apart than in the recordings there are, best first.
+
+    Both fitted effects are simulated at the recordings' own and at other speeds and torques, with a further sensor at
+    each place that the twin has. A sensor is named only if it shows more than any that there is. Its housing is a drawn
+    one: what is compared is how far from gears and bearings it sits. One channel is held against the floors of several.
+
+    Parameters
+    ----------
+    first, second : Tried
+    titles : (str, str)
+        Of both effects, for people.
+    twin : Twin
+    conditions : sequence of Condition
+    """
+    base = conditions[0].facts
+    measured, places = twin.with_further_sensors() if isinstance(twin, HasFurtherPlaces) else (twin, {})
+    here = [condition.facts.point for condition in conditions]
+    points = _distinct([*here, *(Point(v * base.point.speed_rpm, t * base.point.torque_nm) for v, t in FACTORS)])
     runs = [
-        Run(twin, p, base.run_s * max(1.0, base.facts.point.speed_rpm / p.speed_rpm), base.facts.sampling_rate_hz, 1)
+        Run(measured, p, conditions[0].run_s * max(1.0, base.point.speed_rpm / p.speed_rpm), base.sampling_rate_hz, 1)
         for p in points
     ]
-    tasks = [Task(run, SEED, tried.fit.added) for run in runs for tried in (first, second)]
-    rows = finished_runs(tasks, PROCESSES, lambda *_: None)
+    tasks = [Task(run, SEED, tried.fit.added, tuple(places)) for run in runs for tried in (first, second)]
+    rows = finished_runs(tasks, PROCESSES, lambda *_: None, n_together=2)
+    at = {
+        point: _distances(conditions, one, other)
+        for point, one, other in zip(points, rows[::2], rows[1::2], strict=True)
+    }
+    known = [distances for point, distances in at.items() if point in here and distances]
+    if not known:
+        return ()
+    now = max(distances[OWN] for distances in known)
+    best_sensor = max(d for distances in known for channel, d in distances.items() if channel not in places)
     found = []
-    for point, a, b in zip(points, rows[::2], rows[1::2], strict=True):
-        if not (isinstance(a, Reduced) and isinstance(b, Reduced)):
-            continue
-        apart = _apart(names, (a.change - b.change)[:n], floors)
-        if apart >= ENOUGH * now:
-            text = (
-                f"record at {point.speed_rpm:.3g} rpm and {point.torque_nm:.3g} N m: there {_words(first.name)} and "
-                f"{_words(second.name)} lie {apart:.2g} structural floors apart, {now:.2g} so far."
-            )
-            found.append(NextRecording(point, (first.name, second.name), apart, now, text))
-    return tuple(sorted(found, key=lambda one: -one.standard_deviations))
+    for point, distances in at.items():
+        for channel, apart in _worth_naming(distances, places, now, best_sensor):
+            place = places.get(channel, "")
+            text = _text(point, place, f"{titles[0]} and {titles[1]} lie {apart:.2g}", now, is_new=point not in here)
+            found.append(NextRecording(point, (first.name, second.name), apart, now, text, place))
+    return tuple(sorted(found, key=lambda one: -one.standard_deviations)[:MOST])
 
 
-def _apart(names: Sequence[str], difference: FloatArray, floors: FloatArray) -> float:
+def _distinct(points: Sequence[Point]) -> list[Point]:
+    """Return the points without those at nearly the speed and torque of one before them."""
+    found: list[Point] = []
+    for point in points:
+        if not any(same_condition(point, other) for other in found):
+            found.append(point)
+    return found
+
+
+def _distances(conditions: Sequence[Condition], one: Reduced | str, other: Reduced | str) -> dict[str, float]:
+    """Return the distance of two simulations on the rig's own sensors together, and on each sensor alone."""
+    if not (isinstance(one, Reduced) and isinstance(other, Reduced)):
+        return {}
+    alone = {name: _apart(conditions, change - other.alone[name]) for name, change in one.alone.items()}
+    return {OWN: _apart(conditions, one.change - other.change), **alone}
+
+
+def _worth_naming(
+    distances: Mapping[str, float], places: Mapping[str, str], now: float, best_sensor: float
+) -> Iterator[tuple[str, float]]:
+    """Yield the rig's own sensors, and the best further one if it shows more than they, where it is worth it."""
+    own = distances.get(OWN, 0.0)
+    if own >= ENOUGH * now:
+        yield OWN, own
+    further = {name: d for name, d in distances.items() if name in places}
+    best = max(further, key=further.__getitem__, default="")
+    usual = max([best_sensor, own, *(d for name, d in distances.items() if name not in places)])
+    if best and further[best] >= ENOUGH * usual:
+        yield best, further[best]
+
+
+def _text(point: Point, place: str, apart: str, now: float, *, is_new: bool) -> str:
+    where = f"record at {point_text(point)}"
+    if place:
+        where = f"{where}, with" if is_new else "at the same speed and load, add"
+        where += f" a further sensor at {place}"
+    return f"{where}: there {apart} structural floors apart, {now:.2g} so far."
+
+
+def _apart(conditions: Sequence[Condition], difference: FloatArray) -> float:
     """Root of the sum over families of the mean squared difference in floors."""
-    squares = (difference / floors) ** 2
+    n = n_compared(conditions)
+    names = conditions[0].change.names[:n]
+    squares = (difference[:n] / conditions[0].floor.of(names)) ** 2
     return float(np.sqrt(sum(float(squares[rows].mean()) for rows in family_members(names).values())))
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")

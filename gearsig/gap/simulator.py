@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
@@ -95,6 +95,15 @@ class Twin(Protocol):
 
     def preset_toml(self, point: Point, added: Sequence[Added], notes: Sequence[str]) -> str:
         """Return the machine with the effects as a preset file that `gearsig simulate` runs."""
+        ...
+
+
+@runtime_checkable
+class HasFurtherPlaces(Protocol):
+    """A twin that can also be measured where its rig has no sensor."""
+
+    def with_further_sensors(self) -> tuple[Twin, Mapping[str, str]]:
+        """Return the machine with a further sensor at each place that has none, and those channels' places."""
         ...
 
 

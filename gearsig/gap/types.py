@@ -201,6 +201,8 @@ class NextRecording:
         Distance of both predictions there, in structural floors; `now` at the points there are.
     now : float
     text : str
+    place : str
+        Of a further sensor, which alone shows so much; empty: the sensors that there are.
     """
 
     point: Point
@@ -208,6 +210,7 @@ class NextRecording:
     standard_deviations: float
     now: float
     text: str
+    place: str = ""
 
 
 @dataclass(frozen=True)

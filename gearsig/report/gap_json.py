@@ -175,6 +175,7 @@ def _next_recording(one: NextRecording) -> Json:
         "separates": list(one.separates),
         "distance_in_structural_floors": rounded(one.standard_deviations),
         "distance_now_in_structural_floors": rounded(one.now),
+        "place": one.place,
         "text": one.text,
     }
 

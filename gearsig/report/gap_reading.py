@@ -165,7 +165,7 @@ def _evidence(found: Json) -> Evidence:
 
 def _next_recording(found: Json) -> NextRecording:
     there, now = (_number(found[f"distance_{when}in_structural_floors"]) for when in ("", "now_"))
-    return NextRecording(_point(found), _pair(found["separates"]), there, now, found["text"])
+    return NextRecording(_point(found), _pair(found["separates"]), there, now, found["text"], found.get("place", ""))
 
 
 def _spectrum(found: Json) -> SpectrumCurves:

@@ -224,11 +224,11 @@ def step_rows(report: GapReport) -> tuple[StepRow, ...]:
 
 
 def next_rows(report: GapReport) -> tuple[tuple[str, str, str, str], ...]:
-    """Return operating point, the pair that it separates, its distance there and now."""
+    """Return operating point and further sensor, the pair that they separate, its distance there and now."""
     titles = {cause.name: cause.title for cause in report.causes}
     return tuple(
         (
-            point_text(one.point),
+            point_text(one.point) + (f", with a further sensor at {one.place}" if one.place else ""),
             " / ".join(titles.get(name, name) for name in one.separates),
             readable(one.standard_deviations, 2),
             readable(one.now, 2),

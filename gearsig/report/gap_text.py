@@ -23,9 +23,10 @@ def condition_advice(report: GapReport) -> str:
     if report.outcome is GapOutcome.NO_GAP:
         return start + "whether the machine also agrees at another speed or load was not looked at."
     checked = "the result could be checked on other revolutions of the same recordings only. "
-    if not report.next_recordings:
+    here = report.conditions[0].point
+    best = next((one for one in report.next_recordings if not same_condition(one.point, here)), None)
+    if best is None:
         return f"{start}{checked}A second one would check it at another speed or load."
-    best = report.next_recordings[0]
     apart = f"{best.standard_deviations:.2g} structural floors apart, against {best.now:.2g} now"
     return f"{start}{checked}A second one, at {point_text(best.point)}, would put the two likeliest causes {apart}."
 
@@ -34,17 +35,18 @@ def n_conditions(report: GapReport) -> int:
     """Count operating conditions: recordings at nearly the same speed and torque are one."""
     distinct: list[Point] = []
     for facts in report.conditions:
-        if not any(_same(facts.point, point) for point in distinct):
+        if not any(same_condition(facts.point, point) for point in distinct):
             distinct.append(facts.point)
     return len(distinct)
 
 
 def point_text(point: Point) -> str:
     """Write an operating point for people."""
-    return f"{point.speed_rpm:.4g} rpm and {point.torque_nm:.3g} N·m"
+    return f"{float(f'{point.speed_rpm:.4g}'):.6g} rpm and {point.torque_nm:.3g} N·m"
 
 
-def _same(one: Point, other: Point) -> bool:
+def same_condition(one: Point, other: Point) -> bool:
+    """Whether two points are one operating condition."""
     speed = abs(one.speed_rpm - other.speed_rpm) <= SAME_SPEED * max(abs(one.speed_rpm), abs(other.speed_rpm))
     torque = abs(one.torque_nm - other.torque_nm) <= SAME_TORQUE * max(abs(one.torque_nm), abs(other.torque_nm))
     return speed and torque

@@ -8,6 +8,7 @@ from math import pi, sin
 
 from gearsig.rig.speed import TachometerChannel
 from gearsig.rig.types import Bearing, Rig
+from sims.cracked.installed import MOST_SENSORS as MOST_SEATS
 from sims.cracked.installed import HousingMode, Installed, Pickup, SensorSeat
 
 BALLS, BALL_MM, PITCH_MM = 9, 7.94, 39.04
@@ -17,6 +18,7 @@ USUAL_SPLIT = 0.4
 SEAT_ORDER = (1, 3, 2, 4)
 """Bearings under the sensors whose place is not told."""
 MOST_SENSORS = 4
+UNLISTED = "unlisted bearing"
 LEAST_PULSES = 4
 """Per revolution, where the rig's speed is not told by a tachometer: well known speed, but no mark on a tooth."""
 
@@ -83,7 +85,7 @@ def _closest(n: int) -> float:
 
 def _spare(rig: Rig, shaft: str, number: int, size: float) -> Bearing:
     """A sound bearing that the rig says nothing of."""
-    name = f"unlisted bearing {number}"
+    name = f"{UNLISTED} {number}"
     while name in {b.name for b in rig.bearings}:
         name += "'"
     return Bearing(name, shaft, BALLS, BALL_MM * size, PITCH_MM * size)
@@ -124,3 +126,25 @@ def _near(position: str, bearings: Sequence[Bearing]) -> list[int]:
     by_bearing = [n for n, b in enumerate(bearings, 1) if b.name.lower() in position]
     by_shaft = [n for n, b in enumerate(bearings, 1) if b.shaft.lower() in position]
     return by_bearing or by_shaft
+
+
+def further_seats(installed: Installed) -> tuple[SensorSeat, ...]:
+    """Return upright sensors over the bearings that have none."""
+    taken = {seat.bearing for seat in installed.sensors}
+    names = {seat.channel for seat in installed.sensors} | {installed.pickup.channel}
+    seats = []
+    for number, bearing in enumerate(installed.bearings, 1):
+        if number not in taken:
+            name = f"further {number}"
+            while name in names:
+                name += "'"
+            seats.append(SensorSeat(name, number, "vertical", f"{_bearing_words(bearing, number)}, vertical"))
+    return tuple(seats[: MOST_SEATS - len(installed.sensors)])
+
+
+def _bearing_words(bearing: Bearing, number: int) -> str:
+    shaft = bearing.shaft if "shaft" in bearing.shaft.lower() else f"the {bearing.shaft} shaft"
+    if bearing.name.startswith(UNLISTED):
+        return f"the {'free' if number % 2 == 0 else 'drive'} end of {shaft}"
+    name = bearing.name if "bearing" in bearing.name.lower() else f"bearing {bearing.name}"
+    return f"{name} on {shaft}"

@@ -16,9 +16,10 @@ from gearsig.gap.simulator import Added, GapEffect, Point
 from gearsig.recording.types import Recording
 from gearsig.rig.toml import rig_to_dict
 from gearsig.rig.types import OperatingPoint, Rig
+from sims.cracked.installed import SensorSeat
 from sims.cracked.installed_table import table_of
 from sims.cracked.plausible import PLAUSIBLE, Options, Plausible, Surroundings
-from sims.cracked.seats import completed, installed_of_rig
+from sims.cracked.seats import completed, further_seats, installed_of_rig
 from sims.cracked.simulator import NAME, prepare_preset
 from sims.cracked.usual import (
     Nominal,
@@ -48,16 +49,20 @@ class CrackedTwin:
     ----------
     rig : Rig
     nominal : Nominal
+    further : tuple of SensorSeat
+        Sensors beside the rig's own.
     """
 
     rig: Rig
     nominal: Nominal
+    further: tuple[SensorSeat, ...] = ()
 
     @property
     def key(self) -> str:
         """Model, state of its code, and what is known of the rig."""
         known = {name: value for name, value in rig_to_dict(self.rig).items() if name not in ("name", "sources")}
-        return f"{NAME} {sources_digest()} {sha256(repr(known).encode()).hexdigest()[:16]}"
+        told = repr(known) + (repr(self.further) if self.further else "")
+        return f"{NAME} {sources_digest()} {sha256(told.encode()).hexdigest()[:16]}"
 
     @property
     def point(self) -> Point:
@@ -109,6 +114,11 @@ class CrackedTwin:
             found += [Added(name, float(f"{s:.4g}"), options) for s in np.geomspace(low, high, PLAUSIBLE[name].n)]
         return found
 
+    def with_further_sensors(self) -> tuple[CrackedTwin, Mapping[str, str]]:
+        """Return the machine with an upright sensor over each bearing that has none, and those channels' places."""
+        further = further_seats(installed_of_rig(self.rig, self.nominal.size, ()))
+        return replace(self, further=further), {seat.channel: seat.position for seat in further}
+
     def draw(self, name: str, rng: np.random.Generator) -> Added:
         """Draw a setting from the range of the candidates, its options at random.
 
@@ -130,6 +140,7 @@ class CrackedTwin:
         values = usual_parameters(self.nominal) | specimen_parameters(self.nominal, drawn)
         used = [str(a.options["bearing"]) for a in added if "bearing" in a.options]
         installed = installed_of_rig(self.rig, self.nominal.size, usual_housing(drawn), used)
+        installed = replace(installed, sensors=(*installed.sensors, *self.further))
         title = f"Twin of {self.rig.name}" if self.rig.name else "Twin of a rig"
         return Preset(
             name="twin",

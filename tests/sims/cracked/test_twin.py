@@ -276,3 +276,17 @@ def test_severities_of_the_protocol_are_those_of_the_effects() -> None:
         own = effect(name)
         assert (seen.severity_name, seen.unit, seen.group) == (own.severity.name, own.severity.unit, own.group)
         assert seen.is_nuisance == (own.group == "measurement chain")
+
+
+def test_further_sensors_sit_over_the_bearings_that_have_none_and_leave_the_machine_as_it_is() -> None:
+    more, places = twin().with_further_sensors()
+    assert list(places.values()) == [
+        "the free end of the pinion shaft, vertical",
+        "the free end of the wheel shaft, vertical",
+    ]
+    recording = more.run(POINT, seed=0, duration_s=0.3, sampling_rate_hz=FS)
+    assert recording.vibration_names() == ("acc wheel", "acc pinion", *places)
+    assert {c.name: c.position for c in recording.channels if c.name in places} == places
+    assert difference(recording, run()) < 0.1  # the noise is another one
+    assert more.key != twin().key
+    assert more.with_further_sensors()[1] == places
