@@ -42,6 +42,15 @@ UNCALIBRATED = (
     "take them as a ranking only."
 )
 
+OWN_EFFECT = (
+    "The recognition has never seen “{title}”: it was simulated, fitted and scored on held-out data like the likeliest "
+    "effects. Its probability is the share of “unknown” that its held-out shrink beyond placebos explains, and is not "
+    "calibrated."
+)
+NOT_SIMULATED = (
+    "The recognition has never seen “{title}”, and it could not be simulated on this rig: nothing is said of it."
+)
+
 
 def diagnose_gap(
     recordings: Sequence[Recording],
@@ -110,6 +119,9 @@ def diagnose_gap(
         conditions, known, effects, twin, cache, lambda what, done: tell(what, 0.25 + 0.55 * done), fresh=fresh
     )
     tried, probabilities = weighed.tried, weighed.probabilities()
+    notices += [
+        (OWN_EFFECT if name in tried else NOT_SIMULATED).format(title=known[name].title) for name in weighed.unheard_of
+    ]
     outcome = weighed.calibration.outcome(probabilities)
     tell("placing it", 0.82)
     clearest = max(conditions, key=_size)

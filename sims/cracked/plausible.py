@@ -22,7 +22,7 @@ from sims.cracked.usual import (
 )
 from sims.effects import effect
 from sims.effects.bearing_choice import element_spacing_mm
-from sims.effects.effect import OptionValue
+from sims.effects.effect import Effect, OptionValue
 from sims.effects.unbalance import LARGEST_OFFSET
 from sims.machine import BearingSupport
 from sims.mesh import GearGeometry
@@ -316,3 +316,34 @@ def _any_order(rng: np.random.Generator) -> float:
     if rng.uniform() < 2.0 / 3.0:
         return float(rng.choice((1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)))
     return float(rng.uniform(1.5, 16.0))
+
+
+def plausible_of(own: Effect) -> Plausible:
+    """Return the range of an effect that is not listed: a third to three times its typical severity.
+
+    It is tried on each gear, shaft or bearing that it may be on, at the first tooth, with its other options as they
+    are by default.
+    """
+    severity = own.severity
+
+    def choices(machine: Surroundings) -> Sequence[Options]:
+        found: list[Options] = [{}]
+        for option in own.options:
+            words = [b.name for b in machine.bearings] if option.name == "bearing" else option.choices
+            if words:
+                found = [{**options, option.name: word} for options in found for word in words]
+            elif option.name == "tooth":
+                found = [{**options, "tooth": 1.0} for options in found]
+        return found
+
+    def drawn(machine: Surroundings, rng: np.random.Generator) -> Options:
+        every = choices(machine)
+        return dict(every[int(rng.integers(len(every)))])
+
+    return Plausible(
+        max(severity.low, severity.typical / 3.0),
+        min(severity.high, 3.0 * severity.typical),
+        "about its typical severity",
+        choices=choices,
+        drawn=drawn,
+    )

@@ -18,7 +18,7 @@ from gearsig.rig.toml import rig_to_dict
 from gearsig.rig.types import OperatingPoint, Rig
 from sims.cracked.installed import SensorSeat
 from sims.cracked.installed_table import table_of
-from sims.cracked.plausible import PLAUSIBLE, Options, Plausible, Surroundings
+from sims.cracked.plausible import PLAUSIBLE, Options, Plausible, Surroundings, plausible_of
 from sims.cracked.seats import completed, further_seats, installed_of_rig
 from sims.cracked.simulator import NAME, prepare_preset
 from sims.cracked.usual import (
@@ -111,7 +111,7 @@ class CrackedTwin:
         """Return settings of an effect worth a try, from barely noticeable to strong, for each option that matters."""
         found = []
         for options, (low, high) in self._reaches(name):
-            found += [Added(name, float(f"{s:.4g}"), options) for s in np.geomspace(low, high, PLAUSIBLE[name].n)]
+            found += [Added(name, float(f"{s:.4g}"), options) for s in np.geomspace(low, high, _plausible(name).n)]
         return found
 
     def with_further_sensors(self) -> tuple[CrackedTwin, Mapping[str, str]]:
@@ -238,4 +238,4 @@ class CrackedGapSimulator:
 
 
 def _plausible(name: str) -> Plausible:
-    return PLAUSIBLE[effect(name).name]
+    return PLAUSIBLE.get(effect(name).name) or plausible_of(effect(name))
