@@ -16,6 +16,7 @@ from sims.reduced_fe.mesh_size import MeshSize
 from sims.reduced_fe.sector_mesh import SectorMesh
 from sims.reduced_fe.tooth_side import outline_error_mm
 
+
 class MeshQuality(NamedTuple):
     """Quality of a mesh, and its mass properties.
 

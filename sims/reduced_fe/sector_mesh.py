@@ -78,7 +78,9 @@ def sector_mesh(blank: GearBlank, size: MeshSize) -> SectorMesh:
     cells = every
     if web != (0, n_layers - 1):
         web_cells = _extruded(plane.cells[: plane.n_web_cells], n_layers, range(web[0], web[1], 2))
-        cells = np.concatenate((web_cells, _extruded(plane.cells[plane.n_web_cells :], n_layers, range(0, n_layers - 1, 2))))
+        cells = np.concatenate(
+            (web_cells, _extruded(plane.cells[plane.n_web_cells :], n_layers, range(0, n_layers - 1, 2)))
+        )
     mesh = _without_loose_nodes(blank, size, points, cells, plane, n_layers)
     check_jacobians(mesh)
     return mesh
