@@ -1,0 +1,364 @@
+"""Compiled: march two sides of modes over the moving contact between them.
+
+A step: modes move freely, with the modal force extrapolated; the contact is solved at that place; the modes are
+corrected by the force found. The fast way takes this once; the reference repeats it until the forces stay. The force
+a moment later changes a place by h²/6 times the modal mobility, some 1e-4 of what the contact yields, so that one pass
+leaves an error of third order.
+
+Forces of the contact are −∂U/∂η with U(D(η, ζ), ζ); ζ follows the driver, which so feels −∂U/∂ζ ∂ζ/∂θ1 as stiffness
+and flank shape move past under load. Without it a pair would take energy from the drive that appears nowhere.
+
+Damping: the elastic law is taken at D + τ Ḋ, to first order a damper parallel to the contact with τ times its
+stiffness. It never pulls and never adds energy; a contact that closes at 0.1 m/s feels it 1 µm early, as an oil film
+would.
+"""
+
+# mypy: allow-untyped-defs, allow-untyped-calls
+from __future__ import annotations
+
+from math import cos, sin
+
+import numpy as np
+from numba import njit
+
+from sims.reduced_fe.contact_kernel import FAST, hertz_energy, solve_contacts
+from sims.reduced_fe.contact_pairs_kernel import compliance_slope_energy, fill_compliance, near_pairs
+from sims.reduced_fe.integrate_course_kernel import course_value, set_speed
+
+REACH = 4e-5
+"""Depth beyond the present one up to which flanks count as near, m."""
+FAST_PART = 0.05
+"""Change of a contact force, over the nominal one, after which the fast way takes no second iteration."""
+PRECISE_PART = 1e-11
+MOST_PASSES = 50
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def to_tooth(w, turn, n_single, n_pairs, out):
+    """Modal coordinates as the tooth in contact sees them: pairs turned by nψ."""
+    for j in range(n_single):
+        out[j] = w[j]
+    for p in range(n_pairs):
+        c, s = w[n_single + p], w[n_single + n_pairs + p]
+        out[n_single + p] = turn[0, p] * c + turn[1, p] * s
+        out[n_single + n_pairs + p] = turn[0, p] * s - turn[1, p] * c
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def add_from_tooth(g, turn, n_single, n_pairs, out):
+    """Add forces on a tooth's coordinates to those of the gear: the transpose of `to_tooth`."""
+    for j in range(n_single):
+        out[j] += g[j]
+    for p in range(n_pairs):
+        c, s = g[n_single + p], g[n_single + n_pairs + p]
+        out[n_single + p] += turn[0, p] * c - turn[1, p] * s
+        out[n_single + n_pairs + p] += turn[1, p] * c + turn[0, p] * s
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def dots(low, high, w):
+    """(low · w, high · w)."""
+    a, b = 0.0, 0.0
+    for j in range(low.shape[0]):
+        a += low[j] * w[j]
+        b += high[j] * w[j]
+    return a, b
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def dot(a, b):
+    """Inner product."""
+    total = 0.0
+    for j in range(a.shape[0]):
+        total += a[j] * b[j]
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def spread(low, high, t, force, g):
+    """g −= force · ∂D/∂η between two columns."""
+    for j in range(low.shape[0]):
+        g[j] -= force * (low[j] + t * (high[j] - low[j]))
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def march(  # noqa: PLR0912, PLR0915  one machine, one step; parts of it share a score of numbers
+    k, arrays, rows, turn, coefficients, modal, inputs, rigid, back_row, state, speed, torque, time, step, n_steps, stride,
+    precise, lines, found, energies,
+):  # fmt: skip
+    """Run `n_steps` steps; fill `found` with the wanted signals at every `stride`-th.
+
+    k : record, see `sims.reduced_fe.dynamics_constants`.
+    arrays : see `ContactTable.arrays`.
+    rows : (2, n, n_slices, n_rows) ∂D/∂η of both sides.
+    turn : (2, z, 2, n_pairs) cosine and sine by which a tooth's pairs are turned.
+    coefficients : (2, 8, n_modes), see `step_coefficients`.
+    modal : (2, 2, n_modes) ω² and 2ζω.
+    inputs : (2, 7, n_modes). rigid, back_row : (2, n_modes) ∂D/∂η of the rigid gears on either flank.
+    state : (q, v, f, f_before: (2, n_modes); force, root: (n_slots, n_slices); pair: (n_slots,); rest: (3,)), left at
+        the last step. rest: set angle, whether the flanks touched, whether
+        the state has forces already.
+    speed, torque : (2, n) courses in rad/s and N m.
+    time : of the first step.
+    precise : repeat each step until it stays.
+    lines : (kinds (n,), factors (n, 2, n_modes), set factors (n,)): wanted signals; kind 0, 1, 2: displacement,
+        velocity, acceleration; 3 + i: extra i = mesh force, back force, mesh cycles, nearest depth, contact's torque on
+        the driver, then the force of each slot, then of each of its slices.
+    found : (n_out, n). energies : (n_out,) or (0,).
+    Returns the number of rows filled, fewer where the solution burst.
+    """
+    q, v, f, f_before, held, held_root, held_pair, rest = state
+    own, cross, corner, extra, separation, table_rows, pitch, lead = arrays
+    kinds, factors, set_factors = lines
+    n_slots, n_s = held.shape
+    n_modes, n_rows = q.shape[1], rows.shape[3]
+    most = n_slots * n_s
+    pairs, parts = np.empty(n_slots), np.empty(n_slots)
+    apart, slope = np.empty(n_slots), np.empty(n_slots)
+    columns = np.empty(n_slots, dtype=np.int64)
+    r, a = np.empty((most, most)), np.empty((most, most))
+    approach, along, force, root = np.empty(most), np.empty(most), np.zeros(most), np.empty(most)
+    x, last_force = np.empty(most), np.zeros(most)
+    order = np.empty(most, dtype=np.int64)
+    seen, g = np.empty(n_rows), np.empty(n_rows)
+    q1, v1, w = np.empty((2, n_modes)), np.empty((2, n_modes)), np.empty((2, n_modes))
+    free_q, free_v, f1, base = np.empty_like(q1), np.empty_like(q1), np.empty_like(q1), np.empty_like(q1)
+    extras = np.zeros(5 + n_slots + most)
+    n_out = 0
+    angle = rest[0]
+    reach = REACH
+    enough = (PRECISE_PART if precise else FAST_PART) * k.nominal_force
+    passes = MOST_PASSES if precise else 1
+    w1, rate1 = set_speed(k, speed, time)
+    for number in range(n_steps + 1):
+        t = time + number * step
+        if number > 0:
+            w0 = w1
+            wh = set_speed(k, speed, t - 0.5 * step)[0]
+            w1, rate1 = set_speed(k, speed, t)
+            angle += step / 6.0 * (w0 + 4.0 * wh + w1)
+        load = course_value(torque, t)
+        if number > 0:
+            for side in range(2):
+                for j in range(n_modes):
+                    c = coefficients[side]
+                    free_q[side, j] = c[0, j] * q[side, j] + c[1, j] * v[side, j] + c[4, j] * f[side, j]
+                    free_v[side, j] = c[2, j] * q[side, j] + c[3, j] * v[side, j] + c[6, j] * f[side, j]
+                    f1[side, j] = 2.0 * f[side, j] - f_before[side, j]
+        else:
+            for side in range(2):
+                for j in range(n_modes):
+                    free_q[side, j], free_v[side, j], f1[side, j] = q[side, j], v[side, j], f[side, j]
+        # What acts besides the contact.
+        turned_1 = dot(inputs[0, 1], q[0])
+        for side in range(2):
+            if side == 0:
+                drive = load * _ripple(k, angle + dot(inputs[0, 0], q[0])) + k.total_inertia * rate1
+                drive -= k.governor * dot(inputs[0, 0], v[0]) + k.governor_spring * dot(inputs[0, 0], q[0])
+            else:
+                drive = -load * k.ratio
+            for j in range(n_modes):
+                base[side, j] = drive * inputs[side, 0, j] + rate1 * inputs[side, 6, j]
+            if k.pushes:
+                _push(k, side, inputs[side], angle, w1, drive, base[side])
+        cycles, total, back, torque_1 = 0.0, 0.0, 0.0, 0.0
+        n = 0
+        for one_pass in range(passes):
+            for side in range(2):
+                c = coefficients[side]
+                for j in range(n_modes):
+                    if number > 0:
+                        q1[side, j] = free_q[side, j] + c[5, j] * f1[side, j]
+                        v1[side, j] = free_v[side, j] + c[7, j] * f1[side, j]
+                    else:
+                        q1[side, j], v1[side, j] = q[side, j], v[side, j]
+                    w[side, j] = q1[side, j] + k.damping_time * v1[side, j]
+            turned_1 = dot(inputs[0, 1], q1[0])
+            turned_2 = dot(inputs[1, 1], q1[1])
+            cycles = k.cycles_per_rad * (angle + turned_1)
+            cycle_rate = k.cycles_per_rad * (w1 + dot(inputs[0, 1], v1[0]))
+            phi_1 = angle + turned_1 + k.runout_angle[0]
+            phi_2 = angle / k.ratio + turned_2 + k.runout_angle[1]
+            off = k.runout[0] * (sin(phi_1) + k.damping_time * w1 * cos(phi_1))
+            off += k.runout[1] * (sin(phi_2) + k.damping_time * w1 / k.ratio * cos(phi_2))
+            n = near_pairs(
+                cycles, k.start, k.column_step, corner, separation, table_rows, pitch, k.teeth, reach + off, pairs,
+                columns, parts, apart, slope,
+            )  # fmt: skip
+            if n < 0:
+                return n_out
+            deepest = -1.0
+            for p in range(n):
+                ring = int(pairs[p] - n_slots * np.floor(pairs[p] / n_slots))
+                if held_pair[ring] != pairs[p]:
+                    held_pair[ring] = pairs[p]
+                    for s in range(n_s):
+                        held[ring, s], held_root[ring, s] = 0.0, k.small**-0.1
+                for s in range(n_s):
+                    i = p * n_s + s
+                    if one_pass == 0:
+                        force[i], root[i] = held[ring, s], held_root[ring, s]
+                    approach[i] = off - apart[p] - lead[s]
+                    along[i] = -slope[p]
+                for side in range(2):
+                    z = k.teeth[side]
+                    tooth = int(pairs[p] - z * np.floor(pairs[p] / z))
+                    to_tooth(w[side], turn[side, tooth], k.n_single, k.n_pairs, seen)
+                    for s in range(n_s):
+                        low, high = dots(rows[side, columns[p], s], rows[side, columns[p] + 1, s], seen)
+                        i = p * n_s + s
+                        approach[i] += low + parts[p] * (high - low)
+                        along[i] += (high - low) / k.column_step
+                for s in range(n_s):
+                    i = p * n_s + s
+                    approach[i] += k.damping_time * cycle_rate * along[i]
+                    deepest = max(deepest, approach[i] + apart[p])
+            fill_compliance(n, pairs, columns, parts, k.teeth, own, cross, extra, table_rows, r)
+            done = solve_contacts(r, n * n_s, approach, k.hertz, k.small, force, root, enough, order, a, x)[0]
+            if done < 0:
+                return n_out
+            reach = max(deepest - off, 0.0) + REACH
+            total, along_cycles = 0.0, 0.0
+            for i in range(n * n_s):
+                total += force[i]
+                along_cycles += force[i] * along[i]
+            along_cycles -= compliance_slope_energy(
+                n, pairs, columns, k.teeth, own, cross, extra, table_rows, k.column_step, force
+            )
+            if not k.moving_force:
+                along_cycles = 0.0
+            torque_1 = -k.cycles_per_rad * along_cycles - total * k.runout[0] * cos(phi_1)
+            torque_2 = -total * k.runout[1] * cos(phi_2)
+            depth = dot(back_row[0], w[0]) + dot(back_row[1], w[1]) - k.backlash
+            back = k.back_stiffness * depth if depth > 0.0 else 0.0
+            for side in range(2):
+                pull = torque_1 if side == 0 else torque_2
+                for j in range(n_modes):
+                    f1[side, j] = base[side, j] + pull * inputs[side, 1, j] - back * back_row[side, j]
+                for p in range(n):
+                    z = k.teeth[side]
+                    tooth = int(pairs[p] - z * np.floor(pairs[p] / z))
+                    g[:] = 0.0
+                    i = columns[p]
+                    for s in range(n_s):
+                        if force[p * n_s + s] > 0.0:
+                            spread(rows[side, i, s], rows[side, i + 1, s], parts[p], force[p * n_s + s], g)
+                    add_from_tooth(g, turn[side, tooth], k.n_single, k.n_pairs, f1[side])
+            if one_pass > 0:
+                change = 0.0
+                for i in range(n * n_s):
+                    change = max(change, abs(force[i] - last_force[i]))
+                if change <= enough:
+                    break
+            if precise:
+                for i in range(n * n_s):
+                    last_force[i] = force[i]
+        for p in range(n):
+            ring = int(pairs[p] - n_slots * np.floor(pairs[p] / n_slots))
+            for s in range(n_s):
+                held[ring, s], held_root[ring, s] = force[p * n_s + s], root[p * n_s + s]
+        if not abs(total) < 1e12:
+            return n_out
+        for side in range(2):
+            c = coefficients[side]
+            for j in range(n_modes):
+                if number > 0:
+                    q[side, j] = free_q[side, j] + c[5, j] * f1[side, j]
+                    v[side, j] = free_v[side, j] + c[7, j] * f1[side, j]
+                    f_before[side, j] = f[side, j]
+                elif rest[2] == 0.0:
+                    f_before[side, j] = f1[side, j]
+                f[side, j] = f1[side, j]
+        rest[2] = 1.0
+        touches = 1.0 if total > 0.0 else 0.0
+        if k.restitution >= 0.0 and rest[1] == 0.0 and touches > 0.0:
+            closing = dot(rigid[0], v[0]) + dot(rigid[1], v[1])
+            if closing > 0.0:
+                kick = (1.0 + k.restitution) * closing / (dot(rigid[0], rigid[0]) + dot(rigid[1], rigid[1]))
+                for side in range(2):
+                    for j in range(n_modes):
+                        v[side, j] -= kick * rigid[side, j]
+        rest[1] = touches
+        if number % stride == 0 and n_out < found.shape[0]:
+            extras[0], extras[1], extras[2], extras[3], extras[4] = total, back, cycles, reach - REACH, torque_1
+            extras[5:] = 0.0
+            newest = np.floor(cycles - k.start)
+            for p in range(n):
+                slot = int(newest - pairs[p])
+                for s in range(n_s):
+                    extras[5 + slot] += force[p * n_s + s]
+                    extras[5 + n_slots + slot * n_s + s] = force[p * n_s + s]
+            for line in range(kinds.shape[0]):
+                found[n_out, line] = _signal(
+                    kinds[line], factors[line], set_factors[line], q, v, f, modal, angle, w1, rate1, extras
+                )
+            if energies.shape[0] > 0:
+                energies[n_out] = _energy(k, q, v, modal, inputs, angle, load, r, n * n_s, force, back)
+            n_out += 1
+    rest[0] = angle
+    return n_out
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _signal(kind, factor, set_factor, q, v, f, modal, angle, omega, rate, extras):
+    """Return a signal; see `march` for its kinds."""
+    if kind >= 3:
+        return extras[kind - 3]
+    total = set_factor * (angle if kind == 0 else (omega if kind == 1 else rate))
+    for side in range(2):
+        for j in range(q.shape[1]):
+            if kind == 0:
+                total += factor[side, j] * q[side, j]
+            elif kind == 1:
+                total += factor[side, j] * v[side, j]
+            else:
+                a = f[side, j] - modal[side, 1, j] * v[side, j] - modal[side, 0, j] * q[side, j]
+                total += factor[side, j] * a
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _energy(k, q, v, modal, inputs, angle, load, r, n, force, back):
+    """Kinetic and elastic energy, and that of constant drive and load torques; for machines whose set speed is 0."""
+    total = 0.0
+    for side in range(2):
+        for j in range(q.shape[1]):
+            total += 0.5 * (v[side, j] ** 2 + modal[side, 0, j] * q[side, j] ** 2)
+    total -= load * (angle + dot(inputs[0, 0], q[0])) - load * k.ratio * (angle / k.ratio + dot(inputs[1, 0], q[1]))
+    for i in range(n):
+        total += hertz_energy(force[i], k.hertz, k.small)
+        for j in range(n):
+            total += 0.5 * force[i] * r[i, j] * force[j]
+    if back > 0.0:
+        total += 0.5 * back * back / k.back_stiffness
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _ripple(k, theta):
+    """Drive torque over its set value."""
+    factor = 1.0
+    for i in range(k.n_ripples):
+        factor += k.ripples[i, 1] * cos(k.ripples[i, 0] * theta + k.ripples[i, 2])
+    return factor
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _push(k, side, inputs, angle, omega, drive, out):
+    """Add unbalance, weight and a bent coupling, at the set speed."""
+    theta = angle if side == 0 else angle / k.ratio
+    rate = omega if side == 0 else omega / k.ratio
+    up = 1.0 if side == 0 else -1.0
+    phi = theta + k.mass_angle[side]
+    fx = k.unbalance[side] * rate * rate * cos(phi) + k.mass[side] * k.gravity_x
+    fy = up * k.unbalance[side] * rate * rate * sin(phi) + k.mass[side] * k.gravity_y
+    c2, s2 = cos(2.0 * theta), sin(2.0 * theta)
+    kink = (
+        k.torsional_stiffness[side] * k.hooke[side] * s2 + 2.0 * k.torsional_damping[side] * k.hooke[side] * rate * c2
+    )
+    on_rotor = -kink - 2.0 * k.hooke[side] * c2 * drive
+    couple_x = k.hooke_force[side] * drive * (1.0 + c2)
+    couple_y = k.hooke_force[side] * drive * up * s2
+    for j in range(out.shape[0]):
+        out[j] += fx * inputs[2, j] + fy * inputs[3, j] + on_rotor * inputs[0, j] + kink * inputs[1, j]
+        out[j] += couple_x * inputs[4, j] + couple_y * inputs[5, j]
