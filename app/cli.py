@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+import threading
 from collections.abc import Sequence
 
 import typer
@@ -69,6 +71,7 @@ def _root(
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; an error of the user's input is one line on standard error and exit code 2."""
+    _stop_tidily()
     try:
         sys.exit(app(args=list(arguments) if arguments is not None else None, standalone_mode=False))
     except USAGE_ERROR as error:  # a wrong option or argument: left alone, Typer draws a frame of several lines
@@ -83,6 +86,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except BrokenPipeError:  # the reader of our output has gone, e.g. `| head`
         sys.stderr.close()
         sys.exit(0)
+
+
+def _stop_tidily() -> None:
+    """Let SIGTERM end a command as Ctrl-C does: what it began is tidied up."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 def _usage_text(error: Exception) -> str:
