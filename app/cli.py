@@ -16,6 +16,7 @@ from app.commands.compare import compare
 from app.commands.crack import crack
 from app.commands.dashboard import dashboard
 from app.commands.demo import demo
+from app.commands.force import force
 from app.commands.gap import gap
 from app.commands.report import report
 from app.commands.rig import rig_app
@@ -40,6 +41,7 @@ app = typer.Typer(
 )
 app.command()(analyze)
 app.command()(crack)
+app.command()(force)
 app.command()(compare)
 app.command()(report)
 app.add_typer(rig_app, name="rig")
