@@ -69,11 +69,13 @@ def solve_contacts(r, n, approach, hertz, small, force, w, enough, order, a, x):
 
     r : (≥ n, ≥ n) compliance, symmetric.
     approach : (≥ n,) D.
+    hertz : (n_s,) B of the slices; point i is of slice i mod n_s.
     w : (≥ n,) N^-0.1, carried along.
     enough : largest change of a force at which an iteration counts as the last. Newton's error falls with the square
         of the change, as h is almost straight: a change of 5 % leaves 1e-4.
     order, a, x : scratch; on return order[:m] are the points that touch and `a` the factor of R + h'(N) over them.
     """
+    n_s = hertz.shape[0]
     for iteration in range(1, MOST_ITERATIONS + 1):
         m = 0
         for i in range(n):
@@ -83,13 +85,13 @@ def solve_contacts(r, n, approach, hertz, small, force, w, enough, order, a, x):
             if force[i] > 0.0 or free > 0.0:
                 w[i] = root(force[i], small, w[i])
                 order[m] = i
-                x[m] = free - hertz * w[i] * force[i]
+                x[m] = free - hertz[i % n_s] * w[i] * force[i]
                 m += 1
         for p in range(m):
             i = order[p]
             for s in range(p):
                 a[p, s] = r[i, order[s]]
-            a[p, p] = r[i, i] + (0.9 if force[i] > small else 1.0) * hertz * w[i]
+            a[p, p] = r[i, i] + (0.9 if force[i] > small else 1.0) * hertz[i % n_s] * w[i]
         if not factorised(a, m):
             return -1, m
         back_substituted(a, m, x)

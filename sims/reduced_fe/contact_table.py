@@ -60,7 +60,7 @@ class ContactTable:
     pitch_1_m, pitch_2_m : arrays, (z,)
     lead_m : array, (n_slices,)
         Separation of each slice by misaligned axes, its least being 0.
-    hertz : float
+    hertz : array, (n_slices,)
         B of a slice, h = B N^0.9, m/N^0.9.
     """
 
@@ -81,7 +81,7 @@ class ContactTable:
     pitch_1_m: FloatArray
     pitch_2_m: FloatArray
     lead_m: FloatArray
-    hertz: float
+    hertz: FloatArray
 
     @property
     def progress(self) -> FloatArray:
@@ -115,7 +115,7 @@ class ContactTable:
             pitch[i, : len(places)] = places
         extra = np.ascontiguousarray(np.concatenate((self.extra_1, self.extra_2)))
         separation = np.ascontiguousarray(np.vstack((self.separation_1_m, self.separation_2_m)))
-        return self.own, self.cross, self.corner_m, extra, separation, rows, pitch, self.lead_m
+        return self.own, self.cross, self.corner_m, extra, separation, rows, pitch, self.lead_m, self.hertz
 
 
 def contact_table(
@@ -171,7 +171,7 @@ def contact_table(
         pitch_2_m=pitch_separation_m(mesh.pair.driven, mesh.flank_2),
         lead_m=lead,
         # An evenly loaded pair yields as the whole width does: h(N_s) = B (n N_s)^0.9.
-        hertz=float(whole * len(lead) ** 0.9),
+        hertz=np.full(len(lead), whole * len(lead) ** 0.9),
     )
 
 

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from math import cos, pi, radians, sin, sqrt
+from math import cos, pi, radians, sin
 from typing import Any
 
 import numpy as np
 
 from gearsig.checks import FloatArray, within
 from gearsig.errors import InputError
-from sims.cracked.constants import governor_nm_s_per_rad, mesh_mass_kg, total_inertia_kg_m2
+from sims.cracked.constants import governor_nm_s_per_rad, total_inertia_kg_m2
 from sims.machine import Machine
 from sims.machine.operation import Operation
+from sims.reduced_fe.contact_mirror import folded, mirror_groups, mirrors
 from sims.reduced_fe.contact_table import ContactTable, contact_table, static_table
-from sims.reduced_fe.dynamics_side import Side, build_side, kept_modes, residual_compliance
+from sims.reduced_fe.dynamics_side import Kept, Side, build_side, kept_modes, residual_compliance
 from sims.reduced_fe.maps_static import MeshMaps, mesh_maps, teeth_of
 from sims.reduced_fe.reduced_gear import ReducedGear
 
 MOST_LINES = 8
 """Torque ripples, or speed swings, at once."""
-MODE_LIMIT_HZ = 16000.0
+MODE_LIMIT_HZ = 20000.0
 """Elastic modes up to here are kept; the others follow at once."""
 SMALL_PART = 1e-3
 """Of the nominal force on a slice: below it the local contact is straight."""
@@ -31,7 +32,6 @@ LEAST_FORCE_N = 50.0
 _SCALARS = (
     "start",
     "column_step",
-    "hertz",
     "small",
     "nominal_force",
     "cycles_per_rad",
@@ -77,7 +77,8 @@ class FlexiblePair:
     ----------
     machine : Machine
         Masses and inertias of its wheels are those of gear, hub and shaft together; its contact law, friction and the
-        gears' stiffness by potential energy are not used.
+        gears' stiffness by potential energy are not used. `mesh_damping_ratio` is that of the torsional mode in all:
+        the contact has the damping that shafts, bearings and bodies leave wanting.
     gears : (ReducedGear, ReducedGear)
     body_damping_ratio : float
         Of the elastic modes of the gears.
@@ -159,17 +160,14 @@ def constants(pair: FlexiblePair, operation: Operation, *, moving_force: bool = 
     moving_force : bool
         Off: leave out the torque by which stiffness moving past under load acts on the driver, for comparison.
     """
+    from sims.reduced_fe.dynamics_linear import torsional_mode
+
     machine, mesh = pair.machine, pair.machine.mesh
     base = np.array([mesh.pair.driver.base_radius_mm, mesh.pair.driven.base_radius_mm]) * 1e-3
     force = max(operation.torque_nm.largest / base[0], LEAST_FORCE_N)
     stiffness = mean_stiffness_n_per_m(pair, force)
-    kept = [kept_modes(gear, pair.mode_limit_hz) for gear in pair.gears]
-
-    def rest(gear: ReducedGear, teeth: list[int]) -> FloatArray:
-        return residual_compliance(gear, teeth, kept[0] if gear is pair.gears[0] else kept[1])
-
-    table = contact_table(pair.gears, mesh, rest, lead_um=pair.lead_error_um)
-    make = partial(build_side, machine, table=table, body_damping_ratio=pair.body_damping_ratio)
+    table, kept, groups = _contact(pair)
+    make = partial(build_side, machine, table=table, groups=groups, body_damping_ratio=pair.body_damping_ratio)
     sides = _padded([make(i, gear=pair.gears[i], kept=kept[i]) for i in (0, 1)])
     beta = radians(machine.line_of_action_deg)
     wheels, shafts = machine.wheels, machine.shafts
@@ -179,11 +177,9 @@ def constants(pair: FlexiblePair, operation: Operation, *, moving_force: bool = 
     values = {
         "start": table.start,
         "column_step": table.step,
-        "hertz": table.hertz,
         "small": SMALL_PART * nominal,
         "nominal_force": nominal,
         "cycles_per_rad": mesh.pair.driver.teeth / (2.0 * pi),
-        "damping_time": 2.0 * machine.mesh_damping_ratio * sqrt(mesh_mass_kg(machine) / stiffness),
         "backlash": 2e-6 * machine.half_backlash_um,
         "back_stiffness": stiffness,
         "restitution": -1.0 if pair.restitution is None else pair.restitution,
@@ -217,7 +213,29 @@ def constants(pair: FlexiblePair, operation: Operation, *, moving_force: bool = 
     record = np.zeros((), RECORD)
     for name, value in values.items():
         record[name] = value
-    return Constants(record[()], table, sides, stiffness, base)
+    made = Constants(record[()], table, sides, stiffness, base)
+    made.record["damping_time"] = torsional_mode(pair, operation, ready=made).damping_time_s(machine.mesh_damping_ratio)
+    return made
+
+
+def _contact(pair: FlexiblePair) -> tuple[ContactTable, list[Kept], FloatArray]:
+    """Residual contact, the modes that are kept beside it, and which slices stand together."""
+    n_slices = len(pair.gears[0].grid.z_m)
+
+    def made(groups: FloatArray) -> tuple[ContactTable, list[Kept]]:
+        kept = [kept_modes(gear, pair.mode_limit_hz, groups) for gear in pair.gears]
+
+        def rest(gear: ReducedGear, teeth: list[int]) -> FloatArray:
+            return residual_compliance(gear, teeth, kept[0] if gear is pair.gears[0] else kept[1])
+
+        return contact_table(pair.gears, pair.machine.mesh, rest, lead_um=pair.lead_error_um), kept
+
+    groups = mirror_groups(n_slices)
+    table, kept = made(groups)
+    if mirrors(table):
+        return folded(table), kept, groups
+    groups = np.eye(n_slices)
+    return *made(groups), groups
 
 
 def back_rows(machine: Machine, sides: tuple[Side, Side]) -> FloatArray:

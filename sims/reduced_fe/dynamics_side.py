@@ -96,12 +96,13 @@ class Side:
         return len(self.omega_rad_s)
 
 
-def kept_modes(gear: ReducedGear, limit_hz: float) -> Kept:
+def kept_modes(gear: ReducedGear, limit_hz: float, groups: FloatArray) -> Kept:
     """Choose the elastic modes up to a frequency that matter at the driving flank, and the first twist of the hub.
 
-    A pair is kept or left as a whole. Without the twist the hub would stand still against the rim.
+    A pair is kept or left as a whole. Without the twist the hub would stand still against the rim. `groups`: see
+    `sims.reduced_fe.contact_mirror`; modes that bend the face's halves against each other move no group.
     """
-    flank = gear.flank_modes.reshape(gear.n_modes, *gear.grid.shape)[:, FLANK]
+    flank = gear.flank_modes.reshape(gear.n_modes, *gear.grid.shape)[:, FLANK] @ (groups / groups.sum(axis=0))
     part = np.max(flank.reshape(gear.n_modes, -1) ** 2, axis=1) / gear.angular_frequencies_rad_s**2
     paired = (gear.nodal_diameters > 0) & (2 * gear.nodal_diameters < gear.blank.n_teeth)
     first = np.flatnonzero(paired)[::2]
@@ -123,7 +124,13 @@ def residual_compliance(gear: ReducedGear, teeth: list[int], kept: Kept) -> Floa
 
 
 def build_side(
-    machine: Machine, index: int, gear: ReducedGear, kept: Kept, table: ContactTable, body_damping_ratio: float
+    machine: Machine,
+    index: int,
+    gear: ReducedGear,
+    kept: Kept,
+    table: ContactTable,
+    groups: FloatArray,
+    body_damping_ratio: float,
 ) -> Side:
     """Return the modes of the driver's side (0) or the driven one (1).
 
@@ -139,7 +146,7 @@ def build_side(
     mass, stiffness, damping = _matrices(machine, index, gear, kept.single[coupled], twist[coupled], body_damping_ratio)
     squares, shapes = _modes_of(stiffness, mass)
     rate = np.einsum("ij,ik,kj->j", shapes, damping, shapes)
-    elastic = _elastic_rows(machine, index, gear, table)
+    elastic = _elastic_rows(machine, index, gear, table, groups)
     up = 1.0 if index == 0 else -1.0
     rigid = up * (base_m * shapes[GEAR] + shapes[Y])
     rows = rigid + elastic[:, :, kept.single[coupled]] @ shapes[len(COORDINATES) :]
@@ -171,10 +178,12 @@ def build_side(
     )
 
 
-def _elastic_rows(machine: Machine, index: int, gear: ReducedGear, table: ContactTable) -> FloatArray:
-    """∂D/∂q of all elastic modes at tooth 0, (n, n_slices, n_modes): minus the push displacement."""
+def _elastic_rows(
+    machine: Machine, index: int, gear: ReducedGear, table: ContactTable, groups: FloatArray
+) -> FloatArray:
+    """∂D/∂q of all elastic modes at tooth 0, (n, n_groups, n_modes): minus the push displacement."""
     roll = rolls_rad(machine.mesh.pair, table.progress)[index]
-    flank = gear.flank_modes.reshape(gear.n_modes, *gear.grid.shape)[:, FLANK]
+    flank = gear.flank_modes.reshape(gear.n_modes, *gear.grid.shape)[:, FLANK] @ (groups / groups.sum(axis=0))
     return -over_height(gear.grid.roll_rad, np.moveaxis(flank, 0, -1), roll)
 
 

@@ -25,60 +25,76 @@ from sims.reduced_fe.contact_kernel import FAST, hertz_energy, solve_contacts
 from sims.reduced_fe.contact_pairs_kernel import compliance_slope_energy, fill_compliance, near_pairs
 from sims.reduced_fe.integrate_course_kernel import course_value, set_speed
 
-REACH = 4e-5
-"""Depth beyond the present one up to which flanks count as near, m."""
+REACH_MPS = 4.0
+"""Speed at which flanks may close: what is further apart than a step of it, beyond the present depth, is not near."""
 FAST_PART = 0.05
 """Change of a contact force, over the nominal one, after which the fast way takes no second iteration."""
 PRECISE_PART = 1e-11
 MOST_PASSES = 50
 
 
+# Arrays are passed whole, with the places in them: a slice is a new object, whose references are counted at every use.
+
+
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def to_tooth(w, turn, n_single, n_pairs, out):
+def to_tooth(w, side, turn, tooth, n_single, n_pairs, out):
     """Modal coordinates as the tooth in contact sees them: pairs turned by nψ."""
     for j in range(n_single):
-        out[j] = w[j]
+        out[j] = w[side, j]
     for p in range(n_pairs):
-        c, s = w[n_single + p], w[n_single + n_pairs + p]
-        out[n_single + p] = turn[0, p] * c + turn[1, p] * s
-        out[n_single + n_pairs + p] = turn[0, p] * s - turn[1, p] * c
+        c, s = w[side, n_single + p], w[side, n_single + n_pairs + p]
+        cosine, sine = turn[side, tooth, 0, p], turn[side, tooth, 1, p]
+        out[n_single + p] = cosine * c + sine * s
+        out[n_single + n_pairs + p] = cosine * s - sine * c
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def add_from_tooth(g, turn, n_single, n_pairs, out):
+def add_from_tooth(g, side, turn, tooth, n_single, n_pairs, out):
     """Add forces on a tooth's coordinates to those of the gear: the transpose of `to_tooth`."""
     for j in range(n_single):
-        out[j] += g[j]
+        out[side, j] += g[j]
     for p in range(n_pairs):
         c, s = g[n_single + p], g[n_single + n_pairs + p]
-        out[n_single + p] += turn[0, p] * c - turn[1, p] * s
-        out[n_single + n_pairs + p] += turn[1, p] * c + turn[0, p] * s
+        cosine, sine = turn[side, tooth, 0, p], turn[side, tooth, 1, p]
+        out[side, n_single + p] += cosine * c - sine * s
+        out[side, n_single + n_pairs + p] += sine * c + cosine * s
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def dots(low, high, w):
-    """(low · w, high · w)."""
+def dots(rows, side, i, s, w):
+    """∂D/∂η · w in columns i and i + 1."""
     a, b = 0.0, 0.0
-    for j in range(low.shape[0]):
-        a += low[j] * w[j]
-        b += high[j] * w[j]
+    for j in range(rows.shape[3]):
+        a += rows[side, i, s, j] * w[j]
+        b += rows[side, i + 1, s, j] * w[j]
     return a, b
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def dot(a, b):
-    """Inner product."""
+def on_input(inputs, side, number, w):
+    """Displacement (of modal coordinates w) that an input works on."""
     total = 0.0
-    for j in range(a.shape[0]):
-        total += a[j] * b[j]
+    for j in range(w.shape[1]):
+        total += inputs[side, number, j] * w[side, j]
     return total
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def spread(low, high, t, force, g):
+def product(a, b):
+    """Sum of products of all modes of both sides."""
+    total = 0.0
+    for side in range(2):
+        for j in range(a.shape[1]):
+            total += a[side, j] * b[side, j]
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def spread(rows, side, i, s, t, force, g):
     """g −= force · ∂D/∂η between two columns."""
-    for j in range(low.shape[0]):
-        g[j] -= force * (low[j] + t * (high[j] - low[j]))
+    low, high = force * (1.0 - t), force * t
+    for j in range(rows.shape[3]):
+        g[j] -= low * rows[side, i, s, j] + high * rows[side, i + 1, s, j]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -108,7 +124,7 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; parts of it share a
     Returns the number of rows filled, fewer where the solution burst.
     """
     q, v, f, f_before, held, held_root, held_pair, rest = state
-    own, cross, corner, extra, separation, table_rows, pitch, lead = arrays
+    own, cross, corner, extra, separation, table_rows, pitch, lead, hertz = arrays
     kinds, factors, set_factors = lines
     n_slots, n_s = held.shape
     n_modes, n_rows = q.shape[1], rows.shape[3]
@@ -126,7 +142,8 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; parts of it share a
     extras = np.zeros(5 + n_slots + most)
     n_out = 0
     angle = rest[0]
-    reach = REACH
+    margin = REACH_MPS * step
+    reach = margin
     enough = (PRECISE_PART if precise else FAST_PART) * k.nominal_force
     passes = MOST_PASSES if precise else 1
     w1, rate1 = set_speed(k, speed, time)
@@ -141,42 +158,42 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; parts of it share a
         if number > 0:
             for side in range(2):
                 for j in range(n_modes):
-                    c = coefficients[side]
-                    free_q[side, j] = c[0, j] * q[side, j] + c[1, j] * v[side, j] + c[4, j] * f[side, j]
-                    free_v[side, j] = c[2, j] * q[side, j] + c[3, j] * v[side, j] + c[6, j] * f[side, j]
+                    a0, a1, b0 = coefficients[side, 0, j], coefficients[side, 1, j], coefficients[side, 4, j]
+                    free_q[side, j] = a0 * q[side, j] + a1 * v[side, j] + b0 * f[side, j]
+                    a0, a1, b0 = coefficients[side, 2, j], coefficients[side, 3, j], coefficients[side, 6, j]
+                    free_v[side, j] = a0 * q[side, j] + a1 * v[side, j] + b0 * f[side, j]
                     f1[side, j] = 2.0 * f[side, j] - f_before[side, j]
         else:
             for side in range(2):
                 for j in range(n_modes):
                     free_q[side, j], free_v[side, j], f1[side, j] = q[side, j], v[side, j], f[side, j]
         # What acts besides the contact.
-        turned_1 = dot(inputs[0, 1], q[0])
+        turned_1 = on_input(inputs, 0, 1, q)
         for side in range(2):
             if side == 0:
-                drive = load * _ripple(k, angle + dot(inputs[0, 0], q[0])) + k.total_inertia * rate1
-                drive -= k.governor * dot(inputs[0, 0], v[0]) + k.governor_spring * dot(inputs[0, 0], q[0])
+                drive = load * _ripple(k, angle + on_input(inputs, 0, 0, q)) + k.total_inertia * rate1
+                drive -= k.governor * on_input(inputs, 0, 0, v) + k.governor_spring * on_input(inputs, 0, 0, q)
             else:
                 drive = -load * k.ratio
             for j in range(n_modes):
                 base[side, j] = drive * inputs[side, 0, j] + rate1 * inputs[side, 6, j]
             if k.pushes:
-                _push(k, side, inputs[side], angle, w1, drive, base[side])
+                _push(k, side, inputs, angle, w1, drive, base)
         cycles, total, back, torque_1 = 0.0, 0.0, 0.0, 0.0
         n = 0
         for one_pass in range(passes):
             for side in range(2):
-                c = coefficients[side]
                 for j in range(n_modes):
                     if number > 0:
-                        q1[side, j] = free_q[side, j] + c[5, j] * f1[side, j]
-                        v1[side, j] = free_v[side, j] + c[7, j] * f1[side, j]
+                        q1[side, j] = free_q[side, j] + coefficients[side, 5, j] * f1[side, j]
+                        v1[side, j] = free_v[side, j] + coefficients[side, 7, j] * f1[side, j]
                     else:
                         q1[side, j], v1[side, j] = q[side, j], v[side, j]
                     w[side, j] = q1[side, j] + k.damping_time * v1[side, j]
-            turned_1 = dot(inputs[0, 1], q1[0])
-            turned_2 = dot(inputs[1, 1], q1[1])
+            turned_1 = on_input(inputs, 0, 1, q1)
+            turned_2 = on_input(inputs, 1, 1, q1)
             cycles = k.cycles_per_rad * (angle + turned_1)
-            cycle_rate = k.cycles_per_rad * (w1 + dot(inputs[0, 1], v1[0]))
+            cycle_rate = k.cycles_per_rad * (w1 + on_input(inputs, 0, 1, v1))
             phi_1 = angle + turned_1 + k.runout_angle[0]
             phi_2 = angle / k.ratio + turned_2 + k.runout_angle[1]
             off = k.runout[0] * (sin(phi_1) + k.damping_time * w1 * cos(phi_1))
@@ -203,9 +220,9 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; parts of it share a
                 for side in range(2):
                     z = k.teeth[side]
                     tooth = int(pairs[p] - z * np.floor(pairs[p] / z))
-                    to_tooth(w[side], turn[side, tooth], k.n_single, k.n_pairs, seen)
+                    to_tooth(w, side, turn, tooth, k.n_single, k.n_pairs, seen)
                     for s in range(n_s):
-                        low, high = dots(rows[side, columns[p], s], rows[side, columns[p] + 1, s], seen)
+                        low, high = dots(rows, side, columns[p], s, seen)
                         i = p * n_s + s
                         approach[i] += low + parts[p] * (high - low)
                         along[i] += (high - low) / k.column_step
@@ -214,10 +231,10 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; parts of it share a
                     approach[i] += k.damping_time * cycle_rate * along[i]
                     deepest = max(deepest, approach[i] + apart[p])
             fill_compliance(n, pairs, columns, parts, k.teeth, own, cross, extra, table_rows, r)
-            done = solve_contacts(r, n * n_s, approach, k.hertz, k.small, force, root, enough, order, a, x)[0]
+            done = solve_contacts(r, n * n_s, approach, hertz, k.small, force, root, enough, order, a, x)[0]
             if done < 0:
                 return n_out
-            reach = max(deepest - off, 0.0) + REACH
+            reach = max(deepest - off, 0.0) + margin
             total, along_cycles = 0.0, 0.0
             for i in range(n * n_s):
                 total += force[i]
@@ -229,7 +246,7 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; parts of it share a
                 along_cycles = 0.0
             torque_1 = -k.cycles_per_rad * along_cycles - total * k.runout[0] * cos(phi_1)
             torque_2 = -total * k.runout[1] * cos(phi_2)
-            depth = dot(back_row[0], w[0]) + dot(back_row[1], w[1]) - k.backlash
+            depth = product(back_row, w) - k.backlash
             back = k.back_stiffness * depth if depth > 0.0 else 0.0
             for side in range(2):
                 pull = torque_1 if side == 0 else torque_2
@@ -242,8 +259,8 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; parts of it share a
                     i = columns[p]
                     for s in range(n_s):
                         if force[p * n_s + s] > 0.0:
-                            spread(rows[side, i, s], rows[side, i + 1, s], parts[p], force[p * n_s + s], g)
-                    add_from_tooth(g, turn[side, tooth], k.n_single, k.n_pairs, f1[side])
+                            spread(rows, side, i, s, parts[p], force[p * n_s + s], g)
+                    add_from_tooth(g, side, turn, tooth, k.n_single, k.n_pairs, f1)
             if one_pass > 0:
                 change = 0.0
                 for i in range(n * n_s):
@@ -260,11 +277,10 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; parts of it share a
         if not abs(total) < 1e12:
             return n_out
         for side in range(2):
-            c = coefficients[side]
             for j in range(n_modes):
                 if number > 0:
-                    q[side, j] = free_q[side, j] + c[5, j] * f1[side, j]
-                    v[side, j] = free_v[side, j] + c[7, j] * f1[side, j]
+                    q[side, j] = free_q[side, j] + coefficients[side, 5, j] * f1[side, j]
+                    v[side, j] = free_v[side, j] + coefficients[side, 7, j] * f1[side, j]
                     f_before[side, j] = f[side, j]
                 elif rest[2] == 0.0:
                     f_before[side, j] = f1[side, j]
@@ -272,15 +288,15 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; parts of it share a
         rest[2] = 1.0
         touches = 1.0 if total > 0.0 else 0.0
         if k.restitution >= 0.0 and rest[1] == 0.0 and touches > 0.0:
-            closing = dot(rigid[0], v[0]) + dot(rigid[1], v[1])
+            closing = product(rigid, v)
             if closing > 0.0:
-                kick = (1.0 + k.restitution) * closing / (dot(rigid[0], rigid[0]) + dot(rigid[1], rigid[1]))
+                kick = (1.0 + k.restitution) * closing / product(rigid, rigid)
                 for side in range(2):
                     for j in range(n_modes):
                         v[side, j] -= kick * rigid[side, j]
         rest[1] = touches
         if number % stride == 0 and n_out < found.shape[0]:
-            extras[0], extras[1], extras[2], extras[3], extras[4] = total, back, cycles, reach - REACH, torque_1
+            extras[0], extras[1], extras[2], extras[3], extras[4] = total, back, cycles, reach - margin, torque_1
             extras[5:] = 0.0
             newest = np.floor(cycles - k.start)
             for p in range(n):
@@ -290,17 +306,17 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; parts of it share a
                     extras[5 + n_slots + slot * n_s + s] = force[p * n_s + s]
             for line in range(kinds.shape[0]):
                 found[n_out, line] = _signal(
-                    kinds[line], factors[line], set_factors[line], q, v, f, modal, angle, w1, rate1, extras
+                    kinds[line], factors, line, set_factors[line], q, v, f, modal, angle, w1, rate1, extras
                 )
             if energies.shape[0] > 0:
-                energies[n_out] = _energy(k, q, v, modal, inputs, angle, load, r, n * n_s, force, back)
+                energies[n_out] = _energy(k, q, v, modal, inputs, angle, load, r, n * n_s, force, back, hertz)
             n_out += 1
     rest[0] = angle
     return n_out
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _signal(kind, factor, set_factor, q, v, f, modal, angle, omega, rate, extras):
+def _signal(kind, factors, line, set_factor, q, v, f, modal, angle, omega, rate, extras):
     """Return a signal; see `march` for its kinds."""
     if kind >= 3:
         return extras[kind - 3]
@@ -308,25 +324,25 @@ def _signal(kind, factor, set_factor, q, v, f, modal, angle, omega, rate, extras
     for side in range(2):
         for j in range(q.shape[1]):
             if kind == 0:
-                total += factor[side, j] * q[side, j]
+                total += factors[line, side, j] * q[side, j]
             elif kind == 1:
-                total += factor[side, j] * v[side, j]
+                total += factors[line, side, j] * v[side, j]
             else:
                 a = f[side, j] - modal[side, 1, j] * v[side, j] - modal[side, 0, j] * q[side, j]
-                total += factor[side, j] * a
+                total += factors[line, side, j] * a
     return total
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _energy(k, q, v, modal, inputs, angle, load, r, n, force, back):
+def _energy(k, q, v, modal, inputs, angle, load, r, n, force, back, hertz):
     """Kinetic and elastic energy, and that of constant drive and load torques; for machines whose set speed is 0."""
     total = 0.0
     for side in range(2):
         for j in range(q.shape[1]):
             total += 0.5 * (v[side, j] ** 2 + modal[side, 0, j] * q[side, j] ** 2)
-    total -= load * (angle + dot(inputs[0, 0], q[0])) - load * k.ratio * (angle / k.ratio + dot(inputs[1, 0], q[1]))
+    total -= load * (angle + on_input(inputs, 0, 0, q)) - load * k.ratio * (angle / k.ratio + on_input(inputs, 1, 0, q))
     for i in range(n):
-        total += hertz_energy(force[i], k.hertz, k.small)
+        total += hertz_energy(force[i], hertz[i % hertz.shape[0]], k.small)
         for j in range(n):
             total += 0.5 * force[i] * r[i, j] * force[j]
     if back > 0.0:
@@ -359,6 +375,7 @@ def _push(k, side, inputs, angle, omega, drive, out):
     on_rotor = -kink - 2.0 * k.hooke[side] * c2 * drive
     couple_x = k.hooke_force[side] * drive * (1.0 + c2)
     couple_y = k.hooke_force[side] * drive * up * s2
-    for j in range(out.shape[0]):
-        out[j] += fx * inputs[2, j] + fy * inputs[3, j] + on_rotor * inputs[0, j] + kink * inputs[1, j]
-        out[j] += couple_x * inputs[4, j] + couple_y * inputs[5, j]
+    for j in range(out.shape[1]):
+        out[side, j] += fx * inputs[side, 2, j] + fy * inputs[side, 3, j]
+        out[side, j] += on_rotor * inputs[side, 0, j] + kink * inputs[side, 1, j]
+        out[side, j] += couple_x * inputs[side, 4, j] + couple_y * inputs[side, 5, j]

@@ -14,14 +14,14 @@ ENOUGH = 1e-10
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def loaded_contact(cycles, loads, by_force, start, step, teeth, hertz, small, n_slots, arrays, delta, force, tangent):
+def loaded_contact(cycles, loads, by_force, start, step, teeth, small, n_slots, arrays, delta, force, tangent):
     """Solve at each c and load; returns whether all were found.
 
     loads : (n_loads,) total force in N, or approach δ in m where `by_force` is false; ascending.
     delta : (n_c, n_loads) δ in m, or the total force.
     force, tangent : (n_c, n_loads, n_slots, n_slices) N, and dN/dδ; slot j is pair ⌊c − start⌋ − j.
     """
-    own, cross, corner, extra, separation, rows, pitch, lead = arrays
+    own, cross, corner, extra, separation, rows, pitch, lead, hertz = arrays
     n_s = own.shape[1]
     most = n_slots * n_s
     pairs, parts = np.empty(n_slots), np.empty(n_slots)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError, RefusalError
@@ -196,7 +198,6 @@ def _solved(
         table.start,
         table.step,
         teeth_of(mesh),
-        table.hertz,
         SMALL_PART * greatest / table.n_slices,
         table.n_slots,
         table.arrays,
@@ -229,3 +230,48 @@ def _separations(table: ContactTable, mesh: GearMesh, cycles: FloatArray) -> Flo
             total[i] += np.interp(progress[inside][i], table.progress, whole)
         apart[inside, slot] = total
     return apart
+
+
+class ContactState(NamedTuple):
+    """Points of the pairs near contact, slices of a pair one after the other; see `contact_state`.
+
+    Attributes
+    ----------
+    force_n : array, (n,)
+    compliance : array, (n, n)
+        R, with h'(N) on the diagonal of the points that touch.
+    pair, column, part : arrays, (n,)
+        Number of the pair, and its place in the table.
+    """
+
+    force_n: FloatArray
+    compliance: FloatArray
+    pair: FloatArray
+    column: NDArray[np.int64]
+    part: FloatArray
+
+
+def contact_state(table: ContactTable, mesh: GearMesh, force_n: float, mesh_cycles: float) -> ContactState:
+    """Solve the contact at one mesh angle and return what a linear model about it needs."""
+    from sims.reduced_fe.contact_pairs_kernel import fill_compliance, near_pairs
+
+    own, cross, corner, extra, separation, rows, pitch, _, hertz = table.arrays
+    slots, n_s = table.n_slots, table.n_slices
+    pairs, parts, apart, slope = (np.zeros(slots) for _ in range(4))
+    columns = np.zeros(slots, dtype=np.int64)
+    at, teeth = float(mesh_cycles), teeth_of(mesh)
+    near = (at, table.start, table.step, corner, separation, rows, pitch, teeth, 1e9)
+    n = near_pairs(*near, pairs, columns, parts, apart, slope)
+    r = np.zeros((slots * n_s, slots * n_s))
+    fill_compliance(n, pairs, columns, parts, teeth, own, cross, extra, rows, r)
+    _, force, _ = _solved(table, mesh, np.array([at]), np.array([force_n]), by_force=True)
+    carried = force[0, 0, :n].ravel()
+    small = SMALL_PART * force_n / n_s
+    slope_h = np.tile(hertz, n) * np.where(carried > small, 0.9, 1.0) * np.maximum(carried, small) ** -0.1
+    return ContactState(
+        carried,
+        r[: n * n_s, : n * n_s] + np.diag(slope_h),
+        np.repeat(pairs[:n], n_s),
+        np.repeat(columns[:n], n_s),
+        np.repeat(parts[:n], n_s),
+    )
