@@ -105,7 +105,8 @@ def _diagnosed(asked: Asked, model: str, cache: Path | None, *, fresh: bool) -> 
 
     stage = TextColumn("{task.description}", markup=False)  # names of files are no markup
     columns = (stage, BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("reading", total=1.0)
         return run_gap(
             asked,

@@ -16,6 +16,7 @@ from app.gap.prepare import Stage, conditions_of
 from app.gap.rig_data import is_gearless
 from app.gap.unexplained import unexplained
 from app.gap.weigh import weigh
+from gearsig.checks import closest_match_hint
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap.curves import angle_curves, spectrum_curves
 from gearsig.gap.evidence import evidence_of
@@ -61,6 +62,7 @@ def diagnose_gap(
     reference_rigs: Sequence[Rig] = (),
     effects: Sequence[str] = (),
     names: Sequence[str] = (),
+    reference_names: Sequence[str] = (),
     cache: Path | None = None,
     fresh: bool = False,
     on_stage: Stage | None = None,
@@ -82,8 +84,8 @@ def diagnose_gap(
     reference_rigs : sequence of Rig
     effects : sequence of str
         Which effects may be named; empty: all that the simulator has.
-    names : sequence of str
-        Of the recordings, for people.
+    names, reference_names : sequence of str
+        Of the recordings and references, for people.
     cache : Path or None
         Folder that keeps simulations; None: nothing is kept.
     fresh : bool
@@ -105,13 +107,14 @@ def diagnose_gap(
     tell = on_stage or (lambda _what, _done: None)
     known = simulator.gap_effects()
     _check(recordings, names, effects, known)
+    called = tuple(reference_names) or tuple(f"reference {i + 1}" for i in range(len(references)))
     own_rigs, other_rigs = _rigs(recordings, rigs), _rigs(references, reference_rigs)
     if is_gearless(own_rigs[0]):
         allowed = {name: effect for name, effect in known.items() if not effects or name in effects}
-        return diagnose_gearless(recordings, own_rigs, references, other_rigs, names, allowed, tell)
+        return diagnose_gearless(recordings, own_rigs, references, other_rigs, names, called, allowed, tell)
     twin = simulator.twin_of(own_rigs[0])
     tell("reading the recordings", 0.02)
-    conditions, notices = conditions_of(recordings, own_rigs, references, other_rigs, twin, names, tell)
+    conditions, notices = conditions_of(recordings, own_rigs, references, other_rigs, twin, names, tell, called)
     if not is_calibrated():
         notices.insert(0, UNCALIBRATED)
     tell("recognising", 0.2)
@@ -140,7 +143,7 @@ def diagnose_gap(
         rig=own_rigs[0].name,
         simulator=simulator.name,
         conditions=tuple(c.facts for c in conditions),
-        references=tuple(f"reference {i + 1}" for i in range(len(references))) if weighed.with_reference else (),
+        references=called if weighed.with_reference else (),
         outcome=outcome,
         size=size.structural,
         repeatability=size.repeatability.value,
@@ -178,13 +181,25 @@ def _check(
         raise InputError(f"{len(names)} names for {len(recordings)} recordings", allowed="one each")
     strange = [name for name in effects if name not in known]
     if strange:
-        raise InputError(f"the simulator has no effect {strange[0]!r}", allowed=", ".join(known))
+        raise InputError(
+            f"the simulator has no effect {strange[0]!r}",
+            allowed=", ".join(known),
+            remedy=closest_match_hint(strange[0], known),
+        )
 
 
 def _rigs(recordings: Sequence[Recording], rigs: Sequence[Rig]) -> tuple[Rig, ...]:
     if rigs:
         if len(rigs) != len(recordings):
             raise InputError(f"{len(rigs)} rigs for {len(recordings)} recordings", allowed="one each")
+        if any(
+            r.rig is not None and r.rig.sensors not in ((), rig.sensors)
+            for r, rig in zip(recordings, rigs, strict=True)
+        ):
+            raise InputError(
+                "a recording carries a rig with other sensors than the one given for it",
+                remedy="read its file again with that rig",
+            )
         return tuple(rigs)
     found = tuple(r.rig for r in recordings)
     if any(rig is None for rig in found):

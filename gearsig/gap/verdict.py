@@ -16,11 +16,13 @@ def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
 NO_SIMULATION = (
     "How far: cannot be told; the simulators have a gear pair and this rig has none, so nothing was simulated."
 )
+SURE = 0.5
+"""Probability from which a cause is likelier than all others together."""
 SOUND_MACHINE = "the same machine when it was sound"
 
 
 def _where(report: GapReport) -> str:
-    if report.outcome is GapOutcome.NO_GAP:
+    if report.outcome is GapOutcome.NO_GAP and (report.size.value <= 1.0 or not report.places):
         return f"Where: nowhere beyond the floor; the gap is {report.size.value:.2g} structural floors."
     if not report.places:
         return f"Where: spread over all orders and bands, {report.size.value:.2g} structural floors."
@@ -32,7 +34,7 @@ def _which(report: GapReport) -> str:
     first = report.causes[0]
     odds = f"{100 * first.probability:.0f} %"
     if report.outcome is GapOutcome.NO_GAP:
-        return f"Which: none ({odds}); what differs is no more than between healthy machines and the simulator."
+        return _which_none(report, odds)
     if report.outcome is GapOutcome.UNKNOWN:
         return "Which: unknown; nothing in the catalogue explains it well enough."
     if report.outcome is GapOutcome.CANNOT_SEPARATE and report.inseparable is not None:
@@ -41,6 +43,13 @@ def _which(report: GapReport) -> str:
     size = "" if first.severity is None else f", {_severity(first, first.severity)}"
     place = f" at {first.place}" if first.place else ""
     return f"Which: {first.title}{place}{size} (probability {odds})."
+
+
+def _which_none(report: GapReport, odds: str) -> str:
+    rival = max(report.causes[1:], key=lambda cause: cause.probability, default=None)
+    if rival is None or report.causes[0].probability > SURE:
+        return f"Which: none ({odds}); what differs is no more than between healthy machines and the simulator."
+    return f"Which: none is likely enough to be named: no gap {odds}, {rival.title} {100 * rival.probability:.0f} %."
 
 
 def _severity(cause: GapCause, severity: Interval) -> str:

@@ -78,11 +78,12 @@ def test_it_prints_the_verdict_and_leaves_three_files(capsys, stub, tmp_path) ->
     assert sorted(p.name for p in folder.parent.iterdir()) == ["gap"]
     assert (folder / "twin.toml").read_text() == TWIN
     found = json.loads((folder / "gap.json").read_text())
-    assert (found["outcome"], found["references"]) == ("effect", [HEALTHY.name])
+    assert found["outcome"] == "effect"
     assert [r.provenance.source for r in stub.given["recordings"]] == [CRACKED.name]
     assert [r.provenance.source for r in stub.given["references"]] == [HEALTHY.name]
     assert stub.given["simulator"].name == "cracked"
     assert stub.given["names"] == (CRACKED.name,)
+    assert stub.given["reference_names"] == (HEALTHY.name,)
     assert stub.given["rigs"][0].operating_point.torque_nm == 110.0
 
 

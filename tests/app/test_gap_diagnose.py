@@ -89,10 +89,12 @@ def test_lists_that_do_not_fit_are_errors() -> None:
         diagnose_gap([], simulator)
     with pytest.raises(InputError, match="2 names for 1 recordings"):
         diagnose_gap([recording], simulator, names=["a", "b"])
-    with pytest.raises(InputError, match="no effect 'rust'"):
-        diagnose_gap([recording], simulator, effects=["rust"])
+    with pytest.raises(InputError, match=r"no effect 'backlsh'.*did you mean backlash"):
+        diagnose_gap([recording], simulator, effects=["backlsh"])
     with pytest.raises(InputError, match="carries no rig"):
         diagnose_gap([replace(recording, rig=None)], simulator)
+    with pytest.raises(InputError, match="other sensors"):
+        diagnose_gap([recording], simulator, rigs=[replace(rig(), sensors=rig().sensors[:1])])
 
 
 def test_a_recording_whose_channels_have_other_names_can_be_simulated() -> None:
