@@ -21,8 +21,9 @@ def simulators() -> dict[str, Simulator]:
     """Return every simulator by its name."""
     from sims.cracked.simulator import CrackedPair
     from sims.forging.simulator import ForgingManipulator
+    from sims.reduced_fe.simulator import ReducedPair
 
-    found: tuple[Simulator, ...] = (CrackedPair(), ForgingManipulator())
+    found: tuple[Simulator, ...] = (CrackedPair(), ReducedPair(), ForgingManipulator())
     return {simulator.name: simulator for simulator in found}
 
 

@@ -32,7 +32,7 @@ def root(force, small, guess):
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def factorised(a, n):
-    """Overwrite the lower triangle of a symmetric positive matrix by its Cholesky factor, 1/diagonal on the diagonal."""
+    """Overwrite the lower triangle of a symmetric positive matrix by its Cholesky factor, with 1/diagonal on it."""
     for i in range(n):
         for j in range(i):
             total = a[i, j]

@@ -38,7 +38,7 @@ def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reac
         e1 = corner[i] + separation[a, i] + separation[b, i]
         e2 = corner[i + 1] + separation[a, i + 1] + separation[b, i + 1]
         e3 = corner[i + 2] + separation[a, i + 2] + separation[b, i + 2]
-        # The cubic with the slopes (e2 − e0)/2 and (e3 − e1)/2: its slope is continuous, as the contact's damping needs.
+        # The cubic with the slopes (e2 − e0)/2 and (e3 − e1)/2: continuous slopes, as the contact's damping needs.
         c1, c2, c3 = 0.5 * (e2 - e0), e0 - 2.5 * e1 + 2.0 * e2 - 0.5 * e3, 1.5 * (e1 - e2) + 0.5 * (e3 - e0)
         here = e1 + t * (c1 + t * (c2 + t * c3)) + pitch[0, one] + pitch[1, two]
         if here < reach:

@@ -178,7 +178,7 @@ def contact_table(
 def static_table(
     gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, *, lead_um: float = 0.0, support: str = "hub_held"
 ) -> ContactTable:
-    """Return the table for statics: all of the elastic compliance, the hubs held where transmission error is measured."""
+    """Return the table for statics: all of the elastic compliance, held at the hubs whose motion is measured."""
 
     def whole(gear: ReducedGear, teeth: list[int]) -> FloatArray:
         return gear.compliance_m_per_n(teeth, support)  # type: ignore[arg-type]  # refused there if not one of its words

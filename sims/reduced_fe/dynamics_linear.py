@@ -13,7 +13,6 @@ from sims.mesh.stiffness import one_mesh_cycle
 from sims.reduced_fe.dynamics_constants import Constants, FlexiblePair, constants
 from sims.reduced_fe.maps_static import contact_state
 
-
 LEAST_HZ = 200.0
 """Modes below it are those of rotors on their couplings."""
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from sims.machine import Machine
-from sims.reduced_fe.contact_table import FLANK, SIGNS, ContactTable, over_height
 from sims.reduced_fe.contact_path import rolls_rad
+from sims.reduced_fe.contact_table import FLANK, SIGNS, ContactTable, over_height
 from sims.reduced_fe.reduced_gear import ReducedGear
 
 COORDINATES = ("rotor angle", "gear angle", "gear x", "gear y", "first x", "first y", "second x", "second y")

@@ -6,12 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gearsig.checks import FloatArray
 from sims.machine.operation import Operation
-from sims.reduced_fe.dynamics_constants import Constants, FlexiblePair, back_rows
+from sims.reduced_fe.dynamics_constants import Constants, FlexiblePair
 
 if TYPE_CHECKING:
     from sims.reduced_fe.dynamics_respond import FlexState
 
+DEEPEST_M = 1e-3
+"""Beyond any approach of flanks."""
 LEAST_HZ = 1.0
 """Of modes that the balance bends; slower ones are rigid motion."""
 
@@ -56,14 +59,13 @@ def _closed(pair: FlexiblePair, own: Constants, state: FlexState, force: float) 
 
     from sims.reduced_fe.maps_static import force_map
 
-    deepest = np.array([1e-3])
     table = own.table
     rigid = own.sides[1]
     free = np.flatnonzero(rigid.omega_rad_s == 0.0)
     free = free[np.abs(rigid.hub[free]) > 0.0][0]
     column = table.column(0.0)
 
-    def approach(q: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> float:
+    def approach(q: FloatArray) -> float:
         total = 0.0
         for index, side in enumerate(own.sides):
             n = side.rows.shape[-1]
@@ -73,7 +75,7 @@ def _closed(pair: FlexiblePair, own: Constants, state: FlexState, force: float) 
     def missing(depth: float) -> float:
         return float(force_map(table, pair.machine.mesh, np.array([depth]), np.zeros(1)).force_n[0, 0]) - force
 
-    depth = float(brentq(missing, 0.0, deepest[0], xtol=1e-12))
+    depth = float(brentq(missing, 0.0, DEEPEST_M, xtol=1e-12))
     q = state.q.copy()
     per_unit = float(rigid.rows[column].mean(axis=0)[free])
     q[1, free] += (depth - approach(q)) / per_unit

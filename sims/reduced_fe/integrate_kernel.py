@@ -91,16 +91,16 @@ def product(a, b):
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def spread(rows, side, i, s, t, force, g):
-    """g −= force · ∂D/∂η between two columns."""
+    """Take force · ∂D/∂η between two columns from g."""
     low, high = force * (1.0 - t), force * t
     for j in range(rows.shape[3]):
         g[j] -= low * rows[side, i, s, j] + high * rows[side, i + 1, s, j]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def march(  # noqa: PLR0912, PLR0915  one machine, one step; parts of it share a score of numbers
-    k, arrays, rows, turn, coefficients, modal, inputs, rigid, back_row, state, speed, torque, time, step, n_steps, stride,
-    precise, lines, found, energies,
+def march(  # noqa: PLR0912, PLR0915  one machine, one step; its parts share a score of numbers
+    k, arrays, rows, turn, coefficients, modal, inputs, rigid, back_row, state, speed, torque, time, step, n_steps,
+    stride, precise, lines, found, energies,
 ):  # fmt: skip
     """Run `n_steps` steps; fill `found` with the wanted signals at every `stride`-th.
 

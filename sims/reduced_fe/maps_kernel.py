@@ -14,7 +14,9 @@ ENOUGH = 1e-10
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def loaded_contact(cycles, loads, by_force, start, step, teeth, small, n_slots, arrays, delta, force, tangent):
+def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
+    cycles, loads, by_force, start, step, teeth, small, n_slots, arrays, delta, force, tangent
+):
     """Solve at each c and load; returns whether all were found.
 
     loads : (n_loads,) total force in N, or approach δ in m where `by_force` is false; ascending.

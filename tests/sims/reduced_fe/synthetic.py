@@ -1,4 +1,4 @@
-"""A reduced gear without finite elements: tooth compliance by potential energy, a body that is a ring's in-plane modes."""
+"""A reduced gear without finite elements: teeth by potential energy, a body of a ring's in-plane modes."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def _turned(modes, diameters, angle):
 
 def _tooth_alone(gear, roll, width, shape):
     """Compliance between the points of one tooth: of its beam, slices held together, the other flank pulls back."""
-    n_flanks, n_heights, n_slices = shape
+    n_flanks, _, n_slices = shape
     own = tooth_compliance(gear, STEEL, roll).total / width + 2.0e-9
     nearness = np.exp(-np.abs(roll[:, None] - roll[None, :]) / 0.6)
     heights = np.sqrt(np.outer(own, own)) * nearness
