@@ -17,17 +17,10 @@ from sims.reduced_fe.hub import hub_rows, hub_sum
 from sims.reduced_fe.sector_mesh import SectorMesh
 from sims.reduced_fe.sector_plane import IntArray
 
-Held = Literal["free", "bore"]
-"""The gear floats, or every node of its bore is held."""
+Held = Literal["free", "bore", "sprung"]
+"""The gear floats, every node of its bore is held, or springs at the hub hold it."""
 
 Solver = Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
-
-SUPERLU_OPTIONS = {
-    "permc_spec": "MMD_AT_PLUS_A",
-    "diag_pivot_thresh": 0.0,
-    "options": {"SymmetricMode": True},
-}
-"""For symmetric positive definite matrices: four times faster, and half the memory, of the default column ordering."""
 
 
 class Folded(NamedTuple):
@@ -177,12 +170,13 @@ class CyclicGear:
             motions = [(turn, 1j * turn, zero), (z * turn, 1j * z * turn, -r * turn)]
         columns = np.array([np.column_stack(m).ravel() for m in motions]).T
         weight = np.einsum("ia,ia->a", columns.conj(), self.mass.at(self.phase_rad(n)) @ columns).real
-        return columns / np.sqrt(weight)
+        normal: np.ndarray[Any, Any] = columns / np.sqrt(weight)
+        return normal
 
     def _fixed(self, n: int, held: Held) -> IntArray:
         if held == "bore":
             return self.bore_dof
-        if n > 1 or self.hub_stiffness is not None:
+        if n > 1 or held == "sprung":
             return np.empty(0, dtype=np.int64)
         node = int(self.own_places[self.mesh.bore[0, 0]])
         return np.array([3 * node + 1, 3 * node + 2])
@@ -196,7 +190,9 @@ def factorised(matrix: sparse.csc_array) -> Solver:
     """Return a direct solver of a symmetric or Hermitian positive definite matrix."""
     from scipy.sparse.linalg import splu
 
-    factor = splu(matrix, **SUPERLU_OPTIONS)
+    # Ordering and pivoting for symmetric definite matrices: twice as fast, and half the memory, of the defaults.
+    options = {"SymmetricMode": True}
+    factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
 
     def solve(loads: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         if np.iscomplexobj(loads) and matrix.dtype == np.float64:

@@ -89,6 +89,15 @@ def modes_of_diameter(gear: CyclicGear, n: int, n_shapes: int, held: Held = "fre
     return _lowest(_problem(gear, n, held), n_shapes)
 
 
+def lowest_with_static(
+    gear: CyclicGear, n: int, n_shapes: int, loads: ComplexArray
+) -> tuple[FloatArray, ComplexArray, ComplexArray]:
+    """Frequencies and shapes as `modes_of_diameter`, of a gear on springs, and its static answers to loads."""
+    problem = _problem(gear, n, "sprung")
+    frequencies, shapes = _lowest(problem, n_shapes)
+    return frequencies, shapes, problem.solve(loads.real if problem.stiffness.dtype == np.float64 else loads)
+
+
 class _Problem(NamedTuple):
     """Matrices of one nodal diameter, factorised for shift-and-invert."""
 
@@ -168,4 +177,5 @@ def _rayleigh_ritz(
 def _phased(shapes: ComplexArray) -> ComplexArray:
     """Turn each shape so that its largest component is real and positive: the same gear gives the same numbers."""
     top = shapes[np.argmax(np.abs(shapes), axis=0), np.arange(shapes.shape[1])]
-    return shapes * (np.abs(top) / top)
+    phased: ComplexArray = shapes * (np.abs(top) / top)
+    return phased

@@ -16,9 +16,6 @@ GAUSS_ORDER = 5
 """Integrates polynomials up to this degree exactly: three points each way, exact for the mass of a cell with parallel
 faces and the usual full integration of its stiffness."""
 
-_LAYOUT = np.array([[x, y, z] for x in range(3) for y in range(3) for z in range(3)])
-"""Half steps of the 27 nodes in the order of `SectorMesh.cells`, raveled."""
-
 
 class CellFields(NamedTuple):
     """Shape functions and their gradients at the Gauss points of each cell, in `SectorMesh`'s order of nodes.
@@ -98,7 +95,8 @@ def _cell_stiffness(fields: CellFields, material: Material) -> FloatArray:
     cells = lam * products + mu * products.transpose(0, 3, 2, 1, 4)
     for i in range(3):
         cells[:, i, :, i, :] += mu * trace
-    return cells.transpose(0, 2, 1, 4, 3).reshape(n, 81, 81)
+    ordered: FloatArray = cells.transpose(0, 2, 1, 4, 3).reshape(n, 81, 81)
+    return ordered
 
 
 def _cell_mass(fields: CellFields, density: float) -> FloatArray:

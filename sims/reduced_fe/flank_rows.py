@@ -9,7 +9,7 @@ import numpy as np
 from gearsig.checks import FloatArray, count
 from sims.mesh.geometry import GearGeometry
 from sims.mesh.profile import involute_outline
-from sims.reduced_fe.hub import simpson_weights
+from sims.reduced_fe.line_weights import line_weights, parabolic_weights
 from sims.reduced_fe.reduced_gear import FlankGrid
 from sims.reduced_fe.sector_mesh import SectorMesh
 from sims.reduced_fe.sector_plane import IntArray
@@ -22,7 +22,7 @@ PATCH_HALF_WIDTH = 0.1
 """Of a patch along the flank, in modules."""
 
 
-class _Nodes(NamedTuple):
+class SectionNodes(NamedTuple):
     """Nodes of one tooth section in the plane and the weights of their mean; weights add up to 1."""
 
     nodes: IntArray
@@ -44,8 +44,8 @@ def flank_rows(mesh: SectorMesh, grid: FlankGrid, spread: Spread, places: IntArr
 
         d·(ū + θ ẑ×(p − c)),  ū = Σ w u,  c = Σ w x,  θ = Σ w [(x − c)×(u − ū)]_z / Σ w |x − c|²
 
-    "section": nodes across the whole tooth at that height. "patch": nodes of the flank around the point. "node": the
-    flank at that height only, in the middle of the slice.
+    "section": nodes across the whole tooth at that height, weighted like the shear stress of a beam. "patch": nodes of
+    the flank around the point. "node": the flank at that height only, in the middle of the slice.
 
     Parameters
     ----------
@@ -60,71 +60,47 @@ def flank_rows(mesh: SectorMesh, grid: FlankGrid, spread: Spread, places: IntArr
     rows = np.zeros((*grid.shape, n_dof))
     for flank, sign in enumerate((1.0, -1.0)):
         for height, roll in enumerate(grid.roll_rad):
-            point, push = _point_and_push(gear, float(roll), sign)
-            nodes = _height_nodes(mesh, float(roll), spread, flank)
-            plane = _plane_row(mesh, nodes, point, push)
+            point, push = point_and_push(gear, float(roll), sign)
+            nodes = height_nodes(mesh, float(roll), spread, flank)
+            plane = plane_row(mesh, nodes, point, push)
             for k, z in enumerate(grid.z_m):
-                along = _slice_weights(mesh, float(z), len(grid.z_m), spread)
+                along = slice_weights(mesh, float(z), len(grid.z_m), spread)
                 dof = 3 * places[nodes.nodes][..., None] + np.arange(3)
                 np.add.at(rows[flank, height, k], dof, plane[:, None, :] * along[None, :, None])
     return rows.reshape(grid.n_points, n_dof)
 
 
-def _point_and_push(gear: GearGeometry, roll: float, sign: float) -> tuple[FloatArray, FloatArray]:
+def point_and_push(gear: GearGeometry, roll: float, sign: float) -> tuple[FloatArray, FloatArray]:
     """Flank point (m) and the direction into the tooth."""
     at, load = involute_outline(gear, np.array([roll])), roll - gear.base_half_angle_rad
     point = np.array([at.x_mm[0], sign * at.y_mm[0]]) * 1e-3
     return point, np.array([-np.sin(load), -sign * np.cos(load)])
 
 
-def _height_nodes(mesh: SectorMesh, roll: float, spread: Spread, flank: int) -> _Nodes:
+def height_nodes(mesh: SectorMesh, roll: float, spread: Spread, flank: int) -> SectionNodes:
     """Nodes (n, n_layers) of the tooth that stand for a height, and the weights (n,) in the plane."""
     gear, n_up = mesh.blank.geometry, mesh.size.n_up
     place = float(flank_place(gear, np.array([roll]))[0])
     reach = PATCH_HALF_WIDTH * gear.module_mm / side_curve(gear)[1] if spread == "patch" else 0.0
     up = line_weights(row_places(gear, n_up), place - reach, place + reach)
     if spread == "section":
-        across = simpson_weights(np.linspace(0.0, 1.0, mesh.tooth.shape[1]))
+        across = parabolic_weights(mesh.tooth.shape[1])
     else:
         across = np.zeros(mesh.tooth.shape[1])
         across[-1 if flank == 0 else 0] = 1.0
     weights = np.outer(up, across).ravel()
     used = weights != 0.0
-    return _Nodes(mesh.tooth.reshape(-1, mesh.tooth.shape[2])[used], weights[used])
+    return SectionNodes(mesh.tooth.reshape(-1, mesh.tooth.shape[2])[used], weights[used])
 
 
-def _slice_weights(mesh: SectorMesh, z: float, n_slices: int, spread: Spread) -> FloatArray:
+def slice_weights(mesh: SectorMesh, z: float, n_slices: int, spread: Spread) -> FloatArray:
+    """Weights of the layers of nodes for the mean over a slice, or for its middle."""
     layers = mesh.points_m[mesh.tooth[0, 0], 2]
     half = 0.0 if spread == "node" else (layers[-1] - layers[0]) / (2.0 * n_slices)
     return line_weights(layers, z - half, z + half)
 
 
-def line_weights(nodes: FloatArray, low: float, high: float) -> FloatArray:
-    """Weights of the nodes of three-node cells whose middles lie halfway, for the mean from `low` to `high`.
-
-    Ends beyond the line are moved to its ends; low = high interpolates. The weights add up to 1.
-    """
-    low, high = max(low, float(nodes[0])), min(high, float(nodes[-1]))
-    weights = np.zeros(len(nodes))
-    gauss, gauss_weight = np.polynomial.legendre.leggauss(2)
-    for k in range(0, len(nodes) - 2, 2):
-        start, end = nodes[k], nodes[k + 2]
-        a, b = max(low, start), min(high, end)
-        if low == high and start <= low <= end:
-            at, share = np.array([low]), np.array([1.0])
-        elif b > a:
-            at, share = (a + b) / 2.0 + (b - a) / 2.0 * gauss, gauss_weight / 2.0 * (b - a) / (high - low)
-        else:
-            continue
-        t = (at - start) / (end - start)
-        shape = np.array([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)])
-        weights[k : k + 3] += shape @ share
-        if low == high:
-            break
-    return weights
-
-
-def _plane_row(mesh: SectorMesh, nodes: _Nodes, point: FloatArray, push: FloatArray) -> FloatArray:
+def plane_row(mesh: SectorMesh, nodes: SectionNodes, point: FloatArray, push: FloatArray) -> FloatArray:
     """Weights (n, 3) of the radial, tangential and axial motion of the nodes (any layer: all have the same x and y)."""
     x = mesh.points_m[nodes.nodes[:, 0], :2]
     w = nodes.weights

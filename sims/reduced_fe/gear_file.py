@@ -68,11 +68,7 @@ def read_gear(path: str | Path) -> ReducedGear:
     """
     source = Path(path)
     try:
-        with ZipFile(source) as archive:
-            if sum(entry.file_size for entry in archive.infolist()) > MOST_BYTES:
-                raise InputError(
-                    "is too large for a reduced gear", where=str(source), allowed=f"{MOST_BYTES:.0e} bytes"
-                )
+        _check_length(source)
         with np.load(source, allow_pickle=False) as data:
             about = json.loads(str(data["about"]))
             _check_format(about, source)
@@ -87,6 +83,13 @@ def read_gear(path: str | Path) -> ReducedGear:
         ) from error
 
 
+def _check_length(source: Path) -> None:
+    with ZipFile(source) as archive:
+        n_bytes = sum(entry.file_size for entry in archive.infolist())
+    if n_bytes > MOST_BYTES:
+        raise InputError(f"holds {n_bytes:.1e} bytes", where=str(source), allowed=f"at most {MOST_BYTES:.0e}")
+
+
 def _check_format(about: dict[str, Any], source: Path) -> None:
     found = about.get("format") if isinstance(about, dict) else None
     if found != FORMAT:
@@ -99,13 +102,13 @@ def _check_format(about: dict[str, Any], source: Path) -> None:
 
 
 def _gear(about: dict[str, Any], arrays: dict[str, np.ndarray[Any, Any]]) -> ReducedGear:
-    grid = FlankGrid(arrays.pop("roll_rad"), arrays.pop("z_m"))
+    fields: dict[str, Any] = arrays | {name: float(about[name]) for name in _NUMBERS}
+    grid = FlankGrid(fields.pop("roll_rad"), fields.pop("z_m"))
     return ReducedGear(
         blank=blank_from_text(about["blank"]),
         key=str(about["key"]),
         n_dof=int(about["n_dof"]),
         spread=str(about["spread"]),
         grid=grid,
-        **{name: float(about[name]) for name in _NUMBERS},
-        **arrays,  # type: ignore[arg-type]  # the names are those of the fields
+        **fields,
     )

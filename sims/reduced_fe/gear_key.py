@@ -28,6 +28,7 @@ _SOURCES = (
     "cyclic_modes",
     "flank_rows",
     "hub",
+    "line_weights",
     "reduce",
 )
 """Files of this folder whose code changes a reduced gear."""

@@ -7,6 +7,7 @@ from math import pi
 import numpy as np
 
 from gearsig.checks import FloatArray
+from sims.reduced_fe.line_weights import simpson_weights
 from sims.reduced_fe.sector_mesh import SectorMesh
 from sims.reduced_fe.sector_plane import IntArray
 
@@ -30,7 +31,7 @@ def hub_rows(mesh: SectorMesh, n_dof: int, places: IntArray) -> FloatArray:
     places : array of int
         Place of each of the sector's nodes among those of the degrees of freedom.
     """
-    nodes = mesh.bore
+    nodes = mesh.bore[:-1]  # the high side belongs to the next sector
     weight = _surface_weights(mesh) / mesh.blank.n_teeth
     points = mesh.points_m[nodes.ravel()]
     x, y, z = points.T
@@ -60,16 +61,9 @@ def hub_sum(n: int, n_sectors: int) -> ComplexArray:
 
 
 def _surface_weights(mesh: SectorMesh) -> FloatArray:
-    """Part of the sector's bore area that belongs to each node, raveled; they add up to 1."""
+    """Part of the sector's bore area that belongs to each own node, raveled; they add up to 1."""
     around = simpson_weights(np.linspace(0.0, 1.0, mesh.bore.shape[0]))
+    around[0] += around[-1]
     along = simpson_weights(mesh.points_m[mesh.bore[0], 2])
-    weights: FloatArray = np.outer(around, along).ravel()
+    weights: FloatArray = np.outer(around[:-1], along).ravel()
     return weights
-
-
-def simpson_weights(places: FloatArray) -> FloatArray:
-    """Weights of the integral over a line of three-node cells, divided by its length: they add up to 1."""
-    weights = np.zeros(len(places))
-    for k in range(0, len(places) - 2, 2):
-        weights[k : k + 3] += (places[k + 2] - places[k]) * np.array([1.0, 4.0, 1.0]) / 6.0
-    return weights / (places[-1] - places[0])

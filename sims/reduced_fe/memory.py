@@ -21,7 +21,12 @@ def sector_bytes(blank: GearBlank, size: MeshSize) -> float:
     Measured at 540 to 19 000 degrees of freedom of a sector; factors fill about as n^1.4.
     """
     n = n_dof_of(blank, size) / blank.n_teeth
-    return BASE_BYTES + 16.0 * (900.0 * n + 14.0 * n**1.4)
+    return float(BASE_BYTES + 16.0 * (900.0 * n + 14.0 * n**1.4))
+
+
+def full_bytes(n_dof: int) -> float:
+    """Peak of a direct solution of the whole gear: matrices and factors, which fill about as n^1.25."""
+    return float(BASE_BYTES + 12.0 * (300.0 * n_dof + 90.0 * n_dof**1.25))
 
 
 def check_memory(needed_bytes: float, free_bytes: float | None = None) -> None:

@@ -129,14 +129,14 @@ def _least_up(blank: GearBlank) -> int:
 
 
 def _size(blank: GearBlank, cell_mm: float) -> MeshSize:
-    """Cells about `cell_mm` wide in the teeth and half as high, longer where the motion varies less."""
+    """Cells about `cell_mm` wide in the teeth, lower there (where loads act), longer where the motion varies less."""
     g, split = blank.geometry, fillet_split(blank.geometry)
     across, gap, up = 2.0 * split.y_mm, split.gap_length_mm, split.side_length_mm
     return MeshSize(
         n_across=max(2, round(across / cell_mm)),
         n_gap=max(1, round(gap / cell_mm)),
-        n_up=max(_least_up(blank), round(2.0 * up / cell_mm)),
-        n_rim=max(1, round((g.root_radius_mm - blank.rim_radius_mm) / (3.0 * cell_mm))),
+        n_up=max(_least_up(blank), round(2.7 * up / cell_mm)),
+        n_rim=max(1, round((g.root_radius_mm - blank.rim_radius_mm) / (2.0 * cell_mm))),
         n_body=max(1, round((blank.rim_radius_mm - g.bore_mm) / (6.0 * cell_mm))),
-        n_along=max(1, round(g.face_width_mm / (2.0 * cell_mm))),
+        n_along=max(1, round(g.face_width_mm / (2.5 * cell_mm))),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from sims.reduced_fe.mesh_size import MeshSize, mesh_size_for
 from sims.reduced_fe.one_thread import one_thread
 from sims.reduced_fe.reduced_gear import FlankGrid, ReducedGear
 from sims.reduced_fe.sector_mesh import sector_mesh
+from sims.reduced_fe.sector_plane import IntArray
+
+AnyArray = np.ndarray[Any, Any]
 
 
 @dataclass(frozen=True)
@@ -70,8 +73,8 @@ def reduce_gear(blank: GearBlank, plan: ReductionPlan) -> ReducedGear:
     """Mesh a gear and reduce it: its lowest elastic modes, and the exact static compliance at flanks and hub.
 
     The modes are those of the whole free gear; all the others together act as if without mass, which the static
-    compliance accounts for: C − Σ φφᵀ/ω² (residual attachment modes). Frequencies of the reduced gear are therefore those
-    of the full model, and its static answer too.
+    compliance accounts for: C − Σ φφᵀ/ω² (residual attachment modes). Frequencies of the reduced gear are therefore
+    those of the full model, and its static answer too.
 
     Parameters
     ----------
@@ -149,7 +152,7 @@ def static_compliance(
         shares = hub_sum(n, z) @ gear.hub if n <= 1 else np.zeros((0, rows.shape[1]))
         loads = np.hstack((rows[own].T, shares.conj().T))
         moved = _response(gear, n, loads, held)
-        at_flanks = _mirrored(rows @ moved[:, : len(own)], grid, own)
+        at_flanks = _mirrored((rows @ moved[:, : len(own)]).astype(np.complex128), grid, own)
         for offset in range(n_offsets):
             flanks[offset] += weight * np.real(at_flanks * np.exp(1j * gear.phase_rad(n) * offset))
         if n <= 1:
@@ -158,27 +161,30 @@ def static_compliance(
     return StaticCompliance(flanks, hub_flank, hub)
 
 
-def _response(gear: CyclicGear, n: int, loads: np.ndarray, held: Held) -> np.ndarray:  # type: ignore[type-arg]
+def _response(gear: CyclicGear, n: int, loads: AnyArray, held: Held) -> AnyArray:
     """Displacements for loads of one nodal diameter; of a free gear, what is left beside its rigid motion."""
     solve = gear.solver(n, held)
     rigid = gear.rigid(n)
-    if held == "bore" or not rigid.shape[1]:
+    if held != "free" or not rigid.shape[1]:
         return solve(loads)
     inertia = gear.mass.at(gear.phase_rad(n)) @ rigid
     balanced = loads - inertia @ (rigid.conj().T @ loads)
     moved = solve(balanced)
-    return moved - rigid @ (inertia.conj().T @ moved)
+    elastic: AnyArray = moved - rigid @ (inertia.conj().T @ moved)
+    return elastic
 
 
-def _solved_points(grid: FlankGrid) -> np.ndarray:  # type: ignore[type-arg]
+def _solved_points(grid: FlankGrid) -> IntArray:
     """Points on flank 0 in one half of the face, with its middle: the others follow by mirrors."""
     index = np.arange(grid.n_points).reshape(grid.shape)
     return index[0, :, : (grid.shape[2] + 1) // 2].ravel()
 
 
-def _mirrored(part: ComplexArray, grid: FlankGrid, own: np.ndarray) -> ComplexArray:  # type: ignore[type-arg]
-    """H of all points from its columns of some: H is the same seen from the other end of the shaft, and a mirror at the
-    middle of the tooth makes n to −n, which is the complex conjugate.
+def _mirrored(part: ComplexArray, grid: FlankGrid, own: IntArray) -> ComplexArray:
+    """H of all points from its columns of some.
+
+    H is the same seen from the other end of the shaft, and a mirror at the middle of the tooth makes n to −n, which is
+    the complex conjugate.
     """
     index = np.arange(grid.n_points).reshape(grid.shape)
     end, flank = index[:, :, ::-1].ravel(), index[::-1].ravel()
@@ -192,7 +198,7 @@ def _mirrored(part: ComplexArray, grid: FlankGrid, own: np.ndarray) -> ComplexAr
 
 def _real_modes(
     gear: CyclicGear, modes: CyclicModes, rows: FloatArray
-) -> tuple[FloatArray, np.ndarray, FloatArray, FloatArray]:  # type: ignore[type-arg]
+) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
     """Cosine and sine modes at the flank points of tooth 0 and at the hub."""
     frequencies, diameters, at_flanks, at_hub = [], [], [], []
     for k, n in enumerate(modes.nodal_diameters):

@@ -29,7 +29,7 @@ class SectorMesh:
     bore : array of int, (n_across, n_layers)
         Nodes on the bore.
     tooth : array of int, (2 n_up + 1, 2 n_across + 1, n_layers)
-        Nodes of the tooth at [row, column, layer]; row 0 is at the fillets' middles, the last column on flank 0 (y > 0).
+        Nodes of the tooth at [row, column, layer]; row 0 is at the fillets' middles, the last column on flank 0.
     """
 
     blank: GearBlank
@@ -72,7 +72,7 @@ def sector_mesh(blank: GearBlank, size: MeshSize) -> SectorMesh:
     plane = sector_plane(blank, size)
     layers_mm, web = _layers(blank, size)
     n_layers = len(layers_mm)
-    in_plane = np.concatenate((np.repeat(plane.points_mm, n_layers, axis=0),))
+    in_plane = np.repeat(plane.points_mm, n_layers, axis=0)
     points = np.column_stack((in_plane, np.tile(layers_mm, len(plane.points_mm)))) * 1e-3
     every = _extruded(plane.cells, n_layers, range(0, n_layers - 1, 2))
     cells = every
@@ -87,7 +87,7 @@ def sector_mesh(blank: GearBlank, size: MeshSize) -> SectorMesh:
 
 
 def _layers(blank: GearBlank, size: MeshSize) -> tuple[FloatArray, tuple[int, int]]:
-    """z of the layers of nodes in mm, and the first and last layer of the web."""
+    """Heights z of the layers of nodes in mm, and the first and last layer of the web."""
     beside, inside = along_cells(blank, size.n_along)
     face = blank.geometry.face_width_mm
     web = face if blank.web_thickness_mm is None else blank.web_thickness_mm

@@ -1,8 +1,8 @@
 """The transverse plane of one sector: nine-node quadrilaterals in five blocks.
 
 Columns run across the sector from the ray at −π/z to that at +π/z: gap, tooth, gap. Rows run outwards. Gap and tooth
-columns stand on the same rows below the fillets' middles; only the tooth's columns go on up to the tip. Three cells meet
-at the middle of a fillet, each with about 60°.
+columns stand on the same rows below the fillets' middles; only the tooth's columns go on up to the tip. Three cells
+meet at the middle of a fillet, each with about 60°.
 """
 
 from __future__ import annotations
@@ -76,7 +76,8 @@ def _cells(nodes: IntArray) -> IntArray:
     step = np.arange(3)
     r = rows[:, None, None, None] + step[None, None, :, None]
     c = columns[None, :, None, None] + step[None, None, None, :]
-    return nodes[r, c].reshape(-1, 3, 3)
+    cells: IntArray = nodes[r, c].reshape(-1, 3, 3)
+    return cells
 
 
 def _body_grid(blank: GearBlank, size: MeshSize) -> FloatArray:
@@ -85,8 +86,9 @@ def _body_grid(blank: GearBlank, size: MeshSize) -> FloatArray:
     top = _top_line(g, size)
     angles = _rim_angles(g, size)
     ring = blank.rim_radius_mm * np.column_stack((np.cos(angles), np.sin(angles)))
-    down = _even(size.n_rim)[1:, None, None]
-    rim = ring[None] * (1.0 - down) + top[None] * down
+    # Closer below the teeth, where the fillets press into the body.
+    out = with_middles(1.0 - (1.0 - np.arange(size.n_rim + 1) / size.n_rim) ** 1.7)[1:, None, None]
+    rim = ring[None] * (1.0 - out) + top[None] * out
     hub, web = body_cells(blank, size.n_body)
     radii = [g.bore_mm + (blank.hub_radius_mm - g.bore_mm) * _even(hub)[:-1]] if hub else []
     # Cells of a disc grow from the bore with the radius; a web is divided evenly.
