@@ -9,6 +9,7 @@ from gearsig.gap.change import turned_difference
 from gearsig.gap.frame import DRIVEN, DRIVER, GearFrame
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.gear_lines import average_lines
+from gearsig.severity.shaft_lines import orders_from_mesh
 
 NEAR_MESH, SLOW = 2, 5
 """Orders of a shaft beside a mesh harmonic that belong to it, and orders from 0 that are the shaft's own."""
@@ -60,10 +61,11 @@ def _mesh_share(now: Gathered, side: int) -> float:
     for sums in now.channels.values():
         power = np.abs(average_lines(sums, side)[0]) ** 2
         orders = np.arange(len(power))
-        from_mesh = np.abs((orders + teeth // 2) % teeth - teeth // 2)
         above = orders > SLOW
         total = float(power[above].sum())
-        shares.append(float(power[above & (from_mesh <= NEAR_MESH)].sum()) / total if total > 0 else 1.0)
+        shares.append(
+            float(power[above & (orders_from_mesh(orders, teeth) <= NEAR_MESH)].sum()) / total if total > 0 else 1.0
+        )
     return float(np.mean(shares))
 
 

@@ -24,6 +24,7 @@ from sims.cracked.simulator import NAME, prepare_preset
 from sims.cracked.usual import (
     Nominal,
     as_plain,
+    log_uniform,
     nominal_of,
     specimen_parameters,
     usual_housing,
@@ -132,7 +133,7 @@ class CrackedTwin:
             raise RefusalError(f"the rig has nothing that {name} could be in", remedy="describe its bearings")
         options = plausible.drawn(machine, rng)
         low, high = plausible.reach(name, machine, options)
-        return Added(name, float(np.exp(rng.uniform(np.log(low), np.log(high)))), options)
+        return Added(name, log_uniform(rng, low, high), options)
 
     def preset(self, point: Point, added: Sequence[Added] = (), *, seed: int = 0, notes: Sequence[str] = ()) -> Preset:
         """Return the specimen `seed` with its effects as a preset."""
