@@ -21,6 +21,7 @@ from app.commands.gap import gap
 from app.commands.report import report
 from app.commands.rig import rig_app
 from app.commands.simulate import simulate
+from app.commands.start_stop import start_stop
 from app.commands.sweep import sweep
 from gearsig import __version__
 from gearsig.errors import InputError, RefusalError
@@ -42,6 +43,7 @@ app = typer.Typer(
 app.command()(analyze)
 app.command()(crack)
 app.command()(force)
+app.command()(start_stop)
 app.command()(compare)
 app.command()(report)
 app.add_typer(rig_app, name="rig")

@@ -35,9 +35,9 @@ def build_drive(wanted: Wanted, speed_limit_rpm: float) -> ForgingDrive:
     contact = build_contact(wanted, path)
     brake = wanted.number("brake_nm")
     drag, held = wanted.number("drag_nm"), wanted.number("load_friction_nm")
-    pinion_side = wanted.number("motor_inertia_kg_m2") + contact.driver_inertia_kg_m2
+    pinion_side = contact.motor_inertia_kg_m2 + contact.driver_inertia_kg_m2
     motor = HydraulicMotor(
-        wanted.number("motor_inertia_kg_m2"),
+        contact.motor_inertia_kg_m2,
         _bristle(wanted, "drag", drag, drag + brake, pinion_side),
         wanted.number("motor_speed_band"),
         wanted.number("torque_ripple"),
@@ -75,6 +75,7 @@ def build_contact(wanted: Wanted, path: PathOfContact) -> ToothContact:
         wanted.number("wheel_inertia_kg_m2") + piece + offset,
         path.phase,
         path.contact_ratio,
+        wanted.number("motor_inertia_kg_m2"),
     )
 
 
