@@ -27,7 +27,7 @@ def _where(report: GapReport) -> str:
     if not report.places:
         return f"Where: spread over all orders and bands, {report.size.value:.2g} structural floors."
     first = report.places[0]
-    return f"Where: {first.title} ({100 * first.share:.0f} % of a gap of {report.size.value:.2g} structural floors)."
+    return f"Where: {first.title}, {first.structural:.2g} structural floors ({100 * first.share:.0f} % of the gap)."
 
 
 def _which(report: GapReport) -> str:
@@ -67,17 +67,19 @@ def _how_far(report: GapReport) -> str:
     if report.outcome in (GapOutcome.NO_GAP, GapOutcome.UNKNOWN) or shrinkage is None:
         return "How far: no effect was added."
     s = shrinkage.shrink
-    return (
-        f"How far: the gap on its own features shrinks by {100 * s.value:.0f} % ({100 * s.low:.0f} to "
-        f"{100 * s.high:.0f} %) on {shrinkage.held_out}."
-    )
+    shrinks = f"shrinks by {100 * s.value:.0f} % ({100 * s.low:.0f} to {100 * s.high:.0f} %)"
+    if s.value <= 0.0:
+        shrinks = "does not shrink"
+    return f"How far: with {report.causes[0].title}, the gap on its own features {shrinks} on {shrinkage.held_out}."
 
 
 def _next(report: GapReport) -> str:
-    if report.next_recordings:
-        return f"Next: {report.next_recordings[0].text}"
+    best = report.next_recordings[0].text if report.next_recordings else ""
     if not report.references:
-        return f"Next: {SOUND_MACHINE}, at the same speed and load; then only what has changed since counts."
+        first = f"{SOUND_MACHINE}, at the same speed and load; then only what has changed since counts."
+        return f"Next: {first} Or {best}" if best else f"Next: {first}"
+    if best:
+        return f"Next: {best}"
     if report.outcome is GapOutcome.NO_GAP:
         return "Next: nothing is needed; keep these recordings, later ones are best compared with them."
     if sum(cause.shrinkage is not None for cause in report.causes) < 2:

@@ -19,6 +19,7 @@ from gearsig.report.gap_sections import (
     CauseRow,
     cause_rows,
     condition_rows,
+    floors_text,
     group_texts,
     inseparable_text,
     next_rows,
@@ -37,13 +38,6 @@ LOOKS: dict[GapOutcome, tuple[Colour, str]] = {
     GapOutcome.CANNOT_SEPARATE: ("orange", ":material/call_split:"),
     GapOutcome.UNKNOWN: ("gray", ":material/help:"),
 }
-FLOORS = (
-    "A structural floor is what healthy machines differ from this simulator; they exceed 1 once in twenty. A "
-    "repeatability floor is what this machine differs from itself, from one stretch to the next. "
-    "Changes are given as multiples of both, the structural one first."
-)
-
-
 WITHOUT_FLOORS = (
     "Nothing was simulated, so that a gap has no size and no shares. Levels are those of the strongest line over the "
     "noise beside it, or over the reference where that shows it as well."
@@ -90,7 +84,7 @@ def _show_where(finished: Finished) -> None:
     rows = place_rows(report)
     if report.is_simulated:
         st.markdown(f"The whole gap: {as_typed(size_text(report))}.")
-        st.caption(FLOORS)
+        st.caption(as_typed(f"{floors_text(report)} Changes are given as multiples of both, the structural one first."))
     else:
         st.caption(WITHOUT_FLOORS)
     if rows and not report.is_simulated:
@@ -145,7 +139,7 @@ def _show_evidence(row: CauseRow, finished: Finished) -> None:
     if row.evidence:
         _table(
             {
-                "its own features": [one.feature for one in row.evidence],
+                "feature": [one.feature for one in row.evidence],
                 "predicted (dB)": [one.predicted for one in row.evidence],
                 "observed (dB)": [one.observed for one in row.evidence],
                 "floor (dB)": [one.floor for one in row.evidence],
