@@ -173,6 +173,19 @@ class CyclicGear:
         normal: np.ndarray[Any, Any] = columns / np.sqrt(weight)
         return normal
 
+    def sector_fields(self, own: FloatArray) -> FloatArray:
+        """Return all nodes of every sector, (z, n_nodes, 3), x, y, z in its own axes, from (z, n_own_dof) cylindrical.
+
+        A sector's high side is the next one's low side.
+        """
+        mesh = self.mesh
+        by_node = own.reshape(self.n_sectors, -1, 3)
+        fields = by_node[:, self.own_places]
+        fields[:, mesh.high_side] = np.roll(by_node, -1, axis=0)[:, self.own_places[mesh.high_side]]
+        c, s = np.cos(mesh.angles_rad), np.sin(mesh.angles_rad)
+        radial, around = fields[..., 0], fields[..., 1]
+        return np.stack((c * radial - s * around, s * radial + c * around, fields[..., 2]), axis=-1)
+
     def _fixed(self, n: int, held: Held) -> IntArray:
         if held == "bore":
             return self.bore_dof

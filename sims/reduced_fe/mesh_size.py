@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from gearsig.checks import count
@@ -111,6 +111,7 @@ def mesh_size_for(blank: GearBlank, n_dof: int) -> MeshSize:
     if wanted > MOST_DOF:
         raise InputError(f"n_dof is {wanted}", allowed=f"{LEAST_DOF} to {MOST_DOF}", remedy="give a MeshSize")
     sizes = [_size(blank, blank.geometry.module_mm * 2.5 * 0.97**k) for k in range(110)]
+    sizes += [replace(size, n_up=size.n_up - 1) for size in sizes if size.n_up > _least_up(blank)]
     best = min(sizes, key=lambda size: abs(n_dof_of(blank, size) - wanted))
     if n_dof_of(blank, best) > 1.5 * wanted:
         raise InputError(

@@ -9,13 +9,14 @@ from gearsig.checks import one_of
 from sims.mesh.geometry import GearGeometry
 from sims.reduced_fe.blank import GearBlank
 from sims.reduced_fe.gear_file import read_gear, write_gear
-from sims.reduced_fe.reduce import plan_for, reduce_gear
+from sims.reduced_fe.mesh_size import MeshSize
+from sims.reduced_fe.reduce import ReductionPlan, reduce_gear
 from sims.reduced_fe.reduced_gear import ReducedGear
 
 FOLDER = Path(__file__).parent / "gears"
 
-N_DOF = 277_200
-"""Of the whole gear, about: the mesh of the published pair."""
+PLAN = ReductionPlan(MeshSize(n_across=3, n_gap=1, n_up=8, n_rim=2, n_body=3, n_along=4))
+"""300 000 degrees of freedom for 50 teeth, about as many as the published pair; teeth as fine for the others."""
 
 READY = MappingProxyType(
     {
@@ -42,7 +43,7 @@ def make_ready_gears() -> None:
     """Reduce all ready-made gears and write their files."""
     FOLDER.mkdir(exist_ok=True)
     for name, blank in READY.items():
-        write_gear(FOLDER / f"{name}.npz", reduce_gear(blank, plan_for(blank, N_DOF)))
+        write_gear(FOLDER / f"{name}.npz", reduce_gear(blank, PLAN))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ import numpy as np
 from gearsig.checks import FloatArray
 from sims.reduced_fe.blank import GearBlank
 from sims.reduced_fe.mesh_size import MeshSize, along_cells, check_fillet
-from sims.reduced_fe.sector_plane import IntArray, SectorPlane, sector_plane
+from sims.reduced_fe.sector_plane import CrackLine, IntArray, SectorPlane, sector_plane
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,8 @@ class SectorMesh:
         return angle
 
 
-def sector_mesh(blank: GearBlank, size: MeshSize) -> SectorMesh:
-    """Mesh one sector.
+def sector_mesh(blank: GearBlank, size: MeshSize, crack: CrackLine | None = None) -> SectorMesh:
+    """Mesh one sector; with a crack, along its line, without opening it.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def sector_mesh(blank: GearBlank, size: MeshSize) -> SectorMesh:
     from sims.reduced_fe.mesh_quality import check_jacobians
 
     check_fillet(blank, size)
-    plane = sector_plane(blank, size)
+    plane = sector_plane(blank, size, crack)
     layers_mm, web = _layers(blank, size)
     n_layers = len(layers_mm)
     in_plane = np.repeat(plane.points_mm, n_layers, axis=0)
