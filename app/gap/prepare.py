@@ -12,6 +12,7 @@ from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.population import load_population
 from gearsig.gap.simulator import Twin
+from gearsig.gap.types import ConditionFacts
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 
@@ -51,6 +52,7 @@ def conditions_of(
         now = _gathered(recording, rig, name, notices)
         notices += strange_teeth(now, name)
         facts = facts_of(recording, rig, now, name, twin)
+        notices += _assumed(recording, rig, facts)
         simulation = simulated(twin, facts, now)
         reference, why = matching_reference(now, rig, healthy, reference_rigs)
         if why:
@@ -80,6 +82,21 @@ def _gathered(recording: Recording, rig: Rig, name: str, notices: list[str]) -> 
         raise RefusalError(f"{name}: {refusal.reason}", remedy=refusal.remedy) from None
     notices += [f"{name}: channel {p.channel} is dead ({p.evidence}) and left out." for p in dead.values()]
     return found
+
+
+def _assumed(recording: Recording, rig: Rig, facts: ConditionFacts) -> list[str]:
+    """Say what of the operating point was not given."""
+    texts = []
+    if recording.speed_source is None:
+        texts.append(
+            f"{facts.name}: no tachometer and no known speed; {facts.point.speed_rpm:.4g} rpm were found in the vibration"
+            " itself."
+        )
+    if rig.nominal_torque_nm(rig.pairs[0].driver) is None:
+        texts.append(
+            f"{facts.name}: the torque is not given; {facts.point.torque_nm:.3g} N·m are usual for the gears' size."
+        )
+    return texts
 
 
 def _strange_reference(reference: Gathered, simulation: Gathered, name: str) -> list[str]:

@@ -85,5 +85,14 @@ def test_a_dead_channel_is_left_out_and_nothing_but_dead_ones_is_refused() -> No
         conditions_of([replace(whole, samples=samples)], [rig()], [], [], twin, ["now"], nothing)
 
 
+def test_what_was_not_given_of_the_operating_point_is_told() -> None:
+    twin, whole = gap_simulator("cracked").twin_of(rig()), recording(0, 1)
+    _, notices = conditions_of([whole], [rig()], [], [], twin, ["now"], nothing)
+    assert not any("not given" in notice or "tachometer" in notice for notice in notices)
+    point = replace(rig().operating_point, torque_nm=None)
+    _, notices = conditions_of([whole], [replace(rig(), operating_point=point)], [], [], twin, ["now"], nothing)
+    assert any(notice.startswith("now: the torque is not given; ") for notice in notices)
+
+
 def nothing(*_: object) -> None:
     """Be told, and do nothing."""
