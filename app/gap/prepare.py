@@ -89,8 +89,8 @@ def _assumed(recording: Recording, rig: Rig, facts: ConditionFacts) -> list[str]
     texts = []
     if recording.speed_source is None:
         texts.append(
-            f"{facts.name}: no tachometer and no known speed; {facts.point.speed_rpm:.4g} rpm were found in the vibration"
-            " itself."
+            f"{facts.name}: no tachometer and no known speed; {facts.point.speed_rpm:.4g} rpm were found in the"
+            " vibration."
         )
     if rig.nominal_torque_nm(rig.pairs[0].driver) is None:
         texts.append(
