@@ -83,8 +83,6 @@ def compliance_slope_energy(n, pairs, columns, teeth, own, cross, extra, rows, s
         one, two = int(pair - teeth[0] * np.floor(pair / teeth[0])), int(pair - teeth[1] * np.floor(pair / teeth[1]))
         a, b = rows[0, one], rows[1, two]
         for s in range(n_s):
-            if force[at + s] <= 0.0:
-                continue
             line = 0.0
             for u in range(n_s):
                 line += (own[i + 1, s, u] - own[i, s, u]) * force[at + u]

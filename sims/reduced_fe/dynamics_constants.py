@@ -16,6 +16,7 @@ from sims.machine import Machine
 from sims.machine.operation import Operation
 from sims.reduced_fe.contact_mirror import folded, mirror_groups, mirrors
 from sims.reduced_fe.contact_table import ContactTable, contact_table, static_table
+from sims.reduced_fe.dynamics_hub import HubSprings, without_hub
 from sims.reduced_fe.dynamics_side import Kept, Side, build_side, kept_modes, residual_compliance
 from sims.reduced_fe.maps_static import MeshMaps, mesh_maps, teeth_of
 from sims.reduced_fe.reduced_gear import ReducedGear
@@ -228,7 +229,9 @@ def _contact(pair: FlexiblePair) -> tuple[ContactTable, list[Kept], FloatArray]:
         def rest(gear: ReducedGear, teeth: list[int]) -> FloatArray:
             return residual_compliance(gear, teeth, kept[0] if gear is pair.gears[0] else kept[1])
 
-        return contact_table(pair.gears, pair.machine.mesh, rest, lead_um=pair.lead_error_um), kept
+        table = contact_table(pair.gears, pair.machine.mesh, rest, lead_um=pair.lead_error_um)
+        hubs = HubSprings.of(pair.gears[0], kept[0].all), HubSprings.of(pair.gears[1], kept[1].all)
+        return without_hub(table, pair.machine.mesh.pair, pair.gears, hubs), kept
 
     groups = mirror_groups(n_slices)
     table, kept = made(groups)

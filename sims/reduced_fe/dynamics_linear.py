@@ -10,7 +10,7 @@ import numpy as np
 from gearsig.checks import FloatArray
 from sims.machine.operation import Operation
 from sims.mesh.stiffness import one_mesh_cycle
-from sims.reduced_fe.dynamics_constants import Constants, FlexiblePair, constants
+from sims.reduced_fe.dynamics_constants import LEAST_FORCE_N, Constants, FlexiblePair, constants
 from sims.reduced_fe.maps_static import contact_state
 
 LEAST_HZ = 200.0
@@ -102,7 +102,7 @@ def _squares(
     pair: FlexiblePair, own: Constants, operation: Operation, cycles: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Squared angular frequencies, shapes, ∂D/∂η of the points that touch and their stiffness, at one mesh angle."""
-    force = operation.torque_nm.largest / own.base_radius_m[0]
+    force = max(operation.torque_nm.largest / own.base_radius_m[0], LEAST_FORCE_N)
     at = contact_state(own.table, pair.machine.mesh, force, cycles)
     one, two = own.sides
     turn, n = own.turn(), one.n_modes

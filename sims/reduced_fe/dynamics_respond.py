@@ -33,7 +33,7 @@ MOVING = (
     "driven y",
     *(f"bearing {i} {axis}" for i in (1, 2, 3, 4) for axis in ("x", "y")),
 )
-"""Places in rad and m, each also with " velocity" and " acceleration". Angles of gears are those of their hubs."""
+"""Places in rad and m, each also with " velocity" and " acceleration". Those of gears are of their hubs."""
 EXTRAS = ("mesh_force_n", "back_force_n", "mesh_cycles", "approach_m", "contact_torque_nm")
 """Sum of the contact forces, the force behind, c, the greatest approach of flanks, torque of moving stiffness."""
 TRANSMISSION_ERROR = "transmission_error_m"
@@ -240,7 +240,7 @@ def _place(own: Constants, name: str, factors: FloatArray) -> float:
         factors[side] = own.sides[side].shapes[0] if rotor else own.sides[side].hub / own.base_radius_m[side]
         return 1.0 if side == 0 else 1.0 / float(own.record["ratio"])
     if number < 8:
-        factors[(number - 4) // 2] = own.sides[(number - 4) // 2].shapes[2 + number % 2]
+        factors[(number - 4) // 2] = own.sides[(number - 4) // 2].shapes[8 + number % 2]
     else:
         factors[(number - 8) // 4] = own.sides[(number - 8) // 4].shapes[4 + (number - 8) % 4]
     return 0.0

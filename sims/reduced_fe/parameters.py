@@ -27,8 +27,8 @@ _CHANGED = {
         "default": 0.08,
     },
     "roughness_locked_to": {"choices": ("flank", "none")},
-    "bending_stiffness_n_per_m": {"default": 1e10},
-    "bearing_stiffness_n_per_m": {"default": 1e10},
+    "bending_stiffness_n_per_m": {"default": 1.5e10},
+    "bearing_stiffness_n_per_m": {"default": 1.5e10},
 }
 
 

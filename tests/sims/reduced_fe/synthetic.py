@@ -15,7 +15,12 @@ TWIST_HZ = 13000.0
 
 
 def synthetic_gear(
-    geometry: GearGeometry | None = None, n_heights: int = 9, n_slices: int = 5, n_offsets: int = 4
+    geometry: GearGeometry | None = None,
+    n_heights: int = 9,
+    n_slices: int = 5,
+    n_offsets: int = 4,
+    *,
+    even_slices: bool = False,
 ) -> ReducedGear:
     """Return a gear of consistent parts: its free compliance is that of its modes and of teeth which bend alone."""
     gear = geometry or GearGeometry(50, 3.0, bore_radius_mm=20.0)
@@ -27,7 +32,7 @@ def synthetic_gear(
     shape = grid.shape
     mass, inertia = disc_mass_kg(gear), disc_inertia_kg_m2(gear)
     diameters, frequencies, modes, hub = _body_modes(gear, mass, shape)
-    own = _tooth_alone(gear, roll, width, shape)
+    own = _tooth_alone(gear, roll, width, shape, even_slices)
     pitch = 2.0 * np.pi / gear.teeth
     free = np.zeros((n_offsets, grid.n_points, grid.n_points))
     free[0] = own
@@ -51,7 +56,7 @@ def synthetic_gear(
         free_compliance_m_per_n=free,
         clamped_compliance_m_per_n=free,
         hub_flank_compliance=(hub / omega[:, None] ** 2).T @ modes,
-        hub_compliance=(hub / omega[:, None] ** 2).T @ hub,
+        hub_compliance=(hub / omega[:, None] ** 2).T @ hub + np.diag([5e-11, 5e-11, 1e-10, 1e-8, 1e-8, 4e-8]),
     )
 
 
@@ -100,7 +105,7 @@ def _turned(modes, diameters, angle):
     return turned
 
 
-def _tooth_alone(gear, roll, width, shape):
+def _tooth_alone(gear, roll, width, shape, even_slices):
     """Compliance between the points of one tooth: of its beam, slices held together, the other flank pulls back."""
     n_flanks, _, n_slices = shape
     own = tooth_compliance(gear, STEEL, roll).total / width + 2.0e-9
@@ -108,6 +113,8 @@ def _tooth_alone(gear, roll, width, shape):
     heights = np.sqrt(np.outer(own, own)) * nearness
     place = np.arange(n_slices)
     slices = 0.6 + 1.4 * np.exp(-np.abs(place[:, None] - place[None, :]) / 1.2)
+    if even_slices:
+        slices = np.ones((n_slices, n_slices)) + 1e-6 * np.eye(n_slices)
     slices /= slices.sum() / n_slices**2  # even load gives the whole tooth's compliance
     flanks = np.array([[1.0, -0.6], [-0.6, 1.0]])[:n_flanks, :n_flanks]
     return np.einsum("ab,ij,st->aisbjt", flanks, heights, slices).reshape(own.size * n_slices * 2, -1)
