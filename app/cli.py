@@ -18,6 +18,7 @@ from app.commands.dashboard import dashboard
 from app.commands.demo import demo
 from app.commands.force import force
 from app.commands.gap import gap
+from app.commands.identify import identify
 from app.commands.report import report
 from app.commands.rig import rig_app
 from app.commands.simulate import simulate
@@ -44,6 +45,7 @@ app.command()(analyze)
 app.command()(crack)
 app.command()(force)
 app.command()(start_stop)
+app.command()(identify)
 app.command()(compare)
 app.command()(report)
 app.add_typer(rig_app, name="rig")

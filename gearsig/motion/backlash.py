@@ -58,8 +58,8 @@ def estimate_backlash(motion: PairMotion) -> BacklashEstimate:
 
     With torque, q = q₀ + s a + s κ (|F|/n)^{1/λ} is fitted to all loaded samples: s the sign of F = (τ − J1 α1)/r_b1, n
     the pairs in contact, and κ = k^{−1/λ} free, so that the elastic part is measured and not taken from the rig.
-    Outliers beyond four standard deviations are left out. Without torque, the distance between the middle positions on both
-    flanks is given: it contains the deflection of both.
+    Outliers beyond four standard deviations are left out. Without torque, the distance between the middle positions on
+    both flanks is given: it contains the deflection of both.
 
     Raises
     ------
@@ -141,8 +141,8 @@ def _lost_motion(motion: PairMotion) -> BacklashEstimate:
     drawn = 2e-6 * motion.contact.half_backlash_um
     if high - low < max(6.0 * scatter, LEAST_PART * drawn):
         raise RefusalError(
-            f"the flanks move by {1e6 * (high - low):.3g} µm against each other, the rig's play is {1e6 * drawn:.3g} µm "
-            f"and the noise {1e6 * scatter:.2g} µm: only one flank was loaded, or it cannot be told",
+            f"the flanks move by {1e6 * (high - low):.3g} µm against each other, the play drawn is {1e6 * drawn:.3g} "
+            f"µm and the noise {1e6 * scatter:.2g} µm: only one flank was loaded, or it cannot be told",
             remedy="record a start and a braked stop; better with torque",
         )
     deviations = [1.25 * float(np.std(x)) * np.sqrt(dependence(x) / len(x)) for x in (drive, back)]

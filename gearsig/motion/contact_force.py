@@ -42,11 +42,11 @@ def pair_force(g: FloatArray, rate_mps: FloatArray, damping_s_per_m: FloatArray,
     return force
 
 
-def friction_share(motion: PairMotion, g: FloatArray) -> FloatArray:
-    """Mean of 1 − μ sgn(v_s) tan α_k over the pairs that touch: what the driver's torque feels of the normal force.
+def friction_share(motion: PairMotion, g: FloatArray, gear: int = 0) -> FloatArray:
+    """Mean of 1 − μ sgn(v_s) tan α_k over the pairs that touch: what a gear's torque feels of the normal force.
 
-    tan α_k = ρ1/r_b1 at the point of contact; the sign changes at the pitch point, so that the share is 1 ∓ 0.018 there
-    for μ = 0.05 and 20°.
+    tan α_k = ρ/r_b at the point of contact, of the driver (gear 0) or the driven gear (1); the sign changes at the
+    pitch point, so that the share is 1 ∓ 0.018 there for μ = 0.05 and 20°.
     """
     path = motion.path
     flank = np.where(g < 0.0, -1.0, 1.0)
@@ -57,7 +57,8 @@ def friction_share(motion: PairMotion, g: FloatArray) -> FloatArray:
         rho_1 = path.driver_lever_m(first + younger)
         sliding = flank * (motion.driven_speed_rad_s * (path.length_m - rho_1) - motion.driver_speed_rad_s * rho_1)
         sign = np.clip(sliding / SLIDING_SIGN_MPS, -1.0, 1.0)
-        share = 1.0 - motion.contact.friction_coefficient * sign * rho_1 / path.base_radii_m[0]
+        lever = (rho_1, path.length_m - rho_1)[gear]
+        share = 1.0 - motion.contact.friction_coefficient * sign * lever / path.base_radii_m[gear]
         total += np.where((younger == 0.0) | (n > 1.5), share, 0.0)
     result: FloatArray = total / n
     return result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import pi
 
 import numpy as np
@@ -105,6 +106,25 @@ def find_impacts(
         if impact.speed_mps > slowest:
             found.append(impact)
     return tuple(found)
+
+
+def meeting_speeds(motion: PairMotion, datum_m: float, half_backlash_m: float) -> FloatArray:
+    """Speed at which the flanks of each sample met, (n,): the floor at least; nan where the flight was too short.
+
+    In the play it is the floor, too.
+    """
+    q = motion.compression_m - datum_m
+    scatter = (scatter_of(q), scatter_of(motion.compression_rate_mps))
+    flights = _Flights(motion, q, half_backlash_m, scatter)
+    g = depth(q, half_backlash_m)
+    speeds = np.full(len(q), motion.contact.impact_speed_floor_mps)
+    runs = _runs(np.sign(g).astype(np.int64), g, NOISE_DEPTH * scatter[0])
+    for before, this in pairwise(runs):
+        if this[0] != 0:
+            long_enough = before[0] == 0 and before[2] - before[1] >= LEAST_FLIGHT_SAMPLES
+            speed = flights.meets(before, this[0])[1] if long_enough else np.nan
+            speeds[this[1] : this[2]] = np.maximum(speed, motion.contact.impact_speed_floor_mps)
+    return speeds
 
 
 def reduced_mass_kg(motion: PairMotion) -> float:
