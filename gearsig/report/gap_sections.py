@@ -329,4 +329,4 @@ def signed(value: float, n_decimals: int = 1) -> str:
 
 
 def _bar(share: float) -> float:
-    return round(100 * min(max(share, 0.0), 1.0), 1) if isfinite(share) else 0.0
+    return round(100 * min(max(share, 0.0), 1.0), 3) if isfinite(share) else 0.0

@@ -38,6 +38,8 @@ LOOKS: dict[GapOutcome, tuple[Colour, str]] = {
     GapOutcome.CANNOT_SEPARATE: ("orange", ":material/call_split:"),
     GapOutcome.UNKNOWN: ("gray", ":material/help:"),
 }
+TWO_LINES = 72
+"""Height of a table's row, in pixels, from which its texts are broken."""
 WITHOUT_FLOORS = (
     "Nothing was simulated, so that a gap has no size and no shares. Levels are those of the strongest line over the "
     "noise beside it, or over the reference where that shows it as well."
@@ -100,6 +102,7 @@ def _show_where(finished: Finished) -> None:
                 "at": [", ".join(row.where[1:]) for row in rows],  # the title says the kind
             },
             bars=("share",),
+            widths={"place": 380, "at": 230},
         )
     else:
         st.markdown("No place stands out of the floor.")
@@ -202,8 +205,12 @@ def _show_figure(finished: Finished, one: GapFigure) -> None:
     st.caption(as_typed(one.look))
 
 
-def _table(columns: dict[str, list[Any]], bars: tuple[str, ...] = ()) -> None:
+def _table(columns: dict[str, list[Any]], bars: tuple[str, ...] = (), widths: dict[str, int] | None = None) -> None:
+    """Show a table; columns of stated widths, in pixels, are broken into two lines."""
     config: dict[str, Any] = {
-        name: st.column_config.ProgressColumn(format="%.0f %%", min_value=0, max_value=100) for name in bars
+        name: st.column_config.ProgressColumn(format="%.0f %%", min_value=0, max_value=100, width="small")
+        for name in bars
     }
-    st.dataframe(columns, hide_index=True, width="stretch", column_config=config)
+    config |= {name: st.column_config.TextColumn(width=width) for name, width in (widths or {}).items()}
+    height = TWO_LINES if widths else None
+    st.dataframe(columns, hide_index=True, width="stretch", column_config=config, row_height=height)
