@@ -1,5 +1,6 @@
 """Stress under a tooth load, fields of modes, files for other programs."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import meshio
@@ -10,13 +11,15 @@ from gearsig.errors import InputError
 from sims.mesh import GearGeometry
 from sims.reduced_fe.blank import GearBlank
 from sims.reduced_fe.cyclic_modes import cyclic_modes
+from sims.reduced_fe.face_view import face_view
 from sims.reduced_fe.full_gear import full_matrices
+from sims.reduced_fe.mesh_quality import mesh_quality
 from sims.reduced_fe.mesh_size import MeshSize
 from sims.reduced_fe.mode_field import mode_field
 from sims.reduced_fe.sector_mesh import sector_mesh
 from sims.reduced_fe.tooth_load import load_tooth, von_mises_pa
 from sims.reduced_fe.vtk import write_vtk
-from tests.sims.reduced_fe.fe_gears import SMALL, small_cyclic, small_reduced
+from tests.sims.reduced_fe.fe_gears import COARSE, SMALL, small_cyclic, small_reduced
 
 
 def test_uniaxial_tension_has_its_own_stress() -> None:
@@ -106,6 +109,20 @@ def test_a_whole_gear_is_written_as_cells_of_its_volume(tmp_path: Path) -> None:
     assert moved == pytest.approx(np.linalg.norm(load.displacement_m, axis=2).max())
     part = meshio.read(write_vtk(tmp_path / "part.vtk", mesh, n_sectors=2))
     assert len(part.points) == 2 * mesh.n_nodes - len(mesh.high_side)
+
+
+def test_the_view_along_the_shaft_shows_every_cell_once() -> None:
+    mesh = small_cyclic().mesh
+    view = face_view(mesh)
+    corners = view.points_mm[view.triangles]
+    (x1, y1), (x2, y2) = ((corners[:, k] - corners[:, 0]).T for k in (1, 2))
+    area = 0.5 * (x1 * y2 - x2 * y1)
+    assert np.all(area > 0.0)
+    volume = mesh_quality(mesh).volume_m3 * 1e9
+    assert area.sum() * SMALL.geometry.face_width_mm == pytest.approx(volume, rel=0.01)
+    assert len(view.outlines_mm) == 12 * len(mesh.cells)
+    web = sector_mesh(replace(SMALL, web_thickness_mm=4.0, rim_thickness_mm=3.0, hub_thickness_mm=3.0), COARSE)
+    assert len(face_view(web, (0,)).cells) < len(web.cells)
 
 
 def test_files_that_cannot_be_are_refused(tmp_path: Path) -> None:
