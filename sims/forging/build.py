@@ -11,7 +11,7 @@ from gearsig.rig.speed import EncoderChannel
 from gearsig.rig.tooth_pairs import PathOfContact, standard_path
 from gearsig.rig.types import GearPair, OperatingPoint, Rig, Sensor, Shaft
 from sims.cracked.wanted import Wanted
-from sims.forging.drive import Bristle, ForgingDrive, GrippedLoad, HydraulicMotor
+from sims.forging.drive import Bristle, ForgingDrive, GrippedLoad, HydraulicMotor, WeakTooth
 from sims.forging.schedule import Cycle
 from sims.machine.operation import Operation
 
@@ -23,7 +23,7 @@ BRISTLE_DAMPING = 0.5
 """Damping ratio of an inertia that swings on its bristles at rest."""
 
 
-def build_drive(wanted: Wanted, speed_limit_rpm: float) -> ForgingDrive:
+def build_drive(wanted: Wanted, speed_limit_rpm: float, weak_tooth: WeakTooth | None = None) -> ForgingDrive:
     """Return the drive that complete values of `PARAMETERS` describe."""
     path = standard_path(
         (wanted.whole("teeth_driver"), wanted.whole("teeth_driven")),
@@ -55,7 +55,7 @@ def build_drive(wanted: Wanted, speed_limit_rpm: float) -> ForgingDrive:
         wanted.number("flank_presliding_um") * 1e-6,
     )
     limit = speed_limit_rpm * pi / 30.0
-    return ForgingDrive(path, contact, motor, load, flanks, limit, wanted.number("mesh_ramp"))
+    return ForgingDrive(path, contact, motor, load, flanks, limit, wanted.number("mesh_ramp"), weak_tooth)
 
 
 def build_contact(wanted: Wanted, path: PathOfContact) -> ToothContact:

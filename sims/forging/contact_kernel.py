@@ -49,6 +49,14 @@ def position(k, angle, flank, younger):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def soundness(k, number, flank):
+    """Part of its stiffness that a pair has: less than 1 for a weak tooth on its drive flank."""
+    if flank > 0 and k.weak_loss > 0.0 and number - floor(number / k.weak_teeth) * k.weak_teeth == k.weak_tooth:
+        return 1.0 - k.weak_loss
+    return 1.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def one_pair(k, depth, closing, damping):
     """Force of one tooth pair at full stiffness: elastic, and with damping; never tension."""
     if depth <= 0.0:
@@ -64,5 +72,5 @@ def stored_energy(k, angle, q, flank, younger):
     if flank == 0 or depth <= 0.0:
         return 0.0
     p, _ = position(k, angle, flank, younger)
-    n = weight(k, p)[0] + weight(k, p + 1.0)[0]
+    n = weight(k, p)[0] * soundness(k, younger, flank) + weight(k, p + 1.0)[0] * soundness(k, younger - 1.0, flank)
     return n * k.stiffness * depth ** (k.exponent + 1.0) / (k.exponent + 1.0)

@@ -107,6 +107,30 @@ class GrippedLoad:
 
 
 @dataclass(frozen=True)
+class WeakTooth:
+    """A tooth that yields more than the others on its drive flank.
+
+    Parameters
+    ----------
+    gear : int
+        0: pinion, 1: wheel.
+    tooth : int
+        From 0 at the angles' zero.
+    loss : float
+        Part of a pair's stiffness that is gone, 0 to below 1.
+    """
+
+    gear: int
+    tooth: int
+    loss: float
+
+    def __post_init__(self) -> None:
+        within(self.gear, "gear of the weak tooth", 0, 1)
+        not_negative(self.tooth, "tooth of the weak tooth")
+        within(self.loss, "loss of the weak tooth", 0.0, 0.99)
+
+
+@dataclass(frozen=True)
 class ForgingDrive:
     """Pinion with motor, wheel with gripper and piece; one turning freedom each.
 
@@ -123,6 +147,7 @@ class ForgingDrive:
         ω_lim of the pinion that the flow allows; 0: no limit.
     mesh_ramp : float
         Base pitches over which a pair takes up its load, 0.005 to 0.1.
+    weak_tooth : WeakTooth or None
 
     Notes
     -----
@@ -137,6 +162,7 @@ class ForgingDrive:
     flanks: Bristle
     speed_limit_rad_s: float = 0.0
     mesh_ramp: float = 0.05
+    weak_tooth: WeakTooth | None = None
 
     def __post_init__(self) -> None:
         not_negative(self.speed_limit_rad_s, "speed_limit_rad_s", "rad/s")

@@ -7,7 +7,7 @@ from math import cos, exp, sin
 
 from numba import njit
 
-from sims.forging.contact_kernel import one_pair, position, stored_energy, weight
+from sims.forging.contact_kernel import one_pair, position, soundness, stored_energy, weight
 from sims.forging.friction_kernel import bristle
 
 
@@ -45,6 +45,8 @@ def rates(k, y, flank, younger, damping, torque, brake, press, dy, out):
         elastic, pressed = one_pair(k, depth, flank * q_rate, damping)
         for i in range(2):
             w, dw = weight(k, p + i)
+            sound = soundness(k, younger - i, flank)
+            w, dw = w * sound, dw * sound
             pairs += w
             turn_1 -= dw * slope * elastic * depth / (k.exponent + 1.0)
             if k.tooth_friction > 0.0 and w > 0.0:

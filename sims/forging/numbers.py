@@ -37,7 +37,8 @@ _FIELDS = (
     "length", "mirror", "tooth_friction", "tooth_static_ratio", "tooth_stribeck", "tooth_presliding", "speed_limit",
     "speed_band", "ripple_fraction", "ripple_order", "drag", "drag_viscous", "motor_static_ratio", "motor_stribeck",
     "motor_presliding", "motor_bristle_time", "load_friction", "load_viscous", "load_static_ratio", "load_stribeck",
-    "load_presliding", "load_bristle_time", "unbalance_torque", "unbalance_angle",
+    "load_presliding", "load_bristle_time", "unbalance_torque", "unbalance_angle", "weak_teeth", "weak_tooth",
+    "weak_loss",
 )  # fmt: skip
 RECORD = np.dtype([(name, np.float64) for name in _FIELDS])
 """Numbers in SI units by name; compiled code reads them as attributes."""
@@ -70,4 +71,7 @@ def drive_numbers(drive: ForgingDrive) -> Any:
         k[f"{name}_static_ratio"], k[f"{name}_stribeck"] = bristle.static_ratio, bristle.stribeck_speed
         k[f"{name}_presliding"], k[f"{name}_bristle_time"] = bristle.presliding, bristle.damping_time_s
     k["unbalance_torque"], k["unbalance_angle"] = load.unbalance_nm, load.unbalance_angle_rad
+    weak = drive.weak_tooth
+    k["weak_teeth"] = path.teeth[0 if weak is None else weak.gear]
+    k["weak_tooth"], k["weak_loss"] = (0.0, 0.0) if weak is None else (weak.tooth, weak.loss)
     return k

@@ -11,10 +11,12 @@ import numpy as np
 from gearsig.checks import within
 from gearsig.errors import InputError
 from gearsig.recording.types import Recording
+from sims.cracked.simulator import truth_of
 from sims.cracked.wanted import Wanted
-from sims.effects.effect import EffectSetting
+from sims.effects import EffectSetting, effect
 from sims.forging.build import build_cycle, build_drive, build_rig
 from sims.forging.drive import ForgingDrive
+from sims.forging.effects import WITH_MEANING, with_effects
 from sims.forging.parameters import PARAMETERS
 from sims.forging.schedule import Cycle, Schedule, schedule
 from sims.machine.operation import Course, Operation
@@ -32,13 +34,28 @@ TORQUE_RANGE_NM = (0.0, 1e6)
 
 @dataclass(frozen=True)
 class Prepared:
-    """A drive with its cycle, ready to run."""
+    """A drive with its cycle, ready to run.
+
+    Parameters
+    ----------
+    drive : ForgingDrive
+        With its effects.
+    cycle : Cycle
+    operation : Operation
+    preset : str
+    values, sound_values : mapping
+        Every parameter, with the effects and without.
+    effects : tuple of EffectSetting
+        With every option.
+    """
 
     drive: ForgingDrive
     cycle: Cycle
     operation: Operation
     preset: str
     values: Values
+    sound_values: Values
+    effects: tuple[EffectSetting, ...] = ()
 
     def courses(self, duration_s: float) -> Schedule:
         """Torque, brake and press over a run."""
@@ -46,13 +63,8 @@ class Prepared:
 
     def truth(self) -> dict[str, Any]:
         """What was put in, as plain values."""
-        courses = {"speed_rpm": self.operation.speed_rpm, "torque_nm": self.operation.torque_nm}
         return {
-            "model": NAME,
-            "preset": self.preset,
-            "parameters": dict(self.values),
-            "effects": [],
-            "operation": {n: {"times_s": c.times_s.tolist(), "values": c.values.tolist()} for n, c in courses.items()},
+            **truth_of(NAME, self.preset, self.sound_values, self.effects, self.operation),
             "backlash_um": 2.0 * self.drive.contact.half_backlash_um,
             "stiffness_n_per_m_lambda": self.drive.contact.stiffness_n_per_m_lambda,
             "reduced_mass_kg": self.drive.reduced_mass_kg,
@@ -85,8 +97,8 @@ class ForgingManipulator:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """None yet: play, wear, friction, inertia and ripple are parameters."""
-        return ()
+        """Names of the effects that have a meaning: play, wear, friction, ripple, a cracked tooth."""
+        return WITH_MEANING
 
     @property
     def usual_sampling_rate_hz(self) -> float:
@@ -99,15 +111,19 @@ class ForgingManipulator:
         operation: Operation | None,
         *,
         preset_name: str = "",
+        settings: Sequence[EffectSetting] = (),
     ) -> Prepared:
-        """Build the drive and its cycle."""
+        """Build the drive and its cycle, with its effects."""
         chosen = preset(NAME, preset_name)
-        values = complete_values(PARAMETERS, chosen.parameters, parameters)
+        sound = complete_values(PARAMETERS, chosen.parameters, parameters)
+        wanted_effects = (*chosen.effects, *settings)
+        values, weak = with_effects(sound, wanted_effects)
         run = operation or chosen.operation
         within(run.torque_nm.largest, "torque_nm", *TORQUE_RANGE_NM, "N m")
         wanted = Wanted(values)
-        drive = build_drive(wanted, _constant(run.speed_rpm))
-        return Prepared(drive, build_cycle(wanted), run, chosen.name, values)
+        drive = build_drive(wanted, _constant(run.speed_rpm), weak)
+        complete = tuple(EffectSetting(s.name, s.severity, effect(s.name).complete(s.options)) for s in wanted_effects)
+        return Prepared(drive, build_cycle(wanted), run, chosen.name, values, sound, complete)
 
     def simulate(
         self,
@@ -133,20 +149,15 @@ class ForgingManipulator:
         """
         from sims.forging.measure import record, sensors
 
-        if effects:
-            raise InputError(
-                f"{NAME} has no effect {effects[0].name!r}",
-                remedy="change half_backlash_um, wear_um, load_friction_nm, piece_mass_kg or torque_ripple by --set",
-            )
         within(duration_s, "duration_s", *DURATION_RANGE_S, "s")
         within(sampling_rate_hz, "sampling_rate_hz", *SAMPLING_RATE_RANGE_HZ, "Hz")
         if sampling_rate_hz * duration_s > MOST_SAMPLES:
             raise InputError(f"{sampling_rate_hz * duration_s:.3g} samples are wanted", allowed=f"up to {MOST_SAMPLES}")
-        ready = self.prepare(parameters, operation, preset_name=preset)
+        ready = self.prepare(parameters, operation, preset_name=preset, settings=effects)
         wanted = Wanted(ready.values)
         rig = build_rig(
             ready.drive,
-            wanted,
+            Wanted(ready.sound_values),
             ready.operation,
             sensors(sampling_rate_hz),
             name=f"simulated: {ready.preset}",
