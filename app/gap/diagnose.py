@@ -83,7 +83,8 @@ def diagnose_gap(
         Of the same rig when it was healthy; each recording is compared with the one at its speed and torque.
     reference_rigs : sequence of Rig
     effects : sequence of str
-        Which effects may be named; empty: all that the simulator has.
+        Which effects may be named; empty: all that the simulator has, those of the user's own files included, see
+        `sims.effects.add_effect`.
     names, reference_names : sequence of str
         Of the recordings and references, for people.
     cache : Path or None
