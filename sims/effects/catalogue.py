@@ -86,7 +86,9 @@ def effect(name: str) -> Effect:
     found = effects()
     if name not in found:
         raise InputError(
-            f"there is no effect {name!r}", allowed=", ".join(found), remedy=closest_match_hint(name, found)
+            f"there is no effect {name!r}",
+            allowed=", ".join(found),
+            remedy=closest_match_hint(name, found) or f"name the file of an effect of your own in {VARIABLE}",
         )
     return found[name]
 
