@@ -14,6 +14,7 @@ from scipy import sparse
 from gearsig.checks import FloatArray
 from sims.reduced_fe.elements import sector_matrices
 from sims.reduced_fe.hub import hub_rows, hub_sum
+from sims.reduced_fe.mirror import RealFolded, SectorMirror
 from sims.reduced_fe.sector_mesh import SectorMesh
 from sims.reduced_fe.sector_plane import IntArray
 
@@ -36,6 +37,14 @@ class Folded(NamedTuple):
             return sparse.csc_array(real)
         turn = complex(cos(phase_rad), sin(phase_rad))
         return sparse.csc_array(self.own + turn * self.next + turn.conjugate() * self.next.T)
+
+
+class RealSystem(NamedTuple):
+    """Stiffness and mass of one nodal diameter, real and symmetric: K(n) = T stiffness Tᴴ."""
+
+    stiffness: sparse.csc_array
+    mass: sparse.csc_array
+    basis: sparse.csc_array
 
 
 @dataclass(frozen=True)
@@ -93,6 +102,14 @@ class CyclicGear:
         )
 
     @cached_property
+    def _mirror(self) -> SectorMirror:
+        return SectorMirror(self.mesh.points_m[self.own_nodes], self.own_places[self.mesh.low_side])
+
+    @cached_property
+    def _real(self) -> tuple[RealFolded, RealFolded]:
+        return self._mirror.real(*self.stiffness), self._mirror.real(*self.mass)
+
+    @cached_property
     def stiffness(self) -> Folded:
         """K of the own nodes."""
         return self._folded(self._sector[0])
@@ -126,33 +143,37 @@ class CyclicGear:
         """φ of nodal diameter n."""
         return 2.0 * pi * n / self.n_sectors
 
-    def stiffness_at(self, n: int) -> sparse.csc_array:
-        """K of nodal diameter n, with the springs at the hub."""
-        matrix = self.stiffness.at(self.phase_rad(n))
-        if self.hub_stiffness is None or n > 1:
-            return matrix
-        # Springs on the mean motion of the bore: the sum over sectors of the shares, squared.
-        rows = hub_sum(n, self.n_sectors) @ self.hub
-        spring = (rows.conj().T * self.hub_stiffness) @ rows / self.n_sectors
-        return sparse.csc_array(matrix + sparse.csc_array(spring.real if n == 0 else spring))
+    def system(self, n: int) -> RealSystem:
+        """K (with the springs at the hub) and M of nodal diameter n, real and symmetric, and the basis they are in."""
+        phase = self.phase_rad(n)
+        if n == 0 or 2 * n == self.n_sectors:  # real as they are
+            basis = sparse.csc_array(sparse.eye_array(3 * len(self.own_nodes)))
+            stiffness, mass = self.stiffness.at(phase), self.mass.at(phase)
+        else:
+            basis = self._mirror.basis(phase)
+            stiffness, mass = (real.at(phase) for real in self._real)
+        if self.hub_stiffness is not None and n <= 1:
+            # Springs on the mean motion of the bore: the sum over sectors of the shares, squared.
+            rows = np.asarray(hub_sum(n, self.n_sectors) @ self.hub @ basis)
+            spring = (rows.conj().T * self.hub_stiffness) @ rows / self.n_sectors
+            stiffness = sparse.csc_array(stiffness + sparse.csc_array(spring.real))
+        return RealSystem(stiffness, mass, basis)
 
     def solver(self, n: int, held: Held = "free") -> Solver:
-        """Return a function that solves K(n) u = f for one or more columns.
+        """Return a function that solves K(n) U = F for one or more columns.
 
         The free gear has rigid motions for n = 0 and 1: two components of one node are held, which is a solution for
         loads in balance, up to a rigid motion.
         """
-        matrix = self.stiffness_at(n)
-        fixed = self._fixed(n, held)
-        if not len(fixed):
-            return factorised(matrix)
-        kept = np.setdiff1d(np.arange(matrix.shape[0]), fixed)
-        inner = factorised(matrix[kept][:, kept])
+        stiffness, _, basis = self.system(n)
+        kept = np.setdiff1d(np.arange(stiffness.shape[0]), self._fixed(n, held))
+        inner = factorised(sparse.csc_array(stiffness[kept][:, kept]))
 
         def solve(loads: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-            solution = np.zeros(loads.shape, dtype=np.result_type(loads, matrix.dtype))
-            solution[kept] = inner(loads[kept])
-            return solution
+            turned = np.asarray(basis.conj().T @ loads)
+            solution = np.zeros(turned.shape, dtype=np.complex128)
+            solution[kept] = inner(turned[kept])
+            return np.asarray(basis @ solution)
 
         return solve
 
@@ -200,7 +221,7 @@ class CyclicGear:
 
 
 def factorised(matrix: sparse.csc_array) -> Solver:
-    """Return a direct solver of a symmetric or Hermitian positive definite matrix."""
+    """Return a direct solver of a real symmetric positive definite matrix, for real or complex columns."""
     from scipy.sparse.linalg import splu
 
     # Ordering and pivoting for symmetric definite matrices: twice as fast, and half the memory, of the defaults.
@@ -208,11 +229,8 @@ def factorised(matrix: sparse.csc_array) -> Solver:
     factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
 
     def solve(loads: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-        if np.iscomplexobj(loads) and matrix.dtype == np.float64:
-            return np.asarray(factor.solve(np.ascontiguousarray(loads.real))) + 1j * np.asarray(
-                factor.solve(np.ascontiguousarray(loads.imag))
-            )
-        return np.asarray(factor.solve(np.asarray(loads, dtype=matrix.dtype)))
+        real = np.asarray(factor.solve(np.ascontiguousarray(loads.real)))
+        return real + 1j * factor.solve(np.ascontiguousarray(loads.imag)) if np.iscomplexobj(loads) else real
 
     return solve
 

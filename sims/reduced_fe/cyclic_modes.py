@@ -83,8 +83,7 @@ def cyclic_modes(gear: CyclicGear, n_modes: int = 20, held: Held = "free", *, el
 def modes_of_diameter(gear: CyclicGear, n: int, n_shapes: int, held: Held = "free") -> tuple[FloatArray, ComplexArray]:
     """Lowest `n_shapes` frequencies (Hz) and shapes of one nodal diameter, with unit modal mass over the whole gear.
 
-    Shift-and-invert Lanczos, then a Rayleigh–Ritz step in the space found: the Lanczos vectors of a complex Hermitian
-    problem need not be orthonormal.
+    Shift-and-invert Lanczos in real coordinates, then a Rayleigh–Ritz step, which sharpens the vectors.
     """
     return _lowest(_problem(gear, n, held), n_shapes)
 
@@ -95,11 +94,11 @@ def lowest_with_static(
     """Frequencies and shapes as `modes_of_diameter`, of a gear on springs, and its static answers to loads."""
     problem = _problem(gear, n, "sprung")
     frequencies, shapes = _lowest(problem, n_shapes)
-    return frequencies, shapes, problem.solve(loads.real if problem.stiffness.dtype == np.float64 else loads)
+    return frequencies, shapes, problem.static(loads)
 
 
 class _Problem(NamedTuple):
-    """Matrices of one nodal diameter, factorised for shift-and-invert."""
+    """Real matrices of one nodal diameter, factorised for shift-and-invert."""
 
     stiffness: sparse.csc_array
     mass: sparse.csc_array
@@ -107,11 +106,17 @@ class _Problem(NamedTuple):
     n_own: int
     shift: float
     solve: Solver
+    basis: sparse.csc_array
     scale: float
+
+    def static(self, loads: ComplexArray) -> ComplexArray:
+        """K⁻¹ loads; without a shift and with nothing held only."""
+        solved: ComplexArray = self.basis @ self.solve(np.asarray(self.basis.conj().T @ loads))
+        return solved
 
 
 def _problem(gear: CyclicGear, n: int, held: Held) -> _Problem:
-    stiffness, mass = gear.stiffness_at(n), gear.mass.at(gear.phase_rad(n))
+    stiffness, mass, basis = gear.system(n)
     n_own = stiffness.shape[0]
     kept = np.arange(n_own)
     if held == "bore":
@@ -120,7 +125,8 @@ def _problem(gear: CyclicGear, n: int, held: Held) -> _Problem:
     # A shift below zero makes the matrix definite where the gear floats; it costs a few more steps elsewhere.
     shift = -((2.0 * pi * 300.0) ** 2) if held == "free" and n <= 1 else 0.0
     solve = factorised(sparse.csc_array(stiffness - shift * mass) if shift else stiffness)
-    return _Problem(stiffness, mass, kept, n_own, shift, solve, _multiplicity(n, gear.n_sectors) / gear.n_sectors)
+    scale = _multiplicity(n, gear.n_sectors) / gear.n_sectors
+    return _Problem(stiffness, mass, kept, n_own, shift, solve, basis, scale)
 
 
 def _lowest(problem: _Problem, n_shapes: int) -> tuple[FloatArray, ComplexArray]:
@@ -132,8 +138,8 @@ def _lowest(problem: _Problem, n_shapes: int) -> tuple[FloatArray, ComplexArray]
     _, vectors = eigsh(stiffness, n_shapes, M=mass, sigma=problem.shift, OPinv=inverse, v0=start, tol=1e-11)
     values, shapes = _rayleigh_ritz(stiffness, mass, vectors)
     full = np.zeros((problem.n_own, n_shapes), dtype=np.complex128)
-    full[problem.kept] = _phased(shapes) * np.sqrt(problem.scale)
-    return np.sqrt(np.maximum(values, 0.0)) / (2.0 * pi), full
+    full[problem.kept] = shapes * np.sqrt(problem.scale)
+    return np.sqrt(np.maximum(values, 0.0)) / (2.0 * pi), _phased(np.asarray(problem.basis @ full))
 
 
 def _below(

@@ -29,6 +29,7 @@ _SOURCES = (
     "flank_rows",
     "hub",
     "line_weights",
+    "mirror",
     "reduce",
 )
 """Files of this folder whose code changes a reduced gear."""

@@ -13,6 +13,7 @@ from sims.reduced_fe.cyclic_modes import CyclicModes, cyclic_modes, modes_of_dia
 from sims.reduced_fe.full_gear import full_matrices, full_modes
 from sims.reduced_fe.mesh_quality import mesh_quality
 from sims.reduced_fe.mesh_size import mesh_size_for
+from sims.reduced_fe.mode_field import mode_field
 from sims.reduced_fe.sector_mesh import sector_mesh
 from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL, small_cyclic
 
@@ -57,6 +58,18 @@ def test_shapes_are_modes_of_the_whole_gear_with_unit_mass() -> None:
     vectors = np.column_stack(columns)
     np.testing.assert_allclose(vectors.T @ (mass @ vectors), np.eye(len(squares)), atol=1e-9)
     np.testing.assert_allclose(vectors.T @ (stiffness @ vectors) / squares, np.eye(len(squares)), atol=1e-8)
+
+
+def test_rigid_motions_keep_a_gear_rigid() -> None:
+    modes = cyclic_modes(small_cyclic(), 6)
+    for k, n in enumerate(modes.nodal_diameters):
+        for sine in (False, True)[: 1 + int(n > 0)]:
+            field = mode_field(small_cyclic(), modes, k, sine=sine)[0]
+            at = small_cyclic().mesh.points_m
+            rows = [np.column_stack((np.tile(e, (len(at), 1)), np.cross(e, at))) for e in np.eye(3)]
+            basis = np.column_stack([r[:, :3].ravel() for r in rows] + [r[:, 3:].ravel() for r in rows])
+            _, rest, *_ = np.linalg.lstsq(basis, field.ravel(), rcond=None)
+            assert rest[0] < 1e-9 * np.sum(field**2)
 
 
 def test_springs_at_the_hub_carry_the_gear_as_a_rigid_body() -> None:

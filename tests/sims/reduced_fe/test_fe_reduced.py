@@ -226,9 +226,11 @@ def test_compliance_agrees_with_potential_energy() -> None:
 
 
 def test_the_ready_made_gear_agrees_with_potential_energy() -> None:
+    """Five heights between foot and tip within 3 %, all within 5 %; stiffer near the tip, where the beam is short."""
     gear, g = ready_gear("z50_m3"), PAPER.geometry
     roll = gear.grid.roll_rad
     beam = tooth_compliance(g, PAPER.material, roll).total
     body = foundation_compliance(g, PAPER.material, roll - g.base_half_angle_rad)
     found = [1.0 / slice_stiffness(gear, k, "hub_held") for k in range(9)]
-    np.testing.assert_allclose(found, (beam + body) / 0.02, rtol=0.045)
+    np.testing.assert_allclose(found, (beam + body) / 0.02, rtol=0.05)
+    np.testing.assert_allclose(found[1:6], ((beam + body) / 0.02)[1:6], rtol=0.03)
