@@ -16,6 +16,7 @@ from app.commands.compare import compare
 from app.commands.crack import crack
 from app.commands.dashboard import dashboard
 from app.commands.demo import demo
+from app.commands.flexible import flexible
 from app.commands.force import force
 from app.commands.gap import gap
 from app.commands.identify import identify
@@ -52,6 +53,7 @@ app.add_typer(rig_app, name="rig")
 app.command()(simulate)
 app.command()(sweep)
 app.command()(bifurcation)
+app.command()(flexible)
 app.command()(gap)
 app.add_typer(benchmark_app, name="benchmark")
 app.command()(demo)

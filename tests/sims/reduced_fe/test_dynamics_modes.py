@@ -60,7 +60,7 @@ def test_contact_moves_the_rigid_gear_by_its_base_radius(pair, ready):
         assert turned == pytest.approx(side.shapes[GEAR])
 
 
-def test_torsional_mode_lies_where_the_source_has_it_with_the_stated_hub_inertia(pair, ready):
+def test_torsional_mode_lies_where_the_source_has_it_with_the_stated_hub_inertia(pair):
     assert pair.machine.wheels[0].inertia_kg_m2 == pytest.approx(0.0120, abs=1e-4)
     found = [torsional_mode(pair, Operation.steady(2000.0, t)).frequency_hz for t in (170.0, 340.0)]
     assert min(found) > 2630.0
@@ -69,7 +69,7 @@ def test_torsional_mode_lies_where_the_source_has_it_with_the_stated_hub_inertia
     assert 3300.0 < torsional_mode(bare, OPERATION).frequency_hz < 3700.0
 
 
-def test_natural_frequencies_dip_where_one_pair_carries(pair, ready):
+def test_natural_frequencies_dip_where_one_pair_carries(pair):
     cycles = np.array([0.4, 0.88])
     frequencies = eigenfrequencies_hz(pair, Operation.steady(2000.0, 20.0), cycles)
     mode = int(np.argmin(np.abs(frequencies[0] - 2600.0)))

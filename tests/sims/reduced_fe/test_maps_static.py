@@ -140,6 +140,6 @@ def test_mirrored_slices_give_the_same_as_all():
 def test_bad_torques_and_gears_are_refused():
     with pytest.raises(InputError, match="ascend"):
         mesh_maps(GEARS, MESH, np.array([100.0, 50.0]))
+    other = GearMesh(PairGeometry(GearGeometry(49, 3.0), GEARS[1].blank.geometry))
     with pytest.raises(InputError, match="driver's reduced gear"):
-        other = PairGeometry(GearGeometry(49, 3.0), GEARS[1].blank.geometry)
-        mesh_maps(GEARS, GearMesh(other), TORQUES)
+        mesh_maps(GEARS, other, TORQUES)
