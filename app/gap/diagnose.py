@@ -126,6 +126,7 @@ def diagnose_gap(
     notices += [
         (OWN_EFFECT if name in tried else NOT_SIMULATED).format(title=known[name].title) for name in weighed.unheard_of
     ]
+    notices += _without_meaning(twin, known, effects)
     outcome = weighed.calibration.outcome(probabilities)
     tell("placing it", 0.82)
     clearest = max(conditions, key=_size)
@@ -206,6 +207,18 @@ def _rigs(recordings: Sequence[Recording], rigs: Sequence[Rig]) -> tuple[Rig, ..
     if any(rig is None for rig in found):
         raise InputError("a recording carries no rig", remedy="give rigs, one for each recording")
     return tuple(rig for rig in found if rig is not None)
+
+
+def _without_meaning(twin: Twin, known: Mapping[str, GapEffect], effects: Sequence[str]) -> list[str]:
+    """Name the effects that the rig has no place for, a bearing, say."""
+    titles = [known[name].title for name in effects or known if not twin.candidates(name)]
+    if not titles:
+        return []
+    remark = (
+        f"The rig file names nothing that {', '.join(titles)} could be in: none of it can be simulated, and any "
+        "probability rests on recognition alone."
+    )
+    return [remark]
 
 
 def _size(condition: Condition) -> float:

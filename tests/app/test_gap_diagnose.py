@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.gap.conditions import with_channels_of
-from app.gap.diagnose import diagnose_gap
+from app.gap.diagnose import _without_meaning, diagnose_gap
 from gearsig.errors import InputError
 from gearsig.gap.gather import gather
 from gearsig.gap.posterior import is_calibrated
@@ -104,3 +104,11 @@ def test_a_recording_whose_channels_have_other_names_can_be_simulated() -> None:
     renamed = replace(gathered, channels={"Data1": first, "Data2": first, "Data3": first})
     assert list(with_channels_of(gathered, renamed).channels) == ["Data1", "Data2", "Data3"]
     assert list(with_channels_of(gathered, gathered).channels) == list(gathered.channels)
+
+
+def test_an_effect_that_the_rig_has_no_place_for_is_told() -> None:
+    simulator, bare = gap_simulator("cracked"), replace(rig(), bearings=())
+    known = simulator.gap_effects()
+    (text,) = _without_meaning(simulator.twin_of(bare), known, ["bearing_outer_race", "backlash"])
+    assert text.startswith("The rig file names nothing that spall on an outer race could be in")
+    assert _without_meaning(simulator.twin_of(rig()), known, ()) == []
