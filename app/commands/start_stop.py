@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from gearsig.motion.angle_profile import AngleProfile
     from gearsig.motion.start_stop import StartStop
     from gearsig.recording.types import Recording
+    from gearsig.spectra.types import Spectrum
 
 DATA, PICTURE = "start_stop.json", "start_stop.png"
 """Files that -o makes."""
@@ -36,7 +37,7 @@ def start_stop(
 
     Nothing of it needs a steady speed. The picture shows the speed with the impacts, the phase plane of the teeth and
     torque over twist; the JSON has the level of a vibration (else of the torque) tooth by tooth, forwards and backwards
-    apart.
+    apart, and its orders.
 
     Example: gearsig start-stop drive.h5 --rig drive.toml -o drive
     """
@@ -66,14 +67,20 @@ def start_stop(
         typer.echo(f"\nIn {output}: {DATA}, {PICTURE}.")
 
 
-def tooth_levels(recording: Recording, examined: StartStop) -> tuple[AngleProfile | None, str, str]:
-    """Return the level of the first acceleration, else of the torque, tooth by tooth, with its channel and unit."""
+def tooth_levels(recording: Recording, examined: StartStop) -> tuple[AngleProfile | None, str, str, Spectrum | None]:
+    """Return of the first acceleration, else of the torque: level tooth by tooth, channel, unit, orders forwards."""
+    from gearsig.errors import RefusalError
     from gearsig.motion.angle_profile import angle_profile
+    from gearsig.motion.stretch_orders import stretch_order_spectrum
 
     fitting = [c for q in ("acceleration", "torque") for c in recording.channels if c.quantity == q]
     if not fitting:
-        return None, "", ""
+        return None, "", "", None
     channel, motion = fitting[0], examined.motion
-    values = recording.values(channel.name)
-    found = angle_profile(values, motion.driver_angle_rad, examined.course, motion.path.teeth[0])
-    return found, channel.name, channel.unit
+    values, angle = recording.values(channel.name), motion.driver_angle_rad
+    found = angle_profile(values, angle, examined.course, motion.path.teeth[0])
+    try:
+        orders = stretch_order_spectrum(values, angle, examined.course, unit=channel.unit, source=channel.name)
+    except RefusalError:  # no stretch holds a revolution
+        return found, channel.name, channel.unit, None
+    return found, channel.name, channel.unit, orders

@@ -12,6 +12,8 @@ is null. Members may be added within a version, never renamed or removed.
 - ``indicators``: each with ``name``, ``value``, ``unit``, ``computed_on``
 - ``teeth``: per tooth of the driver ``passes_forwards``, ``passes_backwards``, ``rms_forwards``, ``rms_backwards`` of
   ``signal`` in ``unit``; null where there was nothing to average
+- ``orders``: of the same signal, forwards: ``order`` and ``amplitude`` (peak) as lists; null where no stretch holds a
+  revolution
 - ``refusals``: what could not be told
 """
 
@@ -29,6 +31,7 @@ from gearsig.motion.angle_profile import AngleProfile
 from gearsig.motion.impacts import Impact
 from gearsig.motion.start_stop import StartStop
 from gearsig.report.numbers import readable, rounded
+from gearsig.spectra.types import Spectrum
 
 SCHEMA, SCHEMA_VERSION = "gearsig.start_stop", 1
 MOST_ROWS = 12
@@ -66,7 +69,13 @@ def start_stop_text(examined: StartStop) -> str:
     return "\n".join(lines)
 
 
-def start_stop_json(examined: StartStop, profile: AngleProfile | None = None, signal: str = "", unit: str = "") -> str:
+def start_stop_json(
+    examined: StartStop,
+    profile: AngleProfile | None = None,
+    signal: str = "",
+    unit: str = "",
+    orders: Spectrum | None = None,
+) -> str:
     """Return the same as JSON, see the module's description."""
     backlash = None
     if examined.backlash is not None:
@@ -88,6 +97,7 @@ def start_stop_json(examined: StartStop, profile: AngleProfile | None = None, si
             for i in examined.indicators
         ],
         "teeth": None if profile is None else _teeth(profile, signal, unit),
+        "orders": None if orders is None else _orders(orders),
         "refusals": list(examined.refusals),
     }  # fmt: skip
     return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
@@ -102,6 +112,10 @@ def _teeth(profile: AngleProfile, signal: str, unit: str) -> Json:
         "rms_forwards": [rounded(v) for v in profile.rms_forwards],
         "rms_backwards": [rounded(v) for v in profile.rms_backwards],
     }
+
+
+def _orders(orders: Spectrum) -> Json:
+    return {"order": [rounded(v) for v in orders.positions], "amplitude": [rounded(v) for v in orders.values]}
 
 
 def _impact_row(i: Impact) -> str:

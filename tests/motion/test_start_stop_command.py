@@ -27,6 +27,7 @@ def test_text_data_and_picture(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert data["teeth"]["signal"] == "torque"
     assert len(data["teeth"]["rms_forwards"]) == 20
     assert data["teeth"]["rms_backwards"] == [None] * 20
+    assert len(data["orders"]["order"]) == len(data["orders"]["amplitude"]) > 20
     code, out, _ = run(capsys, "start-stop", file, "--json")
     assert (code, json.loads(out)) == (0, data)
 
