@@ -245,14 +245,17 @@ def _matrices(
     damping[range(n_own, n), range(n_own, n)] = 2.0 * body_damping_ratio * omega
     twisted = np.zeros(n)
     twisted[[ROTOR, HUB]] = 1.0, -1.0
-    lines = [(twisted, shaft.torsional_stiffness_nm_per_rad, shaft.torsional_damping_nm_s_per_rad)]
+    lines: list[tuple[FloatArray, float, float]] = [
+        (twisted, shaft.torsional_stiffness_nm_per_rad, shaft.torsional_damping_nm_s_per_rad)
+    ]
     for c, place in enumerate((X, Y, GEAR)):
         inside = np.zeros(n)
         inside[[HUB_X + c, place]] = 1.0, -1.0
         if place == GEAR:
             inside[n_own:] = -twist
-        k = 1.0 / springs.compliance[c]
-        lines.append((inside, k, 2.0 * body_damping_ratio * np.sqrt(k / (1.0 / hub[c] + 1.0 / body[c]))))
+        own_k = float(1.0 / springs.compliance[c])
+        own_c = 2.0 * body_damping_ratio * float(np.sqrt(own_k / (1.0 / hub[c] + 1.0 / body[c])))
+        lines.append((inside, own_k, own_c))
     for axis in range(2):
         bent = np.zeros(n)
         bent[[HUB_X + axis, 4 + axis, 6 + axis]] = 1.0, -0.5, -0.5
@@ -261,9 +264,9 @@ def _matrices(
             moved = np.zeros(n)
             moved[4 + 2 * row + axis] = 1.0
             lines.append((moved, bearing.stiffness_n_per_m, bearing.damping_n_s_per_m))
-    for line, k, c in lines:
-        stiffness += k * np.outer(line, line)
-        damping += c * np.outer(line, line)
+    for line, spring, damper in lines:
+        stiffness += spring * np.outer(line, line)
+        damping += damper * np.outer(line, line)
     return mass, stiffness, damping
 
 

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.laboratory.setup import MODEL, Setup
+from app.dashboard.laboratory.setup import Setup
 from app.dashboard.state import Chosen, Request
 from gearsig.recording.types import Recording
 
@@ -52,7 +52,7 @@ def record(setup: Setup) -> Recording:
     from sims import simulate
 
     return simulate(
-        MODEL,
+        setup.model,
         preset=setup.preset,
         parameters=dict(setup.parameters),
         effects=setup.effects,
