@@ -16,17 +16,20 @@ MOST_PART = 0.9
 
 
 def sector_bytes(blank: GearBlank, size: MeshSize) -> float:
-    """Peak of a cyclic reduction: matrices and complex factors of one sector.
+    """Peak of a cyclic reduction: matrices and factors of one sector, which fill about as n^1.4.
 
-    Measured at 540 to 19 000 degrees of freedom of a sector; factors fill about as n^1.4.
+    Measured, whole gear of 50 teeth: 0.29 GB at 300 000 and 0.36 GB at 510 000 degrees of freedom.
     """
     n = n_dof_of(blank, size) / blank.n_teeth
     return float(BASE_BYTES + 16.0 * (900.0 * n + 14.0 * n**1.4))
 
 
 def full_bytes(n_dof: int) -> float:
-    """Peak of a direct solution of the whole gear: matrices and factors, which fill about as n^1.25."""
-    return float(BASE_BYTES + 12.0 * (300.0 * n_dof + 90.0 * n_dof**1.25))
+    """Peak of a direct solution of the whole gear: matrices and factors, which fill about as n^1.25.
+
+    Measured: 0.35 GB at 31 500 and 0.85 GB at 72 000 degrees of freedom.
+    """
+    return float(BASE_BYTES + 12.0 * (150.0 * n_dof + 38.0 * n_dof**1.25))
 
 
 def check_memory(needed_bytes: float, free_bytes: float | None = None) -> None:

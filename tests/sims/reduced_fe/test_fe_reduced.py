@@ -112,6 +112,22 @@ def test_rows_give_rigid_motions_exactly() -> None:
         np.testing.assert_allclose(rows @ tilt.ravel(), expected[4], atol=1e-9)
 
 
+def test_patches_remove_the_ripple_of_single_nodes() -> None:
+    """Stiffness over the flank's height: a single line of nodes follows the mesh, a patch or section hardly does."""
+    mesh = sector_mesh(PAPER, MeshSize(3, 1, 6, 2, 2, 1))
+    gear = CyclicGear(mesh)
+    grid = flank_grid(PAPER.geometry, 25, 1)
+    ripple = {}
+    for spread in ("section", "patch", "node"):
+        rows = flank_rows(mesh, grid, spread, gear.own_places, 3 * len(gear.own_nodes))
+        logarithm = np.log(np.diag(static_compliance(gear, rows, grid, 1, "bore").flanks[0])[2:23])
+        roll = grid.roll_rad[2:23]
+        ripple[spread] = np.std(logarithm - np.polyval(np.polyfit(roll, logarithm, 4), roll))
+    assert ripple["node"] > 4.0 * ripple["patch"]
+    assert ripple["section"] < 0.01
+    assert ripple["patch"] < 0.01
+
+
 def test_the_mean_motion_of_the_bore_is_that_of_a_rigid_gear() -> None:
     gear = small_cyclic()
     rows = hub_rows(gear.mesh, 3 * len(gear.own_nodes), gear.own_places)
