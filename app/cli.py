@@ -19,6 +19,7 @@ from app.commands.demo import demo
 from app.commands.flexible import flexible
 from app.commands.force import force
 from app.commands.gap import gap
+from app.commands.gear_body import gear_body
 from app.commands.identify import identify
 from app.commands.report import report
 from app.commands.rig import rig_app
@@ -54,6 +55,7 @@ app.command()(simulate)
 app.command()(sweep)
 app.command()(bifurcation)
 app.command()(flexible)
+app.command()(gear_body)
 app.command()(gap)
 app.add_typer(benchmark_app, name="benchmark")
 app.command()(demo)

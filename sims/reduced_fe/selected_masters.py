@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gearsig.checks import FloatArray
+from gearsig.errors import InputError
 from sims.reduced_fe.cyclic import CyclicGear
 from sims.reduced_fe.cyclic_modes import CyclicModes
 from sims.reduced_fe.flank_rows import flank_grid, height_nodes, plane_row, point_and_push, slice_weights
@@ -48,7 +49,20 @@ def contact_masters(gear: CyclicGear, teeth: Sequence[int] = (0, 1, 2, 3), n_sli
     gear : CyclicGear
     teeth : sequence of int
     n_slices : int
+        At most as many as there are layers of nodes along the face: more could not move independently.
+
+    Raises
+    ------
+    InputError
+        If there are more slices than layers.
     """
+    n_layers = gear.mesh.tooth.shape[2]
+    if n_slices > n_layers:
+        raise InputError(
+            f"n_slices is {n_slices}",
+            allowed=f"at most {n_layers}, the layers of nodes along the face",
+            remedy="take fewer slices, or more cells along the face",
+        )
     mesh, n_dof = gear.mesh, 3 * len(gear.own_nodes)
     roll = float(np.mean(flank_grid(mesh.blank.geometry, 2, 1).roll_rad))
     point, push = point_and_push(mesh.blank.geometry, roll, 1.0)

@@ -105,6 +105,11 @@ def test_too_few_degrees_of_freedom_are_refused() -> None:
         CraigBamptonPlan(n_dof=60)
 
 
+def test_more_slices_than_layers_of_nodes_are_refused() -> None:
+    with pytest.raises(InputError, match="n_slices is 5"):
+        craig_bampton(small_cyclic().mesh)
+
+
 @pytest.mark.slow
 def test_the_paper_gear_to_229_degrees_of_freedom() -> None:
     """Below 0.05 % in the first 20 frequencies, subspace MAC above 0.999."""

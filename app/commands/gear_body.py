@@ -1,0 +1,74 @@
+"""`gearsig gear-body`: one gear as finite elements."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.quantities import quantity
+from gearsig.checks import one_of
+
+
+def gear_body(
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for figures and files.")],
+    teeth: Annotated[int, typer.Option("--teeth")] = 50,
+    module: Annotated[str, typer.Option("--module", metavar="LENGTH")] = "3mm",
+    pressure_angle: Annotated[float, typer.Option("--pressure-angle", help="Degrees.")] = 20.0,
+    profile_shift: Annotated[float, typer.Option("--profile-shift", help="In modules.")] = 0.0,
+    fillet: Annotated[float, typer.Option("--fillet", help="Tip radius of the tool, in modules.")] = 0.38,
+    face: Annotated[str, typer.Option("--face", metavar="LENGTH", help="Face width.")] = "20mm",
+    bore: Annotated[str, typer.Option("--bore", metavar="LENGTH", help="Radius of the bore.")] = "20mm",
+    web: Annotated[str, typer.Option("--web", metavar="LENGTH", help="Thickness of the web; none: full disc.")] = "",
+    rim: Annotated[str, typer.Option("--rim", metavar="LENGTH", help="Thickness of the rim, with a web.")] = "",
+    hub: Annotated[str, typer.Option("--hub", metavar="LENGTH", help="Thickness of the hub, with a web.")] = "",
+    dof: Annotated[int, typer.Option("--dof", help="Degrees of freedom of the mesh, about.")] = 277_200,
+    modes: Annotated[int, typer.Option("--modes", help="Elastic modes to find.")] = 20,
+    held: Annotated[str, typer.Option("--held", help="free or bore: how the gear is held for its modes.")] = "free",
+    force: Annotated[str, typer.Option("--force", metavar="FORCE", help="On one tooth, for the stress.")] = "1000N",
+    reduce: Annotated[bool, typer.Option("--reduce", help="Also reduce the gear, with its errors.")] = False,
+    vtk: Annotated[bool, typer.Option("--vtk", help="Also write gear.vtu for other programs.")] = False,
+) -> None:
+    """Mesh one gear with finite elements; show its mesh, modes and stress, and reduce it for the model reduced-fe.
+
+    Example: gearsig gear-body --teeth 50 --module 3mm --web 12mm --reduce -o gear
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from app.gear_body.results import lines, write_study
+    from app.gear_body.study import study_gear
+    from sims.mesh import GearGeometry
+    from sims.reduced_fe.blank import GearBlank
+    from sims.reduced_fe.cyclic import Held
+
+    def length(text: str, name: str) -> float | None:
+        return quantity(text, "mm", name) if text else None
+
+    geometry = GearGeometry(
+        teeth,
+        quantity(module, "mm", "--module"),
+        pressure_angle,
+        profile_shift,
+        quantity(face, "mm", "--face"),
+        tool_tip_radius=fillet,
+        bore_radius_mm=quantity(bore, "mm", "--bore"),
+    )
+    blank = GearBlank(geometry, length(web, "--web"), length(rim, "--rim"), length(hub, "--hub"))
+    support: Held = "bore" if one_of(held, "--held", ("free", "bore")) == "bore" else "free"
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("mesh", total=1.0)
+        study = study_gear(
+            blank,
+            dof,
+            n_modes=modes,
+            held=support,
+            force_n=quantity(force, "N", "--force"),
+            reduce=reduce,
+            on_progress=lambda what, done: progress.update(task, description=what, completed=done),
+        )
+        paths = write_study(study, output, vtk=vtk)
+    typer.echo("\n".join(lines(study)))
+    typer.echo(f"{output}: {', '.join(path.name for path in paths)}")

@@ -1,0 +1,1 @@
+"""One gear as finite elements: mesh, modes, stress, reductions."""

@@ -1,0 +1,127 @@
+"""Figures, files and text of a gear's finite elements."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.gear_body.study import GearBodyStudy
+from gearsig.checks import FloatArray
+from gearsig.errors import InputError
+from gearsig.plot.fe_gear import gear_mesh_figure, gear_modes_figure, gear_stress_figure
+from sims.reduced_fe.face_view import FaceView, face_view
+from sims.reduced_fe.flank_rows import point_and_push
+from sims.reduced_fe.gear_file import write_gear
+from sims.reduced_fe.mode_field import mode_field
+from sims.reduced_fe.vtk import write_vtk
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DOTS_PER_INCH = 160
+N_SHOWN = 6
+NEIGHBOURS = (-1, 0, 1)
+
+
+def write_study(study: GearBodyStudy, folder: Path, *, vtk: bool = False) -> tuple[Path, ...]:
+    """Write the figures as PNG, and where there are: VTK file, reduced gear, table of Craig–Bampton."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot be made ({error.strerror})", where=str(folder)) from None
+    paths = []
+    for name, figure in figures(study).items():
+        paths.append(folder / f"{name}.png")
+        figure.savefig(paths[-1], dpi=DOTS_PER_INCH)
+    if vtk:
+        paths.append(write_vtk(folder / "gear.vtu", study.mesh, _fields(study)))
+    if study.reduced is not None:
+        paths.append(folder / "reduced.npz")
+        write_gear(paths[-1], study.reduced)
+    if study.craig_bampton is not None:
+        paths.append(folder / "craig_bampton.txt")
+        paths[-1].write_text(study.craig_bampton.accuracy.table() + "\n", encoding="utf-8")
+    return tuple(paths)
+
+
+def figures(study: GearBodyStudy) -> dict[str, Figure]:
+    """Return mesh, modes and stress by their files' names."""
+    mesh, view = study.mesh, face_view(study.mesh)
+    g = mesh.blank.geometry
+    name = f"{g.teeth} teeth, module {g.module_mm:g} mm"
+    near = (g.root_radius_mm - 3.0 * g.module_mm, g.tip_radius_mm + 0.5 * g.module_mm)
+    across = 1.55 * np.pi * g.module_mm
+    quality = study.quality.scaled_jacobian[view.cells]
+    shapes = {_label(study, k): _shape(study, view, k) for k in range(min(N_SHOWN, len(study.modes.frequencies_hz)))}
+    return {
+        "mesh": gear_mesh_figure(
+            view.outlines_mm,
+            quality,
+            near_mm=(*near, -across, across),
+            title=f"{name}: {mesh.n_dof} degrees of freedom",
+        ),
+        "modes": gear_modes_figure(view.points_mm, view.triangles, shapes, title=f"{name}: first modes"),
+        "stress": _stress(study, (*near, -across, across), name),
+    }
+
+
+def lines(study: GearBodyStudy) -> list[str]:
+    """Return what was found as text."""
+    q = study.quality
+    text = [
+        f"{study.mesh.n_dof} degrees of freedom; {study.mesh.size}",
+        f"mass {q.mass_kg:.4g} kg ({1e6 * (q.volume_m3 / q.true_volume_m3 - 1.0):+.0f} ppm of the outline's)",
+        f"polar inertia {q.polar_inertia_kg_m2:.4g} kg m², least scaled Jacobian {q.scaled_jacobian.min():.2f}",
+        f"tooth compliance in mid-flank {study.load.push_m / study.load.force_n:.3g} m/N, bore held",
+        *(_label(study, k) for k in range(len(study.modes.frequencies_hz))),
+    ]
+    if study.reduced is not None:
+        text.append(f"free-interface reduction: {study.reduced.n_modes} elastic modes and the static rest")
+    if study.craig_bampton is not None:
+        a = study.craig_bampton.accuracy
+        text.append(
+            f"Craig–Bampton: {len(study.craig_bampton.mass)} degrees of freedom, worst of {len(a.full_hz)} frequencies "
+            f"{100.0 * a.worst_error:.4f} %, least subspace MAC {a.least_mac:.6f}"
+        )
+    return text
+
+
+def _label(study: GearBodyStudy, k: int) -> str:
+    n = int(study.modes.nodal_diameters[k])
+    return f"{study.modes.frequencies_hz[k]:.1f} Hz, {n} nodal diameter{'s' if n != 1 else ''}"
+
+
+def _shape(study: GearBodyStudy, view: FaceView, k: int) -> FloatArray:
+    """Motion of the view's points in the axes of the whole gear."""
+    field = mode_field(study.gear, study.modes, k)[:, view.nodes]
+    angle = study.mesh.blank.pitch_angle_rad * np.arange(len(field))[:, None]
+    c, s = np.cos(angle), np.sin(angle)
+    x, y, z = np.moveaxis(field, 2, 0)
+    return np.column_stack(((c * x - s * y).ravel(), (s * x + c * y).ravel(), z.ravel()))
+
+
+def _stress(study: GearBodyStudy, near: tuple[float, float, float, float], name: str) -> Figure:
+    load, view = study.load, face_view(study.mesh, NEIGHBOURS)
+    point, push = point_and_push(study.mesh.blank.geometry, load.roll_rad, 1.0)
+    return gear_stress_figure(
+        view.points_mm,
+        view.triangles,
+        view.values(np.array([load.von_mises_pa(k) for k in NEIGHBOURS])),
+        near_mm=near,
+        force=(point * 1e3, push, f"{load.force_n:g} N"),
+        title=f"{name}: stress, bore held",
+    )
+
+
+def _fields(study: GearBodyStudy) -> dict[str, FloatArray]:
+    """Values at all nodes for other programs."""
+    z = study.mesh.blank.n_teeth
+    fields = {
+        "displacement_m": study.load.displacement_m,
+        "von_mises_pa": np.array([study.load.von_mises_pa(k) for k in range(z)]),
+    }
+    for k in range(min(N_SHOWN, len(study.modes.frequencies_hz))):
+        fields[f"mode_{k + 1}_{study.modes.frequencies_hz[k]:.0f}_hz"] = mode_field(study.gear, study.modes, k)
+    return fields

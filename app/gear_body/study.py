@@ -1,0 +1,96 @@
+"""Mesh a gear, find its modes, push a tooth, and reduce it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from sims.reduced_fe.blank import GearBlank
+from sims.reduced_fe.craig_bampton import CraigBamptonGear, CraigBamptonPlan, craig_bampton
+from sims.reduced_fe.cyclic import CyclicGear, Held
+from sims.reduced_fe.cyclic_modes import CyclicModes, cyclic_modes
+from sims.reduced_fe.memory import check_memory, sector_bytes
+from sims.reduced_fe.mesh_quality import MeshQuality, mesh_quality
+from sims.reduced_fe.mesh_size import mesh_size_for
+from sims.reduced_fe.one_thread import one_thread
+from sims.reduced_fe.reduce import ReductionPlan, reduce_gear
+from sims.reduced_fe.reduced_gear import ReducedGear
+from sims.reduced_fe.sector_mesh import SectorMesh, sector_mesh
+from sims.reduced_fe.tooth_load import ToothLoad, load_tooth
+
+N_SLICES = 5
+"""Contact patches along the face, where the mesh has layers enough."""
+
+
+@dataclass(frozen=True)
+class GearBodyStudy:
+    """What was found of one gear.
+
+    Parameters
+    ----------
+    mesh : SectorMesh
+    quality : MeshQuality
+    gear : CyclicGear
+    modes : CyclicModes
+        Elastic ones.
+    load : ToothLoad
+        A tooth pushed in the middle of its flank, bore held.
+    reduced : ReducedGear or None
+    craig_bampton : CraigBamptonGear or None
+    """
+
+    mesh: SectorMesh
+    quality: MeshQuality
+    gear: CyclicGear
+    modes: CyclicModes
+    load: ToothLoad
+    reduced: ReducedGear | None
+    craig_bampton: CraigBamptonGear | None
+
+
+def study_gear(
+    blank: GearBlank,
+    n_dof: int,
+    *,
+    n_modes: int = 20,
+    held: Held = "free",
+    force_n: float = 1000.0,
+    reduce: bool = False,
+    on_progress: Callable[[str, float], None] = lambda _what, _done: None,
+) -> GearBodyStudy:
+    """Study one gear.
+
+    Parameters
+    ----------
+    blank : GearBlank
+    n_dof : int
+        Of the whole gear, about.
+    n_modes : int
+        Elastic modes, at least.
+    held : str
+        "free" or "bore".
+    force_n : float
+        On the tooth.
+    reduce : bool
+        Also reduce the gear both ways.
+    on_progress : callable
+        Told what is done and how much, 0 to 1.
+    """
+    on_progress("mesh", 0.0)
+    size = mesh_size_for(blank, n_dof)
+    check_memory(sector_bytes(blank, size))
+    mesh = sector_mesh(blank, size)
+    gear = CyclicGear(mesh)
+    on_progress("modes", 0.05)
+    with one_thread():
+        modes = cyclic_modes(gear, n_modes, held, elastic=held == "free")
+    on_progress("stress", 0.25 if reduce else 0.6)
+    load = load_tooth(mesh, force_n)
+    reduced = both = None
+    if reduce:
+        on_progress("free-interface reduction", 0.35)
+        reduced = reduce_gear(blank, ReductionPlan(size))
+        on_progress("Craig–Bampton reduction", 0.7)
+        both = craig_bampton(mesh, CraigBamptonPlan(n_slices=min(N_SLICES, mesh.tooth.shape[2])))
+    on_progress("done", 1.0)
+    return GearBodyStudy(mesh, mesh_quality(mesh), gear, modes, load, reduced, both)

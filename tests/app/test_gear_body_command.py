@@ -1,0 +1,47 @@
+"""`gearsig gear-body`: figures, files and text of one small gear."""
+
+import meshio
+import pytest
+from typer.testing import CliRunner
+
+from app.cli import app
+from sims.reduced_fe.gear_file import read_gear
+
+SMALL = ["--teeth", "16", "--profile-shift", "0.2", "--face", "10mm", "--bore", "8mm", "--dof", "15000"]
+
+
+def _run(*arguments):
+    return CliRunner().invoke(app, ["gear-body", *arguments])
+
+
+def test_mesh_modes_stress_and_reductions_are_written(tmp_path):
+    found = _run("-o", str(tmp_path / "out"), *SMALL, "--vtk", "--reduce", "--modes", "8")
+    assert found.exit_code == 0, found.output
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"mesh.png", "modes.png", "stress.png", "gear.vtu", "reduced.npz", "craig_bampton.txt"}
+    gear = read_gear(tmp_path / "out" / "reduced.npz")
+    assert gear.blank.n_teeth == 16
+    assert f"{gear.n_dof} degrees of freedom" in found.output
+    assert f"{gear.frequencies_hz[0]:.1f} Hz, {gear.nodal_diameters[0]} nodal diameters" in found.output
+    assert "Craig–Bampton: 229 degrees of freedom" in found.output
+    points = meshio.read(tmp_path / "out" / "gear.vtu").point_data
+    assert "von_mises_pa" in points
+    assert any(name.startswith("mode_1_") for name in points)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--teeth", "12"), "undercuts"),
+        (("--web", "30mm"), "thicker than the face"),
+        (("--dof", "9000"), "too coarse for the fillets"),
+        (("--held", "shaft"), "--held"),
+    ],
+)
+def test_what_cannot_be_is_refused(tmp_path, arguments, said):
+    from gearsig.errors import InputError
+
+    found = _run("-o", str(tmp_path / "out"), *arguments)
+    assert isinstance(found.exception, InputError)
+    assert said in str(found.exception)
+    assert not (tmp_path / "out").exists()
