@@ -43,7 +43,12 @@ def start_stop_analysis(
     else:
         try:
             examined = examine_start_stop(measure_motion(recording, rig))
-            findings += [*_backlash(examined, rig), *_impacts(examined), *_refusals(examined)]
+            findings += [
+                *_backlash(examined, rig),
+                *_weak_teeth(examined, rig),
+                *_impacts(examined),
+                *_refusals(examined),
+            ]
         except (RefusalError, InputError) as error:
             findings.append(_not_examined(error))
     bursts = _bursts(recording, problems)
@@ -158,6 +163,36 @@ def _backlash(examined: StartStop, rig: Rig) -> list[Finding]:
             ),
             surer="A recording of the same machine when it was new." if grown else "",
         )
+    ]
+
+
+def _weak_teeth(examined: StartStop, rig: Rig) -> list[Finding]:
+    """Name teeth of the driver that yield more than the others, as a cracked one does."""
+    found = examined.teeth
+    if found is None or rig.contact is None:
+        return []
+    pair = rig.contact.pair or rig.pairs[0].name
+    return [
+        Finding(
+            "weak-tooth",
+            Kind.SUSPICION,
+            f"Tooth {tooth} of the driver yields {found.extra_um[tooth - 1]:.3g} µm more than the others while it "
+            f"carries alone: it has lost {100.0 * found.stiffness_loss(tooth, rig.contact.exponent):.2g} % of its stiffness.",
+            Where(gear=pair, tooth=tooth),
+            Strength(
+                float(found.extra_um[tooth - 1]),
+                "µm",
+                float(found.uncertainty_um[tooth - 1]),
+                "scatter of the teeth",
+            ),
+            confidence=0.9,
+            confidence_basis="it stands out by five standard deviations; a crack, or a tooth out of place",
+            evidence=(
+                f"{found.n_samples[tooth - 1]} samples of that tooth; a pair yields {found.deflection_um:.3g} µm there",
+            ),
+            surer="A look at the root: a tooth that stands back from its place by as much looks the same at one load.",
+        )
+        for tooth in found.weak_teeth
     ]
 
 

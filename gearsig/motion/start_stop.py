@@ -15,6 +15,7 @@ from gearsig.motion.datum import find_datum
 from gearsig.motion.derivatives import local_polynomial
 from gearsig.motion.hysteresis import TorqueTwist, torque_twist
 from gearsig.motion.impacts import Impact, find_impacts
+from gearsig.motion.tooth_compliance import ToothCompliance, tooth_compliance
 from gearsig.motion.types import PairMotion
 from gearsig.phase.types import PhasePortrait
 
@@ -33,6 +34,8 @@ class StartStop:
     loop : TorqueTwist or None
     portrait : PhasePortrait or None
         Compression and its rate, from the middle of the play.
+    teeth : ToothCompliance or None
+        Of the driver's teeth one by one.
     indicators : tuple of Indicator
     refusals : tuple of str
         What could not be told, with the reason.
@@ -44,6 +47,7 @@ class StartStop:
     impacts: tuple[Impact, ...]
     loop: TorqueTwist | None
     portrait: PhasePortrait | None
+    teeth: ToothCompliance | None
     indicators: tuple[Indicator, ...]
     refusals: tuple[str, ...]
 
@@ -77,8 +81,14 @@ def examine_start_stop(motion: PairMotion) -> StartStop:
             refusals.append(f"impacts: {refusal}")
         if motion.torque_nm is not None:
             loop = torque_twist(motion, course, datum)
+    teeth: ToothCompliance | None = None
+    if motion.torque_nm is not None:
+        try:
+            teeth = tooth_compliance(motion)
+        except RefusalError as refusal:
+            refusals.append(f"stiffness of single teeth: {refusal}")
     indicators = start_stop_indicators(motion, course, backlash, impacts, loop)
-    return StartStop(motion, course, backlash, impacts, loop, portrait, indicators, tuple(refusals))
+    return StartStop(motion, course, backlash, impacts, loop, portrait, teeth, indicators, tuple(refusals))
 
 
 def course_of_angle(angle_rad: FloatArray, sampling_rate_hz: float) -> Course:

@@ -32,8 +32,8 @@ def stretch_order_spectrum(
     """Return the order spectrum of all stretches of one direction, however fast, slow or short they are.
 
     Each stretch is cut into equal steps of angle; a step holds the signal's mean over it, ∫x dθ/Δθ, so that slow
-    passages are averaged and do not fold back, and the passage to and from standstill needs no speed. Blocks of whole steps are
-    windowed (Hann), and their power is averaged over all stretches.
+    passages are averaged and do not fold back, and the passage to and from standstill needs no speed. Blocks of
+    whole steps are windowed (Hann), and their power is averaged over all stretches.
 
     Parameters
     ----------

@@ -12,6 +12,8 @@ is null. Members may be added within a version, never renamed or removed.
 - ``indicators``: each with ``name``, ``value``, ``unit``, ``computed_on``
 - ``teeth``: per tooth of the driver ``passes_forwards``, ``passes_backwards``, ``rms_forwards``, ``rms_backwards`` of
   ``signal`` in ``unit``; null where there was nothing to average
+- ``compliance``: null, or per tooth of the driver ``extra_um``, ``uncertainty_um``, ``n_samples``;
+  ``deflection_um`` and ``weak_teeth``
 - ``orders``: of the same signal, forwards: ``order`` and ``amplitude`` (peak) as lists; null where no stretch holds a
   revolution
 - ``refusals``: what could not be told
@@ -58,6 +60,9 @@ def start_stop_text(examined: StartStop) -> str:
                 f"Backlash {b.backlash_um:.4g} ± {b.uncertainty_um:.2g} µm along the line of action: {b.method}.", 100
             ),
         ]
+    if examined.teeth is not None:
+        weak = ", ".join(map(str, examined.teeth.weak_teeth))
+        lines.append(f"Teeth of the driver that yield more than the others: {weak or 'none'}.")
     if examined.impacts:
         lines += ["", f"{len(examined.impacts)} impacts, the hardest:"]
         lines += ["   time s  flank  tooth    speed m/s   energy J  restitution   force N"]
@@ -97,6 +102,7 @@ def start_stop_json(
             for i in examined.indicators
         ],
         "teeth": None if profile is None else _teeth(profile, signal, unit),
+        "compliance": _compliance(examined),
         "orders": None if orders is None else _orders(orders),
         "refusals": list(examined.refusals),
     }  # fmt: skip
@@ -111,6 +117,19 @@ def _teeth(profile: AngleProfile, signal: str, unit: str) -> Json:
         "passes_backwards": profile.passes_backwards.tolist(),
         "rms_forwards": [rounded(v) for v in profile.rms_forwards],
         "rms_backwards": [rounded(v) for v in profile.rms_backwards],
+    }
+
+
+def _compliance(examined: StartStop) -> Json | None:
+    found = examined.teeth
+    if found is None:
+        return None
+    return {
+        "extra_um": [rounded(v) for v in found.extra_um],
+        "uncertainty_um": [rounded(v) for v in found.uncertainty_um],
+        "n_samples": found.n_samples.tolist(),
+        "deflection_um": rounded(found.deflection_um),
+        "weak_teeth": list(found.weak_teeth),
     }
 
 

@@ -1,0 +1,62 @@
+"""A cracked tooth in a drive that starts and stops: by how much it yields, and that a sound one is left alone."""
+
+import numpy as np
+import pytest
+
+from gearsig import analyze
+from gearsig.errors import RefusalError
+from gearsig.motion.measure import measure_motion
+from gearsig.motion.tooth_compliance import tooth_compliance
+from gearsig.recording.types import Recording
+from sims import simulate
+from sims.effects import EffectSetting
+from sims.forging.simulator import ForgingManipulator
+from tests.motion.recordings import start_stop, without
+
+
+def cracked(depth_mm: float, preset: str, mode: str, seed: int = 0, tooth: int = 7) -> Recording:
+    return simulate(
+        "forging",
+        preset=preset,
+        parameters={"mode": mode},
+        effects=[EffectSetting("root_crack", depth_mm, {"tooth": tooth})],
+        duration_s=12.0,
+        sampling_rate_hz=1000.0,
+        seed=seed,
+    )
+
+
+@pytest.mark.parametrize("preset", ["manipulator_formula", "manipulator_table"])
+@pytest.mark.parametrize("mode", ["start-stop", "continuous"])
+def test_the_cracked_tooth_and_the_stiffness_it_has_lost(preset: str, mode: str) -> None:
+    effect = EffectSetting("root_crack", 6.0, {"tooth": 13})
+    weak = ForgingManipulator().prepare({}, None, preset_name=preset, settings=[effect]).drive.weak_tooth
+    assert weak is not None
+    found = tooth_compliance(measure_motion(cracked(6.0, preset, mode, tooth=13)))
+    assert found.weak_teeth == (13,)
+    assert found.stiffness_loss(13, 1.5) == pytest.approx(weak.loss, abs=0.02)
+    assert found.extra_um[12] > 5.0 * found.uncertainty_um[12]
+
+
+def test_sound_teeth_are_left_alone() -> None:
+    for preset in ("manipulator_formula", "manipulator_table"):
+        for mode in ("start-stop", "continuous"):
+            for seed in range(3):
+                assert tooth_compliance(measure_motion(cracked(0.0, preset, mode, seed))).weak_teeth == ()
+
+
+def test_the_analysis_suspects_it() -> None:
+    result = analyze(cracked(6.0, "manipulator_formula", "start-stop"))
+    weak = [f for f in result.findings if f.code == "weak-tooth"]
+    assert [f.where.tooth for f in weak] == [7]
+    assert "Tooth 7 of the driver" in result.verdict
+    assert "weak-tooth" not in [f.code for f in analyze(start_stop()).findings]
+
+
+def test_too_few_teeth_or_no_torque() -> None:
+    with pytest.raises(RefusalError, match="no torque"):
+        tooth_compliance(measure_motion(without(start_stop(), "torque")))
+    short = simulate("forging", parameters={"mode": "continuous"}, duration_s=0.6, sampling_rate_hz=1000.0)
+    with pytest.raises(RefusalError, match="carried alone"):
+        tooth_compliance(measure_motion(short))
+    assert np.isfinite(tooth_compliance(measure_motion(start_stop())).deflection_um)
