@@ -177,7 +177,8 @@ def _weak_teeth(examined: StartStop, rig: Rig) -> list[Finding]:
             "weak-tooth",
             Kind.SUSPICION,
             f"Tooth {tooth} of the driver yields {found.extra_um[tooth - 1]:.3g} µm more than the others while it "
-            f"carries alone: it has lost {100.0 * found.stiffness_loss(tooth, rig.contact.exponent):.2g} % of its stiffness.",
+            f"carries alone: it has lost {100.0 * found.stiffness_loss(tooth, rig.contact.exponent):.2g} % of its "
+            "stiffness.",
             Where(gear=pair, tooth=tooth),
             Strength(
                 float(found.extra_um[tooth - 1]),

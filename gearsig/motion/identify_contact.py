@@ -81,8 +81,8 @@ class ContactEquation:
         left: FloatArray = m.compression_m - zero - self.side * (a + yielding)
         return left
 
-    def solve(self) -> RobustFit:
-        """Fit the free parameters."""
+    def solve(self, *, with_jackknife: bool = True) -> RobustFit:
+        """Fit the free parameters; without the jackknife where their intervals are not wanted."""
         names = (*NAMES, *(f"damping {i}" for i in range(1, len(self.start) - len(NAMES) + 1)))
         rows = list(self.free)
         inertia = max(self.motion.contact.driver_inertia_kg_m2, 1e-3)
@@ -94,6 +94,7 @@ class ContactEquation:
             self.wanted,
             tuple(names[i] for i in rows),
             least_scatter=LEAST_SCATTER_M,
+            with_jackknife=with_jackknife,
         )
 
 

@@ -75,6 +75,7 @@ def robust_fit(
     names: tuple[str, ...],
     *,
     least_scatter: float = 0.0,
+    with_jackknife: bool = True,
 ) -> RobustFit:
     """Minimise the squares of the wanted residuals; leave out what is far off, and again.
 
@@ -88,6 +89,8 @@ def robust_fit(
     names : tuple of str
     least_scatter : float
         What the equation itself leaves out: a sample nearer than five times that is never left out.
+    with_jackknife : bool
+        Whether the covariance is widened by it; it costs eight further solutions.
 
     Raises
     ------
@@ -112,7 +115,9 @@ def robust_fit(
     inverse[lengths == 0.0, lengths == 0.0] = np.inf  # nothing depends on it: nothing is known of it
     power = float(np.mean(left[keep] ** 2)) * dependence(left[keep])
     covariance = np.where(inverse == 0.0, 0.0, inverse * power)
-    widened = _widening(residuals, x, scale, keep, np.sqrt(np.diag(covariance)))
+    widened = np.ones(len(x))
+    if with_jackknife:
+        widened = _widening(residuals, x, scale, keep, np.sqrt(np.diag(covariance)))
     return RobustFit(
         names,
         x * scale,

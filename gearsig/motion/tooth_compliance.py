@@ -69,7 +69,7 @@ def tooth_compliance(motion: PairMotion) -> ToothCompliance:
     if motion.torque_nm is None:
         raise RefusalError("no torque was measured", remedy="record the driver's torque")
     equation = contact_equation(motion)
-    fit = equation.solve()
+    fit = equation.solve(with_jackknife=False)
     single = _alone(equation)
     left = _at_equal_places(equation, equation.residuals(fit.values), single)
     tooth = (motion.path.tooth(motion.driver_angle_rad) - 1.0).astype(np.int64)

@@ -41,7 +41,7 @@ def test_the_cracked_tooth_and_the_stiffness_it_has_lost(preset: str, mode: str)
 def test_sound_teeth_are_left_alone() -> None:
     for preset in ("manipulator_formula", "manipulator_table"):
         for mode in ("start-stop", "continuous"):
-            for seed in range(3):
+            for seed in range(2):
                 assert tooth_compliance(measure_motion(cracked(0.0, preset, mode, seed))).weak_teeth == ()
 
 
