@@ -41,8 +41,9 @@ def simulator(name: str) -> Simulator:
 def gap_simulators() -> dict[str, GapSimulator]:
     """Return every simulator that takes part in the gap diagnosis, by its name."""
     from sims.cracked.twin import CrackedGapSimulator
+    from sims.reduced_fe.twin import ReducedGapSimulator
 
-    found: tuple[GapSimulator, ...] = (CrackedGapSimulator(),)
+    found: tuple[GapSimulator, ...] = (CrackedGapSimulator(), ReducedGapSimulator())
     return {simulator.name: simulator for simulator in found}
 
 

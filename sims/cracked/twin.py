@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
@@ -31,7 +31,9 @@ from sims.cracked.usual import (
     usual_parameters,
 )
 from sims.effects import EffectSetting, effect, effects
+from sims.mesh import PairGeometry
 from sims.presets import Preset, preset_text
+from sims.simulator import ParameterValue
 from sims.versions import sources_digest
 
 LONGEST_LEAD_REV = 8.0
@@ -63,7 +65,12 @@ class CrackedTwin:
         """Model, state of its code, and what is known of the rig."""
         known = {name: value for name, value in rig_to_dict(self.rig).items() if name not in ("name", "sources")}
         told = repr(known) + (repr(self.further) if self.further else "")
-        return f"{NAME} {sources_digest()} {sha256(told.encode()).hexdigest()[:16]}"
+        return f"{self.model} {sources_digest()} {sha256(told.encode()).hexdigest()[:16]}"
+
+    @property
+    def model(self) -> str:
+        """Name of the model whose preset the twin is."""
+        return NAME
 
     @property
     def point(self) -> Point:
@@ -85,27 +92,21 @@ class CrackedTwin:
         Flanks, tolerances and housing follow from `seed` alone. Sensor noise, tachometer jitter and where the run
         starts follow from seed and noise; run 0 starts at the driver's first tooth.
         """
-        from sims.cracked.simulate import simulate_machine
-
         count(seed, "seed", minimum=0)
         own = self.preset(point, added, seed=seed)
-        rng = np.random.default_rng(seed)
-        ready = prepare_preset(own, {}, (), None, rng, sampling_rate_hz=sampling_rate_hz)
         run_rng = np.random.default_rng([seed, count(noise, "noise", minimum=0)])
         skipped = 0
         if noise:
             skipped = round(run_rng.uniform(0.0, LONGEST_LEAD_REV) * 60.0 / point.speed_rpm * sampling_rate_hz)
-        recording = simulate_machine(
-            ready.machine,
-            ready.operation,
-            rng=rng,
+        recording = self._simulated(
+            own,
+            point,
+            seed,
             sampling_rate_hz=sampling_rate_hz,
             duration_s=duration_s + skipped / sampling_rate_hz,
-            rig=self._rig_at(point),
-            truth={**ready.truth(), "seed": seed, "noise": noise},
-            step_s=self._step_s(own),
             noise_rng=run_rng if noise else None,
         )
+        recording = replace(recording, truth={**(recording.truth or {}), "seed": seed, "noise": noise})
         return replace(recording, samples=recording.samples[:, skipped:]) if skipped else recording
 
     def candidates(self, name: str) -> Sequence[Added]:
@@ -145,7 +146,7 @@ class CrackedTwin:
         title = f"Twin of {self.rig.name}" if self.rig.name else "Twin of a rig"
         return Preset(
             name="twin",
-            model=NAME,
+            model=self.model,
             title=f"{title}: {self.nominal.teeth[0]}/{self.nominal.teeth[1]}, module {self.nominal.module_mm:g}",
             sources=(*self.rig.sources, *notes),
             assumed=(
@@ -155,7 +156,7 @@ class CrackedTwin:
                 *(f"{name}: usual, the rig does not tell" for name in self.nominal.assumed),
             ),
             does_not_represent=("the real machine's own flanks, tolerances and housing",),
-            parameters=MappingProxyType(as_plain(values)),
+            parameters=MappingProxyType(as_plain(self._own_parameters(values))),
             speed_rpm=point.speed_rpm,
             torque_nm=point.torque_nm,
             effects=tuple(EffectSetting(a.name, a.severity, dict(a.options)) for a in added),
@@ -163,14 +164,14 @@ class CrackedTwin:
         )
 
     def preset_toml(self, point: Point, added: Sequence[Added], notes: Sequence[str], *, seed: int = 0) -> str:
-        """Return the machine with the effects as a preset file for `gearsig simulate cracked --preset FILE`."""
+        """Return the machine with the effects as a preset file for `gearsig simulate MODEL --preset FILE`."""
         comments = [f"The flanks' profiles are not in this file: simulate with --seed {seed} for those of the twin."]
         return preset_text(self.preset(point, added, seed=seed, notes=notes), comments)
 
     @cached_property
     def _surroundings(self) -> Surroundings:
         point = Point(self.nominal.speed_rpm, self.nominal.torque_nm)
-        pair = prepare_preset(self.preset(point), {}, (), None, np.random.default_rng(0)).machine.mesh.pair
+        pair = self._geometry(self.preset(point))
         shafts = (self.rig.pairs[0].driver, self.rig.pairs[0].driven)
         own = tuple(completed(b, self.nominal.size) for b in self.rig.bearings if b.shaft in shafts)
         sound = self.run(self.point, seed=0, duration_s=VIBRATION_S, sampling_rate_hz=20480.0)
@@ -180,6 +181,41 @@ class CrackedTwin:
     def _reaches(self, name: str) -> list[tuple[Options, tuple[float, float]]]:
         plausible, machine = _plausible(name), self._surroundings
         return [(o, plausible.reach(name, machine, o)) for o in plausible.choices(machine)]
+
+    def _simulated(
+        self,
+        own: Preset,
+        point: Point,
+        seed: int,
+        *,
+        sampling_rate_hz: float,
+        duration_s: float,
+        noise_rng: np.random.Generator | None,
+    ) -> Recording:
+        """Run a specimen and measure it."""
+        from sims.cracked.simulate import simulate_machine
+
+        rng = np.random.default_rng(seed)
+        ready = prepare_preset(own, {}, (), None, rng, sampling_rate_hz=sampling_rate_hz)
+        return simulate_machine(
+            ready.machine,
+            ready.operation,
+            rng=rng,
+            sampling_rate_hz=sampling_rate_hz,
+            duration_s=duration_s,
+            rig=self._rig_at(point),
+            truth=ready.truth(),
+            step_s=self._step_s(own),
+            noise_rng=noise_rng,
+        )
+
+    def _own_parameters(self, values: dict[str, ParameterValue]) -> dict[str, ParameterValue]:
+        """Return what is usual in the model's own parameters."""
+        return values
+
+    def _geometry(self, own: Preset) -> PairGeometry:
+        """Return the geometry of a specimen's pair."""
+        return prepare_preset(own, {}, (), None, np.random.default_rng(0)).machine.mesh.pair
 
     def _step_s(self, own: Preset) -> float:
         """Step of the integrator: that of the sound machine, so that effects leave the drawn noise as it is.
@@ -207,19 +243,7 @@ class CrackedGapSimulator:
 
     def gap_effects(self) -> Mapping[str, GapEffect]:
         """Return all effects of the catalogue: each has a meaning for this model."""
-        return {
-            e.name: GapEffect(
-                e.name,
-                e.group,
-                e.title,
-                e.severity.name,
-                e.severity.unit,
-                e.signature,
-                e.shows_in,
-                e.group == "measurement chain",
-            )
-            for e in effects().values()
-        }
+        return gap_effects_of(effects())
 
     def twin_of(self, rig: Rig) -> CrackedTwin:
         """Return a twin of the rig.
@@ -236,6 +260,23 @@ class CrackedGapSimulator:
         except InputError as error:
             raise RefusalError(f"the model {NAME!r} cannot be set to this rig: {error}") from None
         return twin
+
+
+def gap_effects_of(names: Iterable[str]) -> dict[str, GapEffect]:
+    """Return effects of the catalogue as the gap diagnosis sees them."""
+    return {
+        e.name: GapEffect(
+            e.name,
+            e.group,
+            e.title,
+            e.severity.name,
+            e.severity.unit,
+            e.signature,
+            e.shows_in,
+            e.group == "measurement chain",
+        )
+        for e in map(effect, names)
+    }
 
 
 def _plausible(name: str) -> Plausible:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 from sims.cracked.build import build_machine
+from sims.cracked.installed import Installed
 from sims.cracked.wanted import Wanted
 from sims.machine import Machine
 from sims.mesh import GearGeometry, Material
@@ -34,7 +35,9 @@ def reduced_gears(values: Values) -> Gears:
     return _gear(_blank(wanted, 0), n_dof), _gear(_blank(wanted, 1), n_dof)
 
 
-def sound_machine(values: Values, gears: Gears, *, sampling_rate_hz: float = 20480.0) -> Machine:
+def sound_machine(
+    values: Values, gears: Gears, *, sampling_rate_hz: float = 20480.0, installed: Installed | None = None
+) -> Machine:
     """Return the machine without effects: that of the 16-DOF pair, with masses and inertias of gears and hubs."""
     wanted = Wanted(values)
     shared: Values = {name: value for name, value in values.items() if name not in OWN}
@@ -43,7 +46,7 @@ def sound_machine(values: Values, gears: Gears, *, sampling_rate_hz: float = 204
         shared[f"mass_{side}_kg"] = gear.mass_kg + wanted.number(f"hub_mass_{side}_kg")
         hub = wanted.number(f"hub_inertia_{side}_kg_m2")
         shared[f"inertia_{side}_kg_m2"] = gear.polar_inertia_kg_m2 + hub
-    return build_machine(shared, sampling_rate_hz=sampling_rate_hz)
+    return build_machine(shared, sampling_rate_hz=sampling_rate_hz, installed=installed)
 
 
 def flexible_pair(values: Values, machine: Machine, gears: Gears) -> FlexiblePair:

@@ -12,6 +12,7 @@ import numpy as np
 from gearsig.checks import within
 from gearsig.errors import InputError
 from gearsig.recording.types import Recording
+from sims.cracked.installed_table import installed_of
 from sims.cracked.simulator import DURATION_RANGE_S, check_load, check_run, truth_of
 from sims.effects import EffectSetting, effect, effects, with_effects
 from sims.machine.operation import Operation
@@ -192,7 +193,8 @@ def prepare_preset(
         _check_meaning(setting)
     complete = tuple(EffectSetting(s.name, s.severity, effect(s.name).complete(s.options)) for s in wanted)
     gears = reduced_gears(values)
-    sound = sound_machine(values, gears, sampling_rate_hz=sampling_rate_hz)
+    installed = installed_of(chosen.installed) if chosen.installed else None
+    sound = sound_machine(values, gears, sampling_rate_hz=sampling_rate_hz, installed=installed)
     check_load(sound, run)
     machine = with_effects(sound, complete, rng)
     if machine.roughness.locked_to == "time" and machine.roughness.rms_um > 0.0:

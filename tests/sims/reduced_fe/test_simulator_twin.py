@@ -1,0 +1,87 @@
+"""The flexible pair set to a rig, for the gap diagnosis."""
+
+import pickle
+from collections.abc import Iterator
+from functools import cache
+
+import numpy as np
+import pytest
+
+from gearsig.errors import RefusalError
+from gearsig.gap.simulator import Added, Point
+from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
+from sims import simulate
+from sims.reduced_fe.simulator import WITHOUT_MEANING
+from sims.reduced_fe.twin import ReducedTwin
+from sims.registry import gap_simulator
+from tests.sims.reduced_fe.synthetic import synthetic_gear
+
+POINT = Point(1800.0, 40.0)
+RIG = Rig(
+    "bench",
+    (Shaft("pinion"), Shaft("wheel")),
+    (GearPair("pair", "pinion", "wheel", 21, 50, 2.0, 20.0, 18.0),),
+    (Bearing("P1", "pinion", 9, 7.94, 39.04),),
+    (Sensor("acc", "acceleration", "m/s^2", "over P1, vertical"),),
+    OperatingPoint("wheel", 756.0, torque_nm=100.0),
+)
+CRACK = Added("root_crack", 2.0, {"gear": "driver", "tooth": 4.0})
+
+
+@pytest.fixture(scope="module")
+def twin() -> Iterator[ReducedTwin]:
+    """Of synthetic gears: how gears are reduced is tested elsewhere."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sims.reduced_fe.build._gear", cache(lambda blank, _n_dof: synthetic_gear(blank.geometry)))
+        made = gap_simulator("reduced-fe").twin_of(RIG)
+        assert isinstance(made, ReducedTwin)
+        yield made
+
+
+def run(twin, added=(), *, seed=0, noise=0):
+    return twin.run(POINT, added, seed=seed, noise=noise, duration_s=0.1, sampling_rate_hz=20480.0)
+
+
+def test_the_twin_is_the_rig_with_this_model(twin):
+    found = run(twin)
+    assert found.rig is not None
+    assert found.rig.pairs == RIG.pairs
+    assert found.truth["model"] == "reduced-fe"
+    assert found.truth["parameters"]["teeth_driven"] == 50
+    assert found.channel_names[0] == "acc"
+    assert twin.key.startswith("reduced-fe ")
+
+
+def test_an_effect_alone_makes_the_difference(twin):
+    sound, cracked, other = run(twin), run(twin, (CRACK,)), run(twin, seed=1)
+    np.testing.assert_array_equal(sound.samples, run(twin).samples)
+    change = np.std(cracked.samples[0] - sound.samples[0])
+    assert 1e-3 * np.std(sound.samples[0]) < change < np.std(other.samples[0] - sound.samples[0])
+    assert not np.array_equal(run(twin, noise=1).samples[0], sound.samples[0])
+
+
+def test_effects_of_the_model_have_candidates(twin):
+    known = gap_simulator("reduced-fe").gap_effects()
+    assert not set(known) & set(WITHOUT_MEANING)
+    for name in ("root_crack", "tooth_wear", "eccentricity", "transfer_path"):
+        candidates = twin.candidates(name)
+        assert len(candidates) >= 2
+        assert twin.draw(name, np.random.default_rng(1)).name == name
+
+
+def test_the_preset_of_a_diagnosis_runs_again(twin, tmp_path):
+    path = tmp_path / "twin.toml"
+    path.write_text(twin.preset_toml(POINT, (CRACK,), (), seed=0), encoding="utf-8")
+    again = simulate("reduced-fe", preset=str(path), duration_s=0.2, seed=0)
+    assert again.truth["effects"][0]["name"] == "root_crack"
+    assert again.truth["parameters"]["mesh_dof"] == 45000.0
+
+
+def test_twins_travel_between_processes(twin):
+    assert pickle.loads(pickle.dumps(twin)).key == twin.key  # noqa: S301 - our own bytes
+
+
+def test_a_rig_without_a_module_is_refused():
+    rig = Rig("x", (Shaft("a"), Shaft("b")), (GearPair("p", "a", "b", 21, 50),))
+    with pytest.raises(RefusalError, match="module_mm"):
+        gap_simulator("reduced-fe").twin_of(rig)
