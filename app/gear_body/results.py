@@ -52,7 +52,7 @@ def figures(study: GearBodyStudy) -> dict[str, Figure]:
     g = mesh.blank.geometry
     name = f"{g.teeth} teeth, module {g.module_mm:g} mm"
     near = (g.root_radius_mm - 3.0 * g.module_mm, g.tip_radius_mm + 0.5 * g.module_mm)
-    across = 1.55 * np.pi * g.module_mm
+    across = 0.95 * np.pi * g.module_mm
     quality = study.quality.scaled_jacobian[view.cells]
     shapes = {_label(study, k): _shape(study, view, k) for k in range(min(N_SHOWN, len(study.modes.frequencies_hz)))}
     return {

@@ -151,7 +151,7 @@ def gear_stress_figure(
         tail = place - span * direction / np.hypot(*direction)
         ends = [(float(x), float(y)) for x, y in (place, tail)]
         axes.annotate("", xy=ends[0], xytext=ends[1], arrowprops={"arrowstyle": "-|>", "color": style.FAULT, "lw": 2.0})
-        axes.text(*ends[1], f" {text}", color=style.FAULT, fontsize=style.SMALL_PT, ha="left", va="bottom")
+        axes.text(*ends[1], text, color=style.FAULT, fontsize=style.SMALL_PT, ha="center", va="bottom")
     style.label_axes(axes, "x (mm)", "y (mm)")
     beyond = top < float(stress[inside].max())
     _bar(figure, drawn, "von Mises stress (MPa)", (0.95 + wide_in, 0.55, TALL_IN), extend=beyond)

@@ -11,15 +11,16 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from scipy import sparse
 
-from gearsig.checks import FloatArray
+from gearsig.checks import FloatArray, frozen_array
+from gearsig.errors import InputError
 from sims.reduced_fe.elements import sector_matrices
 from sims.reduced_fe.hub import hub_rows, hub_sum
 from sims.reduced_fe.mirror import RealFolded, SectorMirror
 from sims.reduced_fe.sector_mesh import SectorMesh
 from sims.reduced_fe.sector_plane import IntArray
 
-Held = Literal["free", "bore", "sprung"]
-"""The gear floats, every node of its bore is held, or springs at the hub hold it."""
+Held = Literal["free", "bore"]
+"""The bore is free, but for springs at the hub if there are any, or every node of it is held."""
 
 Solver = Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
 
@@ -69,6 +70,17 @@ class CyclicGear:
 
     mesh: SectorMesh
     hub_stiffness: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        if self.hub_stiffness is None:
+            return
+        springs = frozen_array(self.hub_stiffness, "hub_stiffness", ndim=1)
+        if springs.shape != (6,) or springs.min() <= 0.0 or springs[0] != springs[1] or springs[3] != springs[4]:
+            raise InputError(
+                f"hub_stiffness is {springs.tolist()}",
+                allowed="six numbers above 0, the first two equal, and the fourth and fifth",
+            )
+        object.__setattr__(self, "hub_stiffness", springs)
 
     @property
     def n_sectors(self) -> int:
@@ -210,7 +222,7 @@ class CyclicGear:
     def _fixed(self, n: int, held: Held) -> IntArray:
         if held == "bore":
             return self.bore_dof
-        if n > 1 or held == "sprung":
+        if n > 1 or self.hub_stiffness is not None:
             return np.empty(0, dtype=np.int64)
         node = int(self.own_places[self.mesh.bore[0, 0]])
         return np.array([3 * node + 1, 3 * node + 2])

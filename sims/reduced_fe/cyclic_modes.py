@@ -92,7 +92,7 @@ def lowest_with_static(
     gear: CyclicGear, n: int, n_shapes: int, loads: ComplexArray
 ) -> tuple[FloatArray, ComplexArray, ComplexArray]:
     """Frequencies and shapes as `modes_of_diameter`, of a gear on springs, and its static answers to loads."""
-    problem = _problem(gear, n, "sprung")
+    problem = _problem(gear, n, "free")
     frequencies, shapes = _lowest(problem, n_shapes)
     return frequencies, shapes, problem.static(loads)
 
@@ -123,7 +123,8 @@ def _problem(gear: CyclicGear, n: int, held: Held) -> _Problem:
         kept = np.setdiff1d(kept, gear.bore_dof)
         stiffness, mass = stiffness[kept][:, kept], mass[kept][:, kept]
     # A shift below zero makes the matrix definite where the gear floats; it costs a few more steps elsewhere.
-    shift = -((2.0 * pi * 300.0) ** 2) if held == "free" and n <= 1 else 0.0
+    floats = held == "free" and gear.hub_stiffness is None and n <= 1
+    shift = -((2.0 * pi * 300.0) ** 2) if floats else 0.0
     solve = factorised(sparse.csc_array(stiffness - shift * mass) if shift else stiffness)
     scale = _multiplicity(n, gear.n_sectors) / gear.n_sectors
     return _Problem(stiffness, mass, kept, n_own, shift, solve, basis, scale)

@@ -48,6 +48,7 @@ def write_gear(path: str | Path, gear: ReducedGear) -> None:
         handle, part = tempfile.mkstemp(dir=target.parent, prefix=".gear-", suffix=".part")
         with os.fdopen(handle, "wb") as file:
             np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays)
+        Path(part).chmod(0o644)  # temporary files are for their owner only
         Path(part).replace(target)
     except OSError as error:
         raise InputError(

@@ -34,6 +34,9 @@ _SOURCES = (
 )
 """Files of this folder whose code changes a reduced gear."""
 
+_OUTLINE = ("geometry", "involute", "profile")
+"""Files of `sims.mesh` that make the outline."""
+
 
 def gear_key(blank: GearBlank, plan: ReductionPlan) -> str:
     """Return a digest of all that makes a reduced gear."""
@@ -45,6 +48,7 @@ def gear_key(blank: GearBlank, plan: ReductionPlan) -> str:
 def code_digest() -> str:
     """Return a digest of the code that meshes and reduces."""
     digest = sha256()
-    for name in _SOURCES:
-        digest.update((Path(__file__).parent / f"{name}.py").read_bytes())
+    here = Path(__file__).parent
+    for path in (*(here / f"{name}.py" for name in _SOURCES), *(here.parent / "mesh" / f"{m}.py" for m in _OUTLINE)):
+        digest.update(path.read_bytes())
     return digest.hexdigest()[:16]

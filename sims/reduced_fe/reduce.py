@@ -165,7 +165,7 @@ def _response(gear: CyclicGear, n: int, loads: AnyArray, held: Held) -> AnyArray
     """Displacements for loads of one nodal diameter; of a free gear, what is left beside its rigid motion."""
     solve = gear.solver(n, held)
     rigid = gear.rigid(n)
-    if held != "free" or not rigid.shape[1]:
+    if held == "bore" or gear.hub_stiffness is not None or not rigid.shape[1]:
         return solve(loads)
     inertia = gear.mass.at(gear.phase_rad(n)) @ rigid
     balanced = loads - inertia @ (rigid.conj().T @ loads)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gearsig.checks import FloatArray
+from gearsig.errors import InputError
 from sims.mesh import Material
 from sims.reduced_fe.blank import GearBlank
 from sims.reduced_fe.cyclic import CyclicGear
@@ -80,6 +81,12 @@ def test_springs_at_the_hub_carry_the_gear_as_a_rigid_body() -> None:
     q = mesh_quality(mesh)
     masses = np.array([q.mass_kg] * 3 + [q.diametral_inertia_kg_m2] * 2 + [q.polar_inertia_kg_m2])
     np.testing.assert_allclose(mounted, np.sort(np.sqrt(springs / masses)) / (2 * np.pi), rtol=2e-4)
+
+
+@pytest.mark.parametrize("springs", [[1e8] * 5, [1e8, 2e8, 1e8, 1e4, 1e4, 1e4], [1e8, 1e8, 0.0, 1e4, 1e4, 1e4]])
+def test_springs_that_are_not_alike_all_round_are_refused(springs: list[float]) -> None:
+    with pytest.raises(InputError, match="hub_stiffness is"):
+        CyclicGear(small_cyclic().mesh, np.array(springs))
 
 
 def test_stiffer_springs_approach_the_clamped_hub() -> None:
