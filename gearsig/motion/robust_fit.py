@@ -115,7 +115,7 @@ def robust_fit(
     inverse[lengths == 0.0, lengths == 0.0] = np.inf  # nothing depends on it: nothing is known of it
     power = float(np.mean(left[keep] ** 2)) * dependence(left[keep])
     covariance = np.where(inverse == 0.0, 0.0, inverse * power)
-    widened = np.ones(len(x))
+    widened: FloatArray = np.ones(len(x))
     if with_jackknife:
         widened = _widening(residuals, x, scale, keep, np.sqrt(np.diag(covariance)))
     return RobustFit(

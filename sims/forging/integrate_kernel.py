@@ -23,9 +23,7 @@ DONE, TOO_MANY_CONTACTS, STUCK = 0, 1, 2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def integrate(  # noqa: PLR0912, PLR0915  the loop of a solver with events
-    k, y, mode, t, t_end, first_step, course, absolute, relative, interval, select, counts, found, contacts
-):
+def integrate(k, y, mode, t, t_end, first_step, course, absolute, relative, interval, select, counts, found, contacts):
     """Run from t to `t_end`; fill rows of `found` at multiples of `interval` and rows of `contacts`.
 
     y : states, left at the end's.
@@ -37,9 +35,8 @@ def integrate(  # noqa: PLR0912, PLR0915  the loop of a solver with events
     Returns the last step's length and a status.
     """
     n = y.shape[0]
-    stages, end, at = np.empty((N_STAGES, n)), np.empty(n), np.empty(n)
-    out, extra = np.empty(N_OUT), np.empty(N_OUT)
-    spare, row = np.empty(n), np.empty(N_SIGNALS)
+    stages, end = np.empty((N_STAGES, n)), np.empty(n)
+    out, spare = np.empty(N_OUT), np.empty((2, n))
     h = first_step
     evaluate(k, y, t, mode, course, stages[0], out)
     while t < t_end - 1e-15 * max(1.0, t_end):
@@ -60,30 +57,15 @@ def integrate(  # noqa: PLR0912, PLR0915  the loop of a solver with events
         changes = next_flank != mode[0]
         if changes:
             h = _to_event(k, y, t, h, mode, course, stages, end, out, next_flank)
-        while counts[0] < found.shape[0] and counts[0] * interval <= t + h:
-            x = (counts[0] * interval - t) / h
-            for i in range(n):
-                at[i] = within_step(y, h, stages, x, i)
-            evaluate(k, at, t + x * h, mode, course, spare, extra)
-            row[:N_OUT] = extra
-            row[N_OUT] = energy(k, at, mode[0], mode[1])
-            row[N_OUT + 1 : N_SIGNALS] = at[8:11]
-            for i in range(select.shape[0]):
-                found[counts[0], i] = row[select[i]]
-            counts[0] += 1
+        if counts[0] < found.shape[0] and counts[0] * interval <= t + h:
+            _fill_rows(k, y, t, h, mode, course, stages, interval, select, counts, found, spare)
         t += h
         y[:] = end
         if mode[0] != 0.0:
             contacts[counts[1] - 1, 7] = max(contacts[counts[1] - 1, 7], abs(out[7]))
         if changes:
-            if mode[0] != 0.0:
-                _close(contacts[counts[1] - 1], t, y)
-            if next_flank != 0.0:
-                if counts[1] == contacts.shape[0]:
-                    return h, TOO_MANY_CONTACTS
-                open_contact(k, y, t, next_flank, mode, contacts[counts[1]])
-                counts[1] += 1
-            mode[0] = next_flank
+            if not _change_contact(k, y, t, next_flank, mode, counts, contacts):
+                return h, TOO_MANY_CONTACTS
             evaluate(k, y, t, mode, course, stages[0], out)
             h = min(free, 1e-5)
             continue
@@ -94,6 +76,38 @@ def integrate(  # noqa: PLR0912, PLR0915  the loop of a solver with events
         grown = h * min(5.0, 0.9 * max(error, 1e-10) ** -0.2)
         h = max(grown, free) if h < free else grown
     return h, DONE
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _fill_rows(k, y, t, h, mode, course, stages, interval, select, counts, found, spare):
+    """Fill the rows of `found` whose times lie within a step."""
+    extra, row = np.empty(N_OUT), np.empty(N_SIGNALS)
+    at = spare[0]
+    while counts[0] < found.shape[0] and counts[0] * interval <= t + h:
+        x = (counts[0] * interval - t) / h
+        for i in range(y.shape[0]):
+            at[i] = within_step(y, h, stages, x, i)
+        evaluate(k, at, t + x * h, mode, course, spare[1], extra)
+        row[:N_OUT] = extra
+        row[N_OUT] = energy(k, at, mode[0], mode[1])
+        row[N_OUT + 1 : N_SIGNALS] = at[8:11]
+        for i in range(select.shape[0]):
+            found[counts[0], i] = row[select[i]]
+        counts[0] += 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _change_contact(k, y, t, next_flank, mode, counts, contacts):
+    """End the contact there is, begin the next; false where no row is left for it."""
+    if mode[0] != 0.0:
+        _close(contacts[counts[1] - 1], t, y)
+    if next_flank != 0.0:
+        if counts[1] == contacts.shape[0]:
+            return False
+        open_contact(k, y, t, next_flank, mode, contacts[counts[1]])
+        counts[1] += 1
+    mode[0] = next_flank
+    return True
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil
 
@@ -54,7 +54,6 @@ class DriveResponse:
     contacts: FloatArray
     n_steps: int
     n_refused: int = 0
-    final: FloatArray = field(default_factory=lambda: np.empty(0))
 
     @property
     def time_s(self) -> FloatArray:
@@ -158,7 +157,6 @@ def respond(
         contacts[: counts[1]].copy(),
         int(counts[2]),
         int(counts[3]),
-        y.copy(),
     )
 
 
