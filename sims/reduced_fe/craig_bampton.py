@@ -12,6 +12,7 @@ from sims.reduced_fe.accuracy import ReductionAccuracy, matched
 from sims.reduced_fe.cyclic import CyclicGear
 from sims.reduced_fe.cyclic_modes import CyclicModes, cyclic_modes, lowest_with_static
 from sims.reduced_fe.hub import ComplexArray
+from sims.reduced_fe.memory import check_memory, craig_bampton_bytes
 from sims.reduced_fe.one_thread import one_thread
 from sims.reduced_fe.sector_mesh import SectorMesh
 from sims.reduced_fe.sector_plane import IntArray
@@ -131,9 +132,15 @@ def craig_bampton(mesh: SectorMesh, plan: CraigBamptonPlan | None = None, n_comp
     n_compared : int
         Elastic modes compared.
 
+    Raises
+    ------
+    InputError
+        If there are more slices than layers of nodes, or the memory does not suffice.
+
     Source: R. R. Craig, M. C. C. Bampton, Coupling of substructures for dynamic analyses, AIAA Journal 6 (1968).
     """
     used = CraigBamptonPlan() if plan is None else plan
+    check_memory(craig_bampton_bytes(mesh.blank, mesh.size, n_compared))
     with one_thread():
         free = CyclicGear(mesh)
         reference = cyclic_modes(free, n_compared, elastic=True)

@@ -1,62 +1,47 @@
-"""Modes by cyclic symmetry beside those of the whole gear, and the two reductions of a 277 000-DoF gear.
+"""How long the sweep of six million steps takes, and how far a smaller step changes its rms values.
 
-Run as `python tests/benchmarks/bench_reduced_fe.py`, `--whole` adds the whole matrices at that size (4 GB, minutes).
+`python tests/benchmarks/bench_reduced_fe.py` prints processor seconds of one core and the machine's load beside them.
 """
 
-import resource
-import sys
-from collections.abc import Callable
-from time import perf_counter
+import os
+import time
 
-from sims.reduced_fe.craig_bampton import craig_bampton
-from sims.reduced_fe.cyclic import CyclicGear
-from sims.reduced_fe.cyclic_modes import cyclic_modes
-from sims.reduced_fe.full_gear import full_modes
-from sims.reduced_fe.mesh_size import MeshSize, mesh_size_for
-from sims.reduced_fe.one_thread import one_thread
-from sims.reduced_fe.ready import READY
-from sims.reduced_fe.reduce import plan_for, reduce_gear
-from sims.reduced_fe.sector_mesh import SectorMesh, sector_mesh
+import numpy as np
 
-GEAR = READY["z50_m3"]
-WANTED = 277_200
+from sims.presets import preset
+from sims.reduced_fe.dynamics_constants import FlexiblePair
+from sims.reduced_fe.dynamics_sweep import speed_sweep
+from sims.reduced_fe.simulator import NAME, prepare_preset
+
+SWEEP_S = 15.0
 
 
-def seconds(work: Callable[[], object]) -> float:
-    start = perf_counter()
-    work()
-    return perf_counter() - start
-
-
-def peak_gb() -> float:
-    """Of this process since it began; the largest job comes last."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-
-
-def compare_modes(mesh: SectorMesh) -> None:
-    cyclic = min(seconds(lambda: cyclic_modes(CyclicGear(mesh), 20)) for _ in range(2))
-    whole = seconds(lambda: full_modes(CyclicGear(mesh), 20))
-    print(f"20 modes of {mesh.n_dof:7d} DoF: cyclic {cyclic:7.2f} s, whole {whole:7.2f} s, ratio {whole / cyclic:5.1f}")
+def pair_of(name: str, **parameters: float) -> FlexiblePair:
+    return prepare_preset(preset(NAME, name), parameters, (), None, np.random.default_rng(0)).pair
 
 
 def main() -> None:
-    with one_thread():
-        for size in (MeshSize(2, 1, 3, 1, 1, 1), MeshSize(2, 1, 4, 1, 2, 2)):
-            compare_modes(sector_mesh(GEAR, size))
-        mesh = sector_mesh(GEAR, mesh_size_for(GEAR, WANTED))
-        took = seconds(lambda: cyclic_modes(CyclicGear(mesh), 20))
-        print(f"20 modes of {mesh.n_dof:7d} DoF: cyclic {took:7.2f} s")
-        plan = plan_for(GEAR, WANTED)
-        print(f"free-interface reduction {seconds(lambda: reduce_gear(GEAR, plan)):7.2f} s, peak {peak_gb():.2f} GB")
-        start = perf_counter()
-        accuracy = craig_bampton(mesh).accuracy
+    speed_sweep(pair_of("flexible_50_50"), 170.0, 900.0, 950.0, 0.05, n_parts=5)  # compiles
+    kinds = {"mirrored slices (3 for 5)": {}, "all five slices": {"lead_error_um": 1e-9}}
+    for words, extra in kinds.items():
+        pair = pair_of("light_damping_50_50", **extra)
+        steps, used = 0, time.process_time()
+        sweeps = [speed_sweep(pair, 170.0, *ends, SWEEP_S) for ends in ((900.0, 4100.0), (4100.0, 900.0))]
+        steps, used = sum(s.n_steps for s in sweeps), time.process_time() - used
+        print(f"{words}: {steps:.1e} steps in {used:.1f} s of processor time, load {os.getloadavg()[0]:.1f}")
+    fine = [
+        speed_sweep(pair_of("light_damping_50_50"), 170.0, *e, SWEEP_S, step_s=2.5e-6)
+        for e in ((900.0, 4100.0), (4100.0, 900.0))
+    ]
+    coarse = [
+        speed_sweep(pair_of("light_damping_50_50"), 170.0, *e, SWEEP_S) for e in ((900.0, 4100.0), (4100.0, 900.0))
+    ]
+    for way, one, two in zip(("up", "down"), coarse, fine, strict=True):
+        off = np.abs(one.rms_m / two.rms_m - 1.0)
         print(
-            f"Craig–Bampton to 229 {perf_counter() - start:7.2f} s, peak {peak_gb():.2f} GB, "
-            f"worst of 20 frequencies {100 * accuracy.worst_error:.4f} %, least subspace MAC {accuracy.least_mac:.6f}"
+            f"sweep {way}: rms at 5 µs against 2.5 µs: median {np.median(off):.2%}, 95 % {np.quantile(off, 0.95):.2%}, "
+            f"parts off by more than 5 %: {np.count_nonzero(off > 0.05)} of {len(off)}"
         )
-        if "--whole" in sys.argv:
-            compare_modes(mesh)
-            print(f"peak {peak_gb():.2f} GB")
 
 
 if __name__ == "__main__":

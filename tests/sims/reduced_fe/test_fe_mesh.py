@@ -10,7 +10,7 @@ from gearsig.errors import InputError
 from sims.mesh import GearGeometry, Material
 from sims.reduced_fe.blank import GearBlank, blank_from_text
 from sims.reduced_fe.elements import cylindrical_turn, sector_matrices
-from sims.reduced_fe.memory import check_memory, full_bytes, sector_bytes
+from sims.reduced_fe.memory import check_memory, craig_bampton_bytes, full_bytes, sector_bytes
 from sims.reduced_fe.mesh_quality import mesh_quality
 from sims.reduced_fe.mesh_size import MeshSize, mesh_size_for, n_dof_of
 from sims.reduced_fe.sector_mesh import sector_mesh
@@ -116,5 +116,6 @@ def test_linear_motions_are_exact() -> None:
 def test_memory_is_refused_with_its_number() -> None:
     with pytest.raises(InputError, match=r"GB of memory are needed, 0\.1 GB are free"):
         check_memory(sector_bytes(PAPER, mesh_size_for(PAPER, 947_000)), free_bytes=1e8)
+    assert craig_bampton_bytes(PAPER, mesh_size_for(PAPER, 277_200), 20) == pytest.approx(0.95e9, rel=0.15)
     with pytest.raises(InputError, match="of memory are needed"):
         check_memory(full_bytes(947_000), free_bytes=4e9)
