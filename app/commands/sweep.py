@@ -54,7 +54,7 @@ def sweep(
     speed: SpeedOption = None,
     torque: TorqueOption = None,
     duration: DurationOption = "5s",
-    fs: RateOption = "20480Hz",
+    fs: RateOption = "",
     seed: SeedOption = 0,
     common_seed: Annotated[
         bool,
