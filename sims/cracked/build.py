@@ -74,7 +74,7 @@ def build_machine(values: Values, *, sampling_rate_hz: float = 20480.0, installe
 
 def build_mesh(wanted: Wanted) -> GearMesh:
     """Return geometry, material, crack and flanks of the pair."""
-    pair = PairGeometry(_gear(wanted, 0), _gear(wanted, 1), wanted.optional("centre_distance_mm"))
+    pair = PairGeometry(gear_geometry(wanted, 0), gear_geometry(wanted, 1), wanted.optional("centre_distance_mm"))
     material = Material(
         wanted.number("youngs_modulus_gpa"), wanted.number("poisson_ratio"), wanted.number("density_kg_m3")
     )
@@ -139,7 +139,8 @@ def _first_pulse_rev(pair: PairGeometry) -> tuple[float, float]:
     return pitches / pair.driver.teeth, pitches / pair.driven.teeth
 
 
-def _gear(wanted: Wanted, side: int) -> GearGeometry:
+def gear_geometry(wanted: Wanted, side: int) -> GearGeometry:
+    """Return the driver's (0) or the driven gear's (1) geometry."""
     name = _SIDES[side]
     return GearGeometry(
         wanted.whole(f"teeth_{name}"),

@@ -10,6 +10,7 @@ from numba import njit
 
 from sims.cracked.energy_kernel import kinetic_energy, place_of_entry, potential_energy
 from sims.cracked.right_hand_side import accelerations
+from sims.machine.course_kernel import course_value, set_speed
 from sims.mesh.roughness_kernel import advance, height_now
 
 
@@ -40,13 +41,13 @@ def integrate(  # noqa: PLR0915  four stages written out
     angle = set_angle[0]
     for step_number in range(n_steps):
         t = start + step_number * step
-        w0, d0 = _set_speed(k, speed, t)
-        wh, dh = _set_speed(k, speed, t + 0.5 * step)
-        w1, d1 = _set_speed(k, speed, t + step)
+        w0, d0 = set_speed(k, speed, t)
+        wh, dh = set_speed(k, speed, t + 0.5 * step)
+        w1, d1 = set_speed(k, speed, t + step)
         # The set angle by Simpson's rule, and by the parabola through the same three speeds half way.
         angle_h = angle + step / 24.0 * (5.0 * w0 + 8.0 * wh - w1)
         angle_1 = angle + step / 6.0 * (w0 + 4.0 * wh + w1)
-        m0, mh, m1 = _course(torque, t)[0], _course(torque, t + 0.5 * step)[0], _course(torque, t + step)[0]
+        m0, mh, m1 = course_value(torque, t), course_value(torque, t + 0.5 * step), course_value(torque, t + step)
         advance(re, im, half_cos, half_sin)
         hh, rh = height_now(re, im, omega)
         advance(re, im, half_cos, half_sin)
@@ -104,7 +105,7 @@ def derivative(k, curves, rows, pitch, t, state, speed, torque, first_angle, rou
     for n in range(amplitude.shape[0]):
         height += amplitude[n] * cos(omega[n] * t + phase[n])
         height_rate -= amplitude[n] * omega[n] * sin(omega[n] * t + phase[n])
-    w, d = _set_speed(k, speed, t)
+    w, d = set_speed(k, speed, t)
     angle = first_angle + w * t
     extra = np.empty(5)
     accelerations(
@@ -114,7 +115,7 @@ def derivative(k, curves, rows, pitch, t, state, speed, torque, first_angle, rou
         pitch,
         state[:16],
         state[16:],
-        _course(torque, t)[0],
+        course_value(torque, t),
         angle,
         w,
         d,
@@ -125,34 +126,3 @@ def derivative(k, curves, rows, pitch, t, state, speed, torque, first_angle, rou
     )
     rate[:16] = state[16:]
     return extra
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _course(course, t):
-    """Value and slope at t: straight between points, held outside."""
-    n = course.shape[1]
-    if t <= course[0, 0]:
-        return course[1, 0], 0.0
-    if t >= course[0, n - 1]:
-        return course[1, n - 1], 0.0
-    low, high = 0, n - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if course[0, middle] <= t:
-            low = middle
-        else:
-            high = middle
-    slope = (course[1, high] - course[1, low]) / (course[0, high] - course[0, low])
-    return course[1, low] + slope * (t - course[0, low]), slope
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _set_speed(k, speed, t):
-    """Set speed in rad/s and its slope, swings included."""
-    value, slope = _course(speed, t)
-    factor, rate = 1.0, 0.0
-    for i in range(k.n_swings):
-        amplitude, omega, phase = k.swings[i, 0], k.swings[i, 1], k.swings[i, 2]
-        factor += amplitude * sin(omega * t + phase)
-        rate += amplitude * omega * cos(omega * t + phase)
-    return value * factor, slope * factor + value * rate

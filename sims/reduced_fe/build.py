@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from sims.cracked.build import build_machine
+from sims.cracked.build import build_machine, gear_geometry
 from sims.cracked.installed import Installed
 from sims.cracked.wanted import Wanted
 from sims.machine import Machine
-from sims.mesh import GearGeometry, Material
+from sims.mesh import Material
 from sims.reduced_fe.blank import GearBlank
 from sims.reduced_fe.dynamics_constants import FlexiblePair
 from sims.reduced_fe.gear_cache import cached_gear
@@ -64,22 +64,11 @@ def flexible_pair(values: Values, machine: Machine, gears: Gears) -> FlexiblePai
 
 def _blank(wanted: Wanted, side: int) -> GearBlank:
     name = SIDES[side]
-    geometry = GearGeometry(
-        wanted.whole(f"teeth_{name}"),
-        wanted.number("module_mm"),
-        wanted.number("pressure_angle_deg"),
-        wanted.number(f"profile_shift_{name}"),
-        wanted.number("face_width_mm"),
-        wanted.number("addendum"),
-        wanted.number("dedendum"),
-        wanted.number("tool_tip_radius"),
-        wanted.optional(f"bore_radius_{name}_mm"),
-    )
     material = Material(
         wanted.number("youngs_modulus_gpa"), wanted.number("poisson_ratio"), wanted.number("density_kg_m3")
     )
     return GearBlank(
-        geometry,
+        gear_geometry(wanted, side),
         wanted.optional(f"web_thickness_{name}_mm"),
         wanted.optional(f"rim_thickness_{name}_mm"),
         wanted.optional(f"hub_thickness_{name}_mm"),

@@ -21,9 +21,9 @@ from math import cos, sin
 import numpy as np
 from numba import njit
 
+from sims.machine.course_kernel import course_value, set_speed
 from sims.reduced_fe.contact_kernel import FAST, back_substituted, hertz_energy, solve_contacts
 from sims.reduced_fe.contact_pairs_kernel import compliance_slope_energy, fill_compliance, near_pairs
-from sims.reduced_fe.integrate_course_kernel import course_value, set_speed
 
 START_REACH = 1e-4
 """Depth up to which flanks count as near at first, m."""
