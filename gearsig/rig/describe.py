@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from math import gcd
 
+from gearsig.errors import RefusalError
 from gearsig.rig.orders import hunting_tooth_order, order_lines
+from gearsig.rig.tooth_pairs import path_of_contact
 from gearsig.rig.types import Rig
 
 
@@ -16,7 +18,7 @@ def describe_rig(rig: Rig) -> str:
     if reference:
         at = f", nominal {speed:g} rpm" if speed else ""
         lines.append(f"Orders are cycles per revolution of shaft '{reference}'{at}.")
-    lines += _shaft_text(rig) + _pair_text(rig) + _bearing_text(rig)
+    lines += _shaft_text(rig) + _pair_text(rig) + _bearing_text(rig) + _contact_text(rig)
     marked = order_lines(rig, n_mesh_harmonics=2, n_shaft_harmonics=2, n_sidebands=1)
     if marked:
         lines += ["", "Expected lines" + (" (frequency at nominal speed)" if speed else "")]
@@ -59,6 +61,23 @@ def _bearing_text(rig: Rig) -> list[str]:
         orders = ", ".join(f"{name} {order:.5g}" for name, order in bearing.orders().items())
         lines.append(f"  {bearing.name} on {bearing.shaft}: {orders or 'no geometry and no orders given'}")
     return lines
+
+
+def _contact_text(rig: Rig) -> list[str]:
+    """Return how the teeth touch, with what follows from it, where the rig says so."""
+    contact = rig.contact
+    if contact is None:
+        return []
+    stiffness = f"stiffness {contact.stiffness_n_per_m_lambda:.4g} N/m^{contact.exponent:g}"
+    backlash = f"backlash {2.0 * contact.half_backlash_um:g} um"
+    restitution = f"restitution {contact.restitution:g} ({contact.damping_law})"
+    lines = ["", "Contact of the teeth", f"  {stiffness}, {backlash}, {restitution}"]
+    try:
+        path = path_of_contact(rig)
+    except RefusalError as refusal:
+        return [*lines, f"  {refusal}"]
+    r1, r2 = (1e3 * r for r in path.base_radii_m)
+    return [*lines, f"  contact ratio {path.contact_ratio:.4g}, base radii {r1:.5g} and {r2:.5g} mm"]
 
 
 def _missing(rig: Rig) -> list[str]:
