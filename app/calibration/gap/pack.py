@@ -32,6 +32,7 @@ def main() -> None:
         allow_pickle=False,
         rigs=np.concatenate([one["rig"] for one in raw]).astype(np.int64),
         causes=np.concatenate([one["label"] for one in raw]),
+        loads_n_per_mm=np.concatenate([one["load_n_per_mm"] for one in raw]).astype(np.float32),
         change_names=raw[0]["change_names"],
         feature_names=raw[0]["gap_names"],
         **tables,
