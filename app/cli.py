@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+import threading
 from collections.abc import Sequence
 
 import typer
@@ -14,10 +16,14 @@ from app.commands.compare import compare
 from app.commands.crack import crack
 from app.commands.dashboard import dashboard
 from app.commands.demo import demo
+from app.commands.flexible import flexible
+from app.commands.force import force
 from app.commands.gap import gap
+from app.commands.identify import identify
 from app.commands.report import report
 from app.commands.rig import rig_app
 from app.commands.simulate import simulate
+from app.commands.start_stop import start_stop
 from app.commands.sweep import sweep
 from gearsig import __version__
 from gearsig.errors import InputError, RefusalError
@@ -38,12 +44,16 @@ app = typer.Typer(
 )
 app.command()(analyze)
 app.command()(crack)
+app.command()(force)
+app.command()(start_stop)
+app.command()(identify)
 app.command()(compare)
 app.command()(report)
 app.add_typer(rig_app, name="rig")
 app.command()(simulate)
 app.command()(sweep)
 app.command()(bifurcation)
+app.command()(flexible)
 app.command()(gap)
 app.add_typer(benchmark_app, name="benchmark")
 app.command()(demo)
@@ -69,6 +79,7 @@ def _root(
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; an error of the user's input is one line on standard error and exit code 2."""
+    _stop_tidily()
     try:
         sys.exit(app(args=list(arguments) if arguments is not None else None, standalone_mode=False))
     except USAGE_ERROR as error:  # a wrong option or argument: left alone, Typer draws a frame of several lines
@@ -83,6 +94,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except BrokenPipeError:  # the reader of our output has gone, e.g. `| head`
         sys.stderr.close()
         sys.exit(0)
+
+
+def _stop_tidily() -> None:
+    """Let SIGTERM end a command as Ctrl-C does: what it began is tidied up."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 def _usage_text(error: Exception) -> str:

@@ -20,8 +20,10 @@ from sims.simulator import ParameterValue, Simulator
 def simulators() -> dict[str, Simulator]:
     """Return every simulator by its name."""
     from sims.cracked.simulator import CrackedPair
+    from sims.forging.simulator import ForgingManipulator
+    from sims.reduced_fe.simulator import ReducedPair
 
-    found: tuple[Simulator, ...] = (CrackedPair(),)
+    found: tuple[Simulator, ...] = (CrackedPair(), ReducedPair(), ForgingManipulator())
     return {simulator.name: simulator for simulator in found}
 
 
@@ -63,6 +65,25 @@ class HasText(Protocol):
     def text(self) -> str:
         """For people."""
         ...
+
+
+@runtime_checkable
+class HasUsualRate(Protocol):
+    """A simulator whose recordings are usually sampled at a rate of its own."""
+
+    @property
+    def usual_sampling_rate_hz(self) -> float:
+        """Taken where no rate is asked for."""
+        ...
+
+
+USUAL_SAMPLING_RATE_HZ = 20480.0
+"""Of vibration, for all other simulators."""
+
+
+def usual_sampling_rate_hz(model: Simulator) -> float:
+    """Return the rate at which recordings of a model are sampled where none is asked for."""
+    return model.usual_sampling_rate_hz if isinstance(model, HasUsualRate) else USUAL_SAMPLING_RATE_HZ
 
 
 @runtime_checkable

@@ -19,6 +19,7 @@ CHAIN = (
     "decompose",
     "phase",
     "indicators",
+    "motion",
     "severity",
     "diagnosis",
     "compare",

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -26,6 +25,7 @@ from app.benchmark.diagnose_one import ANSWERS
 from app.benchmark.diagnosers import diagnoser
 from app.benchmark.make import Truth, make_case
 from app.benchmark.plan import Plan, PlannedCase
+from app.stopping import Running, stop
 from gearsig import __version__
 from gearsig.checks import count
 from sims.processes import process_pool
@@ -97,7 +97,7 @@ def run_benchmark(
 ) -> list[Done]:
     """Make and diagnose all cases, in as many processes; return them in the plan's order.
 
-    After Ctrl-C the answers so far stay in the folder, and the same call goes on from there.
+    After Ctrl-C or SIGTERM the answers so far stay in the folder, and the same call goes on from there.
 
     Raises
     ------
@@ -108,8 +108,9 @@ def run_benchmark(
     (folder / ANSWERS_FOLDER).mkdir(exist_ok=True)
     workers = count(n_processes, "processes")
     found: dict[int, Done] = {}
+    running = Running()
     with process_pool(workers) as makers, ThreadPoolExecutor(workers) as threads:
-        futures = [threads.submit(_one, wanted, planned, folder, makers) for planned in wanted.plan.cases()]
+        futures = [threads.submit(_one, wanted, planned, folder, makers, running) for planned in wanted.plan.cases()]
         try:
             for future in as_completed(futures):
                 done = future.result()
@@ -119,6 +120,7 @@ def run_benchmark(
         finally:
             for future in futures:
                 future.cancel()
+            running.stop()
     return [found[number] for number in sorted(found)]
 
 
@@ -127,7 +129,7 @@ def n_answered(folder: Path) -> int:
     return len(list((folder / ANSWERS_FOLDER).glob("case_*.json")))
 
 
-def _one(wanted: Wanted, planned: PlannedCase, folder: Path, makers: Executor) -> Done:
+def _one(wanted: Wanted, planned: PlannedCase, folder: Path, makers: Executor, running: Running) -> Done:
     kept = folder / ANSWERS_FOLDER / f"case_{planned.number:04d}.json"
     if kept.exists():
         truth = makers.submit(make_case, wanted.plan, planned, None).result()
@@ -135,30 +137,40 @@ def _one(wanted: Wanted, planned: PlannedCase, folder: Path, makers: Executor) -
     with TemporaryDirectory(prefix="gearsig-") as name:
         place = Path(name)
         truth = makers.submit(make_case, wanted.plan, planned, place).result()
-        answers = diagnosed(place, wanted.diagnosers)
+        answers = diagnosed(place, wanted.diagnosers, running)
     written(kept, to_text(answers))
     return Done(planned, truth, answers)
 
 
-def diagnosed(folder: Path, names: Sequence[str]) -> dict[str, Answer]:
-    """Return the answers of a fresh process that is given the folder and nothing else."""
+def diagnosed(folder: Path, names: Sequence[str], running: Running | None = None) -> dict[str, Answer]:
+    """Return the answers of a fresh process that is given the folder and nothing else.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If what runs was stopped: that is no answer.
+    """
+    runs = running or Running()
+    process = runs.start(
+        [sys.executable, "-m", "app.benchmark.diagnose_one", *names],
+        cwd=folder,
+        env=environment(folder),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     try:
-        ended = subprocess.run(
-            [sys.executable, "-m", "app.benchmark.diagnose_one", *names],
-            cwd=folder,
-            env=environment(folder),
-            capture_output=True,
-            text=True,
-            timeout=LONGEST_S,
-            check=False,
-        )
+        _, said = process.communicate(timeout=LONGEST_S)
     except subprocess.TimeoutExpired:
         return dict.fromkeys(names, Answer("", seconds=LONGEST_S, error=f"no answer within {LONGEST_S:g} s"))
-    if ended.returncode in (-signal.SIGINT, 128 + signal.SIGINT):
-        raise KeyboardInterrupt  # the diagnosis was stopped with this process: that is no answer
-    if ended.returncode != 0:
-        last = ended.stderr.strip().rpartition("\n")[2]
-        return dict.fromkeys(names, Answer("", error=f"the process ended with {ended.returncode}: {last}"))
+    finally:
+        stop(process)
+        by_itself = runs.ended(process)
+    if not by_itself:
+        raise KeyboardInterrupt
+    if process.returncode != 0:
+        last = said.strip().rpartition("\n")[2]
+        return dict.fromkeys(names, Answer("", error=f"the process ended with {process.returncode}: {last}"))
     return from_text((folder / ANSWERS).read_text(encoding="utf-8"))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -48,6 +49,15 @@ def gap(
         typer.Option("--cache", metavar="DIR", help="Keeps what is prepared once per rig. Default: your cache folder."),
     ] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Prepare anew what the cache holds, and keep that.")] = False,
+    effect_file: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--effect-file",
+            metavar="FILE",
+            help="Python file with an effect of your own, which is looked for, too; repeatable. The variable "
+            "GEARSIG_EFFECTS names such files for every command and the dashboard.",
+        ),
+    ] = None,
     list_effects: Annotated[bool, typer.Option("--list-effects", help="Show the effects that are looked for.")] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for gap.html, gap.json and twin.toml.")
@@ -60,6 +70,11 @@ def gap(
 
     Example: gearsig gap slow.h5 fast.h5 --rig gearbox.toml --reference healthy.h5 -o gap
     """
+    if effect_file:
+        from sims.effects import add_effect
+
+        for path in effect_file:
+            add_effect(path)
     if list_effects:
         _print_effects(model)
         return
@@ -90,7 +105,8 @@ def _diagnosed(asked: Asked, model: str, cache: Path | None, *, fresh: bool) -> 
 
     stage = TextColumn("{task.description}", markup=False)  # names of files are no markup
     columns = (stage, BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("reading", total=1.0)
         return run_gap(
             asked,
@@ -111,7 +127,19 @@ def _tell(report: GapReport, written: tuple[Path, ...]) -> None:
     typer.echo(f"Open {page} in a browser; beside it: {', '.join(path.name for path in others)}.")
     if report.twin_toml:
         twin = shlex.quote(str(others[-1]))
-        typer.echo(f"Run the simulator with the effect: gearsig simulate {report.simulator} --preset {twin} -o twin.h5")
+        run = f"{_own_effects(report)}gearsig simulate {report.simulator} --preset {twin} -o twin.h5"
+        typer.echo(f"Run the simulator with the effect: {run}")
+
+
+def _own_effects(report: GapReport) -> str:
+    """Return what must stand before a command that needs an effect of the user's own."""
+    from sims.effects import is_own
+    from sims.effects.own import VARIABLE, own_files
+
+    fitted = report.causes[0].fitted
+    if fitted is None or not is_own(fitted.name):
+        return ""
+    return f"{VARIABLE}={shlex.quote(os.pathsep.join(map(str, own_files())))} "
 
 
 def _print_effects(model: str) -> None:
@@ -121,6 +149,7 @@ def _print_effects(model: str) -> None:
     from rich.table import Table
 
     from gearsig.gap.words import severity_unit
+    from sims.effects import is_own
     from sims.registry import gap_simulator
 
     table = Table("group", "effect", "severity", "shows in", box=SIMPLE_HEAD, pad_edge=False)
@@ -130,7 +159,8 @@ def _print_effects(model: str) -> None:
         where = ", ".join(kind.replace("_", " ") for kind in effect.shows_in)
         group = "" if effect.group == last else effect.group
         last = effect.group
-        table.add_row(group, f"{effect.name}\n  {effect.title}", severity_unit(effect.unit) or "–", where)
+        own = "\n  (your own: tried by simulation, not known to the recognition)" if is_own(effect.name) else ""
+        table.add_row(group, f"{effect.name}\n  {effect.title}{own}", severity_unit(effect.unit) or "–", where)
     width = None if sys.stdout.isatty() else TABLE_WIDTH
     Console(markup=False, highlight=False, width=width).print(table)
     typer.echo(f"{len(found)} effects that have a meaning for the model {model}; also: none, unknown.")

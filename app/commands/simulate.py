@@ -28,12 +28,15 @@ if TYPE_CHECKING:
 def simulate(
     model: Annotated[str | None, typer.Argument(help="Model, e.g. cracked; --list shows them.")] = None,
     preset: PresetOption = "",
+    mode: Annotated[
+        str, typer.Option("--mode", help="Of the model forging: start-stop or continuous; short for --set mode=….")
+    ] = "",
     settings: SetOption = None,
     effects: EffectOption = None,
     speed: SpeedOption = None,
     torque: TorqueOption = None,
     duration: DurationOption = "5s",
-    fs: RateOption = "20480Hz",
+    fs: RateOption = "",
     seed: SeedOption = 0,
     output: Annotated[
         Path | None,
@@ -57,6 +60,8 @@ def simulate(
     if listing:
         typer.echo(_listing(model, preset))
         return
+    if mode:
+        settings = [*(settings or []), f"mode={mode}"]
     request = read_request(model, preset, settings, effects, speed, torque, duration, fs, seed)
     if output is None and not check:
         raise InputError("no output file is given", remedy="give -o FILE, or --check")

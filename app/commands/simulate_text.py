@@ -54,9 +54,10 @@ def _model_text(simulator: Simulator) -> str:
         _columns([(p.name, _preset_line(p)) for p in machines.values()]),
         "Parameters (--set NAME=VALUE)",
         _columns([(p.name, _parameter_line(p)) for p in simulator.parameters]),
-        "Effects (--effect NAME=SEVERITY,OPTION=VALUE,…)",
-        "\n\n".join(_effect_text(effect(name)) for name in simulator.effects),
     ]
+    if simulator.effects:
+        parts.append("Effects (--effect NAME=SEVERITY,OPTION=VALUE,…)")
+        parts.append("\n\n".join(_effect_text(effect(name)) for name in simulator.effects))
     return "\n\n".join(parts)
 
 

@@ -49,7 +49,12 @@ TorqueOption = Annotated[
     typer.Option("--torque", metavar="TORQUE", help="110Nm, 20..110Nm, or a CSV file with time_s,torque_nm."),
 ]
 DurationOption = Annotated[str, typer.Option("--duration", metavar="TIME", help="Length of the recording.")]
-RateOption = Annotated[str, typer.Option("--fs", metavar="RATE", help="Sampling rate, in Hz or kHz.")]
+RateOption = Annotated[
+    str,
+    typer.Option(
+        "--fs", metavar="RATE", help="Sampling rate, in Hz or kHz. Default: 20480 Hz; 1 kHz for the model forging."
+    ),
+]
 SeedOption = Annotated[int, typer.Option("--seed", min=0, help="The same seed gives the same recording.")]
 
 
@@ -83,7 +88,7 @@ def read_request(
     from app.profile import course
     from sims.presets import is_file
     from sims.presets import preset as preset_named
-    from sims.registry import simulator, simulators
+    from sims.registry import simulator, simulators, usual_sampling_rate_hz
 
     if model is None:
         raise InputError("no model is named", allowed=", ".join(simulators()), remedy="gearsig simulate --list")
@@ -97,7 +102,7 @@ def read_request(
         None if speed is None else course(speed, "speed_rpm", "rpm", duration_s),
         None if torque is None else course(torque, "torque_nm", "N m", duration_s),
         duration_s,
-        quantity(fs, "Hz", "--fs"),
+        quantity(fs, "Hz", "--fs") if fs else usual_sampling_rate_hz(chosen),
         seed,
     )
 

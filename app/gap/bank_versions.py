@@ -11,6 +11,7 @@ _MODULES = (
     *(f"gearsig.gap.{name}" for name in ("averages", "broadband", "change", "channels", "cyclic", "features", "frame")),
     *(f"gearsig.gap.{name}" for name in ("gather", "gathered", "gear_lines", "hum", "speed", "tooth")),
     "gearsig.severity.reference",
+    "gearsig.severity.shaft_lines",
     "gearsig.angle.pulse_train",
     "gearsig.angle.resample",
 )

@@ -16,6 +16,7 @@ from app.gap.prepare import Stage, conditions_of
 from app.gap.rig_data import is_gearless
 from app.gap.unexplained import unexplained
 from app.gap.weigh import weigh
+from gearsig.checks import closest_match_hint
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap.curves import angle_curves, spectrum_curves
 from gearsig.gap.evidence import evidence_of
@@ -42,6 +43,15 @@ UNCALIBRATED = (
     "take them as a ranking only."
 )
 
+OWN_EFFECT = (
+    "The recognition has never seen “{title}”: it was simulated, fitted and scored on held-out data like the likeliest "
+    "effects. Its probability is the share of “unknown” that its held-out shrink beyond placebos explains, and is not "
+    "calibrated."
+)
+NOT_SIMULATED = (
+    "The recognition has never seen “{title}”, and it could not be simulated on this rig: nothing is said of it."
+)
+
 
 def diagnose_gap(
     recordings: Sequence[Recording],
@@ -52,6 +62,7 @@ def diagnose_gap(
     reference_rigs: Sequence[Rig] = (),
     effects: Sequence[str] = (),
     names: Sequence[str] = (),
+    reference_names: Sequence[str] = (),
     cache: Path | None = None,
     fresh: bool = False,
     on_stage: Stage | None = None,
@@ -72,9 +83,10 @@ def diagnose_gap(
         Of the same rig when it was healthy; each recording is compared with the one at its speed and torque.
     reference_rigs : sequence of Rig
     effects : sequence of str
-        Which effects may be named; empty: all that the simulator has.
-    names : sequence of str
-        Of the recordings, for people.
+        Which effects may be named; empty: all that the simulator has, those of the user's own files included, see
+        `sims.effects.add_effect`.
+    names, reference_names : sequence of str
+        Of the recordings and references, for people.
     cache : Path or None
         Folder that keeps simulations; None: nothing is kept.
     fresh : bool
@@ -96,13 +108,14 @@ def diagnose_gap(
     tell = on_stage or (lambda _what, _done: None)
     known = simulator.gap_effects()
     _check(recordings, names, effects, known)
+    called = tuple(reference_names) or tuple(f"reference {i + 1}" for i in range(len(references)))
     own_rigs, other_rigs = _rigs(recordings, rigs), _rigs(references, reference_rigs)
     if is_gearless(own_rigs[0]):
         allowed = {name: effect for name, effect in known.items() if not effects or name in effects}
-        return diagnose_gearless(recordings, own_rigs, references, other_rigs, names, allowed, tell)
+        return diagnose_gearless(recordings, own_rigs, references, other_rigs, names, called, allowed, tell)
     twin = simulator.twin_of(own_rigs[0])
     tell("reading the recordings", 0.02)
-    conditions, notices = conditions_of(recordings, own_rigs, references, other_rigs, twin, names, tell)
+    conditions, notices = conditions_of(recordings, own_rigs, references, other_rigs, twin, names, tell, called)
     if not is_calibrated():
         notices.insert(0, UNCALIBRATED)
     tell("recognising", 0.2)
@@ -110,6 +123,10 @@ def diagnose_gap(
         conditions, known, effects, twin, cache, lambda what, done: tell(what, 0.25 + 0.55 * done), fresh=fresh
     )
     tried, probabilities = weighed.tried, weighed.probabilities()
+    notices += [
+        (OWN_EFFECT if name in tried else NOT_SIMULATED).format(title=known[name].title) for name in weighed.unheard_of
+    ]
+    notices += _without_meaning(twin, known, effects)
     outcome = weighed.calibration.outcome(probabilities)
     tell("placing it", 0.82)
     clearest = max(conditions, key=_size)
@@ -128,7 +145,7 @@ def diagnose_gap(
         rig=own_rigs[0].name,
         simulator=simulator.name,
         conditions=tuple(c.facts for c in conditions),
-        references=tuple(f"reference {i + 1}" for i in range(len(references))) if weighed.with_reference else (),
+        references=called if weighed.with_reference else (),
         outcome=outcome,
         size=size.structural,
         repeatability=size.repeatability.value,
@@ -166,18 +183,42 @@ def _check(
         raise InputError(f"{len(names)} names for {len(recordings)} recordings", allowed="one each")
     strange = [name for name in effects if name not in known]
     if strange:
-        raise InputError(f"the simulator has no effect {strange[0]!r}", allowed=", ".join(known))
+        raise InputError(
+            f"the simulator has no effect {strange[0]!r}",
+            allowed=", ".join(known),
+            remedy=closest_match_hint(strange[0], known),
+        )
 
 
 def _rigs(recordings: Sequence[Recording], rigs: Sequence[Rig]) -> tuple[Rig, ...]:
     if rigs:
         if len(rigs) != len(recordings):
             raise InputError(f"{len(rigs)} rigs for {len(recordings)} recordings", allowed="one each")
+        if any(
+            r.rig is not None and r.rig.sensors not in ((), rig.sensors)
+            for r, rig in zip(recordings, rigs, strict=True)
+        ):
+            raise InputError(
+                "a recording carries a rig with other sensors than the one given for it",
+                remedy="read its file again with that rig",
+            )
         return tuple(rigs)
     found = tuple(r.rig for r in recordings)
     if any(rig is None for rig in found):
         raise InputError("a recording carries no rig", remedy="give rigs, one for each recording")
     return tuple(rig for rig in found if rig is not None)
+
+
+def _without_meaning(twin: Twin, known: Mapping[str, GapEffect], effects: Sequence[str]) -> list[str]:
+    """Name the effects that the rig has no place for, a bearing, say."""
+    titles = [known[name].title for name in effects or known if not twin.candidates(name)]
+    if not titles:
+        return []
+    remark = (
+        f"The rig file names nothing that {', '.join(titles)} could be in: none of it can be simulated, and any "
+        "probability rests on recognition alone."
+    )
+    return [remark]
 
 
 def _size(condition: Condition) -> float:

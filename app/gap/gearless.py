@@ -49,6 +49,7 @@ def diagnose_gearless(
     references: Sequence[Recording],
     reference_rigs: Sequence[Rig],
     names: Sequence[str],
+    reference_names: Sequence[str],
     effects: Mapping[str, GapEffect],
     tell: Stage,
 ) -> GapReport:
@@ -56,7 +57,7 @@ def diagnose_gearless(
 
     Parameters
     ----------
-    recordings, rigs, references, reference_rigs, names
+    recordings, rigs, references, reference_rigs, names, reference_names
         As of `app.gap.diagnose.diagnose_gap`.
     effects : mapping
         Those that may be named; of them only damaged races can be.
@@ -74,8 +75,7 @@ def diagnose_gearless(
         If there is no speed, no live channel, or too few revolutions.
     """
     tell("analysing the references", 0.05)
-    pairs = enumerate(zip(references, reference_rigs, strict=True), 1)
-    healthy = [analysed(recording, rig, f"reference {i}") for i, (recording, rig) in pairs]
+    healthy = [analysed(*one) for one in zip(references, reference_rigs, reference_names, strict=True)]
     every = []
     for i, (recording, rig) in enumerate(zip(recordings, rigs, strict=True)):
         name = names[i] if names else f"recording {i + 1}"
@@ -88,7 +88,7 @@ def diagnose_gearless(
         rig=rigs[0].name,
         simulator="",
         conditions=tuple(_facts(one, rig) for one, rig in zip(every, rigs, strict=True)),
-        references=tuple(f"reference {i + 1}" for i in range(len(healthy))) if any(e.reference for e in every) else (),
+        references=tuple(reference_names) if any(e.reference for e in every) else (),
         outcome=outcome,
         size=Interval(NAN, NAN, NAN),
         repeatability=NAN,

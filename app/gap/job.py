@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
-import signal
 import subprocess
 import sys
 import weakref
@@ -17,14 +15,13 @@ from typing import TYPE_CHECKING
 from app.gap.inputs import Asked
 from app.gap.results import JSON
 from app.gap.worker import ERROR, PROGRESS, RESULTS, error_from_dict, write_request
+from app.stopping import stop
 from gearsig.errors import GearsigError
 
 if TYPE_CHECKING:
     from gearsig.gap.types import GapReport
 
 LOG = "log.txt"
-PATIENCE_S = 3.0
-"""A process that was told to stop is ended by force after this."""
 
 
 class JobFailedError(GearsigError):
@@ -116,23 +113,7 @@ def _end(process: subprocess.Popen[bytes], folder: Path) -> None:
 
 
 def _stop(process: subprocess.Popen[bytes]) -> None:
-    if process.poll() is None:
-        _signal(process, force=False)
-        try:
-            process.wait(PATIENCE_S)
-        except subprocess.TimeoutExpired:
-            _signal(process, force=True)
-            process.wait()
+    stop(process)
     if process.stdin is not None:
         with suppress(OSError):
             process.stdin.close()
-
-
-def _signal(process: subprocess.Popen[bytes], *, force: bool) -> None:
-    with suppress(ProcessLookupError):
-        if hasattr(os, "killpg"):
-            os.killpg(process.pid, signal.SIGKILL if force else signal.SIGTERM)
-        elif force:
-            process.kill()
-        else:
-            process.terminate()

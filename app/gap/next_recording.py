@@ -48,7 +48,7 @@ def next_recordings(
     base = conditions[0].facts
     measured, places = twin.with_further_sensors() if isinstance(twin, HasFurtherPlaces) else (twin, {})
     here = [condition.facts.point for condition in conditions]
-    points = _distinct([*here, *(Point(v * base.point.speed_rpm, t * base.point.torque_nm) for v, t in FACTORS)])
+    points = _distinct([*here, *(_rounded(v * base.point.speed_rpm, t * base.point.torque_nm) for v, t in FACTORS)])
     runs = [
         Run(measured, p, conditions[0].run_s * max(1.0, base.point.speed_rpm / p.speed_rpm), base.sampling_rate_hz, 1)
         for p in points
@@ -71,6 +71,11 @@ def next_recordings(
             text = _text(point, place, f"{titles[0]} and {titles[1]} lie {apart:.2g}", now, is_new=point not in here)
             found.append(NextRecording(point, (first.name, second.name), apart, now, text, place))
     return tuple(sorted(found, key=lambda one: -one.standard_deviations)[:MOST])
+
+
+def _rounded(speed_rpm: float, torque_nm: float) -> Point:
+    """Return a point that is easily set."""
+    return Point(*(float(f"{value:.2g}") for value in (speed_rpm, torque_nm)))
 
 
 def _distinct(points: Sequence[Point]) -> list[Point]:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from app.gap.conditions import Condition, compare, facts_of, matching_reference, simulated
+from app.gap.doubts import strange_pattern, strange_teeth
+from gearsig.errors import RefusalError
 from gearsig.gap.floors import gap_size
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.population import load_population
 from gearsig.gap.simulator import Twin
+from gearsig.gap.types import ConditionFacts
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 
@@ -27,6 +30,7 @@ def conditions_of(
     twin: Twin,
     names: Sequence[str],
     tell: Stage,
+    reference_names: Sequence[str] = (),
 ) -> tuple[list[Condition], list[str]]:
     """Return the conditions, and what is worth a remark.
 
@@ -35,13 +39,20 @@ def conditions_of(
     RefusalError
         If a speed cannot be known or there are too few revolutions.
     """
-    found, notices = [], []
-    healthy = [gather(r, rig) for r, rig in zip(references, reference_rigs, strict=True)]
+    found: list[Condition] = []
+    healthy: list[Gathered] = []
+    notices: list[str] = []
+    called = reference_names or [f"reference {i + 1}" for i in range(len(references))]
+    for recording, rig, name in zip(references, reference_rigs, called, strict=True):
+        healthy.append(_gathered(recording, rig, name, notices))
+        notices += strange_teeth(healthy[-1], name)
     for i, (recording, rig) in enumerate(zip(recordings, rigs, strict=True)):
         name = names[i] if names else f"recording {i + 1}"
         tell(f"simulating the sound machine at the point of {name}", 0.05 + 0.15 * i / len(recordings))
-        now = gather(recording, rig)
+        now = _gathered(recording, rig, name, notices)
+        notices += strange_teeth(now, name)
         facts = facts_of(recording, rig, now, name, twin)
+        notices += _assumed(recording, rig, facts)
         simulation = simulated(twin, facts, now)
         reference, why = matching_reference(now, rig, healthy, reference_rigs)
         if why:
@@ -49,10 +60,43 @@ def conditions_of(
         change = compare(now, simulation, reference)
         found.append(Condition(facts, now, simulation, reference, change))
         if reference is not None:
+            notices += strange_pattern(now, reference, name)
             notices += _strange_reference(reference, simulation, name)
     if not references:
         notices.append("No healthy reference: a recording of the same rig when it was sound would make it much surer.")
     return found, notices
+
+
+def _gathered(recording: Recording, rig: Rig, name: str, notices: list[str]) -> Gathered:
+    """Reduce a recording without its dead channels; a refusal names the recording."""
+    from gearsig.recording.quality import find_problems
+
+    dead = {p.channel: p for p in find_problems(recording) if p.kind == "dead"}
+    live = [channel for channel in recording.vibration_names() if channel not in dead]
+    if not live:
+        seen = "; ".join(f"{p.channel}: {p.evidence}" for p in dead.values()) or "there is none"
+        raise RefusalError(f"{name}: no vibration channel is live ({seen})", remedy="check sensors, cables and inputs")
+    try:
+        found = gather(recording, rig, live)
+    except RefusalError as refusal:
+        raise RefusalError(f"{name}: {refusal.reason}", remedy=refusal.remedy) from None
+    notices += [f"{name}: channel {p.channel} is dead ({p.evidence}) and left out." for p in dead.values()]
+    return found
+
+
+def _assumed(recording: Recording, rig: Rig, facts: ConditionFacts) -> list[str]:
+    """Say what of the operating point was not given."""
+    texts = []
+    if recording.speed_source is None:
+        texts.append(
+            f"{facts.name}: no tachometer and no known speed; {facts.point.speed_rpm:.4g} rpm were found in the"
+            " vibration."
+        )
+    if rig.nominal_torque_nm(rig.pairs[0].driver) is None:
+        texts.append(
+            f"{facts.name}: the torque is not given; {facts.point.torque_nm:.3g} N·m are usual for the gears' size."
+        )
+    return texts
 
 
 def _strange_reference(reference: Gathered, simulation: Gathered, name: str) -> list[str]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -45,18 +44,18 @@ def run_gap(
 
     simulator = gap_simulator(model)
     inputs = read_inputs(asked, lambda name: on_stage(f"reading {name}", 0.0))
-    report = diagnose_gap(
+    return diagnose_gap(
         inputs.recordings,
         simulator,
         rigs=inputs.rigs,
         references=inputs.references,
         reference_rigs=inputs.reference_rigs,
         names=inputs.names,
+        reference_names=inputs.reference_names,
         cache=cache,
         fresh=fresh,
         on_stage=lambda stage, done: on_stage(stage, READING + (1 - READING) * done),
     )
-    return replace(report, references=inputs.reference_names) if report.references else report
 
 
 def cache_folder() -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gearsig.angle.types import ShaftAngle
 from gearsig.diagnosis.analyze import analyze
@@ -89,6 +89,12 @@ class Examined:
         return "no-bearing-damage" in codes and self.analysis.outcome is Outcome.NO_FAULT
 
 
+def carrying(recording: Recording, rig: Rig) -> Recording:
+    """Return the recording with this rig; one that it carries already has applied its sensors, which are the same."""
+    applied = recording.rig is not None and recording.rig.sensors
+    return replace(recording, rig=rig) if applied else recording.with_rig(rig)
+
+
 def analysed(recording: Recording, rig: Rig, name: str) -> tuple[Analysis, ShaftAngle]:
     """Analyse a recording whose speed must be known.
 
@@ -97,7 +103,7 @@ def analysed(recording: Recording, rig: Rig, name: str) -> tuple[Analysis, Shaft
     RefusalError
         If there is no speed, no live channel, or too few revolutions.
     """
-    analysis = analyze(recording.with_rig(rig))
+    analysis = analyze(carrying(recording, rig))
     if isinstance(analysis.shaft_angle, CannotTell):
         raise RefusalError(f"{name}: {analysis.shaft_angle.reason}", remedy=analysis.shaft_angle.remedy)
     for finding in analysis.findings:

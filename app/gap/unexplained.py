@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from app.gap.standing_out import IMPACTS, LINE, examined
+from app.gap.standing_out import IMPACTS, LINE, carrying, examined
 from gearsig.angle.types import ShaftAngle
 from gearsig.diagnosis.analyze import analyze
-from gearsig.diagnosis.types import Analysis, CannotTell
+from gearsig.diagnosis.speed import determine_angle
+from gearsig.diagnosis.types import Analysis, CannotTell, Outcome
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 
@@ -18,21 +19,46 @@ def unexplained(
     """Say which families of impacts and lines, beyond the reference's, neither the gear model nor an effect has.
 
     The catalogue's effects are compared by features of known places; a strange family is one feature among a hundred
-    there and easily lost. The analysis looks for it by itself.
+    there and easily lost. The analysis looks for it by itself. If the reference at the recording's speed shows a fault,
+    that is said, too.
     """
     now = _analysed(recording, rig)
     if now is None:
         return ()
-    healthy = [_analysed(one, own) for one, own in zip(references, reference_rigs, strict=True)]
-    found = examined(name, now, [one for one in healthy if one is not None])
-    return tuple(
-        f"Not explained by the gear model, in {name}: {standing.finding.title.rstrip('.')}."
-        for standing in found.standing
-        if standing.finding.code in (*IMPACTS, LINE)
+    nearest = _nearest(now[1].mean_speed_rpm, references, reference_rigs)
+    healthy = None if nearest is None else _analysed(*nearest)
+    found = examined(name, now, [healthy] if healthy is not None else [])
+    return (
+        *([] if healthy is None else _fault_of_reference(healthy[0], name)),
+        *(
+            f"Not explained by the gear model, in {name}: {standing.finding.title.rstrip('.')}."
+            for standing in found.standing
+            if standing.finding.code in (*IMPACTS, LINE)
+        ),
     )
+
+
+def _fault_of_reference(analysis: Analysis, name: str) -> list[str]:
+    if analysis.outcome is not Outcome.FAULT:
+        return []
+    remark = (
+        f"The reference of {name} does not look healthy: {analysis.findings[0].title.rstrip('.')}. What is named may "
+        "be what the reference has and the recording has not."
+    )
+    return [remark]
+
+
+def _nearest(speed_rpm: float, references: Sequence[Recording], rigs: Sequence[Rig]) -> tuple[Recording, Rig] | None:
+    """Return the reference at the speed nearest to the recording's; only that is analysed."""
+    pairs = list(zip(references, rigs, strict=True))
+    if len(pairs) < 2:
+        return pairs[0] if pairs else None
+    speeds = [determine_angle(carrying(one, rig), rig) for one, rig in pairs]
+    known = [(abs(a.mean_speed_rpm - speed_rpm), i) for i, a in enumerate(speeds) if not isinstance(a, CannotTell)]
+    return pairs[min(known)[1]] if known else None
 
 
 def _analysed(recording: Recording, rig: Rig) -> tuple[Analysis, ShaftAngle] | None:
     """Return a recording's analysis with its angle; None where it has no speed."""
-    analysis = analyze(recording.with_rig(rig))
+    analysis = analyze(carrying(recording, rig))
     return None if isinstance(analysis.shaft_angle, CannotTell) else (analysis, analysis.shaft_angle)

@@ -34,11 +34,14 @@ class Weighed:
         Effect → how it was tried.
     with_reference : bool
         Whether every condition has one.
+    unheard_of : tuple of str
+        Effects that the forests do not know, the user's own: each was to be tried.
     """
 
     forest: Mapping[str, float]
     tried: dict[str, Tried]
     with_reference: bool
+    unheard_of: tuple[str, ...] = ()
 
     @property
     def scores(self) -> dict[str, float]:
@@ -51,8 +54,23 @@ class Weighed:
         return load_gap_calibration(with_reference=self.with_reference)
 
     def probabilities(self) -> dict[str, float]:
-        """Return cause → calibrated probability, likeliest first."""
-        return self.calibration.probabilities(self.forest, self.scores)
+        """Return cause → probability, likeliest first; calibrated, but for effects that the forests do not know."""
+        found = self.calibration.probabilities(self.forest, self.scores)
+        return shared(found, {name: self.scores[name] for name in self.unheard_of if name in self.tried})
+
+
+def shared(probabilities: Mapping[str, float], scores: Mapping[str, float]) -> dict[str, float]:
+    """Return the probabilities with those of effects that only a trial speaks for, likeliest first.
+
+    They share max_i s_i of what is unknown, each in proportion to its own s_i = max(score, 0): to the forests, a gap
+    that none of their effects explains is unknown, whoever else explains it.
+    """
+    positive = {name: max(score, 0.0) for name, score in scores.items()}
+    total = sum(positive.values())
+    taken = probabilities[UNKNOWN] * max(positive.values(), default=0.0)
+    found = {**probabilities, UNKNOWN: probabilities[UNKNOWN] - taken}
+    found |= {name: taken * score / total if total else 0.0 for name, score in positive.items()}
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
 def weigh(
@@ -68,6 +86,8 @@ def weigh(
 ) -> Weighed:
     """Ask the forests, then simulate, fit and score the likeliest effects, `most_tried` at most.
 
+    Effects that the forests do not know are tried as well, unless nothing is.
+
     Raises
     ------
     RefusalError
@@ -77,9 +97,15 @@ def weigh(
     with_reference = all(c.reference is not None for c in conditions)
     first = load_gap_calibration(with_reference=with_reference).probabilities(forest, {})
     likely = [name for name, p in first.items() if name in known and p >= LEAST_TRIED_PROBABILITY][:most_tried]
+    own = [name for name in effects or known if name not in _known_to_forests(conditions)] if most_tried else []
+    likely += own
     tried = try_effects(likely, twin, conditions, cache, on_progress, fresh=fresh)
     refuse_without_candidates(tried, likely)
-    return Weighed(forest, tried, with_reference)
+    return Weighed(forest, tried, with_reference, tuple(own))
+
+
+def _known_to_forests(conditions: Sequence[Condition]) -> set[str]:
+    return {name for c in conditions for name in load_recogniser(with_reference=c.reference is not None).causes}
 
 
 def _forest(
@@ -89,14 +115,14 @@ def _forest(
 
     At one of two conditions an effect may not show: p(x|e) = (1 − q) p_forest + q p_none for the machine's effects.
     """
-    allowed = {NONE, UNKNOWN, *(effects or known)}
+    allowed = {NONE, UNKNOWN, *(effects or known)} & _known_to_forests(conditions)
     joint: dict[str, float] = {}
     for condition in conditions:
         recogniser = load_recogniser(with_reference=condition.reference is not None)
         load = tooth_load_n_per_mm(condition.now.frame.pair, condition.facts.point.torque_nm)
         found = recogniser.probabilities(condition.change, load)
         hidden = {name: found[NONE] if len(conditions) > 1 else p for name, p in found.items()}
-        for name in allowed & found.keys():
+        for name in allowed:
             joint[name] = joint.get(name, 1.0) * ((1.0 - NOT_SEEN) * found[name] + NOT_SEEN * hidden[name])
     total = sum(joint.values())
     return {name: p / total for name, p in joint.items()}

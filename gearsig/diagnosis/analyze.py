@@ -25,6 +25,7 @@ from gearsig.diagnosis.run_up import order_levels
 from gearsig.diagnosis.settings import AnalysisSettings
 from gearsig.diagnosis.signals import compute_signals
 from gearsig.diagnosis.speed import determine_angle, speed_finding
+from gearsig.diagnosis.start_stop import start_stop_analysis
 from gearsig.diagnosis.types import Analysis, CannotTell, Finding, Kind
 from gearsig.diagnosis.verdict import ranked, verdict_of
 from gearsig.errors import InputError, RefusalError
@@ -68,7 +69,8 @@ def analyze(
     Returns
     -------
     Analysis
-        Findings, most important first; what cannot be told is a finding with its reason, not an error.
+        Findings, most important first; what cannot be told is a finding with its reason, not an error. A machine that
+        starts, stops or reverses is examined for backlash and impacts instead: see `gearsig.diagnosis.start_stop`.
 
     Raises
     ------
@@ -87,6 +89,9 @@ def analyze(
     tell("finding the speed")
     findings, dead = detect_data_problems(recording)
     names = [name for name in recording.vibration_names() if name not in dead]
+    unsteady = start_stop_analysis(recording, known, findings, asdict(settings))
+    if unsteady is not None:
+        return unsteady
     angle = _angle_of(recording, known)
     findings.append(speed_finding(angle))
     if not names:

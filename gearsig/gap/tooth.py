@@ -21,6 +21,7 @@ from gearsig.gap.gear_lines import (
     line_power,
     visible_orders,
 )
+from gearsig.severity.shaft_lines import orders_from_mesh
 
 SMOOTH_SIDEBANDS = 2
 """Mesh lines and as many sidebands on either side are left out: eccentricity makes those."""
@@ -39,7 +40,7 @@ def residual_lines(
     Orders that the other shaft has, too, are left out unless those are most: which teeth meet depends on them.
     """
     orders = np.arange(len(lines))
-    near = np.abs((orders + teeth // 2) % teeth - teeth // 2) <= SMOOTH_SIDEBANDS
+    near = orders_from_mesh(orders, teeth) <= SMOOTH_SIDEBANDS
     out = near | (orders <= SMOOTH_SHAFT_ORDERS) | (orders > highest)
     apart = teeth // gcd(teeth, other_teeth)
     if apart >= FEWEST_APART:

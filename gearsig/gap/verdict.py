@@ -16,23 +16,25 @@ def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
 NO_SIMULATION = (
     "How far: cannot be told; the simulators have a gear pair and this rig has none, so nothing was simulated."
 )
+SURE = 0.5
+"""Probability from which a cause is likelier than all others together."""
 SOUND_MACHINE = "the same machine when it was sound"
 
 
 def _where(report: GapReport) -> str:
-    if report.outcome is GapOutcome.NO_GAP:
+    if report.outcome is GapOutcome.NO_GAP and (report.size.value <= 1.0 or not report.places):
         return f"Where: nowhere beyond the floor; the gap is {report.size.value:.2g} structural floors."
     if not report.places:
         return f"Where: spread over all orders and bands, {report.size.value:.2g} structural floors."
     first = report.places[0]
-    return f"Where: {first.title} ({100 * first.share:.0f} % of a gap of {report.size.value:.2g} structural floors)."
+    return f"Where: {first.title}, {first.structural:.2g} structural floors ({100 * first.share:.0f} % of the gap)."
 
 
 def _which(report: GapReport) -> str:
     first = report.causes[0]
     odds = f"{100 * first.probability:.0f} %"
     if report.outcome is GapOutcome.NO_GAP:
-        return f"Which: none ({odds}); what differs is no more than between healthy machines and the simulator."
+        return _which_none(report, odds)
     if report.outcome is GapOutcome.UNKNOWN:
         return "Which: unknown; nothing in the catalogue explains it well enough."
     if report.outcome is GapOutcome.CANNOT_SEPARATE and report.inseparable is not None:
@@ -41,6 +43,13 @@ def _which(report: GapReport) -> str:
     size = "" if first.severity is None else f", {_severity(first, first.severity)}"
     place = f" at {first.place}" if first.place else ""
     return f"Which: {first.title}{place}{size} (probability {odds})."
+
+
+def _which_none(report: GapReport, odds: str) -> str:
+    rival = max(report.causes[1:], key=lambda cause: cause.probability, default=None)
+    if rival is None or report.causes[0].probability > SURE:
+        return f"Which: none ({odds}); what differs is no more than between healthy machines and the simulator."
+    return f"Which: none is likely enough to be named: no gap {odds}, {rival.title} {100 * rival.probability:.0f} %."
 
 
 def _severity(cause: GapCause, severity: Interval) -> str:
@@ -58,17 +67,19 @@ def _how_far(report: GapReport) -> str:
     if report.outcome in (GapOutcome.NO_GAP, GapOutcome.UNKNOWN) or shrinkage is None:
         return "How far: no effect was added."
     s = shrinkage.shrink
-    return (
-        f"How far: the gap on its own features shrinks by {100 * s.value:.0f} % ({100 * s.low:.0f} to "
-        f"{100 * s.high:.0f} %) on {shrinkage.held_out}."
-    )
+    shrinks = f"shrinks by {100 * s.value:.0f} % ({100 * s.low:.0f} to {100 * s.high:.0f} %)"
+    if s.value <= 0.0:
+        shrinks = "does not shrink"
+    return f"How far: with {report.causes[0].title}, the gap on its own features {shrinks} on {shrinkage.held_out}."
 
 
 def _next(report: GapReport) -> str:
-    if report.next_recordings:
-        return f"Next: {report.next_recordings[0].text}"
+    best = report.next_recordings[0].text if report.next_recordings else ""
     if not report.references:
-        return f"Next: {SOUND_MACHINE}, at the same speed and load; then only what has changed since counts."
+        first = f"{SOUND_MACHINE}, at the same speed and load; then only what has changed since counts."
+        return f"Next: {first} Or {best}" if best else f"Next: {first}"
+    if best:
+        return f"Next: {best}"
     if report.outcome is GapOutcome.NO_GAP:
         return "Next: nothing is needed; keep these recordings, later ones are best compared with them."
     if sum(cause.shrinkage is not None for cause in report.causes) < 2:

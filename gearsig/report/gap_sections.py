@@ -95,6 +95,23 @@ def size_text(report: GapReport) -> str:
     return f"{interval_text(report.size)} structural floors, {readable(report.repeatability, 2)} repeatability floors"
 
 
+def floors_text(report: GapReport) -> str:
+    """Say what the recordings are compared with, and what the two floors are; empty where nothing was simulated."""
+    if not report.is_simulated:
+        return ""
+    structural, beside = "what healthy machines differ by from this simulator", ""
+    if report.references:
+        known = f"Compared with the same machine when it was sound ({', '.join(report.references)}). "
+        structural = "what healthy machines change by from one recording to another"
+        beside = " The curves show the recording beside the simulation."
+    else:
+        known = "Compared with the simulation of the sound machine. "
+    return (
+        f"{known}A structural floor is {structural}; they exceed 1 once in twenty. A repeatability floor is what this "
+        f"machine differs by from itself, from one stretch to the next.{beside}"
+    )
+
+
 def place_rows(report: GapReport) -> tuple[PlaceRow, ...]:
     """Return the places, largest share first."""
     return tuple(
@@ -175,11 +192,16 @@ def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
     if shrinkage is None:
         return ("It was not fitted: no held-out check.",)
     before, after = interval_text(shrinkage.before), interval_text(shrinkage.after)
-    taken, low, high = (percent(x) for x in (shrinkage.shrink.value, shrinkage.shrink.low, shrinkage.shrink.high))
+    shrink, wrong = shrinkage.shrink, shrinkage.placebo
+    taken, low, high = (percent(x) for x in (shrink.value, shrink.low, shrink.high))
+    checked = f"checked on {shrinkage.held_out}"
+    placebo = f"at most {percent(wrong)}" if wrong >= LEAST_SHOWN else "nothing"
     return (
         f"Gap on its own features: {before} structural floors without it, {after} with it.",
-        f"It takes away {taken} ({low} to {high}) of what exceeds the floor, checked on {shrinkage.held_out}.",
-        f"In a wrong place (placebo) it takes away at most {percent(shrinkage.placebo)}.",
+        f"It takes away nothing: with it the gap grows, {checked}."
+        if shrink.value < 0.0
+        else f"It takes away {taken} ({low} to {high}) of what exceeds the floor, {checked}.",
+        f"In a wrong place (placebo) it takes away {placebo}.",
         f"The observed change is {readable(shrinkage.slope, 2)} times the predicted one; 1 is right.",
     )
 
@@ -217,7 +239,7 @@ def step_rows(report: GapReport) -> tuple[StepRow, ...]:
             step.label,
             readable(step.left.value, 2),
             f"{readable(step.left.low, 2)} to {readable(step.left.high, 2)}",
-            "" if last is None else signed(step.left.value - last.value),
+            "" if last is None else signed(step.left.value - last.value, n_decimals=2),
         )
         for step, last in zip(report.steps, before, strict=False)
     )
@@ -292,16 +314,19 @@ def percent(share: float) -> str:
     return "< 1 %" if 0 < share < LEAST_SHOWN else f"{round(100 * share)} %".replace("-", "−")
 
 
-def signed(value: float) -> str:
-    """Write a change with its sign and one decimal.
+def signed(value: float, n_decimals: int = 1) -> str:
+    """Write a change with its sign and one decimal; none where it is nothing.
 
     Examples
     --------
-    >>> signed(14.23), signed(-3.0), signed(float("nan"))
-    ('+14.2', '−3.0', '–')
+    >>> signed(14.23), signed(-3.0), signed(-0.04), signed(float("nan"))
+    ('+14.2', '−3.0', '0.0', '–')
     """
-    return f"{value:+.1f}".replace("-", "−") if isfinite(value) else "–"
+    if not isfinite(value):
+        return "–"
+    rounded = round(value, n_decimals) + 0.0
+    return f"{rounded:+.{n_decimals}f}".replace("-", "−") if rounded else f"{0.0:.{n_decimals}f}"
 
 
 def _bar(share: float) -> float:
-    return round(100 * min(max(share, 0.0), 1.0), 1) if isfinite(share) else 0.0
+    return round(100 * min(max(share, 0.0), 1.0), 3) if isfinite(share) else 0.0

@@ -41,6 +41,8 @@ class ToothContact:
         What turns between torque sensor and teeth. 0: nothing but the teeth.
     driven_inertia_kg_m2 : float or None
         The driven gear with its load; None: not known.
+    motor_inertia_kg_m2 : float
+        Ahead of the torque sensor and rigidly coupled: it takes part in impacts.
     mesh_phase : float
         Driver's angle in tooth pitches at which a pair enters on the drive flank, 0 to 1.
     contact_ratio : float or None
@@ -64,6 +66,7 @@ class ToothContact:
     driven_inertia_kg_m2: float | None = None
     mesh_phase: float = 0.0
     contact_ratio: float | None = None
+    motor_inertia_kg_m2: float = 0.0
 
     def __post_init__(self) -> None:
         positive(self.stiffness_n_per_m_lambda, "stiffness_n_per_m_lambda", "N/m^λ")
@@ -74,6 +77,7 @@ class ToothContact:
         positive(self.impact_speed_floor_mps, "impact_speed_floor_mps", "m/s")
         within(self.friction_coefficient, "friction_coefficient", 0.0, 1.0)
         not_negative(self.driver_inertia_kg_m2, "driver_inertia_kg_m2", "kg m^2")
+        not_negative(self.motor_inertia_kg_m2, "motor_inertia_kg_m2", "kg m^2")
         if self.driven_inertia_kg_m2 is not None:
             positive(self.driven_inertia_kg_m2, "driven_inertia_kg_m2", "kg m^2")
         within(self.mesh_phase, "mesh_phase", 0.0, 1.0)

@@ -21,8 +21,8 @@ class PathOfContact:
 
     Tooth pair j lies at p = z1 θ1/2π − phase − j base pitches behind its entry and touches for 0 ≤ p ≤ ε, at ρ1 = ρ1A +
     p·p_b from the driver's base tangent point. A rotation alone decides: the count holds forwards and backwards alike.
-    On the back flank the path is mirrored, and half a pitch away from where the drive flank passes the pitch point: p' =
-    −(z1 θ1/2π − phase) + 2 p_C + ½.
+    On the back flank the path is mirrored, half a pitch away from where the drive flank passes the pitch point:
+    p' = −(z1 θ1/2π − phase) + 2 p_C + ½.
 
     Parameters
     ----------
@@ -120,8 +120,7 @@ def standard_path(
 ) -> PathOfContact:
     """Return the path of contact of standard teeth: addendum of one module, no shift, reference centre distance.
 
-    ε p_b = √(ra1² − rb1²) + √(ra2² − rb2²) − a sin α. A stated contact ratio shortens or lengthens the path at both ends
-    alike.
+    ε p_b = √(ra1² − rb1²) + √(ra2² − rb2²) − a sin α. A stated contact ratio shortens or lengthens both ends alike.
 
     Examples
     --------

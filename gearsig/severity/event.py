@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.severity.shaft_lines import ShaftLines
+from gearsig.severity.shaft_lines import ShaftLines, orders_from_mesh
 
 MOST_BANDS = 10
 """One band about each mesh harmonic. A band's ratio to its mesh line scatters by some 8 dB, for the line is one number
@@ -103,7 +103,7 @@ def without_regular_lines(shaft: ShaftLines) -> np.ndarray:
     lines = shaft.lines.copy()
     orders = np.arange(lines.shape[1])
     z = shaft.teeth
-    near_mesh = np.abs((orders + z // 2) % z - z // 2) <= _SIDEBANDS
+    near_mesh = orders_from_mesh(orders, z) <= _SIDEBANDS
     lines[:, (orders < _LOWEST_ORDER) | near_mesh] = 0.0
     return lines
 

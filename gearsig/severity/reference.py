@@ -8,7 +8,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.severity.shaft_lines import ShaftLines
+from gearsig.severity.shaft_lines import ShaftLines, orders_from_mesh
 
 LARGEST_SPEED_DIFFERENCE = 0.02
 """Relative, as in the calibration; beyond, resonances amplify both recordings differently."""
@@ -91,8 +91,7 @@ def _matched(reference: np.ndarray, x: np.ndarray, teeth: int) -> np.ndarray:
 
 def telling_teeth_apart(orders: np.ndarray, teeth: int) -> np.ndarray:
     """Return which orders tell one tooth from another; shaft orders, mesh lines and their sidebands hardly do."""
-    near = np.abs((orders + teeth // 2) % teeth - teeth // 2) <= 1
-    used: np.ndarray = (orders > _SHAFT_ORDERS) & ~near
+    used: np.ndarray = (orders > _SHAFT_ORDERS) & (orders_from_mesh(orders, teeth) > 1)
     return used
 
 

@@ -91,6 +91,12 @@ def shaft_lines(
     )
 
 
+def orders_from_mesh(orders: NDArray[np.intp], teeth: int) -> NDArray[np.intp]:
+    """Return how many orders of a shaft lie between each order and the nearest mesh harmonic."""
+    distance: NDArray[np.intp] = np.abs((orders + teeth // 2) % teeth - teeth // 2)
+    return distance
+
+
 def has_mark(recording: Recording, rig: Rig, shaft: str) -> bool:
     """Say whether angle 0 of a shaft is a mark on that very shaft: one pulse per revolution."""
     source = recording.speed_source

@@ -15,6 +15,7 @@ from gearsig.rig.types import Bearing
 from sims.cracked.bearing import EDGES_MM
 from sims.cracked.usual import (
     Nominal,
+    log_uniform,
     pitch_tolerance_um,
     profile_tolerance_um,
     runout_tolerance_um,
@@ -22,7 +23,7 @@ from sims.cracked.usual import (
 )
 from sims.effects import effect
 from sims.effects.bearing_choice import element_spacing_mm
-from sims.effects.effect import OptionValue
+from sims.effects.effect import Effect, OptionValue
 from sims.effects.unbalance import LARGEST_OFFSET
 from sims.machine import BearingSupport
 from sims.mesh import GearGeometry
@@ -125,10 +126,6 @@ def _any_tooth(machine: Surroundings, rng: np.random.Generator) -> Options:
     return {**options, "tooth": float(rng.integers(machine.nominal.teeth[_side(options)]) + 1)}
 
 
-def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
 def _each_bearing(machine: Surroundings) -> Sequence[Options]:
     return [{"bearing": b.name} for b in machine.bearings]
 
@@ -196,7 +193,7 @@ PLAUSIBLE: dict[str, Plausible] = {
         "percent of the face; a pit of a tenth is lost in ordinary flanks, 90 is the model's limit",
         lambda _m, _o: 1.0,
         lambda m: [{**o, "length_mm": 0.45 * m.nominal.module_mm} for o in _one_tooth(m)],
-        lambda m, rng: {**_any_tooth(m, rng), "length_mm": m.nominal.module_mm * _log_uniform(rng, 0.2, 1.0)},
+        lambda m, rng: {**_any_tooth(m, rng), "length_mm": m.nominal.module_mm * log_uniform(rng, 0.2, 1.0)},
     ),
     "chipped_tooth": Plausible(
         0.2,
@@ -262,7 +259,7 @@ PLAUSIBLE: dict[str, Plausible] = {
         5.0,
         "percent: a controlled drive holds 0.1, a hunting one swings by several",
         choices=lambda _m: [{"frequency_hz": 1.0}],
-        drawn=lambda _m, rng: {"frequency_hz": _log_uniform(rng, 0.3, 8.0)},
+        drawn=lambda _m, rng: {"frequency_hz": log_uniform(rng, 0.3, 8.0)},
     ),
     "backlash": Plausible(25.0, 300.0, "um per mm of module; new gears have some 20 to 50", _module_mm),
     "bearing_outer_race": Plausible(
@@ -291,8 +288,8 @@ PLAUSIBLE: dict[str, Plausible] = {
         "amplification: a well damped to a sharp resonance",
         choices=lambda _m: [{"frequency_hz": f} for f in PATH_HZ],
         drawn=lambda _m, rng: {
-            "frequency_hz": _log_uniform(rng, 400.0, 7000.0),
-            "damping_ratio": _log_uniform(rng, 0.01, 0.08),
+            "frequency_hz": log_uniform(rng, 400.0, 7000.0),
+            "damping_ratio": log_uniform(rng, 0.01, 0.08),
         },
     ),
     "mains_hum": Plausible(
@@ -316,3 +313,34 @@ def _any_order(rng: np.random.Generator) -> float:
     if rng.uniform() < 2.0 / 3.0:
         return float(rng.choice((1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)))
     return float(rng.uniform(1.5, 16.0))
+
+
+def plausible_of(own: Effect) -> Plausible:
+    """Return the range of an effect that is not listed: a third to three times its typical severity.
+
+    It is tried on each gear, shaft or bearing that it may be on, at the first tooth, with its other options as they
+    are by default.
+    """
+    severity = own.severity
+
+    def choices(machine: Surroundings) -> Sequence[Options]:
+        found: list[Options] = [{}]
+        for option in own.options:
+            words = [b.name for b in machine.bearings] if option.name == "bearing" else option.choices
+            if words:
+                found = [{**options, option.name: word} for options in found for word in words]
+            elif option.name == "tooth":
+                found = [{**options, "tooth": 1.0} for options in found]
+        return found
+
+    def drawn(machine: Surroundings, rng: np.random.Generator) -> Options:
+        every = choices(machine)
+        return dict(every[int(rng.integers(len(every)))])
+
+    return Plausible(
+        max(severity.low, severity.typical / 3.0),
+        min(severity.high, 3.0 * severity.typical),
+        "about its typical severity",
+        choices=choices,
+        drawn=drawn,
+    )

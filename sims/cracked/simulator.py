@@ -54,24 +54,7 @@ class Prepared:
 
     def truth(self) -> dict[str, Any]:
         """What was put in, as plain values."""
-        return {
-            "model": NAME,
-            "preset": self.preset,
-            "parameters": dict(self.values),
-            "effects": [
-                {
-                    "name": s.name,
-                    "severity": s.severity,
-                    "unit": effect(s.name).severity.unit,
-                    "options": dict(s.options),
-                }
-                for s in self.effects
-            ],
-            "operation": {
-                "speed_rpm": _plain(self.operation.speed_rpm),
-                "torque_nm": _plain(self.operation.torque_nm),
-            },
-        }
+        return truth_of(NAME, self.preset, self.values, self.effects, self.operation)
 
 
 @dataclass(frozen=True)
@@ -186,27 +169,44 @@ def prepare_preset(
 
     values = complete_values(PARAMETERS, chosen.parameters, parameters)
     run = operation or chosen.operation
-    _check_run(run, sampling_rate_hz)
+    check_run(run, sampling_rate_hz)
     wanted = (*chosen.effects, *settings)
     complete = tuple(EffectSetting(s.name, s.severity, effect(s.name).complete(s.options)) for s in wanted)
     installed = installed_of(chosen.installed) if chosen.installed else None
     sound = build_machine(values, sampling_rate_hz=sampling_rate_hz, installed=installed)
-    _check_load(sound, run)
+    check_load(sound, run)
     return Prepared(with_effects(sound, complete, rng), run, chosen.name, values, complete)
 
 
-def _check_run(operation: Operation, sampling_rate_hz: float) -> None:
+def check_run(operation: Operation, sampling_rate_hz: float) -> None:
+    """Refuse speeds and sampling rates that no gear pair has."""
     for value in (operation.speed_rpm.values.min(), operation.speed_rpm.values.max()):
         within(value, "speed_rpm", *SPEED_RANGE_RPM, "rpm")
     within(sampling_rate_hz, "sampling_rate_hz", *SAMPLING_RATE_RANGE_HZ, "Hz")
 
 
-def _check_load(machine: Machine, operation: Operation) -> None:
+def check_load(machine: Machine, operation: Operation) -> None:
     """Refuse a torque that would break the teeth: far beyond, the linear model means nothing."""
     pair = machine.mesh.pair
     section_m2 = pair.face_width_mm * pair.driver.module_mm * 1e-6
     most_nm = BREAKING_STRESS_PA * section_m2 * pair.driver.pitch_radius_mm * 1e-3
     within(operation.torque_nm.largest, "torque_nm", 0.0, float(f"{most_nm:.2g}"), "N m")
+
+
+def truth_of(
+    model: str, preset_name: str, values: Values, settings: Sequence[EffectSetting], operation: Operation
+) -> dict[str, Any]:
+    """Return what was put into a simulation as plain values, for `Recording.truth`."""
+    return {
+        "model": model,
+        "preset": preset_name,
+        "parameters": dict(values),
+        "effects": [
+            {"name": s.name, "severity": s.severity, "unit": effect(s.name).severity.unit, "options": dict(s.options)}
+            for s in settings
+        ],
+        "operation": {"speed_rpm": _plain(operation.speed_rpm), "torque_nm": _plain(operation.torque_nm)},
+    }
 
 
 def _plain(course: Course) -> dict[str, list[float]]:

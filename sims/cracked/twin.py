@@ -18,12 +18,13 @@ from gearsig.rig.toml import rig_to_dict
 from gearsig.rig.types import OperatingPoint, Rig
 from sims.cracked.installed import SensorSeat
 from sims.cracked.installed_table import table_of
-from sims.cracked.plausible import PLAUSIBLE, Options, Plausible, Surroundings
+from sims.cracked.plausible import PLAUSIBLE, Options, Plausible, Surroundings, plausible_of
 from sims.cracked.seats import completed, further_seats, installed_of_rig
 from sims.cracked.simulator import NAME, prepare_preset
 from sims.cracked.usual import (
     Nominal,
     as_plain,
+    log_uniform,
     nominal_of,
     specimen_parameters,
     usual_housing,
@@ -111,7 +112,7 @@ class CrackedTwin:
         """Return settings of an effect worth a try, from barely noticeable to strong, for each option that matters."""
         found = []
         for options, (low, high) in self._reaches(name):
-            found += [Added(name, float(f"{s:.4g}"), options) for s in np.geomspace(low, high, PLAUSIBLE[name].n)]
+            found += [Added(name, float(f"{s:.4g}"), options) for s in np.geomspace(low, high, _plausible(name).n)]
         return found
 
     def with_further_sensors(self) -> tuple[CrackedTwin, Mapping[str, str]]:
@@ -132,7 +133,7 @@ class CrackedTwin:
             raise RefusalError(f"the rig has nothing that {name} could be in", remedy="describe its bearings")
         options = plausible.drawn(machine, rng)
         low, high = plausible.reach(name, machine, options)
-        return Added(name, float(np.exp(rng.uniform(np.log(low), np.log(high)))), options)
+        return Added(name, log_uniform(rng, low, high), options)
 
     def preset(self, point: Point, added: Sequence[Added] = (), *, seed: int = 0, notes: Sequence[str] = ()) -> Preset:
         """Return the specimen `seed` with its effects as a preset."""
@@ -238,4 +239,4 @@ class CrackedGapSimulator:
 
 
 def _plausible(name: str) -> Plausible:
-    return PLAUSIBLE[effect(name).name]
+    return PLAUSIBLE.get(effect(name).name) or plausible_of(effect(name))

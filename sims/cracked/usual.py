@@ -175,13 +175,18 @@ def usual_housing(rng: np.random.Generator) -> tuple[HousingMode, ...]:
     """Draw the modes of a housing that nobody has measured."""
     return tuple(
         HousingMode(
-            _rounded(np.exp(rng.uniform(np.log(600.0), np.log(8000.0)))),
-            _rounded(np.exp(rng.uniform(np.log(0.01), np.log(0.05)))),
+            _rounded(log_uniform(rng, 600.0, 8000.0)),
+            _rounded(log_uniform(rng, 0.01, 0.05)),
             _rounded(rng.uniform(0.02, 0.08)),
             tuple(_rounded(s) for s in rng.uniform(-1.0, 1.0, 4)),  # type: ignore[arg-type]  # four of them
         )
         for _ in range(int(rng.integers(2, 6)))
     )
+
+
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """Draw with even chance per decade."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def pitch_tolerance_um(module_mm: float, diameter_mm: float) -> float:

@@ -1,11 +1,13 @@
-"""All effects, found by their files: a module of this package with an `EFFECT` is one."""
+"""All effects, found by their files: a module of this package with an `EFFECT` is one; so is a file of one's own."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from pkgutil import iter_modules
 from zlib import crc32
 
@@ -14,17 +16,69 @@ import numpy as np
 from gearsig.checks import closest_match_hint
 from gearsig.errors import InputError
 from sims.effects.effect import GROUPS, Effect, EffectSetting
+from sims.effects.own import VARIABLE, loaded, own_files, with_own_file
 from sims.machine import Machine
 
 
 @cache
 def effects() -> dict[str, Effect]:
-    """Return every effect by name, in the order of the groups."""
+    """Return every effect by name, in the order of the groups.
+
+    Raises
+    ------
+    InputError
+        If a file of one's own effect cannot be used.
+    """
+    found = dict(_listed())
+    for path in own_files():
+        own = loaded(path)
+        if own.name in found:
+            raise InputError(f"there is an effect {own.name!r} already", where=str(path), remedy="choose another name")
+        found[own.name] = own
+    return dict(sorted(found.items(), key=lambda item: (GROUPS.index(item[1].group), item[0])))
+
+
+def add_effect(path: str | Path) -> Effect:
+    """Take an effect of one's own from a Python file, in this process and in those that it starts.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of a file with `EFFECT = Effect(…)`.
+
+    Raises
+    ------
+    InputError
+        If it cannot be used, or an effect of that name is there already.
+    """
+    before = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = with_own_file(Path(path))
+    effects.cache_clear()
+    try:
+        effects()
+    except InputError:
+        if before is None:
+            del os.environ[VARIABLE]
+        else:
+            os.environ[VARIABLE] = before
+        effects.cache_clear()
+        raise
+    return effect(loaded(Path(path)).name)
+
+
+def is_own(name: str) -> bool:
+    """Whether an effect is none of this package's."""
+    return name in effects() and name not in _listed()
+
+
+@cache
+def _listed() -> dict[str, Effect]:
+    """Return the effects of this package by name."""
     import sims.effects as package
 
     modules = [import_module(f"sims.effects.{m.name}") for m in iter_modules(package.__path__)]
     found = [m.EFFECT for m in modules if hasattr(m, "EFFECT")]
-    return {e.name: e for e in sorted(found, key=lambda e: (GROUPS.index(e.group), e.name))}
+    return {e.name: e for e in found}
 
 
 def effect(name: str) -> Effect:
@@ -32,7 +86,9 @@ def effect(name: str) -> Effect:
     found = effects()
     if name not in found:
         raise InputError(
-            f"there is no effect {name!r}", allowed=", ".join(found), remedy=closest_match_hint(name, found)
+            f"there is no effect {name!r}",
+            allowed=", ".join(found),
+            remedy=closest_match_hint(name, found) or f"name the file of an effect of your own in {VARIABLE}",
         )
     return found[name]
 

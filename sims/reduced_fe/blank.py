@@ -12,7 +12,6 @@ from gearsig.checks import positive, within
 from gearsig.errors import InputError
 from sims.mesh.geometry import GearGeometry
 from sims.mesh.material import STEEL, Material
-from sims.mesh.profile import root_half_angle_rad
 
 LEAST_RIM = 1.0
 """Least thickness of rim and hub in modules: thinner ones crack through the rim, which this model does not follow."""
@@ -41,8 +40,8 @@ class GearBlank:
     Raises
     ------
     InputError
-        If the web is thicker than the face, hub and rim meet, the bore leaves less than 1 module below the root circle,
-        or neighbouring fillets overlap.
+        If the web is thicker than the face, hub and rim meet, or the bore leaves less than 1 module below the root
+        circle.
 
     Notes
     -----
@@ -63,7 +62,6 @@ class GearBlank:
 
     def __post_init__(self) -> None:
         self._check_bore()
-        self._check_root()
         if self.web_thickness_mm is None:
             self._refuse_parts_without_web()
         else:
@@ -110,15 +108,6 @@ class GearBlank:
                 f"bore_radius_mm is {g.bore_mm:g} mm: it leaves {g.root_radius_mm - g.bore_mm:.3g} mm below the teeth",
                 allowed=f"at most {largest:.4g} mm, 1 module below the root circle",
                 remedy="take a smaller bore",
-            )
-
-    def _check_root(self) -> None:
-        g = self.geometry
-        gap_mm = 2.0 * g.root_radius_mm * (pi / g.teeth - root_half_angle_rad(g))
-        if gap_mm < 0.0:
-            raise InputError(
-                f"tool_tip_radius is {g.tool_tip_radius:g} modules: neighbouring fillets overlap by {-gap_mm:.3g} mm",
-                remedy="take a smaller tip radius of the tool or a smaller dedendum",
             )
 
     def _refuse_parts_without_web(self) -> None:

@@ -16,9 +16,6 @@ GAUSS_ORDER = 5
 """Integrates polynomials up to this degree exactly: three points each way, exact for the mass of a cell with parallel
 faces and the usual full integration of its stiffness."""
 
-_LAYOUT = np.array([[x, y, z] for x in range(3) for y in range(3) for z in range(3)])
-"""Half steps of the 27 nodes in the order of `SectorMesh.cells`, raveled."""
-
 
 class CellFields(NamedTuple):
     """Shape functions and their gradients at the Gauss points of each cell, in `SectorMesh`'s order of nodes.
@@ -44,11 +41,14 @@ def cell_fields(points_m: FloatArray, cells: IntArray) -> CellFields:
     """Evaluate the isoparametric cells at their Gauss points."""
     local, weights = _gauss()
     values, slopes = _shape_functions(local)
-    corners = points_m[cells.reshape(len(cells), 27)]
-    jacobian = np.einsum("qin,cnj->cqij", slopes, corners, optimize=True)
-    determinants = np.linalg.det(jacobian)
-    gradients = np.linalg.solve(jacobian, np.broadcast_to(slopes, (len(cells), *slopes.shape)))
+    gradients, determinants = _gradients(points_m, cells, slopes)
     return CellFields(values, gradients, weights * determinants, determinants)
+
+
+def cell_gradients_at_nodes(points_m: FloatArray, cells: IntArray) -> FloatArray:
+    """Gradients of the shape functions at each cell's own nodes, (n_cells, 27, 3, 27); 1/m."""
+    local = np.array([[x, y, z] for x in (0.0, 0.5, 1.0) for y in (0.0, 0.5, 1.0) for z in (0.0, 0.5, 1.0)]).T
+    return _gradients(points_m, cells, _shape_functions(local)[1])[0]
 
 
 def sector_matrices(mesh: SectorMesh, material: Material | None = None) -> tuple[sparse.csr_array, sparse.csr_array]:
@@ -86,6 +86,14 @@ def lame_pa(material: Material) -> tuple[float, float]:
     return e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu))
 
 
+def _gradients(points_m: FloatArray, cells: IntArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Gradients in space (n_cells, n_points, 3, 27) and Jacobian determinants (n_cells, n_points)."""
+    corners = points_m[cells.reshape(len(cells), 27)]
+    jacobian = np.einsum("qin,cnj->cqij", slopes, corners, optimize=True)
+    gradients = np.linalg.solve(jacobian, np.broadcast_to(slopes, (len(cells), *slopes.shape)))
+    return gradients, np.linalg.det(jacobian)
+
+
 def _cell_stiffness(fields: CellFields, material: Material) -> FloatArray:
     lam, mu = lame_pa(material)
     n = len(fields.volumes)
@@ -98,7 +106,8 @@ def _cell_stiffness(fields: CellFields, material: Material) -> FloatArray:
     cells = lam * products + mu * products.transpose(0, 3, 2, 1, 4)
     for i in range(3):
         cells[:, i, :, i, :] += mu * trace
-    return cells.transpose(0, 2, 1, 4, 3).reshape(n, 81, 81)
+    ordered: FloatArray = cells.transpose(0, 2, 1, 4, 3).reshape(n, 81, 81)
+    return ordered
 
 
 def _cell_mass(fields: CellFields, density: float) -> FloatArray:

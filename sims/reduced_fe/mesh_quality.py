@@ -12,9 +12,9 @@ from sims.mesh.geometry import GearGeometry
 from sims.mesh.profile import fillet_outline, involute_outline, root_half_angle_rad
 from sims.reduced_fe.blank import GearBlank
 from sims.reduced_fe.elements import cell_fields
-from sims.reduced_fe.mesh_size import MeshSize
 from sims.reduced_fe.sector_mesh import SectorMesh
 from sims.reduced_fe.tooth_side import outline_error_mm
+
 
 class MeshQuality(NamedTuple):
     """Quality of a mesh, and its mass properties.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from gearsig.checks import count
@@ -111,6 +111,7 @@ def mesh_size_for(blank: GearBlank, n_dof: int) -> MeshSize:
     if wanted > MOST_DOF:
         raise InputError(f"n_dof is {wanted}", allowed=f"{LEAST_DOF} to {MOST_DOF}", remedy="give a MeshSize")
     sizes = [_size(blank, blank.geometry.module_mm * 2.5 * 0.97**k) for k in range(110)]
+    sizes += [replace(size, n_up=size.n_up - 1) for size in sizes if size.n_up > _least_up(blank)]
     best = min(sizes, key=lambda size: abs(n_dof_of(blank, size) - wanted))
     if n_dof_of(blank, best) > 1.5 * wanted:
         raise InputError(
@@ -129,14 +130,14 @@ def _least_up(blank: GearBlank) -> int:
 
 
 def _size(blank: GearBlank, cell_mm: float) -> MeshSize:
-    """Cells about `cell_mm` wide at the teeth, and longer where the motion varies less: in the body, along the face."""
+    """Cells about `cell_mm` wide in the teeth, lower there (where loads act), longer where the motion varies less."""
     g, split = blank.geometry, fillet_split(blank.geometry)
     across, gap, up = 2.0 * split.y_mm, split.gap_length_mm, split.side_length_mm
     return MeshSize(
         n_across=max(2, round(across / cell_mm)),
         n_gap=max(1, round(gap / cell_mm)),
-        n_up=max(_least_up(blank), round(up / cell_mm)),
+        n_up=max(_least_up(blank), round(2.7 * up / cell_mm)),
         n_rim=max(1, round((g.root_radius_mm - blank.rim_radius_mm) / (2.0 * cell_mm))),
         n_body=max(1, round((blank.rim_radius_mm - g.bore_mm) / (6.0 * cell_mm))),
-        n_along=max(1, round(g.face_width_mm / (3.0 * cell_mm))),
+        n_along=max(1, round(g.face_width_mm / (2.5 * cell_mm))),
     )

@@ -54,9 +54,9 @@ class ReducedGear:
     """Modes and static compliance of a gear at its flanks and hub, in the frame that turns with the gear.
 
     Axes: z along the shaft, x through the middle of tooth 0, origin in the middle of the bore; tooth k lies at the
-    angle +k·2π/z (ccw about +z). *Push* at a flank point is displacement or force along the normal **into the tooth**, in the
-    transverse plane, so that a contact force N ≥ 0 is a push of +N and the compliance of a point to itself is positive.
-    About +z a push of 1 N gives the torque −r_b on flank 0 and +r_b on flank 1.
+    angle +k·2π/z (ccw about +z). *Push* at a flank point is displacement or force along the normal **into the
+    tooth**, in the transverse plane, so that a contact force N ≥ 0 is a push of +N and the compliance of a point to
+    itself is positive. About +z a push of 1 N gives the torque −r_b on flank 0 and +r_b on flank 1.
 
     Any motion of the gear is rigid motion p (6) + elastic modes q + the quasi-static rest:
 
@@ -76,9 +76,10 @@ class ReducedGear:
     n_dof : int
         Degrees of freedom of the full gear's finite-element model.
     spread : str
-        What a flank point stands for: "section" (force and motion of the tooth's whole cross-section at that height, no
-        local indentation in it: add Hertz), "patch" (RBE3 over flank nodes around the point: contains the indentation
-        by a uniform strip as wide as the patch) or "node" (one line of nodes: local indentation depends on the mesh).
+        What a flank point stands for: "section" (force and motion of the tooth's whole cross-section at that height,
+        weighted like the shear stress of a beam; no local indentation in it: add Hertz), "patch" (RBE3 over flank nodes
+        around the point: contains the indentation by a uniform strip as wide as the patch) or "node" (one line of
+        nodes: local indentation depends on the mesh).
     mass_kg, polar_inertia_kg_m2, diametral_inertia_kg_m2 : float
         Of the finite-element body, about its centre.
     grid : FlankGrid
@@ -114,7 +115,7 @@ class ReducedGear:
     diametral_inertia_kg_m2: float
     grid: FlankGrid
     frequencies_hz: FloatArray
-    nodal_diameters: np.ndarray[tuple[int], np.dtype[np.int64]]
+    nodal_diameters: np.ndarray[tuple[int, ...], np.dtype[np.int64]]
     flank_modes: FloatArray
     hub_modes: FloatArray
     free_compliance_m_per_n: FloatArray

@@ -9,7 +9,7 @@ import numpy as np
 from gearsig.checks import FloatArray
 from sims.reduced_fe.blank import GearBlank
 from sims.reduced_fe.mesh_size import MeshSize, along_cells, check_fillet
-from sims.reduced_fe.sector_plane import IntArray, SectorPlane, sector_plane
+from sims.reduced_fe.sector_plane import CrackLine, IntArray, SectorPlane, sector_plane
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class SectorMesh:
     bore : array of int, (n_across, n_layers)
         Nodes on the bore.
     tooth : array of int, (2 n_up + 1, 2 n_across + 1, n_layers)
-        Nodes of the tooth at [row, column, layer]; row 0 is at the fillets' middles, the last column on flank 0 (y > 0).
+        Nodes of the tooth at [row, column, layer]; row 0 is at the fillets' middles, the last column on flank 0.
     """
 
     blank: GearBlank
@@ -58,8 +58,8 @@ class SectorMesh:
         return angle
 
 
-def sector_mesh(blank: GearBlank, size: MeshSize) -> SectorMesh:
-    """Mesh one sector.
+def sector_mesh(blank: GearBlank, size: MeshSize, crack: CrackLine | None = None) -> SectorMesh:
+    """Mesh one sector; with a crack, along its line, without opening it.
 
     Raises
     ------
@@ -69,23 +69,25 @@ def sector_mesh(blank: GearBlank, size: MeshSize) -> SectorMesh:
     from sims.reduced_fe.mesh_quality import check_jacobians
 
     check_fillet(blank, size)
-    plane = sector_plane(blank, size)
+    plane = sector_plane(blank, size, crack)
     layers_mm, web = _layers(blank, size)
     n_layers = len(layers_mm)
-    in_plane = np.concatenate((np.repeat(plane.points_mm, n_layers, axis=0),))
+    in_plane = np.repeat(plane.points_mm, n_layers, axis=0)
     points = np.column_stack((in_plane, np.tile(layers_mm, len(plane.points_mm)))) * 1e-3
     every = _extruded(plane.cells, n_layers, range(0, n_layers - 1, 2))
     cells = every
     if web != (0, n_layers - 1):
         web_cells = _extruded(plane.cells[: plane.n_web_cells], n_layers, range(web[0], web[1], 2))
-        cells = np.concatenate((web_cells, _extruded(plane.cells[plane.n_web_cells :], n_layers, range(0, n_layers - 1, 2))))
+        cells = np.concatenate(
+            (web_cells, _extruded(plane.cells[plane.n_web_cells :], n_layers, range(0, n_layers - 1, 2)))
+        )
     mesh = _without_loose_nodes(blank, size, points, cells, plane, n_layers)
     check_jacobians(mesh)
     return mesh
 
 
 def _layers(blank: GearBlank, size: MeshSize) -> tuple[FloatArray, tuple[int, int]]:
-    """z of the layers of nodes in mm, and the first and last layer of the web."""
+    """Heights z of the layers of nodes in mm, and the first and last layer of the web."""
     beside, inside = along_cells(blank, size.n_along)
     face = blank.geometry.face_width_mm
     web = face if blank.web_thickness_mm is None else blank.web_thickness_mm

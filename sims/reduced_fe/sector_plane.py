@@ -1,8 +1,8 @@
 """The transverse plane of one sector: nine-node quadrilaterals in five blocks.
 
 Columns run across the sector from the ray at −π/z to that at +π/z: gap, tooth, gap. Rows run outwards. Gap and tooth
-columns stand on the same rows below the fillets' middles; only the tooth's columns go on up to the tip. Three cells meet
-at the middle of a fillet, each with about 60°.
+columns stand on the same rows below the fillets' middles; only the tooth's columns go on up to the tip. Three cells
+meet at the middle of a fillet, each with about 60°.
 """
 
 from __future__ import annotations
@@ -49,9 +49,25 @@ class SectorPlane(NamedTuple):
     tooth: IntArray
 
 
-def sector_plane(blank: GearBlank, size: MeshSize) -> SectorPlane:
-    """Mesh the transverse plane of one sector."""
-    below, above = _body_grid(blank, size), _tooth_grid(blank.geometry, size)
+class CrackLine(NamedTuple):
+    """A straight line from the middle of the fillet of flank 0 that the lowest row of the tooth's nodes follows.
+
+    Attributes
+    ----------
+    tip_mm : tuple
+        x and y of its end.
+    n_cells : int
+        Columns of cells along it.
+    """
+
+    tip_mm: tuple[float, float]
+    n_cells: int
+
+
+def sector_plane(blank: GearBlank, size: MeshSize, crack: CrackLine | None = None) -> SectorPlane:
+    """Mesh the transverse plane of one sector; with a crack, along its line (the nodes on it are not doubled here)."""
+    foot = _foot(blank.geometry, size) if crack is None else _cracked_foot(blank.geometry, size, crack)
+    below, above = _body_grid(blank, size, foot), _tooth_grid(blank.geometry, size, foot)
     n_columns = below.shape[1]
     first, last = 2 * size.n_gap, 2 * size.n_gap + 2 * size.n_across
     below_nodes = np.arange(below.shape[0] * n_columns).reshape(below.shape[:2])
@@ -76,17 +92,19 @@ def _cells(nodes: IntArray) -> IntArray:
     step = np.arange(3)
     r = rows[:, None, None, None] + step[None, None, :, None]
     c = columns[None, :, None, None] + step[None, None, None, :]
-    return nodes[r, c].reshape(-1, 3, 3)
+    cells: IntArray = nodes[r, c].reshape(-1, 3, 3)
+    return cells
 
 
-def _body_grid(blank: GearBlank, size: MeshSize) -> FloatArray:
+def _body_grid(blank: GearBlank, size: MeshSize, foot: FloatArray) -> FloatArray:
     """Points [row, column, xy] from the bore to the root circle and the line between the fillets' middles."""
     g = blank.geometry
-    top = _top_line(g, size)
+    top = _top_line(g, size, foot)
     angles = _rim_angles(g, size)
     ring = blank.rim_radius_mm * np.column_stack((np.cos(angles), np.sin(angles)))
-    down = _even(size.n_rim)[1:, None, None]
-    rim = ring[None] * (1.0 - down) + top[None] * down
+    # Closer below the teeth, where the fillets press into the body.
+    out = with_middles(1.0 - (1.0 - np.arange(size.n_rim + 1) / size.n_rim) ** 1.7)[1:, None, None]
+    rim = ring[None] * (1.0 - out) + top[None] * out
     hub, web = body_cells(blank, size.n_body)
     radii = [g.bore_mm + (blank.hub_radius_mm - g.bore_mm) * _even(hub)[:-1]] if hub else []
     # Cells of a disc grow from the bore with the radius; a web is divided evenly.
@@ -123,11 +141,11 @@ def _rim_angles(gear: GearGeometry, size: MeshSize) -> FloatArray:
     return np.concatenate((gap, corner * (2.0 * _even(size.n_across) - 1.0), -gap[::-1]))
 
 
-def _top_line(gear: GearGeometry, size: MeshSize) -> FloatArray:
+def _top_line(gear: GearGeometry, size: MeshSize, foot: FloatArray) -> FloatArray:
     """Points (n_columns, 2): root circle and half fillet, across below the tooth, half fillet and root circle."""
     right = gap_curve(gear)[0](_even(size.n_gap))[:, ::-1].T
     left = right[::-1] * np.array([1.0, -1.0])
-    return np.concatenate((left[:-1], _foot(gear, size), right[1:]))
+    return np.concatenate((left[:-1], foot, right[1:]))
 
 
 def _foot(gear: GearGeometry, size: MeshSize) -> FloatArray:
@@ -138,7 +156,15 @@ def _foot(gear: GearGeometry, size: MeshSize) -> FloatArray:
     return np.column_stack((split.x_mm - sag * (1.0 - place**2), split.y_mm * place))
 
 
-def _tooth_grid(gear: GearGeometry, size: MeshSize) -> FloatArray:
+def _cracked_foot(gear: GearGeometry, size: MeshSize, crack: CrackLine) -> FloatArray:
+    """Across from the fillet's middle opposite the crack to its tip, and along the crack to its mouth."""
+    split = fillet_split(gear)
+    ends = np.array([[split.x_mm, -split.y_mm], crack.tip_mm, [split.x_mm, split.y_mm]])
+    rest, along = _even(size.n_across - crack.n_cells)[:, None], _even(crack.n_cells)[1:, None]
+    return np.concatenate((ends[0] + (ends[1] - ends[0]) * rest, ends[1] + (ends[2] - ends[1]) * along))
+
+
+def _tooth_grid(gear: GearGeometry, size: MeshSize, foot: FloatArray) -> FloatArray:
     """Points [row, column, xy] from between the fillets' middles to the tip, by transfinite interpolation."""
     side: Curve = side_curve(gear)[0]
     up, across = _even(size.n_up), 2.0 * _even(size.n_across) - 1.0
@@ -146,7 +172,6 @@ def _tooth_grid(gear: GearGeometry, size: MeshSize) -> FloatArray:
     left = right * np.array([1.0, -1.0])
     half = np.arctan2(right[-1, 1], right[-1, 0])
     tip = gear.tip_radius_mm * np.column_stack((np.cos(half * across), np.sin(half * across)))
-    foot = _foot(gear, size)
     w, s = ((across + 1.0) / 2.0)[None, :, None], up[:, None, None]
     sides = left[:, None] * (1.0 - w) + right[:, None] * w
     ends = foot[None] * (1.0 - s) + tip[None] * s

@@ -2,7 +2,9 @@
 
 import json
 import os
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 from app.benchmark.seen import Seen
@@ -25,3 +27,12 @@ def diagnose(seen: Seen) -> GapReport:
             }
         )
     )
+
+
+def linger(seen: Seen) -> GapReport:
+    """Say who it is, start a process, and answer too late."""
+    del seen
+    child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(100)"])
+    (Path(os.environ["HOME"]) / "lingering").write_text(f"{os.getpid()} {child.pid}")
+    time.sleep(100.0)
+    raise RefusalError("it is too late")

@@ -2,7 +2,12 @@
 
 import csv
 import json
+import os
+import subprocess
+import sys
+import time
 from collections import Counter
+from pathlib import Path
 
 import h5py
 import pytest
@@ -21,6 +26,7 @@ from gearsig.gap.types import NONE, UNKNOWN
 from sims.blind import CATALOGUE, OUTSIDE
 from sims.effects import effects
 
+ROOT = Path(__file__).parents[2]
 SHORT = Plan(n_cases=2, seed=4, role="development", reference="with", longest_s=2.0)
 WORDS = (*CATALOGUE, *OUTSIDE, "single", "pair", "seed", "label", "twin", "development", "evaluation", "blind")
 
@@ -202,3 +208,36 @@ def test_a_diagnoser_that_is_not_there_is_named():
         diagnoser("nothing")
     with pytest.raises(InputError, match=r"app\.gap:nothing"):
         diagnoser("app.gap:nothing")
+
+
+def test_sigterm_leaves_answers_only(tmp_path):
+    target, temporary, told = tmp_path / "out", tmp_path / "temporary", tmp_path / "lingering"
+    temporary.mkdir()
+    options = ["--cases", "1", "--role", "development", "--longest", "2", "-j", "1", "-o", str(target)]
+    options += ["--diagnoser", "tests.app.benchmark_spy:linger"]
+    stopped = subprocess.Popen(
+        [sys.executable, "-m", "app.cli", "benchmark", "gap", *options],
+        env={**os.environ, "TMPDIR": str(temporary), "HOME": str(tmp_path)},
+        cwd=ROOT,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    until(lambda: told.exists() and told.read_text().count(" ") == 1)
+    stopped.terminate()
+    _, said = stopped.communicate(timeout=30.0)
+    assert stopped.returncode == 130
+    assert "0 of 1 cases are answered" in said
+    assert list(temporary.iterdir()) == []
+    until(lambda: not any(map(is_running, told.read_text().split())))
+
+
+def until(holds):
+    end = time.monotonic() + 60.0
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def is_running(pid):
+    state = Path(f"/proc/{pid}/stat")
+    return state.exists() and state.read_text().rpartition(")")[2].split()[0] != "Z"

@@ -78,11 +78,12 @@ def test_it_prints_the_verdict_and_leaves_three_files(capsys, stub, tmp_path) ->
     assert sorted(p.name for p in folder.parent.iterdir()) == ["gap"]
     assert (folder / "twin.toml").read_text() == TWIN
     found = json.loads((folder / "gap.json").read_text())
-    assert (found["outcome"], found["references"]) == ("effect", [HEALTHY.name])
+    assert found["outcome"] == "effect"
     assert [r.provenance.source for r in stub.given["recordings"]] == [CRACKED.name]
     assert [r.provenance.source for r in stub.given["references"]] == [HEALTHY.name]
     assert stub.given["simulator"].name == "cracked"
     assert stub.given["names"] == (CRACKED.name,)
+    assert stub.given["reference_names"] == (HEALTHY.name,)
     assert stub.given["rigs"][0].operating_point.torque_nm == 110.0
 
 
@@ -261,6 +262,26 @@ def test_the_cache_is_the_users_own_or_a_given_one_and_can_be_made_anew(capsys, 
     assert stub.given["cache"] == tmp_path / "mine"
     run(capsys, CRACKED, "-o", tmp_path / "gap", "--fresh")
     assert (stub.given["cache"], stub.given["fresh"]) == (cache_folder(), True)
+
+
+def test_an_effect_of_ones_own_is_listed_as_such(capsys, tmp_path, monkeypatch) -> None:
+    from sims.effects import effects
+    from sims.effects.own import VARIABLE
+
+    monkeypatch.setenv(VARIABLE, "")
+    file = tmp_path / "seal.py"
+    file.write_text(
+        "from sims.effects import Effect, Severity\n"
+        "EFFECT = Effect('dry_seal', 'shaft', 'dry seal', Severity('x', 'N m', 0.0, 9.0, 1.0, ''), '', '', (), None)\n"
+    )
+    try:
+        code, out, _ = run(capsys, "--effect-file", file, "--list-effects")
+        assert (code, "dry_seal" in out, "your own" in out, "N·m" in out) == (0, True, True, True)
+        code, _, err = run(capsys, "--effect-file", tmp_path / "none.py", "--list-effects")
+        assert (code, len(err.splitlines())) == (2, 1)
+    finally:
+        monkeypatch.undo()
+        effects.cache_clear()
 
 
 def test_the_catalogue_is_listed(capsys) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.gap.conditions import with_channels_of
-from app.gap.diagnose import diagnose_gap
+from app.gap.diagnose import _without_meaning, diagnose_gap
 from gearsig.errors import InputError
 from gearsig.gap.gather import gather
 from gearsig.gap.posterior import is_calibrated
@@ -89,10 +89,12 @@ def test_lists_that_do_not_fit_are_errors() -> None:
         diagnose_gap([], simulator)
     with pytest.raises(InputError, match="2 names for 1 recordings"):
         diagnose_gap([recording], simulator, names=["a", "b"])
-    with pytest.raises(InputError, match="no effect 'rust'"):
-        diagnose_gap([recording], simulator, effects=["rust"])
+    with pytest.raises(InputError, match=r"no effect 'backlsh'.*did you mean backlash"):
+        diagnose_gap([recording], simulator, effects=["backlsh"])
     with pytest.raises(InputError, match="carries no rig"):
         diagnose_gap([replace(recording, rig=None)], simulator)
+    with pytest.raises(InputError, match="other sensors"):
+        diagnose_gap([recording], simulator, rigs=[replace(rig(), sensors=rig().sensors[:1])])
 
 
 def test_a_recording_whose_channels_have_other_names_can_be_simulated() -> None:
@@ -102,3 +104,11 @@ def test_a_recording_whose_channels_have_other_names_can_be_simulated() -> None:
     renamed = replace(gathered, channels={"Data1": first, "Data2": first, "Data3": first})
     assert list(with_channels_of(gathered, renamed).channels) == ["Data1", "Data2", "Data3"]
     assert list(with_channels_of(gathered, gathered).channels) == list(gathered.channels)
+
+
+def test_an_effect_that_the_rig_has_no_place_for_is_told() -> None:
+    simulator, bare = gap_simulator("cracked"), replace(rig(), bearings=())
+    known = simulator.gap_effects()
+    (text,) = _without_meaning(simulator.twin_of(bare), known, ["bearing_outer_race", "backlash"])
+    assert text.startswith("The rig file names nothing that spall on an outer race could be in")
+    assert _without_meaning(simulator.twin_of(rig()), known, ()) == []

@@ -126,7 +126,7 @@ def test_bad_profiles(tmp_path: Path, text: str, named: str) -> None:
 def test_the_list_names_everything_within_100_columns(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = run(capsys, "simulate", "--list")
     assert code == 0
-    assert out == run(capsys, "simulate", "cracked", "--list")[1]  # there is one model so far
+    assert run(capsys, "simulate", "cracked", "--list")[1].rstrip() in out
     assert max(map(len, out.splitlines())) <= 100
     words = out.replace(":", " ").split()
     for name in (*presets("cracked"), *(p.name for p in PARAMETERS), *effects()):

@@ -5,7 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from gearsig.gap.types import GapOutcome, Interval
-from tests.gap.example_report import cannot_separate_report, effect_report, no_gap_report, unknown_report
+from tests.gap.example_report import (
+    cannot_separate_report,
+    effect_report,
+    no_gap_report,
+    shrinkage,
+    unknown_report,
+)
 
 
 def test_a_severity_has_a_unit_for_people_and_no_exponent() -> None:
@@ -29,6 +35,35 @@ def test_what_is_next_says_only_what_was_computed() -> None:
     assert "likely enough" in replace(alone, causes=alone.causes[:2]).verdict[3]
     assert "when it was sound" in replace(nothing, references=()).verdict[3]
     assert "when it was sound" in replace(unknown_report(), references=()).verdict[3]
+
+
+def test_a_sound_machine_is_the_first_wish_and_another_point_the_second() -> None:
+    report = cannot_separate_report()
+    assert report.verdict[3].startswith("Next: the same machine when it was sound")
+    assert f" Or {report.next_recordings[0].text}" in report.verdict[3]
+    known = replace(report, references=("healthy.h5",))
+    assert known.verdict[3] == f"Next: {report.next_recordings[0].text}"
+
+
+def test_an_effect_that_takes_nothing_away_does_not_shrink_the_gap() -> None:
+    report = effect_report()
+    worse = replace(report.causes[0], shrinkage=shrinkage(-1.0, -1.0, -1.0))
+    line = replace(report, causes=(worse, *report.causes[1:])).verdict[2]
+    assert "does not shrink on another operating condition" in line
+
+
+def test_a_small_gap_as_a_whole_may_be_large_in_one_place() -> None:
+    report = replace(effect_report(), size=Interval(0.7, 0.6, 0.8))
+    assert report.verdict[0].endswith("tooth 21 of the input shaft, 8.7 structural floors (58 % of the gap).")
+
+
+def test_a_gap_that_no_cause_explains_is_told_as_it_is() -> None:
+    report = no_gap_report()
+    causes = (replace(report.causes[0], probability=0.3), replace(report.causes[1], probability=0.2))
+    places = effect_report().places
+    unsure = replace(report, causes=causes, size=Interval(1.7, 1.5, 1.9), places=places)
+    assert unsure.verdict[0].startswith("Where: a burst")
+    assert unsure.verdict[1] == "Which: none is likely enough to be named: no gap 30 %, spall on a tooth flank 20 %."
 
 
 def test_without_a_gap_nothing_is_asked_for_that_would_separate_causes() -> None:

@@ -12,8 +12,16 @@ import pytest
 from gearsig.gap.simulator import Point
 from gearsig.gap.types import ConditionFacts, Evidence, GapCause, GapOutcome, GapStep, Interval
 from gearsig.report.gap_page import gap_page_html, write_gap_page
+from gearsig.report.gap_sections import cause_rows, floors_text
 from gearsig.report.gap_text import condition_advice, gap_text, n_conditions
-from tests.gap.example_report import all_reports, cannot_separate_report, effect_report, no_gap_report, shrinkage
+from tests.gap.example_report import (
+    all_reports,
+    cannot_separate_report,
+    effect_report,
+    gearless_report,
+    no_gap_report,
+    shrinkage,
+)
 
 EVIL = "<script>alert(1)</script>"
 QUOTES = "\"rig\" onload='x' & <b>"
@@ -197,3 +205,21 @@ def test_advice_for_one_condition_only():
     assert "900 rpm and 120 N·m" in advice
     one = replace(no_gap_report(), conditions=no_gap_report().conditions[:1])
     assert "was not looked at" in condition_advice(one)
+
+
+def test_what_takes_nothing_away_is_not_said_to_take_a_negative_part():
+    report = effect_report()
+    worse = replace(
+        report.causes[0], shrinkage=replace(report.causes[0].shrinkage, shrink=Interval(-1, -1, -1), placebo=-1.0)
+    )
+    statements = cause_rows(replace(report, causes=(worse, *report.causes[1:])))[0].statements
+    assert "It takes away nothing: with it the gap grows, checked on another operating condition." in statements
+    assert "In a wrong place (placebo) it takes away nothing." in statements
+
+
+def test_it_says_what_is_compared_with():
+    with_reference, without = effect_report(), cannot_separate_report()
+    assert "healthy_1.h5" in floors_text(with_reference)
+    assert "from one recording to another" in floors_text(with_reference)
+    assert "from this simulator" in floors_text(without)
+    assert floors_text(gearless_report()) == ""

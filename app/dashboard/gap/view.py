@@ -19,6 +19,7 @@ from gearsig.report.gap_sections import (
     CauseRow,
     cause_rows,
     condition_rows,
+    floors_text,
     group_texts,
     inseparable_text,
     next_rows,
@@ -37,13 +38,8 @@ LOOKS: dict[GapOutcome, tuple[Colour, str]] = {
     GapOutcome.CANNOT_SEPARATE: ("orange", ":material/call_split:"),
     GapOutcome.UNKNOWN: ("gray", ":material/help:"),
 }
-FLOORS = (
-    "A structural floor is what healthy machines differ from this simulator; they exceed 1 once in twenty. A "
-    "repeatability floor is what this machine differs from itself, from one stretch to the next. "
-    "Changes are given as multiples of both, the structural one first."
-)
-
-
+TWO_LINES = 72
+"""Height of a table's row, in pixels, from which its texts are broken."""
 WITHOUT_FLOORS = (
     "Nothing was simulated, so that a gap has no size and no shares. Levels are those of the strongest line over the "
     "noise beside it, or over the reference where that shows it as well."
@@ -90,7 +86,7 @@ def _show_where(finished: Finished) -> None:
     rows = place_rows(report)
     if report.is_simulated:
         st.markdown(f"The whole gap: {as_typed(size_text(report))}.")
-        st.caption(FLOORS)
+        st.caption(as_typed(f"{floors_text(report)} Changes are given as multiples of both, the structural one first."))
     else:
         st.caption(WITHOUT_FLOORS)
     if rows and not report.is_simulated:
@@ -106,6 +102,7 @@ def _show_where(finished: Finished) -> None:
                 "at": [", ".join(row.where[1:]) for row in rows],  # the title says the kind
             },
             bars=("share",),
+            widths={"place": 380, "at": 230},
         )
     else:
         st.markdown("No place stands out of the floor.")
@@ -145,7 +142,7 @@ def _show_evidence(row: CauseRow, finished: Finished) -> None:
     if row.evidence:
         _table(
             {
-                "its own features": [one.feature for one in row.evidence],
+                "feature": [one.feature for one in row.evidence],
                 "predicted (dB)": [one.predicted for one in row.evidence],
                 "observed (dB)": [one.observed for one in row.evidence],
                 "floor (dB)": [one.floor for one in row.evidence],
@@ -208,8 +205,12 @@ def _show_figure(finished: Finished, one: GapFigure) -> None:
     st.caption(as_typed(one.look))
 
 
-def _table(columns: dict[str, list[Any]], bars: tuple[str, ...] = ()) -> None:
+def _table(columns: dict[str, list[Any]], bars: tuple[str, ...] = (), widths: dict[str, int] | None = None) -> None:
+    """Show a table; columns of stated widths, in pixels, are broken into two lines."""
     config: dict[str, Any] = {
-        name: st.column_config.ProgressColumn(format="%.0f %%", min_value=0, max_value=100) for name in bars
+        name: st.column_config.ProgressColumn(format="%.0f %%", min_value=0, max_value=100, width="small")
+        for name in bars
     }
-    st.dataframe(columns, hide_index=True, width="stretch", column_config=config)
+    config |= {name: st.column_config.TextColumn(width=width) for name, width in (widths or {}).items()}
+    height = TWO_LINES if widths else None
+    st.dataframe(columns, hide_index=True, width="stretch", column_config=config, row_height=height)

@@ -13,6 +13,7 @@ from app.bifurcation.results import NAMES, figure_of, measured_of, points_csv
 from app.dashboard.as_typed import as_typed
 from app.dashboard.laboratory.bifurcation_setup import Range, branch_of, choose_range, motion_s, parameters_of
 from app.dashboard.laboratory.run import Run
+from app.dashboard.laboratory.setup import MODEL
 from app.dashboard.widgets.errors import show_error
 from app.dashboard.widgets.picture import show_picture
 from gearsig.errors import GearsigError, InputError
@@ -32,6 +33,9 @@ Found = dict[str, list[Kept]]
 def show_bifurcation(healthy: Run, faulty: Run | None) -> None:
     """Choose what is varied; run it on demand; show picture and table."""
     run = faulty or healthy
+    if run.setup.model != MODEL:
+        st.info("Only the model with rigid gears has a bifurcation diagram: choose one of its machines.")
+        return
     names = parameters_of(run.setup)
     first, *numbers = st.columns((3, 2, 2, 2))
     name = first.selectbox("Varied", list(names), format_func=names.__getitem__, key="bifurcation varied")

@@ -6,9 +6,9 @@ import streamlit as st
 
 from app.dashboard.laboratory.effect_controls import choose_crack, choose_effects
 from app.dashboard.laboratory.number import choose_number, show_typed_toggle
-from app.dashboard.laboratory.setup import MODEL, Setup
-from sims.cracked.parameters import PARAMETERS
+from app.dashboard.laboratory.setup import MODELS, Setup
 from sims.presets import Preset, presets
+from sims.registry import simulator
 from sims.simulator import ParameterValue
 from sims.values import parameter
 
@@ -28,11 +28,11 @@ def choose_setup() -> Setup:
         with st.expander("Flanks and oil", icon=":material/opacity:"):
             parameters = _choose_flanks(preset)
         st.markdown("**Faults** · *the healthy twin has none*")
-        found = [*choose_crack(), *choose_effects()]
+        found = [*choose_crack(), *choose_effects(simulator(preset.model).effects)]
         with st.expander("Measurement", icon=":material/sensors:"):
             measured, duration, rate, seed = _choose_measurement(preset, speed)
         show_typed_toggle()
-    return Setup(preset.name, speed, torque, (*parameters, *measured), tuple(found), duration, rate, seed)
+    return Setup(preset.name, speed, torque, (*parameters, *measured), tuple(found), duration, rate, seed, preset.model)
 
 
 def shown_name(preset: str) -> str:
@@ -48,7 +48,7 @@ def shown_name(preset: str) -> str:
 
 
 def _choose_preset() -> Preset:
-    found = presets(MODEL)
+    found = {name: preset for model in MODELS for name, preset in presets(model).items()}
     names = list(found)
     name = st.selectbox(
         "Machine",
@@ -72,6 +72,8 @@ def _choose_operation(preset: Preset) -> tuple[float, float]:
 def _choose_flanks(preset: Preset) -> Parameters:
     st.caption("Of the healthy and the faulty machine alike.")
     rough = choose_number("Flank roughness, rms (µm)", f"roughness of {preset.name}", _own(preset, "roughness_um"), 2.0)
+    if not _has(preset, "friction"):
+        return (("roughness_um", rough),)
     oil = choose_number(
         "Oil viscosity at the inlet (cP)", f"oil of {preset.name}", _own(preset, "viscosity_cp"), 100.0, low=1.0
     )
@@ -125,5 +127,9 @@ def automatic_s(preset: Preset, speed_rpm: float) -> float:
 
 def _own(preset: Preset, name: str) -> float:
     """Return a number of the preset, or else the model's default."""
-    value = preset.parameters.get(name, parameter(PARAMETERS, name).default)
+    value = preset.parameters.get(name, parameter(simulator(preset.model).parameters, name).default)
     return float(value or 0.0)
+
+
+def _has(preset: Preset, name: str) -> bool:
+    return any(p.name == name for p in simulator(preset.model).parameters)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import streamlit as st
 
 from app.dashboard.laboratory.number import choose_number
@@ -28,9 +30,9 @@ def choose_crack() -> list[EffectSetting]:
     return [setting] if setting.severity != 0 else []
 
 
-def choose_effects() -> list[EffectSetting]:
-    """Return the other effects that the user switched on; each starts at its typical severity."""
-    found = effects()
+def choose_effects(meaningful: Collection[str]) -> list[EffectSetting]:
+    """Return the other effects that the user switched on, of those the model knows; each at its typical value first."""
+    found = {name: one for name, one in effects().items() if name in meaningful}
     names = st.multiselect(
         "More effects",
         [name for name in found if name != CRACK],

@@ -42,6 +42,8 @@ def stiffness(run: Run, cycles: FloatArray) -> FloatArray:
     """Tangent stiffness at the static mesh force, N/m."""
     from sims.mesh import mesh_stiffness
 
+    if run.pair is not None:
+        return run.pair.maps(np.array([run.setup.torque_nm]), cycles).tangent_stiffness_n_per_m[:, 0]
     mesh = run.machine.mesh
     force_n = run.setup.torque_nm / (mesh.pair.driver.base_radius_mm * 1e-3)
     return mesh_stiffness(mesh, cycles, force_n).total_n_per_m

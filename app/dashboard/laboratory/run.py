@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from app.dashboard.laboratory.setup import Setup
+from app.dashboard.laboratory.setup import MODEL, Setup
 from gearsig.checks import FloatArray
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
@@ -17,6 +17,8 @@ from sims.cracked.respond import Response
 from sims.cracked.simulate import simulate_with_motion
 from sims.machine import Machine
 from sims.machine.operation import Operation
+from sims.reduced_fe.dynamics_constants import FlexiblePair
+from sims.reduced_fe.dynamics_respond import FlexResponse
 
 MOTION = (
     "driver angle",
@@ -45,12 +47,15 @@ class Run:
         With rig and truth.
     response : Response
         Motion from the recording's start on; see `MOTION` for its signals.
+    pair : FlexiblePair or None
+        Of the model with finite-element gears.
     """
 
     setup: Setup
     machine: Machine
     recording: Recording
     response: Response
+    pair: FlexiblePair | None = None
 
     @property
     def rig(self) -> Rig:
@@ -80,6 +85,8 @@ def run_setup(setup: Setup) -> Run:
     """
     from sims.cracked.simulator import CrackedPair
 
+    if setup.model != MODEL:
+        return _run_flexible(setup)
     operation = Operation.steady(setup.speed_rpm, setup.torque_nm)
     rng = np.random.default_rng(setup.seed)
     ready = CrackedPair().prepare(
@@ -103,7 +110,37 @@ def run_setup(setup: Setup) -> Run:
     return Run(setup, ready.machine, recording, _shown_part(response, setup.duration_s))
 
 
-def _shown_part(response: Response, duration_s: float) -> Response:
+def _run_flexible(setup: Setup) -> Run:
+    """Simulate the pair of finite-element gears."""
+    from sims.reduced_fe.simulate import simulate_pair
+    from sims.reduced_fe.simulator import ReducedPair
+
+    operation = Operation.steady(setup.speed_rpm, setup.torque_nm)
+    rng = np.random.default_rng(setup.seed)
+    ready = ReducedPair().prepare(
+        dict(setup.parameters),
+        setup.effects,
+        operation,
+        rng,
+        preset_name=setup.preset,
+        sampling_rate_hz=setup.sampling_rate_hz,
+    )
+    machine = ready.pair.machine
+    recording, response = simulate_pair(
+        ready.pair,
+        operation,
+        rng=rng,
+        sampling_rate_hz=setup.sampling_rate_hz,
+        duration_s=setup.duration_s,
+        rig=build_rig(machine, operation, name=f"simulated: {setup.preset}"),
+        truth=ready.truth(),
+        step_s=ready.step_s,
+        also=MOTION,
+    )
+    return Run(setup, machine, recording, _shown_part(response, setup.duration_s), ready.pair)
+
+
+def _shown_part(response: Response | FlexResponse, duration_s: float) -> Response:
     """Keep the signals that are shown, as many points as that takes, from the recording's start to its end."""
     every = max(int(1.0 / (MOTION_HZ * response.interval_s)), 1)
     time = response.time_s

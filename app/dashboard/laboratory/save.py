@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.laboratory.setup import MODEL, Setup
+from app.dashboard.laboratory.setup import Setup
 from app.dashboard.state import Chosen, Request
 from gearsig.recording.types import Recording
 
@@ -52,7 +52,7 @@ def record(setup: Setup) -> Recording:
     from sims import simulate
 
     return simulate(
-        MODEL,
+        setup.model,
         preset=setup.preset,
         parameters=dict(setup.parameters),
         effects=setup.effects,
@@ -66,27 +66,41 @@ def record(setup: Setup) -> Recording:
 
 def zipped(setups: tuple[Setup, ...], ending: str) -> bytes:
     """Return a zip file with recording, rig file and truth of each setup."""
+    return zip_of({name: content for setup in _distinct(setups) for name, content in files(setup, ending).items()})
+
+
+def zip_of(contents: dict[str, bytes]) -> bytes:
+    """Return files as one zip file."""
     buffer = BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for setup in _distinct(setups):
-            for name, content in files(setup, ending).items():
-                archive.writestr(name, content)
+        for name, content in contents.items():
+            archive.writestr(name, content)
     return buffer.getvalue()
 
 
 def files(setup: Setup, ending: str) -> dict[str, bytes]:
     """Return recording, rig file and truth, in this order, by file name."""
+    return files_of(record(setup), setup.file_stem, ending)
+
+
+def files_of(recording: Recording, stem: str, ending: str) -> dict[str, bytes]:
+    """Return a simulated recording, its rig file and its truth, in this order, by file name."""
     from sims.files import file_set, write_set
 
     with TemporaryDirectory(prefix="gearsig-") as folder:
-        names = file_set(Path(folder) / f"{setup.file_stem}{ending}")
-        write_set(record(setup), names)
+        names = file_set(Path(folder) / f"{stem}{ending}")
+        write_set(recording, names)
         return {path.name: path.read_bytes() for path in names}
 
 
 def chosen_of(setup: Setup) -> Chosen:
     """Return the recording as the analysis page takes an upload."""
-    (name, content), (rig_name, rig), _ = files(setup, ANALYSIS_ENDING).items()
+    return chosen_of_files(files(setup, ANALYSIS_ENDING))
+
+
+def chosen_of_files(contents: dict[str, bytes]) -> Chosen:
+    """Return recording and rig file as the analysis page takes an upload."""
+    (name, content), (rig_name, rig), _ = contents.items()
     request = Request(name, sha256(content).hexdigest(), rig_name, rig.decode("utf-8"))
     return Chosen(request, memoryview(content))
 

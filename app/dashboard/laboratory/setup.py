@@ -8,6 +8,8 @@ from sims.effects import EffectSetting, effect
 from sims.simulator import ParameterValue
 
 MODEL = "cracked"
+"""Whose motion the bifurcation can follow."""
+MODELS = (MODEL, "reduced-fe")
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,8 @@ class Setup:
     duration_s, sampling_rate_hz : float
     seed : int
         The same for the healthy twin, so that the two differ by the effects only.
+    model : str
+        One of `MODELS`.
     """
 
     preset: str
@@ -35,6 +39,7 @@ class Setup:
     duration_s: float = 1.0
     sampling_rate_hz: float = 20480.0
     seed: int = 0
+    model: str = MODEL
 
     @property
     def healthy(self) -> Setup:

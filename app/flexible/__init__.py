@@ -1,0 +1,1 @@
+"""A study of the flexible gear pair: maps, sweeps over speed, spectra, as figures and tables."""

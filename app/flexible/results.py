@@ -1,0 +1,156 @@
+"""Figures and tables of a study of a flexible pair."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.flexible.study import Study
+from gearsig.plot.flexible import frequency_curves_figure, mesh_maps_figure, speed_spectra_figure, speed_sweep_figure
+from gearsig.plot.mesh import load_sharing_figure
+from gearsig.plot.order_map import order_map_figure
+from sims.reduced_fe.contact_table import MARGIN
+from sims.sweep_run import written
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DOTS_PER_INCH = 160
+SHARING_NM = 170.0
+HIGHEST_CURVE_HZ = 12000.0
+RANGE = (0.52, 1.25)
+"""Of the torsional mode's frequency, in which its jumps are looked for."""
+
+
+def write_study(study: Study, folder: Path, title: str) -> tuple[Path, ...]:
+    """Write all figures as PNG, the sweeps as CSV and a summary as JSON; return the paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for name, figure in figures(study, title).items():
+        paths.append(folder / f"{name}.png")
+        figure.savefig(paths[-1], dpi=DOTS_PER_INCH)
+    paths.append(written(folder / "sweeps.csv", sweeps_csv(study)))
+    paths.append(written(folder / "study.json", json.dumps(summary(study), indent=2, ensure_ascii=False) + "\n"))
+    return tuple(paths)
+
+
+def figures(study: Study, title: str) -> dict[str, Figure]:
+    """Return every figure by its file's name."""
+    maps = study.maps
+    twice = np.concatenate((maps.mesh_cycles, maps.mesh_cycles + 1.0))
+    stiffness = {
+        "tangent mesh stiffness (10⁸ N/m)": np.tile(maps.tangent_stiffness_n_per_m, (2, 1)) / 1e8,
+        "secant mesh stiffness (10⁸ N/m)": np.tile(maps.secant_stiffness_n_per_m, (2, 1)) / 1e8,
+    }
+    error = {"static transmission error (µm)": np.tile(maps.transmission_error_m, (2, 1)) * 1e6}
+    found = {
+        "stiffness_map": mesh_maps_figure(twice, maps.torque_nm, stiffness, title=f"Mesh stiffness, {title}"),
+        "transmission_error_map": mesh_maps_figure(
+            twice, maps.torque_nm, error, title=f"Static transmission error, {title}"
+        ),
+        "load_sharing": _sharing(study, title),
+        "spectra": speed_spectra_figure(
+            study.spectra_hz,
+            {f"{speed:g} rpm": values for speed, values in study.spectra_m.items()},
+            mesh_hz=[speed / 60.0 * _teeth(study) for speed in study.spectra_m],
+            natural_hz=study.natural_hz[study.torque_nm],
+            title=f"Spectra of the dynamic transmission error at {study.torque_nm:g} N·m, {title}; dashed: ωₙ",
+        ),
+    }
+    low = study.angle_hz[:, study.angle_hz[0] < HIGHEST_CURVE_HZ]
+    words = f"Natural frequencies over the mesh angle at {study.torque_nm:g} N·m, {title}"
+    found["natural_frequencies"] = frequency_curves_figure(study.angle_cycles, low, title=words)
+    found["run_up"] = order_map_figure(study.run_up, height_in=4.6)
+    if study.sweeps:
+        found["sweeps"] = _sweeps(study, title)
+    return found
+
+
+def sweeps_csv(study: Study) -> str:
+    """Return every part of every sweep as a line."""
+    lines = ["torque_nm,direction,speed_rpm,mesh_hz,rms_um,least_force_n,lost_part"]
+    for torque, pair in study.sweeps.items():
+        for direction, sweep in zip(("up", "down"), pair, strict=True):
+            columns = (sweep.speed_rpm, sweep.mesh_hz, sweep.rms_m * 1e6, sweep.least_force_n, sweep.lost_part)
+            lines += [
+                f"{torque:g},{direction}," + ",".join(f"{v:.6g}" for v in row) for row in zip(*columns, strict=True)
+            ]
+    return "\n".join(lines) + "\n"
+
+
+def summary(study: Study) -> dict[str, object]:
+    """Return the numbers that matter."""
+    rows = []
+    for torque, (up, down) in study.sweeps.items():
+        natural = study.natural_hz[torque]
+        low, highest = (part * natural for part in RANGE)
+        rows.append(
+            {
+                "torque_nm": torque,
+                "torsional_mode_hz": natural,
+                "peak_up_hz": up.peak_hz(low, highest),
+                "peak_down_hz": down.peak_hz(low, highest),
+                "jump_up_hz": up.jump_hz(low, highest),
+                "jump_down_hz": down.jump_hz(low, highest),
+                "largest_rms_um": [float(up.rms_m.max() * 1e6), float(down.rms_m.max() * 1e6)],
+                "largest_part_without_contact": [float(up.lost_part.max()), float(down.lost_part.max())],
+                "n_steps": up.n_steps + down.n_steps,
+                "step_s": up.step_s,
+            }
+        )
+    maps = study.maps
+    static = [
+        {
+            "torque_nm": float(t),
+            "mean_tangent_n_per_m": float(maps.tangent_stiffness_n_per_m[:, i].mean()),
+            "mean_secant_n_per_m": float(maps.secant_stiffness_n_per_m[:, i].mean()),
+            "transmission_error_um": [
+                float(maps.transmission_error_m[:, i].min() * 1e6),
+                float(maps.transmission_error_m[:, i].max() * 1e6),
+            ],
+        }
+        for i, t in enumerate(maps.torque_nm)
+    ]
+    return {"sweeps": rows, "static": static}
+
+
+def _sharing(study: Study, title: str) -> Figure:
+    maps = study.maps
+    place = int(np.argmin(np.abs(maps.torque_nm - SHARING_NM)))
+    n_slots = maps.force_n.shape[2]
+    # Over two cycles each pair keeps its name: slot j of cycle c holds pair ⌊c − start⌋ − j.
+    cycles = np.concatenate((maps.mesh_cycles, maps.mesh_cycles + 1.0))
+    newest = np.floor(cycles + MARGIN).astype(int)
+    forces = np.tile(maps.pair_forces_n[:, place], (2, 1))
+    pairs = range(int(newest.min()) - n_slots + 1, int(newest.max()) + 1)
+    curves = {
+        f"pair {k + 2}": np.array(
+            [f[m - k] if 0 <= m - k < n_slots else 0.0 for f, m in zip(forces, newest, strict=True)]
+        )
+        for k in pairs
+    }
+    carried = {name: force for name, force in curves.items() if force.any()}
+    errors = {f"{maps.torque_nm[i]:.3g} N·m": np.tile(maps.transmission_error_m[:, i], 2) for i in _few(maps.torque_nm)}
+    words = f"Load sharing at {maps.torque_nm[place]:.3g} N·m, and static transmission error, {title}"
+    return load_sharing_figure(cycles, carried, errors, title=words)
+
+
+def _few(torques: np.ndarray[tuple[int, ...], np.dtype[np.floating]]) -> list[int]:
+    """Places of a few torques over the range."""
+    return [int(i) for i in np.unique(np.linspace(0, len(torques) - 1, 5).round())]
+
+
+def _sweeps(study: Study, title: str) -> Figure:
+    rows = []
+    for torque, (up, down) in study.sweeps.items():
+        rows.append((f"{torque:g} N·m", up.mesh_hz, up.rms_m, down.rms_m[::-1]))
+    natural = float(np.mean([study.natural_hz[t] for t in study.sweeps]))
+    return speed_sweep_figure(rows, natural_hz=natural, title=f"Speed sweeps, {title}")
+
+
+def _teeth(study: Study) -> float:
+    sweep = next(iter(study.sweeps.values()))[0]
+    return float(sweep.mesh_hz[0] / sweep.speed_rpm[0] * 60.0)

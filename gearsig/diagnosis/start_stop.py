@@ -1,0 +1,236 @@
+"""Recordings of machines that start, stop and reverse: recognised, and examined without pretending a steady speed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.diagnosis.types import Analysis, CannotTell, Finding, Kind, Strength, Where
+from gearsig.diagnosis.verdict import ranked, verdict_of
+from gearsig.errors import InputError, RefusalError
+from gearsig.indicators.types import Indicator
+from gearsig.motion.bursts import Burst, find_bursts
+from gearsig.motion.course import Course, is_start_stop
+from gearsig.motion.measure import measure_motion
+from gearsig.motion.start_stop import StartStop, course_of_angle, examine_start_stop
+from gearsig.recording.types import Recording
+from gearsig.rig.speed import EncoderChannel, SpeedChannel
+from gearsig.rig.types import Rig
+
+GROWN = 1.15
+"""Backlash over the rig's from which on it is worth a suspicion."""
+CERTAIN = 4.0
+"""Standard deviations that the excess must have, too."""
+
+
+def start_stop_analysis(
+    recording: Recording, rig: Rig, problems: list[Finding], settings: Mapping[str, str | float | int | None]
+) -> Analysis | None:
+    """Return the analysis of a start–stop recording, or None where the motion is not one or is not known.
+
+    Only an encoder or a speed channel tells: both see standstill and direction.
+    """
+    found = course_of(recording, rig)
+    if found is None or not is_start_stop(found[0]):
+        return None
+    course, angle_rad = found
+    findings = [*_not_of_rest(problems, recording), _motion_finding(course), _left_out(course)]
+    examined: StartStop | None = None
+    if rig.contact is None:
+        findings.append(_no_contact())
+    else:
+        try:
+            examined = examine_start_stop(measure_motion(recording, rig))
+            findings += [*_backlash(examined, rig), *_impacts(examined), *_refusals(examined)]
+        except (RefusalError, InputError) as error:
+            findings.append(_not_examined(error))
+    bursts = _bursts(recording, problems)
+    findings += [_burst_finding(name, blows, angle_rad, recording, rig) for name, blows in bursts.items() if blows]
+    order = ranked(findings)
+    return Analysis(
+        recording,
+        recording.rig,
+        CannotTell("What is the speed of the shafts?", "the machine starts and stops: there is no one speed"),
+        (),
+        _indicators(course, examined, bursts),
+        order,
+        verdict_of(order),
+        dict(settings),
+    )
+
+
+def course_of(recording: Recording, rig: Rig) -> tuple[Course, FloatArray] | None:
+    """Return the stretches of the motion and the angle in rad, from an encoder or a speed channel; None without one."""
+    source = recording.speed_source or rig.speed
+    rate = recording.sampling_rate_hz
+    if not isinstance(source, (EncoderChannel, SpeedChannel)) or source.channel not in recording.channel_names:
+        return None
+    values = np.asarray(recording.values(source.channel), dtype=np.float64)
+    if isinstance(source, SpeedChannel):
+        angle = np.cumsum(values * source.rpm_per_unit * np.pi / 30.0) / rate
+    else:
+        revolutions = values / source.units_per_revolution
+        angle = 2.0 * np.pi * (np.unwrap(revolutions, period=1.0) if source.wraps else revolutions)
+    try:
+        return course_of_angle(angle, rate), angle
+    except InputError:  # too short for a speed
+        return None
+
+
+def _not_of_rest(problems: list[Finding], recording: Recording) -> list[Finding]:
+    """Leave out what a machine at rest does to sound sensors: teeth in their play carry nothing, again and again."""
+    forces = {c.name for c in recording.channels if c.quantity in ("force", "torque")}
+    return [p for p in problems if p.code != "channel-stuck" or not set(p.where.channels) <= forces]
+
+
+def _motion_finding(course: Course) -> Finding:
+    top = max((s.top_speed_rad_s for s in course.moving), default=0.0) * 30.0 / np.pi
+    title = (
+        f"The machine starts and stops: {len(course.starts_s)} start(s) and {len(course.stops_s)} stop(s), at rest for "
+        f"{100.0 * course.standing_part:.3g} % of the time, {course.n_reversals} change(s) of direction, up to "
+        f"{top:.4g} rpm."
+    )
+    return Finding(
+        "start-stop",
+        Kind.INFORMATION,
+        title,
+        evidence=tuple(
+            f"{'forwards' if s.direction > 0 else 'backwards'} from {s.start_s:.4g} to {s.end_s:.4g} s by "
+            f"{s.turned_rad / (2.0 * np.pi):.4g} revolutions"
+            for s in course.moving[:8]
+        ),
+    )
+
+
+def _left_out(course: Course) -> Finding:
+    back = f", and it turns back by {course.backwards_rad:.3g} rad" if course.backwards_rad > 0.0 else ""
+    return Finding(
+        "stationary-methods-left-out",
+        Kind.CANNOT_TELL,
+        "Cracks, bearings, shafts and meshing are not examined: spectra, orders and averages want a speed that lasts.",
+        evidence=(f"the speed falls to zero {len(course.stops_s)} time(s){back}",),
+        surer="A recording in continuous rotation, some tens of revolutions at a steady speed.",
+    )
+
+
+def _no_contact() -> Finding:
+    return Finding(
+        "contact-not-described",
+        Kind.CANNOT_TELL,
+        "Backlash and impacts are not examined: the rig does not say how the teeth touch.",
+        surer="A [contact] table in the rig file, and encoders on both shafts.",
+    )
+
+
+def _not_examined(error: RefusalError | InputError) -> Finding:
+    return Finding(
+        "teeth-not-examined", Kind.CANNOT_TELL, "Backlash and impacts cannot be told.", evidence=(str(error),)
+    )
+
+
+def _backlash(examined: StartStop, rig: Rig) -> list[Finding]:
+    found = examined.backlash
+    if found is None or rig.contact is None:
+        return []
+    drawn = 2.0 * rig.contact.half_backlash_um
+    is_pure = found.method.startswith("both flanks")
+    grown = is_pure and found.backlash_um > max(GROWN * drawn, drawn + CERTAIN * found.uncertainty_um)
+    what = "The backlash" if is_pure else "The lost motion, deflection included,"
+    title = f"{what} is {found.backlash_um:.4g} ± {found.uncertainty_um:.2g} µm along the line of action"
+    title += f", where the rig says {drawn:.4g} µm." if drawn else "."
+    strength = Strength(found.backlash_um, "µm", drawn, "backlash of the rig file") if drawn else None
+    pair = rig.contact.pair or rig.pairs[0].name
+    return [
+        Finding(
+            "backlash-grown" if grown and drawn else "backlash",
+            Kind.SUSPICION if grown and drawn else Kind.INFORMATION,
+            title,
+            Where(gear=pair),
+            strength,
+            confidence=0.9 if grown else 1.0,
+            confidence_basis="as far as the rig file's backlash is that of the new gears" if grown else "",
+            evidence=(
+                found.method,
+                f"{found.n_drive} samples on the drive flank and {found.n_back} on the back flank",
+                f"scatter {found.scatter_um:.3g} µm",
+            ),
+            surer="A recording of the same machine when it was new." if grown else "",
+        )
+    ]
+
+
+def _impacts(examined: StartStop) -> list[Finding]:
+    if not examined.impacts:
+        return []
+    hardest = max(examined.impacts, key=lambda impact: impact.speed_mps)
+    side = "drive" if hardest.flank > 0 else "back"
+    n_back = sum(impact.flank < 0 for impact in examined.impacts)
+    lost = np.nansum([i.lost_j for i in examined.impacts])
+    return [
+        Finding(
+            "flank-impacts",
+            Kind.NOTICE,
+            f"The flanks meet {len(examined.impacts)} times, {n_back} of them backwards; hardest at "
+            f"{hardest.time_s:.5g} s with {hardest.speed_mps:.3g} m/s on the {side} flank of tooth "
+            f"{hardest.driver_tooth}.",
+            Where(
+                tooth=hardest.driver_tooth, angle_deg=hardest.driver_angle_deg, time_s=(hardest.time_s, hardest.time_s)
+            ),
+            evidence=(
+                f"energy {hardest.energy_j:.3g} J in the hardest, {lost:.3g} J lost in all of which a rebound was seen",
+            ),
+        )
+    ]
+
+
+def _refusals(examined: StartStop) -> list[Finding]:
+    return [
+        Finding("start-stop-refusal", Kind.CANNOT_TELL, f"Cannot tell the {text.partition(':')[0]}.", evidence=(text,))
+        for text in examined.refusals
+    ]
+
+
+def _bursts(recording: Recording, problems: list[Finding]) -> dict[str, tuple[Burst, ...]]:
+    """Return the blows of every acceleration that is sampled fast enough and not dead."""
+    dead = {name for finding in problems if finding.code == "channel-dead" for name in finding.where.channels}
+    names = [c.name for c in recording.channels if c.quantity == "acceleration" and c.name not in dead]
+    found = {}
+    for name in names:
+        try:
+            found[name] = find_bursts(np.asarray(recording.values(name), dtype=np.float64), recording.sampling_rate_hz)
+        except InputError:  # too slow or too short for blows
+            continue
+    return found
+
+
+def _burst_finding(
+    name: str, blows: tuple[Burst, ...], angle_rad: FloatArray, recording: Recording, rig: Rig
+) -> Finding:
+    hardest = max(blows, key=lambda blow: blow.peak)
+    unit = recording.channels[recording.index(name)].unit
+    angle = float(angle_rad[round(hardest.time_s * recording.sampling_rate_hz)])
+    return Finding(
+        "vibration-blows",
+        Kind.NOTICE,
+        f"{len(blows)} blow(s) in {name}, the hardest with {hardest.peak:.3g} {unit} at {hardest.time_s:.5g} s.",
+        Where(channels=(name,), shaft=rig.reference_shaft, angle_deg=float(np.degrees(angle) % 360.0)),
+        evidence=("only blows of more than a third of the hardest, at least 4 ms apart, are counted",),
+    )
+
+
+def _indicators(
+    course: Course, examined: StartStop | None, bursts: Mapping[str, tuple[Burst, ...]]
+) -> tuple[Indicator, ...]:
+    rows = () if examined is None else examined.indicators
+    if examined is None:
+        rows = (
+            Indicator("starts", float(len(course.starts_s)), computed_on="motion"),
+            Indicator("stops", float(len(course.stops_s)), computed_on="motion"),
+            Indicator("reversals", float(course.n_reversals), computed_on="motion"),
+            Indicator("standing part", course.standing_part, computed_on="motion"),
+        )
+    n_cycles = max(1, len(course.moving))
+    blows = tuple(Indicator("blows per cycle", len(b) / n_cycles, channel=n) for n, b in bursts.items())
+    return (*rows, *blows)

@@ -1,0 +1,1 @@
+"""Measured motion of both gears of a pair: forces between the teeth, impacts, backlash, start–stop indicators."""

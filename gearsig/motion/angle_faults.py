@@ -1,0 +1,61 @@
+"""Angle channels that wrap or jump: told, not repaired."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.errors import InputError
+
+LEAST_JUMP_RAD = 2e-3 * pi
+"""A thousandth of a revolution: no gear with its load gets there and stays within one sample."""
+SCATTER = 50.0
+"""Of the ordinary change of the angle's increments: an impact reaches a tenth of that."""
+QUANTA = 4.0
+"""Of a coarse encoder's step."""
+
+
+def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str) -> None:
+    """Raise where an angle that should run on does not.
+
+    Parameters
+    ----------
+    angle_rad : array, (n,)
+    sampling_rate_hz : float
+    name : str
+        Of the channel, for the error.
+
+    Raises
+    ------
+    InputError
+        At the first step by nearly a whole revolution (an encoder that wraps), or at a jump.
+    """
+    steps = np.diff(angle_rad)
+    if len(steps) < 3:
+        raise InputError(f"channel {name!r} has {len(angle_rad)} samples", allowed="at least 4")
+    # What a step has beyond the steps around it; the middle one of three, so that a jump does not hide itself.
+    around = np.sort(np.stack([np.roll(steps, 1), steps, np.roll(steps, -1)]), axis=0)[1]
+    around[0], around[-1] = steps[1], steps[-2]
+    beyond = np.abs(steps - around)
+    moving = np.abs(steps[steps != 0.0])
+    quantum = float(moving.min()) if len(moving) else 0.0
+    limit = max(LEAST_JUMP_RAD, SCATTER * 1.4826 * float(np.median(beyond)), QUANTA * quantum)
+    found = np.flatnonzero(beyond > limit)
+    if not len(found):
+        return
+    i = int(found[0])
+    when = f"from {i / sampling_rate_hz:.6g} to {(i + 1) / sampling_rate_hz:.6g} s"
+    turns = abs(steps[i]) / (2.0 * pi)
+    if abs(turns - 1.0) < 0.1:
+        raise InputError(
+            f"channel {name!r} steps by {turns:.3g} revolutions {when}: the encoder starts again after each revolution",
+            allowed="an angle that runs on",
+            remedy="give --unwrap, or wraps = true in the rig's [speed] table for that channel",
+        )
+    raise InputError(
+        f"channel {name!r} jumps by {abs(steps[i]):.4g} rad {when} ({len(found)} such jump(s))",
+        allowed="an angle that runs on",
+        remedy="cut the recording there; lost counts make all later forces wrong",
+    )

@@ -1,0 +1,52 @@
+"""Effects of one's own: Python files outside this package, each with an `EFFECT`.
+
+Their files stand in the environment variable `GEARSIG_EFFECTS`, so that processes which are started know them, too.
+"""
+
+from __future__ import annotations
+
+import os
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+from gearsig.errors import InputError
+from sims.effects.effect import Effect
+
+VARIABLE = "GEARSIG_EFFECTS"
+
+
+def own_files() -> tuple[Path, ...]:
+    """Return the files of one's own effects."""
+    return tuple(Path(text) for text in os.environ.get(VARIABLE, "").split(os.pathsep) if text)
+
+
+def with_own_file(path: Path) -> str:
+    """Return the variable's value with a further file."""
+    files = dict.fromkeys([*map(str, own_files()), str(path.resolve())])
+    return os.pathsep.join(files)
+
+
+def loaded(path: Path) -> Effect:
+    """Return the effect of a file.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it does not run, or it defines no effect.
+    """
+    spec = spec_from_file_location(f"own_effect_{path.stem}", path)
+    if spec is None or spec.loader is None or not path.is_file():
+        raise InputError("is no Python file", where=str(path), remedy="give a file NAME.py that defines EFFECT")
+    module = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # anything: it is somebody else's program
+        raise InputError(f"does not run ({type(error).__name__}: {error})", where=str(path)) from error
+    found = getattr(module, "EFFECT", None)
+    if not isinstance(found, Effect):
+        raise InputError(
+            "defines no effect",
+            where=str(path),
+            remedy="set EFFECT = Effect(…), as sims/effects/tooth_wear.py does",
+        )
+    return found

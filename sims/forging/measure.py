@@ -1,0 +1,139 @@
+"""From the drive's motion to a recording: encoders, torque sensor, and an accelerometer where the rate allows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import ceil, pi
+from typing import Any
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.recording.types import Channel, Provenance, Recording
+from gearsig.rig.speed import EncoderChannel
+from gearsig.rig.types import Rig, Sensor
+from sims.cracked.wanted import Wanted
+from sims.forging.drive import ForgingDrive
+from sims.forging.respond import DriveResponse, respond
+from sims.forging.schedule import Schedule
+from sims.measure import Accelerometer, AntiAlias, ColouredNoise, MeasuredChannel, MeasurementChain, ModalPath
+from sims.measure.hold import apply, discrete
+from sims.measure.motion import Motion
+
+LEAST_VIBRATION_HZ = 5000.0
+"""Sampling rate from which on vibration is recorded: flanks in contact ring at some 400 Hz, housings above."""
+FINE_POINTS = 4
+"""Points of the motion per sample of the accelerometer."""
+PLACE = "pinion bearing"
+
+CHANNELS = (
+    Channel("torque", "torque", "N m", "between motor and pinion"),
+    Channel("pinion angle", "angle", "rad", "pinion"),
+    Channel("wheel angle", "angle", "rad", "wheel"),
+    Channel("pinion speed", "rotational_speed", "rad/s", "pinion"),
+    Channel("wheel speed", "rotational_speed", "rad/s", "wheel"),
+    Channel("pinion acceleration", "angular_acceleration", "rad/s^2", "pinion"),
+    Channel("wheel acceleration", "angular_acceleration", "rad/s^2", "wheel"),
+    Channel("interaction force", "force", "N", "tooth flanks, of the model: no sensor measures it"),
+)
+"""What a recording of the motion holds, at the very instants of its samples, as a motion controller stores it."""
+VIBRATION = Channel("vibration", "acceleration", "m/s^2", "pinion bearing, along the line of action")
+
+
+def sensors(sampling_rate_hz: float) -> tuple[Sensor, ...]:
+    """Return the sensors of a recording at that rate, for its rig file."""
+    wanted = (*CHANNELS, VIBRATION) if sampling_rate_hz >= LEAST_VIBRATION_HZ else CHANNELS
+    return tuple(Sensor(c.name, c.quantity, c.unit, c.position) for c in wanted)
+
+
+def record(
+    drive: ForgingDrive,
+    courses: Schedule,
+    wanted: Wanted,
+    *,
+    rig: Rig,
+    rng: np.random.Generator,
+    sampling_rate_hz: float,
+    duration_s: float,
+    truth: Mapping[str, Any],
+) -> Recording:
+    """Run the drive and measure it.
+
+    Angles are rounded down to their encoder's counts after noise was added; speeds and accelerations have noise of
+    their own, as from sensors of their own. Nothing is filtered at 1 kHz: a controller's samples are instants.
+    """
+    motion_rng, vibration_rng = rng.spawn(2)
+    motion = respond(drive, courses, duration_s=duration_s, interval_s=1.0 / sampling_rate_hz)
+    rows = list(_readings(motion, wanted, motion_rng))
+    channels = list(CHANNELS)
+    if sampling_rate_hz >= LEAST_VIBRATION_HZ:
+        rows.append(_vibration(drive, courses, wanted, vibration_rng, sampling_rate_hz, len(rows[0])))
+        channels.append(VIBRATION)
+    return Recording(
+        np.vstack(rows),
+        sampling_rate_hz,
+        tuple(channels),
+        speed=EncoderChannel("pinion angle", 2.0 * pi, wraps=False, shaft="pinion"),
+        rig=rig,
+        provenance=Provenance(source="simulation: forging manipulator drive", reader="sims.forging"),
+        truth={**truth, **_truth(motion)},
+    )
+
+
+def _readings(motion: DriveResponse, wanted: Wanted, rng: np.random.Generator) -> list[FloatArray]:
+    noise = {
+        "torque": wanted.number("torque_noise_nm"),
+        "angle": wanted.number("angle_noise_urad") * 1e-6,
+        "rotational_speed": wanted.number("speed_noise_mrad_per_s") * 1e-3,
+        "angular_acceleration": wanted.number("acceleration_noise_rad_per_s2"),
+        "force": 0.0,
+    }
+    counts = wanted.whole("encoder_counts")
+    rows = []
+    for channel in CHANNELS:
+        true = motion[channel.name]
+        reading: FloatArray = true + noise[channel.quantity] * rng.standard_normal(len(true))
+        if channel.quantity == "angle" and counts:
+            step = 2.0 * pi / counts
+            reading = np.floor(reading / step) * step
+        rows.append(reading)
+    return rows
+
+
+def _vibration(
+    drive: ForgingDrive, courses: Schedule, wanted: Wanted, rng: np.random.Generator, rate_hz: float, n_samples: int
+) -> FloatArray:
+    """Acceleration of the housing's mass, which the force of the teeth shakes; the drive does not feel it."""
+    fine_s = 1.0 / (FINE_POINTS * rate_hz)
+    chain = MeasurementChain(rate_hz, (_channel(wanted),), AntiAlias())
+    lead = ceil(chain.lead_in_s * rate_hz) * FINE_POINTS
+    lasts_s = n_samples / rate_hz + chain.anti_alias.reach_s(rate_hz) + 4.0 / rate_hz
+    force = respond(drive, courses, duration_s=lasts_s, interval_s=fine_s, signals=("interaction force",))
+    shaken = _housing(np.concatenate([np.zeros(lead), force["interaction force"]]), wanted, fine_s)
+    motion = Motion(fine_s, (PLACE,), shaken[:, None])
+    measured = chain.record(motion, rng=rng, duration_s=n_samples / rate_hz, lead_in_s=lead * fine_s)
+    return measured.values(VIBRATION.name)
+
+
+def _housing(force_n: FloatArray, wanted: Wanted, step_s: float) -> FloatArray:
+    """Apply s²/(s² + 2ζωs + ω²)/m, exact for a force that runs straight between steps."""
+    w, zeta = 2.0 * pi * wanted.number("housing_frequency_hz"), wanted.number("housing_damping_ratio")
+    section = discrete((1.0, 0.0, 0.0), (1.0, 2.0 * zeta * w, w * w), step_s)
+    return apply(section, force_n / wanted.number("housing_mass_kg"))
+
+
+def _channel(wanted: Wanted) -> MeasuredChannel:
+    return MeasuredChannel(
+        VIBRATION.name,
+        ModalPath({PLACE: 1.0}),
+        Accelerometer(lower_limit_hz=0.5),
+        background=ColouredNoise(wanted.number("vibration_noise_mps2")),
+        position=VIBRATION.position,
+    )
+
+
+def _truth(motion: DriveResponse) -> dict[str, Any]:
+    from sims.forging.numbers import CONTACT_COLUMNS
+
+    rows = [[None if np.isnan(value) else float(value) for value in row] for row in motion.contacts]
+    return {"contacts": {"columns": list(CONTACT_COLUMNS), "rows": rows}, "solver": {"n_steps": motion.n_steps}}

@@ -1,0 +1,183 @@
+"""The forging manipulator's drive as a simulator: preset and values → drive → recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gearsig.checks import within
+from gearsig.errors import InputError
+from gearsig.recording.types import Recording
+from sims.cracked.simulator import truth_of
+from sims.cracked.wanted import Wanted
+from sims.effects import EffectSetting, effect
+from sims.forging.build import build_cycle, build_drive, build_rig
+from sims.forging.drive import ForgingDrive
+from sims.forging.effects import WITH_MEANING, with_effects
+from sims.forging.parameters import PARAMETERS
+from sims.forging.schedule import Cycle, Schedule, schedule
+from sims.machine.operation import Course, Operation
+from sims.presets import preset, presets
+from sims.simulator import Parameter, ParameterValue
+from sims.values import Values, complete_values
+
+NAME = "forging"
+SAMPLING_RATE_RANGE_HZ = (100.0, 200000.0)
+DURATION_RANGE_S = (0.05, 3600.0)
+MOST_SAMPLES = 12_000_000
+SPEED_RANGE_RPM = (0.0, 5000.0)
+TORQUE_RANGE_NM = (0.0, 1e6)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A drive with its cycle, ready to run.
+
+    Parameters
+    ----------
+    drive : ForgingDrive
+        With its effects.
+    cycle : Cycle
+    operation : Operation
+    preset : str
+    values, sound_values : mapping
+        Every parameter, with the effects and without.
+    effects : tuple of EffectSetting
+        With every option.
+    """
+
+    drive: ForgingDrive
+    cycle: Cycle
+    operation: Operation
+    preset: str
+    values: Values
+    sound_values: Values
+    effects: tuple[EffectSetting, ...] = ()
+
+    def courses(self, duration_s: float) -> Schedule:
+        """Torque, brake and press over a run."""
+        return schedule(self.cycle, self.operation.torque_nm, duration_s)
+
+    def truth(self) -> dict[str, Any]:
+        """What was put in, as plain values."""
+        return {
+            **truth_of(NAME, self.preset, self.sound_values, self.effects, self.operation),
+            "backlash_um": 2.0 * self.drive.contact.half_backlash_um,
+            "stiffness_n_per_m_lambda": self.drive.contact.stiffness_n_per_m_lambda,
+            "reduced_mass_kg": self.drive.reduced_mass_kg,
+        }
+
+
+@dataclass(frozen=True)
+class ForgingManipulator:
+    """Pinion and wheel of a forging manipulator: start–stop, backlash, impact; see `sims.forging`."""
+
+    @property
+    def name(self) -> str:
+        """Short name."""
+        return NAME
+
+    @property
+    def title(self) -> str:
+        """One line for people."""
+        return "forging manipulator's drive: start–stop, backlash, impact on both flanks, stick–slip"
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters."""
+        return PARAMETERS
+
+    @property
+    def presets(self) -> tuple[str, ...]:
+        """Names of the machines."""
+        return tuple(presets(NAME))
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects that have a meaning: play, wear, friction, ripple, a cracked tooth."""
+        return WITH_MEANING
+
+    @property
+    def usual_sampling_rate_hz(self) -> float:
+        """A motion controller's, 1 ms."""
+        return 1000.0
+
+    def prepare(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        operation: Operation | None,
+        *,
+        preset_name: str = "",
+        settings: Sequence[EffectSetting] = (),
+    ) -> Prepared:
+        """Build the drive and its cycle, with its effects."""
+        chosen = preset(NAME, preset_name)
+        sound = complete_values(PARAMETERS, chosen.parameters, parameters)
+        wanted_effects = (*chosen.effects, *settings)
+        values, weak = with_effects(sound, wanted_effects)
+        run = operation or chosen.operation
+        within(run.torque_nm.largest, "torque_nm", *TORQUE_RANGE_NM, "N m")
+        wanted = Wanted(values)
+        drive = build_drive(wanted, _constant(run.speed_rpm), weak)
+        complete = tuple(EffectSetting(s.name, s.severity, effect(s.name).complete(s.options)) for s in wanted_effects)
+        return Prepared(drive, build_cycle(wanted), run, chosen.name, values, sound, complete)
+
+    def simulate(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        effects: Sequence[EffectSetting],
+        operation: Operation | None,
+        rng: np.random.Generator,
+        *,
+        preset: str = "",
+        sampling_rate_hz: float = 1000.0,
+        duration_s: float = 6.0,
+    ) -> Recording:
+        """Make a recording with rig and truth, from rest on; see `sims.simulator.Simulator.simulate`.
+
+        The operation's torque is that of the open valve, its speed the pinion's that the flow allows (0: no limit).
+        Vibration is recorded from 5 kHz on.
+
+        Raises
+        ------
+        InputError
+            If a name does not exist, a value is out of its range, the values do not fit each other, or a stop is longer
+            than the record.
+        """
+        from sims.forging.measure import record, sensors
+
+        within(duration_s, "duration_s", *DURATION_RANGE_S, "s")
+        within(sampling_rate_hz, "sampling_rate_hz", *SAMPLING_RATE_RANGE_HZ, "Hz")
+        if sampling_rate_hz * duration_s > MOST_SAMPLES:
+            raise InputError(f"{sampling_rate_hz * duration_s:.3g} samples are wanted", allowed=f"up to {MOST_SAMPLES}")
+        ready = self.prepare(parameters, operation, preset_name=preset, settings=effects)
+        wanted = Wanted(ready.values)
+        rig = build_rig(
+            ready.drive,
+            Wanted(ready.sound_values),
+            ready.operation,
+            sensors(sampling_rate_hz),
+            name=f"simulated: {ready.preset}",
+            sources=[f"simulated with the model {NAME!r}, preset {ready.preset!r}; the truth stands in the recording"],
+        )
+        ready.courses(duration_s)  # says so where a stop does not fit, before anything is run
+        return record(
+            ready.drive,
+            ready.courses(duration_s + 1.0),
+            wanted,
+            rig=rig,
+            rng=rng,
+            sampling_rate_hz=sampling_rate_hz,
+            duration_s=duration_s,
+            truth=ready.truth(),
+        )
+
+
+def _constant(speed_rpm: Course) -> float:
+    """Return the speed limit: one number, as a valve is set once."""
+    if len(speed_rpm.values) > 1 and float(speed_rpm.values.max() - speed_rpm.values.min()) > 0.0:
+        raise InputError("speed_rpm varies", allowed="one speed that the flow allows", remedy="vary --torque instead")
+    return within(float(speed_rpm.values[0]), "speed_rpm", *SPEED_RANGE_RPM, "rpm")

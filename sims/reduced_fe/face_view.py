@@ -1,0 +1,82 @@
+"""What is seen of a gear's mesh from one end of the shaft: faces, their outlines, triangles for colours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from sims.reduced_fe.sector_mesh import SectorMesh
+from sims.reduced_fe.sector_plane import IntArray
+
+_OUTLINE = ((0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+
+
+@dataclass(frozen=True)
+class FaceView:
+    """Cells' faces towards +z of sectors side by side.
+
+    Parameters
+    ----------
+    points_mm : array, (n_sectors · n_points, 2)
+        x, y.
+    triangles : array of int, (n, 3)
+        Into the points; eight to each face.
+    outlines_mm : array, (n_faces, 8, 2)
+        Round each face, with the middles of its curved edges.
+    cells : array of int, (n_faces,)
+        Cell of the sector that each face belongs to.
+    nodes : array of int, (n_points,)
+        Node of the sector behind each of its points; the same for every sector.
+    """
+
+    points_mm: FloatArray = field(repr=False)
+    triangles: IntArray = field(repr=False)
+    outlines_mm: FloatArray = field(repr=False)
+    cells: IntArray = field(repr=False)
+    nodes: IntArray = field(repr=False)
+
+    def values(self, at_nodes: FloatArray) -> FloatArray:
+        """Values at the points, from values at the nodes of as many sectors, (n_sectors, n_nodes)."""
+        flat: FloatArray = at_nodes[:, self.nodes].ravel()
+        return flat
+
+
+def face_view(mesh: SectorMesh, sectors: tuple[int, ...] | None = None) -> FaceView:
+    """Return the faces that are seen; None: the whole gear."""
+    shown = tuple(range(mesh.blank.n_teeth)) if sectors is None else sectors
+    cells = _foremost(mesh)
+    faces = mesh.cells[cells][:, :, :, 2]  # (n, row, column)
+    nodes, inverse = np.unique(faces, return_inverse=True)
+    local = inverse.reshape(faces.shape)
+    flat = mesh.points_m[nodes, :2] * 1e3
+    points, outlines = [], []
+    for k in shown:
+        c, s = np.cos(k * mesh.blank.pitch_angle_rad), np.sin(k * mesh.blank.pitch_angle_rad)
+        turned = flat @ np.array([[c, s], [-s, c]])
+        points.append(turned)
+        outlines.append(turned[np.stack([local[:, r, q] for r, q in _OUTLINE], axis=1)])
+    one = _triangles(local)
+    triangles = (one[None] + (len(nodes) * np.arange(len(shown)))[:, None, None]).reshape(-1, 3)
+    return FaceView(np.concatenate(points), triangles, np.concatenate(outlines), np.tile(cells, len(shown)), nodes)
+
+
+def _foremost(mesh: SectorMesh) -> IntArray:
+    """Cells with none before them along z: the web lies further back than rim and hub."""
+    middle = mesh.points_m[mesh.cells[:, 1, 1, 1]]
+    _, column = np.unique(np.round(middle[:, :2], 9), axis=0, return_inverse=True)
+    order = np.lexsort((middle[:, 2], column.ravel()))
+    last = np.append(np.diff(column.ravel()[order]) != 0, True)
+    foremost: IntArray = np.sort(order[last])
+    return foremost
+
+
+def _triangles(local: IntArray) -> IntArray:
+    """Eight triangles of each nine-node face."""
+    found = []
+    for r in range(2):
+        for q in range(2):
+            a, b, c, d = local[:, r, q], local[:, r + 1, q], local[:, r + 1, q + 1], local[:, r, q + 1]
+            found += [np.stack((a, b, c), axis=1), np.stack((a, c, d), axis=1)]
+    return np.concatenate(found)

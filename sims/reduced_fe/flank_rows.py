@@ -1,0 +1,117 @@
+"""Flank points: which nodes share a force at a place on a flank, and whose motion counts there (RBE3)."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from gearsig.checks import FloatArray, count
+from sims.mesh.geometry import GearGeometry
+from sims.mesh.profile import involute_outline
+from sims.reduced_fe.line_weights import line_weights, parabolic_weights
+from sims.reduced_fe.reduced_gear import FlankGrid
+from sims.reduced_fe.sector_mesh import SectorMesh
+from sims.reduced_fe.sector_plane import IntArray
+from sims.reduced_fe.tooth_side import flank_place, row_places, side_curve
+
+Spread = Literal["section", "patch", "node"]
+"""What a force at a flank point acts on; see `ReducedGear.spread`."""
+
+PATCH_HALF_WIDTH = 0.1
+"""Of a patch along the flank, in modules."""
+
+
+class SectionNodes(NamedTuple):
+    """Nodes of one tooth section in the plane and the weights of their mean; weights add up to 1."""
+
+    nodes: IntArray
+    weights: FloatArray
+
+
+def flank_grid(gear: GearGeometry, n_heights: int = 9, n_slices: int = 5) -> FlankGrid:
+    """Return even heights (by roll angle) over the whole involute, and the middles of equal slices of the face."""
+    heights, slices = count(n_heights, "n_heights", minimum=2), count(n_slices, "n_slices")
+    roll = np.linspace(gear.form_roll_rad, gear.tip_roll_rad, heights)
+    middles = ((np.arange(slices) + 0.5) / slices - 0.5) * gear.face_width_mm * 1e-3
+    return FlankGrid(roll, middles)
+
+
+def flank_rows(mesh: SectorMesh, grid: FlankGrid, spread: Spread, places: IntArray, n_dof: int) -> FloatArray:
+    """Return rows (n_points, n_dof) that give the push displacement of each flank point; forces act by the transpose.
+
+    The rigid motion in the plane closest to that of the nodes (weights w), carried to the flank point p:
+
+        d·(ū + θ ẑ×(p − c)),  ū = Σ w u,  c = Σ w x,  θ = Σ w [(x − c)×(u − ū)]_z / Σ w |x − c|²
+
+    "section": nodes across the whole tooth at that height, weighted like the shear stress of a beam. "patch": nodes of
+    the flank around the point. "node": the flank at that height only, in the middle of the slice.
+
+    Parameters
+    ----------
+    mesh : SectorMesh
+    grid : FlankGrid
+    spread : str
+    places : array of int
+        Place of each of the sector's nodes among those of the degrees of freedom.
+    n_dof : int
+    """
+    gear = mesh.blank.geometry
+    rows = np.zeros((*grid.shape, n_dof))
+    for flank, sign in enumerate((1.0, -1.0)):
+        for height, roll in enumerate(grid.roll_rad):
+            point, push = point_and_push(gear, float(roll), sign)
+            nodes = height_nodes(mesh, float(roll), spread, flank)
+            plane = plane_row(mesh, nodes, point, push)
+            for k, z in enumerate(grid.z_m):
+                along = slice_weights(mesh, float(z), len(grid.z_m), spread)
+                dof = 3 * places[nodes.nodes][..., None] + np.arange(3)
+                np.add.at(rows[flank, height, k], dof, plane[:, None, :] * along[None, :, None])
+    return rows.reshape(grid.n_points, n_dof)
+
+
+def point_and_push(gear: GearGeometry, roll: float, sign: float) -> tuple[FloatArray, FloatArray]:
+    """Flank point (m) and the direction into the tooth."""
+    at, load = involute_outline(gear, np.array([roll])), roll - gear.base_half_angle_rad
+    point = np.array([at.x_mm[0], sign * at.y_mm[0]]) * 1e-3
+    return point, np.array([-np.sin(load), -sign * np.cos(load)])
+
+
+def height_nodes(mesh: SectorMesh, roll: float, spread: Spread, flank: int) -> SectionNodes:
+    """Nodes (n, n_layers) of the tooth that stand for a height, and the weights (n,) in the plane."""
+    gear, n_up = mesh.blank.geometry, mesh.size.n_up
+    place = float(flank_place(gear, np.array([roll]))[0])
+    reach = PATCH_HALF_WIDTH * gear.module_mm / side_curve(gear)[1] if spread == "patch" else 0.0
+    up = line_weights(row_places(gear, n_up), place - reach, place + reach)
+    if spread == "section":
+        across = parabolic_weights(mesh.tooth.shape[1])
+    else:
+        across = np.zeros(mesh.tooth.shape[1])
+        across[-1 if flank == 0 else 0] = 1.0
+    weights = np.outer(up, across).ravel()
+    used = weights != 0.0
+    return SectionNodes(mesh.tooth.reshape(-1, mesh.tooth.shape[2])[used], weights[used])
+
+
+def slice_weights(mesh: SectorMesh, z: float, n_slices: int, spread: Spread) -> FloatArray:
+    """Weights of the layers of nodes for the mean over a slice, or for its middle."""
+    layers = mesh.points_m[mesh.tooth[0, 0], 2]
+    half = 0.0 if spread == "node" else (layers[-1] - layers[0]) / (2.0 * n_slices)
+    return line_weights(layers, z - half, z + half)
+
+
+def plane_row(mesh: SectorMesh, nodes: SectionNodes, point: FloatArray, push: FloatArray) -> FloatArray:
+    """Weights (n, 3) of the radial, tangential and axial motion of the nodes (any layer: all have the same x and y)."""
+    x = mesh.points_m[nodes.nodes[:, 0], :2]
+    w = nodes.weights
+    centre = w @ x
+    offset = x - centre
+    square = float(w @ np.sum(offset**2, axis=1))
+    row = w[:, None] * push
+    lever = point - centre
+    turn = push[1] * lever[0] - push[0] * lever[1]  # what a unit rotation moves the point along the push
+    if square > 1e-12:
+        row = row + turn / square * w[:, None] * np.column_stack((-offset[:, 1], offset[:, 0]))
+    radius = np.hypot(x[:, 0], x[:, 1])
+    radial, around = x / radius[:, None], np.column_stack((-x[:, 1], x[:, 0])) / radius[:, None]
+    return np.column_stack((np.sum(row * radial, axis=1), np.sum(row * around, axis=1), np.zeros(len(x))))

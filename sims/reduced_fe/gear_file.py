@@ -1,0 +1,114 @@
+"""A reduced gear on disk: arrays without pickles, whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile, ZipFile
+
+import numpy as np
+
+from gearsig.errors import InputError
+from sims.reduced_fe.blank import blank_from_text
+from sims.reduced_fe.gear_key import FORMAT
+from sims.reduced_fe.reduced_gear import FlankGrid, ReducedGear
+
+_NUMBERS = ("mass_kg", "polar_inertia_kg_m2", "diametral_inertia_kg_m2")
+_ARRAYS = (
+    "frequencies_hz",
+    "nodal_diameters",
+    "flank_modes",
+    "hub_modes",
+    "free_compliance_m_per_n",
+    "clamped_compliance_m_per_n",
+    "hub_flank_compliance",
+    "hub_compliance",
+)
+MOST_BYTES = 200_000_000
+"""Of a file's arrays; a usual one has half a million."""
+
+
+def write_gear(path: str | Path, gear: ReducedGear) -> None:
+    """Write a reduced gear beside its place and move it there.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
+    """
+    target, part = Path(path), ""
+    about = {"format": FORMAT, "key": gear.key, "blank": gear.blank.as_text(), "spread": gear.spread}
+    about |= {"n_dof": gear.n_dof, **{name: getattr(gear, name) for name in _NUMBERS}}
+    arrays: dict[str, Any] = {name: getattr(gear, name) for name in _ARRAYS}
+    arrays |= {"roll_rad": gear.grid.roll_rad, "z_m": gear.grid.z_m}
+    try:
+        handle, part = tempfile.mkstemp(dir=target.parent, prefix=".gear-", suffix=".part")
+        with os.fdopen(handle, "wb") as file:
+            np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays)
+        Path(part).replace(target)
+    except OSError as error:
+        raise InputError(
+            f"cannot be written ({error.strerror})", where=str(target), remedy="choose another folder"
+        ) from None
+    finally:
+        if part:
+            Path(part).unlink(missing_ok=True)
+
+
+def read_gear(path: str | Path) -> ReducedGear:
+    """Read a reduced gear.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged, not a reduced gear, or of another version of this format.
+    """
+    source = Path(path)
+    try:
+        _check_length(source)
+        with np.load(source, allow_pickle=False) as data:
+            about = json.loads(str(data["about"]))
+            _check_format(about, source)
+            return _gear(about, {name: data[name] for name in (*_ARRAYS, "roll_rad", "z_m")})
+    except FileNotFoundError:
+        raise InputError("no such file", where=str(source)) from None
+    except InputError:
+        raise
+    except (OSError, BadZipFile, EOFError, ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"is not a reduced gear, or is damaged ({error})", where=str(source), remedy="make it again"
+        ) from error
+
+
+def _check_length(source: Path) -> None:
+    with ZipFile(source) as archive:
+        n_bytes = sum(entry.file_size for entry in archive.infolist())
+    if n_bytes > MOST_BYTES:
+        raise InputError(f"holds {n_bytes:.1e} bytes", where=str(source), allowed=f"at most {MOST_BYTES:.0e}")
+
+
+def _check_format(about: dict[str, Any], source: Path) -> None:
+    found = about.get("format") if isinstance(about, dict) else None
+    if found != FORMAT:
+        raise InputError(
+            f"is of format {found!r}: another version of gearsig wrote it",
+            where=str(source),
+            allowed=f"format {FORMAT}",
+            remedy="reduce the gear again",
+        )
+
+
+def _gear(about: dict[str, Any], arrays: dict[str, np.ndarray[Any, Any]]) -> ReducedGear:
+    fields: dict[str, Any] = arrays | {name: float(about[name]) for name in _NUMBERS}
+    grid = FlankGrid(fields.pop("roll_rad"), fields.pop("z_m"))
+    return ReducedGear(
+        blank=blank_from_text(about["blank"]),
+        key=str(about["key"]),
+        n_dof=int(about["n_dof"]),
+        spread=str(about["spread"]),
+        grid=grid,
+        **fields,
+    )

@@ -1,0 +1,98 @@
+"""What can be noticed of recordings that are not of the machine that they are said to be of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+from app.gap.doubts import strange_pattern, strange_teeth
+from app.gap.prepare import conditions_of
+from app.gap.unexplained import unexplained
+from gearsig.errors import RefusalError
+from gearsig.gap.gather import gather
+from gearsig.gap.gathered import Gathered
+from gearsig.gap.simulator import Added, Point
+from gearsig.recording.types import Recording
+from gearsig.rig.types import Rig
+from sims import simulate
+from sims.registry import gap_simulator
+
+POINT = Point(1500.0, 60.0)
+CHIPPED = Added("chipped_tooth", 1.5, {"gear": "driver", "tooth": 3.0, "width_percent": 85.0})
+
+
+@cache
+def rig() -> Rig:
+    found = simulate("cracked", preset="workshop_29_47", duration_s=0.2).rig
+    assert found is not None
+    return found
+
+
+def recording(seed: int, noise: int, *added: Added, duration_s: float = 3.0) -> Recording:
+    twin = gap_simulator("cracked").twin_of(rig())
+    return twin.run(POINT, added, seed=seed, duration_s=duration_s, sampling_rate_hz=20480.0, noise=noise)
+
+
+@cache
+def gathered(seed: int, noise: int, *, chipped: bool = False) -> Gathered:
+    return gather(recording(seed, noise, *([CHIPPED] if chipped else [])), rig())
+
+
+def test_another_specimen_is_noticed_and_a_damaged_gear_is_not_another_machine() -> None:
+    sound = gathered(0, 0)
+    assert strange_pattern(gathered(0, 1), sound, "now") == []
+    assert strange_pattern(gathered(0, 1, chipped=True), sound, "now") == []
+    (remark,) = strange_pattern(gathered(3, 1), sound, "now")
+    assert "another machine" in remark
+
+
+def test_the_teeth_of_another_rig_are_noticed() -> None:
+    assert strange_teeth(gathered(0, 1), "now") == []
+    assert strange_teeth(gathered(0, 1, chipped=True), "now") == []
+    others = replace(rig(), pairs=(replace(rig().pairs[0], driver_teeth=37, driven_teeth=53),))
+    (remark,) = strange_teeth(gather(recording(0, 1), others), "now")
+    assert "37/53" in remark
+
+
+def test_a_reference_with_a_fault_is_told() -> None:
+    damaged = recording(0, 1, CHIPPED)
+    texts = unexplained(recording(0, 2), rig(), [recording(0, 3), damaged], [rig(), rig()], "now")
+    assert not any("does not look healthy" in text for text in texts)  # at the same speed, the first is taken
+    texts = unexplained(recording(0, 2), rig(), [damaged], [rig()], "now")
+    assert any(text.startswith("The reference of now does not look healthy") for text in texts)
+
+
+def test_a_refusal_names_the_recording_that_is_too_short() -> None:
+    twin, short = gap_simulator("cracked").twin_of(rig()), recording(0, 1, duration_s=0.1)
+    with pytest.raises(RefusalError, match=r"^the old one: the record holds"):
+        conditions_of([short], [rig()], [short], [rig()], twin, [], nothing, ["the old one"])
+    with pytest.raises(RefusalError, match=r"^today: "):
+        conditions_of([short], [rig()], [], [], twin, ["today"], nothing)
+
+
+def test_a_dead_channel_is_left_out_and_nothing_but_dead_ones_is_refused() -> None:
+    twin, whole = gap_simulator("cracked").twin_of(rig()), recording(0, 1)
+    first, *_ = whole.vibration_names()
+    samples = whole.samples.copy()
+    samples[whole.channel_names.index(first)] = 0.0
+    (condition,), notices = conditions_of([replace(whole, samples=samples)], [rig()], [], [], twin, ["now"], nothing)
+    assert first not in condition.now.channels
+    assert any(f"channel {first} is dead" in notice for notice in notices)
+    samples[: len(whole.vibration_names())] = 0.0
+    with pytest.raises(RefusalError, match="now: no vibration channel is live"):
+        conditions_of([replace(whole, samples=samples)], [rig()], [], [], twin, ["now"], nothing)
+
+
+def test_what_was_not_given_of_the_operating_point_is_told() -> None:
+    twin, whole = gap_simulator("cracked").twin_of(rig()), recording(0, 1)
+    _, notices = conditions_of([whole], [rig()], [], [], twin, ["now"], nothing)
+    assert not any("not given" in notice or "tachometer" in notice for notice in notices)
+    point = replace(rig().operating_point, torque_nm=None)
+    _, notices = conditions_of([whole], [replace(rig(), operating_point=point)], [], [], twin, ["now"], nothing)
+    assert any(notice.startswith("now: the torque is not given; ") for notice in notices)
+
+
+def nothing(*_: object) -> None:
+    """Be told, and do nothing."""

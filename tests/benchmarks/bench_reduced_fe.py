@@ -1,0 +1,63 @@
+"""Modes by cyclic symmetry beside those of the whole gear, and the two reductions of a 277 000-DoF gear.
+
+Run as `python tests/benchmarks/bench_reduced_fe.py`, `--whole` adds the whole matrices at that size (4 GB, minutes).
+"""
+
+import resource
+import sys
+from collections.abc import Callable
+from time import perf_counter
+
+from sims.reduced_fe.craig_bampton import craig_bampton
+from sims.reduced_fe.cyclic import CyclicGear
+from sims.reduced_fe.cyclic_modes import cyclic_modes
+from sims.reduced_fe.full_gear import full_modes
+from sims.reduced_fe.mesh_size import MeshSize, mesh_size_for
+from sims.reduced_fe.one_thread import one_thread
+from sims.reduced_fe.ready import READY
+from sims.reduced_fe.reduce import plan_for, reduce_gear
+from sims.reduced_fe.sector_mesh import SectorMesh, sector_mesh
+
+GEAR = READY["z50_m3"]
+WANTED = 277_200
+
+
+def seconds(work: Callable[[], object]) -> float:
+    start = perf_counter()
+    work()
+    return perf_counter() - start
+
+
+def peak_gb() -> float:
+    """Of this process since it began; the largest job comes last."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+
+
+def compare_modes(mesh: SectorMesh) -> None:
+    cyclic = min(seconds(lambda: cyclic_modes(CyclicGear(mesh), 20)) for _ in range(2))
+    whole = seconds(lambda: full_modes(CyclicGear(mesh), 20))
+    print(f"20 modes of {mesh.n_dof:7d} DoF: cyclic {cyclic:7.2f} s, whole {whole:7.2f} s, ratio {whole / cyclic:5.1f}")
+
+
+def main() -> None:
+    with one_thread():
+        for size in (MeshSize(2, 1, 3, 1, 1, 1), MeshSize(2, 1, 4, 1, 2, 2)):
+            compare_modes(sector_mesh(GEAR, size))
+        mesh = sector_mesh(GEAR, mesh_size_for(GEAR, WANTED))
+        took = seconds(lambda: cyclic_modes(CyclicGear(mesh), 20))
+        print(f"20 modes of {mesh.n_dof:7d} DoF: cyclic {took:7.2f} s")
+        plan = plan_for(GEAR, WANTED)
+        print(f"free-interface reduction {seconds(lambda: reduce_gear(GEAR, plan)):7.2f} s, peak {peak_gb():.2f} GB")
+        start = perf_counter()
+        accuracy = craig_bampton(mesh).accuracy
+        print(
+            f"Craig–Bampton to 229 {perf_counter() - start:7.2f} s, peak {peak_gb():.2f} GB, "
+            f"worst of 20 frequencies {100 * accuracy.worst_error:.4f} %, least subspace MAC {accuracy.least_mac:.6f}"
+        )
+        if "--whole" in sys.argv:
+            compare_modes(mesh)
+            print(f"peak {peak_gb():.2f} GB")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,91 @@
+"""`analyze` recognises machines that start, stop and reverse, and does not pretend that they run steadily."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearsig import analyze
+from gearsig.diagnosis.types import CannotTell, Kind, Outcome
+from gearsig.recording.types import Channel, Recording
+from gearsig.report.text import analysis_text
+from gearsig.report.to_json import analysis_to_json
+from gearsig.rig.speed import EncoderChannel, SpeedChannel
+from gearsig.rig.types import GearPair, Rig, Shaft
+from tests.motion.recordings import continuous, start_stop
+
+
+def codes(recording: Recording) -> list[str]:
+    return [finding.code for finding in analyze(recording).findings]
+
+
+def test_a_start_stop_recording_is_examined_as_one() -> None:
+    result = analyze(start_stop())
+    found = {finding.code: finding for finding in result.findings}
+    assert {"start-stop", "stationary-methods-left-out", "backlash", "flank-impacts"} <= set(found)
+    assert isinstance(result.shaft_angle, CannotTell)
+    assert result.channels == ()
+    assert result.outcome is Outcome.CANNOT_TELL
+    assert "1 start(s) and 2 stop(s)" in found["start-stop"].title
+    assert found["flank-impacts"].where.tooth is not None
+    assert {i.name for i in result.indicators} >= {"backlash", "restitution", "standing part"}
+    assert "want a speed that lasts" in analysis_text(result)
+    assert '"start-stop"' in analysis_to_json(result)
+
+
+def test_worn_teeth_are_a_suspicion() -> None:
+    result = analyze(start_stop(wear_um=120.0))
+    worn = next(f for f in result.findings if f.code == "backlash-grown")
+    assert worn.kind is Kind.SUSPICION
+    assert worn.strength is not None
+    assert worn.strength.value == pytest.approx(420.0, rel=0.02)
+    assert result.outcome is Outcome.SUSPICION
+
+
+def test_vibration_blows_are_told_where_the_rate_allows() -> None:
+    assert "vibration-blows" in codes(start_stop(rate_hz=10_000.0))
+    assert "vibration-blows" not in codes(start_stop())
+
+
+def test_continuous_rotation_is_analysed_as_before() -> None:
+    result = analyze(continuous())
+    assert not isinstance(result.shaft_angle, CannotTell)
+    assert "start-stop" not in [f.code for f in result.findings]
+    assert result.channels
+
+
+def swinging(rig: Rig | None = None) -> Recording:
+    """An arm that swings to and fro, with an accelerometer and an encoder that wraps."""
+    t = np.arange(10_000) / 1000.0
+    angle = 200.0 * np.sin(2.0 * np.pi * 0.2 * t)
+    noise = np.random.default_rng(0).standard_normal(len(t))
+    source = EncoderChannel("enc", 360.0, wraps=True, shaft="in" if rig else "")
+    channels = (Channel("a", "acceleration", "m/s^2"), Channel("enc", "encoder", "deg"))
+    return Recording(np.stack([noise, angle % 360.0]), 1000.0, channels, speed=source, rig=rig)
+
+
+def test_a_reversing_machine_without_contact_data_is_recognised_too() -> None:
+    pair = GearPair("p", "in", "out", 20, 40)
+    for rig in (None, Rig(shafts=(Shaft("in"), Shaft("out")), pairs=(pair,))):
+        found = {f.code: f for f in analyze(swinging(rig)).findings}
+        assert {"start-stop", "stationary-methods-left-out", "contact-not-described"} <= set(found)
+        assert "change(s) of direction" in found["start-stop"].title
+        assert "0 change(s)" not in found["start-stop"].title
+
+
+def test_a_speed_channel_tells_as_well() -> None:
+    speed = np.concatenate([np.full(2000, 600.0), np.zeros(2000), np.full(2000, 600.0)])
+    noise = np.random.default_rng(0).standard_normal(len(speed))
+    channels = (Channel("a", "acceleration", "m/s^2"), Channel("n", "rotational_speed", "rpm"))
+    recording = Recording(np.stack([noise, speed]), 1000.0, channels, speed=SpeedChannel("n"))
+    assert "start-stop" in codes(recording)
+    steady = replace(recording, samples=np.stack([noise, np.full(len(speed), 600.0)]))
+    assert "start-stop" not in codes(steady)
+
+
+def test_teeth_that_cannot_be_examined_are_said_so() -> None:
+    recording = start_stop()
+    samples = np.array(recording.samples)
+    samples[recording.index("wheel angle"), 700:] += 0.5
+    found = {f.code: f for f in analyze(replace(recording, samples=samples)).findings}
+    assert "jumps" in found["teeth-not-examined"].evidence[0]

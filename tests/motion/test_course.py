@@ -1,0 +1,136 @@
+"""Stretches of a shaft's motion, signals over an angle that stops and turns back, loops of torque over twist."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gearsig.errors import InputError, RefusalError
+from gearsig.motion.angle_profile import angle_profile
+from gearsig.motion.course import find_course, is_start_stop
+from gearsig.motion.hysteresis import torque_twist
+from gearsig.motion.measure import measure_motion
+from gearsig.motion.start_stop import course_of_angle, examine_start_stop
+from tests.motion.recordings import continuous, start_stop, without
+
+RATE = 1000.0
+
+
+def moved(*pieces: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Angle and speed of pieces (duration in s, speed in rad/s)."""
+    speed = np.concatenate([np.full(round(d * RATE), w) for d, w in pieces])
+    return np.cumsum(speed) / RATE, speed
+
+
+def test_stretches_of_a_known_motion() -> None:
+    course = find_course(*moved((0.5, 0.0), (1.0, 10.0), (0.4, 0.0), (1.0, -10.0), (0.5, 10.0)), RATE)
+    assert [s.direction for s in course.stretches] == [0, 1, 0, -1, 1]
+    assert course.starts_s == pytest.approx((0.5, 1.9))
+    assert course.stops_s == pytest.approx((1.5,))
+    assert course.n_reversals == 2
+    assert course.standing_part == pytest.approx(0.9 / 3.4)
+    assert course.backwards_rad == pytest.approx(10.0, abs=0.03)
+    assert is_start_stop(course)
+
+
+def test_a_run_up_from_rest_is_no_start_stop_motion() -> None:
+    course = find_course(*moved((0.5, 0.0), *((0.05, w) for w in np.linspace(0.5, 20.0, 40))), RATE)
+    assert len(course.starts_s) == 1
+    assert not is_start_stop(course)
+
+
+def test_a_knock_on_a_standing_machine_is_no_start() -> None:
+    course = find_course(*moved((1.0, 10.0), (0.5, 0.0), (0.05, 2.0), (0.5, 0.0)), RATE)
+    assert [s.direction for s in course.stretches] == [1, 0]
+
+
+@given(st.floats(0.0, 0.3), st.integers(0, 1000))
+def test_noise_makes_no_starts(sigma: float, seed: int) -> None:
+    angle, speed = moved((0.5, 0.0), (1.0, 10.0), (0.5, 0.0))
+    noisy = speed + sigma * np.random.default_rng(seed).standard_normal(len(speed))
+    course = find_course(angle, noisy, RATE)
+    assert [s.direction for s in course.stretches] == [0, 1, 0]
+
+
+def test_starts_and_stops_of_the_simulated_drive() -> None:
+    recording = start_stop()
+    course = course_of_angle(recording.values("pinion angle"), RATE)
+    assert [s.direction for s in course.stretches] == [1, 0, 1, 0]
+    assert course.starts_s == pytest.approx((3.0,), abs=0.03)
+    assert course.stops_s == pytest.approx((1.14, 4.14), abs=0.03)
+    assert is_start_stop(course)
+    assert not is_start_stop(course_of_angle(continuous().values("pinion angle"), RATE))
+
+
+def test_lengths_that_do_not_fit() -> None:
+    with pytest.raises(InputError, match="as many"):
+        find_course(np.zeros(10), np.zeros(9), RATE)
+
+
+def test_level_per_tooth_forwards_and_backwards_through_zero_speed() -> None:
+    """A level that is a function of the tooth is found whatever the speed does; each direction has its own."""
+    angle, _ = moved((1.0, 7.0), (0.3, 0.0), (0.6, -7.0), (0.3, 0.0), (1.2, 3.0))
+    n_teeth = 12
+    tooth = np.floor(angle * n_teeth / (2.0 * np.pi)).astype(int) % n_teeth
+    course = course_of_angle(angle, RATE)
+    sense = np.zeros(len(angle))
+    for s in course.moving:
+        sense[s.first : s.last] = s.direction
+    values = (1.0 + tooth) * np.where(sense < 0.0, 10.0, 1.0)
+    profile = angle_profile(values, angle, course, n_teeth)
+    passed = profile.passes_forwards > 0
+    assert profile.rms_forwards[passed] == pytest.approx(1.0 + np.flatnonzero(passed), rel=1e-9)
+    back = profile.passes_backwards > 0
+    assert 5 < np.count_nonzero(back) < n_teeth
+    assert profile.rms_backwards[back] == pytest.approx(10.0 * (1.0 + np.flatnonzero(back)), rel=1e-9)
+    assert np.all(np.isnan(profile.rms_backwards[~back]))
+
+
+def test_slow_and_fast_passages_weigh_by_angle() -> None:
+    """√(mean over angle) of a level that rises along the tooth, at whatever speed it is passed."""
+    t = np.arange(0.0, 1.0, 1e-4)
+    angle = 2.0 * np.pi * (t + 0.1 * np.sin(2.0 * np.pi * t) / np.pi)
+    values = np.sqrt(np.mod(angle * 4.0 / (2.0 * np.pi), 1.0))
+    profile = angle_profile(values, angle, find_course(angle, np.gradient(angle, 1e-4), 1e4), 4)
+    assert profile.rms_forwards == pytest.approx(np.sqrt(0.5), abs=2e-3)
+
+
+def test_work_and_loss_of_the_loop_are_those_of_the_model() -> None:
+    """∮ τ dδ is what leaves through the teeth: contact damping and their friction, all else being a state."""
+    recording = start_stop(quiet=True, rate_hz=20_000.0)
+    motion = measure_motion(recording)
+    course = course_of_angle(motion.driver_angle_rad, 20_000.0)
+    loop = torque_twist(motion, course, 0.0)
+    assert loop.n_cycles == 2
+    from sims.forging.respond import respond
+    from sims.forging.simulator import ForgingManipulator
+
+    ready = ForgingManipulator().prepare({}, None)
+    run = respond(ready.drive, ready.courses(6.0), duration_s=6.0, interval_s=1e-4)
+    work = np.trapezoid(run["torque"] * run["pinion speed"], dx=1e-4)
+    assert loop.work_per_cycle_j == pytest.approx(work / 2.0, rel=1e-3)
+    assert loop.loss_per_cycle_j == pytest.approx(run["lost in contact"][-1] / 2.0, rel=0.5)
+    with pytest.raises(RefusalError, match="torque"):
+        torque_twist(measure_motion(without(recording, "torque")), course, 0.0)
+
+
+def test_everything_at_once_and_what_is_refused() -> None:
+    examined = examine_start_stop(measure_motion(start_stop()))
+    named = {i.name: i.value for i in examined.indicators}
+    assert named["starts"] == 1.0
+    assert named["stops"] == 2.0
+    assert named["standing part"] == pytest.approx(0.62, abs=0.02)
+    assert named["backlash"] == pytest.approx(300.0, rel=0.02)
+    assert named["back impacts per cycle"] > 3.0
+    assert named["impact loss per cycle"] > 0.05
+    assert named["lost motion"] == pytest.approx(np.degrees(300e-6 / 0.047), rel=0.5)
+    assert examined.portrait is not None
+    assert examined.portrait.units == ("m", "m/s")
+    assert not examined.refusals
+    steady = examine_start_stop(measure_motion(continuous()))
+    assert steady.backlash is None
+    assert any("back flank" in text for text in steady.refusals)
+    alone = examine_start_stop(measure_motion(without(continuous(), "torque")))
+    assert alone.portrait is None
+    assert alone.loop is None
+    assert len(alone.refusals) == 2

@@ -1,0 +1,161 @@
+"""Force between the teeth from motion: piecewise against Hunt–Crossley and Kelvin–Voigt, datum, noise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearsig.errors import InputError, RefusalError
+from gearsig.motion.contact_force import depth, latched_damping, pair_force
+from gearsig.motion.force import (
+    AS_PRINTED,
+    FROM_TORQUE,
+    HUNT_CROSSLEY,
+    KELVIN_VOIGT,
+    PIECEWISE,
+    TEETH,
+    TOOTH_FORCE,
+    estimate_forces,
+    inverse_force_n,
+)
+from gearsig.motion.measure import measure_motion
+from gearsig.motion.noise_study import noise_study
+from gearsig.motion.types import ForceEstimate
+from gearsig.recording.types import Recording
+from gearsig.rig.contact import ToothContact
+from tests.motion.recordings import changed, continuous, start_stop, without
+from tests.sims.forging.drives import free_bodies, impact
+
+CONTACT = ToothContact(1.8e10, half_backlash_um=100.0, restitution=0.8, impact_speed_floor_mps=0.01)
+
+
+def estimate(recording: Recording, datum: str | float = "auto", **options: object) -> ForceEstimate:
+    return estimate_forces(measure_motion(recording, **options), datum=datum)  # type: ignore[arg-type]  # as named
+
+
+def relative(found: ForceEstimate, model: str, reference: str) -> float:
+    return found.error(model, reference).relative_rms
+
+
+def test_depth_has_the_flanks_sign_and_is_nothing_in_the_play() -> None:
+    q = np.array([-3e-4, -1e-4, 0.0, 1e-4, 2.5e-4])
+    assert depth(q, 1e-4) == pytest.approx([-2e-4, 0.0, 0.0, 0.0, 1.5e-4])
+
+
+def test_force_is_the_law_on_both_flanks_and_never_tension() -> None:
+    g, rate, beta = np.array([2e-5, -2e-5, 2e-5]), np.array([0.1, -0.1, -1e3]), np.full(3, 2.0)
+    k, lam = 1.8e10, 1.5
+    expected = k * 2e-5**lam * (1.0 + 0.2)
+    assert pair_force(g, rate, beta, CONTACT) == pytest.approx([expected, -expected, 0.0])
+
+
+def test_damping_is_latched_where_flanks_meet() -> None:
+    """8(1 − e)/(5 e v), v of the sample before; it stays until they part; the floor holds for slow ones."""
+    g = np.array([0.0, 0.0, 1e-6, 2e-6, 1e-6, 0.0, -1e-6, 0.0])
+    rate = np.array([0.2, 0.2, 0.15, 0.0, -0.1, -0.001, -0.001, 0.0])
+    beta = latched_damping(g, rate, CONTACT)
+    one, floor = 8.0 * 0.2 / (5.0 * 0.8 * 0.2), 8.0 * 0.2 / (5.0 * 0.8 * 0.01)
+    assert beta == pytest.approx([0.0, 0.0, one, one, one, 0.0, floor, 0.0])
+
+
+def test_the_inverse_formula_recovers_minus_the_force_of_a_free_impact() -> None:
+    made = free_bodies({"restitution": 0.8})
+    run = impact(made, 0.2)
+    r1, r2 = made.path.base_radii_m
+    m1, m2 = made.pinion_side_inertia_kg_m2 / r1**2, (made.contact.driven_inertia_kg_m2 or 0.0) / r2**2
+    acceleration = r1 * run["pinion acceleration"] - r2 * run["wheel acceleration"]
+    force = run["interaction force"]
+    recovered = inverse_force_n(acceleration, force, m2, m2 / m1)
+    assert recovered == pytest.approx(-force, abs=1e-6 * m2 / m1 * force.max())
+
+
+@pytest.mark.parametrize("preset", ["manipulator_formula", "manipulator_table"])
+@pytest.mark.parametrize("record", [start_stop, continuous])
+def test_noiseless_motion_gives_the_simulated_force(preset: str, record: object) -> None:
+    """The force that made the motion; what is left is the twentieth of a pitch in which pairs come and go."""
+    found = estimate(record(preset, quiet=True), "zero")  # type: ignore[operator]  # a function of the preset
+    assert relative(found, TEETH, TOOTH_FORCE) < 0.06
+    assert relative(found, PIECEWISE, FROM_TORQUE) < 0.08
+    whole = (np.abs(np.diff(found.n_pairs, prepend=0.0)) == 0.0) & (found.n_pairs > 0.0)
+    share = found.forces_n[TEETH][whole] / np.where(whole, found.references_n[TOOTH_FORCE], 1.0)[whole]
+    assert np.median(share) == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("preset", ["manipulator_formula", "manipulator_table"])
+def test_piecewise_is_nearer_than_hunt_crossley_on_the_same_motion(preset: str) -> None:
+    for recording in (start_stop(preset), continuous(preset)):
+        found = estimate(recording)
+        for model in (HUNT_CROSSLEY, KELVIN_VOIGT):
+            assert relative(found, PIECEWISE, FROM_TORQUE) < 0.3 * relative(found, model, FROM_TORQUE)
+            assert relative(found, TEETH, TOOTH_FORCE) < 0.3 * relative(found, model, TOOTH_FORCE)
+        assert relative(found, PIECEWISE, FROM_TORQUE) < 0.12
+        # the printed mass is the load's, which the pinion's torque does not carry
+        assert relative(found, AS_PRINTED, FROM_TORQUE) > 1.0
+
+
+def test_only_the_piecewise_model_sees_the_back_flank() -> None:
+    found = estimate(start_stop())
+    struck = found.references_n[TOOTH_FORCE] < -500.0
+    assert np.count_nonzero(struck) > 50
+    assert np.all(found.forces_n[HUNT_CROSSLEY][struck] == 0.0)
+    back = found.forces_n[TEETH][struck] / found.references_n[TOOTH_FORCE][struck]
+    assert np.median(back) == pytest.approx(1.0, abs=0.05)
+
+
+def test_the_datum_is_found_whatever_the_encoders_zero() -> None:
+    recording = start_stop()
+    moved = changed(recording, "pinion angle", recording.values("pinion angle") + 0.01)
+    shift = estimate(moved).datum.compression_m - estimate(recording).datum.compression_m
+    # The pairs count from the driver's angle: its zero is known, that of the wheel is not.
+    wheel = changed(recording, "wheel angle", recording.values("wheel angle") + 0.003)
+    by_wheel = estimate(wheel)
+    assert by_wheel.datum.compression_m - estimate(recording).datum.compression_m == pytest.approx(
+        -0.003 * 0.25 * np.cos(np.radians(20.0)), abs=1e-9
+    )
+    assert relative(by_wheel, PIECEWISE, FROM_TORQUE) == pytest.approx(
+        relative(estimate(recording), PIECEWISE, FROM_TORQUE), rel=1e-6
+    )
+    assert shift == pytest.approx(0.01 * 0.05 * np.cos(np.radians(20.0)), abs=1e-6)
+
+
+def test_without_torque_the_datum_lies_between_the_flanks() -> None:
+    found = estimate(without(start_stop(), "torque"))
+    assert abs(found.datum.compression_m) < 12e-6
+    assert FROM_TORQUE not in found.references_n
+    assert relative(found, TEETH, TOOTH_FORCE) < 1.0
+    with pytest.raises(RefusalError, match="which flank touches cannot be told"):
+        estimate(without(continuous(), "torque"))
+    with pytest.raises(InputError, match="datum"):
+        estimate(start_stop(), "somewhere")
+
+
+def test_a_machine_that_stands_all_the_time_is_refused() -> None:
+    recording = start_stop()
+    still = replace(recording, samples=np.zeros_like(recording.samples))
+    with pytest.raises(RefusalError, match="0 samples carry a load"):
+        estimate(still)
+
+
+@pytest.mark.parametrize(
+    ("preset", "low_um", "high_um"), [("manipulator_formula", 3.0, 12.0), ("manipulator_table", 15.0, 40.0)]
+)
+def test_noise_at_which_piecewise_is_no_longer_nearer(preset: str, low_um: float, high_um: float) -> None:
+    """Stiffer teeth ask for better encoders: their whole deflection is some 20 µm, against some 100 µm."""
+    study = noise_study(
+        start_stop(preset), rng=np.random.default_rng(3), levels_um=(0.0, 1.0, 3.0, 10.0, 30.0, 60.0), n_draws=2
+    )
+    piecewise, other = study.rms_n[PIECEWISE], study.rms_n[HUNT_CROSSLEY]
+    assert piecewise[0] < 0.2 * other[0]
+    assert piecewise[-1] > other[-1]
+    assert study.crossover_um is not None
+    assert low_um < study.crossover_um < high_um
+    assert np.all(np.diff(piecewise) > 0.0)
+    assert f"{study.crossover_um:.3g} µm" in study.text
+
+
+def test_a_study_needs_something_to_compare_with() -> None:
+    rng = np.random.default_rng(0)
+    with pytest.raises(RefusalError, match="neither torque nor tooth force"):
+        noise_study(without(start_stop(), "torque", "interaction force"), rng=rng, levels_um=(0.0, 1.0))
+    with pytest.raises(InputError, match="ascending"):
+        noise_study(start_stop(), rng=rng, levels_um=(1.0, 2.0))

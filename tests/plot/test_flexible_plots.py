@@ -1,0 +1,72 @@
+"""Figures of a flexible pair: maps, sweeps, spectra, natural frequencies."""
+
+from io import BytesIO
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+
+from gearsig.errors import InputError
+from gearsig.plot.flexible import (
+    frequency_curves_figure,
+    mesh_maps_figure,
+    speed_spectra_figure,
+    speed_sweep_figure,
+)
+
+CYCLES = np.linspace(0.0, 2.0, 81)
+TORQUE = np.linspace(10.0, 500.0, 20)
+HZ = np.linspace(750.0, 3400.0, 60)
+
+
+def texts(figure):
+    figure.savefig(BytesIO(), format="png", dpi=40)
+    return [text.get_text() for text in figure.findobj(Text) if text.get_text()]
+
+
+def test_maps_show_values_over_angle_and_torque():
+    values = 2.5 + 0.3 * np.cos(2.0 * np.pi * CYCLES)[:, None] + 1e-3 * TORQUE
+    figure = mesh_maps_figure(CYCLES, TORQUE, {"stiffness (10⁸ N/m)": values, "STE (µm)": 4.0 * values}, title="A pair")
+    assert {"stiffness (10⁸ N/m)", "STE (µm)", "torque (N·m)", "A pair"} <= set(texts(figure))
+    drawn = figure.axes[0].collections[0].get_array()
+    np.testing.assert_allclose(np.asarray(drawn).reshape(len(TORQUE), len(CYCLES)), values.T)
+    with pytest.raises(InputError, match="shape"):
+        mesh_maps_figure(CYCLES, TORQUE, {"x": values.T})
+    with pytest.raises(InputError, match="4 maps"):
+        mesh_maps_figure(CYCLES, TORQUE, dict.fromkeys("abcd", values))
+
+
+def test_an_even_map_is_drawn_without_lines():
+    mesh_maps_figure(CYCLES, TORQUE, {"even": np.ones((len(CYCLES), len(TORQUE)))})
+
+
+def test_sweeps_show_both_ways_and_mark_the_mode():
+    up, down = np.linspace(1e-6, 2e-6, 60), np.linspace(2e-6, 3e-6, 60)
+    figure = speed_sweep_figure([("170 N·m", HZ, up, down)], natural_hz=2650.0, jumps_hz={"jump up": 2500.0})
+    axes = figure.axes[0]
+    np.testing.assert_allclose(axes.lines[0].get_ydata(), up * 1e6)
+    np.testing.assert_allclose(axes.lines[1].get_ydata(), down * 1e6)
+    assert axes.lines[1].get_linestyle() != axes.lines[0].get_linestyle()
+    assert {"ωₙ", "ωₙ/2", "ωₙ/3", "jump up", "rms of the DTE (µm)"} <= set(texts(figure))
+    with pytest.raises(InputError):
+        speed_sweep_figure([])
+
+
+def test_spectra_share_one_scale():
+    frequency = np.linspace(0.0, 5000.0, 500)
+    spectra = {f"{n} rpm": n * 1e-9 * (1.0 + (frequency // 100 % 7 == 0)) for n in (1000, 2000)}
+    figure = speed_spectra_figure(frequency, spectra, mesh_hz=(833.0, 1667.0), natural_hz=2650.0, title="DTE")
+    limits = {axes.get_ylim() for axes in figure.axes}
+    assert len(figure.axes) == 2
+    assert len(limits) == 1
+    assert {"1000 rpm", "2000 rpm", "frequency (Hz)", "DTE (µm)"} <= set(texts(figure))
+
+
+def test_natural_frequencies_that_move_stand_out():
+    curves = np.column_stack((np.full(81, 800.0), 2650.0 - 300.0 * (CYCLES > 1.5)))
+    figure = frequency_curves_figure(CYCLES, curves, title="over the angle")
+    still, moving = figure.axes[0].lines
+    assert still.get_linewidth() < moving.get_linewidth()
+    np.testing.assert_allclose(moving.get_ydata(), curves[:, 1] / 1e3)
+    with pytest.raises(InputError):
+        frequency_curves_figure(CYCLES, curves[:5])

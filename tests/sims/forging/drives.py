@@ -1,0 +1,51 @@
+"""Drives and runs that the tests share."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from gearsig.rig.contact import ToothContact
+from sims.cracked.wanted import Wanted
+from sims.forging.build import build_drive
+from sims.forging.drive import Bristle, ForgingDrive, GrippedLoad, HydraulicMotor
+from sims.forging.parameters import PARAMETERS
+from sims.forging.respond import DriveResponse, FirstState, respond
+from sims.forging.schedule import Schedule
+from sims.machine.operation import Course
+from sims.simulator import ParameterValue
+from sims.values import complete_values
+
+NOTHING = Course.constant(0.0)
+AT_REST = Schedule(NOTHING, NOTHING, NOTHING)
+
+
+def drive(speed_limit_rpm: float = 100.0, **values: ParameterValue) -> ForgingDrive:
+    return build_drive(Wanted(complete_values(PARAMETERS, values)), speed_limit_rpm)
+
+
+def free_bodies(contact: Mapping[str, object] | None = None, **values: ParameterValue) -> ForgingDrive:
+    """Two gears that nothing drives, holds or rubs; one tooth pair all the time in the angle they turn through."""
+    made = drive(0.0, friction_coefficient=0.0, mesh_phase=0.2, **values)
+    none = Bristle(0.0, 1.0, 1.0, 1.0)
+    lossless = replace(made, motor=HydraulicMotor(made.motor.inertia_kg_m2, none), load=GrippedLoad(none))
+    return replace(lossless, contact=replace(made.contact, **(contact or {})))  # type: ignore[arg-type]  # as named
+
+
+def impact(made: ForgingDrive, speed_mps: float, **options: object) -> DriveResponse:
+    """Run the gears into each other from the middle of the gap; the pinion turns, the wheel stands."""
+    start = FirstState(0.0, speed_mps / made.path.base_radii_m[0], 0.0, speed_mps)
+    lasts_s = 1.5 * made.contact.half_backlash_um * 1e-6 / speed_mps + 0.02
+    return respond(made, AT_REST, duration_s=lasts_s, interval_s=1e-5, first=start, **options)  # type: ignore[arg-type]
+
+
+def contact_of(made: ForgingDrive, **changes: object) -> ToothContact:
+    return replace(made.contact, **changes)  # type: ignore[arg-type]  # as named
+
+
+def driven_by(torque_nm: float) -> Schedule:
+    return Schedule(Course.of([0.0, 0.02], [0.0, torque_nm]), NOTHING, NOTHING)
+
+
+def largest(values: np.ndarray) -> float:
+    return float(np.max(np.abs(values)))

@@ -1,0 +1,147 @@
+"""Presets, recordings and the command of the forging manipulator."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearsig.recording.read import read_recording
+from gearsig.rig.toml import read_rig
+from sims import simulate
+from sims.forging.parameters import PARAMETERS
+from sims.forging.simulator import ForgingManipulator
+from sims.presets import preset, presets
+from sims.registry import simulators
+from sims.simulator import ParameterValue
+from tests.app.test_cli import run
+
+UNITS = {
+    "s": "_s", "N m": "_nm", "mm": "_mm", "deg": "_deg", "N/m^λ": "_n_per_m_lambda", "m/s": "_mps", "um": "_um",
+    "kg m^2": "_kg_m2", "kg": "_kg", "N m s/rad": "_nm_s_per_rad", "rad/s": "_rad_per_s", "rad": "_rad",
+    "urad": "_urad", "mrad/s": "_mrad_per_s", "rad/s^2": "_rad_per_s2", "m/s^2": "_mps2", "Hz": "_hz",
+}  # fmt: skip
+
+
+def short(**parameters: ParameterValue) -> object:
+    return simulate("forging", parameters=parameters, duration_s=2.5, sampling_rate_hz=1000.0)
+
+
+def test_every_name_ends_in_its_unit_and_defaults_fit() -> None:
+    for p in PARAMETERS:
+        assert p.name.endswith(UNITS[p.unit] if p.unit else p.name), p.name
+        assert p.meaning
+        if not p.choices and p.default is not None:
+            assert p.low is not None
+            assert p.high is not None
+            assert p.low <= float(p.default) <= p.high
+    assert len({p.name for p in PARAMETERS}) == len(PARAMETERS)
+    assert "forging" in simulators()
+
+
+def test_the_two_stiffnesses_of_the_source_are_presets() -> None:
+    """(13) with the stated geometry gives 1.8366e10 N/m^1.5; table 1 prints 1.72e9. Both say so."""
+    assert set(presets("forging")) == {"manipulator_formula", "manipulator_table"}
+    prepared = {name: ForgingManipulator().prepare({}, None, preset_name=name) for name in presets("forging")}
+    formula, table = prepared["manipulator_formula"].drive, prepared["manipulator_table"].drive
+    assert formula.contact.stiffness_n_per_m_lambda == pytest.approx(1.8366e10, rel=5e-5)
+    assert table.contact.stiffness_n_per_m_lambda == 1.72e9
+    assert table.contact.contact_ratio == 1.749
+    assert formula.path.contact_ratio == pytest.approx(1.705, abs=5e-4)
+    for name in presets("forging"):
+        said = " ".join((*preset("forging", name).assumed, *preset("forging", name).does_not_represent,
+                         *preset("forging", name).sources))  # fmt: skip
+        assert "1.72e9" in said
+        assert "1.8366e10" in said
+    # the table's damping, 1.12e9, is that of an impact at 0.112 m/s
+    ratio = table.contact.damping_ratio_at(0.112)
+    assert ratio * 1.72e9 == pytest.approx(1.12e9, rel=5e-3)
+
+
+def test_a_recording_holds_motion_rig_and_truth() -> None:
+    recording = short()
+    assert recording.n_samples == 2500
+    assert recording.vibration_names() == ("torque", "interaction force")
+    assert recording.rig is not None
+    assert recording.rig.contact is not None
+    assert recording.rig.contact.half_backlash_um == 150.0
+    assert recording.truth["backlash_um"] == 300.0
+    assert len(recording.truth["contacts"]["rows"]) > 5
+    # speeds are the slopes of the angles, the torque what the teeth take
+    slope = np.gradient(recording.values("wheel angle"), 1e-3)
+    assert recording.values("wheel speed")[300:900] == pytest.approx(slope[300:900], abs=0.02)
+    carried = recording.values("interaction force")[400:900].mean() * 0.05 * np.cos(np.radians(20.0))
+    assert recording.values("torque")[400:900].mean() == pytest.approx(carried, rel=0.02)
+
+
+def test_vibration_is_recorded_where_the_rate_allows() -> None:
+    fast = simulate("forging", duration_s=2.5, sampling_rate_hz=10_000.0)
+    assert fast.channel_names[-1] == "vibration"
+    a = fast.values("vibration")
+    start = int(fast.truth["contacts"]["rows"][0][0] * 10_000.0)
+    assert np.max(np.abs(a[start : start + 100])) > 20.0 * np.std(a[: start - 10])
+    # the same motion at either rate
+    slow = simulate("forging", duration_s=2.5, sampling_rate_hz=1000.0, parameters={"encoder_counts": 0})
+    same = simulate("forging", duration_s=2.5, sampling_rate_hz=10_000.0, parameters={"encoder_counts": 0})
+    assert slow.values("interaction force") == pytest.approx(same.values("interaction force")[::10], abs=1e-6)
+
+
+def test_the_same_seed_gives_the_same_recording_and_noise_does_not_touch_the_motion() -> None:
+    first, again, other = short(), short(), simulate("forging", duration_s=2.5, sampling_rate_hz=1000.0, seed=3)
+    assert np.array_equal(first.samples, again.samples)
+    assert not np.array_equal(first.values("torque"), other.values("torque"))
+    assert np.array_equal(first.values("interaction force"), other.values("interaction force"))
+
+
+def test_wear_is_in_the_truth_and_not_in_the_rig() -> None:
+    worn = short(wear_um=80.0)
+    assert worn.truth["backlash_um"] == 380.0
+    assert worn.rig.contact.half_backlash_um == 150.0
+
+
+def test_the_command(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "forge.h5"
+    code, out, _ = run(
+        capsys, "simulate", "forging", "--mode", "continuous", "--preset", "manipulator_table", "--duration", "1s",
+        "--set", "half_backlash_um=0.2mm", "-o", file,
+    )  # fmt: skip
+    assert code == 0
+    assert "1 s at 1000 Hz" in out
+    recording = read_recording(file, rig=read_rig(tmp_path / "forge.toml"))
+    assert recording.truth["parameters"]["mode"] == "continuous"
+    assert recording.rig.contact.stiffness_n_per_m_lambda == 1.72e9
+    assert recording.rig.contact.damping_law == "lankarani"
+    assert recording.values("torque")[500:].mean() > 50.0
+    code, out, _ = run(capsys, "simulate", "forging", "--list")
+    assert code == 0
+    assert "manipulator_table" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("--duration", "1.5s"), "longer than the record"),
+        (("--set", "restitution=1.2"), "restitution"),
+        (("--set", "wheel_inertia_kg_m2=-3"), "wheel_inertia_kg_m2"),
+        (("--set", "contact_ratio=2.5"), "contact_ratio"),
+        (("--set", "exponent=1.2"), "stiffness_n_per_m_lambda"),
+        (("--mode", "now and then"), "start-stop, continuous"),
+        (("--effect", "unbalance=100"), "no meaning"),
+        (("--set", "module_mm=2", "--effect", "root_crack=9mm"), "past the tooth"),
+        (("--speed", "10..50rpm"), "speed_rpm"),
+        (("--fs", "10Hz"), "sampling_rate_hz"),
+    ],
+)
+def test_nonsense_is_one_line(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, arguments: tuple[str, ...], named: str
+) -> None:
+    code, out, err = run(capsys, "simulate", "forging", *arguments, "-o", tmp_path / "a.h5")
+    assert (code, out) == (2, "")
+    assert named in err
+    assert len(err.strip().splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_models_have_no_mode(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    code, _, err = run(capsys, "simulate", "cracked", "--mode", "continuous", "-o", tmp_path / "a.h5")
+    assert code == 2
+    assert "mode" in err

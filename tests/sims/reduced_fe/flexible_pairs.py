@@ -1,0 +1,29 @@
+"""Flexible pairs for tests: of the ready-made gear or the synthetic one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sims.mesh import GearMesh, PairGeometry
+from sims.presets import preset
+from sims.reduced_fe.dynamics_constants import FlexiblePair
+from sims.reduced_fe.ready import ready_gear
+from sims.reduced_fe.simulator import NAME, prepare_preset
+from tests.sims.reduced_fe.synthetic import synthetic_gear
+
+
+def pair_of(preset_name="flexible_50_50", **parameters) -> FlexiblePair:
+    return prepare_preset(preset(NAME, preset_name), parameters, (), None, np.random.default_rng(0)).pair
+
+
+def synthetic_pair(**parameters) -> FlexiblePair:
+    gear = synthetic_gear()
+    return replace(pair_of(**parameters), gears=(gear, gear))
+
+
+def ready_mesh(**fields) -> tuple[tuple, GearMesh]:
+    gear = ready_gear("z50_m3")
+    geometry = gear.blank.geometry
+    return (gear, gear), GearMesh(PairGeometry(geometry, geometry), **fields)

@@ -1,0 +1,145 @@
+"""Loaded contact over angle and torque: equilibrium, what the source study shows, and stiffness as a derivative."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearsig.errors import InputError
+from sims.mesh import GearGeometry, GearMesh, PairGeometry, RootCrack
+from sims.mesh.stiffness_hertz import load_dependent_contact_coefficient
+from sims.reduced_fe.contact_mirror import folded, mirror_groups, mirrors
+from sims.reduced_fe.contact_table import static_table
+from sims.reduced_fe.maps_static import force_map, mesh_maps
+from tests.sims.reduced_fe.flexible_pairs import ready_mesh
+from tests.sims.reduced_fe.synthetic import synthetic_gear
+
+TORQUES = np.array([10.0, 85.0, 170.0, 340.0, 500.0])
+GEARS, MESH = ready_mesh()
+RB_M = MESH.pair.driver.base_radius_mm * 1e-3
+SINGLE = (0.80, 0.95)
+"""Mesh cycles in the middle of the single-pair region: pair 0 alone."""
+
+
+@pytest.fixture(scope="module")
+def maps():
+    return mesh_maps(GEARS, MESH, TORQUES)
+
+
+def single(maps):
+    return (maps.mesh_cycles > SINGLE[0]) & (maps.mesh_cycles < SINGLE[1])
+
+
+def test_pairs_carry_the_load_together_and_never_pull(maps):
+    total = maps.pair_forces_n.sum(axis=2)
+    assert total == pytest.approx(np.broadcast_to(TORQUES / RB_M, total.shape), rel=1e-8)
+    assert np.all(maps.force_n >= 0.0)
+    assert maps.load_sharing.sum(axis=2) == pytest.approx(1.0)
+
+
+def test_one_pair_in_the_middle_two_elsewhere_at_light_load(maps):
+    touching = (maps.pair_forces_n[:, 0] > 0.0).sum(axis=1)
+    assert set(touching[single(maps)]) == {1}
+    double = (maps.mesh_cycles > 0.1) & (maps.mesh_cycles < 0.65)
+    assert set(touching[double]) == {2}
+
+
+def test_transmission_error_peaks_in_the_single_pair_region_and_grows_with_torque(maps):
+    error = maps.transmission_error_m
+    inside = (maps.mesh_cycles >= MESH.pair.contact_ratio - 1.0) & (maps.mesh_cycles <= 1.0)
+    peaks = error.argmax(axis=0)
+    assert np.all(inside[peaks])
+    assert np.all(np.diff(error.max(axis=0)) > 0.0)
+    # Up to 340 N m the step between one pair and two grows as well; then corners begin to fill it.
+    steps = np.ptp(error, axis=0)
+    assert np.all(np.diff(steps[:4]) > 0.0)
+
+
+def test_stiffness_grows_with_load_and_the_tangent_exceeds_the_secant(maps):
+    tangent, secant = maps.tangent_stiffness_n_per_m, maps.secant_stiffness_n_per_m
+    assert np.all(np.diff(tangent.mean(axis=0)) > 0.0)
+    assert np.all(tangent > secant)
+    assert tangent[single(maps), 0].max() < 0.8 * tangent[~single(maps), 0].max()
+    assert maps.contact_tangent_n_per_m.sum(axis=2) == pytest.approx(tangent)
+
+
+def test_corner_contact_lengthens_the_path_with_load(maps):
+    alone = (maps.pair_forces_n > 0.0).sum(axis=2) == 1
+    assert np.all(np.diff(alone.mean(axis=0)) <= 0.0)
+    assert alone[:, 0].mean() == pytest.approx(2.0 - MESH.pair.contact_ratio, abs=0.1)
+    assert alone[:, -1].mean() < 0.1
+
+
+def test_tabulated_force_has_the_tangent_as_its_derivative():
+    table = static_table(GEARS, MESH)
+    depth = np.linspace(2e-6, 3e-5, 1401)
+    tabulated = force_map(table, MESH, depth, np.array([0.1, 0.4, 0.85]))
+    slope = np.gradient(tabulated.force_n, depth, axis=1)[:, 1:-1]
+    # At c = 0.85 a corner comes in at some depth: a kink, of which a difference sees the mean of both sides.
+    off = np.abs(slope / tabulated.tangent_n_per_m[:, 1:-1] - 1.0)
+    assert np.quantile(off, 0.99, axis=1).max() < 2e-4
+
+
+def test_a_tooth_whose_slices_move_as_one_is_spring_and_hertz_in_series():
+    """δ = C F + B F^0.9 where one pair carries, with C of the gears' own points."""
+    gear = synthetic_gear(GearGeometry(30, 2.0), even_slices=True)
+    mesh = GearMesh(PairGeometry(gear.blank.geometry, gear.blank.geometry))
+    table = static_table((gear, gear), mesh, support="free")
+    column = table.column((mesh.pair.contact_ratio - 1.0 + 1.0) / 2.0)
+    force = 5.0 / (mesh.pair.driver.base_radius_mm * 1e-3)
+    found = mesh_maps((gear, gear), mesh, np.array([5.0]), table.progress[column : column + 1], support="free")
+    assert np.count_nonzero(found.pair_forces_n) == 1
+    hertz = load_dependent_contact_coefficient(mesh.material_1, mesh.material_2, mesh.face_width_m)
+    expected = table.own[column].mean() * force + hertz * force**0.9
+    assert found.transmission_error_m[0, 0] == pytest.approx(expected, rel=1e-4)
+
+
+def test_a_crack_softens_its_tooth_alone():
+    cracked = replace(MESH, cracks_1=(RootCrack(2.5, 45.0, 7),))
+    cycles = np.array([7.85, 8.85, 20.85, 57.85])
+    torque = np.array([170.0])
+
+    def error(mesh):
+        return mesh_maps(GEARS, mesh, torque, cycles).transmission_error_m[:, 0]
+
+    sound, found = error(MESH), error(cracked)
+    assert found[0] > 1.02 * sound[0]
+    assert found[3] == pytest.approx(found[0])  # the same tooth a revolution later
+    assert found[1:3] == pytest.approx(sound[1:3], rel=1e-9)
+    assert error(replace(MESH, cracks_1=(RootCrack(3.5, 45.0, 7),)))[0] > found[0]
+
+
+def test_a_crack_over_part_of_the_width_moves_the_load_to_the_sound_slices():
+    half = replace(MESH, cracks_1=(RootCrack(3.0, 45.0, 0, 8.0),))
+    force = mesh_maps(GEARS, half, np.array([170.0]), np.array([0.85])).force_n[0, 0, 1]
+    sound = mesh_maps(GEARS, MESH, np.array([170.0]), np.array([0.85])).force_n[0, 0, 1]
+    assert np.all(force[:2] < sound[:2])
+    assert np.all(force[2:] > sound[2:])
+
+
+def test_misaligned_flanks_carry_at_one_end():
+    force = mesh_maps(GEARS, MESH, np.array([50.0]), np.array([0.85]), lead_um=20.0).force_n[0, 0, 1]
+    assert np.all(np.diff(force) <= 0.0)
+    assert force[0] > 4.0 * force[-1]
+
+
+def test_mirrored_slices_give_the_same_as_all():
+    table = static_table(GEARS, MESH)
+    assert mirrors(table)
+    depth = np.array([5e-6, 1.5e-5])
+    cycles = np.linspace(0.0, 0.99, 12)
+    whole = force_map(table, MESH, depth, cycles)
+    halved = force_map(folded(table), MESH, depth, cycles)
+    assert halved.force_n == pytest.approx(whole.force_n, rel=1e-6)
+    assert halved.tangent_n_per_m == pytest.approx(whole.tangent_n_per_m, rel=1e-4)
+    assert not mirrors(static_table(GEARS, MESH, lead_um=1.0))
+    assert not mirrors(static_table(GEARS, replace(MESH, cracks_1=(RootCrack(3.0, 45.0, 0, 8.0),))))
+    assert mirror_groups(4).sum(axis=0).tolist() == [2.0, 2.0]
+
+
+def test_bad_torques_and_gears_are_refused():
+    with pytest.raises(InputError, match="ascend"):
+        mesh_maps(GEARS, MESH, np.array([100.0, 50.0]))
+    other = GearMesh(PairGeometry(GearGeometry(49, 3.0), GEARS[1].blank.geometry))
+    with pytest.raises(InputError, match="driver's reduced gear"):
+        mesh_maps(GEARS, other, TORQUES)

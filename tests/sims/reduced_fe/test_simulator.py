@@ -1,0 +1,132 @@
+"""The flexible pair as a simulator: recordings, effects, parameters, refusals."""
+
+import numpy as np
+import pytest
+
+import sims
+from gearsig.errors import InputError
+from sims.effects import EffectSetting, effect, effects
+from sims.reduced_fe.simulator import WITHOUT_MEANING
+from sims.registry import ChecksConvergence, simulator
+from sims.values import complete_values
+
+MODEL = "reduced-fe"
+SHORT = {"duration_s": 0.25, "seed": 1}
+
+
+@pytest.fixture(scope="module")
+def sound():
+    return sims.simulate(MODEL, **SHORT)
+
+
+def rms(recording, name="a1"):
+    return float(np.std(recording.values(name)))
+
+
+def test_recording_has_the_channels_units_rig_and_truth_of_the_other_simulator(sound):
+    other = sims.simulate("cracked", preset="symmetric_50_50", duration_s=0.05)
+    assert sound.channel_names == other.channel_names
+    assert [c.unit for c in sound.channels] == [c.unit for c in other.channels]
+    assert sound.rig is not None
+    assert sound.rig.pairs[0].driver_teeth == 50
+    truth = sound.truth
+    assert truth["model"] == MODEL
+    assert truth["parameters"]["hub_inertia_driver_kg_m2"] == 0.0043
+    assert 2600.0 < truth["solver"]["torsional_hz"] < 2750.0
+    assert truth["gears"][0]["degrees_of_freedom"] > 200_000
+    assert truth["measurement"]["n_revolutions"]["input"] == pytest.approx(2000.0 / 60.0 * 0.25, rel=1e-3)
+
+
+def test_mesh_harmonics_stand_out_of_the_spectrum(sound):
+    values = sound.values("a1") * np.hanning(sound.n_samples)
+    lines = np.abs(np.fft.rfft(values))
+    hz = np.fft.rfftfreq(sound.n_samples, 1.0 / sound.sampling_rate_hz)
+    mesh = 2000.0 / 60.0 * 50.0
+    for harmonic in range(1, 5):
+        near = np.abs(hz - harmonic * mesh) < 12.0
+        assert lines[near].max() > 20.0 * np.median(lines)
+
+
+def test_the_same_seed_gives_the_same_recording(sound):
+    again = sims.simulate(MODEL, **SHORT)
+    np.testing.assert_array_equal(sound.samples, again.samples)
+
+
+@pytest.mark.parametrize("name", [n for n in effects() if n not in WITHOUT_MEANING])
+def test_every_effect_changes_the_recording_or_says_why_not(sound, name):
+    wanted = effect(name)
+    found = sims.simulate(MODEL, effects={name: wanted.severity.typical}, **SHORT)
+    assert found.truth["effects"][0]["name"] == name
+    change = float(np.std(found.values("a1") - sound.values("a1")))
+    if name == "backlash":  # at full load the play is never crossed
+        assert change == 0.0
+    else:
+        assert change > 1e-5 * rms(sound)
+    nothing = sims.simulate(MODEL, effects={name: 0.0}, **SHORT)
+    np.testing.assert_array_equal(nothing.samples, sound.samples)
+
+
+@pytest.mark.parametrize("name", list(WITHOUT_MEANING))
+def test_effects_without_a_meaning_are_refused_with_the_reason(name):
+    assert name not in simulator(MODEL).effects
+    with pytest.raises(InputError, match=f"{name} has no meaning .* take the model 'cracked'"):
+        sims.simulate(MODEL, effects={name: effect(name).severity.typical}, **SHORT)
+
+
+def test_a_crack_shows_once_per_revolution_and_grows():
+    def burst(depth):
+        settings = {"effects": {"root_crack": depth}} if depth else {}
+        found = sims.simulate(
+            MODEL,
+            speed_rpm=1920.0,
+            duration_s=0.6,
+            parameters={"noise_mps2": 0.0, "sensor_noise_mps2_per_sqrt_hz": 0.0},
+            sampling_rate_hz=40960.0,
+            **settings,
+        )
+        return found.values("a1")
+
+    sound, small, deep = burst(0.0), burst(2.0), burst(3.5)
+    assert np.std(deep - sound) > 1.6 * np.std(small - sound)
+    per_revolution = 1280  # 40960 Hz at 1920 rpm
+    power = (deep - sound)[: 18 * per_revolution].reshape(18, per_revolution) ** 2
+    profile = power.mean(axis=0)
+    window = np.convolve(np.tile(profile, 2), np.ones(per_revolution // 10), "valid")[:per_revolution]
+    assert window.max() > 0.6 * profile.sum()  # within a tenth of the revolution
+
+
+def test_bad_values_are_refused():
+    rough = EffectSetting("surface_roughness", 0.8, {"locked_to": "time"})
+    with pytest.raises(InputError, match="locked to time"):
+        sims.simulate(MODEL, effects=(rough,), **SHORT)
+    with pytest.raises(InputError, match="teeth yield by"):
+        sims.simulate(MODEL, torque_nm=1500.0, **SHORT)
+    with pytest.raises(InputError, match="did you mean hub_inertia_driver_kg_m2"):
+        sims.simulate(MODEL, parameters={"hub_inertia_drver_kg_m2": 0.0}, **SHORT)
+    with pytest.raises(InputError, match="web"):
+        sims.simulate(MODEL, parameters={"web_thickness_driver_mm": 30.0}, **SHORT)
+
+
+def test_parameters_have_units_ranges_and_defaults():
+    model = simulator(MODEL)
+    names = [p.name for p in model.parameters]
+    assert len(set(names)) == len(names)
+    values = complete_values(model.parameters)
+    assert values["mesh_damping_ratio"] == 0.08
+    assert "friction" not in values
+    for p in model.parameters:
+        assert p.meaning
+        assert p.choices or (p.low is not None and p.high is not None)
+    assert isinstance(model, ChecksConvergence)
+    text = model.check_convergence({}, (), None, np.random.default_rng(0)).text
+    assert "transmission_error_m: rms off by" in text
+
+
+def test_speed_courses_and_encoders_are_measured():
+    found = sims.simulate(
+        MODEL, speed_rpm=[(0.0, 1500.0), (0.4, 2500.0)], parameters={"encoder_counts": 3600}, duration_s=0.4
+    )
+    angle = np.unwrap(np.radians(found.values("encoder")))
+    rpm = np.gradient(angle, 1.0 / found.sampling_rate_hz) * 30.0 / np.pi
+    assert rpm[200:600].mean() == pytest.approx(1500.0, rel=0.05)
+    assert rpm[-600:-200].mean() == pytest.approx(2500.0, rel=0.05)
