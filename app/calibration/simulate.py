@@ -20,6 +20,7 @@ from sims.machine.operation import Operation
 from sims.measure import MeasuredChannel, ModalPath, PathMode
 
 SAMPLING_RATE_HZ = 20480.0
+MOST_LEAD_REV = 8
 
 
 def simulate_rig(
@@ -64,7 +65,7 @@ def simulate_rig(
     machine = with_effects(_with_path(ready.machine, drawn), [*settings, *further], draws)
     machine = _with_fixed_flanks(machine, [drawn.seed, 77 + flanks])
     rng = np.random.default_rng([drawn.seed, run])
-    lead_rev = float(rng.integers(0, 8))
+    lead_rev = float(rng.integers(0, MOST_LEAD_REV))
     lead_s = lead_rev * 60.0 / drawn.speed_rpm
     recording = simulate_machine(
         machine,
@@ -77,6 +78,11 @@ def simulate_rig(
         truth={"depth_mm": size, "effect": effect if size else "", **chosen},
     )
     return _cut(recording, round(lead_s * SAMPLING_RATE_HZ)) if run else recording
+
+
+def turns_before(drawn: DrawnRig, run: int) -> int:
+    """Return the whole turns of the driver that a run's recording leaves out at its beginning."""
+    return int(np.random.default_rng([drawn.seed, run]).integers(0, MOST_LEAD_REV)) if run else 0
 
 
 def _with_fixed_flanks(machine: Machine, seed: list[int]) -> Machine:

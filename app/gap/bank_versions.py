@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 _MODULES = (
-    *(f"gearsig.gap.{name}" for name in ("averages", "broadband", "change", "cyclic", "features", "frame")),
+    *(f"gearsig.gap.{name}" for name in ("averages", "broadband", "change", "channels", "cyclic", "features", "frame")),
     *(f"gearsig.gap.{name}" for name in ("gather", "gathered", "gear_lines", "hum", "speed", "tooth")),
     "gearsig.severity.reference",
     "gearsig.severity.shaft_lines",

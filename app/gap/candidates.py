@@ -13,7 +13,7 @@ from app.gap.bank_runs import Run
 from app.gap.conditions import LEAST_BLOCKS, SEED, Condition, compare, halves, observed
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.gap.change import SURPRISE
+from gearsig.gap.change import UNFORETOLD
 from gearsig.gap.features import once as feature_values
 from gearsig.gap.population import load_population
 from gearsig.gap.prediction import EffectPath, Fit, Observed, fit_effect, paths_of
@@ -84,7 +84,7 @@ def try_effects(
 
 def n_compared(conditions: Sequence[Condition]) -> int:
     """Return how many features all conditions have and a simulation can foretell; those of patterns need references."""
-    return min(sum(not name.startswith(SURPRISE) for name in c.change.names) for c in conditions)
+    return min(sum(not name.startswith(UNFORETOLD) for name in c.change.names) for c in conditions)
 
 
 def _run(twin: Twin, condition: Condition) -> Run:

@@ -11,10 +11,15 @@ from app.gap.conditions import Condition
 from gearsig.gap.posterior import GapCalibration, load_gap_calibration, score_of
 from gearsig.gap.recognise import load_recogniser
 from gearsig.gap.simulator import GapEffect, Twin
+from gearsig.gap.tooth_load import tooth_load_n_per_mm
 from gearsig.gap.types import NONE, UNKNOWN
 
 MOST_TRIED, LEAST_TRIED_PROBABILITY = 3, 0.06
 """Effects that are simulated: so many of the likeliest, none less likely than this."""
+
+
+NOT_SEEN = 0.4
+"""Probability that an effect is too weak to be seen at one of several conditions."""
 
 
 @dataclass(frozen=True)
@@ -106,13 +111,18 @@ def _known_to_forests(conditions: Sequence[Condition]) -> set[str]:
 def _forest(
     conditions: Sequence[Condition], effects: Sequence[str], known: Mapping[str, GapEffect]
 ) -> dict[str, float]:
-    """Return the forests' joint probabilities: the geometric mean over conditions, over what may be named."""
+    """Return the forests' joint probabilities over what may be named, conditions being independent.
+
+    At one of two conditions an effect may not show: p(x|e) = (1 − q) p_forest + q p_none for the machine's effects.
+    """
     allowed = {NONE, UNKNOWN, *(effects or known)} & _known_to_forests(conditions)
     joint: dict[str, float] = {}
     for condition in conditions:
         recogniser = load_recogniser(with_reference=condition.reference is not None)
-        for name, p in recogniser.probabilities(condition.change).items():
-            if name in allowed:
-                joint[name] = joint.get(name, 1.0) * p ** (1.0 / len(conditions))
+        load = tooth_load_n_per_mm(condition.now.frame.pair, condition.facts.point.torque_nm)
+        found = recogniser.probabilities(condition.change, load)
+        hidden = {name: found[NONE] if len(conditions) > 1 else p for name, p in found.items()}
+        for name in allowed:
+            joint[name] = joint.get(name, 1.0) * ((1.0 - NOT_SEEN) * found[name] + NOT_SEEN * hidden[name])
     total = sum(joint.values())
     return {name: p / total for name, p in joint.items()}

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.gap.channels import APART, apart_features
 from gearsig.gap.features import Features, once, whole_and_parts, whole_record_variance
 from gearsig.gap.frame import DRIVEN, DRIVER
 from gearsig.gap.gathered import Gathered
@@ -24,7 +25,10 @@ from gearsig.severity.reference import difference_lines
 from gearsig.severity.shaft_lines import ShaftLines
 
 SURPRISE = "surprise."
-"""Of features that are measured in the two recordings' own noise: no simulation can foretell them."""
+"""Of features that are measured in the two recordings' own noise."""
+
+UNFORETOLD = (SURPRISE, APART)
+"""Of features, the last ones, that no simulation can foretell: what they are hangs on noise and on the sensors."""
 
 LEAST_NOISE = 1e-8
 """Of all lines together over the mesh's power: two gears of equal teeth leave nothing of their own in one average."""
@@ -102,6 +106,7 @@ def _patterns(now: Gathered, sound: Gathered) -> Iterator[Feature]:
         yield from pattern_features(
             f"{SURPRISE}{SIDES[side]}", surprises(now, sound, turned, side), now.frame.teeth[side], 0.0, 0.0
         )
+    yield from apart_features(now, sound)
 
 
 def turned_difference(now: Gathered, sound: Gathered, side: int) -> tuple[ShaftLines, float]:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.gap.change import SURPRISE
 from gearsig.gap.gear_lines import N_MESH_HARMONICS, SIDES
 
 _OF_A_SHAFT = (
@@ -46,7 +45,7 @@ _OF_ALL = (
 
 
 def seen_rows(names: Sequence[str], distances: FloatArray) -> FloatArray:
-    """Return the rows that a forest is fitted to.
+    """Return part of the rows that a forest is fitted to.
 
     Simulators and machines agree on which lines an effect moves and in which direction, not on how far: beside the
     compressed sizes stand shares of the largest change, and differences of what tells one effect from another.
@@ -74,10 +73,10 @@ def seen_rows(names: Sequence[str], distances: FloatArray) -> FloatArray:
 
 
 def _pairs(place: dict[str, int]) -> list[tuple[str, str]]:
-    of_a_shaft = _OF_A_SHAFT + (_OF_A_DIFFERENCE if any(name.startswith(SURPRISE) for name in place) else ())
+    of_a_shaft = _OF_A_SHAFT + _OF_A_DIFFERENCE
     found = [(a.format(side), b.format(side)) for side in SIDES for a, b in of_a_shaft]
     found += [(name.format(SIDES[0]), name.format(SIDES[1])) for name in _BETWEEN_SHAFTS]
-    return [*found, *_OF_ALL]
+    return [pair for pair in (*found, *_OF_ALL) if pair[0] in place and pair[1] in place]
 
 
 def mirrored(names: Sequence[str]) -> np.ndarray:

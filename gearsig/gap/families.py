@@ -22,6 +22,11 @@ _PLAIN = {
     "speed": PlaceKind.SPEED,
     "raw": PlaceKind.TAIL,
 }
+_APART = {"mesh": PlaceKind.MESH, "floor": PlaceKind.BAND}
+
+UNSIZED = ("change.", "surprise.", "apart.")
+"""Features of a change, not changes of features: no size of a gap is made of them, as healthy ones have long tails."""
+
 _OF_A_SHAFT = {
     "sideband": PlaceKind.SIDEBANDS,
     "shaft": PlaceKind.SHAFT,
@@ -42,6 +47,8 @@ def family_of(name: str) -> Family:
     first, _, rest = name.partition(".")
     if name == "line.half_mesh":
         return PlaceKind.MESH, ""
+    if first == "apart":
+        return _APART[rest], ""
     if first in _PLAIN:
         return _PLAIN[first], ""
     side = rest.partition(".")[0]
@@ -51,6 +58,20 @@ def family_of(name: str) -> Family:
 def family_members(names: Sequence[str]) -> dict[Family, np.ndarray]:
     """Return for each family the positions of its features."""
     return _members(tuple(names))
+
+
+def sized_members(names: Sequence[str]) -> dict[Family, np.ndarray]:
+    """Return for each family the positions of those of its features that the size of a gap is made of."""
+    return _sized(tuple(names))
+
+
+@cache
+def _sized(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
+    kept = {
+        family: np.array([i for i in rows if not names[i].startswith(UNSIZED)], dtype=np.intp)
+        for family, rows in _members(names).items()
+    }
+    return {family: rows for family, rows in kept.items() if len(rows)}
 
 
 @cache

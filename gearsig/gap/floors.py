@@ -9,7 +9,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError
-from gearsig.gap.families import family_members
+from gearsig.gap.families import family_members, sized_members
 from gearsig.gap.features import Features
 from gearsig.gap.types import Interval
 
@@ -182,7 +182,7 @@ def _t_quantile(degrees: int) -> float:
 
 def soft_size(names: Sequence[str], normalised: FloatArray) -> float:
     """Return [Σ_f (mean_{i∈f} |u_i|⁸)^(4/8)]^(1/4)."""
-    sizes = np.array([family_size(normalised[members]) for members in family_members(names).values()])
+    sizes = np.array([family_size(normalised[members]) for members in sized_members(names).values()])
     largest = float(sizes.max(initial=0.0))
     return largest * float(np.sum((sizes / largest) ** ACROSS) ** (1 / ACROSS)) if largest > 0.0 else 0.0
 
@@ -225,7 +225,7 @@ def independent_whole(names: tuple[str, ...]) -> float:
     if names not in _known:
         draws = np.random.default_rng(0).standard_normal((_N_DRAWS, len(names))) / REPEATABLE
         total = np.zeros(_N_DRAWS)
-        for members in family_members(names).values():
+        for members in sized_members(names).values():
             total += np.mean(np.abs(draws[:, members]) ** WITHIN, axis=1) ** (ACROSS / WITHIN)
         _known[names] = float(np.quantile(total, 1.0 - _TAIL) ** (1 / ACROSS))
     return _known[names]

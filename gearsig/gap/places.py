@@ -9,11 +9,13 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.gap.change import change_features, difference_features
+from gearsig.gap.channels import APART
 from gearsig.gap.families import Family, family_members
 from gearsig.gap.features import Features
 from gearsig.gap.floors import REPEATABLE, StructuralFloor, family_size, pooled_scatter
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.gear_lines import SIDES
+from gearsig.gap.relative import beyond_the_mesh
 from gearsig.gap.spots import Comparison, Spot
 from gearsig.gap.spots_cyclic import envelope_spot, line_spot
 from gearsig.gap.spots_gear import mesh_spot, shaft_spot, sideband_spot
@@ -90,40 +92,8 @@ def _merged(places: list[GapPlace]) -> list[GapPlace]:
     return list(merged.values())
 
 
-def beyond_the_mesh(names: tuple[str, ...], distances: FloatArray) -> FloatArray:
-    """Return changes of levels as far as they hold both relative to the mesh harmonics and by themselves.
-
-    If the mesh alone falls by 6 dB, all that is counted relative to it rises by as much, and none of it has changed; if
-    a sensor's gain rises, everything does but the ratios. The smaller of both changes counts, none where signs differ.
-    """
-    mesh = dict(zip(names, distances.tolist(), strict=True)).get("mesh.total", 0.0)
-    held = distances.copy()
-    for i, name in enumerate(names):
-        relative = _is_relative(name)
-        if relative or _is_shaft_level(name):
-            another = distances[i] + (mesh if relative else -mesh)
-            smaller = np.sign(distances[i]) * min(abs(distances[i]), abs(another))
-            held[i] = smaller if distances[i] * another > 0 else 0.0
-    return held
-
-
-def _is_relative(name: str) -> bool:
-    """Whether a feature is a level relative to the mesh harmonics."""
-    family, _, rest = name.partition(".")
-    last = rest.rpartition(".")[2]
-    if family == "sideband":
-        return last != "strongest"
-    if family in ("tooth", "change"):
-        return last in ("level", "elsewhere", "peak")
-    return family == "shaft" and last in ("to_mesh", "low")
-
-
-def _is_shaft_level(name: str) -> bool:
-    return name.startswith("shaft.") and name.rpartition(".")[2].isdigit()
-
-
 def _telling(names: tuple[str, ...], rows: np.ndarray) -> np.ndarray:
-    kept = [row for row in rows if names[row] not in REPEATED]
+    kept = [row for row in rows if names[row] not in REPEATED and not names[row].startswith(APART)]
     return np.array(kept, dtype=np.intp)
 
 

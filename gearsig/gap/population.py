@@ -33,6 +33,8 @@ class Population:
         Against a sound recording of the same machine on another day, and standard errors.
     gaps, gap_scatter : arrays, (n, n_features)
         Against the twin that knows the rig file only.
+    loads_n_per_mm : array, (n,)
+        Of the teeth.
     """
 
     rigs: NDArray[np.int64]
@@ -43,6 +45,7 @@ class Population:
     change_scatter: FloatArray
     gaps: FloatArray
     gap_scatter: FloatArray
+    loads_n_per_mm: FloatArray
 
     @cached_property
     def reference_floor(self) -> StructuralFloor:
@@ -59,11 +62,6 @@ class Population:
     def floor(self, *, with_reference: bool) -> StructuralFloor:
         """Return the floor of one way of comparing."""
         return self.reference_floor if with_reference else self.simulation_floor
-
-    def feature_floor(self, *, with_reference: bool) -> StructuralFloor:
-        """Return the floor of the features alone, without the patterns of a difference."""
-        table = self.changes if with_reference else self.gaps
-        return StructuralFloor.of_healthy(self.feature_names, table[self.causes == NONE][:, : len(self.feature_names)])
 
 
 @cache
@@ -86,7 +84,7 @@ def load_population(path: Path = FILE) -> Population:
         ) from None
     tables = {
         name: np.asarray(arrays[name], dtype=np.float64)
-        for name in ("changes", "change_scatter", "gaps", "gap_scatter")
+        for name in ("changes", "change_scatter", "gaps", "gap_scatter", "loads_n_per_mm")
     }
     return Population(
         arrays["rigs"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -11,21 +12,27 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
+from gearsig.gap.change import SURPRISE
 from gearsig.gap.contrasts import mirrored, seen_rows
 from gearsig.gap.features import Features
 from gearsig.gap.floors import REPEATABLE, StructuralFloor, soft_size
 from gearsig.gap.population import Population, load_population
+from gearsig.gap.relative import beyond_the_mesh, counted_from_the_mesh
 from gearsig.gap.types import NONE, UNKNOWN
 
 N_TREES = 200
-FEATURE_SHARE, FEWEST_IN_A_LEAF = 0.15, 3
-"""Of the columns that each split may choose from, and the least rows that a split leaves on either side."""
+ROW_SHARE, FEATURE_SHARE, FEWEST_IN_A_LEAF = 0.4, 0.1, 3
+"""Of the rows that each tree is fitted to, of the columns that each split may choose from, and the least rows that a
+split leaves on either side."""
 
-LEAST_SIZE = 0.3
+LEAST_SIZE = 0.6
 """Structural floors, below which a drawn effect changed nothing that could be learned."""
 
 LEAST_PROBABILITY = 2e-3
 """That a forest gives any cause: no tree having voted for it is no proof."""
+
+LEAST_LOAD_N_PER_MM = 0.01
+"""Of the teeth: less is none."""
 
 _SEED = 0
 
@@ -40,39 +47,62 @@ class Recogniser:
         Of the probabilities.
     floor : StructuralFloor
     forest : sklearn.ensemble.ExtraTreesClassifier
+    usual_load_n_per_mm : float
+        Of the teeth, where a rig does not say.
     """
 
     causes: tuple[str, ...]
     floor: StructuralFloor
     forest: Any
+    usual_load_n_per_mm: float
 
-    def probabilities(self, change: Features) -> dict[str, float]:
+    def probabilities(self, change: Features, tooth_load_n_per_mm: float = nan) -> dict[str, float]:
         """Return cause → probability, uncalibrated.
 
         Parameters
         ----------
         change : Features
             Against the reference or against the twin, as the forest was fitted.
+        tooth_load_n_per_mm : float
+            See `gearsig.gap.tooth_load`; nan where it is not known.
         """
-        found = np.maximum(self.forest.predict_proba(self._row(change))[0], LEAST_PROBABILITY)
-        return dict(zip(self.causes, (found / found.sum()).tolist(), strict=True))
-
-    def _row(self, change: Features) -> FloatArray:
         if change.names != self.floor.names:
             raise InputError(
                 "the population belongs to other features than this version computes",
                 remedy="make it again: python -m app.calibration.gap.population",
             )
-        return input_rows(self.floor, change.values[None], change.scatter[None])
+        load = tooth_load_n_per_mm if tooth_load_n_per_mm > 0.0 else self.usual_load_n_per_mm
+        row = input_rows(self.floor, change.values[None], change.scatter[None], np.array([load]))
+        found = np.maximum(self.forest.predict_proba(row)[0], LEAST_PROBABILITY)
+        return dict(zip(self.causes, (found / found.sum()).tolist(), strict=True))
 
 
-def input_rows(floor: StructuralFloor, changes: FloatArray, scatter: FloatArray) -> FloatArray:
+def input_rows(
+    floor: StructuralFloor, changes: FloatArray, scatter: FloatArray, loads_n_per_mm: FloatArray
+) -> FloatArray:
     """Return what the forest sees: changes over both floors, and what sets them apart from each other.
 
-    Not the features themselves: a tachometer that jitters more than any in the population is no hunting speed.
+    Not the features themselves: a tachometer that jitters more than any in the population is no hunting speed. Levels
+    come twice, as they changed and as far as that holds both relative to the mesh and by itself. Where two averages
+    can be subtracted, what a tooth did is in the difference: the change of either average's own figures is left out.
+    Against a simulation the speed is: every drive and tachometer wanders, and a simulation knows neither.
     """
-    both = np.hypot(floor.of(floor.names) / REPEATABLE, scatter)
-    return seen_rows(floor.names, floor.from_centre(floor.names, changes) / both)
+    patterns = any(name.startswith(SURPRISE) for name in floor.names)
+    left_out = "tooth." if patterns else "speed."
+    kept = [i for i, name in enumerate(floor.names) if not name.startswith(left_out)]
+    names = [floor.names[i] for i in kept]
+    distances = floor.from_centre(floor.names, changes)[:, kept]
+    both = np.hypot(floor.of(names) / REPEATABLE, scatter[:, kept])
+    held = seen_rows(names, beyond_the_mesh(names, distances) / both)
+    further = np.ones(held.shape[1], dtype=bool)
+    further[: 2 * len(names)] = np.tile(counted_from_the_mesh(names) != 0.0, 2)  # the others are as they were
+    return np.column_stack(
+        [
+            seen_rows(names, distances / both),
+            held[:, further],
+            np.log10(np.maximum(loads_n_per_mm, LEAST_LOAD_N_PER_MM)),
+        ]
+    )
 
 
 def fit_recogniser(population: Population, *, with_reference: bool) -> Recogniser:
@@ -88,6 +118,8 @@ def fit_recogniser(population: Population, *, with_reference: bool) -> Recognise
     )
     forest = ExtraTreesClassifier(
         N_TREES,
+        bootstrap=True,
+        max_samples=ROW_SHARE,
         max_features=FEATURE_SHARE,
         min_samples_leaf=FEWEST_IN_A_LEAF,
         class_weight="balanced",
@@ -96,9 +128,10 @@ def fit_recogniser(population: Population, *, with_reference: bool) -> Recognise
     )
     seen = _visible(floor, tables[0], population.causes)
     exchanged = mirrored(floor.names)
-    both = [np.concatenate([table[seen], table[seen][:, exchanged]]) for table in tables]
-    forest.fit(input_rows(floor, *both), np.tile(population.causes[seen], 2))
-    return Recogniser(tuple(map(str, forest.classes_)), floor, forest)
+    changes, scatter = (np.concatenate([table[seen], table[seen][:, exchanged]]) for table in tables)
+    loads = np.tile(population.loads_n_per_mm[seen], 2)
+    forest.fit(input_rows(floor, changes, scatter, loads).astype(np.float32), np.tile(population.causes[seen], 2))
+    return Recogniser(tuple(map(str, forest.classes_)), floor, forest, float(np.median(population.loads_n_per_mm)))
 
 
 def _visible(floor: StructuralFloor, changes: FloatArray, causes: NDArray[np.str_]) -> NDArray[np.bool_]:

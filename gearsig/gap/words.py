@@ -59,6 +59,8 @@ _CYCLIC = {
 _OTHER = {
     "mesh.total": "mesh harmonics together",
     "mesh.half": "half mesh orders",
+    "apart.mesh": "mesh harmonics, difference between sensors",
+    "apart.floor": "floor, difference between sensors",
     "floor.total": "floor, all bands",
     "floor.to_signal": "floor over the whole signal",
     "raw.level": "level of the whole signal",

@@ -14,7 +14,8 @@ from gearsig.gap.frame import DRIVEN, DRIVER
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.gear_lines import is_synchronous
-from gearsig.gap.places import beyond_the_mesh, gap_places
+from gearsig.gap.places import gap_places
+from gearsig.gap.relative import beyond_the_mesh
 from gearsig.gap.types import GapPlace, PlaceKind
 from tests.gap.synthetic import RIG, SPEED_HZ, TEETH, record, ringing
 

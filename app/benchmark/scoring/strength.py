@@ -26,9 +26,7 @@ def known_floors(truths: Sequence[Truth]) -> Floors:
 
     try:
         population = load_population()
-        return {
-            with_reference: population.feature_floor(with_reference=with_reference) for with_reference in (False, True)
-        }
+        return {with_reference: population.floor(with_reference=with_reference) for with_reference in (False, True)}
     except InputError:
         return batch_floors(truths)
 

@@ -16,16 +16,18 @@ import numpy as np
 import typer
 
 from app.calibration.gap.machines import Day, another_day, draw_machine, first_day
+from app.calibration.gap.ordinary import Ordinary, mounted_anew
 from app.calibration.gap.outside import with_foreign_vibration
 from app.calibration.gap.signatures import HAND_MADE, with_signature
 from app.calibration.rigs import DrawnRig
-from app.calibration.simulate import SAMPLING_RATE_HZ, simulate_rig
+from app.calibration.simulate import SAMPLING_RATE_HZ, simulate_rig, turns_before
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap.change import change_features, difference_features
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.simulator import Point
+from gearsig.gap.tooth_load import tooth_load_n_per_mm
 from gearsig.gap.types import NONE, UNKNOWN
 from gearsig.recording.types import Recording
 from sims.cracked.twin import STEP_ANGLE_RAD, CrackedTwin
@@ -33,8 +35,16 @@ from sims.cracked.usual import nominal_of
 from sims.effects import EffectSetting, effects
 
 SEED = 4107
-N_SOUND, N_FOREIGN, N_BY_HAND = 3, 10, 3
-MEASUREMENT_CHAIN = "measurement chain"
+N_SOUND, N_MOUNTED_ANEW, N_FOREIGN, N_BY_HAND = 3, 8, 14, 6
+
+ONE_SENSOR_SHARE = 0.4
+"""Machines of which one sensor's signal is known."""
+
+LIGHT_LOAD_N_PER_MM = 50.0
+"""Of the teeth, up to which they may part and the backlash shows."""
+
+AT_THE_END = ("clipping",)
+"""Effects of what records: made by hand only, since the machine's own path comes before."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +58,8 @@ class Sample:
         Effect, "none" or "unknown"; options or the foreign vibration's name.
     severity : float
     torque_nm : float
+    load_n_per_mm : float
+        Of the teeth.
     change, change_scatter : arrays, (n_changes,)
         Against the sound reference.
     gap, gap_scatter : arrays, (n_features,)
@@ -59,6 +71,7 @@ class Sample:
     detail: str
     severity: float
     torque_nm: float
+    load_n_per_mm: float
     change: FloatArray
     change_scatter: FloatArray
     gap: FloatArray
@@ -89,7 +102,8 @@ def main() -> None:
 def write(path: Path, samples: list[Sample], names: tuple[tuple[str, ...], tuple[str, ...]]) -> None:
     """Write the table as arrays of numbers and text."""
     rows = {
-        key: np.array([getattr(s, key) for s in samples]) for key in ("rig", "label", "detail", "severity", "torque_nm")
+        key: np.array([getattr(s, key) for s in samples])
+        for key in ("rig", "label", "detail", "severity", "torque_nm", "load_n_per_mm")
     }
     tables = {
         key: np.array([getattr(s, key) for s in samples], dtype=np.float32)
@@ -112,18 +126,20 @@ def one_rig(index: int) -> tuple[list[Sample], tuple[tuple[str, ...], tuple[str,
     rng = np.random.default_rng([SEED, index])
     drawn = draw_machine(rng)
     try:
-        reference = _record(first_day(drawn, rng), 0)
+        new = _record(first_day(drawn, rng), 0)
     except (InputError, RefusalError):
         return [], None
+    ordinary = Ordinary.of(new, index)
+    reference = ordinary.on(new, 0, rng)
     if reference.rig is None:
         raise InputError("a simulated recording has no rig")
     try:
         twin = CrackedTwin(reference.rig, nominal_of(reference.rig))
-        sound, simulated = gather(reference, reference.rig), gather(_run(twin, drawn, index), reference.rig)
+        sound, simulated = reduced(reference, index), reduced(_run(twin, drawn, index), index)
     except RefusalError:
         return [], None
     samples = []
-    for label, detail, severity, recording, torque_nm in _recordings(drawn, twin, rng):
+    for label, detail, severity, recording, torque_nm in _recordings(drawn, twin, ordinary, rng):
         try:
             samples.append(_sample(index, label, detail, severity, torque_nm, recording, (sound, simulated)))
         except (InputError, RefusalError) as error:
@@ -141,9 +157,7 @@ def _sample(
     recording: Recording,
     others: tuple[Gathered, Gathered],
 ) -> Sample:
-    if recording.rig is None:
-        raise InputError("a simulated recording has no rig")
-    now = gather(recording, recording.rig)
+    now = reduced(recording, rig)
     change, gap = change_features(now, others[0]), difference_features(now, others[1])
     return Sample(
         rig,
@@ -151,11 +165,24 @@ def _sample(
         detail,
         severity,
         torque_nm,
+        tooth_load_n_per_mm(now.frame.pair, torque_nm),
         change.values,
         change.scatter,
         gap.values,
         gap.scatter,
     )
+
+
+def reduced(recording: Recording, rig: int) -> Gathered:
+    """Return a recording's sums, with the channels that are known of its machine."""
+    if recording.rig is None:
+        raise InputError("a simulated recording has no rig")
+    found = gather(recording, recording.rig)
+    draw = np.random.default_rng([SEED, rig, 1])
+    if draw.uniform() >= ONE_SENSOR_SHARE:
+        return found
+    name = str(draw.choice(sorted(found.channels)))
+    return found.with_channels({name: found.channels[name]})
 
 
 def _run(twin: CrackedTwin, drawn: DrawnRig, index: int) -> Recording:
@@ -164,31 +191,42 @@ def _run(twin: CrackedTwin, drawn: DrawnRig, index: int) -> Recording:
 
 
 def _recordings(
-    drawn: DrawnRig, twin: CrackedTwin, rng: np.random.Generator
+    drawn: DrawnRig, twin: CrackedTwin, ordinary: Ordinary, rng: np.random.Generator
 ) -> Iterator[tuple[str, str, float, Recording, float]]:
     """Yield label, detail, severity, recording and torque of everything that is recorded of one gearbox."""
     sound: list[Recording] = []
     for run in range(1, N_SOUND + 1):
         day = another_day(drawn, rng)
-        sound.append(_record(day, run))
+        sound.append(ordinary.on(_record(day, run), turns_before(drawn, run), rng))
         yield NONE, "", 0.0, sound[-1], drawn.torque_nm * day.torque_factor
+    for i in range(N_MOUNTED_ANEW):
+        yield NONE, "mounted anew", 0.0, mounted_anew(sound[i % N_SOUND], rng), drawn.torque_nm
     for i in range(N_FOREIGN):
         recording, name = with_foreign_vibration(sound[i % N_SOUND], rng)
         yield UNKNOWN, name, 0.0, recording, drawn.torque_nm
-    for i, name in enumerate(HAND_MADE * N_BY_HAND):
+    for i, name in enumerate(made_by_hand(sound[0], drawn.torque_nm)):
         recording, strength = with_signature(sound[i % N_SOUND], name, rng)
         yield name, "by hand", strength, recording, drawn.torque_nm
-    for run, name in enumerate(effects(), start=N_SOUND + 1):
+    for run, name in enumerate((e for e in effects() if e not in AT_THE_END), start=N_SOUND + 1):
         day = another_day(drawn, rng)
         try:
             added = twin.draw(name, rng)
             setting = EffectSetting(name, added.severity, dict(added.options))
-            recording = _record(day, run, setting)
+            recording = ordinary.on(_record(day, run, setting), turns_before(drawn, run), rng)
         except (InputError, RefusalError) as error:
             typer.echo(f"{name}: {error}")
             continue
         detail = ", ".join(f"{k}={v}" for k, v in setting.options.items())
         yield name, detail, setting.severity, recording, drawn.torque_nm * day.torque_factor
+
+
+def made_by_hand(sound: Recording, torque_nm: float) -> tuple[str, ...]:
+    """Return whose signatures are put into a machine's sound recordings: no backlash where teeth never part."""
+    if sound.rig is None:
+        raise InputError("a simulated recording has no rig")
+    light = tooth_load_n_per_mm(sound.rig.pairs[0], torque_nm) < LIGHT_LOAD_N_PER_MM
+    names = tuple(name for name in HAND_MADE if light or name != "backlash")
+    return names * N_BY_HAND
 
 
 def _record(day: Day, run: int, setting: EffectSetting | None = None) -> Recording:

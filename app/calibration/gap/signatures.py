@@ -50,12 +50,15 @@ class Signature:
         In standard deviations of the channel.
     mesh_gains : tuple of float
         By which the mesh harmonics are multiplied.
+    paths_scatter : float
+        Standard deviation of the logarithm of what each channel's own mesh gains differ by.
     """
 
     gain: FloatArray | None = None
     advance_rev: FloatArray | None = None
     added: tuple[FloatArray, ...] = ()
     mesh_gains: tuple[float, ...] = ()
+    paths_scatter: float = 0.0
 
 
 def with_signature(recording: Recording, name: str, rng: np.random.Generator) -> tuple[Recording, float]:
@@ -65,17 +68,18 @@ def with_signature(recording: Recording, name: str, rng: np.random.Generator) ->
     samples = recording.samples.copy()
     if name == "clipping":
         most = 10.0 ** (-3.5 + 2.5 * strength)  # share of the samples that are cut
-        for i in _vibrations(recording):
+        for i in vibrations(recording):
             low, high = np.quantile(samples[i], (most / 2.0, 1.0 - most / 2.0))
             samples[i] = np.clip(samples[i], low, high) if rng.uniform() < 0.5 else _cut_at(samples[i], most)
         return replace(recording, samples=samples), strength
     signature = SIGNATURES[name](scene, 10.0 ** (-1.6 + 1.6 * strength), rng)
-    for i in _vibrations(recording):
-        samples[i] = _changed(samples[i], signature, scene, rng)
+    for i in vibrations(recording):
+        samples[i] = changed(samples[i], signature, scene, rng, float(samples[i].std()))
     return replace(recording, samples=samples), strength
 
 
-def _vibrations(recording: Recording) -> list[int]:
+def vibrations(recording: Recording) -> list[int]:
+    """Return the rows of a recording that hold vibration."""
     return [i for i, channel in enumerate(recording.channels) if channel.is_vibration]
 
 
@@ -85,15 +89,19 @@ def _cut_at(values: FloatArray, share: float) -> FloatArray:
     return cut
 
 
-def _changed(values: FloatArray, signature: Signature, scene: Scene, rng: np.random.Generator) -> FloatArray:
-    found, size = values, float(values.std())
+def changed(
+    values: FloatArray, signature: Signature, scene: Scene, rng: np.random.Generator, size: float
+) -> FloatArray:
+    """Return one channel with an effect's signature; what is added is in units of `size`."""
+    found = values
     if signature.advance_rev is not None:
         speed = np.gradient(scene.revolutions, scene.time_s)
         found = _at(found, signature.advance_rev / speed * scene.sampling_rate_hz)
     if signature.gain is not None:
         found = found * (1.0 + (signature.gain - 1.0) * rng.uniform(0.5, 1.0))
     if signature.mesh_gains:
-        found = found + _mesh_change(values, signature.mesh_gains, scene)
+        own = np.exp(signature.paths_scatter * rng.standard_normal(len(signature.mesh_gains)))
+        found = found + _mesh_change(values, np.array(signature.mesh_gains) * own, scene)
     for added in signature.added:
         found = found + added * size * rng.uniform(0.3, 1.0)
     return found
@@ -106,7 +114,7 @@ def _at(values: FloatArray, advance_samples: FloatArray) -> FloatArray:
     return moved
 
 
-def _mesh_change(values: FloatArray, gains: tuple[float, ...], scene: Scene) -> FloatArray:
+def _mesh_change(values: FloatArray, gains: FloatArray, scene: Scene) -> FloatArray:
     """Return what must be added for the mesh harmonics to be `gains` times as large."""
     change = np.zeros_like(values)
     for k, gain in enumerate(gains, start=1):
@@ -251,6 +259,7 @@ def _sliding_friction(scene: Scene, size: float, rng: np.random.Generator) -> Si
     """A force along the flanks that turns round at the pitch point: twice per mesh, and some noise."""
     gains = np.ones(N_MESH_HARMONICS)
     gains += 1.5 * size * rng.standard_normal(N_MESH_HARMONICS) * (0.4, 1.0, 0.6, 1.0, 0.6, 1.0)
+    gains *= 1.0 + 3.0 * size * float(rng.choice((0.0, 1.0))) * rng.uniform()  # at light load it outweighs the mesh
     noise = 0.8 * size * rng.uniform(0.2, 1.0) * _at_the_mesh(scene, band_noise(scene, rng), rng)
     return Signature(added=(noise,), mesh_gains=tuple(np.maximum(gains, 0.1).tolist()))
 
@@ -298,7 +307,8 @@ def _misalignment(scene: Scene, size: float, rng: np.random.Generator) -> Signat
 def _torque_ripple(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
     """The drive pulls n times per turn: that line, and sidebands of the mesh so far apart."""
     shaft = scene.shaft_orders[_side(rng)]
-    order = shaft * (float(rng.integers(2, 15)) if rng.uniform() < 0.75 else float(rng.uniform(1.5, 15.0)))
+    pulls = log_uniform(rng, 1.5, 15.0)  # motors and engines pull twice to six times rather than fifteen times
+    order = shaft * (float(round(pulls)) if rng.uniform() < 0.75 else pulls)
     gain, late, line = _balance(rng, 3)
     return Signature(
         _swing(scene, order, 0.8 * gain * size, rng),
@@ -350,15 +360,15 @@ def _inner_race(scene: Scene, size: float, rng: np.random.Generator) -> Signatur
 
 
 def _bearing_clearance(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
-    """A shaft that is held less: other resonances for the mesh, lines of its turn, of the elements passing."""
+    """A shaft that is held less: other paths from the mesh to each sensor, lines of its turn, of elements passing."""
     bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
     mesh, passing, turn = _balance(rng, 3)
-    gains = np.exp(2.0 * mesh * size * rng.standard_normal(N_MESH_HARMONICS))
+    gains = np.exp(1.4 * mesh * size * rng.standard_normal(N_MESH_HARMONICS))
     lines = [
         0.4 * passing * size / k * tone(k * bearing["BPFO"] * float(rng.uniform(0.99, 1.0)), scene, rng) for k in (1, 2)
     ]
     lines += [0.4 * turn * size / k * tone(k * bearing["shaft"], scene, rng) for k in (1, 2, 3)]
-    return Signature(added=tuple(lines), mesh_gains=tuple(gains.tolist()))
+    return Signature(added=tuple(lines), mesh_gains=tuple(gains.tolist()), paths_scatter=1.4 * mesh * size)
 
 
 SIGNATURES: dict[str, Callable[[Scene, float, np.random.Generator], Signature]] = {
