@@ -102,19 +102,21 @@ def flexible_study(
     at_angle = eigenfrequencies_hz(pair, Operation.steady(last_rpm, torque_nm), cycles)
     axis = spectra[SPECTRUM_RPM[0]][0]
     lines = {speed: values for speed, (_, values) in spectra.items()}
-    run_up = _run_up(pair, torque_nm, (first_rpm, last_rpm), step_s)
+    run_up = _run_up(pair, torque_nm, (first_rpm, last_rpm), min(RUN_UP_S, 2.0 * sweep_s + 0.5), step_s)
     return Study(torque_nm, maps, sweeps, axis, lines, natural, cycles, at_angle, run_up)
 
 
-def _run_up(pair: FlexiblePair, torque_nm: float, speeds_rpm: tuple[float, float], step_s: float) -> OrderMap:
+def _run_up(
+    pair: FlexiblePair, torque_nm: float, speeds_rpm: tuple[float, float], duration_s: float, step_s: float
+) -> OrderMap:
     """Measure a run-up and return its first channel's levels over order and time."""
-    operation = Operation(Course.of([0.0, RUN_UP_S], speeds_rpm), Course.constant(torque_nm))
+    operation = Operation(Course.of([0.0, duration_s], speeds_rpm), Course.constant(torque_nm))
     recording, _ = simulate_pair(
         pair,
         operation,
         rng=np.random.default_rng(0),
         sampling_rate_hz=RUN_UP_RATE_HZ,
-        duration_s=RUN_UP_S,
+        duration_s=duration_s,
         rig=build_rig(pair.machine, operation, name="run-up"),
         step_s=step_s,
     )
