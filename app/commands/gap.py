@@ -101,7 +101,8 @@ def _diagnosed(asked: Asked, model: str, cache: Path | None, *, fresh: bool) -> 
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-    from app.gap.run import cache_folder, run_gap
+    from app.gap.run import run_gap
+    from sims.cache import cache_folder
 
     stage = TextColumn("{task.description}", markup=False)  # names of files are no markup
     columns = (stage, BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
@@ -111,7 +112,7 @@ def _diagnosed(asked: Asked, model: str, cache: Path | None, *, fresh: bool) -> 
         return run_gap(
             asked,
             model,
-            cache=cache or cache_folder(),
+            cache=cache or cache_folder("gap"),
             fresh=fresh,
             on_stage=lambda what, done: progress.update(task, description=what, completed=done),
         )

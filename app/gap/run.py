@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -56,14 +54,3 @@ def run_gap(
         fresh=fresh,
         on_stage=lambda stage, done: on_stage(stage, READING + (1 - READING) * done),
     )
-
-
-def cache_folder() -> Path:
-    """Return the folder of this user for what can be computed again; the variable GEARSIG_CACHE names another."""
-    if os.environ.get("GEARSIG_CACHE"):
-        return Path(os.environ["GEARSIG_CACHE"]) / "gap"
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return base / "gearsig" / "gap"

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from pathlib import Path
 
 from gearsig.errors import InputError
+from sims.cache import cache_folder
 from sims.reduced_fe.blank import GearBlank
 from sims.reduced_fe.gear_file import read_gear, write_gear
 from sims.reduced_fe.gear_key import gear_key
@@ -24,14 +23,14 @@ def cached_gear(blank: GearBlank, plan: ReductionPlan, folder: str | Path | None
     blank : GearBlank
     plan : ReductionPlan
     folder : path or None
-        None: `cache_folder()`.
+        None: `sims.cache.cache_folder("gears")`.
 
     Raises
     ------
     InputError
         If the gear cannot be reduced, or the folder not written.
     """
-    where = cache_folder() if folder is None else Path(folder)
+    where = cache_folder("gears") if folder is None else Path(folder)
     key = gear_key(blank, plan)
     path = where / f"{key}.npz"
     if path.is_file():
@@ -50,14 +49,3 @@ def cached_gear(blank: GearBlank, plan: ReductionPlan, folder: str | Path | None
         ) from None
     write_gear(path, gear)
     return gear
-
-
-def cache_folder() -> Path:
-    """Return the folder of this user for reduced gears; the variable GEARSIG_CACHE names another."""
-    if os.environ.get("GEARSIG_CACHE"):
-        return Path(os.environ["GEARSIG_CACHE"]) / "gears"
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return base / "gearsig" / "gears"

@@ -13,12 +13,12 @@ import pytest
 from app.cli import main
 from app.gap.inputs import Asked, read_inputs
 from app.gap.results import check_folder, write_results
-from app.gap.run import cache_folder
 from app.samples import sample_folder
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap.types import GapReport
 from gearsig.rig.toml import read_rig, write_rig
 from gearsig.rig.types import Bearing, OperatingPoint
+from sims.cache import cache_folder
 from tests.gap.example_report import TWIN, cannot_separate_report, effect_report, no_gap_report
 
 SAMPLES = sample_folder()
@@ -256,12 +256,12 @@ def test_bad_input_is_one_line(capsys, tmp_path, arguments, said) -> None:
 def test_the_cache_is_the_users_own_or_a_given_one_and_can_be_made_anew(capsys, stub, tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     run(capsys, CRACKED, "-o", tmp_path / "gap")
-    assert stub.given["cache"] == cache_folder() == tmp_path / "cache" / "gearsig" / "gap"
+    assert stub.given["cache"] == cache_folder("gap") == tmp_path / "cache" / "gearsig" / "gap"
     assert not stub.given["fresh"]
     run(capsys, CRACKED, "-o", tmp_path / "gap", "--cache", tmp_path / "mine")
     assert stub.given["cache"] == tmp_path / "mine"
     run(capsys, CRACKED, "-o", tmp_path / "gap", "--fresh")
-    assert (stub.given["cache"], stub.given["fresh"]) == (cache_folder(), True)
+    assert (stub.given["cache"], stub.given["fresh"]) == (cache_folder("gap"), True)
 
 
 def test_an_effect_of_ones_own_is_listed_as_such(capsys, tmp_path, monkeypatch) -> None:

@@ -12,9 +12,9 @@ from app.dashboard.gap.choice import Choice, files_of
 from app.dashboard.widgets.picture import picture_bytes
 from app.gap.job import Job, private_folder
 from app.gap.results import JSON, PAGE, TWIN
-from app.gap.run import cache_folder
 from gearsig.gap.types import GapReport
 from gearsig.report.gap_pictures import GapFigure, gap_figures
+from sims.cache import cache_folder
 
 _JOB, _FINISHED, _STOPPED = "gap job", "gap result", "gap stopped"
 EVERY_S = 0.5
@@ -91,7 +91,7 @@ def _start(choice: Choice) -> None:
     folder = private_folder()
     try:
         asked = files_of(choice, folder)
-        job = Job(folder, asked, choice.model, cache=cache_folder(), command=choice.command)
+        job = Job(folder, asked, choice.model, cache=cache_folder("gap"), command=choice.command)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
