@@ -29,9 +29,10 @@ class TorqueTwist:
         Width of the loop at a light load, between both signs of the torque: the play as the driver's shaft feels it;
         nan where the torque has one sign.
     loss_per_cycle_j : float
-        ∮ τ dδ per stretch of motion: what contact and friction of the teeth take.
+        ∮ τ dδ per stretch of motion: what contact and friction of the teeth take; nan where the motion neither stops
+        nor reverses, as no loop closes then.
     work_per_cycle_j : float
-        ∫ τ dθ1 per stretch of motion: what goes through the shaft.
+        ∫ τ dθ1 per stretch of motion: what goes through the shaft; nan likewise.
     n_cycles : int
     """
 
@@ -56,15 +57,14 @@ def torque_twist(motion: PairMotion, course: Course, datum_m: float) -> TorqueTw
     r1 = motion.path.base_radii_m[0]
     twist = (motion.compression_m - datum_m) / r1
     torque = motion.torque_nm
-    n_cycles = max(1, sum(s.direction != 0 for s in course.stretches))
-    step = 1.0 / motion.sampling_rate_hz
-    width = _width(twist, torque)
+    n_cycles = len(course.moving) if course.stops_s or course.n_reversals else 0
+    share = 1.0 / (n_cycles * motion.sampling_rate_hz) if n_cycles else float("nan")
     return TorqueTwist(
         twist,
         torque,
-        width,
-        float(np.trapezoid(torque * motion.compression_rate_mps / r1, dx=step)) / n_cycles,
-        float(np.trapezoid(torque * motion.driver_speed_rad_s, dx=step)) / n_cycles,
+        _width(twist, torque),
+        float(np.trapezoid(torque * motion.compression_rate_mps / r1, dx=share)),
+        float(np.trapezoid(torque * motion.driver_speed_rad_s, dx=share)),
         n_cycles,
     )
 

@@ -110,10 +110,12 @@ def settling_time(bandwidth: FloatArray, skirt_poles: int) -> FloatArray:
     """Return the time after which the filter's response has decayed to 1 %, in the inverse unit of the bandwidth.
 
     The slowest pole of 1/(1 + (√2 - 1)(2f/B)^2p) decays as exp(-t/τ), τ = (√2 - 1)^(1/2p)/(πB sin(π/2p)); this is
-    τ ln 100: 0.94/B, 1.66/B and 2.53/B for one, two and three poles. The first generation's skirts have one.
+    τ ln 100: 0.94/B, 1.66/B and 2.53/B for one, two and three poles. The first generation's skirts have one. Where the
+    bandwidth is 0, as that of an order of a shaft at rest, it is infinite.
     """
     slowness = HALF_POWER ** (1.0 / skirt_poles) / (np.pi * np.sin(0.5 * np.pi / skirt_poles))
-    time: FloatArray = np.log(100.0) * slowness / bandwidth
+    with np.errstate(divide="ignore"):
+        time: FloatArray = np.log(100.0) * slowness / bandwidth
     return time
 
 

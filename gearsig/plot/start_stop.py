@@ -97,7 +97,8 @@ def _draw_loop(axes: Axes, examined: StartStop) -> None:
         return
     points = _few(np.stack([loop.twist_rad, loop.torque_nm], axis=1))
     axes.plot(points[:, 0] * 1e3, points[:, 1], color=style.MEASURED, linewidth=0.5, alpha=0.7)
-    style.note(axes, f"{loop.loss_per_cycle_j:.3g} J lost of {loop.work_per_cycle_j:.4g} J per cycle")
+    if loop.n_cycles:
+        style.note(axes, f"{loop.loss_per_cycle_j:.3g} J lost of {loop.work_per_cycle_j:.4g} J per cycle")
 
 
 def _few(points: FloatArray) -> FloatArray:

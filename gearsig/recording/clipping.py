@@ -34,7 +34,7 @@ class Clipping:
     place: str
 
 
-def find_clipping(x: FloatArray, levels: Levels) -> Clipping | None:
+def find_clipping(x: FloatArray, levels: Levels, *, rest: float | None = None) -> Clipping | None:
     r"""Return where a channel is clipped, or None.
 
     A smooth peak is a parabola: what stays within a width w of the top for ±h samples has fallen by about 4 w after
@@ -56,10 +56,15 @@ def find_clipping(x: FloatArray, levels: Levels) -> Clipping | None:
     x : array, (n_samples,)
     levels : Levels
         Those of `x`.
+    rest : float or None
+        Level at which the quantity itself stays for a time, e.g. 0 of a force between parts that come apart: an end of
+        the range there is no limit of the measurement.
     """
     low, high = float(x.min()), float(x.max())
     ends = {}
     for sign, extreme in ((1.0, high), (-1.0, low)):
+        if extreme == rest:
+            continue
         distance = sign * (extreme - x)  # 0 at the extreme, positive elsewhere
         n = max(_n_held(distance, levels), _n_piled(distance, high - low, levels.step))
         if n and n < MAX_REST_SHARE * len(x):

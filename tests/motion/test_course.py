@@ -130,6 +130,8 @@ def test_everything_at_once_and_what_is_refused() -> None:
     steady = examine_start_stop(measure_motion(continuous()))
     assert steady.backlash is None
     assert any("back flank" in text for text in steady.refusals)
+    # no loop closes, so that there is no work per cycle
+    assert np.isnan({i.name: i.value for i in steady.indicators}["loop loss per cycle"])
     alone = examine_start_stop(measure_motion(without(continuous(), "torque")))
     assert alone.portrait is None
     assert alone.loop is None

@@ -47,6 +47,14 @@ def test_coarse_noise_is_not_clipped(bits, relative_rms):
     ]
 
 
+@pytest.mark.parametrize(("quantity", "found"), [("force", []), ("acceleration", ["clipped"])])
+def test_parts_that_come_apart_carry_no_force(quantity, found):
+    x = np.maximum(np.sin(2 * np.pi * 0.0131 * T) + 0.3, 0.0)
+    assert [kind for _, kind in kinds(x, quantity=quantity)] == found
+    held = np.minimum(x, 1.0)
+    assert [kind for _, kind in kinds(held, quantity=quantity)] == ["clipped"]
+
+
 def test_impulses_and_pulse_trains_are_not_clipped():
     ringing = np.convolve((T % 500 == 0) * RNG.uniform(0.5, 1, N), np.exp(-T[:200] / 20) * np.sin(T[:200]))[:N]
     assert kinds(ringing + 1e-3 * RNG.standard_normal(N)) == []

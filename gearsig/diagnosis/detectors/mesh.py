@@ -133,7 +133,8 @@ def _disagree(signals: Signals, pair: GearPair, mesh: float, order: float) -> Fi
 
 def _reckoned_from(signals: Signals, pair: GearPair) -> list[float]:
     """Return the orders of the pair's shafts that are known without this pair's own teeth."""
-    without = replace(signals.rig, pairs=tuple(p for p in signals.rig.pairs if p is not pair))
+    others = tuple(p for p in signals.rig.pairs if p is not pair)
+    without = replace(signals.rig, pairs=others, contact=None)  # the contact may be this pair's
     reference = signals.rig.reference_shaft
     orders = [without.ratio(shaft, to=reference) for shaft in (pair.driver, pair.driven)]
     return [order for order in orders if order is not None]

@@ -31,6 +31,8 @@ def test_energy_balance_of_a_whole_cycle() -> None:
     balance = found["energy"] - found["work put in"] + found["lost in contact"] + found["lost in friction"]
     assert found["work put in"].max() > 400.0
     assert largest(balance) < 1e-4
+    # flanks push, never pull: forwards on the drive flank, backwards on the back flank
+    assert np.all(found["interaction force"] * np.sign(found["compression"]) >= 0.0)
     assert np.all(np.diff(found["lost in contact"]) >= -1e-9)
 
 
