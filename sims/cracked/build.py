@@ -13,7 +13,6 @@ from gearsig.rig.speed import EncoderChannel, SpeedSource, TachometerChannel
 from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
 from sims.cracked.chain import build_chain
 from sims.cracked.installed import Installed
-from sims.cracked.wanted import Wanted
 from sims.machine import BearingSupport, Drive, Lubrication, Machine, Roughness, ShaftLine, Wheel
 from sims.machine.operation import Course, Operation
 from sims.measure import MeasurementChain, Tachometer
@@ -28,6 +27,7 @@ from sims.mesh import (
     disc_mass_kg,
 )
 from sims.values import Values
+from sims.wanted import Wanted
 
 _SIDES = ("driver", "driven")
 SHAFTS = ("input", "output")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import cos, radians, sin
 
 from sims.cracked.installed import HousingMode, Installed, Pickup, SensorSeat
-from sims.cracked.wanted import Wanted
 from sims.measure import (
     Accelerometer,
     AntiAlias,
@@ -19,6 +18,7 @@ from sims.measure import (
     PathMode,
     Tachometer,
 )
+from sims.wanted import Wanted
 
 _PLACES = (
     (1, "input shaft, drive end"),

@@ -14,9 +14,10 @@ from sims.cracked.installed_table import installed_of
 from sims.cracked.parameters import PARAMETERS
 from sims.effects import EffectSetting, effect, effects, with_effects
 from sims.machine import Machine
-from sims.machine.operation import Course, Operation
+from sims.machine.operation import Operation
 from sims.presets import Preset, preset, presets
 from sims.simulator import Parameter, ParameterValue
+from sims.truth import truth_of
 from sims.values import Values, complete_values
 
 if TYPE_CHECKING:
@@ -191,23 +192,3 @@ def check_load(machine: Machine, operation: Operation) -> None:
     section_m2 = pair.face_width_mm * pair.driver.module_mm * 1e-6
     most_nm = BREAKING_STRESS_PA * section_m2 * pair.driver.pitch_radius_mm * 1e-3
     within(operation.torque_nm.largest, "torque_nm", 0.0, float(f"{most_nm:.2g}"), "N m")
-
-
-def truth_of(
-    model: str, preset_name: str, values: Values, settings: Sequence[EffectSetting], operation: Operation
-) -> dict[str, Any]:
-    """Return what was put into a simulation as plain values, for `Recording.truth`."""
-    return {
-        "model": model,
-        "preset": preset_name,
-        "parameters": dict(values),
-        "effects": [
-            {"name": s.name, "severity": s.severity, "unit": effect(s.name).severity.unit, "options": dict(s.options)}
-            for s in settings
-        ],
-        "operation": {"speed_rpm": _plain(operation.speed_rpm), "torque_nm": _plain(operation.torque_nm)},
-    }
-
-
-def _plain(course: Course) -> dict[str, list[float]]:
-    return {"times_s": course.times_s.tolist(), "values": course.values.tolist()}

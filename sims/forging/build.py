@@ -10,10 +10,10 @@ from gearsig.rig.contact import ToothContact, hertz_stiffness_n_per_m1p5
 from gearsig.rig.speed import EncoderChannel
 from gearsig.rig.tooth_pairs import PathOfContact, standard_path
 from gearsig.rig.types import GearPair, OperatingPoint, Rig, Sensor, Shaft
-from sims.cracked.wanted import Wanted
 from sims.forging.drive import Bristle, ForgingDrive, GrippedLoad, HydraulicMotor, WeakTooth
 from sims.forging.schedule import Cycle
 from sims.machine.operation import Operation
+from sims.wanted import Wanted
 
 TABLE_STIFFNESS = 1.72e9
 """As the source's table prints it, there in N/m; taken as N/m^1.5."""

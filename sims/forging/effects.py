@@ -8,12 +8,12 @@ import numpy as np
 
 from gearsig.checks import closest_match_hint, within
 from gearsig.errors import InputError
-from sims.cracked.wanted import Wanted
 from sims.effects import EffectSetting, effect
 from sims.forging.drive import WeakTooth
 from sims.mesh import GearGeometry, GearMesh, PairGeometry, RootCrack, mesh_stiffness, wear_profile
 from sims.mesh.flank import contact_ends_mm
 from sims.values import Values
+from sims.wanted import Wanted
 
 WITH_MEANING = ("root_crack", "tooth_wear", "sliding_friction", "backlash", "torque_ripple")
 """What the drive can do. A wrong load inertia is `piece_mass_kg` or `wheel_inertia_kg_m2`."""

@@ -12,13 +12,13 @@ from gearsig.checks import FloatArray
 from gearsig.recording.types import Channel, Provenance, Recording
 from gearsig.rig.speed import EncoderChannel
 from gearsig.rig.types import Rig, Sensor
-from sims.cracked.wanted import Wanted
 from sims.forging.drive import ForgingDrive
 from sims.forging.respond import DriveResponse, respond
 from sims.forging.schedule import Schedule
 from sims.measure import Accelerometer, AntiAlias, ColouredNoise, MeasuredChannel, MeasurementChain, ModalPath
 from sims.measure.hold import apply, discrete
 from sims.measure.motion import Motion
+from sims.wanted import Wanted
 
 LEAST_VIBRATION_HZ = 5000.0
 """Sampling rate from which on vibration is recorded: flanks in contact ring at some 400 Hz, housings above."""

@@ -11,8 +11,6 @@ import numpy as np
 from gearsig.checks import within
 from gearsig.errors import InputError
 from gearsig.recording.types import Recording
-from sims.cracked.simulator import truth_of
-from sims.cracked.wanted import Wanted
 from sims.effects import EffectSetting, effect
 from sims.forging.build import build_cycle, build_drive, build_rig
 from sims.forging.drive import ForgingDrive
@@ -22,7 +20,9 @@ from sims.forging.schedule import Cycle, Schedule, schedule
 from sims.machine.operation import Course, Operation
 from sims.presets import preset, presets
 from sims.simulator import Parameter, ParameterValue
+from sims.truth import truth_of
 from sims.values import Values, complete_values
+from sims.wanted import Wanted
 
 NAME = "forging"
 SAMPLING_RATE_RANGE_HZ = (100.0, 200000.0)

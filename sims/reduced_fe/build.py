@@ -6,7 +6,6 @@ from functools import lru_cache
 
 from sims.cracked.build import build_machine, gear_geometry
 from sims.cracked.installed import Installed
-from sims.cracked.wanted import Wanted
 from sims.machine import Machine
 from sims.mesh import Material
 from sims.reduced_fe.blank import GearBlank
@@ -17,6 +16,7 @@ from sims.reduced_fe.ready import READY, ready_gear
 from sims.reduced_fe.reduce import plan_for
 from sims.reduced_fe.reduced_gear import ReducedGear
 from sims.values import Values
+from sims.wanted import Wanted
 
 SIDES = ("driver", "driven")
 Gears = tuple[ReducedGear, ReducedGear]

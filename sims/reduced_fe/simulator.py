@@ -13,12 +13,13 @@ from gearsig.checks import within
 from gearsig.errors import InputError
 from gearsig.recording.types import Recording
 from sims.cracked.installed_table import installed_of
-from sims.cracked.simulator import DURATION_RANGE_S, check_load, check_run, truth_of
+from sims.cracked.simulator import DURATION_RANGE_S, check_load, check_run
 from sims.effects import EffectSetting, effect, effects, with_effects
 from sims.machine.operation import Operation
 from sims.presets import Preset, preset, presets
 from sims.reduced_fe.parameters import PARAMETERS
 from sims.simulator import Parameter, ParameterValue
+from sims.truth import truth_of
 from sims.values import Values, complete_values
 
 if TYPE_CHECKING:

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.rig.contact import ToothContact
-from sims.cracked.wanted import Wanted
 from sims.forging.build import build_drive
 from sims.forging.drive import Bristle, ForgingDrive, GrippedLoad, HydraulicMotor
 from sims.forging.parameters import PARAMETERS
@@ -15,6 +14,7 @@ from sims.forging.schedule import Schedule
 from sims.machine.operation import Course
 from sims.simulator import ParameterValue
 from sims.values import complete_values
+from sims.wanted import Wanted
 
 NOTHING = Course.constant(0.0)
 AT_REST = Schedule(NOTHING, NOTHING, NOTHING)
