@@ -115,14 +115,14 @@ def report_many(
         If there are no paths, `n_processes` is below 1, or the folder cannot be made.
     """
     from gearsig.checks import count
-    from gearsig.report.files import remove_parts
+    from gearsig.report.files import made_folder, remove_parts
     from gearsig.report.index import write_index
 
     files = [Path(path) for path in paths]
     if not files:
         raise InputError("there are no recordings to report on", remedy="name at least one file")
     workers = min(len(files), _n_processors()) if n_processes is None else count(n_processes, "n_processes")
-    folder = _made(Path(output_folder))
+    folder = made_folder(Path(output_folder))
     sound = Path(reference) if reference is not None else None
     jobs = [
         _compared(replace(job, torque_nm=torque_nm), sound)
@@ -297,16 +297,6 @@ def _sorted_out(results: Mapping[int, Entry | Failure]) -> tuple[tuple[Entry, ..
         tuple(item for item in ordered if isinstance(item, Entry)),
         tuple(item for item in ordered if isinstance(item, Failure)),
     )
-
-
-def _made(folder: Path) -> Path:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"the folder cannot be made ({error.strerror or error})", where=str(folder), remedy="choose another with -o"
-        ) from error
-    return folder
 
 
 def _n_processors() -> int:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.options import RigOption, SamplingRateOption, open_recording, open_rig
+from app.commands.motion import BandwidthOption, UnwrapOption, UseOption, open_motion, read_bandwidth, read_uses
+from app.commands.options import RigOption, SamplingRateOption, open_rig
 from app.quantities import quantity
-from gearsig.errors import InputError
 
 if TYPE_CHECKING:
     from gearsig.motion.noise_study import NoiseStudy
@@ -18,20 +18,6 @@ if TYPE_CHECKING:
 DATA, TABLE, PICTURE, NOISE_PICTURE = "force.json", "force.csv", "force.png", "noise.png"
 """Files that -o makes."""
 
-UseOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--use",
-        metavar="ROLE=CHANNEL",
-        help='Which channel is what, e.g. "driven angle=enc2"; "driver speed=" leaves it out. Roles: driver or driven, '
-        "angle, speed or acceleration; torque; force. Default: by quantity, position and name. Repeatable.",
-    ),
-]
-BandwidthOption = Annotated[
-    str | None,
-    typer.Option("--bandwidth", metavar="HZ", help="Smooth all motion to this, by a Savitzky–Golay filter."),
-]
-UnwrapOption = Annotated[bool, typer.Option("--unwrap", help="The angles start again after each revolution.")]
 DatumOption = Annotated[
     str,
     typer.Option(
@@ -69,16 +55,12 @@ def force(
     from rich.console import Console
 
     from gearsig.motion.force import estimate_forces
-    from gearsig.motion.measure import measure_motion
     from gearsig.report.force_text import force_json, force_text
 
     machine = open_rig(rig, recording)
-    roles = dict(read_use(text) for text in use or ())
-    band = quantity(bandwidth, "Hz", "--bandwidth") if bandwidth else None
     zero = read_datum(datum)
     with Console(stderr=True).status("reading") as status:
-        opened = open_recording(recording, machine, fs)
-        motion = measure_motion(opened, machine, use=roles, bandwidth_hz=band, unwrap=unwrap)
+        opened, motion = open_motion(recording, machine, fs, use, bandwidth, unwrap)
         estimate = estimate_forces(motion, datum=zero)
         study = None
         if noise:
@@ -88,21 +70,15 @@ def force(
 
             status.update("adding noise")
             rng = np.random.default_rng(0)
+            roles, band = read_uses(use), read_bandwidth(bandwidth)
             study = noise_study(opened, machine, rng=rng, use=roles, bandwidth_hz=band, unwrap=unwrap, datum=zero)
+        written: tuple[str, ...] = ()
         if output is not None:
             status.update("drawing")
-            write_force(estimate, study, output)
+            written = write_force(estimate, study, output)
     typer.echo(force_json(estimate, study) if json else force_text(estimate, study))
-    if output is not None and not json:
-        typer.echo(f"\nIn {output}: {DATA}, {TABLE}, {PICTURE}{f', {NOISE_PICTURE}' if study else ''}.")
-
-
-def read_use(text: str) -> tuple[str, str]:
-    """Return role and channel of "driven angle=enc2"; the channel may hold "=" itself."""
-    role, sign, channel = text.partition("=")
-    if not sign:
-        raise InputError(f"--use is {text!r}", allowed="ROLE=CHANNEL", remedy='write for example "driven angle=enc2"')
-    return role.strip(), channel.strip()
+    if written and not json:
+        typer.echo(f"\nIn {output}: {', '.join(written)}.")
 
 
 def read_datum(text: str) -> str | float:
@@ -110,15 +86,19 @@ def read_datum(text: str) -> str | float:
     return text if text in ("auto", "zero") else quantity(text, "um", "--datum") * 1e-6
 
 
-def write_force(estimate: ForceEstimate, study: NoiseStudy | None, folder: Path) -> None:
-    """Write data, table and pictures."""
+def write_force(estimate: ForceEstimate, study: NoiseStudy | None, folder: Path) -> tuple[str, ...]:
+    """Write data, table and pictures; return the files' names. Without a reference there is no picture."""
     from gearsig.plot.force import force_figure, noise_figure
     from gearsig.report.files import write_text
     from gearsig.report.force_text import force_csv, force_json
 
     write_text(folder / DATA, force_json(estimate, study))
     write_text(folder / TABLE, force_csv(estimate))
+    pictures = {}
     if estimate.references_n:
-        force_figure(estimate).savefig(folder / PICTURE)
+        pictures[PICTURE] = force_figure(estimate)
     if study is not None:
-        noise_figure(study).savefig(folder / NOISE_PICTURE)
+        pictures[NOISE_PICTURE] = noise_figure(study)
+    for name, figure in pictures.items():
+        figure.savefig(folder / name)
+    return (DATA, TABLE, *pictures)

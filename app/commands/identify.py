@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.force import BandwidthOption, UnwrapOption, UseOption, read_use
-from app.commands.options import RigOption, SamplingRateOption, open_recording, open_rig
-from app.quantities import quantity
+from app.commands.motion import BandwidthOption, UnwrapOption, UseOption, open_motion
+from app.commands.options import RigOption, SamplingRateOption, open_rig
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
@@ -48,24 +47,17 @@ def identify(
     Example: gearsig identify drive.h5 --rig drive.toml -o fitted.toml
     """
     from gearsig.motion.identify import identify as fit
-    from gearsig.motion.measure import measure_motion
     from gearsig.report.identify_text import identify_json, identify_text
     from gearsig.rig.toml import write_rig
 
     machine = open_rig(rig, recording)
-    opened = open_recording(recording, machine, fs)
-    motion = measure_motion(
-        opened,
-        machine,
-        use=dict(read_use(text) for text in use or ()),
-        bandwidth_hz=quantity(bandwidth, "Hz", "--bandwidth") if bandwidth else None,
-        unwrap=unwrap,
-    )
+    if output is not None and (output.suffix.lower() != ".toml" or not output.parent.is_dir()):
+        raise InputError(f"cannot write {str(output)!r}", allowed="a .toml file in a folder that exists")
+    opened, motion = open_motion(recording, machine, fs, use, bandwidth, unwrap)
     found = fit(motion)
-    if output is not None:
-        if machine is None or output.suffix.lower() != ".toml" or not output.parent.is_dir():
-            raise InputError(f"cannot write {str(output)!r}", allowed="a .toml file in a folder that exists")
-        write_rig(with_fitted(machine, found), output)
+    known = machine or opened.rig
+    if output is not None and known is not None:  # motion could not have been measured without a rig
+        write_rig(with_fitted(known, found), output)
     typer.echo(identify_json(found) if json else identify_text(found))
     if output is not None and not json:
         typer.echo(f"\n{output.name}: the rig with what could be told.")

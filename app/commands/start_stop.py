@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.force import BandwidthOption, UnwrapOption, UseOption, read_use
-from app.commands.options import RigOption, SamplingRateOption, open_recording, open_rig
-from app.quantities import quantity
+from app.commands.motion import BandwidthOption, UnwrapOption, UseOption, open_motion
+from app.commands.options import RigOption, SamplingRateOption, open_rig
 
 if TYPE_CHECKING:
     from gearsig.motion.angle_profile import AngleProfile
@@ -41,20 +40,11 @@ def start_stop(
 
     Example: gearsig start-stop drive.h5 --rig drive.toml -o drive
     """
-    from gearsig.motion.measure import measure_motion
     from gearsig.motion.start_stop import examine_start_stop
     from gearsig.report.files import write_text
     from gearsig.report.start_stop_text import start_stop_json, start_stop_text
 
-    machine = open_rig(rig, recording)
-    opened = open_recording(recording, machine, fs)
-    motion = measure_motion(
-        opened,
-        machine,
-        use=dict(read_use(text) for text in use or ()),
-        bandwidth_hz=quantity(bandwidth, "Hz", "--bandwidth") if bandwidth else None,
-        unwrap=unwrap,
-    )
+    opened, motion = open_motion(recording, open_rig(rig, recording), fs, use, bandwidth, unwrap)
     examined = examine_start_stop(motion)
     data = start_stop_json(examined, *tooth_levels(opened, examined))
     if output is not None:

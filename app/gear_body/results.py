@@ -9,8 +9,8 @@ import numpy as np
 
 from app.gear_body.study import GearBodyStudy
 from gearsig.checks import FloatArray
-from gearsig.errors import InputError
 from gearsig.plot.fe_gear import gear_mesh_figure, gear_modes_figure, gear_stress_figure
+from gearsig.report.files import made_folder
 from sims.reduced_fe.face_view import FaceView, face_view
 from sims.reduced_fe.flank_rows import point_and_push
 from sims.reduced_fe.gear_file import write_gear
@@ -27,10 +27,7 @@ NEIGHBOURS = (-1, 0, 1)
 
 def write_study(study: GearBodyStudy, folder: Path, *, vtk: bool = False) -> tuple[Path, ...]:
     """Write the figures as PNG, and where there are: VTK file, reduced gear, table of Craig–Bampton."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot be made ({error.strerror})", where=str(folder)) from None
+    made_folder(folder)
     paths = []
     for name, figure in figures(study).items():
         paths.append(folder / f"{name}.png")

@@ -11,6 +11,7 @@ from gearsig.diagnosis.types import Analysis, CannotTell, Finding, Kind, Strengt
 from gearsig.diagnosis.verdict import ranked, verdict_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.indicators.types import Indicator
+from gearsig.motion.angle_faults import check_wrap
 from gearsig.motion.bursts import Burst, find_bursts
 from gearsig.motion.course import Course, is_start_stop
 from gearsig.motion.measure import measure_motion
@@ -31,11 +32,19 @@ def start_stop_analysis(
     """Return the analysis of a start–stop recording, or None where the motion is not one or is not known.
 
     Only an encoder or a speed channel tells: both see standstill and direction.
+
+    Raises
+    ------
+    InputError
+        If the encoder's angle starts again after each revolution and the rig does not say so.
     """
     found = course_of(recording, rig)
     if found is None or not is_start_stop(found[0]):
         return None
     course, angle_rad = found
+    source = recording.speed_source or rig.speed
+    if isinstance(source, EncoderChannel):  # what seems to turn back may be an encoder that wraps
+        check_wrap(angle_rad, recording.sampling_rate_hz, source.channel)
     findings = [*_not_of_rest(problems, recording), _motion_finding(course), _left_out(course)]
     examined: StartStop | None = None
     if rig.contact is None:

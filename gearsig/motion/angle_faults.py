@@ -15,6 +15,8 @@ SCATTER = 50.0
 """Of the ordinary change of the angle's increments: an impact reaches a tenth of that."""
 QUANTA = 4.0
 """Of a coarse encoder's step."""
+NEARLY = 0.1
+"""Of a revolution, by which a step may differ from a whole one that is an encoder's new beginning."""
 
 
 def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str) -> None:
@@ -32,30 +34,59 @@ def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str) -> No
     InputError
         At the first step by nearly a whole revolution (an encoder that wraps), or at a jump.
     """
-    steps = np.diff(angle_rad)
-    if len(steps) < 3:
-        raise InputError(f"channel {name!r} has {len(angle_rad)} samples", allowed="at least 4")
-    # What a step has beyond the steps around it; the middle one of three, so that a jump does not hide itself.
-    around = np.sort(np.stack([np.roll(steps, 1), steps, np.roll(steps, -1)]), axis=0)[1]
-    around[0], around[-1] = steps[1], steps[-2]
-    beyond = np.abs(steps - around)
+    check_wrap(angle_rad, sampling_rate_hz, name)
+    steps, beyond = _steps(angle_rad)
     moving = np.abs(steps[steps != 0.0])
     quantum = float(moving.min()) if len(moving) else 0.0
     limit = max(LEAST_JUMP_RAD, SCATTER * 1.4826 * float(np.median(beyond)), QUANTA * quantum)
     found = np.flatnonzero(beyond > limit)
-    if not len(found):
-        return
-    i = int(found[0])
-    when = f"from {i / sampling_rate_hz:.6g} to {(i + 1) / sampling_rate_hz:.6g} s"
-    turns = abs(steps[i]) / (2.0 * pi)
-    if abs(turns - 1.0) < 0.1:
+    if len(found):
+        i = int(found[0])
         raise InputError(
-            f"channel {name!r} steps by {turns:.3g} revolutions {when}: the encoder starts again after each revolution",
+            f"channel {name!r} jumps by {abs(steps[i]):.4g} rad {_when(i, sampling_rate_hz)} "
+            f"({len(found)} such jump(s))",
+            allowed="an angle that runs on",
+            remedy="cut the recording there; lost counts make all later forces wrong",
+        )
+
+
+def check_wrap(angle_rad: FloatArray, sampling_rate_hz: float, name: str) -> None:
+    """Raise where an angle steps by nearly a whole revolution: an encoder that starts again after each.
+
+    Parameters
+    ----------
+    angle_rad : array, (n,)
+    sampling_rate_hz : float
+    name : str
+        Of the channel, for the error.
+
+    Raises
+    ------
+    InputError
+        At the first such step, or if there are fewer than 4 samples.
+    """
+    if len(angle_rad) < 4:
+        raise InputError(f"channel {name!r} has {len(angle_rad)} samples", allowed="at least 4")
+    turns = _steps(angle_rad)[1] / (2.0 * pi)
+    found = np.flatnonzero(np.abs(turns - 1.0) < NEARLY)
+    if len(found):
+        i = int(found[0])
+        raise InputError(
+            f"channel {name!r} steps by {turns[i]:.3g} revolutions {_when(i, sampling_rate_hz)}: the encoder starts "
+            "again after each revolution",
             allowed="an angle that runs on",
             remedy="give --unwrap, or wraps = true in the rig's [speed] table for that channel",
         )
-    raise InputError(
-        f"channel {name!r} jumps by {abs(steps[i]):.4g} rad {when} ({len(found)} such jump(s))",
-        allowed="an angle that runs on",
-        remedy="cut the recording there; lost counts make all later forces wrong",
-    )
+
+
+def _steps(angle_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the angle's steps, and what each has beyond the steps around it."""
+    steps = np.diff(angle_rad)
+    # Around it: the middle one of three, so that a jump does not hide itself.
+    around = np.sort(np.stack([np.roll(steps, 1), steps, np.roll(steps, -1)]), axis=0)[1]
+    around[0], around[-1] = steps[1], steps[-2]
+    return steps, np.abs(steps - around)
+
+
+def _when(step: int, sampling_rate_hz: float) -> str:
+    return f"from {step / sampling_rate_hz:.6g} to {(step + 1) / sampling_rate_hz:.6g} s"

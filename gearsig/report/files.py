@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from glob import escape
 from pathlib import Path
 
+from gearsig.errors import InputError
+
 PART_SUFFIX = ".part"
 LONGEST_NAME = 50  # a letter may take four bytes, and file systems stop at 255
 _RESERVED = {"index", "con", "prn", "aux", "nul"} | {f"{port}{i}" for port in ("com", "lpt") for i in range(1, 10)}
@@ -28,9 +30,26 @@ def page_names(sources: Iterable[str | Path]) -> tuple[str, ...]:
     return tuple(_unique(_safe(str(source)), taken) for source in sources)
 
 
+def made_folder(folder: Path) -> Path:
+    """Make a folder where there is none, and return it.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made: a file of that name, a place that may not be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"the folder cannot be made ({error.strerror or error})", where=str(folder), remedy="choose another with -o"
+        ) from error
+    return folder
+
+
 def write_text(path: Path, text: str) -> Path:
     """Write a file beside its place and move it there when it is complete; a failure leaves what was there before."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    made_folder(path.parent)
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PART_SUFFIX}")
     try:
         with part.open("x", encoding="utf-8", newline="\n") as file:

@@ -7,6 +7,7 @@ import pytest
 
 from gearsig import analyze
 from gearsig.diagnosis.types import CannotTell, Kind, Outcome
+from gearsig.errors import InputError
 from gearsig.recording.types import Channel, Recording
 from gearsig.report.text import analysis_text
 from gearsig.report.to_json import analysis_to_json
@@ -53,6 +54,14 @@ def test_continuous_rotation_is_analysed_as_before() -> None:
     assert not isinstance(result.shaft_angle, CannotTell)
     assert "start-stop" not in [f.code for f in result.findings]
     assert result.channels
+
+
+def test_an_encoder_that_wraps_unsaid_is_no_reversing_machine() -> None:
+    recording = start_stop()
+    samples = np.array(recording.samples)
+    samples[recording.index("pinion angle")] %= 2.0 * np.pi
+    with pytest.raises(InputError, match=r"starts again after each revolution.*wraps = true"):
+        analyze(replace(recording, samples=samples))
 
 
 def test_a_contact_in_the_rig_is_no_hindrance_to_the_other_examinations() -> None:

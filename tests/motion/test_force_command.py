@@ -50,6 +50,17 @@ def test_json_alone(capsys: pytest.CaptureFixture[str], file: Path) -> None:
     assert "Savitzky–Golay" in data["methods"]["driver angle"]
 
 
+def test_what_was_not_made_is_not_named_and_a_file_is_no_folder(
+    capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path
+) -> None:
+    code, out, _ = run(capsys, "force", file, "--use", "torque=", "--use", "force=", "-o", tmp_path / "force")
+    assert (code, out.splitlines()[-1]) == (0, f"In {tmp_path / 'force'}: force.json, force.csv.")
+    assert sorted(p.name for p in (tmp_path / "force").iterdir()) == ["force.csv", "force.json"]
+    code, out, err = run(capsys, "force", file, "-o", file)
+    assert (code, out) == (2, "")
+    assert "the folder cannot be made" in err.splitlines()[-1]
+
+
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
