@@ -78,15 +78,23 @@ def find_impacts(
     Raises
     ------
     RefusalError
-        If the compression's noise is a quarter of the play or more.
+        If the compression's noise is a quarter of the play or more, or no play is known.
 
     Notes
     -----
     An impact lasts a millisecond or so and its rebounds follow in some more: at 1 kHz those are missed whose flight
     holds fewer than two samples. The tooth counts from the angles' zero.
     """
-    a = motion.contact.half_backlash_um * 1e-6 if half_backlash_m is None else half_backlash_m
-    positive(a, "half_backlash_m", "m", remedy="an impact needs a play to cross")
+    a = (
+        motion.contact.half_backlash_um * 1e-6
+        if half_backlash_m is None
+        else positive(half_backlash_m, "half_backlash_m")
+    )
+    if a == 0.0:
+        raise RefusalError(
+            "the rig says that the flanks have no play: there is none to cross",
+            remedy="give half_backlash_um in its [contact] table, or record a braked stop, which shows it",
+        )
     q, rate = motion.compression_m - datum_m, motion.compression_rate_mps
     noise = scatter_of(q)
     if noise > 0.5 * a:

@@ -11,6 +11,7 @@ from gearsig.motion.bursts import find_bursts
 from gearsig.motion.flight import fit_flight
 from gearsig.motion.impacts import Impact, find_impacts, reduced_mass_kg
 from gearsig.motion.measure import measure_motion
+from gearsig.motion.start_stop import examine_start_stop
 from gearsig.recording.types import Recording
 from sims import simulate
 from tests.motion.recordings import continuous, start_stop, without
@@ -133,6 +134,14 @@ def test_a_play_drowned_in_noise_is_refused() -> None:
     motion = measure_motion(recording)
     with pytest.raises(RefusalError, match="flights cannot be seen"):
         find_impacts(motion, 0.0)
+
+
+def test_without_a_known_play_the_rest_is_told_all_the_same() -> None:
+    motion = measure_motion(continuous())
+    examined = examine_start_stop(replace(motion, contact=replace(motion.contact, half_backlash_um=0.0)))
+    assert any("half_backlash_um" in text for text in examined.refusals)
+    assert examined.portrait is not None
+    assert examined.loop is not None
 
 
 def test_energy_is_not_defined_without_an_inertia() -> None:

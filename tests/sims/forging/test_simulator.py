@@ -57,6 +57,19 @@ def test_the_two_stiffnesses_of_the_source_are_presets() -> None:
     assert ratio * 1.72e9 == pytest.approx(1.12e9, rel=5e-3)
 
 
+@pytest.mark.parametrize("name", ["manipulator_formula", "manipulator_table"])
+def test_the_presets_hold_what_the_source_states(name: str) -> None:
+    prepared = ForgingManipulator().prepare({}, None, preset_name=name)
+    v, cycle = prepared.values, prepared.cycle
+    assert (v["teeth_driver"], v["teeth_driven"], v["module_mm"], v["pressure_angle_deg"]) == (20, 100, 5.0, 20.0)
+    assert (v["exponent"], v["friction_coefficient"], v["restitution"], v["piece_mass_kg"]) == (1.5, 0.05, 0.95, 290.0)
+    assert (cycle.mode, cycle.on_s, cycle.off_s) == ("start-stop", 1.0, 2.0)
+    assert prepared.operation.torque_nm.largest == 95.0
+    assert prepared.operation.speed_rpm.largest / 5.0 == 20.0
+    assert prepared.drive.path.base_radii_m == pytest.approx(np.cos(np.radians(20.0)) * np.array([0.05, 0.25]))
+    assert ForgingManipulator().usual_sampling_rate_hz == 1000.0
+
+
 def test_a_recording_holds_motion_rig_and_truth() -> None:
     recording = short()
     assert recording.n_samples == 2500

@@ -148,6 +148,19 @@ def test_friction_of_the_flanks_turns_round_at_the_pitch_point() -> None:
         assert np.mean(share[near]) == pytest.approx(1.0 + side * 0.018, abs=1.5e-3)
 
 
+def test_flanks_hold_more_than_they_slide_with() -> None:
+    """Bristles of the flanks: μN in sliding, up to 1.2 μN where they slide slowly, as near the pitch point."""
+    found = run(1.0, Cycle(mode="continuous"), interval_s=1e-4)
+    loaded = (found["pairs in contact"] == 1.0) & (found["interaction force"] > 200.0)
+    share = np.abs(found["tooth friction"][loaded]) / found["interaction force"][loaded]
+    assert 1.1 * 0.05 < share.max() <= 1.2 * 0.05 * (1.0 + 1e-6)
+    path = drive().path
+    place = found["pinion angle"][loaded] * 20.0 / (2.0 * np.pi) % 1.0 - path.pitch_point
+    sliding = (np.abs(place) > 0.1) & (found["pinion speed"][loaded] > 5.0)
+    assert np.count_nonzero(sliding) > 20
+    assert np.median(share[sliding]) == pytest.approx(0.05, abs=1e-3)
+
+
 def test_wear_widens_the_play() -> None:
     assert drive(wear_um=100.0).contact.half_backlash_um == pytest.approx(200.0)
 
