@@ -122,6 +122,11 @@ def standard_path(
 
     ε p_b = √(ra1² − rb1²) + √(ra2² − rb2²) − a sin α. A stated contact ratio shortens or lengthens both ends alike.
 
+    Raises
+    ------
+    InputError
+        If the teeth interfere, or the contact ratio is not 1 to 2.
+
     Examples
     --------
     >>> path = standard_path((20, 100), 5e-3, 0.3490658503988659)
@@ -133,6 +138,12 @@ def standard_path(
     base_pitch = pi * module_m * cos(pressure_angle_rad)
     length = (r[0] + r[1]) * sin(pressure_angle_rad)
     out_1, out_2 = (sqrt((radius + module_m) ** 2 - (radius * cos(pressure_angle_rad)) ** 2) for radius in r)
+    if max(out_1, out_2) > length:
+        raise InputError(
+            f"standard teeth of {teeth[0]} and {teeth[1]} interfere: a tip reaches past the other's involute",
+            where="teeth",
+            remedy="give the smaller gear more teeth",
+        )
     own = (out_1 + out_2 - length) / base_pitch
     ratio = own if contact_ratio is None else contact_ratio
     within(ratio, "contact_ratio", 1.0, 2.0, remedy="the model holds for one to two pairs in contact")

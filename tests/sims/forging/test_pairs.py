@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gearsig.errors import InputError
 from gearsig.rig.tooth_pairs import standard_path
 from sims.forging.numbers import drive_numbers
 from sims.forging.respond import FirstState, respond
@@ -73,3 +74,11 @@ def test_back_flanks_pass_the_pitch_point_half_a_pitch_later() -> None:
     later = at_pitch_point + np.pi / 20.0
     assert float(STANDARD.position(np.array(at_pitch_point))) == pytest.approx(STANDARD.pitch_point % 1.0)
     assert float(STANDARD.position(np.array(later), -1.0)) == pytest.approx(STANDARD.pitch_point % 1.0)
+
+
+def test_teeth_that_interfere_are_refused() -> None:
+    """With a wheel of 100 teeth a standard pinion at 20° needs 17."""
+    standard_path((17, 100), 5e-3, np.radians(20.0))
+    for small in (8, 12, 16):
+        with pytest.raises(InputError, match="interfere"):
+            standard_path((small, 100), 5e-3, np.radians(20.0))
