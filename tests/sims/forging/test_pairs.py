@@ -76,9 +76,9 @@ def test_back_flanks_pass_the_pitch_point_half_a_pitch_later() -> None:
     assert float(STANDARD.position(np.array(later), -1.0)) == pytest.approx(STANDARD.pitch_point % 1.0)
 
 
-def test_teeth_that_interfere_are_refused() -> None:
-    """With a wheel of 100 teeth a standard pinion at 20° needs 17."""
-    standard_path((17, 100), 5e-3, np.radians(20.0))
-    for small in (8, 12, 16):
-        with pytest.raises(InputError, match="interfere"):
-            standard_path((small, 100), 5e-3, np.radians(20.0))
+@pytest.mark.parametrize(("pinion", "largest_wheel"), [(13, 16), (14, 26), (15, 45), (16, 101), (17, 1309)])
+def test_teeth_that_interfere_are_refused(pinion: int, largest_wheel: int) -> None:
+    """Largest wheels for full-depth teeth at 20°: Shigley's Mechanical Engineering Design, 11th ed., section 13-7."""
+    standard_path((pinion, largest_wheel), 5e-3, np.radians(20.0))
+    with pytest.raises(InputError, match="interfere"):
+        standard_path((pinion, largest_wheel + 1), 5e-3, np.radians(20.0))
