@@ -12,7 +12,7 @@ from gearsig.checks import within
 from gearsig.recording.types import Recording
 from sims.cracked.installed_table import installed_of
 from sims.cracked.parameters import PARAMETERS
-from sims.effects import EffectSetting, effect, effects, with_effects
+from sims.effects import EffectSetting, completed, effects, with_effects
 from sims.machine import Machine
 from sims.machine.operation import Operation
 from sims.presets import Preset, preset, presets
@@ -172,7 +172,7 @@ def prepare_preset(
     run = operation or chosen.operation
     check_run(run, sampling_rate_hz)
     wanted = (*chosen.effects, *settings)
-    complete = tuple(EffectSetting(s.name, s.severity, effect(s.name).complete(s.options)) for s in wanted)
+    complete = completed(wanted)
     installed = installed_of(chosen.installed) if chosen.installed else None
     sound = build_machine(values, sampling_rate_hz=sampling_rate_hz, installed=installed)
     check_load(sound, run)

@@ -1,6 +1,6 @@
 """Effects that can be switched on: one file each; see `sims.effects.effect`."""
 
-from sims.effects.catalogue import add_effect, effect, effects, is_own, with_effects
+from sims.effects.catalogue import add_effect, completed, effect, effects, is_own, with_effects
 from sims.effects.effect import Effect, EffectSetting, Option, Severity
 
 __all__ = [
@@ -9,6 +9,7 @@ __all__ = [
     "Option",
     "Severity",
     "add_effect",
+    "completed",
     "effect",
     "effects",
     "is_own",

@@ -93,6 +93,17 @@ def effect(name: str) -> Effect:
     return found[name]
 
 
+def completed(settings: Iterable[EffectSetting]) -> tuple[EffectSetting, ...]:
+    """Return settings with every option, defaults included.
+
+    Raises
+    ------
+    InputError
+        If an effect or an option does not exist, or an option's value is not allowed.
+    """
+    return tuple(EffectSetting(s.name, s.severity, effect(s.name).complete(s.options)) for s in settings)
+
+
 def with_effects(machine: Machine, settings: Iterable[EffectSetting], rng: np.random.Generator) -> Machine:
     """Return the machine with the effects switched on, mechanical ones first.
 

@@ -11,7 +11,7 @@ import numpy as np
 from gearsig.checks import within
 from gearsig.errors import InputError
 from gearsig.recording.types import Recording
-from sims.effects import EffectSetting, effect
+from sims.effects import EffectSetting, completed
 from sims.forging.build import build_cycle, build_drive, build_rig
 from sims.forging.drive import ForgingDrive
 from sims.forging.effects import WITH_MEANING, with_effects
@@ -122,7 +122,7 @@ class ForgingManipulator:
         within(run.torque_nm.largest, "torque_nm", *TORQUE_RANGE_NM, "N m")
         wanted = Wanted(values)
         drive = build_drive(wanted, _constant(run.speed_rpm), weak)
-        complete = tuple(EffectSetting(s.name, s.severity, effect(s.name).complete(s.options)) for s in wanted_effects)
+        complete = completed(wanted_effects)
         return Prepared(drive, build_cycle(wanted), run, chosen.name, values, sound, complete)
 
     def simulate(

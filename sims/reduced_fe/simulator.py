@@ -14,7 +14,7 @@ from gearsig.errors import InputError
 from gearsig.recording.types import Recording
 from sims.cracked.installed_table import installed_of
 from sims.cracked.simulator import DURATION_RANGE_S, check_load, check_run
-from sims.effects import EffectSetting, effect, effects, with_effects
+from sims.effects import EffectSetting, completed, effects, with_effects
 from sims.machine.operation import Operation
 from sims.presets import Preset, preset, presets
 from sims.reduced_fe.parameters import PARAMETERS
@@ -192,7 +192,7 @@ def prepare_preset(
     wanted = (*chosen.effects, *settings)
     for setting in wanted:
         _check_meaning(setting)
-    complete = tuple(EffectSetting(s.name, s.severity, effect(s.name).complete(s.options)) for s in wanted)
+    complete = completed(wanted)
     gears = reduced_gears(values)
     installed = installed_of(chosen.installed) if chosen.installed else None
     sound = sound_machine(values, gears, sampling_rate_hz=sampling_rate_hz, installed=installed)

@@ -10,7 +10,7 @@ from app.dashboard.laboratory.run import Run, times_of
 from app.dashboard.laboratory.setup import Setup
 from gearsig.plot.cursors import Cursor, order_cursors
 from gearsig.rig.orders import order_lines
-from sims.effects import EffectSetting, effect
+from sims.effects import completed, effect
 
 N_MESH_HARMONICS, N_SIDEBANDS, N_BEARING_HARMONICS, N_SHAFT_HARMONICS = 5, 3, 4, 8
 SIDES = ("driver", "driven")
@@ -100,5 +100,4 @@ def entries(run: Run) -> tuple[Cursor, ...]:
 
 def with_complete_effects(setup: Setup) -> Setup:
     """Return the setup with every option of its effects that has a default."""
-    settings = [EffectSetting(s.name, s.severity, effect(s.name).complete(s.options)) for s in setup.effects]
-    return replace(setup, effects=tuple(settings))
+    return replace(setup, effects=completed(setup.effects))
