@@ -13,7 +13,7 @@ from app.gap.bank_runs import Run
 from app.gap.conditions import LEAST_BLOCKS, SEED, Condition, compare, halves, observed
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.gap.change import UNFORETOLD
+from gearsig.gap.families import UNFORETOLD
 from gearsig.gap.features import once as feature_values
 from gearsig.gap.population import load_population
 from gearsig.gap.prediction import EffectPath, Fit, Observed, fit_effect, paths_of

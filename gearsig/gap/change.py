@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from gearsig.gap.channels import APART, apart_features
+from gearsig.gap.channels import apart_features
 from gearsig.gap.features import Features, once, whole_and_parts, whole_record_variance
 from gearsig.gap.frame import DRIVEN, DRIVER
 from gearsig.gap.gathered import Gathered
@@ -26,9 +26,6 @@ from gearsig.severity.shaft_lines import ShaftLines
 
 SURPRISE = "surprise."
 """Of features that are measured in the two recordings' own noise."""
-
-UNFORETOLD = (SURPRISE, APART)
-"""Of features, the last ones, that no simulation can foretell: what they are hangs on noise and on the sensors."""
 
 LEAST_NOISE = 1e-8
 """Of all lines together over the mesh's power: two gears of equal teeth leave nothing of their own in one average."""

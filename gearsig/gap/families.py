@@ -24,8 +24,8 @@ _PLAIN = {
 }
 _APART = {"mesh": PlaceKind.MESH, "floor": PlaceKind.BAND}
 
-UNSIZED = ("change.", "surprise.", "apart.")
-"""Features of a change, not changes of features: no size of a gap is made of them, as healthy ones have long tails."""
+UNFORETOLD = ("surprise.", "apart.")
+"""Features, the last ones, that hang on noise and sensors: no simulation foretells them, no size is made of them."""
 
 _OF_A_SHAFT = {
     "sideband": PlaceKind.SIDEBANDS,
@@ -68,7 +68,7 @@ def sized_members(names: Sequence[str]) -> dict[Family, np.ndarray]:
 @cache
 def _sized(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
     kept = {
-        family: np.array([i for i in rows if not names[i].startswith(UNSIZED)], dtype=np.intp)
+        family: np.array([i for i in rows if not names[i].startswith(UNFORETOLD)], dtype=np.intp)
         for family, rows in _members(names).items()
     }
     return {family: rows for family, rows in kept.items() if len(rows)}
