@@ -64,8 +64,7 @@ def simulate_rig(
     ready = CrackedPair().prepare(drawn.parameters, [], operation, draws, sampling_rate_hz=SAMPLING_RATE_HZ)
     machine = with_effects(_with_path(ready.machine, drawn), [*settings, *further], draws)
     machine = _with_fixed_flanks(machine, [drawn.seed, 77 + flanks])
-    rng = np.random.default_rng([drawn.seed, run])
-    lead_rev = float(rng.integers(0, MOST_LEAD_REV))
+    rng, lead_rev = _beginning(drawn, run)
     lead_s = lead_rev * 60.0 / drawn.speed_rpm
     recording = simulate_machine(
         machine,
@@ -82,7 +81,13 @@ def simulate_rig(
 
 def turns_before(drawn: DrawnRig, run: int) -> int:
     """Return the whole turns of the driver that a run's recording leaves out at its beginning."""
-    return int(np.random.default_rng([drawn.seed, run]).integers(0, MOST_LEAD_REV)) if run else 0
+    return _beginning(drawn, run)[1] if run else 0
+
+
+def _beginning(drawn: DrawnRig, run: int) -> tuple[np.random.Generator, int]:
+    """Return a run's generator and the first it draws: whole turns before the recording."""
+    rng = np.random.default_rng([drawn.seed, run])
+    return rng, int(rng.integers(0, MOST_LEAD_REV))
 
 
 def _with_fixed_flanks(machine: Machine, seed: list[int]) -> Machine:

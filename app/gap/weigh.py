@@ -17,7 +17,6 @@ from gearsig.gap.types import NONE, UNKNOWN
 MOST_TRIED, LEAST_TRIED_PROBABILITY = 3, 0.06
 """Effects that are simulated: so many of the likeliest, none less likely than this."""
 
-
 NOT_SEEN = 0.4
 """Probability that an effect is too weak to be seen at one of several conditions."""
 
@@ -97,7 +96,8 @@ def weigh(
     with_reference = all(c.reference is not None for c in conditions)
     first = load_gap_calibration(with_reference=with_reference).probabilities(forest, {})
     likely = [name for name, p in first.items() if name in known and p >= LEAST_TRIED_PROBABILITY][:most_tried]
-    own = [name for name in effects or known if name not in _known_to_forests(conditions)] if most_tried else []
+    heard_of = _known_to_forests(conditions)
+    own = [name for name in effects or known if name not in heard_of] if most_tried else []
     likely += own
     tried = try_effects(likely, twin, conditions, cache, on_progress, fresh=fresh)
     refuse_without_candidates(tried, likely)
@@ -117,12 +117,12 @@ def _forest(
     """
     allowed = {NONE, UNKNOWN, *(effects or known)} & _known_to_forests(conditions)
     joint: dict[str, float] = {}
+    unseen = NOT_SEEN if len(conditions) > 1 else 0.0
     for condition in conditions:
         recogniser = load_recogniser(with_reference=condition.reference is not None)
         load = tooth_load_n_per_mm(condition.now.frame.pair, condition.facts.point.torque_nm)
         found = recogniser.probabilities(condition.change, load)
-        hidden = {name: found[NONE] if len(conditions) > 1 else p for name, p in found.items()}
         for name in allowed:
-            joint[name] = joint.get(name, 1.0) * ((1.0 - NOT_SEEN) * found[name] + NOT_SEEN * hidden[name])
+            joint[name] = joint.get(name, 1.0) * ((1.0 - unseen) * found[name] + unseen * found[NONE])
     total = sum(joint.values())
     return {name: p / total for name, p in joint.items()}

@@ -9,7 +9,7 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.gap.frame import DRIVER
 from gearsig.gap.gathered import Gathered
-from gearsig.gap.gear_lines import N_MESH_HARMONICS, Feature, line_power, visible_orders
+from gearsig.gap.gear_lines import Feature, line_power, mesh_lines, visible_orders
 
 APART = "apart."
 """Of these features; 0 where there is one channel, which no two channels reach."""
@@ -38,7 +38,7 @@ def _mesh_levels(gathered: Gathered) -> FloatArray:
     for sums in gathered.channels.values():
         power = line_power(sums, DRIVER)
         highest = visible_orders(gathered, DRIVER, len(power))
-        rows.append(power[teeth : N_MESH_HARMONICS * teeth + 1 : teeth][: highest // teeth])
+        rows.append(mesh_lines(power, teeth, highest))
     return _decibels(np.array(rows))
 
 

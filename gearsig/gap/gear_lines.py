@@ -76,6 +76,11 @@ def visible_orders(gathered: Gathered, side: int, n_lines: int) -> int:
     return int(min(gathered.highest_order / gathered.frame.shaft_orders[side], n_lines - 1))
 
 
+def mesh_lines(power: FloatArray, teeth: int, highest: int) -> FloatArray:
+    """Return those of the first mesh harmonics that can be seen, of a shaft's lines."""
+    return power[teeth : N_MESH_HARMONICS * teeth + 1 : teeth][: highest // teeth]
+
+
 def line_features(gathered: Gathered, sums: ChannelSums) -> Iterator[Feature]:
     """Yield name and value, in dB, of one channel's mesh, sideband and shaft-order features."""
     total = 0.0
@@ -84,7 +89,7 @@ def line_features(gathered: Gathered, sums: ChannelSums) -> Iterator[Feature]:
         highest = visible_orders(gathered, side, len(power))
         teeth = gathered.frame.teeth[side]
         if side == DRIVER:
-            total = float(power[teeth : N_MESH_HARMONICS * teeth + 1 : teeth][: highest // teeth].sum())
+            total = float(mesh_lines(power, teeth, highest).sum())
             yield from _mesh(power, teeth, highest, total)
         yield from _sidebands(power, teeth, highest, total, SIDES[side])
         yield from _shaft_orders(power, teeth, highest, total, SIDES[side])

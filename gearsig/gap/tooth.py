@@ -12,13 +12,13 @@ from gearsig.checks import FloatArray
 from gearsig.gap.frame import DRIVEN, DRIVER
 from gearsig.gap.gathered import ChannelSums, Gathered
 from gearsig.gap.gear_lines import (
-    N_MESH_HARMONICS,
     NOMINAL_REVOLUTIONS,
     SIDES,
     Feature,
     average_lines,
     decibel,
     line_power,
+    mesh_lines,
     visible_orders,
 )
 from gearsig.severity.shaft_lines import orders_from_mesh
@@ -81,7 +81,7 @@ def mesh_power(gathered: Gathered, channel: ChannelSums, side: int) -> float:
     power = line_power(channel, side)
     teeth = gathered.frame.teeth[side]
     highest = visible_orders(gathered, side, len(power))
-    return float(power[teeth : N_MESH_HARMONICS * teeth + 1 : teeth][: highest // teeth].sum())
+    return float(mesh_lines(power, teeth, highest).sum())
 
 
 def pattern_features(
