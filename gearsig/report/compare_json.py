@@ -26,24 +26,19 @@ records.
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
-from typing import Any
 
 from gearsig import __version__
 from gearsig.compare.types import (
-    Agreement,
     BandLevel,
     ChannelComparison,
     Comparison,
     LevelPair,
     LineLevel,
-    Repeated,
     ShaftComparison,
 )
-from gearsig.report.numbers import rounded
+from gearsig.report.plain import Json, members, plain
 
 SCHEMA, SCHEMA_VERSION = "gearsig.comparison", 1
-Json = dict[str, Any]
 
 
 def comparison_to_json(comparison: Comparison) -> str:
@@ -57,29 +52,18 @@ def comparison_to_dict(comparison: Comparison) -> Json:
         "schema": SCHEMA,
         "schema_version": SCHEMA_VERSION,
         "gearsig_version": __version__,
-        "verdict": comparison.verdict,
-        "findings": list(comparison.findings),
-        "notes": list(comparison.notes),
-        "simulated": _plain(asdict(comparison.simulated)),
-        "recorded": _plain(asdict(comparison.recorded)),
-        "machine": comparison.machine,
-        "reference_shaft": comparison.reference_shaft,
-        "mesh_orders": _plain(comparison.mesh_orders),
-        "highest_order": rounded(comparison.highest_order),
-        "alignments": [_plain(asdict(alignment)) for alignment in comparison.alignments],
+        **members(comparison, "verdict", "findings", "notes"),
+        **members(comparison, "simulated", "recorded", "machine", "reference_shaft", "mesh_orders", "highest_order"),
+        "alignments": plain(comparison.alignments),
         "channels": [_channel(channel) for channel in comparison.channels],
     }
 
 
 def _channel(channel: ChannelComparison) -> Json:
     return {
-        "simulated_name": channel.simulated_name,
-        "recorded_name": channel.recorded_name,
-        "quantity": channel.quantity,
-        "unit": channel.unit,
-        "levels_compare": channel.levels_compare,
+        **members(channel, "simulated_name", "recorded_name", "quantity", "unit", "levels_compare"),
         "overall": _level(channel.overall),
-        "locked": {side: _repeated(getattr(channel.locked, side)) for side in ("simulated", "recorded")},
+        "locked": members(channel.locked, "simulated", "recorded"),
         "lines": [_line(line) for line in channel.lines],
         "other_lines": [_line(line) for line in channel.other_lines],
         "order_bands": [_band(band) for band in channel.order_bands],
@@ -88,60 +72,19 @@ def _channel(channel: ChannelComparison) -> Json:
     }
 
 
-def _level(level: LevelPair) -> Json:
-    return {
-        "simulated_db": rounded(level.simulated_db),
-        "recorded_db": rounded(level.recorded_db),
-        "difference_db": rounded(level.difference_db),
-        "repeatability_db": rounded(level.repeatability_db),
-        "is_beyond": level.is_beyond,
-    }
-
-
 def _line(line: LineLevel) -> Json:
-    return {
-        "label": line.label,
-        "kind": line.kind,
-        "order": rounded(line.order),
-        "shaft": line.shaft,
-        "simulated_is_seen": line.simulated_is_seen,
-        "recorded_is_seen": line.recorded_is_seen,
-    } | _level(line.level)
+    names = ("label", "kind", "order", "shaft", "simulated_is_seen", "recorded_is_seen")
+    return members(line, *names) | _level(line.level)
 
 
 def _band(band: BandLevel) -> Json:
-    place: Json = {"label": band.label, "low": rounded(band.low), "high": rounded(band.high), "axis": band.axis}
-    return place | _level(band.level) | {"agreement": _agreement(band.agreement) if band.agreement else None}
+    return members(band, "label", "low", "high", "axis") | _level(band.level) | members(band, "agreement")
 
 
 def _shaft(shaft: ShaftComparison) -> Json:
-    return {
-        "shaft": shaft.shaft,
-        "n_teeth": shaft.n_teeth,
-        "correlation": _repeated(shaft.correlation),
-        "simulated_reliability": rounded(shaft.simulated_reliability),
-        "recorded_reliability": rounded(shaft.recorded_reliability),
-        "agreement": _agreement(shaft.agreement),
-        "tooth_levels": [_level(level) for level in shaft.tooth_levels],
-    }
+    names = ("shaft", "n_teeth", "correlation", "simulated_reliability", "recorded_reliability", "agreement")
+    return members(shaft, *names) | {"tooth_levels": [_level(level) for level in shaft.tooth_levels]}
 
 
-def _agreement(agreement: Agreement) -> Json:
-    return {
-        "complex_frac": _repeated(agreement.complex_frac),
-        "magnitude_frac": _repeated(agreement.magnitude_frac),
-        "complex_by_chance": rounded(agreement.complex_by_chance),
-        "n_lines": agreement.n_lines,
-    }
-
-
-def _repeated(figure: Repeated) -> Json:
-    return {"value": rounded(figure.value), "repeatability": rounded(figure.repeatability)}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, tuple):
-        return [_plain(item) for item in value]
-    return rounded(value) if isinstance(value, float) else value
+def _level(level: LevelPair) -> Json:
+    return members(level, "simulated_db", "recorded_db", "difference_db", "repeatability_db", "is_beyond")

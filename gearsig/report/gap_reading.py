@@ -27,7 +27,8 @@ from gearsig.gap.types import (
     Shrinkage,
     SpectrumCurves,
 )
-from gearsig.report.gap_json import SCHEMA, SCHEMA_VERSION, Json
+from gearsig.report.gap_json import SCHEMA, SCHEMA_VERSION
+from gearsig.report.plain import Json
 
 
 def read_gap_json(path: str | Path) -> GapReport:

@@ -29,13 +29,7 @@ not defined is null. Members may be added within a version, never renamed or rem
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
-from enum import Enum
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from gearsig import __version__
 from gearsig.angle.types import ShaftAngle
@@ -44,11 +38,11 @@ from gearsig.diagnosis.types import Analysis, CannotTell, ChannelAnalysis
 from gearsig.recording.types import Recording
 from gearsig.report.files import write_text
 from gearsig.report.numbers import rounded
+from gearsig.report.plain import Json, plain
 from gearsig.rig.speed import SpeedSource
 from gearsig.severity.types import CrackEstimate, NoCrackSeen
 
 SCHEMA, SCHEMA_VERSION = "gearsig.analysis", 1
-Json = dict[str, Any]
 
 
 def analysis_to_dict(analysis: Analysis, *, arrays: bool = False) -> Json:
@@ -71,13 +65,13 @@ def analysis_to_dict(analysis: Analysis, *, arrays: bool = False) -> Json:
         "gearsig_version": __version__,
         "outcome": analysis.outcome.value,
         "verdict": analysis.verdict,
-        "findings": [_plain(finding, arrays=False) for finding in analysis.findings],
+        "findings": [plain(finding, arrays=False) for finding in analysis.findings],
         "speed": _speed(analysis.shaft_angle, arrays=arrays),
         "indicators": _indicators(analysis),
         "recording": _recording(analysis.recording),
-        "rig": _plain(analysis.rig, arrays=False),
+        "rig": plain(analysis.rig, arrays=False),
         "channels": [_channel(channel, arrays=arrays) for channel in analysis.channels],
-        "settings": _plain(analysis.settings, arrays=False),
+        "settings": plain(analysis.settings, arrays=False),
         "crack": _crack(analysis.crack),
         "reference": _reference(analysis.reference),
     }
@@ -105,18 +99,18 @@ def _recording(recording: Recording) -> Json:
         "sampling_rate_hz": recording.sampling_rate_hz,
         "n_samples": recording.n_samples,
         "duration_s": rounded(recording.duration_s),
-        "channels": [_plain(channel, arrays=False) for channel in recording.channels],
+        "channels": [plain(channel, arrays=False) for channel in recording.channels],
         "speed_source": _speed_source(recording.speed_source),
     }
 
 
 def _speed_source(source: SpeedSource | None) -> Json | None:
-    return None if source is None else {"kind": type(source).__name__, **_plain(source, arrays=False)}
+    return None if source is None else {"kind": type(source).__name__, **plain(source, arrays=False)}
 
 
 def _speed(angle: ShaftAngle | CannotTell, *, arrays: bool) -> Json:
     if isinstance(angle, CannotTell):
-        return {"known": False, **_plain(angle, arrays=False)}
+        return {"known": False, **plain(angle, arrays=False)}
     lowest, highest = angle.speed_range_rpm
     result = {
         "known": True,
@@ -131,14 +125,14 @@ def _speed(angle: ShaftAngle | CannotTell, *, arrays: bool) -> Json:
         "notes": list(angle.notes),
     }
     if arrays:
-        result |= {name: _plain(getattr(angle, name), arrays=True) for name in ("time_s", "revolutions")}
+        result |= {name: plain(getattr(angle, name), arrays=True) for name in ("time_s", "revolutions")}
     return result
 
 
 def _indicators(analysis: Analysis) -> list[Json]:
     nothing: Json = {"reference_value": None, "change_db": None}
     return [
-        _plain(indicator, arrays=False) | (nothing if change is None else _plain(change, arrays=False))
+        plain(indicator, arrays=False) | (nothing if change is None else plain(change, arrays=False))
         for indicator, change in zip(analysis.indicators, changes(analysis), strict=True)
     ]
 
@@ -147,9 +141,9 @@ def _crack(answer: CrackEstimate | NoCrackSeen | CannotTell | None) -> Json | No
     if answer is None:
         return None
     if isinstance(answer, CannotTell):
-        return {"answer": "cannot tell", **_plain(answer, arrays=False)}
+        return {"answer": "cannot tell", **plain(answer, arrays=False)}
     kind = "crack" if isinstance(answer, CrackEstimate) else "none seen"
-    return {"answer": kind, "text": answer.text, **_plain(answer, arrays=False)}
+    return {"answer": kind, "text": answer.text, **plain(answer, arrays=False)}
 
 
 def _reference(reference: Analysis | None) -> Json | None:
@@ -165,38 +159,11 @@ def _reference(reference: Analysis | None) -> Json | None:
 
 
 def _channel(channel: ChannelAnalysis, *, arrays: bool) -> Json:
-    result: Json = _plain(channel, arrays=arrays)
-    result["averages"] = [_plain(average, arrays=arrays) for average in channel.averages.values()]
+    result: Json = plain(channel, arrays=arrays)
+    result["averages"] = [plain(average, arrays=arrays) for average in channel.averages.values()]
     result["order_levels"] = [
-        _plain(level, arrays=True)
+        plain(level, arrays=True)
         | dict(zip(("largest", "largest_at_rpm", "largest_at_hz"), map(rounded, level.largest), strict=True))
         for level in channel.order_levels
     ]
     return result
-
-
-def _plain(value: Any, *, arrays: bool) -> Any:
-    """Return a value as JSON knows it; arrays as lists, or as their length where they are not asked for."""
-    if isinstance(value, np.ndarray):
-        return _array(value) if arrays else {"shape": list(value.shape)}
-    if is_dataclass(value):
-        return {field.name: _plain(getattr(value, field.name), arrays=arrays) for field in fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item, arrays=arrays) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item, arrays=arrays) for item in value]
-    return _scalar(value)
-
-
-def _scalar(value: Any) -> str | bool | float | None:
-    if isinstance(value, Enum):
-        return str(value.value)
-    if value is None or isinstance(value, (str, bool)):
-        return value
-    return int(value) if isinstance(value, (int, np.integer)) else rounded(value)
-
-
-def _array(values: np.ndarray[Any, np.dtype[Any]]) -> list[Any]:
-    if values.ndim > 1:
-        return [_array(row) for row in values]
-    return [rounded(value) for value in values.tolist()]
