@@ -72,6 +72,7 @@ def start_stop_analysis(
         order,
         verdict_of(order),
         dict(settings),
+        motion=examined,
     )
 
 
@@ -102,9 +103,8 @@ def _not_of_rest(problems: list[Finding], recording: Recording) -> list[Finding]
 def _motion_finding(course: Course) -> Finding:
     top = max((s.top_speed_rad_s for s in course.moving), default=0.0) * 30.0 / np.pi
     title = (
-        f"The machine starts and stops: {len(course.starts_s)} start(s) and {len(course.stops_s)} stop(s), at rest for "
-        f"{100.0 * course.standing_part:.3g} % of the time, {course.n_reversals} change(s) of direction, up to "
-        f"{top:.4g} rpm."
+        f"The machine starts and stops: {course.summary}, at rest for {100.0 * course.standing_part:.3g} % of the "
+        f"time, {course.n_reversals} change(s) of direction, up to {top:.4g} rpm."
     )
     return Finding(
         "start-stop",

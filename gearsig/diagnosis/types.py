@@ -9,6 +9,7 @@ from enum import Enum
 from gearsig.angle.types import ShaftAngle
 from gearsig.checks import FloatArray
 from gearsig.indicators.types import Indicator
+from gearsig.motion.start_stop import StartStop
 from gearsig.orders.types import OrderMap, SynchronousAverage
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
@@ -226,6 +227,8 @@ class Analysis:
         Depth of a root crack; None where nobody asked and none is clear.
     reference : Analysis or None
         Of the recording of the sound machine that was given to compare with.
+    motion : StartStop or None
+        Of a machine that starts and stops, where its teeth could be examined.
     """
 
     recording: Recording
@@ -238,6 +241,7 @@ class Analysis:
     settings: Mapping[str, str | float | int | None] = field(default_factory=dict)
     crack: CrackEstimate | NoCrackSeen | CannotTell | None = None
     reference: Analysis | None = None
+    motion: StartStop | None = None
 
     @property
     def outcome(self) -> Outcome:

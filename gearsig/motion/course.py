@@ -81,6 +81,13 @@ class Course:
         return tuple(b.start_s for a, b in self._pairs() if a.direction and not b.direction)
 
     @property
+    def summary(self) -> str:
+        """Starts and stops in words; a record that begins or ends in motion holds one less of them."""
+        said = f"{_counted(len(self.starts_s), 'start')} and {_counted(len(self.stops_s), 'stop')}"
+        ends = [name for name, at in (("begins", 0), ("ends", -1)) if self.stretches[at].direction]
+        return f"{said} in a record that {' and '.join(ends)} in motion" if ends else said
+
+    @property
     def n_reversals(self) -> int:
         """Changes from one direction to the other, with or without a rest between."""
         return sum(a.direction != b.direction for a, b in pairwise(self.moving))
@@ -99,6 +106,10 @@ class Course:
 
     def _pairs(self) -> list[tuple[Stretch, Stretch]]:
         return list(pairwise(self.stretches))
+
+
+def _counted(n: int, name: str) -> str:
+    return f"{n} {name}" if n == 1 else f"{n} {name}s"
 
 
 def find_course(angle_rad: FloatArray, speed_rad_s: FloatArray, sampling_rate_hz: float) -> Course:

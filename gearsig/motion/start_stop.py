@@ -12,9 +12,9 @@ from gearsig.indicators.types import Indicator
 from gearsig.motion.backlash import BacklashEstimate, estimate_backlash
 from gearsig.motion.course import Course, find_course
 from gearsig.motion.datum import find_datum
-from gearsig.motion.derivatives import local_polynomial
 from gearsig.motion.hysteresis import TorqueTwist, torque_twist
 from gearsig.motion.impacts import Impact, find_impacts
+from gearsig.motion.phases import shaft_speed_rad_s
 from gearsig.motion.tooth_compliance import ToothCompliance, tooth_compliance
 from gearsig.motion.types import PairMotion
 from gearsig.phase.types import PhasePortrait
@@ -50,10 +50,6 @@ class StartStop:
     teeth: ToothCompliance | None
     indicators: tuple[Indicator, ...]
     refusals: tuple[str, ...]
-
-
-SPEED_BANDWIDTH_HZ = 50.0
-"""In which a shaft starts and stops; what is faster is ringing."""
 
 
 def examine_start_stop(motion: PairMotion) -> StartStop:
@@ -93,8 +89,7 @@ def examine_start_stop(motion: PairMotion) -> StartStop:
 
 def course_of_angle(angle_rad: FloatArray, sampling_rate_hz: float) -> Course:
     """Return the stretches of a shaft's angle, its speed derived within 50 Hz."""
-    smoother = local_polynomial(sampling_rate_hz, min(SPEED_BANDWIDTH_HZ, 0.1 * sampling_rate_hz))
-    return find_course(angle_rad, smoother.apply(angle_rad, 1), sampling_rate_hz)
+    return find_course(angle_rad, shaft_speed_rad_s(angle_rad, sampling_rate_hz), sampling_rate_hz)
 
 
 def phase_plane_of_teeth(motion: PairMotion, datum_m: float) -> PhasePortrait:

@@ -43,7 +43,7 @@ Json = dict[str, Any]
 
 def start_stop_text(examined: StartStop) -> str:
     """Return stretches, backlash, the hardest impacts and the indicators, in plain text."""
-    lines = [f"{examined.motion.source or 'recording'}: {len(examined.course.stretches)} stretch(es)", ""]
+    lines = [f"{examined.motion.source or 'recording'}: {examined.course.summary}", ""]
     lines += ["stretch           from s     to s   turned rev   top rpm"]
     for s in examined.course.stretches[:MOST_ROWS]:
         name = {1: "forwards", -1: "backwards", 0: "at rest"}[s.direction]
