@@ -140,11 +140,13 @@ def folds_of(conditions: Sequence[Condition]) -> tuple[list[Fold], str]:
     return [Fold((first,), second, again), Fold((second,), first, again)], OTHER_REVOLUTIONS
 
 
-def _again(condition: Condition, index: int, n: int) -> tuple[Observed, ...]:
-    base = observed(condition, index, n)
-    rows = condition.change.left_out[0] if condition.change.left_out else np.empty((0, n))
-    shift = rows[:, :n] - condition.change.values[:n]
-    return tuple(replace(base, distances=base.distances + row) for row in shift)
+def _again(condition: Condition, index: int, n: int) -> tuple[tuple[Observed, ...], ...]:
+    """Return the condition with each block left out: blocks of the recording, then of what it is compared with."""
+    base, values = observed(condition, index, n), condition.change.values[:n]
+    return tuple(
+        tuple(replace(base, distances=base.distances + row[:n] - values) for row in rows)
+        for rows in condition.change.left_out
+    )
 
 
 def refuse_without_candidates(tried: dict[str, Tried], names: Sequence[str]) -> None:

@@ -14,7 +14,7 @@ from gearsig.gap.simulator import Added
 from gearsig.gap.types import Interval
 
 STEPS = 41
-"""Severities that are tried."""
+"""Severities that are tried, over the whole range and again about the best."""
 
 LEAST_TRIED = 0.3
 """Times the least simulated severity."""
@@ -22,8 +22,8 @@ LEAST_TRIED = 0.3
 LARGEST_DISTANCE = 6.0
 """In floors; what is further from a prediction counts no more: one wild feature must not decide."""
 
-INTERVAL_COST = 1.35
-"""Rise of the cost, in squared standard deviations, that bounds the 90 % interval: half of 1.645²."""
+INTERVAL_COST = 2.71
+"""Rise of the cost, a sum of squared standard deviations, that bounds the 90 % interval: 1.645²."""
 
 FLOOR_IN_DEVIATIONS = 1.96
 """A floor holds 19 of 20: so many standard deviations."""
@@ -161,12 +161,26 @@ def fit_effect(paths: Iterable[EffectPath], observed: Sequence[Observed]) -> Fit
 
 
 def fit_path(path: EffectPath, observed: Sequence[Observed]) -> Fit:
-    """Return the severity with the least cost, with the interval in which the cost rises little."""
-    tried = path.tried()
-    costs = np.array([_cost(path, severity, observed) for severity in tried])
+    """Return the severity with the least cost, with the interval in which the cost rises little.
+
+    The interval ends at the severities that were simulated, though a larger one may fit as well.
+    """
+    coarse = path.tried()
+    low, high = _near_the_best(coarse, _costs(path, coarse, observed))
+    tried = np.geomspace(low, high, STEPS)
+    costs = _costs(path, tried, observed)
     best = int(np.argmin(costs))
-    near = tried[costs <= costs[best] + INTERVAL_COST]
-    return Fit(path, Interval(float(tried[best]), float(near.min()), float(near.max())), float(costs[best]))
+    return Fit(path, Interval(float(tried[best]), *_near_the_best(tried, costs)), float(costs[best]))
+
+
+def _near_the_best(tried: FloatArray, costs: FloatArray) -> tuple[float, float]:
+    """Return the first severities on either side at which the cost has risen by more than `INTERVAL_COST`."""
+    near = np.flatnonzero(costs <= costs.min() + INTERVAL_COST)
+    return float(tried[max(near[0] - 1, 0)]), float(tried[min(near[-1] + 1, len(tried) - 1)])
+
+
+def _costs(path: EffectPath, severities: FloatArray, observed: Sequence[Observed]) -> FloatArray:
+    return np.array([_cost(path, severity, observed) for severity in severities])
 
 
 def _cost(path: EffectPath, severity: float, observed: Sequence[Observed]) -> float:

@@ -14,16 +14,22 @@ from gearsig.gap.types import Interval, Shrinkage
 OWN_FROM = 1.5
 """Floors that an effect must change a feature by for it to be its own."""
 
-_Z = 1.645
-
 
 @dataclass(frozen=True)
 class Fold:
-    """Observations to fit to, and others to score on; `again` are those others with a block of revolutions left out."""
+    """Observations to fit to, and others to score on.
+
+    Parameters
+    ----------
+    fitted : tuple of Observed
+    scored : Observed
+    again : tuple of tuples of Observed
+        `scored` with a block of revolutions left out, each block in turn: of the recording, and of its reference.
+    """
 
     fitted: tuple[Observed, ...]
     scored: Observed
-    again: tuple[Observed, ...] = ()
+    again: tuple[tuple[Observed, ...], ...] = ()
 
 
 def own_features(fit: Fit, observed: Observed) -> FloatArray:
@@ -39,6 +45,8 @@ def shrinkage(paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str)
     shrink = 1 − (r² − n²)/(o² − n²) on the effect's own features: o the gap before, r what is left, n what the floors
     themselves make; the effect's severity and options are fitted to the other part of the data.
 
+    The intervals hold the scatter of what is scored, from its blocks of revolutions; that of the fit is not in them.
+
     Parameters
     ----------
     paths : sequence of EffectPath
@@ -48,19 +56,28 @@ def shrinkage(paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str)
     """
     scores = [_score(paths, fold) for fold in folds]
     before, after, shrink, slope, placebo = np.mean([s[:5] for s in scores], axis=0)
-    errors = np.sqrt(np.mean([s[5] for s in scores], axis=0))
+    wide = _t_quantile(folds) * np.sqrt(np.mean([s[5] for s in scores], axis=0))
     return Shrinkage(
-        _interval(before, errors[0], 0.0),
-        _interval(after, errors[1], 0.0),
-        _interval(shrink, errors[2], -np.inf),
+        _interval(before, wide[0], 0.0, np.inf),
+        _interval(after, wide[1], 0.0, np.inf),
+        _interval(shrink, wide[2], -np.inf, 1.0),
         float(slope),
         float(placebo),
         held_out,
+        n_placebos=max(len(paths) - 1, 0),
     )
 
 
-def _interval(value: float, error: float, least: float) -> Interval:
-    return Interval(float(value), float(max(value - _Z * error, least)), float(value + _Z * error))
+def _interval(value: float, wide: float, least: float, most: float) -> Interval:
+    return Interval(float(value), float(max(value - wide, least)), float(min(value + wide, most)))
+
+
+def _t_quantile(folds: Sequence[Fold]) -> float:
+    """Return what bounds 90 % with as few blocks as there are."""
+    from scipy.special import stdtrit
+
+    n_blocks = min((len(group) for fold in folds for group in fold.again), default=2)
+    return float(stdtrit(max(n_blocks - 1, 1), 0.95))
 
 
 def _score(paths: Sequence[EffectPath], fold: Fold) -> tuple[float, float, float, float, float, FloatArray]:
@@ -70,9 +87,9 @@ def _score(paths: Sequence[EffectPath], fold: Fold) -> tuple[float, float, float
     wrong = [fit_path(path, fold.fitted) for path in paths if path.options != fit.path.options]
     placebos = [_before_and_after(other, fold.scored, used)[2] for other in wrong]
     variance = np.zeros(3)
-    if len(fold.again) > 1:
-        rows = np.array([_before_and_after(fit, one, used) for one in fold.again])
-        variance = (len(rows) - 1.0) * rows.var(axis=0)
+    for group in fold.again:
+        rows = np.array([_before_and_after(fit, one, used) for one in group])
+        variance += (len(rows) - 1.0) * rows.var(axis=0)
     return before, after, shrink, _slope(fit, fold.scored, used), max(placebos, default=0.0), variance
 
 

@@ -102,9 +102,12 @@ class Shrinkage:
     slope : float
         Of the observed change over the predicted one; 1: sign and size are right.
     placebo : float
-        The largest shrink that the same effect gets at a wrong order, gear or tooth, or by other effects' predictions.
+        The largest shrink that the same effect gets in a wrong place: another order, gear, shaft or bearing. 0 where
+        there is no other.
     held_out : str
         What it was scored on: "another operating condition" or "other revolutions of the same recordings".
+    n_placebos : int
+        Wrong places that were tried.
     """
 
     before: Interval
@@ -113,6 +116,7 @@ class Shrinkage:
     slope: float
     placebo: float
     held_out: str
+    n_placebos: int = 1
 
 
 @dataclass(frozen=True)

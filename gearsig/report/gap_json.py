@@ -121,7 +121,7 @@ def _shrinkage(shrinkage: Shrinkage) -> Json:
         "shrink": _interval(shrinkage.shrink, "1"),
         "slope": rounded(shrinkage.slope),
         "placebo_shrink": rounded(shrinkage.placebo),
-        "held_out": shrinkage.held_out,
+        **members(shrinkage, "held_out", "n_placebos"),
     }
 
 

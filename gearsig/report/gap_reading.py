@@ -156,7 +156,7 @@ def _added(found: Json) -> Added:
 def _shrinkage(found: Json) -> Shrinkage:
     before, after, shrink = (_interval(found[key]) for key in ("before", "after", "shrink"))
     slope, placebo = _number(found["slope"]), _number(found["placebo_shrink"])
-    return Shrinkage(before, after, shrink, slope, placebo, found["held_out"])
+    return Shrinkage(before, after, shrink, slope, placebo, found["held_out"], found.get("n_placebos", 1))
 
 
 def _evidence(found: Json) -> Evidence:

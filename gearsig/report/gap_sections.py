@@ -195,13 +195,15 @@ def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
     shrink, wrong = shrinkage.shrink, shrinkage.placebo
     taken, low, high = (percent(x) for x in (shrink.value, shrink.low, shrink.high))
     checked = f"checked on {shrinkage.held_out}"
-    placebo = f"at most {percent(wrong)}" if wrong >= LEAST_SHOWN else "nothing"
+    placebo = f"takes away at most {percent(wrong)}" if wrong >= LEAST_SHOWN else "takes away nothing"
+    if not shrinkage.n_placebos:
+        placebo = "could not be tried, as the machine has no other place for it"
     return (
         f"Gap on its own features: {before} structural floors without it, {after} with it.",
         f"It takes away nothing: with it the gap grows, {checked}."
         if shrink.value < 0.0
         else f"It takes away {taken} ({low} to {high}) of what exceeds the floor, {checked}.",
-        f"In a wrong place (placebo) it takes away {placebo}.",
+        f"In a wrong place (placebo) it {placebo}.",
         f"The observed change is {readable(shrinkage.slope, 2)} times the predicted one; 1 is right.",
     )
 

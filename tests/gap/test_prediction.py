@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from gearsig.gap.prediction import EffectPath, Observed, fit_effect, fit_path, paths_of
+from gearsig.gap.prediction import FLOOR_IN_DEVIATIONS, EffectPath, Observed, fit_effect, fit_path, paths_of
 from gearsig.gap.shrinkage import Fold, shrinkage
 from gearsig.gap.simulator import Added
 
@@ -71,7 +71,7 @@ def test_a_true_effect_shrinks_the_gap_and_its_placebo_does_not() -> None:
     driver, driven = path(gear="driver"), path(SHAPE[[0, 1, 3, 2, 5, 4]], gear="driven")
     rng = np.random.default_rng(1)
     noisy = [seen(driver.at(2.0, 0) + 0.3 * FLOORS * rng.standard_normal(len(NAMES))) for _ in range(3)]
-    result = shrinkage([driver, driven], [Fold((noisy[0],), noisy[1], (noisy[1], noisy[2]))], "other revolutions")
+    result = shrinkage([driver, driven], [Fold((noisy[0],), noisy[1], ((noisy[1], noisy[2]),))], "other revolutions")
     assert result.shrink.value > 0.9
     assert result.slope == pytest.approx(1.0, abs=0.15)
     assert result.placebo < 0.1
@@ -85,3 +85,39 @@ def test_an_effect_that_was_fitted_to_one_condition_and_fails_at_the_other_does_
     result = shrinkage([one], [Fold((seen(one.at(4.0, 0)),), seen(nothing, 1))], "another operating condition")
     assert result.shrink.value <= 0.0
     assert result.slope == pytest.approx(0.0)
+
+
+def test_the_severity_lies_in_its_interval_nine_times_out_of_ten() -> None:
+    """With features of one standard deviation of noise each; the two that change are of different families."""
+    rng = np.random.default_rng(3)
+    n, true = 300, 2.0
+    inside = 0
+    for _ in range(n):
+        noise = FLOORS / FLOOR_IN_DEVIATIONS * rng.standard_normal(len(NAMES))
+        severity = fit_path(path(), [seen(path().at(true, 0) + noise)]).severity
+        inside += severity.low <= true <= severity.high
+    assert inside / n == pytest.approx(0.9, abs=0.045)  # 2.6 standard errors
+
+
+def test_the_reference_s_scatter_widens_the_interval() -> None:
+    rng = np.random.default_rng(4)
+    fitted, truth = path().at(2.0, 0), path().at(4.0, 0)
+
+    def blocks() -> tuple[Observed, ...]:
+        return tuple(seen(truth + 0.2 * FLOORS * rng.standard_normal(len(NAMES))) for _ in range(6))
+
+    recording, reference = blocks(), blocks()
+    narrow, wide = (
+        shrinkage([path()], [Fold((seen(fitted),), seen(truth), again)], "").shrink
+        for again in ((recording,), (recording, reference))
+    )
+    assert wide.value == narrow.value < 1.0
+    assert wide.low < narrow.low
+    assert wide.high <= 1.0
+
+
+def test_an_effect_without_another_place_has_no_placebo() -> None:
+    truth = seen(path().at(2.0, 0))
+    assert shrinkage([path()], [Fold((truth,), truth)], "").n_placebos == 0
+    other = path(SHAPE[[0, 1, 3, 2, 5, 4]], gear="driven")
+    assert shrinkage([path(gear="driver"), other], [Fold((truth,), truth)], "").n_placebos == 1
