@@ -164,7 +164,7 @@ def _jobs(
         # Files of the same name are told apart by their folders.
         _Job(
             file,
-            file.name if names.count(file.name) == 1 else str(file),
+            file.name if file.name and names.count(file.name) == 1 else str(file),
             folder / f"{page}.html",
             rig,
             sampling_rate_hz,

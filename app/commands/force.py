@@ -10,6 +10,7 @@ import typer
 from app.commands.motion import BandwidthOption, UnwrapOption, UseOption, open_motion, read_bandwidth, read_uses
 from app.commands.options import RigOption, SamplingRateOption, open_rig
 from app.quantities import quantity
+from gearsig.errors import InputError
 
 if TYPE_CHECKING:
     from gearsig.motion.noise_study import NoiseStudy
@@ -83,7 +84,12 @@ def force(
 
 def read_datum(text: str) -> str | float:
     """Return "auto", "zero" or a length in m."""
-    return text if text in ("auto", "zero") else quantity(text, "um", "--datum") * 1e-6
+    if text in ("auto", "zero"):
+        return text
+    try:
+        return quantity(text, "um", "--datum") * 1e-6
+    except InputError as error:
+        raise InputError(error.what, allowed="auto, zero, or a length, e.g. 12um") from None
 
 
 def write_force(estimate: ForceEstimate, study: NoiseStudy | None, folder: Path) -> tuple[str, ...]:

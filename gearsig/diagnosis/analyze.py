@@ -92,6 +92,7 @@ def analyze(
     unsteady = start_stop_analysis(recording, known, findings, asdict(settings))
     if unsteady is not None:
         return unsteady
+    _check_vibration(recording)
     angle = _angle_of(recording, known)
     findings.append(speed_finding(angle))
     if not names:
@@ -191,11 +192,14 @@ def _check_size(recording: Recording) -> None:
         raise InputError(
             "samples are too large", where=where, allowed=allowed, remedy="check the file's format and unit"
         )
+
+
+def _check_vibration(recording: Recording) -> None:
     if not recording.vibration_names():
         quantities = ", ".join(sorted({c.quantity for c in recording.channels}))
         raise InputError(
             f"there is no vibration channel (only {quantities})",
-            where=where,
+            where=recording.provenance.source or "recording",
             remedy="name the channel's quantity with a [[sensor]] in the rig file",
         )
 

@@ -44,7 +44,7 @@ def start_stop_analysis(
     course, angle_rad = found
     source = recording.speed_source or rig.speed
     if isinstance(source, EncoderChannel):  # what seems to turn back may be an encoder that wraps
-        check_wrap(angle_rad, recording.sampling_rate_hz, source.channel)
+        check_wrap(angle_rad, recording.sampling_rate_hz, source.channel, recording.provenance.source)
     findings = [*_not_of_rest(problems, recording), _motion_finding(course), _left_out(course)]
     examined: StartStop | None = None
     if rig.contact is None:

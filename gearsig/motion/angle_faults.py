@@ -19,22 +19,22 @@ NEARLY = 0.1
 """Of a revolution, by which a step may differ from a whole one that is an encoder's new beginning."""
 
 
-def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str) -> None:
+def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where: str = "") -> None:
     """Raise where an angle that should run on does not.
 
     Parameters
     ----------
     angle_rad : array, (n,)
     sampling_rate_hz : float
-    name : str
-        Of the channel, for the error.
+    name, where : str
+        Of the channel and of its recording, for the error.
 
     Raises
     ------
     InputError
         At the first step by nearly a whole revolution (an encoder that wraps), or at a jump.
     """
-    check_wrap(angle_rad, sampling_rate_hz, name)
+    check_wrap(angle_rad, sampling_rate_hz, name, where)
     steps, beyond = _steps(angle_rad)
     moving = np.abs(steps[steps != 0.0])
     quantum = float(moving.min()) if len(moving) else 0.0
@@ -45,20 +45,21 @@ def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str) -> No
         raise InputError(
             f"channel {name!r} jumps by {abs(steps[i]):.4g} rad {_when(i, sampling_rate_hz)} "
             f"({len(found)} such jump(s))",
+            where=where,
             allowed="an angle that runs on",
             remedy="cut the recording there; lost counts make all later forces wrong",
         )
 
 
-def check_wrap(angle_rad: FloatArray, sampling_rate_hz: float, name: str) -> None:
+def check_wrap(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where: str = "") -> None:
     """Raise where an angle steps by nearly a whole revolution: an encoder that starts again after each.
 
     Parameters
     ----------
     angle_rad : array, (n,)
     sampling_rate_hz : float
-    name : str
-        Of the channel, for the error.
+    name, where : str
+        Of the channel and of its recording, for the error.
 
     Raises
     ------
@@ -66,7 +67,7 @@ def check_wrap(angle_rad: FloatArray, sampling_rate_hz: float, name: str) -> Non
         At the first such step, or if there are fewer than 4 samples.
     """
     if len(angle_rad) < 4:
-        raise InputError(f"channel {name!r} has {len(angle_rad)} samples", allowed="at least 4")
+        raise InputError(f"channel {name!r} has {len(angle_rad)} samples", where=where, allowed="at least 4")
     turns = _steps(angle_rad)[1] / (2.0 * pi)
     found = np.flatnonzero(np.abs(turns - 1.0) < NEARLY)
     if len(found):
@@ -74,8 +75,10 @@ def check_wrap(angle_rad: FloatArray, sampling_rate_hz: float, name: str) -> Non
         raise InputError(
             f"channel {name!r} steps by {turns[i]:.3g} revolutions {_when(i, sampling_rate_hz)}: the encoder starts "
             "again after each revolution",
+            where=where,
             allowed="an angle that runs on",
-            remedy="give --unwrap, or wraps = true in the rig's [speed] table for that channel",
+            remedy=f"give wraps = true in the rig file, in [speed] or in the [[sensor]] table of {name!r} (force, "
+            "start-stop and identify also take --unwrap)",
         )
 
 

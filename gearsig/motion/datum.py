@@ -57,7 +57,7 @@ def _from_torque(motion: PairMotion) -> Datum:
     if np.count_nonzero(loaded) < LEAST_SAMPLES or not np.any(force):
         raise RefusalError(
             f"{np.count_nonzero(loaded)} samples carry a load: the zero of the compression cannot be found",
-            remedy="record while the machine drives, or give --datum",
+            remedy="record while the machine drives, or tell the zero to gearsig force by --datum",
         )
     a = motion.contact.half_backlash_um * 1e-6
     zero = (motion.compression_m - np.sign(force) * a - elastic_depth(motion, force))[loaded]
@@ -73,7 +73,8 @@ def _between_flanks(motion: PairMotion) -> Datum:
         raise RefusalError(
             f"there is no torque, and the distance between the flanks spans {1e6 * (high - low):.4g} µm where the "
             f"backlash is {1e6 * play:.4g} µm: which flank touches cannot be told",
-            remedy="record the torque, or a start and stop that touches both flanks, or give --datum",
+            remedy="record the torque, or a start and stop that touches both flanks, or tell the zero to gearsig force "
+            "by --datum",
         )
     return Datum(
         float(low + high) / 2.0,

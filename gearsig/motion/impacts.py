@@ -100,7 +100,7 @@ def find_impacts(
     if noise > 0.5 * a:
         raise RefusalError(
             f"the compression scatters by {1e6 * noise:.3g} µm in a play of {2e6 * a:.3g} µm: flights cannot be seen",
-            remedy="encoders of more counts, or --bandwidth where the motion is slow",
+            remedy="encoders of more counts; where the motion is slow, --bandwidth of gearsig start-stop",
         )
     g = depth(q, a)
     slowest = 5.0 * scatter_of(rate) if least_speed_mps is None else least_speed_mps

@@ -110,7 +110,7 @@ class _Reader:
             if self.unwrap or self._wraps(name):
                 values = np.unwrap(values)
                 self.notes.append(f"channel {name!r} was unwrapped")
-            check_angle(values, self.recording.sampling_rate_hz, name)
+            check_angle(values, self.recording.sampling_rate_hz, name, self.recording.provenance.source)
         self.methods[role] = f"channel {name!r}" + (f", {self.smoother.text}" if self.smooths else "")
         return self.smoother.apply(values) if self.smooths else values
 
@@ -120,7 +120,8 @@ class _Reader:
         if angle_role not in self.roles and speed_role not in self.roles:
             raise RefusalError(
                 f"neither angle nor speed of the {side} gear was measured: how far the flanks are apart is not known",
-                remedy=f'name the channel, e.g. --use "{angle_role}=CHANNEL"; an acceleration alone drifts away',
+                remedy=f'name the channel, e.g. --use "{angle_role}=CHANNEL", or give it quantity = "angle" and the '
+                "shaft's name as position in its [[sensor]] table; an acceleration alone drifts away",
             )
         speed = self.measured(speed_role) if speed_role in self.roles else None
         if angle_role in self.roles:
@@ -150,7 +151,9 @@ class _Reader:
 
     def _wraps(self, name: str) -> bool:
         sources = (self.recording.speed, self.rig.speed)
-        return any(isinstance(s, EncoderChannel) and s.channel == name and s.wraps for s in sources)
+        return any(isinstance(s, EncoderChannel) and s.channel == name and s.wraps for s in sources) or any(
+            sensor.channel == name and sensor.wraps for sensor in self.rig.sensors
+        )
 
 
 def _check_ratio(driver_rad: FloatArray, driven_rad: FloatArray, path: PathOfContact, where: str) -> None:

@@ -64,7 +64,7 @@ def find_roles(recording: Recording, pair: GearPair, given: Mapping[str, str] | 
             raise InputError(
                 f"channels {', '.join(map(repr, fitting))} may all be the {role}",
                 where=recording.provenance.source or "recording",
-                remedy=f'say which, e.g. --use "{role}={fitting[0]}"',
+                remedy=f'say which, e.g. --use "{role}={fitting[0]}", or give positions in their [[sensor]] tables',
             )
         if role not in chosen and fitting:
             chosen[role] = fitting[0]

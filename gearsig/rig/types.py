@@ -171,7 +171,10 @@ class Bearing:
 
 @dataclass(frozen=True)
 class Sensor:
-    """What a channel of the recordings measures: value = number in the file × scale + offset."""
+    """What a channel of the recordings measures: value = number in the file × scale + offset.
+
+    `wraps` says that an angle starts again after each revolution.
+    """
 
     channel: str
     quantity: str = ""
@@ -179,6 +182,7 @@ class Sensor:
     position: str = ""
     scale: float = 1.0
     offset: float = 0.0
+    wraps: bool = False
 
     def __post_init__(self) -> None:
         if self.quantity:

@@ -1,0 +1,122 @@
+"""Every bad input of a start–stop recording, by every command that reads one: one line, exit 2, nothing written."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearsig.motion.measure import measure_motion
+from gearsig.recording.write import write_recording
+from gearsig.rig.toml import read_rig, write_rig
+from tests.app.test_cli import run
+from tests.motion.recordings import changed, start_stop, without
+
+RECORDING = start_stop()
+JUMP = np.where(np.arange(RECORDING.n_samples) < 2700, 0.0, 0.5)
+WRAPPED = np.mod(RECORDING.values("wheel angle") + 6.2, 2.0 * np.pi)
+COMMANDS = ("force", "start-stop", "identify")
+OUTPUT = {"force": "out", "start-stop": "out", "identify": "out.toml"}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """The rig, the angle that jumps, the encoder that wraps, and the torque without times."""
+    assert RECORDING.rig is not None
+    write_rig(RECORDING.rig, tmp_path / "rig.toml")
+    write_recording(changed(RECORDING, "wheel angle", RECORDING.values("wheel angle") + JUMP), tmp_path / "jump.h5")
+    write_recording(changed(RECORDING, "wheel angle", WRAPPED), tmp_path / "wrap.h5")
+    write_recording(RECORDING, tmp_path / "good.h5")
+    np.savetxt(tmp_path / "torque.csv", RECORDING.values("torque")[:500], header="torque", comments="")
+    return tmp_path
+
+
+def changed_rig(folder: Path, old: str, new: str) -> Path:
+    text = (folder / "rig.toml").read_text()
+    assert old in text
+    (folder / "bad.toml").write_text(text.replace(old, new))
+    return folder / "bad.toml"
+
+
+def refused(capsys: pytest.CaptureFixture[str], folder: Path, command: str, file: str, rig: Path | None = None) -> str:
+    before = sorted(folder.rglob("*"))
+    output = () if command == "analyze" else ("-o", folder / OUTPUT[command])
+    code, out, err = run(capsys, command, folder / file, "--rig", rig or folder / "rig.toml", *output)
+    assert (code, out) == (2, "")
+    assert len(err.strip().splitlines()) == 1
+    assert sorted(folder.rglob("*")) == before
+    return err
+
+
+def options_of(capsys: pytest.CaptureFixture[str], command: str) -> set[str]:
+    return set(re.findall(r"--[a-z-]+", run(capsys, command, "--help")[1]))
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_angles_that_jump_or_wrap(capsys: pytest.CaptureFixture[str], folder: Path, command: str) -> None:
+    jump = refused(capsys, folder, command, "jump.h5")
+    assert "jump.h5: channel 'wheel angle' jumps by 0.5" in jump
+    assert "from 2.699 to 2.7 s" in jump
+    wrap = refused(capsys, folder, command, "wrap.h5")
+    assert "wrap.h5: channel 'wheel angle' steps by 1 revolutions" in wrap
+    assert set(re.findall(r"--[a-z-]+", wrap)) <= options_of(capsys, command)
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, "analyze"])
+def test_torque_without_a_time_base(capsys: pytest.CaptureFixture[str], folder: Path, command: str) -> None:
+    err = refused(capsys, folder, command, "torque.csv")
+    assert "torque.csv: states no sampling rate" in err
+    assert "--fs" in err
+    assert "--fs" in options_of(capsys, command)
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, "analyze"])
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ("driver_inertia_kg_m2 = 0.01", "driver_inertia_kg_m2 = -0.01", "driver_inertia_kg_m2 is -0.01"),
+        ("half_backlash_um = 150.0", "half_backlash_um = 150.0\nrestitution = 1.2", "restitution is 1.2"),
+    ],
+)
+def test_impossible_contacts(
+    capsys: pytest.CaptureFixture[str], folder: Path, command: str, old: str, new: str, named: str
+) -> None:
+    err = refused(capsys, folder, command, "good.h5", changed_rig(folder, old, new))
+    assert f"bad.toml: [contact]: {named}" in err
+    assert "allowed" in err
+
+
+def test_analysis_says_what_it_cannot_examine_and_names_a_remedy_it_has(
+    capsys: pytest.CaptureFixture[str], folder: Path
+) -> None:
+    """An angle that jumps or wraps does not stop the examination of the other channels; the remedy is the rig file."""
+    for file, named in (("jump.h5", "jumps by 0.5"), ("wrap.h5", "wraps = true")):
+        code, out, _ = run(capsys, "analyze", folder / file, "--rig", folder / "rig.toml")
+        assert code == 0
+        text = " ".join(out.split())
+        assert "Backlash and impacts cannot be told." in text
+        assert named in text
+
+
+def test_the_remedy_for_an_encoder_that_wraps_works(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    rig = changed_rig(folder, 'channel = "wheel angle"', 'channel = "wheel angle"\nwraps = true')
+    for command in ("force", "start-stop", "analyze"):
+        code, out, _ = run(capsys, command, folder / "wrap.h5", "--rig", rig)
+        assert code == 0
+        assert "cannot be told" not in " ".join(out.split())
+    wrapped = replace(changed(RECORDING, "wheel angle", WRAPPED), rig=None)
+    plain = measure_motion(RECORDING).driven_angle_rad
+    assert measure_motion(wrapped, read_rig(rig)).driven_angle_rad - plain == pytest.approx(
+        np.full(len(plain), 6.2), abs=1e-9
+    )
+
+
+def test_motion_alone_is_examined_as_far_as_it_goes(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    """No vibration, no torque: starts, stops, impacts and lost motion still show."""
+    alone = without(RECORDING, *(n for n in RECORDING.channel_names if "angle" not in n))
+    write_recording(alone, folder / "motion.h5")
+    code, out, _ = run(capsys, "analyze", folder / "motion.h5", "--rig", folder / "rig.toml")
+    assert code == 0
+    assert "1 start and 2 stops" in " ".join(out.split())
+    assert "The lost motion" in out
