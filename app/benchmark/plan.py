@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from app.benchmark.shares import SHARES
-from gearsig.checks import count, one_of
+from gearsig.checks import count, one_of, within
 from sims.blind import CATALOGUE, OUTSIDE, ROLES
 
 REFERENCES = ("both", "with", "without")
@@ -62,6 +62,9 @@ class Plan:
         Whether the same cases are made by the diagnosing simulator too, but for the unknown, which it cannot make.
     longest_s : float or None
         Recordings are cut to this; None: 4 to 8 s as drawn.
+    least_level : float
+        0 (barely noticeable) to 1 (strong), from which the levels of effects go up to 1; above 0 more cases are as
+        strong as the targets ask, which one in thirty is otherwise.
     """
 
     n_cases: int = 200
@@ -70,11 +73,13 @@ class Plan:
     reference: str = "both"
     same_simulator: bool = False
     longest_s: float | None = None
+    least_level: float = 0.0
 
     def __post_init__(self) -> None:
         count(self.n_cases, "cases")
         one_of(self.role, "role", ROLES)
         one_of(self.reference, "reference", REFERENCES)
+        within(self.least_level, "least level", 0, 1)
 
     def definition(self) -> dict[str, Any]:
         """What decides the cases, as plain values."""
@@ -85,6 +90,7 @@ class Plan:
             "reference": self.reference,
             "same_simulator": self.same_simulator,
             "longest_s": self.longest_s,
+            "least_level": self.least_level,
         }
 
     def cases(self) -> list[PlannedCase]:
@@ -132,4 +138,4 @@ def _of_kind(
         for level in (rng.permutation(k) + rng.random(k)) / k:
             turn = (turn + 1) % 4
             reference = turn % 2 == 0 if plan.reference == "both" else plan.reference == "with"
-            yield kind, effect, float(level), reference, 1 + turn // 2
+            yield kind, effect, plan.least_level + (1.0 - plan.least_level) * float(level), reference, 1 + turn // 2

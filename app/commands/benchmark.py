@@ -51,6 +51,10 @@ def gap(
     longest: Annotated[
         float | None, typer.Option("--longest", metavar="SECONDS", help="Cut recordings to this; default 4 to 8 s.")
     ] = None,
+    least_level: Annotated[
+        float,
+        typer.Option("--least-level", help="0 to 1: levels of effects go from here to 1 (strong); default 0: all."),
+    ] = 0.0,
     processes: Annotated[int, typer.Option("--processes", "-j", help="Cases at a time.")] = 2,
 ) -> None:
     """Make blind cases, diagnose each in a process that cannot know its cause, score the answers.
@@ -68,7 +72,7 @@ def gap(
 
     wished = "both" if reference is None else "with" if reference else "without"
     names = tuple(dict.fromkeys([*(diagnosers or [GAP]), *BASELINES]))
-    wanted = Wanted(Plan(cases, seed, role, wished, same_simulator, longest), names)
+    wanted = Wanted(Plan(cases, seed, role, wished, same_simulator, longest, least_level), names)
     done = _run(wanted, output, processes)
     page = write_results(judge(wanted, done), done, output, " ".join(["gearsig", *sys.argv[1:]]))
     typer.echo((output / TABLE).read_text(encoding="utf-8"))

@@ -181,6 +181,16 @@ def test_the_plan_is_balanced_and_repeats():
     assert not any(c.with_reference for c in Plan(20, reference="without").cases())
 
 
+def test_cases_can_be_strong_ones_only():
+    strong = Plan(200, 3, least_level=0.75)
+    levels = [c.level for c in strong.cases()]
+    assert min(levels) >= 0.75
+    assert max(levels) <= 1.0
+    assert [0.75 + 0.25 * c.level for c in Plan(200, 3).cases()] == pytest.approx(levels)
+    with pytest.raises(InputError, match="least level"):
+        Plan(200, 3, least_level=1.5)
+
+
 def test_the_same_simulator_repeats_all_but_the_unknown():
     cases = Plan(40, same_simulator=True).cases()
     blind, same = ([c for c in cases if c.source == source] for source in (BLIND, SAME))
