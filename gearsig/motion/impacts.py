@@ -107,7 +107,7 @@ def find_impacts(
     flights = _Flights(motion, q, a, (noise, scatter_of(rate)))
     runs = _runs(np.where(np.abs(g) > 0.0, np.sign(g), 0.0).astype(np.int64), g, NOISE_DEPTH * noise)
     found = []
-    for before, this, after in zip(runs[:-1], runs[1:], [*runs[2:], None], strict=True):
+    for before, this, after in zip(runs[:-1], runs[1:], [*runs[2:], None][: len(runs) - 1], strict=True):
         if this[0] == 0 or before[0] != 0 or before[2] - before[1] < LEAST_FLIGHT_SAMPLES:
             continue
         impact = _impact(motion, flights, g, before, this, after)
