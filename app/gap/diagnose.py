@@ -14,7 +14,8 @@ from app.gap.next_recording import next_recordings
 from app.gap.placing import at_its_tooth, place_of
 from app.gap.prepare import Stage, conditions_of
 from app.gap.rig_data import is_gearless
-from app.gap.unexplained import unexplained
+from app.gap.standing_places import standing_place
+from app.gap.unexplained import stood_out
 from app.gap.weigh import weigh
 from gearsig.checks import closest_match_hint
 from gearsig.errors import InputError, RefusalError
@@ -24,6 +25,7 @@ from gearsig.gap.floors import gap_size
 from gearsig.gap.places import gap_places
 from gearsig.gap.population import load_population
 from gearsig.gap.posterior import is_calibrated
+from gearsig.gap.ranking import ranked_places
 from gearsig.gap.simulator import Added, GapEffect, GapSimulator, Twin
 from gearsig.gap.types import (
     NONE,
@@ -130,13 +132,14 @@ def diagnose_gap(
     outcome = weighed.calibration.outcome(probabilities)
     tell("placing it", 0.82)
     clearest = max(conditions, key=_size)
-    places = _places(clearest)
+    k = conditions.index(clearest)
+    standing, remarks = stood_out(recordings[k], own_rigs[k], references, other_rigs, clearest.facts.name)
+    notices += remarks
+    places = ranked_places(_places(clearest), [standing_place(one, own_rigs[k]) for one in standing])
     causes = tuple(_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items())
     causes = _in_order(causes, outcome)
     fitted = causes[0].fitted if outcome is GapOutcome.EFFECT else None
     after = None if fitted is None else simulated(twin, clearest.facts, clearest.now, (fitted,))
-    k = conditions.index(clearest)
-    notices += unexplained(recordings[k], own_rigs[k], references, other_rigs, clearest.facts.name)
     tell("looking for what would tell more", 0.88)
     pair = _rivals(causes)
     size = gap_size(clearest.change, clearest.floor)

@@ -8,26 +8,23 @@ import numpy as np
 
 from app.gap.gearless_causes import causes_of
 from app.gap.prepare import Stage
-from app.gap.standing_out import LINE, PARTS, RACES, Examined, Standing, analysed, bearings_text, examined, surest
+from app.gap.standing_out import LINE, PARTS, RACES, Examined, Standing, analysed, examined, surest
+from app.gap.standing_places import NAN, standing_place
 from gearsig.diagnosis.types import Kind
 from gearsig.gap.simulator import GapEffect, Point
-from gearsig.gap.spots import band_words, hertz
+from gearsig.gap.spots import band_words
 from gearsig.gap.types import (
     ConditionFacts,
-    GapPlace,
     GapReport,
     Interval,
-    PlaceKind,
     SpectrumCurves,
     group_probabilities,
 )
 from gearsig.recording.types import Recording
-from gearsig.report.gap_sections import signed
 from gearsig.report.sections import named
 from gearsig.rig.types import Rig
 from gearsig.spectra.floor import noise_floor
 
-NAN = float("nan")
 NOT_SIMULATED = (
     "The rig has no gear pair, so that no simulator could be set to it: nothing was simulated, and no effect of gears "
     "is weighed. How large the gap is, how severe its cause and how far it shrinks cannot be told; there is no twin. "
@@ -92,7 +89,7 @@ def diagnose_gearless(
         outcome=outcome,
         size=Interval(NAN, NAN, NAN),
         repeatability=NAN,
-        places=tuple(_place(one, rigs[0], name=one.recording if len(every) > 1 else "") for one in standing),
+        places=tuple(standing_place(one, rigs[0], name=one.recording if len(every) > 1 else "") for one in standing),
         causes=causes,
         groups=group_probabilities(causes),
         spectra=_spectra(standing, every),
@@ -133,38 +130,6 @@ def _facts(one: Examined, rig: Rig) -> ConditionFacts:
         recording.duration_s,
         recording.sampling_rate_hz,
     )
-
-
-def _place(one: Standing, rig: Rig, *, name: str) -> GapPlace:
-    """Return the place of what stands out; `name` is the recording's where there are several."""
-    where = one.finding.where
-    order, frequency = where.order or NAN, where.frequency_hz or NAN
-    over = f"{one.over_floor_db:.0f} dB over their floor" + (
-        f" in {band_words(where.band_hz)}" if where.band_hz else ""
-    )
-    since = "" if one.rise_db is None else f", {signed(one.rise_db)} dB over the reference"
-    seen = f", in {name}" if name else ""
-    return GapPlace(
-        PlaceKind.LINE if one.finding.code == LINE else PlaceKind.ENVELOPE,
-        f"{_what(one, rig)} (order {order:.4g}, {hertz(frequency)}), {over}{since}{seen}",
-        one.over_floor_db if one.rise_db is None else one.rise_db,
-        repeatability=NAN,
-        structural=NAN,
-        share=NAN,
-        shaft=where.shaft,
-        orders=(order,),
-        band_hz=where.band_hz,
-        channel=where.channels[0] if where.channels else "",
-    )
-
-
-def _what(one: Standing, rig: Rig) -> str:
-    code = one.finding.code
-    if code in PARTS:
-        return f"envelope lines of the {PARTS[code][0]} of {bearings_text(one.finding, rig)}"
-    if code == LINE:
-        return "the strongest line of no known shaft or bearing"
-    return "envelope lines of impacts that no shaft and no bearing explains"
 
 
 def _spectra(standing: Sequence[Standing], every: Sequence[Examined]) -> tuple[SpectrumCurves, ...]:

@@ -1,10 +1,10 @@
-"""What stands out of a recording of gears and belongs to no gear, shaft or known bearing, found by the analysis."""
+"""What stands out of a recording of gears by itself, found by the analysis: impacts, and lines of nothing known."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from app.gap.standing_out import IMPACTS, LINE, carrying, examined
+from app.gap.standing_out import LINE, Standing, carrying, examined
 from gearsig.angle.types import ShaftAngle
 from gearsig.diagnosis.analyze import analyze
 from gearsig.diagnosis.speed import determine_angle
@@ -13,29 +13,27 @@ from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 
 
-def unexplained(
+def stood_out(
     recording: Recording, rig: Rig, references: Sequence[Recording], reference_rigs: Sequence[Rig], name: str
-) -> tuple[str, ...]:
-    """Say which families of impacts and lines, beyond the reference's, neither the gear model nor an effect has.
+) -> tuple[list[Standing], list[str]]:
+    """Return the families of impacts, beyond the reference's, that no shaft repeats, surest first; and remarks.
 
     The catalogue's effects are compared by features of known places; a strange family is one feature among a hundred
-    there and easily lost. The analysis looks for it by itself. If the reference at the recording's speed shows a fault,
-    that is said, too.
+    there and easily lost. The analysis looks for it by itself. A strange line and a fault of the reference are remarks.
     """
     now = _analysed(recording, rig)
     if now is None:
-        return ()
+        return [], []
     nearest = _nearest(now[1].mean_speed_rpm, references, reference_rigs)
     healthy = None if nearest is None else _analysed(*nearest)
     found = examined(name, now, [healthy] if healthy is not None else [])
-    return (
-        *([] if healthy is None else _fault_of_reference(healthy[0], name)),
-        *(
-            f"Not explained by the gear model, in {name}: {standing.finding.title.rstrip('.')}."
-            for standing in found.standing
-            if standing.finding.code in (*IMPACTS, LINE)
-        ),
-    )
+    remarks = [] if healthy is None else _fault_of_reference(healthy[0], name)
+    remarks += [
+        f"Not explained by the gear model, in {name}: {standing.finding.title.rstrip('.')}."
+        for standing in found.standing
+        if standing.finding.code == LINE
+    ]
+    return [standing for standing in found.standing if standing.finding.code != LINE], remarks
 
 
 def _fault_of_reference(analysis: Analysis, name: str) -> list[str]:

@@ -15,6 +15,7 @@ from gearsig.gap.features import Features
 from gearsig.gap.floors import REPEATABLE, StructuralFloor, family_size, pooled_scatter
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.gear_lines import SIDES
+from gearsig.gap.ranking import ranked_places
 from gearsig.gap.relative import beyond_the_mesh
 from gearsig.gap.spots import Comparison, Spot
 from gearsig.gap.spots_cyclic import envelope_spot, line_spot
@@ -37,7 +38,7 @@ def gap_places(
     is_reference: bool,
     change: Features | None = None,
 ) -> tuple[GapPlace, ...]:
-    """Return where a recording differs, largest share first.
+    """Return where a recording differs, largest share first; last what only follows from other places.
 
     A place is a family of features; its size s_f is their mean of high order over the floors, and its share
     max(s_f² − 1, 0)/Σ max(s² − 1, 0): what does not exceed the larger floor has none. Shares add up to less than 1
@@ -77,7 +78,7 @@ def gap_places(
         if spot is not None:
             sizes = [family_size(distances[members[family]] / floor[members[family]]) for floor in floors]
             found.append(_place(family, spot, (sizes[0], sizes[1]), energy / total, now))
-    return tuple(sorted(_merged(found), key=lambda place: -place.share))
+    return ranked_places(_merged(found))
 
 
 def _merged(places: list[GapPlace]) -> list[GapPlace]:
@@ -130,4 +131,5 @@ def _place(family: Family, spot: Spot, sizes: tuple[float, float], share: float,
         angle_deg=spot.angle_deg,
         tooth=spot.tooth,
         channel=spot.channel,
+        follows=spot.follows,
     )

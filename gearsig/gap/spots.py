@@ -40,7 +40,8 @@ class Comparison:
 class Spot:
     """What `GapPlace` says of where; its sizes are added later.
 
-    `kind` is given where the place turns out to be of another kind than the features that led to it.
+    `kind` is given where the place turns out to be of another kind than the features that led to it; `follows` where
+    it only follows from what other places say.
     """
 
     title: str
@@ -51,6 +52,7 @@ class Spot:
     tooth: int | None = None
     channel: str = ""
     kind: PlaceKind | None = None
+    follows: bool = False
 
 
 def shaft_words(frame: GearFrame, side: int) -> str:

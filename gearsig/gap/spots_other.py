@@ -24,7 +24,8 @@ def band_spot(comparison: Comparison) -> Spot:
         return tone
     what = "noise" if kind == "band" else "kurtosis of the noise"
     title = f"{what} between {band_words(band).replace(' to ', ' and ')}, {by_decibels(change)}"
-    return Spot(title, change, band_hz=band, channel=_loudest(comparison, int(number) - 1, kurtosis=kind != "band"))
+    channel = _loudest(comparison, int(number) - 1, kurtosis=kind != "band")
+    return Spot(title, change, band_hz=band, channel=channel, follows=kind != "band")
 
 
 def _loudest(comparison: Comparison, band: int, *, kurtosis: bool) -> str:
@@ -60,6 +61,7 @@ def tail_spot(comparison: Comparison) -> Spot:
         piled = float(comparison.now.channels[channel].tail[:, 2].mean()) > PILED_UP
         clipping = ", as clipping makes them" if change > 0 and piled else ""
         title = f"samples close to the largest amplitude{clipping}, {by_decibels(change)}"
-        return Spot(title, change, channel=channel)
+        return Spot(title, change, channel=channel, follows=not clipping)
     tails = "heavier" if change > 0 else "lighter"
-    return Spot(f"{tails} tails of the amplitudes (kurtosis {by_decibels(change)})", change, channel=channel)
+    title = f"{tails} tails of the amplitudes (kurtosis {by_decibels(change)})"
+    return Spot(title, change, channel=channel, follows=True)

@@ -117,4 +117,5 @@ def _all_round(comparison: Comparison, side: int, shaft: str, channel: str) -> S
         f"shape of the teeth's pattern of {shaft}, no tooth in particular",
         comparison.change_db[strongest],
         channel=channel,
+        follows=True,
     )

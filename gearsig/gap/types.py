@@ -64,6 +64,8 @@ class GapPlace:
         From 1 at the mark; None where there is no mark.
     channel : str
         Where it is strongest; empty: on all.
+    follows : bool
+        Whether it only follows from what other places say, and tells nobody where to look.
     """
 
     kind: PlaceKind
@@ -78,6 +80,7 @@ class GapPlace:
     angle_deg: float | None = None
     tooth: int | None = None
     channel: str = ""
+    follows: bool = False
 
 
 @dataclass(frozen=True)
@@ -309,7 +312,7 @@ class GapReport:
     repeatability : float
         The same in repeatability floors.
     places : tuple of GapPlace
-        Largest share first.
+        See `gearsig.gap.ranking`.
     causes : tuple of GapCause
         Likeliest first; their probabilities add up to 1.
     groups : mapping

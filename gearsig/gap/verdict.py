@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from gearsig.gap.types import GapCause, GapOutcome, GapReport, Interval
+from math import isfinite
+
+from gearsig.gap.types import GapCause, GapOutcome, GapPlace, GapReport, Interval
 from gearsig.gap.words import severity_unit
 
 
@@ -26,8 +28,15 @@ def _where(report: GapReport) -> str:
         return f"Where: nowhere beyond the floor; the gap is {report.size.value:.2g} structural floors."
     if not report.places:
         return f"Where: spread over all orders and bands, {report.size.value:.2g} structural floors."
-    first = report.places[0]
-    return f"Where: {first.title}, {first.structural:.2g} structural floors ({100 * first.share:.0f} % of the gap)."
+    first, *others = report.places
+    if isfinite(first.share):
+        return f"Where: {_with_size(first)}."
+    beside = f"; beside it, {_with_size(others[0])}" if others and isfinite(others[0].share) else ""
+    return f"Where: {first.title}{beside}."
+
+
+def _with_size(place: GapPlace) -> str:
+    return f"{place.title}, {place.structural:.2g} structural floors ({100 * place.share:.0f} % of the gap)"
 
 
 def _which(report: GapReport) -> str:

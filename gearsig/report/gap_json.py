@@ -95,7 +95,7 @@ def _place(place: GapPlace) -> Json:
         **members(place, "kind", "title", "change_db"),
         "change_in_repeatability_floors": rounded(place.repeatability),
         "change_in_structural_floors": rounded(place.structural),
-        **members(place, "share", "shaft", "orders", "band_hz", "angle_deg", "tooth", "channel"),
+        **members(place, "share", "shaft", "orders", "band_hz", "angle_deg", "tooth", "channel", "follows"),
     }
 
 

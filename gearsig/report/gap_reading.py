@@ -128,6 +128,7 @@ def _place(found: Json) -> GapPlace:
         None if found["angle_deg"] is None else _number(found["angle_deg"]),
         found["tooth"],
         found["channel"],
+        found.get("follows", False),
     )
 
 

@@ -42,6 +42,7 @@ class PlaceRow:
     change: str
     repeatability: str
     structural: str
+    sizes: str
     share: str
     bar_percent: float
 
@@ -113,7 +114,7 @@ def floors_text(report: GapReport) -> str:
 
 
 def place_rows(report: GapReport) -> tuple[PlaceRow, ...]:
-    """Return the places, largest share first."""
+    """Return the places in their order."""
     return tuple(
         PlaceRow(
             place.title[:1].upper() + place.title[1:],
@@ -121,11 +122,22 @@ def place_rows(report: GapReport) -> tuple[PlaceRow, ...]:
             f"{signed(place.change_db)} dB",
             readable(place.repeatability, 2),
             readable(place.structural, 2),
+            _sizes(place),
             percent(place.share),
             _bar(place.share),
         )
         for place in report.places
     )
+
+
+def _sizes(place: GapPlace) -> str:
+    """Write the change against both floors, or that it was found without them."""
+    if not isfinite(place.structural):
+        return "stands out by itself, over the noise beside it"
+    floors = (
+        f"{readable(place.structural, 2)} × structural floor · {readable(place.repeatability, 2)} × repeatability floor"
+    )
+    return f"{signed(place.change_db)} dB · {floors}"
 
 
 def _where(place: GapPlace) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ import pytest
 
 from app.gap.doubts import strange_pattern, strange_teeth
 from app.gap.prepare import conditions_of
-from app.gap.unexplained import unexplained
+from app.gap.unexplained import stood_out
 from gearsig.errors import RefusalError
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
@@ -58,9 +58,9 @@ def test_the_teeth_of_another_rig_are_noticed() -> None:
 
 def test_a_reference_with_a_fault_is_told() -> None:
     damaged = recording(0, 1, CHIPPED)
-    texts = unexplained(recording(0, 2), rig(), [recording(0, 3), damaged], [rig(), rig()], "now")
+    _, texts = stood_out(recording(0, 2), rig(), [recording(0, 3), damaged], [rig(), rig()], "now")
     assert not any("does not look healthy" in text for text in texts)  # at the same speed, the first is taken
-    texts = unexplained(recording(0, 2), rig(), [damaged], [rig()], "now")
+    _, texts = stood_out(recording(0, 2), rig(), [damaged], [rig()], "now")
     assert any(text.startswith("The reference of now does not look healthy") for text in texts)
 
 

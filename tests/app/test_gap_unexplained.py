@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
-from app.gap.unexplained import unexplained
+import numpy as np
+import pytest
+
+from app.gap.standing_places import standing_place
+from app.gap.unexplained import stood_out
 from gearsig.checks import FloatArray
 from tests.gap.synthetic import RIG, record, ringing
 
@@ -17,11 +21,23 @@ def knocking(_time: FloatArray, revolutions: FloatArray) -> FloatArray:
 
 def test_impacts_at_a_strange_order_are_named_and_a_reference_that_has_them_silences_them() -> None:
     struck, sound = record(knocking), record(seed=1)
-    texts = unexplained(struck, RIG, [sound], [RIG], "today")
-    assert any("5.148" in text and "today" in text for text in texts)
-    again = unexplained(struck, RIG, [record(knocking, seed=2)], [RIG], "today")
-    assert not any("5.148" in text for text in again)
+    standing, _ = stood_out(struck, RIG, [sound], [RIG], "today")
+    place = standing_place(standing[0], RIG)
+    assert "order 5.148" in place.title
+    assert "no gear, no shaft and no bearing" in place.title
+    assert place.orders[0] == pytest.approx(STRANGE, rel=1e-3)
+    again, _ = stood_out(struck, RIG, [record(knocking, seed=2)], [RIG], "today")
+    assert not again
 
 
 def test_sound_gears_have_nothing_strange() -> None:
-    assert unexplained(record(), RIG, [], [], "today") == ()
+    assert stood_out(record(), RIG, [], [], "today") == ([], [])
+
+
+def test_orders_of_a_place_are_the_drivers_whatever_shaft_the_speed_is_of() -> None:
+    """Shaft "out" is the reference: the family's order there is 37/23 of that of the driver."""
+    turned = replace(RIG, shafts=RIG.shafts[::-1])
+    assert turned.reference_shaft == "out"
+    standing, _ = stood_out(record(knocking), turned, [], [], "today")
+    assert standing[0].finding.where.order == pytest.approx(STRANGE * 37 / 23, rel=1e-3)
+    assert standing_place(standing[0], turned).orders[0] == pytest.approx(STRANGE, rel=1e-3)
