@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from gearsig.gap.shrinkage import Fold, shrinkage
 from gearsig.gap.simulator import Twin
 from gearsig.gap.transplant import transplanted
 from gearsig.gap.types import Shrinkage
+from gearsig.gap.which_shaft import told_options
 
 PROCESSES = 2
 OTHER_POINT, OTHER_REVOLUTIONS = "another operating condition", "other revolutions of the same recordings"
@@ -36,7 +37,7 @@ class Tried:
     name : str
     paths : tuple of EffectPath
     fit : Fit
-        To all conditions.
+        To all conditions; on the shaft that the recordings tell by themselves, where they do.
     shrinkage : Shrinkage
         On held-out data.
     """
@@ -74,12 +75,19 @@ def try_effects(
         on_progress=lambda done, of: on_progress(f"simulating {len(names)} effects at the point of {where}", done / of),
     )
     everything = [observed(c, k, n_compared(conditions)) for k, c in enumerate(conditions)]
+    changes = [condition.over_floors for condition in conditions]
     found = {}
     for name in names:
         paths = _paths([at[name] for at in banks], conditions)
         if paths:
-            found[name] = Tried(name, paths, fit_effect(paths, everything), shrinkage(paths, folds, held_out))
+            fit = fit_effect(on_shaft(paths, told_options(name, changes, conditions[0].now.frame.teeth)), everything)
+            found[name] = Tried(name, paths, fit, shrinkage(paths, folds, held_out))
     return found
+
+
+def on_shaft(paths: Sequence[EffectPath], told: Mapping[str, str]) -> Sequence[EffectPath]:
+    """Return the paths on the shaft that the recordings tell by themselves; all where they do not."""
+    return [path for path in paths if told.items() <= path.options.items()] or paths
 
 
 def n_compared(conditions: Sequence[Condition]) -> int:

@@ -15,6 +15,7 @@ from gearsig.gap.population import load_population
 from gearsig.gap.prediction import Observed
 from gearsig.gap.simulator import Added, Point, Twin
 from gearsig.gap.types import ConditionFacts
+from gearsig.gap.which_shaft import over_floors
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 from gearsig.severity.reference import LARGEST_SPEED_DIFFERENCE
@@ -63,6 +64,11 @@ class Condition:
     def run_s(self) -> float:
         """Length of a simulation at this point."""
         return run_length_s(self.now)
+
+    @property
+    def over_floors(self) -> dict[str, float]:
+        """Changes over the larger of both floors, with their signs."""
+        return over_floors(self.change, self.floor, is_reference=self.reference is not None)
 
 
 LEAST_BLOCKS = 4

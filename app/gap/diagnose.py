@@ -11,7 +11,7 @@ from app.gap.conditions import Condition, observed, simulated
 from app.gap.gearless import diagnose_gearless
 from app.gap.left import steps_of
 from app.gap.next_recording import next_recordings
-from app.gap.placing import at_its_tooth, place_of
+from app.gap.placing import at_its_tooth, cause_place
 from app.gap.prepare import Stage, conditions_of
 from app.gap.rig_data import is_gearless
 from app.gap.standing_places import standing_place
@@ -253,10 +253,18 @@ def _cause(
         title = "nothing beyond what healthy machines differ by" if name == NONE else "nothing in the catalogue"
         return GapCause(name, name, title, "", probability)
     effect = known[name]
-    base = GapCause(name, effect.group, effect.title, effect.unit, probability, is_nuisance=effect.is_nuisance)
-    if name not in tried:
+    one = tried.get(name)
+    base = GapCause(
+        name,
+        effect.group,
+        effect.title,
+        effect.unit,
+        probability,
+        place=cause_place(name, one, conditions, places),
+        is_nuisance=effect.is_nuisance,
+    )
+    if one is None:
         return base
-    one = tried[name]
     n = n_compared(conditions)
     seen = [observed(c, k, n) for k, c in enumerate(conditions)]
     frame = conditions[0].now.frame
@@ -264,7 +272,6 @@ def _cause(
         base,
         severity=one.fit.severity,
         fitted=at_its_tooth(one.fit.added, frame, places),
-        place=place_of(one.fit.added, frame, places),
         shrinkage=one.shrinkage,
         evidence=evidence_of(one.fit, seen, frame),
     )

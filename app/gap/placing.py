@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from app.gap.candidates import Tried, n_compared
+from app.gap.conditions import Condition, observed
 from gearsig.gap.frame import GearFrame
 from gearsig.gap.gear_lines import SIDES
+from gearsig.gap.prediction import INTERVAL_COST, EffectPath, fit_effect
 from gearsig.gap.simulator import Added
 from gearsig.gap.spots import shaft_words
 from gearsig.gap.types import GapPlace, PlaceKind
+from gearsig.gap.which_shaft import ONE_TOOTH, SIGNS, told_options
 
 
 def place_of(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> str:
@@ -34,6 +38,41 @@ def place_of(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> str:
         return f"one tooth of the gear on {words}"
     tooth = f"tooth {found.tooth} of the gear on"
     return f"{tooth} {words}" if found.tooth is not None else f"{found.angle_deg:.0f}° of {words}"
+
+
+def cause_place(name: str, tried: Tried | None, conditions: Sequence[Condition], places: Sequence[GapPlace]) -> str:
+    """Return where a cause sits, in words; empty where it has no place or nothing is known of it.
+
+    Which shaft, the recordings tell by themselves. Where they do not, a fit tells that is clearly better on one of them
+    than on the other; else that is what it says.
+    """
+    frame = conditions[0].now.frame
+    changes = [condition.over_floors for condition in conditions]
+    told: dict[str, float | str] = {**told_options(name, changes, frame.teeth)}
+    if told or name not in SIGNS:
+        added = tried.fit.added if tried is not None else Added(name, 0.0, _with_a_tooth(name, told))
+        return place_of(added, frame, places)
+    if tried is not None and _is_clear(tried, conditions):
+        return place_of(tried.fit.added, frame, places)
+    either = " or ".join(shaft_words(frame, side) for side in range(len(SIDES)))
+    return f"{either} (which cannot be told)"
+
+
+def _with_a_tooth(name: str, told: dict[str, float | str]) -> dict[str, float | str]:
+    return {**told, "tooth": 1.0} if name in ONE_TOOTH else told
+
+
+def _is_clear(tried: Tried, conditions: Sequence[Condition]) -> bool:
+    """Whether the fit is worse on the other shaft by more than chance."""
+    n = n_compared(conditions)
+    seen = [observed(condition, k, n) for k, condition in enumerate(conditions)]
+    costs = [fit_effect(paths, seen).cost for paths in _by_shaft(tried.paths)]
+    return len(costs) < len(SIDES) or max(costs) - min(costs) > INTERVAL_COST
+
+
+def _by_shaft(paths: Sequence[EffectPath]) -> list[list[EffectPath]]:
+    both = [[path for path in paths if path.options.get("gear", path.options.get("shaft")) == side] for side in SIDES]
+    return [some for some in both if some]
 
 
 def at_its_tooth(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> Added:

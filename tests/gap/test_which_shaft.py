@@ -1,0 +1,118 @@
+"""On which shaft a cause sits: simulated on either one, by hand, and where it cannot be told."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gearsig.gap.change import change_features
+from gearsig.gap.gather import gather
+from gearsig.gap.gathered import Gathered
+from gearsig.gap.gear_lines import SIDES
+from gearsig.gap.population import load_population
+from gearsig.gap.simulator import Added, Point
+from gearsig.gap.which_shaft import CLEAR, SIGNS, ShaftSigns, over_floors, shaft_signs, told_options
+from gearsig.rig.types import GearPair, OperatingPoint, Rig, Shaft
+from sims.registry import gap_simulator
+
+TEETH = (23, 37)
+
+
+def risen(cause: str, side: str, by: float) -> dict[str, float]:
+    """Return changes in floors: nothing but a cause's signs on one shaft."""
+    own = {sign.format(side) for sign in SIGNS[cause]}
+    return {sign.format(s): by * (sign.format(s) in own) for sign in SIGNS[cause] for s in SIDES}
+
+
+def on_both(cause: str) -> dict[str, float]:
+    return {sign.format(side): 4.0 for sign in SIGNS[cause] for side in SIDES}
+
+
+@pytest.mark.parametrize("cause", SIGNS)
+@pytest.mark.parametrize("side", SIDES)
+def test_signs_that_rose_on_one_shaft_put_it_there(cause: str, side: str) -> None:
+    (option,) = told_options(cause, [risen(cause, side, 2.0)], TEETH).items()
+    assert option == ("shaft" if cause == "misalignment" else "gear", side)
+    assert told_options(cause, [risen(cause, side, 0.9 * CLEAR)], TEETH) == {}
+    assert told_options(cause, [risen(cause, side, -5.0)], TEETH) == {}
+
+
+def test_what_no_shaft_has_to_itself_cannot_be_told() -> None:
+    assert shaft_signs("tooth_wear", [{}], TEETH) is None
+    assert told_options("backlash", [{}], TEETH) == {}
+
+
+@given(st.floats(0.0, 20.0), st.floats(0.0, 20.0))
+def test_exchanged_shafts_exchange_the_answer(one: float, other: float) -> None:
+    side, turned = ShaftSigns((one, other)).side, ShaftSigns((other, one)).side
+    assert (side is None and turned is None) or side == 1 - (turned or 0)
+
+
+def test_signs_on_both_shafts_cannot_be_told_but_for_an_order_that_one_shaft_cannot_have() -> None:
+    both = on_both("eccentricity")
+    assert told_options("eccentricity", [both], TEETH) == {}
+    # Two turns of the driver are one of the driven shaft: only the latter makes half an order of the driver.
+    assert told_options("eccentricity", [both], (23, 46)) == {"gear": "driven"}
+    assert told_options("eccentricity", [risen("eccentricity", "driver", 4.0)], (23, 46)) == {"gear": "driver"}
+    # Its second order is the driver's first.
+    assert told_options("misalignment", [on_both("misalignment")], (23, 46)) == {}
+    assert told_options("misalignment", [on_both("misalignment")], (69, 23)) == {"shaft": "driver"}
+
+
+def test_every_sign_is_a_feature() -> None:
+    names = load_population().change_names
+    assert {sign.format(side) for signs in SIGNS.values() for sign in signs for side in SIDES} <= set(names)
+
+
+POINT = Point(1500.0, 50.0)
+PAIR = Rig(
+    name="pair",
+    shafts=(Shaft("input"), Shaft("output")),
+    pairs=(GearPair("stage", "input", "output", 29, 47, 2.0, 20.0, 20.0),),
+    operating_point=OperatingPoint("input", POINT.speed_rpm, torque_nm=POINT.torque_nm),
+)
+
+
+@cache
+def twin():
+    return gap_simulator("cracked").twin_of(PAIR)
+
+
+def run(*added: Added, noise: int, point: Point) -> Gathered:
+    recording = twin().run(point, added, seed=0, duration_s=1.5, sampling_rate_hz=12800.0, noise=noise)
+    assert recording.rig is not None
+    return gather(recording, recording.rig)
+
+
+@cache
+def sound(point: Point) -> Gathered:
+    return run(noise=1, point=point)
+
+
+def simulated(*added: Added, point: Point = POINT) -> dict[str, float]:
+    floor = load_population().floor(with_reference=True)
+    return over_floors(change_features(run(*added, noise=2, point=point), sound(point)), floor, is_reference=True)
+
+
+@pytest.mark.parametrize("cause", ["root_crack", "tooth_spall", "chipped_tooth", "pitch_error", "eccentricity"])
+@pytest.mark.parametrize("side", SIDES)
+def test_a_simulated_effect_is_put_on_its_shaft(cause: str, side: str) -> None:
+    *_, strong = (added for added in twin().candidates(cause) if added.options["gear"] == side)
+    assert told_options(cause, [simulated(strong)], (29, 47)) == {"gear": side}
+
+
+@pytest.mark.parametrize(
+    ("cause", "point"), [("unbalance", Point(4500.0, 50.0)), ("misalignment", Point(3000.0, 200.0))]
+)
+@pytest.mark.parametrize("side", SIDES)
+def test_what_shows_at_speed_or_load_only_is_put_on_its_shaft_there(cause: str, point: Point, side: str) -> None:
+    *_, strong = (a for a in twin().candidates(cause) if a.options.get("gear", a.options.get("shaft")) == side)
+    assert list(told_options(cause, [simulated(strong, point=point)], (29, 47)).values()) == [side]
+
+
+def test_a_sound_machine_has_no_signs_on_either_shaft() -> None:
+    again = simulated()
+    assert all(told_options(cause, [again], (29, 47)) == {} for cause in SIGNS)
