@@ -66,7 +66,7 @@ def gap(
     """Say where recordings differ from the simulation of their rig, which effect causes it, how far it shrinks then.
 
     Give recordings at several speeds and loads if there are any, and recordings of the same rig when it was healthy:
-    both make the answer much surer. The first diagnosis of a rig takes minutes of preparation, which are kept.
+    both make the answer much surer. It takes up to a minute on two cores; the rig's simulations are kept for the next.
 
     Example: gearsig gap slow.h5 fast.h5 --rig gearbox.toml --reference healthy.h5 -o gap
     """

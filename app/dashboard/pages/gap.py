@@ -15,8 +15,8 @@ WELCOME = """
 Give recordings of one rig and its rig file: the page says **where** they differ from the simulation of the rig,
 **which** effect that is not in the simulator causes it, **how far** the gap shrinks with it, and what to record next.
 
-Surest with recordings at several speeds and loads, and with one of the same rig when it was healthy. The first
-diagnosis of a rig takes minutes of preparation, which are kept; after that one takes about a minute.
+Surest with recordings at several speeds and loads, and with one of the same rig when it was healthy. A diagnosis
+takes up to a minute on two free cores; the rig's simulations are kept for the next one.
 """
 
 
