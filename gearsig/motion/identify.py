@@ -24,6 +24,7 @@ TURNING = 0.1
 LEAST_SCATTER = 1e-3
 """Part of the ordinary acceleration that the load's equation leaves out."""
 ONE_FLANK = "only one flank was loaded: play and zero of the angles cannot be told apart; record a stop with a brake"
+ONE_ZERO = "only one flank was loaded: it is told from the zero of the angles by little; record a stop with a brake"
 MOTOR = "it lies ahead of the torque sensor and does not show in the torque"
 
 
@@ -124,7 +125,7 @@ def _contact_parameters(motion: PairMotion, fit: RobustFit, *, has_both_flanks: 
         play = _plain(fit, "half_backlash", "half_backlash_um", "um", c.half_backlash_um, 1e6)
     return [
         play,
-        _stiffness(fit, c.stiffness_n_per_m_lambda),
+        _stiffness(fit, c.stiffness_n_per_m_lambda, has_both_flanks=has_both_flanks),
         _restitution(fit, c.damping_law, c.restitution),
         _plain(fit, "driver inertia", "driver_inertia_kg_m2", "kg m^2", c.driver_inertia_kg_m2),
         _plain(fit, "friction", "friction_coefficient", "", c.friction_coefficient),
@@ -161,12 +162,13 @@ def _plain(
     return FittedParameter(name, unit, value, (value - half, value + half), told, why, rig_value, fit.most_like(own))
 
 
-def _stiffness(fit: RobustFit, rig_value: float) -> FittedParameter:
+def _stiffness(fit: RobustFit, rig_value: float, *, has_both_flanks: bool) -> FittedParameter:
+    """Return the stiffness; from one flank a filter ahead of the torque's samples feigns it, twenty times too high."""
     own = "log stiffness"
     log_k, half = fit.value(own), NORMAL_95 * fit.deviation(own)
-    told = half < TOLD
+    told = half < TOLD and has_both_flanks
     low, middle, high = (float(np.exp(min(v, 700.0))) for v in (log_k - half, log_k, log_k + half))
-    why = "" if told else _why(fit, own)
+    why = "" if told else _why(fit, own) if has_both_flanks else ONE_ZERO
     return FittedParameter(
         "stiffness_n_per_m_lambda", "N/m^λ", middle, (low, high), told, why, rig_value, fit.most_like(own)
     )

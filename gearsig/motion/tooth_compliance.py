@@ -33,7 +33,7 @@ class ToothCompliance:
     uncertainty_um : array, (n_teeth,)
         One standard deviation, from the scatter of the teeth's own samples.
     deflection_um : float
-        Median deflection of a pair in those samples.
+        Median deflection of a pair in those samples; with the rig's stiffness where only one flank was loaded.
     n_samples : array of int, (n_teeth,)
     weak_teeth : tuple of int
         Those that stand out, from 1, the weakest first.
@@ -91,7 +91,8 @@ def tooth_compliance(motion: PairMotion) -> ToothCompliance:
     alone = 1.25 * np.nanmedian(spread) / np.sqrt(np.maximum(counts, 1))
     among = 1.4826 * float(np.nanmedian(np.abs(extra)))
     uncertainty = np.where(np.isnan(extra), np.nan, np.maximum(alone, among))
-    deflection = _deflection(equation, fit.value("log stiffness"), single)
+    known = float(np.log(motion.contact.stiffness_n_per_m_lambda))  # one flank hardly tells it from the angles' zero
+    deflection = _deflection(equation, fit.value("log stiffness") if equation.has_both_flanks else known, single)
     return ToothCompliance(
         1e6 * extra, 1e6 * uncertainty, 1e6 * deflection, counts, _weak(extra, uncertainty, deflection)
     )

@@ -152,7 +152,8 @@ class ForgingDrive:
     Notes
     -----
     Left out: bending of shafts and of the torque sensor (the paper takes them as stiff), bearings, profile errors, wear
-    that differs from tooth to tooth, oil between the flanks.
+    that differs from tooth to tooth (the paper takes all teeth alike), oil between the flanks; teeth never break or
+    yield, however large the torque: neither strength nor hardness of the teeth is stated.
     """
 
     path: PathOfContact

@@ -13,8 +13,10 @@ from gearsig.recording.types import Channel, Provenance, Recording
 from gearsig.rig.speed import EncoderChannel
 from gearsig.rig.types import Rig, Sensor
 from sims.forging.drive import ForgingDrive
+from sims.forging.filtered import filtered_signals
+from sims.forging.parameters import SAMPLINGS
 from sims.forging.respond import DriveResponse, respond
-from sims.forging.schedule import Schedule
+from sims.forging.schedule import CONTINUOUS, Schedule
 from sims.measure import Accelerometer, AntiAlias, ColouredNoise, MeasuredChannel, MeasurementChain, ModalPath
 from sims.measure.hold import apply, discrete
 from sims.measure.motion import Motion
@@ -25,6 +27,10 @@ LEAST_VIBRATION_HZ = 5000.0
 FINE_POINTS = 4
 """Points of the motion per sample of the accelerometer."""
 PLACE = "pinion bearing"
+FOLDS = (
+    "torque, force, speeds and accelerations are samples of instants: what happens above {:g} Hz folds back, so lines "
+    "of their spectra may be none of the machine (slow_channels=filtered keeps them out)"
+)
 
 CHANNELS = (
     Channel("torque", "torque", "N m", "between motor and pinion"),
@@ -36,7 +42,8 @@ CHANNELS = (
     Channel("wheel acceleration", "angular_acceleration", "rad/s^2", "wheel"),
     Channel("interaction force", "force", "N", "tooth flanks, of the model: no sensor measures it"),
 )
-"""What a recording of the motion holds, at the very instants of its samples, as a motion controller stores it."""
+"""What a recording of the motion holds."""
+FILTERED = SAMPLINGS[1]
 VIBRATION = Channel("vibration", "acceleration", "m/s^2", "pinion bearing, along the line of action")
 
 
@@ -59,12 +66,21 @@ def record(
 ) -> Recording:
     """Run the drive and measure it.
 
-    Angles are rounded down to their encoder's counts after noise was added; speeds and accelerations have noise of
-    their own, as from sensors of their own. Nothing is filtered at 1 kHz: a controller's samples are instants.
+    Angles are rounded down to their encoder's counts after noise was added: counters store instants. Speeds and
+    accelerations have noise of their own, as from sensors of their own. With torque and force they are instants as
+    well, or filtered (`slow_channels`). Instants of a machine that runs on carry a warning at slow rates: their spectra
+    hold lines from above half the sampling rate.
     """
     motion_rng, vibration_rng = rng.spawn(2)
     motion = respond(drive, courses, duration_s=duration_s, interval_s=1.0 / sampling_rate_hz)
-    rows = list(_readings(motion, wanted, motion_rng))
+    is_filtered = wanted.word("slow_channels") == FILTERED
+    folds = not is_filtered and wanted.word("mode") == CONTINUOUS and sampling_rate_hz < LEAST_VIBRATION_HZ
+    true = {c.name: motion[c.name] for c in CHANNELS}
+    if is_filtered:
+        slow = [c.name for c in CHANNELS if c.quantity != "angle"]
+        n = len(true[slow[0]])
+        true |= filtered_signals(drive, courses, slow, sampling_rate_hz=sampling_rate_hz, n_samples=n)
+    rows = list(_readings(true, wanted, motion_rng))
     channels = list(CHANNELS)
     if sampling_rate_hz >= LEAST_VIBRATION_HZ:
         rows.append(_vibration(drive, courses, wanted, vibration_rng, sampling_rate_hz, len(rows[0])))
@@ -75,12 +91,23 @@ def record(
         tuple(channels),
         speed=EncoderChannel("pinion angle", 2.0 * pi, wraps=False, shaft="pinion"),
         rig=rig,
-        provenance=Provenance(source="simulation: forging manipulator drive", reader="sims.forging"),
+        provenance=Provenance(
+            source="simulation: forging manipulator drive",
+            reader="sims.forging",
+            history=(_sampling_text(sampling_rate_hz, is_filtered=is_filtered),),
+        ),
         truth={**truth, **_truth(motion)},
+        warnings=(FOLDS.format(0.5 * sampling_rate_hz),) if folds else (),
     )
 
 
-def _readings(motion: DriveResponse, wanted: Wanted, rng: np.random.Generator) -> list[FloatArray]:
+def _sampling_text(rate_hz: float, *, is_filtered: bool) -> str:
+    if is_filtered:
+        return f"torque, force, speeds and accelerations filtered below {0.5 * rate_hz:g} Hz before they were sampled"
+    return "torque, force, speeds and accelerations sampled at instants, without a filter"
+
+
+def _readings(true: Mapping[str, FloatArray], wanted: Wanted, rng: np.random.Generator) -> list[FloatArray]:
     noise = {
         "torque": wanted.number("torque_noise_nm"),
         "angle": wanted.number("angle_noise_urad") * 1e-6,
@@ -91,8 +118,8 @@ def _readings(motion: DriveResponse, wanted: Wanted, rng: np.random.Generator) -
     counts = wanted.whole("encoder_counts")
     rows = []
     for channel in CHANNELS:
-        true = motion[channel.name]
-        reading: FloatArray = true + noise[channel.quantity] * rng.standard_normal(len(true))
+        values = true[channel.name]
+        reading: FloatArray = values + noise[channel.quantity] * rng.standard_normal(len(values))
         if channel.quantity == "angle" and counts:
             step = 2.0 * pi / counts
             reading = np.floor(reading / step) * step

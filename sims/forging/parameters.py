@@ -7,6 +7,7 @@ from sims.simulator import Parameter
 
 STIFFNESSES = ("formula", "table")
 """Two that one source gives for one pair of gears: by its formula, and as its table prints it, a tenth of that."""
+SAMPLINGS = ("instants", "filtered")
 
 
 def _number(
@@ -93,6 +94,13 @@ _DRIVE = (
 )
 
 _CHAIN = (
+    _word(
+        "slow_channels",
+        "torque, force, speeds and accelerations: instants, as a motion controller stores them and as forces from "
+        "motion want them; or filtered below half the sampling rate, as a data logger does and as spectra want them",
+        SAMPLINGS,
+        "instants",
+    ),
     _number(
         "encoder_counts", "", "counts per revolution of both encoders; 0: no rounding", 0, 2**30, 2**20, whole=True
     ),

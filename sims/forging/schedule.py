@@ -10,7 +10,7 @@ from gearsig.checks import FloatArray, not_negative, one_of, positive
 from gearsig.errors import InputError
 from sims.machine.operation import Course
 
-MODES = ("start-stop", "continuous")
+START_STOP, CONTINUOUS = MODES = ("start-stop", "continuous")
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Cycle:
         From the torque's end to the blow, and its length.
     """
 
-    mode: str = "start-stop"
+    mode: str = START_STOP
     on_s: float = 1.0
     off_s: float = 2.0
     rise_s: float = 0.02
@@ -52,7 +52,7 @@ class Cycle:
         for name in ("brake_delay_s", "press_delay_s"):
             not_negative(getattr(self, name), name, "s")
         not_negative(self.brake_nm, "brake_nm", "N m")
-        if self.mode == "start-stop":
+        if self.mode == START_STOP:
             self._check_times()
 
     def _check_times(self) -> None:
@@ -68,7 +68,7 @@ class Cycle:
 
     def starts_s(self, duration_s: float) -> FloatArray:
         """Times at which the torque comes on."""
-        if self.mode == "continuous":
+        if self.mode == CONTINUOUS:
             return np.zeros(1)
         return np.arange(0.0, duration_s, self.on_s + self.off_s)
 
@@ -105,7 +105,7 @@ def schedule(cycle: Cycle, torque_nm: Course, duration_s: float) -> Schedule:
         If a stop is longer than the record.
     """
     positive(duration_s, "duration_s", "s")
-    if cycle.mode == "continuous":
+    if cycle.mode == CONTINUOUS:
         gate = Course.of([0.0, cycle.rise_s], [0.0, 1.0])
         nothing = Course.constant(0.0)
         return Schedule(_product(torque_nm, gate), nothing, nothing)

@@ -134,3 +134,9 @@ def test_bad_contacts_are_named(changes: dict[str, object]) -> None:
 def test_a_drive_without_inertia_is_refused() -> None:
     with pytest.raises(InputError, match="wheel_inertia"):
         drive(wheel_inertia_kg_m2=-3.0)
+
+
+def test_flores_is_the_damping_unless_another_is_chosen() -> None:
+    assert ToothContact(1e10).damping_law == "flores"
+    assert drive().contact.damping_law == "flores"
+    assert drive(damping_law="lankarani").contact.damping_law == "lankarani"

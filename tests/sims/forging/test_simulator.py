@@ -4,8 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import get_window
 
+from gearsig import analyze
 from gearsig.recording.read import read_recording
+from gearsig.recording.types import Recording
 from gearsig.rig.toml import read_rig
 from sims import simulate
 from sims.forging.parameters import PARAMETERS
@@ -158,3 +161,44 @@ def test_other_models_have_no_mode(capsys: pytest.CaptureFixture[str], tmp_path:
     code, _, err = run(capsys, "simulate", "cracked", "--mode", "continuous", "-o", tmp_path / "a.h5")
     assert code == 2
     assert "mode" in err
+
+
+def amplitude_near(recording: Recording, name: str, hertz: float, from_s: float = 3.0) -> float:
+    """Amplitude of a line within 0.3 Hz, by a flat-topped window."""
+    x = recording.values(name)[round(from_s * recording.sampling_rate_hz) :]
+    w = get_window("flattop", len(x))
+    spectrum = 2.0 * np.abs(np.fft.rfft((x - x.mean()) * w)) / np.sum(w)
+    f = np.fft.rfftfreq(len(x), 1.0 / recording.sampling_rate_hz)
+    return float(spectrum[np.abs(f - hertz) < 0.3].max())
+
+
+def test_filtered_channels_hold_no_folded_lines_and_lose_none_below() -> None:
+    """The mesh's 26th harmonic, at 665 Hz, folds to 335 Hz in instants; a logger's filter keeps it out."""
+    common = {"mode": "continuous", "speed_noise_mrad_per_s": 0, "torque_noise_nm": 0, "encoder_counts": 0}
+    instants, filtered = (
+        simulate("forging", parameters=common | {"slow_channels": how}, duration_s=12.0, sampling_rate_hz=1000.0)
+        for how in ("instants", "filtered")
+    )
+    mesh_hz = 20.0 * instants.values("pinion speed")[3000:].mean() / (2.0 * np.pi)
+    for name in ("torque", "interaction force"):
+        folded = [amplitude_near(r, name, 1000.0 - 26.0 * mesh_hz) for r in (instants, filtered)]
+        below = [amplitude_near(r, name, 4.0 * mesh_hz) for r in (instants, filtered)]
+        assert folded[0] > 300.0 * folded[1]
+        assert below[1] == pytest.approx(below[0], rel=1e-3)
+    # counters store instants whatever the others do; nothing is late
+    assert np.array_equal(instants.values("pinion angle"), filtered.values("pinion angle"))
+    assert filtered.values("wheel speed")[1500:] == pytest.approx(instants.values("wheel speed")[1500:], abs=0.01)
+
+
+def test_recordings_of_instants_say_that_lines_fold() -> None:
+    def of(mode: str, how: str, rate_hz: float = 1000.0) -> Recording:
+        values = {"mode": mode, "slow_channels": how}
+        return simulate("forging", parameters=values, duration_s=3.0, sampling_rate_hz=rate_hz)
+
+    instants = of("continuous", "instants")
+    assert "above 500 Hz folds back" in instants.warnings[0]
+    assert "at instants" in instants.provenance.history[0]
+    assert any("folds back" in finding.title for finding in analyze(instants).findings)
+    for other in (of("continuous", "filtered"), of("start-stop", "instants"), of("continuous", "instants", 10_000.0)):
+        assert other.warnings == ()
+    assert "filtered below 500 Hz" in of("start-stop", "filtered").provenance.history[0]
