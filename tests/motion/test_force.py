@@ -159,3 +159,56 @@ def test_a_study_needs_something_to_compare_with() -> None:
         noise_study(without(start_stop(), "torque", "interaction force"), rng=rng, levels_um=(0.0, 1.0))
     with pytest.raises(InputError, match="ascending"):
         noise_study(start_stop(), rng=rng, levels_um=(1.0, 2.0))
+
+
+def noisy(recording: Recording, quantity: str, deviation: float, seed: int = 1) -> Recording:
+    """Add white noise to both gears' channels of a quantity."""
+    rng = np.random.default_rng(seed)
+    samples = np.array(recording.samples)
+    for i, channel in enumerate(recording.channels):
+        if channel.quantity == quantity:
+            samples[i] += deviation * rng.standard_normal(recording.n_samples)
+    return replace(recording, samples=samples)
+
+
+@pytest.mark.parametrize("preset", ["manipulator_formula", "manipulator_table"])
+def test_noise_on_the_acceleration_costs_the_drivers_inertia_times_it(preset: str) -> None:
+    """rms² grows by (J1 σ/r_b1)²: up to some 2600 rad/s² the piecewise model stays the nearer one."""
+    recording = start_stop(preset)
+    still = estimate(recording).error(PIECEWISE, FROM_TORQUE).rms_n
+    other = estimate(recording).error(HUNT_CROSSLEY, FROM_TORQUE).rms_n
+    r1, inertia = 0.05 * np.cos(np.radians(20.0)), 0.01
+    for deviation in (300.0, 1000.0, 3000.0):
+        found = estimate(noisy(recording, "angular_acceleration", deviation))
+        expected = np.hypot(still, inertia * deviation / r1)
+        assert found.error(PIECEWISE, FROM_TORQUE).rms_n == pytest.approx(expected, rel=0.1)
+    crossover = np.sqrt(other**2 - still**2) * r1 / inertia
+    assert 2300.0 < crossover < 2900.0
+    for share, is_nearer in ((0.8, True), (1.2, False)):
+        found = estimate(noisy(recording, "angular_acceleration", share * crossover))
+        error = {m: found.error(m, FROM_TORQUE).rms_n for m in (PIECEWISE, HUNT_CROSSLEY)}
+        assert (error[PIECEWISE] < error[HUNT_CROSSLEY]) == is_nearer
+
+
+def test_noise_on_the_speed_spoils_the_damping_of_single_contacts() -> None:
+    """Nearer up to 0.3 rad/s in every draw; at 1 rad/s a contact whose first speed was read wrong decides."""
+
+    def is_nearer(deviation: float, seed: int) -> bool:
+        found = estimate(noisy(start_stop(), "rotational_speed", deviation, seed))
+        return found.error(PIECEWISE, FROM_TORQUE).rms_n < found.error(HUNT_CROSSLEY, FROM_TORQUE).rms_n
+
+    assert all(is_nearer(deviation, seed) for deviation in (0.1, 0.3) for seed in range(4))
+    assert {is_nearer(1.0, seed) for seed in range(4)} == {True, False}
+
+
+def test_two_pairs_count_one_mass() -> None:
+    """As printed, but for (30), which adds the inertia once per pair: it is there once, whatever touches."""
+    found = estimate(start_stop(quiet=True), "zero")
+    motion = found.motion
+    j2, r2 = motion.contact.driven_inertia_kg_m2, motion.path.base_radii_m[1]
+    assert j2 is not None
+    own = motion.contact.driver_inertia_kg_m2 * motion.driver_acceleration_rad_s2 / motion.path.base_radii_m[0]
+    added = found.forces_n[AS_PRINTED] - (found.forces_n[PIECEWISE] - own)
+    expected = j2 / r2**2 * motion.compression_acceleration_mps2
+    assert set(found.n_pairs) == {0.0, 1.0, 2.0}
+    assert added == pytest.approx(expected, abs=1e-6 * np.max(np.abs(expected)))

@@ -34,7 +34,7 @@ def found(recording: Recording) -> Identification:
     return identify(measure_motion(recording))
 
 
-def drive(preset: str, seed: int = 0, **parameters: float) -> Recording:
+def drive(preset: str, seed: int = 0, **parameters: float | str) -> Recording:
     return simulate(
         "forging", preset=preset, parameters=parameters, duration_s=12.0, sampling_rate_hz=1000.0, seed=seed
     )
@@ -90,6 +90,17 @@ def test_continuous_rotation_tells_neither_play_nor_damping() -> None:
     assert not fitted.parameter("restitution").is_told
     assert not fitted.parameter("motor_inertia_kg_m2").is_told
     assert fitted.parameter("driven_inertia_kg_m2").is_told
+
+
+def test_stiffness_from_one_flank_is_not_told() -> None:
+    """A torque that a filter has smoothed makes the teeth seem twenty times stiffer, if nothing tells the zero."""
+    both = {"mode": "continuous", "slow_channels": "filtered"}
+    fitted = found(drive("manipulator_formula", **both)).parameter("stiffness_n_per_m_lambda")
+    assert not fitted.is_told
+    assert "only one flank" in fitted.why_not
+    stopped = found(drive("manipulator_formula", slow_channels="filtered")).parameter("stiffness_n_per_m_lambda")
+    assert stopped.is_told
+    assert stopped.value == pytest.approx(1.8366e10, rel=0.06)
 
 
 def test_motion_alone_tells_no_values() -> None:

@@ -14,11 +14,13 @@ from sims.forging.simulator import ForgingManipulator
 from tests.motion.recordings import start_stop, without
 
 
-def cracked(depth_mm: float, preset: str, mode: str, seed: int = 0, tooth: int = 7) -> Recording:
+def cracked(
+    depth_mm: float, preset: str, mode: str, seed: int = 0, tooth: int = 7, slow: str = "instants"
+) -> Recording:
     return simulate(
         "forging",
         preset=preset,
-        parameters={"mode": mode},
+        parameters={"mode": mode, "slow_channels": slow},
         effects=[EffectSetting("root_crack", depth_mm, {"tooth": tooth})],
         duration_s=12.0,
         sampling_rate_hz=1000.0,
@@ -32,7 +34,8 @@ def test_the_cracked_tooth_and_the_stiffness_it_has_lost(preset: str, mode: str)
     effect = EffectSetting("root_crack", 6.0, {"tooth": 13})
     weak = ForgingManipulator().prepare({}, None, preset_name=preset, settings=[effect]).drive.weak_tooth
     assert weak is not None
-    found = tooth_compliance(measure_motion(cracked(6.0, preset, mode, tooth=13)))
+    slow = "filtered" if mode == "continuous" else "instants"
+    found = tooth_compliance(measure_motion(cracked(6.0, preset, mode, tooth=13, slow=slow)))
     assert found.weak_teeth == (13,)
     assert found.stiffness_loss(13, 1.5) == pytest.approx(weak.loss, abs=0.02)
     assert found.extra_um[12] > 5.0 * found.uncertainty_um[12]
