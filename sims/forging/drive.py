@@ -9,6 +9,11 @@ from gearsig.errors import InputError
 from gearsig.rig.contact import ToothContact
 from gearsig.rig.tooth_pairs import PathOfContact
 
+STATIC_RATIO_RANGE = (1.0, 10.0)
+SPEED_BAND_RANGE = (0.01, 1.0)
+MESH_RAMP_RANGE = (0.005, 0.1)
+LEAST_CONTACT_RATIO = 1.1
+
 
 @dataclass(frozen=True)
 class Bristle:
@@ -47,7 +52,7 @@ class Bristle:
 
     def __post_init__(self) -> None:
         not_negative(self.level, "level of the friction")
-        within(self.static_ratio, "static_ratio of the friction", 1.0, 10.0)
+        within(self.static_ratio, "static_ratio of the friction", *STATIC_RATIO_RANGE)
         positive(self.stribeck_speed, "stribeck_speed of the friction")
         positive(self.presliding, "presliding of the friction")
         not_negative(self.damping_time_s, "damping_time_s of the friction", "s")
@@ -80,7 +85,7 @@ class HydraulicMotor:
 
     def __post_init__(self) -> None:
         not_negative(self.inertia_kg_m2, "inertia_kg_m2 of the motor", "kg m^2")
-        within(self.speed_band, "speed_band of the motor", 0.01, 1.0)
+        within(self.speed_band, "speed_band of the motor", *SPEED_BAND_RANGE)
         within(self.ripple_fraction, "ripple_fraction of the motor", 0.0, 1.0)
         positive(self.ripple_order, "ripple_order of the motor")
 
@@ -167,8 +172,9 @@ class ForgingDrive:
 
     def __post_init__(self) -> None:
         not_negative(self.speed_limit_rad_s, "speed_limit_rad_s", "rad/s")
-        within(self.mesh_ramp, "mesh_ramp", 0.005, 0.1)
-        within(self.path.contact_ratio, "contact_ratio", 1.1, 1.9 - self.mesh_ramp, remedy="one to two pairs touch")
+        within(self.mesh_ramp, "mesh_ramp", *MESH_RAMP_RANGE)
+        highest = 1.9 - self.mesh_ramp
+        within(self.path.contact_ratio, "contact_ratio", LEAST_CONTACT_RATIO, highest, remedy="one to two pairs touch")
         if self.contact.driven_inertia_kg_m2 is None or self.pinion_side_inertia_kg_m2 <= 0.0:
             raise InputError("an inertia is missing", where="forging drive", allowed="above 0 kg m^2 on either side")
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from gearsig.rig.contact import DAMPING_LAWS
+from sims.forging.drive import LEAST_CONTACT_RATIO, MESH_RAMP_RANGE, SPEED_BAND_RANGE, STATIC_RATIO_RANGE
 from sims.forging.schedule import MODES
 from sims.simulator import Parameter
 
@@ -38,8 +40,8 @@ _GEARS = (
     _number("module_mm", "mm", "module of both gears", 0.3, 50, 5.0),
     _number("pressure_angle_deg", "deg", "pressure angle", 14, 30, 20.0),
     _number("face_width_mm", "mm", "face width; for the rig file only", 1, 1000, 80.0),
-    _number("contact_ratio", "", "mean pairs in contact; none: of standard teeth", 1.1, 1.85, None),
-    _number("mesh_ramp", "", "base pitches over which a pair takes up its load", 0.005, 0.1, 0.05),
+    _number("contact_ratio", "", "mean pairs in contact; none: of standard teeth", LEAST_CONTACT_RATIO, 1.85, None),
+    _number("mesh_ramp", "", "base pitches over which a pair takes up its load", *MESH_RAMP_RANGE, 0.05),
     _number("mesh_phase", "", "pinion's angle, in tooth pitches, at which a pair enters", 0, 1, 0.0),
 )
 
@@ -56,14 +58,12 @@ _CONTACT = (
     ),
     _number("exponent", "", "λ: force grows as depth^λ", 1, 2, 1.5),
     _number("restitution", "", "speed after a free impact over speed before", 0.05, 1, 0.95),
-    _word(
-        "damping_law", "damping that follows from the restitution", ("flores", "lankarani", "hunt-crossley"), "flores"
-    ),
+    _word("damping_law", "damping that follows from the restitution", DAMPING_LAWS, DAMPING_LAWS[0]),
     _number("impact_speed_floor_mps", "m/s", "least speed of impact in the damping law", 1e-4, 10, 0.01),
     _number("half_backlash_um", "um", "half of the play along the line of action, new", 0, 5000, 150.0),
     _number("wear_um", "um", "worn off both drive flanks together; it widens the play by that", 0, 5000, 0.0),
     _number("friction_coefficient", "", "sliding friction of the flanks", 0, 0.5, 0.05),
-    _number("flank_static_ratio", "", "static over sliding friction of the flanks", 1, 3, 1.2),
+    _number("flank_static_ratio", "", "static over sliding friction of the flanks", *STATIC_RATIO_RANGE, 1.2),
     _number("flank_stribeck_mps", "m/s", "sliding speed at which static friction has gone", 1e-4, 1, 0.005),
     _number("flank_presliding_um", "um", "deflection of the flanks' bristles at which they slide", 0.5, 1000, 10.0),
 )
@@ -79,14 +79,16 @@ _MASSES = (
 )
 
 _DRIVE = (
-    _number("motor_speed_band", "", "part of the speed limit over which the torque falls to nothing", 0.01, 1, 0.3),
+    _number(
+        "motor_speed_band", "", "part of the speed limit over which the torque falls to nothing", *SPEED_BAND_RANGE, 0.3
+    ),
     _number("torque_ripple", "", "ripple of the motor, part of its torque", 0, 1, 0.0),
     _number("torque_ripple_order", "", "ripples per revolution: pistons", 0.1, 1000, 9.0),
     _number("drag_nm", "N m", "sliding friction of motor and pinion shaft", 0, 1e5, 5.0),
     _number("drag_viscous_nm_s_per_rad", "N m s/rad", "viscous friction of them", 0, 1e5, 0.2),
     _number("load_friction_nm", "N m", "sliding friction of the gripper's bearings", 0, 1e6, 300.0),
     _number("load_viscous_nm_s_per_rad", "N m s/rad", "viscous friction of them", 0, 1e6, 20.0),
-    _number("static_ratio", "", "static over sliding friction of both shafts", 1, 3, 1.3),
+    _number("static_ratio", "", "static over sliding friction of both shafts", *STATIC_RATIO_RANGE, 1.3),
     _number("drag_stribeck_rad_per_s", "rad/s", "speed at which the motor's static friction has gone", 1e-4, 100, 0.1),
     _number("load_stribeck_rad_per_s", "rad/s", "the same of the gripper", 1e-4, 100, 0.02),
     _number("drag_presliding_rad", "rad", "deflection of the motor's bristles at which they slide", 1e-6, 0.1, 5e-4),

@@ -6,8 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, closest_match_hint, one_of, positive, within
 from gearsig.errors import InputError, RefusalError
@@ -106,58 +108,68 @@ def respond(
     RefusalError
         If flanks touch and part without end, or the state grows without bound.
     """
-    from sims.forging.integrate_kernel import DONE, integrate, open_contact
-
     positive(duration_s, "duration_s", "s")
     positive(interval_s, "interval_s", "s")
     within(tolerance, "tolerance", 1e-12, 1e-3)
-    n = ceil(duration_s / interval_s - 1e-9)
-    if n > MOST_POINTS:
-        raise InputError(f"{n} points are wanted", allowed=f"up to {MOST_POINTS}", remedy="shorten the run")
-    k = drive_numbers(drive)
-    start = first or FirstState()
-    y = np.zeros(N_STATES)
-    y[:4] = start.pinion_angle_rad, start.pinion_speed_rad_s, start.compression_m, start.compression_rate_mps
-    select = np.array([SIGNALS.index(one_of(name, "signals", SIGNALS)) for name in signals], dtype=np.int64)
-    found = np.full((n, len(select)), np.nan)
-    contacts = np.zeros((1000 + int(CONTACTS_PER_SECOND * duration_s), len(CONTACT_COLUMNS)))
-    mode, counts = np.zeros(3), np.zeros(4, dtype=np.int64)
-    if abs(y[2]) > k.half_backlash:
-        open_contact(k, y, 0.0, np.sign(y[2]), mode, contacts[0])
-        counts[1] = 1
-    h = 1e-6
-    absolute = ABSOLUTE * (tolerance / TOLERANCE)
-    times = courses.stretches(duration_s)
-    for begin, end in pairwise(times):
-        course = courses.straight(begin, end)
-        h, status = integrate(
-            k,
-            y,
-            mode,
-            begin,
-            end,
-            min(h, 1e-5),
-            course,
-            absolute,
-            tolerance,
-            interval_s,
-            select,
-            counts,
-            found,
-            contacts,
-        )
-        if status != DONE or not np.isfinite(y).all():
-            raise _failure(status, float(end))
-    while counts[0] < n:  # rounding may leave the last point just beyond the end
-        found[counts[0]] = found[counts[0] - 1]
-        counts[0] += 1
-    return DriveResponse(
-        interval_s,
-        {name: np.ascontiguousarray(found[:, i]) for i, name in enumerate(signals)},
-        contacts[: counts[1]].copy(),
-        int(counts[2]),
-        int(counts[3]),
-    )
+    run = _Run.begin(drive, first or FirstState(), signals, duration_s, interval_s)
+    for begin, end in pairwise(courses.stretches(duration_s)):
+        run.advance(begin, end, courses.straight(begin, end), tolerance)
+    return run.response(signals)
+
+
+@dataclass
+class _Run:
+    """A run on its way: states, contact, and what has been kept; arrays that the kernel fills in place."""
+
+    k: Any
+    y: FloatArray
+    mode: FloatArray
+    counts: NDArray[np.int64]
+    select: NDArray[np.int64]
+    found: FloatArray
+    contacts: FloatArray
+    interval_s: float
+    step_s: float = 1e-6
+
+    @classmethod
+    def begin(
+        cls, drive: ForgingDrive, start: FirstState, signals: Sequence[str], duration_s: float, interval_s: float
+    ) -> _Run:
+        """Make room for the signals, and put the drive into its first state."""
+        from sims.forging.integrate_kernel import open_contact
+
+        n = ceil(duration_s / interval_s - 1e-9)
+        if n > MOST_POINTS:
+            raise InputError(f"{n} points are wanted", allowed=f"up to {MOST_POINTS}", remedy="shorten the run")
+        select = np.array([SIGNALS.index(one_of(name, "signals", SIGNALS)) for name in signals], dtype=np.int64)
+        contacts = np.zeros((1000 + int(CONTACTS_PER_SECOND * duration_s), len(CONTACT_COLUMNS)))
+        y, mode, counts = np.zeros(N_STATES), np.zeros(3), np.zeros(4, dtype=np.int64)
+        y[:4] = start.pinion_angle_rad, start.pinion_speed_rad_s, start.compression_m, start.compression_rate_mps
+        k = drive_numbers(drive)
+        if abs(y[2]) > k.half_backlash:
+            open_contact(k, y, 0.0, np.sign(y[2]), mode, contacts[0])
+            counts[1] = 1
+        return cls(k, y, mode, counts, select, np.full((n, len(select)), np.nan), contacts, interval_s)
+
+    def advance(self, begin_s: float, end_s: float, course: FloatArray, tolerance: float) -> None:
+        """Integrate over one stretch of straight courses."""
+        from sims.forging.integrate_kernel import DONE, integrate
+
+        absolute = ABSOLUTE * (tolerance / TOLERANCE)
+        self.step_s, status = integrate(
+            self.k, self.y, self.mode, begin_s, end_s, min(self.step_s, 1e-5), course, absolute, tolerance,
+            self.interval_s, self.select, self.counts, self.found, self.contacts,
+        )  # fmt: skip
+        if status != DONE or not np.isfinite(self.y).all():
+            raise _failure(status, end_s)
+
+    def response(self, signals: Sequence[str]) -> DriveResponse:
+        """Return what was kept."""
+        filled = int(self.counts[0])
+        self.found[filled:] = self.found[filled - 1]  # rounding may leave the last point just beyond the end
+        kept = {name: np.ascontiguousarray(self.found[:, i]) for i, name in enumerate(signals)}
+        contacts = self.contacts[: self.counts[1]].copy()
+        return DriveResponse(self.interval_s, kept, contacts, int(self.counts[2]), int(self.counts[3]))
 
 
 def _failure(status: int, before_s: float) -> RefusalError:
