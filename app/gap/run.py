@@ -38,10 +38,17 @@ def run_gap(
     InputError, RefusalError
     """
     from app.gap.diagnose import diagnose_gap
+    from app.gap.start_stop.recognise import MODEL, refuse_start_stop
     from sims.registry import gap_simulator
 
+    def tell(stage: str, done: float) -> None:
+        on_stage(stage, READING + (1 - READING) * done)
+
+    if model == MODEL:
+        return _start_stop(asked, tell)
     simulator = gap_simulator(model)
     inputs = read_inputs(asked, lambda name: on_stage(f"reading {name}", 0.0))
+    refuse_start_stop(inputs.recordings, inputs.rigs, inputs.names, model)
     return diagnose_gap(
         inputs.recordings,
         simulator,
@@ -52,5 +59,21 @@ def run_gap(
         reference_names=inputs.reference_names,
         cache=cache,
         fresh=fresh,
-        on_stage=lambda stage, done: on_stage(stage, READING + (1 - READING) * done),
+        on_stage=tell,
+    )
+
+
+def _start_stop(asked: Asked, tell: Stage) -> GapReport:
+    """Diagnose a machine that starts and stops; nothing is kept, as nothing takes long."""
+    from app.gap.start_stop.diagnose import diagnose_start_stop
+
+    inputs = read_inputs(asked, lambda name: tell(f"reading {name}", 0.0))
+    return diagnose_start_stop(
+        inputs.recordings,
+        rigs=inputs.rigs,
+        references=inputs.references,
+        reference_rigs=inputs.reference_rigs,
+        names=inputs.names,
+        reference_names=inputs.reference_names,
+        on_stage=tell,
     )

@@ -14,7 +14,7 @@ N_OUT = 8
 """Pinion's and wheel's angle, speed, acceleration; torque of the sensor; force of the teeth."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _relief(r, p):
     """Tip relief at both ends of the path: the pair comes and goes without a step."""
     if p < r.relief_length:
@@ -92,7 +92,7 @@ def _rates(r, t, y, errors_1, errors_2, dy, out):
     share = y[1] / r.speed_limit
     motor = r.torque * y[8] * min(max(1.0 - share**5, -1.0), 1.0)
     motor *= 1.0 + r.ripple * (cos(r.ripple_order * y[0] + r.ripple_phase) + 0.3 * cos(2.0 * r.ripple_order * y[0]))
-    motor -= _friction(y[1], r.motor_level + r.brake * y[9], 0.2, 0.2, 0.02, r.motor_viscous)
+    motor -= _friction(y[1], r.motor_level + r.brake * y[9], 0.2, 0.2, 0.05, r.motor_viscous)
     shaft_1 = r.kt * (y[0] - y[2]) + r.ct * (y[1] - y[3])
     shaft_2 = r.kw * (y[4] - y[6]) + r.cw * (y[5] - y[7])
     drive, d1, d2 = _teeth(r, 1.0, y, errors_1, errors_2)
@@ -118,17 +118,18 @@ def march(r, y, errors_1, errors_2, n_samples, interval, longest_step):
     n_steps = ceil(interval / longest_step)
     h = interval / n_steps
     found = np.empty((n_samples, N_OUT))
-    k1, k2, k3, k4 = np.empty(N_STATES), np.empty(N_STATES), np.empty(N_STATES), np.empty(N_STATES)
-    out = np.empty(N_OUT)
+    slopes, at, out = np.empty((4, N_STATES)), np.empty(N_STATES), np.empty(N_OUT)
     for sample in range(n_samples):
         t = sample * interval
-        _rates(r, t, y, errors_1, errors_2, k1, found[sample])
+        _rates(r, t, y, errors_1, errors_2, slopes[0], found[sample])
         for i in range(n_steps):
             s = t + i * h
-            _rates(r, s, y, errors_1, errors_2, k1, out)
-            _rates(r, s + 0.5 * h, y + 0.5 * h * k1, errors_1, errors_2, k2, out)
-            _rates(r, s + 0.5 * h, y + 0.5 * h * k2, errors_1, errors_2, k3, out)
-            _rates(r, s + h, y + h * k3, errors_1, errors_2, k4, out)
+            _rates(r, s, y, errors_1, errors_2, slopes[0], out)
+            for stage in range(1, 4):
+                ahead = h if stage == 3 else 0.5 * h
+                for m in range(N_STATES):
+                    at[m] = y[m] + ahead * slopes[stage - 1, m]
+                _rates(r, s + ahead, at, errors_1, errors_2, slopes[stage], out)
             for m in range(N_STATES):
-                y[m] += h / 6.0 * (k1[m] + 2.0 * k2[m] + 2.0 * k3[m] + k4[m])
+                y[m] += h / 6.0 * (slopes[0, m] + 2.0 * slopes[1, m] + 2.0 * slopes[2, m] + slopes[3, m])
     return found

@@ -13,7 +13,7 @@ from gearsig.rig.speed import EncoderChannel
 from gearsig.rig.types import Sensor
 from sims.blind_drive.machine import Machine
 
-INTERVAL_S, STEP_S = 1e-3, 2.5e-5
+INTERVAL_S, STEP_S = 1e-3, 5e-5
 ALL = (
     Channel("torque", "torque", "N m", "between motor and pinion"),
     Channel("pinion angle", "angle", "rad", "pinion"),

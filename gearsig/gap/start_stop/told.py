@@ -140,9 +140,9 @@ def spot_of(now: Told, other: Told) -> Spot:
 def change_of(now: Told, other: Told, curve_shape: FloatArray, at: Spot | None = None) -> FloatArray:
     """Return how far what is told changed, (n,) by `NAMES`; nan where it cannot be told.
 
-    Levels (play, deflection, inertia, friction of the load, impact, scatter) in dB. What is ordinarily near zero and may
-    have a sign is given as 20 lg e · asinh(x/2f), f what sound machines differ by: for large x in dB over it. Tooth and
-    ripple are given over the next largest.
+    Levels (play, deflection, inertia, friction of the load, impact, scatter) in dB. What is ordinarily near zero and
+    may have a sign is given as 20 lg e · asinh(x/2f), f what sound machines differ by: for large x in dB over it. Tooth
+    and ripple are given over the next largest.
 
     Parameters
     ----------

@@ -1,0 +1,1 @@
+"""The gap diagnosis of machines that start and stop: `gearsig gap --model forging`."""

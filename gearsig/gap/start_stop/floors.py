@@ -1,0 +1,108 @@
+"""How far sound drives lie from what they are compared with: the structural floor of start–stop changes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.gap.start_stop.told import NAMES
+
+FILE = Path(__file__).with_name("floors.json")
+LEAST_DB = 0.15
+FLOOR = 1.96
+"""Scales of the middle of the distribution: 19 of 20 sound machines stay below."""
+TAIL = 4.0
+"""Degrees of freedom: a feature lies far off oftener than a normal one."""
+SUM_POWER = 4.0
+
+
+@dataclass(frozen=True)
+class DriveFloor:
+    """Middle and scale of each change of sound drives.
+
+    Parameters
+    ----------
+    centre, scale : array, (n,) by `NAMES`
+        dB.
+    whole : float
+        Size of the whole change that one sound drive in twenty exceeds.
+    """
+
+    centre: FloatArray
+    scale: FloatArray
+    whole: float
+
+    @classmethod
+    def of_sound(cls, rows: FloatArray) -> DriveFloor:
+        """Return the floor of a table of changes of sound drives, (n_drives, n); nan where a change could not be told.
+
+        The scale is the half width of the middle 80 % over 1.28: what lies far off is the tail's, see `log_density`.
+        """
+        table = np.asarray(rows, dtype=np.float64)
+        known = np.isfinite(table)
+        centre, scale = np.zeros(table.shape[1]), np.full(table.shape[1], 6.0)
+        for i in range(table.shape[1]):
+            values = table[known[:, i], i]
+            if len(values) >= 5:
+                low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
+                centre[i], scale[i] = middle, max(0.5 * (high - low) / 1.2816, LEAST_DB)
+        sizes = [_soft((row - centre) / (FLOOR * scale)) for row in table]
+        return cls(centre, scale, float(np.quantile(sizes, 0.95)))
+
+    def size(self, change: FloatArray) -> float:
+        """Return the size of a whole change; 1: one sound drive in twenty is that far."""
+        return _soft((change - self.centre) / (FLOOR * self.scale)) / self.whole
+
+    def log_density(self, change: FloatArray, predicted: FloatArray, widen: FloatArray | float = 0.0) -> FloatArray:
+        """Return the logarithm of Student's density of each change around centre + predicted, (n,); 0 where unknown.
+
+        Parameters
+        ----------
+        change, predicted : array, (n,)
+        widen : array or float
+            dB that the scale is widened by: an error of the prediction.
+        """
+        scale = np.hypot(self.scale, widen)
+        z = np.nan_to_num((change - self.centre - predicted) / scale)
+        logs: FloatArray = np.where(
+            np.isfinite(change), -0.5 * (TAIL + 1.0) * np.log1p(z * z / TAIL) - np.log(scale / self.scale), 0.0
+        )
+        return logs
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain values by name."""
+        return {
+            "centre_db": dict(zip(NAMES, (round(float(v), 4) for v in self.centre), strict=True)),
+            "scale_db": dict(zip(NAMES, (round(float(v), 4) for v in self.scale), strict=True)),
+            "whole": round(self.whole, 4),
+        }
+
+    @classmethod
+    def from_dict(cls, found: Mapping[str, Any]) -> DriveFloor:
+        """Return what `to_dict` made."""
+        centre, scale = (np.array([float(found[key][name]) for name in NAMES]) for key in ("centre_db", "scale_db"))
+        return cls(centre, scale, float(found["whole"]))
+
+
+def _soft(normalised: FloatArray) -> float:
+    z = np.abs(normalised[np.isfinite(normalised)])
+    return float(np.sum(z**SUM_POWER) ** (1.0 / SUM_POWER)) if len(z) else 0.0
+
+
+@cache
+def load_floors() -> Mapping[str, Any]:
+    """Return the file that comes with this version."""
+    found: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
+    return found
+
+
+def load_floor(*, with_reference: bool, part: str = "whole") -> DriveFloor:
+    """Return the floor of whole recordings, or of the "half" of their cycles."""
+    return DriveFloor.from_dict(load_floors()["with_reference" if with_reference else "without_reference"][part])
