@@ -96,6 +96,8 @@ def _simulate_to(request: Request, output: Path, force: bool) -> None:
     for warning in recording.warnings:
         typer.echo(f"Note: {warning}", err=True)
     typer.echo(f"Next: gearsig analyze {names.recording}")
+    if recording.rig is not None and recording.rig.contact is not None:
+        typer.echo("It holds the motion of both gears: gearsig start-stop, force and identify read it as well.")
 
 
 def simulate_request(request: Request) -> Recording:

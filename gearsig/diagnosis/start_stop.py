@@ -16,7 +16,9 @@ from gearsig.motion.bursts import Burst, find_bursts
 from gearsig.motion.course import Course, is_start_stop
 from gearsig.motion.measure import measure_motion
 from gearsig.motion.start_stop import StartStop, course_of_angle, examine_start_stop
+from gearsig.motion.tooth_compliance import ToothCompliance
 from gearsig.recording.types import Recording
+from gearsig.rig.contact import ToothContact
 from gearsig.rig.speed import EncoderChannel, SpeedChannel
 from gearsig.rig.types import Rig
 
@@ -45,7 +47,7 @@ def start_stop_analysis(
     source = recording.speed_source or rig.speed
     if isinstance(source, EncoderChannel):  # what seems to turn back may be an encoder that wraps
         check_wrap(angle_rad, recording.sampling_rate_hz, source.channel, recording.provenance.source)
-    findings = [*_not_of_rest(problems, recording), _motion_finding(course), _left_out(course)]
+    findings = [*_not_of_rest(problems, recording), _motion_finding(course)]
     examined: StartStop | None = None
     if rig.contact is None:
         findings.append(_no_contact())
@@ -60,6 +62,7 @@ def start_stop_analysis(
             ]
         except (RefusalError, InputError) as error:
             findings.append(_not_examined(error))
+    findings.append(_left_out(course, examined))
     bursts = _bursts(recording, problems)
     findings += [_burst_finding(name, blows, angle_rad, recording, rig) for name, blows in bursts.items() if blows]
     order = ranked(findings)
@@ -118,12 +121,14 @@ def _motion_finding(course: Course) -> Finding:
     )
 
 
-def _left_out(course: Course) -> Finding:
+def _left_out(course: Course, examined: StartStop | None) -> Finding:
+    without_teeth = examined is None or examined.teeth is None
+    what = "Cracks, bearings, shafts and meshing" if without_teeth else "Bearings, shafts and meshing"
     back = f", and it turns back by {course.backwards_rad:.3g} rad" if course.backwards_rad > 0.0 else ""
     return Finding(
         "stationary-methods-left-out",
         Kind.CANNOT_TELL,
-        "Cracks, bearings, shafts and meshing are not examined: spectra, orders and averages want a speed that lasts.",
+        f"{what} are not examined: spectra, orders and averages want a speed that lasts.",
         evidence=(f"the speed falls to zero {len(course.stops_s)} time(s){back}",),
         surer="A recording in continuous rotation, some tens of revolutions at a steady speed.",
     )
@@ -180,6 +185,8 @@ def _weak_teeth(examined: StartStop, rig: Rig) -> list[Finding]:
     found = examined.teeth
     if found is None or rig.contact is None:
         return []
+    if not found.weak_teeth:
+        return [_teeth_alike(found, rig.contact)]
     pair = rig.contact.pair or rig.pairs[0].name
     return [
         Finding(
@@ -204,6 +211,21 @@ def _weak_teeth(examined: StartStop, rig: Rig) -> list[Finding]:
         )
         for tooth in found.weak_teeth
     ]
+
+
+def _teeth_alike(found: ToothCompliance, contact: ToothContact) -> Finding:
+    """Say that no tooth stands out, and from which loss of stiffness on one would."""
+    least = 100.0 * found.least_loss(contact.exponent)
+    seen = int(np.count_nonzero(np.isfinite(found.extra_um)))
+    return Finding(
+        "teeth-alike",
+        Kind.INFORMATION,
+        f"Of {seen} teeth of the driver none yields more than the others; one that had lost {least:.2g} % of its "
+        "stiffness would show.",
+        Where(gear=contact.pair),
+        evidence=(f"compression that torque and contact do not explain; a pair yields {found.deflection_um:.3g} µm",),
+        surer="A longer recording: more passes of each tooth.",
+    )
 
 
 def _impacts(examined: StartStop) -> list[Finding]:

@@ -25,6 +25,18 @@ LEAST_SCATTER = 1e-3
 """Part of the ordinary acceleration that the load's equation leaves out."""
 ONE_FLANK = "only one flank was loaded: play and zero of the angles cannot be told apart; record a stop with a brake"
 ONE_ZERO = "only one flank was loaded: it is told from the zero of the angles by little; record a stop with a brake"
+NAMES_OF_RESULT = {
+    "datum": "the zero of the angles",
+    "half_backlash": "half_backlash_um",
+    "log stiffness": "stiffness_n_per_m_lambda",
+    "damping": "restitution",
+    "driver inertia": "driver_inertia_kg_m2",
+    "friction": "friction_coefficient",
+    "inverse inertia": "driven_inertia_kg_m2",
+}
+"""For the names of the equations' terms."""
+FALLING = ("damping", "inverse inertia")
+"""Terms that fall as what they stand for grows."""
 MOTOR = "it lies ahead of the torque sensor and does not show in the torque"
 
 
@@ -146,7 +158,7 @@ def _load_parameters(motion: PairMotion, fit: RobustFit) -> list[FittedParameter
             told,
             "" if told else _why(fit, "inverse inertia"),
             motion.contact.driven_inertia_kg_m2,
-            fit.most_like("inverse inertia"),
+            _alike(fit, "inverse inertia"),
         ),
         _plain(fit, "load_friction_nm", "load_friction_nm", "N m", None),
         _plain(fit, "load_viscous_nm_s_per_rad", "load_viscous_nm_s_per_rad", "N m s/rad", None),
@@ -159,7 +171,7 @@ def _plain(
     value, half = factor * fit.value(own), factor * NORMAL_95 * fit.deviation(own)
     told = half < TOLD * abs(value)
     why = "" if told else _why(fit, own)
-    return FittedParameter(name, unit, value, (value - half, value + half), told, why, rig_value, fit.most_like(own))
+    return FittedParameter(name, unit, value, (value - half, value + half), told, why, rig_value, _alike(fit, own))
 
 
 def _stiffness(fit: RobustFit, rig_value: float, *, has_both_flanks: bool) -> FittedParameter:
@@ -170,7 +182,7 @@ def _stiffness(fit: RobustFit, rig_value: float, *, has_both_flanks: bool) -> Fi
     low, middle, high = (float(np.exp(min(v, 700.0))) for v in (log_k - half, log_k, log_k + half))
     why = "" if told else _why(fit, own) if has_both_flanks else ONE_ZERO
     return FittedParameter(
-        "stiffness_n_per_m_lambda", "N/m^λ", middle, (low, high), told, why, rig_value, fit.most_like(own)
+        "stiffness_n_per_m_lambda", "N/m^λ", middle, (low, high), told, why, rig_value, _alike(fit, own)
     )
 
 
@@ -182,9 +194,18 @@ def _restitution(fit: RobustFit, law: str, rig_value: float) -> FittedParameter:
     factors = np.array([damping_ratio_s_per_m(law, float(e), 1.0) for e in grid])
     low, middle, high = (float(np.interp(v, factors[::-1], grid[::-1])) for v in (c + half, c, c - half))
     why = "" if told else _why(fit, "damping")
-    return FittedParameter("restitution", "", middle, (low, high), told, why, rig_value, fit.most_like("damping"))
+    return FittedParameter("restitution", "", middle, (low, high), told, why, rig_value, _alike(fit, "damping"))
+
+
+def _alike(fit: RobustFit, own: str) -> str:
+    """Return what could take a parameter's place, by the name that the result gives it; empty where nothing could."""
+    like, correlation = fit.most_like(own)
+    if not like:
+        return ""
+    sign = -1.0 if (own in FALLING) != (like in FALLING) else 1.0
+    return f"{NAMES_OF_RESULT.get(like, like)} (correlation {sign * correlation:.2f})"
 
 
 def _why(fit: RobustFit, own: str) -> str:
-    like = fit.most_like(own)
+    like = _alike(fit, own)
     return "the record hardly depends on it" + (f", and it is mistaken for {like}" if like else "")

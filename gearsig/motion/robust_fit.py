@@ -55,16 +55,16 @@ class RobustFit:
         i = self.names.index(name)
         return float(np.sqrt(max(self.covariance[i, i], 0.0)))
 
-    def most_like(self, name: str) -> str:
-        """Name the parameter whose estimate nearly goes with this one; empty where none does."""
+    def most_like(self, name: str) -> tuple[str, float]:
+        """Return the parameter whose estimate nearly goes with this one, and their correlation; no name: none does."""
         i = self.names.index(name)
         deviations = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
         if not np.isfinite(deviations[i]):
-            return ""
+            return "", 0.0
         correlation = self.covariance[i] / (deviations[i] * deviations)
         correlation[i] = 0.0
         j = int(np.argmax(np.abs(correlation)))
-        return f"{self.names[j]} (correlation {correlation[j]:.2f})" if abs(correlation[j]) > ALIKE else ""
+        return (self.names[j], float(correlation[j])) if abs(correlation[j]) > ALIKE else ("", 0.0)
 
 
 def robust_fit(

@@ -47,7 +47,15 @@ class ToothCompliance:
 
     def stiffness_loss(self, tooth: int, exponent: float) -> float:
         """Part of the stiffness of a pair that such an extra deflection stands for: 1 − (1 + x/g)^−λ."""
-        return float(1.0 - (1.0 + self.extra_um[tooth - 1] / self.deflection_um) ** -exponent)
+        return self._loss(float(self.extra_um[tooth - 1]), exponent)
+
+    def least_loss(self, exponent: float) -> float:
+        """Part of its stiffness that an ordinary tooth must have lost to stand out."""
+        ordinary = float(np.nanmedian(self.uncertainty_um))
+        return self._loss(max(CERTAIN * ordinary, LEAST_PART * self.deflection_um), exponent)
+
+    def _loss(self, extra_um: float, exponent: float) -> float:
+        return float(1.0 - (1.0 + extra_um / self.deflection_um) ** -exponent)
 
 
 def tooth_compliance(motion: PairMotion) -> ToothCompliance:

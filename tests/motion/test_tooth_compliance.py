@@ -1,5 +1,7 @@
 """A cracked tooth in a drive that starts and stops: by how much it yields, and that a sound one is left alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,11 @@ from gearsig.motion.tooth_compliance import tooth_compliance
 from gearsig.recording.types import Recording
 from sims import simulate
 from sims.effects import EffectSetting
+from sims.forging.build import build_rig
+from sims.forging.drive import WeakTooth
+from sims.forging.measure import record, sensors
 from sims.forging.simulator import ForgingManipulator
+from sims.wanted import Wanted
 from tests.motion.recordings import start_stop, without
 
 
@@ -26,6 +32,26 @@ def cracked(
         sampling_rate_hz=1000.0,
         seed=seed,
     )
+
+
+@pytest.mark.parametrize("part", [0.4, 2.0])
+def test_the_least_loss_parts_what_shows_from_what_does_not(part: float) -> None:
+    """A tooth that has lost two fifths of it is not named, one that has lost twice as much is."""
+    sound = tooth_compliance(measure_motion(cracked(0.0, "manipulator_formula", "start-stop")))
+    prepared = ForgingManipulator().prepare({}, None, preset_name="manipulator_formula")
+    drive = replace(prepared.drive, weak_tooth=WeakTooth(0, 6, part * sound.least_loss(1.5)))
+    wanted = Wanted(prepared.values)
+    recording = record(
+        drive,
+        prepared.courses(13.0),
+        wanted,
+        rig=build_rig(drive, wanted, prepared.operation, sensors(1000.0)),
+        rng=np.random.default_rng(0),
+        sampling_rate_hz=1000.0,
+        duration_s=12.0,
+        truth={},
+    )
+    assert tooth_compliance(measure_motion(recording)).weak_teeth == ((7,) if part > 1.0 else ())
 
 
 @pytest.mark.parametrize("preset", ["manipulator_formula", "manipulator_table"])
