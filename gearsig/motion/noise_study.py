@@ -20,6 +20,7 @@ from gearsig.motion.force import (
 )
 from gearsig.motion.measure import measure_motion
 from gearsig.motion.roles import find_roles, role_values
+from gearsig.motion.types import PairMotion
 from gearsig.recording.types import Recording
 from gearsig.rig.tooth_pairs import contact_pair, path_of_contact
 from gearsig.rig.types import Rig
@@ -59,6 +60,19 @@ class NoiseStudy:
         if np.all(ratio < 1.0):
             return f"The piecewise model is nearer than Hunt–Crossley at all levels, up to {self.levels_um[-1]:g} µm."
         return "The piecewise model is not nearer than Hunt–Crossley, even without added noise."
+
+
+def acceleration_limit_rad_s2(study: NoiseStudy, motion: PairMotion) -> float | None:
+    """Return the white noise on the driver's acceleration up to which the piecewise model is nearer than Hunt–Crossley.
+
+    It adds J1 σ/r_b1 to the piecewise model alone, in squares: σ = (r_b1/J1) √(rms_HC² − rms_piecewise²). None where
+    nothing turns between torque sensor and teeth, where the reference is the tooth force, or where it is never nearer.
+    """
+    inertia, r1 = motion.contact.driver_inertia_kg_m2, motion.path.base_radii_m[0]
+    own, other = float(study.rms_n[PIECEWISE][0]), float(study.rms_n[HUNT_CROSSLEY][0])
+    if inertia == 0.0 or study.reference != FROM_TORQUE or own >= other:
+        return None
+    return r1 / inertia * float(np.sqrt(other**2 - own**2))
 
 
 def noise_study(

@@ -22,7 +22,7 @@ from textwrap import fill
 from typing import Any
 
 from gearsig import __version__
-from gearsig.motion.noise_study import NoiseStudy
+from gearsig.motion.noise_study import NoiseStudy, acceleration_limit_rad_s2
 from gearsig.motion.types import ForceEstimate
 from gearsig.report.numbers import rounded
 
@@ -51,7 +51,7 @@ def force_text(estimate: ForceEstimate, noise: NoiseStudy | None = None) -> str:
         *_error_lines(estimate),
     ]
     if noise is not None:
-        lines += ["", *_noise_lines(noise)]
+        lines += ["", *_noise_lines(noise), *_acceleration_line(estimate, noise)]
     return "\n".join(lines)
 
 
@@ -120,6 +120,20 @@ def _noise_lines(noise: NoiseStudy) -> list[str]:
     head = f"{'noise added (µm rms)':<24}" + "".join(f"{level:>9g}" for level in noise.levels_um)
     rows = [f"{model:<24}" + "".join(f"{value:>9.0f}" for value in rms) for model, rms in noise.rms_n.items()]
     return [head, *rows, f"(rms error in N against {noise.reference})", fill(noise.text, WIDTH)]
+
+
+def _acceleration_line(estimate: ForceEstimate, noise: NoiseStudy) -> list[str]:
+    """Noise of the angle is what the study adds; what the acceleration's does follows from the inertia."""
+    motion = estimate.motion
+    limit = acceleration_limit_rad_s2(noise, motion)
+    if limit is None:
+        return []
+    each = motion.contact.driver_inertia_kg_m2 / motion.path.base_radii_m[0]
+    text = (
+        f"Noise on the driver's acceleration adds J1/rb1 = {each:.3g} N per rad/s²: the piecewise model is nearer up "
+        f"to {limit:.0f} rad/s² rms. Noise on the speeds moves the damping alone."
+    )
+    return [fill(text, WIDTH)]
 
 
 def _noise_json(noise: NoiseStudy) -> Json:

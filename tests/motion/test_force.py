@@ -19,7 +19,7 @@ from gearsig.motion.force import (
     inverse_force_n,
 )
 from gearsig.motion.measure import measure_motion
-from gearsig.motion.noise_study import noise_study
+from gearsig.motion.noise_study import NoiseStudy, acceleration_limit_rad_s2, noise_study
 from gearsig.motion.types import ForceEstimate
 from gearsig.recording.types import Recording
 from gearsig.rig.contact import ToothContact
@@ -182,7 +182,11 @@ def test_noise_on_the_acceleration_costs_the_drivers_inertia_times_it(preset: st
         found = estimate(noisy(recording, "angular_acceleration", deviation))
         expected = np.hypot(still, inertia * deviation / r1)
         assert found.error(PIECEWISE, FROM_TORQUE).rms_n == pytest.approx(expected, rel=0.1)
-    crossover = np.sqrt(other**2 - still**2) * r1 / inertia
+    study = NoiseStudy(
+        np.array([0.0]), FROM_TORQUE, {PIECEWISE: np.array([still]), HUNT_CROSSLEY: np.array([other])}, None
+    )
+    crossover = acceleration_limit_rad_s2(study, measure_motion(recording))
+    assert crossover is not None
     assert 2300.0 < crossover < 2900.0
     for share, is_nearer in ((0.8, True), (1.2, False)):
         found = estimate(noisy(recording, "angular_acceleration", share * crossover))

@@ -27,6 +27,7 @@ def test_text_data_table_and_pictures(capsys: pytest.CaptureFixture[str], file: 
     assert code == 0
     assert "piecewise                torque / rb1" in out
     assert "nearer than Hunt–Crossley up to" in out
+    assert "J1/rb1 = 0.213 N per rad/s²" in out
     assert sorted(p.name for p in folder.iterdir()) == ["force.csv", "force.json", "force.png", "noise.png"]
     data = json.loads((folder / "force.json").read_text())
     errors = {(e["model"], e["reference"]): e["relative_rms"] for e in data["errors"]}
