@@ -50,6 +50,9 @@ OWN_EFFECT = (
     "effects. Its probability is the share of “unknown” that its held-out shrink beyond placebos explains, and is not "
     "calibrated."
 )
+NAMING = (GapOutcome.EFFECT, GapOutcome.CANNOT_SEPARATE)
+"""Outcomes that name an effect; nothing is added to the simulator elsewhere."""
+
 NOT_SIMULATED = (
     "The recognition has never seen “{title}”, and it could not be simulated on this rig: nothing is said of it."
 )
@@ -129,12 +132,14 @@ def diagnose_gap(
         (OWN_EFFECT if name in tried else NOT_SIMULATED).format(title=known[name].title) for name in weighed.unheard_of
     ]
     notices += _without_meaning(twin, known, effects)
-    outcome = weighed.calibration.outcome(probabilities)
     tell("placing it", 0.82)
     clearest = max(conditions, key=_size)
     k = conditions.index(clearest)
     standing, remarks = stood_out(recordings[k], own_rigs[k], references, other_rigs, clearest.facts.name)
     notices += remarks
+    outcome = weighed.calibration.outcome(probabilities)
+    if standing and outcome is GapOutcome.NO_GAP:
+        outcome = GapOutcome.UNKNOWN  # impacts that no shaft repeats are a gap, however few features see them
     places = ranked_places(_places(clearest), [standing_place(one, own_rigs[k]) for one in standing])
     causes = tuple(_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items())
     causes = _in_order(causes, outcome)
@@ -156,7 +161,7 @@ def diagnose_gap(
         causes=causes,
         groups=group_probabilities(causes),
         inseparable=pair if outcome is GapOutcome.CANNOT_SEPARATE else None,
-        steps=steps_of(conditions, tried, causes) if tried and outcome is not GapOutcome.NO_GAP else (),
+        steps=steps_of(conditions, tried, causes) if tried and outcome in NAMING else (),
         next_recordings=_next(pair, known, tried, twin, conditions, outcome),
         spectra=spectrum_curves(
             clearest.now,

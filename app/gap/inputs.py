@@ -90,6 +90,8 @@ def _check_files(asked: Asked) -> None:
         raise InputError("no recording is given", remedy="give one, or better several operating conditions of one rig")
     seen: set[Path] = set()
     for path in (*asked.recordings, *asked.references):
+        if not path.exists():
+            raise InputError("there is no such file", where=str(path), remedy="check its name and folder")
         if path.resolve() in seen:
             healthy = path in asked.references and path in asked.recordings
             what = "is given as a recording and as its own healthy reference" if healthy else "is given twice"
@@ -116,7 +118,9 @@ def _rigs(asked: Asked, files: Sequence[Path]) -> tuple[Rig, ...]:
         own = read_rig(beside) if beside is not None and is_own else None
         if own is None and common is None:
             raise InputError(
-                "no rig file is given, and none lies beside it", where=str(path), remedy="give --rig RIG.toml"
+                "no rig file is given, and none lies beside it",
+                where=str(path),
+                remedy="give --rig RIG.toml with the gears' teeth and module; `gearsig rig example` prints one",
             )
         first = first or own
         if own is not None and first is not None:
@@ -166,7 +170,7 @@ def _check_same(rig: Rig, own: Rig, name: str) -> None:
 def _identity(rig: Rig) -> dict[str, str]:
     """Return what makes a machine another one, as far as it is known."""
     facts: dict[str, str] = {}
-    if rig.pairs:
+    if rig.pairs and all(p.driver_teeth and p.driven_teeth for p in rig.pairs):
         facts["teeth"] = ", ".join(f"{p.driver_teeth}/{p.driven_teeth}" for p in rig.pairs)
     for i, pair in enumerate(rig.pairs, 1):
         for key, unit in (("module_mm", "mm"), ("pressure_angle_deg", "°"), ("face_width_mm", "mm")):

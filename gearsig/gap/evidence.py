@@ -12,16 +12,20 @@ from gearsig.gap.prediction import Fit, Observed
 from gearsig.gap.types import Evidence
 from gearsig.gap.words import feature_words
 
-MOST = 8
+MOST, MOST_OF_A_FAMILY = 10, 3
 CLEAR = 1.0
 """Floors from which a change, predicted or observed, says something."""
+
+OWN_COUNTS = 2.0
 
 AGREES = 0.5
 """Observed over predicted, from here to its inverse, speaks for the effect."""
 
 
 def evidence_of(fit: Fit, observed: Sequence[Observed], frame: GearFrame) -> tuple[Evidence, ...]:
-    """Return the most telling feature of each family, clearest first; of the condition that shows most.
+    """Return the most telling features of each family, clearest first; of the condition that shows most.
+
+    What the effect would change counts twice as much as what it would not: its own features must be among them.
 
     Parameters
     ----------
@@ -32,9 +36,14 @@ def evidence_of(fit: Fit, observed: Sequence[Observed], frame: GearFrame) -> tup
     """
     clearest = max(observed, key=lambda one: float(np.abs(one.normalised).max()))
     predicted = fit.at(clearest.condition)
-    sizes = np.maximum(np.abs(predicted), np.abs(clearest.distances)) / clearest.floors
-    best = [int(rows[np.argmax(sizes[rows])]) for rows in family_members(fit.path.names).values()]
-    telling = sorted((i for i in best if sizes[i] >= CLEAR), key=lambda i: -sizes[i])
+    sizes = np.maximum(OWN_COUNTS * np.abs(predicted), np.abs(clearest.distances)) / clearest.floors
+    clear = np.maximum(np.abs(predicted), np.abs(clearest.distances)) >= CLEAR * clearest.floors
+    best = [
+        int(i)
+        for rows in family_members(fit.path.names).values()
+        for i in rows[np.argsort(-sizes[rows], kind="stable")][:MOST_OF_A_FAMILY]
+    ]
+    telling = sorted((i for i in best if clear[i]), key=lambda i: -sizes[i])
     return tuple(
         Evidence(
             feature_words(fit.path.names[i], frame),

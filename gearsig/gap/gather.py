@@ -60,7 +60,7 @@ def gather(recording: Recording, rig: Rig, channels: Sequence[str] = (), angle: 
     for own in shaft_angles:
         if own.n_revolutions < LEAST_REVOLUTIONS:
             raise RefusalError(
-                f"the record holds {own.n_revolutions:.3g} revolutions of shaft {own.shaft!r}, "
+                f"shaft {own.shaft!r} turns {own.n_revolutions:.3g} times in the record, "
                 f"{LEAST_REVOLUTIONS} are needed",
                 remedy="record longer",
             )

@@ -41,7 +41,8 @@ def gap_places(
     """Return where a recording differs, largest share first; last what only follows from other places.
 
     A place is a family of features; its size s_f is their mean of high order over the floors, and its share
-    max(s_f² − 1, 0)/Σ max(s² − 1, 0): what does not exceed the larger floor has none. Shares add up to less than 1
+    max(s_f² − 1, 0)/Σ max(s² − 1, 0): what does not exceed the larger floor has none, nor has what only follows from
+    other places (nan), which is not in the sum. Shares add up to less than 1
     where some of what changed is no more than noise and leakage in a place, or below 1 % of the whole.
 
     Parameters
@@ -71,21 +72,24 @@ def gap_places(
     comparison = Comparison(now, other, is_reference, _named(change.names, distances), _named(change.names, both))
     members = {family: _telling(change.names, rows) for family, rows in family_members(change.names).items()}
     energies = {family: max(family_size(both[rows]) ** 2 - 1.0, 0.0) for family, rows in members.items()}
-    total = sum(energies.values())
+    least = LEAST_SHARE * sum(energies.values())
+    spots = {family: _spot(comparison, family) for family, energy in energies.items() if energy > least}
+    following = {family for family, spot in spots.items() if spot is not None and spot.follows}
+    total = sum(energy for family, energy in energies.items() if family not in following)
     found = []
-    for family, energy in energies.items():
-        spot = _spot(comparison, family) if energy > LEAST_SHARE * total else None
+    for family, spot in spots.items():
         if spot is not None:
             sizes = [family_size(distances[members[family]] / floor[members[family]]) for floor in floors]
-            found.append(_place(family, spot, (sizes[0], sizes[1]), energy / total, now))
+            share = float("nan") if family in following else energies[family] / total
+            found.append(_place(family, spot, (sizes[0], sizes[1]), share, now))
     return ranked_places(_merged(found))
 
 
 def _merged(places: list[GapPlace]) -> list[GapPlace]:
     """Return the places with those put together to which two families of features led."""
-    merged: dict[tuple[PlaceKind, str], GapPlace] = {}
-    for place in sorted(places, key=lambda one: -one.share):
-        key = (place.kind, place.shaft)
+    merged: dict[tuple[PlaceKind, str, bool], GapPlace] = {}
+    for place in sorted(places, key=lambda one: -one.structural):
+        key = (place.kind, place.shaft, place.follows)
         if key in merged:
             merged[key] = replace(merged[key], share=merged[key].share + place.share)
         else:

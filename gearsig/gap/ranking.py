@@ -30,7 +30,10 @@ def ranked_places(places: Sequence[GapPlace], standing: Sequence[GapPlace] = ())
         same = [place for place in left if _same_family(place, one)]
         first.append(_joined(one, same))
         left = [place for place in left if place not in same]
-    return (*first, *sorted(left, key=lambda place: (place.follows, -place.share)))
+    return (
+        *first,
+        *sorted(left, key=lambda place: (place.follows, -(place.structural if place.follows else place.share))),
+    )
 
 
 def _same_family(place: GapPlace, standing: GapPlace) -> bool:

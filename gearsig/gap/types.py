@@ -53,7 +53,7 @@ class GapPlace:
     repeatability, structural : float
         The change over both floors, 1: as large as a floor; nan where nothing was simulated.
     share : float
-        Of the whole gap, 0 to 1; nan where nothing was simulated.
+        Of the whole gap, 0 to 1; nan where it `follows`, or was found without a simulation.
     shaft : str
     orders : tuple of float
         Of the driver's shaft, where it is largest.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from gearsig.gap.types import GapCause, GapOutcome, GapPlace, GapReport, Interval
+from gearsig.gap.types import NONE, UNKNOWN, GapCause, GapOutcome, GapPlace, GapReport, Interval
 from gearsig.gap.words import severity_unit
 
 
@@ -58,7 +58,8 @@ def _which_none(report: GapReport, odds: str) -> str:
     rival = max(report.causes[1:], key=lambda cause: cause.probability, default=None)
     if rival is None or report.causes[0].probability > SURE:
         return f"Which: none ({odds}); what differs is no more than between healthy machines and the simulator."
-    return f"Which: none is likely enough to be named: no gap {odds}, {rival.title} {100 * rival.probability:.0f} %."
+    name = "a gap of unknown cause" if rival.name == UNKNOWN else rival.title
+    return f"Which: none is likely enough to be named: no gap {odds}, {name} {100 * rival.probability:.0f} %."
 
 
 def _severity(cause: GapCause, severity: Interval) -> str:
@@ -75,10 +76,13 @@ def _how_far(report: GapReport) -> str:
     shrinkage = report.causes[0].shrinkage
     if report.outcome in (GapOutcome.NO_GAP, GapOutcome.UNKNOWN) or shrinkage is None:
         return "How far: no effect was added."
-    s = shrinkage.shrink
-    shrinks = f"shrinks by {100 * s.value:.0f} % ({100 * s.low:.0f} to {100 * s.high:.0f} %)"
+    s, both = shrinkage.shrink, f"from {shrinkage.before.value:.2g} to {shrinkage.after.value:.2g} structural floors"
+    percent = f"{100 * s.value:.0f} % ({100 * s.low:.0f} to {100 * s.high:.0f} %)"
+    shrinks = f"shrinks {both}, by {percent} of what exceeds one,"
     if s.value <= 0.0:
         shrinks = "does not shrink"
+    elif shrinkage.after.high < 1.0:
+        shrinks = f"shrinks {both}, within what healthy machines show,"
     return f"How far: with {report.causes[0].title}, the gap on its own features {shrinks} on {shrinkage.held_out}."
 
 
@@ -93,7 +97,15 @@ def _next(report: GapReport) -> str:
         return "Next: nothing is needed; keep these recordings, later ones are best compared with them."
     if sum(cause.shrinkage is not None for cause in report.causes) < 2:
         return "Next: another speed or load; no two effects are likely enough to compute which would tell most."
-    return "Next: no other speed or load that was simulated would put the two likeliest effects further apart."
+    seen = _place_of_both(report)
+    look = f"look at {seen}; " if seen else ""
+    return f"Next: {look}no other speed or load that was simulated would put the two likeliest effects further apart."
+
+
+def _place_of_both(report: GapReport) -> str:
+    """Return the place that both likeliest effects share, which can be looked at; empty where they have none."""
+    first, second = [cause.place for cause in report.causes if cause.name not in (NONE, UNKNOWN)][:2]
+    return first if first == second and first.startswith("tooth") else ""
 
 
 def _where_seen(report: GapReport) -> str:

@@ -109,7 +109,8 @@ def floors_text(report: GapReport) -> str:
         known = "Compared with the simulation of the sound machine. "
     return (
         f"{known}A structural floor is {structural}; they exceed 1 once in twenty. A repeatability floor is what this "
-        f"machine differs by from itself, from one stretch to the next.{beside}"
+        f"machine differs by from itself, from one stretch to the next. A place counts against its own features alone: "
+        f"one may be many floors where the whole is few.{beside}"
     )
 
 

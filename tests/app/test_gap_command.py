@@ -295,3 +295,18 @@ def test_the_catalogue_is_listed(capsys) -> None:
     assert "envelope orders" in out
     assert "µm" in out
     assert max(map(len, out.splitlines())) <= 110
+
+
+def test_a_file_that_is_not_there_is_told_before_its_rig(capsys, tmp_path) -> None:
+    code, out, err = run(capsys, tmp_path / "missing.h5", "-o", tmp_path / "gap")
+    assert (code, out, list(tmp_path.iterdir())) == (2, "", [])
+    assert "there is no such file" in err
+
+
+def test_a_rig_that_does_not_know_all_teeth_is_no_other_machine(tmp_path) -> None:
+    path = copied(tmp_path, "now", name="of its own")
+    rig = read_rig(RIG)
+    partly = replace(rig, pairs=(replace(rig.pairs[0], driven_teeth=None),))
+    write_rig(partly, tmp_path / "common.toml")
+    (read,) = read_inputs(Asked((path,), rig=tmp_path / "common.toml")).rigs
+    assert read.pairs[0].driven_teeth is None

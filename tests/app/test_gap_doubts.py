@@ -66,7 +66,7 @@ def test_a_reference_with_a_fault_is_told() -> None:
 
 def test_a_refusal_names_the_recording_that_is_too_short() -> None:
     twin, short = gap_simulator("cracked").twin_of(rig()), recording(0, 1, duration_s=0.1)
-    with pytest.raises(RefusalError, match=r"^the old one: the record holds"):
+    with pytest.raises(RefusalError, match=r"^the old one: shaft .* turns"):
         conditions_of([short], [rig()], [short], [rig()], twin, [], nothing, ["the old one"])
     with pytest.raises(RefusalError, match=r"^today: "):
         conditions_of([short], [rig()], [], [], twin, ["today"], nothing)

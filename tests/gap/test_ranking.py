@@ -10,7 +10,9 @@ NAN = float("nan")
 
 def place(kind: PlaceKind, share: float, order: float = 0.0, *, follows: bool = False) -> GapPlace:
     orders = (order,) if order else ()
-    return GapPlace(kind, f"{kind.value} {share}", 10.0, 9.0, 3.0, share, orders=orders, follows=follows)
+    return GapPlace(
+        kind, f"{kind.value} {share}", 10.0, 9.0, 3.0, NAN if follows else share, orders=orders, follows=follows
+    )
 
 
 MESH, TAIL = place(PlaceKind.MESH, 0.1, 23.0), place(PlaceKind.TAIL, 0.6, follows=True)

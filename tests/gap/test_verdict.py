@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gearsig.gap.types import GapOutcome, Interval
+from gearsig.gap.types import GapOutcome, GapPlace, Interval, PlaceKind
 from tests.gap.example_report import (
     cannot_separate_report,
     effect_report,
@@ -73,3 +73,29 @@ def test_without_a_gap_nothing_is_asked_for_that_would_separate_causes() -> None
     assert (
         report.verdict[3] == "Next: nothing is needed; keep these recordings, later ones are best compared with them."
     )
+
+
+def test_a_gap_that_an_effect_explains_ends_within_the_floor() -> None:
+    report = effect_report()
+    found = replace(shrinkage(1.0, 1.0, 1.0), before=Interval(3.8, 3.7, 3.9), after=Interval(0.4, 0.3, 0.5))
+    line = replace(report, causes=(replace(report.causes[0], shrinkage=found), *report.causes[1:])).verdict[2]
+    assert "shrinks from 3.8 to 0.4 structural floors, within what healthy machines show, on" in line
+    partly = replace(found, after=Interval(2.0, 1.9, 2.1), shrink=Interval(0.6, 0.5, 0.7))
+    line = replace(report, causes=(replace(report.causes[0], shrinkage=partly), *report.causes[1:])).verdict[2]
+    assert "from 3.8 to 2 structural floors, by 60 % (50 to 70 %) of what exceeds one, on" in line
+
+
+def test_a_tooth_that_both_likeliest_effects_share_can_be_looked_at() -> None:
+    report = replace(cannot_separate_report(), next_recordings=(), references=("healthy.h5",))
+    at_one = tuple(replace(cause, place="tooth 21 of the gear on the input shaft") for cause in report.causes)
+    assert replace(report, causes=at_one).verdict[3].startswith("Next: look at tooth 21 of the gear on the input shaft")
+
+
+def test_impacts_without_a_size_are_named_with_the_place_beside_them() -> None:
+    report, nan = unknown_report(), float("nan")
+    impacts = GapPlace(PlaceKind.ENVELOPE, "impacts at order 5.148", 20.0, nan, nan, nan, orders=(5.148,))
+    mesh = effect_report().places[0]
+    line = replace(report, places=(impacts, mesh)).verdict[0]
+    assert line.startswith(f"Where: impacts at order 5.148; beside it, {mesh.title}, 8.7 structural floors")
+    assert replace(report, places=(impacts,)).verdict[0] == "Where: impacts at order 5.148."
+    assert "nan" not in line

@@ -1,0 +1,38 @@
+"""What speaks for an effect: its own features, predicted beside observed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.gap.evidence import MOST_OF_A_FAMILY, evidence_of
+from gearsig.gap.frame import gear_frame
+from gearsig.gap.prediction import EffectPath, Fit, Observed
+from gearsig.gap.types import Evidence, Interval
+from tests.gap.synthetic import RIG
+
+NAMES = (*(f"change.driver.{what}" for what in ("level", "peak", "prominence", "second", "kurtosis")), "hum")
+
+
+def told(predicted: list[float], observed: list[float]) -> tuple[Evidence, ...]:
+    table: FloatArray = np.array([predicted])
+    path = EffectPath("root_crack", {}, np.array([1.0]), (table,), NAMES)
+    seen = Observed(0, np.array(observed), np.ones(len(NAMES)))
+    return evidence_of(Fit(path, Interval(1.0, 1.0, 1.0), 0.0), [seen], gear_frame(RIG))
+
+
+def test_a_burst_is_told_by_more_than_one_of_its_figures() -> None:
+    found = told([2.0, 9.0, 10.0, 8.0, 3.0, 0.0], [2.0, 8.0, 9.0, 8.0, 3.0, 0.0])
+    assert len(found) == MOST_OF_A_FAMILY
+    assert all(one.speaks_for for one in found)
+    assert "burst over the median tooth" in found[0].feature
+
+
+def test_what_it_would_change_comes_before_a_change_that_is_not_its_own() -> None:
+    found = told([0.0, 0.0, 5.0, 0.0, 0.0, 0.0], [0.0, 7.0, 5.0, 0.0, 0.0, 8.0])
+    assert [one.predicted_db for one in found] == [5.0, 0.0, 0.0]
+    assert [one.speaks_for for one in found] == [True, False, False]
+
+
+def test_what_stays_within_the_floor_on_both_sides_says_nothing() -> None:
+    assert told([0.6] * 6, [0.9] * 6) == ()
