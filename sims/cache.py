@@ -1,10 +1,15 @@
-"""Where a user's machine keeps what can be computed again."""
+"""Where a user's machine keeps what can be computed again, and how a file gets there whole."""
 
 from __future__ import annotations
 
 import os
 import sys
+import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import IO
+
+from gearsig.errors import InputError
 
 
 def cache_folder(room: str) -> Path:
@@ -22,3 +27,27 @@ def cache_folder(room: str) -> Path:
     else:
         base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return base / "gearsig" / room
+
+
+def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
+    """Write a file beside its place and move it there: whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
+    """
+    part = ""
+    try:
+        handle, part = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem[:32]}-", suffix=".part")
+        with os.fdopen(handle, "wb") as file:
+            write(file)
+        Path(part).chmod(0o644)  # temporary files are for their owner only
+        Path(part).replace(path)
+    except OSError as error:
+        raise InputError(
+            f"cannot be written ({error.strerror})", where=str(path), remedy="choose another folder"
+        ) from None
+    finally:
+        if part:
+            Path(part).unlink(missing_ok=True)

@@ -26,6 +26,9 @@ def flexible(
     duration: Annotated[
         str, typer.Option("--duration", metavar="TIME", help="Of one sweep; 15s up and 15s down are six million steps.")
     ] = "15s",
+    spreading: Annotated[
+        bool, typer.Option("--spreading", help="Also check contact at single nodes against patches (RBE3).")
+    ] = False,
     seed: SeedOption = 0,
 ) -> None:
     """Study a pair of reduced finite-element gears: stiffness and transmission-error maps, sweeps with jumps, spectra.
@@ -59,6 +62,7 @@ def flexible(
             first_rpm=first,
             last_rpm=last,
             step_s=ready.step_s,
+            check_spreading=spreading,
             on_progress=lambda what, done: progress.update(task, description=what, completed=done),
         )
         paths = write_study(study, output, chosen.name)

@@ -25,7 +25,15 @@ def gear_body(
     hub: Annotated[str, typer.Option("--hub", metavar="LENGTH", help="Thickness of the hub, with a web.")] = "",
     dof: Annotated[int, typer.Option("--dof", help="Degrees of freedom of the mesh, about.")] = 277_200,
     modes: Annotated[int, typer.Option("--modes", help="Elastic modes to find.")] = 20,
-    held: Annotated[str, typer.Option("--held", help="free or bore: how the gear is held for its modes.")] = "free",
+    held: Annotated[
+        str, typer.Option("--held", help="free, bore or springs: how the gear is held for its modes.")
+    ] = "free",
+    radial: Annotated[
+        str, typer.Option("--radial", metavar="STIFFNESS", help="Springs at the hub, across.")
+    ] = "2e8N/m",
+    axial: Annotated[str, typer.Option("--axial", metavar="STIFFNESS", help="Along the shaft.")] = "1e8N/m",
+    tilt: Annotated[str, typer.Option("--tilt", metavar="STIFFNESS", help="Against tilting.")] = "1e5Nm/rad",
+    twist: Annotated[str, typer.Option("--twist", metavar="STIFFNESS", help="About the shaft.")] = "4e4Nm/rad",
     force: Annotated[str, typer.Option("--force", metavar="FORCE", help="On one tooth, for the stress.")] = "1000N",
     reduce: Annotated[bool, typer.Option("--reduce", help="Also reduce the gear, with its errors.")] = False,
     vtk: Annotated[bool, typer.Option("--vtk", help="Also write gear.vtu for other programs.")] = False,
@@ -34,6 +42,7 @@ def gear_body(
 
     Example: gearsig gear-body --teeth 50 --module 3mm --web 12mm --reduce -o gear
     """
+    import numpy as np
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -41,7 +50,6 @@ def gear_body(
     from app.gear_body.study import study_gear
     from sims.mesh import GearGeometry
     from sims.reduced_fe.blank import GearBlank
-    from sims.reduced_fe.cyclic import Held
 
     def length(text: str, name: str) -> float | None:
         return quantity(text, "mm", name) if text else None
@@ -56,7 +64,9 @@ def gear_body(
         bore_radius_mm=quantity(bore, "mm", "--bore"),
     )
     blank = GearBlank(geometry, length(web, "--web"), length(rim, "--rim"), length(hub, "--hub"))
-    support: Held = "bore" if one_of(held, "--held", ("free", "bore")) == "bore" else "free"
+    one_of(held, "--held", ("free", "bore", "springs"))
+    across, along = quantity(radial, "N/m", "--radial"), quantity(axial, "N/m", "--axial")
+    tilting, turning = quantity(tilt, "Nm/rad", "--tilt"), quantity(twist, "Nm/rad", "--twist")
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("mesh", total=1.0)
@@ -64,7 +74,8 @@ def gear_body(
             blank,
             dof,
             n_modes=modes,
-            held=support,
+            held="bore" if held == "bore" else "free",
+            springs=np.array([across, across, along, tilting, tilting, turning]) if held == "springs" else None,
             force_n=quantity(force, "N", "--force"),
             reduce=reduce,
             on_progress=lambda what, done: progress.update(task, description=what, completed=done),

@@ -9,9 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.flexible.study import Study
-from gearsig.plot.flexible import frequency_curves_figure, mesh_maps_figure, speed_spectra_figure, speed_sweep_figure
+from gearsig.plot.flexible import (
+    contact_spreading_figure,
+    frequency_curves_figure,
+    mesh_maps_figure,
+    speed_spectra_figure,
+    speed_sweep_figure,
+)
 from gearsig.plot.mesh import load_sharing_figure
 from gearsig.plot.order_map import order_map_figure
+from sims.reduced_fe.contact_spreading import SpreadingCheck
 from sims.reduced_fe.contact_table import MARGIN
 from sims.sweep_run import written
 
@@ -21,6 +28,7 @@ if TYPE_CHECKING:
 DOTS_PER_INCH = 160
 SHARING_NM = 170.0
 HIGHEST_CURVE_HZ = 12000.0
+NAMES = {"node": "one line of nodes", "patch": "patch (RBE3)", "section": "section"}
 RANGE = (0.52, 1.25)
 """Of the torsional mode's frequency, in which its jumps are looked for."""
 
@@ -62,7 +70,10 @@ def figures(study: Study, title: str) -> dict[str, Figure]:
     }
     low = study.angle_hz[:, study.angle_hz[0] < HIGHEST_CURVE_HZ]
     words = f"Natural frequencies over the mesh angle at {study.torque_nm:g} N·m, {title}"
-    found["natural_frequencies"] = frequency_curves_figure(study.angle_cycles, low, title=words)
+    uncoupled = study.uncoupled_hz[study.uncoupled_hz < HIGHEST_CURVE_HZ]
+    found["natural_frequencies"] = frequency_curves_figure(study.angle_cycles, low, uncoupled, title=words)
+    if study.spreading is not None:
+        found["contact_spreading"] = _spreading(study.spreading, study.torque_nm, title)
     found["run_up"] = order_map_figure(study.run_up, height_in=4.6)
     if study.sweeps:
         found["sweeps"] = _sweeps(study, title)
@@ -136,6 +147,15 @@ def _sharing(study: Study, title: str) -> Figure:
     errors = {f"{maps.torque_nm[i]:.3g} N·m": np.tile(maps.transmission_error_m[:, i], 2) for i in _few(maps.torque_nm)}
     words = f"Load sharing at {maps.torque_nm[place]:.3g} N·m, and static transmission error, {title}"
     return load_sharing_figure(cycles, carried, errors, title=words)
+
+
+def _spreading(check: SpreadingCheck, torque_nm: float, title: str) -> Figure:
+    curves = {
+        f"{NAMES[spread]} ({100.0 * check.ripple[spread]:.2g} %)": values
+        for spread, values in check.frequency_hz.items()
+    }
+    words = f"Contact spread over nodes at {torque_nm:g} N·m, {title}; ripple of a tooth's compliance in brackets"
+    return contact_spreading_figure(check.mesh_cycles, curves, title=words)
 
 
 def _few(torques: np.ndarray[tuple[int, ...], np.dtype[np.floating]]) -> list[int]:

@@ -14,6 +14,7 @@ from gearsig.orders.map import order_map
 from gearsig.orders.types import OrderMap
 from sims.cracked.build import build_rig
 from sims.machine.operation import Course, Operation
+from sims.reduced_fe.contact_spreading import SpreadingCheck, spreading_check
 from sims.reduced_fe.dynamics_constants import FlexiblePair, constants
 from sims.reduced_fe.dynamics_linear import eigenfrequencies_hz, torsional_mode
 from sims.reduced_fe.dynamics_respond import STEP_S, TRANSMISSION_ERROR, respond
@@ -44,6 +45,9 @@ class Study:
     natural_hz : mapping of torque to the torsional mode's frequency
     angle_hz : array, (n_c, n_modes)
         Eigenfrequencies over the mesh cycles `angle_cycles`, at the pair's own torque.
+    uncoupled_hz : array, (n,)
+        Of both sides without contact, rising.
+    spreading : SpreadingCheck or None
     run_up : OrderMap
         Of the acceleration that the first sensor reads in a run-up through the sweeps' speeds.
     """
@@ -56,6 +60,8 @@ class Study:
     natural_hz: dict[float, float]
     angle_cycles: FloatArray
     angle_hz: FloatArray
+    uncoupled_hz: FloatArray
+    spreading: SpreadingCheck | None
     run_up: OrderMap
 
 
@@ -68,6 +74,7 @@ def flexible_study(
     first_rpm: float = 900.0,
     last_rpm: float = 4100.0,
     step_s: float = STEP_S,
+    check_spreading: bool = False,
     on_progress: Progress = lambda *_: None,
 ) -> Study:
     """Run everything.
@@ -82,6 +89,8 @@ def flexible_study(
     sweep_s : float
         Length of one sweep; up and down of 15 s each are six million steps of 5 µs.
     first_rpm, last_rpm, step_s : float
+    check_spreading : bool
+        Also reduce the gears with contact at single nodes and at patches, see `sims.reduced_fe.contact_spreading`.
     on_progress : callable
         Told what is done, and which part of the whole.
     """
@@ -99,11 +108,18 @@ def flexible_study(
     spectra = {speed: _spectrum(pair, speed, torque_nm, step_s) for speed in SPECTRUM_RPM}
     natural = {t: torsional_mode(pair, Operation.steady(last_rpm, t)).frequency_hz for t in (*torques_nm, torque_nm)}
     cycles = (np.arange(80) + 0.5) / 80.0
-    at_angle = eigenfrequencies_hz(pair, Operation.steady(last_rpm, torque_nm), cycles)
+    loaded = Operation.steady(last_rpm, torque_nm)
+    own = constants(pair, loaded)
+    at_angle = eigenfrequencies_hz(pair, loaded, cycles, ready=own)
+    uncoupled = np.sort(np.concatenate([side.omega_rad_s[side.moving] for side in own.sides])) / (2.0 * np.pi)
+    spreading = None
+    if check_spreading:
+        on_progress("contact at nodes and patches", (n - 1) / n)
+        spreading = spreading_check(pair, loaded, cycles)
     axis = spectra[SPECTRUM_RPM[0]][0]
     lines = {speed: values for speed, (_, values) in spectra.items()}
     run_up = _run_up(pair, torque_nm, (first_rpm, last_rpm), min(RUN_UP_S, 2.0 * sweep_s + 0.5), step_s)
-    return Study(torque_nm, maps, sweeps, axis, lines, natural, cycles, at_angle, run_up)
+    return Study(torque_nm, maps, sweeps, axis, lines, natural, cycles, at_angle, uncoupled, spreading, run_up)
 
 
 def _run_up(

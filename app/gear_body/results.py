@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 DOTS_PER_INCH = 160
 N_SHOWN = 6
 NEIGHBOURS = (-1, 0, 1)
+HELD = {"free": "free", "bore": "bore held", "springs": "hub on springs"}
 
 
 def write_study(study: GearBodyStudy, folder: Path, *, vtk: bool = False) -> tuple[Path, ...]:
@@ -59,7 +60,9 @@ def figures(study: GearBodyStudy) -> dict[str, Figure]:
             near_mm=(*near, -across, across),
             title=f"{name}: {mesh.n_dof} degrees of freedom",
         ),
-        "modes": gear_modes_figure(view.points_mm, view.triangles, shapes, title=f"{name}: first modes"),
+        "modes": gear_modes_figure(
+            view.points_mm, view.triangles, shapes, title=f"{name}: first modes, {HELD[study.held]}"
+        ),
         "stress": _stress(study, (*near, -across, across), name),
     }
 
@@ -72,8 +75,18 @@ def lines(study: GearBodyStudy) -> list[str]:
         f"mass {q.mass_kg:.4g} kg ({1e6 * (q.volume_m3 / q.true_volume_m3 - 1.0):+.0f} ppm of the outline's)",
         f"polar inertia {q.polar_inertia_kg_m2:.4g} kg m², least scaled Jacobian {q.scaled_jacobian.min():.2f}",
         f"tooth compliance in mid-flank {study.load.push_m / study.load.force_n:.3g} m/N, bore held",
+        f"modes, {HELD[study.held]}:",
         *(_label(study, k) for k in range(len(study.modes.frequencies_hz))),
     ]
+    if study.discretisation is not None:
+        d, size = study.discretisation, study.mesh.size
+        text.append(
+            f"coarse: against {d.finer_dof} degrees of freedom the first frequency is {100.0 * d.frequency[0]:+.1f} %, "
+            f"the worst of {len(d.frequency)} {100.0 * d.frequency[np.argmax(np.abs(d.frequency))]:+.1f} %, a tooth's "
+            f"compliance {100.0 * d.compliance:+.0f} %"
+        )
+        if size.order == 1:
+            text.append(f"edges straight, up to {q.outline_error_mm:.2g} mm off the outline: no stress in the fillet")
     if study.reduced is not None:
         text.append(f"free-interface reduction: {study.reduced.n_modes} elastic modes and the static rest")
     if study.craig_bampton is not None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from gearsig.checks import FloatArray
 from sims.reduced_fe.blank import GearBlank
 from sims.reduced_fe.craig_bampton import CraigBamptonGear, CraigBamptonPlan, craig_bampton
 from sims.reduced_fe.cyclic import CyclicGear, Held
 from sims.reduced_fe.cyclic_modes import CyclicModes, cyclic_modes
+from sims.reduced_fe.discretisation import FINER_DOF, DiscretisationError, discretisation_error
 from sims.reduced_fe.memory import check_memory, sector_bytes
 from sims.reduced_fe.mesh_quality import MeshQuality, mesh_quality
 from sims.reduced_fe.mesh_size import mesh_size_for
@@ -31,10 +33,15 @@ class GearBodyStudy:
     mesh : SectorMesh
     quality : MeshQuality
     gear : CyclicGear
+        As it is held for its modes.
+    held : str
+        "free", "bore" or "springs".
     modes : CyclicModes
-        Elastic ones.
+        Elastic ones; of a gear on springs also those in which it moves as a whole.
     load : ToothLoad
         A tooth pushed in the middle of its flank, bore held.
+    discretisation : DiscretisationError or None
+        Of a mesh that is much coarser than what it is compared with.
     reduced : ReducedGear or None
     craig_bampton : CraigBamptonGear or None
     """
@@ -42,8 +49,10 @@ class GearBodyStudy:
     mesh: SectorMesh
     quality: MeshQuality
     gear: CyclicGear
+    held: str
     modes: CyclicModes
     load: ToothLoad
+    discretisation: DiscretisationError | None
     reduced: ReducedGear | None
     craig_bampton: CraigBamptonGear | None
 
@@ -54,6 +63,7 @@ def study_gear(
     *,
     n_modes: int = 20,
     held: Held = "free",
+    springs: FloatArray | None = None,
     force_n: float = 1000.0,
     reduce: bool = False,
     on_progress: Callable[[str, float], None] = lambda _what, _done: None,
@@ -69,6 +79,8 @@ def study_gear(
         Elastic modes, at least.
     held : str
         "free" or "bore".
+    springs : array (6,) or None
+        That hold the hub for the modes, see `CyclicGear`; with "free" only.
     force_n : float
         On the tooth.
     reduce : bool
@@ -80,12 +92,17 @@ def study_gear(
     size = mesh_size_for(blank, n_dof)
     check_memory(sector_bytes(blank, size))
     mesh = sector_mesh(blank, size)
-    gear = CyclicGear(mesh)
+    gear = CyclicGear(mesh, springs)
     on_progress("modes", 0.05)
+    elastic = held == "free" and springs is None
     with one_thread():
-        modes = cyclic_modes(gear, n_modes, held, elastic=held == "free")
+        modes = cyclic_modes(gear, n_modes, held, elastic=elastic)
     on_progress("stress", 0.25 if reduce else 0.6)
     load = load_tooth(mesh, force_n)
+    error = None
+    if mesh.n_dof < FINER_DOF / 2:
+        on_progress("finer mesh", 0.3)
+        error = discretisation_error(gear, modes, load, held, elastic=elastic)
     reduced = both = None
     if reduce:
         on_progress("free-interface reduction", 0.35)
@@ -93,4 +110,6 @@ def study_gear(
         on_progress("Craig–Bampton reduction", 0.7)
         both = craig_bampton(mesh, CraigBamptonPlan(n_slices=min(N_SLICES, mesh.tooth.shape[2])))
     on_progress("done", 1.0)
-    return GearBodyStudy(mesh, mesh_quality(mesh), gear, modes, load, reduced, both)
+    return GearBodyStudy(
+        mesh, mesh_quality(mesh), gear, held if springs is None else "springs", modes, load, error, reduced, both
+    )

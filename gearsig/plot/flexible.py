@@ -15,6 +15,7 @@ from gearsig.plot.display import plain
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 CYCLES = "mesh cycles (tooth passages)"
 MAP_IN, SWEEP_IN = 3.9, 3.6
@@ -166,7 +167,9 @@ def speed_spectra_figure(
     return figure
 
 
-def frequency_curves_figure(mesh_cycles: FloatArray, frequencies_hz: FloatArray, *, title: str = "") -> Figure:
+def frequency_curves_figure(
+    mesh_cycles: FloatArray, frequencies_hz: FloatArray, uncoupled_hz: FloatArray | None = None, *, title: str = ""
+) -> Figure:
     """Draw natural frequencies over the mesh angle, one curve each; those that hardly move are drawn quietly.
 
     Parameters
@@ -174,6 +177,8 @@ def frequency_curves_figure(mesh_cycles: FloatArray, frequencies_hz: FloatArray,
     mesh_cycles : array, (n_c,)
     frequencies_hz : array, (n_c, n)
         Rising along the second axis.
+    uncoupled_hz : array, (m,), or None
+        Of the two sides without contact: they do not depend on the angle; drawn dashed.
     title : str
     """
     x = series.checked_axis(mesh_cycles, "mesh_cycles")
@@ -181,13 +186,53 @@ def frequency_curves_figure(mesh_cycles: FloatArray, frequencies_hz: FloatArray,
     if curves.shape[0] != len(x):
         raise InputError(f"frequencies_hz has {curves.shape[0]} rows, its axis {len(x)}", allowed="equal lengths")
     figure = style.new_figure(SWEEP_IN)
-    axes = style.panel(figure, bottom_in=0.55, top_in=0.5)
+    axes = style.panel(figure, bottom_in=0.55, top_in=0.85 if uncoupled_hz is not None else 0.5)
+    named: dict[str, Line2D] = {}
     for curve in curves.T:
         moves = float(np.ptp(curve)) > 0.01 * float(curve.mean())
-        axes.plot(x, curve / 1e3, color=style.SIMULATED if moves else style.FLOOR, linewidth=1.5 if moves else 0.8)
+        line = axes.plot(
+            x, curve / 1e3, color=style.SIMULATED if moves else style.FLOOR, linewidth=1.5 if moves else 0.8
+        )
+        word = "coupled, moves with the angle" if moves else "coupled, hardly moves"
+        line[0].set_label(word)
+        named.setdefault(word, line[0])
+    for hertz in () if uncoupled_hz is None else frozen_array(uncoupled_hz, "uncoupled_hz", ndim=1):
+        line = axes.plot(x[[0, -1]], [hertz / 1e3] * 2, color=style.FAULT, linewidth=0.9, linestyle=(0, (4, 3)))
+        line[0].set_label("without contact")
+        named.setdefault("without contact", line[0])
     axes.set_xlim(float(x[0]), float(x[-1]))
     axes.set_ylim(bottom=0.0)
     style.label_axes(axes, CYCLES, "natural frequency (kHz)")
+    if uncoupled_hz is not None:
+        series.legend_row(figure, list(named.values()), left_in=0.85, top_in=series.NAMES_AT_IN)
+    series.headline(figure, title)
+    return figure
+
+
+def contact_spreading_figure(
+    mesh_cycles: FloatArray, frequency_hz: Mapping[str, FloatArray], *, title: str = ""
+) -> Figure:
+    """Draw one natural frequency over the mesh angle, by how contact forces reach the nodes of the mesh.
+
+    Parameters
+    ----------
+    mesh_cycles : array, (n_c,)
+    frequency_hz : mapping
+        Name of the way, e.g. "one line of nodes" → array, (n_c,).
+    title : str
+    """
+    x = series.checked_axis(mesh_cycles, "mesh_cycles")
+    curves = series.checked_curves(frequency_hz, len(x), "frequency_hz")
+    figure = style.new_figure(SWEEP_IN)
+    axes = style.panel(figure, bottom_in=0.55, top_in=0.85)
+    colours = series.series_colours(len(curves))
+    lines = [
+        axes.plot(x, values, color=colour, linewidth=1.5, label=name)[0]
+        for (name, values), colour in zip(curves.items(), colours, strict=True)
+    ]
+    axes.set_xlim(float(x[0]), float(x[-1]))
+    style.label_axes(axes, CYCLES, "torsional mode (Hz)")
+    series.legend_row(figure, lines, left_in=0.85, top_in=series.NAMES_AT_IN)
     series.headline(figure, title)
     return figure
 

@@ -32,15 +32,24 @@ SIGN_THRESHOLD = 0.01
 """Sliding speed below which the sign of friction is smoothed, over the mesh's greatest sliding speed."""
 
 
+FRICTION_SCALARS = (
+    "start_radius",
+    "base_pitch",
+    "action_length",
+    "friction_factor",
+    "width",
+    "reduced_modulus",
+    "log10_oil",
+    "oil_constant",
+    "sign_threshold",
+)
+"""Of the record: what `sims.mesh.friction_kernel.contact_friction_n` needs."""
 SCALARS = (
     "table_start",
     "table_step",
     "contact_coefficient",
     "contact_ratio",
     "ramp",
-    "start_radius",
-    "base_pitch",
-    "action_length",
     "cycles_per_rad",
     "damping_time",
     "damping_ramp",
@@ -51,12 +60,7 @@ SCALARS = (
     "turn_x",
     "cos_back",
     "sin_back",
-    "friction_factor",
-    "width",
-    "reduced_modulus",
-    "log10_oil",
-    "oil_constant",
-    "sign_threshold",
+    *FRICTION_SCALARS,
     "gravity_x",
     "gravity_y",
     "governor",
@@ -139,13 +143,8 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
     mean_stiffness = mean_stiffness_n_per_m(machine, force)
     inertia = np.array([w.inertia_kg_m2 for w in machine.wheels])
     mass = np.array([w.mass_kg for w in machine.wheels])
-    log10_oil, oil_constant = oil_terms(machine.lubrication.viscosity_cp, machine.roughness.rms_um)
-    one, two = mesh.material_1, mesh.material_2
-    width = mesh.face_width_m
-    moduli = (one.youngs_modulus_pa, one.poisson_ratio, two.youngs_modulus_pa, two.poisson_ratio)
     alpha, beta = pair.working_pressure_angle_rad, radians(machine.line_of_action_deg)
     hooke_rad = np.array([radians(s.coupling_angle_deg) for s in machine.shafts])
-    omega = operation.speed_rpm.largest * pi / 30.0
     rotors = np.array([s.rotor_inertia_kg_m2 for s in machine.shafts])
     values = {
         "table_start": table.start,
@@ -163,9 +162,6 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
             [(s.fraction, 2 * pi * s.frequency_hz, s.phase_rad) for s in machine.drive.swings], "speed swings"
         ),
         "base_radius": base_radius,
-        "start_radius": pair.start_radius_mm * 1e-3,
-        "base_pitch": pair.base_pitch_mm * 1e-3,
-        "action_length": pair.action_length_mm * 1e-3,
         "cycles_per_rad": pair.driver.teeth / (2.0 * pi),
         "damping_time": 2.0 * machine.mesh_damping_ratio * sqrt(mesh_mass_kg(machine) / mean_stiffness),
         "damping_ramp": DAMPING_RAMP_M,
@@ -177,15 +173,6 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
         "turn_x": base_radius[0] / (pair.action_length_mm * pair.base_pitch_mm * 1e-6),
         "cos_back": cos(2.0 * alpha),
         "sin_back": sin(2.0 * alpha),
-        "friction": machine.lubrication.friction,
-        "friction_factor": machine.lubrication.factor,
-        "width": width,
-        "reduced_modulus": reduced_modulus_pa(*moduli),
-        "log10_oil": log10_oil,
-        "oil_constant": oil_constant,
-        "sign_threshold": max(
-            SIGN_THRESHOLD * greatest_sliding_mps(machine, omega), STICKING * force * STICKING_S / min(mass), 1e-6
-        ),
         "mass": mass,
         "inertia": inertia,
         "per_mass": 1.0 / mass,
@@ -211,10 +198,35 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
         "ratio": machine.ratio,
     }
     record = np.zeros((), RECORD)
-    for name, value in (values | bearing_fields(machine, force, rng)).items():
+    for name, value in (
+        values | friction_fields(machine, operation, force) | bearing_fields(machine, force, rng)
+    ).items():
         record[name] = value
     curves, rows, pitch = _stacked(table)
     return Constants(record[()], curves, rows, pitch)
+
+
+def friction_fields(machine: Machine, operation: Operation, force_n: float) -> dict[str, Any]:
+    """Values of `FRICTION_SCALARS`, and whether there is friction, at the set mesh force."""
+    mesh, pair = machine.mesh, machine.mesh.pair
+    log10_oil, oil_constant = oil_terms(machine.lubrication.viscosity_cp, machine.roughness.rms_um)
+    one, two = mesh.material_1, mesh.material_2
+    sliding = greatest_sliding_mps(machine, operation.speed_rpm.largest * pi / 30.0)
+    lightest = min(w.mass_kg for w in machine.wheels)
+    return {
+        "friction": machine.lubrication.friction,
+        "start_radius": pair.start_radius_mm * 1e-3,
+        "base_pitch": pair.base_pitch_mm * 1e-3,
+        "action_length": pair.action_length_mm * 1e-3,
+        "friction_factor": machine.lubrication.factor,
+        "width": mesh.face_width_m,
+        "reduced_modulus": reduced_modulus_pa(
+            one.youngs_modulus_pa, one.poisson_ratio, two.youngs_modulus_pa, two.poisson_ratio
+        ),
+        "log10_oil": log10_oil,
+        "oil_constant": oil_constant,
+        "sign_threshold": max(SIGN_THRESHOLD * sliding, STICKING * force_n * STICKING_S / lightest, 1e-6),
+    }
 
 
 def mesh_mass_kg(machine: Machine) -> float:

@@ -1,4 +1,4 @@
-"""What faulty teeth add to the compliance of each slice of a tooth pair."""
+"""What faulty teeth add to the compliance between the slices of a tooth pair."""
 
 from __future__ import annotations
 
@@ -6,56 +6,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from sims.mesh.crack import RootCrack, check_crack
 from sims.mesh.gear_mesh import SOUND, GearMesh
-from sims.mesh.stiffness_tooth import tooth_compliance
+from sims.reduced_fe.contact_path import over_height, rolls_rad
+from sims.reduced_fe.crack_table import crack_added_m_per_n
+from sims.reduced_fe.reduced_gear import ReducedGear
 
 
 def fault_compliance_rows(
-    mesh: GearMesh, side: int, progress: FloatArray, n_slices: int
+    gear: ReducedGear, mesh: GearMesh, side: int, progress: FloatArray
 ) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Added compliance of a slice over ζ, (n_variants, n, n_slices) in m/N, and the row of each tooth.
+    """Added compliance over ζ, (n_variants, n, n_slices, n_slices) in m/N, and the row of each tooth.
 
-    Row 0 belongs to sound teeth. A crack makes the slices it reaches more compliant by what the potential energy of a
-    cracked tooth exceeds that of a sound one; its slices hang together through the sound gear's compliance. A spall or
-    chip adds as in `sims.mesh.GearMesh`, alike in every slice.
+    Row 0 belongs to sound teeth. A crack adds what finite elements of the cracked tooth yield more than those of the
+    sound one, see `sims.reduced_fe.cracked_tooth`. A spall or chip adds as in `sims.mesh.GearMesh`, alike in every
+    slice.
 
     Notes
     -----
     A crack leaves the gear's modes as they are: one tooth in fifty hardly changes them.
     """
-    own = mesh.side(side)
+    own, n_slices = mesh.side(side), len(gear.grid.z_m)
     variant = np.zeros(own.gear.teeth, dtype=np.int64)
-    rows = [np.zeros((len(progress), n_slices))]
+    rows = [np.zeros((len(progress), n_slices, n_slices))]
     sound = mesh.gear_compliance(side, progress)
+    roll = rolls_rad(mesh.pair, progress)[side - 1]
     for row, tooth in enumerate(own.faulty_teeth, start=1):
         faults = own.faults_of(tooth)
         lost = mesh.gear_compliance(side, progress, faults._replace(crack=SOUND.crack)) - sound
-        added = np.repeat(n_slices * lost[:, None], n_slices, axis=1)
+        added = n_slices * lost[:, None, None] * np.eye(n_slices)
         if faults.crack is not None:
-            added = added + crack_compliance(mesh, side, faults.crack, progress, n_slices)
+            added = added + over_height(gear.grid.roll_rad, crack_added_m_per_n(gear, faults.crack), roll)
         rows.append(added)
         variant[tooth] = row
     return np.array(rows), variant
-
-
-def crack_compliance(mesh: GearMesh, side: int, crack: RootCrack, progress: FloatArray, n_slices: int) -> FloatArray:
-    """What a crack adds to the compliance of each slice, (n, n_slices) in m/N.
-
-    A slice of which the crack covers the part f has the compliance 1/(f/c_cracked + (1 − f)/c_sound), c for its width.
-    """
-    own = mesh.side(side)
-    check_crack(own.gear, crack)
-    roll = mesh.roll_length_mm(side, progress) / own.gear.base_radius_mm
-    width = mesh.face_width_m / n_slices
-    sound = tooth_compliance(own.gear, own.material, roll).total / width
-    reach = mesh.face_width_m if crack.width_mm is None else min(crack.width_mm * 1e-3, mesh.face_width_m)
-    added = np.zeros((len(roll), n_slices))
-    for s in range(n_slices):
-        part = float(np.clip(reach / width - s, 0.0, 1.0))
-        if part > 0.0:
-            middle = (s + 0.5 * part) * width / reach
-            depth = crack.depth_mm * (float(np.sqrt(1.0 - middle)) if crack.front == "parabolic" else 1.0)
-            cracked = tooth_compliance(own.gear, own.material, roll, (depth, crack.angle_deg)).total / width
-            added[:, s] = 1.0 / (part / cracked + (1.0 - part) / sound) - sound
-    return added

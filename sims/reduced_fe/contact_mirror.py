@@ -32,12 +32,9 @@ def mirrors(table: ContactTable) -> bool:
     """Whether both halves of the face are alike: compliance, faults, and no misalignment."""
     if np.any(table.lead_m != 0.0) or table.n_slices < 2:
         return False
-    for array in (table.extra_1, table.extra_2):
-        if not np.allclose(array, array[..., ::-1], rtol=ALIKE, atol=0.0):
-            return False
     return all(
         bool(np.max(np.abs(c - c[..., ::-1, ::-1])) <= ALIKE * np.max(np.abs(table.own)))
-        for c in (table.own, table.cross)
+        for c in (table.own, table.cross, table.extra_1, table.extra_2)
     )
 
 
@@ -49,12 +46,16 @@ def folded(table: ContactTable) -> ContactTable:
     groups = mirror_groups(table.n_slices)
     size = groups.sum(axis=0)
     mean = groups / size
+
+    def grouped(compliance: FloatArray) -> FloatArray:
+        return np.ascontiguousarray(np.einsum("sg,...st,th->...gh", mean, compliance, mean))
+
     return replace(
         table,
-        own=np.ascontiguousarray(np.einsum("sg,nst,th->ngh", mean, table.own, mean)),
-        cross=np.ascontiguousarray(np.einsum("sg,onst,th->ongh", mean, table.cross, mean)),
-        extra_1=table.extra_1 @ mean / size,
-        extra_2=table.extra_2 @ mean / size,
+        own=grouped(table.own),
+        cross=grouped(table.cross),
+        extra_1=grouped(table.extra_1),
+        extra_2=grouped(table.extra_2),
         lead_m=np.zeros(len(size)),
         hertz=table.hertz @ mean * size**-0.9,
     )

@@ -61,8 +61,12 @@ def fill_compliance(n, pairs, columns, parts, teeth, own, cross, extra, rows, r)
         for s in range(n_s):
             for u in range(n_s):
                 r[at + s, at + u] = own[i, s, u] + t * (own[i + 1, s, u] - own[i, s, u])
-            low, high = extra[a, i, s] + extra[b, i, s], extra[a, i + 1, s] + extra[b, i + 1, s]
-            r[at + s, at + s] += low + t * (high - low)
+        for row in (a, b):
+            if row > 0:  # a faulty tooth
+                for s in range(n_s):
+                    for u in range(n_s):
+                        low, high = extra[row, i, s, u], extra[row, i + 1, s, u]
+                        r[at + s, at + u] += low + t * (high - low)
         for q in range(p + 1, n):  # the older pairs
             o = int(pair - pairs[q]) - 1
             for s in range(n_s):
@@ -86,7 +90,10 @@ def compliance_slope_energy(n, pairs, columns, teeth, own, cross, extra, rows, s
             line = 0.0
             for u in range(n_s):
                 line += (own[i + 1, s, u] - own[i, s, u]) * force[at + u]
-            line += (extra[a, i + 1, s] - extra[a, i, s] + extra[b, i + 1, s] - extra[b, i, s]) * force[at + s]
+            for row in (a, b):
+                if row > 0:
+                    for u in range(n_s):
+                        line += (extra[row, i + 1, s, u] - extra[row, i, s, u]) * force[at + u]
             for q in range(p + 1, n):
                 o = int(pair - pairs[q]) - 1
                 if o < cross.shape[0]:

@@ -63,3 +63,12 @@ def _corner_mm(rb_flank: float, rb_tip: float, length: float, start: float, befo
     own = (start - before) / rb_flank
     result: FloatArray = np.where(before > 0.0, rb_flank * (base_angle - own), 0.0)
     return result
+
+
+def over_height(roll: FloatArray, values: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Values at the heights of a grid (first axis) between them, by a cubic spline; held beyond the grid's ends."""
+    from scipy.interpolate import CubicSpline
+
+    spline = CubicSpline(roll, values, axis=0)
+    result: FloatArray = spline(np.clip(wanted, roll[0], roll[-1]))
+    return result

@@ -16,7 +16,7 @@ from sims.mesh.gear_mesh import GearMesh
 from sims.mesh.separation import separation_rows
 from sims.mesh.stiffness_hertz import load_dependent_contact_coefficient
 from sims.reduced_fe.contact_faults import fault_compliance_rows
-from sims.reduced_fe.contact_path import corner_separation_m, rolls_rad
+from sims.reduced_fe.contact_path import corner_separation_m, over_height, rolls_rad
 from sims.reduced_fe.reduced_gear import ReducedGear
 
 POINTS_PER_PITCH = 64
@@ -51,8 +51,8 @@ class ContactTable:
         Between a pair at ζ (first slice) and the pair that entered o + 1 pitches earlier (second), m/N.
     corner_m : array, (n,)
         Separation of unloaded perfect flanks.
-    extra_1, extra_2 : arrays, (n_variants, n, n_slices)
-        What faulty teeth add to the compliance of a slice; row 0, of sound teeth, is 0.
+    extra_1, extra_2 : arrays, (n_variants, n, n_slices, n_slices)
+        What faulty teeth add to the compliance between their slices; row 0, of sound teeth, is 0.
     variant_1, variant_2 : int arrays, (z,)
     separation_1_m, separation_2_m : arrays, (n_surfaces, n)
         Metal missing on the flanks, see `sims.mesh.MeshTable`.
@@ -106,14 +106,21 @@ class ContactTable:
     @property
     def arrays(self) -> tuple[FloatArray | NDArray[np.int64], ...]:
         """In the order in which kernels take them; one of each kind for both gears, the driver's rows first."""
-        n1 = len(self.extra_1), len(self.separation_1_m)
+        n1 = len(self.extra_1) - 1, len(self.separation_1_m)  # sound teeth of both gears share row 0
         rows = np.zeros((4, max(len(self.variant_1), len(self.variant_2))), dtype=np.int64)
         pitch = np.zeros((2, rows.shape[1]))
-        for i, values in enumerate((self.variant_1, self.variant_2 + n1[0], self.surface_1, self.surface_2 + n1[1])):
+        for i, values in enumerate(
+            (
+                self.variant_1,
+                np.where(self.variant_2 > 0, self.variant_2 + n1[0], 0),
+                self.surface_1,
+                self.surface_2 + n1[1],
+            )
+        ):
             rows[i, : len(values)] = values
         for i, places in enumerate((self.pitch_1_m, self.pitch_2_m)):
             pitch[i, : len(places)] = places
-        extra = np.ascontiguousarray(np.concatenate((self.extra_1, self.extra_2)))
+        extra = np.ascontiguousarray(np.concatenate((self.extra_1, self.extra_2[1:])))
         separation = np.ascontiguousarray(np.vstack((self.separation_1_m, self.separation_2_m)))
         return self.own, self.cross, self.corner_m, extra, separation, rows, pitch, self.lead_m, self.hertz
 
@@ -149,7 +156,7 @@ def contact_table(
     own, cross = _compliances(gears, mesh, progress, compliance)
     places = np.linspace(0.0, 1.0, len(gears[0].grid.z_m))
     lead = 1e-6 * abs(lead_um) * (places if lead_um >= 0.0 else 1.0 - places)
-    faults = [fault_compliance_rows(mesh, side, inside, len(lead)) for side in (1, 2)]
+    faults = [fault_compliance_rows(gears[side - 1], mesh, side, inside) for side in (1, 2)]
     flanks = [separation_rows(mesh, side, inside) for side in (1, 2)]
     whole = load_dependent_contact_coefficient(mesh.material_1, mesh.material_2, mesh.face_width_m)
     return ContactTable(
@@ -227,15 +234,6 @@ def _along_diagonal(roll: FloatArray, block: FloatArray, wanted: FloatArray) -> 
     """Compliance between slices at one height, (n, n_slices, n_slices)."""
     heights = np.arange(len(roll))
     return over_height(roll, block[heights, :, heights, :], wanted)
-
-
-def over_height(roll: FloatArray, values: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Values at the heights of a grid (first axis) between them, by a cubic spline; held beyond the grid's ends."""
-    from scipy.interpolate import CubicSpline
-
-    spline = CubicSpline(roll, values, axis=0)
-    result: FloatArray = spline(np.clip(wanted, roll[0], roll[-1]))
-    return result
 
 
 def _over_both(roll: FloatArray, block: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:

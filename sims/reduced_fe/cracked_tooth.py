@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from math import radians, sin
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -24,6 +25,41 @@ from sims.reduced_fe.sector_plane import CrackLine, IntArray
 
 CRACK_SIZE = MeshSize(n_across=8, n_gap=1, n_up=9, n_rim=3, n_body=2, n_along=4)
 """Finer across the root than the whole gear needs: the crack ends in the middle of it."""
+
+
+class OpenCrack(NamedTuple):
+    """Flank 0 of a tooth with a crack that is open through the whole width, and what would close it.
+
+    Attributes
+    ----------
+    across : array, (n_points, n_closing)
+        Opening of the crack at its nodes, by components, for unit pushes at the flank: R K⁻¹ Gᵀ, m/N.
+    closing : array, (n_closing, n_closing)
+        Opening for unit pairs of forces that open it: G K⁻¹ Gᵀ, m/N.
+    layer : array of int, (n_closing,)
+        Layer of nodes along the face, from the end at z < 0, of each of them.
+    last_layer : int
+    """
+
+    across: FloatArray
+    closing: FloatArray
+    layer: IntArray
+    last_layer: int
+
+    def added_m_per_n(self, front_layer: int | None = None) -> FloatArray:
+        """What the crack adds to the compliance between the flank's points, (n_points, n_points).
+
+        A B⁻¹ Aᵀ closes the crack altogether; less A_S B_SS⁻¹ A_Sᵀ, what closes it beyond the front.
+        """
+        added = self._closed(np.full(len(self.layer), True))
+        if front_layer is not None and front_layer < self.last_layer:
+            added = added - self._closed(self.layer >= front_layer)
+        return added
+
+    def _closed(self, which: IntArray | np.ndarray[Any, np.dtype[np.bool_]]) -> FloatArray:
+        part = self.across[:, which]
+        whole: FloatArray = part @ np.linalg.solve(self.closing[np.ix_(which, which)], part.T)
+        return (whole + whole.T) / 2.0
 
 
 def crack_compliance_m_per_n(
@@ -59,21 +95,50 @@ def crack_compliance_m_per_n(
     add 2 to 5 % more. Near the tooth's tip this agrees with the potential energy of sections behind a limiting line to
     5 %; halfway up the flank that method finds only half as much.
     """
-    sound, cracked = crack_meshes(blank, crack, size)
-    with one_thread():
-        chain = _chain(sector_matrices(sound)[0], sound, blank.n_teeth - 1)
-        added = tooth_compliance_with(cracked, chain, grid, spread) - tooth_compliance_with(sound, chain, grid, spread)
+    if crack.front != "straight":
+        raise InputError("front of the crack is 'parabolic'", allowed="straight", remedy="give the mean depth")
+    opened = open_crack(blank, replace(crack, width_mm=None), grid, spread, size)
+    added = np.zeros((grid.n_points, grid.n_points))
     half = grid.n_points // 2
-    added[half:], added[:, half:] = 0.0, 0.0
-    return (added + added.T) / 2.0
+    added[:half, :half] = opened.added_m_per_n(front_layer(blank, crack.width_mm, size))
+    return added
+
+
+def open_crack(
+    blank: GearBlank, crack: RootCrack, grid: FlankGrid, spread: Spread = "section", size: MeshSize = CRACK_SIZE
+) -> OpenCrack:
+    """Solve the gear with the crack open, once for all widths; see `crack_compliance_m_per_n`."""
+    sound, cracked = crack_meshes(blank, crack, size)
+    n_new = cracked.n_nodes - sound.n_nodes
+    old = sound.tooth[0, sound.tooth.shape[1] - n_new // sound.tooth.shape[2] :].ravel()
+    opening = sparse.csr_array(sparse.eye_array(3 * cracked.n_nodes, format="csr")[3 * sound.n_nodes :])
+    opening = opening - sparse.csr_array(
+        (
+            np.ones(3 * n_new),
+            ((3 * np.arange(n_new)[:, None] + np.arange(3)).ravel(), (3 * old[:, None] + np.arange(3)).ravel()),
+        ),
+        shape=opening.shape,
+    )
+    with one_thread():
+        stiffness, kept = _ring(cracked, other_sectors(blank, size))
+        rows = flank_rows(cracked, grid, spread, np.arange(cracked.n_nodes), 3 * cracked.n_nodes)
+        flank, gap = rows[: grid.n_points // 2, kept], opening[:, kept].toarray()
+        moved = factorised(stiffness)(gap.T)
+    layer = np.repeat(np.tile(np.arange(sound.tooth.shape[2]), n_new // sound.tooth.shape[2]), 3)
+    return OpenCrack(flank @ moved, gap @ moved, layer, sound.tooth.shape[2] - 1)
+
+
+def front_layer(blank: GearBlank, width_mm: float | None, size: MeshSize = CRACK_SIZE) -> int | None:
+    """Layer of nodes between cells where the crack's front lies, from the end at z < 0; None: through the width."""
+    if width_mm is None:
+        return None
+    return 2 * (int(np.argmin(np.abs(front_widths_mm(blank, size) - width_mm))) + 1)
 
 
 def crack_meshes(blank: GearBlank, crack: RootCrack, size: MeshSize = CRACK_SIZE) -> tuple[SectorMesh, SectorMesh]:
     """Return the mesh along the crack's line, closed and open."""
     g = blank.geometry
     check_crack(g, crack)
-    if crack.front != "straight":
-        raise InputError("front of the crack is 'parabolic'", allowed="straight", remedy="give the mean depth")
     part = crack.depth_mm * sin(radians(crack.angle_deg)) / (2.0 * crack_mouth_mm(g)[1])
     n_cells = min(max(1, round(part * size.n_across)), size.n_across - 1)
     line = CrackLine(crack_tip_mm(g, crack.depth_mm, crack.angle_deg), n_cells)
@@ -85,25 +150,41 @@ def crack_meshes(blank: GearBlank, crack: RootCrack, size: MeshSize = CRACK_SIZE
             allowed="angles from about 35°",
             remedy="take a larger angle or a shallower crack",
         ) from error
-    return sound, _opened(sound, n_cells, _last_layer(sound, crack.width_mm))
+    return sound, _opened(sound, n_cells)
 
 
 def tooth_compliance_with(mesh: SectorMesh, chain: FloatArray, grid: FlankGrid, spread: Spread) -> FloatArray:
     """Compliance between the flank points of the tooth of a sector that is closed to a ring by others."""
+    stiffness, kept = _ring(mesh, chain)
+    rows = flank_rows(mesh, grid, spread, np.arange(mesh.n_nodes), 3 * mesh.n_nodes)[:, kept]
+    compliance: FloatArray = rows @ factorised(stiffness)(rows.T)
+    return compliance
+
+
+def _ring(mesh: SectorMesh, chain: FloatArray) -> tuple[sparse.csc_array, IntArray]:
+    """Stiffness of a sector, closed to a ring by others, over its degrees of freedom that are not held."""
     own = sector_matrices(mesh)[0]
     ends = np.concatenate((_free_side(mesh, mesh.high_side), _free_side(mesh, mesh.low_side)))
     places = (np.repeat(ends, len(ends)), np.tile(ends, len(ends)))
     stiffness = own + sparse.csr_array(sparse.coo_array((chain.ravel(), places), shape=own.shape))
     kept = _free_dof(mesh)
-    rows = flank_rows(mesh, grid, spread, np.arange(mesh.n_nodes), 3 * mesh.n_nodes)[:, kept]
-    moved = factorised(sparse.csc_array(stiffness[kept][:, kept]))(rows.T)
-    compliance: FloatArray = rows @ moved
-    return compliance
+    return sparse.csc_array(stiffness[kept][:, kept]), kept
 
 
-def _chain(stiffness: sparse.csr_array, mesh: SectorMesh, n_sectors: int) -> FloatArray:
-    """Stiffness of a chain of sound sectors at its two ends, low and high side, the bore held."""
-    one = _condensed(stiffness, mesh)
+def front_widths_mm(blank: GearBlank, size: MeshSize = CRACK_SIZE) -> FloatArray:
+    """Widths over which a crack can reach without rounding, from one cell to the whole face."""
+    mesh = sector_mesh(blank, size)
+    z = mesh.points_m[mesh.tooth[0, 0], 2]
+    widths: FloatArray = 1e3 * (z[2::2] - z[0])
+    return widths
+
+
+@lru_cache(maxsize=4)
+def other_sectors(blank: GearBlank, size: MeshSize) -> FloatArray:
+    """Stiffness of all sectors but one at the sides of that one, high and low, the bore held; cracks leave it be."""
+    mesh = sector_mesh(blank, size)
+    one = _condensed(sector_matrices(mesh)[0], mesh)
+    n_sectors = blank.n_teeth - 1
     chain: FloatArray | None = None
     power = one
     while n_sectors:
@@ -136,11 +217,9 @@ def _joined(first: FloatArray, second: FloatArray) -> FloatArray:
     return (joined + joined.T) / 2.0
 
 
-def _opened(mesh: SectorMesh, n_cells: int, last_layer: int) -> SectorMesh:
-    """Double the nodes of the tooth's lowest row from the crack's mouth up to, without, its tip and its front."""
-    n_layers = mesh.tooth.shape[2]
-    layers = slice(0, n_layers if last_layer == n_layers - 1 else last_layer)
-    old = mesh.tooth[0, -2 * n_cells :, layers].ravel()
+def _opened(mesh: SectorMesh, n_cells: int) -> SectorMesh:
+    """Double the nodes of the tooth's lowest row from the crack's mouth up to, without, its tip."""
+    old = mesh.tooth[0, -2 * n_cells :].ravel()
     new = mesh.n_nodes + np.arange(len(old))
     number = np.arange(mesh.n_nodes)
     number[old] = new
@@ -150,15 +229,6 @@ def _opened(mesh: SectorMesh, n_cells: int, last_layer: int) -> SectorMesh:
     tooth = mesh.tooth.copy()
     tooth[0] = number[tooth[0]]
     return replace(mesh, points_m=np.vstack((mesh.points_m, mesh.points_m[old])), cells=cells, tooth=tooth)
-
-
-def _last_layer(mesh: SectorMesh, width_mm: float | None) -> int:
-    """Layer of nodes between cells where the crack's front lies, from the end at z < 0."""
-    z = mesh.points_m[mesh.tooth[0, 0], 2]
-    if width_mm is None:
-        return len(z) - 1
-    corners = np.arange(0, len(z), 2)
-    return int(max(2, corners[np.argmin(np.abs(z[corners] - z[0] - width_mm * 1e-3))]))
 
 
 def _free_dof(mesh: SectorMesh) -> IntArray:

@@ -11,11 +11,13 @@ import numpy as np
 
 from gearsig.checks import FloatArray, within
 from gearsig.errors import InputError
-from sims.cracked.constants import governor_nm_s_per_rad, total_inertia_kg_m2
+from sims.cracked.bearing import bearing_loads_n
+from sims.cracked.constants import FRICTION_SCALARS, friction_fields, governor_nm_s_per_rad, total_inertia_kg_m2
 from sims.machine import Machine
 from sims.machine.operation import Operation
 from sims.reduced_fe.contact_mirror import folded, mirror_groups, mirrors
 from sims.reduced_fe.contact_table import ContactTable, contact_table, static_table
+from sims.reduced_fe.dynamics_bearings import ROLLING_FIELDS, rolling_fields
 from sims.reduced_fe.dynamics_hub import HubSprings, without_hub
 from sims.reduced_fe.dynamics_side import Kept, Side, build_side, kept_modes, residual_compliance
 from sims.reduced_fe.maps_static import MeshMaps, mesh_maps, teeth_of
@@ -46,6 +48,9 @@ _SCALARS = (
     "governor_spring",
     "total_inertia",
     "ratio",
+    "nominal_torque",
+    "contact_ratio",
+    *FRICTION_SCALARS,
 )
 _PER_SIDE = (
     "teeth",
@@ -62,9 +67,11 @@ _PER_SIDE = (
 RECORD = np.dtype(
     [(name, np.float64) for name in _SCALARS]
     + [(name, np.float64, (2,)) for name in _PER_SIDE]
-    + [("pushes", np.bool_), ("moving_force", np.bool_), ("n_single", np.int64), ("n_pairs", np.int64)]
+    + [(name, np.bool_) for name in ("pushes", "rolls", "friction", "moving_force")]
+    + [("n_single", np.int64), ("n_pairs", np.int64)]
     + [("n_ripples", np.int64), ("ripples", np.float64, (MOST_LINES, 3))]
-    + [("n_swings", np.int64), ("swings", np.float64, (MOST_LINES, 3))],
+    + [("n_swings", np.int64), ("swings", np.float64, (MOST_LINES, 3))]
+    + ROLLING_FIELDS,
     align=True,
 )
 """SI units; of a side in pairs (driver, driven)."""
@@ -77,8 +84,8 @@ class FlexiblePair:
     Parameters
     ----------
     machine : Machine
-        Masses and inertias of its wheels are those of gear, hub and shaft together; its contact law, friction and the
-        gears' stiffness by potential energy are not used. `mesh_damping_ratio` is that of the torsional mode in all:
+        Masses and inertias of its wheels are those of gear, hub and shaft together; its contact law and the gears'
+        stiffness by potential energy are not used. `mesh_damping_ratio` is that of the torsional mode in all:
         the contact has the damping that shafts, bearings and bodies leave wanting.
     gears : (ReducedGear, ReducedGear)
     body_damping_ratio : float
@@ -150,7 +157,9 @@ class Constants:
         return found
 
 
-def constants(pair: FlexiblePair, operation: Operation, *, moving_force: bool = True) -> Constants:
+def constants(
+    pair: FlexiblePair, operation: Operation, *, moving_force: bool = True, rng: np.random.Generator | None = None
+) -> Constants:
     """Turn a flexible pair into plain numbers.
 
     Parameters
@@ -160,6 +169,8 @@ def constants(pair: FlexiblePair, operation: Operation, *, moving_force: bool = 
         Its greatest torque sets the scale of forces and the damping of the contact.
     moving_force : bool
         Off: leave out the torque by which stiffness moving past under load acts on the driver, for comparison.
+    rng : numpy.random.Generator or None
+        Draws the places of rolling elements in bearings with a defect; None: always the same ones.
     """
     from sims.reduced_fe.dynamics_linear import torsional_mode
 
@@ -168,14 +179,17 @@ def constants(pair: FlexiblePair, operation: Operation, *, moving_force: bool = 
     force = max(operation.torque_nm.largest / base[0], LEAST_FORCE_N)
     stiffness = mean_stiffness_n_per_m(pair, force)
     table, kept, groups = _contact(pair)
-    make = partial(build_side, machine, table=table, groups=groups, body_damping_ratio=pair.body_damping_ratio)
+    loads = bearing_loads_n(machine, force)
+    make = partial(
+        build_side, machine, table=table, groups=groups, body_damping_ratio=pair.body_damping_ratio, loads_n=loads
+    )
     sides = _padded([make(i, gear=pair.gears[i], kept=kept[i]) for i in (0, 1)])
     beta = radians(machine.line_of_action_deg)
     wheels, shafts = machine.wheels, machine.shafts
     governor, total = governor_nm_s_per_rad(machine), total_inertia_kg_m2(machine)
     hooke = np.array([radians(s.coupling_angle_deg) for s in shafts])
     nominal = force / table.n_slices
-    values = {
+    values: dict[str, Any] = {
         "start": table.start,
         "column_step": table.step,
         "small": SMALL_PART * nominal,
@@ -201,7 +215,10 @@ def constants(pair: FlexiblePair, operation: Operation, *, moving_force: bool = 
         "hooke": hooke**2 / 4.0,
         "hooke_force": hooke / np.array([2.0 * s.bearing_distance_m for s in shafts]),
         "pushes": machine.gravity_mps2 > 0.0 or bool(hooke.any()) or any(w.unbalance_g_mm > 0.0 for w in wheels),
+        "rolls": any(b.defect is not None or b.clearance_um > 0.0 for b in machine.bearings),
         "moving_force": moving_force,
+        "nominal_torque": force * base[0],
+        "contact_ratio": mesh.pair.contact_ratio,
         "n_single": sides[0].n_single,
         "n_pairs": sides[0].n_pairs,
         "n_ripples": len(machine.drive.ripples),
@@ -212,6 +229,8 @@ def constants(pair: FlexiblePair, operation: Operation, *, moving_force: bool = 
         ),
     }
     record = np.zeros((), RECORD)
+    values |= friction_fields(machine, operation, force)
+    values |= rolling_fields(machine, operation, force, loads, np.random.default_rng(0) if rng is None else rng)
     for name, value in values.items():
         record[name] = value
     made = Constants(record[()], table, sides, stiffness, base)

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, positive
 from sims.mesh.pair import PairGeometry
-from sims.reduced_fe.contact_path import rolls_rad
-from sims.reduced_fe.contact_table import FLANK, SIGNS, ContactTable, over_height
+from sims.reduced_fe.contact_path import over_height, rolls_rad
+from sims.reduced_fe.contact_table import FLANK, SIGNS, ContactTable
 from sims.reduced_fe.reduced_gear import ReducedGear
 
 PLANE = (0, 1, 5)

@@ -85,17 +85,27 @@ def torsional_mode(
         Mesh angles in a cycle.
     """
     own = constants(pair, operation) if ready is None else ready
+    frequency, contact, other = _torsional(pair, own, operation, one_mesh_cycle(n_points)).mean(axis=0)
+    return TorsionalMode(float(frequency), float(contact), float(other))
+
+
+def torsional_curve_hz(pair: FlexiblePair, operation: Operation, mesh_cycles: FloatArray) -> FloatArray:
+    """Frequency of the torsional mode at each mesh angle, (n_c,)."""
+    return _torsional(pair, constants(pair, operation), operation, mesh_cycles)[:, 0]
+
+
+def _torsional(pair: FlexiblePair, own: Constants, operation: Operation, mesh_cycles: FloatArray) -> FloatArray:
+    """Frequency, contact part and damping ratio of others at each mesh angle, (n_c, 3)."""
     rates = np.concatenate([side.damping_rate for side in own.sides])
     found = []
-    for c in one_mesh_cycle(n_points):
+    for c in mesh_cycles:
         squares, shapes, rows, stiff = _squares(pair, own, operation, c)
         energy = np.einsum("ij,ik,kj->j", rows @ shapes, stiff, rows @ shapes)
         part = energy / np.maximum(squares, (2.0 * pi * LEAST_HZ) ** 2)
         mode = int(np.argmax(part))
         omega = float(np.sqrt(squares[mode]))
         found.append((omega / (2.0 * pi), part[mode], float(rates @ shapes[:, mode] ** 2) / (2.0 * omega)))
-    frequency, contact, other = np.mean(found, axis=0)
-    return TorsionalMode(float(frequency), float(contact), float(other))
+    return np.array(found)
 
 
 def _squares(

@@ -34,8 +34,9 @@ MOVING = (
     *(f"bearing {i} {axis}" for i in (1, 2, 3, 4) for axis in ("x", "y")),
 )
 """Places in rad and m, each also with " velocity" and " acceleration". Those of gears are of their hubs."""
-EXTRAS = ("mesh_force_n", "back_force_n", "mesh_cycles", "approach_m", "contact_torque_nm")
-"""Sum of the contact forces, the force behind, c, the greatest approach of flanks, torque of moving stiffness."""
+EXTRAS = ("mesh_force_n", "back_force_n", "mesh_cycles", "approach_m", "contact_torque_nm", "friction_n")
+"""Sum of the contact forces, the force behind, c, the greatest approach of flanks, torque of moving stiffness, friction
+along x on the driven gear."""
 TRANSMISSION_ERROR = "transmission_error_m"
 """r_b1 θ1 − r_b2 θ2 of the hubs."""
 KINDS = ("", " velocity", " acceleration")

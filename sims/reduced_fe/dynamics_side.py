@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from sims.machine import Machine
-from sims.reduced_fe.contact_path import rolls_rad
-from sims.reduced_fe.contact_table import FLANK, SIGNS, ContactTable, over_height
+from sims.reduced_fe.contact_path import over_height, rolls_rad
+from sims.reduced_fe.contact_table import FLANK, SIGNS, ContactTable
+from sims.reduced_fe.dynamics_bearings import bearing_springs
 from sims.reduced_fe.dynamics_hub import HubSprings
 from sims.reduced_fe.reduced_gear import ReducedGear
 
@@ -39,8 +40,19 @@ COORDINATES = (
 """Of a side: rad and m; "first" and "second" are its two bearings. Those of the gear are of its body as a whole,
 the hub's of its bore."""
 ROTOR, GEAR, X, Y, HUB_X, HUB = 0, 1, 2, 3, 8, 10
-INPUTS = ("rotor torque", "gear torque", "gear x force", "gear y force", "couple x", "couple y", "even acceleration")
-"""Generalised forces that act on a side besides the contact; the last is minus one of the whole side turning."""
+INPUTS = (
+    "rotor torque",
+    "gear torque",
+    "gear x force",
+    "gear y force",
+    "first x force",
+    "first y force",
+    "second x force",
+    "second y force",
+    "even acceleration",
+)
+"""Generalised forces that act on a side besides the contact, those of bearings on the shaft in them; the last is minus
+one of the whole side turning."""
 LEAST_PART = 1e-3
 """Static part of a mode at the flank, of the greatest one: modes below it are left to the residual compliance."""
 ABOUT_Z = 5
@@ -84,7 +96,7 @@ class Side:
         2ζω; of a rigid mode too.
     shapes : array, (11, n_modes)
         `COORDINATES` in each mode.
-    inputs : array, (7, n_modes)
+    inputs : array, (9, n_modes)
         Modal forces of unit `INPUTS`.
     hub : array, (n_modes,)
         r_b times the hub's rotation, m.
@@ -112,6 +124,13 @@ class Side:
     def n_modes(self) -> int:
         """Of the shaft line and the gear together."""
         return len(self.omega_rad_s)
+
+    @property
+    def moving(self) -> NDArray[np.bool_]:
+        """Modes that are the side's own, (n_modes,): not those added so that both sides have as many."""
+        moves: NDArray[np.bool_] = np.any(self.shapes != 0.0, axis=0)
+        moves[: self.rows.shape[2]] |= np.any(self.rows != 0.0, axis=(0, 1))
+        return moves
 
 
 def kept_modes(gear: ReducedGear, limit_hz: float, groups: FloatArray) -> Kept:
@@ -144,8 +163,9 @@ def build_side(
     table: ContactTable,
     groups: FloatArray,
     body_damping_ratio: float,
+    loads_n: FloatArray,
 ) -> Side:
-    """Return the modes of the driver's side (0) or the driven one (1).
+    """Return the modes of the driver's side (0) or the driven one (1); `loads_n` (4, 2) press the bearings.
 
     Raises
     ------
@@ -157,7 +177,9 @@ def build_side(
     coupled = np.flatnonzero(np.abs(twist) > 0.0)
     alone = np.setdiff1d(np.arange(len(kept.single)), coupled)
     springs = HubSprings.of(gear, kept.all)
-    matrices = _matrices(machine, index, gear, kept.single[coupled], twist[coupled], springs, body_damping_ratio)
+    matrices = _matrices(
+        machine, index, gear, kept.single[coupled], twist[coupled], springs, body_damping_ratio, loads_n
+    )
     mass, stiffness, damping = matrices
     squares, shapes = _modes_of(stiffness, mass)
     rate = np.einsum("ij,ik,kj->j", shapes, damping, shapes)
@@ -229,6 +251,7 @@ def _matrices(
     twist: FloatArray,
     springs: HubSprings,
     body_damping_ratio: float,
+    loads_n: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """M, K and C over `COORDINATES` and the modes that twist the hub."""
     n, n_own = len(COORDINATES) + len(modes), len(COORDINATES)
@@ -261,9 +284,10 @@ def _matrices(
         bent[[HUB_X + axis, 4 + axis, 6 + axis]] = 1.0, -0.5, -0.5
         lines.append((bent, shaft.bending_stiffness_n_per_m, shaft.bending_damping_n_s_per_m))
         for row, bearing in enumerate(bearings):
+            direction, spring = bearing_springs(bearing, loads_n[2 * index + row])[axis]
             moved = np.zeros(n)
-            moved[4 + 2 * row + axis] = 1.0
-            lines.append((moved, bearing.stiffness_n_per_m, bearing.damping_n_s_per_m))
+            moved[4 + 2 * row : 6 + 2 * row] = direction
+            lines.append((moved, spring, bearing.damping_n_s_per_m))
     for line, spring, damper in lines:
         stiffness += spring * np.outer(line, line)
         damping += damper * np.outer(line, line)
@@ -282,9 +306,7 @@ def _modes_of(stiffness: FloatArray, mass: FloatArray) -> tuple[FloatArray, Floa
 def _input_places(n: int, even: FloatArray) -> FloatArray:
     """Generalised forces of unit `INPUTS`, (7, n)."""
     places = np.zeros((len(INPUTS), n))
-    for row, coordinate in enumerate((ROTOR, GEAR, X, Y)):
+    for row, coordinate in enumerate((ROTOR, GEAR, X, Y, 4, 5, 6, 7)):
         places[row, coordinate] = 1.0
-    for axis in range(2):
-        places[4 + axis, [4 + axis, 6 + axis]] = 1.0, -1.0
-    places[6] = even
+    places[-1] = even
     return places

@@ -1,4 +1,4 @@
-"""Stiffness and mass of one sector: 27-node hexahedra of scikit-fem, three Gauss points each way."""
+"""Stiffness and mass of one sector: hexahedra of scikit-fem with 27 or eight nodes, three Gauss points each way."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ class CellFields(NamedTuple):
 
     Attributes
     ----------
-    values : array, (27, n_points)
-    gradients : array, (n_cells, n_points, 3, 27)
+    values : array, (n_local, n_points)
+        n_local is 27, or 8 in a mesh of first order.
+    gradients : array, (n_cells, n_points, 3, n_local)
         1/m.
     volumes : array, (n_cells, n_points)
         Weight times Jacobian determinant, m³.
@@ -40,15 +41,16 @@ class CellFields(NamedTuple):
 def cell_fields(points_m: FloatArray, cells: IntArray) -> CellFields:
     """Evaluate the isoparametric cells at their Gauss points."""
     local, weights = _gauss()
-    values, slopes = _shape_functions(local)
+    values, slopes = _shape_functions(local, cells.shape[1])
     gradients, determinants = _gradients(points_m, cells, slopes)
     return CellFields(values, gradients, weights * determinants, determinants)
 
 
 def cell_gradients_at_nodes(points_m: FloatArray, cells: IntArray) -> FloatArray:
-    """Gradients of the shape functions at each cell's own nodes, (n_cells, 27, 3, 27); 1/m."""
-    local = np.array([[x, y, z] for x in (0.0, 0.5, 1.0) for y in (0.0, 0.5, 1.0) for z in (0.0, 0.5, 1.0)]).T
-    return _gradients(points_m, cells, _shape_functions(local)[1])[0]
+    """Gradients of the shape functions at each cell's own nodes, (n_cells, n_local, 3, n_local); 1/m."""
+    places = np.linspace(0.0, 1.0, cells.shape[1])
+    local = np.array([[x, y, z] for x in places for y in places for z in places]).T
+    return _gradients(points_m, cells, _shape_functions(local, cells.shape[1])[1])[0]
 
 
 def sector_matrices(mesh: SectorMesh, material: Material | None = None) -> tuple[sparse.csr_array, sparse.csr_array]:
@@ -59,13 +61,22 @@ def sector_matrices(mesh: SectorMesh, material: Material | None = None) -> tuple
     Degrees of freedom are 3·node + component; the components of every node are radial, tangential, axial, so that
     neighbouring sectors have the same matrices.
 
-    Source: T. J. R. Hughes, *The Finite Element Method*, 1987, ch. 2 and 3.
+    Eight-node cells have the incompatible modes 4t(1 − t) of each direction besides, eliminated cell by cell: without
+    them they would be far too stiff in bending.
+
+    Source: T. J. R. Hughes, *The Finite Element Method*, 1987, ch. 2 and 3; R. L. Taylor, P. J. Beresford,
+    E. L. Wilson, A non-conforming element for stress analysis, International Journal for Numerical Methods in
+    Engineering 10 (1976).
     """
     used = mesh.blank.material if material is None else material
     fields = cell_fields(mesh.points_m, mesh.cells)
-    nodes = mesh.cells.reshape(-1, 27)
+    nodes = mesh.cells.reshape(len(mesh.cells), -1)
     turn = cylindrical_turn(mesh)
-    stiffness = _assembled(_cell_stiffness(fields, used), nodes, mesh.n_nodes)
+    if nodes.shape[1] == 27:
+        cells = _cell_stiffness(fields.gradients, fields.volumes, used)
+    else:
+        cells = _incompatible_stiffness(mesh, fields, used)
+    stiffness = _assembled(cells, nodes, mesh.n_nodes)
     mass = _assembled(_cell_mass(fields, used.density_kg_m3), nodes, mesh.n_nodes)
     return sparse.csr_array(turn @ stiffness @ turn.T), sparse.csr_array(turn @ mass @ turn.T)
 
@@ -87,42 +98,55 @@ def lame_pa(material: Material) -> tuple[float, float]:
 
 
 def _gradients(points_m: FloatArray, cells: IntArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Gradients in space (n_cells, n_points, 3, 27) and Jacobian determinants (n_cells, n_points)."""
-    corners = points_m[cells.reshape(len(cells), 27)]
+    """Gradients in space (n_cells, n_points, 3, n_local) and Jacobian determinants (n_cells, n_points)."""
+    corners = points_m[cells.reshape(len(cells), -1)]
     jacobian = np.einsum("qin,cnj->cqij", slopes, corners, optimize=True)
     gradients = np.linalg.solve(jacobian, np.broadcast_to(slopes, (len(cells), *slopes.shape)))
     return gradients, np.linalg.det(jacobian)
 
 
-def _cell_stiffness(fields: CellFields, material: Material) -> FloatArray:
+def _cell_stiffness(gradients: FloatArray, volumes: FloatArray, material: Material) -> FloatArray:
     lam, mu = lame_pa(material)
-    n = len(fields.volumes)
-    g = fields.gradients  # (cell, point, i, a)
-    weighted = g * fields.volumes[:, :, None, None]
-    flat = g.reshape(n, -1, 81)
-    products = np.matmul(weighted.reshape(n, -1, 81).transpose(0, 2, 1), flat).reshape(n, 3, 27, 3, 27)
+    n, n_local = len(volumes), gradients.shape[3]
+    weighted = gradients * volumes[:, :, None, None]  # (cell, point, i, a)
+    flat = gradients.reshape(n, -1, 3 * n_local)
+    products = np.matmul(weighted.reshape(flat.shape).transpose(0, 2, 1), flat).reshape(n, 3, n_local, 3, n_local)
     # products[c, i, a, j, b] = ∫ ∂_i N_a ∂_j N_b
     trace = np.einsum("ciaib->cab", products)
     cells = lam * products + mu * products.transpose(0, 3, 2, 1, 4)
     for i in range(3):
         cells[:, i, :, i, :] += mu * trace
-    ordered: FloatArray = cells.transpose(0, 2, 1, 4, 3).reshape(n, 81, 81)
+    ordered: FloatArray = cells.transpose(0, 2, 1, 4, 3).reshape(n, 3 * n_local, 3 * n_local)
     return ordered
 
 
+def _incompatible_stiffness(mesh: SectorMesh, fields: CellFields, material: Material) -> FloatArray:
+    """K_uu − K_ua K_aa⁻¹ K_au; gradients of the modes by the Jacobian of the cell's middle, so that patches pass."""
+    local, _ = _gauss()
+    middle = _shape_functions(np.full((3, 1), 0.5), 2)[1][0]
+    jacobian = np.einsum("in,cnj->cij", middle, mesh.points_m[mesh.cells.reshape(len(mesh.cells), -1)])
+    slopes = np.einsum("iq,ia->qia", 4.0 * (1.0 - 2.0 * local), np.eye(3))
+    modes = np.linalg.solve(jacobian[:, None], np.broadcast_to(slopes, (len(jacobian), *slopes.shape)))
+    modes = modes * (np.linalg.det(jacobian)[:, None] / fields.determinants)[:, :, None, None]
+    whole = _cell_stiffness(np.concatenate((fields.gradients, modes), axis=3), fields.volumes, material)
+    inner = whole[:, 24:, 24:]
+    condensed: FloatArray = whole[:, :24, :24] - whole[:, :24, 24:] @ np.linalg.solve(inner, whole[:, 24:, :24])
+    return condensed
+
+
 def _cell_mass(fields: CellFields, density: float) -> FloatArray:
-    n = len(fields.volumes)
+    n, n_local = len(fields.volumes), len(fields.values)
     weighted = density * fields.volumes[:, None, :] * fields.values[None]
     scalar = weighted @ fields.values.T
-    cells = np.zeros((n, 27, 3, 27, 3))
+    cells = np.zeros((n, n_local, 3, n_local, 3))
     for i in range(3):
         cells[:, :, i, :, i] = scalar
-    return cells.reshape(n, 81, 81)
+    return cells.reshape(n, 3 * n_local, 3 * n_local)
 
 
 def _assembled(cell_matrices: FloatArray, nodes: IntArray, n_nodes: int) -> sparse.csr_array:
-    dof = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), 81)
-    rows, columns = np.repeat(dof, 81, axis=1).ravel(), np.tile(dof, (1, 81)).ravel()
+    dof = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
+    rows, columns = np.repeat(dof, dof.shape[1], axis=1).ravel(), np.tile(dof, (1, dof.shape[1])).ravel()
     size = 3 * n_nodes
     summed = sparse.coo_array((cell_matrices.ravel(), (rows, columns)), shape=(size, size)).tocsr()
     summed.data[np.abs(summed.data) < 1e-16 * np.abs(summed.data).max()] = 0.0
@@ -139,14 +163,16 @@ def _gauss() -> tuple[FloatArray, FloatArray]:
     return local, weights
 
 
-def _shape_functions(local: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Values (27, n) and slopes (n, 3, 27) of the shape functions at local points, in the order of the cells' nodes."""
-    from skfem.element import ElementHex2
+def _shape_functions(local: FloatArray, n_each_way: int) -> tuple[FloatArray, FloatArray]:
+    """Values (n_local, n) and slopes (n, 3, n_local) at local points, in the order of the cells' nodes."""
+    from skfem.element import ElementHex1, ElementHex2
 
-    element: Any = ElementHex2()
-    values, slopes = np.empty((27, local.shape[1])), np.empty((local.shape[1], 3, 27))
-    for k, place in enumerate(np.rint(2.0 * np.asarray(element.doflocs)).astype(int)):
-        own = int(place @ [9, 3, 1])
+    element: Any = ElementHex2() if n_each_way == 3 else ElementHex1()
+    n_local = n_each_way**3
+    values, slopes = np.empty((n_local, local.shape[1])), np.empty((local.shape[1], 3, n_local))
+    order = n_each_way ** np.array([2, 1, 0])
+    for k, place in enumerate(np.rint((n_each_way - 1) * np.asarray(element.doflocs)).astype(int)):
+        own = int(place @ order)
         value, slope = element.lbasis(local, k)
         values[own], slopes[:, :, own] = value, np.asarray(slope).T
     return values, slopes

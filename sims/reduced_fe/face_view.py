@@ -10,7 +10,11 @@ from gearsig.checks import FloatArray
 from sims.reduced_fe.sector_mesh import SectorMesh
 from sims.reduced_fe.sector_plane import IntArray
 
-_OUTLINE = ((0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+_OUTLINES = {
+    3: ((0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)),
+    2: ((0, 0), (1, 0), (1, 1), (0, 1)),
+}
+"""Nodes round a face, by nodes each way."""
 
 
 @dataclass(frozen=True)
@@ -22,9 +26,9 @@ class FaceView:
     points_mm : array, (n_sectors · n_points, 2)
         x, y.
     triangles : array of int, (n, 3)
-        Into the points; eight to each face.
+        Into the points; eight to each face, or two in a mesh of first order.
     outlines_mm : array, (n_faces, 8, 2)
-        Round each face, with the middles of its curved edges.
+        Round each face, with the middles of its curved edges; (n_faces, 4, 2) in a mesh of first order.
     cells : array of int, (n_faces,)
         Cell of the sector that each face belongs to.
     nodes : array of int, (n_points,)
@@ -47,7 +51,7 @@ def face_view(mesh: SectorMesh, sectors: tuple[int, ...] | None = None) -> FaceV
     """Return the faces that are seen; None: the whole gear."""
     shown = tuple(range(mesh.blank.n_teeth)) if sectors is None else sectors
     cells = _foremost(mesh)
-    faces = mesh.cells[cells][:, :, :, 2]  # (n, row, column)
+    faces = mesh.cells[cells][:, :, :, -1]  # (n, row, column)
     nodes, inverse = np.unique(faces, return_inverse=True)
     local = inverse.reshape(faces.shape)
     flat = mesh.points_m[nodes, :2] * 1e3
@@ -56,7 +60,7 @@ def face_view(mesh: SectorMesh, sectors: tuple[int, ...] | None = None) -> FaceV
         c, s = np.cos(k * mesh.blank.pitch_angle_rad), np.sin(k * mesh.blank.pitch_angle_rad)
         turned = flat @ np.array([[c, s], [-s, c]])
         points.append(turned)
-        outlines.append(turned[np.stack([local[:, r, q] for r, q in _OUTLINE], axis=1)])
+        outlines.append(turned[np.stack([local[:, r, q] for r, q in _OUTLINES[faces.shape[1]]], axis=1)])
     one = _triangles(local)
     triangles = (one[None] + (len(nodes) * np.arange(len(shown)))[:, None, None]).reshape(-1, 3)
     return FaceView(np.concatenate(points), triangles, np.concatenate(outlines), np.tile(cells, len(shown)), nodes)
@@ -64,7 +68,7 @@ def face_view(mesh: SectorMesh, sectors: tuple[int, ...] | None = None) -> FaceV
 
 def _foremost(mesh: SectorMesh) -> IntArray:
     """Cells with none before them along z: the web lies further back than rim and hub."""
-    middle = mesh.points_m[mesh.cells[:, 1, 1, 1]]
+    middle = mesh.points_m[mesh.cells].mean(axis=(1, 2, 3))
     _, column = np.unique(np.round(middle[:, :2], 9), axis=0, return_inverse=True)
     order = np.lexsort((middle[:, 2], column.ravel()))
     last = np.append(np.diff(column.ravel()[order]) != 0, True)
@@ -73,10 +77,10 @@ def _foremost(mesh: SectorMesh) -> IntArray:
 
 
 def _triangles(local: IntArray) -> IntArray:
-    """Eight triangles of each nine-node face."""
+    """Two triangles between any four neighbours of each face."""
     found = []
-    for r in range(2):
-        for q in range(2):
+    for r in range(local.shape[1] - 1):
+        for q in range(local.shape[2] - 1):
             a, b, c, d = local[:, r, q], local[:, r + 1, q], local[:, r + 1, q + 1], local[:, r, q + 1]
             found += [np.stack((a, b, c), axis=1), np.stack((a, c, d), axis=1)]
     return np.concatenate(found)

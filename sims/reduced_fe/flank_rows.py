@@ -82,9 +82,11 @@ def height_nodes(mesh: SectorMesh, roll: float, spread: Spread, flank: int) -> S
     gear, n_up = mesh.blank.geometry, mesh.size.n_up
     place = float(flank_place(gear, np.array([roll]))[0])
     reach = PATCH_HALF_WIDTH * gear.module_mm / side_curve(gear)[1] if spread == "patch" else 0.0
-    up = line_weights(row_places(gear, n_up), place - reach, place + reach)
+    order = mesh.size.order
+    rows = row_places(gear, n_up)[:: 3 - order]
+    up = line_weights(rows, place - reach, place + reach, order)
     if spread == "section":
-        across = parabolic_weights(mesh.tooth.shape[1])
+        across = parabolic_weights(mesh.tooth.shape[1], order)
     else:
         across = np.zeros(mesh.tooth.shape[1])
         across[-1 if flank == 0 else 0] = 1.0
@@ -97,7 +99,7 @@ def slice_weights(mesh: SectorMesh, z: float, n_slices: int, spread: Spread) -> 
     """Weights of the layers of nodes for the mean over a slice, or for its middle."""
     layers = mesh.points_m[mesh.tooth[0, 0], 2]
     half = 0.0 if spread == "node" else (layers[-1] - layers[0]) / (2.0 * n_slices)
-    return line_weights(layers, z - half, z + half)
+    return line_weights(layers, z - half, z + half, mesh.size.order)
 
 
 def plane_row(mesh: SectorMesh, nodes: SectionNodes, point: FloatArray, push: FloatArray) -> FloatArray:

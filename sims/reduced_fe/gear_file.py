@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile, ZipFile
@@ -12,6 +10,7 @@ from zipfile import BadZipFile, ZipFile
 import numpy as np
 
 from gearsig.errors import InputError
+from sims.cache import write_whole
 from sims.reduced_fe.blank import blank_from_text
 from sims.reduced_fe.gear_key import FORMAT
 from sims.reduced_fe.reduced_gear import FlankGrid, ReducedGear
@@ -39,24 +38,11 @@ def write_gear(path: str | Path, gear: ReducedGear) -> None:
     InputError
         If the folder cannot be written.
     """
-    target, part = Path(path), ""
     about = {"format": FORMAT, "key": gear.key, "blank": gear.blank.as_text(), "spread": gear.spread}
     about |= {"n_dof": gear.n_dof, **{name: getattr(gear, name) for name in _NUMBERS}}
     arrays: dict[str, Any] = {name: getattr(gear, name) for name in _ARRAYS}
     arrays |= {"roll_rad": gear.grid.roll_rad, "z_m": gear.grid.z_m}
-    try:
-        handle, part = tempfile.mkstemp(dir=target.parent, prefix=".gear-", suffix=".part")
-        with os.fdopen(handle, "wb") as file:
-            np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays)
-        Path(part).chmod(0o644)  # temporary files are for their owner only
-        Path(part).replace(target)
-    except OSError as error:
-        raise InputError(
-            f"cannot be written ({error.strerror})", where=str(target), remedy="choose another folder"
-        ) from None
-    finally:
-        if part:
-            Path(part).unlink(missing_ok=True)
+    write_whole(Path(path), lambda file: np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays))
 
 
 def read_gear(path: str | Path) -> ReducedGear:

@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 
 from gearsig.checks import FloatArray
-from sims.reduced_fe.line_weights import simpson_weights
+from sims.reduced_fe.line_weights import whole_weights
 from sims.reduced_fe.sector_mesh import SectorMesh
 from sims.reduced_fe.sector_plane import IntArray
 
@@ -62,8 +62,8 @@ def hub_sum(n: int, n_sectors: int) -> ComplexArray:
 
 def _surface_weights(mesh: SectorMesh) -> FloatArray:
     """Part of the sector's bore area that belongs to each own node, raveled; they add up to 1."""
-    around = simpson_weights(np.linspace(0.0, 1.0, mesh.bore.shape[0]))
+    around = whole_weights(np.linspace(0.0, 1.0, mesh.bore.shape[0]), mesh.size.order)
     around[0] += around[-1]
-    along = simpson_weights(mesh.points_m[mesh.bore[0], 2])
+    along = whole_weights(mesh.points_m[mesh.bore[0], 2], mesh.size.order)
     weights: FloatArray = np.outer(around[:-1], along).ravel()
     return weights

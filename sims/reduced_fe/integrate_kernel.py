@@ -11,6 +11,8 @@ and flank shape move past under load. Without it a pair would take energy from t
 Damping: the elastic law is taken at D + τ ∂D/∂η·η̇, to first order a damper parallel to the contact with τ times its
 stiffness, which feels the vibration and not the flanks' shape moving past. It never pulls and never adds energy; teeth
 that close at 0.1 m/s feel it 1 µm early, as by an oil film. The torque of moving contact has the elastic part alone.
+
+Friction acts on the bodies as a whole, across the line of action and about their axes; teeth do not bend under it.
 """
 
 # mypy: allow-untyped-defs, allow-untyped-calls
@@ -24,6 +26,8 @@ from numba import njit
 from sims.machine.course_kernel import course_value, set_speed
 from sims.reduced_fe.contact_kernel import FAST, back_substituted, hertz_energy, solve_contacts
 from sims.reduced_fe.contact_pairs_kernel import compliance_slope_energy, fill_compliance, near_pairs
+from sims.reduced_fe.integrate_drive_kernel import friction_of_pair, outer_forces
+from sims.reduced_fe.integrate_modes_kernel import add_from_tooth, dots, on_input, product, spread, to_tooth
 
 START_REACH = 1e-4
 """Depth up to which flanks count as near at first, m."""
@@ -33,77 +37,14 @@ FAST_PART = 0.05
 """Change of a contact force, over the nominal one, after which the fast way takes no second iteration."""
 PRECISE_PART = 1e-11
 MOST_PASSES = 50
+N_EXTRAS = 6
 
 
 # Arrays are passed whole, with the places in them: a slice is a new object, whose references are counted at every use.
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def to_tooth(w, side, turn, tooth, n_single, n_pairs, out):
-    """Modal coordinates as the tooth in contact sees them: pairs turned by nψ."""
-    for j in range(n_single):
-        out[j] = w[side, j]
-    for p in range(n_pairs):
-        c, s = w[side, n_single + p], w[side, n_single + n_pairs + p]
-        cosine, sine = turn[side, tooth, 0, p], turn[side, tooth, 1, p]
-        out[n_single + p] = cosine * c + sine * s
-        out[n_single + n_pairs + p] = cosine * s - sine * c
-
-
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def add_from_tooth(g, side, turn, tooth, n_single, n_pairs, out):
-    """Add forces on a tooth's coordinates to those of the gear: the transpose of `to_tooth`."""
-    for j in range(n_single):
-        out[side, j] += g[j]
-    for p in range(n_pairs):
-        c, s = g[n_single + p], g[n_single + n_pairs + p]
-        cosine, sine = turn[side, tooth, 0, p], turn[side, tooth, 1, p]
-        out[side, n_single + p] += cosine * c - sine * s
-        out[side, n_single + n_pairs + p] += sine * c + cosine * s
-
-
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def dots(rows, side, i, s, t, q, v):
-    """∂D/∂η · q in columns i and i + 1, and ∂D/∂η · v at the part t between them."""
-    a, b, c, d = 0.0, 0.0, 0.0, 0.0
-    for j in range(rows.shape[3]):
-        low, high = rows[side, i, s, j], rows[side, i + 1, s, j]
-        a += low * q[j]
-        b += high * q[j]
-        c += low * v[j]
-        d += high * v[j]
-    return a, b, c + t * (d - c)
-
-
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def on_input(inputs, side, number, w):
-    """Displacement (of modal coordinates w) that an input works on."""
-    total = 0.0
-    for j in range(w.shape[1]):
-        total += inputs[side, number, j] * w[side, j]
-    return total
-
-
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def product(a, b):
-    """Sum of products of all modes of both sides."""
-    total = 0.0
-    for side in range(2):
-        for j in range(a.shape[1]):
-            total += a[side, j] * b[side, j]
-    return total
-
-
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def spread(rows, side, i, s, t, force, g):
-    """Take force · ∂D/∂η between two columns from g."""
-    low, high = force * (1.0 - t), force * t
-    for j in range(rows.shape[3]):
-        g[j] -= low * rows[side, i, s, j] + high * rows[side, i + 1, s, j]
-
-
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def march(  # noqa: PLR0912, PLR0915  one machine, one step; its parts share a score of numbers
+def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scratch that they share
     k, arrays, rows, turn, coefficients, modal, inputs, rigid, back_row, state, speed, torque, time, step, n_steps,
     stride, precise, lines, found, energies,
 ):  # fmt: skip
@@ -115,7 +56,7 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; its parts share a s
     turn : (2, z, 2, n_pairs) cosine and sine by which a tooth's pairs are turned.
     coefficients : (2, 8, n_modes), see `step_coefficients`.
     modal : (2, 2, n_modes) ω² and 2ζω.
-    inputs : (2, 7, n_modes). rigid, back_row : (2, n_modes) ∂D/∂η of the rigid gears on either flank.
+    inputs : (2, 9, n_modes). rigid, back_row : (2, n_modes) ∂D/∂η of the rigid gears on either flank.
     state : (q, v, f, f_before: (2, n_modes); force, root: (n_slots, n_slices); pair: (n_slots,); rest: (3,)), left at
         the last step. rest: set angle, whether the flanks touched, whether
         the state has forces already.
@@ -123,8 +64,8 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; its parts share a s
     time : of the first step.
     precise : repeat each step until it stays.
     lines : (kinds (n,), factors (n, 2, n_modes), set factors (n,)): wanted signals; kind 0, 1, 2: displacement,
-        velocity, acceleration; 3 + i: extra i = mesh force, back force, mesh cycles, nearest depth, contact's torque on
-        the driver, then the force of each slot, then of each of its slices.
+        velocity, acceleration; 3 + i: extra i = mesh force, back force, mesh cycles, nearest depth, torque of moving
+        contact on the driver, friction, then the force of each slot, then of each of its slices.
     found : (n_out, n). energies : (n_out,) or (0,).
     Returns the number of rows filled, fewer where the solution burst.
     """
@@ -132,24 +73,16 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; its parts share a s
     own, cross, corner, extra, separation, table_rows, pitch, lead, hertz = arrays
     kinds, factors, set_factors = lines
     n_slots, n_s = held.shape
-    n_modes, n_rows = q.shape[1], rows.shape[3]
-    most = n_slots * n_s
-    pairs, parts = np.empty(n_slots), np.empty(n_slots)
-    apart, slope = np.empty(n_slots), np.empty(n_slots)
-    columns = np.empty(n_slots, dtype=np.int64)
+    n_modes, n_rows, most = q.shape[1], rows.shape[3], n_slots * n_s
+    pairs, parts, apart, slope = np.empty(n_slots), np.empty(n_slots), np.empty(n_slots), np.empty(n_slots)
+    columns, order = np.empty(n_slots, dtype=np.int64), np.empty(most, dtype=np.int64)
     r, a = np.empty((most, most)), np.empty((most, most))
     approach, along, force, root = np.empty(most), np.empty(most), np.zeros(most), np.empty(most)
-    x, last_force = np.empty(most), np.zeros(most)
-    viscous, elastic = np.empty(most), np.empty(most)
-    order = np.empty(most, dtype=np.int64)
+    x, last_force, viscous, elastic = np.empty(most), np.zeros(most), np.empty(most), np.empty(most)
     seen, moving, g = np.empty(n_rows), np.empty(n_rows), np.empty(n_rows)
-    q1, v1 = np.empty((2, n_modes)), np.empty((2, n_modes))
-    free_q, free_v, f1, base = np.empty_like(q1), np.empty_like(q1), np.empty_like(q1), np.empty_like(q1)
-    extras = np.zeros(5 + n_slots + most)
-    n_out = 0
-    angle = rest[0]
-    margin = REACH_MPS * step
-    reach = START_REACH
+    q1, v1, f1, base = np.empty((2, n_modes)), np.empty((2, n_modes)), np.empty((2, n_modes)), np.empty((2, n_modes))
+    free_q, free_v, extras = np.empty((2, n_modes)), np.empty((2, n_modes)), np.zeros(N_EXTRAS + n_slots + most)
+    n_out, angle, margin, reach = 0, rest[0], REACH_MPS * step, START_REACH
     enough = (PRECISE_PART if precise else FAST_PART) * k.nominal_force
     passes = MOST_PASSES if precise else 1
     w1, rate1 = set_speed(k, speed, time)
@@ -161,42 +94,12 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; its parts share a s
             w1, rate1 = set_speed(k, speed, t)
             angle += step / 6.0 * (w0 + 4.0 * wh + w1)
         load = course_value(torque, t)
-        if number > 0:
-            for side in range(2):
-                for j in range(n_modes):
-                    a0, a1, b0 = coefficients[side, 0, j], coefficients[side, 1, j], coefficients[side, 4, j]
-                    free_q[side, j] = a0 * q[side, j] + a1 * v[side, j] + b0 * f[side, j]
-                    a0, a1, b0 = coefficients[side, 2, j], coefficients[side, 3, j], coefficients[side, 6, j]
-                    free_v[side, j] = a0 * q[side, j] + a1 * v[side, j] + b0 * f[side, j]
-                    f1[side, j] = 2.0 * f[side, j] - f_before[side, j]
-        else:
-            for side in range(2):
-                for j in range(n_modes):
-                    free_q[side, j], free_v[side, j], f1[side, j] = q[side, j], v[side, j], f[side, j]
-        # What acts besides the contact.
-        turned_1 = on_input(inputs, 0, 1, q)
-        for side in range(2):
-            if side == 0:
-                drive = load * _ripple(k, angle + on_input(inputs, 0, 0, q)) + k.total_inertia * rate1
-                drive -= k.governor * on_input(inputs, 0, 0, v) + k.governor_spring * on_input(inputs, 0, 0, q)
-            else:
-                drive = -load * k.ratio
-            for j in range(n_modes):
-                base[side, j] = drive * inputs[side, 0, j] + rate1 * inputs[side, 6, j]
-            if k.pushes:
-                _push(k, side, inputs, angle, w1, drive, base)
-        cycles, total, back, torque_1 = 0.0, 0.0, 0.0, 0.0
-        n = 0
+        _predict(number, coefficients, q, v, f, f_before, free_q, free_v, f1)
+        outer_forces(k, inputs, q, v, angle, w1, rate1, load, base)
+        cycles, total, back, along_torque, rubbing, n = 0.0, 0.0, 0.0, 0.0, 0.0, 0
         for one_pass in range(passes):
-            for side in range(2):
-                for j in range(n_modes):
-                    if number > 0:
-                        q1[side, j] = free_q[side, j] + coefficients[side, 5, j] * f1[side, j]
-                        v1[side, j] = free_v[side, j] + coefficients[side, 7, j] * f1[side, j]
-                    else:
-                        q1[side, j], v1[side, j] = q[side, j], v[side, j]
-            turned_1 = on_input(inputs, 0, 1, q1)
-            turned_2 = on_input(inputs, 1, 1, q1)
+            _moved(number, coefficients, free_q, free_v, f1, q, v, q1, v1)
+            turned_1, turned_2 = on_input(inputs, 0, 1, q1), on_input(inputs, 1, 1, q1)
             cycles = k.cycles_per_rad * (angle + turned_1)
             phi_1 = angle + turned_1 + k.runout_angle[0]
             phi_2 = angle / k.ratio + turned_2 + k.runout_angle[1]
@@ -207,117 +110,60 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; its parts share a s
             )  # fmt: skip
             if n < 0:
                 return n_out
-            deepest = -1.0
-            for p in range(n):
-                ring = int(pairs[p] - n_slots * np.floor(pairs[p] / n_slots))
-                if held_pair[ring] != pairs[p]:
-                    held_pair[ring] = pairs[p]
-                    for s in range(n_s):
-                        held[ring, s], held_root[ring, s] = 0.0, k.small**-0.1
-                for s in range(n_s):
-                    i = p * n_s + s
-                    if one_pass == 0:
-                        force[i], root[i] = held[ring, s], held_root[ring, s]
-                    approach[i], viscous[i] = off - apart[p] - lead[s], 0.0
-                    along[i] = -slope[p]
-                for side in range(2):
-                    z = k.teeth[side]
-                    tooth = int(pairs[p] - z * np.floor(pairs[p] / z))
-                    to_tooth(q1, side, turn, tooth, k.n_single, k.n_pairs, seen)
-                    to_tooth(v1, side, turn, tooth, k.n_single, k.n_pairs, moving)
-                    for s in range(n_s):
-                        low, high, rate = dots(rows, side, columns[p], s, parts[p], seen, moving)
-                        i = p * n_s + s
-                        approach[i] += low + parts[p] * (high - low)
-                        viscous[i] += k.damping_time * rate
-                        along[i] += (high - low) / k.column_step
-                for s in range(n_s):
-                    i = p * n_s + s
-                    approach[i] += viscous[i]
-                    deepest = max(deepest, approach[i] + apart[p])
+            if one_pass == 0:
+                _taken_up(k, n, pairs, held, held_root, held_pair, force, root)
+            deepest = _approaches(
+                k, n, rows, turn, q1, v1, pairs, columns, parts, apart, slope, lead, off, seen, moving, approach,
+                viscous, along,
+            )  # fmt: skip
             fill_compliance(n, pairs, columns, parts, k.teeth, own, cross, extra, table_rows, r)
             done, m = solve_contacts(r, n * n_s, approach, hertz, k.small, force, root, enough, order, a, x)
             if done < 0:
                 return n_out
-            for i in range(n * n_s):
-                elastic[i] = force[i]
-            if k.damping_time > 0.0:
-                for p in range(m):
-                    x[p] = viscous[order[p]]
-                back_substituted(a, m, x)
-                for p in range(m):
-                    elastic[order[p]] -= x[p]
+            _without_damping(k, n * n_s, m, force, viscous, order, a, x, elastic)
             reach = max(deepest - off, 0.0) + margin
             total, along_cycles = 0.0, 0.0
             for i in range(n * n_s):
                 total += force[i]
                 along_cycles += elastic[i] * along[i]
-            along_cycles -= compliance_slope_energy(
-                n, pairs, columns, k.teeth, own, cross, extra, table_rows, k.column_step, elastic
-            )
-            if not k.moving_force:
-                along_cycles = 0.0
-            torque_1 = -k.cycles_per_rad * along_cycles - total * k.runout[0] * cos(phi_1)
+            if k.moving_force:
+                along_cycles -= compliance_slope_energy(
+                    n, pairs, columns, k.teeth, own, cross, extra, table_rows, k.column_step, elastic
+                )
+                along_torque = -k.cycles_per_rad * along_cycles
+            torque_1 = along_torque - total * k.runout[0] * cos(phi_1)
             torque_2 = -total * k.runout[1] * cos(phi_2)
+            if k.friction:
+                slip_x = on_input(inputs, 0, 2, v1) - on_input(inputs, 1, 2, v1)
+                rubbing, moment_1, moment_2 = _rubbing(k, n, n_s, pairs, cycles, force, w1, slip_x)
+                torque_1, torque_2 = torque_1 + moment_1, torque_2 + moment_2
             depth = product(back_row, q1) + k.damping_time * product(back_row, v1) - k.backlash
             back = k.back_stiffness * depth if depth > 0.0 else 0.0
             for side in range(2):
-                pull = torque_1 if side == 0 else torque_2
+                pull, across = (torque_1, -rubbing) if side == 0 else (torque_2, rubbing)
                 for j in range(n_modes):
-                    f1[side, j] = base[side, j] + pull * inputs[side, 1, j] - back * back_row[side, j]
-                for p in range(n):
-                    z = k.teeth[side]
-                    tooth = int(pairs[p] - z * np.floor(pairs[p] / z))
-                    g[:] = 0.0
-                    i = columns[p]
-                    for s in range(n_s):
-                        if force[p * n_s + s] > 0.0:
-                            spread(rows, side, i, s, parts[p], force[p * n_s + s], g)
-                    add_from_tooth(g, side, turn, tooth, k.n_single, k.n_pairs, f1)
-            if one_pass > 0:
-                change = 0.0
-                for i in range(n * n_s):
-                    change = max(change, abs(force[i] - last_force[i]))
-                if change <= enough:
-                    break
+                    f1[side, j] = base[side, j] + pull * inputs[side, 1, j] + across * inputs[side, 2, j]
+                    f1[side, j] -= back * back_row[side, j]
+            _contact_on_modes(k, n, n_s, pairs, columns, parts, rows, turn, force, g, f1)
+            if one_pass > 0 and _greatest_change(n * n_s, force, last_force) <= enough:
+                break
             if precise:
                 for i in range(n * n_s):
                     last_force[i] = force[i]
         if not abs(total) < 1e12:
             return n_out
         if number > 0 or rest[2] == 0.0:  # a state that another run left is only looked at
-            for p in range(n):
-                ring = int(pairs[p] - n_slots * np.floor(pairs[p] / n_slots))
-                for s in range(n_s):
-                    held[ring, s], held_root[ring, s] = force[p * n_s + s], root[p * n_s + s]
-            for side in range(2):
-                for j in range(n_modes):
-                    if number > 0:
-                        q[side, j] = free_q[side, j] + coefficients[side, 5, j] * f1[side, j]
-                        v[side, j] = free_v[side, j] + coefficients[side, 7, j] * f1[side, j]
-                        f_before[side, j] = f[side, j]
-                    else:
-                        f_before[side, j] = f1[side, j]
-                    f[side, j] = f1[side, j]
+            _keep(n, n_slots, pairs, force, root, held, held_root)
+            _advance(number, coefficients, free_q, free_v, f1, q, v, f, f_before)
         rest[2] = 1.0
         touches = 1.0 if total > 0.0 else 0.0
         if k.restitution >= 0.0 and rest[1] == 0.0 and touches > 0.0:
-            closing = product(rigid, v)
-            if closing > 0.0:
-                kick = (1.0 + k.restitution) * closing / product(rigid, rigid)
-                for side in range(2):
-                    for j in range(n_modes):
-                        v[side, j] -= kick * rigid[side, j]
+            _bounce(k, rigid, v)
         rest[1] = touches
         if number % stride == 0 and n_out < found.shape[0]:
-            extras[0], extras[1], extras[2], extras[3], extras[4] = total, back, cycles, reach - margin, torque_1
-            extras[5:] = 0.0
-            newest = np.floor(cycles - k.start)
-            for p in range(n):
-                slot = int(newest - pairs[p])
-                for s in range(n_s):
-                    extras[5 + slot] += force[p * n_s + s]
-                    extras[5 + n_slots + slot * n_s + s] = force[p * n_s + s]
+            extras[0], extras[1], extras[2], extras[3], extras[4] = total, back, cycles, reach - margin, along_torque
+            extras[5] = rubbing
+            _pair_extras(n, n_slots, n_s, pairs, np.floor(cycles - k.start), force, extras)
             for line in range(kinds.shape[0]):
                 found[n_out, line] = _signal(
                     kinds[line], factors, line, set_factors[line], q, v, f, modal, angle, w1, rate1, extras
@@ -327,6 +173,169 @@ def march(  # noqa: PLR0912, PLR0915  one machine, one step; its parts share a s
             n_out += 1
     rest[0] = angle
     return n_out
+
+
+@njit(inline="always", error_model="numpy", fastmath=FAST)
+def _predict(number, coefficients, q, v, f, f_before, free_q, free_v, f1):
+    """Where modes move without the force at the step's end, and that force extrapolated."""
+    for side in range(2):
+        for j in range(q.shape[1]):
+            if number > 0:
+                a0, a1, b0 = coefficients[side, 0, j], coefficients[side, 1, j], coefficients[side, 4, j]
+                free_q[side, j] = a0 * q[side, j] + a1 * v[side, j] + b0 * f[side, j]
+                a0, a1, b0 = coefficients[side, 2, j], coefficients[side, 3, j], coefficients[side, 6, j]
+                free_v[side, j] = a0 * q[side, j] + a1 * v[side, j] + b0 * f[side, j]
+                f1[side, j] = 2.0 * f[side, j] - f_before[side, j]
+            else:
+                free_q[side, j], free_v[side, j], f1[side, j] = q[side, j], v[side, j], f[side, j]
+
+
+@njit(inline="always", error_model="numpy", fastmath=FAST)
+def _moved(number, coefficients, free_q, free_v, f1, q, v, q1, v1):
+    """Modes at the step's end with a force there; at the start, where they are."""
+    for side in range(2):
+        for j in range(q.shape[1]):
+            if number > 0:
+                q1[side, j] = free_q[side, j] + coefficients[side, 5, j] * f1[side, j]
+                v1[side, j] = free_v[side, j] + coefficients[side, 7, j] * f1[side, j]
+            else:
+                q1[side, j], v1[side, j] = q[side, j], v[side, j]
+
+
+@njit(inline="always", error_model="numpy", fastmath=FAST)
+def _taken_up(k, n, pairs, held, held_root, held_pair, force, root):
+    """Forces of the pairs at the step before, where the solution starts; none of pairs that are new."""
+    n_slots, n_s = held.shape
+    for p in range(n):
+        ring = int(pairs[p] - n_slots * np.floor(pairs[p] / n_slots))
+        if held_pair[ring] != pairs[p]:
+            held_pair[ring] = pairs[p]
+            for s in range(n_s):
+                held[ring, s], held_root[ring, s] = 0.0, k.small**-0.1
+        for s in range(n_s):
+            force[p * n_s + s], root[p * n_s + s] = held[ring, s], held_root[ring, s]
+
+
+@njit(inline="always", error_model="numpy", fastmath=FAST)
+def _approaches(
+    k, n, rows, turn, q1, v1, pairs, columns, parts, apart, slope, lead, off, seen, moving, approach, viscous, along
+):  # fmt: skip
+    """Fill the approach of each slice, damping's part in it and its change per mesh cycle; return the deepest."""
+    n_s, deepest = lead.shape[0], -1.0
+    for p in range(n):
+        for s in range(n_s):
+            i = p * n_s + s
+            approach[i], viscous[i], along[i] = off - apart[p] - lead[s], 0.0, -slope[p]
+        for side in range(2):
+            z = k.teeth[side]
+            tooth = int(pairs[p] - z * np.floor(pairs[p] / z))
+            to_tooth(q1, side, turn, tooth, k.n_single, k.n_pairs, seen)
+            to_tooth(v1, side, turn, tooth, k.n_single, k.n_pairs, moving)
+            for s in range(n_s):
+                low, high, rate = dots(rows, side, columns[p], s, parts[p], seen, moving)
+                i = p * n_s + s
+                approach[i] += low + parts[p] * (high - low)
+                viscous[i] += k.damping_time * rate
+                along[i] += (high - low) / k.column_step
+        for s in range(n_s):
+            approach[p * n_s + s] += viscous[p * n_s + s]
+            deepest = max(deepest, approach[p * n_s + s] + apart[p])
+    return deepest
+
+
+@njit(inline="always", error_model="numpy", fastmath=FAST)
+def _without_damping(k, n, m, force, viscous, order, a, x, elastic):
+    """Elastic part of the forces: less the contact's stiffness times the approach that damping adds."""
+    for i in range(n):
+        elastic[i] = force[i]
+    if k.damping_time > 0.0:
+        for p in range(m):
+            x[p] = viscous[order[p]]
+        back_substituted(a, m, x)
+        for p in range(m):
+            elastic[order[p]] -= x[p]
+
+
+@njit(inline="always", error_model="numpy", fastmath=FAST)
+def _rubbing(k, n, n_s, pairs, cycles, force, omega, slip_x):
+    """Sums of friction and its moments about both axes over the pairs."""
+    rubbing, moment_1, moment_2 = 0.0, 0.0, 0.0
+    for p in range(n):
+        carried = 0.0
+        for s in range(n_s):
+            carried += force[p * n_s + s]
+        if carried > 0.0:
+            one, two, three = friction_of_pair(k, carried, cycles - pairs[p], omega, slip_x)
+            rubbing, moment_1, moment_2 = rubbing + one, moment_1 + two, moment_2 + three
+    return rubbing, moment_1, moment_2
+
+
+@njit(inline="always", error_model="numpy", fastmath=FAST)
+def _contact_on_modes(k, n, n_s, pairs, columns, parts, rows, turn, force, g, f1):
+    """Add −N ∂D/∂η of every slice."""
+    for side in range(2):
+        z = k.teeth[side]
+        for p in range(n):
+            tooth = int(pairs[p] - z * np.floor(pairs[p] / z))
+            g[:] = 0.0
+            for s in range(n_s):
+                if force[p * n_s + s] > 0.0:
+                    spread(rows, side, columns[p], s, parts[p], force[p * n_s + s], g)
+            add_from_tooth(g, side, turn, tooth, k.n_single, k.n_pairs, f1)
+
+
+@njit(inline="always", error_model="numpy", fastmath=FAST)
+def _greatest_change(n, force, last_force):
+    change = 0.0
+    for i in range(n):
+        change = max(change, abs(force[i] - last_force[i]))
+    return change
+
+
+@njit(inline="always", error_model="numpy", fastmath=FAST)
+def _keep(n, n_slots, pairs, force, root, held, held_root):
+    """Keep the pairs' forces for the next step."""
+    n_s = held.shape[1]
+    for p in range(n):
+        ring = int(pairs[p] - n_slots * np.floor(pairs[p] / n_slots))
+        for s in range(n_s):
+            held[ring, s], held_root[ring, s] = force[p * n_s + s], root[p * n_s + s]
+
+
+@njit(inline="always", error_model="numpy", fastmath=FAST)
+def _advance(number, coefficients, free_q, free_v, f1, q, v, f, f_before):
+    """Take the step with the force found; at the start, take only the force."""
+    for side in range(2):
+        for j in range(q.shape[1]):
+            if number > 0:
+                q[side, j] = free_q[side, j] + coefficients[side, 5, j] * f1[side, j]
+                v[side, j] = free_v[side, j] + coefficients[side, 7, j] * f1[side, j]
+                f_before[side, j] = f[side, j]
+            else:
+                f_before[side, j] = f1[side, j]
+            f[side, j] = f1[side, j]
+
+
+@njit(inline="always", error_model="numpy", fastmath=FAST)
+def _bounce(k, rigid, v):
+    """Turn the gears' closing speed round by the coefficient of restitution."""
+    closing = product(rigid, v)
+    if closing > 0.0:
+        kick = (1.0 + k.restitution) * closing / product(rigid, rigid)
+        for side in range(2):
+            for j in range(v.shape[1]):
+                v[side, j] -= kick * rigid[side, j]
+
+
+@njit(inline="always", error_model="numpy", fastmath=FAST)
+def _pair_extras(n, n_slots, n_s, pairs, newest, force, extras):
+    """Fill the forces of slots and of their slices."""
+    extras[N_EXTRAS:] = 0.0
+    for p in range(n):
+        slot = int(newest - pairs[p])
+        for s in range(n_s):
+            extras[N_EXTRAS + slot] += force[p * n_s + s]
+            extras[N_EXTRAS + n_slots + slot * n_s + s] = force[p * n_s + s]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -362,34 +371,3 @@ def _energy(k, q, v, modal, inputs, angle, load, r, n, force, back, hertz):
     if back > 0.0:
         total += 0.5 * back * back / k.back_stiffness
     return total
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _ripple(k, theta):
-    """Drive torque over its set value."""
-    factor = 1.0
-    for i in range(k.n_ripples):
-        factor += k.ripples[i, 1] * cos(k.ripples[i, 0] * theta + k.ripples[i, 2])
-    return factor
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _push(k, side, inputs, angle, omega, drive, out):
-    """Add unbalance, weight and a bent coupling, at the set speed."""
-    theta = angle if side == 0 else angle / k.ratio
-    rate = omega if side == 0 else omega / k.ratio
-    up = 1.0 if side == 0 else -1.0
-    phi = theta + k.mass_angle[side]
-    fx = k.unbalance[side] * rate * rate * cos(phi) + k.mass[side] * k.gravity_x
-    fy = up * k.unbalance[side] * rate * rate * sin(phi) + k.mass[side] * k.gravity_y
-    c2, s2 = cos(2.0 * theta), sin(2.0 * theta)
-    kink = (
-        k.torsional_stiffness[side] * k.hooke[side] * s2 + 2.0 * k.torsional_damping[side] * k.hooke[side] * rate * c2
-    )
-    on_rotor = -kink - 2.0 * k.hooke[side] * c2 * drive
-    couple_x = k.hooke_force[side] * drive * (1.0 + c2)
-    couple_y = k.hooke_force[side] * drive * up * s2
-    for j in range(out.shape[1]):
-        out[side, j] += fx * inputs[side, 2, j] + fy * inputs[side, 3, j]
-        out[side, j] += on_rotor * inputs[side, 0, j] + kink * inputs[side, 1, j]
-        out[side, j] += couple_x * inputs[side, 4, j] + couple_y * inputs[side, 5, j]

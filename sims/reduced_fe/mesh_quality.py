@@ -44,7 +44,9 @@ class MeshQuality(NamedTuple):
 def mesh_quality(mesh: SectorMesh) -> MeshQuality:
     """Jacobians, outline and mass properties of a mesh."""
     blank, fields = mesh.blank, cell_fields(mesh.points_m, mesh.cells)
-    places = np.einsum("nq,cnj->cqj", fields.values, mesh.points_m[mesh.cells.reshape(-1, 27)], optimize=True)
+    places = np.einsum(
+        "nq,cnj->cqj", fields.values, mesh.points_m[mesh.cells.reshape(len(mesh.cells), -1)], optimize=True
+    )
     weight = fields.volumes * blank.n_teeth
     density = blank.material.density_kg_m3
     in_plane = float(np.sum(weight * (places[..., 0] ** 2 + places[..., 1] ** 2)))
@@ -53,7 +55,7 @@ def mesh_quality(mesh: SectorMesh) -> MeshQuality:
     true_volume, true_inertia = true_mass_properties(blank)
     return MeshQuality(
         fields.determinants.min(axis=1) / fields.determinants.mean(axis=1),
-        outline_error_mm(blank.geometry, mesh.size.n_gap, mesh.size.n_up),
+        outline_error_mm(blank.geometry, mesh.size.n_gap, mesh.size.n_up, mesh.size.order),
         volume,
         volume * density,
         in_plane * density,

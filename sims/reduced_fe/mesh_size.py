@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from gearsig.checks import count
+from gearsig.checks import count, within
 from gearsig.errors import InputError
 from sims.reduced_fe.blank import GearBlank
 from sims.reduced_fe.tooth_side import fillet_split, outline_error_mm
@@ -16,7 +16,7 @@ LEAST_DOF, MOST_DOF = 5_000, 1_100_000
 
 @dataclass(frozen=True)
 class MeshSize:
-    """Numbers of 27-node hexahedra in one sector.
+    """Numbers of hexahedra in one sector.
 
     Parameters
     ----------
@@ -32,6 +32,9 @@ class MeshSize:
         Radially between rim and bore (web and hub).
     n_along : int
         Along the face.
+    order : int
+        2: 27-node hexahedra, exact to second order. 1: eight-node ones with incompatible modes, for meshes too coarse
+        to follow a fillet; their edges are straight.
     """
 
     n_across: int = 3
@@ -40,18 +43,41 @@ class MeshSize:
     n_rim: int = 2
     n_body: int = 3
     n_along: int = 4
+    order: int = 2
 
     def __post_init__(self) -> None:
         for name in ("n_across", "n_gap", "n_up", "n_rim", "n_body", "n_along"):
             count(getattr(self, name), name)
+        within(self.order, "order", 1, 2)
 
+
+COARSE = tuple(
+    MeshSize(n_across, 1, n_up, n_rim, n_body, n_along, order=1)
+    for n_across, n_up, n_rim, n_body, n_along in (
+        (1, 1, 1, 1, 1),
+        (1, 2, 1, 1, 1),
+        (1, 2, 1, 2, 1),
+        (2, 2, 1, 2, 1),
+        (2, 3, 1, 2, 1),
+        (2, 3, 1, 2, 2),
+        (2, 4, 2, 2, 2),
+        (3, 5, 2, 3, 2),
+        (4, 6, 2, 3, 3),
+    )
+)
+"""Meshes of first order, from the coarsest on: 54 to some 1 000 degrees of freedom per tooth."""
 
 MOST_OUTLINE_ERROR = 0.01
 """In modules: how far the cells' edges may lie off the true outline."""
 
 
 def check_fillet(blank: GearBlank, size: MeshSize) -> None:
-    """Refuse a mesh whose edges leave the outline by more than 1 % of a module; it is the fillet that they leave."""
+    """Refuse a mesh whose edges leave the outline by more than 1 % of a module; it is the fillet that they leave.
+
+    A mesh of first order is not refused: who asks for one knows that it is coarse, see `MeshQuality.outline_error_mm`.
+    """
+    if size.order == 1:
+        return
     error = outline_error_mm(blank.geometry, size.n_gap, size.n_up)
     most = MOST_OUTLINE_ERROR * blank.geometry.module_mm
     if error > most:
@@ -84,12 +110,13 @@ def n_dof_of(blank: GearBlank, size: MeshSize) -> int:
     """Degrees of freedom of the whole gear."""
     hub, web = body_cells(blank, size.n_body)
     beside, inside = along_cells(blank, size.n_along)
-    columns = size.n_across + 2 * size.n_gap
-    layers, web_layers = 2 * (2 * beside + inside) + 1, 2 * inside + 1
-    tooth = 2 * size.n_up * (2 * size.n_across + 1)
-    full = tooth + 2 * columns * (2 * size.n_rim + 1)
-    hub_rows, web_rows = (2 * hub + 1, 2 * web - 1) if hub else (0, 2 * web)
-    nodes = (full + 2 * columns * hub_rows) * layers + 2 * columns * web_rows * web_layers
+    k = size.order
+    columns = k * (size.n_across + 2 * size.n_gap)
+    layers, web_layers = k * (2 * beside + inside) + 1, k * inside + 1
+    tooth = k * size.n_up * (k * size.n_across + 1)
+    full = tooth + columns * (k * size.n_rim + 1)
+    hub_rows, web_rows = (k * hub + 1, k * web - 1) if hub else (0, k * web)
+    nodes = (full + columns * hub_rows) * layers + columns * web_rows * web_layers
     return 3 * nodes * blank.n_teeth
 
 
@@ -100,12 +127,13 @@ def mesh_size_for(blank: GearBlank, n_dof: int) -> MeshSize:
     ----------
     blank : GearBlank
     n_dof : int
-        Of the whole gear, 5 000 to 1 100 000.
+        Of the whole gear, 5 000 to 1 100 000. Where the coarsest mesh of second order that follows the fillet has more,
+        one of first order is chosen.
 
     Raises
     ------
     InputError
-        If the coarsest mesh that follows the fillet has more.
+        If even the coarsest has more.
     """
     wanted = count(n_dof, "n_dof", minimum=LEAST_DOF)
     if wanted > MOST_DOF:
@@ -113,9 +141,11 @@ def mesh_size_for(blank: GearBlank, n_dof: int) -> MeshSize:
     sizes = [_size(blank, blank.geometry.module_mm * 2.5 * 0.97**k) for k in range(110)]
     sizes += [replace(size, n_up=size.n_up - 1) for size in sizes if size.n_up > _least_up(blank)]
     best = min(sizes, key=lambda size: abs(n_dof_of(blank, size) - wanted))
+    if n_dof_of(blank, best) > 1.2 * wanted:
+        best = min(COARSE, key=lambda size: abs(n_dof_of(blank, size) - wanted))
     if n_dof_of(blank, best) > 1.5 * wanted:
         raise InputError(
-            f"n_dof is {wanted}: too coarse for the fillets of {blank.n_teeth} teeth",
+            f"n_dof is {wanted}: too few for {blank.n_teeth} teeth",
             allowed=f"at least {n_dof_of(blank, best)}",
             remedy="ask for more degrees of freedom",
         )

@@ -10,14 +10,10 @@ from sims.simulator import Parameter, ParameterValue
 MEANINGLESS: dict[str, ParameterValue | None] = {
     "contact_law": "linear",
     "mesh_ramp": 0.05,
-    "friction": "off",
-    "friction_factor": 1.0,
-    "viscosity_cp": 17.6,
     "mass_driver_kg": None,
     "mass_driven_kg": None,
     "inertia_driver_kg_m2": None,
     "inertia_driven_kg_m2": None,
-    "bearing_clearance_um": 0.0,
 }
 """Parameters of the 16-DOF pair that this model lacks, and the values with which its machine is built all the same."""
 
@@ -26,6 +22,7 @@ _CHANGED = {
         "meaning": "damping ratio of the torsional mode, rotors standing still; the contact gives what others do not",
         "default": 0.08,
     },
+    "friction": {"default": "off"},
     "roughness_locked_to": {"choices": ("flank", "none")},
     "bending_stiffness_n_per_m": {"default": 1.5e10},
     "bearing_stiffness_n_per_m": {"default": 1.5e10},

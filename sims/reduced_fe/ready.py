@@ -1,4 +1,7 @@
-"""Reduced gears that come with the product: `python -m sims.reduced_fe.ready` makes their files again."""
+"""Reduced gears that come with the product: `python -m sims.reduced_fe.ready` makes their files again.
+
+Their cracks are in a file of their own, see `sims.reduced_fe.crack_table`.
+"""
 
 from __future__ import annotations
 

@@ -82,6 +82,8 @@ def sector_mesh(blank: GearBlank, size: MeshSize, crack: CrackLine | None = None
             (web_cells, _extruded(plane.cells[plane.n_web_cells :], n_layers, range(0, n_layers - 1, 2)))
         )
     mesh = _without_loose_nodes(blank, size, points, cells, plane, n_layers)
+    if size.order == 1:
+        mesh = _corners_alone(mesh)
     check_jacobians(mesh)
     return mesh
 
@@ -124,4 +126,22 @@ def _without_loose_nodes(
         number[high[used[high]]],
         number[place(plane.bore)],
         number[place(plane.tooth)],
+    )
+
+
+def _corners_alone(mesh: SectorMesh) -> SectorMesh:
+    """Return the mesh of eight-node cells between the corners of the 27-node ones."""
+    corners = mesh.cells[:, ::2, ::2, ::2]
+    used = np.zeros(mesh.n_nodes, dtype=bool)
+    used[corners] = True
+    number = np.cumsum(used) - 1
+    return SectorMesh(
+        mesh.blank,
+        mesh.size,
+        mesh.points_m[used],
+        number[corners],
+        number[mesh.low_side[used[mesh.low_side]]],
+        number[mesh.high_side[used[mesh.high_side]]],
+        number[mesh.bore[::2, ::2]],
+        number[mesh.tooth[::2, ::2, ::2]],
     )

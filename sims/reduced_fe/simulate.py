@@ -81,7 +81,7 @@ def simulate_pair(
     pair = replace(pair, machine=machine)
     chain = replace(machine.chain, sampling_rate_hz=rate)
     _check_depth(pair, operation)
-    own = constants(pair, operation)
+    own = constants(pair, operation, rng=machine_rng)
     wanted_hz = motion_rate_hz(chain)
     per_sample = ceil(max(1.0 / positive(step_s, "step_s", "s"), wanted_hz) / rate - 1e-9)
     lead = ceil(lead_in_s(machine, chain) * rate) / rate  # so that time 0 of the courses is a sample

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,15 +26,6 @@ if TYPE_CHECKING:
     from sims.reduced_fe.dynamics_convergence import FlexConvergence
 
 NAME = "reduced-fe"
-WITHOUT_MEANING = MappingProxyType(
-    {
-        "bearing_clearance": "its bearings are springs without rolling elements",
-        "bearing_inner_race": "its bearings are springs without rolling elements",
-        "bearing_outer_race": "its bearings are springs without rolling elements",
-        "sliding_friction": "its flanks slide without friction",
-    }
-)
-"""Effects of the catalogue that this model cannot show, and why."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +63,9 @@ class PreparedPair:
 class ReducedPair:
     """Spur pair of reduced finite-element gears between two rotors; see `sims.reduced_fe`.
 
-    Does not represent: friction, gyroscopic and centrifugal terms, tilting of the gears, oil churning, heating, rolling
-    elements in the bearings, a change of the gears' modes by a crack, contact off the line of action at corners.
+    Does not represent: gyroscopic and centrifugal terms, tilting of the gears, oil churning, heating, teeth bent by
+    friction, a shaft that lifts in its bearings or vibrates within their clearance, a change of the gears' modes by a
+    crack, contact off the line of action at corners.
     """
 
     @property
@@ -99,8 +90,8 @@ class ReducedPair:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects that have a meaning: all of the catalogue but `WITHOUT_MEANING`."""
-        return tuple(name for name in effects() if name not in WITHOUT_MEANING)
+        """Names of the effects: all of the catalogue have a meaning here."""
+        return tuple(effects())
 
     def prepare(
         self,
@@ -190,8 +181,6 @@ def prepare_preset(
     run = operation or chosen.operation
     check_run(run, sampling_rate_hz)
     wanted = (*chosen.effects, *settings)
-    for setting in wanted:
-        _check_meaning(setting)
     complete = completed(wanted)
     gears = reduced_gears(values)
     installed = installed_of(chosen.installed) if chosen.installed else None
@@ -205,12 +194,3 @@ def prepare_preset(
             allowed="'flank'",
         )
     return PreparedPair(flexible_pair(values, machine, gears), run, chosen.name, values, complete)
-
-
-def _check_meaning(setting: EffectSetting) -> None:
-    if setting.name in WITHOUT_MEANING:
-        raise InputError(
-            f"{setting.name} has no meaning for the model {NAME!r}: {WITHOUT_MEANING[setting.name]}",
-            allowed=", ".join(name for name in effects() if name not in WITHOUT_MEANING),
-            remedy="take the model 'cracked'",
-        )

@@ -87,10 +87,11 @@ def von_mises_pa(mesh: SectorMesh, displacement_m: FloatArray) -> FloatArray:
     Returns
     -------
     array, (n_nodes,)
-        Pa. Stresses are taken at the nodes of each cell and averaged there.
+        Pa. Stresses are taken at the nodes of each cell and averaged there; those of eight-node cells leave out what
+        their incompatible modes add.
     """
     _, mu = lame_pa(mesh.blank.material)
-    nodes = mesh.cells.reshape(-1, 27)
+    nodes = mesh.cells.reshape(len(mesh.cells), -1)
     gradient = np.einsum("cqia,caj->cqij", cell_gradients_at_nodes(mesh.points_m, mesh.cells), displacement_m[nodes])
     strain = (gradient + gradient.transpose(0, 1, 3, 2)) / 2.0
     deviator = strain - np.trace(strain, axis1=2, axis2=3)[..., None, None] * np.eye(3) / 3.0

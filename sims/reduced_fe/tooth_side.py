@@ -93,16 +93,17 @@ def with_middles(corners: FloatArray) -> FloatArray:
     return nodes
 
 
-def outline_error_mm(gear: GearGeometry, n_gap: int, n_up: int) -> float:
-    """Largest distance between the parabolic edges of the cells and the true outline."""
-    gap = _edge_error_mm(gap_curve(gear)[0], np.linspace(0.0, 1.0, 2 * n_gap + 1))
-    return max(gap, _edge_error_mm(side_curve(gear)[0], row_places(gear, n_up)))
+def outline_error_mm(gear: GearGeometry, n_gap: int, n_up: int, order: int = 2) -> float:
+    """Largest distance between the cells' edges, parabolic or (order 1) straight, and the true outline."""
+    gap = _edge_error_mm(gap_curve(gear)[0], np.linspace(0.0, 1.0, 2 * n_gap + 1), order)
+    return max(gap, _edge_error_mm(side_curve(gear)[0], row_places(gear, n_up), order))
 
 
-def _edge_error_mm(curve: Curve, places: FloatArray) -> float:
+def _edge_error_mm(curve: Curve, places: FloatArray, order: int) -> float:
     nodes, t, worst = curve(places), np.linspace(0.0, 1.0, 41)[:, None], 0.0
     for k in range(0, len(places) - 1, 2):
-        a, b, c = nodes[:, k], nodes[:, k + 1], nodes[:, k + 2]
+        a, c = nodes[:, k], nodes[:, k + 2]
+        b = nodes[:, k + 1] if order == 2 else (a + c) / 2.0
         edge = (1 - t) * (1 - 2 * t) * a + 4 * t * (1 - t) * b + t * (2 * t - 1) * c
         own = curve(np.linspace(places[k], places[k + 2], 400))
         distance = np.hypot(edge[:, :1] - own[0], edge[:, 1:] - own[1]).min(axis=1)

@@ -17,7 +17,7 @@ from sims.effects import effects
 from sims.mesh import PairGeometry
 from sims.presets import Preset
 from sims.reduced_fe.parameters import PARAMETERS
-from sims.reduced_fe.simulator import NAME, WITHOUT_MEANING, prepare_preset
+from sims.reduced_fe.simulator import NAME, prepare_preset
 from sims.simulator import ParameterValue
 
 MESH_DOF, MESH_DOF_PER_TOOTH = 40_000, 900
@@ -81,8 +81,8 @@ class ReducedGapSimulator:
         return NAME
 
     def gap_effects(self) -> Mapping[str, GapEffect]:
-        """Return the effects of the catalogue that have a meaning for this model."""
-        return gap_effects_of(name for name in effects() if name not in WITHOUT_MEANING)
+        """Return the effects of the catalogue."""
+        return gap_effects_of(effects())
 
     def twin_of(self, rig: Rig) -> ReducedTwin:
         """Return a twin of the rig; its gears are meshed and reduced, and kept on disk.

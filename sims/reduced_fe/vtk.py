@@ -23,7 +23,7 @@ _FACES = np.array([[0, 1, 1], [2, 1, 1], [1, 0, 1], [1, 2, 1], [1, 1, 0], [1, 1,
 def write_vtk(
     path: str | Path, mesh: SectorMesh, values: Mapping[str, FloatArray] | None = None, *, n_sectors: int | None = None
 ) -> Path:
-    """Write sectors of a gear, with values at their nodes, as 27-node hexahedra (VTK type 29).
+    """Write sectors of a gear, with values at their nodes, as hexahedra of 27 nodes (VTK type 29) or eight (12).
 
     Parameters
     ----------
@@ -56,10 +56,11 @@ def write_vtk(
     number = _shared_numbers(mesh, n)
     turns = _turns(mesh, n)
     points = _merged(np.einsum("kij,aj->kai", turns, mesh.points_m), number)
-    cells = number[:, mesh.cells.reshape(-1, 27)[:, _vtk_order()]].reshape(-1, 27)
+    kind, order = ("hexahedron27", _vtk_order()) if mesh.size.order == 2 else ("hexahedron", _CORNERS // 2 @ [4, 2, 1])
+    cells = number[:, mesh.cells.reshape(len(mesh.cells), -1)[:, order]].reshape(-1, len(order))
     point_data = {name: _merged(_turned(name, v, turns, mesh), number) for name, v in (values or {}).items()}
     try:
-        meshio.Mesh(points, [("hexahedron27", cells)], point_data=point_data).write(target)
+        meshio.Mesh(points, [(kind, cells)], point_data=point_data).write(target)
     except OSError as error:
         raise InputError(f"cannot be written ({error.strerror})", where=str(target)) from None
     return target

@@ -34,7 +34,8 @@ def test_mesh_modes_stress_and_reductions_are_written(tmp_path):
     [
         (("--teeth", "12"), "undercuts"),
         (("--web", "30mm"), "thicker than the face"),
-        (("--dof", "9000"), "too coarse for the fillets"),
+        (("--dof", "5000", "--teeth", "150", "--module", "1mm"), "too few for 150 teeth"),
+        (("--held", "springs", "--radial", "0N/m", "--dof", "5000"), "hub_stiffness"),
         (("--held", "shaft"), "--held"),
     ],
 )
@@ -45,3 +46,15 @@ def test_what_cannot_be_is_refused(tmp_path, arguments, said):
     assert isinstance(found.exception, InputError)
     assert said in str(found.exception)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_coarse_gear_on_springs_says_how_coarse_it_is(tmp_path):
+    found = _run(
+        "-o", str(tmp_path / "out"), "--dof", "5000", "--held", "springs", "--twist", "1e5Nm/rad", "--modes", "9"
+    )
+    assert found.exit_code == 0, found.output
+    assert "modes, hub on springs:" in found.output
+    assert "coarse: against " in found.output
+    assert "edges straight" in found.output
+    lowest = [float(line.split(" Hz")[0]) for line in found.output.splitlines() if "nodal diameter" in line]
+    assert 100.0 < lowest[0] < 3000.0  # the gear as a whole on its springs

@@ -32,7 +32,7 @@ def coasting(pair, *, moving_force=True, omega=120.0):
     own = constants(pair, STANDING, moving_force=moving_force)
     own.record["governor"] = own.record["governor_spring"] = 0.0
     start = start_state(pair, own, STANDING, 0.0)
-    v = np.array([-side.inputs[6] * omega for side in own.sides])
+    v = np.array([-side.inputs[-1] * omega for side in own.sides])
     return own, replace(start, v=v)
 
 

@@ -9,11 +9,16 @@ from scipy.spatial.transform import Rotation
 from gearsig.errors import InputError
 from sims.mesh import GearGeometry, Material
 from sims.reduced_fe.blank import GearBlank, blank_from_text
-from sims.reduced_fe.elements import cylindrical_turn, sector_matrices
+from sims.reduced_fe.cyclic import CyclicGear
+from sims.reduced_fe.cyclic_modes import cyclic_modes
+from sims.reduced_fe.discretisation import discretisation_error
+from sims.reduced_fe.elements import cell_fields, cylindrical_turn, lame_pa, sector_matrices
 from sims.reduced_fe.memory import check_memory, craig_bampton_bytes, full_bytes, sector_bytes
 from sims.reduced_fe.mesh_quality import mesh_quality
 from sims.reduced_fe.mesh_size import MeshSize, mesh_size_for, n_dof_of
+from sims.reduced_fe.ready import READY
 from sims.reduced_fe.sector_mesh import sector_mesh
+from sims.reduced_fe.tooth_load import load_tooth
 from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL
 
 WEB = GearBlank(
@@ -60,9 +65,45 @@ def test_sizes_come_close_to_what_is_asked_for(blank: GearBlank, n_dof: int) -> 
 def test_too_coarse_for_the_fillet() -> None:
     with pytest.raises(InputError, match="too coarse for the fillet: its edges lie up to"):
         sector_mesh(PAPER, MeshSize(n_up=1))
-    with pytest.raises(InputError, match="n_dof is 5000: too coarse for the fillets of 50 teeth"):
-        mesh_size_for(PAPER, 5000)
+    many = GearBlank(GearGeometry(150, 1.0, bore_radius_mm=20.0))
+    with pytest.raises(InputError, match="n_dof is 5000: too few for 150 teeth"):
+        mesh_size_for(many, 5000)
     assert n_dof_of(SMALL, mesh_size_for(SMALL, 8000)) < 9000
+
+
+@pytest.mark.parametrize("blank", READY.values(), ids=READY)
+def test_five_thousand_degrees_of_freedom_are_a_gear_of_first_order(blank: GearBlank) -> None:
+    """Coarse, but a gear: its mass to 1 %."""
+    size = mesh_size_for(blank, 5000)
+    mesh = sector_mesh(blank, size)
+    assert size.order == 1
+    assert mesh.n_dof == n_dof_of(blank, size)
+    assert 4500 < mesh.n_dof < 5500
+    quality = mesh_quality(mesh)
+    assert quality.volume_m3 == pytest.approx(quality.true_volume_m3, rel=0.01)
+
+
+def test_what_a_coarse_mesh_misses_is_measured_against_a_finer_one() -> None:
+    """75 teeth with 5000 degrees of freedom, the coarsest: first frequency within 8 %, teeth too stiff by a quarter."""
+    gear = CyclicGear(sector_mesh(READY["z75_m2"], mesh_size_for(READY["z75_m2"], 5000)))
+    error = discretisation_error(gear, cyclic_modes(gear, 8, elastic=True), load_tooth(gear.mesh, 1000.0))
+    assert error.finer_dof > 120_000
+    assert 0.0 < error.frequency[0] < 0.08
+    assert -0.35 < error.compliance < 0.0
+
+
+def test_eight_node_cells_pass_the_patch() -> None:
+    """Constant strain has its own energy in every direction, whatever the cells' shape: the modes stay at rest."""
+    mesh = sector_mesh(SMALL, MeshSize(2, 1, 3, 1, 1, 1, order=1))
+    stiffness = sector_matrices(mesh)[0]
+    turn = cylindrical_turn(mesh)
+    volume = cell_fields(mesh.points_m, mesh.cells).volumes.sum()
+    lam, mu = lame_pa(SMALL.material)
+    for i in range(3):
+        strain = np.zeros((3, 3))
+        strain[i, i] = 1e-3
+        field = turn @ (mesh.points_m @ strain).ravel()
+        assert field @ (stiffness @ field) == pytest.approx((lam + 2.0 * mu) * 1e-6 * volume, rel=1e-9)
 
 
 @pytest.mark.parametrize(

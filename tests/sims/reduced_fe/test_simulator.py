@@ -6,7 +6,6 @@ import pytest
 import sims
 from gearsig.errors import InputError
 from sims.effects import EffectSetting, effect, effects
-from sims.reduced_fe.simulator import WITHOUT_MEANING
 from sims.registry import ChecksConvergence, simulator
 from sims.values import complete_values
 
@@ -52,7 +51,7 @@ def test_the_same_seed_gives_the_same_recording(sound):
     np.testing.assert_array_equal(sound.samples, again.samples)
 
 
-@pytest.mark.parametrize("name", [n for n in effects() if n not in WITHOUT_MEANING])
+@pytest.mark.parametrize("name", effects())
 def test_every_effect_changes_the_recording_or_says_why_not(sound, name):
     wanted = effect(name)
     found = sims.simulate(MODEL, effects={name: wanted.severity.typical}, **SHORT)
@@ -64,13 +63,6 @@ def test_every_effect_changes_the_recording_or_says_why_not(sound, name):
         assert change > 1e-5 * rms(sound)
     nothing = sims.simulate(MODEL, effects={name: 0.0}, **SHORT)
     np.testing.assert_array_equal(nothing.samples, sound.samples)
-
-
-@pytest.mark.parametrize("name", list(WITHOUT_MEANING))
-def test_effects_without_a_meaning_are_refused_with_the_reason(name):
-    assert name not in simulator(MODEL).effects
-    with pytest.raises(InputError, match=f"{name} has no meaning .* take the model 'cracked'"):
-        sims.simulate(MODEL, effects={name: effect(name).severity.typical}, **SHORT)
 
 
 def test_a_crack_shows_once_per_revolution_and_grows():
@@ -113,7 +105,8 @@ def test_parameters_have_units_ranges_and_defaults():
     assert len(set(names)) == len(names)
     values = complete_values(model.parameters)
     assert values["mesh_damping_ratio"] == 0.08
-    assert "friction" not in values
+    assert values["friction"] == "off"
+    assert "contact_law" not in values
     for p in model.parameters:
         assert p.meaning
         assert p.choices or (p.low is not None and p.high is not None)
