@@ -30,10 +30,11 @@ def ranked_places(places: Sequence[GapPlace], standing: Sequence[GapPlace] = ())
         same = [place for place in left if _same_family(place, one)]
         first.append(_joined(one, same))
         left = [place for place in left if place not in same]
-    return (
-        *first,
-        *sorted(left, key=lambda place: (place.follows, -(place.structural if place.follows else place.share))),
-    )
+    return (*first, *sorted(left, key=_rank))
+
+
+def _rank(place: GapPlace) -> tuple[bool, float]:
+    return place.follows, -(place.structural if place.follows else place.share)
 
 
 def _same_family(place: GapPlace, standing: GapPlace) -> bool:

@@ -29,14 +29,16 @@ def _where(report: GapReport) -> str:
     if not report.places:
         return f"Where: spread over all orders and bands, {report.size.value:.2g} structural floors."
     first, *others = report.places
-    if isfinite(first.share):
-        return f"Where: {_with_size(first)}."
-    beside = f"; beside it, {_with_size(others[0])}" if others and isfinite(others[0].share) else ""
-    return f"Where: {first.title}{beside}."
+    beside = ""
+    if not isfinite(first.structural) and others and isfinite(others[0].share):
+        beside = f"; beside it, {_with_size(others[0])}"
+    return f"Where: {_with_size(first)}{beside}."
 
 
 def _with_size(place: GapPlace) -> str:
-    return f"{place.title}, {place.structural:.2g} structural floors ({100 * place.share:.0f} % of the gap)"
+    """Return a place's title, with its size and share as far as it has them."""
+    size = f", {place.structural:.2g} structural floors" if isfinite(place.structural) else ""
+    return f"{place.title}{size}{f' ({100 * place.share:.0f} % of the gap)' if isfinite(place.share) else ''}"
 
 
 def _which(report: GapReport) -> str:
