@@ -21,7 +21,7 @@ from gearsig.report.lines import (
     speed_is_constant,
 )
 from gearsig.report.numbers import readable
-from gearsig.report.start_stop_pictures import start_stop_pictures
+from gearsig.report.start_stop_figures import start_stop_figures
 
 MOST_BYTES = 2_500_000
 """Of all pictures of a page, as text: the page stays below 3 MB."""
@@ -63,7 +63,8 @@ def gallery(analysis: Analysis) -> Gallery:
     if crack is not None:
         groups.insert(0, Group("The damaged tooth", (crack,)))
     if analysis.motion is not None:
-        groups.insert(0, Group("Starts and stops", tuple(start_stop_pictures(analysis.motion))))
+        drawn = (embed(f.figure, f.caption, f.alternative) for f in start_stop_figures(analysis.motion))
+        groups.insert(0, Group("Starts and stops", tuple(drawn)))
     left_out: list[str] = []
     n_bytes = sum(_size(group) for group in groups)
     detailed = _detailed_channels(analysis)

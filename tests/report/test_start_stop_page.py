@@ -4,7 +4,7 @@ import pytest
 
 from gearsig import analyze
 from gearsig.report.page import page_html
-from gearsig.report.start_stop_pictures import start_stop_pictures
+from gearsig.report.start_stop_figures import start_stop_figures
 from tests.motion.recordings import continuous, start_stop, without
 
 
@@ -19,7 +19,7 @@ def test_the_page_shows_course_planes_impacts_and_force() -> None:
 def test_what_was_not_measured_has_no_picture() -> None:
     motion = analyze(without(start_stop(), "torque")).motion
     assert motion is not None
-    words = [picture.alternative for picture in start_stop_pictures(motion)]
+    words = [drawn.alternative for drawn in start_stop_figures(motion)]
     assert not any("Force" in text for text in words)
     assert len(words) == 3
 
@@ -27,7 +27,7 @@ def test_what_was_not_measured_has_no_picture() -> None:
 def test_force_errors_are_said_under_the_picture() -> None:
     motion = analyze(start_stop()).motion
     assert motion is not None
-    caption = list(start_stop_pictures(motion))[-1].caption
+    caption = list(start_stop_figures(motion))[-1].caption
     assert "Hunt–Crossley" in caption
     assert "6." in caption or "7." in caption  # per cent rms of the piecewise model on this record
 

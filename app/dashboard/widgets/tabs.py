@@ -16,9 +16,12 @@ from app.dashboard.widgets.methods.menu import show_methods
 from app.dashboard.widgets.order_map import show_order_map
 from app.dashboard.widgets.report import show_report
 from app.dashboard.widgets.speed import show_speed
+from app.dashboard.widgets.start_stop import show_start_stop
 from gearsig.diagnosis.types import Analysis
 
 OF_RECORDING: dict[str, Callable[[Analysis], None]] = {"Channels": show_channels, "Speed": show_speed}
+OF_MOTION: dict[str, Callable[[Analysis], None]] = {"Starts and stops": show_start_stop}
+"""Of machines that start and stop, where the teeth could be examined."""
 OF_CHANNEL: dict[str, views.ChannelView] = {
     "Spectrum": views.show_frequency_spectrum,
     "Order spectrum": views.show_order_spectrum,
@@ -31,7 +34,8 @@ OF_CHANNEL: dict[str, views.ChannelView] = {
 
 def show_tabs(analysis: Analysis, request: Request) -> None:
     """Show the views as tabs."""
-    names = (*OF_RECORDING, *OF_CHANNEL, "Indicators", "Report")
+    of_motion = OF_MOTION if analysis.motion is not None else {}
+    names = (*of_motion, *OF_RECORDING, *OF_CHANNEL, "Indicators", "Report")
     for name, tab in zip(names, st.tabs(names, key=state.TAB, on_change="rerun"), strict=True):
         if tab.open:
             with tab:
@@ -41,7 +45,9 @@ def show_tabs(analysis: Analysis, request: Request) -> None:
 @st.fragment
 def _show(name: str, analysis: Analysis, request: Request) -> None:
     """Show one view; what the user changes in it reruns only this."""
-    if name in OF_RECORDING:
+    if name in OF_MOTION:
+        OF_MOTION[name](analysis)
+    elif name in OF_RECORDING:
         OF_RECORDING[name](analysis)
     elif name in OF_CHANNEL:
         views.show_of_channel(analysis, OF_CHANNEL[name])

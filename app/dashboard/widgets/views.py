@@ -19,6 +19,10 @@ from gearsig.report.lines import (
     speed_is_constant,
 )
 
+STARTS_AND_STOPS = (
+    "The machine starts and stops: spectra, orders and averages want a speed that lasts. Backlash, impacts and forces "
+    "stand on the tab Starts and stops, where the motion of both gears was recorded."
+)
 ChannelView = Callable[[Analysis, ChannelAnalysis], None]
 
 
@@ -26,7 +30,8 @@ def show_of_channel(analysis: Analysis, view: ChannelView) -> None:
     """Show a view of the channel that the user chooses; the first is the one with the most important finding."""
     channels = {channel.channel: channel for channel in analysis.channels}
     if not channels:
-        st.info("There is no vibration channel with a signal.")
+        is_unsteady = any(finding.code == "start-stop" for finding in analysis.findings)
+        st.info(STARTS_AND_STOPS if is_unsteady else "There is no vibration channel with a signal.")
         return
     named = [name for finding in analysis.findings for name in finding.where.channels if name in channels]
     names = list(dict.fromkeys([*named, *channels]))

@@ -1,4 +1,4 @@
-"""The pictures of a machine that starts and stops: its course, the teeth in their play, impacts, force from motion."""
+"""The figures of a machine that starts and stops: its course, the teeth in their play, impacts, force from motion."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from gearsig.errors import RefusalError
 from gearsig.motion.start_stop import StartStop
-from gearsig.plot.embed import Picture, embed
+from gearsig.plot.embed import Captioned
 
 
-def start_stop_pictures(examined: StartStop) -> Iterator[Picture]:
-    """Make the pictures; what the record does not show has none."""
+def start_stop_figures(examined: StartStop) -> Iterator[Captioned]:
+    """Draw the figures; what the record does not show has none."""
     yield _course(examined)
     yield _planes(examined)
     if examined.impacts:
@@ -18,10 +18,10 @@ def start_stop_pictures(examined: StartStop) -> Iterator[Picture]:
     yield from _forces(examined)
 
 
-def _course(examined: StartStop) -> Picture:
+def _course(examined: StartStop) -> Captioned:
     from gearsig.plot.start_stop_course import course_figure
 
-    return embed(
+    return Captioned(
         course_figure(examined, title="Speed, torque and compression in their phases"),
         "Look when the compression changes sides: within a dashed pair the flanks do not touch, beyond they carry. A "
         "run-down that grows shorter tells of friction.",
@@ -29,10 +29,10 @@ def _course(examined: StartStop) -> Picture:
     )
 
 
-def _planes(examined: StartStop) -> Picture:
+def _planes(examined: StartStop) -> Captioned:
     from gearsig.plot.start_stop import start_stop_figure
 
-    return embed(
+    return Captioned(
         start_stop_figure(examined, title="Speed with the impacts"),
         "The walls of the phase plane stand a backlash apart. Torque over twist at the driver: the flat middle is the "
         "play, the slopes are the teeth's stiffness, the area is what is lost.",
@@ -40,11 +40,11 @@ def _planes(examined: StartStop) -> Picture:
     )
 
 
-def _impacts(examined: StartStop) -> Picture:
+def _impacts(examined: StartStop) -> Captioned:
     from gearsig.plot.impacts import impacts_figure
 
     motion = examined.motion
-    return embed(
+    return Captioned(
         impacts_figure(examined.impacts, motion.path.teeth[0], restitution=motion.contact.restitution),
         "Look whether the same teeth meet each time the machine starts or stops: they wear first. Energies are on a "
         "logarithmic scale; a restitution is missing where the flanks stayed together.",
@@ -52,7 +52,7 @@ def _impacts(examined: StartStop) -> Picture:
     )
 
 
-def _forces(examined: StartStop) -> Iterator[Picture]:
+def _forces(examined: StartStop) -> Iterator[Captioned]:
     from gearsig.motion.force import FROM_TORQUE, HUNT_CROSSLEY, PIECEWISE, estimate_forces
     from gearsig.plot.force import force_figure
 
@@ -63,7 +63,7 @@ def _forces(examined: StartStop) -> Iterator[Picture]:
     except RefusalError:  # no sample carries a load
         return
     shares = [100.0 * estimate.error(model, FROM_TORQUE).relative_rms for model in (PIECEWISE, HUNT_CROSSLEY)]
-    yield embed(
+    yield Captioned(
         force_figure(estimate, title="Force from the motion, beside the torque's"),
         f"The piecewise model, which knows both flanks and one or two pairs, is {shares[0]:.3g} % rms off torque over "
         f"base radius; Hunt–Crossley, one pair on one flank, {shares[1]:.3g} %. Where the first is far off, the rig's "

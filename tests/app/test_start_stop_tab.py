@@ -1,0 +1,36 @@
+"""The analysis page on a recording of a machine that starts and stops, run without a browser."""
+
+from pathlib import Path
+
+import pytest
+from streamlit.testing.v1 import AppTest
+
+from app.dashboard import state
+from app.dashboard.widgets.tabs import OF_MOTION
+from sims.files import file_set, write_set
+from tests.app.test_dashboard import TABS, opened, shown_text, upload
+from tests.motion.recordings import start_stop
+
+
+@pytest.fixture
+def page(tmp_path: Path) -> AppTest:
+    names = file_set(tmp_path / "drive.h5")
+    write_set(start_stop(), names)
+    return upload(opened(), "drive.h5", names.recording.read_bytes(), names.rig.read_text())
+
+
+def test_its_figures_have_a_tab_and_the_others_say_why_they_are_empty(page: AppTest) -> None:
+    assert [tab.label for tab in page.tabs] == [*OF_MOTION, *TABS]
+    page.session_state[state.TAB] = "Starts and stops"
+    page.run()
+    assert not page.exception
+    assert len(page.get("image")) + len(page.get("imgs")) == 4
+    assert "Hunt–Crossley, one pair on one flank" in shown_text(page)
+    page.session_state[state.TAB] = "Spectrum"
+    page.run()
+    assert not page.exception
+    assert "The machine starts and stops" in shown_text(page)
+
+
+def test_other_recordings_have_no_such_tab() -> None:
+    assert [tab.label for tab in opened().tabs] == list(TABS)
