@@ -12,12 +12,15 @@ from gearsig.gap.types import GapReport
 Diagnoser = Callable[[Seen], GapReport]
 
 GAP, FOREST, MAJORITY, RULES = "gap", "forest", "majority", "rules"
+START_STOP = "start-stop"
+"""Of machines that start and stop, by the model forging."""
 BASELINES = (MAJORITY, RULES)
 _HOMES = {
     GAP: "app.benchmark.diagnosers:diagnose",
     FOREST: "app.benchmark.forest:diagnose",
     MAJORITY: "app.benchmark.majority:diagnose",
     RULES: "app.benchmark.rules:diagnose",
+    START_STOP: "app.benchmark.diagnosers:diagnose_drive",
 }
 
 
@@ -54,4 +57,17 @@ def diagnose(seen: Seen) -> GapReport:
         reference_rigs=seen.reference_rigs,
         names=seen.names,
         cache=Path.cwd() / "kept",
+    )
+
+
+def diagnose_drive(seen: Seen) -> GapReport:
+    """Diagnose a case of starts and stops with the product itself."""
+    from app.gap.start_stop.diagnose import diagnose_start_stop
+
+    return diagnose_start_stop(
+        seen.recordings,
+        rigs=seen.rigs,
+        references=seen.references,
+        reference_rigs=seen.reference_rigs,
+        names=seen.names,
     )

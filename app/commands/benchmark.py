@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gearsig.checks import one_of
+from gearsig.errors import InputError
+
 if TYPE_CHECKING:
+    from rich.progress import Progress
+
     from app.benchmark.run import Done, Wanted
 
 EXIT_INTERRUPTED = 130
@@ -55,6 +60,9 @@ def gap(
         float,
         typer.Option("--least-level", help="0 to 1: levels of effects go from here to 1 (strong); default 0: all."),
     ] = 0.0,
+    model: Annotated[
+        str, typer.Option("--model", help="cracked, or forging: blind starts and stops, from a drive of their own.")
+    ] = "cracked",
     processes: Annotated[int, typer.Option("--processes", "-j", help="Cases at a time.")] = 2,
 ) -> None:
     """Make blind cases, diagnose each in a process that cannot know its cause, score the answers.
@@ -71,6 +79,10 @@ def gap(
     from app.benchmark.scoring.strata import judge
 
     wished = "both" if reference is None else "with" if reference else "without"
+    if one_of(model, "model", ("cracked", "forging")) == "forging":
+        _refuse_others(same_simulator=same_simulator, diagnosers=bool(diagnosers), longest=longest is not None)
+        _run_drives(cases, seed, role, wished, output, processes)
+        return
     names = tuple(dict.fromkeys([*(diagnosers or [GAP]), *BASELINES]))
     wanted = Wanted(Plan(cases, seed, role, wished, same_simulator, longest, least_level), names)
     done = _run(wanted, output, processes)
@@ -79,17 +91,43 @@ def gap(
     typer.echo(f"{page} (report), {TABLE}, scores.json, cases.csv, labels/.")
 
 
-def _run(wanted: Wanted, output: Path, processes: int) -> list[Done]:
+def _refuse_others(**given: bool) -> None:
+    for name, is_given in given.items():
+        if is_given:
+            option = name.replace("_", "-").removesuffix("s")
+            raise InputError(f"--{option} is given with --model forging", remedy=f"leave --{option} out")
+
+
+def _run_drives(cases: int, seed: int, role: str, reference: str, output: Path, processes: int) -> None:
+    from app.benchmark.start_stop import DrivePlan, run_drive_benchmark
+    from app.benchmark.start_stop_score import write_scores
+
+    plan = DrivePlan(cases, seed, role, reference)
+    with _progress() as progress:
+        task = progress.add_task("diagnosing", total=cases)
+        done = run_drive_benchmark(
+            plan, output, n_processes=processes, on_progress=lambda n: progress.update(task, completed=n)
+        )
+    table = write_scores(done, output, " ".join(["gearsig", *sys.argv[1:]]))
+    typer.echo(table.read_text(encoding="utf-8"))
+    typer.echo(f"{table}, scores.json, cases.csv.")
+
+
+def _progress() -> Progress:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from app.benchmark.run import n_answered, run_benchmark
-
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+
+
+def _run(wanted: Wanted, output: Path, processes: int) -> list[Done]:
+    from app.benchmark.run import n_answered, run_benchmark
+
     n_cases = len(wanted.plan.cases())
     try:
-        with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        with _progress() as progress:
             task = progress.add_task("diagnosing", total=n_cases)
             return run_benchmark(
                 wanted, output, n_processes=processes, on_progress=lambda n: progress.update(task, completed=n)

@@ -149,12 +149,12 @@ def _print_effects(model: str) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from app.gap.models import gap_effects_of
     from gearsig.gap.words import severity_unit
     from sims.effects import is_own
-    from sims.registry import gap_simulator
 
     table = Table("group", "effect", "severity", "shows in", box=SIMPLE_HEAD, pad_edge=False)
-    found = gap_simulator(model).gap_effects()
+    found = gap_effects_of(model)
     last = ""
     for effect in found.values():
         where = ", ".join(kind.replace("_", " ") for kind in effect.shows_in)

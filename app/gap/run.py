@@ -38,8 +38,11 @@ def run_gap(
     InputError, RefusalError
     """
     from app.gap.diagnose import diagnose_gap
+    from app.gap.models import checked_model
     from app.gap.start_stop.recognise import MODEL, refuse_start_stop
     from sims.registry import gap_simulator
+
+    checked_model(model)
 
     def tell(stage: str, done: float) -> None:
         on_stage(stage, READING + (1 - READING) * done)

@@ -133,6 +133,8 @@ def place_rows(report: GapReport) -> tuple[PlaceRow, ...]:
 
 def _sizes(place: GapPlace) -> str:
     """Write the change against both floors, or that it was found without them."""
+    if place.follows and not isfinite(place.structural):
+        return f"{signed(place.change_db)} dB over what it is compared with"
     if not isfinite(place.structural):
         return "stands out by itself, over the noise beside it"
     floors = (

@@ -22,7 +22,9 @@ def condition_advice(report: GapReport) -> str:
     start = "One operating condition: "
     if report.outcome is GapOutcome.NO_GAP:
         return start + "whether the machine also agrees at another speed or load was not looked at."
-    checked = "the result could be checked on other revolutions of the same recordings only. "
+    held_out = next((c.shrinkage.held_out for c in report.causes if c.shrinkage), "other revolutions")
+    where = held_out if "starts" in held_out else "other revolutions of the same recordings"
+    checked = f"the result could be checked on {where} only. "
     here = report.conditions[0].point
     best = next((one for one in report.next_recordings if not same_condition(one.point, here)), None)
     if best is None:

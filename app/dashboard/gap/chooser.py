@@ -28,12 +28,12 @@ RECORDINGS, REFERENCES, RIGS = "gap recordings", "gap references", "gap rigs"
 
 def choose() -> Choice:
     """Return what the user chose; there may be no recording in it yet."""
-    from sims.registry import gap_simulators
+    from app.gap.models import gap_models
 
     with st.sidebar:
         origin = st.radio("Recordings", (SAMPLES, OWN), horizontal=True, key="gap origin", persist_state="session")
         chosen = _choose_samples() if origin == SAMPLES else _choose_files()
-        model = st.selectbox("Simulator", list(gap_simulators()), key="gap simulator", persist_state="session")
+        model = st.selectbox("Simulator", gap_models(), key="gap simulator", persist_state="session")
         with st.expander("Not in the files?", icon=":material/tune:"):
             torque = st.number_input(
                 "Torque (N·m)",

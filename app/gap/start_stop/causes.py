@@ -45,8 +45,8 @@ TRIED: Mapping[str, Tried] = {
         (12.0, 25.0, 50.0, 100.0, 200.0), ("play", "curve"), ("deflection", "flank_friction", "impact", *_ROUGH)
     ),
     "sliding_friction": Tried((60.0, 180.0, 400.0), ("flank_friction",), ("curve", *_ROUGH), "torque"),
-    LOAD_FRICTION: Tried((20.0, 45.0), ("load_friction",), (), "torque", needs_reference=True),
-    "root_crack": Tried((1.0, 2.0, 4.0, 6.0, 8.0, 10.0), ("tooth",), ("next_tooth",), "torque"),
+    LOAD_FRICTION: Tried((8.0, 20.0, 45.0), ("load_friction",), (), "torque", needs_reference=True),
+    "root_crack": Tried((1.0, 2.0, 4.0, 6.0, 8.0, 10.0), ("tooth",), (), "torque"),
     LOAD_INERTIA: Tried((-50.0, -25.0, 40.0, 120.0), ("inertia",), ("load_scatter",), "torque"),
     "torque_ripple": Tried((1.5, 5.0, 15.0), ("ripple",), ("next_ripple", *_ROUGH), "torque"),
 }
@@ -60,7 +60,7 @@ OF_PARAMETERS = {
         "added_percent",
         "%",
         "torque against acceleration of the driven gear, in starts and stops",
-        ("motion",),
+        TRIED[LOAD_INERTIA].shows_in,
     ),
     LOAD_FRICTION: GapEffect(
         LOAD_FRICTION,
@@ -69,7 +69,7 @@ OF_PARAMETERS = {
         "added_percent",
         "%",
         "torque that turns the load without accelerating it",
-        ("motion",),
+        TRIED[LOAD_FRICTION].shows_in,
     ),
 }
 """What no effect of the catalogue is: parameters of the drive that may be wrong."""
@@ -100,5 +100,5 @@ def setting_of(name: str, severity: float, options: Mapping[str, float | str]) -
 def _of_catalogue(name: str) -> GapEffect:
     found = effect(name)
     return GapEffect(
-        found.name, found.group, found.title, found.severity.name, found.severity.unit, "", tuple(found.shows_in)
+        found.name, found.group, found.title, found.severity.name, found.severity.unit, "", TRIED[name].shows_in
     )

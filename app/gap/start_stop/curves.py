@@ -8,7 +8,7 @@ from app.gap.start_stop.compare import Compared
 from gearsig.checks import FloatArray
 from gearsig.gap.simulator import Added
 from gearsig.gap.start_stop.floors import FLOOR
-from gearsig.gap.start_stop.told import TOOTH_PART
+from gearsig.gap.start_stop.told import NAMES, RIPPLE_PART, TOOTH_PART
 from gearsig.gap.types import AngleCurves, SpectrumCurves
 
 RIPPLE, CRACK = "torque_ripple", "root_crack"
@@ -35,8 +35,18 @@ def torque_curves(compared: Compared, fitted: Added | None) -> tuple[SpectrumCur
             mean_nm * other,
             mean_nm * after,
             mean_nm * FLOOR * np.maximum(scatter, 1e-5),
+            _ripple_floor_db(compared, other),
         ),
     )
+
+
+def _ripple_floor_db(compared: Compared, other: FloatArray) -> FloatArray:
+    """Return how far a line of sound drives may rise, in dB: the floor of the ripple, from its scale back to a part."""
+    floor = compared.floor()
+    limit = FLOOR * float(floor.scale[NAMES.index("ripple")])
+    part = 2.0 * RIPPLE_PART * float(np.sinh(limit * np.log(10.0) / 20.0))
+    found: FloatArray = 20.0 * np.log10(1.0 + part / np.maximum(other, 1e-5))
+    return found
 
 
 def tooth_curves(compared: Compared, fitted: Added | None, predicted_um: float) -> tuple[AngleCurves, ...]:

@@ -68,13 +68,14 @@ def predict(
     for i, name in enumerate(names):
         tell(name, i / len(names))
         rows, kept = [], []
+        shown = np.isin(NAMES, TRIED[name].shows_in)
         for severity in TRIED[name].severities:
             told = _told(twin, name, severity, options.get(name, {}), spot)
-            if told is not None:
-                rows.append(change_of(told, twin.sound, shape, spot))
+            change = None if told is None else change_of(told, twin.sound, shape, spot)
+            if change is not None and np.isfinite(change[shown]).any():  # else it stands still
+                rows.append(change)
                 kept.append(severity)
         if rows:
-            shown = np.isin(NAMES, TRIED[name].shows_in)
             changes = np.where(shown, np.nan_to_num(np.array(rows)), 0.0)
             causes[name] = Predicted(name, np.array(kept), changes, np.isin(NAMES, TRIED[name].may_move))
     return Predictions(causes, shape, {name: options.get(name, {}) for name in causes})
@@ -113,5 +114,5 @@ def _cracked(twin: DriveTwin, setting: EffectSetting, spot: Spot) -> Told:
     sound = twin.sound
     extra = sound.contact.deflection_um * ((1.0 - weak.loss) ** (-1.0 / float(twin.parameters["exponent"])) - 1.0)
     teeth = sound.contact.teeth_um.copy()
-    teeth[spot.tooth] = np.nan_to_num(teeth[spot.tooth]) + extra
+    teeth[spot.tooth] += extra
     return replace(sound, contact=replace(sound.contact, teeth_um=teeth))

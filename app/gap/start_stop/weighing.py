@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.gap.start_stop.compare import Compared
 from gearsig.checks import FloatArray
@@ -163,7 +164,7 @@ def _mean(values: Sequence[float]) -> float:
     return float(np.mean(known)) if known else float("nan")
 
 
-def _placebo(name: str, fold: Fold, floor: DriveFloor, own: FloatArray, predicted: FloatArray) -> float:
+def _placebo(name: str, fold: Fold, floor: DriveFloor, own: NDArray[np.intp], predicted: FloatArray) -> float:
     """Return the largest shrink of the same cause elsewhere; 0 where it sits nowhere."""
     if name not in PLACED:
         return 0.0

@@ -1,0 +1,182 @@
+"""Scores of blind start–stop cases: how often right, what is said of sound and of unknown ones, how far gaps shrink."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections import Counter
+from collections.abc import Callable, Sequence
+from math import isfinite, nan
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from app.benchmark.run import ANSWERS_FOLDER, DEFINITION
+from app.benchmark.scoring.calibration_curve import brier, calibration_error
+from app.benchmark.scoring.intervals import Score, share
+from app.benchmark.start_stop import DriveDone
+from gearsig.gap.types import NONE, UNKNOWN, GapOutcome
+from sims.blind_drive import CATALOGUE
+
+TABLE, SCORES, CASES = "table.md", "scores.json", "cases.csv"
+FILES = (TABLE, SCORES, CASES, DEFINITION, ANSWERS_FOLDER)
+NAMING = (GapOutcome.EFFECT.value, GapOutcome.CANNOT_SEPARATE.value)
+STRONG = 0.5
+"""Level from which on an effect is in the upper half of its span."""
+
+Cases = Sequence[DriveDone]
+
+
+def truth_of(done: DriveDone) -> str:
+    """Return the cause that is right."""
+    return str(done.label["effect"]) if done.label["kind"] == "single" else str(done.label["kind"])
+
+
+def ranked(done: DriveDone) -> list[str]:
+    """Return the causes by probability."""
+    return [c.name for c in sorted(done.answer.causes, key=lambda c: -c.probability)]
+
+
+def mechanical(done: DriveDone) -> list[str]:
+    """Return the effects by probability."""
+    return [name for name in ranked(done) if name not in (NONE, UNKNOWN)]
+
+
+def names_effect(done: DriveDone) -> bool:
+    """Whether the answer names an effect."""
+    return done.answer.outcome in NAMING
+
+
+def figures(cases: Cases) -> dict[str, Score]:
+    """Return the figures of some cases, each with its 90 % interval and its number of cases."""
+    single = [c for c in cases if c.label["kind"] == "single"]
+    strong = [c for c in single if c.label["level"] >= STRONG]
+    placed = [c for c in single if c.label["place"] and mechanical(c)[:1] == [truth_of(c)]]
+    found = {
+        "likeliest effect right": _share(single, lambda c: mechanical(c)[:1] == [truth_of(c)]),
+        "among the first two": _share(single, lambda c: truth_of(c) in mechanical(c)[:2]),
+        "likeliest effect right, upper half of the span": _share(strong, lambda c: mechanical(c)[:1] == [truth_of(c)]),
+        "named, and right": _share(single, lambda c: names_effect(c) and mechanical(c)[:1] == [truth_of(c)]),
+        "named, and wrong": _share(single, lambda c: names_effect(c) and mechanical(c)[:1] != [truth_of(c)]),
+        "tooth or order right, of effects found": _share(placed, _is_placed),
+        "effect named on a sound machine": _share([c for c in cases if c.label["kind"] == "none"], names_effect),
+        "effect named on an unknown": _share([c for c in cases if c.label["kind"] == "unknown"], names_effect),
+        "unknown recognised": _share(
+            [c for c in cases if c.label["kind"] == "unknown"],
+            lambda c: c.answer.outcome == GapOutcome.UNKNOWN.value,
+        ),
+    }
+    shrinks = [s for c in single if (s := _shrink(c, truth_of(c))) is not None]
+    found["held-out shrink by the true effect, median"] = _middle([s[0] for s in shrinks])
+    found["by the same effect elsewhere (placebo), median"] = _middle([s[1] for s in shrinks if s[1] != 0.0])
+    wrong = [s[0] for c in single for n in mechanical(c) if n != truth_of(c) and (s := _shrink(c, n)) is not None]
+    found["by wrong effects, median"] = _middle(wrong)
+    answered = [c for c in cases if c.answer.causes]
+    sure = [max(k.probability for k in c.answer.causes) for c in answered]
+    right = [ranked(c)[0] == truth_of(c) for c in answered]
+    error = calibration_error(sure, right, 5) if answered else nan
+    found["calibration error"] = Score(error, nan, nan, len(answered))
+    scores = [brier({k.name: k.probability for k in c.answer.causes}, truth_of(c)) for c in answered]
+    found["Brier score, mean"] = Score(sum(scores) / len(scores) if scores else nan, nan, nan, len(scores))
+    found["processor time of a diagnosis in s, median"] = _middle([c.answer.cpu_seconds for c in cases])
+    found["longest time of a diagnosis in s"] = Score(
+        max((c.answer.seconds for c in cases), default=nan), nan, nan, len(cases)
+    )
+    found["no answer"] = _share(cases, lambda c: not c.answer.causes)
+    return found
+
+
+def write_scores(cases: Cases, folder: Path, command: str) -> Path:
+    """Write table, scores and cases beside the answers."""
+    with_, without = ([c for c in cases if bool(c.label["with_reference"]) is wanted] for wanted in (True, False))
+    parts = {"all": figures(cases), "with reference": figures(with_), "without": figures(without)}
+    rows = [f"| {name} | {' | '.join(_cell(parts[part][name]) for part in parts)} |" for name in parts["all"]]
+    head = f"| blind start–stop cases | {' | '.join(parts)} |\n|---|{'---|' * len(parts)}\n"
+    text = head + "\n".join(rows) + "\n\n" + _effect_table(cases) + f"\n`{command}`\n"
+    (folder / TABLE).write_text(text, encoding="utf-8")
+    plain = {
+        part: {name: {"value": s.value, "low": s.low, "high": s.high, "n": s.n} for name, s in found.items()}
+        for part, found in parts.items()
+    }
+    (folder / SCORES).write_text(json.dumps(_finite(plain), indent=1) + "\n", encoding="utf-8")
+    _write_cases(cases, folder / CASES)
+    return folder / TABLE
+
+
+def _effect_table(cases: Cases) -> str:
+    """Return, for each effect, how often the likeliest effect was right and what it was taken for."""
+    lines = ["| effect | right | in the upper half of its span | most often taken for |", "|---|---|---|---|"]
+    for name in CATALOGUE:
+        own = [c for c in cases if c.label["effect"] == name]
+        strong = [c for c in own if c.label["level"] >= STRONG]
+        wrong = Counter(ranked(c)[0] for c in own if c.answer.causes and ranked(c)[0] != name).most_common(1)
+        cells = [_right(own, name), _right(strong, name), f"{wrong[0][0]} ({wrong[0][1]})" if wrong else ""]
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _right(cases: Cases, name: str) -> str:
+    return f"{sum(mechanical(c)[:1] == [name] for c in cases)} of {len(cases)}"
+
+
+def _share(cases: Cases, wanted: Callable[[DriveDone], bool]) -> Score:
+    return share(sum(wanted(c) for c in cases), len(cases))
+
+
+def _middle(values: Sequence[float]) -> Score:
+    known = sorted(v for v in values if isfinite(v))
+    if not known:
+        return Score(nan, nan, nan, 0)
+    n = len(known)
+    low, high = known[max(0, int(0.05 * n))], known[min(n - 1, int(0.95 * n))]
+    return Score(median(known), low, high, n)
+
+
+def _shrink(done: DriveDone, name: str) -> tuple[float, float] | None:
+    cause = done.answer.cause(name)
+    if cause is None or cause.shrinkage is None:
+        return None
+    return cause.shrinkage.shrink, cause.shrinkage.placebo
+
+
+def _is_placed(done: DriveDone) -> bool:
+    cause = done.answer.cause(truth_of(done))
+    place = done.label["place"]
+    return cause is not None and all(cause.options.get(key) == value for key, value in place.items())
+
+
+def _cell(score: Score) -> str:
+    if not score.n or not isfinite(score.value):
+        return "–"
+    interval = f" ({score.low:.2f} to {score.high:.2f})" if isfinite(score.low) else ""
+    return f"{score.value:.2f}{interval}, n {score.n}"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def _write_cases(cases: Cases, path: Path) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        rows = csv.writer(file)
+        rows.writerow(["case", "kind", "effect", "level", "severity", "unit", "with_reference", "n_channels",
+                       "encoder_counts", "outcome", "first", "probability", "second", "seconds", "error"])  # fmt: skip
+        for c in cases:
+            names, label = ranked(c), c.label
+            first = names[0] if names else ""
+            rows.writerow(
+                [
+                    c.number,
+                    *(label[k] for k in ("kind", "effect", "level", "severity", "unit", "with_reference")),
+                    label["n_channels"],
+                    label["encoder_counts"],
+                    c.answer.outcome,
+                    first,
+                    f"{c.answer.probability(first):.3f}",
+                    names[1] if len(names) > 1 else "",
+                    f"{c.answer.seconds:.1f}",
+                    c.answer.error,
+                ]
+            )
