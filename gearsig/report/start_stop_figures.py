@@ -23,8 +23,8 @@ def _course(examined: StartStop) -> Captioned:
 
     return Captioned(
         course_figure(examined, title="Speed, torque and compression in their phases"),
-        "Look when the compression changes sides: within a dashed pair the flanks do not touch, beyond they carry. A "
-        "run-down that grows shorter tells of friction.",
+        "Look when the compression changes sides: between the dashed lines the flanks do not touch, beyond them they "
+        "carry. A run-down that grows shorter tells of friction.",
         f"Driver's speed, torque and compression over {examined.motion.time_s[-1]:.4g} s, phases shaded.",
     )
 
