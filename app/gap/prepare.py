@@ -85,8 +85,8 @@ def _gathered(recording: Recording, rig: Rig, name: str, notices: list[str]) -> 
 
 
 def _assumed(recording: Recording, rig: Rig, facts: ConditionFacts) -> list[str]:
-    """Say what of the operating point was not given."""
-    texts = []
+    """Say what is doubtful of a recording, and what of its operating point was not given."""
+    texts = [f"{facts.name}: {warning}." for warning in recording.warnings]
     if recording.speed_source is None:
         texts.append(
             f"{facts.name}: no tachometer and no known speed; {facts.point.speed_rpm:.4g} rpm were found in the"

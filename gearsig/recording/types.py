@@ -198,7 +198,8 @@ class Recording:
     def with_rig(self, rig: Rig | None) -> Recording:
         """Return the recording with another rig; its sensors' quantity, unit, scale and position are applied.
 
-        Sensors apply once, to the values as they were read: give the rig to a recording that has none.
+        Sensors apply once, to the values as they were read: give the rig to a recording that has none. Where the file
+        states another unit and the rig no scale between the two, the rig's unit is taken, with a warning.
         """
         if rig is None:
             return replace(self, rig=None)
@@ -210,7 +211,7 @@ class Recording:
         if self.rig is rig or not rig.sensors:
             return replace(self, rig=rig)
         samples = np.array(self.samples)
-        channels = list(self.channels)
+        channels, warnings = list(self.channels), list(self.warnings)
         for sensor in rig.sensors:
             if sensor.channel not in self.channel_names:
                 continue  # a rig may describe more sensors than this file holds
@@ -218,13 +219,18 @@ class Recording:
             if sensor.scale != 1.0 or sensor.offset != 0.0:
                 samples[i] = samples[i] * sensor.scale + sensor.offset
             old = channels[i]
+            if old.unit and sensor.unit not in ("", old.unit) and (sensor.scale, sensor.offset) == (1.0, 0.0):
+                warnings.append(
+                    f"channel {old.name!r}: the file says {old.unit}, the rig file {sensor.unit} without a scale; "
+                    f"the values are taken as {sensor.unit}"
+                )
             channels[i] = Channel(
                 old.name,
                 sensor.quantity or old.quantity,
                 sensor.unit or old.unit,
                 sensor.position or old.position,
             )
-        return replace(self, samples=samples, channels=tuple(channels), rig=rig)
+        return replace(self, samples=samples, channels=tuple(channels), rig=rig, warnings=tuple(warnings))
 
     def _changed(self, step: str, **changes: Any) -> Recording:
         provenance = replace(self.provenance, history=(*self.provenance.history, step))

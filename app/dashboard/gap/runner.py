@@ -12,6 +12,7 @@ from app.dashboard.gap.choice import Choice, files_of
 from app.dashboard.widgets.picture import picture_bytes
 from app.gap.job import Job, private_folder
 from app.gap.results import JSON, PAGE, TWIN
+from gearsig.errors import GearsigError
 from gearsig.gap.types import GapReport
 from gearsig.report.gap_pictures import GapFigure, gap_figures
 from sims.cache import cache_folder
@@ -57,8 +58,12 @@ def show_running(choice: Choice) -> Finished | None:
         Why the job that has just ended has no result.
     """
     running: _Running | None = st.session_state.get(_JOB)
+    failed: GearsigError | None = None
     if running is not None and not running.job.is_running:
-        _take(running)
+        try:
+            _take(running)
+        except GearsigError as error:
+            failed = error
         running = None
     with st.container(horizontal=True, vertical_alignment="center"):
         st.button(
@@ -70,6 +75,8 @@ def show_running(choice: Choice) -> Finished | None:
             args=(choice,),
         )
         st.button("Stop", icon=":material/stop:", disabled=running is None, on_click=_stop)
+    if failed is not None:
+        raise failed
     if running is not None:
         _show_progress(running)
     elif st.session_state.pop(_STOPPED, False):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any
 
 import streamlit as st
@@ -84,6 +85,7 @@ def _show_downloads(finished: Finished) -> None:
 def _show_where(finished: Finished) -> None:
     report = finished.report
     rows = place_rows(report)
+    both = tuple(zip(rows, report.places, strict=True))
     if report.is_simulated:
         st.markdown(f"The whole gap: {as_typed(size_text(report))}.")
         st.caption(as_typed(f"{floors_text(report)} Changes are given as multiples of both, the structural one first."))
@@ -95,7 +97,7 @@ def _show_where(finished: Finished) -> None:
     elif rows:
         _table(
             {
-                "share": [row.bar_percent for row in rows],
+                "share": [row.bar_percent if isfinite(place.share) else None for row, place in both],
                 "place": [row.title for row in rows],
                 "change": [row.change for row in rows],
                 "× both floors": [f"{row.structural}, {row.repeatability}" for row in rows],

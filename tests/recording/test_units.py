@@ -1,0 +1,34 @@
+"""Units of a file against those of the rig file."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearsig.recording.types import Channel, Recording
+from gearsig.rig.types import Rig, Sensor
+
+
+def recording(unit: str) -> Recording:
+    return Recording(np.ones((1, 8)), 100.0, (Channel("a1", "acceleration", unit),))
+
+
+def rig(**sensor: float | str) -> Rig:
+    return Rig(name="rig", sensors=(Sensor("a1", "acceleration", "m/s^2", **sensor),))  # type: ignore[arg-type]  # by name
+
+
+def test_another_unit_without_a_scale_is_told() -> None:
+    (warning,) = recording("g").with_rig(rig()).warnings
+    assert "the file says g" in warning
+    assert "m/s^2 without a scale" in warning
+
+
+@pytest.mark.parametrize("unit", ["m/s^2", ""])
+def test_the_same_unit_or_none_is_no_contradiction(unit: str) -> None:
+    assert recording(unit).with_rig(rig()).warnings == ()
+
+
+def test_a_scale_converts_and_says_nothing() -> None:
+    found = recording("g").with_rig(rig(scale=9.81))
+    assert found.warnings == ()
+    assert found.values("a1") == pytest.approx(9.81 * np.ones(8))
