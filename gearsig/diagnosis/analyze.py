@@ -152,7 +152,8 @@ def _angle_of(recording: Recording, rig: Rig) -> ShaftAngle | CannotTell:
         return CannotTell("What is the speed of the shafts?", refusal.reason, refusal.remedy)
     except InputError as error:  # it names the channel; which file it is in is known here
         where = error.where if error.where.startswith(source) else f"{source}: {error.where}".removesuffix(": ")
-        raise InputError(error.what, where=where, allowed=error.allowed, remedy=error.remedy) from None
+        remedy = error.remedy or "check [speed] in the rig file, or state the speed by --speed-rpm"
+        raise InputError(error.what, where=where, allowed=error.allowed, remedy=remedy) from None
 
 
 def _detect(material: Material) -> list[Finding]:

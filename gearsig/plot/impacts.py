@@ -10,12 +10,13 @@ import numpy as np
 from gearsig.errors import InputError
 from gearsig.motion.impacts import Impact
 from gearsig.plot import series, style
+from gearsig.plot.start_stop import FLANKS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FLANKS = {1: (style.FAULT, "drive flank", "o"), -1: (style.BEARING, "back flank", "s")}
+MARKERS = {1: "o", -1: "s"}
 PANEL_IN, GAP_IN, LEFT_IN, TOP_IN = 2.4, 0.95, 0.85, 0.8
 MARK_PT = 4.0
 
@@ -54,12 +55,12 @@ def impacts_figure(
     has_energy = bool(np.isfinite([i.energy_j for i in impacts]).all())
     label = "energy (J)" if has_energy else "speed (m/s)"
     lines = []
-    for flank, (colour, name, marker) in FLANKS.items():
+    for flank, (colour, name) in FLANKS.items():
         chosen = [i for i in impacts if i.flank == flank]
         if not chosen:
             continue
         size = [i.energy_j if has_energy else i.speed_mps for i in chosen]
-        look = {"color": colour, "marker": marker, "markersize": MARK_PT, "linestyle": "none", "alpha": 0.75}
+        look = {"color": colour, "marker": MARKERS[flank], "markersize": MARK_PT, "linestyle": "none", "alpha": 0.75}
         lines += over_time.plot([i.time_s for i in chosen], size, label=f"{name}: {len(chosen)}", **look)  # type: ignore[arg-type]  # as named
         by_tooth.plot([i.driver_tooth for i in chosen], size, **look)  # type: ignore[arg-type]  # as named
         bounce.plot([i.speed_mps for i in chosen], [i.restitution for i in chosen], **look)  # type: ignore[arg-type]  # as named

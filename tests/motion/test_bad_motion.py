@@ -120,3 +120,11 @@ def test_motion_alone_is_examined_as_far_as_it_goes(capsys: pytest.CaptureFixtur
     assert code == 0
     assert "1 start and 2 stops" in " ".join(out.split())
     assert "The lost motion" in out
+
+
+def test_a_rig_whose_encoder_is_missing_has_a_remedy(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    write_recording(without(RECORDING, *(n for n in RECORDING.channel_names if n != "torque")), folder / "t.h5")
+    err = refused(capsys, folder, "analyze", "t.h5")
+    assert "there is no channel 'pinion angle'" in err
+    assert "--speed-rpm" in err
+    assert "--speed-rpm" in options_of(capsys, "analyze")
