@@ -126,6 +126,22 @@ def is_unit(text: str) -> bool:
     return word in _QUANTITY_OF_UNIT or (word != "" and word in SECONDS_PER_UNIT)
 
 
+def same_unit(one: str, other: str) -> bool:
+    """Whether two units are one, however they are spelled.
+
+    Examples
+    --------
+    >>> same_unit("m/s²", "m/s^2"), same_unit("m/s2", "m/s**2"), same_unit("g", "m/s^2")
+    (True, True, False)
+    """
+    return _plain_unit(one) == _plain_unit(other)
+
+
+def _plain_unit(unit: str) -> str:
+    squares = unit.strip().casefold().replace("²", "2").replace("**", "").replace("^", "")
+    return re.sub(r"[\s·*]+", "", squares).replace("/s/s", "/s2").replace("μ", "µ").replace("um", "µm")
+
+
 def quantity_of(name: str, unit: str) -> str:
     """Return the quantity that a unit, or a telling name, stands for; "unknown" where neither tells.
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, closest_match_hint, frozen_array, one_of, positive, within
 from gearsig.errors import InputError
+from gearsig.recording.names import same_unit
 from gearsig.rig.speed import SpeedSource
 from gearsig.rig.types import QUANTITIES, Rig
 
@@ -216,10 +217,10 @@ class Recording:
             if sensor.channel not in self.channel_names:
                 continue  # a rig may describe more sensors than this file holds
             i = self.index(sensor.channel)
-            if sensor.scale != 1.0 or sensor.offset != 0.0:
+            scaled, old = sensor.scale != 1.0 or sensor.offset != 0.0, channels[i]
+            if scaled:
                 samples[i] = samples[i] * sensor.scale + sensor.offset
-            old = channels[i]
-            if old.unit and sensor.unit not in ("", old.unit) and (sensor.scale, sensor.offset) == (1.0, 0.0):
+            elif old.unit and sensor.unit and not same_unit(old.unit, sensor.unit):
                 warnings.append(
                     f"channel {old.name!r}: the file says {old.unit}, the rig file {sensor.unit} without a scale; "
                     f"the values are taken as {sensor.unit}"

@@ -23,7 +23,7 @@ def test_another_unit_without_a_scale_is_told() -> None:
     assert "m/s^2 without a scale" in warning
 
 
-@pytest.mark.parametrize("unit", ["m/s^2", ""])
+@pytest.mark.parametrize("unit", ["m/s^2", "m/s²", "m/s2", "m/s/s", "M/S**2", ""])
 def test_the_same_unit_or_none_is_no_contradiction(unit: str) -> None:
     assert recording(unit).with_rig(rig()).warnings == ()
 
