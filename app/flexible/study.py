@@ -28,6 +28,8 @@ SETTLED_S, SPECTRUM_S = 0.4, 0.4
 HIGHEST_HZ = 12000.0
 RUN_UP_S, RUN_UP_RATE_HZ, HIGHEST_ORDER = 6.0, 40960.0, 260.0
 STRIDE = 4
+N_ANGLES = 160
+"""Mesh angles of natural frequencies."""
 
 Progress = Callable[[str, float], object]
 
@@ -107,7 +109,7 @@ def flexible_study(
     on_progress("spectra", (n - 1) / n)
     spectra = {speed: _spectrum(pair, speed, torque_nm, step_s) for speed in SPECTRUM_RPM}
     natural = {t: torsional_mode(pair, Operation.steady(last_rpm, t)).frequency_hz for t in (*torques_nm, torque_nm)}
-    cycles = (np.arange(80) + 0.5) / 80.0
+    cycles = (np.arange(N_ANGLES) + 0.5) / N_ANGLES
     loaded = Operation.steady(last_rpm, torque_nm)
     own = constants(pair, loaded)
     at_angle = eigenfrequencies_hz(pair, loaded, cycles, ready=own)

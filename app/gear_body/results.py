@@ -14,7 +14,7 @@ from gearsig.report.files import made_folder
 from sims.reduced_fe.face_view import FaceView, face_view
 from sims.reduced_fe.flank_rows import point_and_push
 from sims.reduced_fe.gear_file import write_gear
-from sims.reduced_fe.mode_field import mode_field
+from sims.reduced_fe.mode_field import mode_field, rigid_part
 from sims.reduced_fe.vtk import write_vtk
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def write_study(study: GearBodyStudy, folder: Path, *, vtk: bool = False) -> tup
 
 
 def figures(study: GearBodyStudy) -> dict[str, Figure]:
-    """Return mesh, modes and stress by their files' names."""
+    """Return mesh, modes and stress by their files' names; a mesh of first order has no stress worth showing."""
     mesh, view = study.mesh, face_view(study.mesh)
     g = mesh.blank.geometry
     name = f"{g.teeth} teeth, module {g.module_mm:g} mm"
@@ -53,7 +53,7 @@ def figures(study: GearBodyStudy) -> dict[str, Figure]:
     across = 0.95 * np.pi * g.module_mm
     quality = study.quality.scaled_jacobian[view.cells]
     shapes = {_label(study, k): _shape(study, view, k) for k in range(min(N_SHOWN, len(study.modes.frequencies_hz)))}
-    return {
+    found = {
         "mesh": gear_mesh_figure(
             view.outlines_mm,
             quality,
@@ -63,8 +63,10 @@ def figures(study: GearBodyStudy) -> dict[str, Figure]:
         "modes": gear_modes_figure(
             view.points_mm, view.triangles, shapes, title=f"{name}: first modes, {HELD[study.held]}"
         ),
-        "stress": _stress(study, (*near, -across, across), name),
     }
+    if mesh.size.order > 1:
+        found["stress"] = _stress(study, (*near, -across, across), name)
+    return found
 
 
 def lines(study: GearBodyStudy) -> list[str]:
@@ -86,7 +88,7 @@ def lines(study: GearBodyStudy) -> list[str]:
             f"compliance {100.0 * d.compliance:+.0f} %"
         )
         if size.order == 1:
-            text.append(f"edges straight, up to {q.outline_error_mm:.2g} mm off the outline: no stress in the fillet")
+            text.append(f"edges straight, up to {q.outline_error_mm:.2g} mm off the outline: no stress is shown")
     if study.reduced is not None:
         text.append(f"free-interface reduction: {study.reduced.n_modes} elastic modes and the static rest")
     if study.craig_bampton is not None:
@@ -100,7 +102,9 @@ def lines(study: GearBodyStudy) -> list[str]:
 
 def _label(study: GearBodyStudy, k: int) -> str:
     n = int(study.modes.nodal_diameters[k])
-    return f"{study.modes.frequencies_hz[k]:.1f} Hz, {n} nodal diameter{'s' if n != 1 else ''}"
+    whole = rigid_part(study.gear, study.modes, k)
+    kind = whole or f"{n} nodal diameter{'s' if n != 1 else ''}"
+    return f"{study.modes.frequencies_hz[k]:.1f} Hz, {kind}"
 
 
 def _shape(study: GearBodyStudy, view: FaceView, k: int) -> FloatArray:

@@ -21,6 +21,8 @@ CYCLES = "mesh cycles (tooth passages)"
 MAP_IN, SWEEP_IN = 3.9, 3.6
 MOST_MAPS = 3
 BAR_IN, GAP_IN = 0.12, 0.95
+STEEP = 0.3
+"""Step between neighbouring angles, of a map's range: beyond it lines of equal values would run into one another."""
 SPAN = 1e-5
 """Range of a waterfall's levels below the greatest amplitude."""
 
@@ -238,12 +240,15 @@ def contact_spreading_figure(
 
 
 def _draw_map(figure: Figure, axes: Axes, x: FloatArray, y: FloatArray, values: FloatArray, right_in: float) -> None:
+    from matplotlib.patheffects import withStroke
+
     from gearsig.plot.order_map import colours
 
     mesh = axes.pcolormesh(x, y, values.T, cmap=colours(), shading="gouraud", rasterized=True)
-    if np.ptp(values) > 0.0:
+    if np.max(np.abs(np.diff(values, axis=0))) < STEEP * np.ptp(values):
         lines = axes.contour(x, y, values.T, levels=7, colors=style.INK, linewidths=0.5, alpha=0.6)
-        axes.clabel(lines, fontsize=style.SMALL_PT - 1.5, fmt="%.3g")
+        for label in axes.clabel(lines, fontsize=style.SMALL_PT - 1.5, fmt="%.3g"):
+            label.set_path_effects([withStroke(linewidth=1.8, foreground="white")])
     axes.grid(visible=False)
     height = figure.get_size_inches()[1]
     place = ((right_in + 0.1) / style.WIDTH_IN, 0.55 / height, BAR_IN / style.WIDTH_IN, (height - 1.3) / height)

@@ -15,6 +15,7 @@ from gearsig.plot.display import decibels, plain, unit_text
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
@@ -64,6 +65,7 @@ def order_map_figure(
     axes.set_xlim(*limits)
     speed.set_ylim(float(y[0]), float(y[-1]))
     speed.plot(order_map.speed_rpm, order_map.time_s, color=style.MEASURED, linewidth=1.2)
+    _spare_the_right_end(speed)
     width = style.WIDTH_IN - left - RIGHT_IN
     draw(axes, place(cursors, limits, width), (width, height_in - BOTTOM_IN - TOP_IN), through=False)
     name = f"order (of {order_map.shaft or 'the shaft'})" if order_map.axis == "order" else "frequency (Hz)"
@@ -81,6 +83,15 @@ def order_map_figure(
     )
     style.no_offset(speed)
     return figure
+
+
+def _spare_the_right_end(axes: Axes) -> None:
+    """Leave out a number that would run into those of the panel on the right."""
+    from matplotlib.ticker import MaxNLocator
+
+    low, high = axes.get_xlim()
+    ticks = MaxNLocator(3).tick_values(low, high)
+    axes.set_xticks([t for t in ticks if low <= t <= high - 0.2 * (high - low)])
 
 
 def colours() -> Colormap:

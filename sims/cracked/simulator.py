@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +15,8 @@ from sims.cracked.parameters import PARAMETERS
 from sims.effects import EffectSetting, completed, effects, with_effects
 from sims.machine import Machine
 from sims.machine.operation import Operation
-from sims.presets import Preset, preset, presets
+from sims.model import Model
+from sims.presets import Preset, preset
 from sims.simulator import Parameter, ParameterValue
 from sims.truth import truth_of
 from sims.values import Values, complete_values
@@ -59,33 +60,13 @@ class Prepared:
 
 
 @dataclass(frozen=True)
-class CrackedPair:
+class CrackedPair(Model):
     """Spur gear pair on four bearings between two rotors, 16 degrees of freedom; see `sims.cracked`."""
 
-    @property
-    def name(self) -> str:
-        """Short name."""
-        return NAME
-
-    @property
-    def title(self) -> str:
-        """One line for people."""
-        return "spur gear pair with root crack: 16 degrees of freedom, friction, backlash, roughness"
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """All parameters."""
-        return PARAMETERS
-
-    @property
-    def presets(self) -> tuple[str, ...]:
-        """Names of the machines."""
-        return tuple(presets(NAME))
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Names of the effects: all of the catalogue have a meaning here."""
-        return tuple(effects())
+    name: str = NAME
+    title: str = "spur gear pair with root crack: 16 degrees of freedom, friction, backlash, roughness"
+    parameters: tuple[Parameter, ...] = field(default=PARAMETERS, repr=False)
+    effects: tuple[str, ...] = field(default_factory=lambda: tuple(effects()), repr=False)
 
     def prepare(
         self,
@@ -127,8 +108,8 @@ class CrackedPair:
         rig = build_rig(
             ready.machine,
             ready.operation,
-            name=f"simulated: {ready.preset}",
-            sources=[f"simulated with the model {NAME!r}, preset {ready.preset!r}; the truth stands in the recording"],
+            name=self.rig_name(ready.preset),
+            sources=self.rig_sources(ready.preset),
         )
         return simulate_machine(
             ready.machine,

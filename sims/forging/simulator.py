@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,8 @@ from sims.forging.effects import WITH_MEANING, with_effects
 from sims.forging.parameters import PARAMETERS
 from sims.forging.schedule import Cycle, Schedule, schedule
 from sims.machine.operation import Course, Operation
-from sims.presets import preset, presets
+from sims.model import Model
+from sims.presets import preset
 from sims.simulator import Parameter, ParameterValue
 from sims.truth import truth_of
 from sims.values import Values, complete_values
@@ -72,33 +73,13 @@ class Prepared:
 
 
 @dataclass(frozen=True)
-class ForgingManipulator:
+class ForgingManipulator(Model):
     """Pinion and wheel of a forging manipulator: start–stop, backlash, impact; see `sims.forging`."""
 
-    @property
-    def name(self) -> str:
-        """Short name."""
-        return NAME
-
-    @property
-    def title(self) -> str:
-        """One line for people."""
-        return "forging manipulator's drive: start–stop, backlash, impact on both flanks, stick–slip"
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """All parameters."""
-        return PARAMETERS
-
-    @property
-    def presets(self) -> tuple[str, ...]:
-        """Names of the machines."""
-        return tuple(presets(NAME))
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Names of the effects that have a meaning: play, wear, friction, ripple, a cracked tooth."""
-        return WITH_MEANING
+    name: str = NAME
+    title: str = "forging manipulator's drive: start–stop, backlash, impact on both flanks, stick–slip"
+    parameters: tuple[Parameter, ...] = field(default=PARAMETERS, repr=False)
+    effects: tuple[str, ...] = field(default=WITH_MEANING, repr=False)
 
     @property
     def usual_sampling_rate_hz(self) -> float:
@@ -160,8 +141,8 @@ class ForgingManipulator:
             Wanted(ready.sound_values),
             ready.operation,
             sensors(sampling_rate_hz),
-            name=f"simulated: {ready.preset}",
-            sources=[f"simulated with the model {NAME!r}, preset {ready.preset!r}; the truth stands in the recording"],
+            name=self.rig_name(ready.preset),
+            sources=self.rig_sources(ready.preset),
         )
         ready.courses(duration_s)  # says so where a stop does not fit, before anything is run
         return record(

@@ -32,7 +32,7 @@ class SpreadingCheck:
     mesh_cycles : array, (n_c,)
     frequency_hz : mapping of "node", "patch", "section" to arrays, (n_c,)
     ripple : mapping
-        Part by which the compliance of a tooth to its flank departs from a smooth curve over its height, greatest.
+        Part by which a tooth's compliance departs from a smooth curve over the height of its flank, rms.
     """
 
     mesh_cycles: FloatArray
@@ -70,5 +70,5 @@ def spreading_check(pair: FlexiblePair, operation: Operation, mesh_cycles: Float
         compliance = np.log(np.diag(one.clamped_compliance_m_per_n[0])[:N_HEIGHTS][inner])
         roll = one.grid.roll_rad[inner]
         smooth = np.polyval(np.polyfit(roll, compliance, DEGREE), roll)
-        ripple[spread] = float(np.max(np.abs(compliance - smooth)))
+        ripple[spread] = float(np.std(compliance - smooth))
     return SpreadingCheck(mesh_cycles, frequency, ripple)

@@ -84,7 +84,8 @@ def height_nodes(mesh: SectorMesh, roll: float, spread: Spread, flank: int) -> S
     reach = PATCH_HALF_WIDTH * gear.module_mm / side_curve(gear)[1] if spread == "patch" else 0.0
     order = mesh.size.order
     rows = row_places(gear, n_up)[:: 3 - order]
-    up = line_weights(rows, place - reach, place + reach, order)
+    low = min(place - reach, 1.0 - 2.0 * reach)  # near the tip the patch stays on the flank, as wide as elsewhere
+    up = line_weights(rows, low, low + 2.0 * reach, order)
     if spread == "section":
         across = parabolic_weights(mesh.tooth.shape[1], order)
     else:

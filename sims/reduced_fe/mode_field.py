@@ -9,6 +9,23 @@ from gearsig.errors import InputError
 from sims.reduced_fe.cyclic import CyclicGear
 from sims.reduced_fe.cyclic_modes import CyclicModes
 
+MOSTLY = 0.9
+"""Part of a mode's kinetic energy from which on the gear moves as a whole."""
+RIGID = (("moves along the shaft", "turns about the shaft"), ("moves across the shaft", "tilts"))
+"""Motions of `CyclicGear.rigid` with 0 and with 1 nodal diameter."""
+
+
+def rigid_part(gear: CyclicGear, modes: CyclicModes, which: int) -> str:
+    """How the gear moves as a whole in a mode, where nine tenths of the kinetic energy are of one such motion."""
+    n = int(modes.nodal_diameters[which])
+    if n > 1:
+        return ""
+    moving = np.asarray(gear.mass.at(gear.phase_rad(n)) @ modes.shapes[:, which])
+    energy = float(np.vdot(modes.shapes[:, which], moving).real)
+    part = np.abs(gear.rigid(n).conj().T @ moving) ** 2 / energy
+    most = int(np.argmax(part))
+    return RIGID[n][most] if part[most] > MOSTLY else ""
+
 
 def mode_field(gear: CyclicGear, modes: CyclicModes, which: int, *, sine: bool = False) -> FloatArray:
     """Return a real mode at all nodes, (n_teeth, n_nodes, 3), x, y, z in the axes of each sector; modal mass 1 kg.

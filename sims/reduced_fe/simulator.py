@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +15,8 @@ from sims.cracked.installed_table import installed_of
 from sims.cracked.simulator import DURATION_RANGE_S, check_load, check_run
 from sims.effects import EffectSetting, completed, effects, with_effects
 from sims.machine.operation import Operation
-from sims.presets import Preset, preset, presets
+from sims.model import Model
+from sims.presets import Preset, preset
 from sims.reduced_fe.parameters import PARAMETERS
 from sims.simulator import Parameter, ParameterValue
 from sims.truth import truth_of
@@ -60,7 +61,7 @@ class PreparedPair:
 
 
 @dataclass(frozen=True)
-class ReducedPair:
+class ReducedPair(Model):
     """Spur pair of reduced finite-element gears between two rotors; see `sims.reduced_fe`.
 
     Does not represent: gyroscopic and centrifugal terms, tilting of the gears, oil churning, heating, teeth bent by
@@ -68,30 +69,10 @@ class ReducedPair:
     crack, contact off the line of action at corners.
     """
 
-    @property
-    def name(self) -> str:
-        """Short name."""
-        return NAME
-
-    @property
-    def title(self) -> str:
-        """One line for people."""
-        return "spur pair of finite-element gears, reduced: elastic bodies, contact of slices, contact loss"
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """All parameters."""
-        return PARAMETERS
-
-    @property
-    def presets(self) -> tuple[str, ...]:
-        """Names of the machines."""
-        return tuple(presets(NAME))
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Names of the effects: all of the catalogue have a meaning here."""
-        return tuple(effects())
+    name: str = NAME
+    title: str = "spur pair of finite-element gears, reduced: elastic bodies, contact of slices, contact loss"
+    parameters: tuple[Parameter, ...] = field(default=PARAMETERS, repr=False)
+    effects: tuple[str, ...] = field(default_factory=lambda: tuple(effects()), repr=False)
 
     def prepare(
         self,
@@ -134,8 +115,8 @@ class ReducedPair:
         rig = build_rig(
             ready.pair.machine,
             ready.operation,
-            name=f"simulated: {ready.preset}",
-            sources=[f"simulated with the model {NAME!r}, preset {ready.preset!r}; the truth stands in the recording"],
+            name=self.rig_name(ready.preset),
+            sources=self.rig_sources(ready.preset),
         )
         recording, _ = simulate_pair(
             ready.pair,
