@@ -12,7 +12,7 @@ the meshing vibration", J. Vib. Acoust. 108 (1986).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -269,17 +269,25 @@ def _swing(scene: Scene, order: float, size: float, rng: np.random.Generator) ->
     return wave
 
 
+def _modulated(
+    scene: Scene, order: float, swings: tuple[float, float], lines: Sequence[float], rng: np.random.Generator
+) -> Signature:
+    """The mesh swings in size and in phase at an order, which shows with its multiples as lines as well."""
+    gain, late = swings
+    return Signature(
+        _swing(scene, order, 0.8 * gain, rng),
+        LARGEST_ADVANCE * late / scene.teeth[0] * tone(order, scene, rng),
+        tuple(line * tone(n * order, scene, rng) for n, line in enumerate(lines, start=1)),
+    )
+
+
 def _eccentricity(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
     """Run-out: the mesh swings once per turn in size and phase; the shaft's own line, and its second, may show."""
     order = scene.shaft_orders[_side(rng)]
     gain, late = 10.0 ** (-rng.uniform(0.0, 0.7, 2))
     first = float(rng.choice((0.0, 1.0))) * rng.uniform(0.0, 1.0)
     second = first * rng.uniform(0.0, 0.3)
-    return Signature(
-        _swing(scene, order, 0.8 * gain * size, rng),
-        LARGEST_ADVANCE * late * size / scene.teeth[0] * tone(order, scene, rng),
-        (size * first * tone(order, scene, rng), size * second * tone(2.0 * order, scene, rng)),
-    )
+    return _modulated(scene, order, (gain * size, late * size), (size * first, size * second), rng)
 
 
 def _unbalance(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
@@ -310,11 +318,7 @@ def _torque_ripple(scene: Scene, size: float, rng: np.random.Generator) -> Signa
     pulls = log_uniform(rng, 1.5, 15.0)  # motors and engines pull twice to six times rather than fifteen times
     order = shaft * (float(round(pulls)) if rng.uniform() < 0.75 else pulls)
     gain, late, line = _balance(rng, 3)
-    return Signature(
-        _swing(scene, order, 0.8 * gain * size, rng),
-        LARGEST_ADVANCE * late * size / scene.teeth[0] * tone(order, scene, rng),
-        (size * max(line, 0.2) * tone(order, scene, rng),),
-    )
+    return _modulated(scene, order, (gain * size, late * size), (size * max(line, 0.2),), rng)
 
 
 def _backlash(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
