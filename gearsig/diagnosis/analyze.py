@@ -89,7 +89,7 @@ def analyze(
     tell("finding the speed")
     findings, dead = detect_data_problems(recording)
     names = [name for name in recording.vibration_names() if name not in dead]
-    unsteady = start_stop_analysis(recording, known, findings, asdict(settings))
+    unsteady = start_stop_analysis(recording, known, findings, asdict(settings), reference)
     if unsteady is not None:
         return unsteady
     _check_vibration(recording)

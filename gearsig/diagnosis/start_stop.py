@@ -7,6 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from gearsig.checks import FloatArray
+from gearsig.diagnosis.comparison import beside_reference
+from gearsig.diagnosis.detectors.quality import detect_data_problems
 from gearsig.diagnosis.types import Analysis, CannotTell, Finding, Kind, Strength, Where
 from gearsig.diagnosis.verdict import ranked, verdict_of
 from gearsig.errors import InputError, RefusalError
@@ -24,16 +26,30 @@ from gearsig.rig.types import Rig
 
 GROWN = 1.15
 """Backlash over the rig's from which on it is worth a suspicion."""
+GROWN_SINCE = 1.05
+"""The same over the reference's: temperature and load move it less."""
+BASIS = {
+    "rig": "as far as the rig file's backlash is that of the new gears",
+    "reference": "as far as temperature and load are the reference's",
+}
 CERTAIN = 4.0
 """Standard deviations that the excess must have, too."""
 
 
+Settings = Mapping[str, str | float | int | None]
+
+
 def start_stop_analysis(
-    recording: Recording, rig: Rig, problems: list[Finding], settings: Mapping[str, str | float | int | None]
+    recording: Recording,
+    rig: Rig,
+    problems: list[Finding],
+    settings: Settings,
+    reference: Recording | None = None,
 ) -> Analysis | None:
     """Return the analysis of a start–stop recording, or None where the motion is not one or is not known.
 
-    Only an encoder or a speed channel tells: both see standstill and direction.
+    Only an encoder or a speed channel tells: both see standstill and direction. With a reference, the backlash is
+    compared with its backlash instead of the rig file's, and suspicions say whether it shows them as well.
 
     Raises
     ------
@@ -48,6 +64,9 @@ def start_stop_analysis(
     if isinstance(source, EncoderChannel):  # what seems to turn back may be an encoder that wraps
         check_wrap(angle_rad, recording.sampling_rate_hz, source.channel, recording.provenance.source)
     findings = [*_not_of_rest(problems, recording), _motion_finding(course)]
+    then = None if reference is None else _of_reference(reference, rig, settings)
+    if reference is not None and then is None:
+        findings.append(_reference_runs_on())
     examined: StartStop | None = None
     if rig.contact is None:
         findings.append(_no_contact())
@@ -55,7 +74,7 @@ def start_stop_analysis(
         try:
             examined = examine_start_stop(measure_motion(recording, rig))
             findings += [
-                *_backlash(examined, rig),
+                *_backlash(examined, rig, then),
                 *_weak_teeth(examined, rig),
                 *_impacts(examined),
                 *_refusals(examined),
@@ -65,7 +84,7 @@ def start_stop_analysis(
     findings.append(_left_out(course, examined))
     bursts = _bursts(recording, problems)
     findings += [_burst_finding(name, blows, angle_rad, recording, rig) for name, blows in bursts.items() if blows]
-    order = ranked(findings)
+    order = ranked(findings if then is None else beside_reference(findings, then))
     return Analysis(
         recording,
         recording.rig,
@@ -73,10 +92,16 @@ def start_stop_analysis(
         (),
         _indicators(course, examined, bursts),
         order,
-        verdict_of(order),
+        verdict_of(order, has_reference=then is not None),
         dict(settings),
+        reference=then,
         motion=examined,
     )
+
+
+def _of_reference(reference: Recording, rig: Rig, settings: Settings) -> Analysis | None:
+    own = reference if reference.rig is not None else reference.with_rig(rig)
+    return start_stop_analysis(own, rig, detect_data_problems(own)[0], settings)
 
 
 def course_of(recording: Recording, rig: Rig) -> tuple[Course, FloatArray] | None:
@@ -121,6 +146,15 @@ def _motion_finding(course: Course) -> Finding:
     )
 
 
+def _reference_runs_on() -> Finding:
+    return Finding(
+        "reference-not-compared",
+        Kind.CANNOT_TELL,
+        "The reference does not start and stop: nothing is compared with it.",
+        surer="A reference of the same cycle.",
+    )
+
+
 def _left_out(course: Course, examined: StartStop | None) -> Finding:
     without_teeth = examined is None or examined.teeth is None
     what = "Cracks, bearings, shafts and meshing" if without_teeth else "Bearings, shafts and meshing"
@@ -149,17 +183,22 @@ def _not_examined(error: RefusalError | InputError) -> Finding:
     )
 
 
-def _backlash(examined: StartStop, rig: Rig) -> list[Finding]:
+def _backlash(examined: StartStop, rig: Rig, then: Analysis | None) -> list[Finding]:
     found = examined.backlash
     if found is None or rig.contact is None:
         return []
-    drawn = 2.0 * rig.contact.half_backlash_um
+    drawn, deviation, whose, least = 2.0 * rig.contact.half_backlash_um, found.uncertainty_um, "rig", GROWN
+    before = None if then is None or then.motion is None else then.motion.backlash
+    if before is not None and before.method == found.method:
+        drawn, deviation = before.backlash_um, float(np.hypot(before.uncertainty_um, deviation))
+        whose, least = "reference", GROWN_SINCE
     is_pure = found.method.startswith("both flanks")
-    grown = is_pure and found.backlash_um > max(GROWN * drawn, drawn + CERTAIN * found.uncertainty_um)
+    grown = is_pure and found.backlash_um > max(least * drawn, drawn + CERTAIN * deviation)
     what = "The backlash" if is_pure else "The lost motion, deflection included,"
     title = f"{what} is {found.backlash_um:.4g} ± {found.uncertainty_um:.2g} µm along the line of action"
-    title += f", where the rig says {drawn:.4g} µm." if drawn else "."
-    strength = Strength(found.backlash_um, "µm", drawn, "backlash of the rig file") if drawn else None
+    title += f", where the {whose} {'says' if whose == 'rig' else 'has'} {drawn:.4g} µm." if drawn else "."
+    floor = "backlash of the rig file" if whose == "rig" else "backlash of the reference"
+    strength = Strength(found.backlash_um, "µm", drawn, floor) if drawn else None
     pair = rig.contact.pair or rig.pairs[0].name
     return [
         Finding(
@@ -169,13 +208,13 @@ def _backlash(examined: StartStop, rig: Rig) -> list[Finding]:
             Where(gear=pair),
             strength,
             confidence=0.9 if grown else 1.0,
-            confidence_basis="as far as the rig file's backlash is that of the new gears" if grown else "",
+            confidence_basis=BASIS[whose] if grown else "",
             evidence=(
                 found.method,
                 f"{found.n_drive} samples on the drive flank and {found.n_back} on the back flank",
                 f"scatter {found.scatter_um:.3g} µm",
             ),
-            surer="A recording of the same machine when it was new." if grown else "",
+            surer="A recording of the same machine when it was new." if grown and whose == "rig" else "",
         )
     ]
 

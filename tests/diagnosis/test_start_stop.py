@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gearsig import analyze
+from gearsig.diagnosis.comparison import changes
 from gearsig.diagnosis.types import CannotTell, Kind, Outcome
 from gearsig.errors import InputError
 from gearsig.recording.types import Channel, Recording
@@ -42,6 +43,30 @@ def test_worn_teeth_are_a_suspicion() -> None:
     assert worn.strength is not None
     assert worn.strength.value == pytest.approx(420.0, rel=0.02)
     assert result.outcome is Outcome.SUSPICION
+
+
+def test_a_reference_of_the_same_cycle_is_what_backlash_is_compared_with() -> None:
+    """340 µm against 300 µm is no suspicion by a drawing, but it is by the machine's own earlier recording."""
+    worn = start_stop(wear_um=40.0)
+    alone = {f.code: f for f in analyze(worn).findings}
+    assert "backlash-grown" not in alone
+    beside = analyze(worn, reference=start_stop())
+    found = next(f for f in beside.findings if f.code == "backlash-grown")
+    assert "where the reference has 299" in found.title
+    assert found.strength is not None
+    assert found.strength.value / found.strength.floor == pytest.approx(340.0 / 300.0, rel=0.01)
+    assert "The reference does not show it." in found.evidence
+    assert beside.reference is not None
+    then = {c.reference_value for c in changes(beside) if c is not None}
+    assert any(value == pytest.approx(300.0, rel=0.01) for value in then)
+    same = analyze(start_stop(), reference=start_stop(angle_noise_urad=2.0))
+    assert "backlash-grown" not in [f.code for f in same.findings]
+
+
+def test_a_reference_that_runs_on_is_said_not_to_be_compared() -> None:
+    result = analyze(start_stop(), reference=continuous())
+    assert "reference-not-compared" in [f.code for f in result.findings]
+    assert result.reference is None
 
 
 def test_teeth_are_compared_and_said_to_be_alike_from_which_loss_on() -> None:
