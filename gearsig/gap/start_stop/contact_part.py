@@ -164,9 +164,11 @@ def _by_place(m: PairMotion) -> tuple[FloatArray, Mask, FloatArray]:
 def _robust(design: FloatArray, q: FloatArray, keep: Mask) -> tuple[FloatArray, Mask]:
     """Least squares without samples far off: blows, slipped counts."""
     wanted = keep
+    size = np.sqrt(np.mean(design[keep] ** 2, axis=0)) + 1e-30
+    scaled, least = design / size, 1e-12 * np.eye(design.shape[1])
     for _ in range(MOST_ROUNDS):
-        a = design[keep]
-        x: FloatArray = np.linalg.lstsq(a, q[keep], rcond=None)[0]
+        a = scaled[keep]
+        x: FloatArray = np.linalg.solve(a.T @ a / len(a) + least, a.T @ q[keep] / len(a)) / size
         left = np.abs(q - design @ x)
         again = wanted & (left < FAR * (1.4826 * float(np.median(left[keep])) + 1e-12))
         if np.array_equal(again, keep) or np.sum(again) < 4 * len(x):

@@ -14,6 +14,8 @@ from gearsig.motion.start_stop import course_of_angle
 from gearsig.motion.types import PairMotion
 
 FEWEST = 2
+LEAST_STANDING = 0.05
+"""Of the time: a machine that stands so long has stopped."""
 HIGHEST_RATE_HZ = 2000.0
 """Motion of shafts is slower; vibration is not looked at here."""
 STARTING_S, SETTLING_S = 0.15, 0.1
@@ -63,15 +65,16 @@ def cut_cycles(motion: PairMotion) -> CycledMotion:
     thinned = thin(motion)
     course = course_of_angle(thinned.driver_angle_rad, thinned.sampling_rate_hz)
     where = thinned.source or "the recording"
-    if not is_start_stop(course):
+    if not is_start_stop(course) and course.standing_part < LEAST_STANDING:
         raise RefusalError(
             f"{where} turns all the time: no start and stop is in it, and the start–stop diagnosis rests on them",
             remedy="record starts and stops; compare stationary running with --model cracked or reduced-fe",
         )
     moving = course.moving
     if len(moving) < FEWEST:
+        n = f"{len(moving)} start{'' if len(moving) == 1 else 's'}"
         raise RefusalError(
-            f"{where} has {len(moving)} start: what is fitted to one cycle must be checked on another",
+            f"{where} has {n}: what is fitted to one cycle must be checked on another",
             remedy="record several starts and stops; six or more tell most",
         )
     number = np.full(len(thinned.driver_angle_rad), -1, dtype=np.int64)

@@ -150,9 +150,10 @@ def _flank_friction(equation: LoadEquation, keep: Mask, from_load: float) -> flo
 
 def _robust(columns: FloatArray, response: FloatArray, keep: Mask) -> FloatArray:
     scale = np.sqrt(np.mean(columns[keep] ** 2, axis=0)) + 1e-30
-    wanted = keep
+    wanted, least = keep, 1e-12 * np.eye(columns.shape[1])
     for _ in range(MOST_ROUNDS):
-        x: FloatArray = np.linalg.lstsq(columns[keep] / scale, response[keep], rcond=None)[0] / scale
+        a = columns[keep] / scale
+        x: FloatArray = np.linalg.solve(a.T @ a / len(a) + least, a.T @ response[keep] / len(a)) / scale
         left = np.abs(response - columns @ x)
         keep = wanted & (left < FAR * (1.4826 * float(np.median(left[keep])) + 1e-12))
     return x

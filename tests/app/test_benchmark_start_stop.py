@@ -1,0 +1,89 @@
+"""Blind start–stop cases: their plan, what a case's folder holds, and how answers are scored."""
+
+import json
+from collections import Counter
+from math import isnan
+
+import pytest
+
+from app.benchmark.answer import Answer, AnsweredCause, AnsweredShrinkage
+from app.benchmark.start_stop import DriveDone, DrivePlan, make_drive_case
+from app.benchmark.start_stop_score import figures, write_scores
+from app.benchmark.start_stop_seen import planned
+from app.cli import main
+from gearsig.recording.read import read_recording
+from gearsig.rig.toml import read_rig
+from sims.blind_drive import CATALOGUE
+
+
+def run(arguments: list[str]) -> int:
+    """Run the command line; return its exit code."""
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    return int(end.value.code or 0)
+
+
+def test_effects_come_in_turn_and_seeds_decide():
+    plan = planned(100, 3)
+    counts = Counter(effect for kind, effect, _ in plan if kind == "single")
+    assert set(counts) == set(CATALOGUE)
+    assert max(counts.values()) - min(counts.values()) <= 1
+    assert plan == planned(100, 3) != planned(100, 4)
+
+
+def test_a_case_folder_holds_recordings_and_rigs_and_no_label(tmp_path):
+    plan = DrivePlan(10, 2, "development", "with")
+    label = make_drive_case(plan, 0, tmp_path)
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"condition_1.h5", "condition_1.toml", "reference_1.h5", "reference_1.toml"}
+    read = read_recording(tmp_path / "condition_1.h5", rig=read_rig(tmp_path / "condition_1.toml"))
+    assert not read.truth
+    assert label["teeth"] == [read.rig.pairs[0].driver_teeth, read.rig.pairs[0].driven_teeth]
+    assert make_drive_case(plan, 0, None) == label
+
+
+def done(number: int, kind: str, effect: str, causes: dict[str, float], outcome: str, shrink: float = 0.8) -> DriveDone:
+    label = {
+        "kind": kind, "effect": effect, "level": 0.7, "severity": 1.0, "unit": "um", "place": {"tooth": 3}
+        if effect == "root_crack" else {}, "with_reference": number % 2 == 0, "n_channels": 8, "encoder_counts": 2**18,
+    }  # fmt: skip
+    found = AnsweredShrinkage(shrink, 1.0, 0.1, "starts and stops")
+    answered = [
+        AnsweredCause(name, p, {"tooth": 3.0} if name == "root_crack" else {}, found) for name, p in causes.items()
+    ]
+    return DriveDone(number, label, Answer(outcome, tuple(answered), seconds=5.0, cpu_seconds=4.0))
+
+
+CASES = [
+    done(0, "single", "root_crack", {"root_crack": 0.8, "backlash": 0.1, "none": 0.1}, "effect"),
+    done(1, "single", "backlash", {"none": 0.5, "root_crack": 0.3, "backlash": 0.2}, "no gap"),
+    done(2, "none", "", {"none": 0.9, "backlash": 0.1}, "no gap"),
+    done(3, "none", "", {"backlash": 0.9, "none": 0.1}, "effect"),
+    done(4, "unknown", "run_out", {"unknown": 0.9, "backlash": 0.1}, "unknown"),
+]
+
+
+def test_figures_count_what_they_say():
+    found = {name: score.value for name, score in figures(CASES).items()}
+    assert found["likeliest effect right"] == 0.5
+    assert found["among the first two"] == 1.0
+    assert found["named, and right"] == 0.5
+    assert found["named, and wrong"] == 0.0
+    assert found["tooth or order right, of effects found"] == 1.0
+    assert found["effect named on a sound machine"] == 0.5
+    assert found["unknown recognised"] == 1.0
+    assert found["held-out shrink by the true effect, median"] == 0.8
+    assert isnan(figures([])["likeliest effect right"].value)
+
+
+def test_scores_are_written_whole(tmp_path):
+    table = write_scores(CASES, tmp_path, "gearsig benchmark gap")
+    assert "| likeliest effect right | 0.50" in table.read_text()
+    assert json.loads((tmp_path / "scores.json").read_text())["all"]["no answer"]["value"] == 0.0
+    assert len((tmp_path / "cases.csv").read_text().splitlines()) == 1 + len(CASES)
+
+
+@pytest.mark.parametrize("option", [["--same-simulator"], ["--diagnoser", "rules"], ["--longest", "3"]])
+def test_options_of_the_other_benchmark_are_refused(tmp_path, capsys, option):
+    assert run(["benchmark", "gap", "--model", "forging", *option, "-o", str(tmp_path / "b")]) == 2
+    assert option[0] in capsys.readouterr().err

@@ -1,0 +1,151 @@
+"""`gearsig gap --model forging`: from files to the report; recordings that are for another model are refused."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from app.cli import main
+from app.gap.models import checked_model, gap_effects_of, gap_models
+from app.gap.start_stop.causes import TRIED
+from app.gap.start_stop.diagnose import compared_of, diagnose_start_stop
+from app.gap.start_stop.worn import worn_curve_um
+from app.samples import sample_folder
+from gearsig.errors import InputError
+from gearsig.gap.types import NONE, GapOutcome
+from gearsig.recording.write import write_recording
+from gearsig.report.gap_json import gap_schema
+from gearsig.report.gap_reading import read_gap_json
+from gearsig.rig.toml import write_rig
+from sims import simulate
+
+
+def run(arguments: list[str]) -> int:
+    """Run the command line; return its exit code."""
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    return int(end.value.code or 0)
+
+
+def made(seed: int, effects: dict[str, float] | None = None, mode: str = "start-stop", **parameters):
+    return simulate(
+        "forging",
+        effects=effects,
+        parameters={"mode": mode, **parameters},
+        duration_s=12.0,
+        sampling_rate_hz=1000.0,
+        seed=seed,
+    )
+
+
+def written(recording, path: Path) -> str:
+    write_recording(recording, path)
+    write_rig(recording.rig, path.with_suffix(".toml"))
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    place = tmp_path_factory.mktemp("drives")
+    written(made(1), place / "sound.h5")
+    written(made(2, {"backlash": 120.0}), place / "wide.h5")
+    written(made(1, mode="continuous"), place / "continuous.h5")
+    return place
+
+
+def diagnosed(recording, reference=None):
+    references = [] if reference is None else [reference]
+    return diagnose_start_stop(
+        [recording],
+        rigs=[recording.rig],
+        references=references,
+        reference_rigs=[one.rig for one in references],
+        names=["now"],
+    )
+
+
+def test_more_play_is_named_measured_and_simulated_again(folder, tmp_path, capsys):
+    out = tmp_path / "gap"
+    files = [str(folder / "wide.h5"), "--reference", str(folder / "sound.h5")]
+    assert run(["gap", *files, "--model", "forging", "-o", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "Which: more backlash" in said
+    found = json.loads((out / "gap.json").read_text())
+    jsonschema.Draft202012Validator(gap_schema()).validate(found)
+    report = read_gap_json(out / "gap.json")
+    cause = report.causes[0]
+    assert (report.outcome, cause.name) == (GapOutcome.EFFECT, "backlash")
+    assert cause.severity.low < 120.0 < cause.severity.high
+    assert cause.shrinkage.shrink.value > 0.9
+    assert report.places[0].title.startswith("where the drive stops and the back flank takes over: play 420")
+    again = tmp_path / "twin.h5"
+    assert run(["simulate", "forging", "--preset", str(out / "twin.toml"), "--duration", "9s", "-o", str(again)]) == 0
+    truth = json.loads(again.with_suffix(".truth.json").read_text())
+    assert truth["backlash_um"] == pytest.approx(420.0, rel=0.05)
+
+
+def test_a_heavier_load_is_named_by_its_own_name():
+    report = diagnosed(made(3, wheel_inertia_kg_m2=80.0), made(4))
+    assert report.causes[0].name == "load_inertia"
+    assert report.causes[0].severity.value == pytest.approx(100 * 38 / 45.2625, rel=0.15)
+    assert report.references == ("reference 1",)
+
+
+def test_a_sound_drive_has_no_gap():
+    report = diagnosed(made(5), made(6))
+    assert report.outcome is GapOutcome.NO_GAP
+    assert report.causes[0].name == NONE
+    assert not report.twin_toml
+
+
+def test_without_torque_the_play_can_still_be_told():
+    now, sound = made(7, {"backlash": 150.0}), made(8)
+
+    def without(recording):
+        kept = [i for i, c in enumerate(recording.channels) if c.quantity == "angle"]
+        channels = tuple(recording.channels[i] for i in kept)
+        names = {c.name for c in channels}
+        rig = replace(recording.rig, sensors=tuple(s for s in recording.rig.sensors if s.channel in names))
+        return replace(recording, samples=recording.samples[kept], channels=channels, rig=rig, truth=None)
+
+    report = diagnosed(without(now), without(sound))
+    ranked = [c.name for c in report.causes if c.severity is not None]
+    assert set(ranked) == {name for name, tried in TRIED.items() if tried.needs != "torque"}
+    assert any("no torque was recorded" in notice for notice in report.notices)
+    assert report.causes[0].name == "backlash"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["{folder}/wide.h5", "--model", "cracked"], "--model forging"),
+        (["{folder}/continuous.h5", "--model", "forging"], "turns all the time"),
+        (["{samples}/root_crack_3mm.h5", "--model", "forging"], "--model cracked"),
+        (["{folder}/wide.h5", "--model", "forgin"], "forging"),
+    ],
+)
+def test_a_recording_for_another_model_is_one_clear_line(folder, tmp_path, capsys, arguments, words):
+    filled = [text.format(folder=folder, samples=sample_folder()) for text in arguments]
+    assert run(["gap", *filled, "-o", str(tmp_path / "gap")]) == 2
+    said = capsys.readouterr().err.strip()
+    assert words in said
+    assert not (tmp_path / "gap").exists()
+
+
+def test_models_and_their_effects_are_known():
+    assert gap_models() == ("cracked", "reduced-fe", "forging")
+    assert set(gap_effects_of("forging")) == set(TRIED)
+    with pytest.raises(InputError, match="cracked"):
+        checked_model("craked")
+
+
+def test_worn_flanks_touch_later_where_they_slide_most():
+    compared = compared_of(made(9), None, "now")
+    curve = worn_curve_um(compared.twin.parameters, 20.0, 60.0)
+    assert np.all(curve >= -1e-6)
+    assert np.max(curve) < 60.0
+    assert np.ptp(curve) > 5.0
+    assert worn_curve_um(compared.twin.parameters, 20.0, 0.0) == pytest.approx(np.zeros(len(curve)), abs=1e-6)

@@ -1,0 +1,89 @@
+"""Weighing causes of start–stop changes: closed forms on made-up floors and predictions."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gearsig.gap.posterior import GapCalibration
+from gearsig.gap.start_stop.floors import FLOOR, DriveFloor, load_floor, load_floors
+from gearsig.gap.start_stop.told import NAMES
+from gearsig.gap.start_stop.weigh import Predicted, evidences, fit, own_features, shares, shrink
+from gearsig.gap.types import NONE, UNKNOWN
+
+N = len(NAMES)
+FLOOR_OF_ONE = DriveFloor(np.zeros(N), np.ones(N), 1.0)
+
+
+def direction(place: int, size: float = 1.0) -> np.ndarray:
+    found = np.zeros(N)
+    found[place] = size
+    return found
+
+
+def cause(name: str, place: int) -> Predicted:
+    severities = np.array([10.0, 20.0, 40.0])
+    changes = np.array([direction(place, 0.5 * s) for s in severities])
+    return Predicted(name, severities, changes, np.zeros(N, dtype=bool))
+
+
+def test_a_severity_is_recovered():
+    found = fit(cause("a", 0), direction(0, 14.0), FLOOR_OF_ONE)
+    assert found.severity.value == pytest.approx(28.0, rel=0.05)
+    assert found.severity.low < 28.0 < found.severity.high
+
+
+def test_two_signs_have_two_sides():
+    both = Predicted(
+        "a", np.array([-40.0, 40.0]), np.array([direction(0, -20.0), direction(0, 20.0)]), np.zeros(N, bool)
+    )
+    assert fit(both, direction(0, -10.0), FLOOR_OF_ONE).severity.value == pytest.approx(-20.0, rel=0.1)
+
+
+def test_no_change_is_none():
+    fits = [fit(cause(str(i), i), np.zeros(N), FLOOR_OF_ONE) for i in range(4)]
+    assert max(evidences(np.zeros(N), FLOOR_OF_ONE, fits).items(), key=lambda one: one[1])[0] == NONE
+
+
+def test_a_change_of_its_own_is_named_and_a_strange_one_is_not():
+    fits = [fit(cause(str(i), i), direction(2, 15.0), FLOOR_OF_ONE) for i in range(4)]
+    found = shares(evidences(direction(2, 15.0), FLOOR_OF_ONE, fits))
+    assert found["2"] > 0.5
+    strange = shares(
+        evidences(direction(9, 15.0), FLOOR_OF_ONE, [fit(cause("0", 0), direction(9, 15.0), FLOOR_OF_ONE)])
+    )
+    assert strange[UNKNOWN] > 0.9
+    assert sum(found.values()) == pytest.approx(1.0)
+
+
+def test_what_cannot_be_told_says_nothing():
+    change = np.full(N, np.nan)
+    found = evidences(change, FLOOR_OF_ONE, [fit(cause("a", 0), change, FLOOR_OF_ONE)])
+    assert found["a"] == pytest.approx(found[NONE])
+    assert FLOOR_OF_ONE.size(change) == 0.0
+
+
+@given(st.floats(0.1, 30.0))
+def test_a_right_prediction_takes_all_away(size):
+    change = direction(3, size)
+    own = own_features(change, change, FLOOR_OF_ONE)
+    before, after, taken, slope = shrink(change, change, FLOOR_OF_ONE, own)
+    assert (after, taken) == (0.0, 1.0)
+    assert before == pytest.approx(size / FLOOR)
+    assert slope == pytest.approx(1.0)
+
+
+def test_a_floor_of_sound_drives_keeps_nineteen_of_twenty():
+    rows = np.random.default_rng(1).normal(2.0, 3.0, (400, N))
+    floor = DriveFloor.of_sound(rows)
+    assert np.mean([floor.size(row) > 1.0 for row in rows]) == pytest.approx(0.05, abs=0.01)
+    assert floor.scale == pytest.approx(np.full(N, 3.0), rel=0.15)
+    again = DriveFloor.from_dict(floor.to_dict())
+    assert again.size(rows[0]) == pytest.approx(floor.size(rows[0]), rel=1e-3)
+
+
+@pytest.mark.parametrize("with_reference", [True, False])
+def test_the_shipped_floors_are_whole(with_reference):
+    for part in ("whole", "half"):
+        assert np.all(load_floor(with_reference=with_reference, part=part).scale > 0.0)
+    GapCalibration.from_mapping(load_floors()["with_reference" if with_reference else "without_reference"])
