@@ -56,3 +56,20 @@ def test_a_setup_names_its_files_and_makes_the_commands_recording() -> None:
     assert recording.truth is not None
     assert recording.truth["backlash_um"] == 400.0
     assert setup.sound.effects == ()
+
+
+def test_a_crack_has_its_tooth_and_a_ripple_its_order() -> None:
+    page = opened()
+    page.sidebar.multiselect(key="effects of the drive").set_value(["root_crack", "torque_ripple"]).run()
+    page.number_input(key="tooth of root_crack of the drive").set_value(7).run()
+    assert not page.exception
+    assert page.number_input(key="order of torque_ripple of the drive").value == 6
+
+
+def test_the_laboratory_leads_to_the_drive() -> None:
+    page = AppTest.from_file(str(MAIN), default_timeout=120).run()
+    page.switch_page("pages/laboratory.py").run()
+    button = next(b for b in page.sidebar.button if b.label == "A drive that starts and stops")
+    button.click().run()
+    assert not page.exception
+    assert "Backlash" in [metric.label for metric in page.metric]

@@ -15,6 +15,7 @@ from sims.values import parameter
 Parameters = tuple[tuple[str, ParameterValue], ...]
 
 FIRST = "published_55_75"
+DRIVE_PAGE = "pages/start_stop.py"
 DURATIONS_S = (0.5, 1.0, 2.0, 4.0)
 AUTOMATIC, LONGEST_AUTOMATIC_S, WANTED_REVOLUTIONS = "auto", 1.0, 8.0
 RATES_HZ = (10240.0, 20480.0, 40960.0)
@@ -59,6 +60,14 @@ def _choose_preset() -> Preset:
         persist_state="session",
     )
     st.caption(found[name].title)
+    if st.button(
+        "A drive that starts and stops",
+        icon=":material/sync_alt:",
+        type="tertiary",
+        help="The forging manipulator has no steady speed and so a page of its own: play, friction, wear, a cracked "
+        "tooth and ripple of the torque, with the impacts of its flanks.",
+    ):
+        st.switch_page(DRIVE_PAGE)
     return found[name]
 
 

@@ -16,6 +16,11 @@ from sims.simulator import ParameterValue
 from sims.values import parameter
 
 RATES_HZ = (1000.0, 4000.0, 10000.0)
+PLACES = {
+    "root_crack": ("tooth", "Cracked tooth of the pinion", 20),
+    "torque_ripple": ("order", "Ripples per revolution", 50),
+}
+"""Effects that sit somewhere: their option, its words, its highest value."""
 Parameters = list[tuple[str, ParameterValue]]
 
 
@@ -89,7 +94,12 @@ def _choose_effect(name: str) -> EffectSetting:
     s = found.severity
     title = f"{found.title[:1].upper()}{found.title[1:]} ({s.unit})"
     severity = choose_number(title, f"severity of {name} of the drive", s.typical, min(s.high, 5.0 * s.typical))
-    return EffectSetting(name, severity)
+    if name not in PLACES:
+        return EffectSetting(name, severity)
+    option, label, highest = PLACES[name]
+    default = next(int(float(o.default or 1)) for o in found.options if o.name == option)
+    place = st.number_input(label, 1, highest, default, key=f"{option} of {name} of the drive", persist_state="session")
+    return EffectSetting(name, severity, {option: float(place)})
 
 
 def _choose_measurement(chosen: Preset) -> tuple[Parameters, float, float]:
