@@ -136,9 +136,17 @@ def matching_reference(
     here, there = _torque_nm(rig), _torque_nm(rigs[nearest])
     if here and there and abs(here / there - 1.0) > LARGEST_TORQUE_DIFFERENCE:
         return None, f"the reference at its speed has {there:.3g} N m, the recording {here:.3g} N m"
-    if set(found.channels) != set(now.channels):
-        return None, f"the reference has the channels {', '.join(found.channels)}"
-    return found, ""
+    named = _with_names_of(found, now)
+    return (named, "") if named is not None else (None, f"the reference has the channels {', '.join(found.channels)}")
+
+
+def _with_names_of(reference: Gathered, now: Gathered) -> Gathered | None:
+    """Return the reference with the recording's channels: those of equal names, or the only one of each; else None."""
+    if set(reference.channels) == set(now.channels):
+        return reference
+    if len(reference.channels) == len(now.channels) == 1:
+        return reference.with_channels(dict(zip(now.channels, reference.channels.values(), strict=True)))
+    return None
 
 
 def _distance(now: Gathered, rig: Rig, reference: Gathered, other: Rig) -> float:

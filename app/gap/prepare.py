@@ -57,6 +57,8 @@ def conditions_of(
         reference, why = matching_reference(now, rig, healthy, reference_rigs)
         if why:
             notices.append(f"{name} is compared with the simulation: {why}.")
+        if reference is not None and all(reference is not one for one in healthy):
+            notices.append(f"{name}: its only channel is taken for the reference's only one, which has another name.")
         change = compare(now, simulation, reference)
         found.append(Condition(facts, now, simulation, reference, change))
         if reference is not None:

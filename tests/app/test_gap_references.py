@@ -1,0 +1,38 @@
+"""Which reference a recording is compared with."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from app.gap.conditions import matching_reference
+from gearsig.gap.gather import gather
+from gearsig.gap.gathered import Gathered
+from tests.gap.synthetic import RIG, record
+
+
+@cache
+def run(seed: int) -> Gathered:
+    return gather(record(seed=seed), RIG)
+
+
+def named(seed: int, *names: str) -> Gathered:
+    return run(seed).with_channels(dict(zip(names, run(seed).channels.values(), strict=False)))
+
+
+def test_equal_names_are_compared_as_they_are() -> None:
+    sound = run(1)
+    assert matching_reference(run(0), RIG, [sound], [RIG]) == (sound, "")
+
+
+def test_the_only_channel_of_each_is_the_same_whatever_its_name() -> None:
+    found, why = matching_reference(named(0, "ch1"), RIG, [named(1, "a1")], [RIG])
+    assert found is not None
+    assert why == ""
+    assert tuple(found.channels) == ("ch1",)
+    assert found.channels["ch1"] is run(1).channels["a1"]
+
+
+def test_of_several_channels_with_other_names_nobody_knows_which_is_which() -> None:
+    found, why = matching_reference(named(0, "left", "right"), RIG, [run(1)], [RIG])
+    assert found is None
+    assert "a1, a2" in why
