@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from sims.simulator import Parameter, ParameterValue
 from sims.truth import truth_of
 from sims.values import Values, complete_values
 from sims.wanted import Wanted
+
+if TYPE_CHECKING:
+    from sims.forging.convergence import ForgingConvergence
 
 NAME = "forging"
 SAMPLING_RATE_RANGE_HZ = (100.0, 200000.0)
@@ -155,6 +158,22 @@ class ForgingManipulator(Model):
             duration_s=duration_s,
             truth=ready.truth(),
         )
+
+    def check_convergence(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        effects: Sequence[EffectSetting],
+        operation: Operation | None,
+        rng: np.random.Generator,
+        *,
+        preset: str = "",
+    ) -> ForgingConvergence:
+        """Tell how far shorter steps change the motion of this very drive, which nothing random enters."""
+        from sims.forging.convergence import check_convergence
+
+        del rng
+        ready = self.prepare(parameters, operation, preset_name=preset, settings=effects)
+        return check_convergence(ready.drive, ready.cycle, ready.operation.torque_nm)
 
 
 def _constant(speed_rpm: Course) -> float:
