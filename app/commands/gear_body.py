@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from app.quantities import quantity
-from gearsig.checks import one_of
+from gearsig.checks import one_of, positive
 
 
 def gear_body(
@@ -65,8 +65,15 @@ def gear_body(
     )
     blank = GearBlank(geometry, length(web, "--web"), length(rim, "--rim"), length(hub, "--hub"))
     one_of(held, "--held", ("free", "bore", "springs"))
-    across, along = quantity(radial, "N/m", "--radial"), quantity(axial, "N/m", "--axial")
-    tilting, turning = quantity(tilt, "Nm/rad", "--tilt"), quantity(twist, "Nm/rad", "--twist")
+    across, along, tilting, turning = (
+        positive(quantity(text, unit, f"--{name}"), f"--{name}", unit)
+        for name, text, unit in (
+            ("radial", radial, "N/m"),
+            ("axial", axial, "N/m"),
+            ("tilt", tilt, "Nm/rad"),
+            ("twist", twist, "Nm/rad"),
+        )
+    )
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("mesh", total=1.0)

@@ -137,7 +137,7 @@ def mesh_size_for(blank: GearBlank, n_dof: int) -> MeshSize:
     """
     wanted = count(n_dof, "n_dof", minimum=LEAST_DOF)
     if wanted > MOST_DOF:
-        raise InputError(f"n_dof is {wanted}", allowed=f"{LEAST_DOF} to {MOST_DOF}", remedy="give a MeshSize")
+        raise InputError(f"n_dof is {wanted}", allowed=f"{LEAST_DOF} to {MOST_DOF}", remedy="take fewer")
     sizes = [_size(blank, blank.geometry.module_mm * 2.5 * 0.97**k) for k in range(110)]
     sizes += [replace(size, n_up=size.n_up - 1) for size in sizes if size.n_up > _least_up(blank)]
     best = min(sizes, key=lambda size: abs(n_dof_of(blank, size) - wanted))

@@ -6,6 +6,7 @@ import pytest
 from gearsig.errors import InputError
 from sims.machine.operation import Operation
 from sims.reduced_fe.contact_mirror import mirror_groups
+from sims.reduced_fe.contact_spreading import spreading_check
 from sims.reduced_fe.dynamics_constants import constants
 from sims.reduced_fe.dynamics_linear import eigenfrequencies_hz, torsional_mode
 from sims.reduced_fe.dynamics_side import GEAR, HUB, ROTOR, kept_modes, residual_compliance
@@ -67,6 +68,29 @@ def test_torsional_mode_lies_where_the_source_has_it_with_the_stated_hub_inertia
     assert max(found) < 2730.0
     bare = pair_of(hub_inertia_driver_kg_m2=0.0, hub_inertia_driven_kg_m2=0.0)
     assert 3300.0 < torsional_mode(bare, OPERATION).frequency_hz < 3700.0
+
+
+def test_the_torsional_mode_is_that_of_two_inertias_on_the_mesh_spring():
+    """ω_n = √(k r_b² (1/J1 + 1/J2)) where hubs are heavy and supports stiff, so that the bodies are springs alone."""
+    heavy = {f"hub_inertia_{side}_kg_m2": 0.2 for side in ("driver", "driven")}
+    pair = pair_of(bending_stiffness_n_per_m=1e12, bearing_stiffness_n_per_m=1e12, **heavy)
+    k = pair.maps(np.array([170.0])).tangent_stiffness_n_per_m[:, 0]
+    rb, inertia = pair.machine.mesh.pair.driver.base_radius_mm * 1e-3, pair.machine.wheels[0].inertia_kg_m2
+    expected = np.mean(rb * np.sqrt(2.0 * k / inertia)) / (2.0 * np.pi)
+    assert torsional_mode(pair, OPERATION).frequency_hz == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.slow
+def test_patches_smooth_the_pair_that_single_nodes_make_drop(pair):
+    """The torsional mode where two pairs carry: contact at lines of nodes ripples, at patches (RBE3) it does not."""
+    check = spreading_check(pair, OPERATION, np.linspace(0.15, 0.6, 46))
+    ripple = {}
+    for spread, hertz in check.frequency_hz.items():
+        smooth = np.polyval(np.polyfit(check.mesh_cycles, hertz, 2), check.mesh_cycles)
+        ripple[spread] = np.std(hertz / smooth - 1.0)
+    assert ripple["node"] > 3.0 * ripple["patch"]
+    assert ripple["section"] < 1e-3
+    assert check.ripple["node"] > 4.0 * check.ripple["patch"]
 
 
 def test_natural_frequencies_dip_where_one_pair_carries(pair):

@@ -62,6 +62,17 @@ def test_damping_of_the_source_leaves_no_jump():
     assert sweep.jump_hz(1700.0, 2900.0) is None
 
 
+def test_relieved_tips_lose_contact_and_jump_with_the_source_damping():
+    """20 µm of tip relief, 8 % damping: the flanks part, and the sweep down keeps the great motion longer."""
+    pair = pair_of(tip_relief_um=20.0)
+    up, down = (speed_sweep(pair, 85.0, *ends, 2.0, n_parts=100) for ends in ((1900.0, 3500.0), (3500.0, 1900.0)))
+    assert min(sweep.lost_part.max() for sweep in (up, down)) > 0.2
+    jumps = [sweep.jump_hz(1700.0, 2700.0) for sweep in (up, down)]
+    assert jumps[0] is not None
+    assert jumps[1] is not None
+    assert jumps[1] < jumps[0] - 60.0
+
+
 @pytest.mark.slow
 def test_six_million_steps_have_converged():
     """Rms at 5 µs against half the step, over the whole sweep with contact loss on, both ways."""
