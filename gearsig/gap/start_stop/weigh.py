@@ -14,6 +14,8 @@ from gearsig.gap.types import NONE, UNKNOWN, Interval
 
 MODEL_ERROR = 0.25
 """Of a predicted change: another machine of the same drawing answers by that much more or less."""
+CLEAR = 1.0
+"""Floors that a change must have for its cause to be one."""
 FREE = 6.0
 """Scales by which what a cause may move is widened."""
 N_FINE = 48
@@ -85,8 +87,11 @@ class Fitted:
 
 
 def fit(cause: Predicted, change: FloatArray, floor: DriveFloor) -> Fitted:
-    """Fit a cause's severity to a change."""
+    """Fit a cause's severity to a change; what would change less than sound machines differ by is none, not a cause."""
     grid, predicted = cause.fine()
+    sizes = np.max(np.abs(predicted) / (FLOOR * floor.scale), axis=1, initial=0.0)
+    clear = sizes >= min(CLEAR, float(sizes.max(initial=0.0)))
+    grid, predicted = grid[clear], predicted[clear]
     free = np.where(cause.may_move, FREE * floor.scale, 0.0)
     logs = np.array([float(np.sum(floor.log_density(change, p, MODEL_ERROR * np.abs(p) + free))) for p in predicted])
     best = int(np.argmax(logs))
