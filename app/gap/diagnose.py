@@ -315,7 +315,7 @@ def _next(
     conditions: Sequence[Condition],
     outcome: GapOutcome,
 ) -> tuple[NextRecording, ...]:
-    if pair is None or outcome is GapOutcome.NO_GAP or any(name not in tried for name in pair):
+    if pair is None or outcome not in NAMING or any(name not in tried for name in pair):
         return ()
     first, second = pair
     return next_recordings(tried[first], tried[second], (known[first].title, known[second].title), twin, conditions)

@@ -49,5 +49,6 @@ def _what(one: Standing, rig: Rig) -> str:
         return f"envelope lines of the {PARTS[code][0]} of {bearings_text(one.finding, rig)}"
     if code == LINE:
         return "the strongest line of no known shaft or bearing"
-    gears = "no gear, " if rig.pairs else ""
-    return f"envelope lines of impacts that {gears}no shaft and no bearing explains"
+    parts = [*(["no gear"] if rig.pairs else []), "no shaft", *(["no bearing"] if rig.bearings else [])]
+    unknown = "" if rig.bearings else ", the rig file naming no bearing"
+    return f"envelope lines of impacts that {', '.join(parts[:-1])} and {parts[-1]} explains{unknown}"

@@ -95,6 +95,8 @@ def _next(report: GapReport) -> str:
         return f"Next: {first} Or {best}" if best else f"Next: {first}"
     if best:
         return f"Next: {best}"
+    if report.outcome is GapOutcome.UNKNOWN:
+        return "Next: another sensor nearer to where it is loudest, or a run-up, which tells orders from resonances."
     if report.outcome is GapOutcome.NO_GAP:
         return "Next: nothing is needed; keep these recordings, later ones are best compared with them."
     if sum(cause.shrinkage is not None for cause in report.causes) < 2:

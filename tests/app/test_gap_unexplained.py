@@ -13,6 +13,7 @@ from gearsig.checks import FloatArray
 from tests.gap.synthetic import RIG, record, ringing
 
 STRANGE = 5.148
+NO_BEARINGS = replace(RIG, bearings=())
 
 
 def knocking(_time: FloatArray, revolutions: FloatArray) -> FloatArray:
@@ -24,7 +25,8 @@ def test_impacts_at_a_strange_order_are_named_and_a_reference_that_has_them_sile
     standing, _ = stood_out(struck, RIG, [sound], [RIG], "today")
     place = standing_place(standing[0], RIG)
     assert "order 5.148" in place.title
-    assert "no gear, no shaft and no bearing" in place.title
+    assert "no gear, no shaft and no bearing explains (" in place.title
+    assert "no shaft explains, the rig file naming no bearing" in standing_place(standing[0], NO_BEARINGS).title
     assert place.orders[0] == pytest.approx(STRANGE, rel=1e-3)
     again, _ = stood_out(struck, RIG, [record(knocking, seed=2)], [RIG], "today")
     assert not again

@@ -99,3 +99,7 @@ def test_impacts_without_a_size_are_named_with_the_place_beside_them() -> None:
     assert line.startswith(f"Where: impacts at order 5.148; beside it, {mesh.title}, 8.7 structural floors")
     assert replace(report, places=(impacts,)).verdict[0] == "Where: impacts at order 5.148."
     assert "nan" not in line
+
+
+def test_next_to_an_unknown_cause_is_another_look_at_it() -> None:
+    assert "sensor nearer" in replace(unknown_report(), next_recordings=(), references=("healthy.h5",)).verdict[3]
