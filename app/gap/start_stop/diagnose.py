@@ -36,7 +36,10 @@ from gearsig.rig.types import Rig
 
 Stage = Callable[[str, float], object]
 UNCALIBRATED = "The probabilities are not calibrated yet: take them as a ranking only."
-LIKE_CYCLES = "Tooth and order count from the zero of the pinion's encoder, which must be the same in both recordings."
+LIKE_CYCLES = (
+    "Tooth and order count from the zero of the pinion's encoder, which must be the same in both recordings. In the "
+    "figures of torque and teeth the healthy reference stands for the simulation before."
+)
 FEW = 4
 """Cycles below which a hold-out says little."""
 

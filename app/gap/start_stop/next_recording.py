@@ -20,7 +20,7 @@ from gearsig.gap.types import NextRecording
 FACTORS = (0.7, 1.5)
 """Torques that are tried, over the present one."""
 ANALYTIC = ("tooth_wear", "root_crack")
-LEAST_GAIN = 1.1
+LEAST_GAIN, SAME = 1.1, 0.1
 
 
 def next_drive_recordings(
@@ -35,6 +35,8 @@ def next_drive_recordings(
     now = _distance(fits[pair[0]].predicted, fits[pair[1]].predicted, floor.scale)
     found = []
     for factor in FACTORS:
+        if not _turns(compared, factor):
+            continue
         try:
             first, second = (_change(compared, predictions, fits[name], factor) for name in pair)
             apart = _distance(first, second, floor.scale)
@@ -62,6 +64,12 @@ def _change(compared: Compared, predictions: Predictions, fitted: Fitted, factor
     )
     change = change_of(told, twin.sound, predictions.shape, compared.spot)
     return np.where(np.isin(NAMES, TRIED[name].shows_in), np.nan_to_num(change), 0.0)
+
+
+def _turns(compared: Compared, factor: float) -> bool:
+    """Whether the sound drive turns its load at another torque: what its cycles tell is then the same."""
+    now, there = compared.twin.sound.load.friction_nm, compared.twin.at_torque(factor).sound.load.friction_nm
+    return bool(abs(there - now) < SAME * now)
 
 
 def _distance(first: FloatArray, second: FloatArray, scale: FloatArray) -> float:
