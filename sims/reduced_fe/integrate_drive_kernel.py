@@ -12,7 +12,7 @@ from sims.mesh.friction_kernel import contact_friction_n
 from sims.reduced_fe.integrate_modes_kernel import on_input
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(inline="always", error_model="numpy")
 def outer_forces(k, inputs, q, v, angle, omega, rate, load, out):
     """Fill `out` with drive and load, the turning set speed, unbalance and weight, rolling elements."""
     for side in range(2):
