@@ -60,6 +60,15 @@ def test_an_effect_alone_makes_the_difference(twin):
     assert not np.array_equal(run(twin, noise=1).samples[0], sound.samples[0])
 
 
+def test_a_small_spall_in_a_bearing_knocks_as_in_the_other_model(twin):
+    """The knock's force is that of the rolling element's load, and bearing and sensor are the same in both."""
+    other = gap_simulator("cracked").twin_of(RIG)
+    for race in ("outer", "inner"):
+        spall = Added(f"bearing_{race}_race", 0.08, {"bearing": "P1"})
+        change = [np.std(run(t, (spall,)).samples[0] - run(t).samples[0]) for t in (twin, other)]
+        assert change[0] == pytest.approx(change[1], rel=0.1)
+
+
 def test_effects_of_the_model_have_candidates(twin):
     known = gap_simulator("reduced-fe").gap_effects()
     assert set(known) == set(effects())
