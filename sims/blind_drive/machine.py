@@ -148,48 +148,79 @@ def draw_drawing(rng: np.random.Generator, role: str) -> Drawing:
 def build(rng: np.random.Generator, drawing: Drawing) -> Machine:
     """Build a machine by its drawing, within its tolerances."""
     d = drawing
-
-    def about(value: float) -> float:
-        return value * rng.uniform(1.0 - TOLERANCE, 1.0 + TOLERANCE)
-
     depth = (d.tooth_force_n / d.hertz_n_per_m1p5) ** (2.0 / 3.0)
-    k0 = about(d.tooth_force_n / depth) / 0.9
-    load = about(d.load_inertia_kg_m2)
+    k0 = _about(rng, d.tooth_force_n / depth) / 0.9
+    load = _about(rng, d.load_inertia_kg_m2)
     wheel_part = rng.uniform(0.3, 0.5)
-    rb1, rb2 = d.base_radii_m
     holding = d.torque_nm * d.z2 / d.z1
-    load_level = about(0.5 * holding)
-    kt = about(6e4) * (d.torque_nm / 95.0)
-    swing = load * wheel_part * (1.0 - wheel_part)
-    kw = swing * (2.0 * pi * rng.uniform(50.0, 90.0)) ** 2
+    load_level = _about(rng, 0.5 * holding)
+    shafts = _shafts(rng, d, load * wheel_part * (1.0 - wheel_part))
     pitch_um = rng.uniform(1.0, 3.0)
     numbers = {
         **_path(d),
+        **_flanks(rng, d, k0, load, depth),
+        "j_motor": d.motor_inertia_kg_m2 * rng.uniform(0.9, 1.1),
+        "j_pinion": d.pinion_inertia_kg_m2 * rng.uniform(0.95, 1.05),
+        "j_wheel": wheel_part * load,
+        "j_load": (1.0 - wheel_part) * load,
+        **shafts,
+        **_motor(rng, d),
+        "load_level": load_level,
+        "load_viscous": 0.04 * load_level,
+        "off_centre": rng.uniform(0.0, 0.01) * holding,
+        "off_centre_phase": rng.uniform(0.0, 2.0 * pi),
+        "blow": float(rng.random() < 0.5) * 3.0 * holding,
+        "blow_delay": 0.6 * d.off_s,
+        "blow_lasts": 0.02,
+    }
+    errors = tuple(1e-6 * rng.normal(0.0, pitch_um, (2, z)) for z in (d.z1, d.z2))
+    return Machine(d, numbers, (errors[0], errors[1]))
+
+
+def _about(rng: np.random.Generator, value: float) -> float:
+    return value * rng.uniform(1.0 - TOLERANCE, 1.0 + TOLERANCE)
+
+
+def _shafts(rng: np.random.Generator, d: Drawing, swing_kg_m2: float) -> dict[str, float]:
+    """Torque sensor's shaft, and the one between wheel and gripper, on which both swing."""
+    kt = _about(rng, 6e4) * (d.torque_nm / 95.0)
+    kw = swing_kg_m2 * (2.0 * pi * rng.uniform(50.0, 90.0)) ** 2
+    return {
+        "kt": kt,
+        "ct": 0.02 * sqrt(kt * d.pinion_inertia_kg_m2),
+        "kw": kw,
+        "cw": 0.06 * sqrt(kw * swing_kg_m2),
+    }
+
+
+def _flanks(rng: np.random.Generator, d: Drawing, k0: float, load: float, depth_m: float) -> dict[str, float]:
+    """Stiffness, damping, play, relief and friction of the teeth; nothing worn, nothing cracked."""
+    rb1, rb2 = d.base_radii_m
+    per_mass = rb1**2 / d.motor_inertia_kg_m2 + rb2**2 / load
+    return {
         "phase": rng.normal(0.0, 0.01),
-        "half_play": about(d.half_backlash_um) * 1e-6,
+        "half_play": _about(rng, d.half_backlash_um) * 1e-6,
         "k0": k0,
         "k_curve": rng.uniform(0.2, 0.4),
-        "c0": 2.0 * rng.uniform(0.02, 0.06) * sqrt(k0 / (rb1**2 / d.motor_inertia_kg_m2 + rb2**2 / load)),
+        "c0": 2.0 * rng.uniform(0.02, 0.06) * sqrt(k0 / per_mass),
         "soft": 3e-6,
-        "relief": 0.8 * depth,
+        "relief": 0.8 * depth_m,
         "relief_length": 0.1,
         "wear": 0.0,
         "crack": 0.0,
         "cracked": -1.0,
-        "mu": about(d.friction_coefficient),
+        "mu": _about(rng, d.friction_coefficient),
         "mu_rise": 0.25,
         "mu_stribeck": 0.01,
         "mu_near": 1e-3,
         "run_out": rng.uniform(1e-6, 6e-6),
         "run_out_phase": rng.uniform(0.0, 2.0 * pi),
-        "j_motor": d.motor_inertia_kg_m2 * rng.uniform(0.9, 1.1),
-        "j_pinion": d.pinion_inertia_kg_m2 * rng.uniform(0.95, 1.05),
-        "j_wheel": wheel_part * load,
-        "j_load": (1.0 - wheel_part) * load,
-        "kt": kt,
-        "ct": 0.02 * sqrt(kt * d.pinion_inertia_kg_m2),
-        "kw": kw,
-        "cw": 0.06 * sqrt(kw * swing),
+    }
+
+
+def _motor(rng: np.random.Generator, d: Drawing) -> dict[str, float]:
+    """Valve, flow, brake, ripple and drag."""
+    return {
         "torque": d.torque_nm,
         "speed_limit": d.speed_limit_rpm * pi / 30.0 * rng.uniform(0.95, 1.05),
         "on": d.on_s,
@@ -203,16 +234,7 @@ def build(rng: np.random.Generator, drawing: Drawing) -> Machine:
         "ripple_phase": rng.uniform(0.0, 2.0 * pi),
         "motor_level": 0.05 * d.torque_nm,
         "motor_viscous": 0.002 * d.torque_nm,
-        "load_level": load_level,
-        "load_viscous": 0.04 * load_level,
-        "off_centre": rng.uniform(0.0, 0.01) * holding,
-        "off_centre_phase": rng.uniform(0.0, 2.0 * pi),
-        "blow": float(rng.random() < 0.5) * 3.0 * holding,
-        "blow_delay": 0.6 * d.off_s,
-        "blow_lasts": 0.02,
     }
-    errors = tuple(1e-6 * rng.normal(0.0, pitch_um, (2, z)) for z in (d.z1, d.z2))
-    return Machine(d, numbers, (errors[0], errors[1]))
 
 
 def _path(d: Drawing) -> dict[str, float]:

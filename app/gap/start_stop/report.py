@@ -16,7 +16,7 @@ from app.gap.start_stop.predict import Predictions
 from app.gap.start_stop.weighing import Seen, Weighed
 from gearsig.gap.simulator import Added, GapEffect, Point
 from gearsig.gap.start_stop.floors import FLOOR, DriveFloor
-from gearsig.gap.start_stop.told import NAMES
+from gearsig.gap.start_stop.told import NAMES, TOOTH_PART
 from gearsig.gap.start_stop.weigh import Fitted
 from gearsig.gap.types import (
     NONE,
@@ -208,8 +208,6 @@ def _extra_um(fitted: Fitted | None, compared: Compared) -> float:
     """Return how much more a cracked tooth yields at the fitted severity: from the change back to µm."""
     if fitted is None:
         return 0.0
-    from gearsig.gap.start_stop.told import TOOTH_PART
-
     step = TOOTH_PART * np.nan_to_num(compared.other.contact.deflection_um, nan=20.0)
     return float(2.0 * step * np.sinh(fitted.predicted[NAMES.index("tooth")] * np.log(10.0) / 20.0))
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.gap.start_stop.contact_part import FULL_TURN
 from gearsig.gap.start_stop.cycles import CycledMotion
 from gearsig.motion.contact_force import friction_share
 from gearsig.motion.derivatives import local_polynomial
@@ -119,7 +120,7 @@ def load_part(equation: LoadEquation | None, wanted: Mask) -> LoadPart:
         return nothing
     m = equation.motion
     turned = float(np.ptp(m.driven_angle_rad)) / (2.0 * np.pi)
-    used = [0, 1, 2, 3, 4, 5] if turned > 0.7 else [0, 1, 2, 3]
+    used = [0, 1, 2, 3, 4, 5] if turned > FULL_TURN else [0, 1, 2, 3]
     x = _robust(equation.columns[:, used], equation.response, keep)
     if not x[0] > 0.0:
         return nothing

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from gearsig.checks import FloatArray
@@ -15,33 +13,17 @@ from gearsig.gap.start_stop.told import Examined, Told
 LEAST_SAMPLES = 20
 COMPRESSION, TORQUE = "compression", "torque"
 UNITS = {COMPRESSION: "µm", TORQUE: "N·m"}
-
-
-@dataclass(frozen=True)
-class PhaseError:
-    """Root mean square of measured less predicted in one phase.
-
-    Parameters
-    ----------
-    quantity : str
-        "compression" (µm along the line of action) or "torque" (of the driver's shaft, N m).
-    phase : str
-        One of `gearsig.gap.start_stop.cycles.PHASES`.
-    flank : str
-        "drive", "back", or empty: either.
-    rms : float
-    """
-
-    quantity: str
-    phase: str
-    flank: str
-    rms: float
+MEDIAN_OF_SQUARES = 0.455
+"""Of a normal variable of variance 1: single blows do not decide."""
 
 
 def prediction_errors(examined: Examined, known: Told) -> dict[tuple[str, str, str], float]:
     """Return the root mean square error of prediction by quantity, phase and flank.
 
     Compression: q − q₀ − s(a + κ(|F|/n)^{1/λ}), a and κ those known, q₀ so that the drive flank lies right on average.
+    Keys are "compression" (µm along the line of action) or "torque" (of the driver's shaft, N m); a phase of
+    `gearsig.gap.start_stop.cycles.PHASES`; "drive", "back" or, for either, nothing.
+
     Torque: τ − J1 α1 − (r_b1/r_b2)(J2 α2 + T sgn ω2)/(1 + μ G) within 40 Hz, while the load turns.
 
     Parameters
@@ -92,5 +74,5 @@ def _by_phase(
         for number, phase in enumerate(PHASES):
             here = wanted & (examined.cycles.phase == number) & (examined.cycles.number >= 0)
             if np.sum(here) >= LEAST_SAMPLES:
-                found[quantity, phase, flank] = float(np.sqrt(np.median(left[here] ** 2) / 0.455))
+                found[quantity, phase, flank] = float(np.sqrt(np.median(left[here] ** 2) / MEDIAN_OF_SQUARES))
     return found
