@@ -12,10 +12,10 @@ from gearsig.checks import within
 from gearsig.errors import InputError
 from gearsig.recording.types import Recording
 from sims.cracked.installed_table import installed_of
-from sims.cracked.simulator import DURATION_RANGE_S, check_load, check_run
 from sims.effects import EffectSetting, completed, effects, with_effects
 from sims.machine.operation import Operation
 from sims.model import Model
+from sims.pair_limits import DURATION_RANGE_S, check_load, check_run
 from sims.presets import Preset, preset
 from sims.reduced_fe.parameters import PARAMETERS
 from sims.simulator import Parameter, ParameterValue
