@@ -10,10 +10,12 @@ R. B. Randall, *Vibration-based Condition Monitoring*, 2nd ed., 2021, chapter 2.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from app.calibration.gap.paths import PathChange
 from app.calibration.gap.scene import Scene, scene_of, tone
 from app.calibration.gap.signatures import (
     LARGEST_ADVANCE,
@@ -75,7 +77,9 @@ class Ordinary:
             ),
         )
 
-    def on(self, recording: Recording, turns: int, rng: np.random.Generator) -> Recording:
+    def on(
+        self, recording: Recording, turns: int, rng: np.random.Generator, changed_paths: Sequence[PathChange] = ()
+    ) -> Recording:
         """Return a recording as this machine makes it; noise and the phase of the hum are that day's.
 
         Parameters
@@ -84,21 +88,25 @@ class Ordinary:
         turns : int
             Of the driver, before the recording begins: what belongs to the driven shaft comes at its own place.
         rng : numpy.random.Generator
+        changed_paths : sequence of PathChange
+            One for each vibration channel; none: they are as ever.
         """
         scene = scene_of(recording)
         scene = replace(scene, revolutions=scene.revolutions + turns)
         paths, mains_hz = _paths(self.seed, scene, len(recording.channels)), _mains_hz(self.seed)
         signatures = _tolerances(scene, np.random.default_rng([self.seed, 11]))
         samples = recording.samples.copy()
-        for i in vibrations(recording):
+        for k, i in enumerate(vibrations(recording)):
             own, scale = np.random.default_rng([self.seed, 12, i]), self.scales[i]
             values = _through(samples[i], paths[i], recording.sampling_rate_hz)
             for signature in signatures:
                 values = changed(values, signature, scene, own, scale)
+            if changed_paths:
+                values = changed_paths[k].of(values, recording.sampling_rate_hz)
             values = values + log_uniform(own, *NOISE) * scale * rng.standard_normal(len(values))
-            for k in (1, 2, 3):
-                hum = np.sin(2 * np.pi * (k * mains_hz * scene.time_s + rng.uniform()))
-                values = values + log_uniform(own, *HUM) / k * scale * hum
+            for n in (1, 2, 3):
+                hum = np.sin(2 * np.pi * (n * mains_hz * scene.time_s + rng.uniform()))
+                values = values + log_uniform(own, *HUM) / n * scale * hum
             samples[i] = values
         for i, channel in enumerate(recording.channels):
             if channel.quantity == "tachometer":

@@ -18,7 +18,8 @@ import typer
 from app.calibration.gap.machines import Day, another_day, draw_machine, first_day
 from app.calibration.gap.ordinary import Ordinary, mounted_anew
 from app.calibration.gap.outside import with_foreign_vibration
-from app.calibration.gap.signatures import HAND_MADE, with_signature
+from app.calibration.gap.paths import draw_path_changes
+from app.calibration.gap.signatures import HAND_MADE, vibrations, with_signature
 from app.calibration.rigs import DrawnRig
 from app.calibration.simulate import SAMPLING_RATE_HZ, simulate_rig, turns_before
 from gearsig.checks import FloatArray
@@ -43,8 +44,8 @@ ONE_SENSOR_SHARE = 0.4
 LIGHT_LOAD_N_PER_MM = 50.0
 """Of the teeth, up to which they may part and the backlash shows."""
 
-AT_THE_END = ("clipping",)
-"""Effects of what records: made by hand only, since the machine's own path comes before."""
+AT_THE_END = ("clipping", "transfer_path")
+"""Effects of what records: made by hand only, since what a machine's tolerances do comes before."""
 
 
 @dataclass(frozen=True)
@@ -194,10 +195,12 @@ def _recordings(
     drawn: DrawnRig, twin: CrackedTwin, ordinary: Ordinary, rng: np.random.Generator
 ) -> Iterator[tuple[str, str, float, Recording, float]]:
     """Yield label, detail, severity, recording and torque of everything that is recorded of one gearbox."""
+    bare: list[Recording] = []
     sound: list[Recording] = []
     for run in range(1, N_SOUND + 1):
         day = another_day(drawn, rng)
-        sound.append(ordinary.on(_record(day, run), turns_before(drawn, run), rng))
+        bare.append(_record(day, run))
+        sound.append(ordinary.on(bare[-1], turns_before(drawn, run), rng))
         yield NONE, "", 0.0, sound[-1], drawn.torque_nm * day.torque_factor
     for i in range(N_MOUNTED_ANEW):
         yield NONE, "mounted anew", 0.0, mounted_anew(sound[i % N_SOUND], rng), drawn.torque_nm
@@ -207,6 +210,9 @@ def _recordings(
     for i, name in enumerate(made_by_hand(sound[0], drawn.torque_nm)):
         recording, strength = with_signature(sound[i % N_SOUND], name, rng)
         yield name, "by hand", strength, recording, drawn.torque_nm
+    for i in range(N_BY_HAND):
+        recording, strength = _with_changed_path(ordinary, bare[i % N_SOUND], turns_before(drawn, i % N_SOUND + 1), rng)
+        yield "transfer_path", "by hand", strength, recording, drawn.torque_nm
     for run, name in enumerate((e for e in effects() if e not in AT_THE_END), start=N_SOUND + 1):
         day = another_day(drawn, rng)
         try:
@@ -218,6 +224,16 @@ def _recordings(
             continue
         detail = ", ".join(f"{k}={v}" for k, v in setting.options.items())
         yield name, detail, setting.severity, recording, drawn.torque_nm * day.torque_factor
+
+
+def _with_changed_path(
+    ordinary: Ordinary, bare: Recording, turns: int, rng: np.random.Generator
+) -> tuple[Recording, float]:
+    """Return a recording that came through other paths, and how much other, 0 to 1."""
+    strength = float(rng.uniform())
+    size = 10.0 ** (1.6 * (strength - 1.0))
+    paths = draw_path_changes(len(vibrations(bare)), size, bare.sampling_rate_hz, rng)
+    return ordinary.on(bare, turns, rng, paths), strength
 
 
 def made_by_hand(sound: Recording, torque_nm: float) -> tuple[str, ...]:
