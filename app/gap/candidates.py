@@ -13,12 +13,11 @@ from app.gap.bank_runs import Run
 from app.gap.conditions import LEAST_BLOCKS, SEED, Condition, compare, halves, observed
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.gap.families import UNFORETOLD
+from gearsig.gap.families import UNFORETOLD, shown_in
 from gearsig.gap.features import once as feature_values
-from gearsig.gap.population import load_population
-from gearsig.gap.prediction import EffectPath, Fit, Observed, fit_effect, paths_of
+from gearsig.gap.prediction import LEVELS_DB, EffectPath, Fit, Observed, fit_effect, paths_of
 from gearsig.gap.shrinkage import Fold, shrinkage
-from gearsig.gap.simulator import Twin
+from gearsig.gap.simulator import CanBeQuiet, GapEffect, Twin
 from gearsig.gap.transplant import transplanted
 from gearsig.gap.types import Shrinkage
 from gearsig.gap.which_shaft import told_options
@@ -49,7 +48,7 @@ class Tried:
 
 
 def try_effects(
-    names: Sequence[str],
+    effects: Sequence[GapEffect],
     twin: Twin,
     conditions: Sequence[Condition],
     cache: Path | None,
@@ -61,8 +60,9 @@ def try_effects(
 
     Effects that the rig cannot have, for it lacks a bearing, say, are left out.
     """
-    if not names:
+    if not effects:
         return {}
+    names = [effect.name for effect in effects]
     folds, held_out = folds_of(conditions)
     where = " and ".join(c.facts.name for c in conditions)
     banks = banks_of(
@@ -77,8 +77,9 @@ def try_effects(
     everything = [observed(c, k, n_compared(conditions)) for k, c in enumerate(conditions)]
     changes = [condition.over_floors for condition in conditions]
     found = {}
-    for name in names:
-        paths = _paths([at[name] for at in banks], conditions)
+    for effect in effects:
+        name = effect.name
+        paths = _paths([at[name] for at in banks], conditions, effect.shows_in)
         if paths:
             fit = fit_effect(on_shaft(paths, told_options(name, changes, conditions[0].now.frame.teeth)), everything)
             found[name] = Tried(name, paths, fit, shrinkage(paths, folds, held_out))
@@ -96,56 +97,68 @@ def n_compared(conditions: Sequence[Condition]) -> int:
 
 
 def _run(twin: Twin, condition: Condition) -> Run:
-    return Run(twin, condition.facts.point, float(f"{condition.run_s:.3g}"), condition.facts.sampling_rate_hz, noise=1)
+    """Return where an effect is simulated: without noise, if the twin can, in which what it adds would drown.
+
+    The machine's own baseline is put under it, see `_distances`.
+    """
+    still = twin.quiet() if isinstance(twin, CanBeQuiet) else twin
+    return Run(still, condition.facts.point, float(f"{condition.run_s:.3g}"), condition.facts.sampling_rate_hz, noise=1)
 
 
-def _paths(banks: Sequence[Bank], conditions: Sequence[Condition]) -> tuple[EffectPath, ...]:
+def _paths(banks: Sequence[Bank], conditions: Sequence[Condition], shows_in: tuple[str, ...]) -> tuple[EffectPath, ...]:
     """Return an effect's paths over the candidates that could be simulated at every condition."""
     n = n_compared(conditions)
     kept = [a for a in banks[0].added if all(a in bank.added for bank in banks)]
     tables = [
-        np.array([_distances(bank, bank.added.index(a), condition)[:n] for a in kept]).reshape(len(kept), n)
+        np.array([_distances(bank, bank.added.index(a), condition, shows_in)[:, :n] for a in kept])
+        .reshape(len(kept), len(LEVELS_DB), n)
+        .swapaxes(0, 1)
         for bank, condition in zip(banks, conditions, strict=True)
     ]
-    return paths_of(banks[0].change_names[:n], kept, tables)
+    return paths_of(banks[0].change_names[:n], kept, tables, LEVELS_DB)
 
 
-def _distances(bank: Bank, row: int, condition: Condition) -> FloatArray:
-    """Return what a candidate would change: on the sound machine's own baseline, where a reference shows it."""
-    n = len(bank.feature_names)
+def _distances(bank: Bank, row: int, condition: Condition, shows_in: tuple[str, ...]) -> FloatArray:
+    """Return what a candidate would change on the sound machine's own baseline, one row for each level.
+
+    Nothing where theory does not expect it: a simulation changes more, and that is its own.
+
+    The reference shows the baseline; without one it is as far from the twin's as sound machines usually are.
+    """
+    floor, names = condition.floor, bank.feature_names
     change: FloatArray = bank.changes[row].mean(axis=0)
-    change[:n] -= bank.sound_changes.mean(axis=0)[:n]  # a mere second run changes something, too
-    if condition.reference is None:
-        alone: FloatArray = change[:n]
-        return alone
-    floor = load_population().reference_floor
-    centres = -floor.from_centre(floor.names, np.zeros(len(floor.names)))
-    usual = dict(zip(floor.names, centres.tolist(), strict=True))
-    simulated = dict(zip(bank.feature_names, bank.sound.mean(axis=0).tolist(), strict=True))
-    real = dict(zip(*feature_values(condition.reference), strict=True))
-    return transplanted(bank.change_names, change, simulated, real, usual)
+    change[: len(names)] -= bank.sound_changes.mean(axis=0)[: len(names)]  # a mere second run changes something, too
+    usual = dict(zip(floor.names, (-floor.from_centre(floor.names, np.zeros(len(floor.names)))).tolist(), strict=True))
+    simulated = dict(zip(names, bank.sound.mean(axis=0).tolist(), strict=True))
+    if condition.reference is not None:
+        compared, real = bank.change_names, dict(zip(*feature_values(condition.reference), strict=True))
+    else:
+        compared, real = names, {name: value + usual[name] for name, value in simulated.items()}
+    given = change[: len(compared)]
+    rows = np.array([transplanted(compared, given, simulated, real, usual, level) for level in LEVELS_DB])
+    return np.where(shown_in(compared, shows_in), rows, 0.0)
 
 
 def folds_of(conditions: Sequence[Condition]) -> tuple[list[Fold], str]:
-    """Return what to fit to and what to score on: each condition in turn, or both halves of the only one."""
+    """Return what to fit to and what to score on: half of the revolutions at a condition, and all but that half."""
     n = n_compared(conditions)
-    if len(conditions) > 1:
-        all_of_them = [observed(c, k, n) for k, c in enumerate(conditions)]
-        return [
-            Fold(
-                tuple(o for o in all_of_them if o is not one), one, _again(conditions[one.condition], one.condition, n)
-            )
-            for one in all_of_them
-        ], OTHER_POINT
-    only = conditions[0]
-    if only.now.n_blocks < LEAST_BLOCKS:
-        whole = observed(only, 0, n)
-        return [Fold((whole,), whole, _again(only, 0, n))], SAME_REVOLUTIONS
-    parts = halves(only.now)
-    changes = [compare(part, only.simulated, only.reference) for part in parts]
-    first, second = (observed(only, 0, n, change) for change in changes)
-    again = _again(only, 0, n)
-    return [Fold((first,), second, again), Fold((second,), first, again)], OTHER_REVOLUTIONS
+    whole = [observed(c, k, n) for k, c in enumerate(conditions)]
+    found = []
+    for k, condition in enumerate(conditions):
+        others, again = [one for one in whole if one.condition != k], _again(condition, k, n)
+        if condition.now.n_blocks < LEAST_BLOCKS:
+            found.append(Fold((*others, *(() if others else (whole[k],))), whole[k], again))
+            continue
+        changes = [compare(part, condition.simulated, condition.reference) for part in halves(condition.now)]
+        first, second = (observed(condition, k, n, change) for change in changes)
+        found += [Fold((*others, first), second, again), Fold((*others, second), first, again)]
+    return found, _held_out(conditions)
+
+
+def _held_out(conditions: Sequence[Condition]) -> str:
+    if all(c.now.n_blocks >= LEAST_BLOCKS for c in conditions):
+        return OTHER_REVOLUTIONS
+    return OTHER_POINT if len(conditions) > 1 else SAME_REVOLUTIONS
 
 
 def _again(condition: Condition, index: int, n: int) -> tuple[tuple[Observed, ...], ...]:

@@ -99,7 +99,7 @@ def weigh(
     heard_of = _known_to_forests(conditions)
     own = [name for name in effects or known if name not in heard_of] if most_tried else []
     likely += own
-    tried = try_effects(likely, twin, conditions, cache, on_progress, fresh=fresh)
+    tried = try_effects([known[name] for name in likely], twin, conditions, cache, on_progress, fresh=fresh)
     refuse_without_candidates(tried, likely)
     return Weighed(forest, tried, with_reference, tuple(own))
 

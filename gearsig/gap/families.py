@@ -36,6 +36,50 @@ _OF_A_SHAFT = {
 }
 
 
+_ALL_ROUND = ("level", "elsewhere")
+"""Features of a shaft's pattern that speak of all its orders and not of one tooth."""
+
+_KINDS = {
+    "mesh_harmonics": (PlaceKind.MESH,),
+    "mesh_sidebands": (PlaceKind.SIDEBANDS,),
+    "shaft_orders": (PlaceKind.SHAFT,),
+    "tooth_window": (PlaceKind.TOOTH,),
+    "envelope_orders": (PlaceKind.ENVELOPE,),
+    "broadband": (PlaceKind.BAND,),
+    "resonances": (PlaceKind.BAND, PlaceKind.MESH),
+    "amplitude_tail": (PlaceKind.TAIL,),
+    "speed": (PlaceKind.SPEED,),
+}
+"""What an effect says it shows in (`gearsig.gap.simulator.GapEffect.shows_in`), as kinds of places."""
+
+
+def shown_in(names: Sequence[str], shows_in: Sequence[str]) -> np.ndarray:
+    """Return which features are of the kinds that an effect says it shows in; all, if it says none that is known.
+
+    Parameters
+    ----------
+    names : sequence of str
+    shows_in : sequence of str
+        See `gearsig.gap.simulator.GapEffect.shows_in`.
+
+    Returns
+    -------
+    array of bool, (n,)
+    """
+    kinds = {kind for shown in shows_in for kind in _KINDS.get(shown, ())}
+    found = np.array([_is_shown(name, kinds, shows_in) for name in names], dtype=np.bool_)
+    return found if found.any() else np.ones(len(names), dtype=np.bool_)
+
+
+def _is_shown(name: str, kinds: set[PlaceKind], shows_in: Sequence[str]) -> bool:
+    kind = family_of(name)[0]
+    if name == "hum":
+        return "mains_lines" in shows_in
+    if kind is PlaceKind.TOOTH and "shaft_orders" in shows_in and name.rpartition(".")[2] in _ALL_ROUND:
+        return True
+    return kind in kinds
+
+
 def family_of(name: str) -> Family:
     """Return the family of a feature.
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
@@ -27,6 +28,11 @@ INTERVAL_COST = 2.71
 
 FLOOR_IN_DEVIATIONS = 1.96
 """A floor holds 19 of 20: so many standard deviations."""
+
+LEVELS_DB = tuple(float(level) for level in range(-30, 31, 5))
+LEVEL_SCATTER_DB = 10.0
+"""By how much louder than on the twin what an effect adds may be on the real machine, whose path from gears and shafts
+to the sensor nobody knows; and its standard deviation, for each operating condition."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +70,12 @@ class EffectPath:
     options : mapping
     severities : array, (k,)
         Rising, above 0.
-    distances : tuple of arrays, (k, n)
-        dB from the sound simulation; one per condition.
+    distances : tuple of arrays, (n_levels, k, n)
+        dB from the sound machine; one per condition.
     names : tuple of str
         Of the n features.
+    levels_db : tuple of float
+        See `LEVELS_DB`.
     """
 
     name: str
@@ -75,17 +83,20 @@ class EffectPath:
     severities: FloatArray
     distances: tuple[FloatArray, ...]
     names: tuple[str, ...]
+    levels_db: tuple[float, ...] = (0.0,)
 
-    def at(self, severity: float, condition: int) -> FloatArray:
-        """Return the predicted distances: straight over ln s between simulations, and proportional to s below."""
+    def at(self, severities: FloatArray, condition: int) -> FloatArray:
+        """Return the predicted distances, (n_levels, n_severities, n).
+
+        Straight over ln s between simulations, and proportional to s below them.
+        """
         table = self.distances[condition]
-        if severity <= self.severities[0]:
-            low: FloatArray = table[0] * severity / self.severities[0]
-            return low
-        place = np.interp(np.log(severity), np.log(self.severities), np.arange(len(table)))
-        i = min(int(place), len(table) - 2)
-        between: FloatArray = table[i] + (place - i) * (table[i + 1] - table[i]) if len(table) > 1 else table[0]
-        return between
+        place = np.interp(np.log(severities), np.log(self.severities), np.arange(len(self.severities)))
+        first = np.minimum(place.astype(np.intp), max(len(self.severities) - 2, 0))
+        second = np.minimum(first + 1, len(self.severities) - 1)
+        between = table[:, first] + (place - first)[:, None] * (table[:, second] - table[:, first])
+        found: FloatArray = between * np.minimum(severities / self.severities[0], 1.0)[:, None]
+        return found
 
     def tried(self) -> FloatArray:
         """Return the severities that a fit looks at."""
@@ -101,12 +112,15 @@ class Fit:
     path : EffectPath
     severity : Interval
     cost : float
-        Mean squared distance between observed and predicted, in standard deviations.
+        The least: squared distances between observed and predicted, in standard deviations.
+    levels : mapping
+        Condition → which of the path's levels.
     """
 
     path: EffectPath
     severity: Interval
     cost: float
+    levels: Mapping[int, int]
 
     @property
     def added(self) -> Added:
@@ -114,12 +128,21 @@ class Fit:
         return Added(self.path.name, float(f"{self.severity.value:.4g}"), dict(self.path.options))
 
     def at(self, condition: int) -> FloatArray:
-        """Return the predicted distances."""
-        return self.path.at(self.severity.value, condition)
+        """Return the predicted distances; at a condition that it was not fitted to, at the level of the others."""
+        level = self.levels.get(condition, round(float(np.median(list(self.levels.values())))))
+        found: FloatArray = self.path.at(np.array([self.severity.value]), condition)[level, 0]
+        return found
+
+    def level_db(self, condition: int) -> float:
+        """Return by how much louder than on the twin the effect is."""
+        return self.path.levels_db[self.levels[condition]]
 
 
 def paths_of(
-    names: tuple[str, ...], candidates: Sequence[Added], distances: Sequence[FloatArray]
+    names: tuple[str, ...],
+    candidates: Sequence[Added],
+    distances: Sequence[FloatArray],
+    levels_db: tuple[float, ...] = (0.0,),
 ) -> tuple[EffectPath, ...]:
     """Return the paths that an effect's candidates make: one for each set of options.
 
@@ -128,8 +151,9 @@ def paths_of(
     names : tuple of str
         Of the features.
     candidates : sequence of Added
-    distances : sequence of arrays, (n_candidates, n)
+    distances : sequence of arrays, (n_levels, n_candidates, n)
         One per condition.
+    levels_db : tuple of float
     """
     groups: dict[tuple[tuple[str, float | str], ...], list[int]] = {}
     for i, added in enumerate(candidates):
@@ -140,7 +164,12 @@ def paths_of(
         severities = np.array([candidates[i].severity for i in order])
         found.append(
             EffectPath(
-                candidates[rows[0]].name, dict(options), severities, tuple(table[order] for table in distances), names
+                candidates[rows[0]].name,
+                dict(options),
+                severities,
+                tuple(table[:, order] for table in distances),
+                names,
+                levels_db,
             )
         )
     return tuple(found)
@@ -161,16 +190,25 @@ def fit_effect(paths: Iterable[EffectPath], observed: Sequence[Observed]) -> Fit
 
 
 def fit_path(path: EffectPath, observed: Sequence[Observed]) -> Fit:
-    """Return the severity with the least cost, with the interval in which the cost rises little.
+    """Return the likely severity, with the interval in which the cost rises little.
+
+    s = exp(Σ w_i ln s_i/Σ w_i), w = exp(−(cost − least)/2): where many fit alike, the least cost is one of them by
+    chance.
+
+    How loud the effect is beside the twin's is fitted at each condition, within what paths differ by: two sensors of
+    one gearbox show one unbalance 20 dB apart, and so do two speeds. What an effect changes, and which part of it more
+    than another, is the simulation's.
 
     The interval ends at the severities that were simulated, though a larger one may fit as well.
     """
     coarse = path.tried()
-    low, high = _near_the_best(coarse, _costs(path, coarse, observed))
+    low, high = _near_the_best(coarse, _costs(path, coarse, observed)[0])
     tried = np.geomspace(low, high, STEPS)
-    costs = _costs(path, tried, observed)
-    best = int(np.argmin(costs))
-    return Fit(path, Interval(float(tried[best]), *_near_the_best(tried, costs)), float(costs[best]))
+    costs, levels = _costs(path, tried, observed)
+    likelihood = np.exp(-0.5 * (costs - costs.min()))
+    best = round(float(likelihood @ np.arange(len(tried)) / likelihood.sum()))  # they are even in ln s
+    fitted = {one.condition: int(row[best]) for one, row in zip(observed, levels, strict=True)}
+    return Fit(path, Interval(float(tried[best]), *_near_the_best(tried, costs)), float(costs.min()), fitted)
 
 
 def _near_the_best(tried: FloatArray, costs: FloatArray) -> tuple[float, float]:
@@ -179,25 +217,42 @@ def _near_the_best(tried: FloatArray, costs: FloatArray) -> tuple[float, float]:
     return float(tried[max(near[0] - 1, 0)]), float(tried[min(near[-1] + 1, len(tried) - 1)])
 
 
-def _costs(path: EffectPath, severities: FloatArray, observed: Sequence[Observed]) -> FloatArray:
-    return np.array([_cost(path, severity, observed) for severity in severities])
+def _costs(
+    path: EffectPath, severities: FloatArray, observed: Sequence[Observed]
+) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Return the costs, mean over conditions, (n_severities,), and the best levels, (n_conditions, n_severities).
+
+    Σ over families of the mean squared distance, and the squared level over its standard deviation.
+    """
+    weights = _family_weights(path.names)
+    unusual = (np.array(path.levels_db) / LEVEL_SCATTER_DB) ** 2
+    costs, levels = [], []
+    for one in observed:
+        left = one.distances - path.at(severities, one.condition)
+        each = _squares(left, one.floors) @ weights + unusual[:, None]
+        levels.append(each.argmin(axis=0))
+        costs.append(each.min(axis=0))
+    return np.mean(costs, axis=0), np.array(levels)
 
 
-def _cost(path: EffectPath, severity: float, observed: Sequence[Observed]) -> float:
-    """Sum over families of the mean squared distance, mean over conditions."""
-    return float(
-        np.mean([family_square(path.names, one.distances - path.at(severity, one.condition), one) for one in observed])
-    )
+def _squares(left: FloatArray, floors: FloatArray) -> FloatArray:
+    """Return min(|u|, 6)², u = left/floor, in standard deviations."""
+    squares: FloatArray = (np.minimum(np.abs(left / floors), LARGEST_DISTANCE) * FLOOR_IN_DEVIATIONS) ** 2
+    return squares
 
 
-def family_square(
-    names: tuple[str, ...], left: FloatArray, observed: Observed, used: FloatArray | None = None
-) -> float:
-    """Return Σ_f mean_{i∈f} min(|u_i|, 6)², u = left/floor in standard deviations; `used` is 1 for what counts."""
-    squares = (np.minimum(np.abs(left / observed.floors), LARGEST_DISTANCE) * FLOOR_IN_DEVIATIONS) ** 2
-    total = 0.0
+def _family_weights(names: tuple[str, ...]) -> FloatArray:
+    """Return what makes a sum over features one over families of their means."""
+    weights = np.zeros(len(names))
     for rows in family_members(names).values():
-        weights = np.ones(len(rows)) if used is None else used[rows]
-        if weights.sum() > 0:
-            total += float(weights @ squares[rows] / weights.sum())
+        weights[rows] = 1.0 / len(rows)
+    return weights
+
+
+def family_square(names: tuple[str, ...], left: FloatArray, observed: Observed, used: FloatArray) -> float:
+    """Return Σ_f mean_{i∈f} min(|u_i|, 6)², u = left/floor in standard deviations; `used` is 1 for what counts."""
+    squares, total = _squares(left, observed.floors), 0.0
+    for rows in family_members(names).values():
+        if used[rows].sum() > 0:
+            total += float(used[rows] @ squares[rows] / used[rows].sum())
     return total

@@ -11,6 +11,9 @@ from gearsig.checks import FloatArray
 from gearsig.gap.prediction import FLOOR_IN_DEVIATIONS, EffectPath, Fit, Observed, family_square, fit_effect, fit_path
 from gearsig.gap.types import Interval, Shrinkage
 
+ALIKE = 0.8
+"""Cosine of the angle between two predictions, in floors, from which they say the same."""
+
 OWN_FROM = 1.5
 """Floors that an effect must change a feature by for it to be its own."""
 
@@ -56,7 +59,7 @@ def shrinkage(paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str)
     """
     scores = [_score(paths, fold) for fold in folds]
     before, after, shrink, slope, placebo = np.mean([s[:5] for s in scores], axis=0)
-    wide = _t_quantile(folds) * np.sqrt(np.mean([s[5] for s in scores], axis=0))
+    wide = _t_quantile(folds) * np.sqrt(np.mean([s[6] for s in scores], axis=0))
     return Shrinkage(
         _interval(before, wide[0], 0.0, np.inf),
         _interval(after, wide[1], 0.0, np.inf),
@@ -64,7 +67,7 @@ def shrinkage(paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str)
         float(slope),
         float(placebo),
         held_out,
-        n_placebos=max(len(paths) - 1, 0),
+        n_placebos=max(s[5] for s in scores),
     )
 
 
@@ -80,17 +83,28 @@ def _t_quantile(folds: Sequence[Fold]) -> float:
     return float(stdtrit(max(n_blocks - 1, 1), 0.95))
 
 
-def _score(paths: Sequence[EffectPath], fold: Fold) -> tuple[float, float, float, float, float, FloatArray]:
+def _score(paths: Sequence[EffectPath], fold: Fold) -> tuple[float, float, float, float, float, int, FloatArray]:
+    """Return before, after, shrink, slope, the best placebo's shrink, the number of placebos, and variances."""
     fit = fit_effect(paths, fold.fitted)
     used = own_features(fit, fold.scored)
     before, after, shrink = _before_and_after(fit, fold.scored, used)
     wrong = [fit_path(path, fold.fitted) for path in paths if path.options != fit.path.options]
-    placebos = [_before_and_after(other, fold.scored, used)[2] for other in wrong]
+    placebos = [
+        _before_and_after(other, fold.scored, used)[2] for other in wrong if not _is_alike(fit, other, fold.scored)
+    ]
     variance = np.zeros(3)
     for group in fold.again:
         rows = np.array([_before_and_after(fit, one, used) for one in group])
         variance += (len(rows) - 1.0) * rows.var(axis=0)
-    return before, after, shrink, _slope(fit, fold.scored, used), max(placebos, default=0.0), variance
+    slope = _slope(fit, fold.scored, used)
+    return before, after, shrink, slope, max(placebos, default=0.0), len(placebos), variance
+
+
+def _is_alike(fit: Fit, other: Fit, scored: Observed) -> bool:
+    """Whether two places foretell the same: bearings of one type on one shaft do, and are no placebos of each other."""
+    a, b = (one.at(scored.condition) / scored.floors for one in (fit, other))
+    product = float(np.sqrt((a @ a) * (b @ b)))
+    return product > 0.0 and float(a @ b) > ALIKE * product
 
 
 def _before_and_after(fit: Fit, scored: Observed, used: FloatArray) -> tuple[float, float, float]:

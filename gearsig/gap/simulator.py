@@ -99,6 +99,15 @@ class Twin(Protocol):
 
 
 @runtime_checkable
+class CanBeQuiet(Protocol):
+    """A twin that can also run where nothing but the machine vibrates."""
+
+    def quiet(self) -> Twin:
+        """Return the machine without the noise of its surroundings."""
+        ...
+
+
+@runtime_checkable
 class HasFurtherPlaces(Protocol):
     """A twin that can also be measured where its rig has no sensor."""
 

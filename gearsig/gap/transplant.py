@@ -19,7 +19,7 @@ _RELATIVE = (
 """Powers over that of the mesh, or of its harmonic."""
 
 _ABSOLUTE = (*(f"shaft.{side}.{n}" for side in SIDES for n in (1, 2, 3)), "floor.total")
-_BANDS = "floor.band."
+_BANDS, _KURTOSIS = "floor.band.", "floor.kurtosis."
 _EXCESSES = ("envelope.", "line.")
 _NO_EXCESS = ("envelope.depth",)
 _OF_A_PATTERN = ("prominence", "second", "kurtosis", "width", "below_mesh", "centroid")
@@ -31,6 +31,7 @@ def transplanted(
     simulated: Mapping[str, float],
     real: Mapping[str, float],
     usual: Mapping[str, float],
+    level_db: float = 0.0,
 ) -> FloatArray:
     """Return the changes that a simulated effect makes on the real machine's own baseline.
 
@@ -48,6 +49,8 @@ def transplanted(
         Feature → value of the sound twin and of the sound machine.
     usual : mapping
         `change.…` → what mere repetition gives.
+    level_db : float
+        By which everything the effect adds is louder on the real machine than on the twin: its path is another.
 
     Returns
     -------
@@ -60,15 +63,19 @@ def transplanted(
     floor_db = real["floor.total"] - simulated["floor.total"] - gain_db
     for name in names:
         if name in _RELATIVE:
-            found[name] = _added(given[name], simulated[name], real[name], 0.0)
+            found[name] = _added(given[name], simulated[name], real[name], level_db)
         elif name in _ABSOLUTE or name.startswith(_BANDS):
-            found[name] = _added(given[name], simulated[name], real[name], gain_db)
+            found[name] = _added(given[name], simulated[name], real[name], gain_db + level_db)
         elif name.startswith(_EXCESSES) and name not in _NO_EXCESS:
-            found[name] = _added(given[name], simulated[name], real[name], -floor_db)
+            found[name] = _added(given[name], simulated[name], real[name], level_db - floor_db)
+    for name in names:
+        if name.startswith(_KURTOSIS):
+            part = _part(found[name.replace(_KURTOSIS, _BANDS)])
+            found[name] = part * (simulated[name] + given[name] - real[name])
     for side in SIDES:
         found |= _tooth(f"tooth.{side}", found, given, simulated, real)
         if f"change.{side}.level" in given:
-            found |= _pattern(f"change.{side}", given, usual, real[f"tooth.{side}.level"])
+            found |= _pattern(f"change.{side}", given, usual, real[f"tooth.{side}.level"], level_db)
     return np.array([found[name] for name in names])
 
 
@@ -84,6 +91,11 @@ def _added(change_db: float, simulated_db: float, real_db: float, gain_db: float
     return float(10.0 * np.log10(1.0 + more / _power(real_db)))
 
 
+def _part(change_db: float) -> float:
+    """Return which part of the power is the effect's, if that raised it by so many decibels."""
+    return 1.0 - 1.0 / _power(change_db) if change_db > 0.0 else 0.0
+
+
 def _tooth(
     name: str,
     found: Mapping[str, float],
@@ -93,7 +105,7 @@ def _tooth(
 ) -> dict[str, float]:
     """Return the shape of a shaft's pattern where the effect's own is added to what the real teeth are born with."""
     peak, elsewhere = found[f"{name}.peak"], found[f"{name}.elsewhere"]
-    part = 1.0 - 1.0 / _power(found[f"{name}.level"]) if found[f"{name}.level"] > 0 else 0.0
+    part = _part(found[f"{name}.level"])
     shapes = {
         f"{name}.{what}": part * (simulated[f"{name}.{what}"] + given[f"{name}.{what}"] - real[f"{name}.{what}"])
         for what in ("kurtosis", "width", "below_mesh", "centroid")
@@ -103,16 +115,18 @@ def _tooth(
     return {f"{name}.prominence": peak - elsewhere, f"{name}.second": second, **shapes}
 
 
-def _pattern(name: str, given: Mapping[str, float], usual: Mapping[str, float], own_db: float) -> dict[str, float]:
+def _pattern(
+    name: str, given: Mapping[str, float], usual: Mapping[str, float], own_db: float, level_db: float
+) -> dict[str, float]:
     """Return how far the pattern of the difference lies from what mere repetition gives."""
     found = {}
     for what in ("level", "elsewhere", "peak"):
         key = f"{name}.{what}"
-        found[key] = float(10.0 * np.log10(1.0 + _power(given[key]) / _power(usual[key])))
-    part = 1.0 - 1.0 / _power(found[f"{name}.level"])
+        found[key] = float(10.0 * np.log10(1.0 + _power(given[key] + level_db) / _power(usual[key])))
+    part = _part(found[f"{name}.level"])
     for what in _OF_A_PATTERN:
         key = f"{name}.{what}"
         found[key] = part * (given[key] - usual[key])
-    agreement = (1.0 + _power(given[f"{name}.level"] - own_db)) ** -0.5
+    agreement = (1.0 + _power(given[f"{name}.level"] + level_db - own_db)) ** -0.5
     found[f"{name}.agreement"] = 10.0 * (agreement - 1.0)
     return found

@@ -31,7 +31,7 @@ from sims.mesh.crack import deepest_crack_mm
 
 Options = dict[str, OptionValue]
 GEARS = ("driver", "driven")
-RIPPLE_ORDERS = (2.0, 4.0, 6.0)
+RIPPLE_ORDERS = (1.0, 2.0, 3.0, 4.0, 6.0)
 PATH_HZ = (1200.0, 3500.0)
 _JITTER = 0.01
 

@@ -54,17 +54,20 @@ class CrackedTwin:
     nominal : Nominal
     further : tuple of SensorSeat
         Sensors beside the rig's own.
+    is_quiet : bool
+        Without the vibration of the surroundings.
     """
 
     rig: Rig
     nominal: Nominal
     further: tuple[SensorSeat, ...] = ()
+    is_quiet: bool = False
 
     @property
     def key(self) -> str:
         """Model, state of its code, and what is known of the rig."""
         known = {name: value for name, value in rig_to_dict(self.rig).items() if name not in ("name", "sources")}
-        told = repr(known) + (repr(self.further) if self.further else "")
+        told = repr(known) + (repr(self.further) if self.further else "") + ("quiet" if self.is_quiet else "")
         return f"{self.model} {sources_digest()} {sha256(told.encode()).hexdigest()[:16]}"
 
     @property
@@ -109,6 +112,10 @@ class CrackedTwin:
         recording = replace(recording, truth={**(recording.truth or {}), "seed": seed, "noise": noise})
         return replace(recording, samples=recording.samples[:, skipped:]) if skipped else recording
 
+    def quiet(self) -> CrackedTwin:
+        """Return the machine where nothing else vibrates: what an effect adds is not lost in noise."""
+        return replace(self, is_quiet=True)
+
     def candidates(self, name: str) -> Sequence[Added]:
         """Return settings of an effect worth a try, from barely noticeable to strong, for each option that matters."""
         found = []
@@ -140,6 +147,8 @@ class CrackedTwin:
         """Return the specimen `seed` with its effects as a preset."""
         drawn = np.random.default_rng([seed, 1])
         values = usual_parameters(self.nominal) | specimen_parameters(self.nominal, drawn)
+        if self.is_quiet:
+            values["noise_mps2"] = 0.0
         used = [str(a.options["bearing"]) for a in added if "bearing" in a.options]
         installed = installed_of_rig(self.rig, self.nominal.size, usual_housing(drawn), used)
         installed = replace(installed, sensors=(*installed.sensors, *self.further))

@@ -16,9 +16,9 @@ NAMES = (*(f"change.driver.{what}" for what in ("level", "peak", "prominence", "
 
 def told(predicted: list[float], observed: list[float]) -> tuple[Evidence, ...]:
     table: FloatArray = np.array([predicted])
-    path = EffectPath("root_crack", {}, np.array([1.0]), (table,), NAMES)
+    path = EffectPath("root_crack", {}, np.array([1.0]), (table[None],), NAMES)
     seen = Observed(0, np.array(observed), np.ones(len(NAMES)))
-    return evidence_of(Fit(path, Interval(1.0, 1.0, 1.0), 0.0), [seen], gear_frame(RIG))
+    return evidence_of(Fit(path, Interval(1.0, 1.0, 1.0), 0.0, {0: 0}), [seen], gear_frame(RIG))
 
 
 def test_a_burst_is_told_by_more_than_one_of_its_figures() -> None:
