@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,6 +133,13 @@ class Fit:
         found: FloatArray = self.path.at(np.array([self.severity.value]), condition)[level, 0]
         return found
 
+    def at_level_of(self, one: Observed) -> Fit:
+        """Return the fit with the level that suits another condition best; severity and options stay."""
+        predicted = self.path.at(np.array([self.severity.value]), one.condition)[:, 0]
+        costs = _squares(one.distances - predicted, one.floors) @ _family_weights(self.path.names)
+        level = int(np.argmin(costs + _unusual(self.path)))
+        return replace(self, levels={**self.levels, one.condition: level})
+
     def level_db(self, condition: int) -> float:
         """Return by how much louder than on the twin the effect is."""
         return self.path.levels_db[self.levels[condition]]
@@ -225,14 +232,19 @@ def _costs(
     Σ over families of the mean squared distance, and the squared level over its standard deviation.
     """
     weights = _family_weights(path.names)
-    unusual = (np.array(path.levels_db) / LEVEL_SCATTER_DB) ** 2
     costs, levels = [], []
     for one in observed:
         left = one.distances - path.at(severities, one.condition)
-        each = _squares(left, one.floors) @ weights + unusual[:, None]
+        each = _squares(left, one.floors) @ weights + _unusual(path)[:, None]
         levels.append(each.argmin(axis=0))
         costs.append(each.min(axis=0))
     return np.mean(costs, axis=0), np.array(levels)
+
+
+def _unusual(path: EffectPath) -> FloatArray:
+    """Return the levels' squares in standard deviations."""
+    squares: FloatArray = (np.array(path.levels_db) / LEVEL_SCATTER_DB) ** 2
+    return squares
 
 
 def _squares(left: FloatArray, floors: FloatArray) -> FloatArray:

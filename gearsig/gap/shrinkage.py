@@ -68,7 +68,28 @@ def shrinkage(paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str)
         float(placebo),
         held_out,
         n_placebos=max(s[5] for s in scores),
+        elsewhere=_mean([_elsewhere(paths, fold) for fold in folds]),
     )
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
+
+
+def _elsewhere(paths: Sequence[EffectPath], fold: Fold) -> float | None:
+    """Return the shrink where severity and options come from the other conditions alone; None if there is none.
+
+    The level comes from the condition's own other revolutions: no other condition knows the path at this speed.
+    """
+    others = [one for one in fold.fitted if one.condition != fold.scored.condition]
+    if not others:
+        return None
+    fit = fit_effect(paths, others)
+    for one in fold.fitted:
+        if one.condition == fold.scored.condition:
+            fit = fit.at_level_of(one)
+    return _before_and_after(fit, fold.scored, own_features(fit, fold.scored))[2]
 
 
 def _interval(value: float, wide: float, least: float, most: float) -> Interval:

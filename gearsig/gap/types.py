@@ -111,6 +111,9 @@ class Shrinkage:
         What it was scored on: "another operating condition" or "other revolutions of the same recordings".
     n_placebos : int
         Wrong places that were tried.
+    elsewhere : float or None
+        The shrink at operating conditions of which nothing but the level was fitted, severity and place being those of
+        the others; None with one condition.
     """
 
     before: Interval
@@ -120,6 +123,7 @@ class Shrinkage:
     placebo: float
     held_out: str
     n_placebos: int = 1
+    elsewhere: float | None = None
 
 
 @dataclass(frozen=True)

@@ -121,6 +121,7 @@ def _shrinkage(shrinkage: Shrinkage) -> Json:
         "shrink": _interval(shrinkage.shrink, "1"),
         "slope": rounded(shrinkage.slope),
         "placebo_shrink": rounded(shrinkage.placebo),
+        "shrink_elsewhere": None if shrinkage.elsewhere is None else rounded(shrinkage.elsewhere),
         **members(shrinkage, "held_out", "n_placebos"),
     }
 

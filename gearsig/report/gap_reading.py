@@ -157,7 +157,11 @@ def _added(found: Json) -> Added:
 def _shrinkage(found: Json) -> Shrinkage:
     before, after, shrink = (_interval(found[key]) for key in ("before", "after", "shrink"))
     slope, placebo = _number(found["slope"]), _number(found["placebo_shrink"])
-    return Shrinkage(before, after, shrink, slope, placebo, found["held_out"], found.get("n_placebos", 1))
+    elsewhere = found.get("shrink_elsewhere")
+    return Shrinkage(
+        *(before, after, shrink, slope, placebo, found["held_out"], found.get("n_placebos", 1)),
+        None if elsewhere is None else _number(elsewhere),
+    )
 
 
 def _evidence(found: Json) -> Evidence:

@@ -213,14 +213,21 @@ def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
     placebo = f"takes away at most {percent(wrong)}" if wrong >= LEAST_SHOWN else "takes away nothing"
     if not shrinkage.n_placebos:
         placebo = "could not be tried, as the machine has no other place for it"
+    elsewhere = shrinkage.elsewhere
     return (
         f"Gap on its own features: {before} structural floors without it, {after} with it.",
         f"It takes away nothing: with it the gap grows, {checked}."
         if shrink.value < 0.0
         else f"It takes away {taken} ({low} to {high}) of what exceeds the floor, {checked}.",
+        *(() if elsewhere is None else (_elsewhere_statement(elsewhere),)),
         f"In a wrong place (placebo) it {placebo}.",
         f"The observed change is {readable(shrinkage.slope, 2)} times the predicted one; 1 is right.",
     )
+
+
+def _elsewhere_statement(shrink: float) -> str:
+    taken = f"it takes away {percent(shrink)}" if shrink >= LEAST_SHOWN else "it takes away nothing"
+    return f"At an operating condition of which only its level was fitted {taken}."
 
 
 def _evidence_row(one: Evidence) -> EvidenceRow:

@@ -157,3 +157,17 @@ def test_two_places_that_foretell_the_same_are_no_placebos() -> None:
     first, twin = path(bearing="bearing 1"), path(1.1 * SHAPE, bearing="bearing 2")
     truth = seen(foretold(first, 2.0))
     assert shrinkage([first, twin], [Fold((truth,), truth)], "").n_placebos == 0
+
+
+def test_a_severity_from_one_condition_is_tried_at_the_other() -> None:
+    """The level may differ; what the effect changes may not."""
+    effect = louder(n_conditions=2)
+    first = seen(foretold(effect, 2.0, 0, level=1))
+    second = seen(foretold(effect, 2.0, 1, level=2), 1)
+    other_features = seen(foretold(effect, 2.0, 1, level=2)[::-1], 1)
+    right, wrong = (shrinkage([effect], [Fold((first, one), one)], "") for one in (second, other_features))
+    assert right.elsewhere is not None
+    assert wrong.elsewhere is not None
+    assert right.elsewhere > 0.9
+    assert wrong.elsewhere < 0.3
+    assert shrinkage([effect], [Fold((first,), first)], "").elsewhere is None
