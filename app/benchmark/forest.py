@@ -8,9 +8,10 @@ from gearsig.gap.types import GapReport
 
 
 def diagnose(seen: Seen) -> GapReport:
-    """Return the calibrated probabilities of the forests, and what may be said of them."""
+    """Return the calibrated probabilities of the forests, what may be said of them, and the shaft that shows it."""
     from app.gap.prepare import conditions_of
     from app.gap.weigh import weigh
+    from gearsig.gap.which_shaft import told_options
     from sims.registry import gap_simulator
 
     simulator = gap_simulator("cracked")
@@ -20,4 +21,6 @@ def diagnose(seen: Seen) -> GapReport:
     )
     weighed = weigh(conditions, simulator.gap_effects(), (), twin, None, lambda *_: None, most_tried=0)
     probabilities = weighed.probabilities()
-    return bare_report("forest", probabilities, outcome=weighed.calibration.outcome(probabilities))
+    changes, teeth = [condition.over_floors for condition in conditions], conditions[0].now.frame.teeth
+    shafts = {name: told_options(name, changes, teeth) for name in probabilities}
+    return bare_report("forest", probabilities, shafts, weighed.calibration.outcome(probabilities))
