@@ -89,7 +89,7 @@ def _without_spurious(times_s: FloatArray) -> tuple[FloatArray, list[int]]:
             break
         d = np.diff(t)
         trend = local_trend(d)
-        drop = [_spurious_end(t, trend, k) for k in _shortest_of_each_group(d / trend)]
+        drop = [_spurious_end(t, trend, k) for k in _shortest_of_each_group(d / np.minimum(trend, _of_neighbours(d)))]
         found = sorted({k for k in drop if k is not None})
         if not found:
             break
@@ -135,7 +135,7 @@ def _numbered(t: FloatArray, spurious_s: FloatArray) -> PulseCount:
     pauses: list[float] = []
     gaps: list[float] = []
     trend = local_trend(d) if len(d) >= 3 else d
-    for k in np.flatnonzero(d > _LONG * trend):
+    for k in np.flatnonzero((d > _LONG * trend) & (d > _LONG * _of_neighbours(d))):
         if _slows_down_around(d, int(k)):
             pauses.append(float(t[k]))
             continue
@@ -151,6 +151,17 @@ def _numbered(t: FloatArray, spurious_s: FloatArray) -> PulseCount:
     return PulseCount(
         t, counts, np.asarray(spurious_s), *(np.asarray(list_, dtype=float) for list_ in (missed, pauses, gaps))
     )
+
+
+def _of_neighbours(d: FloatArray) -> FloatArray:
+    """Return the median of the three intervals on either side of each.
+
+    Where speed swings from one revolution to the next a trend at the ends of the train extrapolates the swing.
+    """
+    padded = np.pad(d, 3, constant_values=np.nan)
+    around = np.stack([padded[i : i + len(d)] for i in (0, 1, 2, 4, 5, 6)])
+    medians: FloatArray = np.nanmedian(around, axis=0)
+    return medians
 
 
 def _slows_down_around(d: FloatArray, k: int) -> bool:

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.angle.clock import clock_tick
+from gearsig.angle.pulse_faults import count_pulses
 from gearsig.angle.pulse_train import pulse_train_angle
 from gearsig.errors import InputError, RefusalError
 
@@ -165,3 +166,11 @@ def test_measured_run_up_and_run_down() -> None:
     assert angle.speed_rev_per_s.argmax() not in (0, len(t) - 1)
     assert angle.speed_rev_per_s[0] < 6
     assert angle.speed_rev_per_s[-1] < 4
+
+
+@pytest.mark.parametrize("n", [58, 59])
+def test_a_speed_that_swings_from_one_revolution_to_the_next_is_no_fault_of_the_pulses(n: int) -> None:
+    """Lightly loaded drives do: intervals of 97 and 75 ms in turn, at the ends as within."""
+    t = np.concatenate([[0.0], np.cumsum(np.tile([0.0974, 0.0753], n)[:n])])
+    counted = count_pulses(t)
+    assert counted.n_missed == len(counted.spurious_s) == len(counted.open_gaps_s) == 0
