@@ -37,15 +37,12 @@ def conditions_of(
     Raises
     ------
     RefusalError
-        If a speed cannot be known or there are too few revolutions.
+        If a speed cannot be known or there are too few revolutions: in a recording, or in every reference.
     """
     found: list[Condition] = []
-    healthy: list[Gathered] = []
     notices: list[str] = []
     called = reference_names or [f"reference {i + 1}" for i in range(len(references))]
-    for recording, rig, name in zip(references, reference_rigs, called, strict=True):
-        healthy.append(_gathered(recording, rig, name, notices))
-        notices += strange_teeth(healthy[-1], name)
+    healthy, healthy_rigs = _references(references, reference_rigs, called, notices)
     for i, (recording, rig) in enumerate(zip(recordings, rigs, strict=True)):
         name = names[i] if names else f"recording {i + 1}"
         tell(f"simulating the sound machine at the point of {name}", 0.05 + 0.15 * i / len(recordings))
@@ -54,7 +51,7 @@ def conditions_of(
         facts = facts_of(recording, rig, now, name, twin)
         notices += _assumed(recording, rig, facts)
         simulation = simulated(twin, facts, now)
-        reference, why = matching_reference(now, rig, healthy, reference_rigs)
+        reference, why = matching_reference(now, rig, healthy, healthy_rigs)
         if why:
             notices.append(f"{name} is compared with the simulation: {why}.")
         if reference is not None and all(reference is not one for one in healthy):
@@ -67,6 +64,25 @@ def conditions_of(
     if not references:
         notices.append("No healthy reference: a recording of the same rig when it was sound would make it much surer.")
     return found, notices
+
+
+def _references(
+    references: Sequence[Recording], rigs: Sequence[Rig], names: Sequence[str], notices: list[str]
+) -> tuple[list[Gathered], list[Rig]]:
+    """Reduce the references; one of several that cannot be read is left out, and said."""
+    healthy: list[Gathered] = []
+    kept: list[Rig] = []
+    for recording, rig, name in zip(references, rigs, names, strict=True):
+        try:
+            healthy.append(_gathered(recording, rig, name, notices))
+        except RefusalError as refusal:
+            if not healthy and recording is references[-1]:
+                raise
+            notices.append(f"{refusal.reason}; this reference is left out.")
+            continue
+        kept.append(rig)
+        notices += strange_teeth(healthy[-1], name)
+    return healthy, kept
 
 
 def _gathered(recording: Recording, rig: Rig, name: str, notices: list[str]) -> Gathered:

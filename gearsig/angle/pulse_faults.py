@@ -158,6 +158,8 @@ def _of_neighbours(d: FloatArray) -> FloatArray:
 
     Where speed swings from one revolution to the next a trend at the ends of the train extrapolates the swing.
     """
+    if len(d) < 2:
+        return d
     padded = np.pad(d, 3, constant_values=np.nan)
     around = np.stack([padded[i : i + len(d)] for i in (0, 1, 2, 4, 5, 6)])
     medians: FloatArray = np.nanmedian(around, axis=0)

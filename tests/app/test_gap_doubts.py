@@ -72,6 +72,17 @@ def test_a_refusal_names_the_recording_that_is_too_short() -> None:
         conditions_of([short], [rig()], [], [], twin, ["today"], nothing)
 
 
+def test_one_of_several_references_that_cannot_be_read_is_left_out() -> None:
+    whole = recording(0, 1)
+    short = replace(whole, samples=whole.samples[:, :4000])
+    twin = gap_simulator("cracked").twin_of(rig())
+    (condition,), notices = conditions_of(
+        [whole], [rig()], [short, whole], [rig(), rig()], twin, ["now"], nothing, ["the short one", "the long one"]
+    )
+    assert condition.reference is not None
+    assert any(n.startswith("the short one") and n.endswith("this reference is left out.") for n in notices)
+
+
 def test_a_dead_channel_is_left_out_and_nothing_but_dead_ones_is_refused() -> None:
     twin, whole = gap_simulator("cracked").twin_of(rig()), recording(0, 1)
     first, *_ = whole.vibration_names()
