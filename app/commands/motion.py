@@ -41,12 +41,15 @@ def open_motion(
     bandwidth: str | None,
     unwrap: bool,
 ) -> tuple[Recording, PairMotion]:
-    """Read a recording and the motion of its pair, as the options say."""
+    """Read a recording and the motion of its pair, as the options say; a machine that only stands is refused."""
     from gearsig.motion.measure import measure_motion
+    from gearsig.motion.start_stop import check_turns
 
     roles, band = read_uses(use), read_bandwidth(bandwidth)
     opened = open_recording(recording, machine, fs)
-    return opened, measure_motion(opened, machine, use=roles, bandwidth_hz=band, unwrap=unwrap)
+    motion = measure_motion(opened, machine, use=roles, bandwidth_hz=band, unwrap=unwrap)
+    check_turns(motion)
+    return opened, motion
 
 
 def read_uses(texts: Sequence[str] | None) -> dict[str, str]:

@@ -64,7 +64,7 @@ def estimate_backlash(motion: PairMotion) -> BacklashEstimate:
     Raises
     ------
     RefusalError
-        If only one flank was loaded: there was no reversal.
+        If only one flank was loaded, as there was no reversal; or neither, as the machine stood.
 
     Notes
     -----
@@ -94,6 +94,11 @@ def _fitted(motion: PairMotion, design: FloatArray, loaded: NDArray[np.bool_]) -
         if np.array_equal(again, keep):
             break
         keep = again
+    if not x[1] > 0.0:
+        raise RefusalError(
+            f"the flanks come out {2e6 * float(x[1]):.3g} µm apart: torque does not tell which of them carries",
+            remedy="record a start and a braked stop: both flanks must carry",
+        )
     inverse = np.linalg.pinv(design[keep].T @ design[keep])
     deviation = float(np.sqrt(np.mean(left[keep] ** 2) * inverse[1, 1] * dependence(left[keep])))
     stiffness = float(x[2]) ** -motion.contact.exponent if x[2] > 0.0 else float("nan")

@@ -19,6 +19,9 @@ from gearsig.motion.tooth_compliance import ToothCompliance, tooth_compliance
 from gearsig.motion.types import PairMotion
 from gearsig.phase.types import PhasePortrait
 
+LEAST_PITCHES = 0.02
+"""Of the driver's teeth: a machine that turns by less than that beyond its play stands."""
+
 
 @dataclass(frozen=True)
 class StartStop:
@@ -56,7 +59,13 @@ def examine_start_stop(motion: PairMotion) -> StartStop:
     """Find stretches, backlash, impacts, the loop of torque over twist and the phase plane of a pair's motion.
 
     What the record does not allow is left out and said in `refusals`.
+
+    Raises
+    ------
+    RefusalError
+        If the machine stands all the time: its stop is longer than the record.
     """
+    check_turns(motion)
     course = course_of_angle(motion.driver_angle_rad, motion.sampling_rate_hz)
     refusals: list[str] = []
     backlash: BacklashEstimate | None = None
@@ -85,6 +94,26 @@ def examine_start_stop(motion: PairMotion) -> StartStop:
             refusals.append(f"stiffness of single teeth: {refusal}")
     indicators = start_stop_indicators(motion, course, backlash, impacts, loop)
     return StartStop(motion, course, backlash, impacts, loop, portrait, teeth, indicators, tuple(refusals))
+
+
+def check_turns(motion: PairMotion) -> None:
+    """Refuse a record in which the driver turns by less than its play and a fiftieth of a tooth pitch.
+
+    Raises
+    ------
+    RefusalError
+        If the machine stands.
+    """
+    turned = float(np.ptp(motion.driver_angle_rad))
+    play = 2e-6 * motion.contact.half_backlash_um / motion.path.base_radii_m[0]
+    least = play + 2.0 * np.pi / motion.path.teeth[0] * LEAST_PITCHES
+    if turned < least:
+        duration_s, where = len(motion.driver_angle_rad) / motion.sampling_rate_hz, motion.source or "the recording"
+        raise RefusalError(
+            f"{where}: the driver turns by {1e3 * turned:.3g} mrad in {duration_s:.4g} s, against a "
+            f"play of {1e3 * play:.3g} mrad: the machine stands, its stop is longer than the record",
+            remedy="record a start and a braked stop",
+        )
 
 
 def course_of_angle(angle_rad: FloatArray, sampling_rate_hz: float) -> Course:

@@ -128,3 +128,14 @@ def test_a_rig_whose_encoder_is_missing_has_a_remedy(capsys: pytest.CaptureFixtu
     assert "there is no channel 'pinion angle'" in err
     assert "--speed-rpm" in err
     assert "--speed-rpm" in options_of(capsys, "analyze")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_stop_longer_than_the_record_is_refused(
+    capsys: pytest.CaptureFixture[str], folder: Path, command: str
+) -> None:
+    """Cut out between the stop and the press blow: the flanks lie in the play, and nothing can be told."""
+    write_recording(replace(RECORDING, samples=RECORDING.samples[:, 1200:1900]), folder / "rest.h5")
+    err = refused(capsys, folder, command, "rest.h5")
+    assert "its stop is longer than the record" in err
+    assert "record a start and a braked stop" in err

@@ -119,7 +119,7 @@ def contact_part(flanks: Flanks, wanted: Mask) -> ContactPart:
     others = [c for c in range(1, flanks.design.shape[1]) if c != 1 or has_torque]
     columns = [levels, flanks.design[:, others]] + ([(~drive)[:, None].astype(np.float64)] if has_back else [])
     design = np.concatenate(columns, axis=1)
-    x, keep = _robust(design, q, keep)
+    x, keep = _robust(design, q, keep, drive)
     left = q - design @ x
     of = dict(zip(others, x[len(places) : len(places) + len(others)], strict=True))
     middle = float(np.mean(x[: len(places)]))
@@ -161,8 +161,12 @@ def _by_place(m: PairMotion) -> tuple[FloatArray, Mask, FloatArray]:
     return side, loaded, np.zeros(len(q))
 
 
-def _robust(design: FloatArray, q: FloatArray, keep: Mask) -> tuple[FloatArray, Mask]:
-    """Least squares without samples far off: blows, slipped counts."""
+def _robust(design: FloatArray, q: FloatArray, keep: Mask, drive: Mask) -> tuple[FloatArray, Mask]:
+    """Least squares without samples far off: blows, slipped counts.
+
+    Far off is said by the scatter of a sample's own flank: the back flank knocks while the drive flank runs smoothly,
+    and without noise all of it would lie far off.
+    """
     wanted = keep
     size = np.sqrt(np.mean(design[keep] ** 2, axis=0)) + 1e-30
     scaled, least = design / size, 1e-12 * np.eye(design.shape[1])
@@ -170,7 +174,11 @@ def _robust(design: FloatArray, q: FloatArray, keep: Mask) -> tuple[FloatArray, 
         a = scaled[keep]
         x: FloatArray = np.linalg.solve(a.T @ a / len(a) + least, a.T @ q[keep] / len(a)) / size
         left = np.abs(q - design @ x)
-        again = wanted & (left < FAR * (1.4826 * float(np.median(left[keep])) + 1e-12))
+        limits = [
+            FAR * (1.4826 * float(np.median(left[keep & f] if np.any(keep & f) else 0.0)) + 1e-12)
+            for f in (drive, ~drive)
+        ]
+        again = wanted & (left < np.where(drive, *limits))
         if np.array_equal(again, keep) or np.sum(again) < 4 * len(x):
             break
         keep = again

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import RefusalError
+from gearsig.gap.start_stop.contact_part import _robust
 from gearsig.gap.start_stop.cycles import PHASES, cut_cycles, halves, thin
 from gearsig.gap.start_stop.prediction_error import prediction_errors
 from gearsig.gap.start_stop.told import NAMES, Examined, Spot, change_of, spot_of
@@ -50,6 +51,15 @@ def test_a_recording_has_its_cycles_and_phases():
     assert halves(cycles) == ((0, 2), (1, 3))
     running = cycles.motion.driver_speed_rad_s[cycles.phase == PHASES.index("run")]
     assert np.median(running) > 0.8 * np.max(cycles.motion.driver_speed_rad_s)
+
+
+def test_knocks_of_the_back_flank_are_not_all_left_out_where_the_drive_flank_scatters_by_nanometres():
+    rng = np.random.default_rng(0)
+    drive = np.arange(400) < 360
+    levels = np.where(drive, 150e-6, -150e-6) + np.where(drive, 1e-9, 5e-6) * rng.standard_normal(400)
+    found, keep = _robust(np.stack([drive, ~drive], axis=1).astype(float), levels, np.ones(400, dtype=bool), drive)
+    assert np.sum(keep & ~drive) > 30
+    assert found == pytest.approx([150e-6, -150e-6], abs=3e-6)
 
 
 def test_what_goes_on_turning_is_refused():
