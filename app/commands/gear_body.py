@@ -8,7 +8,11 @@ from typing import Annotated
 import typer
 
 from app.quantities import quantity
-from gearsig.checks import one_of, positive
+from gearsig.checks import FloatArray, one_of, positive
+from gearsig.errors import InputError
+
+SPRINGS = {"radial": "2e8N/m", "axial": "1e8N/m", "tilt": "1e5Nm/rad", "twist": "4e4Nm/rad"}
+"""That hold the hub unless others are given."""
 
 
 def gear_body(
@@ -28,12 +32,12 @@ def gear_body(
     held: Annotated[
         str, typer.Option("--held", help="free, bore or springs: how the gear is held for its modes.")
     ] = "free",
-    radial: Annotated[
-        str, typer.Option("--radial", metavar="STIFFNESS", help="Springs at the hub, across.")
-    ] = "2e8N/m",
-    axial: Annotated[str, typer.Option("--axial", metavar="STIFFNESS", help="Along the shaft.")] = "1e8N/m",
-    tilt: Annotated[str, typer.Option("--tilt", metavar="STIFFNESS", help="Against tilting.")] = "1e5Nm/rad",
-    twist: Annotated[str, typer.Option("--twist", metavar="STIFFNESS", help="About the shaft.")] = "4e4Nm/rad",
+    radial: Annotated[str, typer.Option("--radial", metavar="STIFFNESS", help="Springs at the hub, across.")] = SPRINGS[
+        "radial"
+    ],
+    axial: Annotated[str, typer.Option("--axial", metavar="STIFFNESS", help="Along the shaft.")] = SPRINGS["axial"],
+    tilt: Annotated[str, typer.Option("--tilt", metavar="STIFFNESS", help="Against tilting.")] = SPRINGS["tilt"],
+    twist: Annotated[str, typer.Option("--twist", metavar="STIFFNESS", help="About the shaft.")] = SPRINGS["twist"],
     force: Annotated[str, typer.Option("--force", metavar="FORCE", help="On one tooth, for the stress.")] = "1000N",
     reduce: Annotated[bool, typer.Option("--reduce", help="Also reduce the gear, with its errors.")] = False,
     vtk: Annotated[bool, typer.Option("--vtk", help="Also write gear.vtu for other programs.")] = False,
@@ -42,7 +46,6 @@ def gear_body(
 
     Example: gearsig gear-body --teeth 50 --module 3mm --web 12mm --reduce -o gear
     """
-    import numpy as np
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -65,15 +68,7 @@ def gear_body(
     )
     blank = GearBlank(geometry, length(web, "--web"), length(rim, "--rim"), length(hub, "--hub"))
     one_of(held, "--held", ("free", "bore", "springs"))
-    across, along, tilting, turning = (
-        positive(quantity(text, unit, f"--{name}"), f"--{name}", unit)
-        for name, text, unit in (
-            ("radial", radial, "N/m"),
-            ("axial", axial, "N/m"),
-            ("tilt", tilt, "Nm/rad"),
-            ("twist", twist, "Nm/rad"),
-        )
-    )
+    springs = _springs(held, {"radial": radial, "axial": axial, "tilt": tilt, "twist": twist})
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("mesh", total=1.0)
@@ -82,7 +77,7 @@ def gear_body(
             dof,
             n_modes=modes,
             held="bore" if held == "bore" else "free",
-            springs=np.array([across, across, along, tilting, tilting, turning]) if held == "springs" else None,
+            springs=springs,
             force_n=quantity(force, "N", "--force"),
             reduce=reduce,
             on_progress=lambda what, done: progress.update(task, description=what, completed=done),
@@ -90,3 +85,19 @@ def gear_body(
         paths = write_study(study, output, vtk=vtk)
     typer.echo("\n".join(lines(study)))
     typer.echo(f"{output}: {', '.join(path.name for path in paths)}")
+
+
+def _springs(held: str, given: dict[str, str]) -> FloatArray | None:
+    """Stiffness in the six directions of the hub; None where it is not on springs."""
+    import numpy as np
+
+    if held != "springs":
+        for name, text in given.items():
+            if text != SPRINGS[name]:
+                raise InputError(f"--{name} is given, but --held is {held!r}", remedy="add --held springs")
+        return None
+    units = {"radial": "N/m", "axial": "N/m", "tilt": "Nm/rad", "twist": "Nm/rad"}
+    radial, axial, tilt, twist = (
+        positive(quantity(given[name], unit, f"--{name}"), f"--{name}", unit) for name, unit in units.items()
+    )
+    return np.array([radial, radial, axial, tilt, tilt, twist])

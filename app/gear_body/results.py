@@ -73,7 +73,7 @@ def lines(study: GearBodyStudy) -> list[str]:
     """Return what was found as text."""
     q = study.quality
     text = [
-        f"{study.mesh.n_dof} degrees of freedom; {study.mesh.size}",
+        f"{study.mesh.n_dof} degrees of freedom; {_cells(study)}",
         f"mass {q.mass_kg:.4g} kg ({1e6 * (q.volume_m3 / q.true_volume_m3 - 1.0):+.0f} ppm of the outline's)",
         f"polar inertia {q.polar_inertia_kg_m2:.4g} kg m², least scaled Jacobian {q.scaled_jacobian.min():.2f}",
         f"tooth compliance in mid-flank {study.load.push_m / study.load.force_n:.3g} m/N, bore held",
@@ -98,6 +98,12 @@ def lines(study: GearBodyStudy) -> list[str]:
             f"{100.0 * a.worst_error:.4f} %, least subspace MAC {a.least_mac:.6f}"
         )
     return text
+
+
+def _cells(study: GearBodyStudy) -> str:
+    size = study.mesh.size
+    kind = "27-node hexahedra" if size.order == 2 else "8-node hexahedra with incompatible modes"
+    return f"{kind}: {size.n_across} over a tooth's thickness, {size.n_up} up its flank, {size.n_along} along the face"
 
 
 def _label(study: GearBodyStudy, k: int) -> str:

@@ -7,15 +7,16 @@ from dataclasses import dataclass
 
 from gearsig.checks import FloatArray
 from sims.reduced_fe.blank import GearBlank
-from sims.reduced_fe.craig_bampton import CraigBamptonGear, CraigBamptonPlan, craig_bampton
+from sims.reduced_fe.craig_bampton import N_COMPARED, CraigBamptonGear, CraigBamptonPlan, craig_bampton
 from sims.reduced_fe.cyclic import CyclicGear, Held
 from sims.reduced_fe.cyclic_modes import CyclicModes, cyclic_modes
 from sims.reduced_fe.discretisation import FINER_DOF, DiscretisationError, discretisation_error
-from sims.reduced_fe.memory import check_memory, sector_bytes
+from sims.reduced_fe.gear_cache import cached_gear
+from sims.reduced_fe.memory import check_memory, craig_bampton_bytes, sector_bytes
 from sims.reduced_fe.mesh_quality import MeshQuality, mesh_quality
 from sims.reduced_fe.mesh_size import mesh_size_for
 from sims.reduced_fe.one_thread import one_thread
-from sims.reduced_fe.reduce import ReductionPlan, reduce_gear
+from sims.reduced_fe.reduce import ReductionPlan
 from sims.reduced_fe.reduced_gear import ReducedGear
 from sims.reduced_fe.sector_mesh import SectorMesh, sector_mesh
 from sims.reduced_fe.tooth_load import ToothLoad, load_tooth
@@ -84,13 +85,13 @@ def study_gear(
     force_n : float
         On the tooth.
     reduce : bool
-        Also reduce the gear both ways.
+        Also reduce the gear both ways. The free-interface reduction is kept where the model `reduced-fe` finds it.
     on_progress : callable
         Told what is done and how much, 0 to 1.
     """
     on_progress("mesh", 0.0)
     size = mesh_size_for(blank, n_dof)
-    check_memory(sector_bytes(blank, size))
+    check_memory(craig_bampton_bytes(blank, size, N_COMPARED) if reduce else sector_bytes(blank, size))
     mesh = sector_mesh(blank, size)
     gear = CyclicGear(mesh, springs)
     on_progress("modes", 0.05)
@@ -106,7 +107,7 @@ def study_gear(
     reduced = both = None
     if reduce:
         on_progress("free-interface reduction", 0.35)
-        reduced = reduce_gear(blank, ReductionPlan(size))
+        reduced = cached_gear(blank, ReductionPlan(size))
         on_progress("Craig–Bampton reduction", 0.7)
         both = craig_bampton(mesh, CraigBamptonPlan(n_slices=min(N_SLICES, mesh.tooth.shape[2])))
     on_progress("done", 1.0)

@@ -18,6 +18,9 @@ from sims.reduced_fe.sector_mesh import SectorMesh
 from sims.reduced_fe.sector_plane import IntArray
 from sims.reduced_fe.selected_masters import N_HUB, Masters, contact_masters, motion_at, phased_rows, with_auxiliary
 
+N_COMPARED = 20
+"""Elastic modes in the table of errors."""
+
 
 @dataclass(frozen=True)
 class CraigBamptonPlan:
@@ -114,7 +117,9 @@ class _Targets(NamedTuple):
         return squares
 
 
-def craig_bampton(mesh: SectorMesh, plan: CraigBamptonPlan | None = None, n_compared: int = 20) -> CraigBamptonGear:
+def craig_bampton(
+    mesh: SectorMesh, plan: CraigBamptonPlan | None = None, n_compared: int = N_COMPARED
+) -> CraigBamptonGear:
     """Reduce a gear to masters and fixed-interface modes, and compare its first elastic modes with the full model.
 
     u = Ψ u_m + Y η;  Ψ: static answers to unit motions of the masters, Y: modes with the masters held.

@@ -84,7 +84,8 @@ def check_fillet(blank: GearBlank, size: MeshSize) -> None:
         raise InputError(
             f"the mesh is too coarse for the fillet: its edges lie up to {error:.3g} mm off it",
             allowed=f"at most {most:.3g} mm",
-            remedy=f"take more cells than n_up = {size.n_up} and n_gap = {size.n_gap}",
+            remedy=f"ask for more degrees of freedom (cells: more than n_up = {size.n_up}, n_gap = {size.n_gap}), or a "
+            "rounder tool",
         )
 
 
@@ -139,7 +140,7 @@ def mesh_size_for(blank: GearBlank, n_dof: int) -> MeshSize:
     if wanted > MOST_DOF:
         raise InputError(f"n_dof is {wanted}", allowed=f"{LEAST_DOF} to {MOST_DOF}", remedy="take fewer")
     sizes = [_size(blank, blank.geometry.module_mm * 2.5 * 0.97**k) for k in range(110)]
-    sizes += [replace(size, n_up=size.n_up - 1) for size in sizes if size.n_up > _least_up(blank)]
+    sizes += [replace(size, n_up=size.n_up - 1) for size in sizes if size.n_up > _least_cells(blank)[1]]
     best = min(sizes, key=lambda size: abs(n_dof_of(blank, size) - wanted))
     if n_dof_of(blank, best) > 1.2 * wanted:
         best = min(COARSE, key=lambda size: abs(n_dof_of(blank, size) - wanted))
@@ -153,20 +154,22 @@ def mesh_size_for(blank: GearBlank, n_dof: int) -> MeshSize:
 
 
 @lru_cache(maxsize=16)
-def _least_up(blank: GearBlank) -> int:
-    """Fewest rows of the tooth that follow the fillet."""
-    most = MOST_OUTLINE_ERROR * blank.geometry.module_mm
-    return next((n for n in range(1, 12) if outline_error_mm(blank.geometry, 4, n) <= most), 12)
+def _least_cells(blank: GearBlank) -> tuple[int, int]:
+    """Fewest cells in the gap, and rows of the tooth, that follow the fillet."""
+    g, most = blank.geometry, MOST_OUTLINE_ERROR * blank.geometry.module_mm
+    gap = next((n for n in range(1, 4) if outline_error_mm(g, n, 12) <= most), 4)
+    return gap, next((n for n in range(1, 12) if outline_error_mm(g, 4, n) <= most), 12)
 
 
 def _size(blank: GearBlank, cell_mm: float) -> MeshSize:
     """Cells about `cell_mm` wide in the teeth, lower there (where loads act), longer where the motion varies less."""
     g, split = blank.geometry, fillet_split(blank.geometry)
     across, gap, up = 2.0 * split.y_mm, split.gap_length_mm, split.side_length_mm
+    least_gap, least_up = _least_cells(blank)
     return MeshSize(
         n_across=max(2, round(across / cell_mm)),
-        n_gap=max(1, round(gap / cell_mm)),
-        n_up=max(_least_up(blank), round(2.7 * up / cell_mm)),
+        n_gap=max(least_gap, round(gap / cell_mm)),
+        n_up=max(least_up, round(2.7 * up / cell_mm)),
         n_rim=max(1, round((g.root_radius_mm - blank.rim_radius_mm) / (2.0 * cell_mm))),
         n_body=max(1, round((blank.rim_radius_mm - g.bore_mm) / (6.0 * cell_mm))),
         n_along=max(1, round(g.face_width_mm / (2.5 * cell_mm))),

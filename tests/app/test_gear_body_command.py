@@ -9,6 +9,8 @@ from typer.testing import CliRunner
 
 from app.cli import app
 from sims.reduced_fe.gear_file import read_gear
+from sims.reduced_fe.gear_key import gear_key
+from sims.reduced_fe.reduce import plan_for
 
 SMALL = ["--teeth", "16", "--profile-shift", "0.2", "--face", "10mm", "--bore", "8mm", "--dof", "15000"]
 
@@ -17,13 +19,17 @@ def _run(*arguments):
     return CliRunner().invoke(app, ["gear-body", *arguments])
 
 
-def test_mesh_modes_stress_and_reductions_are_written(tmp_path):
+def test_mesh_modes_stress_and_reductions_are_written(tmp_path, monkeypatch):
+    monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path / "kept"))
     found = _run("-o", str(tmp_path / "out"), *SMALL, "--vtk", "--reduce", "--modes", "8")
     assert found.exit_code == 0, found.output
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"mesh.png", "modes.png", "stress.png", "gear.vtu", "reduced.npz", "craig_bampton.txt"}
     gear = read_gear(tmp_path / "out" / "reduced.npz")
     assert gear.blank.n_teeth == 16
+    # The model finds it there.
+    assert [path.stem for path in (tmp_path / "kept" / "gears").iterdir()] == [gear.key]
+    assert gear.key == gear_key(gear.blank, plan_for(gear.blank, 15_000))
     assert f"{gear.n_dof} degrees of freedom" in found.output
     assert f"{gear.frequencies_hz[0]:.1f} Hz, {gear.nodal_diameters[0]} nodal diameters" in found.output
     assert "Craig–Bampton: 229 degrees of freedom" in found.output
@@ -40,6 +46,7 @@ def test_mesh_modes_stress_and_reductions_are_written(tmp_path):
         (("--dof", "5000", "--teeth", "150", "--module", "1mm"), "too few for 150 teeth"),
         (("--held", "springs", "--radial", "0N/m", "--dof", "5000"), "--radial"),
         (("--held", "shaft"), "--held"),
+        (("--held", "bore", "--radial", "1e8N/m", "--dof", "5000"), "add --held springs"),
     ],
 )
 def test_what_cannot_be_is_refused(tmp_path, arguments, said):

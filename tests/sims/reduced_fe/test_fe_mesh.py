@@ -19,6 +19,7 @@ from sims.reduced_fe.mesh_size import MeshSize, mesh_size_for, n_dof_of
 from sims.reduced_fe.ready import READY
 from sims.reduced_fe.sector_mesh import sector_mesh
 from sims.reduced_fe.tooth_load import load_tooth
+from sims.reduced_fe.tooth_side import outline_error_mm
 from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL
 
 WEB = GearBlank(
@@ -63,12 +64,20 @@ def test_sizes_come_close_to_what_is_asked_for(blank: GearBlank, n_dof: int) -> 
 
 
 def test_too_coarse_for_the_fillet() -> None:
-    with pytest.raises(InputError, match="too coarse for the fillet: its edges lie up to"):
+    with pytest.raises(InputError, match=r"too coarse for the fillet: .*ask for more degrees"):
         sector_mesh(PAPER, MeshSize(n_up=1))
     many = GearBlank(GearGeometry(150, 1.0, bore_radius_mm=20.0))
     with pytest.raises(InputError, match="n_dof is 5000: too few for 150 teeth"):
         mesh_size_for(many, 5000)
     assert n_dof_of(SMALL, mesh_size_for(SMALL, 8000)) < 9000
+
+
+@pytest.mark.parametrize("tip_radius", [0.05, 0.1, 0.2])
+def test_sharp_fillets_get_the_cells_that_follow_them(tip_radius: float) -> None:
+    blank = GearBlank(GearGeometry(50, 3.0, bore_radius_mm=20.0, tool_tip_radius=tip_radius))
+    size = mesh_size_for(blank, 100_000)
+    assert size.order == 2
+    assert outline_error_mm(blank.geometry, size.n_gap, size.n_up) <= 0.01 * 3.0
 
 
 @pytest.mark.parametrize("blank", READY.values(), ids=READY)
