@@ -17,7 +17,7 @@ from gearsig.gap.families import UNFORETOLD, shown_in
 from gearsig.gap.features import once as feature_values
 from gearsig.gap.prediction import LEVELS_DB, EffectPath, Fit, Observed, fit_effect, paths_of
 from gearsig.gap.shrinkage import Fold, shrinkage
-from gearsig.gap.simulator import CanBeQuiet, GapEffect, Twin
+from gearsig.gap.simulator import Added, CanBeQuiet, GapEffect, Twin
 from gearsig.gap.transplant import transplanted
 from gearsig.gap.types import Shrinkage
 from gearsig.gap.which_shaft import told_options
@@ -110,33 +110,31 @@ def _paths(banks: Sequence[Bank], conditions: Sequence[Condition], shows_in: tup
     n = n_compared(conditions)
     kept = [a for a in banks[0].added if all(a in bank.added for bank in banks)]
     tables = [
-        np.array([_distances(bank, bank.added.index(a), condition, shows_in)[:, :n] for a in kept])
-        .reshape(len(kept), len(LEVELS_DB), n)
-        .swapaxes(0, 1)
-        for bank, condition in zip(banks, conditions, strict=True)
+        _distances(bank, kept, condition, shows_in)[:, :, :n] for bank, condition in zip(banks, conditions, strict=True)
     ]
     return paths_of(banks[0].change_names[:n], kept, tables, LEVELS_DB)
 
 
-def _distances(bank: Bank, row: int, condition: Condition, shows_in: tuple[str, ...]) -> FloatArray:
-    """Return what a candidate would change on the sound machine's own baseline, one row for each level.
+def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in: tuple[str, ...]) -> FloatArray:
+    """Return what candidates would change on the sound machine's own baseline, (n_levels, n_candidates, n).
 
     Nothing where theory does not expect it: a simulation changes more, and that is its own.
 
     The reference shows the baseline; without one it is as far from the twin's as sound machines usually are.
     """
     floor, names = condition.floor, bank.feature_names
-    change: FloatArray = bank.changes[row].mean(axis=0)
-    change[: len(names)] -= bank.sound_changes.mean(axis=0)[: len(names)]  # a mere second run changes something, too
     usual = dict(zip(floor.names, (-floor.from_centre(floor.names, np.zeros(len(floor.names)))).tolist(), strict=True))
     simulated = dict(zip(names, bank.sound.mean(axis=0).tolist(), strict=True))
     if condition.reference is not None:
         compared, real = bank.change_names, dict(zip(*feature_values(condition.reference), strict=True))
     else:
         compared, real = names, {name: value + usual[name] for name, value in simulated.items()}
-    given = change[: len(compared)]
-    rows = np.array([transplanted(compared, given, simulated, real, usual, level) for level in LEVELS_DB])
-    return np.where(shown_in(compared, shows_in), rows, 0.0)
+    again = np.zeros(len(bank.change_names))  # a mere second run changes something, too
+    again[: len(names)] = bank.sound_changes.mean(axis=0)[: len(names)]
+    given = [(bank.changes[bank.added.index(a)].mean(axis=0) - again)[: len(compared)] for a in kept]
+    rows = [[transplanted(compared, one, simulated, real, usual, level) for one in given] for level in LEVELS_DB]
+    table = np.array(rows).reshape(len(LEVELS_DB), len(kept), len(compared))
+    return np.where(shown_in(compared, shows_in), table, 0.0)
 
 
 def folds_of(conditions: Sequence[Condition]) -> tuple[list[Fold], str]:
