@@ -45,7 +45,9 @@ def flank_rows(mesh: SectorMesh, grid: FlankGrid, spread: Spread, places: IntArr
         d·(ū + θ ẑ×(p − c)),  ū = Σ w u,  c = Σ w x,  θ = Σ w [(x − c)×(u − ū)]_z / Σ w |x − c|²
 
     "section": nodes across the whole tooth at that height, weighted like the shear stress of a beam. "patch": nodes of
-    the flank around the point. "node": the flank at that height only, in the middle of the slice.
+    the flank around the point. "node": the flank at that height only, in the middle of the slice. A patch that would
+    cross the tip's edge is moved down; θ is then that of the section, as the few nodes of a patch would carry the lever
+    by forces that grow without bound at the edge.
 
     Parameters
     ----------
@@ -61,12 +63,12 @@ def flank_rows(mesh: SectorMesh, grid: FlankGrid, spread: Spread, places: IntArr
     for flank, sign in enumerate((1.0, -1.0)):
         for height, roll in enumerate(grid.roll_rad):
             point, push = point_and_push(gear, float(roll), sign)
-            nodes = height_nodes(mesh, float(roll), spread, flank)
-            plane = plane_row(mesh, nodes, point, push)
+            parts = _plane_parts(mesh, float(roll), spread, flank, point, push)
             for k, z in enumerate(grid.z_m):
                 along = slice_weights(mesh, float(z), len(grid.z_m), spread)
-                dof = 3 * places[nodes.nodes][..., None] + np.arange(3)
-                np.add.at(rows[flank, height, k], dof, plane[:, None, :] * along[None, :, None])
+                for nodes, plane in parts:
+                    dof = 3 * places[nodes][..., None] + np.arange(3)
+                    np.add.at(rows[flank, height, k], dof, plane[:, None, :] * along[None, :, None])
     return rows.reshape(grid.n_points, n_dof)
 
 
@@ -77,11 +79,18 @@ def point_and_push(gear: GearGeometry, roll: float, sign: float) -> tuple[FloatA
     return point, np.array([-np.sin(load), -sign * np.cos(load)])
 
 
-def height_nodes(mesh: SectorMesh, roll: float, spread: Spread, flank: int) -> SectionNodes:
-    """Nodes (n, n_layers) of the tooth that stand for a height, and the weights (n,) in the plane."""
+def height_nodes(
+    mesh: SectorMesh, roll: float, spread: Spread, flank: int, half_width: float | None = None
+) -> SectionNodes:
+    """Nodes (n, n_layers) of the tooth that stand for a height, and the weights (n,) in the plane.
+
+    `half_width`: up and down the flank, in modules; None: `PATCH_HALF_WIDTH` of a patch, else 0.
+    """
     gear, n_up = mesh.blank.geometry, mesh.size.n_up
     place = float(flank_place(gear, np.array([roll]))[0])
-    reach = PATCH_HALF_WIDTH * gear.module_mm / side_curve(gear)[1] if spread == "patch" else 0.0
+    if half_width is None:
+        half_width = PATCH_HALF_WIDTH if spread == "patch" else 0.0
+    reach = half_width * gear.module_mm / side_curve(gear)[1]
     order = mesh.size.order
     rows = row_places(gear, n_up)[:: 3 - order]
     low = min(place - reach, 1.0 - 2.0 * reach)  # near the tip the patch stays on the flank, as wide as elsewhere
@@ -103,18 +112,48 @@ def slice_weights(mesh: SectorMesh, z: float, n_slices: int, spread: Spread) -> 
     return line_weights(layers, z - half, z + half, mesh.size.order)
 
 
+def _plane_parts(
+    mesh: SectorMesh, roll: float, spread: Spread, flank: int, point: FloatArray, push: FloatArray
+) -> list[tuple[IntArray, FloatArray]]:
+    """Nodes and their weights as of `plane_row`; of a patch apart for its mean motion and for the section's turning."""
+    nodes = height_nodes(mesh, roll, spread, flank)
+    if spread != "patch":
+        return [(nodes.nodes, plane_row(mesh, nodes, point, push))]
+    section = height_nodes(mesh, roll, "section", flank, PATCH_HALF_WIDTH)
+    centre = nodes.weights @ mesh.points_m[nodes.nodes[:, 0], :2]
+    lever = _turn(point - centre, push) * turning_weights(mesh, section)
+    return [
+        (nodes.nodes, _polar(mesh, nodes, nodes.weights[:, None] * push)),
+        (section.nodes, _polar(mesh, section, lever)),
+    ]
+
+
 def plane_row(mesh: SectorMesh, nodes: SectionNodes, point: FloatArray, push: FloatArray) -> FloatArray:
     """Weights (n, 3) of the radial, tangential and axial motion of the nodes (any layer: all have the same x and y)."""
-    x = mesh.points_m[nodes.nodes[:, 0], :2]
     w = nodes.weights
-    centre = w @ x
-    offset = x - centre
+    lever = point - w @ mesh.points_m[nodes.nodes[:, 0], :2]
+    return _polar(mesh, nodes, w[:, None] * push + _turn(lever, push) * turning_weights(mesh, nodes))
+
+
+def turning_weights(mesh: SectorMesh, nodes: SectionNodes) -> FloatArray:
+    """Weights (n, 2) of the motion along x and y for θ, how far the nodes turn; 0 for nodes at one place."""
+    x, w = mesh.points_m[nodes.nodes[:, 0], :2], nodes.weights
+    offset = x - w @ x
     square = float(w @ np.sum(offset**2, axis=1))
-    row = w[:, None] * push
-    lever = point - centre
-    turn = push[1] * lever[0] - push[0] * lever[1]  # what a unit rotation moves the point along the push
-    if square > 1e-12:
-        row = row + turn / square * w[:, None] * np.column_stack((-offset[:, 1], offset[:, 0]))
+    if square <= 1e-12:
+        return np.zeros_like(offset)
+    weights: FloatArray = w[:, None] * np.column_stack((-offset[:, 1], offset[:, 0])) / square
+    return weights
+
+
+def _turn(lever: FloatArray, push: FloatArray) -> float:
+    """What a unit rotation moves a point along the push."""
+    return float(push[1] * lever[0] - push[0] * lever[1])
+
+
+def _polar(mesh: SectorMesh, nodes: SectionNodes, row: FloatArray) -> FloatArray:
+    """Weights along the radius, around and along the axis, from those along x and y."""
+    x = mesh.points_m[nodes.nodes[:, 0], :2]
     radius = np.hypot(x[:, 0], x[:, 1])
     radial, around = x / radius[:, None], np.column_stack((-x[:, 1], x[:, 0])) / radius[:, None]
     return np.column_stack((np.sum(row * radial, axis=1), np.sum(row * around, axis=1), np.zeros(len(x))))
