@@ -82,7 +82,7 @@ def test_the_torsional_mode_is_that_of_two_inertias_on_the_mesh_spring():
 
 @pytest.mark.slow
 def test_patches_smooth_the_pair_that_single_nodes_make_drop(pair):
-    """Beside the section, which nodes hardly touch: the mode at lines of nodes drops and ripples, at patches it does not.
+    """Beside the section, which nodes hardly touch: at lines of nodes the mode drops and ripples, at patches not.
 
     All but a small part of a mesh cycle, tips included; what is left of the cycle is the true dip of single contact.
     """
