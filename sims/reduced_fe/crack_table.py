@@ -15,7 +15,8 @@ from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from sims.cache import cache_folder, write_whole
 from sims.mesh.crack import RootCrack, check_crack, deepest_crack_mm
-from sims.reduced_fe.cracked_tooth import CRACK_SIZE, front_widths_mm, open_crack
+from sims.reduced_fe.blank import GearBlank
+from sims.reduced_fe.cracked_tooth import CRACK_SIZE, crack_meshes, front_widths_mm, open_crack
 from sims.reduced_fe.flank_rows import Spread
 from sims.reduced_fe.gear_key import code_digest
 from sims.reduced_fe.mesh_size import MeshSize
@@ -71,6 +72,28 @@ def crack_added_m_per_n(gear: ReducedGear, crack: RootCrack) -> FloatArray:
     return between
 
 
+@lru_cache(maxsize=64)
+def deepest_followed_mm(blank: GearBlank, size: MeshSize, angle_deg: float) -> float:
+    """Deepest crack for which a mesh along its line is found; 0 if there is none.
+
+    Parameters
+    ----------
+    blank : GearBlank
+    size : MeshSize
+        `crack_size` of the gear.
+    angle_deg : float
+        ϑ between the crack and the tooth's centre line.
+    """
+    deepest = deepest_crack_mm(blank.geometry, angle_deg)
+    for part in reversed(DEPTH_PARTS):
+        try:
+            crack_meshes(blank, RootCrack(part * deepest, angle_deg), size)
+        except InputError:
+            continue
+        return part * deepest
+    return 0.0
+
+
 def crack_size(gear: ReducedGear) -> MeshSize:
     """Mesh on which a gear's cracks are solved."""
     return COARSE_SIZE if gear.n_dof < COARSE_DOF * gear.blank.n_teeth else CRACK_SIZE
@@ -83,14 +106,14 @@ def _at_depth(gear: ReducedGear, crack: RootCrack) -> FloatArray:
     if k == 0:
         shallow: FloatArray = (crack.depth_mm / depths[0]) ** 2 * _solved(gear, crack.angle_deg, 0)
         return shallow
-    try:
-        above = _solved(gear, crack.angle_deg, k) / depths[k] ** 2
-    except InputError as error:
+    deepest = deepest_followed_mm(gear.blank, crack_size(gear), crack.angle_deg)
+    if crack.depth_mm > deepest * (1.0 + 1e-9):
         raise InputError(
             f"the mesh cannot follow a crack of {crack.depth_mm:g} mm at {crack.angle_deg:g}°",
-            allowed=f"up to {depths[k - 1]:.3g} mm, or a greater angle",
+            allowed=f"up to {deepest:.3g} mm, or a greater angle",
             remedy="take a shallower crack or one that runs less steeply into the body",
-        ) from error
+        )
+    above = _solved(gear, crack.angle_deg, k) / depths[k] ** 2
     below = _solved(gear, crack.angle_deg, k - 1) / depths[k - 1] ** 2
     part = (crack.depth_mm - depths[k - 1]) / (depths[k] - depths[k - 1])
     between: FloatArray = crack.depth_mm**2 * ((1.0 - part) * below + part * above)

@@ -2,19 +2,25 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from streamlit.testing.v1 import AppTest
 
 import app.dashboard
 from app.dashboard import state
 from app.dashboard.laboratory.controls import automatic_s, shown_name
+from app.dashboard.laboratory.effect_controls import WIDEST
+from app.dashboard.laboratory.limits import greatest_severity
 from app.dashboard.laboratory.number import nice_step
 from app.dashboard.laboratory.save import chosen_of
-from app.dashboard.laboratory.setup import Setup
+from app.dashboard.laboratory.setup import MODELS, Setup
 from app.dashboard.laboratory.summary import NUMBERS, change
 from app.dashboard.laboratory.views import NAMES, TAB
+from gearsig.errors import InputError
 from sims.effects import EffectSetting, effects
-from sims.presets import presets
+from sims.presets import Preset, presets
+from sims.reduced_fe.contact_table import static_table
+from sims.registry import simulator
 
 FOLDER = Path(app.dashboard.__file__).parent
 CHARTS = {"Time": 3, "Spectrum": 1, "Envelope": 1, "Phase portrait": 2, "Bifurcation": 0, "Mesh": 2}
@@ -169,3 +175,33 @@ def test_the_automatic_length_holds_eight_revolutions_where_it_can() -> None:
     preset = presets("cracked")["published_55_75"]
     assert automatic_s(preset, 500.0) == 1.0  # 8 revolutions of the output shaft would take 1.3 s
     assert automatic_s(preset, 1400.0) == 0.5  # they take 0.47 s
+
+
+@pytest.mark.parametrize("name", [n for model in MODELS for n in presets(model)])
+def test_sliders_end_where_the_machine_does(name: str) -> None:
+    """At its end every slider gives a machine; a step further the crack's does not."""
+    (chosen,) = (found for model in MODELS for found in presets(model).values() if found.name == name)
+    for own in effects().values():
+        wanted = min(own.severity.high, WIDEST * own.severity.typical)
+        end = greatest_severity(chosen, own.name, wanted)
+        assert 0.0 < end <= wanted
+        prepared(chosen, EffectSetting(own.name, end))
+    end = greatest_severity(chosen, "root_crack", 10.0)
+    with pytest.raises(InputError, match="crack"):
+        prepared(chosen, EffectSetting("root_crack", end + 0.06))
+
+
+def prepared(chosen: Preset, setting: EffectSetting) -> None:
+    """Make the machine as far as its contact, without a simulation."""
+    ready = simulator(chosen.model).prepare({}, (setting,), None, np.random.default_rng(0), preset_name=chosen.name)  # type: ignore[attr-defined]
+    if chosen.model == "reduced-fe":
+        static_table(ready.pair.gears, ready.pair.machine.mesh)
+
+
+def test_a_steeper_crack_ends_the_slider_earlier_or_later() -> None:
+    chosen = presets("reduced-fe")["flexible_50_50"]
+    ends = [greatest_severity(chosen, "root_crack", 10.0, (("angle_deg", a),)) for a in (30.0, 45.0, 90.0)]
+    assert ends == [10.0, pytest.approx(8.15), pytest.approx(6.2)]
+    page = opened("flexible_50_50")
+    assert slider(page, "Crack").max == pytest.approx(8.15)
+    assert slider(page, "Crack").min == 0.0

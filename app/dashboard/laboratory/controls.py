@@ -29,7 +29,7 @@ def choose_setup() -> Setup:
         with st.expander("Flanks and oil", icon=":material/opacity:"):
             parameters = _choose_flanks(preset)
         st.markdown("**Faults** · *the healthy twin has none*")
-        found = [*choose_crack(), *choose_effects(simulator(preset.model).effects)]
+        found = [*choose_crack(preset), *choose_effects(preset, simulator(preset.model).effects)]
         with st.expander("Measurement", icon=":material/sensors:"):
             measured, duration, rate, seed = _choose_measurement(preset, speed)
         show_typed_toggle()

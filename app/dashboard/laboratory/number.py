@@ -36,7 +36,7 @@ def choose_number(label: str, name: str, default: float, high: float, *, low: fl
         Shown on demand.
     """
     key = PREFIX + name
-    step = nice_step((high - low) / 150.0)
+    step = slider_step(low, high)
     typed = bool(st.session_state.get(TYPED, False))
     if typed:
         key += SUFFIX
@@ -48,6 +48,11 @@ def choose_number(label: str, name: str, default: float, high: float, *, low: fl
         return float(number)
     ends = min(low, value), max(high, value)
     return float(st.slider(label, *ends, step=step, format="%g", key=key, help=about or None, persist_state="session"))
+
+
+def slider_step(low: float, high: float) -> float:
+    """Return the step of a slider: some 150 of them from end to end."""
+    return nice_step((high - low) / 150.0)
 
 
 def nice_step(size: float) -> float:
