@@ -9,6 +9,7 @@ from gearsig.gap.change import turned_difference
 from gearsig.gap.frame import DRIVEN, DRIVER, GearFrame
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.gear_lines import average_lines
+from gearsig.severity.reference import telling_teeth_apart
 from gearsig.severity.shaft_lines import orders_from_mesh
 
 NEAR_MESH, SLOW = 2, 5
@@ -17,6 +18,9 @@ NEAR_MESH, SLOW = 2, 5
 LEAST_MESH_SHARE = 0.5
 """Of what repeats with either shaft. Machines of the simulator have 0.7 and more, the heaviest damage included; a pair
 of 55/75 teeth taken for one of 29/47 has 0.45."""
+
+LEAST_PATTERN = 3.0
+"""Power of the lines that tell teeth apart over that of the noise in them: with less, any two patterns differ."""
 
 LEAST_AGREEMENT = 0.6
 """Of both gears' patterns. One damaged gear lowers its own to 0.2, and leaves the other's at 0.8 and more; another
@@ -39,7 +43,9 @@ def strange_teeth(now: Gathered, name: str) -> list[str]:
 
 
 def strange_pattern(now: Gathered, reference: Gathered, name: str) -> list[str]:
-    """Say so where neither gear's pattern of teeth is that of the reference."""
+    """Say so where neither gear's pattern of teeth is that of the reference; flawless gears have none to compare."""
+    if not all(_has_pattern(one, side) for one in (now, reference) for side in (DRIVER, DRIVEN)):
+        return []
     try:
         agreements = [turned_difference(now, reference, side)[1] for side in (DRIVER, DRIVEN)]
     except RefusalError:
@@ -52,6 +58,16 @@ def strange_pattern(now: Gathered, reference: Gathered, name: str) -> list[str]:
         "gears. The reference is of another machine, or both gears have worn since."
     )
     return [remark]
+
+
+def _has_pattern(gathered: Gathered, side: int) -> bool:
+    """Return whether what tells a gear's teeth apart stands clear of noise in the channel where it is clearest."""
+    clearest = 0.0
+    for sums in gathered.channels.values():
+        lines, noise = average_lines(sums, side)
+        used = telling_teeth_apart(np.arange(len(lines)), gathered.frame.teeth[side])
+        clearest = max(clearest, float(np.sum(np.abs(lines[used]) ** 2) / np.sum(noise[used])))
+    return clearest >= LEAST_PATTERN
 
 
 def _mesh_share(now: Gathered, side: int) -> float:

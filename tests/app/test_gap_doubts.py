@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import pytest
 
 from app.gap.doubts import strange_pattern, strange_teeth
 from app.gap.prepare import conditions_of
 from app.gap.unexplained import stood_out
+from gearsig.angle.shaft import find_shaft_angle
 from gearsig.errors import RefusalError
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
@@ -46,6 +48,22 @@ def test_another_specimen_is_noticed_and_a_damaged_gear_is_not_another_machine()
     assert strange_pattern(gathered(0, 1, chipped=True), sound, "now") == []
     (remark,) = strange_pattern(gathered(3, 1), sound, "now")
     assert "another machine" in remark
+
+
+def test_gears_without_a_pattern_are_not_another_machine() -> None:
+    assert strange_pattern(gather(_flawless(1), rig()), gather(_flawless(2), rig()), "now") == []
+
+
+def _flawless(seed: int) -> Recording:
+    """A mesh and noise, no tooth unlike the others."""
+    bare = recording(0, 1)
+    time_s = np.arange(bare.samples.shape[1]) / bare.sampling_rate_hz
+    turns = find_shaft_angle(bare, rig()).revolutions_at(time_s)
+    rng, samples = np.random.default_rng(seed), bare.samples.copy()
+    for i, channel in enumerate(bare.channels):
+        if channel.is_vibration:
+            samples[i] = np.cos(2 * np.pi * 29 * turns) + 0.05 * rng.standard_normal(len(turns))
+    return replace(bare, samples=samples)
 
 
 def test_the_teeth_of_another_rig_are_noticed() -> None:
