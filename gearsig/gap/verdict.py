@@ -20,6 +20,8 @@ NO_SIMULATION = (
 )
 SURE = 0.5
 """Probability from which a cause is likelier than all others together."""
+NEARLY = 0.75
+"""Of the second cause's probability, from which a third one is as likely as that."""
 SOUND_MACHINE = "the same machine when it was sound"
 
 
@@ -49,11 +51,20 @@ def _which(report: GapReport) -> str:
     if report.outcome is GapOutcome.UNKNOWN:
         return "Which: unknown; nothing in the catalogue explains it well enough."
     if report.outcome is GapOutcome.CANNOT_SEPARATE and report.inseparable is not None:
-        a, b = (_titled(report, name) for name in report.inseparable)
-        return f"Which: {a} or {b}; these recordings cannot tell them apart."
+        named = " or ".join(_titled(report, name) for name in rivals(report))
+        return f"Which: {named}; these recordings cannot tell them apart."
     size = "" if first.severity is None else f", {_severity(first, first.severity)}"
     place = f" at {first.place}" if first.place else ""
     return f"Which: {first.title}{place}{size} (probability {odds})."
+
+
+def rivals(report: GapReport) -> tuple[str, ...]:
+    """Return the causes that cannot be told apart: the two likeliest, and what is nearly as likely as the second."""
+    both = report.inseparable or ()
+    found = {cause.name: cause.probability for cause in report.causes}
+    least = NEARLY * min((found.get(name, 0.0) for name in both), default=1.0)
+    near = (name for name, p in found.items() if p >= least > 0.0 and name not in (*both, NONE, UNKNOWN))
+    return (*both, *near)
 
 
 def _which_none(report: GapReport, odds: str) -> str:

@@ -20,6 +20,7 @@ from gearsig.gap.types import (
     Interval,
     Shrinkage,
 )
+from gearsig.gap.verdict import rivals
 from gearsig.gap.words import severity_unit
 from gearsig.report.gap_text import point_text
 from gearsig.report.numbers import readable
@@ -251,8 +252,8 @@ def inseparable_text(report: GapReport) -> str:
     if report.inseparable is None:
         return ""
     titles = {cause.name: f"{cause.title} ({percent(cause.probability)})" for cause in report.causes}
-    first, second = (titles.get(name, name) for name in report.inseparable)
-    return f"These recordings cannot tell {first} from {second}."
+    first, *others = (titles.get(name, name) for name in rivals(report))
+    return f"These recordings cannot tell {first} from {' or '.join(others)}."
 
 
 def step_rows(report: GapReport) -> tuple[StepRow, ...]:

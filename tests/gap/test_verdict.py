@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from gearsig.gap.types import GapOutcome, GapPlace, Interval, PlaceKind
+from gearsig.gap.verdict import rivals
 from tests.gap.example_report import (
     cannot_separate_report,
     effect_report,
@@ -26,6 +27,16 @@ def test_causes_that_cannot_be_told_apart_are_named_even_if_one_is_not_among_the
     assert report.verdict[1] == (
         "Which: crack in a tooth root (48 %) or torque ripple; these recordings cannot tell them apart."
     )
+
+
+def test_a_third_cause_as_likely_as_the_second_is_named_too() -> None:
+    report = cannot_separate_report()
+    first, second, third, *_ = report.causes
+    names = (first.name, second.name)
+    assert rivals(replace(report, inseparable=names)) == names
+    equal = replace(report, inseparable=names, causes=(first, second, replace(third, probability=second.probability)))
+    assert rivals(equal) == (*names, third.name)
+    assert equal.verdict[1].count(" or ") == 2
 
 
 def test_what_is_next_says_only_what_was_computed() -> None:
