@@ -29,7 +29,7 @@ RIDGE = 0.02
 START = (0.6, 1.0, 0.0, 0.0)
 """Sharpness, weight of the shrink, bias of none and of unknown."""
 FALSE_ALARMS = 0.05
-LEAST_NAMED, MOST_NAMED, APART = 0.6, 0.95, 0.6
+LEAST_NAMED, MOST_NAMED, APART = 0.6, 0.95, 0.7
 LEAST_SHARE = 1e-6
 
 Row = tuple[Mapping[str, Any], Seen]

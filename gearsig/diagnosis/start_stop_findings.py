@@ -208,7 +208,7 @@ def refusal_findings(examined: StartStop) -> list[Finding]:
     return [
         Finding("start-stop-refusal", Kind.CANNOT_TELL, f"Cannot tell the {text.partition(':')[0]}.", evidence=(text,))
         for text in examined.refusals
-    ]
+    ] + [Finding("start-stop-note", Kind.NOTICE, text) for text in examined.notes]
 
 
 def burst_finding(

@@ -18,6 +18,8 @@ SHORTEST_S = 0.03
 """A shorter rest is the turning point of a swing, a shorter motion a tremor."""
 LEAST_TURN = 0.02
 """Of the longest stretch's angle: a standing machine that is knocked has not been started."""
+AT_ONCE, FIRST_S = 0.15, 0.01
+"""Of the top speed of the first stretch: slower on average in its first hundredth of a second, it begins from rest."""
 
 
 @dataclass(frozen=True)
@@ -60,10 +62,13 @@ class Course:
         One after the other, without gaps.
     threshold_rad_s : float
         Speed below which the shaft is taken to stand.
+    starts_at_once : bool
+        Whether the shaft stands at the first sample and moves from it on: a start without a rest ahead of it.
     """
 
     stretches: tuple[Stretch, ...]
     threshold_rad_s: float
+    starts_at_once: bool = False
 
     @property
     def moving(self) -> tuple[Stretch, ...]:
@@ -72,8 +77,9 @@ class Course:
 
     @property
     def starts_s(self) -> tuple[float, ...]:
-        """Times at which motion begins after a rest in the record."""
-        return tuple(b.start_s for a, b in self._pairs() if not a.direction and b.direction)
+        """Times at which motion begins after a rest in the record, or from rest at its first sample."""
+        at_once = (self.stretches[0].start_s,) if self.starts_at_once else ()
+        return (*at_once, *(b.start_s for a, b in self._pairs() if not a.direction and b.direction))
 
     @property
     def stops_s(self) -> tuple[float, ...]:
@@ -84,7 +90,11 @@ class Course:
     def summary(self) -> str:
         """Starts and stops in words; a record that begins or ends in motion holds one less of them."""
         said = f"{_counted(len(self.starts_s), 'start')} and {_counted(len(self.stops_s), 'stop')}"
-        ends = [name for name, at in (("begins", 0), ("ends", -1)) if self.stretches[at].direction]
+        moves = {
+            "begins": self.stretches[0].direction and not self.starts_at_once,
+            "ends": self.stretches[-1].direction,
+        }
+        ends = [name for name, is_moving in moves.items() if is_moving]
         return f"{said} in a record that {' and '.join(ends)} in motion" if ends else said
 
     @property
@@ -136,7 +146,8 @@ def find_course(angle_rad: FloatArray, speed_rad_s: FloatArray, sampling_rate_hz
     for stretch in stretches:
         if abs(stretch.turned_rad) < least:
             directions[stretch.first : stretch.last] = 0
-    return Course(_cut(directions, angle_rad, speed_rad_s, sampling_rate_hz), threshold)
+    final = _cut(directions, angle_rad, speed_rad_s, sampling_rate_hz)
+    return Course(final, threshold, _starts_at_once(final[0], angle_rad, sampling_rate_hz))
 
 
 def is_start_stop(course: Course, *, least_standing: float = 0.05, least_back_rad: float = 0.1) -> bool:
@@ -146,6 +157,13 @@ def is_start_stop(course: Course, *, least_standing: float = 0.05, least_back_ra
     """
     rests = bool(course.starts_s) and bool(course.stops_s) and course.standing_part >= least_standing
     return rests or course.backwards_rad >= least_back_rad
+
+
+def _starts_at_once(first: Stretch, angle_rad: FloatArray, rate_hz: float) -> bool:
+    """Say whether the first stretch moves, and began to with the record."""
+    n = min(max(2, round(FIRST_S * rate_hz)), first.last - 1)
+    speed = abs(float(angle_rad[n] - angle_rad[0])) * rate_hz / n
+    return bool(first.direction) and speed < AT_ONCE * first.top_speed_rad_s
 
 
 def _absorb(directions: np.ndarray, shortest: int) -> None:

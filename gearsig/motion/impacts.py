@@ -41,11 +41,14 @@ class Impact:
     energy_j : float
         ½ m v², m the mass of both gears reduced to the line of action; nan where an inertia is not known.
     restitution : float
-        Speed of parting over speed of approach; nan where the flanks stayed in contact.
+        Speed of parting over speed of approach; nan where the flanks stayed in contact, or where it comes out above 1,
+        which no impact has: see `note`.
     lost_j : float
         ½ m v² (1 − e²); nan likewise.
     peak_force_n : float
         By the contact's stiffness from the greatest depth; short of the truth where samples are rare.
+    note : str
+        What is wrong with it; empty: nothing.
     """
 
     time_s: float
@@ -58,6 +61,7 @@ class Impact:
     restitution: float
     lost_j: float
     peak_force_n: float
+    note: str = ""
 
 
 def find_impacts(
@@ -208,11 +212,14 @@ def _impact(motion: PairMotion, flights: _Flights, g: FloatArray, before: Run, t
     step = 1.0 / motion.sampling_rate_hz
     mass = reduced_mass_kg(motion)
     angle = float(np.interp(time, [(first - 1) * step, first * step], motion.driver_angle_rad[first - 1 : first + 1]))
-    restitution = float("nan")
+    restitution, note = float("nan"), ""
     bounced = after is not None and after[0] == 0 and after[2] - after[1] >= LEAST_FLIGHT_SAMPLES
     if bounced and speed > 0.0 and (last - first - 1) * step < LONGEST_BOUNCE * _bounce_s(motion, speed, mass):
         assert after is not None  # noqa: S101  bounced says so
         restitution = max(flights.leaves(after, flank), 0.0) / speed
+        if restitution > 1.0:
+            note = f"parting is {restitution:.3g} times as fast as approach: noise, or too few samples in the flights"
+            restitution = float("nan")
     energy = 0.5 * mass * speed**2
     deepest = float(np.max(np.abs(g[first:last])))
     contact, path = motion.contact, motion.path
@@ -230,6 +237,7 @@ def _impact(motion: PairMotion, flights: _Flights, g: FloatArray, before: Run, t
         restitution,
         energy * (1.0 - restitution**2),
         n * contact.stiffness_n_per_m_lambda * deepest**contact.exponent,
+        note,
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
 from gearsig.motion.angle_faults import check_angle
+from gearsig.motion.channel_gains import check_scale
 from gearsig.motion.derivatives import LocalPolynomial, local_polynomial
 from gearsig.motion.roles import SIDES, find_roles, role_values
 from gearsig.motion.types import PairMotion
@@ -55,7 +56,8 @@ def measure_motion(
     Raises
     ------
     InputError
-        If an angle jumps or wraps, both angles do not go together as the teeth want, or a unit is not known.
+        If an angle jumps or wraps, both angles do not go together as the teeth want, a speed or acceleration does not
+        go with its angle, or a unit is not known.
     RefusalError
         If the rig has no contact, or neither angle nor speed of a gear was measured.
     """
@@ -68,6 +70,8 @@ def measure_motion(
     reader = _Reader(recording, known, roles, smoother, bandwidth_hz is not None, unwrap)
     driver, driven = (reader.side(side) for side in SIDES)
     _check_ratio(driver[0], driven[0], path, recording.provenance.source or "recording")
+    for side, motion in zip(SIDES, (driver, driven), strict=True):
+        reader.check_scales(side, motion)
     torque, force = (reader.measured(role) if role in roles else None for role in ("torque", "force"))
     contact = known.contact
     assert contact is not None  # noqa: S101  path_of_contact has seen to it
@@ -136,6 +140,15 @@ class _Reader:
         if speed_role in self.roles:
             return angle, speed, self._derived(acceleration_role, speed, 1, "speed")
         return angle, speed, self._derived(acceleration_role, angle, 2, "angle")
+
+    def check_scales(self, side: str, motion: tuple[FloatArray, FloatArray, FloatArray]) -> None:
+        """Refuse a measured speed or acceleration that the measured angle of that gear contradicts."""
+        angle = self.roles.get(f"{side} angle")
+        for order, what in ((1, "speed"), (2, "acceleration")):
+            name = self.roles.get(f"{side} {what}")
+            if angle is not None and name is not None:
+                where, rate = self.recording.provenance.source or "recording", self.recording.sampling_rate_hz
+                check_scale(motion[0], motion[order], rate, order=order, names=(angle, name), where=where)
 
     def _derived(self, role: str, values: FloatArray, order: int, of: str) -> FloatArray:
         self.methods[role] = f"{'second ' if order == 2 else ''}derivative of the {of}: {self.smoother.text}"

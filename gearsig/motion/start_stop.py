@@ -22,6 +22,9 @@ from gearsig.phase.types import PhasePortrait
 LEAST_PITCHES = 0.02
 """Of the driver's teeth: a machine that turns by less than that beyond its play stands."""
 
+ENOUGH_HZ = 4000.0
+"""All hard impacts of the manipulator are found from here on."""
+
 
 @dataclass(frozen=True)
 class StartStop:
@@ -42,6 +45,8 @@ class StartStop:
     indicators : tuple of Indicator
     refusals : tuple of str
         What could not be told, with the reason.
+    notes : tuple of str
+        What is told in part.
     """
 
     motion: PairMotion
@@ -53,6 +58,7 @@ class StartStop:
     teeth: ToothCompliance | None
     indicators: tuple[Indicator, ...]
     refusals: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
 def examine_start_stop(motion: PairMotion) -> StartStop:
@@ -93,7 +99,18 @@ def examine_start_stop(motion: PairMotion) -> StartStop:
         except RefusalError as refusal:
             refusals.append(f"stiffness of single teeth: {refusal}")
     indicators = start_stop_indicators(motion, course, backlash, impacts, loop)
-    return StartStop(motion, course, backlash, impacts, loop, portrait, teeth, indicators, tuple(refusals))
+    return StartStop(
+        motion,
+        course,
+        backlash,
+        impacts,
+        loop,
+        portrait,
+        teeth,
+        indicators,
+        tuple(refusals),
+        _notes(impacts, motion.sampling_rate_hz),
+    )
 
 
 def check_turns(motion: PairMotion) -> None:
@@ -185,6 +202,19 @@ def run_down_rad_s2(motion: PairMotion, course: Course) -> float:
         if len(high) and len(low) and low[0] > high[0]:
             found.append(0.6 * speed[top] * motion.sampling_rate_hz / (low[0] - high[0]))
     return float(np.median(found)) if found else float("nan")
+
+
+def _notes(impacts: tuple[Impact, ...], rate_hz: float) -> tuple[str, ...]:
+    """Say of how many bounces the restitution cannot be read off the samples."""
+    n = sum(bool(i.note) for i in impacts)
+    if not n:
+        return ()
+    known = n + sum(not np.isnan(i.restitution) for i in impacts)
+    remedy = "; record at 4 kHz or more" if rate_hz < ENOUGH_HZ else ""
+    return (
+        f"The restitution of {n} of {known} bounces cannot be read: they part faster than they met, as noise is too "
+        f"large or samples at {rate_hz:g} Hz are too few for their flights{remedy}.",
+    )
 
 
 def _datum(motion: PairMotion, backlash: BacklashEstimate | None, refusals: list[str]) -> float | None:

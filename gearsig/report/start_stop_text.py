@@ -8,7 +8,7 @@ is null. Members may be added within a version, never renamed or removed.
 - ``backlash``: null, or ``backlash_um``, ``uncertainty_um``, ``stiffness_n_per_m_lambda``, ``n_drive``, ``n_back``,
   ``scatter_um``, ``method``
 - ``impacts``: each with ``time_s``, ``flank``, ``driver_tooth``, ``driven_tooth``, ``driver_angle_deg``, ``speed_mps``,
-  ``energy_j``, ``restitution``, ``lost_j``, ``peak_force_n``
+  ``energy_j``, ``restitution``, ``lost_j``, ``peak_force_n``, ``note`` (why there is no restitution, where there should be)
 - ``indicators``: each with ``name``, ``value``, ``unit``, ``computed_on``
 - ``teeth``: per tooth of the driver ``passes_forwards``, ``passes_backwards``, ``rms_forwards``, ``rms_backwards`` of
   ``signal`` in ``unit``; null where there was nothing to average
@@ -16,7 +16,7 @@ is null. Members may be added within a version, never renamed or removed.
   ``deflection_um`` and ``weak_teeth``
 - ``orders``: of the same signal, forwards: ``order`` and ``amplitude`` (peak) as lists; null where no stretch holds a
   revolution
-- ``refusals``: what could not be told
+- ``refusals``: what could not be told; ``notes``: what was told in part
 """
 
 from __future__ import annotations
@@ -71,6 +71,7 @@ def start_stop_text(examined: StartStop) -> str:
         lines += _more(len(examined.impacts))
     lines += ["", *(f"{i.name:<24} {readable(i.value, 5):>12} {i.unit}" for i in examined.indicators)]
     lines += [fill(f"Cannot tell: {text}", 100) for text in examined.refusals]
+    lines += [fill(f"Note: {text}", 100) for text in examined.notes]
     return "\n".join(lines)
 
 
@@ -105,6 +106,7 @@ def start_stop_json(
         "compliance": _compliance(examined),
         "orders": None if orders is None else _orders(orders),
         "refusals": list(examined.refusals),
+        "notes": list(examined.notes),
     }  # fmt: skip
     return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 

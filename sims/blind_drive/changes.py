@@ -83,7 +83,7 @@ def _off_centre(m: Machine, percent: float, _: np.random.Generator) -> Applied:
     return {"off_centre": 0.01 * percent * m.drawing.torque_nm * m.drawing.z2 / m.drawing.z1}, {}
 
 
-def _sensor_gain(_: Machine, percent: float, rng: np.random.Generator) -> Applied:
+def _torque_gain(_: Machine, percent: float, rng: np.random.Generator) -> Applied:
     return {"gain": 1.0 + 0.01 * percent * float(rng.choice([-1.0, 1.0]))}, {}
 
 
@@ -99,13 +99,13 @@ CATALOGUE = {
     "load_friction": Change(12.0, 40.0, "%", _load_friction, needs_reference=True),
     "root_crack": Change(2.5, 7.5, "mm", _crack),
     "load_inertia": Change(20.0, 100.0, "%", _inertia),
+    "torque_gain": Change(12.0, 40.0, "%", _torque_gain),
     "torque_ripple": Change(1.5, 10.0, "%", _ripple),
 }
 """What a diagnosis may name."""
 OUTSIDE = {
     "run_out": Change(30.0, 150.0, "um", _run_out),
     "off_centre": Change(8.0, 40.0, "%", _off_centre),
-    "sensor_gain": Change(12.0, 40.0, "%", _sensor_gain),
     "encoder_slip": Change(30.0, 200.0, "um", _slip),
 }
 """What it must call unknown."""

@@ -12,6 +12,7 @@ from gearsig.rig.tooth_pairs import PathOfContact, standard_path
 from gearsig.rig.types import GearPair, OperatingPoint, Rig, Sensor, Shaft
 from sims.forging.drive import Bristle, ForgingDrive, GrippedLoad, HydraulicMotor, WeakTooth
 from sims.forging.schedule import Cycle
+from sims.forging.worn import worn_um
 from sims.machine.operation import Operation
 from sims.wanted import Wanted
 
@@ -55,7 +56,8 @@ def build_drive(wanted: Wanted, speed_limit_rpm: float, weak_tooth: WeakTooth | 
         wanted.number("flank_presliding_um") * 1e-6,
     )
     limit = speed_limit_rpm * pi / 30.0
-    return ForgingDrive(path, contact, motor, load, flanks, limit, wanted.number("mesh_ramp"), weak_tooth)
+    ramp, worn = wanted.number("mesh_ramp"), worn_um(wanted, path)
+    return ForgingDrive(path, contact, motor, load, flanks, limit, ramp, weak_tooth, worn)
 
 
 def build_contact(wanted: Wanted, path: PathOfContact) -> ToothContact:

@@ -1,4 +1,4 @@
-"""Compiled: which tooth pairs carry, and the force of the flanks that touch."""
+"""Compiled: which tooth pairs carry, where worn ones touch, and the force of the flanks that do."""
 
 # mypy: allow-untyped-defs, allow-untyped-calls
 from __future__ import annotations
@@ -57,6 +57,42 @@ def soundness(k, number, flank):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def worn_off(k, p, flank):
+    """What wear has taken off a pair p base pitches behind its entry, drive flanks alone, and its slope over p.
+
+    Cubic between the points of the table, with their slopes; beyond the path of contact as at its end.
+    """
+    if flank < 0 or k.is_worn == 0.0:
+        return 0.0, 0.0
+    x = p / k.contact_ratio * (k.wear.shape[0] - 1)
+    if x <= 0.0:
+        return k.wear[0], 0.0
+    if x >= k.wear.shape[0] - 1:
+        return k.wear[-1], 0.0
+    i = int(x)
+    u = x - i
+    a, b, c, d = k.wear[i], k.wear[i + 1], k.wear_slope[i], k.wear_slope[i + 1]
+    depth = a + u * (c + u * (3.0 * (b - a) - 2.0 * c - d + u * (2.0 * (a - b) + c + d)))
+    slope = c + u * (2.0 * (3.0 * (b - a) - 2.0 * c - d) + u * 3.0 * (2.0 * (a - b) + c + d))
+    return depth, slope * (k.wear.shape[0] - 1) / k.contact_ratio
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def reach(k, angle, flank):
+    """Compression at which the first pair touches a flank, in the flank's direction; and its slope over the angle."""
+    if flank < 0 or k.is_worn == 0.0:
+        return k.half_backlash, 0.0
+    p, slope = position(k, angle, flank, younger_pair(k, angle, flank))
+    least, change = 1e9, 0.0
+    for i in range(2):
+        if -0.5 * k.ramp < p + i < k.contact_ratio + 0.5 * k.ramp:
+            depth, over = worn_off(k, p + i, flank)
+            if depth < least:
+                least, change = depth, over * slope
+    return k.half_backlash + least, change
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def one_pair(k, depth, closing, damping):
     """Force of one tooth pair at full stiffness: elastic, and with damping; never tension."""
     if depth <= 0.0:
@@ -67,10 +103,14 @@ def one_pair(k, depth, closing, damping):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def stored_energy(k, angle, q, flank, younger):
-    """Energy in the teeth that touch: n(θ1) k g^(λ+1)/(λ+1)."""
-    depth = flank * q - k.half_backlash
-    if flank == 0 or depth <= 0.0:
+    """Energy in the teeth that touch: Σ n_i(θ1) k g_i^(λ+1)/(λ+1)."""
+    if flank == 0 or flank * q <= k.half_backlash:
         return 0.0
     p, _ = position(k, angle, flank, younger)
-    n = weight(k, p)[0] * soundness(k, younger, flank) + weight(k, p + 1.0)[0] * soundness(k, younger - 1.0, flank)
-    return n * k.stiffness * depth ** (k.exponent + 1.0) / (k.exponent + 1.0)
+    total = 0.0
+    for i in range(2):
+        depth = flank * q - k.half_backlash - worn_off(k, p + i, flank)[0]
+        if depth > 0.0:
+            n = weight(k, p + i)[0] * soundness(k, younger - i, flank)
+            total += n * k.stiffness * depth ** (k.exponent + 1.0) / (k.exponent + 1.0)
+    return total

@@ -153,11 +153,15 @@ class ForgingDrive:
     mesh_ramp : float
         Base pitches over which a pair takes up its load, 0.005 to 0.1.
     weak_tooth : WeakTooth or None
+    wear_um : tuple of float
+        Worn off both drive flanks together, at equal steps of the path of contact from where a pair enters to where it
+        leaves; empty: nothing. All teeth alike; the pitch point is crossed smoothly over a 64th of the path.
 
     Notes
     -----
     Left out: bending of shafts and of the torque sensor (the paper takes them as stiff), bearings, profile errors, wear
-    that differs from tooth to tooth (the paper takes all teeth alike), oil between the flanks; teeth never break or
+    that differs from tooth to tooth or grows while the drive runs (the paper takes all teeth alike), oil between the
+    flanks; teeth never break or
     yield, however large the torque: neither strength nor hardness of the teeth is stated.
     """
 
@@ -169,10 +173,13 @@ class ForgingDrive:
     speed_limit_rad_s: float = 0.0
     mesh_ramp: float = 0.05
     weak_tooth: WeakTooth | None = None
+    wear_um: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         not_negative(self.speed_limit_rad_s, "speed_limit_rad_s", "rad/s")
         within(self.mesh_ramp, "mesh_ramp", *MESH_RAMP_RANGE)
+        for depth in self.wear_um:
+            not_negative(depth, "wear_um", "um")
         highest = 1.9 - self.mesh_ramp
         within(self.path.contact_ratio, "contact_ratio", LEAST_CONTACT_RATIO, highest, remedy="one to two pairs touch")
         if self.contact.driven_inertia_kg_m2 is None or self.pinion_side_inertia_kg_m2 <= 0.0:

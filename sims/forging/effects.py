@@ -10,22 +10,21 @@ from gearsig.checks import closest_match_hint, within
 from gearsig.errors import InputError
 from sims.effects import EffectSetting, effect
 from sims.forging.drive import WeakTooth
-from sims.mesh import GearGeometry, GearMesh, PairGeometry, RootCrack, mesh_stiffness, wear_profile
-from sims.mesh.flank import contact_ends_mm
+from sims.forging.worn import SIDES, gear_pair
+from sims.mesh import GearMesh, RootCrack, mesh_stiffness
 from sims.values import Values
 from sims.wanted import Wanted
 
 WITH_MEANING = ("root_crack", "tooth_wear", "sliding_friction", "backlash", "torque_ripple")
 """What the drive can do. A wrong load inertia is `piece_mass_kg` or `wheel_inertia_kg_m2`."""
-SIDES = ("driver", "driven")
-N_POINTS = 200
 
 
 def with_effects(values: Values, settings: Sequence[EffectSetting]) -> tuple[Values, WeakTooth | None]:
     """Return the parameters with the effects in them, and the tooth that a crack makes weak.
 
     - backlash: the play grows by the severity.
-    - tooth_wear: the play grows by the mean depth over the flank; its shape is not modelled.
+    - tooth_wear: the drive flanks of one gear lose material by sliding, most at their ends and nothing at the pitch
+      point (`sims.mesh.wear_profile`); pairs touch the later the more they lost.
     - sliding_friction: multiplies the coefficient by 1 + severity/100; the bristles' deflection stays.
     - torque_ripple: amplitude and order of the motor's ripple.
     - root_crack: the tooth's pairs lose stiffness in the ratio of their mean stiffness with and without the crack, by
@@ -47,7 +46,8 @@ def with_effects(values: Values, settings: Sequence[EffectSetting]) -> tuple[Val
         if setting.name == "backlash":
             changed["half_backlash_um"] = wanted.number("half_backlash_um") + 0.5 * severity
         elif setting.name == "tooth_wear":
-            changed["wear_um"] = wanted.number("wear_um") + severity * _mean_wear(wanted, str(options["gear"]))
+            worn = f"sliding_wear_{options['gear']}_um"
+            changed[worn] = wanted.number(worn) + severity
         elif setting.name == "sliding_friction":
             changed["friction_coefficient"] = wanted.number("friction_coefficient") * (1.0 + severity / 100.0)
         elif setting.name == "torque_ripple":
@@ -70,17 +70,9 @@ def _check_names(settings: Sequence[EffectSetting]) -> None:
             raise InputError(f"effect {name!r} is given {names.count(name)} times", allowed="once")
 
 
-def _mean_wear(wanted: Wanted, gear: str) -> float:
-    """Mean depth of wear over the path of contact, where the greatest is 1."""
-    side = SIDES.index(gear) + 1
-    pair = _pair(wanted)
-    roll = np.linspace(*contact_ends_mm(pair, side), N_POINTS)
-    return float(np.mean(wear_profile(pair, side, roll)))
-
-
 def _weak_tooth(wanted: Wanted, depth_mm: float, options: Mapping[str, float | str]) -> WeakTooth:
     gear = SIDES.index(str(options["gear"]))
-    pair = _pair(wanted)
+    pair = gear_pair(wanted)
     n_teeth = (pair.driver, pair.driven)[gear].teeth
     tooth = int(within(float(options["tooth"]), f"tooth of the {SIDES[gear]} gear", 1, n_teeth)) - 1
     percent = float(options["width_percent"])
@@ -93,9 +85,3 @@ def _weak_tooth(wanted: Wanted, depth_mm: float, options: Mapping[str, float | s
         mesh_stiffness(mesh, cycles).pairs_n_per_m[:, 0] for mesh in (GearMesh(pair), cracked)
     )
     return WeakTooth(gear, tooth, 1.0 - float(np.mean(weak_n_per_m / sound_n_per_m)))
-
-
-def _pair(wanted: Wanted) -> PairGeometry:
-    module, angle, width = (wanted.number(n) for n in ("module_mm", "pressure_angle_deg", "face_width_mm"))
-    gears = [GearGeometry(wanted.whole(f"teeth_{side}"), module, angle, face_width_mm=width) for side in SIDES]
-    return PairGeometry(gears[0], gears[1])

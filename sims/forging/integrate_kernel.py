@@ -8,7 +8,7 @@ from math import floor
 import numpy as np
 from numba import njit
 
-from sims.forging.contact_kernel import younger_pair
+from sims.forging.contact_kernel import reach, younger_pair
 from sims.forging.motion_kernel import energy
 from sims.forging.runge_kutta_kernel import N_STAGES, error_norm, evaluate, step, within_step
 
@@ -115,7 +115,7 @@ def open_contact(k, y, t, flank, mode, row):
     """Latch the speed at which flanks meet and the damping that follows; the bristles of the flanks begin straight."""
     mode[0] = flank
     mode[1] = younger_pair(k, y[0], flank)
-    speed = abs(y[3])
+    speed = abs(flank * y[3] - reach(k, y[0], flank)[1] * y[1])
     mode[2] = k.damping_at_1_mps / max(speed, k.speed_floor)
     y[4], y[5] = 0.0, 0.0
     row[0], row[1], row[2] = t, flank, speed
@@ -146,15 +146,18 @@ def _hand_over(k, y, mode):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _flank_after(k, y, end, h, stages, flank):
     """Flank that touches when the step ends, or that it touches on the way."""
-    a = k.half_backlash
     if flank != 0.0:
-        return 0.0 if flank * end[2] < a else flank
-    if abs(end[2]) > a:
-        return 1.0 if end[2] > 0.0 else -1.0
+        return 0.0 if flank * end[2] < reach(k, end[0], flank)[0] else flank
+    if abs(end[2]) > k.half_backlash:
+        side = 1.0 if end[2] > 0.0 else -1.0
+        if side * end[2] > reach(k, end[0], side)[0]:
+            return side
     if y[3] * end[3] < 0.0:  # it turned round on the way, maybe beyond the flank
-        q = within_step(y, h, stages, y[3] / (y[3] - end[3]), 2)
-        if abs(q) > a:
-            return 1.0 if q > 0.0 else -1.0
+        x = y[3] / (y[3] - end[3])
+        q = within_step(y, h, stages, x, 2)
+        side = 1.0 if q > 0.0 else -1.0
+        if side * q > reach(k, within_step(y, h, stages, x, 0), side)[0]:
+            return side
     return 0.0
 
 
@@ -167,11 +170,12 @@ def _to_event(k, y, t, h, mode, course, stages, end, out, next_flank):
     flank = next_flank if next_flank != 0.0 else mode[0]
     entering = next_flank != 0.0
     low, high = 0.0, 1.0
-    if entering and not flank * end[2] > k.half_backlash:
+    if entering and not flank * end[2] > reach(k, end[0], flank)[0]:
         high = y[3] / (y[3] - end[3])
     for _ in range(50):
         middle = 0.5 * (low + high)
-        if (flank * within_step(y, h, stages, middle, 2) > k.half_backlash) == entering:
+        edge = reach(k, within_step(y, h, stages, middle, 0), flank)[0]
+        if (flank * within_step(y, h, stages, middle, 2) > edge) == entering:
             high = middle
         else:
             low = middle
@@ -179,8 +183,9 @@ def _to_event(k, y, t, h, mode, course, stages, end, out, next_flank):
     for _ in range(4):
         found = min(max(found, 1e-15), h)
         step(k, y, t, found, mode, course, stages, end, out)
-        left = flank * end[2] - k.half_backlash
-        speed = flank * end[3]
+        edge, over = reach(k, end[0], flank)
+        left = flank * end[2] - edge
+        speed = flank * end[3] - over * end[1]
         if abs(left) < ROOT_M or speed == 0.0:
             break
         change = left / speed

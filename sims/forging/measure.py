@@ -119,7 +119,8 @@ def _readings(true: Mapping[str, FloatArray], wanted: Wanted, rng: np.random.Gen
     rows = []
     for channel in CHANNELS:
         values = true[channel.name]
-        reading: FloatArray = values + noise[channel.quantity] * rng.standard_normal(len(values))
+        gain = wanted.number("torque_gain") if channel.quantity == "torque" else 1.0
+        reading: FloatArray = gain * values + noise[channel.quantity] * rng.standard_normal(len(values))
         if channel.quantity == "angle" and counts:
             step = 2.0 * pi / counts
             reading = np.floor(reading / step) * step

@@ -7,7 +7,7 @@ from math import cos, exp, sin
 
 from numba import njit
 
-from sims.forging.contact_kernel import one_pair, position, soundness, stored_energy, weight
+from sims.forging.contact_kernel import one_pair, position, soundness, stored_energy, weight, worn_off
 from sims.forging.friction_kernel import bristle
 
 
@@ -32,32 +32,37 @@ def rates(k, y, flank, younger, damping, torque, brake, press, dy, out):
 
     J1 ω̇1 = T_m − T_1 − rb1 F + Σ f ρ1 − ∂V/∂θ1,  J2 ω̇2 = rb2 F − Σ f ρ2 − T_2 + T_press − T_weight.
     ∂V/∂θ1 is the work that the changing number of pairs does on the rotation (J.-J. Oh, K. Grosh, J. R. Barber, Energy
-    conserving equations of motion for gear systems, 2005): without it the mesh would feed or brake the motor.
+    conserving equations of motion for gear systems, 2005): without it the mesh would feed or brake the motor. Worn
+    flanks give way to the rotation in the same way: δ_i = ±q − a − h(p_i), so that N_i h'(p_i) dp/dθ1 turns the pinion.
     """
     w1, q, q_rate = y[1], y[2], y[3]
     w2 = (k.rb1 * w1 - q_rate) / k.rb2
     force, turn_1, turn_2, loss, friction = 0.0, 0.0, 0.0, 0.0, 0.0
-    elastic_force, pairs = 0.0, 0.0
+    pairs, damped = 0.0, 0.0
     dy[4], dy[5] = 0.0, 0.0
-    depth = flank * q - k.half_backlash
-    if flank != 0 and depth > 0.0:
+    if flank != 0 and flank * q > k.half_backlash:
         p, slope = position(k, y[0], flank, younger)
-        elastic, pressed = one_pair(k, depth, flank * q_rate, damping)
         for i in range(2):
+            worn, over = worn_off(k, p + i, flank)
+            depth = flank * q - k.half_backlash - worn
             w, dw = weight(k, p + i)
+            if depth <= 0.0 or w <= 0.0:
+                continue
             sound = soundness(k, younger - i, flank)
             w, dw = w * sound, dw * sound
+            closing = flank * q_rate - over * slope * w1
+            elastic, pressed = one_pair(k, depth, closing, damping)
             pairs += w
-            turn_1 -= dw * slope * elastic * depth / (k.exponent + 1.0)
-            if k.tooth_friction > 0.0 and w > 0.0:
+            force += flank * w * pressed
+            turn_1 += slope * (over * w * pressed - dw * elastic * depth / (k.exponent + 1.0))
+            damped += w * (pressed - elastic) * closing
+            if k.tooth_friction > 0.0:
                 f, on_1, on_2, lost, rate = tooth_friction(k, w * pressed, p + i, y[4 + i], w1, w2, flank)
                 turn_1 += flank * on_1
                 turn_2 -= flank * on_2
                 loss += lost
                 friction += f
                 dy[4 + i] = rate
-        force = flank * pairs * pressed
-        elastic_force = flank * pairs * elastic
     share_1, dy[6] = bristle(w1, y[6], k.motor_static_ratio, k.motor_stribeck, k.motor_presliding, k.motor_bristle_time)
     share_2, dy[7] = bristle(w2, y[7], k.load_static_ratio, k.load_stribeck, k.load_presliding, k.load_bristle_time)
     drag = (k.drag + brake) * share_1 + k.drag_viscous * w1
@@ -71,7 +76,7 @@ def rates(k, y, flank, younger, damping, torque, brake, press, dy, out):
     a2 = (k.rb2 * force + turn_2 - held + outside) / k.wheel_inertia
     dy[0], dy[1], dy[2], dy[3] = w1, a1, q_rate, k.rb1 * a1 - k.rb2 * a2
     dy[8] = motor * w1 + outside * w2
-    dy[9] = (force - elastic_force) * q_rate
+    dy[9] = damped
     dy[10] = loss + drag * w1 + held * w2
     out[0], out[1], out[2] = y[0], w1, a1
     out[3], out[4], out[5] = angle_2, w2, a2

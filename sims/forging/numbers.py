@@ -38,9 +38,13 @@ _FIELDS = (
     "speed_band", "ripple_fraction", "ripple_order", "drag", "drag_viscous", "motor_static_ratio", "motor_stribeck",
     "motor_presliding", "motor_bristle_time", "load_friction", "load_viscous", "load_static_ratio", "load_stribeck",
     "load_presliding", "load_bristle_time", "unbalance_torque", "unbalance_angle", "weak_teeth", "weak_tooth",
-    "weak_loss",
+    "weak_loss", "is_worn",
 )  # fmt: skip
-RECORD = np.dtype([(name, np.float64) for name in _FIELDS])
+N_WEAR = 65
+"""Points of the table of wear over the path of contact."""
+RECORD = np.dtype(
+    [(name, np.float64) for name in _FIELDS] + [(name, np.float64, (N_WEAR,)) for name in ("wear", "wear_slope")]
+)
 """Numbers in SI units by name; compiled code reads them as attributes."""
 
 
@@ -73,5 +77,10 @@ def drive_numbers(drive: ForgingDrive) -> Any:
     k["unbalance_torque"], k["unbalance_angle"] = load.unbalance_nm, load.unbalance_angle_rad
     weak = drive.weak_tooth
     k["weak_teeth"] = path.teeth[0 if weak is None else weak.gear]
+    depths = drive.wear_um
+    if len(depths):
+        k["is_worn"] = 1.0
+        table = np.interp(np.linspace(0.0, 1.0, N_WEAR), np.linspace(0.0, 1.0, len(depths)), 1e-6 * np.asarray(depths))
+        k["wear"], k["wear_slope"] = table, np.gradient(table)
     k["weak_tooth"], k["weak_loss"] = (0.0, 0.0) if weak is None else (weak.tooth, weak.loss)
     return k

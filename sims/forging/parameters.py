@@ -61,7 +61,13 @@ _CONTACT = (
     _word("damping_law", "damping that follows from the restitution", DAMPING_LAWS, DAMPING_LAWS[0]),
     _number("impact_speed_floor_mps", "m/s", "least speed of impact in the damping law", 1e-4, 10, 0.01),
     _number("half_backlash_um", "um", "half of the play along the line of action, new", 0, 5000, 150.0),
-    _number("wear_um", "um", "worn off both drive flanks together; it widens the play by that", 0, 5000, 0.0),
+    _number("wear_um", "um", "worn off both drive flanks together, all over; it widens the play by that", 0, 5000, 0.0),
+    _number(
+        "sliding_wear_driver_um", "um", "worn off the pinion's drive flanks by sliding, where it is most", 0, 1000, 0.0
+    ),
+    _number(
+        "sliding_wear_driven_um", "um", "worn off the wheel's drive flanks by sliding, where it is most", 0, 1000, 0.0
+    ),
     _number("friction_coefficient", "", "sliding friction of the flanks", 0, 0.5, 0.05),
     _number("flank_static_ratio", "", "static over sliding friction of the flanks", *STATIC_RATIO_RANGE, 1.2),
     _number("flank_stribeck_mps", "m/s", "sliding speed at which static friction has gone", 1e-4, 1, 0.005),
@@ -110,6 +116,7 @@ _CHAIN = (
     _number("speed_noise_mrad_per_s", "mrad/s", "rms noise of the speeds", 0, 1e6, 1.0),
     _number("acceleration_noise_rad_per_s2", "rad/s^2", "rms noise of the angular accelerations", 0, 1e6, 0.5),
     _number("torque_noise_nm", "N m", "rms noise of the torque sensor", 0, 1e5, 0.2),
+    _number("torque_gain", "", "reading of the torque sensor over the torque", 0.05, 20, 1.0),
     _number("vibration_noise_mps2", "m/s^2", "rms noise of the accelerometer", 0, 1e3, 0.05),
     _number("housing_mass_kg", "kg", "that moves with the pinion's bearing", 1, 1e5, 150.0),
     _number("housing_frequency_hz", "Hz", "its natural frequency on the frame", 20, 5000, 640.0),

@@ -136,6 +136,7 @@ class _Run:
         cls, drive: ForgingDrive, start: FirstState, signals: Sequence[str], duration_s: float, interval_s: float
     ) -> _Run:
         """Make room for the signals, and put the drive into its first state."""
+        from sims.forging.contact_kernel import reach
         from sims.forging.integrate_kernel import open_contact
 
         n = ceil(duration_s / interval_s - 1e-9)
@@ -146,8 +147,9 @@ class _Run:
         y, mode, counts = np.zeros(N_STATES), np.zeros(3), np.zeros(4, dtype=np.int64)
         y[:4] = start.pinion_angle_rad, start.pinion_speed_rad_s, start.compression_m, start.compression_rate_mps
         k = drive_numbers(drive)
-        if abs(y[2]) > k.half_backlash:
-            open_contact(k, y, 0.0, np.sign(y[2]), mode, contacts[0])
+        flank = float(np.sign(y[2]))
+        if flank * y[2] > reach(k, y[0], flank)[0]:
+            open_contact(k, y, 0.0, flank, mode, contacts[0])
             counts[1] = 1
         return cls(k, y, mode, counts, select, np.full((n, len(select)), np.nan), contacts, interval_s)
 

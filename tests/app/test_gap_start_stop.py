@@ -21,6 +21,7 @@ from gearsig.report.gap_json import gap_schema
 from gearsig.report.gap_reading import read_gap_json
 from gearsig.rig.toml import write_rig
 from sims import simulate
+from sims.effects import EffectSetting
 
 
 def run(arguments: list[str]) -> int:
@@ -149,3 +150,38 @@ def test_worn_flanks_touch_later_where_they_slide_most():
     assert np.max(curve) < 60.0
     assert np.ptp(curve) > 5.0
     assert worn_curve_um(compared.twin.parameters, 20.0, 0.0) == pytest.approx(np.zeros(len(curve)), abs=1e-6)
+
+
+@pytest.mark.parametrize("depth_um", [30.0, 60.0, 120.0])
+def test_a_worn_drive_runs_as_its_teeth_at_rest_say(depth_um):
+    """The course of the compression from the balance of forces of two worn pairs, against the drive in motion."""
+    twin = compared_of(made(9), None, "now").twin
+    worn = twin.tell(twin.parameters, (EffectSetting("tooth_wear", depth_um, {"gear": "driver"}),)).contact
+    sound, expected = twin.sound.contact, worn_curve_um(twin.parameters, twin.sound.contact.deflection_um, depth_um)
+    known = np.isfinite(worn.curve_um) & np.isfinite(sound.curve_um)
+    found = (worn.curve_um - sound.curve_um)[known]
+    assert found - found.mean() == pytest.approx(expected[known] - expected[known].mean(), abs=1.5)
+    assert np.ptp(found) > 5.0
+    assert worn.play_um - sound.play_um == pytest.approx(expected.mean(), abs=1.5)
+
+
+@pytest.mark.parametrize("gain", [0.8, 1.3])
+def test_a_sensor_that_misreads_is_not_taken_for_another_load(gain):
+    answer = diagnosed(made(2, torque_gain=gain), made(1))
+    first = answer.causes[0]
+    assert first.name == "torque_gain"
+    assert first.severity.value == pytest.approx(100.0 * (gain - 1.0), rel=0.15)
+
+
+def without_force(recording):
+    """Leave out the channel of the model that no sensor measures: it would tell a misread torque by itself."""
+    return recording.select([name for name in recording.channel_names if name != "interaction force"])
+
+
+@pytest.mark.parametrize("parameters", [{"torque_gain": 1.4}, {"piece_mass_kg": 2500.0}])
+def test_without_a_reference_another_load_and_another_reading_are_not_told_apart(parameters):
+    now = replace(made(2, **parameters), rig=made(1).rig)
+    answer = diagnosed(without_force(now))
+    both = {cause.name: cause.probability for cause in answer.causes if cause.name in ("torque_gain", "load_inertia")}
+    assert min(both.values()) > 0.15
+    assert sum(both.values()) > 0.6

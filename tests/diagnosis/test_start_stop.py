@@ -29,7 +29,7 @@ def test_a_start_stop_recording_is_examined_as_one() -> None:
     assert isinstance(result.shaft_angle, CannotTell)
     assert result.channels == ()
     assert result.outcome is Outcome.CANNOT_TELL
-    assert "1 start and 2 stops in a record that begins in motion" in found["start-stop"].title
+    assert "2 starts and 2 stops" in found["start-stop"].title
     assert found["flank-impacts"].where.tooth is not None
     assert {i.name for i in result.indicators} >= {"backlash", "restitution", "standing part"}
     assert "want a speed that lasts" in " ".join(analysis_text(result).split())

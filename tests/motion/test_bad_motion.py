@@ -118,7 +118,7 @@ def test_motion_alone_is_examined_as_far_as_it_goes(capsys: pytest.CaptureFixtur
     write_recording(alone, folder / "motion.h5")
     code, out, _ = run(capsys, "analyze", folder / "motion.h5", "--rig", folder / "rig.toml")
     assert code == 0
-    assert "1 start and 2 stops" in " ".join(out.split())
+    assert "2 starts and 2 stops" in " ".join(out.split())
     assert "The lost motion" in out
 
 

@@ -56,7 +56,7 @@ def test_starts_and_stops_of_the_simulated_drive() -> None:
     recording = start_stop()
     course = course_of_angle(recording.values("pinion angle"), RATE)
     assert [s.direction for s in course.stretches] == [1, 0, 1, 0]
-    assert course.starts_s == pytest.approx((3.0,), abs=0.03)
+    assert course.starts_s == pytest.approx((0.0, 3.0), abs=0.03)
     assert course.stops_s == pytest.approx((1.14, 4.14), abs=0.03)
     assert is_start_stop(course)
     assert not is_start_stop(course_of_angle(continuous().values("pinion angle"), RATE))
@@ -117,8 +117,7 @@ def test_work_and_loss_of_the_loop_are_those_of_the_model() -> None:
 def test_everything_at_once_and_what_is_refused() -> None:
     examined = examine_start_stop(measure_motion(start_stop()))
     named = {i.name: i.value for i in examined.indicators}
-    assert named["starts"] == 1.0
-    assert named["stops"] == 2.0
+    assert (named["starts"], named["stops"]) == (2.0, 2.0)
     assert named["standing part"] == pytest.approx(0.62, abs=0.02)
     assert named["backlash"] == pytest.approx(300.0, rel=0.02)
     assert named["back impacts per cycle"] > 3.0
@@ -126,7 +125,10 @@ def test_everything_at_once_and_what_is_refused() -> None:
     assert named["lost motion"] == pytest.approx(np.degrees(300e-6 / 0.047), rel=0.5)
     assert examined.portrait is not None
     assert examined.portrait.units == ("m", "m/s")
+    # at 1 kHz a bounce now and then parts faster than it met: that one is refused, and said
     assert not examined.refusals
+    assert all(text.startswith("The restitution of 1 of ") for text in examined.notes)
+    assert all(i.note or not i.restitution > 1.0 for i in examined.impacts)
     steady = examine_start_stop(measure_motion(continuous()))
     assert steady.backlash is None
     assert any("back flank" in text for text in steady.refusals)

@@ -63,6 +63,8 @@ def show_views(sound: DriveRun, faulty: DriveRun | None) -> None:
         _show_motion(run)
     for text in run.examined.refusals:
         st.caption(f":material/info: {as_typed(f'Cannot tell the {text}')}")
+    for text in run.examined.notes:
+        st.caption(f":material/info: {as_typed(text)}")
 
 
 def show_saving(run: DriveRun) -> None:

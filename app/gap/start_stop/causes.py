@@ -9,7 +9,7 @@ from gearsig.gap.simulator import GapEffect
 from sims.effects import EffectSetting, effect
 from sims.forging.effects import WITH_MEANING
 
-LOAD_INERTIA, LOAD_FRICTION = "load_inertia", "load_friction"
+LOAD_INERTIA, LOAD_FRICTION, TORQUE_GAIN = "load_inertia", "load_friction", "torque_gain"
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,9 @@ TRIED: Mapping[str, Tried] = {
     LOAD_FRICTION: Tried((8.0, 20.0, 45.0), ("load_friction",), (), "torque", needs_reference=True),
     "root_crack": Tried((1.0, 2.0, 4.0, 6.0, 8.0, 10.0), ("tooth",), (), "torque"),
     LOAD_INERTIA: Tried((-50.0, -25.0, 40.0, 120.0), ("inertia",), ("load_scatter",), "torque"),
+    TORQUE_GAIN: Tried(
+        (-40.0, -20.0, 25.0, 60.0), ("inertia", "load_friction", "deflection"), ("flank_friction", *_ROUGH), "torque"
+    ),
     "torque_ripple": Tried((1.5, 5.0, 15.0), ("ripple",), ("next_ripple", *_ROUGH), "torque"),
 }
 """Of each cause."""
@@ -71,8 +74,17 @@ OF_PARAMETERS = {
         "torque that turns the load without accelerating it",
         TRIED[LOAD_FRICTION].shows_in,
     ),
+    TORQUE_GAIN: GapEffect(
+        TORQUE_GAIN,
+        "measurement",
+        "a torque sensor that reads too much or too little",
+        "added_percent",
+        "%",
+        "inertia and friction of the load seem to change alike",
+        TRIED[TORQUE_GAIN].shows_in,
+    ),
 }
-"""What no effect of the catalogue is: parameters of the drive that may be wrong."""
+"""What no effect of the catalogue is: parameters of the drive or of its sensors that may be wrong."""
 
 
 def drive_effects() -> dict[str, GapEffect]:
@@ -89,6 +101,9 @@ def parameters_with(name: str, severity: float, parameters: Mapping[str, float |
     if name == LOAD_FRICTION:
         both = ("load_friction_nm", "load_viscous_nm_s_per_rad")
         return {**parameters, **{key: float(parameters[key]) * factor for key in both}}
+    if name == TORQUE_GAIN:  # what was read off the recording was misread as well
+        read = ("brake_nm", "drag_nm", "drag_viscous_nm_s_per_rad")
+        return {**parameters, **{key: float(parameters[key]) / factor for key in read}, "torque_gain": factor}
     return dict(parameters)
 
 

@@ -8,7 +8,7 @@ from app.gap.start_stop.compare import Compared
 from gearsig.checks import FloatArray
 from gearsig.gap.simulator import Added
 from gearsig.gap.start_stop.floors import FLOOR
-from gearsig.gap.start_stop.told import NAMES, RIPPLE_PART, TOOTH_PART
+from gearsig.gap.start_stop.told import NAMES
 from gearsig.gap.types import AngleCurves, SpectrumCurves
 
 RIPPLE, CRACK = "torque_ripple", "root_crack"
@@ -44,7 +44,7 @@ def _ripple_floor_db(compared: Compared, other: FloatArray) -> FloatArray:
     """Return how far a line of sound drives may rise, in dB: the floor of the ripple, from its scale back to a part."""
     floor = compared.floor()
     limit = FLOOR * float(floor.scale[NAMES.index("ripple")])
-    part = 2.0 * RIPPLE_PART * float(np.sinh(limit * np.log(10.0) / 20.0))
+    part = 2.0 * compared.spot.ripple_step * float(np.sinh(limit * np.log(10.0) / 20.0))
     found: FloatArray = 20.0 * np.log10(1.0 + part / np.maximum(other, 1e-5))
     return found
 
@@ -54,9 +54,7 @@ def tooth_curves(compared: Compared, fitted: Added | None, predicted_um: float) 
     now, other = compared.told.contact, compared.other.contact
     if np.sum(np.isfinite(now.teeth_um)) < 0.8 * len(now.teeth_um):
         return ()
-    deflection = other.deflection_um if np.isfinite(other.deflection_um) else 20.0
-    known: FloatArray = other.teeth_um[np.isfinite(other.teeth_um)]
-    step = max(TOOTH_PART * deflection, 1.4826 * float(np.median(np.abs(known))) if len(known) else 0.0)
+    step = compared.spot.tooth_step_um
 
     def energy(extra_um: FloatArray) -> FloatArray:
         found: FloatArray = 1.0 + (np.maximum(np.nan_to_num(extra_um), 0.0) / step) ** 2

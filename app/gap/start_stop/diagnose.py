@@ -160,7 +160,14 @@ def _torque(one: Examined) -> float:
 def predictions_of(compared: Compared, tell: Callable[[str, float], object] = lambda *_: None) -> Predictions:
     """Simulate every cause that the recording can tell."""
     order = int(compared.now.orders[compared.spot.order])
-    return predict(compared.twin, compared.spot, order, tellable(compared), tell)
+    return predict(
+        compared.twin,
+        compared.spot,
+        order,
+        tellable(compared),
+        tell,
+        with_reference=compared.reference is not None,
+    )
 
 
 def tellable(compared: Compared) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from app.gap.start_stop.causes import TRIED, parameters_with, setting_of
+from app.gap.start_stop.causes import TORQUE_GAIN, TRIED, parameters_with, setting_of
 from app.gap.start_stop.compare import Compared
 from app.gap.start_stop.predict import Predictions
 from gearsig.checks import FloatArray
@@ -19,7 +19,7 @@ from gearsig.gap.types import NextRecording
 
 FACTORS = (0.7, 1.5)
 """Torques that are tried, over the present one."""
-ANALYTIC = ("tooth_wear", "root_crack")
+ANALYTIC = ("tooth_wear", "root_crack", TORQUE_GAIN)
 LEAST_GAIN, SAME = 1.1, 0.1
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.gap.start_stop.causes import TRIED, parameters_with, setting_of
+from app.gap.start_stop.causes import TORQUE_GAIN, TRIED, parameters_with, setting_of
 from app.gap.start_stop.twin import DriveTwin
 from app.gap.start_stop.worn import worn_curve_um
 from gearsig.checks import FloatArray
@@ -39,7 +39,13 @@ def curve_shape(twin: DriveTwin) -> FloatArray:
 
 
 def predict(
-    twin: DriveTwin, spot: Spot, order: int, names: tuple[str, ...], tell: Tell = lambda *_: None
+    twin: DriveTwin,
+    spot: Spot,
+    order: int,
+    names: tuple[str, ...],
+    tell: Tell = lambda *_: None,
+    *,
+    with_reference: bool = True,
 ) -> Predictions:
     """Simulate every cause at some severities.
 
@@ -58,6 +64,8 @@ def predict(
         Causes that the recording can tell.
     tell : callable
         Is told the cause and the share that is done.
+    with_reference : bool
+        Whether a sound recording is compared with, and not the simulated drive.
     """
     shape = curve_shape(twin)
     options: dict[str, dict[str, float | str]] = {
@@ -70,7 +78,11 @@ def predict(
         rows, kept = [], []
         shown = np.isin(NAMES, TRIED[name].shows_in)
         for severity in TRIED[name].severities:
-            told = _told(twin, name, severity, options.get(name, {}), spot)
+            told = (
+                _misread(twin, severity, with_reference=with_reference)
+                if name == TORQUE_GAIN
+                else _told(twin, name, severity, options.get(name, {}), spot)
+            )
             change = None if told is None else change_of(told, twin.sound, shape, spot)
             if change is not None and np.isfinite(change[shown]).any():  # else it stands still
                 rows.append(change)
@@ -104,6 +116,21 @@ def _worn(twin: DriveTwin, depth_um: float) -> Told:
         curve_um=sound.contact.curve_um + curve - mean,
     )
     return replace(sound, contact=contact)
+
+
+def _misread(twin: DriveTwin, percent: float, *, with_reference: bool) -> Told:
+    """Return what a torque sensor of another gain makes of the same motion.
+
+    Inertia and friction of the load follow from the torque, and grow with the reading. What the teeth yield does not:
+    it stays as in a sound recording, and falls behind a simulated drive, which is driven by the torque that was read.
+    That one also takes the friction of its load from the recording.
+    """
+    gain, sound = 1.0 + 0.01 * percent, twin.sound
+    load = replace(sound.load, inertia_kg_m2=gain * sound.load.inertia_kg_m2)
+    if with_reference:
+        return replace(sound, load=replace(load, friction_nm=gain * sound.load.friction_nm))
+    yielding = sound.contact.deflection_um * gain ** (-1.0 / float(twin.parameters["exponent"]))
+    return replace(sound, load=load, contact=replace(sound.contact, deflection_um=yielding))
 
 
 def _cracked(twin: DriveTwin, setting: EffectSetting, spot: Spot) -> Told:

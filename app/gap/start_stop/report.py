@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.gap.start_stop.causes import TRIED, drive_effects, parameters_with, setting_of
+from app.gap.start_stop.causes import TORQUE_GAIN, TRIED, drive_effects, parameters_with, setting_of
 from app.gap.start_stop.compare import Compared
 from app.gap.start_stop.curves import CRACK, tooth_curves, torque_curves
 from app.gap.start_stop.next_recording import next_drive_recordings
@@ -16,7 +16,7 @@ from app.gap.start_stop.predict import Predictions
 from app.gap.start_stop.weighing import Seen, Weighed
 from gearsig.gap.simulator import Added, GapEffect, Point
 from gearsig.gap.start_stop.floors import FLOOR, DriveFloor
-from gearsig.gap.start_stop.told import NAMES, TOOTH_PART
+from gearsig.gap.start_stop.told import NAMES
 from gearsig.gap.start_stop.weigh import Fitted
 from gearsig.gap.types import (
     NONE,
@@ -208,8 +208,9 @@ def _extra_um(fitted: Fitted | None, compared: Compared) -> float:
     """Return how much more a cracked tooth yields at the fitted severity: from the change back to µm."""
     if fitted is None:
         return 0.0
-    step = TOOTH_PART * np.nan_to_num(compared.other.contact.deflection_um, nan=20.0)
-    return float(2.0 * step * np.sinh(fitted.predicted[NAMES.index("tooth")] * np.log(10.0) / 20.0))
+    return float(
+        2.0 * compared.spot.tooth_step_um * np.sinh(fitted.predicted[NAMES.index("tooth")] * np.log(10.0) / 20.0)
+    )
 
 
 def _preset(compared: Compared, cause: GapCause, fitted: Added) -> str:
@@ -220,4 +221,6 @@ def _preset(compared: Compared, cause: GapCause, fitted: Added) -> str:
     )
     twin = compared.twin
     parameters = parameters_with(cause.name, fitted.severity, twin.parameters)
+    if cause.name == TORQUE_GAIN:
+        twin = twin.at_torque(1.0 / (1.0 + 0.01 * fitted.severity))
     return twin.preset(setting_of(cause.name, fitted.severity, fitted.options), parameters, (note,))

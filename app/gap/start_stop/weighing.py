@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from app.gap.start_stop.compare import Compared
 from gearsig.checks import FloatArray
 from gearsig.gap.posterior import score_of
 from gearsig.gap.start_stop.floors import DriveFloor
-from gearsig.gap.start_stop.told import Spot, spot_of
+from gearsig.gap.start_stop.told import spot_of
 from gearsig.gap.start_stop.weigh import Fitted, Predicted, evidences, fit, own_features, shares, shrink
 from gearsig.gap.types import Interval, Shrinkage
 
@@ -102,8 +102,8 @@ def _fold(compared: Compared, ours: tuple[int, ...], theirs: tuple[int, ...]) ->
     blocks = [tuple(c for c in theirs if c != one) for one in theirs] if len(theirs) > 1 else [theirs]
     n_teeth, n_orders = len(here.contact.teeth_um), len(here.ripple)
     steps = [1 + i * max(1, n_teeth // (N_PLACEBOS + 1)) for i in range(N_PLACEBOS)]
-    teeth = [Spot((spot.tooth + step) % n_teeth, spot.order) for step in steps]
-    orders = [Spot(spot.tooth, (spot.order + 3 + 4 * i) % n_orders) for i in range(N_PLACEBOS)]
+    teeth = [replace(spot, tooth=(spot.tooth + step) % n_teeth) for step in steps]
+    orders = [replace(spot, order=(spot.order + 3 + 4 * i) % n_orders) for i in range(N_PLACEBOS)]
     return Fold(
         compared.change_in(ours, spot),
         compared.change_in(theirs, spot),

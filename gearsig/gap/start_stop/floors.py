@@ -15,7 +15,9 @@ from gearsig.checks import FloatArray
 from gearsig.gap.start_stop.told import NAMES
 
 FILE = Path(__file__).with_name("floors.json")
-LEAST_DB = 0.15
+LEAST_DB, LEAST_SIGNED_DB = 0.15, 0.87
+"""Of a scale: 2 % of a level; a fifth of the step of what is ordinarily near zero."""
+LEVELS = ("play", "deflection", "inertia", "load_friction", "impact", "contact_scatter", "load_scatter")
 FLOOR = 1.96
 """Scales of the middle of the distribution: 19 of 20 sound machines stay below."""
 TAIL = 4.0
@@ -52,7 +54,8 @@ class DriveFloor:
             values = table[known[:, i], i]
             if len(values) >= 5:
                 low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
-                centre[i], scale[i] = middle, max(0.5 * (high - low) / 1.2816, LEAST_DB)
+                least = LEAST_DB if NAMES[i] in LEVELS else LEAST_SIGNED_DB
+                centre[i], scale[i] = middle, max(0.5 * (high - low) / 1.2816, least)
         sizes = [_soft((row - centre) / (FLOOR * scale)) for row in table]
         return cls(centre, scale, float(np.quantile(sizes, 0.95)))
 

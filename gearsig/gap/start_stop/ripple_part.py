@@ -24,6 +24,13 @@ def orders_of(cycles: CycledMotion) -> NDArray[np.int64]:
     return found
 
 
+def runs_of(cycles: CycledMotion) -> list[FloatArray]:
+    """Return the driver's angle in each run that is long enough."""
+    runs = cycles.phase == PHASES.index("run")
+    found = [cycles.motion.driver_angle_rad[runs & (cycles.number == c)] for c in range(cycles.n_cycles)]
+    return [angle for angle in found if len(angle) >= FEWEST_SAMPLES]
+
+
 def ripple_part(cycles: CycledMotion, wanted: tuple[int, ...], orders: NDArray[np.int64]) -> FloatArray:
     """Return amplitude over mean torque at each order, (n,); nan without torque.
 

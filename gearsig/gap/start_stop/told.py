@@ -13,7 +13,7 @@ from gearsig.errors import RefusalError
 from gearsig.gap.start_stop.contact_part import ContactPart, Flanks, contact_part, prepare_flanks
 from gearsig.gap.start_stop.cycles import CycledMotion
 from gearsig.gap.start_stop.load_part import LoadEquation, LoadPart, load_part, prepare_load
-from gearsig.gap.start_stop.ripple_part import orders_of, ripple_part
+from gearsig.gap.start_stop.ripple_part import orders_of, ripple_part, runs_of
 from gearsig.motion.impacts import Impact, find_impacts
 
 NAMES = (
@@ -36,10 +36,15 @@ NAMES = (
 )
 """Of the changes, see `change_of`."""
 
-TOOTH_PART, CURVE_PART, WAVE_PART = 0.05, 0.1, 0.2
-"""Of the deflection under the ordinary load: teeth, curve and waves of sound gears differ by that."""
+CURVE_PART, WAVE_PART = 0.1, 0.2
+"""Of the deflection under the ordinary load: curve and waves of sound gears differ by that."""
+TOOTH_PART = 0.01
+"""Of it: teeth differ by that at least; by how much they do is read off the recording, see `spot_of`."""
 RIPPLE_PART, OFF_CENTRE_PART, FRICTION_STEP = 0.01, 0.03, 0.02
 """Of the mean torque; of the ordinary drive; of the coefficient: below it nothing is told from nothing."""
+FEW_WAVES = 6.0
+"""Of an order in one run: fewer, and the course of a start and a stop passes for a ripple."""
+ORDINARY_DEFLECTION_UM = 20.0
 BESIDE = 2
 """Orders on either side into which a ripple leaks: a run is short."""
 LEAST_SCATTER_UM, LEAST_SCATTER_PART = 0.5, 0.01
@@ -57,20 +62,37 @@ class Told:
         Amplitude over mean torque.
     impact_mps : float
         Median over the cycles of the hardest impact; nan where none can be seen.
+    ripple_waves : array, (n_orders,)
+        How many waves of each order an ordinary run holds.
     """
 
     contact: ContactPart
     load: LoadPart
     ripple: FloatArray
     impact_mps: float
+    ripple_waves: FloatArray
 
 
 @dataclass(frozen=True)
 class Spot:
-    """Where a change was found: tooth of the driver (from 0) and place among the orders of the ripple."""
+    """Where a change was found, and what teeth and orders differ by ordinarily.
+
+    Parameters
+    ----------
+    tooth : int
+        Of the driver, from 0.
+    order : int
+        Place among the orders of the ripple.
+    tooth_step_um : float
+        Scatter of the changes of all teeth.
+    ripple_step : array, (n_orders,)
+        Part of the mean torque that a run's own course may put there.
+    """
 
     tooth: int
     order: int
+    tooth_step_um: float
+    ripple_step: FloatArray
 
 
 @dataclass(frozen=True)
@@ -119,7 +141,13 @@ class Examined:
             load_part(self.equation, rows),
             ripple_part(self.cycles, wanted, self.orders),
             self._hardest(wanted),
+            self.orders * self._revolutions_of_a_run,
         )
+
+    @cached_property
+    def _revolutions_of_a_run(self) -> float:
+        """Median over the runs."""
+        return float(np.median([np.ptp(angle) / (2.0 * np.pi) for angle in runs_of(self.cycles)] or [0.0]))
 
     def _hardest(self, wanted: tuple[int, ...]) -> float:
         rate = self.cycles.motion.sampling_rate_hz
@@ -133,8 +161,19 @@ class Examined:
 
 
 def spot_of(now: Told, other: Told) -> Spot:
-    """Return the tooth and the order that changed most."""
-    return Spot(_largest(now.contact.teeth_um - other.contact.teeth_um), _largest(now.ripple - other.ripple))
+    """Return the tooth and the order that changed most over what the others did.
+
+    Teeth: the scatter of their changes, 1.4826 of the median deviation, so that a tooth is judged by the other teeth
+    and not by what another make differs by. Orders: f (1 + (w₀/w)³), w the waves of an order in one run: the trend of a
+    run of one revolution cannot be told from an order of four.
+    """
+    teeth, ripple = now.contact.teeth_um - other.contact.teeth_um, now.ripple - other.ripple
+    known = teeth[np.isfinite(teeth)]
+    scatter = 1.4826 * float(np.median(np.abs(known - np.median(known)))) if len(known) else 0.0
+    tooth_step = float(np.hypot(scatter, TOOTH_PART * _deflection(now, other)))
+    waves = np.maximum(np.minimum(now.ripple_waves, other.ripple_waves), 1e-3)
+    steps = RIPPLE_PART * (1.0 + (FEW_WAVES / waves) ** 3)
+    return Spot(_largest(teeth), _largest(ripple / steps), tooth_step, steps)
 
 
 def change_of(now: Told, other: Told, curve_shape: FloatArray, at: Spot | None = None) -> FloatArray:
@@ -142,7 +181,7 @@ def change_of(now: Told, other: Told, curve_shape: FloatArray, at: Spot | None =
 
     Levels (play, deflection, inertia, friction of the load, impact, scatter) in dB. What is ordinarily near zero and
     may have a sign is given as 20 lg e · asinh(x/2f), f what sound machines differ by: for large x in dB over it. Tooth
-    and ripple are given over the next largest.
+    and ripple are given over the next largest, f as `spot_of` says.
 
     Parameters
     ----------
@@ -151,15 +190,14 @@ def change_of(now: Told, other: Told, curve_shape: FloatArray, at: Spot | None =
     curve_shape : array
         Course of the compression over the mesh cycle that worn flanks give; its mean is 0.
     at : Spot or None
-        Tooth and order to look at. None: those that changed most.
+        Tooth and order to look at, and their steps. None: those that changed most.
     """
     c, d = now.contact, other.contact
     a, b = now.load, other.load
     spot = at or spot_of(now, other)
-    teeth, ripple = c.teeth_um - d.teeth_um, now.ripple - other.ripple
-    deflection = d.deflection_um if np.isfinite(d.deflection_um) else c.deflection_um
-    deflection = deflection if np.isfinite(deflection) else 20.0
-    drive, tooth_step = b.drive_nm, TOOTH_PART * deflection
+    teeth = (c.teeth_um - d.teeth_um) / spot.tooth_step_um
+    ripple = (now.ripple - other.ripple) / spot.ripple_step
+    deflection, drive = _deflection(now, other), b.drive_nm
     values = (
         _level(c.play_um, d.play_um),
         _level(c.deflection_um, d.deflection_um),
@@ -167,10 +205,10 @@ def change_of(now: Told, other: Told, curve_shape: FloatArray, at: Spot | None =
         _level(a.inertia_kg_m2, b.inertia_kg_m2),
         _level(a.friction_nm, b.friction_nm),
         _signed(a.flank_friction - b.flank_friction, FRICTION_STEP),
-        _signed(_at(teeth, spot.tooth), tooth_step) - _signed(_but(teeth, spot.tooth), tooth_step),
-        _signed(_but(teeth, spot.tooth), tooth_step),
-        _signed(_at(ripple, spot.order), RIPPLE_PART) - _signed(_but(ripple, spot.order, BESIDE), RIPPLE_PART),
-        _signed(_but(ripple, spot.order, BESIDE), RIPPLE_PART),
+        _signed(_at(teeth, spot.tooth), 1.0) - _signed(_but(teeth, spot.tooth), 1.0),
+        _signed(_but(teeth, spot.tooth), 1.0),
+        _signed(_at(ripple, spot.order), 1.0) - _signed(_but(ripple, spot.order, BESIDE), 1.0),
+        _signed(_but(ripple, spot.order, BESIDE), 1.0),
         _signed(_size(c.waves_um[:2] - d.waves_um[:2]), WAVE_PART * deflection),
         _signed(_size(c.waves_um[2:] - d.waves_um[2:]), WAVE_PART * deflection),
         _signed(_size(a.off_centre_nm - b.off_centre_nm), OFF_CENTRE_PART * drive),
@@ -179,6 +217,12 @@ def change_of(now: Told, other: Told, curve_shape: FloatArray, at: Spot | None =
         _level(np.hypot(a.scatter_nm, LEAST_SCATTER_PART * drive), np.hypot(b.scatter_nm, LEAST_SCATTER_PART * drive)),
     )
     return np.array(values, dtype=np.float64)
+
+
+def _deflection(now: Told, other: Told) -> float:
+    """Return what a pair of teeth yields under the ordinary load; an ordinary value where no torque tells it."""
+    known = (one.contact.deflection_um for one in (other, now) if np.isfinite(one.contact.deflection_um))
+    return float(next(known, ORDINARY_DEFLECTION_UM))
 
 
 def _level(now: float, other: float) -> float:

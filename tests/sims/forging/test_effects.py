@@ -37,9 +37,9 @@ def test_effects_change_their_parameter_and_not_the_rig_file() -> None:
     assert estimate_backlash(measure_motion(faulty)).backlash_um == pytest.approx(380.0, rel=0.02)
 
 
-def test_wear_widens_the_play_by_its_mean_depth() -> None:
-    values = made(EffectSetting("tooth_wear", 100.0, {"gear": "driver"})).values
-    assert 10.0 < float(values["wear_um"] or 0.0) < 60.0
+def test_wear_is_of_the_gear_that_is_named() -> None:
+    values = made(EffectSetting("tooth_wear", 100.0, {"gear": "driven"})).values
+    assert (values["sliding_wear_driver_um"], values["sliding_wear_driven_um"]) == (0.0, 100.0)
 
 
 def test_ripple_shows_at_its_order() -> None:
