@@ -26,8 +26,8 @@ def channel_scale(
     """Return the scale of a speed or acceleration against the angle, and its standard error.
 
     Speed: ∫ ω dt = s Δθ over windows of a twentieth of a second. Acceleration: the second difference of ∬ α dt² is s
-    times that of θ. Least squares, in which the angle, which a counter gives nearly without noise, explains the rate; the
-    error by leaving out each window (jackknife), as blows between samples spoil single ones.
+    times that of θ. Least squares, in which the angle, which a counter gives nearly without noise, explains the
+    rate; the error by leaving out each window (jackknife), as blows between samples spoil single ones.
 
     Parameters
     ----------

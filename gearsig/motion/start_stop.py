@@ -211,10 +211,11 @@ def _notes(impacts: tuple[Impact, ...], rate_hz: float) -> tuple[str, ...]:
         return ()
     known = n + sum(not np.isnan(i.restitution) for i in impacts)
     remedy = "; record at 4 kHz or more" if rate_hz < ENOUGH_HZ else ""
-    return (
+    text = (
         f"The restitution of {n} of {known} bounces cannot be read: they part faster than they met, as noise is too "
-        f"large or samples at {rate_hz:g} Hz are too few for their flights{remedy}.",
+        f"large or samples at {rate_hz:g} Hz are too few for their flights{remedy}."
     )
+    return (text,)
 
 
 def _datum(motion: PairMotion, backlash: BacklashEstimate | None, refusals: list[str]) -> float | None:

@@ -8,7 +8,7 @@ is null. Members may be added within a version, never renamed or removed.
 - ``backlash``: null, or ``backlash_um``, ``uncertainty_um``, ``stiffness_n_per_m_lambda``, ``n_drive``, ``n_back``,
   ``scatter_um``, ``method``
 - ``impacts``: each with ``time_s``, ``flank``, ``driver_tooth``, ``driven_tooth``, ``driver_angle_deg``, ``speed_mps``,
-  ``energy_j``, ``restitution``, ``lost_j``, ``peak_force_n``, ``note`` (why there is no restitution, where there should be)
+  ``energy_j``, ``restitution``, ``lost_j``, ``peak_force_n``, ``note`` (why it has no restitution)
 - ``indicators``: each with ``name``, ``value``, ``unit``, ``computed_on``
 - ``teeth``: per tooth of the driver ``passes_forwards``, ``passes_backwards``, ``rms_forwards``, ``rms_backwards`` of
   ``signal`` in ``unit``; null where there was nothing to average

@@ -1,4 +1,4 @@
-"""Scales of speeds and accelerations against the angle: recovered, refused where wrong, left alone where nothing moves."""
+"""Scales of speeds and accelerations against the angle: recovered, refused where wrong."""
 
 from dataclasses import replace
 

@@ -147,7 +147,8 @@ class Examined:
     @cached_property
     def _revolutions_of_a_run(self) -> float:
         """Median over the runs."""
-        return float(np.median([np.ptp(angle) / (2.0 * np.pi) for angle in runs_of(self.cycles)] or [0.0]))
+        turned = [float(np.ptp(angle)) / (2.0 * np.pi) for angle in runs_of(self.cycles)]
+        return float(np.median(turned)) if turned else 0.0
 
     def _hardest(self, wanted: tuple[int, ...]) -> float:
         rate = self.cycles.motion.sampling_rate_hz
