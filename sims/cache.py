@@ -11,6 +11,13 @@ from typing import IO
 
 from gearsig.errors import InputError
 
+FRESH = "add --fresh to gearsig simulate, flexible, gear-body or gap, which clears such files away, or delete this one"
+"""What makes a file again that another version of the code kept."""
+
+
+class OtherVersionError(InputError):
+    """A kept file was made by another version of the code."""
+
 
 def cache_folder(room: str) -> Path:
     """Return this user's folder for one kind of kept results; the variable GEARSIG_CACHE names another place.

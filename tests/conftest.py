@@ -2,6 +2,7 @@
 
 import os
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 # Compiled kernels are built on their first call: how long an example takes says nothing about the code.
@@ -9,3 +10,9 @@ settings.register_profile("gearsig", deadline=None, suppress_health_check=[Healt
 # In continuous integration the examples are the same each time: a change fails by what it changes, not by chance.
 settings.register_profile("ci", settings.get_profile("gearsig"), derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "gearsig")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def kept_results_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Keep results of tests apart from the user's, which may be of another state of the code."""
+    os.environ.setdefault("GEARSIG_CACHE", str(tmp_path_factory.mktemp("cache")))

@@ -7,7 +7,15 @@ from typing import Annotated
 
 import typer
 
-from app.commands.simulation_options import EffectOption, PresetOption, SeedOption, SetOption, read_request
+from app.commands.simulation_options import (
+    EffectOption,
+    FreshOption,
+    PresetOption,
+    SeedOption,
+    SetOption,
+    clear_other_versions,
+    read_request,
+)
 from app.quantities import quantity
 from gearsig.errors import InputError
 
@@ -30,6 +38,7 @@ def flexible(
         bool, typer.Option("--spreading", help="Also check contact at single nodes against patches (RBE3).")
     ] = False,
     seed: SeedOption = 0,
+    fresh: FreshOption = False,
 ) -> None:
     """Study a pair of reduced finite-element gears: stiffness and transmission-error maps, sweeps with jumps, spectra.
 
@@ -47,6 +56,8 @@ def flexible(
     request = read_request(MODEL, preset, settings, effects, None, None, "1s", "20480Hz", seed)
     first, last = _range(speeds)
     wanted = tuple(quantity(f"{t.strip().removesuffix('Nm')}Nm", "N m", "--torques") for t in torques.split(","))
+    if fresh:
+        clear_other_versions(MODEL)
     ready = ReducedPair().prepare(
         request.parameters, request.effects, None, np.random.default_rng(seed), preset_name=request.preset
     )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.commands.options import SamplingRateOption
+from app.commands.simulation_options import clear_other_versions
 from app.gap.inputs import Asked
 from gearsig.errors import InputError
 
@@ -84,6 +85,8 @@ def gap(
 
     asked = Asked(tuple(recordings or ()), tuple(reference or ()), rig, _torques(torque), fs)
     check_folder(output)
+    if fresh and model == "reduced-fe":
+        clear_other_versions(model)
     report = _diagnosed(asked, model, cache, fresh=fresh)
     written = write_results(report, output, command="gearsig " + shlex.join(sys.argv[1:]))
     _tell(report, written)

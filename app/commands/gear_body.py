@@ -40,6 +40,9 @@ def gear_body(
     twist: Annotated[str, typer.Option("--twist", metavar="STIFFNESS", help="About the shaft.")] = SPRINGS["twist"],
     force: Annotated[str, typer.Option("--force", metavar="FORCE", help="On one tooth, for the stress.")] = "1000N",
     reduce: Annotated[bool, typer.Option("--reduce", help="Also reduce the gear, with its errors.")] = False,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Clear away reduced gears that another version of gearsig kept.")
+    ] = False,
     vtk: Annotated[bool, typer.Option("--vtk", help="Also write gear.vtu for other programs.")] = False,
 ) -> None:
     """Mesh one gear with finite elements; show its mesh, modes and stress, and reduce it for the model reduced-fe.
@@ -49,10 +52,12 @@ def gear_body(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+    from app.commands.simulation_options import clear_other_versions
     from app.gear_body.results import lines, write_study
     from app.gear_body.study import study_gear
     from sims.mesh import GearGeometry
     from sims.reduced_fe.blank import GearBlank
+    from sims.reduced_fe.simulator import NAME
 
     def length(text: str, name: str) -> float | None:
         return quantity(text, "mm", name) if text else None
@@ -69,6 +74,8 @@ def gear_body(
     blank = GearBlank(geometry, length(web, "--web"), length(rim, "--rim"), length(hub, "--hub"))
     one_of(held, "--held", ("free", "bore", "springs"))
     springs = _springs(held, {"radial": radial, "axial": axial, "tilt": tilt, "twist": twist})
+    if fresh:
+        clear_other_versions(NAME)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("mesh", total=1.0)

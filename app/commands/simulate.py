@@ -10,6 +10,7 @@ import typer
 from app.commands.simulation_options import (
     DurationOption,
     EffectOption,
+    FreshOption,
     PresetOption,
     RateOption,
     Request,
@@ -17,6 +18,7 @@ from app.commands.simulation_options import (
     SetOption,
     SpeedOption,
     TorqueOption,
+    clear_other_versions,
     read_request,
 )
 from gearsig.errors import InputError
@@ -38,6 +40,7 @@ def simulate(
     duration: DurationOption = "5s",
     fs: RateOption = "",
     seed: SeedOption = 0,
+    fresh: FreshOption = False,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", metavar="FILE", help="Recording: .csv .h5 .parquet .wav or .mat."),
@@ -65,6 +68,8 @@ def simulate(
     request = read_request(model, preset, settings, effects, speed, torque, duration, fs, seed)
     if output is None and not check:
         raise InputError("no output file is given", remedy="give -o FILE, or --check")
+    if fresh:
+        clear_other_versions(model)
     if check:
         typer.echo(_convergence(request))
     if output is not None:

@@ -56,6 +56,13 @@ RateOption = Annotated[
     ),
 ]
 SeedOption = Annotated[int, typer.Option("--seed", min=0, help="The same seed gives the same recording.")]
+FreshOption = Annotated[
+    bool,
+    typer.Option(
+        "--fresh",
+        help="Model reduced-fe: make reduced gears anew that another version of gearsig kept.",
+    ),
+]
 
 
 @dataclass(frozen=True)
@@ -105,6 +112,24 @@ def read_request(
         quantity(fs, "Hz", "--fs") if fs else usual_sampling_rate_hz(chosen),
         seed,
     )
+
+
+def clear_other_versions(model: str | None) -> None:
+    """Delete what other versions kept of finite-element gears, and say so.
+
+    Raises
+    ------
+    InputError
+        If the model keeps nothing.
+    """
+    from sims.reduced_fe.fresh import forget_other_versions
+    from sims.reduced_fe.simulator import NAME
+
+    if model != NAME:
+        raise InputError(f"--fresh is given, but the model {model} keeps nothing", remedy="leave out --fresh")
+    gone = forget_other_versions()
+    if gone:
+        typer.echo(f"{len(gone)} file{'s' if len(gone) > 1 else ''} of another version cleared away", err=True)
 
 
 def read_parameter(chosen: Simulator, text: str) -> tuple[str, ParameterValue]:

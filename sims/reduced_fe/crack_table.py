@@ -8,12 +8,13 @@ from functools import cache, lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from sims.cache import cache_folder, write_whole
+from sims.cache import FRESH, OtherVersionError, cache_folder, write_whole
 from sims.mesh.crack import RootCrack, check_crack, deepest_crack_mm
 from sims.reduced_fe.blank import GearBlank
 from sims.reduced_fe.cracked_tooth import CRACK_SIZE, crack_meshes, front_widths_mm, open_crack
@@ -125,10 +126,9 @@ def _solved(gear: ReducedGear, angle_deg: float, place: int) -> FloatArray:
     shipped = _shipped(gear, angle_deg, place)
     if shipped is not None:
         return shipped
-    made_of = [gear.blank.as_text(), gear.spread, angle_deg, DEPTH_PARTS[place], repr(crack_size(gear))]
-    key = json.dumps([*made_of, code_digest(), _own_digest()]).encode()
+    made_of = [gear.blank.as_text(), gear.spread, angle_deg, DEPTH_PARTS[place], repr(crack_size(gear)), gear.n_dof]
     grid = np.concatenate((gear.grid.roll_rad, gear.grid.z_m)).tobytes()
-    path = cache_folder("cracks") / f"{sha256(key + grid).hexdigest()[:32]}.npy"
+    path = cache_folder("cracks") / f"{sha256(json.dumps(made_of).encode() + grid).hexdigest()[:32]}.npz"
     return _kept(path, lambda: solved_crack_m_per_n(gear, angle_deg, place), gear.grid.shape)
 
 
@@ -182,15 +182,22 @@ def make_ready_cracks() -> None:
     write_whole(READY_FILE, lambda file: np.savez_compressed(file, **arrays))
 
 
+def forget_cracks_of_other_versions(folder: Path | None = None) -> tuple[Path, ...]:
+    """Delete the kept cracks that another version of the code solved, and damaged ones; return their files."""
+    where = cache_folder("cracks") if folder is None else folder
+    gone = [path for path in sorted(where.glob("*.np[yz]")) if _read(path)[0] != _code()]
+    for path in gone:
+        path.unlink(missing_ok=True)
+    return tuple(gone)
+
+
 def _kept(path: Path, solve: Callable[[], FloatArray], grid: tuple[int, int, int]) -> FloatArray:
     """Return what a file keeps, or solve and keep it; a damaged one is made again."""
-    shape = (grid[1], grid[2], grid[2])
-    try:
-        found: FloatArray = np.load(path, allow_pickle=False)
-        if found.shape[1:] == shape and np.isfinite(found).all():
-            return found
-    except (OSError, ValueError, EOFError):
-        pass  # not there, or damaged
+    code, added = _read(path)
+    if added is not None and code != _code():
+        raise OtherVersionError("this crack was solved by another version of gearsig", where=str(path), remedy=FRESH)
+    if added is not None and added.shape[1:] == (grid[1], grid[2], grid[2]) and np.isfinite(added).all():
+        return added
     found = solve()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -198,8 +205,23 @@ def _kept(path: Path, solve: Callable[[], FloatArray], grid: tuple[int, int, int
         raise InputError(
             f"cannot be made ({error.strerror})", where=str(path.parent), remedy="choose another folder"
         ) from None
-    write_whole(path, lambda file: np.save(file, found))
+    write_whole(path, lambda file: np.savez(file, code=np.array(_code()), added=found))
     return found
+
+
+def _read(path: Path) -> tuple[str, FloatArray | None]:
+    """Code that made a file, and what it keeps; None if it is not there or damaged."""
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return str(data["code"]), data["added"]
+    except (OSError, ValueError, EOFError, KeyError, TypeError, AttributeError, BadZipFile):
+        return "", None
+
+
+@cache
+def _code() -> str:
+    """Digest of the code that meshes a gear, opens and solves a crack."""
+    return f"{code_digest()}-{_own_digest()}"
 
 
 @cache

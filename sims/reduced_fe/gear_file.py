@@ -10,7 +10,7 @@ from zipfile import BadZipFile, ZipFile
 import numpy as np
 
 from gearsig.errors import InputError
-from sims.cache import write_whole
+from sims.cache import FRESH, OtherVersionError, write_whole
 from sims.reduced_fe.blank import blank_from_text
 from sims.reduced_fe.gear_key import FORMAT
 from sims.reduced_fe.reduced_gear import FlankGrid, ReducedGear
@@ -51,7 +51,7 @@ def read_gear(path: str | Path) -> ReducedGear:
     Raises
     ------
     InputError
-        If the file is missing, damaged, not a reduced gear, or of another version of this format.
+        If the file is missing, damaged, not a reduced gear, or (`OtherVersionError`) of another version of this format.
     """
     source = Path(path)
     try:
@@ -80,11 +80,11 @@ def _check_length(source: Path) -> None:
 def _check_format(about: dict[str, Any], source: Path) -> None:
     found = about.get("format") if isinstance(about, dict) else None
     if found != FORMAT:
-        raise InputError(
+        raise OtherVersionError(
             f"is of format {found!r}: another version of gearsig wrote it",
             where=str(source),
             allowed=f"format {FORMAT}",
-            remedy="reduce the gear again",
+            remedy=FRESH,
         )
 
 

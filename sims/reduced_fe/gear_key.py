@@ -38,10 +38,20 @@ _OUTLINE = ("geometry", "involute", "profile")
 """Files of `sims.mesh` that make the outline."""
 
 
+def gear_name(blank: GearBlank, plan: ReductionPlan) -> str:
+    """Return a digest of what is asked of a reduced gear, the same for every state of the code."""
+    made_of = json.dumps({"blank": asdict(blank), "plan": asdict(plan)}, sort_keys=True)
+    return sha256(made_of.encode()).hexdigest()[:32]
+
+
 def gear_key(blank: GearBlank, plan: ReductionPlan) -> str:
-    """Return a digest of all that makes a reduced gear."""
-    made_of = json.dumps({"blank": asdict(blank), "plan": asdict(plan), "format": FORMAT}, sort_keys=True)
-    return sha256((made_of + code_digest()).encode()).hexdigest()[:32]
+    """Return what tells reduced gears apart: digests of what is asked for and of the code that makes it."""
+    return f"{gear_name(blank, plan)}-{code_digest()}"
+
+
+def is_of_this_code(key: str) -> bool:
+    """Whether a key of `gear_key` names the present state of the code."""
+    return key.endswith(f"-{code_digest()}")
 
 
 @cache

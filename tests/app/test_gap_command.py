@@ -254,6 +254,7 @@ def test_bad_input_is_one_line(capsys, tmp_path, arguments, said) -> None:
 
 
 def test_the_cache_is_the_users_own_or_a_given_one_and_can_be_made_anew(capsys, stub, tmp_path, monkeypatch) -> None:
+    monkeypatch.delenv("GEARSIG_CACHE", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     run(capsys, CRACKED, "-o", tmp_path / "gap")
     assert stub.given["cache"] == cache_folder("gap") == tmp_path / "cache" / "gearsig" / "gap"

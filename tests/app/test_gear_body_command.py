@@ -1,6 +1,7 @@
 """`gearsig gear-body`: figures, files and text of one small gear."""
 
 import re
+from dataclasses import replace
 
 import meshio
 import numpy as np
@@ -8,8 +9,10 @@ import pytest
 from typer.testing import CliRunner
 
 from app.cli import app
-from sims.reduced_fe.gear_file import read_gear
-from sims.reduced_fe.gear_key import gear_key
+from gearsig.errors import InputError
+from sims.cache import OtherVersionError
+from sims.reduced_fe.gear_file import read_gear, write_gear
+from sims.reduced_fe.gear_key import gear_key, gear_name
 from sims.reduced_fe.reduce import plan_for
 
 SMALL = ["--teeth", "16", "--profile-shift", "0.2", "--face", "10mm", "--bore", "8mm", "--dof", "15000"]
@@ -28,7 +31,8 @@ def test_mesh_modes_stress_and_reductions_are_written(tmp_path, monkeypatch):
     gear = read_gear(tmp_path / "out" / "reduced.npz")
     assert gear.blank.n_teeth == 16
     # The model finds it there.
-    assert [path.stem for path in (tmp_path / "kept" / "gears").iterdir()] == [gear.key]
+    (kept,) = (tmp_path / "kept" / "gears").iterdir()
+    assert kept.stem == gear_name(gear.blank, plan_for(gear.blank, 15_000))
     assert gear.key == gear_key(gear.blank, plan_for(gear.blank, 15_000))
     assert f"{gear.n_dof} degrees of freedom" in found.output
     assert f"{gear.frequencies_hz[0]:.1f} Hz, {gear.nodal_diameters[0]} nodal diameters" in found.output
@@ -36,6 +40,33 @@ def test_mesh_modes_stress_and_reductions_are_written(tmp_path, monkeypatch):
     points = meshio.read(tmp_path / "out" / "gear.vtu").point_data
     assert "von_mises_pa" in points
     assert any(name.startswith("mode_1_") for name in points)
+
+
+def test_a_gear_of_another_version_is_named_until_it_is_cleared_away(tmp_path, monkeypatch):
+    monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path / "kept"))
+    arguments = ("-o", str(tmp_path / "out"), *SMALL, "--dof", "5000", "--modes", "4", "--reduce")
+    assert _run(*arguments).exit_code == 0
+    (kept,) = (tmp_path / "kept" / "gears").iterdir()
+    gear = read_gear(kept)
+    write_gear(kept, replace(gear, key="of another version"))
+    for path in (tmp_path / "out").iterdir():
+        path.unlink()
+    refused = _run(*arguments)
+    assert isinstance(refused.exception, OtherVersionError)
+    assert str(kept) in str(refused.exception)
+    assert "--fresh" in str(refused.exception)
+    assert not list((tmp_path / "out").iterdir())
+    again = _run(*arguments, "--fresh")
+    assert again.exit_code == 0
+    assert "1 file of another version cleared away" in again.stderr
+    assert read_gear(kept).key == gear.key
+
+
+def test_a_model_that_keeps_nothing_has_nothing_to_clear_away(tmp_path):
+    found = CliRunner().invoke(app, ["simulate", "cracked", "--fresh", "-o", str(tmp_path / "a.h5")])
+    assert isinstance(found.exception, InputError)
+    assert "--fresh" in str(found.exception)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
@@ -50,8 +81,6 @@ def test_mesh_modes_stress_and_reductions_are_written(tmp_path, monkeypatch):
     ],
 )
 def test_what_cannot_be_is_refused(tmp_path, arguments, said):
-    from gearsig.errors import InputError
-
     found = _run("-o", str(tmp_path / "out"), *arguments)
     assert isinstance(found.exception, InputError)
     assert said in str(found.exception)

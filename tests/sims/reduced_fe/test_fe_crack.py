@@ -8,9 +8,15 @@ import pytest
 from scipy import sparse
 
 from gearsig.errors import InputError
+from sims.cache import OtherVersionError
 from sims.mesh import RootCrack
 from sims.mesh.stiffness_tooth import tooth_compliance
-from sims.reduced_fe.crack_table import _ready_cracks, crack_added_m_per_n, solved_crack_m_per_n
+from sims.reduced_fe.crack_table import (
+    _ready_cracks,
+    crack_added_m_per_n,
+    forget_cracks_of_other_versions,
+    solved_crack_m_per_n,
+)
 from sims.reduced_fe.cracked_tooth import (
     CRACK_SIZE,
     crack_compliance_m_per_n,
@@ -126,6 +132,12 @@ def test_cracks_of_other_gears_are_kept_on_disk(tmp_path, monkeypatch) -> None:
     again = crack_added_m_per_n(gear, crack)
     np.testing.assert_array_equal(first, again)
     kept[0].write_bytes(b"damaged")
+    np.testing.assert_allclose(crack_added_m_per_n(gear, crack), first, rtol=1e-12)
+    with np.load(kept[1]) as data:
+        np.savez(kept[1], code=np.array("of another version"), added=data["added"])
+    with pytest.raises(OtherVersionError, match="solved by another version of gearsig; add --fresh"):
+        crack_added_m_per_n(gear, crack)
+    assert forget_cracks_of_other_versions() == (kept[1],)
     np.testing.assert_allclose(crack_added_m_per_n(gear, crack), first, rtol=1e-12)
     with pytest.raises(InputError, match=r"cannot follow a crack of 9 mm .*allowed: up to 8\.17 mm"):
         crack_added_m_per_n(ready_gear("z50_m3"), RootCrack(9.0, 45.0))

@@ -8,14 +8,16 @@ import pytest
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
+from sims.cache import OtherVersionError
 from sims.mesh.foundation import foundation_compliance
 from sims.mesh.stiffness_tooth import tooth_compliance
 from sims.reduced_fe import gear_file
 from sims.reduced_fe.cyclic import CyclicGear, factorised
 from sims.reduced_fe.flank_rows import flank_grid, flank_rows
 from sims.reduced_fe.full_gear import full_matrices
-from sims.reduced_fe.gear_cache import cached_gear
+from sims.reduced_fe.gear_cache import cached_gear, forget_gears_of_other_versions
 from sims.reduced_fe.gear_file import read_gear, write_gear
+from sims.reduced_fe.gear_key import gear_name
 from sims.reduced_fe.hub import hub_rows
 from sims.reduced_fe.line_weights import line_weights, parabolic_weights
 from sims.reduced_fe.mesh_size import MeshSize
@@ -197,10 +199,23 @@ def test_the_cache_keeps_a_gear_and_remakes_a_damaged_one(tmp_path: Path) -> Non
     assert cached_gear(SMALL, plan, tmp_path).mass_kg == 9.0
     kept.write_bytes(b"torn")
     assert cached_gear(SMALL, plan, tmp_path).mass_kg == pytest.approx(first.mass_kg)
-    write_gear(kept, replace(marked, key="of other code"))
-    assert cached_gear(SMALL, plan, tmp_path).mass_kg == pytest.approx(first.mass_kg)
     assert cached_gear(SMALL, replace(plan, n_modes=6), tmp_path).key != first.key
     assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_a_gear_that_another_version_kept_is_named_and_can_be_cleared_away(tmp_path: Path) -> None:
+    plan = ReductionPlan(COARSE, n_modes=4, n_heights=2, n_slices=1, n_offsets=2)
+    first, other = cached_gear(SMALL, plan, tmp_path), cached_gear(SMALL, replace(plan, n_modes=6), tmp_path)
+    kept = tmp_path / f"{gear_name(SMALL, plan)}.npz"
+    write_gear(kept, replace(first, key=first.key[:-16] + 16 * "0"))
+    with pytest.raises(OtherVersionError) as caught:
+        cached_gear(SMALL, plan, tmp_path)
+    assert str(caught.value).startswith(f"{kept}: this reduced gear was made by another version of gearsig")
+    assert "--fresh" in caught.value.remedy
+    assert kept.is_file()
+    assert forget_gears_of_other_versions(tmp_path) == (kept,)
+    assert cached_gear(SMALL, plan, tmp_path).key == first.key
+    assert {read_gear(path).key for path in tmp_path.iterdir()} == {first.key, other.key}
 
 
 @pytest.mark.parametrize("name", READY)
