@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from app.benchmark.start_stop_seen import collect, planned
+from app.gap.start_stop.compare import HALF
 from app.gap.start_stop.weighing import Seen, Weighed, weigh
 from gearsig.checks import FloatArray
 from gearsig.gap.posterior import GapCalibration
@@ -24,7 +25,7 @@ from sims.processes import process_pool
 
 ROLE = "calibration"
 NEUTRAL_SHRINK = 0.3
-RIDGE = 0.02
+RIDGE = 0.005
 """Draws the weights to their start: some hundred cases do not settle five numbers."""
 START = (0.6, 1.0, 0.0, 0.0)
 """Sharpness, weight of the shrink, bias of none and of unknown."""
@@ -43,8 +44,9 @@ def truth_of(label: Mapping[str, Any]) -> str:
 def fit_part(rows: Sequence[Row]) -> dict[str, Any]:
     """Return floors and calibration of all cases with a reference, or of all without, as plain values."""
     sound = [seen for label, seen in rows if label["kind"] == "none"]
-    whole = DriveFloor.of_sound(np.array([seen.whole for seen in sound]))
-    half = DriveFloor.of_sound(np.array([fold.fitted_to for seen in sound for fold in seen.folds]))
+    whole = DriveFloor.of_sound(np.array([seen.whole for seen in sound]), np.array([seen.scatter for seen in sound]))
+    halves = [(fold.fitted_to, HALF * seen.scatter) for seen in sound for fold in seen.folds]
+    half = DriveFloor.of_sound(np.array([change for change, _ in halves]), np.array([error for _, error in halves]))
     weighed = [(truth_of(label), weigh([seen], (whole, half))) for label, seen in rows]
     calibration = fit_calibration(weighed)
     return {
@@ -67,7 +69,7 @@ def fit_calibration(weighed: Sequence[tuple[str, Weighed]]) -> GapCalibration:
     calibration = _calibration(found.x)
     sound = [_probabilities(calibration, w) for t, w in weighed if t == NONE]
     named = sorted(1.0 - p[NONE] - p[UNKNOWN] for p in sound)
-    limit = float(np.quantile(named, 1.0 - FALSE_ALARMS)) if named else LEAST_NAMED
+    limit = float(np.quantile(named, 1.0 - FALSE_ALARMS, method="higher")) if named else LEAST_NAMED
     return _calibration(found.x, float(np.clip(limit, LEAST_NAMED, MOST_NAMED)))
 
 
@@ -93,7 +95,12 @@ def main() -> None:
         futures = [pool.submit(collect, ROLE, asked.seed, i, one) for i, one in enumerate(plan)]
         for future in as_completed(futures):
             rows += future.result()
-    FILE.write_text(json.dumps(floors_of(rows, asked.seed), indent=1) + "\n", encoding="utf-8")
+    write_floors(rows, asked.seed)
+
+
+def write_floors(rows: Sequence[Row], seed: int) -> None:
+    """Write what a seed's cases give into the package."""
+    FILE.write_text(json.dumps(floors_of(rows, seed), indent=1) + "\n", encoding="utf-8")
 
 
 def floors_of(rows: Sequence[Row], seed: int) -> dict[str, Any]:

@@ -40,7 +40,7 @@ class Tried:
 
 _ROUGH = ("contact_scatter", "load_scatter")
 TRIED: Mapping[str, Tried] = {
-    "backlash": Tried((60.0, 180.0, 500.0), ("play", "impact"), ("curve",)),
+    "backlash": Tried((60.0, 180.0, 500.0), ("play", "impact")),
     "tooth_wear": Tried(
         (12.0, 25.0, 50.0, 100.0, 200.0), ("play", "curve"), ("deflection", "flank_friction", "impact", *_ROUGH)
     ),

@@ -12,9 +12,11 @@ from app.gap.start_stop.twin import DriveTwin
 from gearsig.checks import FloatArray
 from gearsig.gap.start_stop.cycles import halves
 from gearsig.gap.start_stop.floors import DriveFloor, load_floor
-from gearsig.gap.start_stop.told import Examined, Spot, Told, change_of, spot_of
+from gearsig.gap.start_stop.told import NAMES, Examined, Spot, Told, change_of, spot_of
 
 MOST_BLOCKS = 8
+HALF = float(np.sqrt(2.0))
+"""By which half of the cycles scatter more."""
 
 
 @dataclass(frozen=True)
@@ -76,18 +78,36 @@ class Compared:
     @cached_property
     def without(self) -> FloatArray:
         """Changes without each cycle (or each of eight blocks of them), (n_blocks, n): the tooth and order stay."""
-        every = self.now.every
-        blocks = np.array_split(np.array(every), min(len(every), MOST_BLOCKS))
-        rows = [tuple(c for c in every if c not in block) for block in blocks]
-        return np.array([self.change_in(kept, self.spot) for kept in rows])
+        return np.array([self.change_in(kept, self.spot) for kept in _but_each(self.now.every)])
 
     @cached_property
     def scatter(self) -> FloatArray:
-        """Standard errors of the change, from its cycles (jackknife)."""
-        n = len(self.without)
-        spread: FloatArray = np.sqrt((n - 1.0) * np.nanvar(np.nan_to_num(self.without), axis=0))
+        """Standard errors of the change, from the cycles of the recording and of its reference (jackknife)."""
+        spread: FloatArray = np.hypot(_jackknife(self.without), _jackknife(self._without_of_reference))
         return spread
 
+    @property
+    def _without_of_reference(self) -> FloatArray:
+        """Changes against the reference without each of its cycles; a simulated drive has no noise."""
+        if self.reference is None:
+            return np.zeros((1, len(NAMES)))
+        kept = _but_each(self.reference.every)
+        return np.array([change_of(self.told, self.reference.tell(one), self.shape, self.spot) for one in kept])
+
     def floor(self, part: str = "whole") -> DriveFloor:
-        """Return how far sound drives lie from what this is compared with."""
-        return load_floor(with_reference=self.reference is not None, part=part)
+        """Return how far sound drives lie from what this is compared with, as far as it can be told of this one."""
+        floor = load_floor(with_reference=self.reference is not None, part=part)
+        return floor.widened(self.scatter * (1.0 if part == "whole" else HALF))
+
+
+def _but_each(every: tuple[int, ...]) -> list[tuple[int, ...]]:
+    """Return all cycles but one, for each; or but one of eight blocks."""
+    blocks = np.array_split(np.array(every), min(len(every), MOST_BLOCKS))
+    return [tuple(c for c in every if c not in block) for block in blocks]
+
+
+def _jackknife(rows: FloatArray) -> FloatArray:
+    """Return the standard error by leaving out each block, (n,)."""
+    n = len(rows)
+    spread: FloatArray = np.sqrt((n - 1.0) * np.nanvar(np.nan_to_num(rows), axis=0))
+    return spread

@@ -25,6 +25,7 @@ from app.gap.start_stop.twin import drive_twin
 from app.gap.start_stop.weighing import seen_of, weigh
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap.start_stop.cycles import cut_cycles
+from gearsig.gap.start_stop.floors import load_floor
 from gearsig.gap.start_stop.posterior import is_drive_calibrated, load_drive_calibration
 from gearsig.gap.start_stop.told import Examined
 from gearsig.gap.types import GapReport
@@ -96,8 +97,10 @@ def diagnose_start_stop(
         predictions.append(predictions_of(one, simulating))
     tell("weighing", 0.85)
     seen = tuple(seen_of(one, found.causes) for one, found in zip(compared, predictions, strict=True))
-    weighed = weigh(seen, (compared[0].floor(), compared[0].floor("half")))
-    calibration = load_drive_calibration(with_reference=bool(references))
+    with_reference = bool(references)
+    whole, half = (load_floor(with_reference=with_reference, part=part) for part in ("whole", "half"))
+    weighed = weigh(seen, (whole, half))
+    calibration = load_drive_calibration(with_reference=with_reference)
     probabilities = calibration.probabilities(weighed.shares, weighed.scores)
     return report_of(
         Diagnosis(

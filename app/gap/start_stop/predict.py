@@ -134,12 +134,13 @@ def _misread(twin: DriveTwin, percent: float, *, with_reference: bool) -> Told:
 
 
 def _cracked(twin: DriveTwin, setting: EffectSetting, spot: Spot) -> Told:
-    """Let one tooth yield more: g grows as (1 − loss)^{−1/λ}."""
+    """Let one tooth yield more, g grows as (1 − loss)^{−1/λ}, among teeth that differ as the recording's do."""
     values = complete_values(PARAMETERS, twin.parameters)
     _, weak = with_effects(values, (setting,))
     assert weak is not None  # noqa: S101  a crack of some depth makes a tooth weak
     sound = twin.sound
     extra = sound.contact.deflection_um * ((1.0 - weak.loss) ** (-1.0 / float(twin.parameters["exponent"])) - 1.0)
     teeth = sound.contact.teeth_um.copy()
-    teeth[spot.tooth] += extra
+    teeth[(spot.tooth + len(teeth) // 2) % len(teeth)] += spot.next_tooth_um
+    teeth[spot.tooth] += max(extra, spot.next_tooth_um)
     return replace(sound, contact=replace(sound.contact, teeth_um=teeth))

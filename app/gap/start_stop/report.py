@@ -10,6 +10,7 @@ import numpy as np
 from app.gap.start_stop.causes import TORQUE_GAIN, TRIED, drive_effects, parameters_with, setting_of
 from app.gap.start_stop.compare import Compared
 from app.gap.start_stop.curves import CRACK, tooth_curves, torque_curves
+from app.gap.start_stop.least import least_seen
 from app.gap.start_stop.next_recording import next_drive_recordings
 from app.gap.start_stop.places import FEATURES, drive_places
 from app.gap.start_stop.predict import Predictions
@@ -102,7 +103,7 @@ def report_of(found: Diagnosis) -> GapReport:
         else (),
         spectra=torque_curves(compared, fitted),
         angles=tooth_curves(compared, fitted, extra_um),
-        notices=found.notices,
+        notices=(*found.notices, *least_seen(compared, found.predictions[k])),
         twin_toml="" if fitted is None else _preset(compared, first, fitted),
     )
 
@@ -208,9 +209,9 @@ def _extra_um(fitted: Fitted | None, compared: Compared) -> float:
     """Return how much more a cracked tooth yields at the fitted severity: from the change back to µm."""
     if fitted is None:
         return 0.0
-    return float(
-        2.0 * compared.spot.tooth_step_um * np.sinh(fitted.predicted[NAMES.index("tooth")] * np.log(10.0) / 20.0)
-    )
+    spot, per_db = compared.spot, np.log(10.0) / 20.0
+    over = fitted.predicted[NAMES.index("tooth")] * per_db + np.arcsinh(0.5 * spot.next_tooth_um / spot.tooth_step_um)
+    return float(2.0 * spot.tooth_step_um * np.sinh(over))
 
 
 def _preset(compared: Compared, cause: GapCause, fitted: Added) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.gap.start_stop.compare import Compared
+from app.gap.start_stop.compare import HALF, Compared
 from gearsig.checks import FloatArray
 from gearsig.gap.posterior import score_of
 from gearsig.gap.start_stop.floors import DriveFloor
@@ -57,12 +57,19 @@ class Seen:
     predicted : mapping
         Cause → what the simulator predicts.
     with_reference : bool
+    scatter : array
+        Standard errors of `whole`.
     """
 
     whole: FloatArray
     folds: tuple[Fold, ...]
     predicted: Mapping[str, Predicted]
     with_reference: bool
+    scatter: FloatArray
+
+    def floors(self, whole: DriveFloor, half: DriveFloor) -> tuple[DriveFloor, DriveFloor]:
+        """Return the floors of this recording, of its whole and of its halves: wider where its cycles scatter."""
+        return whole.widened(self.scatter), half.widened(HALF * self.scatter)
 
 
 @dataclass(frozen=True)
@@ -93,7 +100,7 @@ def seen_of(compared: Compared, predicted: Mapping[str, Predicted]) -> Seen:
     """Reduce a recording to its changes."""
     first, second = compared.halves
     folds = tuple(_fold(compared, a, b) for a, b in ((first, second), (second, first)))
-    return Seen(compared.change, folds, predicted, compared.reference is not None)
+    return Seen(compared.change, folds, predicted, compared.reference is not None, compared.scatter)
 
 
 def _fold(compared: Compared, ours: tuple[int, ...], theirs: tuple[int, ...]) -> Fold:
@@ -124,23 +131,24 @@ def weigh(every: Sequence[Seen], floors: tuple[DriveFloor, DriveFloor]) -> Weigh
     ----------
     every : sequence of Seen
     floors : (DriveFloor, DriveFloor)
-        Of whole recordings and of halves.
+        Of other drives' whole recordings and halves.
     """
-    whole, half = floors
+    own = [seen.floors(*floors) for seen in every]
     names = [name for name in every[0].predicted if all(name in seen.predicted for seen in every)]
-    fits = {name: [fit(seen.predicted[name], seen.whole, whole) for seen in every] for name in names}
-    logs = [evidences(seen.whole, whole, [fits[name][i] for name in names]) for i, seen in enumerate(every)]
+    pairs = [(seen, whole) for seen, (whole, _) in zip(every, own, strict=True)]
+    fits = {name: [fit(seen.predicted[name], seen.whole, whole) for seen, whole in pairs] for name in names}
+    logs = [evidences(seen.whole, whole, [fits[n][i] for n in names]) for i, (seen, whole) in enumerate(pairs)]
     mean = {name: float(np.mean([log[name] for log in logs])) for name in logs[0]}
-    folds = [(seen, fold) for seen in every for fold in seen.folds]
-    found = {name: _shrinkage(name, folds, half) for name in names}
+    folds = [(seen, fold, half) for seen, (_, half) in zip(every, own, strict=True) for fold in seen.folds]
+    found = {name: _shrinkage(name, folds) for name in names}
     best = {name: max(fits[name], key=lambda one: one.log_evidence) for name in names}
     return Weighed(best, shares(mean), found)
 
 
-def _shrinkage(name: str, folds: Sequence[tuple[Seen, Fold]], floor: DriveFloor) -> Shrinkage:
+def _shrinkage(name: str, folds: Sequence[tuple[Seen, Fold, DriveFloor]]) -> Shrinkage:
     """Fit to one half, check on the other, and the other way round; the mean of both."""
     values, placebos, spread = [], [], []
-    for seen, fold in folds:
+    for seen, fold, floor in folds:
         fitted = fit(seen.predicted[name], fold.fitted_to, floor)
         own = own_features(fitted.predicted, fold.held_out, floor)
         values.append(shrink(fold.held_out, fitted.predicted, floor, own))

@@ -18,8 +18,9 @@ LEAST_SAMPLES, LEAST_OF_A_TOOTH, LEAST_OF_A_PLACE = 12, 3, 5
 EDGE = 0.07
 """Base pitches around the entry and exit of pairs that are left out."""
 FAR, MOST_ROUNDS = 4.0, 4
-MOST_LEFT_M = 2e-4
-"""A sample further off lies in the play: the flanks have just parted."""
+PARTED_M = 5e-5
+"""A sample further from one level for all places lies in the play: the flanks have just parted. Worn flanks differ by
+less from place to place, as the least worn pair decides."""
 FULL_TURN = 0.7
 """Revolutions from which on a wave of one cycle per revolution is told from a straight line."""
 N_PLACES = 20
@@ -106,7 +107,9 @@ def contact_part(flanks: Flanks, wanted: Mask) -> ContactPart:
     level for each place leaves the deflection to what the load changes there, and shows the shape of worn flanks.
     """
     m, q = flanks.motion, flanks.motion.compression_m
-    keep, drive = flanks.loaded & wanted, flanks.design[:, 0] > 0.0
+    drive = flanks.design[:, 0] > 0.0
+    keep = flanks.loaded & wanted
+    keep &= _touching(flanks, q, keep, drive)
     back = keep & ~drive
     has_torque, has_back = bool(np.any(flanks.design[keep, 1])), np.sum(back) >= LEAST_SAMPLES
     counts = np.bincount(flanks.place[keep & drive], minlength=N_PLACES)
@@ -126,7 +129,7 @@ def contact_part(flanks: Flanks, wanted: Mask) -> ContactPart:
     play = middle - float(x[-1]) if has_back else np.nan
     curve = np.full(N_PLACES, np.nan)
     curve[places] = x[: len(places)] - middle
-    alone = flanks.alone & known & wanted & (np.abs(left) < MOST_LEFT_M)
+    alone = flanks.alone & known & wanted & (np.abs(left) < PARTED_M)
     ordinary = float(np.median(np.abs(flanks.design[alone, 1]))) if np.any(alone) else np.nan
     deflection = 1e6 * of.get(1, np.nan) * ordinary
     return ContactPart(
@@ -161,6 +164,23 @@ def _by_place(m: PairMotion) -> tuple[FloatArray, Mask, FloatArray]:
     return side, loaded, np.zeros(len(q))
 
 
+def _touching(flanks: Flanks, q: FloatArray, keep: Mask, drive: Mask) -> Mask:
+    """Say which samples are near one level for each flank: a place's own level would follow what flies past it."""
+    has_torque = bool(np.any(flanks.design[keep, 1]))
+    others = [c for c in range(1, flanks.design.shape[1]) if c != 1 or has_torque]
+    design = np.concatenate([np.stack([drive, ~drive], axis=1).astype(np.float64), flanks.design[:, others]], axis=1)
+    if np.sum(keep) < 4 * design.shape[1]:
+        return keep
+    x, near = _robust(design, q, keep, drive)
+    left = np.abs(q - design @ x)
+    limits = [max(PARTED_M, FAR * _spread(left[near & f])) for f in (drive, ~drive)]
+    return left < np.where(drive, *limits)
+
+
+def _spread(left: FloatArray) -> float:
+    return 1.4826 * float(np.median(left)) if len(left) else 0.0
+
+
 def _robust(design: FloatArray, q: FloatArray, keep: Mask, drive: Mask) -> tuple[FloatArray, Mask]:
     """Least squares without samples far off: blows, slipped counts.
 
@@ -174,10 +194,7 @@ def _robust(design: FloatArray, q: FloatArray, keep: Mask, drive: Mask) -> tuple
         a = scaled[keep]
         x: FloatArray = np.linalg.solve(a.T @ a / len(a) + least, a.T @ q[keep] / len(a)) / size
         left = np.abs(q - design @ x)
-        limits = [
-            FAR * (1.4826 * float(np.median(left[keep & f] if np.any(keep & f) else 0.0)) + 1e-12)
-            for f in (drive, ~drive)
-        ]
+        limits = [FAR * (_spread(left[keep & f]) + 1e-12) for f in (drive, ~drive)]
         again = wanted & (left < np.where(drive, *limits))
         if np.array_equal(again, keep) or np.sum(again) < 4 * len(x):
             break

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,8 @@ FLOOR = 1.96
 TAIL = 4.0
 """Degrees of freedom: a feature lies far off oftener than a normal one."""
 SUM_POWER = 4.0
+INNER, NORMAL_80 = 0.8, 1.2816
+N_BISECTIONS = 40
 
 
 @dataclass(frozen=True)
@@ -42,22 +44,34 @@ class DriveFloor:
     whole: float
 
     @classmethod
-    def of_sound(cls, rows: FloatArray) -> DriveFloor:
+    def of_sound(cls, rows: FloatArray, scatters: FloatArray | None = None) -> DriveFloor:
         """Return the floor of a table of changes of sound drives, (n_drives, n); nan where a change could not be told.
 
         The scale is the half width of the middle 80 % over 1.28: what lies far off is the tail's, see `log_density`.
+        What a recording's own cycles scatter by is taken out of it: coarse encoders are no property of other drives.
+
+        Parameters
+        ----------
+        rows : array, (n_drives, n)
+        scatters : array or None, (n_drives, n)
+            Standard errors of the changes; None: none.
         """
         table = np.asarray(rows, dtype=np.float64)
+        errors = np.zeros_like(table) if scatters is None else np.nan_to_num(scatters)
         known = np.isfinite(table)
         centre, scale = np.zeros(table.shape[1]), np.full(table.shape[1], 6.0)
         for i in range(table.shape[1]):
-            values = table[known[:, i], i]
+            values, own = table[known[:, i], i], errors[known[:, i], i]
             if len(values) >= 5:
-                low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
                 least = LEAST_DB if NAMES[i] in LEVELS else LEAST_SIGNED_DB
-                centre[i], scale[i] = middle, max(0.5 * (high - low) / 1.2816, least)
-        sizes = [_soft((row - centre) / (FLOOR * scale)) for row in table]
+                centre[i], scale[i] = _centre(values, own), least
+                scale[i] = max(_scale(values - centre[i], own), least)
+        sizes = [_soft((r - centre) / (FLOOR * np.hypot(scale, e))) for r, e in zip(table, errors, strict=True)]
         return cls(centre, scale, float(np.quantile(sizes, 0.95)))
+
+    def widened(self, scatter: FloatArray) -> DriveFloor:
+        """Return the floor of a recording whose changes have standard errors of their own, (n,)."""
+        return replace(self, scale=np.hypot(self.scale, np.nan_to_num(scatter)))
 
     def size(self, change: FloatArray) -> float:
         """Return the size of a whole change; 1: one sound drive in twenty is that far."""
@@ -92,6 +106,24 @@ class DriveFloor:
         """Return what `to_dict` made."""
         centre, scale = (np.array([float(found[key][name]) for name in NAMES]) for key in ("centre_db", "scale_db"))
         return cls(centre, scale, float(found["whole"]))
+
+
+def _centre(values: FloatArray, errors: FloatArray) -> float:
+    """Return the median, precise values counting more."""
+    order = np.argsort(values)
+    spread = 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    weights = np.cumsum(1.0 / (spread**2 + errors[order] ** 2 + 1e-6))
+    return float(values[order][np.searchsorted(weights, 0.5 * weights[-1])])
+
+
+def _scale(distances: FloatArray, errors: FloatArray) -> float:
+    """Return the s at which four of five distances are below 1.28 √(s² + e²); 0 where the errors alone are enough."""
+    low, high = 0.0, float(np.max(np.abs(distances))) + 1e-9
+    for _ in range(N_BISECTIONS):
+        middle = 0.5 * (low + high)
+        inside = np.quantile(np.abs(distances) / np.hypot(middle, errors + 1e-12), INNER)
+        low, high = (middle, high) if inside > NORMAL_80 else (low, middle)
+    return high
 
 
 def _soft(normalised: FloatArray) -> float:

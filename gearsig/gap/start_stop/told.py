@@ -87,12 +87,15 @@ class Spot:
         Scatter of the changes of all teeth.
     ripple_step : array, (n_orders,)
         Part of the mean torque that a run's own course may put there.
+    next_tooth_um : float
+        Change of the tooth that changed next most: a cracked one must yield more to be seen.
     """
 
     tooth: int
     order: int
     tooth_step_um: float
     ripple_step: FloatArray
+    next_tooth_um: float
 
 
 @dataclass(frozen=True)
@@ -174,7 +177,8 @@ def spot_of(now: Told, other: Told) -> Spot:
     tooth_step = float(np.hypot(scatter, TOOTH_PART * _deflection(now, other)))
     waves = np.maximum(np.minimum(now.ripple_waves, other.ripple_waves), 1e-3)
     steps = RIPPLE_PART * (1.0 + (FEW_WAVES / waves) ** 3)
-    return Spot(_largest(teeth), _largest(ripple / steps), tooth_step, steps)
+    tooth = _largest(teeth)
+    return Spot(tooth, _largest(ripple / steps), tooth_step, steps, max(float(np.nan_to_num(_but(teeth, tooth))), 0.0))
 
 
 def change_of(now: Told, other: Told, curve_shape: FloatArray, at: Spot | None = None) -> FloatArray:
