@@ -81,8 +81,12 @@ def flexible(
     for torque, (up, down) in study.sweeps.items():
         natural = study.natural_hz[torque]
         jumps = [sweep.jump_hz(RANGE[0] * natural, RANGE[1] * natural) for sweep in (up, down)]
-        said = ["no jump" if jump is None else f"jump at {jump:.0f} Hz" for jump in jumps]
-        typer.echo(f"{torque:g} N·m: torsional mode {natural:.0f} Hz; sweep up: {said[0]}, sweep down: {said[1]}")
+        peaks = [sweep.peak_hz(RANGE[0] * natural, RANGE[1] * natural) for sweep in (up, down)]
+        said = [
+            f"greatest at {peak:.0f} Hz, {'no jump' if jump is None else f'jump at {jump:.0f} Hz'}"
+            for peak, jump in zip(peaks, jumps, strict=True)
+        ]
+        typer.echo(f"{torque:g} N·m: torsional mode {natural:.0f} Hz; sweep up: {said[0]}; sweep down: {said[1]}")
 
 
 def _range(text: str) -> tuple[float, float]:

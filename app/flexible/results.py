@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 DOTS_PER_INCH = 160
 SHARING_NM = 170.0
 HIGHEST_CURVE_HZ = 12000.0
-NAMES = {"node": "one line of nodes", "patch": "patch (RBE3)", "section": "section"}
+NAMES = {"node": "one line of nodes", "patch": "RBE3 patch", "section": "tooth section"}
 RANGE = (0.52, 1.25)
 """Of the torsional mode's frequency, in which its jumps are looked for."""
 
@@ -74,7 +75,8 @@ def figures(study: Study, title: str) -> dict[str, Figure]:
     found["natural_frequencies"] = frequency_curves_figure(study.angle_cycles, low, uncoupled, title=words)
     if study.spreading is not None:
         found["contact_spreading"] = _spreading(study.spreading, study.torque_nm, title)
-    found["run_up"] = order_map_figure(study.run_up, height_in=4.6)
+    words = f"Run-up at {study.torque_nm:g} N·m, {title}: acceleration (m/s²) at sensor {study.run_up.source}"
+    found["run_up"] = order_map_figure(replace(study.run_up, source=words), height_in=4.6)
     if study.sweeps:
         found["sweeps"] = _sweeps(study, title)
     return found
@@ -151,10 +153,10 @@ def _sharing(study: Study, title: str) -> Figure:
 
 def _spreading(check: SpreadingCheck, torque_nm: float, title: str) -> Figure:
     curves = {
-        f"{NAMES[spread]} ({100.0 * check.ripple[spread]:.2g} %)": values
+        f"{NAMES[spread]}: ripple {100.0 * check.ripple[spread]:.2g} %": values
         for spread, values in check.frequency_hz.items()
     }
-    words = f"Contact spread over nodes at {torque_nm:g} N·m, {title}; ripple of a tooth's compliance in brackets"
+    words = f"Contact spread over nodes at {torque_nm:g} N·m, {title}; ripple is that of a tooth's compliance"
     return contact_spreading_figure(check.mesh_cycles, curves, title=words)
 
 

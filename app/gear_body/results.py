@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 DOTS_PER_INCH = 160
 N_SHOWN = 6
 NEIGHBOURS = (-1, 0, 1)
+PEAKS = "Peaks at the force and in sharp corners grow with a finer mesh."
+"""A line load and corners without a round have no finite stress."""
 HELD = {"free": "free", "bore": "bore held", "springs": "hub on springs"}
 
 
@@ -131,6 +133,7 @@ def _stress(study: GearBodyStudy, near: tuple[float, float, float, float], name:
         view.values(np.array([load.von_mises_pa(k) for k in NEIGHBOURS])),
         near_mm=near,
         force=(point * 1e3, push, f"{load.force_n:g} N"),
+        note=PEAKS,
         title=f"{name}: stress, bore held",
     )
 

@@ -112,6 +112,7 @@ def gear_stress_figure(
     near_mm: tuple[float, float, float, float],
     top_pa: float | None = None,
     force: tuple[FloatArray, FloatArray, str] | None = None,
+    note: str = "",
     title: str = "",
 ) -> Figure:
     """Draw the von Mises stress on the end face.
@@ -128,6 +129,8 @@ def gear_stress_figure(
         Where the colours end; more is drawn as the last. None: the highest stress shown.
     force : (place (2,) in mm, direction (2,), text) or None
         An arrow that ends at the place.
+    note : str
+        Below the title.
     title : str
 
     Returns
@@ -153,6 +156,9 @@ def gear_stress_figure(
         axes.annotate("", xy=ends[0], xytext=ends[1], arrowprops={"arrowstyle": "-|>", "color": style.FAULT, "lw": 2.0})
         axes.text(*ends[1], text, color=style.FAULT, fontsize=style.SMALL_PT, ha="center", va="bottom")
     style.label_axes(axes, "x (mm)", "y (mm)")
+    if note:
+        place_in = (0.75 / figure.get_size_inches()[0], 1.0 - 0.31 / 4.9)
+        figure.text(*place_in, note, fontsize=style.SMALL_PT, color=style.QUIET, va="center", parse_math=False)
     beyond = top < float(stress[inside].max())
     _bar(figure, drawn, "von Mises stress (MPa)", (0.95 + wide_in, 0.55, TALL_IN), extend=beyond)
     series.headline(figure, title)
@@ -196,7 +202,7 @@ def _draw_border(axes: Axes, moved: FloatArray, points: FloatArray, triangles: I
     _, first, same = np.unique(np.round(points, 6), axis=0, return_index=True, return_inverse=True)
     corners = first[same.ravel()][triangles]
     edges = np.sort(np.concatenate((corners[:, :2], corners[:, 1:], corners[:, ::2])), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
+    unique, count = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0, return_counts=True)
     axes.add_collection(LineCollection(list(moved[unique[count == 1]]), colors=style.QUIET, linewidths=0.5))
 
 

@@ -23,6 +23,8 @@ MOST_MAPS = 3
 BAR_IN, GAP_IN = 0.12, 0.95
 STEEP = 0.3
 """Step between neighbouring angles, of a map's range: beyond it lines of equal values would run into one another."""
+N_LEVELS = 7
+"""Lines of equal values in a map."""
 SPAN = 1e-5
 """Range of a waterfall's levels below the greatest amplitude."""
 
@@ -240,20 +242,23 @@ def contact_spreading_figure(
 
 
 def _draw_map(figure: Figure, axes: Axes, x: FloatArray, y: FloatArray, values: FloatArray, right_in: float) -> None:
-    from matplotlib.patheffects import withStroke
-
     from gearsig.plot.order_map import colours
 
     mesh = axes.pcolormesh(x, y, values.T, cmap=colours(), shading="gouraud", rasterized=True)
+    lines = None
     if np.max(np.abs(np.diff(values, axis=0))) < STEEP * np.ptp(values):
-        lines = axes.contour(x, y, values.T, levels=7, colors=style.INK, linewidths=0.5, alpha=0.6)
-        for label in axes.clabel(lines, fontsize=style.SMALL_PT - 1.5, fmt="%.3g"):
-            label.set_path_effects([withStroke(linewidth=1.8, foreground="white")])
+        levels = np.linspace(float(values.min()), float(values.max()), N_LEVELS + 2)[1:-1]
+        # Dark lines where the map is light, light ones where it is dark; the bar beside it has them with their values.
+        inks = [style.INK if i < N_LEVELS / 2 else "white" for i in range(N_LEVELS)]
+        lines = axes.contour(x, y, values.T, levels=levels, colors=inks, linewidths=0.7, alpha=0.8)
     axes.grid(visible=False)
     height = figure.get_size_inches()[1]
     place = ((right_in + 0.1) / style.WIDTH_IN, 0.55 / height, BAR_IN / style.WIDTH_IN, (height - 1.3) / height)
     bar = figure.colorbar(mesh, cax=figure.add_axes(place))
     bar.outline.set_visible(False)
+    if lines is not None:
+        bar.add_lines(lines)
+        bar.set_ticks([float(f"{level:.3g}") for level in levels])
     bar.ax.tick_params(colors=style.QUIET, labelcolor=style.INK, labelsize=style.SMALL_PT)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -106,8 +105,7 @@ def load_sharing_figure(
     upper = style.panel(figure, bottom_in=2.55, top_in=0.55)
     lower = style.panel(figure, bottom_in=0.55, top_in=2.65, sharex=upper)
     highest = max(float(force.max()) for force in forces.values())
-    # Pairs have no order of severity: three colours in turn keep neighbours apart.
-    for (label, force), colour in zip(forces.items(), cycle(series.series_colours(3)), strict=False):
+    for (label, force), colour in zip(forces.items(), series.series_colours(len(forces)), strict=True):
         upper.plot(x, _touching(force), color=colour, linewidth=1.6, label=label)
         if force.max() > 0.95 * highest:
             plateau = x[force > 0.98 * force.max()]

@@ -26,7 +26,8 @@ class FaceView:
     points_mm : array, (n_sectors · n_points, 2)
         x, y.
     triangles : array of int, (n, 3)
-        Into the points; eight to each face, or two in a mesh of first order.
+        Into the points; eight to each face, or two in a mesh of first order. Before them walls between rim or hub and
+        the web further back: without area, until the points are moved.
     outlines_mm : array, (n_faces, 8, 2)
         Round each face, with the middles of its curved edges; (n_faces, 4, 2) in a mesh of first order.
     cells : array of int, (n_faces,)
@@ -61,7 +62,7 @@ def face_view(mesh: SectorMesh, sectors: tuple[int, ...] | None = None) -> FaceV
         turned = flat @ np.array([[c, s], [-s, c]])
         points.append(turned)
         outlines.append(turned[np.stack([local[:, r, q] for r, q in _OUTLINES[faces.shape[1]]], axis=1)])
-    one = _triangles(local)
+    one = np.concatenate((_walls(flat, local), _triangles(local)))
     triangles = (one[None] + (len(nodes) * np.arange(len(shown)))[:, None, None]).reshape(-1, 3)
     return FaceView(np.concatenate(points), triangles, np.concatenate(outlines), np.tile(cells, len(shown)), nodes)
 
@@ -74,6 +75,21 @@ def _foremost(mesh: SectorMesh) -> IntArray:
     last = np.append(np.diff(column.ravel()[order]) != 0, True)
     foremost: IntArray = np.sort(order[last])
     return foremost
+
+
+def _walls(points_mm: FloatArray, local: IntArray) -> IntArray:
+    """Two triangles between edges that lie at one place, one behind the other."""
+    place = np.unique(np.round(points_mm, 6), axis=0, return_inverse=True)[1].ravel()
+    order = np.argsort(place, kind="stable")
+    equal = np.flatnonzero(np.diff(place[order]) == 0)
+    behind = np.full(len(points_mm), -1, dtype=np.int64)
+    behind[order[equal]], behind[order[equal + 1]] = order[equal + 1], order[equal]
+    ends = np.concatenate([np.column_stack((local[:, r, :-1].ravel(), local[:, r, 1:].ravel())) for r in (0, -1)])
+    a, b = ends[np.all(behind[ends] >= 0, axis=1)].T
+    walls: IntArray = np.concatenate(
+        (np.column_stack((a, b, behind[b])), np.column_stack((a, behind[b], behind[a]))), dtype=np.int64
+    )
+    return walls
 
 
 def _triangles(local: IntArray) -> IntArray:

@@ -122,7 +122,15 @@ def test_the_view_along_the_shaft_shows_every_cell_once() -> None:
     assert area.sum() * SMALL.geometry.face_width_mm == pytest.approx(volume, rel=0.01)
     assert len(view.outlines_mm) == 12 * len(mesh.cells)
     web = sector_mesh(replace(SMALL, web_thickness_mm=4.0, rim_thickness_mm=3.0, hub_thickness_mm=3.0), COARSE)
-    assert len(face_view(web, (0,)).cells) < len(web.cells)
+    stepped = face_view(web, (0,))
+    assert len(stepped.cells) < len(web.cells)
+    walls = stepped.triangles[: len(stepped.triangles) - 8 * len(stepped.cells)]
+    assert len(walls) > 0  # where the web meets rim and hub: of no area, between faces one behind the other
+    x, y = stepped.points_mm[walls].transpose(2, 0, 1)
+    twice = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
+    np.testing.assert_allclose(twice, 0.0, atol=1e-9)
+    behind = web.points_m[stepped.nodes[walls], 2]
+    assert np.all(np.ptp(behind, axis=1) == pytest.approx(0.5 * (SMALL.geometry.face_width_mm - 4.0) * 1e-3))
 
 
 def test_files_that_cannot_be_are_refused(tmp_path: Path) -> None:
