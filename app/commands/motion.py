@@ -43,7 +43,7 @@ def open_motion(
 ) -> tuple[Recording, PairMotion]:
     """Read a recording and the motion of its pair, as the options say; a machine that only stands is refused."""
     from gearsig.motion.measure import measure_motion
-    from gearsig.motion.start_stop import check_turns
+    from gearsig.motion.standing import check_turns
 
     roles, band = read_uses(use), read_bandwidth(bandwidth)
     opened = open_recording(recording, machine, fs)

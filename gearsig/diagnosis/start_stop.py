@@ -30,9 +30,11 @@ from gearsig.motion.angle_faults import check_wrap
 from gearsig.motion.bursts import Burst, find_bursts
 from gearsig.motion.course import Course, is_start_stop
 from gearsig.motion.measure import measure_motion
+from gearsig.motion.standing import refuse_standing
 from gearsig.motion.start_stop import StartStop, course_of_angle, examine_start_stop
 from gearsig.recording.types import Recording
 from gearsig.rig.speed import EncoderChannel, SpeedChannel
+from gearsig.rig.tooth_pairs import path_of_contact
 from gearsig.rig.types import Rig
 
 Settings = Mapping[str, str | float | int | None]
@@ -54,8 +56,12 @@ def start_stop_analysis(
     ------
     InputError
         If the encoder's angle starts again after each revolution and the rig does not say so.
+    RefusalError
+        If a machine whose contact the rig describes only stands.
     """
     found = course_of(recording, rig)
+    if found is not None:
+        _check_standing(found[1], recording, rig)
     if found is None or not is_start_stop(found[0]):
         return None
     course, angle_rad = found
@@ -84,6 +90,17 @@ def start_stop_analysis(
         reference=then,
         motion=examined,
     )
+
+
+def _check_standing(angle_rad: FloatArray, recording: Recording, rig: Rig) -> None:
+    """Refuse a machine that only stands, where its contact says how far its teeth are apart."""
+    if rig.contact is None:
+        return
+    try:
+        path = path_of_contact(rig)
+    except RefusalError:  # without geometry the rest is examined all the same
+        return
+    refuse_standing(angle_rad, path, rig.contact, recording.sampling_rate_hz, recording.provenance.source)
 
 
 def _of_teeth(recording: Recording, rig: Rig, then: Analysis | None) -> tuple[StartStop | None, list[Finding]]:

@@ -14,6 +14,7 @@ from gearsig.motion.angle_faults import check_angle
 from gearsig.motion.channel_gains import check_scale
 from gearsig.motion.derivatives import LocalPolynomial, local_polynomial
 from gearsig.motion.roles import SIDES, find_roles, role_values
+from gearsig.motion.standing import stands
 from gearsig.motion.types import PairMotion
 from gearsig.recording.types import Recording
 from gearsig.rig.speed import EncoderChannel
@@ -70,11 +71,12 @@ def measure_motion(
     reader = _Reader(recording, known, roles, smoother, bandwidth_hz is not None, unwrap)
     driver, driven = (reader.side(side) for side in SIDES)
     _check_ratio(driver[0], driven[0], path, recording.provenance.source or "recording")
-    for side, motion in zip(SIDES, (driver, driven), strict=True):
-        reader.check_scales(side, motion)
-    torque, force = (reader.measured(role) if role in roles else None for role in ("torque", "force"))
     contact = known.contact
     assert contact is not None  # noqa: S101  path_of_contact has seen to it
+    if not stands(driver[0], path, contact):
+        for side, motion in zip(SIDES, (driver, driven), strict=True):
+            reader.check_scales(side, motion)
+    torque, force = (reader.measured(role) if role in roles else None for role in ("torque", "force"))
     return PairMotion(
         recording.sampling_rate_hz,
         driver[0],

@@ -15,12 +15,10 @@ from gearsig.motion.datum import find_datum
 from gearsig.motion.hysteresis import TorqueTwist, torque_twist
 from gearsig.motion.impacts import Impact, find_impacts
 from gearsig.motion.phases import shaft_speed_rad_s
+from gearsig.motion.standing import check_turns
 from gearsig.motion.tooth_compliance import ToothCompliance, tooth_compliance
 from gearsig.motion.types import PairMotion
 from gearsig.phase.types import PhasePortrait
-
-LEAST_PITCHES = 0.02
-"""Of the driver's teeth: a machine that turns by less than that beyond its play stands."""
 
 ENOUGH_HZ = 4000.0
 """All hard impacts of the manipulator are found from here on."""
@@ -111,26 +109,6 @@ def examine_start_stop(motion: PairMotion) -> StartStop:
         tuple(refusals),
         _notes(impacts, motion.sampling_rate_hz),
     )
-
-
-def check_turns(motion: PairMotion) -> None:
-    """Refuse a record in which the driver turns by less than its play and a fiftieth of a tooth pitch.
-
-    Raises
-    ------
-    RefusalError
-        If the machine stands.
-    """
-    turned = float(np.ptp(motion.driver_angle_rad))
-    play = 2e-6 * motion.contact.half_backlash_um / motion.path.base_radii_m[0]
-    least = play + 2.0 * np.pi / motion.path.teeth[0] * LEAST_PITCHES
-    if turned < least:
-        duration_s, where = len(motion.driver_angle_rad) / motion.sampling_rate_hz, motion.source or "the recording"
-        raise RefusalError(
-            f"{where}: the driver turns by {1e3 * turned:.3g} mrad in {duration_s:.4g} s, against a "
-            f"play of {1e3 * play:.3g} mrad: the machine stands, its stop is longer than the record",
-            remedy="record a start and a braked stop",
-        )
 
 
 def course_of_angle(angle_rad: FloatArray, sampling_rate_hz: float) -> Course:

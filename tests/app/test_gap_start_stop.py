@@ -54,6 +54,7 @@ def folder(tmp_path_factory) -> Path:
     written(made(1), place / "sound.h5")
     written(made(2, {"backlash": 120.0}), place / "wide.h5")
     written(made(1, mode="continuous"), place / "continuous.h5")
+    written(made(1, drag_nm=200.0), place / "stands.h5")
     return place
 
 
@@ -126,6 +127,7 @@ def test_without_torque_the_play_can_still_be_told():
         (["{folder}/continuous.h5", "--model", "forging"], "turns all the time"),
         (["{samples}/root_crack_3mm.h5", "--model", "forging"], "--model cracked"),
         (["{folder}/wide.h5", "--model", "forgin"], "forging"),
+        (["{folder}/stands.h5", "--model", "forging"], "the machine stands"),
     ],
 )
 def test_a_recording_for_another_model_is_one_clear_line(folder, tmp_path, capsys, arguments, words):

@@ -11,6 +11,7 @@ from gearsig.motion.measure import measure_motion
 from gearsig.recording.write import write_recording
 from gearsig.rig.toml import read_rig, write_rig
 from tests.app.test_cli import run
+from sims import simulate
 from tests.motion.recordings import changed, start_stop, without
 
 RECORDING = start_stop()
@@ -130,7 +131,7 @@ def test_a_rig_whose_encoder_is_missing_has_a_remedy(capsys: pytest.CaptureFixtu
     assert "--speed-rpm" in options_of(capsys, "analyze")
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", [*COMMANDS, "analyze"])
 def test_a_stop_longer_than_the_record_is_refused(
     capsys: pytest.CaptureFixture[str], folder: Path, command: str
 ) -> None:
@@ -139,3 +140,13 @@ def test_a_stop_longer_than_the_record_is_refused(
     err = refused(capsys, folder, command, "rest.h5")
     assert "its stop is longer than the record" in err
     assert "record a start and a braked stop" in err
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, "analyze"])
+def test_a_machine_that_is_only_knocked_is_refused(
+    capsys: pytest.CaptureFixture[str], folder: Path, command: str
+) -> None:
+    """A torque that never breaks away, and blows of the press that rattle the teeth."""
+    knocked = simulate("forging", torque_nm=1.0, duration_s=6.0, sampling_rate_hz=1000.0)
+    write_recording(knocked, folder / "knocked.h5")
+    assert "the machine stands" in refused(capsys, folder, command, "knocked.h5")

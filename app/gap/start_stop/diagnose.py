@@ -31,6 +31,7 @@ from gearsig.gap.start_stop.told import Examined
 from gearsig.gap.types import GapReport
 from gearsig.motion.measure import measure_motion
 from gearsig.motion.roles import find_roles
+from gearsig.motion.standing import check_turns
 from gearsig.recording.types import Recording
 from gearsig.rig.tooth_pairs import contact_pair
 from gearsig.rig.types import Rig
@@ -137,7 +138,9 @@ def examined(recording: Recording, rig: Rig | None = None) -> Examined:
                 remedy="compare vibration of stationary running with --model cracked; else name the channels' shafts "
                 "in the rig file's [[sensor]] tables",
             )
-    return Examined(cut_cycles(measure_motion(recording, known)))
+    motion = measure_motion(recording, known)
+    check_turns(motion)
+    return Examined(cut_cycles(motion))
 
 
 def compared_of(recording: Recording, reference: Recording | None, name: str) -> Compared:
