@@ -10,8 +10,8 @@ import pytest
 from gearsig.motion.measure import measure_motion
 from gearsig.recording.write import write_recording
 from gearsig.rig.toml import read_rig, write_rig
-from tests.app.test_cli import run
 from sims import simulate
+from tests.app.test_cli import run
 from tests.motion.recordings import changed, start_stop, without
 
 RECORDING = start_stop()
