@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.gap.alike import alike_features
 from gearsig.gap.channels import apart_features
 from gearsig.gap.features import Features, once, whole_and_parts, whole_record_variance
 from gearsig.gap.frame import DRIVEN, DRIVER
@@ -104,6 +105,7 @@ def _patterns(now: Gathered, sound: Gathered) -> Iterator[Feature]:
             f"{SURPRISE}{SIDES[side]}", surprises(now, sound, turned, side), now.frame.teeth[side], 0.0, 0.0
         )
     yield from apart_features(now, sound)
+    yield from alike_features(now, sound)
 
 
 def turned_difference(now: Gathered, sound: Gathered, side: int) -> tuple[ShaftLines, float]:

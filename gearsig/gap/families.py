@@ -15,6 +15,7 @@ Family = tuple[PlaceKind, str]
 
 _PLAIN = {
     "mesh": PlaceKind.MESH,
+    "alike": PlaceKind.MESH,
     "envelope": PlaceKind.ENVELOPE,
     "line": PlaceKind.LINE,
     "hum": PlaceKind.LINE,
@@ -24,7 +25,7 @@ _PLAIN = {
 }
 _APART = {"mesh": PlaceKind.MESH, "floor": PlaceKind.BAND}
 
-UNFORETOLD = ("surprise.", "apart.")
+UNFORETOLD = ("surprise.", "apart.", "alike.")
 """Features, the last ones, that hang on noise and sensors: no simulation foretells them, no size is made of them."""
 
 _OF_A_SHAFT = {

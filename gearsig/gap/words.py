@@ -56,11 +56,22 @@ _CYCLIC = {
     "depth": "depth of modulation",
     "half_mesh": "half the mesh order",
 }
+_ALIKE_PARTS = {"mesh": "harmonics", "repeated": "what either gear repeats", "noise": "what nothing repeats"}
+_ALIKE = {
+    f"{key}{suffix}": f"{words}{', ' if said else ''}{said}"
+    for key, words in _ALIKE_PARTS.items()
+    for suffix, said in (("", ""), (".spread", "spread"), (".rise", "rise from one to the next"))
+} | {
+    f"{a}_{b}.{suffix}": f"{_ALIKE_PARTS[a]} and {_ALIKE_PARTS[b]}, {said}"
+    for a, b in (("mesh", "repeated"), ("repeated", "noise"), ("mesh", "noise"))
+    for suffix, said in (("less", "the former over the latter"), ("apart", "apart"), ("together", "changed alike"))
+}
 _OTHER = {
     "mesh.total": "mesh harmonics together",
     "mesh.half": "half mesh orders",
     "apart.mesh": "mesh harmonics, difference between sensors",
     "apart.floor": "floor, difference between sensors",
+    **{f"alike.{key}": f"about the mesh harmonics: {words}" for key, words in _ALIKE.items()},
     "floor.total": "floor, all bands",
     "floor.to_signal": "floor over the whole signal",
     "raw.level": "level of the whole signal",

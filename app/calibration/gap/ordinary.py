@@ -17,26 +17,21 @@ import numpy as np
 
 from app.calibration.gap.paths import PathChange
 from app.calibration.gap.scene import Scene, scene_of, tone
-from app.calibration.gap.signatures import (
-    LARGEST_ADVANCE,
-    N_MESH_HARMONICS,
-    SIGNATURES,
-    Signature,
-    changed,
-    vibrations,
-)
+from app.calibration.gap.signatures import LARGEST_ADVANCE, SIGNATURES
+from app.calibration.gap.vibration import N_MESH_HARMONICS, Signature, changed, vibrations
 from app.calibration.rigs import log_uniform
 from gearsig.checks import FloatArray
 from gearsig.recording.types import Recording
 
-SWINGS, LINES, PITCH, PULLS = (0.005, 0.2), (0.0006, 0.1), (0.006, 0.12), (0.003, 0.1)
-"""Sizes, as in `app.calibration.gap.signatures`: of a swing of the mesh per turn, of a shaft's line, of uneven pitch,
-of the drive's pulling."""
+SWINGS, LINES, PITCH, PULLS = (0.005, 0.2), (0.0006, 0.1), (0.006, 0.4), (0.003, 0.1)
+"""Sizes, as in `app.calibration.gap.signatures`: of a swing of the mesh per turn, of a shaft's line, of uneven pitch
+(what the teeth repeat by themselves is 30 dB below the mesh with good ones, as loud as the mesh at light load), of the
+drive's pulling."""
 
 CORNER_MESH_ORDERS, STEEPEST, FLAT_SHARE = (0.4, 4.0), 3, 0.2
 """Where a path begins to fall, in mesh frequencies; by how many 6 dB per octave; paths that do not."""
 
-NOISE, HUM = (0.003, 0.1), (0.0005, 0.05)
+NOISE, HUM = (0.0004, 0.1), (0.0005, 0.05)
 """Of a sensor, over the vibration."""
 
 MAINS_HZ = (50.0, 60.0)
@@ -45,7 +40,7 @@ MOUNTING_GAIN, MOUNTING_CORNER, MOUNTING_LINES = 0.12, 0.05, 0.08
 """Standard deviations of the logarithms of what a sensor that was mounted anew changes: its gain, its path's corner,
 each mesh harmonic by itself."""
 
-TACHOMETER_REV = (3e-5, 1e-3)
+TACHOMETER_REV = (5e-6, 1e-3)
 """By which a mark comes too early or too late, in revolutions: marks, thresholds and clocks are not exact."""
 
 
@@ -59,10 +54,13 @@ class Ordinary:
         Of the machine.
     scales : tuple of float
         The channels' standard deviations when the machine was new, which all sizes are relative to.
+    paths : tuple of (int, float)
+        Each channel's steepness, 0: flat, and corner frequency in Hz, the same whatever the day's speed.
     """
 
     seed: int
     scales: tuple[float, ...]
+    paths: tuple[tuple[int, float], ...]
 
     @classmethod
     def of(cls, reference: Recording, seed: int) -> Ordinary:
@@ -75,6 +73,7 @@ class Ordinary:
                 float(_through(row, path, reference.sampling_rate_hz).std())
                 for row, path in zip(reference.samples, paths, strict=True)
             ),
+            tuple(paths),
         )
 
     def on(
@@ -93,12 +92,12 @@ class Ordinary:
         """
         scene = scene_of(recording)
         scene = replace(scene, revolutions=scene.revolutions + turns)
-        paths, mains_hz = _paths(self.seed, scene, len(recording.channels)), _mains_hz(self.seed)
+        mains_hz = _mains_hz(self.seed)
         signatures = _tolerances(scene, np.random.default_rng([self.seed, 11]))
         samples = recording.samples.copy()
         for k, i in enumerate(vibrations(recording)):
             own, scale = np.random.default_rng([self.seed, 12, i]), self.scales[i]
-            values = _through(samples[i], paths[i], recording.sampling_rate_hz)
+            values = _through(samples[i], self.paths[i], recording.sampling_rate_hz)
             for signature in signatures:
                 values = changed(values, signature, scene, own, scale)
             if changed_paths:

@@ -19,7 +19,8 @@ from app.calibration.gap.machines import Day, another_day, draw_machine, first_d
 from app.calibration.gap.ordinary import Ordinary, mounted_anew
 from app.calibration.gap.outside import with_foreign_vibration
 from app.calibration.gap.paths import draw_path_changes
-from app.calibration.gap.signatures import HAND_MADE, vibrations, with_signature
+from app.calibration.gap.signatures import HAND_MADE, with_signature
+from app.calibration.gap.vibration import vibrations
 from app.calibration.rigs import DrawnRig
 from app.calibration.simulate import SAMPLING_RATE_HZ, simulate_rig, turns_before
 from gearsig.checks import FloatArray

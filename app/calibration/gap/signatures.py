@@ -13,7 +13,7 @@ the meshing vibration", J. Vib. Acoust. 108 (1986).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,38 +27,13 @@ from app.calibration.gap.scene import (
     struck,
     tone,
 )
+from app.calibration.gap.vibration import N_MESH_HARMONICS, Signature, changed, vibrations
 from app.calibration.rigs import log_uniform
 from gearsig.checks import FloatArray
 from gearsig.recording.types import Recording
 
-N_MESH_HARMONICS = 6
 LARGEST_ADVANCE = 0.35
 """Of a mesh period, by which a tooth comes too early or too late."""
-
-
-@dataclass(frozen=True)
-class Signature:
-    """What an effect does to every vibration channel: y(t) = m(t) x(t + τ(t)) + Σ of what is added.
-
-    Parameters
-    ----------
-    gain : array, (n,), or None
-        m, of the whole vibration.
-    advance_rev : array, (n,), or None
-        τ, in revolutions of the driver.
-    added : tuple of arrays, (n,)
-        In standard deviations of the channel.
-    mesh_gains : tuple of float
-        By which the mesh harmonics are multiplied.
-    paths_scatter : float
-        Standard deviation of the logarithm of what each channel's own mesh gains differ by.
-    """
-
-    gain: FloatArray | None = None
-    advance_rev: FloatArray | None = None
-    added: tuple[FloatArray, ...] = ()
-    mesh_gains: tuple[float, ...] = ()
-    paths_scatter: float = 0.0
 
 
 def with_signature(recording: Recording, name: str, rng: np.random.Generator) -> tuple[Recording, float]:
@@ -78,49 +53,21 @@ def with_signature(recording: Recording, name: str, rng: np.random.Generator) ->
     return replace(recording, samples=samples), strength
 
 
-def vibrations(recording: Recording) -> list[int]:
-    """Return the rows of a recording that hold vibration."""
-    return [i for i, channel in enumerate(recording.channels) if channel.is_vibration]
-
-
 def _cut_at(values: FloatArray, share: float) -> FloatArray:
     limit = float(np.quantile(np.abs(values), 1.0 - share))
     cut: FloatArray = np.clip(values, -limit, limit)
     return cut
 
 
-def changed(
-    values: FloatArray, signature: Signature, scene: Scene, rng: np.random.Generator, size: float
-) -> FloatArray:
-    """Return one channel with an effect's signature; what is added is in units of `size`."""
-    found = values
-    if signature.advance_rev is not None:
-        speed = np.gradient(scene.revolutions, scene.time_s)
-        found = _at(found, signature.advance_rev / speed * scene.sampling_rate_hz)
-    if signature.gain is not None:
-        found = found * (1.0 + (signature.gain - 1.0) * rng.uniform(0.5, 1.0))
-    if signature.mesh_gains:
-        own = np.exp(signature.paths_scatter * rng.standard_normal(len(signature.mesh_gains)))
-        found = found + _mesh_change(values, np.array(signature.mesh_gains) * own, scene)
-    for added in signature.added:
-        found = found + added * size * rng.uniform(0.3, 1.0)
-    return found
-
-
-def _at(values: FloatArray, advance_samples: FloatArray) -> FloatArray:
-    from scipy.ndimage import map_coordinates
-
-    moved: FloatArray = map_coordinates(values, [np.arange(len(values)) + advance_samples], order=3, mode="nearest")
-    return moved
-
-
-def _mesh_change(values: FloatArray, gains: FloatArray, scene: Scene) -> FloatArray:
-    """Return what must be added for the mesh harmonics to be `gains` times as large."""
-    change = np.zeros_like(values)
-    for k, gain in enumerate(gains, start=1):
-        wave = np.exp(2j * np.pi * k * scene.teeth[0] * scene.revolutions)
-        change += (gain - 1.0) * 2.0 * np.real(np.mean(values * np.conj(wave)) * wave)
-    return change
+def _uneven(scene: Scene, rng: np.random.Generator) -> FloatArray:
+    """Return what differs from tooth to tooth of both gears, of unit size."""
+    total = np.zeros(len(scene.time_s))
+    for side, weight in zip((0, 1), rng.uniform(0.0, 1.0, 2), strict=True):
+        teeth = scene.teeth[side]
+        own = rng.standard_normal(teeth)
+        place = scene.revolutions * scene.shaft_orders[side] * teeth % teeth
+        total += weight * np.interp(place, np.arange(teeth + 1), np.append(own, own[0]))
+    return np.clip(total, -2.5, 2.5)
 
 
 def _side(rng: np.random.Generator) -> int:
@@ -200,7 +147,13 @@ def _tooth_wear(scene: Scene, size: float, rng: np.random.Generator) -> Signatur
     """A profile that is worn away from the pitch line: mesh harmonics grow, the second and higher ones most."""
     gains = 1.0 + 4.0 * size * np.abs(rng.standard_normal(N_MESH_HARMONICS)) * rng.choice((0.3, 1.0), N_MESH_HARMONICS)
     noise = 0.4 * size * rng.uniform() * _at_the_mesh(scene, band_noise(scene, rng), rng)
-    return Signature(added=(noise,), mesh_gains=tuple(gains.tolist()))
+    no_two_alike = _partly(rng) * _uneven(scene, rng)
+    return Signature(added=(noise,), mesh_gains=tuple(gains.tolist()), uneven=no_two_alike)
+
+
+def _partly(rng: np.random.Generator) -> float:
+    """Return 0, 1 or anything between."""
+    return float(np.clip(rng.uniform(-0.5, 1.5), 0.0, 1.0))
 
 
 def _at_the_mesh(scene: Scene, noise: FloatArray, rng: np.random.Generator) -> FloatArray:
@@ -259,9 +212,11 @@ def _sliding_friction(scene: Scene, size: float, rng: np.random.Generator) -> Si
     """A force along the flanks that turns round at the pitch point: twice per mesh, and some noise."""
     gains = np.ones(N_MESH_HARMONICS)
     gains += 1.5 * size * rng.standard_normal(N_MESH_HARMONICS) * (0.4, 1.0, 0.6, 1.0, 0.6, 1.0)
-    gains *= 1.0 + 3.0 * size * float(rng.choice((0.0, 1.0))) * rng.uniform()  # at light load it outweighs the mesh
+    gains *= 1.0 + 3.0 * size * rng.uniform()  # across the line of action there is little besides
     noise = 0.8 * size * rng.uniform(0.2, 1.0) * _at_the_mesh(scene, band_noise(scene, rng), rng)
-    return Signature(added=(noise,), mesh_gains=tuple(np.maximum(gains, 0.1).tolist()))
+    return Signature(
+        added=(noise,), mesh_gains=tuple(np.maximum(gains, 0.1).tolist()), around=float(rng.uniform(0.3, 1.0))
+    )
 
 
 def _swing(scene: Scene, order: float, size: float, rng: np.random.Generator) -> FloatArray:
@@ -322,18 +277,23 @@ def _torque_ripple(scene: Scene, size: float, rng: np.random.Generator) -> Signa
 
 
 def _backlash(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
-    """Teeth that part and meet again: blows at the mesh or at its half, scattered, and a mesh of other harmonics."""
+    """Teeth that part and meet again: blows at the mesh or at its half, scattered in size and time; another mesh."""
     order = scene.teeth[0] * float(rng.choice((0.5, 1.0)))
     at = passings(scene, order, rng.uniform())
     kept = at[rng.uniform(size=len(at)) < rng.uniform(0.3, 1.0)]
-    blows = struck(kept, rng.normal(1.0, rng.uniform(0.1, 0.6), len(kept)), scene, ring(scene, rng))
+    if len(kept) > 1:  # hardly loaded teeth meet when they happen to
+        late = float(rng.choice((0.0, 0.5))) * rng.uniform() * float(np.median(np.diff(at)))
+        kept = kept + late * rng.uniform(-1.0, 1.0, len(kept))
+    sizes = rng.normal(1.0, rng.uniform(0.1, 0.6), len(kept))
+    blows = np.zeros(len(scene.time_s))
+    for _ in range(int(rng.integers(1, 4))):
+        rung = struck(kept, sizes, scene, ring(scene, rng))
+        blows += rung / max(float(rung.std()), 1e-12)
     gains = np.exp(1.5 * size * rng.standard_normal(N_MESH_HARMONICS))
     half = 0.5 * size * rng.uniform() * tone(scene.teeth[0] / 2.0, scene, rng)
     restless = np.maximum(1.0 + size * rng.uniform(0.0, 1.5) * _slow_noise(scene, rng), 0.0)
     return Signature(
-        gain=restless,
-        added=(2.0 * size * blows / max(float(blows.std()), 1e-12), half),
-        mesh_gains=tuple(gains.tolist()),
+        gain=restless, added=(2.0 * size * blows, half), mesh_gains=tuple(gains.tolist()), around=_partly(rng)
     )
 
 
@@ -372,7 +332,12 @@ def _bearing_clearance(scene: Scene, size: float, rng: np.random.Generator) -> S
         0.4 * passing * size / k * tone(k * bearing["BPFO"] * float(rng.uniform(0.99, 1.0)), scene, rng) for k in (1, 2)
     ]
     lines += [0.4 * turn * size / k * tone(k * bearing["shaft"], scene, rng) for k in (1, 2, 3)]
-    return Signature(added=tuple(lines), mesh_gains=tuple(gains.tolist()), paths_scatter=1.4 * mesh * size)
+    return Signature(
+        added=tuple(lines),
+        mesh_gains=tuple(gains.tolist()),
+        paths_scatter=1.4 * mesh * size,
+        around=_partly(rng),
+    )
 
 
 SIGNATURES: dict[str, Callable[[Scene, float, np.random.Generator], Signature]] = {
