@@ -22,8 +22,10 @@ from sims.simulator import ParameterValue
 
 MESH_DOF, MESH_DOF_PER_TOOTH = 40_000, 900
 """Of a twin's gears: their compliance is within a few per cent of that of finer meshes, less than a rig file knows."""
-STEP_S = 8e-6
-"""Longer than that of a single simulation: the transmission error misses some 4 parts in a thousand."""
+STEP_S = 8.2e-6
+"""Longer than that of a single simulation: six steps for a sample at 20480 Hz. Up to 10 kHz lines of acceleration miss
+0.2 dB (median; 95 % of them less than 0.8 dB), those of the transmission error 0.01 dB: far less than one specimen's
+housing differs from another's."""
 
 
 @dataclass(frozen=True)
