@@ -14,7 +14,6 @@ st.navigation(
     [
         st.Page(PAGES / "analysis.py", title="Analysis", icon=":material/troubleshoot:", default=True),
         st.Page(PAGES / "laboratory.py", title="Fault laboratory", icon=":material/experiment:"),
-        st.Page(PAGES / "start_stop.py", title="Start–stop drive", icon=":material/sync_alt:"),
         st.Page(PAGES / "compare.py", title="Simulation against recording", icon=":material/stacked_line_chart:"),
         st.Page(PAGES / "gap.py", title="Gap", icon=":material/compare_arrows:"),
     ],

@@ -109,7 +109,7 @@ def backlash_findings(examined: StartStop, rig: Rig, then: Analysis | None) -> l
     title = f"{what} is {found.backlash_um:.4g} ± {found.uncertainty_um:.2g} µm along the line of action"
     title += f", where the {whose} {'says' if whose == 'rig' else 'has'} {drawn:.4g} µm." if drawn else "."
     floor = "backlash of the rig file" if whose == "rig" else "backlash of the reference"
-    strength = Strength(found.backlash_um, "µm", drawn, floor) if drawn else None
+    strength = Strength(found.backlash_um, "µm", drawn, floor, against="") if drawn else None
     pair = rig.contact.pair or rig.pairs[0].name
     return [
         Finding(

@@ -67,7 +67,8 @@ class Where:
 class Strength:
     """The size of a finding against the floor it has to exceed.
 
-    `ratio_db` is 20 lg(value/floor) for amplitudes; None where a ratio has no meaning.
+    `ratio_db` is 20 lg(value/floor) for amplitudes; None where a ratio has no meaning. `against` is what the floor is
+    called: a drawing's value is none.
     """
 
     value: float
@@ -75,6 +76,7 @@ class Strength:
     floor: float
     floor_is: str
     ratio_db: float | None = None
+    against: str = "a floor of"
 
 
 @dataclass(frozen=True)

@@ -90,7 +90,7 @@ def noise_figure(study: NoiseStudy, *, title: str = "") -> Figure:
     axes.set_xticks(study.levels_um, [f"{level:g}" for level in study.levels_um])
     if study.crossover_um is not None:
         axes.axvline(study.crossover_um, color=style.FLOOR, linewidth=0.9)
-        series.write(axes, study.crossover_um, 0.06, f" {study.crossover_um:.3g} µm", ha="left")
+        style.note(axes, f"grey line: no longer nearer from {study.crossover_um:.3g} µm on")
     style.label_axes(axes, "noise added to the compression (µm rms)", f"error against {study.reference} (kN rms)")
     _title(figure, title or "error over noise", "")
     series.legend_row(figure, lines, left_in=LEFT_IN, top_in=0.5)

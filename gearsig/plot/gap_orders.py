@@ -83,18 +83,18 @@ def _draw_spectra(axes: Axes, x: FloatArray, curves: SpectrumCurves, simulated: 
     axes.set_yscale("log")
     axes.set_ylim(bottom, 2.0 * top)
     axes.fill_between(x, bottom, np.maximum(curves.floor, bottom), color=style.FLOOR, alpha=0.25, linewidth=0)
-    drawn = [
-        (curves.before, style.QUIET, 1.0, f"{simulated} before"),
-        (curves.measured, style.MEASURED, 1.1, "measured"),
-    ]
+    # Where the effect changes little both simulations coincide: dashes over a wider line show either.
+    drawn: list[tuple[FloatArray, str, float, str | tuple[float, tuple[float, float]], str]]
+    drawn = [(curves.measured, style.MEASURED, 1.1, "-", "measured")]
     if len(curves.after):
-        drawn.insert(1, (curves.after, style.MESH, 1.0, f"{simulated} with the effect"))
+        drawn.append((curves.after, style.MESH, 2.0, "-", f"{simulated} with the effect"))
+    drawn.append((curves.before, style.INK, 0.9, (0.0, (3.0, 2.0)), f"{simulated} before"))
     lines = []
-    for values, colour, width, label in drawn:
+    for values, colour, width, dashes, label in drawn:
         points = thin(x, np.maximum(values, bottom), N_POINTS)
-        lines += axes.plot(*points, color=colour, linewidth=width, label=label, alpha=0.9)
+        lines += axes.plot(*points, color=colour, linewidth=width, linestyle=dashes, label=label, alpha=0.85)
     floor = axes.plot([], [], color=style.FLOOR, alpha=0.4, linewidth=7, label="repeatability floor")
-    return [*lines[::-1], *floor]
+    return [*lines, *floor]
 
 
 def _draw_gap(axes: Axes, x: FloatArray, curves: SpectrumCurves) -> None:

@@ -95,7 +95,8 @@ def strength_text(strength: Strength | None) -> str:
     if strength is None:
         return ""
     unit = f" {unit_text(strength.unit)}" if strength.unit else ""
-    text = f"{readable(strength.value)}{unit} against a floor of {readable(strength.floor)}{unit} ({strength.floor_is})"
+    floor = f"{strength.against} {readable(strength.floor)}{unit}".strip()
+    text = f"{readable(strength.value)}{unit} against {floor} ({strength.floor_is})"
     return text if strength.ratio_db is None else f"{text}: {readable(strength.ratio_db, 3)}\u00a0dB"
 
 

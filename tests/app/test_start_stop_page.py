@@ -6,6 +6,7 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 import app.dashboard
+from app.dashboard.start_stop.controls import HIGHEST
 from app.dashboard.start_stop.setup import DriveSetup
 from app.dashboard.start_stop.view import NUMBERS, VIEWS
 from sims.effects import EffectSetting
@@ -15,14 +16,15 @@ MAIN = Path(app.dashboard.__file__).parent / "main.py"
 
 def opened() -> AppTest:
     page = AppTest.from_file(str(MAIN), default_timeout=120).run()
-    page.switch_page("pages/start_stop.py").run()
+    page.switch_page("pages/laboratory.py").run()
+    page.sidebar.selectbox(key="machine of the laboratory").set_value("manipulator_formula").run()
     return page
 
 
 @pytest.mark.parametrize("view", VIEWS)
 def test_every_view_of_the_sound_drive(view: str) -> None:
     page = opened()
-    page.session_state["view of the drive"] = view
+    page.session_state["view of the sound drive"] = view
     page.run()
     assert not page.exception
     assert not page.error
@@ -34,8 +36,10 @@ def test_every_view_of_the_sound_drive(view: str) -> None:
 
 def test_an_effect_shows_beside_the_sound_drive() -> None:
     page = opened()
-    page.sidebar.multiselect(key="effects of the drive").set_value(["backlash"]).run()
+    page.sidebar.slider(key="lab severity of backlash of the drive").set_value(100.0).run()
     assert not page.exception
+    assert not page.error
+    assert len(page.get("image")) + len(page.get("imgs")) >= 1
     backlash = next(m for m in page.metric if m.label == "Backlash")
     assert float(backlash.value.split()[0]) == pytest.approx(400.0, rel=0.02)
     assert backlash.delta.startswith("sound 299")
@@ -60,16 +64,25 @@ def test_a_setup_names_its_files_and_makes_the_commands_recording() -> None:
 
 def test_a_crack_has_its_tooth_and_a_ripple_its_order() -> None:
     page = opened()
-    page.sidebar.multiselect(key="effects of the drive").set_value(["root_crack", "torque_ripple"]).run()
+    page.sidebar.slider(key="lab severity of root_crack of the drive").set_value(6.0).run()
+    page.sidebar.slider(key="lab severity of torque_ripple of the drive").set_value(5.0).run()
     page.number_input(key="tooth of root_crack of the drive").set_value(7).run()
     assert not page.exception
     assert page.number_input(key="order of torque_ripple of the drive").value == 6
 
 
-def test_the_laboratory_leads_to_the_drive() -> None:
-    page = AppTest.from_file(str(MAIN), default_timeout=120).run()
-    page.switch_page("pages/laboratory.py").run()
-    button = next(b for b in page.sidebar.button if b.label == "A drive that starts and stops")
-    button.click().run()
+def test_the_laboratory_goes_back_to_pairs_that_run_on() -> None:
+    page = opened()
+    page.sidebar.selectbox(key="machine of the laboratory").set_value("published_55_75").run()
     assert not page.exception
-    assert "Backlash" in [metric.label for metric in page.metric]
+    assert not page.error
+    assert "Kurtosis" in [metric.label for metric in page.metric]
+
+
+@pytest.mark.parametrize("name", HIGHEST)
+def test_every_fault_at_the_end_of_its_slider_runs_or_says_why(name: str) -> None:
+    page = opened()
+    slider = page.sidebar.slider(key=f"lab severity of {name} of the drive")
+    slider.set_value(slider.max).run()
+    assert not page.exception
+    assert not page.error

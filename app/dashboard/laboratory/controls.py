@@ -7,6 +7,7 @@ import streamlit as st
 from app.dashboard.laboratory.effect_controls import choose_crack, choose_effects
 from app.dashboard.laboratory.number import choose_number, show_typed_toggle
 from app.dashboard.laboratory.setup import MODELS, Setup
+from app.dashboard.start_stop.setup import MODEL as DRIVE
 from sims.presets import Preset, presets
 from sims.registry import simulator
 from sims.simulator import ParameterValue
@@ -15,16 +16,14 @@ from sims.values import parameter
 Parameters = tuple[tuple[str, ParameterValue], ...]
 
 FIRST = "published_55_75"
-DRIVE_PAGE = "pages/start_stop.py"
 DURATIONS_S = (0.5, 1.0, 2.0, 4.0)
 AUTOMATIC, LONGEST_AUTOMATIC_S, WANTED_REVOLUTIONS = "auto", 1.0, 8.0
 RATES_HZ = (10240.0, 20480.0, 40960.0)
 
 
-def choose_setup() -> Setup:
+def choose_setup(preset: Preset) -> Setup:
     """Return what the user set in the sidebar; what the sliders do not offer is the preset's."""
     with st.sidebar:
-        preset = _choose_preset()
         speed, torque = _choose_operation(preset)
         with st.expander("Flanks and oil", icon=":material/opacity:"):
             parameters = _choose_flanks(preset)
@@ -41,33 +40,29 @@ def shown_name(preset: str) -> str:
 
     Examples
     --------
-    >>> shown_name("published_55_75")
-    'Published 55/75'
+    >>> shown_name("published_55_75"), shown_name("manipulator_formula")
+    ('Published 55/75', 'Manipulator formula')
     """
     words = preset.split("_")
+    if not words[-1].isdigit():
+        return " ".join(words).capitalize()
     return f"{' '.join(words[:-2]).capitalize()} {'/'.join(words[-2:])}"
 
 
-def _choose_preset() -> Preset:
-    found = {name: preset for model in MODELS for name, preset in presets(model).items()}
+def choose_preset() -> Preset:
+    """Return the machine: pairs that run at a steady speed, and the drive that starts and stops."""
+    found = {name: preset for model in (*MODELS, DRIVE) for name, preset in presets(model).items()}
     names = list(found)
-    name = st.selectbox(
-        "Machine",
-        names,
-        index=names.index(FIRST) if FIRST in names else 0,
-        format_func=shown_name,
-        key="machine of the laboratory",
-        persist_state="session",
-    )
-    st.caption(found[name].title)
-    if st.button(
-        "A drive that starts and stops",
-        icon=":material/sync_alt:",
-        type="tertiary",
-        help="The forging manipulator has no steady speed and so a page of its own: play, friction, wear, a cracked "
-        "tooth and ripple of the torque, with the impacts of its flanks.",
-    ):
-        st.switch_page(DRIVE_PAGE)
+    with st.sidebar:
+        name = st.selectbox(
+            "Machine",
+            names,
+            index=names.index(FIRST) if FIRST in names else 0,
+            format_func=shown_name,
+            key="machine of the laboratory",
+            persist_state="session",
+        )
+        st.caption(found[name].title)
     return found[name]
 
 

@@ -5,20 +5,32 @@ from __future__ import annotations
 import streamlit as st
 
 from app.dashboard.laboratory.cached import simulated
-from app.dashboard.laboratory.controls import choose_setup
+from app.dashboard.laboratory.controls import choose_preset, choose_setup
 from app.dashboard.laboratory.expected import with_complete_effects
 from app.dashboard.laboratory.run import Run
 from app.dashboard.laboratory.save import show_saving
 from app.dashboard.laboratory.setup import Setup
 from app.dashboard.laboratory.summary import show_expectation, show_legend, show_numbers, show_title
 from app.dashboard.laboratory.views import show_views
+from app.dashboard.start_stop.page import show_drive
+from app.dashboard.start_stop.setup import MODEL as DRIVE
 from app.dashboard.widgets.errors import show_error
 from gearsig.errors import GearsigError
+from sims.presets import Preset
 
 
 def show() -> None:
-    """Choose, simulate, show."""
-    setup = choose_setup()
+    """Choose a machine, simulate, show; a drive that starts and stops has controls and figures of its own."""
+    preset = choose_preset()
+    if preset.model == DRIVE:
+        show_drive(preset)
+    else:
+        show_pair(preset)
+
+
+def show_pair(preset: Preset) -> None:
+    """Choose, simulate, show a pair that runs at a steady speed."""
+    setup = choose_setup(preset)
     healthy = simulated(setup.healthy)
     faulty = faulty_run(setup)
     head, buttons = st.columns((3, 2), vertical_alignment="top")

@@ -5,32 +5,38 @@ from __future__ import annotations
 import streamlit as st
 
 from app.dashboard.laboratory.number import choose_number, show_typed_toggle
-from app.dashboard.start_stop.setup import MODEL, DriveSetup
+from app.dashboard.laboratory.setup import shown_unit
+from app.dashboard.start_stop.setup import DriveSetup
 from gearsig.rig.contact import DAMPING_LAWS
 from sims.effects import EffectSetting, effect
-from sims.forging.effects import WITH_MEANING
 from sims.forging.parameters import PARAMETERS
 from sims.forging.schedule import MODES
-from sims.presets import Preset, presets
+from sims.presets import Preset
 from sims.simulator import ParameterValue
 from sims.values import parameter
 
 RATES_HZ = (1000.0, 4000.0, 10000.0)
+CRACK = "root_crack"
+HIGHEST = {CRACK: 2.0, "backlash": 500.0, "tooth_wear": 200.0, "sliding_friction": 400.0, "torque_ripple": 20.0}
+"""Ends of the sliders; the crack's is in modules."""
+WORDS = {
+    CRACK: "Pairs of the cracked tooth lose stiffness, on the drive flank, where the load opens the crack.",
+    "backlash": "Both flanks move apart: longer flights, harder impacts.",
+    "tooth_wear": "Worn off the drive flanks where it is most: at their ends, by sliding; nothing at the pitch point.",
+    "sliding_friction": "Of the flanks, over its sound value.",
+    "torque_ripple": "Pistons of the motor, part of its torque.",
+}
 PLACES = {
-    "root_crack": ("tooth", "Cracked tooth of the pinion", 20),
+    CRACK: ("tooth", "Cracked tooth of the pinion", 20),
     "torque_ripple": ("order", "Ripples per revolution", 50),
 }
 """Effects that sit somewhere: their option, its words, its highest value."""
 Parameters = list[tuple[str, ParameterValue]]
 
 
-def choose_drive() -> DriveSetup:
+def choose_drive(chosen: Preset) -> DriveSetup:
     """Return what the user set; what is not offered is the preset's."""
     with st.sidebar:
-        found = presets(MODEL)
-        name = st.selectbox("Machine", list(found), key="machine of the drive", persist_state="session")
-        chosen = found[name]
-        st.caption(chosen.title)
         mode = st.segmented_control("Mode", MODES, default=MODES[0], key="mode of the drive", persist_state="session")
         torque = choose_number("Torque of the motor (N·m)", "torque of the drive", chosen.torque_nm, 300.0)
         speed = choose_number(
@@ -40,13 +46,13 @@ def choose_drive() -> DriveSetup:
             values = _choose_teeth(chosen)
         with st.expander("Brake, press and load", icon=":material/weight:"):
             values += _choose_load(chosen)
-        st.markdown("**Effects** · *the sound drive has none*")
-        effects = _choose_effects()
+        st.markdown("**Faults** · *the sound drive has none*")
+        effects = _choose_effects(chosen)
         with st.expander("Measurement", icon=":material/sensors:"):
             measured, duration, rate = _choose_measurement(chosen)
         show_typed_toggle()
     values.append(("mode", mode or MODES[0]))
-    return DriveSetup(name, speed, torque, tuple(values + measured), tuple(effects), duration, rate)
+    return DriveSetup(chosen.name, speed, torque, tuple(values + measured), tuple(effects), duration, rate)
 
 
 def _choose_teeth(chosen: Preset) -> Parameters:
@@ -76,29 +82,28 @@ def _choose_load(chosen: Preset) -> Parameters:
     ]
 
 
-def _choose_effects() -> list[EffectSetting]:
-    names = st.multiselect(
-        "Effects",
-        WITH_MEANING,
-        format_func=lambda name: effect(name).title,
-        key="effects of the drive",
-        placeholder="Choose what is wrong …",
-        persist_state="session",
-        label_visibility="collapsed",
-    )
-    return [_choose_effect(name) for name in WITH_MEANING if name in names]
+def _choose_effects(chosen: Preset) -> list[EffectSetting]:
+    """Return the faults whose sliders do not stand at 0."""
+    settings = [_choose_effect(name, chosen) for name in HIGHEST]
+    return [setting for setting in settings if setting.severity > 0.0]
 
 
-def _choose_effect(name: str) -> EffectSetting:
-    found = effect(name)
+def _choose_effect(name: str, chosen: Preset) -> EffectSetting:
+    found, high = effect(name), HIGHEST[name]
     s = found.severity
-    title = f"{found.title[:1].upper()}{found.title[1:]} ({s.unit})"
-    severity = choose_number(title, f"severity of {name} of the drive", s.typical, min(s.high, 5.0 * s.typical))
-    if name not in PLACES:
+    if name == CRACK:
+        high *= float(chosen.parameters.get("module_mm") or parameter(PARAMETERS, "module_mm").default or 1.0)
+    label = f"{found.title[:1].upper()}{found.title[1:]} ({shown_unit(s.unit)})"
+    severity = choose_number(label, f"severity of {name} of the drive", 0.0, high, about=WORDS[name])
+    if name not in PLACES or severity == 0.0:
         return EffectSetting(name, severity)
-    option, label, highest = PLACES[name]
+    option, words, highest = PLACES[name]
+    if name == CRACK:
+        highest = int(float(chosen.parameters.get("teeth_driver") or highest))
     default = next(int(float(o.default or 1)) for o in found.options if o.name == option)
-    place = st.number_input(label, 1, highest, default, key=f"{option} of {name} of the drive", persist_state="session")
+    place = st.number_input(
+        words, 1, highest, min(default, highest), key=f"{option} of {name} of the drive", persist_state="session"
+    )
     return EffectSetting(name, severity, {option: float(place)})
 
 

@@ -10,8 +10,9 @@ import streamlit as st
 from app.dashboard.start_stop.setup import DriveSetup
 
 if TYPE_CHECKING:
+    from gearsig.checks import FloatArray
     from gearsig.motion.start_stop import StartStop
-    from gearsig.motion.types import ForceEstimate
+    from gearsig.motion.types import ForceEstimate, PairMotion
     from gearsig.recording.types import Recording
 
 N_RUNS = 12
@@ -29,6 +30,8 @@ class DriveRun:
     force : ForceEstimate or None
     refusal : str
         Why there is no force.
+    curve_um : array or None
+        Course of the compression over the mesh cycle on the drive flank; None where nothing starts and stops.
     """
 
     setup: DriveSetup
@@ -36,6 +39,7 @@ class DriveRun:
     examined: StartStop
     force: ForceEstimate | None
     refusal: str = ""
+    curve_um: FloatArray | None = None
 
     def number(self, name: str) -> float:
         """Return an indicator by its name; nan where there is none."""
@@ -62,4 +66,16 @@ def run_drive(setup: DriveSetup) -> DriveRun:
         force, refusal = estimate_forces(motion), ""
     except RefusalError as error:
         force, refusal = None, str(error)
-    return DriveRun(setup, recording, examine_start_stop(motion), force, refusal)
+    return DriveRun(setup, recording, examine_start_stop(motion), force, refusal, _curve_um(motion))
+
+
+def _curve_um(motion: PairMotion) -> FloatArray | None:
+    from gearsig.errors import RefusalError
+    from gearsig.gap.start_stop.cycles import cut_cycles
+    from gearsig.gap.start_stop.told import Examined
+
+    try:
+        cycles = Examined(cut_cycles(motion))
+    except RefusalError:
+        return None
+    return cycles.tell(cycles.every).contact.curve_um

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isfinite
+
 import pandas as pd
 import streamlit as st
 
@@ -20,6 +22,7 @@ NUMBERS = {
     "impact loss per cycle": "J",
 }
 """Indicators on top of the page, with the unit for people."""
+TOGETHER = "Sound beside faulty"
 VIEWS = ("Motion", "Force between the teeth", "Impacts", "Indicators")
 
 
@@ -30,27 +33,34 @@ def show_numbers(sound: DriveRun, faulty: DriveRun | None) -> None:
             own = sound.number(name)
             label = name[:1].upper() + name[1:]
             if faulty is None:
-                st.metric(label, shown(own, unit))
+                st.metric(label, _told(own, unit))
                 continue
             value = faulty.number(name)
-            below = f"sound {shown(own, unit)}{change(own, value)}"
-            st.metric(label, shown(value, unit), below, delta_color="off", delta_arrow="off")
+            below = f"sound {_told(own, unit)}{change(own, value)}"
+            st.metric(label, _told(value, unit), below, delta_color="off", delta_arrow="off")
+
+
+def _told(value: float, unit: str) -> str:
+    return shown(value, unit) if isfinite(value) else "not told"
 
 
 def show_views(sound: DriveRun, faulty: DriveRun | None) -> None:
     """Show one of the views, of either drive."""
     with st.container(horizontal=True, horizontal_alignment="distribute", vertical_alignment="center"):
         view = st.segmented_control(
-            "View", VIEWS, default=VIEWS[0], key="view of the drive", label_visibility="collapsed",
+            "View", VIEWS if faulty is None else (TOGETHER, *VIEWS), default=VIEWS[0] if faulty is None else TOGETHER,
+            key=f"view of the {'sound' if faulty is None else 'faulty'} drive", label_visibility="collapsed",
             persist_state="session",
         )  # fmt: skip
         which = "Faulty"
-        if faulty is not None:
+        if faulty is not None and view != TOGETHER:
             which = st.segmented_control(
                 "Drive", ("Faulty", "Sound"), default="Faulty", key="side of the drive", label_visibility="collapsed"
             ) or "Faulty"  # fmt: skip
     run = sound if faulty is None or which == "Sound" else faulty
-    if view == VIEWS[1]:
+    if view == TOGETHER and faulty is not None:
+        _show_together(sound, faulty)
+    elif view == VIEWS[1]:
         _show_force(run)
     elif view == VIEWS[2]:
         _show_impacts(run)
@@ -93,6 +103,14 @@ def _show_motion(run: DriveRun) -> None:
     show_picture(start_stop_figure(run.examined, title=run.setup.preset), words)
 
 
+def _show_together(sound: DriveRun, faulty: DriveRun) -> None:
+    from gearsig.plot.start_stop_pair import start_stop_pair_figure
+
+    curves = None if sound.curve_um is None or faulty.curve_um is None else (sound.curve_um, faulty.curve_um)
+    words = "Sound and faulty drive: speed, phase plane, torque over twist, drive flank over the mesh cycle, teeth"
+    show_picture(start_stop_pair_figure(sound.examined, faulty.examined, curves_um=curves), words)
+
+
 def _show_force(run: DriveRun) -> None:
     from gearsig.plot.force import force_figure
 
@@ -102,7 +120,12 @@ def _show_force(run: DriveRun) -> None:
     words = "Force between the teeth: measured, piecewise model, Hunt–Crossley; below, the errors"
     show_picture(force_figure(run.force, title=run.setup.preset), words)
     rows = [
-        {"model": e.model, "against": e.reference, "rms (N)": e.rms_n, "rms (%)": 100.0 * e.relative_rms}
+        {
+            "model": e.model,
+            "against": e.reference,
+            "rms (N)": round(e.rms_n),
+            "rms (%)": round(100.0 * e.relative_rms, 1),
+        }
         for e in run.force.errors
     ]
     st.dataframe(pd.DataFrame(rows), hide_index=True)
@@ -112,6 +135,11 @@ def _show_impacts(run: DriveRun) -> None:
     if not run.examined.impacts:
         st.info("No impacts were seen.")
         return
+    from gearsig.plot.impacts import impacts_figure
+
+    motion = run.examined.motion
+    figure = impacts_figure(run.examined.impacts, motion.path.teeth[0], restitution=motion.contact.restitution)
+    show_picture(figure, "Energy of the impacts over time and over the tooth, restitution over speed")
     rows = [
         {
             "time (s)": i.time_s,

@@ -5,24 +5,26 @@ from __future__ import annotations
 import streamlit as st
 
 from app.dashboard.as_typed import as_typed
+from app.dashboard.laboratory.setup import effect_text
 from app.dashboard.start_stop.controls import choose_drive
 from app.dashboard.start_stop.run import DriveRun, run_drive
 from app.dashboard.start_stop.setup import DriveSetup
 from app.dashboard.start_stop.view import show_numbers, show_saving, show_views
 from app.dashboard.widgets.errors import show_error
 from gearsig.errors import GearsigError
-from sims.effects import effect
+from sims.presets import Preset
 
 
-def show() -> None:
+def show_drive(preset: Preset) -> None:
     """Choose, simulate, show."""
-    setup = choose_drive()
+    setup = choose_drive(preset)
     sound = run_drive(setup.sound)
     faulty = faulty_run(setup)
     head, buttons = st.columns((3, 2), vertical_alignment="top")
     with head:
-        titles = [effect(setting.name).title for setting in setup.effects] if faulty else []
-        st.subheader(as_typed(" + ".join(titles).capitalize() or "Sound: nothing is switched on"), anchor=False)
+        titles = [effect_text(setting) for setting in setup.effects] if faulty else []
+        title = " + ".join(titles)
+        st.subheader(as_typed(title[:1].upper() + title[1:] or "Sound: nothing is switched on"), anchor=False)
         st.caption(
             "Forging manipulator: pinion and wheel with gripper and piece. Every number is read from the recording, as "
             "of a measured one."
@@ -40,9 +42,3 @@ def faulty_run(setup: DriveSetup) -> DriveRun | None:
     except GearsigError as error:
         show_error(error)
         return None
-
-
-try:
-    show()
-except GearsigError as error:
-    show_error(error)
