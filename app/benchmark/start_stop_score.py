@@ -47,6 +47,12 @@ def names_effect(done: DriveDone) -> bool:
     return done.answer.outcome in NAMING
 
 
+def named_effects(done: DriveDone) -> list[str]:
+    """Return what the answer names: one effect, or two that it cannot tell apart."""
+    n_named = {GapOutcome.EFFECT.value: 1, GapOutcome.CANNOT_SEPARATE.value: 2}.get(done.answer.outcome, 0)
+    return mechanical(done)[:n_named]
+
+
 def figures(cases: Cases) -> dict[str, Score]:
     """Return the figures of some cases, each with its 90 % interval and its number of cases."""
     single = [c for c in cases if c.label["kind"] == "single"]
@@ -56,8 +62,8 @@ def figures(cases: Cases) -> dict[str, Score]:
         "likeliest effect right": _share(single, lambda c: mechanical(c)[:1] == [truth_of(c)]),
         "among the first two": _share(single, lambda c: truth_of(c) in mechanical(c)[:2]),
         "likeliest effect right, upper half of the span": _share(strong, lambda c: mechanical(c)[:1] == [truth_of(c)]),
-        "named, and right": _share(single, lambda c: names_effect(c) and mechanical(c)[:1] == [truth_of(c)]),
-        "named, and wrong": _share(single, lambda c: names_effect(c) and mechanical(c)[:1] != [truth_of(c)]),
+        "named, and right": _share(single, lambda c: truth_of(c) in named_effects(c)),
+        "named, and wrong": _share(single, lambda c: names_effect(c) and truth_of(c) not in named_effects(c)),
         "tooth or order right, of effects found": _share(placed, _is_placed),
         "effect named on a sound machine": _share([c for c in cases if c.label["kind"] == "none"], names_effect),
         "effect named on an unknown": _share([c for c in cases if c.label["kind"] == "unknown"], names_effect),

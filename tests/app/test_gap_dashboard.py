@@ -90,6 +90,12 @@ def test_two_rig_files_for_all_are_refused() -> None:
         common_rig(choice)
 
 
+def test_the_only_rig_file_is_for_all_though_it_is_named_as_the_reference() -> None:
+    now, sound = upload("now.h5", b"1"), upload("sound.h5", b"2")
+    rig = upload("sound.toml", text=RIG)
+    assert common_rig(Choice((now,), (sound,), (rig,))) is rig
+
+
 def test_another_choice_has_another_key() -> None:
     one = Choice((CRACKED,), (HEALTHY,))
     others = (

@@ -60,13 +60,15 @@ def name_of(source: Source) -> str:
 
 
 def common_rig(choice: Choice) -> Upload | None:
-    """Return the rig file that is no recording's own; None where there is none.
+    """Return the rig file that is no recording's own, or the only one there is; None where there is none.
 
     Raises
     ------
     InputError
         If there are several.
     """
+    if len(choice.rigs) == 1:  # all recordings are of one rig, whatever its file is called
+        return choice.rigs[0]
     stems = {_stem(name_of(one)) for one in (*choice.recordings, *choice.references)}
     others = [rig for rig in choice.rigs if _stem(rig.name) not in stems]
     if len(others) > 1:
