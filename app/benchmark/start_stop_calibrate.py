@@ -1,7 +1,8 @@
 """Fits floors and probabilities of the start–stop diagnosis to blind cases kept for that.
 
 ``python -m app.benchmark.start_stop_calibrate --cases 100 --seed 71`` makes cases of the role calibration, whose gears
-no case of the evaluation has, and writes `gearsig/gap/start_stop/floors.json`. 4 s of processor time a case.
+no case of the evaluation has, and writes `gearsig/gap/start_stop/floors.json`. 3 s of processor time a case. The
+file's provenance says which cases it was made of: `--numbers` makes some of those planned only.
 """
 
 from __future__ import annotations
@@ -88,22 +89,32 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=100)
     parser.add_argument("--seed", type=int, default=71)
     parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--numbers", default="", help="of the planned cases, e.g. 0-38,140-177; default: all")
     asked = parser.parse_args()
     rows: list[Row] = []
     plan = planned(asked.cases, asked.seed)
     with process_pool(asked.processes) as pool:
-        futures = [pool.submit(collect, ROLE, asked.seed, i, one) for i, one in enumerate(plan)]
+        chosen = numbers_of(asked.numbers, len(plan))
+        futures = [pool.submit(collect, ROLE, asked.seed, i, plan[i]) for i in chosen]
         for future in as_completed(futures):
             rows += future.result()
-    write_floors(rows, asked.seed)
+    write_floors(rows, asked.seed, f"{asked.numbers or 'all'} of {len(plan)} planned")
 
 
-def write_floors(rows: Sequence[Row], seed: int) -> None:
+def numbers_of(text: str, n_planned: int) -> list[int]:
+    """Return the numbers that a text such as "0-38,140-177" names; all where it is empty."""
+    if not text:
+        return list(range(n_planned))
+    ends = [part.partition("-") for part in text.split(",")]
+    return [i for low, _, high in ends for i in range(int(low), int(high or low) + 1)]
+
+
+def write_floors(rows: Sequence[Row], seed: int, drawn: str) -> None:
     """Write what a seed's cases give into the package."""
-    FILE.write_text(json.dumps(floors_of(rows, seed), indent=1) + "\n", encoding="utf-8")
+    FILE.write_text(json.dumps(floors_of(rows, seed, drawn), indent=1) + "\n", encoding="utf-8")
 
 
-def floors_of(rows: Sequence[Row], seed: int) -> dict[str, Any]:
+def floors_of(rows: Sequence[Row], seed: int, drawn: str = "all") -> dict[str, Any]:
     """Return the content of the floors' file."""
     parts = {
         name: [row for row in rows if bool(row[0]["with_reference"]) is wanted]
@@ -111,7 +122,14 @@ def floors_of(rows: Sequence[Row], seed: int) -> dict[str, Any]:
     }
     n_cases = len(parts["with_reference"])
     n_sound = sum(label["kind"] == "none" for label, _ in parts["with_reference"])
-    provenance = {"n_cases": n_cases, "n_sound": n_sound, "role": ROLE, "seed": seed, "made_by": "sims.blind_drive"}
+    provenance = {
+        "n_cases": n_cases,
+        "n_sound": n_sound,
+        "role": ROLE,
+        "seed": seed,
+        "drawn": drawn,
+        "made_by": "sims.blind_drive",
+    }
     return {"provenance": provenance, **{name: fit_part(found) for name, found in parts.items()}}
 
 

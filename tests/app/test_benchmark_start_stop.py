@@ -8,6 +8,7 @@ import pytest
 
 from app.benchmark.answer import Answer, AnsweredCause, AnsweredShrinkage
 from app.benchmark.start_stop import DriveDone, DrivePlan, make_drive_case
+from app.benchmark.start_stop_calibrate import numbers_of
 from app.benchmark.start_stop_score import figures, write_scores
 from app.benchmark.start_stop_seen import planned
 from app.cli import main
@@ -87,3 +88,8 @@ def test_scores_are_written_whole(tmp_path):
 def test_options_of_the_other_benchmark_are_refused(tmp_path, capsys, option):
     assert run(["benchmark", "gap", "--model", "forging", *option, "-o", str(tmp_path / "b")]) == 2
     assert option[0] in capsys.readouterr().err
+
+
+def test_calibration_cases_are_chosen_by_their_numbers():
+    assert numbers_of("", 3) == [0, 1, 2]
+    assert numbers_of("0-2,7,9-10", 20) == [0, 1, 2, 7, 9, 10]
