@@ -20,7 +20,7 @@ from sims.reduced_fe.dynamics_linear import eigenfrequencies_hz, torsional_mode
 from sims.reduced_fe.dynamics_respond import STEP_S, TRANSMISSION_ERROR, respond
 from sims.reduced_fe.dynamics_sweep import SpeedSweep, speed_sweep
 from sims.reduced_fe.maps_static import MeshMaps
-from sims.reduced_fe.simulate import simulate_pair
+from sims.reduced_fe.simulate import check_depth, simulate_pair
 
 SPECTRUM_RPM = (1000.0, 2000.0, 3000.0, 4000.0, 5000.0)
 SETTLED_S, SPECTRUM_S = 0.4, 0.4
@@ -97,6 +97,8 @@ def flexible_study(
         Told what is done, and which part of the whole.
     """
     positive(sweep_s, "sweep_s", "s")
+    for torque in torques_nm:
+        check_depth(pair, Operation.steady(last_rpm, torque))
     on_progress("maps", 0.0)
     maps = pair.maps()
     sweeps, n = {}, 2 * len(torques_nm) + 1

@@ -14,7 +14,7 @@ from sims.reduced_fe.discretisation import FINER_DOF, DiscretisationError, discr
 from sims.reduced_fe.gear_cache import cached_gear
 from sims.reduced_fe.memory import check_memory, craig_bampton_bytes, sector_bytes
 from sims.reduced_fe.mesh_quality import MeshQuality, mesh_quality
-from sims.reduced_fe.mesh_size import mesh_size_for
+from sims.reduced_fe.mesh_size import check_reducible, mesh_size_for
 from sims.reduced_fe.one_thread import one_thread
 from sims.reduced_fe.reduce import ReductionPlan
 from sims.reduced_fe.reduced_gear import ReducedGear
@@ -91,6 +91,8 @@ def study_gear(
     """
     on_progress("mesh", 0.0)
     size = mesh_size_for(blank, n_dof)
+    if reduce:
+        check_reducible(blank, size)
     check_memory(craig_bampton_bytes(blank, size, N_COMPARED) if reduce else sector_bytes(blank, size))
     mesh = sector_mesh(blank, size)
     gear = CyclicGear(mesh, springs)

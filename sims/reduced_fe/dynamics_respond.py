@@ -180,7 +180,7 @@ def respond(
         if filled < len(found) or not np.isfinite(found).all():
             raise RefusalError(
                 f"the solution grows beyond all bounds after {(begun + filled * every) * step:.3g} s",
-                remedy="look for stiffness, damping and inertia that do not go together, or give a shorter step_s",
+                remedy="lower mesh_damping_ratio, look for inertias that do not go together, or give a shorter step",
             )
         if on_progress is not None:
             on_progress((begun + n) / n_steps)

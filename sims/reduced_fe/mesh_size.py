@@ -70,6 +70,9 @@ COARSE = tuple(
 MOST_OUTLINE_ERROR = 0.01
 """In modules: how far the cells' edges may lie off the true outline."""
 
+MOST_STRAIGHT_ERROR = 0.04
+"""The same of a mesh of first order that is to be reduced: with more, a tooth's compliance is a fifth off."""
+
 
 def check_fillet(blank: GearBlank, size: MeshSize) -> None:
     """Refuse a mesh whose edges leave the outline by more than 1 % of a module; it is the fillet that they leave.
@@ -86,6 +89,25 @@ def check_fillet(blank: GearBlank, size: MeshSize) -> None:
             allowed=f"at most {most:.3g} mm",
             remedy=f"ask for more degrees of freedom (cells: more than n_up = {size.n_up}, n_gap = {size.n_gap}), or a "
             "rounder tool",
+        )
+
+
+def check_reducible(blank: GearBlank, size: MeshSize) -> None:
+    """Refuse a mesh of first order that follows the fillet too coarsely for the teeth of a reduced gear.
+
+    Its modes may be looked at all the same: they hardly depend on the fillet.
+    """
+    most = MOST_STRAIGHT_ERROR * blank.geometry.module_mm
+
+    def error_mm(wanted: MeshSize) -> float:
+        return outline_error_mm(blank.geometry, wanted.n_gap, wanted.n_up, wanted.order)
+
+    if size.order == 1 and error_mm(size) > most:
+        enough = next((n_dof_of(blank, finer) for finer in COARSE if error_mm(finer) <= most), None)
+        raise InputError(
+            f"the mesh is too coarse for the fillet: its straight edges lie up to {error_mm(size):.2g} mm off it",
+            allowed=f"at most {most:.2g} mm in a gear that is to be reduced",
+            remedy=f"ask for {'more' if enough is None else f'at least {enough}'} degrees of freedom",
         )
 
 

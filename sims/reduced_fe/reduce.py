@@ -15,7 +15,7 @@ from sims.reduced_fe.cyclic_modes import CyclicModes, cyclic_modes
 from sims.reduced_fe.flank_rows import Spread, flank_grid, flank_rows
 from sims.reduced_fe.hub import ComplexArray, hub_sum
 from sims.reduced_fe.mesh_quality import mesh_quality
-from sims.reduced_fe.mesh_size import MeshSize, mesh_size_for
+from sims.reduced_fe.mesh_size import MeshSize, check_reducible, mesh_size_for
 from sims.reduced_fe.one_thread import one_thread
 from sims.reduced_fe.reduced_gear import FlankGrid, ReducedGear
 from sims.reduced_fe.sector_mesh import sector_mesh
@@ -95,6 +95,7 @@ def reduce_gear(blank: GearBlank, plan: ReductionPlan) -> ReducedGear:
 
     if plan.n_offsets > blank.n_teeth // 2:
         raise InputError(f"n_offsets is {plan.n_offsets}", allowed=f"at most {blank.n_teeth // 2}, half of the teeth")
+    check_reducible(blank, plan.size)
     check_memory(sector_bytes(blank, plan.size))
     mesh = sector_mesh(blank, plan.size)
     quality, gear = mesh_quality(mesh), CyclicGear(mesh)

@@ -80,7 +80,7 @@ def simulate_pair(
     machine, _ = draw_roughness(pair.machine, machine_rng)
     pair = replace(pair, machine=machine)
     chain = replace(machine.chain, sampling_rate_hz=rate)
-    _check_depth(pair, operation)
+    check_depth(pair, operation)
     own = constants(pair, operation, rng=machine_rng)
     wanted_hz = motion_rate_hz(chain)
     per_sample = ceil(max(1.0 / positive(step_s, "step_s", "s"), wanted_hz) / rate - 1e-9)
@@ -151,7 +151,8 @@ def _known(pair: FlexiblePair, operation: Operation, own: Constants, response: F
     }
 
 
-def _check_depth(pair: FlexiblePair, operation: Operation) -> None:
+def check_depth(pair: FlexiblePair, operation: Operation) -> None:
+    """Refuse a torque under which the teeth yield further than half of what their corners are apart."""
     torque = operation.torque_nm.largest
     if torque <= 0.0:
         return

@@ -7,6 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from app.cli import app
+from gearsig.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +41,13 @@ def test_figures_table_and_summary_are_written(study):
     assert summary["sweeps"][0]["n_steps"] == 200_000
     errors = [row["transmission_error_um"][1] for row in summary["static"]]
     assert errors == sorted(errors)
+
+
+def test_a_torque_beyond_what_corners_follow_is_refused_before_anything_is_written(tmp_path):
+    found = CliRunner().invoke(app, ["flexible", "-o", str(tmp_path / "x"), "--torques", "170,5000Nm"])
+    assert isinstance(found.exception, InputError)
+    assert "the teeth yield by" in str(found.exception)
+    assert not (tmp_path / "x").exists()
 
 
 def test_a_range_without_dots_is_refused(tmp_path):

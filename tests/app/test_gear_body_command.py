@@ -75,6 +75,7 @@ def test_a_model_that_keeps_nothing_has_nothing_to_clear_away(tmp_path):
         (("--teeth", "12"), "undercuts"),
         (("--web", "30mm"), "thicker than the face"),
         (("--dof", "5000", "--teeth", "150", "--module", "1mm"), "too few for 150 teeth"),
+        (("--dof", "5000", "--reduce"), "too coarse for the fillet: its straight edges lie up to 0.15 mm off it"),
         (("--held", "springs", "--radial", "0N/m", "--dof", "5000"), "--radial"),
         (("--held", "shaft"), "--held"),
         (("--held", "bore", "--radial", "1e8N/m", "--dof", "5000"), "add --held springs"),
