@@ -59,6 +59,22 @@ def test_from_the_slider_to_the_analysis_and_back(laboratory: playwright.Page) -
     assert title(laboratory) == "Crack in a tooth root, 2 mm"
 
 
+def test_the_finite_element_pair_follows_its_slider_to_the_end(laboratory: playwright.Page) -> None:
+    laboratory.get_by_role("combobox", name="Machine").click()
+    laboratory.get_by_role("option", name="Flexible 50/50").click()
+    laboratory.get_by_text("Flexible spur pair 50/50").wait_for()
+    settle(laboratory)
+    laboratory.get_by_role("slider", name="Crack in a tooth root").focus()
+    laboratory.keyboard.press("End")
+    laboratory.get_by_role("heading", name="Crack in a tooth root, 8.15 mm").wait_for()
+    settle(laboratory)
+    for name in ("Spectrum", "Mesh"):
+        laboratory.get_by_role("tab", name=name, exact=True).click()
+        settle(laboratory)
+        laboratory.locator(".js-plotly-plot").first.wait_for()
+    assert laboratory.get_by_test_id("stAlert").count() == 0
+
+
 def test_a_recording_is_saved_with_rig_and_truth(laboratory: playwright.Page) -> None:
     pull_the_crack(laboratory, 20)
     laboratory.get_by_role("button", name="Save as recording").click()

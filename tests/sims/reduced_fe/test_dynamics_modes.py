@@ -63,9 +63,10 @@ def test_contact_moves_the_rigid_gear_by_its_base_radius(pair, ready):
 
 def test_torsional_mode_lies_where_the_source_has_it_with_the_stated_hub_inertia(pair):
     assert pair.machine.wheels[0].inertia_kg_m2 == pytest.approx(0.0120, abs=1e-4)
-    found = [torsional_mode(pair, Operation.steady(2000.0, t)).frequency_hz for t in (170.0, 340.0)]
-    assert min(found) > 2630.0
-    assert max(found) < 2730.0
+    light, *found = [torsional_mode(pair, Operation.steady(2000.0, t)).frequency_hz for t in (85.0, 170.0, 340.0)]
+    assert min(found) > 2650.0
+    assert max(found) < 2700.0
+    assert light == pytest.approx(2604.0, abs=5.0)  # contact softens under less load
     bare = pair_of(hub_inertia_driver_kg_m2=0.0, hub_inertia_driven_kg_m2=0.0)
     assert 3300.0 < torsional_mode(bare, OPERATION).frequency_hz < 3700.0
 
