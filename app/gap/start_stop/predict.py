@@ -50,8 +50,9 @@ def predict(
     """Simulate every cause at some severities.
 
     Worn flanks and a cracked tooth move the gears against each other by hundredths of a millimetre; that is added to
-    what the sound drive tells, as the simulated drive knows no shape of wear: the play by the mean depth over the mesh
-    cycle, the curve by the shape, a tooth by what its lost stiffness lets it yield. All others are run.
+    what the sound drive tells, without the noise of a run: the play by the mean depth over the mesh cycle, the curve by
+    its shape (the drive in motion agrees, see the tests), a tooth by what its lost stiffness lets it yield. A sensor
+    that misreads changes no motion. All others are run.
 
     Parameters
     ----------

@@ -87,3 +87,17 @@ def test_the_shipped_floors_are_whole(with_reference):
     for part in ("whole", "half"):
         assert np.all(load_floor(with_reference=with_reference, part=part).scale > 0.0)
     GapCalibration.from_mapping(load_floors()["with_reference" if with_reference else "without_reference"])
+
+
+def test_what_a_recording_itself_scatters_by_is_no_property_of_other_drives():
+    """Half of the drives have coarse encoders: their scatter is known, and the floor is that of the others."""
+    rng = np.random.default_rng(2)
+    scatters = np.where(np.arange(400)[:, None] % 2, 12.0, 0.1) * np.ones(N)
+    rows = 1.0 + rng.normal(0.0, np.hypot(2.0, scatters))
+    floor = DriveFloor.of_sound(rows, scatters)
+    assert floor.scale == pytest.approx(np.full(N, 2.0), rel=0.35)
+    assert DriveFloor.of_sound(rows).scale.min() > 4.0
+    assert np.mean([floor.widened(e).size(row) > 1.0 for row, e in zip(rows, scatters, strict=True)]) == pytest.approx(
+        0.05, abs=0.01
+    )
+    assert floor.widened(np.full(N, np.nan)).scale == pytest.approx(floor.scale)
