@@ -32,6 +32,7 @@ from gearsig import __version__
 from gearsig.motion.angle_profile import AngleProfile
 from gearsig.motion.impacts import Impact
 from gearsig.motion.start_stop import StartStop
+from gearsig.plot.display import unit_text
 from gearsig.report.numbers import readable, rounded
 from gearsig.spectra.types import Spectrum
 
@@ -69,7 +70,10 @@ def start_stop_text(examined: StartStop) -> str:
         hardest = sorted(examined.impacts, key=lambda i: -i.speed_mps)[:MOST_ROWS]
         lines += [_impact_row(impact) for impact in sorted(hardest, key=lambda i: i.time_s)]
         lines += _more(len(examined.impacts))
-    lines += ["", *(f"{i.name:<24} {readable(i.value, 5):>12} {i.unit}" for i in examined.indicators)]
+    lines += [
+        "",
+        *(f"{i.name:<24} {readable(i.value, 5):>12} {unit_text(i.unit)}".rstrip() for i in examined.indicators),
+    ]
     lines += [fill(f"Cannot tell: {text}", 100) for text in examined.refusals]
     lines += [fill(f"Note: {text}", 100) for text in examined.notes]
     return "\n".join(lines)
