@@ -15,7 +15,9 @@ import json
 from textwrap import fill
 
 from gearsig import __version__
+from gearsig.gap.words import severity_unit
 from gearsig.motion.identify_types import FittedParameter, Identification
+from gearsig.plot.display import unit_text
 from gearsig.report.numbers import readable, rounded
 
 SCHEMA, SCHEMA_VERSION = "gearsig.identify", 1
@@ -62,4 +64,5 @@ def identify_json(found: Identification) -> str:
 def _row(p: FittedParameter) -> str:
     rig = "" if p.rig_value is None else readable(p.rig_value, 5)
     low, high = (readable(v, 5) for v in p.interval)
-    return f"{p.name:<26} {readable(p.value, 5):>11} {low:>11} {high:>11} {rig:>11}  {p.unit}"
+    unit = unit_text(severity_unit(p.unit))
+    return f"{p.name:<26} {readable(p.value, 5):>11} {low:>11} {high:>11} {rig:>11}  {unit}".rstrip()

@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 
 from gearsig import __version__
+from gearsig.gap.words import severity_unit
 from gearsig.motion.angle_profile import AngleProfile
 from gearsig.motion.impacts import Impact
 from gearsig.motion.start_stop import StartStop
@@ -72,7 +73,10 @@ def start_stop_text(examined: StartStop) -> str:
         lines += _more(len(examined.impacts))
     lines += [
         "",
-        *(f"{i.name:<24} {readable(i.value, 5):>12} {unit_text(i.unit)}".rstrip() for i in examined.indicators),
+        *(
+            f"{i.name:<24} {readable(i.value, 5):>12} {unit_text(severity_unit(i.unit))}".rstrip()
+            for i in examined.indicators
+        ),
     ]
     lines += [fill(f"Cannot tell: {text}", 100) for text in examined.refusals]
     lines += [fill(f"Note: {text}", 100) for text in examined.notes]
