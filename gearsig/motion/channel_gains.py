@@ -16,6 +16,9 @@ MOST_OF_ONE = 0.5
 """Of the sum of squares that a single window may have."""
 ALLOWED = {1: 0.03, 2: 0.06}
 """Parts by which scales of speeds and of accelerations may differ."""
+LEAST_RATE_HZ = {1: 0.0, 2: 4000.0}
+"""Sampling rates from which on they are compared: slower, an acceleration that rings is folded down, alike in each
+start, so that its sum is off and its scatter does not say so."""
 CERTAIN = 5.0
 """Standard errors of the scale."""
 
@@ -79,8 +82,11 @@ def check_scale(
     Raises
     ------
     InputError
-        If the scale is off by more than 3 % (speeds) or 6 % (accelerations), and by five of its standard errors.
+        If the scale is off by more than 3 % (speeds) or 6 % (accelerations, from 4 kHz on), and by five of its standard
+        errors.
     """
+    if sampling_rate_hz < LEAST_RATE_HZ[order]:
+        return
     scale, error = channel_scale(angle_rad, rate, sampling_rate_hz, order)
     if not abs(scale - 1.0) > max(ALLOWED[order], CERTAIN * error):
         return

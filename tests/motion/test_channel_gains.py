@@ -47,3 +47,9 @@ def test_simulated_channels_agree_in_every_mode() -> None:
     measure_motion(start_stop(slow_channels="filtered"))  # type: ignore[arg-type]  # a word
     coarse = start_stop(encoder_counts=512.0)
     measure_motion(replace(coarse, samples=coarse.samples))
+
+
+def test_an_acceleration_that_is_sampled_too_slowly_is_not_judged() -> None:
+    """Ringing folds down, alike in each start: the sum is off though the channel is right."""
+    sound = start_stop()
+    measure_motion(changed(sound, "pinion acceleration", 0.7 * sound.values("pinion acceleration")))
