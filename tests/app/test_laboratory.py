@@ -97,14 +97,15 @@ def test_two_effects_at_once() -> None:
 
 def test_a_crack_deeper_than_the_tooth_is_one_message() -> None:
     page = opened()
-    slider(page, "Crack").set_value(9.0).run()
+    page.sidebar.toggle(key="lab typed values").set_value(True).run()
+    typed(page, "Crack").set_value(9.0).run()
     assert not page.exception
     assert len(page.error) == 1
     assert "past the tooth" in page.error[0].value
     assert "Allowed" in page.error[0].value
     assert "healthy machine alone" in page.subheader[0].value
     assert len(page.metric) == len(NUMBERS)
-    slider(page, "Crack").set_value(1.0).run()
+    typed(page, "Crack").set_value(1.0).run()
     assert not page.error
     assert "1 mm" in shown_text(page)
 

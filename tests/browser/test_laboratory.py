@@ -42,7 +42,7 @@ def pull_the_crack(page: playwright.Page, n_steps: int) -> None:
 
 def test_from_the_slider_to_the_analysis_and_back(laboratory: playwright.Page) -> None:
     assert title(laboratory).startswith("Healthy")
-    pull_the_crack(laboratory, 40)
+    pull_the_crack(laboratory, 100)
     assert title(laboratory) == "Crack in a tooth root, 2 mm"
     for name in ("Spectrum", "Envelope", "Phase portrait", "Mesh"):
         laboratory.get_by_role("tab", name=name, exact=True).click()
@@ -76,7 +76,7 @@ def test_the_finite_element_pair_follows_its_slider_to_the_end(laboratory: playw
 
 
 def test_a_recording_is_saved_with_rig_and_truth(laboratory: playwright.Page) -> None:
-    pull_the_crack(laboratory, 20)
+    pull_the_crack(laboratory, 50)
     laboratory.get_by_role("button", name="Save as recording").click()
     with laboratory.expect_download() as download:
         laboratory.get_by_role("button", name="Download", exact=True).click()
