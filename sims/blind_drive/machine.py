@@ -102,7 +102,8 @@ class Machine:
     ----------
     drawing : Drawing
     numbers : mapping
-        Every number of the kernel by name, in SI units.
+        Every number of the kernel and the sensors by name, in SI units: always the same names, or the kernel would be
+        compiled anew.
     errors : (array, array)
         Deviations in m of each tooth's drive and back flank, (2, z1) and (2, z2); above 0: material is missing.
     """
@@ -172,6 +173,8 @@ def build(rng: np.random.Generator, drawing: Drawing) -> Machine:
         "blow": float(rng.random() < 0.5) * 3.0 * holding,
         "blow_delay": 0.6 * d.off_s,
         "blow_lasts": 0.02,
+        "gain": 1.0,
+        "slip": 0.0,
     }
     errors = tuple(1e-6 * rng.normal(0.0, pitch_um, (2, z)) for z in (d.z1, d.z2))
     return Machine(d, numbers, (errors[0], errors[1]))

@@ -109,7 +109,7 @@ def _readings(machine: Machine, chain: Chain, found: FloatArray, rng: np.random.
         return counted
 
     full = machine.drawing.torque_nm
-    torque = machine.numbers.get("gain", 1.0) * found[:, 6] + chain.torque_offset * full
+    torque = machine.numbers["gain"] * found[:, 6] + chain.torque_offset * full
     wheel = found[:, 3] + chain.wheel_zero_rad + _slips(machine, found, rng)
     return [
         torque + noise(chain.torque_noise * full),
@@ -126,7 +126,7 @@ def _readings(machine: Machine, chain: Chain, found: FloatArray, rng: np.random.
 def _slips(machine: Machine, found: FloatArray, rng: np.random.Generator) -> FloatArray:
     """The wheel's encoder stays behind by a random way in each start."""
     angle = np.zeros(len(found))
-    slip, n = machine.numbers.get("slip", 0.0), machine.numbers
+    slip, n = machine.numbers["slip"], machine.numbers
     if slip == 0.0:
         return angle
     time = np.arange(len(found)) * INTERVAL_S

@@ -32,6 +32,13 @@ def test_gears_are_in_one_role_only():
     assert len(set(every)) == len(every)
 
 
+@pytest.mark.parametrize("name", CATALOGUE | OUTSIDE)
+def test_one_compiled_kernel_runs_them_all(name: str):
+    """Two processes that compile two kernels at once can keep one under the other's name."""
+    sound = machine()
+    assert changed(sound, name, 1.0, np.random.default_rng(1))[0].record().dtype == sound.record().dtype
+
+
 def test_torque_less_friction_accelerates_the_inertias():
     """After the start: τ r2/r1 = J2 α2 + load, with frictionless flanks."""
     made = machine(mu=0.0, off_centre=0.0, run_out=0.0)
