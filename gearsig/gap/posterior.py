@@ -15,6 +15,10 @@ from gearsig.gap.types import NONE, UNKNOWN, GapOutcome
 
 FILE = Path(__file__).with_name("calibration.json")
 
+LIKELIER_THAN_NOT = 0.5
+"""Probability from which a cause is likelier than all others together. No effect is named below it, nor are two that
+have less together: then what is wrong is unknown, however sure it is that something is."""
+
 
 @dataclass(frozen=True)
 class GapCalibration:
@@ -79,7 +83,10 @@ class GapCalibration:
             return GapOutcome.NO_GAP if none >= unknown else GapOutcome.UNKNOWN
         first, *others = sorted((p for name, p in probabilities.items() if name not in (NONE, UNKNOWN)), reverse=True)
         second = others[0] if others else 0.0
-        return GapOutcome.EFFECT if first / (first + second) >= self.apart else GapOutcome.CANNOT_SEPARATE
+        if first + second < LIKELIER_THAN_NOT:
+            return GapOutcome.UNKNOWN
+        alone = first >= LIKELIER_THAN_NOT and first / (first + second) >= self.apart
+        return GapOutcome.EFFECT if alone else GapOutcome.CANNOT_SEPARATE
 
 
 def score_of(shrink: float, placebo: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import isfinite
 
+from gearsig.gap.posterior import LIKELIER_THAN_NOT
 from gearsig.gap.types import NONE, UNKNOWN, GapCause, GapOutcome, GapPlace, GapReport, Interval
 from gearsig.gap.words import severity_unit
 
@@ -18,8 +19,6 @@ def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
 NO_SIMULATION = (
     "How far: cannot be told; the simulators have a gear pair and this rig has none, so nothing was simulated."
 )
-SURE = 0.5
-"""Probability from which a cause is likelier than all others together."""
 NEARLY = 0.75
 """Of the second cause's probability, from which a third one is as likely as that."""
 SOUND_MACHINE = "the same machine when it was sound"
@@ -49,13 +48,22 @@ def _which(report: GapReport) -> str:
     if report.outcome is GapOutcome.NO_GAP:
         return _which_none(report, odds)
     if report.outcome is GapOutcome.UNKNOWN:
-        return "Which: unknown; nothing in the catalogue explains it well enough."
+        return _which_unknown(report)
     if report.outcome is GapOutcome.CANNOT_SEPARATE and report.inseparable is not None:
         named = " or ".join(_titled(report, name) for name in rivals(report))
         return f"Which: {named}; these recordings cannot tell them apart."
     size = "" if first.severity is None else f", {_severity(first, first.severity)}"
     place = f" at {first.place}" if first.place else ""
     return f"Which: {first.title}{place}{size} (probability {odds})."
+
+
+def _which_unknown(report: GapReport) -> str:
+    known = [cause for cause in report.causes if cause.name not in (NONE, UNKNOWN)]
+    best = max(known, key=lambda cause: cause.probability, default=None)
+    unknown = next((cause.probability for cause in report.causes if cause.name == UNKNOWN), 1.0)
+    if best is None or best.probability <= unknown:
+        return "Which: unknown; nothing in the catalogue explains it well enough."
+    return f"Which: unknown; {best.title} comes nearest ({100 * best.probability:.0f} %), too little to be named."
 
 
 def rivals(report: GapReport) -> tuple[str, ...]:
@@ -69,7 +77,7 @@ def rivals(report: GapReport) -> tuple[str, ...]:
 
 def _which_none(report: GapReport, odds: str) -> str:
     rival = max(report.causes[1:], key=lambda cause: cause.probability, default=None)
-    if rival is None or report.causes[0].probability > SURE:
+    if rival is None or report.causes[0].probability > LIKELIER_THAN_NOT:
         return f"Which: none ({odds}); what differs is no more than between healthy machines and the simulator."
     name = "a gap of unknown cause" if rival.name == UNKNOWN else rival.title
     return f"Which: none is likely enough to be named: no gap {odds}, {name} {100 * rival.probability:.0f} %."

@@ -36,8 +36,16 @@ def test_outcomes() -> None:
 
     assert outcome(root_crack=0.8) is GapOutcome.EFFECT
     assert outcome(root_crack=0.5) is GapOutcome.CANNOT_SEPARATE
+    assert PLAIN.outcome(probabilities(root_crack=0.45, unbalance=0.1)) is GapOutcome.CANNOT_SEPARATE
+    assert PLAIN.outcome(probabilities(root_crack=0.4, unbalance=0.05)) is GapOutcome.UNKNOWN
     assert outcome(none=0.7) is GapOutcome.NO_GAP
     assert outcome(unknown=0.7) is GapOutcome.UNKNOWN
+
+
+def probabilities(**given: float) -> dict[str, float]:
+    """Many further effects share the rest."""
+    rest = 1.0 - sum(given.values())
+    return {NONE: 0.0, UNKNOWN: 0.0, **{f"effect {i}": rest / 20 for i in range(20)}, **given}
 
 
 def test_a_placebo_that_does_as_well_leaves_no_score() -> None:

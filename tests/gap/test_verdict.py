@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gearsig.gap.types import GapOutcome, GapPlace, Interval, PlaceKind
+from gearsig.gap.types import UNKNOWN, GapOutcome, GapPlace, Interval, PlaceKind
 from gearsig.gap.verdict import rivals
 from tests.gap.example_report import (
     cannot_separate_report,
@@ -75,6 +75,14 @@ def test_a_gap_that_no_cause_explains_is_told_as_it_is() -> None:
     unsure = replace(report, causes=causes, size=Interval(1.7, 1.5, 1.9), places=places)
     assert unsure.verdict[0].startswith("Where: a burst")
     assert unsure.verdict[1] == "Which: none is likely enough to be named: no gap 30 %, spall on a tooth flank 20 %."
+
+
+def test_what_comes_nearest_to_an_unknown_cause_is_told_with_its_probability() -> None:
+    report = unknown_report()
+    known = replace(effect_report().causes[0], probability=0.4)
+    unknown = next(cause for cause in report.causes if cause.name == UNKNOWN)
+    line = replace(report, causes=(replace(unknown, probability=0.2), known)).verdict[1]
+    assert line == f"Which: unknown; {known.title} comes nearest (40 %), too little to be named."
 
 
 def test_without_a_gap_nothing_is_asked_for_that_would_separate_causes() -> None:
