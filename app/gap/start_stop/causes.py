@@ -25,6 +25,8 @@ class Tried:
         simulated run's own chance.
     may_move : tuple of str
         Changes that it moves on real teeth and not in the simulated drive: they speak neither for nor against it.
+    direct : tuple of str
+        Changes that measure the severity itself.
     needs : str
         Channel without which it cannot be told: "torque", or empty.
     needs_reference : bool
@@ -36,18 +38,21 @@ class Tried:
     may_move: tuple[str, ...] = ()
     needs: str = ""
     needs_reference: bool = False
+    direct: tuple[str, ...] = ()
 
 
 _ROUGH = ("contact_scatter", "load_scatter")
 TRIED: Mapping[str, Tried] = {
-    "backlash": Tried((60.0, 180.0, 500.0), ("play", "impact")),
+    "backlash": Tried((60.0, 180.0, 500.0), ("play", "impact"), direct=("play",)),
     "tooth_wear": Tried(
         (12.0, 25.0, 50.0, 100.0, 200.0), ("play", "curve"), ("deflection", "flank_friction", "impact", *_ROUGH)
     ),
     "sliding_friction": Tried((60.0, 180.0, 400.0), ("flank_friction",), ("curve", *_ROUGH), "torque"),
-    LOAD_FRICTION: Tried((8.0, 20.0, 45.0), ("load_friction",), (), "torque", needs_reference=True),
+    LOAD_FRICTION: Tried(
+        (8.0, 20.0, 45.0), ("load_friction",), (), "torque", needs_reference=True, direct=("load_friction",)
+    ),
     "root_crack": Tried((1.0, 2.0, 4.0, 6.0, 8.0, 10.0), ("tooth",), (), "torque"),
-    LOAD_INERTIA: Tried((-50.0, -25.0, 40.0, 120.0), ("inertia",), ("load_scatter",), "torque"),
+    LOAD_INERTIA: Tried((-50.0, -25.0, 40.0, 120.0), ("inertia",), ("load_scatter",), "torque", direct=("inertia",)),
     TORQUE_GAIN: Tried(
         (-40.0, -20.0, 25.0, 60.0), ("inertia", "load_friction", "deflection"), ("flank_friction", *_ROUGH), "torque"
     ),

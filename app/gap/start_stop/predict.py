@@ -90,7 +90,8 @@ def predict(
                 kept.append(severity)
         if rows:
             changes = np.where(shown, np.nan_to_num(np.array(rows)), 0.0)
-            causes[name] = Predicted(name, np.array(kept), changes, np.isin(NAMES, TRIED[name].may_move))
+            free, direct = (np.isin(NAMES, which) for which in (TRIED[name].may_move, TRIED[name].direct))
+            causes[name] = Predicted(name, np.array(kept), changes, free, direct)
     return Predictions(causes, shape, {name: options.get(name, {}) for name in causes})
 
 

@@ -14,11 +14,14 @@ from gearsig.gap.types import NONE, UNKNOWN, Interval
 
 MODEL_ERROR = 0.25
 """Of a predicted change: another machine of the same drawing answers by that much more or less."""
+DIRECT_ERROR = 0.08
+"""The same of what the severity itself is measured by: 100 µm more play are 100 µm on any machine, as far as straight
+lines between the severities that were simulated follow it."""
 CLEAR = 1.0
 """Floors that a change must have for its cause to be one."""
 FREE = 6.0
 """Scales by which what a cause may move is widened."""
-N_FINE = 48
+N_FINE = 192
 WIDE, ALL_WIDE = 10.0, 4.0
 """Scales by which something unknown moves one change, or all of them."""
 WORST = -1.0
@@ -42,12 +45,15 @@ class Predicted:
         dB by `NAMES`.
     may_move : array of bool, (n,)
         Changes that the cause moves in a way that the simulator does not know.
+    direct : array of bool, (n,), or None
+        Changes that measure the severity itself, if there are any.
     """
 
     name: str
     severities: FloatArray
     changes: FloatArray
     may_move: NDArray[np.bool_]
+    direct: NDArray[np.bool_] | None = None
 
     def fine(self) -> tuple[FloatArray, FloatArray]:
         """Return many severities and their changes: straight lines between those simulated, and to 0."""
@@ -87,17 +93,27 @@ class Fitted:
 
 
 def fit(cause: Predicted, change: FloatArray, floor: DriveFloor) -> Fitted:
-    """Fit a cause's severity to a change; what would change less than sound machines differ by is none, not a cause."""
+    """Fit a cause's severity to a change; what would change less than sound machines differ by is none, not a cause.
+
+    How much is read from what measures it directly, as far as anything does; whether it is this cause, from all changes
+    with the same margin, since machines of one drawing answer differently.
+    """
     grid, predicted = cause.fine()
     sizes = np.max(np.abs(predicted) / (FLOOR * floor.scale), axis=1, initial=0.0)
     clear = sizes >= min(CLEAR, float(sizes.max(initial=0.0)))
     grid, predicted = grid[clear], predicted[clear]
     free = np.where(cause.may_move, FREE * floor.scale, 0.0)
-    logs = np.array([float(np.sum(floor.log_density(change, p, MODEL_ERROR * np.abs(p) + free))) for p in predicted])
+
+    def likelihoods(error: float | FloatArray) -> FloatArray:
+        return np.array([float(np.sum(floor.log_density(change, p, error * np.abs(p) + free))) for p in predicted])
+
+    logs = likelihoods(MODEL_ERROR)
+    top = float(logs.max())
+    evidence = top + float(np.log(np.mean(np.exp(logs - top))))
+    if cause.direct is not None and np.any(cause.direct & np.isfinite(change)):
+        logs = likelihoods(np.where(cause.direct, DIRECT_ERROR, MODEL_ERROR))
     best = int(np.argmax(logs))
     inside = grid[logs > logs[best] - INTERVAL_LOG]
-    top = logs[best]
-    evidence = top + float(np.log(np.mean(np.exp(logs - top))))
     return Fitted(
         cause.name,
         Interval(float(grid[best]), float(inside.min()), float(inside.max())),

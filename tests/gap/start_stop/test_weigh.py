@@ -1,5 +1,7 @@
 """Weighing causes of start–stop changes: closed forms on made-up floors and predictions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -31,6 +33,18 @@ def test_a_severity_is_recovered():
     found = fit(cause("a", 0), direction(0, 14.0), FLOOR_OF_ONE)
     assert found.severity.value == pytest.approx(28.0, rel=0.05)
     assert found.severity.low < 28.0 < found.severity.high
+
+
+def test_what_measures_the_severity_decides_how_much_and_not_whether():
+    """The second change asks for twice the severity; a quarter more or less is the model's own error."""
+    plain = cause("a", 0)
+    both = replace(plain, changes=plain.changes + 0.5 * plain.changes[:, [0]] * direction(1))
+    change = direction(0, 14.0) + direction(1, 14.0)
+    between = fit(both, change, FLOOR_OF_ONE)
+    direct = fit(replace(both, direct=direction(0) > 0.0), change, FLOOR_OF_ONE)
+    assert direct.severity.value == pytest.approx(28.0, rel=0.08)
+    assert abs(direct.severity.value - 28.0) < abs(between.severity.value - 28.0)
+    assert direct.log_evidence == between.log_evidence
 
 
 def test_two_signs_have_two_sides():
