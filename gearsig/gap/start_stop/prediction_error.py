@@ -74,5 +74,11 @@ def _by_phase(
         for number, phase in enumerate(PHASES):
             here = wanted & (examined.cycles.phase == number) & (examined.cycles.number >= 0)
             if np.sum(here) >= LEAST_SAMPLES:
-                found[quantity, phase, flank] = float(np.sqrt(np.median(left[here] ** 2) / MEDIAN_OF_SQUARES))
+                found[quantity, phase, flank] = _root_mean_square(left[here])
     return found
+
+
+def _root_mean_square(left: FloatArray) -> float:
+    """Return it of an offset and a normal scatter about it, both by medians."""
+    offset = float(np.median(left))
+    return float(np.sqrt(offset**2 + np.median((left - offset) ** 2) / MEDIAN_OF_SQUARES))

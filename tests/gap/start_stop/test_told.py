@@ -126,5 +126,5 @@ def test_without_torque_the_play_is_told_and_the_load_is_not():
 
 def test_more_play_is_mispredicted_on_the_back_flank():
     errors = prediction_errors(examined("backlash", 120.0), told(examined()))
-    assert errors["compression", "stop", "back"] == pytest.approx(120.0, rel=0.6)
+    assert errors["compression", "stop", "back"] == pytest.approx(120.0, rel=0.1)
     assert errors["compression", "run", "drive"] < 5.0
