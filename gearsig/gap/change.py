@@ -31,6 +31,10 @@ SURPRISE = "surprise."
 LEAST_NOISE = 1e-8
 """Of all lines together over the mesh's power: two gears of equal teeth leave nothing of their own in one average."""
 
+LEAST_SURPRISE = 0.1
+"""Energy below any that a sound machine's own noise makes: of two gears of equal teeth one has no average of its own,
+and what rounding leaves in it says nothing."""
+
 REPEATS = 0.1
 """Share by which a sound machine's pattern differs on another day, see `surprises`."""
 
@@ -102,7 +106,12 @@ def _patterns(now: Gathered, sound: Gathered) -> Iterator[Feature]:
         yield f"change.{SIDES[side]}.agreement", 10.0 * agreement
     for side, (turned, _) in enumerate(differences):
         yield from pattern_features(
-            f"{SURPRISE}{SIDES[side]}", surprises(now, sound, turned, side), now.frame.teeth[side], 0.0, 0.0
+            f"{SURPRISE}{SIDES[side]}",
+            surprises(now, sound, turned, side),
+            now.frame.teeth[side],
+            noise=0.0,
+            longer=0.0,
+            least=LEAST_SURPRISE,
         )
     yield from apart_features(now, sound)
     yield from alike_features(now, sound)

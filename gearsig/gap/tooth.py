@@ -85,14 +85,20 @@ def mesh_power(gathered: Gathered, channel: ChannelSums, side: int) -> float:
 
 
 def pattern_features(
-    name: str, residuals: Sequence[NDArray[np.complex128]], teeth: int, noise: float, longer: float
+    name: str,
+    residuals: Sequence[NDArray[np.complex128]],
+    teeth: int,
+    noise: float,
+    longer: float,
+    least: float = 1e-30,
 ) -> Iterator[Feature]:
     """Yield size, prominence, kurtosis, width, centroid of residuals relative to their mesh.
 
-    `noise` is the energy that noise leaves in them; `longer` times it is put under what exceeds it.
+    `noise` is the energy that noise leaves in them; `longer` times it is put under what exceeds it. `least` is the
+    energy that is told apart from nothing.
     """
     energy = np.mean([tooth_energy(lines, teeth) for lines in residuals], axis=0)
-    energy = np.maximum(np.maximum(energy - noise, 0.0) + longer * noise, 1e-30)
+    energy = np.maximum(np.maximum(energy - noise, 0.0) + longer * noise, least)
     best = int(np.argmax(energy))
     share = energy / energy.max()
     width = float(np.count_nonzero(share > 0.5)) / STEPS_PER_TOOTH

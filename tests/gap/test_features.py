@@ -8,7 +8,7 @@ import pytest
 
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.gap.change import change_features
+from gearsig.gap.change import LEAST_SURPRISE, SURPRISE, change_features
 from gearsig.gap.features import Features, features_of
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
@@ -89,6 +89,14 @@ def test_nothing_changes_but_noise(sound: Gathered) -> None:
     again = change_features(reduced(seed=5), sound)
     level = [i for i, name in enumerate(again.names) if name.startswith(("mesh.", "sideband.", "floor.band"))]
     assert np.all(np.abs(again.values[level]) < 4.0 * again.scatter[level] + 0.2)
+
+
+def test_two_gears_of_equal_teeth_leave_nothing_of_their_own_in_one_average() -> None:
+    pair = replace(RIG.pairs[0], driven_teeth=TEETH[0])
+    rig = replace(RIG, pairs=(pair,))
+    values = as_dict(change_features(*(gather(record(seed=seed), rig) for seed in (1, 0))))
+    assert values[f"{SURPRISE}driven.level"] == pytest.approx(10.0 * np.log10(LEAST_SURPRISE))
+    assert -10.0 < values[f"{SURPRISE}driver.level"] < 3.0
 
 
 def test_a_longer_record_reads_alike(sound: Gathered) -> None:
