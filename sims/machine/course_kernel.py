@@ -7,8 +7,10 @@ from math import cos, sin
 
 from numba import njit
 
+from sims.compiled import UNCOUNTED
 
-@njit(cache=True, nogil=True, error_model="numpy")
+
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def course(points, t):
     """Value and slope at t: straight between points, held outside; (2, n) times and values."""
     n = points.shape[1]
@@ -27,13 +29,13 @@ def course(points, t):
     return points[1, low] + slope * (t - points[0, low]), slope
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def course_value(points, t):
     """Value at t."""
     return course(points, t)[0]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def set_speed(k, speed, t):
     """Set speed in rad/s and its slope, swings included."""
     value, slope = course(speed, t)

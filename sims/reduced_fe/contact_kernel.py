@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from numba import njit
 
+from sims.compiled import UNCOUNTED
+
 FAST = {"reassoc", "contract", "nsz"}
 """Sums may be reordered for vector instructions; infinities and NaN keep their meaning."""
 MOST_ITERATIONS = 60
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def root(force, small, guess):
     """max(N, small)^-0.1, by Newton's method from a guess near it."""
     n = max(force, small)
@@ -30,7 +32,7 @@ def root(force, small, guess):
     return w * (1.1 - 0.1 * n * w4 * w4 * w2)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED)
 def factorised(a, n):
     """Overwrite the lower triangle of a symmetric positive matrix by its Cholesky factor, with 1/diagonal on it."""
     for i in range(n):
@@ -48,7 +50,7 @@ def factorised(a, n):
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED)
 def back_substituted(a, n, x):
     """Solve with the factor of `factorised`, in place."""
     for i in range(n):
@@ -63,7 +65,7 @@ def back_substituted(a, n, x):
         x[i] = total * a[i, i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED)
 def solve_contacts(r, n, approach, hertz, small, force, w, enough, order, a, x):
     """Fill `force` (start values on entry) with N ≥ 0; return the number of iterations, or −1 where it fails.
 
@@ -110,7 +112,7 @@ def solve_contacts(r, n, approach, hertz, small, force, w, enough, order, a, x):
     return -1, 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def hertz_energy(force, hertz, small):
     """Energy of the local approach, ∫ N dh, in J."""
     if force <= small:

@@ -6,11 +6,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from sims.compiled import UNCOUNTED
+
 MOST_CYCLES = 1e12
 """Mesh cycles beyond which a run has burst; until then, single cycles are resolved to 1e-4."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reach, pairs, columns, parts, apart, slope):
     """Find the pairs whose flanks are less than `reach` apart; return their number.
 
@@ -48,7 +50,7 @@ def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reac
     return n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def fill_compliance(n, pairs, columns, parts, teeth, own, cross, extra, rows, r):
     """Fill r[p·n_s + s, q·n_s + t] with the compliance between slices of the near pairs; both triangles."""
     n_s = own.shape[1]
@@ -78,7 +80,7 @@ def fill_compliance(n, pairs, columns, parts, teeth, own, cross, extra, rows, r)
                     r[q * n_s + u, at + s] = value
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def compliance_slope_energy(n, pairs, columns, teeth, own, cross, extra, rows, step, force):
     """½ Nᵀ (∂R/∂ζ) N of the near pairs, in J per base pitch."""
     n_s, total = own.shape[1], 0.0

@@ -144,7 +144,7 @@ def respond(
     RefusalError
         If the solution grows beyond all bounds.
     """
-    from sims.reduced_fe.integrate_kernel import march
+    from sims.reduced_fe.integrate_kernel import march, room
 
     step, every = positive(step_s, "step_s", "s"), count(stride, "stride")
     n_steps = ceil(positive(duration_s, "duration_s", "s") / step - 1e-9)
@@ -167,6 +167,7 @@ def respond(
         back_rows(pair.machine, own.sides),
     )
     courses = course_points(operation.speed_rpm, pi / 30.0), course_points(operation.torque_nm, 1.0)
+    scratch = room(state[4].shape, state[0].shape[1], fixed[2].shape[3])
     rows = np.empty((-(-n_steps // every), len(signals)))
     energies = np.empty(len(rows) if with_energy else 0)
     per_call = every * max(STEPS_PER_CALL // every, 1)
@@ -176,7 +177,9 @@ def respond(
         energy = energies[part] if with_energy else energies
         time = start_s + begun * step
         found = rows[part]
-        filled = march(*fixed, state, *courses, time, step, n, every, method == "newmark", lines, found, energy)
+        filled = march(
+            *fixed, state, *courses, time, step, n, every, method == "newmark", lines, found, energy, scratch
+        )
         if filled < len(found) or not np.isfinite(found).all():
             raise RefusalError(
                 f"the solution grows beyond all bounds after {(begun + filled * every) * step:.3g} s",

@@ -7,6 +7,7 @@ from math import cos, sin
 
 from numba import njit
 
+from sims.compiled import UNCOUNTED
 from sims.cracked.bearing_kernel import foot
 from sims.mesh.friction_kernel import contact_friction_n
 from sims.reduced_fe.integrate_modes_kernel import on_input
@@ -29,7 +30,7 @@ def outer_forces(k, inputs, q, v, angle, omega, rate, load, out):
             _roll(k, side, inputs, angle, load, out)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def friction_of_pair(k, force, progress, omega, slip_x):
     """(f, fρ1, fρ2) of a pair at ζ; the film knows the set speed `omega`, its sign feels the vibration `slip_x`."""
     rho_1 = k.start_radius + min(max(progress, 0.0), k.contact_ratio) * k.base_pitch
@@ -49,7 +50,7 @@ def friction_of_pair(k, force, progress, omega, slip_x):
     return rubbing, rubbing * rho_1, rubbing * rho_2
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def _ripple(k, theta):
     """Drive torque over its set value."""
     factor = 1.0
@@ -58,7 +59,7 @@ def _ripple(k, theta):
     return factor
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def _push(k, side, inputs, angle, omega, drive, out):
     """Add unbalance, weight and a bent coupling, at the set speed."""
     theta = angle if side == 0 else angle / k.ratio
@@ -81,7 +82,7 @@ def _push(k, side, inputs, angle, omega, drive, out):
         out[side, j] += couple_y * (inputs[side, 5, j] - inputs[side, 7, j])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def _roll(k, side, inputs, angle, load, out):
     """Add the forces of bearing springs whose feet move as rolling elements pass, under the load of this moment."""
     theta = angle if side == 0 else angle / k.ratio

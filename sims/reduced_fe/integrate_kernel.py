@@ -19,15 +19,17 @@ Friction acts on the bodies as a whole, across the line of action and about thei
 from __future__ import annotations
 
 from math import cos, sin
+from typing import Any
 
 import numpy as np
 from numba import njit
 
+from sims.compiled import UNCOUNTED
 from sims.machine.course_kernel import course_value, set_speed
 from sims.reduced_fe.contact_kernel import FAST, back_substituted, hertz_energy, solve_contacts
 from sims.reduced_fe.contact_pairs_kernel import compliance_slope_energy, fill_compliance, near_pairs
 from sims.reduced_fe.integrate_drive_kernel import friction_of_pair, outer_forces
-from sims.reduced_fe.integrate_modes_kernel import add_from_tooth, dots, on_input, product, spread, to_tooth
+from sims.reduced_fe.integrate_modes_kernel import add_from_tooth, dots, on_input, product, seen_in, spread, to_tooth
 
 START_REACH = 1e-4
 """Depth up to which flanks count as near at first, m."""
@@ -43,10 +45,22 @@ N_EXTRAS = 6
 # Arrays are passed whole, with the places in them: a slice is a new object, whose references are counted at every use.
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def room(shape: tuple[int, ...], n_modes: int, n_rows: int) -> tuple[Any, ...]:
+    """Return what `march` writes to besides its results, nothing of which is kept; shape: (n_slots, n_slices)."""
+    n_slots, most = shape[0], shape[0] * shape[1]
+    places = tuple(np.empty(n_slots) for _ in range(4))
+    integers = np.empty(n_slots, dtype=np.int64), np.empty(most, dtype=np.int64)
+    squares = np.empty((most, most)), np.empty((most, most))
+    points = (*(np.empty(most) for _ in range(4)), np.empty(most), np.zeros(most), np.empty(most), np.empty(most))
+    seen = tuple(np.empty(n_rows) for _ in range(3))
+    modes = tuple(np.empty((2, n_modes)) for _ in range(6))
+    return places, integers, squares, points, seen, modes, np.zeros(N_EXTRAS + n_slots + most)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED)
 def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scratch that they share
     k, arrays, rows, turn, coefficients, modal, inputs, rigid, back_row, state, speed, torque, time, step, n_steps,
-    stride, precise, lines, found, energies,
+    stride, precise, lines, found, energies, scratch,
 ):  # fmt: skip
     """Run `n_steps` steps; fill `found` with the wanted signals at every `stride`-th.
 
@@ -67,21 +81,17 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
         velocity, acceleration; 3 + i: extra i = mesh force, back force, mesh cycles, nearest depth, torque of moving
         contact on the driver, friction, then the force of each slot, then of each of its slices.
     found : (n_out, n). energies : (n_out,) or (0,).
+    scratch : see `room`.
     Returns the number of rows filled, fewer where the solution burst.
     """
     q, v, f, f_before, held, held_root, held_pair, rest = state
     own, cross, corner, extra, separation, table_rows, pitch, lead, hertz = arrays
     kinds, factors, set_factors = lines
     n_slots, n_s = held.shape
-    n_modes, n_rows, most = q.shape[1], rows.shape[3], n_slots * n_s
-    pairs, parts, apart, slope = np.empty(n_slots), np.empty(n_slots), np.empty(n_slots), np.empty(n_slots)
-    columns, order = np.empty(n_slots, dtype=np.int64), np.empty(most, dtype=np.int64)
-    r, a = np.empty((most, most)), np.empty((most, most))
-    approach, along, force, root = np.empty(most), np.empty(most), np.zeros(most), np.empty(most)
-    x, last_force, viscous, elastic = np.empty(most), np.zeros(most), np.empty(most), np.empty(most)
-    seen, moving, g = np.empty(n_rows), np.empty(n_rows), np.empty(n_rows)
-    q1, v1, f1, base = np.empty((2, n_modes)), np.empty((2, n_modes)), np.empty((2, n_modes)), np.empty((2, n_modes))
-    free_q, free_v, extras = np.empty((2, n_modes)), np.empty((2, n_modes)), np.zeros(N_EXTRAS + n_slots + most)
+    n_modes = q.shape[1]
+    (pairs, parts, apart, slope), (columns, order), (r, a), points, (seen, moving, g), modes, extras = scratch
+    approach, along, force, root, x, last_force, viscous, elastic = points
+    q1, v1, f1, base, free_q, free_v = modes
     n_out, angle, margin, reach = 0, rest[0], REACH_MPS * step, START_REACH
     enough = (PRECISE_PART if precise else FAST_PART) * k.nominal_force
     passes = MOST_PASSES if precise else 1
@@ -164,10 +174,16 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
             extras[0], extras[1], extras[2], extras[3], extras[4] = total, back, cycles, reach - margin, along_torque
             extras[5] = rubbing
             _pair_extras(n, n_slots, n_s, pairs, np.floor(cycles - k.start), force, extras)
+            _accelerations(q, v, f, modal, q1)  # scratch until the next step
             for line in range(kinds.shape[0]):
-                found[n_out, line] = _signal(
-                    kinds[line], factors, line, set_factors[line], q, v, f, modal, angle, w1, rate1, extras
-                )
+                if kinds[line] >= 3:
+                    found[n_out, line] = extras[kinds[line] - 3]
+                elif kinds[line] == 2:
+                    found[n_out, line] = set_factors[line] * rate1 + seen_in(factors, line, q1)
+                elif kinds[line] == 1:
+                    found[n_out, line] = set_factors[line] * w1 + seen_in(factors, line, v)
+                else:
+                    found[n_out, line] = set_factors[line] * angle + seen_in(factors, line, q)
             if energies.shape[0] > 0:
                 energies[n_out] = _energy(k, q, v, modal, inputs, angle, load, r, n * n_s, force, back, hertz)
             n_out += 1
@@ -338,22 +354,12 @@ def _pair_extras(n, n_slots, n_s, pairs, newest, force, extras):
             extras[N_EXTRAS + n_slots + slot * n_s + s] = force[p * n_s + s]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _signal(kind, factors, line, set_factor, q, v, f, modal, angle, omega, rate, extras):
-    """Return a signal; see `march` for its kinds."""
-    if kind >= 3:
-        return extras[kind - 3]
-    total = set_factor * (angle if kind == 0 else (omega if kind == 1 else rate))
+@njit(inline="always", error_model="numpy", fastmath=FAST)
+def _accelerations(q, v, f, modal, out):
+    """Fill the modal accelerations."""
     for side in range(2):
         for j in range(q.shape[1]):
-            if kind == 0:
-                total += factors[line, side, j] * q[side, j]
-            elif kind == 1:
-                total += factors[line, side, j] * v[side, j]
-            else:
-                a = f[side, j] - modal[side, 1, j] * v[side, j] - modal[side, 0, j] * q[side, j]
-                total += factors[line, side, j] * a
-    return total
+            out[side, j] = f[side, j] - modal[side, 1, j] * v[side, j] - modal[side, 0, j] * q[side, j]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

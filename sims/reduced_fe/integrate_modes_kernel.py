@@ -60,6 +60,16 @@ def on_input(inputs, side, number, w):
 
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
+def seen_in(factors, line, w):
+    """Signal `line` of modal coordinates w of both sides."""
+    total = 0.0
+    for side in range(2):
+        for j in range(w.shape[1]):
+            total += factors[line, side, j] * w[side, j]
+    return total
+
+
+@njit(inline="always", error_model="numpy", fastmath=FAST)
 def product(a, b):
     """Sum of products of all modes of both sides."""
     total = 0.0
