@@ -7,7 +7,8 @@ anew each time, and whoever learns from the population learns what the balances 
 
 Source of the signatures: R. B. Randall, *Vibration-based Condition Monitoring*, 2nd ed., 2021, chapters 2, 5 and 7;
 ISO 13373-2:2016, annexes; P. D. McFadden, "Detecting fatigue cracks in gears by amplitude and phase demodulation of
-the meshing vibration", J. Vib. Acoust. 108 (1986).
+the meshing vibration", J. Vib. Acoust. 108 (1986); J. E. Berry, *Illustrated Vibration Diagnostic Chart*, Technical
+Associates of Charlotte, 1994 (misalignment: second and higher mesh harmonics with sidebands at running speed).
 """
 
 from __future__ import annotations
@@ -246,25 +247,29 @@ def _eccentricity(scene: Scene, size: float, rng: np.random.Generator) -> Signat
 
 
 def _unbalance(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
-    """A force that turns with the shaft: its line, and hardly a sideband."""
+    """A force that turns with the shaft: its line, and hardly a sideband; a large one bends what holds the shaft."""
     order = scene.shaft_orders[_side(rng)]
-    return Signature(
-        _swing(scene, order, 0.04 * size * rng.uniform(), rng), None, (1.5 * size * tone(order, scene, rng),)
-    )
+    force = size * 10.0 ** rng.uniform(0.0, 0.8)
+    lines = force * np.array([1.5, 0.15 * _partly(rng), 0.15 * _partly(rng)])
+    return _modulated(scene, order, (0.05 * force * rng.uniform(), 0.1 * force * rng.uniform()), lines.tolist(), rng)
 
 
 def _misalignment(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
-    """Two stiffness swings per turn: the shaft's second line above all, and sidebands of the mesh one and two apart."""
+    """Two stiffness swings per turn, or a load that wanders along the teeth: the shaft's second line; mesh harmonics
+    from the second on; sidebands of the mesh one and two apart. Which of them shows depends on the machine.
+    """
     order = scene.shaft_orders[_side(rng)]
-    lines, bands = _balance(rng, 2)
+    lines, bands, mesh = _balance(rng, 3)
     first, third = rng.uniform(0.0, 0.7, 2)
     waves = sum(
         (w * tone(n * order, scene, rng) for n, w in ((1.0, first), (2.0, 1.0), (3.0, third))),
         np.zeros(len(scene.time_s)),
     )
-    swing = _swing(scene, 2.0 * order, 0.6 * bands * size, rng)
-    swing = swing * _swing(scene, order, 0.6 * bands * size * rng.uniform(), rng)
-    return Signature(swing, None, (size * max(lines, 0.2) * waves,))
+    once, twice = _balance(rng, 2)
+    swing = _swing(scene, 2.0 * order, 0.6 * bands * twice * size, rng)
+    swing = swing * _swing(scene, order, 0.6 * bands * once * size, rng)
+    higher = np.append(1.0, np.exp(1.2 * mesh * size * np.abs(rng.standard_normal(N_MESH_HARMONICS - 1))))
+    return Signature(swing, None, (size * max(lines, 0.2) * waves,), tuple(higher.tolist()), around=_partly(rng))
 
 
 def _torque_ripple(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
