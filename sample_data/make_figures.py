@@ -23,9 +23,9 @@ from gearsig.plot.mesh import mesh_stiffness_figure
 from gearsig.plot.response import ResponseCase, response_figure
 from gearsig.plot.roughness import backlash_figure, friction_figure
 from gearsig.spectra.amplitude import amplitude_spectrum
-from sims.cracked.build import build_machine
-from sims.cracked.parameters import PARAMETERS
 from sims.cracked.respond import Response, respond
+from sims.gear_pair.build import build_machine
+from sims.gear_pair.parameters import PARAMETERS
 from sims.machine import Machine
 from sims.mesh import mesh_stiffness
 from sims.mesh.mesh_friction import friction_over_mesh

@@ -20,11 +20,11 @@ from gearsig.recording.types import Recording
 from gearsig.rig.speed import TachometerChannel
 from gearsig.rig.toml import write_rig
 from gearsig.rig.types import OperatingPoint, Rig, Sensor
-from sims.cracked.build import build_rig
-from sims.cracked.respond import draw_roughness
 from sims.cracked.simulate import simulate_machine
 from sims.cracked.simulator import CrackedPair
 from sims.effects import EffectSetting
+from sims.gear_pair.build import build_rig
+from sims.gear_pair.roughness import draw_roughness
 from sims.machine import Machine
 from sims.machine.operation import Course, Operation
 from sims.simulator import ParameterValue

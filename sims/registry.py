@@ -40,10 +40,10 @@ def simulator(name: str) -> Simulator:
 @cache
 def gap_simulators() -> dict[str, GapSimulator]:
     """Return every simulator that takes part in the gap diagnosis, by its name."""
-    from sims.cracked.twin import CrackedGapSimulator
-    from sims.reduced_fe.twin import ReducedGapSimulator
+    from sims.cracked.twin import cracked_gap_simulator
+    from sims.reduced_fe.twin import reduced_gap_simulator
 
-    found: tuple[GapSimulator, ...] = (CrackedGapSimulator(), ReducedGapSimulator())
+    found: tuple[GapSimulator, ...] = (cracked_gap_simulator(), reduced_gap_simulator())
     return {simulator.name: simulator for simulator in found}
 
 

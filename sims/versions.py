@@ -6,7 +6,7 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
-_ROOMS = ("cracked", "effects", "forging", "machine", "measure", "mesh", "reduced_fe")
+_ROOMS = ("cracked", "effects", "forging", "gear_pair", "machine", "measure", "mesh", "reduced_fe")
 
 
 def sources_digest() -> str:

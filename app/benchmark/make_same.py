@@ -15,8 +15,9 @@ from app.benchmark.plan import Plan, PlannedCase
 from gearsig.gap.simulator import Added, Point
 from gearsig.recording.types import Recording
 from sims.blind import SHAFTS, Case, CaseRecordings, Condition
-from sims.cracked.twin import CrackedGapSimulator, CrackedTwin
+from sims.cracked.twin import cracked_gap_simulator
 from sims.effects import effect
+from sims.gear_pair.twin import PairTwin
 
 N_DRAWS = 9
 """Settings drawn per effect, of which the planned level picks one by severity."""
@@ -26,7 +27,7 @@ def record_same(plan: Plan, planned: PlannedCase, case: Case) -> tuple[CaseRecor
     """Record a case on a specimen of the simulator; return it with its labels, laid out like the blind rig's."""
     rng = plan.rng_of(planned)
     first = case.conditions[0]
-    twin = CrackedGapSimulator().twin_of(case.rig.description(first.stated_rpm, first.stated_nm))
+    twin = cracked_gap_simulator().twin_of(case.rig.description(first.stated_rpm, first.stated_nm))
     added = [_added(twin, fault.name, planned.level, rng) for fault in case.faults]
     seed = int(rng.integers(1, 2**31))
 
@@ -51,7 +52,7 @@ def record_same(plan: Plan, planned: PlannedCase, case: Case) -> tuple[CaseRecor
     return made, _labels(case, planned, added, made)
 
 
-def _added(twin: CrackedTwin, name: str, level: float, rng: np.random.Generator) -> Added:
+def _added(twin: PairTwin, name: str, level: float, rng: np.random.Generator) -> Added:
     drawn = sorted((twin.draw(name, rng) for _ in range(N_DRAWS)), key=lambda one: one.severity)
     return drawn[min(int(level * N_DRAWS), N_DRAWS - 1)]
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from app.calibration.rigs import DrawnRig
 from gearsig.recording.types import Recording
-from sims.cracked.build import build_rig
 from sims.cracked.linear import default_step_s
-from sims.cracked.respond import draw_roughness
 from sims.cracked.simulate import simulate_machine
 from sims.cracked.simulator import CrackedPair
 from sims.effects import EffectSetting, with_effects
+from sims.gear_pair.build import build_rig
+from sims.gear_pair.roughness import draw_roughness
 from sims.machine import Machine
 from sims.machine.operation import Operation
 from sims.measure import MeasuredChannel, ModalPath, PathMode

@@ -12,7 +12,7 @@ from gearsig.angle.shaft import find_shaft_angle
 from gearsig.checks import FloatArray, positive
 from gearsig.orders.map import order_map
 from gearsig.orders.types import OrderMap
-from sims.cracked.build import build_rig
+from sims.gear_pair.build import build_rig
 from sims.machine.operation import Course, Operation
 from sims.reduced_fe.contact_spreading import SpreadingCheck, spreading_check
 from sims.reduced_fe.dynamics_constants import FlexiblePair, constants

@@ -10,40 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from gearsig.errors import InputError
-from sims.cracked.bearing import BEARING_FIELDS, bearing_fields
 from sims.cracked.contact_kernel import MOST_LATE
+from sims.gear_pair.bearing import BEARING_FIELDS, bearing_fields
+from sims.gear_pair.drive import DRIVE_FIELDS, DRIVE_SCALARS, drive_fields
+from sims.gear_pair.friction import FRICTION_SCALARS, friction_fields
 from sims.machine import Machine
 from sims.machine.operation import Operation
-from sims.machine.parts import RECOVERY_S
 from sims.mesh import back_stiffness_n_per_m, mesh_stiffness, mesh_table
-from sims.mesh.friction import reduced_modulus_pa
-from sims.mesh.friction_kernel import oil_terms
 from sims.mesh.table import MeshTable
 
 DAMPING_RAMP_M = 2e-7
 """Depth over which the contact's damping comes in."""
-MOST_LINES = 8
-"""Torque ripples, or speed swings, at once."""
-STICKING, STICKING_S = 0.1, 1e-5
-"""Friction coefficient, and time within which it must not turn a gear's sliding round: near standstill the smoothed
-sign is as stiff as a spring, and a fixed step would chatter."""
-SIGN_THRESHOLD = 0.01
-"""Sliding speed below which the sign of friction is smoothed, over the mesh's greatest sliding speed."""
-
-
-FRICTION_SCALARS = (
-    "start_radius",
-    "base_pitch",
-    "action_length",
-    "friction_factor",
-    "width",
-    "reduced_modulus",
-    "log10_oil",
-    "oil_constant",
-    "sign_threshold",
-)
-"""Of the record: what `sims.mesh.friction_kernel.contact_friction_n` needs."""
 SCALARS = (
     "table_start",
     "table_step",
@@ -63,10 +40,7 @@ SCALARS = (
     *FRICTION_SCALARS,
     "gravity_x",
     "gravity_y",
-    "governor",
-    "governor_spring",
-    "total_inertia",
-    "ratio",
+    *DRIVE_SCALARS,
 )
 PER_SIDE = (
     "base_radius",
@@ -97,8 +71,7 @@ RECORD = np.dtype(
         ("n_slots", np.int64),
         ("teeth", np.int64, (2,)),
     ]
-    + [("n_ripples", np.int64), ("ripples", np.float64, (MOST_LINES, 3))]
-    + [("n_swings", np.int64), ("swings", np.float64, (MOST_LINES, 3))]
+    + DRIVE_FIELDS
     + BEARING_FIELDS,
     align=True,
 )
@@ -146,7 +119,7 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
     alpha, beta = pair.working_pressure_angle_rad, radians(machine.line_of_action_deg)
     hooke_rad = np.array([radians(s.coupling_angle_deg) for s in machine.shafts])
     rotors = np.array([s.rotor_inertia_kg_m2 for s in machine.shafts])
-    values = {
+    values: dict[str, Any] = {
         "table_start": table.start,
         "table_step": table.step,
         "contact_coefficient": table.contact_coefficient,
@@ -155,12 +128,6 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
         "ramp": table.ramp,
         "n_slots": floor(table.contact_ratio + table.ramp + 2.0 * MOST_LATE) + 1,
         "teeth": (pair.driver.teeth, pair.driven.teeth),
-        "n_ripples": len(machine.drive.ripples),
-        "n_swings": len(machine.drive.swings),
-        "ripples": _rows([(r.order, r.fraction, r.phase_rad) for r in machine.drive.ripples], "torque ripples"),
-        "swings": _rows(
-            [(s.fraction, 2 * pi * s.frequency_hz, s.phase_rad) for s in machine.drive.swings], "speed swings"
-        ),
         "base_radius": base_radius,
         "cycles_per_rad": pair.driver.teeth / (2.0 * pi),
         "damping_time": 2.0 * machine.mesh_damping_ratio * sqrt(mesh_mass_kg(machine) / mean_stiffness),
@@ -192,41 +159,13 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
         "hooke_force": hooke_rad / np.array([2.0 * s.bearing_distance_m for s in machine.shafts]),
         "gravity_x": -machine.gravity_mps2 * sin(beta),
         "gravity_y": -machine.gravity_mps2 * cos(beta),
-        "governor": governor_nm_s_per_rad(machine),
-        "governor_spring": governor_nm_s_per_rad(machine) ** 2 / (4.0 * total_inertia_kg_m2(machine)),
-        "total_inertia": total_inertia_kg_m2(machine),
-        "ratio": machine.ratio,
     }
     record = np.zeros((), RECORD)
-    for name, value in (
-        values | friction_fields(machine, operation, force) | bearing_fields(machine, force, rng)
-    ).items():
+    values |= drive_fields(machine) | friction_fields(machine, operation, force) | bearing_fields(machine, force, rng)
+    for name, value in values.items():
         record[name] = value
     curves, rows, pitch = _stacked(table)
     return Constants(record[()], curves, rows, pitch)
-
-
-def friction_fields(machine: Machine, operation: Operation, force_n: float) -> dict[str, Any]:
-    """Values of `FRICTION_SCALARS`, and whether there is friction, at the set mesh force."""
-    mesh, pair = machine.mesh, machine.mesh.pair
-    log10_oil, oil_constant = oil_terms(machine.lubrication.viscosity_cp, machine.roughness.rms_um)
-    one, two = mesh.material_1, mesh.material_2
-    sliding = greatest_sliding_mps(machine, operation.speed_rpm.largest * pi / 30.0)
-    lightest = min(w.mass_kg for w in machine.wheels)
-    return {
-        "friction": machine.lubrication.friction,
-        "start_radius": pair.start_radius_mm * 1e-3,
-        "base_pitch": pair.base_pitch_mm * 1e-3,
-        "action_length": pair.action_length_mm * 1e-3,
-        "friction_factor": machine.lubrication.factor,
-        "width": mesh.face_width_m,
-        "reduced_modulus": reduced_modulus_pa(
-            one.youngs_modulus_pa, one.poisson_ratio, two.youngs_modulus_pa, two.poisson_ratio
-        ),
-        "log10_oil": log10_oil,
-        "oil_constant": oil_constant,
-        "sign_threshold": max(SIGN_THRESHOLD * sliding, STICKING * force_n * STICKING_S / lightest, 1e-6),
-    }
 
 
 def mesh_mass_kg(machine: Machine) -> float:
@@ -246,26 +185,6 @@ def mean_stiffness_n_per_m(machine: Machine, force_n: float) -> float:
     return mesh_stiffness(sound, force_n=max(force_n, 1.0)).mean_n_per_m
 
 
-def total_inertia_kg_m2(machine: Machine) -> float:
-    """Everything that turns, as the input shaft feels it."""
-    (input_shaft, output_shaft), (driver, driven) = machine.shafts, machine.wheels
-    far = driven.inertia_kg_m2 + output_shaft.rotor_inertia_kg_m2
-    return input_shaft.rotor_inertia_kg_m2 + driver.inertia_kg_m2 + far / machine.ratio**2
-
-
-def governor_nm_s_per_rad(machine: Machine) -> float:
-    """G of the drive; an ordinary one suits what it turns."""
-    given = machine.drive.governor_nm_s_per_rad
-    return 2.0 * total_inertia_kg_m2(machine) / RECOVERY_S if given is None else given
-
-
-def greatest_sliding_mps(machine: Machine, omega_rad_s: float) -> float:
-    """Sliding speed at the end of the path of contact where it is greatest."""
-    pair = machine.mesh.pair
-    cycles = np.array([0.0, pair.contact_ratio])
-    return float(np.max(np.abs(pair.sliding_speed_m_s(cycles, omega_rad_s * 30.0 / pi))))
-
-
 def _stacked(table: MeshTable) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
     """Curves, rows and pitch of a table; see `Constants`."""
     kinds = (
@@ -283,11 +202,3 @@ def _stacked(table: MeshTable) -> tuple[FloatArray, NDArray[np.int64], FloatArra
     for side, values in enumerate((table.pitch_1_m, table.pitch_2_m)):
         pitch[side, : len(values)] = values
     return np.ascontiguousarray(np.vstack([curves for curves, _ in kinds])), rows, pitch
-
-
-def _rows(items: list[tuple[float, float, float]], what: str) -> FloatArray:
-    if len(items) > MOST_LINES:
-        raise InputError(f"{len(items)} {what}", allowed=f"at most {MOST_LINES}")
-    rows = np.zeros((MOST_LINES, 3))
-    rows[: len(items)] = np.array(items, dtype=np.float64).reshape(-1, 3)
-    return rows

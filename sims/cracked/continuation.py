@@ -13,8 +13,9 @@ from gearsig.recording.types import Recording
 from sims.cracked.layout import COORDINATES, SIGNALS
 from sims.cracked.linear import default_step_s, slowest_decay_s
 from sims.cracked.respond import Response, State, respond
-from sims.cracked.simulate import LEAST_MOTION_HZ, simulate_with_motion
+from sims.cracked.simulate import simulate_with_motion
 from sims.cracked.simulator import NAME, CrackedPair, Prepared
+from sims.gear_pair.measurement import LEAST_MOTION_HZ
 from sims.machine import Machine
 from sims.machine.operation import Course, Operation
 from sims.request import operation_of

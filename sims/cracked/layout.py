@@ -2,29 +2,12 @@
 
 from __future__ import annotations
 
-COORDINATES = (
-    "input rotor angle",
-    "driver angle",
-    "driven angle",
-    "output rotor angle",
-    "driver x",
-    "driver y",
-    "driven x",
-    "driven y",
-    "bearing 1 x",
-    "bearing 1 y",
-    "bearing 2 x",
-    "bearing 2 y",
-    "bearing 3 x",
-    "bearing 3 y",
-    "bearing 4 x",
-    "bearing 4 y",
-)
-"""In rad and m; their velocities and accelerations follow in the same order."""
+from sims.gear_pair.measurement import COORDINATES, POSITIONS
+
+__all__ = ["COORDINATES", "N_COORDINATES", "POSITIONS", "SIGNALS"]
 
 N_COORDINATES = len(COORDINATES)
-POSITIONS = COORDINATES[4:]
-"""Places whose acceleration a sensor can read, each with its direction."""
+"""In rad and m; their velocities and accelerations follow in the same order."""
 
 SIGNALS = (
     *COORDINATES,

@@ -8,13 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from sims.cracked.constants import (
-    governor_nm_s_per_rad,
-    mean_stiffness_n_per_m,
-    mesh_mass_kg,
-    total_inertia_kg_m2,
-)
+from sims.cracked.constants import mean_stiffness_n_per_m, mesh_mass_kg
 from sims.cracked.layout import N_COORDINATES
+from sims.gear_pair.drive import governor_nm_s_per_rad, total_inertia_kg_m2
 from sims.machine import Machine
 from sims.machine.operation import Operation
 

@@ -14,9 +14,10 @@ from sims.cracked.constants import Constants, constants
 from sims.cracked.layout import SIGNALS
 from sims.cracked.linear import default_step_s
 from sims.cracked.start import start_state
+from sims.gear_pair.roughness import draw_roughness
 from sims.machine import Machine
 from sims.machine.operation import Course, Operation
-from sims.mesh.roughness import FlankRoughness, FractalSurface, TimeLockedRoughness
+from sims.mesh.roughness import TimeLockedRoughness
 
 MOST_STEPS = 400_000_000
 """Ten minutes of computing or so; more is taken for a mistake."""
@@ -215,23 +216,6 @@ def _first_state(ready: Prepared, given: State | None) -> tuple[FloatArray, Floa
             f"a state of {given.q.size} coordinates", where="first", allowed=f"{ready.q.size}: another run's last"
         )
     return given.q.copy(), given.v.copy(), np.array([given.set_angle_rad])
-
-
-def draw_roughness(machine: Machine, rng: np.random.Generator) -> tuple[Machine, TimeLockedRoughness]:
-    """Give every tooth its profile, or the backlash its endless one; returns what the mesh and the kernel need.
-
-    Composite roughness S is shared evenly by the two flanks of a pair: each has S/√2.
-    """
-    from dataclasses import replace
-
-    rough, pair = machine.roughness, machine.mesh.pair
-    endless = FractalSurface.of_roughness(rough.rms_um if rough.locked_to == "time" else 0.0, rough.dimension)
-    profile = TimeLockedRoughness.draw(endless, rng)
-    if rough.locked_to == "flank" and rough.rms_um > 0.0:
-        surface = FractalSurface.of_roughness(rough.rms_um / np.sqrt(2.0), rough.dimension)
-        flanks = [FlankRoughness.draw(surface, gear.teeth, rng) for gear in (pair.driver, pair.driven)]
-        machine = replace(machine, mesh=replace(machine.mesh, roughness_1=flanks[0], roughness_2=flanks[1]))
-    return machine, profile
 
 
 def _points(course: Course, factor: float) -> FloatArray:

@@ -16,8 +16,8 @@ from math import cos, sin
 
 from numba import njit
 
-from sims.cracked.bearing_kernel import carried_part, foot
 from sims.cracked.contact_kernel import back_flank_force, contact_forces, late_entry
+from sims.gear_pair.bearing_kernel import carried_part, foot
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -4,32 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import ceil, floor
 from typing import Any
 
 import numpy as np
 
-from gearsig.checks import positive
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
-from sims.cracked.constants import governor_nm_s_per_rad, total_inertia_kg_m2
-from sims.cracked.layout import POSITIONS
 from sims.cracked.linear import default_step_s, eigenfrequencies_hz
 from sims.cracked.respond import Response, State, respond
+from sims.gear_pair.measurement import Measurement
 from sims.machine import Machine
 from sims.machine.operation import Operation
-from sims.measure.chain import MeasurementChain
-from sims.measure.motion import Motion
 from sims.measure.truth import plain
 from sims.mesh import friction_over_mesh
-
-ANGLES = ("driver angle", "driven angle")
-POINTS_PER_CYCLE = 6
-"""Of the fastest resonance in path and sensor, in the motion handed to the measurement chain."""
-LEAST_MOTION_HZ = 80_000.0
-"""Rate of that motion at least: what the model still holds above half of it would fold back."""
-SETTLING = 6.0
-"""Time constants of the slowest start-up motion that are left out ahead of the recording."""
 
 
 def simulate_machine(
@@ -110,33 +97,20 @@ def simulate_with_motion(
     motion : Response
         Lead-in included: it begins before time 0.
     """
-    positive(duration_s, "duration_s", "s")
-    rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
-    chain = replace(machine.chain, sampling_rate_hz=rate)
-    longest = default_step_s(machine, operation) if step_s is None else positive(step_s, "step_s", "s")
-    wanted_hz = motion_rate_hz(chain)
-    per_sample = ceil(max(1.0 / longest, wanted_hz) / rate - 1e-9)
-    lead = ceil(lead_in_s(machine, chain) * rate) / rate  # so that time 0 of the courses is a sample
+    longest = default_step_s(machine, operation) if step_s is None else step_s
+    measured = Measurement.of(machine, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s, longest_step_s=longest)
     machine_rng, chain_rng = rng.spawn(2)
-    positions = used_positions(chain)
-    measured = (*ANGLES, *(f"{name} acceleration" for name in positions))
     response = respond(
         machine,
         operation,
-        duration_s=chain.simulated_s(duration_s, lead) + 4.0 / rate,
+        duration_s=measured.motion_s,
         rng=machine_rng,
-        signals=tuple(dict.fromkeys((*measured, *also))),
-        start_s=-lead,
-        step_s=1.0 / (rate * per_sample),
-        stride=max(floor(rate * per_sample / wanted_hz + 1e-9), 1),
+        signals=measured.signals(also),
+        start_s=-measured.lead_in_s,
+        step_s=measured.step_s,
+        stride=measured.stride,
         first=first,
         on_progress=on_progress,
-    )
-    motion = Motion(
-        response.interval_s,
-        positions,
-        np.column_stack([response[f"{name} acceleration"] for name in positions]),
-        dict(zip(machine.shaft_names, (response[name] for name in ANGLES), strict=True)),
     )
     known = {
         "machine": plain(replace(machine, chain=None)),  # type: ignore[arg-type]  # the chain stands under "measurement"
@@ -145,41 +119,15 @@ def simulate_with_motion(
             "eigenfrequencies_hz": [float(f) for f in eigenfrequencies_hz(machine, _force_n(machine, operation))],
         },
     }
-    recording = chain.record(
-        motion,
+    recording = measured.record(
+        response,
         rng=chain_rng if noise_rng is None else noise_rng,
         rig=rig,
-        duration_s=duration_s,
-        lead_in_s=lead,
         truth={**(truth or {}), **known},
         source="simulation: cracked 16-DOF spur pair",
         reader="sims.cracked",
     )
     return replace(recording, warnings=(*recording.warnings, *model_notes(machine, operation))), response
-
-
-def lead_in_s(machine: Machine, chain: MeasurementChain) -> float:
-    """Time ahead of the recording: filters, the drive's governor, and the least damped start-up ringing settle."""
-    recovery = 2.0 * total_inertia_kg_m2(machine) / governor_nm_s_per_rad(machine)
-    return max(chain.lead_in_s, SETTLING * recovery, 0.1)
-
-
-def motion_rate_hz(chain: MeasurementChain) -> float:
-    """Points per second that the chain needs of the motion at least."""
-    modes = [mode.frequency_hz for channel in chain.channels for mode in channel.path.modes]
-    sensors = [channel.accelerometer.resonance_hz or 0.0 for channel in chain.channels]
-    return max(POINTS_PER_CYCLE * max([*modes, *sensors, 0.0]), LEAST_MOTION_HZ, 4.0 * chain.sampling_rate_hz)
-
-
-def used_positions(chain: MeasurementChain) -> tuple[str, ...]:
-    """Places that the channels' paths start from, in the model's order; unknown ones last, for the chain to refuse."""
-    used = {
-        name
-        for channel in chain.channels
-        for gains in (channel.path.direct, *(mode.gains for mode in channel.path.modes))
-        for name in gains
-    }
-    return tuple(name for name in POSITIONS if name in used) or POSITIONS[:1]
 
 
 def model_notes(machine: Machine, operation: Operation) -> tuple[str, ...]:

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearsig.checks import within
 from gearsig.recording.types import Recording
-from sims.cracked.installed_table import installed_of
-from sims.cracked.parameters import PARAMETERS
-from sims.effects import EffectSetting, completed, effects, with_effects
+from gearsig.rig.types import Rig
+from sims.effects import EffectSetting, effects, with_effects
+from sims.gear_pair.parameters import PARAMETERS
+from sims.gear_pair.simulator import Asked, PairModel, ReadyPair
 from sims.machine import Machine
 from sims.machine.operation import Operation
-from sims.model import Model
-from sims.pair_limits import DURATION_RANGE_S, check_load, check_run
-from sims.presets import Preset, preset
+from sims.pair_limits import check_load
+from sims.presets import Preset
 from sims.simulator import Parameter, ParameterValue
-from sims.truth import truth_of
-from sims.values import Values, complete_values
 
 if TYPE_CHECKING:
     from sims.cracked.convergence import Convergence
@@ -29,33 +26,26 @@ NAME = "cracked"
 
 
 @dataclass(frozen=True)
-class Prepared:
+class Prepared(ReadyPair):
     """A machine with its effects switched on, ready to run.
 
     Parameters
     ----------
-    machine : Machine
-    operation : Operation
-    preset : str
-    values : mapping
-        Every parameter; None where it follows from the others.
-    effects : tuple of EffectSetting
-        With every option.
+    asked : Asked
+    made : Machine
+        With its effects.
     """
 
-    machine: Machine
-    operation: Operation
-    preset: str
-    values: Values
-    effects: tuple[EffectSetting, ...]
+    made: Machine
 
-    def truth(self) -> dict[str, Any]:
-        """What was put in, as plain values."""
-        return truth_of(NAME, self.preset, self.values, self.effects, self.operation)
+    @property
+    def machine(self) -> Machine:
+        """The machine, effects included."""
+        return self.made
 
 
 @dataclass(frozen=True)
-class CrackedPair(Model):
+class CrackedPair(PairModel[Prepared]):
     """Spur gear pair on four bearings between two rotors, 16 degrees of freedom; see `sims.cracked`."""
 
     name: str = NAME
@@ -63,49 +53,14 @@ class CrackedPair(Model):
     parameters: tuple[Parameter, ...] = field(default=PARAMETERS, repr=False)
     effects: tuple[str, ...] = field(default_factory=lambda: tuple(effects()), repr=False)
 
-    def prepare(
-        self,
-        parameters: Mapping[str, ParameterValue],
-        settings: Sequence[EffectSetting],
-        operation: Operation | None,
-        rng: np.random.Generator,
-        *,
-        preset_name: str = "",
-        sampling_rate_hz: float = 20480.0,
-    ) -> Prepared:
-        """Build the machine and switch its effects on; one number is drawn from `rng`, with and without effects."""
-        chosen = preset(NAME, preset_name)
-        return prepare_preset(chosen, parameters, settings, operation, rng, sampling_rate_hz=sampling_rate_hz)
+    def _built(self, asked: Asked, rng: np.random.Generator, sampling_rate_hz: float) -> Prepared:
+        return _prepared(asked, rng, sampling_rate_hz)
 
-    def simulate(
-        self,
-        parameters: Mapping[str, ParameterValue],
-        effects: Sequence[EffectSetting],
-        operation: Operation | None,
-        rng: np.random.Generator,
-        *,
-        preset: str = "",
-        sampling_rate_hz: float = 20480.0,
-        duration_s: float = 5.0,
+    def _recorded(
+        self, ready: Prepared, rig: Rig, rng: np.random.Generator, *, sampling_rate_hz: float, duration_s: float
     ) -> Recording:
-        """Make a recording with rig and truth; see `sims.simulator.Simulator.simulate`.
-
-        Raises
-        ------
-        InputError
-            If a name does not exist, a value is out of its range, or the values do not fit each other.
-        """
-        from sims.cracked.build import build_rig
         from sims.cracked.simulate import simulate_machine
 
-        within(duration_s, "duration_s", *DURATION_RANGE_S, "s")
-        ready = self.prepare(parameters, effects, operation, rng, preset_name=preset, sampling_rate_hz=sampling_rate_hz)
-        rig = build_rig(
-            ready.machine,
-            ready.operation,
-            name=self.rig_name(ready.preset),
-            sources=self.rig_sources(ready.preset),
-        )
         return simulate_machine(
             ready.machine,
             ready.operation,
@@ -142,14 +97,14 @@ def prepare_preset(
     sampling_rate_hz: float = 20480.0,
 ) -> Prepared:
     """Build a preset's machine and switch on its effects and `settings`; one number is drawn from `rng`."""
-    from sims.cracked.build import build_machine
+    return _prepared(
+        Asked.of(chosen, PARAMETERS, parameters, settings, operation, sampling_rate_hz), rng, sampling_rate_hz
+    )
 
-    values = complete_values(PARAMETERS, chosen.parameters, parameters)
-    run = operation or chosen.operation
-    check_run(run, sampling_rate_hz)
-    wanted = (*chosen.effects, *settings)
-    complete = completed(wanted)
-    installed = installed_of(chosen.installed) if chosen.installed else None
-    sound = build_machine(values, sampling_rate_hz=sampling_rate_hz, installed=installed)
-    check_load(sound, run)
-    return Prepared(with_effects(sound, complete, rng), run, chosen.name, values, complete)
+
+def _prepared(asked: Asked, rng: np.random.Generator, sampling_rate_hz: float) -> Prepared:
+    from sims.gear_pair.build import build_machine
+
+    sound = build_machine(asked.values, sampling_rate_hz=sampling_rate_hz, installed=asked.installed)
+    check_load(sound, asked.operation)
+    return Prepared(asked, with_effects(sound, asked.effects, rng))

@@ -7,8 +7,8 @@ from math import pi
 import numpy as np
 
 from gearsig.checks import FloatArray
-from sims.cracked.bearing import bearing_loads_n
 from sims.cracked.layout import N_COORDINATES
+from sims.gear_pair.bearing import bearing_loads_n
 from sims.machine import Machine
 from sims.machine.operation import Operation
 from sims.mesh import share_torque

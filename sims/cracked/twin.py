@@ -2,194 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from hashlib import sha256
-from types import MappingProxyType
 
 import numpy as np
 
-from gearsig.checks import count
-from gearsig.errors import InputError, RefusalError
-from gearsig.gap.simulator import Added, GapEffect, Point
+from gearsig.gap.simulator import Point
 from gearsig.recording.types import Recording
-from gearsig.rig.toml import rig_to_dict
-from gearsig.rig.types import OperatingPoint, Rig
-from sims.cracked.installed import SensorSeat
-from sims.cracked.installed_table import table_of
-from sims.cracked.plausible import PLAUSIBLE, Options, Plausible, Surroundings, plausible_of
-from sims.cracked.seats import completed, further_seats, installed_of_rig
 from sims.cracked.simulator import NAME, prepare_preset
-from sims.cracked.usual import (
-    Nominal,
-    as_plain,
-    log_uniform,
-    nominal_of,
-    specimen_parameters,
-    usual_housing,
-    usual_parameters,
-)
-from sims.effects import EffectSetting, effect, effects
+from sims.gear_pair.twin import PairGapSimulator, PairTwin
 from sims.mesh import PairGeometry
-from sims.presets import Preset, preset_text
-from sims.simulator import ParameterValue
-from sims.versions import sources_digest
+from sims.presets import Preset
 
-LONGEST_LEAD_REV = 8.0
-"""Of the driver, that another run starts later."""
 STEP_ANGLE_RAD = 0.9
 """Step times the greatest angular eigenfrequency: three times that of a single simulation, see `_step_s`."""
-VIBRATION_S = 0.5
-"""Length of the run that tells how strongly the sound machine vibrates."""
 
 
 @dataclass(frozen=True)
-class CrackedTwin:
-    """A rig's twin: its own geometry, the rest usual for its size; a seed is one specimen with its housing.
-
-    Parameters
-    ----------
-    rig : Rig
-    nominal : Nominal
-    further : tuple of SensorSeat
-        Sensors beside the rig's own.
-    is_quiet : bool
-        Without the vibration of the surroundings.
-    """
-
-    rig: Rig
-    nominal: Nominal
-    further: tuple[SensorSeat, ...] = ()
-    is_quiet: bool = False
-
-    @property
-    def key(self) -> str:
-        """Model, state of its code, and what is known of the rig."""
-        known = {name: value for name, value in rig_to_dict(self.rig).items() if name not in ("name", "sources")}
-        told = repr(known) + (repr(self.further) if self.further else "") + ("quiet" if self.is_quiet else "")
-        return f"{self.model} {sources_digest()} {sha256(told.encode()).hexdigest()[:16]}"
+class CrackedTwin(PairTwin):
+    """A rig's twin with 16 degrees of freedom; see `sims.gear_pair.twin.PairTwin`."""
 
     @property
     def model(self) -> str:
         """Name of the model whose preset the twin is."""
         return NAME
-
-    @property
-    def point(self) -> Point:
-        """The rig's nominal operating point, as is usual for its size where the rig does not tell."""
-        return Point(self.nominal.speed_rpm, self.nominal.torque_nm)
-
-    def run(
-        self,
-        point: Point,
-        added: Sequence[Added] = (),
-        *,
-        seed: int,
-        duration_s: float,
-        sampling_rate_hz: float,
-        noise: int = 0,
-    ) -> Recording:
-        """Return a recording that carries the rig; another `noise` is another run of the same machine.
-
-        Flanks, tolerances and housing follow from `seed` alone. Sensor noise, tachometer jitter and where the run
-        starts follow from seed and noise; run 0 starts at the driver's first tooth.
-        """
-        count(seed, "seed", minimum=0)
-        own = self.preset(point, added, seed=seed)
-        run_rng = np.random.default_rng([seed, count(noise, "noise", minimum=0)])
-        skipped = 0
-        if noise:
-            skipped = round(run_rng.uniform(0.0, LONGEST_LEAD_REV) * 60.0 / point.speed_rpm * sampling_rate_hz)
-        recording = self._simulated(
-            own,
-            point,
-            seed,
-            sampling_rate_hz=sampling_rate_hz,
-            duration_s=duration_s + skipped / sampling_rate_hz,
-            noise_rng=run_rng if noise else None,
-        )
-        recording = replace(recording, truth={**(recording.truth or {}), "seed": seed, "noise": noise})
-        return replace(recording, samples=recording.samples[:, skipped:]) if skipped else recording
-
-    def quiet(self) -> CrackedTwin:
-        """Return the machine where nothing else vibrates: what an effect adds is not lost in noise."""
-        return replace(self, is_quiet=True)
-
-    def candidates(self, name: str) -> Sequence[Added]:
-        """Return settings of an effect worth a try, from barely noticeable to strong, for each option that matters."""
-        found = []
-        for options, (low, high) in self._reaches(name):
-            found += [Added(name, float(f"{s:.4g}"), options) for s in np.geomspace(low, high, _plausible(name).n)]
-        return found
-
-    def with_further_sensors(self) -> tuple[CrackedTwin, Mapping[str, str]]:
-        """Return the machine with an upright sensor over each bearing that has none, and those channels' places."""
-        further = further_seats(installed_of_rig(self.rig, self.nominal.size, ()))
-        return replace(self, further=further), {seat.channel: seat.position for seat in further}
-
-    def draw(self, name: str, rng: np.random.Generator) -> Added:
-        """Draw a setting from the range of the candidates, its options at random.
-
-        Raises
-        ------
-        RefusalError
-            If the rig lacks what the effect needs: a bearing.
-        """
-        plausible, machine = _plausible(name), self._surroundings
-        if not plausible.choices(machine):
-            raise RefusalError(f"the rig has nothing that {name} could be in", remedy="describe its bearings")
-        options = plausible.drawn(machine, rng)
-        low, high = plausible.reach(name, machine, options)
-        return Added(name, log_uniform(rng, low, high), options)
-
-    def preset(self, point: Point, added: Sequence[Added] = (), *, seed: int = 0, notes: Sequence[str] = ()) -> Preset:
-        """Return the specimen `seed` with its effects as a preset."""
-        drawn = np.random.default_rng([seed, 1])
-        values = usual_parameters(self.nominal) | specimen_parameters(self.nominal, drawn)
-        if self.is_quiet:
-            values["noise_mps2"] = 0.0
-        used = [str(a.options["bearing"]) for a in added if "bearing" in a.options]
-        installed = installed_of_rig(self.rig, self.nominal.size, usual_housing(drawn), used)
-        installed = replace(installed, sensors=(*installed.sensors, *self.further))
-        title = f"Twin of {self.rig.name}" if self.rig.name else "Twin of a rig"
-        return Preset(
-            name="twin",
-            model=self.model,
-            title=f"{title}: {self.nominal.teeth[0]}/{self.nominal.teeth[1]}, module {self.nominal.module_mm:g}",
-            sources=(*self.rig.sources, *notes),
-            assumed=(
-                "usual for its size: masses, inertias, shafts, stiffness and damping, tip relief, tolerances, oil",
-                "transfer path: drawn",
-                f"profiles of the flanks, and angles of its effects: those of seed {seed}",
-                *(f"{name}: usual, the rig does not tell" for name in self.nominal.assumed),
-            ),
-            does_not_represent=("the real machine's own flanks, tolerances and housing",),
-            parameters=MappingProxyType(as_plain(self._own_parameters(values))),
-            speed_rpm=point.speed_rpm,
-            torque_nm=point.torque_nm,
-            effects=tuple(EffectSetting(a.name, a.severity, dict(a.options)) for a in added),
-            installed=table_of(installed),
-        )
-
-    def preset_toml(self, point: Point, added: Sequence[Added], notes: Sequence[str], *, seed: int = 0) -> str:
-        """Return the machine with the effects as a preset file for `gearsig simulate MODEL --preset FILE`."""
-        comments = [f"The flanks' profiles are not in this file: simulate with --seed {seed} for those of the twin."]
-        return preset_text(self.preset(point, added, seed=seed, notes=notes), comments)
-
-    @cached_property
-    def _surroundings(self) -> Surroundings:
-        point = Point(self.nominal.speed_rpm, self.nominal.torque_nm)
-        pair = self._geometry(self.preset(point))
-        shafts = (self.rig.pairs[0].driver, self.rig.pairs[0].driven)
-        own = tuple(completed(b, self.nominal.size) for b in self.rig.bearings if b.shaft in shafts)
-        sound = self.run(self.point, seed=0, duration_s=VIBRATION_S, sampling_rate_hz=20480.0)
-        rms = np.mean([np.std(sound.values(name)) for name in sound.vibration_names()])
-        return Surroundings(self.nominal, (pair.driver, pair.driven), own, float(rms))
-
-    def _reaches(self, name: str) -> list[tuple[Options, tuple[float, float]]]:
-        plausible, machine = _plausible(name), self._surroundings
-        return [(o, plausible.reach(name, machine, o)) for o in plausible.choices(machine)]
 
     def _simulated(
         self,
@@ -218,10 +53,6 @@ class CrackedTwin:
             noise_rng=noise_rng,
         )
 
-    def _own_parameters(self, values: dict[str, ParameterValue]) -> dict[str, ParameterValue]:
-        """Return what is usual in the model's own parameters."""
-        return values
-
     def _geometry(self, own: Preset) -> PairGeometry:
         """Return the geometry of a specimen's pair."""
         return prepare_preset(own, {}, (), None, np.random.default_rng(0)).machine.mesh.pair
@@ -236,57 +67,7 @@ class CrackedTwin:
         sound = prepare_preset(replace(own, effects=()), {}, (), None, np.random.default_rng(0))
         return default_step_s(sound.machine, sound.operation, STEP_ANGLE_RAD)
 
-    def _rig_at(self, point: Point) -> Rig:
-        own = OperatingPoint(self.rig.pairs[0].driver, point.speed_rpm, torque_nm=point.torque_nm)
-        return replace(self.rig, operating_point=own)
 
-
-@dataclass(frozen=True)
-class CrackedGapSimulator:
-    """The model "cracked" as the gap diagnosis takes it."""
-
-    @property
-    def name(self) -> str:
-        """As on the command line."""
-        return NAME
-
-    def gap_effects(self) -> Mapping[str, GapEffect]:
-        """Return all effects of the catalogue: each has a meaning for this model."""
-        return gap_effects_of(effects())
-
-    def twin_of(self, rig: Rig) -> CrackedTwin:
-        """Return a twin of the rig.
-
-        Raises
-        ------
-        RefusalError
-            If there is not exactly one pair, its teeth or module are not known, or the model cannot have such gears.
-        """
-        twin = CrackedTwin(rig, nominal_of(rig))
-        point = Point(twin.nominal.speed_rpm, twin.nominal.torque_nm)
-        try:
-            prepare_preset(twin.preset(point), {}, (), None, np.random.default_rng(0))
-        except InputError as error:
-            raise RefusalError(f"the model {NAME!r} cannot be set to this rig: {error}") from None
-        return twin
-
-
-def gap_effects_of(names: Iterable[str]) -> dict[str, GapEffect]:
-    """Return effects of the catalogue as the gap diagnosis sees them."""
-    return {
-        e.name: GapEffect(
-            e.name,
-            e.group,
-            e.title,
-            e.severity.name,
-            e.severity.unit,
-            e.signature,
-            e.shows_in,
-            e.group == "measurement chain",
-        )
-        for e in map(effect, names)
-    }
-
-
-def _plausible(name: str) -> Plausible:
-    return PLAUSIBLE.get(effect(name).name) or plausible_of(effect(name))
+def cracked_gap_simulator() -> PairGapSimulator:
+    """Return the model "cracked" as the gap diagnosis takes it."""
+    return PairGapSimulator(NAME, CrackedTwin)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from sims.cracked.build import build_machine, gear_geometry
-from sims.cracked.installed import Installed
+from sims.gear_pair.build import build_machine, gear_geometry
+from sims.gear_pair.installed import Installed
 from sims.machine import Machine
 from sims.mesh import Material
 from sims.reduced_fe.blank import GearBlank

@@ -2,7 +2,7 @@
 
 A bearing with clearance c that its load presses to one side by δ = Q/k is as stiff as it is along the load, and only
 k δ/(c + δ) across it, as the shaft may roll along the race. Rolling elements that pass move the spring's foot: over a
-spall it sinks, with clearance it sways (see `sims.cracked.bearing`). Their load is that of the torque at this moment,
+spall it sinks, with clearance it sways (see `sims.gear_pair.bearing`). Their load is that of the torque at this moment,
 without the vibration; a load that lets the shaft lift is refused.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from sims.cracked.bearing import BEARING_FIELDS, bearing_fields
+from sims.gear_pair.bearing import BEARING_FIELDS, bearing_fields
 from sims.machine import BearingSupport, Machine
 from sims.machine.operation import Operation
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from gearsig.checks import FloatArray, within
-from gearsig.errors import InputError
-from sims.cracked.bearing import bearing_loads_n
-from sims.cracked.constants import FRICTION_SCALARS, friction_fields, governor_nm_s_per_rad, total_inertia_kg_m2
+from sims.gear_pair.bearing import bearing_loads_n
+from sims.gear_pair.drive import DRIVE_FIELDS, DRIVE_SCALARS, drive_fields
+from sims.gear_pair.friction import FRICTION_SCALARS, friction_fields
 from sims.machine import Machine
 from sims.machine.operation import Operation
 from sims.reduced_fe.contact_mirror import folded, mirror_groups, mirrors
@@ -23,8 +23,6 @@ from sims.reduced_fe.dynamics_side import Kept, Side, build_side, kept_modes, re
 from sims.reduced_fe.maps_static import MeshMaps, mesh_maps, teeth_of
 from sims.reduced_fe.reduced_gear import ReducedGear
 
-MOST_LINES = 8
-"""Torque ripples, or speed swings, at once."""
 MODE_LIMIT_HZ = 20000.0
 """Elastic modes up to here are kept; the others follow at once."""
 SMALL_PART = 1e-3
@@ -44,10 +42,7 @@ _SCALARS = (
     "restitution",
     "gravity_x",
     "gravity_y",
-    "governor",
-    "governor_spring",
-    "total_inertia",
-    "ratio",
+    *DRIVE_SCALARS,
     "nominal_torque",
     "contact_ratio",
     *FRICTION_SCALARS,
@@ -69,8 +64,7 @@ RECORD = np.dtype(
     + [(name, np.float64, (2,)) for name in _PER_SIDE]
     + [(name, np.bool_) for name in ("pushes", "rolls", "friction", "moving_force")]
     + [("n_single", np.int64), ("n_pairs", np.int64)]
-    + [("n_ripples", np.int64), ("ripples", np.float64, (MOST_LINES, 3))]
-    + [("n_swings", np.int64), ("swings", np.float64, (MOST_LINES, 3))]
+    + DRIVE_FIELDS
     + ROLLING_FIELDS,
     align=True,
 )
@@ -186,7 +180,6 @@ def constants(
     sides = _padded([make(i, gear=pair.gears[i], kept=kept[i]) for i in (0, 1)])
     beta = radians(machine.line_of_action_deg)
     wheels, shafts = machine.wheels, machine.shafts
-    governor, total = governor_nm_s_per_rad(machine), total_inertia_kg_m2(machine)
     hooke = np.array([radians(s.coupling_angle_deg) for s in shafts])
     nominal = force / table.n_slices
     values: dict[str, Any] = {
@@ -200,10 +193,6 @@ def constants(
         "restitution": -1.0 if pair.restitution is None else pair.restitution,
         "gravity_x": -machine.gravity_mps2 * sin(beta),
         "gravity_y": -machine.gravity_mps2 * cos(beta),
-        "governor": governor,
-        "governor_spring": governor**2 / (4.0 * total),
-        "total_inertia": total,
-        "ratio": machine.ratio,
         "teeth": teeth_of(mesh),
         "mass": [w.mass_kg for w in wheels],
         "unbalance": [w.unbalance_g_mm * 1e-6 for w in wheels],
@@ -221,15 +210,9 @@ def constants(
         "contact_ratio": mesh.pair.contact_ratio,
         "n_single": sides[0].n_single,
         "n_pairs": sides[0].n_pairs,
-        "n_ripples": len(machine.drive.ripples),
-        "n_swings": len(machine.drive.swings),
-        "ripples": _rows([(r.order, r.fraction, r.phase_rad) for r in machine.drive.ripples], "torque ripples"),
-        "swings": _rows(
-            [(s.fraction, 2.0 * pi * s.frequency_hz, s.phase_rad) for s in machine.drive.swings], "speed swings"
-        ),
     }
     record = np.zeros((), RECORD)
-    values |= friction_fields(machine, operation, force)
+    values |= drive_fields(machine) | friction_fields(machine, operation, force)
     values |= rolling_fields(machine, operation, force, loads, np.random.default_rng(0) if rng is None else rng)
     for name, value in values.items():
         record[name] = value
@@ -317,11 +300,3 @@ def _pad(side: Side, single: int, pairs: int, silent: int) -> Side:
         single,
         pairs,
     )
-
-
-def _rows(items: list[tuple[float, float, float]], what: str) -> FloatArray:
-    if len(items) > MOST_LINES:
-        raise InputError(f"{len(items)} {what}", allowed=f"at most {MOST_LINES}")
-    rows = np.zeros((MOST_LINES, 3))
-    rows[: len(items)] = np.array(items, dtype=np.float64).reshape(-1, 3)
-    return rows

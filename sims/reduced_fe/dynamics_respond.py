@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, closest_match_hint, count, positive
 from gearsig.errors import InputError, RefusalError
+from sims.gear_pair.measurement import COORDINATES
 from sims.machine.operation import Course, Operation
 from sims.reduced_fe.dynamics_constants import Constants, FlexiblePair, back_rows, constants
 from sims.reduced_fe.dynamics_start import start_state
@@ -22,17 +23,7 @@ MOST_STEPS = 400_000_000
 """Half an hour of computing or so; more is taken for a mistake."""
 STEPS_PER_CALL = 100_000
 """Compiled code cannot be interrupted: it comes back for a look every quarter of a second or so."""
-MOVING = (
-    "input rotor angle",
-    "driver angle",
-    "driven angle",
-    "output rotor angle",
-    "driver x",
-    "driver y",
-    "driven x",
-    "driven y",
-    *(f"bearing {i} {axis}" for i in (1, 2, 3, 4) for axis in ("x", "y")),
-)
+MOVING = COORDINATES
 """Places in rad and m, each also with " velocity" and " acceleration". Those of gears are of their hubs."""
 EXTRAS = ("mesh_force_n", "back_force_n", "mesh_cycles", "approach_m", "contact_torque_nm", "friction_n")
 """Sum of the contact forces, the force behind, c, the greatest approach of flanks, torque of moving stiffness, friction

@@ -8,7 +8,7 @@ from math import cos, sin
 from numba import njit
 
 from sims.compiled import UNCOUNTED
-from sims.cracked.bearing_kernel import foot
+from sims.gear_pair.bearing_kernel import foot
 from sims.mesh.friction_kernel import contact_friction_n
 from sims.reduced_fe.integrate_modes_kernel import on_input
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sims.cracked.parameters import PARAMETERS as SHARED
+from sims.gear_pair.parameters import PARAMETERS as SHARED
 from sims.simulator import Parameter, ParameterValue
 
 MEANINGLESS: dict[str, ParameterValue | None] = {

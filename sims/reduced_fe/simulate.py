@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import ceil, floor
 from typing import Any
 
 import numpy as np
 
-from gearsig.checks import positive
 from gearsig.errors import InputError
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
-from sims.cracked.respond import draw_roughness
-from sims.cracked.simulate import lead_in_s, motion_rate_hz, used_positions
+from sims.gear_pair.measurement import Measurement
+from sims.gear_pair.roughness import draw_roughness
 from sims.machine.operation import Operation
-from sims.measure.motion import Motion
 from sims.measure.truth import plain
 from sims.reduced_fe.contact_path import corner_separation_m
 from sims.reduced_fe.contact_table import MARGIN
@@ -24,7 +21,6 @@ from sims.reduced_fe.dynamics_constants import Constants, FlexiblePair, constant
 from sims.reduced_fe.dynamics_linear import eigenfrequencies_hz, torsional_mode
 from sims.reduced_fe.dynamics_respond import STEP_S, FlexResponse, FlexState, respond
 
-ANGLES = ("driver angle", "driven angle")
 LARGEST_DEPTH = 0.5
 """Of what corners are apart at the table's ends: the most the static approach may take, to leave room to vibrate."""
 
@@ -74,43 +70,30 @@ def simulate_pair(
     InputError
         If the teeth yield further under the load than their corners are apart.
     """
-    positive(duration_s, "duration_s", "s")
-    rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    measured = Measurement.of(
+        pair.machine, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s, longest_step_s=step_s
+    )
     machine_rng, chain_rng = rng.spawn(2)
     machine, _ = draw_roughness(pair.machine, machine_rng)
     pair = replace(pair, machine=machine)
-    chain = replace(machine.chain, sampling_rate_hz=rate)
     check_depth(pair, operation)
     own = constants(pair, operation, rng=machine_rng)
-    wanted_hz = motion_rate_hz(chain)
-    per_sample = ceil(max(1.0 / positive(step_s, "step_s", "s"), wanted_hz) / rate - 1e-9)
-    lead = ceil(lead_in_s(machine, chain) * rate) / rate  # so that time 0 of the courses is a sample
-    positions = used_positions(chain)
-    measured = (*ANGLES, *(f"{name} acceleration" for name in positions))
     response = respond(
         pair,
         operation,
-        duration_s=chain.simulated_s(duration_s, lead) + 4.0 / rate,
-        signals=tuple(dict.fromkeys((*measured, *also))),
-        start_s=-lead,
-        step_s=1.0 / (rate * per_sample),
-        stride=max(floor(rate * per_sample / wanted_hz + 1e-9), 1),
+        duration_s=measured.motion_s,
+        signals=measured.signals(also),
+        start_s=-measured.lead_in_s,
+        step_s=measured.step_s,
+        stride=measured.stride,
         first=first,
         ready=own,
         on_progress=on_progress,
     )
-    motion = Motion(
-        response.interval_s,
-        positions,
-        np.column_stack([response[f"{name} acceleration"] for name in positions]),
-        dict(zip(machine.shaft_names, (response[name] for name in ANGLES), strict=True)),
-    )
-    recording = chain.record(
-        motion,
+    recording = measured.record(
+        response,
         rng=chain_rng if noise_rng is None else noise_rng,
         rig=rig,
-        duration_s=duration_s,
-        lead_in_s=lead,
         truth={**(truth or {}), **_known(pair, operation, own, response)},
         source="simulation: pair of reduced finite-element gears",
         reader="sims.reduced_fe",

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearsig.checks import within
 from gearsig.errors import InputError
 from gearsig.recording.types import Recording
-from sims.cracked.installed_table import installed_of
-from sims.effects import EffectSetting, completed, effects, with_effects
+from gearsig.rig.types import Rig
+from sims.effects import EffectSetting, effects, with_effects
+from sims.gear_pair.simulator import Asked, PairModel, ReadyPair
+from sims.machine import Machine
 from sims.machine.operation import Operation
-from sims.model import Model
-from sims.pair_limits import DURATION_RANGE_S, check_load, check_run
-from sims.presets import Preset, preset
+from sims.pair_limits import check_load
+from sims.presets import Preset
 from sims.reduced_fe.parameters import PARAMETERS
 from sims.simulator import Parameter, ParameterValue
-from sims.truth import truth_of
-from sims.values import Values, complete_values
 
 if TYPE_CHECKING:
     from sims.reduced_fe.dynamics_constants import FlexiblePair
@@ -30,38 +28,30 @@ NAME = "reduced-fe"
 
 
 @dataclass(frozen=True)
-class PreparedPair:
+class PreparedPair(ReadyPair):
     """A flexible pair with its effects switched on, ready to run.
 
     Parameters
     ----------
+    asked : Asked
     pair : FlexiblePair
-    operation : Operation
-    preset : str
-    values : mapping
-        Every parameter; None where it follows from the others.
-    effects : tuple of EffectSetting
-        With every option.
     """
 
     pair: FlexiblePair
-    operation: Operation
-    preset: str
-    values: Values
-    effects: tuple[EffectSetting, ...]
+
+    @property
+    def machine(self) -> Machine:
+        """The machine, effects included."""
+        return self.pair.machine
 
     @property
     def step_s(self) -> float:
         """Longest step of the integrator."""
         return 1e-6 * float(self.values["step_us"] or 0.0)
 
-    def truth(self) -> dict[str, Any]:
-        """What was put in, as plain values."""
-        return truth_of(NAME, self.preset, self.values, self.effects, self.operation)
-
 
 @dataclass(frozen=True)
-class ReducedPair(Model):
+class ReducedPair(PairModel[PreparedPair]):
     """Spur pair of reduced finite-element gears between two rotors; see `sims.reduced_fe`.
 
     Does not represent: gyroscopic and centrifugal terms, tilting of the gears, oil churning, heating, teeth bent by
@@ -74,50 +64,14 @@ class ReducedPair(Model):
     parameters: tuple[Parameter, ...] = field(default=PARAMETERS, repr=False)
     effects: tuple[str, ...] = field(default_factory=lambda: tuple(effects()), repr=False)
 
-    def prepare(
-        self,
-        parameters: Mapping[str, ParameterValue],
-        settings: Sequence[EffectSetting],
-        operation: Operation | None,
-        rng: np.random.Generator,
-        *,
-        preset_name: str = "",
-        sampling_rate_hz: float = 20480.0,
-    ) -> PreparedPair:
-        """Build the pair and switch its effects on; one number is drawn from `rng`, with and without effects."""
-        chosen = preset(NAME, preset_name)
-        return prepare_preset(chosen, parameters, settings, operation, rng, sampling_rate_hz=sampling_rate_hz)
+    def _built(self, asked: Asked, rng: np.random.Generator, sampling_rate_hz: float) -> PreparedPair:
+        return _prepared(asked, rng, sampling_rate_hz)
 
-    def simulate(
-        self,
-        parameters: Mapping[str, ParameterValue],
-        effects: Sequence[EffectSetting],
-        operation: Operation | None,
-        rng: np.random.Generator,
-        *,
-        preset: str = "",
-        sampling_rate_hz: float = 20480.0,
-        duration_s: float = 5.0,
+    def _recorded(
+        self, ready: PreparedPair, rig: Rig, rng: np.random.Generator, *, sampling_rate_hz: float, duration_s: float
     ) -> Recording:
-        """Make a recording with rig and truth; see `sims.simulator.Simulator.simulate`.
-
-        Raises
-        ------
-        InputError
-            If a name does not exist, a value is out of its range, the values do not fit each other, or an effect has no
-            meaning here.
-        """
-        from sims.cracked.build import build_rig
         from sims.reduced_fe.simulate import simulate_pair
 
-        within(duration_s, "duration_s", *DURATION_RANGE_S, "s")
-        ready = self.prepare(parameters, effects, operation, rng, preset_name=preset, sampling_rate_hz=sampling_rate_hz)
-        rig = build_rig(
-            ready.pair.machine,
-            ready.operation,
-            name=self.rig_name(ready.preset),
-            sources=self.rig_sources(ready.preset),
-        )
         recording, _ = simulate_pair(
             ready.pair,
             ready.operation,
@@ -156,22 +110,22 @@ def prepare_preset(
     sampling_rate_hz: float = 20480.0,
 ) -> PreparedPair:
     """Build a preset's pair and switch on its effects and `settings`; one number is drawn from `rng`."""
+    return _prepared(
+        Asked.of(chosen, PARAMETERS, parameters, settings, operation, sampling_rate_hz), rng, sampling_rate_hz
+    )
+
+
+def _prepared(asked: Asked, rng: np.random.Generator, sampling_rate_hz: float) -> PreparedPair:
     from sims.reduced_fe.build import flexible_pair, reduced_gears, sound_machine
 
-    values = complete_values(PARAMETERS, chosen.parameters, parameters)
-    run = operation or chosen.operation
-    check_run(run, sampling_rate_hz)
-    wanted = (*chosen.effects, *settings)
-    complete = completed(wanted)
-    gears = reduced_gears(values)
-    installed = installed_of(chosen.installed) if chosen.installed else None
-    sound = sound_machine(values, gears, sampling_rate_hz=sampling_rate_hz, installed=installed)
-    check_load(sound, run)
-    machine = with_effects(sound, complete, rng)
+    gears = reduced_gears(asked.values)
+    sound = sound_machine(asked.values, gears, sampling_rate_hz=sampling_rate_hz, installed=asked.installed)
+    check_load(sound, asked.operation)
+    machine = with_effects(sound, asked.effects, rng)
     if machine.roughness.locked_to == "time" and machine.roughness.rms_um > 0.0:
         raise InputError(
             "a roughness that is locked to time has no meaning here: flanks are shapes that return with their teeth",
             where="locked_to of surface_roughness",
             allowed="'flank'",
         )
-    return PreparedPair(flexible_pair(values, machine, gears), run, chosen.name, values, complete)
+    return PreparedPair(asked, flexible_pair(asked.values, machine, gears))

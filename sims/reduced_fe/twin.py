@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from gearsig.errors import InputError, RefusalError
-from gearsig.gap.simulator import GapEffect, Point
+from gearsig.gap.simulator import Point
 from gearsig.recording.types import Recording
-from gearsig.rig.types import Rig
-from sims.cracked.twin import CrackedTwin, gap_effects_of
-from sims.cracked.usual import nominal_of
-from sims.effects import effects
+from sims.gear_pair.twin import PairGapSimulator, PairTwin
 from sims.mesh import PairGeometry
 from sims.presets import Preset
 from sims.reduced_fe.parameters import PARAMETERS
@@ -29,8 +24,8 @@ housing differs from another's."""
 
 
 @dataclass(frozen=True)
-class ReducedTwin(CrackedTwin):
-    """A rig's twin with finite-element gears, full discs; the rest as of `sims.cracked.twin.CrackedTwin`."""
+class ReducedTwin(PairTwin):
+    """A rig's twin with finite-element gears, full discs; see `sims.gear_pair.twin.PairTwin`."""
 
     @property
     def model(self) -> str:
@@ -73,30 +68,6 @@ class ReducedTwin(CrackedTwin):
         return prepare_preset(own, {}, (), None, np.random.default_rng(0)).pair.machine.mesh.pair
 
 
-@dataclass(frozen=True)
-class ReducedGapSimulator:
-    """The model "reduced-fe" as the gap diagnosis takes it."""
-
-    @property
-    def name(self) -> str:
-        """As on the command line."""
-        return NAME
-
-    def gap_effects(self) -> Mapping[str, GapEffect]:
-        """Return the effects of the catalogue."""
-        return gap_effects_of(effects())
-
-    def twin_of(self, rig: Rig) -> ReducedTwin:
-        """Return a twin of the rig; its gears are meshed and reduced, and kept on disk.
-
-        Raises
-        ------
-        RefusalError
-            If there is not exactly one pair, its teeth or module are not known, or the model cannot have such gears.
-        """
-        twin = ReducedTwin(rig, nominal_of(rig))
-        try:
-            prepare_preset(twin.preset(twin.point), {}, (), None, np.random.default_rng(0))
-        except InputError as error:
-            raise RefusalError(f"the model {NAME!r} cannot be set to this rig: {error}") from None
-        return twin
+def reduced_gap_simulator() -> PairGapSimulator:
+    """Return the model "reduced-fe" as the gap diagnosis takes it; its twin's gears are reduced, and kept on disk."""
+    return PairGapSimulator(NAME, ReducedTwin)

@@ -12,8 +12,8 @@ from gearsig.errors import InputError
 from gearsig.recording.read import read_recording
 from gearsig.rig.toml import read_rig
 from sims import simulate
-from sims.cracked.parameters import PARAMETERS
 from sims.effects import effects
+from sims.gear_pair.parameters import PARAMETERS
 from sims.presets import presets
 from tests.app.test_cli import run
 

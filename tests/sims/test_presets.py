@@ -11,10 +11,10 @@ from gearsig.errors import InputError
 from gearsig.rig.toml import read_rig, write_rig
 from gearsig.rig.types import Rig
 from sims import simulate
-from sims.cracked.build import build_machine, build_rig
-from sims.cracked.parameters import PARAMETERS
 from sims.cracked.simulator import CrackedPair, Prepared
 from sims.effects import EffectSetting
+from sims.gear_pair.build import build_machine, build_rig
+from sims.gear_pair.parameters import PARAMETERS
 from sims.machine import Machine
 from sims.machine.operation import Course, Operation
 from sims.measure import Tachometer

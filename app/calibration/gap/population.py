@@ -33,8 +33,8 @@ from gearsig.gap.tooth_load import tooth_load_n_per_mm
 from gearsig.gap.types import NONE, UNKNOWN
 from gearsig.recording.types import Recording
 from sims.cracked.twin import STEP_ANGLE_RAD, CrackedTwin
-from sims.cracked.usual import nominal_of
 from sims.effects import EffectSetting, effects
+from sims.gear_pair.usual import nominal_of
 
 SEED = 4107
 N_SOUND, N_MOUNTED_ANEW, N_FOREIGN, N_BY_HAND = 3, 8, 14, 6

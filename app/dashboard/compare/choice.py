@@ -92,7 +92,7 @@ def run_simulation(run: Run, recorded: Recording) -> Recording:
 
 def _twin(run: Run, rig: Rig | None, speed_rpm: float, sampling_rate_hz: float) -> Recording:
     from gearsig.gap.simulator import Point
-    from sims.cracked.usual import nominal_of
+    from sims.gear_pair.usual import nominal_of
     from sims.registry import gap_simulator
 
     if rig is None:

@@ -12,9 +12,9 @@ from app.dashboard.laboratory.setup import MODEL, Setup
 from gearsig.checks import FloatArray
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
-from sims.cracked.build import build_rig
 from sims.cracked.respond import Response
 from sims.cracked.simulate import simulate_with_motion
+from sims.gear_pair.build import build_rig
 from sims.machine import Machine
 from sims.machine.operation import Operation
 from sims.reduced_fe.dynamics_constants import FlexiblePair

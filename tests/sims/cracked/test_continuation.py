@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from sims.cracked.constants import total_inertia_kg_m2
 from sims.cracked.continuation import DECAYS, Branch
 from sims.cracked.linear import slowest_decay_s
 from sims.cracked.respond import State, respond
 from sims.cracked.simulator import CrackedPair
 from sims.effects import EffectSetting
+from sims.gear_pair.drive import total_inertia_kg_m2
 from sims.machine.operation import Course, Operation
 from sims.sweep import Axis, Sweep
 

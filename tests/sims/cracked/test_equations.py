@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sims.cracked.bearing import bearing_loads_n
 from sims.cracked.constants import Constants
 from sims.cracked.energy_kernel import place_of_entry, potential_energy
 from sims.cracked.integrate_kernel import derivative, integrate
 from sims.cracked.layout import SIGNALS
 from sims.cracked.respond import prepare
+from sims.gear_pair.bearing import bearing_loads_n
 from sims.machine import Machine, Roughness
 from sims.machine.operation import Operation
 from tests.sims.cracked.machines import (

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sims.cracked.bearing import bearing_fields, bearing_loads_n
-from sims.cracked.bearing_kernel import foot
 from sims.cracked.constants import mean_stiffness_n_per_m, mesh_mass_kg
 from sims.cracked.contact_kernel import contact_forces, late_entry
 from sims.cracked.linear import eigenfrequencies_hz, matrices
 from sims.cracked.respond import prepare, respond
+from sims.gear_pair.bearing import bearing_fields, bearing_loads_n
+from sims.gear_pair.bearing_kernel import foot
 from sims.machine import Lubrication, Machine, RaceDefect, Roughness
 from sims.machine.operation import Operation
 from tests.sims.cracked.machines import conservative, frictionless

@@ -16,12 +16,12 @@ from gearsig.recording.types import Recording
 from gearsig.rig.speed import EncoderChannel, TachometerChannel
 from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
 from sims import simulate
-from sims.cracked.plausible import PLAUSIBLE
-from sims.cracked.seats import completed
 from sims.cracked.simulator import prepare_preset
 from sims.cracked.twin import CrackedTwin
-from sims.cracked.usual import nominal_of
 from sims.effects import effect, effects
+from sims.gear_pair.plausible import PLAUSIBLE
+from sims.gear_pair.seats import completed
+from sims.gear_pair.usual import nominal_of
 from sims.registry import gap_simulator
 
 FS = 20480.0

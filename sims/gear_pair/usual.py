@@ -13,7 +13,7 @@ import numpy as np
 
 from gearsig.errors import RefusalError
 from gearsig.rig.types import Rig
-from sims.cracked.installed import HousingMode
+from sims.gear_pair.installed import HousingMode
 from sims.simulator import ParameterValue
 
 USUAL_LOAD_N_PER_MM2 = 50.0

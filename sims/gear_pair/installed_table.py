@@ -8,7 +8,7 @@ from typing import Any
 from gearsig.errors import InputError
 from gearsig.rig.toml import from_table, to_table
 from gearsig.rig.types import Bearing
-from sims.cracked.installed import HousingMode, Installed, Pickup, SensorSeat
+from sims.gear_pair.installed import HousingMode, Installed, Pickup, SensorSeat
 
 _LISTS = {"bearings": Bearing, "sensors": SensorSeat, "modes": HousingMode}
 _KEYS = ("shafts", "pickup", *_LISTS)

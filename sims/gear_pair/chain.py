@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import cos, radians, sin
 
-from sims.cracked.installed import HousingMode, Installed, Pickup, SensorSeat
+from sims.gear_pair.installed import HousingMode, Installed, Pickup, SensorSeat
 from sims.measure import (
     Accelerometer,
     AntiAlias,

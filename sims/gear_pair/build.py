@@ -11,8 +11,8 @@ from gearsig.checks import within
 from gearsig.errors import InputError
 from gearsig.rig.speed import EncoderChannel, SpeedSource, TachometerChannel
 from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
-from sims.cracked.chain import build_chain
-from sims.cracked.installed import Installed
+from sims.gear_pair.chain import build_chain
+from sims.gear_pair.installed import Installed
 from sims.machine import BearingSupport, Drive, Lubrication, Machine, Roughness, ShaftLine, Wheel
 from sims.machine.operation import Course, Operation
 from sims.measure import MeasurementChain, Tachometer

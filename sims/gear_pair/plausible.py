@@ -12,8 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearsig.rig.types import Bearing
-from sims.cracked.bearing import EDGES_MM
-from sims.cracked.usual import (
+from sims.effects import effect
+from sims.effects.bearing_choice import element_spacing_mm
+from sims.effects.effect import Effect, OptionValue
+from sims.effects.unbalance import LARGEST_OFFSET
+from sims.gear_pair.bearing import EDGES_MM
+from sims.gear_pair.usual import (
     Nominal,
     log_uniform,
     pitch_tolerance_um,
@@ -21,10 +25,6 @@ from sims.cracked.usual import (
     runout_tolerance_um,
     usual_mass_kg,
 )
-from sims.effects import effect
-from sims.effects.bearing_choice import element_spacing_mm
-from sims.effects.effect import Effect, OptionValue
-from sims.effects.unbalance import LARGEST_OFFSET
 from sims.machine import BearingSupport
 from sims.mesh import GearGeometry
 from sims.mesh.crack import deepest_crack_mm

@@ -8,8 +8,8 @@ from math import pi, sin
 
 from gearsig.rig.speed import TachometerChannel
 from gearsig.rig.types import Bearing, Rig
-from sims.cracked.installed import MOST_SENSORS as MOST_SEATS
-from sims.cracked.installed import HousingMode, Installed, Pickup, SensorSeat
+from sims.gear_pair.installed import MOST_SENSORS as MOST_SEATS
+from sims.gear_pair.installed import HousingMode, Installed, Pickup, SensorSeat
 
 BALLS, BALL_MM, PITCH_MM = 9, 7.94, 39.04
 """A usual bearing of a machine of size 1."""
@@ -31,7 +31,7 @@ def installed_of_rig(rig: Rig, size: float, modes: Sequence[HousingMode], used: 
     rig : Rig
         With one gear pair.
     size : float
-        See `sims.cracked.usual.Nominal.size`.
+        See `sims.gear_pair.usual.Nominal.size`.
     modes : sequence of HousingMode
     used : sequence of str
         Bearings that must have a place: a model's shaft has only two.
