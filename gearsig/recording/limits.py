@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import gzip
-import os
 import re
 import zlib
 from pathlib import Path
 
 from gearsig.errors import InputError
+from gearsig.recording.free_memory import free_memory_bytes
 
 CHUNK_BYTES = 1 << 22
 HEAD_BYTES = 1 << 16
@@ -16,17 +16,14 @@ MAX_GZIP_RATIO = 200
 """Text of numbers shrinks by 2 to 20; anything far beyond carries no information."""
 GZIP_FREE_BYTES = 1 << 26
 """Below this decoded size the ratio is not looked at: short files may be very regular."""
+UNTOLD_BYTES = 4 << 30
+"""Taken as free where the system does not tell."""
 
 
 def available_memory_bytes() -> int:
     """Return the memory that can be had without swapping, a guess of 4 GB where the system does not tell."""
-    try:
-        for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
-            if line.startswith("MemAvailable:"):
-                return int(line.split()[1]) * 1024
-        return int(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")) // 2
-    except (OSError, ValueError, IndexError, AttributeError):
-        return 4 << 30
+    free = free_memory_bytes()
+    return UNTOLD_BYTES if free is None else int(free)
 
 
 def check_memory(needed_bytes: int, where: str) -> None:
