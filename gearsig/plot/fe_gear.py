@@ -192,6 +192,8 @@ def _coloured(
     from matplotlib.tri import Triangulation
 
     mesh = Triangulation(points[:, 0], points[:, 1], triangles)
+    # Smoothly shaded triangles let the paper show through where they meet; flat ones below, hard-edged, close that.
+    axes.tripcolor(mesh, values, cmap=cmap, vmin=limits[0], vmax=limits[1], antialiased=False, linewidth=0.0)
     return axes.tripcolor(mesh, values, shading="gouraud", cmap=cmap, vmin=limits[0], vmax=limits[1])
 
 
