@@ -53,7 +53,7 @@ def fit_part(rows: Sequence[Row]) -> dict[str, Any]:
     return {
         "whole": whole.to_dict(),
         "half": half.to_dict(),
-        **{name: round(float(value), 4) for name, value in vars(calibration).items()},
+        **calibration.to_mapping(),
     }
 
 

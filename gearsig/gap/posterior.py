@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,8 @@ FILE = Path(__file__).with_name("calibration.json")
 LIKELIER_THAN_NOT = 0.5
 """Probability from which a cause is likelier than all others together. No effect is named below it, nor are two that
 have less together: then what is wrong is unknown, however sure it is that something is."""
+
+_NUMBERS = ("sharpness", "shrink_weight", "neutral_shrink", "none_bias", "unknown_bias", "named_from", "apart")
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,9 @@ class GapCalibration:
         Probability of the machine's effects together from which one is named.
     apart : float
         The likeliest effect's share, of the first two together, from which it stands alone.
+    effect_biases : mapping
+        c of effects: of machines that others built some look more often, some less often, like what the population
+        shows than that says. 0 where it is missing.
     """
 
     sharpness: float
@@ -47,12 +52,18 @@ class GapCalibration:
     unknown_bias: float
     named_from: float
     apart: float
+    effect_biases: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> GapCalibration:
         """Build it from what a JSON file holds."""
-        names = ("sharpness", "shrink_weight", "neutral_shrink", "none_bias", "unknown_bias", "named_from", "apart")
-        return cls(*(float(values[name]) for name in names))
+        biases = {name: float(value) for name, value in values.get("effect_biases", {}).items()}
+        return cls(*(float(values[name]) for name in _NUMBERS), biases)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return plain values, for a JSON file."""
+        numbers: dict[str, Any] = {name: round(float(getattr(self, name)), 4) for name in _NUMBERS}
+        return numbers | ({"effect_biases": dict(self.effect_biases)} if self.effect_biases else {})
 
     def probabilities(self, forest: Mapping[str, float], scores: Mapping[str, float]) -> dict[str, float]:
         """Return cause → probability, likeliest first.
@@ -67,6 +78,7 @@ class GapCalibration:
         levels = {
             name: self.sharpness * float(np.log(max(p, 1e-9)))
             + self.shrink_weight * (scores.get(name, self.neutral_shrink) - self.neutral_shrink)
+            + self.effect_biases.get(name, 0.0)
             for name, p in forest.items()
         }
         levels[NONE] += self.none_bias

@@ -48,7 +48,7 @@ def main() -> None:
             typer.echo(f"case {i}: {', '.join(rows[0]['truths']) if rows else 'refused'}")
     rows = [row for i, found in _read(given.work).items() if i < given.cases for row in found]
     values: dict[str, Any] = {
-        name: vars(fit_calibration([_case(r) for r in rows if r["with_reference"] == flag]))
+        name: fit_calibration([_case(r) for r in rows if r["with_reference"] == flag]).to_mapping()
         for name, flag in (("with_reference", True), ("without_reference", False))
     }
     values["provenance"] = {

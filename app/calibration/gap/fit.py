@@ -17,8 +17,11 @@ FALSE_ON_NONE, FALSE_ON_UNKNOWN = 0.05, 0.15
 APART = 0.65
 _START = np.array([1.0, 0.0, 0.3, 0.0, 0.0])
 _BOUNDS = ((0.1, 5.0), (0.0, 10.0), (-1.0, 1.0), (-4.0, 4.0), (-4.0, 4.0))
+_BIAS_BOUNDS = (-2.0, 2.0)
 _PRIOR = 0.5
 """Weight of the start, at which trials say nothing, beside that of one case."""
+BIAS_SCATTER = 0.3
+"""Of effects' biases, in which a handful of cases each must not be learned by heart."""
 
 
 @dataclass(frozen=True)
@@ -39,27 +42,32 @@ class WeighedCase:
 
 
 def fit_calibration(cases: Sequence[WeighedCase]) -> GapCalibration:
-    """Fit sharpness, what trials say and both biases by likelihood; then the threshold for naming an effect.
+    """Fit sharpness, what trials say and all biases by likelihood; then the threshold for naming an effect.
 
     J. C. Platt, "Probabilistic outputs for support vector machines", 1999; C. Guo, G. Pleiss, Y. Sun, K. Q. Weinberger,
-    "On calibration of modern neural networks", 2017 (one temperature for all classes).
+    "On calibration of modern neural networks", 2017 (one temperature for all classes, a bias for each).
     """
     from scipy.optimize import minimize
 
-    def loss(x: FloatArray) -> float:
-        fitted = _calibration(x)
-        right = [sum(fitted.probabilities(c.forest, c.scores)[t] for t in c.truths) for c in cases]
-        off = x - _START
-        return float(-np.mean(np.log(np.maximum(right, 1e-9))) + _PRIOR / len(cases) * off @ off)
+    effects = sorted({t for c in cases for t in c.truths} - {NONE, UNKNOWN})
+    start = np.append(_START, np.zeros(len(effects)))
+    weights = np.append(np.full(len(_START), _PRIOR), np.full(len(effects), 0.5 / BIAS_SCATTER**2))
 
-    best = minimize(loss, _START, method="L-BFGS-B", bounds=_BOUNDS).x
-    fitted = _calibration(np.round(best, 3))
+    def loss(x: FloatArray) -> float:
+        fitted = _calibration(x, effects)
+        right = [sum(fitted.probabilities(c.forest, c.scores)[t] for t in c.truths) for c in cases]
+        return float(-np.mean(np.log(np.maximum(right, 1e-9))) + weights @ (x - start) ** 2 / len(cases))
+
+    best = minimize(loss, start, method="L-BFGS-B", bounds=[*_BOUNDS, *[_BIAS_BOUNDS] * len(effects)]).x
+    fitted = _calibration(np.round(best, 3), effects)
     return replace(fitted, named_from=_named_from(fitted, cases))
 
 
-def _calibration(x: FloatArray) -> GapCalibration:
-    sharpness, weight, neutral, none, unknown = (float(v) for v in x)
-    return GapCalibration(sharpness, weight, neutral, none, unknown, 0.5, APART)
+def _calibration(x: FloatArray, effects: Sequence[str]) -> GapCalibration:
+    sharpness, weight, neutral, none, unknown, *biases = (float(v) for v in x)
+    return GapCalibration(
+        sharpness, weight, neutral, none, unknown, 0.5, APART, dict(zip(effects, biases, strict=True))
+    )
 
 
 def _named_from(fitted: GapCalibration, cases: Sequence[WeighedCase]) -> float:

@@ -8,7 +8,8 @@ anew each time, and whoever learns from the population learns what the balances 
 Source of the signatures: R. B. Randall, *Vibration-based Condition Monitoring*, 2nd ed., 2021, chapters 2, 5 and 7;
 ISO 13373-2:2016, annexes; P. D. McFadden, "Detecting fatigue cracks in gears by amplitude and phase demodulation of
 the meshing vibration", J. Vib. Acoust. 108 (1986); J. E. Berry, *Illustrated Vibration Diagnostic Chart*, Technical
-Associates of Charlotte, 1994 (misalignment: second and higher mesh harmonics with sidebands at running speed).
+Associates of Charlotte, 1994 (misalignment: higher mesh harmonics with sidebands at running speed;
+looseness: many harmonics of running speed, halves, a raised floor).
 """
 
 from __future__ import annotations
@@ -35,6 +36,9 @@ from gearsig.recording.types import Recording
 
 LARGEST_ADVANCE = 0.35
 """Of a mesh period, by which a tooth comes too early or too late."""
+
+LOOSE_ORDERS = 10
+"""Of its shaft, up to which a loose bearing shows lines."""
 
 
 def with_signature(recording: Recording, name: str, rng: np.random.Generator) -> tuple[Recording, float]:
@@ -255,8 +259,9 @@ def _unbalance(scene: Scene, size: float, rng: np.random.Generator) -> Signature
 
 
 def _misalignment(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
-    """Two stiffness swings per turn, or a load that wanders along the teeth: the shaft's second line; mesh harmonics
-    from the second on; sidebands of the mesh one and two apart. Which of them shows depends on the machine.
+    """Two stiffness swings per turn, or a load that wanders along the teeth.
+
+    The shaft's second line, mesh harmonics from the second on, sidebands one and two apart: any of them may lead.
     """
     order = scene.shaft_orders[_side(rng)]
     lines, bands, mesh = _balance(rng, 3)
@@ -329,16 +334,23 @@ def _inner_race(scene: Scene, size: float, rng: np.random.Generator) -> Signatur
 
 
 def _bearing_clearance(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
-    """A shaft that is held less: other paths from the mesh to each sensor, lines of its turn, of elements passing."""
+    """A shaft that is held less: other paths from the mesh to each sensor, lines of elements passing.
+
+    And what loose parts show: many orders of the shaft's turn, their halves, a mesh that swings with it, noise.
+    """
     bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
-    mesh, passing, turn = _balance(rng, 3)
+    mesh, passing, turn, loose = _balance(rng, 4)
     gains = np.exp(1.4 * mesh * size * rng.standard_normal(N_MESH_HARMONICS))
     lines = [
         0.4 * passing * size / k * tone(k * bearing["BPFO"] * float(rng.uniform(0.99, 1.0)), scene, rng) for k in (1, 2)
     ]
-    lines += [0.4 * turn * size / k * tone(k * bearing["shaft"], scene, rng) for k in (1, 2, 3)]
+    fall, halves = float(rng.uniform(0.2, 1.5)), 0.5 * _partly(rng)
+    lines += [0.4 * turn * size / k**fall * tone(k * bearing["shaft"], scene, rng) for k in range(1, LOOSE_ORDERS + 1)]
+    lines += [0.4 * turn * halves * size / k * tone((k - 0.5) * bearing["shaft"], scene, rng) for k in (1, 2, 3)]
+    noise = 0.4 * loose * size * _at_the_mesh(scene, band_noise(scene, rng), rng)
     return Signature(
-        added=tuple(lines),
+        gain=_swing(scene, bearing["shaft"], 0.5 * turn * _partly(rng) * size, rng),
+        added=(*lines, noise),
         mesh_gains=tuple(gains.tolist()),
         paths_scatter=1.4 * mesh * size,
         around=_partly(rng),
