@@ -10,6 +10,7 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.plot import series, style
+from gearsig.plot.shaded import draw_shaded
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -145,7 +146,8 @@ def gear_stress_figure(
     inside = (points[:, 0] > near_mm[0]) & (points[:, 0] < near_mm[1])
     inside &= (points[:, 1] > near_mm[2]) & (points[:, 1] < near_mm[3])
     top = float(stress[inside].max()) if top_pa is None else top_pa * 1e-6
-    drawn = _coloured(axes, points, triangles, stress, (0.0, top), "viridis")
+    drawn = draw_shaded(axes, points, triangles, stress, window=near_mm, limits=(0.0, top), cmap="viridis")
+    _draw_border(axes, points, points, triangles)
     axes.set_xlim(*near_mm[:2])
     axes.set_ylim(*near_mm[2:])
     if force is not None:
@@ -178,23 +180,15 @@ def _faces(axes: Axes, outlines: FloatArray, values: FloatArray, line: float) ->
 def _draw_shape(axes: Axes, points: FloatArray, triangles: IntArray, motion: FloatArray) -> Any:
     reach = float(np.abs(points).max())
     moved = points + 0.12 * reach * motion[:, :2]
-    drawn = _coloured(axes, moved, triangles, motion[:, 2], (-1.0, 1.0), "RdBu_r")
+    end = 1.15 * reach
+    drawn = draw_shaded(
+        axes, moved, triangles, motion[:, 2], window=(-end, end, -end, end), limits=(-1.0, 1.0), cmap="RdBu_r"
+    )
     _draw_border(axes, moved, points, triangles)
-    axes.set_xlim(-1.15 * reach, 1.15 * reach)
-    axes.set_ylim(-1.15 * reach, 1.15 * reach)
+    axes.set_xlim(-end, end)
+    axes.set_ylim(-end, end)
     axes.set_axis_off()
     return drawn
-
-
-def _coloured(
-    axes: Axes, points: FloatArray, triangles: IntArray, values: FloatArray, limits: tuple[float, float], cmap: str
-) -> Any:
-    from matplotlib.tri import Triangulation
-
-    mesh = Triangulation(points[:, 0], points[:, 1], triangles)
-    # Smoothly shaded triangles let the paper show through where they meet; flat ones below, hard-edged, close that.
-    axes.tripcolor(mesh, values, cmap=cmap, vmin=limits[0], vmax=limits[1], antialiased=False, linewidth=0.0)
-    return axes.tripcolor(mesh, values, shading="gouraud", cmap=cmap, vmin=limits[0], vmax=limits[1])
 
 
 def _draw_border(axes: Axes, moved: FloatArray, points: FloatArray, triangles: IntArray) -> None:

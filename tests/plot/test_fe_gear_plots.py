@@ -8,6 +8,8 @@ from matplotlib.text import Text
 
 from gearsig.errors import InputError
 from gearsig.plot.fe_gear import gear_mesh_figure, gear_modes_figure, gear_stress_figure
+from gearsig.plot.shaded import draw_shaded
+from gearsig.plot.style import new_figure
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -36,10 +38,12 @@ def test_modes_have_names_a_form_and_a_border():
     sideways = np.array([[2.0, 0, 0]] * 4)
     figure = gear_modes_figure(SQUARE, TRIANGLES, {"100 Hz, n = 2": axial, "200 Hz, n = 0": sideways}, title="Free")
     first, second, _ = figure.axes
-    np.testing.assert_allclose(first.collections[0].get_array(), axial[:, 2])
-    np.testing.assert_allclose(second.collections[0].get_array(), 0.0)
-    assert len(first.collections[1].get_segments()) == 4
-    right = max(segment[:, 0].max() for segment in second.collections[1].get_segments())
+    image = first.images[0].get_array()
+    assert image.max() == pytest.approx(1.0, abs=0.01)
+    assert image.min() == pytest.approx(-1.0, abs=0.01)
+    np.testing.assert_allclose(second.images[0].get_array().compressed(), 0.0)
+    assert len(first.collections[0].get_segments()) == 4
+    right = max(segment[:, 0].max() for segment in second.collections[0].get_segments())
     assert right == pytest.approx(1.12)
     assert {"100 Hz, n = 2", "200 Hz, n = 0", "Free"} <= _texts(figure)
 
@@ -50,11 +54,27 @@ def test_stress_is_drawn_in_mpa_with_its_force():
         SQUARE, TRIANGLES, stress, near_mm=NEAR, top_pa=10e6, force=(SQUARE[2], np.array([0.0, -1.0]), "500 N")
     )
     axes = figure.axes[0]
-    np.testing.assert_allclose(axes.collections[0].get_array(), stress * 1e-6)
-    assert axes.collections[0].get_clim() == (0.0, 10.0)
+    assert axes.images[0].get_array().max() == pytest.approx(50.0, rel=0.01)
+    assert axes.images[0].get_clim() == (0.0, 10.0)
     assert {"von Mises stress (MPa)", "500 N"} <= _texts(figure)
     free = gear_stress_figure(SQUARE, TRIANGLES, stress, near_mm=NEAR)
-    assert free.axes[0].collections[0].get_clim() == (0.0, 50.0)
+    assert free.axes[0].images[0].get_clim() == (0.0, 50.0)
+
+
+def test_long_thin_triangles_are_shaded_without_streaks_or_holes():
+    y = np.linspace(0.0, 1.0, 301)
+    points = np.vstack([np.column_stack((np.full(len(y), x), y)) for x in (0.0, 1.0)])
+    low = np.arange(len(y) - 1)
+    triangles = np.vstack(
+        [np.column_stack((low, low + 1, low + 301)), np.column_stack((low + 1, low + 302, low + 301))]
+    )
+    axes = new_figure(4.0).add_subplot()
+    shaded = draw_shaded(
+        axes, points, triangles, points @ [3.0, 1.0], window=(0.0, 1.0, 0.0, 1.0), limits=(0.0, 4.0), cmap="viridis"
+    ).get_array()
+    middle = (np.arange(shaded.shape[0]) + 0.5) / shaded.shape[0]
+    assert not np.ma.getmaskarray(shaded).any()
+    np.testing.assert_allclose(shaded, 3.0 * middle + middle[:, None], atol=4.0 / shaded.shape[0])
 
 
 def test_wrong_shapes_are_refused():
