@@ -22,12 +22,15 @@ class Model:
         All of them.
     effects : tuple of str
         Names of the effects that have a meaning.
+    meaningless : tuple of str
+        What of them has none, and why, one sentence each.
     """
 
     name: str
     title: str
     parameters: tuple[Parameter, ...] = field(repr=False)
     effects: tuple[str, ...] = field(repr=False)
+    meaningless: tuple[str, ...] = field(default=(), repr=False)
 
     @property
     def presets(self) -> tuple[str, ...]:

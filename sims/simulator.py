@@ -71,6 +71,11 @@ class Simulator(Protocol):
         """Names of the effects that have a meaning here."""
         ...
 
+    @property
+    def meaningless(self) -> tuple[str, ...]:
+        """What of these effects has none, and why, one sentence each."""
+        ...
+
     def simulate(
         self,
         parameters: Mapping[str, ParameterValue],

@@ -44,7 +44,7 @@ def _setting(setting: EffectSetting) -> str:
 
 
 def _model_text(simulator: Simulator) -> str:
-    from sims.effects import effect
+    from sims.effects import effect, effects
     from sims.presets import presets
 
     machines = presets(simulator.name)
@@ -58,6 +58,11 @@ def _model_text(simulator: Simulator) -> str:
     if simulator.effects:
         parts.append("Effects (--effect NAME=SEVERITY,OPTION=VALUE,…)")
         parts.append("\n\n".join(_effect_text(effect(name)) for name in simulator.effects))
+    others = [name for name in effects() if name not in simulator.effects]
+    lacking = [f"{', '.join(others)}: not represented."] if others else []
+    if lacking or simulator.meaningless:
+        parts.append("Effects without a meaning here")
+        parts += [_wrapped(text, "  ", "  ") for text in (*lacking, *simulator.meaningless)]
     return "\n\n".join(parts)
 
 

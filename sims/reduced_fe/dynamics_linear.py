@@ -111,7 +111,17 @@ def _torsional(pair: FlexiblePair, own: Constants, operation: Operation, mesh_cy
 def _squares(
     pair: FlexiblePair, own: Constants, operation: Operation, cycles: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Squared angular frequencies, shapes, ∂D/∂η of the points that touch and their stiffness, at one mesh angle."""
+    """Squared angular frequencies, shapes, and what `contact_rows` returns, at one mesh angle."""
+    rows, stiff = contact_rows(pair, own, operation, cycles)
+    k = np.diag(np.concatenate([side.omega_rad_s for side in own.sides]) ** 2) + rows.T @ stiff @ rows
+    squares, shapes = np.linalg.eigh(k)
+    return squares, shapes, rows, stiff
+
+
+def contact_rows(
+    pair: FlexiblePair, own: Constants, operation: Operation, cycles: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return ∂D/∂η of the points that touch under the set torque, (n, n_modes), and their stiffness, (n, n)."""
     force = max(operation.torque_nm.largest / own.base_radius_m[0], LEAST_FORCE_N)
     at = contact_state(own.table, pair.machine.mesh, force, cycles)
     one, two = own.sides
@@ -128,7 +138,5 @@ def _squares(
             rows[point, index * n : index * n + len(full)] = full
     touching = at.force_n > 0.0
     rows = rows[touching]
-    stiff = np.linalg.inv(at.compliance[np.ix_(touching, touching)])
-    k = np.diag(np.concatenate((one.omega_rad_s, two.omega_rad_s)) ** 2) + rows.T @ stiff @ rows
-    squares, shapes = np.linalg.eigh(k)
-    return squares, shapes, rows, stiff
+    stiff: FloatArray = np.linalg.inv(at.compliance[np.ix_(touching, touching)])
+    return rows, stiff

@@ -63,6 +63,9 @@ class ReducedPair(PairModel[PreparedPair]):
     title: str = "spur pair of finite-element gears, reduced: elastic bodies, contact of slices, contact loss"
     parameters: tuple[Parameter, ...] = field(default=PARAMETERS, repr=False)
     effects: tuple[str, ...] = field(default_factory=lambda: tuple(effects()), repr=False)
+    meaningless: tuple[str, ...] = (
+        "surface_roughness with locked_to=time: flanks are shapes here, which return with their teeth.",
+    )
 
     def _built(self, asked: Asked, rng: np.random.Generator, sampling_rate_hz: float) -> PreparedPair:
         return _prepared(asked, rng, sampling_rate_hz)

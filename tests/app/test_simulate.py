@@ -140,6 +140,13 @@ def test_the_list_names_everything_within_100_columns(capsys: pytest.CaptureFixt
         assert " ".join(e.signature.split()) in flowing
 
 
+def test_the_list_says_what_has_no_meaning_and_why(capsys: pytest.CaptureFixture[str]) -> None:
+    flexible = " ".join(run(capsys, "simulate", "reduced-fe", "--list")[1].split())
+    assert "without a meaning here surface_roughness with locked_to=time: flanks are shapes here" in flexible
+    assert "unbalance" in run(capsys, "simulate", "forging", "--list")[1].split("without a meaning here")[1]
+    assert "without a meaning" not in run(capsys, "simulate", "cracked", "--list")[1]
+
+
 @pytest.mark.parametrize("command", ["simulate", "sweep"])
 def test_help(capsys: pytest.CaptureFixture[str], command: str) -> None:
     code, out, _ = run(capsys, command, "--help")

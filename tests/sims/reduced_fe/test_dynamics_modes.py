@@ -9,6 +9,7 @@ from sims.reduced_fe.contact_mirror import mirror_groups
 from sims.reduced_fe.contact_spreading import spreading_check
 from sims.reduced_fe.dynamics_constants import constants
 from sims.reduced_fe.dynamics_linear import eigenfrequencies_hz, torsional_mode
+from sims.reduced_fe.dynamics_respond import respond
 from sims.reduced_fe.dynamics_side import GEAR, HUB, ROTOR, kept_modes, residual_compliance
 from sims.reduced_fe.integrate_coefficients import step_coefficients
 from sims.reduced_fe.ready import ready_gear
@@ -125,6 +126,25 @@ def test_a_hub_lighter_than_the_toothed_body_is_refused(pair):
     thin = replace(pair, machine=replace(pair.machine, wheels=wheels))
     with pytest.raises(InputError, match="toothed body"):
         constants(thin, OPERATION)
+
+
+def heavy_hubs(inertia_kg_m2):
+    return pair_of(**{f"hub_inertia_{side}_kg_m2": inertia_kg_m2 for side in ("driver", "driven")})
+
+
+def test_damping_is_followed_up_to_where_it_is_refused():
+    """A hub 6.5 times as heavy as its teeth lies just below the limit: the fast way is the reference's."""
+    one, two = (respond(heavy_hubs(0.05), OPERATION, duration_s=0.1, method=m) for m in ("exponential", "newmark"))
+    fast, reference = (np.std(response["mesh_force_n"][2000:]) for response in (one, two))
+    assert fast == pytest.approx(reference, rel=0.01)
+
+
+@pytest.mark.parametrize(("method", "inertia"), [("exponential", 0.1), ("newmark", 1.0)])
+def test_damping_that_light_bodies_behind_heavy_hubs_cannot_follow_is_refused(method, inertia):
+    with pytest.raises(InputError, match=r"hub_inertia_driver_kg_m2: the contact is damped more than its gears can"):
+        respond(heavy_hubs(inertia), OPERATION, duration_s=1e-3, method=method)
+    with pytest.raises(InputError, match=r"mesh_damping_ratio: .* 0\.56 and 0\.56 times the inertia"):
+        respond(pair_of(mesh_damping_ratio=0.3), OPERATION, duration_s=1e-3)
 
 
 @pytest.mark.parametrize("method", ["exponential", "newmark"])
