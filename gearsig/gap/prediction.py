@@ -21,7 +21,7 @@ LEAST_TRIED = 0.3
 """Times the least simulated severity."""
 
 LARGEST_DISTANCE = 6.0
-"""In floors; what is further from a prediction counts no more: one wild feature must not decide."""
+"""In floors; what is further from a prediction counts little more: one wild feature must not decide."""
 
 INTERVAL_COST = 2.71
 """Rise of the cost, a sum of squared standard deviations, that bounds the 90 % interval: 1.645²."""
@@ -29,10 +29,11 @@ INTERVAL_COST = 2.71
 FLOOR_IN_DEVIATIONS = 1.96
 """A floor holds 19 of 20: so many standard deviations."""
 
-LEVELS_DB = tuple(float(level) for level in range(-30, 31, 5))
+LEVELS_DB = tuple(float(level) for level in (*range(-30, 30, 5), *range(30, 61, 10)))
 LEVEL_SCATTER_DB = 10.0
 """By how much louder than on the twin what an effect adds may be on the real machine, whose path from gears and shafts
-to the sensor nobody knows; and its standard deviation, for each operating condition."""
+to the sensor nobody knows; and its standard deviation, for each operating condition. Much
+louder it may be: a twin stands on rigid ground, and what shakes a whole machine at low orders hardly shows on it."""
 
 
 @dataclass(frozen=True)
@@ -248,8 +249,13 @@ def _unusual(path: EffectPath) -> FloatArray:
 
 
 def _squares(left: FloatArray, floors: FloatArray) -> FloatArray:
-    """Return min(|u|, 6)², u = left/floor, in standard deviations."""
-    squares: FloatArray = (np.minimum(np.abs(left / floors), LARGEST_DISTANCE) * FLOOR_IN_DEVIATIONS) ** 2
+    """Return ρ(u), u = left/floor, in squared standard deviations: u² up to 6, from there 36 (1 + ln(u²/36)).
+
+    It never ceases to rise: a fit must find its way to a change that is larger than anything that it starts from.
+    """
+    further = np.maximum(np.abs(left / floors) / LARGEST_DISTANCE, 1.0)
+    near = np.minimum(np.abs(left / floors), LARGEST_DISTANCE)
+    squares: FloatArray = (near * FLOOR_IN_DEVIATIONS) ** 2 * (1.0 + 2.0 * np.log(further))
     return squares
 
 
@@ -262,7 +268,7 @@ def _family_weights(names: tuple[str, ...]) -> FloatArray:
 
 
 def family_square(names: tuple[str, ...], left: FloatArray, observed: Observed, used: FloatArray) -> float:
-    """Return Σ_f mean_{i∈f} min(|u_i|, 6)², u = left/floor in standard deviations; `used` is 1 for what counts."""
+    """Return Σ_f mean_{i∈f} ρ(u_i), u = left/floor in standard deviations; `used` is 1 for what counts."""
     squares, total = _squares(left, observed.floors), 0.0
     for rows in family_members(names).values():
         if used[rows].sum() > 0:

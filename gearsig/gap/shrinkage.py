@@ -135,7 +135,7 @@ def _before_and_after(fit: Fit, scored: Observed, used: FloatArray) -> tuple[flo
     left = scored.distances - fit.at(scored.condition)
     squares = [family_square(names, d, scored, used) / n_families for d in (scored.distances, left)]
     excess = max(squares[0] - 1.0, 0.1)
-    shrink = (squares[0] - max(squares[1], 1.0)) / excess
+    shrink = (max(squares[0], 1.0) - max(squares[1], 1.0)) / excess  # where there was no gap, none can shrink
     before, after = (float(np.sqrt(s)) / FLOOR_IN_DEVIATIONS for s in squares)
     return before, after, float(np.clip(shrink, -1.0, 1.0))
 

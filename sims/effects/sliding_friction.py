@@ -28,7 +28,7 @@ EFFECT = Effect(
         "added_percent",
         "%",
         0.0,
-        500.0,
+        1000.0,
         100.0,
         "friction that is added, in percent of the coefficient of well lubricated flanks",
     ),

@@ -91,6 +91,12 @@ def test_an_effect_that_was_fitted_to_one_condition_and_fails_at_the_other_does_
     assert result.slope == pytest.approx(0.0)
 
 
+def test_where_there_was_no_gap_none_shrinks_nor_grows() -> None:
+    effect = path(0.1 * SHAPE)
+    quiet = seen(np.array([0.3, -0.2, 0.5, 0.4, -0.6, 0.1]))
+    assert shrinkage([effect], [Fold((quiet,), quiet)], "").shrink.value == 0.0
+
+
 def test_the_severity_lies_in_its_interval_nine_times_out_of_ten() -> None:
     """With features of one standard deviation of noise each; the two that change are of different families."""
     rng = np.random.default_rng(3)
