@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 DOTS_PER_INCH = 160
 SHARING_NM = 170.0
 HIGHEST_CURVE_HZ = 12000.0
-NAMES = {"node": "one line of nodes", "patch": "RBE3 patch", "section": "tooth section"}
+NAMES = {"node": "line of nodes", "patch": "RBE3 patch", "section": "tooth section"}
 RANGE = (0.52, 1.25)
 """Of the torsional mode's frequency, in which its jumps are looked for."""
 

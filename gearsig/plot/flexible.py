@@ -222,7 +222,7 @@ def contact_spreading_figure(
     ----------
     mesh_cycles : array, (n_c,)
     frequency_hz : mapping
-        Name of the way, e.g. "one line of nodes" → array, (n_c,).
+        Name of the way, e.g. "line of nodes" → array, (n_c,).
     title : str
     """
     x = series.checked_axis(mesh_cycles, "mesh_cycles")
