@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.flexible.study import Study
+from gearsig.checks import FloatArray
 from gearsig.plot.flexible import (
     contact_spreading_figure,
     frequency_curves_figure,
@@ -21,6 +22,7 @@ from gearsig.plot.mesh import load_sharing_figure
 from gearsig.plot.order_map import order_map_figure
 from sims.reduced_fe.contact_spreading import SpreadingCheck
 from sims.reduced_fe.contact_table import MARGIN
+from sims.reduced_fe.maps_static import MeshMaps
 from sims.sweep_run import written
 
 if TYPE_CHECKING:
@@ -42,6 +44,7 @@ def write_study(study: Study, folder: Path, title: str) -> tuple[Path, ...]:
         paths.append(folder / f"{name}.png")
         figure.savefig(paths[-1], dpi=DOTS_PER_INCH)
     paths.append(written(folder / "sweeps.csv", sweeps_csv(study)))
+    paths.append(written(folder / "maps.csv", maps_csv(study.maps)))
     paths.append(written(folder / "study.json", json.dumps(summary(study), indent=2, ensure_ascii=False) + "\n"))
     return tuple(paths)
 
@@ -57,6 +60,7 @@ def figures(study: Study, title: str) -> dict[str, Figure]:
     error = {"static transmission error (µm)": np.tile(maps.transmission_error_m, (2, 1)) * 1e6}
     found = {
         "stiffness_map": mesh_maps_figure(twice, maps.torque_nm, stiffness, title=f"Mesh stiffness, {title}"),
+        "pair_stiffness_map": _pair_stiffness(study, title),
         "transmission_error_map": mesh_maps_figure(
             twice, maps.torque_nm, error, title=f"Static transmission error, {title}"
         ),
@@ -94,6 +98,20 @@ def sweeps_csv(study: Study) -> str:
     return "\n".join(lines) + "\n"
 
 
+def maps_csv(maps: MeshMaps) -> str:
+    """Return every angle and torque as a line: the whole mesh, then each pair, the newest first."""
+    n_slots = maps.pair_forces_n.shape[2]
+    names = ["torque_nm", "mesh_cycles", "transmission_error_um", "tangent_n_per_m", "secant_n_per_m"]
+    whole = (1e6 * maps.transmission_error_m, maps.tangent_stiffness_n_per_m, maps.secant_stiffness_n_per_m)
+    columns = [*np.broadcast_arrays(maps.torque_nm, maps.mesh_cycles[:, None]), *whole]
+    for j in range(n_slots):
+        names += [f"pair_{j}_force_n", f"pair_{j}_load_part", f"pair_{j}_tangent_n_per_m", f"pair_{j}_secant_n_per_m"]
+        pair = (maps.pair_forces_n, maps.load_sharing, maps.contact_tangent_n_per_m, maps.contact_secant_n_per_m)
+        columns += [values[:, :, j] for values in pair]
+    rows = np.column_stack([values.T.ravel() for values in columns])
+    return "\n".join([",".join(names), *(",".join(f"{v:.6g}" for v in row) for row in rows)]) + "\n"
+
+
 def summary(study: Study) -> dict[str, object]:
     """Return the numbers that matter."""
     rows = []
@@ -128,6 +146,27 @@ def summary(study: Study) -> dict[str, object]:
         for i, t in enumerate(maps.torque_nm)
     ]
     return {"sweeps": rows, "static": static}
+
+
+def _pair_stiffness(study: Study, title: str) -> Figure:
+    """Contact stiffness of one pair along its way, over the torque; it enters at 1."""
+    maps = study.maps
+    twice = np.concatenate((maps.mesh_cycles, maps.mesh_cycles + 1.0, maps.mesh_cycles + 2.0))
+    slot = np.floor(twice + MARGIN).astype(np.int64) - 1
+    place = np.tile(np.arange(len(maps.mesh_cycles)), 3)
+    there = (slot >= 0) & (slot < maps.pair_forces_n.shape[2])
+
+    def of_pair(values: FloatArray) -> FloatArray:
+        found = values[place, :, np.clip(slot, 0, values.shape[2] - 1)]
+        return np.where(there[:, None], found, 0.0) / 1e8
+
+    kinds = {
+        "tangent contact stiffness (10⁸ N/m)": of_pair(maps.contact_tangent_n_per_m),
+        "secant contact stiffness (10⁸ N/m)": of_pair(maps.contact_secant_n_per_m),
+    }
+    return mesh_maps_figure(
+        twice, maps.torque_nm, kinds, title=f"Contact stiffness of the pair that enters at 1, {title}"
+    )
 
 
 def _sharing(study: Study, title: str) -> Figure:

@@ -25,6 +25,7 @@ def test_figures_table_and_summary_are_written(study):
     pictures = {p.stem for p in folder.glob("*.png")}
     wanted = {
         "stiffness_map",
+        "pair_stiffness_map",
         "transmission_error_map",
         "load_sharing",
         "spectra",
@@ -37,6 +38,15 @@ def test_figures_table_and_summary_are_written(study):
     rows = list(csv.DictReader((folder / "sweeps.csv").read_text(encoding="utf-8").splitlines()))
     assert {row["direction"] for row in rows} == {"up", "down"}
     assert len(rows) == 400
+    maps = list(csv.DictReader((folder / "maps.csv").read_text(encoding="utf-8").splitlines()))
+    for row in (maps[0], maps[len(maps) // 2], maps[-1]):
+        numbers = {name: float(value) for name, value in row.items()}
+        slots = range(sum(name.endswith("_force_n") for name in numbers))
+        parts = [numbers[f"pair_{j}_load_part"] for j in slots]
+        assert sum(parts) == pytest.approx(1.0, abs=1e-5)
+        tangents = [numbers[f"pair_{j}_tangent_n_per_m"] for j in slots]
+        assert sum(tangents) == pytest.approx(numbers["tangent_n_per_m"], rel=1e-4)
+    assert (float(maps[0]["torque_nm"]), float(maps[-1]["torque_nm"])) == (10.0, 500.0)
     summary = json.loads((folder / "study.json").read_text(encoding="utf-8"))
     assert summary["sweeps"][0]["n_steps"] == 200_000
     errors = [row["transmission_error_um"][1] for row in summary["static"]]
