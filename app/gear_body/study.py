@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from gearsig.checks import FloatArray
+from gearsig.checks import FloatArray, count, within
 from sims.reduced_fe.blank import GearBlank
 from sims.reduced_fe.craig_bampton import N_COMPARED, CraigBamptonGear, CraigBamptonPlan, craig_bampton
 from sims.reduced_fe.cyclic import CyclicGear, Held
@@ -21,6 +21,8 @@ from sims.reduced_fe.reduced_gear import ReducedGear
 from sims.reduced_fe.sector_mesh import SectorMesh, sector_mesh
 from sims.reduced_fe.tooth_load import ToothLoad, load_tooth
 
+MOST_MODES = 300
+"""Beyond, the search takes many minutes, and teeth alone move."""
 N_SLICES = 5
 """Contact patches along the face, where the mesh has layers enough."""
 
@@ -77,7 +79,7 @@ def study_gear(
     n_dof : int
         Of the whole gear, about.
     n_modes : int
-        Elastic modes, at least.
+        Elastic modes, at least; up to 300.
     held : str
         "free" or "bore".
     springs : array (6,) or None
@@ -89,6 +91,7 @@ def study_gear(
     on_progress : callable
         Told what is done and how much, 0 to 1.
     """
+    within(count(n_modes, "n_modes"), "n_modes", 1, MOST_MODES)
     on_progress("mesh", 0.0)
     size = mesh_size_for(blank, n_dof)
     if reduce:

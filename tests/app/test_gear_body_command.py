@@ -101,3 +101,9 @@ def test_a_coarse_gear_on_springs_says_how_coarse_it_is(tmp_path):
     inertia = float(re.search(r"polar inertia ([0-9.e-]+)", found.output)[1])
     # The hub's twist adds its compliance to the spring's.
     assert float(turning.split(" Hz")[0]) == pytest.approx(np.sqrt(1e5 / inertia) / (2.0 * np.pi), rel=0.03)
+
+
+def test_more_modes_than_bodies_have_are_refused_before_the_search(tmp_path):
+    found = _run("-o", str(tmp_path / "out"), *SMALL, "--modes", "2000")
+    assert isinstance(found.exception, InputError)
+    assert "n_modes is 2000 (allowed: 1 to 300)" in str(found.exception)
