@@ -58,7 +58,7 @@ class GapCalibration:
     def from_mapping(cls, values: Mapping[str, Any]) -> GapCalibration:
         """Build it from what a JSON file holds."""
         biases = {name: float(value) for name, value in values.get("effect_biases", {}).items()}
-        return cls(*(float(values[name]) for name in _NUMBERS), biases)
+        return cls(**{name: float(values[name]) for name in _NUMBERS}, effect_biases=biases)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return plain values, for a JSON file."""
