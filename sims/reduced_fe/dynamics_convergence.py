@@ -10,6 +10,7 @@ from gearsig.checks import FloatArray, positive
 from sims.machine.operation import Operation
 from sims.reduced_fe.dynamics_constants import FlexiblePair, constants
 from sims.reduced_fe.dynamics_respond import TRANSMISSION_ERROR, respond
+from sims.reduced_fe.dynamics_stability import followed_step_s
 
 CHECK_S = 0.05
 """Time over which runs are compared."""
@@ -72,11 +73,11 @@ def check_convergence(
     pair : FlexiblePair
     operation : Operation
     step_s : float
-        Of the fast way; the reference takes a quarter of it.
+        Longest of the fast way, see `followed_step_s`; the reference takes a quarter of it.
     time_s : float
     """
-    step = positive(step_s, "step_s", "s")
     own = constants(pair, operation)
+    step = followed_step_s(pair, own, operation, positive(step_s, "step_s", "s"))
     fast = respond(pair, operation, duration_s=time_s, signals=SIGNALS, step_s=step, ready=own)
     fine = respond(
         pair,

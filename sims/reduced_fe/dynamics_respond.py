@@ -14,7 +14,7 @@ from gearsig.errors import InputError, RefusalError
 from sims.gear_pair.measurement import COORDINATES
 from sims.machine.operation import Course, Operation
 from sims.reduced_fe.dynamics_constants import Constants, FlexiblePair, back_rows, constants
-from sims.reduced_fe.dynamics_damping import check_damping
+from sims.reduced_fe.dynamics_stability import check_step
 from sims.reduced_fe.dynamics_start import start_state
 from sims.reduced_fe.integrate_coefficients import Method, step_coefficients
 
@@ -147,7 +147,7 @@ def respond(
     own = constants(pair, operation) if ready is None else ready
     lines = _lines(own, signals)
     coefficients = np.array([step_coefficients(s.omega_rad_s, s.damping_rate, step, method) for s in own.sides])
-    check_damping(pair, own, operation, coefficients, method)
+    check_step(pair, own, operation, coefficients, method)
     state = (start_state(pair, own, operation, start_s) if first is None else first).arrays
     fixed = (
         own.record,

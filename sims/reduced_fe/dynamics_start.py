@@ -75,7 +75,8 @@ def _closed(pair: FlexiblePair, own: Constants, state: FlexState, force: float) 
     def missing(depth: float) -> float:
         return float(force_map(table, pair.machine.mesh, np.array([depth]), np.zeros(1)).force_n[0, 0]) - force
 
-    depth = float(brentq(missing, 0.0, DEEPEST_M, xtol=1e-12))
+    # Below 0: a tooth that stands ahead of its place carries before the others would touch.
+    depth = float(brentq(missing, -DEEPEST_M, DEEPEST_M, xtol=1e-12))
     q = state.q.copy()
     per_unit = float(rigid.rows[column].mean(axis=0)[free])
     q[1, free] += (depth - approach(q)) / per_unit

@@ -61,7 +61,14 @@ _DYNAMICS = (
         None,
     ),
     _number("lead_error_um", "um", "misalignment of the flanks over the face width", -500, 500, 0.0),
-    _number("step_us", "us", "step of the integrator; shortened to a part of the sampling interval", 0.1, 20, 5.0),
+    _number(
+        "step_us",
+        "us",
+        "longest step of the integrator; shortened to what the contact needs and to a part of the sampling interval",
+        0.1,
+        20,
+        5.0,
+    ),
     Parameter(
         "mesh_dof",
         "",

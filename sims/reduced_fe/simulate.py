@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gearsig.checks import positive
 from gearsig.errors import InputError
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
@@ -20,6 +21,7 @@ from sims.reduced_fe.contact_table import MARGIN
 from sims.reduced_fe.dynamics_constants import Constants, FlexiblePair, constants
 from sims.reduced_fe.dynamics_linear import eigenfrequencies_hz, torsional_mode
 from sims.reduced_fe.dynamics_respond import STEP_S, FlexResponse, FlexState, respond
+from sims.reduced_fe.dynamics_stability import followed_step_s
 
 LARGEST_DEPTH = 0.5
 """Of what corners are apart at the table's ends: the most the static approach may take, to leave room to vibrate."""
@@ -55,7 +57,8 @@ def simulate_pair(
     truth : mapping or None
         What was asked for; "machine", "gears" and "solver" are added.
     step_s : float
-        Longest step; it is shortened to a whole part of the sampling interval.
+        Longest step; it is shortened to what the contact can be followed with, and to a whole part of the sampling
+        interval.
     also : sequence of str
         Signals of `sims.reduced_fe.dynamics_respond.signal_names` wanted besides those that are measured.
     first : FlexState or None
@@ -70,14 +73,13 @@ def simulate_pair(
     InputError
         If the teeth yield further under the load than their corners are apart.
     """
-    measured = Measurement.of(
-        pair.machine, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s, longest_step_s=step_s
-    )
     machine_rng, chain_rng = rng.spawn(2)
     machine, _ = draw_roughness(pair.machine, machine_rng)
     pair = replace(pair, machine=machine)
     check_depth(pair, operation)
     own = constants(pair, operation, rng=machine_rng)
+    step = followed_step_s(pair, own, operation, positive(step_s, "step_s", "s"))
+    measured = Measurement.of(machine, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s, longest_step_s=step)
     response = respond(
         pair,
         operation,

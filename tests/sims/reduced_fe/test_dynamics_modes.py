@@ -11,6 +11,7 @@ from sims.reduced_fe.dynamics_constants import constants
 from sims.reduced_fe.dynamics_linear import eigenfrequencies_hz, torsional_mode
 from sims.reduced_fe.dynamics_respond import respond
 from sims.reduced_fe.dynamics_side import GEAR, HUB, ROTOR, kept_modes, residual_compliance
+from sims.reduced_fe.dynamics_stability import followed_step_s, growth
 from sims.reduced_fe.integrate_coefficients import step_coefficients
 from sims.reduced_fe.ready import ready_gear
 from tests.sims.reduced_fe.flexible_pairs import pair_of
@@ -141,10 +142,21 @@ def test_damping_is_followed_up_to_where_it_is_refused():
 
 @pytest.mark.parametrize(("method", "inertia"), [("exponential", 0.1), ("newmark", 1.0)])
 def test_damping_that_light_bodies_behind_heavy_hubs_cannot_follow_is_refused(method, inertia):
-    with pytest.raises(InputError, match=r"hub_inertia_driver_kg_m2: the contact is damped more than its gears can"):
+    with pytest.raises(InputError, match=r"hub_inertia_driver_kg_m2: the contact is stiffer or damped more than"):
         respond(heavy_hubs(inertia), OPERATION, duration_s=1e-3, method=method)
     with pytest.raises(InputError, match=r"mesh_damping_ratio: .* 0\.56 and 0\.56 times the inertia"):
         respond(pair_of(mesh_damping_ratio=0.3), OPERATION, duration_s=1e-3)
+
+
+def test_a_step_is_shortened_to_what_the_contact_can_be_followed_with(pair, ready):
+    """Steps that a sound pair is not followed with: its forces are many times those of shorter ones."""
+    assert followed_step_s(pair, ready, OPERATION, 5e-6) == 5e-6
+    step = followed_step_s(pair, ready, OPERATION, 40e-6)
+    assert step < 40e-6
+    coefficients = np.array([step_coefficients(s.omega_rad_s, s.damping_rate, 40e-6) for s in ready.sides])
+    assert growth(pair, ready, OPERATION, coefficients) > 0.01
+    found = [np.std(respond(pair, OPERATION, duration_s=0.1, step_s=h)["mesh_force_n"][-2000:]) for h in (step, 2e-6)]
+    assert found[0] == pytest.approx(found[1], rel=0.1)
 
 
 @pytest.mark.parametrize("method", ["exponential", "newmark"])

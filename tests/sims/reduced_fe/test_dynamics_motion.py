@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
+from sims.effects import EffectSetting
 from sims.machine.operation import Course, Operation
+from sims.presets import preset
 from sims.reduced_fe import dynamics_respond
 from sims.reduced_fe.dynamics_constants import constants
 from sims.reduced_fe.dynamics_convergence import check_convergence
 from sims.reduced_fe.dynamics_linear import torsional_mode
 from sims.reduced_fe.dynamics_respond import TRANSMISSION_ERROR, respond
 from sims.reduced_fe.dynamics_start import start_state
+from sims.reduced_fe.simulator import NAME, prepare_preset
 from tests.sims.reduced_fe.flexible_pairs import pair_of, synthetic_pair
 
 STEADY = Operation.steady(2000.0, 170.0)
@@ -224,9 +227,19 @@ def test_convergence_of_the_preset_is_stated():
     found = check_convergence(pair_of(), STEADY, 5e-6, 0.02)
     assert found.is_enough
     assert "rms off by" in found.text
-    assert not check_convergence(pair_of(), STEADY, 2e-5, 0.01).is_enough
+    assert check_convergence(pair_of(), STEADY, 2e-5, 0.01).step_s < 2e-5  # what a simulation would take
 
 
 def test_unknown_signals_are_refused():
     with pytest.raises(InputError, match="did you mean mesh_force_n"):
         respond(pair_of(), STEADY, duration_s=1e-3, signals=("mesh_force",))
+
+
+def test_a_run_starts_on_a_tooth_that_stands_ahead_of_its_place():
+    """At next to no load a tooth ahead carries before the others would touch: the balance lies below their contact."""
+    chosen, operation = preset(NAME, "flexible_50_50"), Operation.steady(2000.0, 1.0)
+    for seed in range(4):
+        setting = EffectSetting("pitch_error", 50.0, {})
+        pair = prepare_preset(chosen, {}, (setting,), operation, np.random.default_rng(seed)).pair
+        response = respond(pair, operation, duration_s=1e-4)
+        assert response["mesh_force_n"][0] == pytest.approx(1.0 / RB_M, rel=0.3)
