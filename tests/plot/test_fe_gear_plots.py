@@ -5,6 +5,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 from matplotlib.text import Text
+from scipy.spatial import Delaunay
 
 from gearsig.errors import InputError
 from gearsig.plot.fe_gear import gear_mesh_figure, gear_modes_figure, gear_stress_figure
@@ -75,6 +76,17 @@ def test_long_thin_triangles_are_shaded_without_streaks_or_holes():
     middle = (np.arange(shaded.shape[0]) + 0.5) / shaded.shape[0]
     assert not np.ma.getmaskarray(shaded).any()
     np.testing.assert_allclose(shaded, 3.0 * middle + middle[:, None], atol=4.0 / shaded.shape[0])
+
+
+def test_oblique_triangles_leave_no_holes():
+    points = np.vstack([SQUARE, np.random.default_rng(1).random((300, 2))])
+    triangles = Delaunay(points).simplices
+    axes = new_figure(4.0).add_subplot()
+    shaded = draw_shaded(
+        axes, points, triangles, points[:, 0], window=(0.0, 1.0, 0.0, 1.0), limits=(0.0, 1.0), cmap="viridis"
+    ).get_array()
+    assert not np.ma.getmaskarray(shaded)[1:-1, 1:-1].any()
+    np.testing.assert_allclose(shaded[1:-1, 1:-1], np.broadcast_to(shaded[1, 1:-1], (638, 638)), atol=2.0 / 640)
 
 
 def test_wrong_shapes_are_refused():
