@@ -253,8 +253,9 @@ def _squares(left: FloatArray, floors: FloatArray) -> FloatArray:
 
     It never ceases to rise: a fit must find its way to a change that is larger than anything that it starts from.
     """
-    further = np.maximum(np.abs(left / floors) / LARGEST_DISTANCE, 1.0)
-    near = np.minimum(np.abs(left / floors), LARGEST_DISTANCE)
+    distances = np.abs(left / floors)
+    near = np.minimum(distances, LARGEST_DISTANCE)
+    further = np.maximum(distances / LARGEST_DISTANCE, 1.0)
     squares: FloatArray = (near * FLOOR_IN_DEVIATIONS) ** 2 * (1.0 + 2.0 * np.log(further))
     return squares
 

@@ -46,7 +46,7 @@ def shrinkage(paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str)
     """Return the shrinkage of the gap by an effect, mean over folds.
 
     shrink = 1 − (r² − n²)/(o² − n²) on the effect's own features: o the gap before, r what is left, n what the floors
-    themselves make; the effect's severity and options are fitted to the other part of the data.
+    themselves make, o and r no less than n; the effect's severity and options are fitted to the other part of the data.
 
     The intervals hold the scatter of what is scored, from its blocks of revolutions; that of the fit is not in them.
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from sims.gear_pair.measurement import COORDINATES, POSITIONS
+from sims.gear_pair.measurement import COORDINATES
 
-__all__ = ["COORDINATES", "N_COORDINATES", "POSITIONS", "SIGNALS"]
+__all__ = ["COORDINATES", "N_COORDINATES", "SIGNALS"]
 
 N_COORDINATES = len(COORDINATES)
-"""In rad and m; their velocities and accelerations follow in the same order."""
 
 SIGNALS = (
     *COORDINATES,

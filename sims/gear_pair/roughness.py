@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from sims.machine import Machine
@@ -13,8 +15,6 @@ def draw_roughness(machine: Machine, rng: np.random.Generator) -> tuple[Machine,
 
     Composite roughness S is shared evenly by the two flanks of a pair: each has S/√2.
     """
-    from dataclasses import replace
-
     rough, pair = machine.roughness, machine.mesh.pair
     endless = FractalSurface.of_roughness(rough.rms_um if rough.locked_to == "time" else 0.0, rough.dimension)
     profile = TimeLockedRoughness.draw(endless, rng)
