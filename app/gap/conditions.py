@@ -107,8 +107,10 @@ def with_channels_of(simulation: Gathered, now: Gathered) -> Gathered:
 
 
 def compare(now: Gathered, simulation: Gathered, reference: Gathered | None) -> Features:
-    """Return the change against the reference, or else against the simulation."""
-    return difference_features(now, simulation) if reference is None else change_features(now, reference)
+    """Return the change against the reference, or else against the simulation as far as it is credible."""
+    if reference is not None:
+        return change_features(now, reference)
+    return difference_features(now, simulation, load_population().credibility)
 
 
 def facts_of(recording: Recording, rig: Rig, now: Gathered, name: str, twin: Twin) -> ConditionFacts:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from app.gap.candidates import Tried, refuse_without_candidates, try_effects
 from app.gap.conditions import Condition
+from gearsig.gap.floors import gap_size
 from gearsig.gap.posterior import GapCalibration, load_gap_calibration, score_of
 from gearsig.gap.recognise import load_recogniser
 from gearsig.gap.simulator import GapEffect, Twin
@@ -33,6 +34,8 @@ class Weighed:
         Effect → how it was tried.
     with_reference : bool
         Whether every condition has one.
+    size : float
+        Of the gap in structural floors; of several conditions the largest.
     unheard_of : tuple of str
         Effects that the forests do not know, the user's own: each was to be tried.
     """
@@ -40,6 +43,7 @@ class Weighed:
     forest: Mapping[str, float]
     tried: dict[str, Tried]
     with_reference: bool
+    size: float
     unheard_of: tuple[str, ...] = ()
 
     @property
@@ -54,7 +58,7 @@ class Weighed:
 
     def probabilities(self) -> dict[str, float]:
         """Return cause → probability, likeliest first; calibrated, but for effects that the forests do not know."""
-        found = self.calibration.probabilities(self.forest, self.scores)
+        found = self.calibration.probabilities(self.forest, self.scores, self.size)
         return shared(found, {name: self.scores[name] for name in self.unheard_of if name in self.tried})
 
 
@@ -94,14 +98,20 @@ def weigh(
     """
     forest = _forest(conditions, effects, known)
     with_reference = all(c.reference is not None for c in conditions)
-    first = load_gap_calibration(with_reference=with_reference).probabilities(forest, {})
+    size = max(_size(condition) for condition in conditions)
+    first = load_gap_calibration(with_reference=with_reference).probabilities(forest, {}, size)
     likely = [name for name, p in first.items() if name in known and p >= LEAST_TRIED_PROBABILITY][:most_tried]
     heard_of = _known_to_forests(conditions)
     own = [name for name in effects or known if name not in heard_of] if most_tried else []
     likely += own
     tried = try_effects([known[name] for name in likely], twin, conditions, cache, on_progress, fresh=fresh)
     refuse_without_candidates(tried, likely)
-    return Weighed(forest, tried, with_reference, tuple(own))
+    return Weighed(forest, tried, with_reference, size, tuple(own))
+
+
+def _size(condition: Condition) -> float:
+    floor = load_recogniser(with_reference=condition.reference is not None).floor
+    return gap_size(condition.change, floor).structural.value
 
 
 def _known_to_forests(conditions: Sequence[Condition]) -> set[str]:

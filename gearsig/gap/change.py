@@ -64,9 +64,16 @@ def change_once(now: Gathered, sound: Gathered) -> tuple[tuple[str, ...], FloatA
     return _joined(names, here - before, now, sound)
 
 
-def difference_features(now: Gathered, simulated: Gathered) -> Features:
-    """Return the differences of all features alone: a simulation's flanks are not this machine's."""
-    (names, here), before = whole_and_parts(now), whole_and_parts(simulated)[1]
+def difference_features(now: Gathered, simulated: Gathered, credibility: FloatArray | float = 1.0) -> Features:
+    """Return the differences of all features alone: a simulation's flanks are not this machine's.
+
+    Parameters
+    ----------
+    now, simulated : Gathered
+    credibility : array, (n_features,), or float
+        How much of what the simulation says of each feature is subtracted, see `gearsig.gap.population`.
+    """
+    (names, here), before = whole_and_parts(now), credibility * whole_and_parts(simulated)[1]
     return _with_scatter(names, here[0] - before[0], here[1:] - before[0], here[0] - before[1:])
 
 

@@ -31,8 +31,10 @@ class Population:
         Of the columns; the first changes are the differences of the features.
     changes, change_scatter : arrays, (n, n_changes)
         Against a sound recording of the same machine on another day, and standard errors.
-    gaps, gap_scatter : arrays, (n, n_features)
-        Against the twin that knows the rig file only.
+    features, feature_scatter : arrays, (n, n_features)
+        Of the recording itself, and standard errors.
+    simulated, simulated_scatter : arrays, (n, n_features)
+        Of the twin that knows the rig file only.
     loads_n_per_mm : array, (n,)
         Of the teeth.
     """
@@ -43,8 +45,10 @@ class Population:
     feature_names: tuple[str, ...]
     changes: FloatArray
     change_scatter: FloatArray
-    gaps: FloatArray
-    gap_scatter: FloatArray
+    features: FloatArray
+    feature_scatter: FloatArray
+    simulated: FloatArray
+    simulated_scatter: FloatArray
     loads_n_per_mm: FloatArray
 
     @cached_property
@@ -54,14 +58,49 @@ class Population:
         return StructuralFloor.of_healthy(self.change_names, self.changes[sound])
 
     @cached_property
+    def credibility(self) -> FloatArray:
+        """How much of what the simulation says of each feature holds for sound machines, 0 to 1, (n_features,)."""
+        sound = self.causes == NONE
+        return credibility_of(self.features[sound], self.simulated[sound])
+
+    @cached_property
+    def gaps(self) -> FloatArray:
+        """What the simulation, as far as it is credible, leaves of the features, (n, n_features)."""
+        gaps: FloatArray = self.features - self.credibility * self.simulated
+        return gaps
+
+    @cached_property
+    def gap_scatter(self) -> FloatArray:
+        """Standard errors of the gaps."""
+        scatter: FloatArray = np.hypot(self.feature_scatter, self.credibility * self.simulated_scatter)
+        return scatter
+
+    @cached_property
     def simulation_floor(self) -> StructuralFloor:
-        """By how much sound machines differ from a simulation that knows their rig file."""
+        """By how much sound machines differ from what a simulation that knows their rig file lets expect."""
         sound = self.causes == NONE
         return StructuralFloor.of_healthy(self.feature_names, self.gaps[sound])
 
     def floor(self, *, with_reference: bool) -> StructuralFloor:
         """Return the floor of one way of comparing."""
         return self.reference_floor if with_reference else self.simulation_floor
+
+
+def credibility_of(features: FloatArray, simulated: FloatArray) -> FloatArray:
+    """Return the slope of sound machines' features over those of their simulations, cut to 0 … 1.
+
+    A simulation knows how a figure goes with geometry, speed and load, and little of how impulsive or how uneven a
+    machine is: subtracting all of what it says adds its own scatter there. The slope is what leaves least.
+
+    Source: the credibility factor of H. Bühlmann, "Experience rating and credibility", ASTIN Bulletin 4 (1967).
+
+    Parameters
+    ----------
+    features, simulated : arrays, (n, n_features)
+    """
+    own, twin = features - features.mean(axis=0), simulated - simulated.mean(axis=0)
+    slope: FloatArray = (own * twin).sum(axis=0) / np.maximum((twin**2).sum(axis=0), 1e-9)
+    return np.clip(slope, 0.0, 1.0)
 
 
 @cache
@@ -82,10 +121,11 @@ def load_population(path: Path = FILE) -> Population:
             where=path.name,
             remedy="make it again: python -m app.calibration.gap.population",
         ) from None
+    of_rigs = np.searchsorted(arrays["simulated_rigs"], arrays["rigs"])
     tables = {
         name: np.asarray(arrays[name], dtype=np.float64)
-        for name in ("changes", "change_scatter", "gaps", "gap_scatter", "loads_n_per_mm")
-    }
+        for name in ("changes", "change_scatter", "features", "feature_scatter", "loads_n_per_mm")
+    } | {name: np.asarray(arrays[name], dtype=np.float64)[of_rigs] for name in ("simulated", "simulated_scatter")}
     return Population(
         arrays["rigs"],
         arrays["causes"],

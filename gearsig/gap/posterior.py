@@ -19,12 +19,16 @@ LIKELIER_THAN_NOT = 0.5
 """Probability from which a cause is likelier than all others together. No effect is named below it, nor are two that
 have less together: then what is wrong is unknown, however sure it is that something is."""
 
+SIZES = (0.3, 6.0)
+"""Structural floors that a gap's size counts from and to."""
+
 _NUMBERS = ("sharpness", "shrink_weight", "neutral_shrink", "none_bias", "unknown_bias", "named_from", "apart")
+_FURTHER = ("sharper", "none_slope")
 
 
 @dataclass(frozen=True)
 class GapCalibration:
-    """p ∝ exp(a ln p_forest + b (score − s0) + c[kind]), fitted to blind cases kept for that.
+    """p ∝ exp(a s^κ ln p_forest + b (score − s0) + c[kind] + d[kind] ln s), s the gap's size, fitted to blind cases.
 
     Parameters
     ----------
@@ -43,6 +47,8 @@ class GapCalibration:
     effect_biases : mapping
         c of effects: of machines that others built some look more often, some less often, like what the population
         shows than that says. 0 where it is missing.
+    sharper, none_slope : float
+        κ, and d of no gap: of a large gap more can be said, and hardly that it is none.
     """
 
     sharpness: float
@@ -53,19 +59,24 @@ class GapCalibration:
     named_from: float
     apart: float
     effect_biases: Mapping[str, float] = field(default_factory=dict)
+    sharper: float = 0.0
+    none_slope: float = 0.0
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> GapCalibration:
         """Build it from what a JSON file holds."""
         biases = {name: float(value) for name, value in values.get("effect_biases", {}).items()}
-        return cls(**{name: float(values[name]) for name in _NUMBERS}, effect_biases=biases)
+        further = {name: float(values.get(name, 0.0)) for name in _FURTHER}
+        return cls(**{name: float(values[name]) for name in _NUMBERS}, effect_biases=biases, **further)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return plain values, for a JSON file."""
-        numbers: dict[str, Any] = {name: round(float(getattr(self, name)), 4) for name in _NUMBERS}
+        numbers: dict[str, Any] = {name: round(float(getattr(self, name)), 4) for name in (*_NUMBERS, *_FURTHER)}
         return numbers | ({"effect_biases": dict(self.effect_biases)} if self.effect_biases else {})
 
-    def probabilities(self, forest: Mapping[str, float], scores: Mapping[str, float]) -> dict[str, float]:
+    def probabilities(
+        self, forest: Mapping[str, float], scores: Mapping[str, float], size: float = 1.0
+    ) -> dict[str, float]:
         """Return cause → probability, likeliest first.
 
         Parameters
@@ -74,14 +85,18 @@ class GapCalibration:
             Cause → probability by the forest.
         scores : mapping
             Effect → score of those that were tried.
+        size : float
+            Of the gap, in structural floors.
         """
+        counted = float(np.clip(size, *SIZES))
+        sharpness = self.sharpness * counted**self.sharper
         levels = {
-            name: self.sharpness * float(np.log(max(p, 1e-9)))
+            name: sharpness * float(np.log(max(p, 1e-9)))
             + self.shrink_weight * (scores.get(name, self.neutral_shrink) - self.neutral_shrink)
             + self.effect_biases.get(name, 0.0)
             for name, p in forest.items()
         }
-        levels[NONE] += self.none_bias
+        levels[NONE] += self.none_bias + self.none_slope * float(np.log(counted))
         levels[UNKNOWN] += self.unknown_bias
         top = max(levels.values())
         weights = {name: float(np.exp(level - top)) for name, level in levels.items()}

@@ -97,10 +97,11 @@ def input_rows(
     Not the features themselves: a tachometer that jitters more than any in the population is no hunting speed. Levels
     come twice, as they changed and as far as that holds both relative to the mesh and by itself. Where two averages
     can be subtracted, what a tooth did is in the difference: the change of either average's own figures is left out.
-    Against a simulation the speed is: every drive and tachometer wanders, and a simulation knows neither.
+    Against a simulation, of the speed only how much it swings counts: how steadily it does, beside the tachometer's
+    jitter, says more of the tachometer.
     """
     patterns = any(name.startswith(SURPRISE) for name in floor.names)
-    left_out = "tooth." if patterns else "speed."
+    left_out = "tooth." if patterns else ("speed.drift", "speed.swing_line")
     kept = [i for i, name in enumerate(floor.names) if not name.startswith(left_out)]
     names = [floor.names[i] for i in kept]
     distances = floor.from_centre(floor.names, changes)[:, kept]

@@ -101,13 +101,13 @@ def floors_text(report: GapReport) -> str:
     """Say what the recordings are compared with, and what the two floors are; empty where nothing was simulated."""
     if not report.is_simulated:
         return ""
-    structural, beside = "what healthy machines differ by from this simulator", ""
+    structural, beside = "what healthy machines differ by from that", ""
     if report.references:
         known = f"Compared with the same machine when it was sound ({', '.join(report.references)}). "
         structural = "what healthy machines change by from one recording to another"
         beside = " The curves show the recording beside the simulation."
     else:
-        known = "Compared with the simulation of the sound machine. "
+        known = "Compared with what the simulation of the sound machine lets expect, as far as it is credible. "
     return (
         f"{known}A structural floor is {structural}; they exceed 1 once in twenty. A repeatability floor is what this "
         f"machine differs by from itself, from one stretch to the next. A place counts against its own features alone: "

@@ -19,23 +19,27 @@ def drawn(n: int, truth: GapCalibration, seed: int = 3) -> list[WeighedCase]:
     for _ in range(n):
         forest = dict(zip(CAUSES, rng.dirichlet(np.full(len(CAUSES), 0.7)).tolist(), strict=True))
         scores = {name: float(rng.uniform(-1.0, 1.0)) for name in CAUSES[:3]}
-        p = truth.probabilities(forest, scores)
-        cases.append(WeighedCase((str(rng.choice(list(p), p=list(p.values()))),), forest, scores))
+        size = float(np.exp(rng.uniform(-1.0, 1.5)))
+        p = truth.probabilities(forest, scores, size)
+        cases.append(WeighedCase((str(rng.choice(list(p), p=list(p.values()))),), forest, scores, size))
     return cases
 
 
 @pytest.mark.parametrize(("sharpness", "weight"), [(0.6, 2.0), (1.3, 0.5)])
 def test_the_drawn_calibration_is_found(sharpness: float, weight: float) -> None:
-    fitted = fit_calibration(drawn(3000, GapCalibration(sharpness, weight, 0.2, 0.7, -0.5, 0.5, 0.65)))
+    truth = GapCalibration(sharpness, weight, 0.2, 0.7, -0.5, 0.5, 0.65, sharper=0.4, none_slope=-1.0)
+    fitted = fit_calibration(drawn(3000, truth))
     assert fitted.sharpness == pytest.approx(sharpness, rel=0.2)
     assert fitted.shrink_weight == pytest.approx(weight, abs=0.3)
     assert fitted.none_bias == pytest.approx(0.7, abs=0.3)
     assert fitted.unknown_bias == pytest.approx(-0.5, abs=0.3)
+    assert fitted.sharper == pytest.approx(0.4, abs=0.15)
+    assert fitted.none_slope == pytest.approx(-1.0, abs=0.4)
 
 
 def test_few_healthy_cases_get_an_effect() -> None:
     cases = drawn(1500, GapCalibration(1.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.65))
     fitted = fit_calibration(cases)
-    found = [fitted.probabilities(c.forest, c.scores) for c in cases if c.truths == (NONE,)]
+    found = [fitted.probabilities(c.forest, c.scores, c.size) for c in cases if c.truths == (NONE,)]
     named = [1.0 - p[NONE] - p[UNKNOWN] >= fitted.named_from for p in found]
     assert 0.0 < np.mean(named) <= FALSE_ON_NONE + 1.5 / len(found)

@@ -29,6 +29,15 @@ def test_what_shrinks_the_gap_gains() -> None:
     assert next(iter(weighed)) == "eccentricity"
 
 
+def test_of_a_large_gap_more_is_said_and_less_that_it_is_none() -> None:
+    calibration = GapCalibration(1.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.65, sharper=0.3, none_slope=-1.0)
+    small, usual, large = (calibration.probabilities(FOREST, {}, size) for size in (0.5, 1.0, 4.0))
+    assert usual == pytest.approx(FOREST)
+    assert small["root_crack"] < usual["root_crack"] < large["root_crack"]
+    assert small[NONE] > usual[NONE] > large[NONE]
+    assert GapCalibration.from_mapping(calibration.to_mapping()) == calibration
+
+
 def test_outcomes() -> None:
     def outcome(**given: float) -> GapOutcome:
         rest = 1.0 - sum(given.values())

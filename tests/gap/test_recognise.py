@@ -28,7 +28,8 @@ def on_half(population: Population) -> Recogniser:
 
 
 def some(population: Population, rows: np.ndarray) -> Population:
-    tables = ("rigs", "causes", "changes", "change_scatter", "gaps", "gap_scatter", "loads_n_per_mm")
+    tables = ("rigs", "causes", "changes", "change_scatter", "features", "feature_scatter")
+    tables += ("simulated", "simulated_scatter", "loads_n_per_mm")
     return replace(population, **{name: getattr(population, name)[rows] for name in tables})
 
 

@@ -92,6 +92,7 @@ def weigh_case(index: int, most_tried: int) -> list[dict[str, Any]]:
                 "truths": truths,
                 "level": wanted.get("level"),
                 "with_reference": weighed.with_reference,
+                "size": weighed.size,
                 "forest": dict(weighed.forest),
                 "scores": weighed.scores,
             }
@@ -111,7 +112,7 @@ def _read(path: Path) -> dict[int, list[dict[str, Any]]]:
 
 
 def _case(row: dict[str, Any]) -> WeighedCase:
-    return WeighedCase(tuple(row["truths"]), row["forest"], row["scores"])
+    return WeighedCase(tuple(row["truths"]), row["forest"], row["scores"], row["size"])
 
 
 if __name__ == "__main__":

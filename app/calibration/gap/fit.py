@@ -15,8 +15,8 @@ FALSE_ON_NONE, FALSE_ON_UNKNOWN = 0.05, 0.15
 """Parts of the healthy cases, and of those outside the catalogue, on which an effect may be named."""
 
 APART = 0.65
-_START = np.array([1.0, 0.0, 0.3, 0.0, 0.0])
-_BOUNDS = ((0.1, 5.0), (0.0, 10.0), (-1.0, 1.0), (-4.0, 4.0), (-4.0, 4.0))
+_START = np.array([1.0, 0.0, 0.3, 0.0, 0.0, 0.0, 0.0])
+_BOUNDS = ((0.1, 5.0), (0.0, 10.0), (-1.0, 1.0), (-4.0, 4.0), (-4.0, 4.0), (0.0, 1.0), (-4.0, 0.0))
 _BIAS_BOUNDS = (-2.0, 2.0)
 _PRIOR = 0.5
 """Weight of the start, at which trials say nothing, beside that of one case."""
@@ -33,12 +33,14 @@ class WeighedCase:
     truths : tuple of str
         Causes that are right; two for a pair.
     forest, scores : mapping
+    size : float
         See `app.gap.weigh.Weighed`.
     """
 
     truths: tuple[str, ...]
     forest: Mapping[str, float]
     scores: Mapping[str, float]
+    size: float = 1.0
 
 
 def fit_calibration(cases: Sequence[WeighedCase]) -> GapCalibration:
@@ -55,7 +57,7 @@ def fit_calibration(cases: Sequence[WeighedCase]) -> GapCalibration:
 
     def loss(x: FloatArray) -> float:
         fitted = _calibration(x, effects)
-        right = [sum(fitted.probabilities(c.forest, c.scores)[t] for t in c.truths) for c in cases]
+        right = [sum(fitted.probabilities(c.forest, c.scores, c.size)[t] for t in c.truths) for c in cases]
         return float(-np.mean(np.log(np.maximum(right, 1e-9))) + weights @ (x - start) ** 2 / len(cases))
 
     best = minimize(loss, start, method="L-BFGS-B", bounds=[*_BOUNDS, *[_BIAS_BOUNDS] * len(effects)]).x
@@ -64,9 +66,10 @@ def fit_calibration(cases: Sequence[WeighedCase]) -> GapCalibration:
 
 
 def _calibration(x: FloatArray, effects: Sequence[str]) -> GapCalibration:
-    sharpness, weight, neutral, none, unknown, *biases = (float(v) for v in x)
+    sharpness, weight, neutral, none, unknown, sharper, none_slope, *biases = (float(v) for v in x)
+    named = dict(zip(effects, biases, strict=True))
     return GapCalibration(
-        sharpness, weight, neutral, none, unknown, 0.5, APART, dict(zip(effects, biases, strict=True))
+        sharpness, weight, neutral, none, unknown, 0.5, APART, named, sharper=sharper, none_slope=none_slope
     )
 
 
@@ -81,5 +84,5 @@ def _named_from(fitted: GapCalibration, cases: Sequence[WeighedCase]) -> float:
 
 
 def _effects(fitted: GapCalibration, case: WeighedCase) -> float:
-    p = fitted.probabilities(case.forest, case.scores)
+    p = fitted.probabilities(case.forest, case.scores, case.size)
     return 1.0 - p[NONE] - p[UNKNOWN]

@@ -23,7 +23,7 @@ GAIN_SCATTER, MODE_SCATTER, MODE_GAIN_SCATTER = 0.10, 0.03, 0.20
 NOISE_SCATTER = 0.12
 """Of the natural logarithm of the sensors' noise."""
 
-WANDER_PERCENT, WANDER_HZ, WANDER_SCATTER = (0.005, 0.1), (0.05, 1.0), 0.3
+WANDER_PERCENT, WANDER_HZ, WANDER_SCATTER = (0.005, 0.3), (0.03, 1.0), 0.4
 """Of every drive's speed: amplitude and frequency, and by how much the amplitude's logarithm differs on another day."""
 
 

@@ -74,17 +74,6 @@ def _whirl(scene: Scene, rng: np.random.Generator) -> FloatArray:
     return whirl
 
 
-def _looseness(scene: Scene, rng: np.random.Generator) -> FloatArray:
-    """Many multiples of a shaft's order or of its half."""
-    order = (1.0, scene.teeth[0] / scene.teeth[1])[int(rng.integers(2))] * float(rng.choice((0.5, 1.0)))
-    waves = [
-        np.sin(2 * np.pi * k * order * scene.revolutions + rng.uniform(0, 6)) * float(rng.uniform(0.3, 1.0))
-        for k in range(1, 14)
-    ]
-    loose: FloatArray = np.sum(waves, axis=0)
-    return loose
-
-
 def _other_machine(scene: Scene, rng: np.random.Generator) -> FloatArray:
     """Lines at fixed frequencies, and their multiples."""
     first = float(np.exp(rng.uniform(np.log(17.0), np.log(900.0))))
@@ -122,6 +111,14 @@ def _steady_noise(scene: Scene, rng: np.random.Generator) -> FloatArray:
     return band_noise(scene, rng)
 
 
+def _bad_contact(scene: Scene, rng: np.random.Generator) -> FloatArray:
+    """A plug that works loose: the signal jumps now and then, and what couples it to the amplifier takes that back."""
+    n = max(2, int(scene.time_s[-1] * log_uniform(rng, 1.0, 60.0)))
+    places = rng.integers(0, len(scene.time_s), n).astype(np.float64)
+    back = np.exp(-np.arange(int(scene.sampling_rate_hz)) / (log_uniform(rng, 0.001, 0.2) * scene.sampling_rate_hz))
+    return struck(places, rng.standard_normal(n), scene, back)
+
+
 FOREIGN: dict[str, Callable[[Scene, np.random.Generator], FloatArray]] = {
     "rolling element": _rolling_element,
     "knocks at a strange order": _strange_knocks,
@@ -129,10 +126,10 @@ FOREIGN: dict[str, Callable[[Scene, np.random.Generator], FloatArray]] = {
     "tone at a strange order": _strange_tone,
     "ghost line": _ghost,
     "whirl": _whirl,
-    "looseness": _looseness,
     "another machine": _other_machine,
     "inverter": _inverter,
     "random knocks": _random_knocks,
     "swelling noise": _swelling_noise,
     "steady noise": _steady_noise,
+    "bad contact": _bad_contact,
 }

@@ -14,8 +14,8 @@ from gearsig.gap.population import FILE
 TABLES = {
     "changes": "change",
     "change_scatter": "change_scatter",
-    "gaps": "gap",
-    "gap_scatter": "gap_scatter",
+    "features": "features",
+    "feature_scatter": "feature_scatter",
 }
 """Name in the library → name in the raw tables."""
 
@@ -28,14 +28,19 @@ def main() -> None:
     given = parser.parse_args()
     raw = [np.load(path, allow_pickle=False) for path in given.raw]
     tables = {name: _rounded(np.concatenate([one[key] for one in raw])) for name, key in TABLES.items()}
+    rigs = np.concatenate([one["rig"] for one in raw]).astype(np.int64)
+    simulated_rigs, first = np.unique(rigs, return_index=True)  # one twin for all recordings of a machine
+    for name in ("simulated", "simulated_scatter"):
+        tables[name] = _rounded(np.concatenate([one[name] for one in raw])[first])
     np.savez_compressed(
         given.to,
         allow_pickle=False,
-        rigs=np.concatenate([one["rig"] for one in raw]).astype(np.int64),
+        rigs=rigs,
+        simulated_rigs=simulated_rigs,
         causes=np.concatenate([one["label"] for one in raw]),
         loads_n_per_mm=np.concatenate([one["load_n_per_mm"] for one in raw]).astype(np.float32),
         change_names=raw[0]["change_names"],
-        feature_names=raw[0]["gap_names"],
+        feature_names=raw[0]["feature_names"],
         **tables,
     )
     typer.echo(f"{len(tables['changes'])} recordings; {given.to.stat().st_size / 1e6:.1f} MB")

@@ -25,7 +25,8 @@ from app.calibration.rigs import DrawnRig
 from app.calibration.simulate import SAMPLING_RATE_HZ, simulate_rig, turns_before
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap.change import change_features, difference_features
+from gearsig.gap.change import change_features
+from gearsig.gap.features import features_of
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.simulator import Point
@@ -37,13 +38,16 @@ from sims.effects import EffectSetting, effects
 from sims.gear_pair.usual import nominal_of
 
 SEED = 4107
-N_SOUND, N_MOUNTED_ANEW, N_FOREIGN, N_BY_HAND = 3, 8, 14, 6
+N_SOUND, N_MOUNTED_ANEW, N_FOREIGN, N_BY_HAND = 3, 6, 10, 4
 
 ONE_SENSOR_SHARE = 0.4
 """Machines of which one sensor's signal is known."""
 
 LIGHT_LOAD_N_PER_MM = 50.0
 """Of the teeth, up to which they may part and the backlash shows."""
+
+SIMULATED_SHARE = 0.5
+"""Of the effects with a signature by hand that are simulated on a machine as well."""
 
 AT_THE_END = ("clipping", "transfer_path")
 """Effects of what records: made by hand only, since what a machine's tolerances do comes before."""
@@ -64,8 +68,10 @@ class Sample:
         Of the teeth.
     change, change_scatter : arrays, (n_changes,)
         Against the sound reference.
-    gap, gap_scatter : arrays, (n_features,)
-        Against the twin that knows the rig file only.
+    features, feature_scatter : arrays, (n_features,)
+        Of the recording itself.
+    simulated, simulated_scatter : arrays, (n_features,)
+        Of the twin that knows the rig file only.
     """
 
     rig: int
@@ -76,8 +82,10 @@ class Sample:
     load_n_per_mm: float
     change: FloatArray
     change_scatter: FloatArray
-    gap: FloatArray
-    gap_scatter: FloatArray
+    features: FloatArray
+    feature_scatter: FloatArray
+    simulated: FloatArray
+    simulated_scatter: FloatArray
 
 
 def main() -> None:
@@ -109,14 +117,14 @@ def write(path: Path, samples: list[Sample], names: tuple[tuple[str, ...], tuple
     }
     tables = {
         key: np.array([getattr(s, key) for s in samples], dtype=np.float32)
-        for key in ("change", "change_scatter", "gap", "gap_scatter")
+        for key in ("change", "change_scatter", "features", "feature_scatter", "simulated", "simulated_scatter")
     }
     part = path.with_suffix(".part.npz")
     np.savez_compressed(
         part,
         allow_pickle=False,
         change_names=np.array(names[0]),
-        gap_names=np.array(names[1]),
+        feature_names=np.array(names[1]),
         **rows,
         **tables,
     )
@@ -146,7 +154,7 @@ def one_rig(index: int) -> tuple[list[Sample], tuple[tuple[str, ...], tuple[str,
             samples.append(_sample(index, label, detail, severity, torque_nm, recording, (sound, simulated)))
         except (InputError, RefusalError) as error:
             typer.echo(f"gearbox {index}, {label}: {error}")
-    names = change_features(sound, sound).names, difference_features(sound, simulated).names
+    names = change_features(sound, sound).names, features_of(simulated).names
     return samples, names
 
 
@@ -160,7 +168,7 @@ def _sample(
     others: tuple[Gathered, Gathered],
 ) -> Sample:
     now = reduced(recording, rig)
-    change, gap = change_features(now, others[0]), difference_features(now, others[1])
+    change, own, twin = change_features(now, others[0]), features_of(now), features_of(others[1])
     return Sample(
         rig,
         label,
@@ -170,8 +178,10 @@ def _sample(
         tooth_load_n_per_mm(now.frame.pair, torque_nm),
         change.values,
         change.scatter,
-        gap.values,
-        gap.scatter,
+        own.values,
+        own.scatter,
+        twin.values,
+        twin.scatter,
     )
 
 
@@ -215,6 +225,8 @@ def _recordings(
         recording, strength = _with_changed_path(ordinary, bare[i % N_SOUND], turns_before(drawn, i % N_SOUND + 1), rng)
         yield "transfer_path", "by hand", strength, recording, drawn.torque_nm
     for run, name in enumerate((e for e in effects() if e not in AT_THE_END), start=N_SOUND + 1):
+        if name in HAND_MADE and rng.uniform() > SIMULATED_SHARE:
+            continue
         day = another_day(drawn, rng)
         try:
             added = twin.draw(name, rng)

@@ -9,7 +9,10 @@ Source of the signatures: R. B. Randall, *Vibration-based Condition Monitoring*,
 ISO 13373-2:2016, annexes; P. D. McFadden, "Detecting fatigue cracks in gears by amplitude and phase demodulation of
 the meshing vibration", J. Vib. Acoust. 108 (1986); J. E. Berry, *Illustrated Vibration Diagnostic Chart*, Technical
 Associates of Charlotte, 1994 (misalignment: higher mesh harmonics with sidebands at running speed;
-looseness: many harmonics of running speed, halves, a raised floor).
+looseness: many harmonics of running speed, halves, a raised floor); S. He, S. Cho, R. Singh, "Prediction of dynamic
+friction forces in spur gears using alternate sliding friction formulations", J. Sound Vib. 309 (2008); M. Tiwari,
+K. Gupta, O. Prakash, "Effect of radial internal clearance of a ball bearing on the dynamics of a balanced horizontal
+rotor", J. Sound Vib. 238 (2000) (a larger clearance makes the support softer).
 """
 
 from __future__ import annotations
@@ -113,13 +116,20 @@ def _tooth_knocks(
 
 
 def _root_crack(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
-    """A softer tooth: it comes late, the mesh swings on for a tooth or two; hardly any blow."""
+    """A softer tooth: it comes late and gives way while it carries, slower than the mesh; the mesh swings on.
+
+    A deep crack lets the next tooth strike.
+    """
     side = _side(rng)
     window, place = _tooth_window(scene, side, float(rng.uniform(0.8, 2.0)), rng)
-    gain, late, blow = _balance(rng, 3) * (0.8, 1.0, 0.7)
+    gain, late, blow, slow = _balance(rng, 4) * (0.8, 1.0, 4.0, 2.0)
     knock = _tooth_knocks(scene, side, place, 0.03, rng)
+    giving_way = np.gradient(np.gradient(window))
+    giving_way /= max(float(np.abs(giving_way).max()), 1e-12)
     return Signature(
-        1.0 + _sign(rng) * gain * size * window, _late(scene, late * size, window, rng), (blow * size * knock,)
+        1.0 + _sign(rng) * gain * size * window,
+        _late(scene, late * size, window, rng),
+        (blow * size * knock, slow * size * giving_way),
     )
 
 
@@ -144,16 +154,30 @@ def _chipped_tooth(scene: Scene, size: float, rng: np.random.Generator) -> Signa
     return Signature(
         1.0 + _sign(rng) * size * rng.uniform(0.3, 1.2) * window,
         _late(scene, size * rng.uniform(0.3, 1.2), window, rng),
-        (6.0 * size * rng.uniform(0.5, 1.0) * blow,),
+        (6.0 * size * 10.0 ** -rng.uniform(0.0, 0.7) * blow,),
     )
 
 
 def _tooth_wear(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
-    """A profile that is worn away from the pitch line: mesh harmonics grow, the second and higher ones most."""
-    gains = 1.0 + 4.0 * size * np.abs(rng.standard_normal(N_MESH_HARMONICS)) * rng.choice((0.3, 1.0), N_MESH_HARMONICS)
-    noise = 0.4 * size * rng.uniform() * _at_the_mesh(scene, band_noise(scene, rng), rng)
-    no_two_alike = _partly(rng) * _uneven(scene, rng)
-    return Signature(added=(noise,), mesh_gains=tuple(gains.tolist()), uneven=no_two_alike)
+    """A profile that is worn away from the pitch line: mesh harmonics grow, the higher the more; rough flanks.
+
+    What modulates the mesh grows less than the mesh does: all alike would be another path.
+    """
+    gains = 1.0 + 8.0 * size * np.abs(rng.standard_normal(N_MESH_HARMONICS)) * _steeply(rng)[::-1]
+    noise = size * rng.uniform() ** 2 * _at_the_mesh(scene, band_noise(scene, rng), rng)
+    return Signature(
+        added=(noise,),
+        mesh_gains=tuple(gains.tolist()),
+        paths_scatter=0.4 * size * _partly(rng),
+        around=0.5 * _partly(rng),
+        uneven=_partly(rng) * _uneven(scene, rng),
+    )
+
+
+def _steeply(rng: np.random.Generator) -> FloatArray:
+    """Return shares of the mesh harmonics that fall with their number, from nearly not to steeply."""
+    shares: FloatArray = np.arange(1.0, N_MESH_HARMONICS + 1.0) ** -rng.uniform(0.2, 2.0)
+    return shares
 
 
 def _partly(rng: np.random.Generator) -> float:
@@ -214,13 +238,21 @@ def _born_with(scene: Scene, side: int, rng: np.random.Generator) -> FloatArray:
 
 
 def _sliding_friction(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
-    """A force along the flanks that turns round at the pitch point: twice per mesh, and some noise."""
-    gains = np.ones(N_MESH_HARMONICS)
-    gains += 1.5 * size * rng.standard_normal(N_MESH_HARMONICS) * (0.4, 1.0, 0.6, 1.0, 0.6, 1.0)
-    gains *= 1.0 + 3.0 * size * rng.uniform()  # across the line of action there is little besides
+    """A force along the flanks that turns round at the pitch point, and some noise.
+
+    Nearly a square wave of the mesh: its harmonics fall with their number. Across the line of action there is little
+    besides, so that it may be far louder than what was there.
+    """
+    waves = np.abs(1.0 + 0.5 * rng.standard_normal(N_MESH_HARMONICS)) * _steeply(rng)
+    gains = 1.0 + size * 10.0 ** rng.uniform(0.0, 1.0) * waves
+    gains *= np.exp(0.7 * size * rng.standard_normal(N_MESH_HARMONICS))  # it may also be against what was there
     noise = 0.8 * size * rng.uniform(0.2, 1.0) * _at_the_mesh(scene, band_noise(scene, rng), rng)
     return Signature(
-        added=(noise,), mesh_gains=tuple(np.maximum(gains, 0.1).tolist()), around=float(rng.uniform(0.3, 1.0))
+        added=(noise,),
+        mesh_gains=tuple(gains.tolist()),
+        paths_scatter=0.7 * size * _partly(rng),
+        around=_partly(rng),
+        uneven=_partly(rng) * _uneven(scene, rng),
     )
 
 
@@ -242,11 +274,14 @@ def _modulated(
 
 
 def _eccentricity(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
-    """Run-out: the mesh swings once per turn in size and phase; the shaft's own line, and its second, may show."""
+    """Run-out: the mesh swings once per turn in size and phase; the shaft's own line, and its second, may show.
+
+    The gear's mass is off the axis as well, so that the line may be as large as that of an unbalance: the mesh tells.
+    """
     order = scene.shaft_orders[_side(rng)]
-    gain, late = 10.0 ** (-rng.uniform(0.0, 0.7, 2))
-    first = float(rng.choice((0.0, 1.0))) * rng.uniform(0.0, 1.0)
-    second = first * rng.uniform(0.0, 0.3)
+    gain, late = 10.0 ** (-rng.uniform(0.0, 0.9, 2))
+    first = float(rng.choice((0.0, 1.0, 1.0))) * 10.0 ** rng.uniform(-1.0, 0.5)
+    second = first * rng.uniform(0.0, 0.2)
     return _modulated(scene, order, (gain * size, late * size), (size * first, size * second), rng)
 
 
@@ -255,26 +290,37 @@ def _unbalance(scene: Scene, size: float, rng: np.random.Generator) -> Signature
     order = scene.shaft_orders[_side(rng)]
     force = size * 10.0 ** rng.uniform(0.0, 0.8)
     lines = force * np.array([1.5, 0.15 * _partly(rng), 0.15 * _partly(rng)])
-    return _modulated(scene, order, (0.05 * force * rng.uniform(), 0.1 * force * rng.uniform()), lines.tolist(), rng)
+    gain, late = 0.03 * force * rng.uniform(0.0, 1.0, 2)
+    return _modulated(scene, order, (gain, late), lines.tolist(), rng)
 
 
 def _misalignment(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
     """Two stiffness swings per turn, or a load that wanders along the teeth.
 
-    The shaft's second line, mesh harmonics from the second on, sidebands one and two apart: any of them may lead.
+    The shaft's second line, mesh harmonics from the second on, sidebands one and two apart: any of them may lead. The
+    contact wanders along the teeth, which are not alike there; forces of a coupling reach one sensor more than another.
     """
     order = scene.shaft_orders[_side(rng)]
     lines, bands, mesh = _balance(rng, 3)
     first, third = rng.uniform(0.0, 0.7, 2)
+    line = size * max(lines, 0.2) * 10.0 ** rng.uniform(0.0, 0.5)
     waves = sum(
         (w * tone(n * order, scene, rng) for n, w in ((1.0, first), (2.0, 1.0), (3.0, third))),
         np.zeros(len(scene.time_s)),
     )
     once, twice = _balance(rng, 2)
-    swing = _swing(scene, 2.0 * order, 0.6 * bands * twice * size, rng)
-    swing = swing * _swing(scene, order, 0.6 * bands * once * size, rng)
-    higher = np.append(1.0, np.exp(1.2 * mesh * size * np.abs(rng.standard_normal(N_MESH_HARMONICS - 1))))
-    return Signature(swing, None, (size * max(lines, 0.2) * waves,), tuple(higher.tolist()), around=_partly(rng))
+    swing = _swing(scene, 2.0 * order, bands * twice * size, rng)
+    swing = swing * _swing(scene, order, bands * once * size, rng)
+    higher = np.append(1.0, np.exp(2.0 * mesh * size * np.abs(rng.standard_normal(N_MESH_HARMONICS - 1))))
+    return Signature(
+        swing,
+        None,
+        (line * waves,),
+        tuple(higher.tolist()),
+        paths_scatter=0.7 * size * _partly(rng),
+        around=_partly(rng),
+        uneven=_partly(rng) * _uneven(scene, rng),
+    )
 
 
 def _torque_ripple(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
@@ -299,7 +345,7 @@ def _backlash(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
     for _ in range(int(rng.integers(1, 4))):
         rung = struck(kept, sizes, scene, ring(scene, rng))
         blows += rung / max(float(rung.std()), 1e-12)
-    gains = np.exp(1.5 * size * rng.standard_normal(N_MESH_HARMONICS))
+    gains = np.exp(1.5 * size * _partly(rng) * rng.standard_normal(N_MESH_HARMONICS))
     half = 0.5 * size * rng.uniform() * tone(scene.teeth[0] / 2.0, scene, rng)
     restless = np.maximum(1.0 + size * rng.uniform(0.0, 1.5) * _slow_noise(scene, rng), 0.0)
     return Signature(
@@ -336,11 +382,14 @@ def _inner_race(scene: Scene, size: float, rng: np.random.Generator) -> Signatur
 def _bearing_clearance(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
     """A shaft that is held less: other paths from the mesh to each sensor, lines of elements passing.
 
-    And what loose parts show: many orders of the shaft's turn, their halves, a mesh that swings with it, noise.
+    And what loose parts show: many orders of the shaft's turn, their halves, a mesh that swings with it, noise. A
+    softer support lets less through at the higher mesh harmonics.
     """
     bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
     mesh, passing, turn, loose = _balance(rng, 4)
-    gains = np.exp(1.4 * mesh * size * rng.standard_normal(N_MESH_HARMONICS))
+    turn = max(turn, float(rng.uniform(0.1, 0.5)))  # what tells it from another path
+    softer = rng.standard_normal() - rng.uniform(0.0, 0.7) * np.arange(N_MESH_HARMONICS)
+    gains = np.exp(1.4 * mesh * size * (rng.standard_normal(N_MESH_HARMONICS) + softer))
     lines = [
         0.4 * passing * size / k * tone(k * bearing["BPFO"] * float(rng.uniform(0.99, 1.0)), scene, rng) for k in (1, 2)
     ]
@@ -354,6 +403,7 @@ def _bearing_clearance(scene: Scene, size: float, rng: np.random.Generator) -> S
         mesh_gains=tuple(gains.tolist()),
         paths_scatter=1.4 * mesh * size,
         around=_partly(rng),
+        uneven=_partly(rng) * _uneven(scene, rng),
     )
 
 
