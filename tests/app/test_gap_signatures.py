@@ -20,6 +20,8 @@ EXPECTED = {
     "chipped_tooth": ("surprise.driver.peak", "surprise.driven.peak"),
     "root_crack": ("surprise.driver.peak", "surprise.driven.peak"),
     "tooth_wear": ("mesh.total",),
+    "sliding_friction": ("mesh.total",),
+    "bearing_clearance": ("shaft.driver.low", "shaft.driven.low"),
     "bearing_outer_race": ("envelope.outer",),
     "bearing_inner_race": ("envelope.inner",),
     "surface_roughness": ("floor.total", "tooth.driver.level", "tooth.driven.level"),

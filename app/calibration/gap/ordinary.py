@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from app.calibration.gap.chance import LARGEST_ADVANCE
 from app.calibration.gap.paths import PathChange
 from app.calibration.gap.scene import Scene, scene_of, tone
-from app.calibration.gap.signatures import LARGEST_ADVANCE, SIGNATURES
+from app.calibration.gap.signatures import SIGNATURES
 from app.calibration.gap.vibration import N_MESH_HARMONICS, Signature, changed, vibrations
 from app.calibration.rigs import log_uniform
 from gearsig.checks import FloatArray

@@ -22,6 +22,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.calibration.gap.chance import LARGEST_ADVANCE, balance, draw_side, partly, steeply
 from app.calibration.gap.scene import (
     Scene,
     band_noise,
@@ -32,13 +33,11 @@ from app.calibration.gap.scene import (
     struck,
     tone,
 )
+from app.calibration.gap.tooth_signatures import chipped_tooth, root_crack, tooth_spall
 from app.calibration.gap.vibration import N_MESH_HARMONICS, Signature, changed, vibrations
 from app.calibration.rigs import log_uniform
 from gearsig.checks import FloatArray
 from gearsig.recording.types import Recording
-
-LARGEST_ADVANCE = 0.35
-"""Of a mesh period, by which a tooth comes too early or too late."""
 
 LOOSE_ORDERS = 10
 """Of its shaft, up to which a loose bearing shows lines."""
@@ -78,111 +77,20 @@ def _uneven(scene: Scene, rng: np.random.Generator) -> FloatArray:
     return np.clip(total, -2.5, 2.5)
 
 
-def _side(rng: np.random.Generator) -> int:
-    return int(rng.integers(2))
-
-
-def _sign(rng: np.random.Generator) -> float:
-    return float(rng.choice((-1.0, 1.0)))
-
-
-def _balance(rng: np.random.Generator, n: int) -> FloatArray:
-    """Return n weights, the largest 1, any of the others nearly nothing."""
-    weights = 10.0 ** (-rng.uniform(0.0, 1.5, n))
-    weights[rng.uniform(size=n) < 0.25] = 0.0
-    weights[int(rng.integers(n))] = 1.0
-    found: FloatArray = weights
-    return found
-
-
-def _tooth_window(scene: Scene, side: int, width_teeth: float, rng: np.random.Generator) -> tuple[FloatArray, float]:
-    """Return 1 in the middle of one tooth's mesh, 0 away from it, and that tooth's place in revolutions."""
-    place, teeth = float(rng.uniform()), scene.teeth[side]
-    off = (scene.revolutions * scene.shaft_orders[side] - place + 0.5) % 1.0 - 0.5
-    reach = np.clip(off * teeth / width_teeth, -1.0, 1.0)
-    window: FloatArray = 0.5 + 0.5 * np.cos(np.pi * reach)
-    return window, place
-
-
-def _tooth_knocks(
-    scene: Scene, side: int, place: float, scatter: float, rng: np.random.Generator, of: int = 1
-) -> FloatArray:
-    """Return knocks when a tooth meshes, `of` of them a fraction of a pitch apart, in standard deviations at most 1."""
-    answer, order, total = ring(scene, rng), scene.shaft_orders[side], np.zeros(len(scene.time_s))
-    for _ in range(of):
-        at = passings(scene, order, -place - float(rng.uniform(0.0, 0.7)) / scene.teeth[side])
-        total += struck(at, np.maximum(rng.normal(1.0, scatter, len(at)), 0.0) * _sign(rng), scene, answer)
-    return total / max(float(np.abs(total).max()), 1e-12)
-
-
-def _root_crack(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
-    """A softer tooth: it comes late and gives way while it carries, slower than the mesh; the mesh swings on.
-
-    A deep crack lets the next tooth strike.
-    """
-    side = _side(rng)
-    window, place = _tooth_window(scene, side, float(rng.uniform(0.8, 2.0)), rng)
-    gain, late, blow, slow = _balance(rng, 4) * (0.8, 1.0, 4.0, 2.0)
-    knock = _tooth_knocks(scene, side, place, 0.03, rng)
-    giving_way = np.gradient(np.gradient(window))
-    giving_way /= max(float(np.abs(giving_way).max()), 1e-12)
-    return Signature(
-        1.0 + _sign(rng) * gain * size * window,
-        _late(scene, late * size, window, rng),
-        (blow * size * knock, slow * size * giving_way),
-    )
-
-
-def _late(scene: Scene, share: float, window: FloatArray, rng: np.random.Generator) -> FloatArray:
-    late: FloatArray = _sign(rng) * LARGEST_ADVANCE * share / scene.teeth[0] * window
-    return late
-
-
-def _tooth_spall(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
-    """A pit: short blows when the flank enters and leaves it, different each time; the mesh hardly notices."""
-    side = _side(rng)
-    window, place = _tooth_window(scene, side, float(rng.uniform(0.3, 0.8)), rng)
-    blows = _tooth_knocks(scene, side, place, float(rng.uniform(0.05, 0.4)), rng, of=2)
-    return Signature(1.0 + _sign(rng) * 0.4 * size * rng.uniform() * window, None, (4.0 * size * blows,))
-
-
-def _chipped_tooth(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
-    """A missing corner: load is lost, the next tooth takes it with a blow."""
-    side = _side(rng)
-    window, place = _tooth_window(scene, side, float(rng.uniform(0.5, 1.2)), rng)
-    blow = _tooth_knocks(scene, side, place, 0.08, rng)
-    return Signature(
-        1.0 + _sign(rng) * size * rng.uniform(0.3, 1.2) * window,
-        _late(scene, size * rng.uniform(0.3, 1.2), window, rng),
-        (6.0 * size * 10.0 ** -rng.uniform(0.0, 0.7) * blow,),
-    )
-
-
 def _tooth_wear(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
     """A profile that is worn away from the pitch line: mesh harmonics grow, the higher the more; rough flanks.
 
     What modulates the mesh grows less than the mesh does: all alike would be another path.
     """
-    gains = 1.0 + 8.0 * size * np.abs(rng.standard_normal(N_MESH_HARMONICS)) * _steeply(rng)[::-1]
+    gains = 1.0 + 8.0 * size * np.abs(rng.standard_normal(N_MESH_HARMONICS)) * steeply(rng)[::-1]
     noise = size * rng.uniform() ** 2 * _at_the_mesh(scene, band_noise(scene, rng), rng)
     return Signature(
         added=(noise,),
         mesh_gains=tuple(gains.tolist()),
-        paths_scatter=0.4 * size * _partly(rng),
-        around=0.5 * _partly(rng),
-        uneven=_partly(rng) * _uneven(scene, rng),
+        paths_scatter=0.4 * size * partly(rng),
+        around=0.5 * partly(rng),
+        uneven=partly(rng) * _uneven(scene, rng),
     )
-
-
-def _steeply(rng: np.random.Generator) -> FloatArray:
-    """Return shares of the mesh harmonics that fall with their number, from nearly not to steeply."""
-    shares: FloatArray = np.arange(1.0, N_MESH_HARMONICS + 1.0) ** -rng.uniform(0.2, 2.0)
-    return shares
-
-
-def _partly(rng: np.random.Generator) -> float:
-    """Return 0, 1 or anything between."""
-    return float(np.clip(rng.uniform(-0.5, 1.5), 0.0, 1.0))
 
 
 def _at_the_mesh(scene: Scene, noise: FloatArray, rng: np.random.Generator) -> FloatArray:
@@ -194,10 +102,10 @@ def _at_the_mesh(scene: Scene, noise: FloatArray, rng: np.random.Generator) -> F
 
 def _pitch_error(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
     """Each tooth comes early or late by its own amount: lines at all orders of its shaft."""
-    side = _side(rng)
+    side = draw_side(rng)
     teeth, turn = scene.teeth[side], scene.revolutions * scene.shaft_orders[side]
     errors, gains = (rng.standard_normal(teeth) for _ in range(2))
-    at, gain, slow = _balance(rng, 3)
+    at, gain, slow = balance(rng, 3)
     place = turn * teeth % teeth
     nodes = np.arange(teeth + 1)
     early = np.interp(place, nodes, np.append(errors, errors[0]))
@@ -213,7 +121,7 @@ def _pitch_error(scene: Scene, size: float, rng: np.random.Generator) -> Signatu
 
 def _surface_roughness(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
     """Asperities that slide over each other: noise, in bands, more or less with the mesh."""
-    loose, locked = _balance(rng, 2)
+    loose, locked = balance(rng, 2)
     total = sum(
         (_at_the_mesh(scene, band_noise(scene, rng), rng) * rng.uniform(0.3, 1.0) for _ in range(3)),
         np.zeros(len(scene.time_s)),
@@ -243,16 +151,16 @@ def _sliding_friction(scene: Scene, size: float, rng: np.random.Generator) -> Si
     Nearly a square wave of the mesh: its harmonics fall with their number. Across the line of action there is little
     besides, so that it may be far louder than what was there.
     """
-    waves = np.abs(1.0 + 0.5 * rng.standard_normal(N_MESH_HARMONICS)) * _steeply(rng)
+    waves = np.abs(1.0 + 0.5 * rng.standard_normal(N_MESH_HARMONICS)) * steeply(rng)
     gains = 1.0 + size * 10.0 ** rng.uniform(0.0, 1.0) * waves
     gains *= np.exp(0.7 * size * rng.standard_normal(N_MESH_HARMONICS))  # it may also be against what was there
     noise = 0.8 * size * rng.uniform(0.2, 1.0) * _at_the_mesh(scene, band_noise(scene, rng), rng)
     return Signature(
         added=(noise,),
         mesh_gains=tuple(gains.tolist()),
-        paths_scatter=0.7 * size * _partly(rng),
-        around=_partly(rng),
-        uneven=_partly(rng) * _uneven(scene, rng),
+        paths_scatter=0.7 * size * partly(rng),
+        around=partly(rng),
+        uneven=partly(rng) * _uneven(scene, rng),
     )
 
 
@@ -278,7 +186,7 @@ def _eccentricity(scene: Scene, size: float, rng: np.random.Generator) -> Signat
 
     The gear's mass is off the axis as well, so that the line may be as large as that of an unbalance: the mesh tells.
     """
-    order = scene.shaft_orders[_side(rng)]
+    order = scene.shaft_orders[draw_side(rng)]
     gain, late = 10.0 ** (-rng.uniform(0.0, 0.9, 2))
     first = float(rng.choice((0.0, 1.0, 1.0))) * 10.0 ** rng.uniform(-1.0, 0.5)
     second = first * rng.uniform(0.0, 0.2)
@@ -287,9 +195,9 @@ def _eccentricity(scene: Scene, size: float, rng: np.random.Generator) -> Signat
 
 def _unbalance(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
     """A force that turns with the shaft: its line, and hardly a sideband; a large one bends what holds the shaft."""
-    order = scene.shaft_orders[_side(rng)]
+    order = scene.shaft_orders[draw_side(rng)]
     force = size * 10.0 ** rng.uniform(0.0, 0.8)
-    lines = force * np.array([1.5, 0.15 * _partly(rng), 0.15 * _partly(rng)])
+    lines = force * np.array([1.5, 0.15 * partly(rng), 0.15 * partly(rng)])
     gain, late = 0.03 * force * rng.uniform(0.0, 1.0, 2)
     return _modulated(scene, order, (gain, late), lines.tolist(), rng)
 
@@ -300,15 +208,15 @@ def _misalignment(scene: Scene, size: float, rng: np.random.Generator) -> Signat
     The shaft's second line, mesh harmonics from the second on, sidebands one and two apart: any of them may lead. The
     contact wanders along the teeth, which are not alike there; forces of a coupling reach one sensor more than another.
     """
-    order = scene.shaft_orders[_side(rng)]
-    lines, bands, mesh = _balance(rng, 3)
+    order = scene.shaft_orders[draw_side(rng)]
+    lines, bands, mesh = balance(rng, 3)
     first, third = rng.uniform(0.0, 0.7, 2)
     line = size * max(lines, 0.2) * 10.0 ** rng.uniform(0.0, 0.5)
     waves = sum(
         (w * tone(n * order, scene, rng) for n, w in ((1.0, first), (2.0, 1.0), (3.0, third))),
         np.zeros(len(scene.time_s)),
     )
-    once, twice = _balance(rng, 2)
+    once, twice = balance(rng, 2)
     swing = _swing(scene, 2.0 * order, bands * twice * size, rng)
     swing = swing * _swing(scene, order, bands * once * size, rng)
     higher = np.append(1.0, np.exp(2.0 * mesh * size * np.abs(rng.standard_normal(N_MESH_HARMONICS - 1))))
@@ -317,18 +225,18 @@ def _misalignment(scene: Scene, size: float, rng: np.random.Generator) -> Signat
         None,
         (line * waves,),
         tuple(higher.tolist()),
-        paths_scatter=0.7 * size * _partly(rng),
-        around=_partly(rng),
-        uneven=_partly(rng) * _uneven(scene, rng),
+        paths_scatter=0.7 * size * partly(rng),
+        around=partly(rng),
+        uneven=partly(rng) * _uneven(scene, rng),
     )
 
 
 def _torque_ripple(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
     """The drive pulls n times per turn: that line, and sidebands of the mesh so far apart."""
-    shaft = scene.shaft_orders[_side(rng)]
+    shaft = scene.shaft_orders[draw_side(rng)]
     pulls = log_uniform(rng, 1.5, 15.0)  # motors and engines pull twice to six times rather than fifteen times
     order = shaft * (float(round(pulls)) if rng.uniform() < 0.75 else pulls)
-    gain, late, line = _balance(rng, 3)
+    gain, late, line = balance(rng, 3)
     return _modulated(scene, order, (gain * size, late * size), (size * max(line, 0.2),), rng)
 
 
@@ -345,11 +253,11 @@ def _backlash(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
     for _ in range(int(rng.integers(1, 4))):
         rung = struck(kept, sizes, scene, ring(scene, rng))
         blows += rung / max(float(rung.std()), 1e-12)
-    gains = np.exp(1.5 * size * _partly(rng) * rng.standard_normal(N_MESH_HARMONICS))
+    gains = np.exp(1.5 * size * partly(rng) * rng.standard_normal(N_MESH_HARMONICS))
     half = 0.5 * size * rng.uniform() * tone(scene.teeth[0] / 2.0, scene, rng)
     restless = np.maximum(1.0 + size * rng.uniform(0.0, 1.5) * _slow_noise(scene, rng), 0.0)
     return Signature(
-        gain=restless, added=(2.0 * size * blows, half), mesh_gains=tuple(gains.tolist()), around=_partly(rng)
+        gain=restless, added=(2.0 * size * blows, half), mesh_gains=tuple(gains.tolist()), around=partly(rng)
     )
 
 
@@ -386,31 +294,31 @@ def _bearing_clearance(scene: Scene, size: float, rng: np.random.Generator) -> S
     softer support lets less through at the higher mesh harmonics.
     """
     bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
-    mesh, passing, turn, loose = _balance(rng, 4)
+    mesh, passing, turn, loose = balance(rng, 4)
     turn = max(turn, float(rng.uniform(0.1, 0.5)))  # what tells it from another path
     softer = rng.standard_normal() - rng.uniform(0.0, 0.7) * np.arange(N_MESH_HARMONICS)
     gains = np.exp(1.4 * mesh * size * (rng.standard_normal(N_MESH_HARMONICS) + softer))
     lines = [
         0.4 * passing * size / k * tone(k * bearing["BPFO"] * float(rng.uniform(0.99, 1.0)), scene, rng) for k in (1, 2)
     ]
-    fall, halves = float(rng.uniform(0.2, 1.5)), 0.5 * _partly(rng)
+    fall, halves = float(rng.uniform(0.2, 1.5)), 0.5 * partly(rng)
     lines += [0.4 * turn * size / k**fall * tone(k * bearing["shaft"], scene, rng) for k in range(1, LOOSE_ORDERS + 1)]
     lines += [0.4 * turn * halves * size / k * tone((k - 0.5) * bearing["shaft"], scene, rng) for k in (1, 2, 3)]
     noise = 0.4 * loose * size * _at_the_mesh(scene, band_noise(scene, rng), rng)
     return Signature(
-        gain=_swing(scene, bearing["shaft"], 0.5 * turn * _partly(rng) * size, rng),
+        gain=_swing(scene, bearing["shaft"], 0.5 * turn * partly(rng) * size, rng),
         added=(*lines, noise),
         mesh_gains=tuple(gains.tolist()),
         paths_scatter=1.4 * mesh * size,
-        around=_partly(rng),
-        uneven=_partly(rng) * _uneven(scene, rng),
+        around=partly(rng),
+        uneven=partly(rng) * _uneven(scene, rng),
     )
 
 
 SIGNATURES: dict[str, Callable[[Scene, float, np.random.Generator], Signature]] = {
-    "root_crack": _root_crack,
-    "tooth_spall": _tooth_spall,
-    "chipped_tooth": _chipped_tooth,
+    "root_crack": root_crack,
+    "tooth_spall": tooth_spall,
+    "chipped_tooth": chipped_tooth,
     "tooth_wear": _tooth_wear,
     "pitch_error": _pitch_error,
     "surface_roughness": _surface_roughness,
