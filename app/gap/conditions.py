@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from gearsig.errors import InputError
 from gearsig.gap.change import change_features, difference_features
 from gearsig.gap.features import Features
-from gearsig.gap.floors import REPEATABLE, StructuralFloor, pooled_scatter
+from gearsig.gap.floors import REPEATABLE, GapSize, StructuralFloor, gap_size, pooled_scatter
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.population import load_population
@@ -59,6 +60,11 @@ class Condition:
     def floor(self) -> StructuralFloor:
         """How far healthy machines lie from what it is compared with."""
         return load_population().floor(with_reference=self.reference is not None)
+
+    @cached_property
+    def size(self) -> GapSize:
+        """How large the whole gap is."""
+        return gap_size(self.change, self.floor)
 
     @property
     def run_s(self) -> float:

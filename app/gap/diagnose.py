@@ -21,7 +21,6 @@ from gearsig.checks import closest_match_hint
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap.curves import angle_curves, spectrum_curves
 from gearsig.gap.evidence import evidence_of
-from gearsig.gap.floors import gap_size
 from gearsig.gap.places import gap_places
 from gearsig.gap.population import load_population
 from gearsig.gap.posterior import is_calibrated
@@ -133,7 +132,7 @@ def diagnose_gap(
     ]
     notices += _without_meaning(twin, known, effects)
     tell("placing it", 0.82)
-    clearest = max(conditions, key=_size)
+    clearest = max(conditions, key=lambda condition: condition.size.structural.value)
     k = conditions.index(clearest)
     standing, remarks = stood_out(recordings[k], own_rigs[k], references, other_rigs, clearest.facts.name)
     notices += remarks
@@ -147,7 +146,7 @@ def diagnose_gap(
     after = None if fitted is None else simulated(twin, clearest.facts, clearest.now, (fitted,))
     tell("looking for what would tell more", 0.88)
     pair = _rivals(causes)
-    size = gap_size(clearest.change, clearest.floor)
+    size = clearest.size
     reference = clearest.reference
     return GapReport(
         rig=own_rigs[0].name,
@@ -227,10 +226,6 @@ def _without_meaning(twin: Twin, known: Mapping[str, GapEffect], effects: Sequen
         "probability rests on recognition alone."
     )
     return [remark]
-
-
-def _size(condition: Condition) -> float:
-    return gap_size(condition.change, condition.floor).structural.value
 
 
 def _places(condition: Condition) -> tuple[GapPlace, ...]:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from app.gap.candidates import Tried, refuse_without_candidates, try_effects
 from app.gap.conditions import Condition
-from gearsig.gap.floors import gap_size
 from gearsig.gap.posterior import GapCalibration, load_gap_calibration, score_of
 from gearsig.gap.recognise import load_recogniser
 from gearsig.gap.simulator import GapEffect, Twin
@@ -98,7 +97,7 @@ def weigh(
     """
     forest = _forest(conditions, effects, known)
     with_reference = all(c.reference is not None for c in conditions)
-    size = max(_size(condition) for condition in conditions)
+    size = max(condition.size.structural.value for condition in conditions)
     first = load_gap_calibration(with_reference=with_reference).probabilities(forest, {}, size)
     likely = [name for name, p in first.items() if name in known and p >= LEAST_TRIED_PROBABILITY][:most_tried]
     heard_of = _known_to_forests(conditions)
@@ -107,11 +106,6 @@ def weigh(
     tried = try_effects([known[name] for name in likely], twin, conditions, cache, on_progress, fresh=fresh)
     refuse_without_candidates(tried, likely)
     return Weighed(forest, tried, with_reference, size, tuple(own))
-
-
-def _size(condition: Condition) -> float:
-    floor = load_recogniser(with_reference=condition.reference is not None).floor
-    return gap_size(condition.change, floor).structural.value
 
 
 def _known_to_forests(conditions: Sequence[Condition]) -> set[str]:
