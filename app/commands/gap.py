@@ -105,7 +105,7 @@ def _diagnosed(asked: Asked, model: str, cache: Path | None, *, fresh: bool) -> 
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
     from app.gap.run import run_gap
-    from sims.cache import cache_folder
+    from gearsig.cache import cache_folder
 
     stage = TextColumn("{task.description}", markup=False)  # names of files are no markup
     columns = (stage, BarColumn(), TaskProgressColumn(), TimeElapsedColumn())

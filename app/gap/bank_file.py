@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
+from gearsig.cache import write_whole
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.gap.simulator import Added, Point
@@ -46,20 +45,11 @@ def write_bank(path: Path, key: str, bank: Bank) -> None:
         "added": [_plain(a) for a in bank.added],
         "left_out": [[_plain(a), why] for a, why in bank.left_out],
     }
-    part = ""
+    arrays: dict[str, Any] = {name: getattr(bank, name) for name in _ARRAYS}
     try:
-        handle, part = tempfile.mkstemp(dir=path.parent, prefix=".bank-", suffix=".part")
-        with os.fdopen(handle, "wb") as file:
-            arrays: dict[str, Any] = {name: getattr(bank, name) for name in _ARRAYS}
-            np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays)
-        Path(part).replace(path)
-    except OSError as error:
-        raise InputError(
-            f"cannot be written ({error.strerror})", where=str(path.parent), remedy="choose another folder with --cache"
-        ) from None
-    finally:
-        if part:
-            Path(part).unlink(missing_ok=True)
+        write_whole(path, lambda file: np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays))
+    except InputError as error:
+        raise InputError(error.what, where=str(path.parent), remedy="choose another folder with --cache") from None
 
 
 def _checked(about: dict[str, Any], arrays: dict[str, FloatArray]) -> Bank | None:

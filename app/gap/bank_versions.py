@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from functools import cache
-from hashlib import sha256
-from importlib.util import find_spec
-from pathlib import Path
+
+from gearsig.cache import modules_digest
 
 _MODULES = (
     *(f"gearsig.gap.{name}" for name in ("averages", "broadband", "change", "channels", "cyclic", "features", "frame")),
@@ -21,10 +20,4 @@ _MODULES = (
 @cache
 def features_digest() -> str:
     """Return a short hash of the code that makes features of a recording."""
-    digest = sha256()
-    for name in _MODULES:
-        spec = find_spec(name)
-        if spec is None or spec.origin is None:
-            raise ModuleNotFoundError(name)
-        digest.update(name.encode() + b"\0" + Path(spec.origin).read_bytes())
-    return digest.hexdigest()[:16]
+    return modules_digest(_MODULES)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from math import nan
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +15,10 @@ from gearsig.gap.change import SURPRISE
 from gearsig.gap.contrasts import mirrored, seen_rows
 from gearsig.gap.features import Features
 from gearsig.gap.floors import REPEATABLE, StructuralFloor, soft_size
+from gearsig.gap.kept_recogniser import Fitted, keep_fitted, read_fitted
 from gearsig.gap.population import Population, load_population
 from gearsig.gap.relative import beyond_the_mesh, counted_from_the_mesh
+from gearsig.gap.trees import LinearRule, Trees
 from gearsig.gap.types import NONE, UNKNOWN
 
 N_TREES = 200
@@ -51,18 +52,18 @@ class Recogniser:
     causes : tuple of str
         Of the probabilities.
     floor : StructuralFloor
-    forest : sklearn.ensemble.ExtraTreesClassifier
+    trees : Trees
     usual_load_n_per_mm : float
         Of the teeth, where a rig does not say.
-    linear : sklearn.discriminant_analysis.LinearDiscriminantAnalysis or None
+    linear : LinearRule or None
         What is heard besides the forest, by `LINEAR_SHARE`.
     """
 
     causes: tuple[str, ...]
     floor: StructuralFloor
-    forest: Any
+    trees: Trees
     usual_load_n_per_mm: float
-    linear: Any = None
+    linear: LinearRule | None = None
 
     def probabilities(self, change: Features, tooth_load_n_per_mm: float = nan) -> dict[str, float]:
         """Return cause → probability, uncalibrated.
@@ -80,10 +81,10 @@ class Recogniser:
                 remedy="make it again: python -m app.calibration.gap.population",
             )
         load = tooth_load_n_per_mm if tooth_load_n_per_mm > 0.0 else self.usual_load_n_per_mm
-        row = input_rows(self.floor, change.values[None], change.scatter[None], np.array([load]))
-        found = self.forest.predict_proba(row)[0]
+        row = input_rows(self.floor, change.values[None], change.scatter[None], np.array([load]))[0]
+        found = self.trees.probabilities(row)
         if self.linear is not None:
-            told = self.linear.predict_proba(_within_reach(row))[0]
+            told = self.linear.probabilities(_within_reach(row))
             found = (1.0 - LINEAR_SHARE) * found + LINEAR_SHARE * told
         found = np.maximum(found, LEAST_PROBABILITY)
         return dict(zip(self.causes, (found / found.sum()).tolist(), strict=True))
@@ -119,6 +120,17 @@ def input_rows(
 
 
 def fit_recogniser(population: Population, *, with_reference: bool) -> Recogniser:
+    """Return the recogniser that is fitted to a population."""
+    return _with_floor(population, _fit(population, with_reference=with_reference), with_reference=with_reference)
+
+
+def _with_floor(population: Population, fitted: Fitted, *, with_reference: bool) -> Recogniser:
+    causes, trees, linear = fitted
+    usual_load = float(np.median(population.loads_n_per_mm))
+    return Recogniser(causes, population.floor(with_reference=with_reference), trees, usual_load, linear)
+
+
+def _fit(population: Population, *, with_reference: bool) -> Fitted:
     """Fit to a population, and to the same with driver and driven gear exchanged.
 
     Extremely randomised trees: P. Geurts, D. Ernst, L. Wehenkel, "Extremely randomized trees", 2006. The linear
@@ -149,12 +161,12 @@ def fit_recogniser(population: Population, *, with_reference: bool) -> Recognise
     causes = np.tile(population.causes[seen], 2)
     forest.fit(rows, causes)
     names = tuple(map(str, forest.classes_))
-    linear = None
-    if not with_reference:
-        even = np.full(len(names), 1.0 / len(names))
-        linear = LinearDiscriminantAnalysis(solver="lsqr", shrinkage=LINEAR_SHRINKAGE, priors=even)
-        linear.fit(_within_reach(rows), causes)
-    return Recogniser(names, floor, forest, float(np.median(population.loads_n_per_mm)), linear)
+    if with_reference:
+        return names, Trees.of(forest), None
+    even = np.full(len(names), 1.0 / len(names))
+    linear = LinearDiscriminantAnalysis(solver="lsqr", shrinkage=LINEAR_SHRINKAGE, priors=even)
+    linear.fit(_within_reach(rows), causes)
+    return names, Trees.of(forest), LinearRule(linear.coef_, linear.intercept_)
 
 
 def _within_reach(rows: FloatArray) -> FloatArray:
@@ -172,5 +184,10 @@ def _visible(floor: StructuralFloor, changes: FloatArray, causes: NDArray[np.str
 
 @cache
 def load_recogniser(*, with_reference: bool) -> Recogniser:
-    """Return the forest over the population that comes with this version; fitted once per process."""
-    return fit_recogniser(load_population(), with_reference=with_reference)
+    """Return the one for the population that comes with this version: fitted once, then kept among the user's files."""
+    population, name = load_population(), "with_reference" if with_reference else "without_reference"
+    fitted = read_fitted(name)
+    if fitted is None:
+        fitted = _fit(population, with_reference=with_reference)
+        keep_fitted(name, fitted)
+    return _with_floor(population, fitted, with_reference=with_reference)

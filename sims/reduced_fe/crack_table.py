@@ -12,9 +12,9 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from gearsig.cache import FRESH, OtherVersionError, cache_folder, write_whole
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from sims.cache import FRESH, OtherVersionError, cache_folder, write_whole
 from sims.mesh.crack import RootCrack, check_crack, deepest_crack_mm
 from sims.reduced_fe.blank import GearBlank
 from sims.reduced_fe.cracked_tooth import CRACK_SIZE, crack_meshes, front_widths_mm, open_crack

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gearsig.cache import FRESH, OtherVersionError, cache_folder
 from gearsig.errors import InputError
-from sims.cache import FRESH, OtherVersionError, cache_folder
 from sims.reduced_fe.blank import GearBlank
 from sims.reduced_fe.gear_file import read_gear, write_gear
 from sims.reduced_fe.gear_key import gear_key, gear_name, is_of_this_code
@@ -24,7 +24,7 @@ def cached_gear(blank: GearBlank, plan: ReductionPlan, folder: str | Path | None
     blank : GearBlank
     plan : ReductionPlan
     folder : path or None
-        None: `sims.cache.cache_folder("gears")`.
+        None: `gearsig.cache.cache_folder("gears")`.
 
     Raises
     ------

@@ -9,8 +9,8 @@ from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
+from gearsig.cache import FRESH, OtherVersionError, write_whole
 from gearsig.errors import InputError
-from sims.cache import FRESH, OtherVersionError, write_whole
 from sims.reduced_fe.blank import blank_from_text
 from sims.reduced_fe.gear_key import FORMAT
 from sims.reduced_fe.reduced_gear import FlankGrid, ReducedGear

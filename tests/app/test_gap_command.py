@@ -14,11 +14,11 @@ from app.cli import main
 from app.gap.inputs import Asked, read_inputs
 from app.gap.results import check_folder, write_results
 from app.samples import sample_folder
+from gearsig.cache import cache_folder
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap.types import GapReport
 from gearsig.rig.toml import read_rig, write_rig
 from gearsig.rig.types import Bearing, OperatingPoint
-from sims.cache import cache_folder
 from tests.gap.example_report import TWIN, cannot_separate_report, effect_report, no_gap_report
 
 SAMPLES = sample_folder()

@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from app.cli import app
+from gearsig.cache import OtherVersionError
 from gearsig.errors import InputError
-from sims.cache import OtherVersionError
 from sims.reduced_fe.gear_file import read_gear, write_gear
 from sims.reduced_fe.gear_key import gear_key, gear_name
 from sims.reduced_fe.reduce import plan_for

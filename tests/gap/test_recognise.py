@@ -10,6 +10,7 @@ import pytest
 
 from gearsig.errors import InputError
 from gearsig.gap.features import Features
+from gearsig.gap.kept_recogniser import keep_fitted
 from gearsig.gap.population import Population, load_population
 from gearsig.gap.recognise import Recogniser, fit_recogniser, load_recogniser
 from gearsig.gap.types import NONE, UNKNOWN
@@ -72,3 +73,16 @@ def test_a_missing_population_says_how_to_make_it(tmp_path: Path) -> None:
 
 def test_the_forest_is_fitted_once() -> None:
     assert load_recogniser(with_reference=False) is load_recogniser(with_reference=False)
+
+
+def test_a_kept_one_says_the_same(
+    population: Population, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, on_half: Recogniser
+) -> None:
+    monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path))
+    keep_fitted("with_reference", (on_half.causes, on_half.trees, None))
+    load_recogniser.cache_clear()
+    kept = load_recogniser(with_reference=True)
+    load_recogniser.cache_clear()
+    change = row(population, 5)
+    assert kept.probabilities(change, 100.0).keys() == on_half.probabilities(change, 100.0).keys()
+    assert np.array_equal(kept.trees.shares, on_half.trees.shares)

@@ -12,10 +12,10 @@ from app.dashboard.gap.choice import Choice, files_of
 from app.dashboard.widgets.picture import picture_bytes
 from app.gap.job import Job, private_folder
 from app.gap.results import JSON, PAGE, TWIN
+from gearsig.cache import cache_folder
 from gearsig.errors import GearsigError
 from gearsig.gap.types import GapReport
 from gearsig.report.gap_pictures import GapFigure, gap_figures
-from sims.cache import cache_folder
 
 _JOB, _FINISHED, _STOPPED = "gap job", "gap result", "gap stopped"
 EVERY_S = 0.5

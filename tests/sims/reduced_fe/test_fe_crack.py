@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from gearsig.cache import OtherVersionError
 from gearsig.errors import InputError
-from sims.cache import OtherVersionError
 from sims.mesh import RootCrack
 from sims.mesh.stiffness_tooth import tooth_compliance
 from sims.reduced_fe.crack_table import (

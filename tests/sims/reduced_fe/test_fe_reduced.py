@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gearsig.cache import OtherVersionError
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from sims.cache import OtherVersionError
 from sims.mesh.foundation import foundation_compliance
 from sims.mesh.stiffness_tooth import tooth_compliance
 from sims.reduced_fe import gear_file

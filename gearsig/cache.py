@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from hashlib import sha256
+from importlib.util import find_spec
 from pathlib import Path
 from typing import IO
 
@@ -58,3 +60,14 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
     finally:
         if part:
             Path(part).unlink(missing_ok=True)
+
+
+def modules_digest(modules: Iterable[str]) -> str:
+    """Return a short hash of the code of modules, by which it shows that a kept file is of another state of it."""
+    digest = sha256()
+    for name in modules:
+        spec = find_spec(name)
+        if spec is None or spec.origin is None:
+            raise ModuleNotFoundError(name)
+        digest.update(name.encode() + b"\0" + Path(spec.origin).read_bytes())
+    return digest.hexdigest()[:16]
