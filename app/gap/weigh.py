@@ -8,6 +8,7 @@ from pathlib import Path
 
 from app.gap.candidates import Tried, refuse_without_candidates, try_effects
 from app.gap.conditions import Condition
+from gearsig.gap.joint import joint_probabilities
 from gearsig.gap.posterior import GapCalibration, load_gap_calibration, score_of
 from gearsig.gap.recognise import load_recogniser
 from gearsig.gap.simulator import GapEffect, Twin
@@ -16,9 +17,6 @@ from gearsig.gap.types import NONE, UNKNOWN
 
 MOST_TRIED, LEAST_TRIED_PROBABILITY = 3, 0.06
 """Effects that are simulated: so many of the likeliest, none less likely than this."""
-
-NOT_SEEN = 0.4
-"""Probability that an effect is too weak to be seen at one of several conditions."""
 
 
 @dataclass(frozen=True)
@@ -115,18 +113,11 @@ def _known_to_forests(conditions: Sequence[Condition]) -> set[str]:
 def _forest(
     conditions: Sequence[Condition], effects: Sequence[str], known: Mapping[str, GapEffect]
 ) -> dict[str, float]:
-    """Return the forests' joint probabilities over what may be named, conditions being independent.
-
-    At one of two conditions an effect may not show: p(x|e) = (1 − q) p_forest + q p_none for the machine's effects.
-    """
+    """Return the forests' joint probabilities over what may be named."""
     allowed = {NONE, UNKNOWN, *(effects or known)} & _known_to_forests(conditions)
-    joint: dict[str, float] = {}
-    unseen = NOT_SEEN if len(conditions) > 1 else 0.0
+    found, loads = [], []
     for condition in conditions:
         recogniser = load_recogniser(with_reference=condition.reference is not None)
-        load = tooth_load_n_per_mm(condition.now.frame.pair, condition.facts.point.torque_nm)
-        found = recogniser.probabilities(condition.change, load)
-        for name in allowed:
-            joint[name] = joint.get(name, 1.0) * ((1.0 - unseen) * found[name] + unseen * found[NONE])
-    total = sum(joint.values())
-    return {name: p / total for name, p in joint.items()}
+        loads.append(tooth_load_n_per_mm(condition.now.frame.pair, condition.facts.point.torque_nm))
+        found.append(recogniser.probabilities(condition.change, loads[-1]))
+    return joint_probabilities(found, loads, allowed)

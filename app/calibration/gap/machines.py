@@ -9,8 +9,8 @@ import numpy as np
 from app.calibration.rigs import DrawnRig, HousingMode, draw_rig, log_uniform
 from sims.effects import EffectSetting
 
-LIGHT_SHARE, LIGHT_TORQUE = 0.4, (0.003, 0.3)
-"""Machines that run at light load, and their torque over that of the others."""
+LIGHT_SHARE, LIGHT_TORQUE = 0.4, (0.0005, 0.3)
+"""Machines that run at light load, and their torque over that of the others: down to what idling takes."""
 
 DURATION_S = (3.0, 7.0)
 MOUNTED_ANEW_SHARE = 0.6

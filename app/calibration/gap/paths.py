@@ -72,14 +72,19 @@ class PathChange:
         return found
 
 
-def draw_path_changes(n_channels: int, size: float, rate_hz: float, rng: np.random.Generator) -> Sequence[PathChange]:
-    """Draw each channel's change, of size 0 to 1; modes of a housing are the same for all, their shares are not."""
+def draw_path_changes(
+    n_channels: int, size: float, rate_hz: float, rng: np.random.Generator, *, everywhere: bool = False
+) -> Sequence[PathChange]:
+    """Draw each channel's change, of size 0 to 1; modes of a housing are the same for all, their shares are not.
+
+    Unless it is everywhere, one channel alone may change.
+    """
     places = [
         (log_uniform(rng, LOWEST_HZ, HIGHEST_OF_RATE * rate_hz), log_uniform(rng, *DAMPING_RATIOS))
         for _ in range(int(rng.integers(1, MOST_MODES + 1)))
     ]
     shifts = np.exp(SHIFT * size * rng.standard_normal(len(places)))
-    only = int(rng.integers(n_channels)) if rng.uniform() < ONE_CHANNEL_SHARE else None
+    only = int(rng.integers(n_channels)) if not everywhere and rng.uniform() < ONE_CHANNEL_SHARE else None
     found = []
     for i in range(n_channels):
         modes = tuple(

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from zlib import crc32
 
 import numpy as np
 import typer
@@ -30,7 +31,7 @@ from gearsig.gap.features import features_of
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.simulator import Point
-from gearsig.gap.tooth_load import tooth_load_n_per_mm
+from gearsig.gap.tooth_load import LIGHT_LOAD_N_PER_MM, tooth_load_n_per_mm
 from gearsig.gap.types import NONE, UNKNOWN
 from gearsig.recording.types import Recording
 from sims.cracked.twin import STEP_ANGLE_RAD, CrackedTwin
@@ -42,9 +43,6 @@ N_SOUND, N_MOUNTED_ANEW, N_FOREIGN, N_BY_HAND = 3, 6, 10, 4
 
 ONE_SENSOR_SHARE = 0.4
 """Machines of which one sensor's signal is known."""
-
-LIGHT_LOAD_N_PER_MM = 50.0
-"""Of the teeth, up to which they may part and the backlash shows."""
 
 SIMULATED_SHARE = 0.5
 """Of the effects with a signature by hand that are simulated on a machine as well."""
@@ -149,7 +147,7 @@ def one_rig(index: int) -> tuple[list[Sample], tuple[tuple[str, ...], tuple[str,
     except RefusalError:
         return [], None
     samples = []
-    for label, detail, severity, recording, torque_nm in _recordings(drawn, twin, ordinary, rng):
+    for label, detail, severity, recording, torque_nm in _recordings(drawn, twin, ordinary, index):
         try:
             samples.append(_sample(index, label, detail, severity, torque_nm, recording, (sound, simulated)))
         except (InputError, RefusalError) as error:
@@ -203,28 +201,36 @@ def _run(twin: CrackedTwin, drawn: DrawnRig, index: int) -> Recording:
 
 
 def _recordings(
-    drawn: DrawnRig, twin: CrackedTwin, ordinary: Ordinary, rng: np.random.Generator
+    drawn: DrawnRig, twin: CrackedTwin, ordinary: Ordinary, index: int
 ) -> Iterator[tuple[str, str, float, Recording, float]]:
-    """Yield label, detail, severity, recording and torque of everything that is recorded of one gearbox."""
+    """Yield label, detail, severity, recording and torque of everything that is recorded of one gearbox.
+
+    Each draws from a seed of its own: where one effect is drawn otherwise, the others stay as they are.
+    """
     bare: list[Recording] = []
     sound: list[Recording] = []
     for run in range(1, N_SOUND + 1):
+        rng = _chance(index, NONE, run)
         day = another_day(drawn, rng)
         bare.append(_record(day, run))
         sound.append(ordinary.on(bare[-1], turns_before(drawn, run), rng))
         yield NONE, "", 0.0, sound[-1], drawn.torque_nm * day.torque_factor
     for i in range(N_MOUNTED_ANEW):
-        yield NONE, "mounted anew", 0.0, mounted_anew(sound[i % N_SOUND], rng), drawn.torque_nm
+        recording = mounted_anew(sound[i % N_SOUND], _chance(index, "mounted anew", i))
+        yield NONE, "mounted anew", 0.0, recording, drawn.torque_nm
     for i in range(N_FOREIGN):
-        recording, name = with_foreign_vibration(sound[i % N_SOUND], rng)
+        recording, name = with_foreign_vibration(sound[i % N_SOUND], _chance(index, UNKNOWN, i))
         yield UNKNOWN, name, 0.0, recording, drawn.torque_nm
-    for i, name in enumerate(made_by_hand(sound[0], drawn.torque_nm)):
-        recording, strength = with_signature(sound[i % N_SOUND], name, rng)
-        yield name, "by hand", strength, recording, drawn.torque_nm
+    for name in made_by_hand(sound[0], drawn.torque_nm):
+        for i in range(N_BY_HAND):
+            recording, strength = with_signature(sound[i % N_SOUND], name, _chance(index, f"{name} by hand", i))
+            yield name, "by hand", strength, recording, drawn.torque_nm
     for i in range(N_BY_HAND):
-        recording, strength = _with_changed_path(ordinary, bare[i % N_SOUND], turns_before(drawn, i % N_SOUND + 1), rng)
+        turns, rng = turns_before(drawn, i % N_SOUND + 1), _chance(index, "transfer_path by hand", i)
+        recording, strength = _with_changed_path(ordinary, bare[i % N_SOUND], turns, rng)
         yield "transfer_path", "by hand", strength, recording, drawn.torque_nm
     for run, name in enumerate((e for e in effects() if e not in AT_THE_END), start=N_SOUND + 1):
+        rng = _chance(index, name, run)
         if name in HAND_MADE and rng.uniform() > SIMULATED_SHARE:
             continue
         day = another_day(drawn, rng)
@@ -239,12 +245,16 @@ def _recordings(
         yield name, detail, setting.severity, recording, drawn.torque_nm * day.torque_factor
 
 
+def _chance(index: int, name: str, i: int) -> np.random.Generator:
+    return np.random.default_rng([SEED, index, crc32(name.encode()), i])
+
+
 def _with_changed_path(
     ordinary: Ordinary, bare: Recording, turns: int, rng: np.random.Generator
 ) -> tuple[Recording, float]:
     """Return a recording that came through other paths, and how much other, 0 to 1."""
     strength = float(rng.uniform())
-    size = 10.0 ** (1.6 * (strength - 1.0))
+    size = 10.0 ** (0.8 * (strength - 1.0))
     paths = draw_path_changes(len(vibrations(bare)), size, bare.sampling_rate_hz, rng)
     return ordinary.on(bare, turns, rng, paths), strength
 
@@ -254,8 +264,7 @@ def made_by_hand(sound: Recording, torque_nm: float) -> tuple[str, ...]:
     if sound.rig is None:
         raise InputError("a simulated recording has no rig")
     light = tooth_load_n_per_mm(sound.rig.pairs[0], torque_nm) < LIGHT_LOAD_N_PER_MM
-    names = tuple(name for name in HAND_MADE if light or name != "backlash")
-    return names * N_BY_HAND
+    return tuple(name for name in HAND_MADE if light or name != "backlash")
 
 
 def _record(day: Day, run: int, setting: EffectSetting | None = None) -> Recording:

@@ -23,6 +23,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.calibration.gap.chance import LARGEST_ADVANCE, balance, draw_side, partly, steeply
+from app.calibration.gap.paths import draw_path_changes
 from app.calibration.gap.scene import (
     Scene,
     band_noise,
@@ -39,6 +40,13 @@ from app.calibration.rigs import log_uniform
 from gearsig.checks import FloatArray
 from gearsig.recording.types import Recording
 
+SIZES = (0.06, 2.5)
+"""Of a signature: from what nobody sees to several floors. Effects reach about as far as each other; where one ended
+before its look-alikes do, whatever is large would be one of those."""
+
+MOST_CHANNELS = 2
+"""Of vibration, in a simulated recording."""
+
 LOOSE_ORDERS = 10
 """Of its shaft, up to which a loose bearing shows lines."""
 
@@ -49,14 +57,14 @@ def with_signature(recording: Recording, name: str, rng: np.random.Generator) ->
     strength = float(rng.uniform())
     samples = recording.samples.copy()
     if name == "clipping":
-        most = 10.0 ** (-3.5 + 2.5 * strength)  # share of the samples that are cut
+        most = 10.0 ** (-3.0 + 2.5 * strength)  # share of the samples that are cut
         for i in vibrations(recording):
             low, high = np.quantile(samples[i], (most / 2.0, 1.0 - most / 2.0))
             samples[i] = np.clip(samples[i], low, high) if rng.uniform() < 0.5 else _cut_at(samples[i], most)
         return replace(recording, samples=samples), strength
-    signature = SIGNATURES[name](scene, 10.0 ** (-1.6 + 1.6 * strength), rng)
-    for i in vibrations(recording):
-        samples[i] = changed(samples[i], signature, scene, rng, float(samples[i].std()))
+    signature = SIGNATURES[name](scene, SIZES[0] * (SIZES[1] / SIZES[0]) ** strength, rng)
+    for k, i in enumerate(vibrations(recording)):
+        samples[i] = changed(samples[i], signature, scene, rng, float(samples[i].std()), k)
     return replace(recording, samples=samples), strength
 
 
@@ -87,7 +95,7 @@ def _tooth_wear(scene: Scene, size: float, rng: np.random.Generator) -> Signatur
     return Signature(
         added=(noise,),
         mesh_gains=tuple(gains.tolist()),
-        paths_scatter=0.4 * size * partly(rng),
+        paths_scatter=0.4 * min(size, 1.0) * partly(rng),
         around=0.5 * partly(rng),
         uneven=partly(rng) * _uneven(scene, rng),
     )
@@ -114,7 +122,7 @@ def _pitch_error(scene: Scene, size: float, rng: np.random.Generator) -> Signatu
     low = np.interp(place, nodes, np.append(run, run[0])) / max(float(run.std()), 1e-12)
     return Signature(
         np.maximum(1.0 + 0.6 * gain * size * louder, 0.0),
-        0.3 * LARGEST_ADVANCE * at * size / scene.teeth[0] * np.clip(early, -2.5, 2.5),
+        0.3 * LARGEST_ADVANCE * min(at * size, 1.0) / scene.teeth[0] * np.clip(early, -2.5, 2.5),
         (0.5 * slow * size * low,),
     )
 
@@ -153,13 +161,13 @@ def _sliding_friction(scene: Scene, size: float, rng: np.random.Generator) -> Si
     """
     waves = np.abs(1.0 + 0.5 * rng.standard_normal(N_MESH_HARMONICS)) * steeply(rng)
     gains = 1.0 + size * 10.0 ** rng.uniform(0.0, 1.0) * waves
-    gains *= np.exp(0.7 * size * rng.standard_normal(N_MESH_HARMONICS))  # it may also be against what was there
+    gains *= np.exp(0.7 * min(size, 1.0) * rng.standard_normal(N_MESH_HARMONICS))  # it may be against what was there
     noise = 0.8 * size * rng.uniform(0.2, 1.0) * _at_the_mesh(scene, band_noise(scene, rng), rng)
     return Signature(
         added=(noise,),
         mesh_gains=tuple(gains.tolist()),
-        paths_scatter=0.7 * size * partly(rng),
-        around=partly(rng),
+        paths_scatter=0.7 * min(size, 1.0) * partly(rng),
+        around=0.5 * partly(rng),
         uneven=partly(rng) * _uneven(scene, rng),
     )
 
@@ -176,7 +184,7 @@ def _modulated(
     gain, late = swings
     return Signature(
         _swing(scene, order, 0.8 * gain, rng),
-        LARGEST_ADVANCE * late / scene.teeth[0] * tone(order, scene, rng),
+        LARGEST_ADVANCE * min(late, 1.0) / scene.teeth[0] * tone(order, scene, rng),
         tuple(line * tone(n * order, scene, rng) for n, line in enumerate(lines, start=1)),
     )
 
@@ -219,13 +227,13 @@ def _misalignment(scene: Scene, size: float, rng: np.random.Generator) -> Signat
     once, twice = balance(rng, 2)
     swing = _swing(scene, 2.0 * order, bands * twice * size, rng)
     swing = swing * _swing(scene, order, bands * once * size, rng)
-    higher = np.append(1.0, np.exp(2.0 * mesh * size * np.abs(rng.standard_normal(N_MESH_HARMONICS - 1))))
+    higher = np.append(1.0, np.exp(2.0 * mesh * min(size, 1.0) * np.abs(rng.standard_normal(N_MESH_HARMONICS - 1))))
     return Signature(
         swing,
         None,
         (line * waves,),
         tuple(higher.tolist()),
-        paths_scatter=0.7 * size * partly(rng),
+        paths_scatter=0.7 * min(size, 1.0) * partly(rng),
         around=partly(rng),
         uneven=partly(rng) * _uneven(scene, rng),
     )
@@ -253,7 +261,7 @@ def _backlash(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
     for _ in range(int(rng.integers(1, 4))):
         rung = struck(kept, sizes, scene, ring(scene, rng))
         blows += rung / max(float(rung.std()), 1e-12)
-    gains = np.exp(1.5 * size * partly(rng) * rng.standard_normal(N_MESH_HARMONICS))
+    gains = np.exp(1.5 * min(size, 1.0) * partly(rng) * rng.standard_normal(N_MESH_HARMONICS))
     half = 0.5 * size * rng.uniform() * tone(scene.teeth[0] / 2.0, scene, rng)
     restless = np.maximum(1.0 + size * rng.uniform(0.0, 1.5) * _slow_noise(scene, rng), 0.0)
     return Signature(
@@ -291,13 +299,14 @@ def _bearing_clearance(scene: Scene, size: float, rng: np.random.Generator) -> S
     """A shaft that is held less: other paths from the mesh to each sensor, lines of elements passing.
 
     And what loose parts show: many orders of the shaft's turn, their halves, a mesh that swings with it, noise. A
-    softer support lets less through at the higher mesh harmonics.
+    softer support moves the modes that all comes through, and lets less through at the higher mesh harmonics.
     """
     bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
     mesh, passing, turn, loose = balance(rng, 4)
     turn = max(turn, float(rng.uniform(0.1, 0.5)))  # what tells it from another path
+    limited = min(size, 1.0)
     softer = rng.standard_normal() - rng.uniform(0.0, 0.7) * np.arange(N_MESH_HARMONICS)
-    gains = np.exp(1.4 * mesh * size * (rng.standard_normal(N_MESH_HARMONICS) + softer))
+    gains = np.exp(1.4 * mesh * limited * (rng.standard_normal(N_MESH_HARMONICS) + softer))
     lines = [
         0.4 * passing * size / k * tone(k * bearing["BPFO"] * float(rng.uniform(0.99, 1.0)), scene, rng) for k in (1, 2)
     ]
@@ -309,9 +318,10 @@ def _bearing_clearance(scene: Scene, size: float, rng: np.random.Generator) -> S
         gain=_swing(scene, bearing["shaft"], 0.5 * turn * partly(rng) * size, rng),
         added=(*lines, noise),
         mesh_gains=tuple(gains.tolist()),
-        paths_scatter=1.4 * mesh * size,
+        paths_scatter=1.4 * mesh * limited,
         around=partly(rng),
         uneven=partly(rng) * _uneven(scene, rng),
+        paths=draw_path_changes(MOST_CHANNELS, limited * partly(rng), scene.sampling_rate_hz, rng, everywhere=True),
     )
 
 

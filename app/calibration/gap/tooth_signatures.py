@@ -37,19 +37,25 @@ def root_crack(scene: Scene, size: float, rng: np.random.Generator) -> Signature
     """
     side = draw_side(rng)
     window, place = _tooth_window(scene, side, float(rng.uniform(0.8, 2.0)), rng)
-    gain, late, blow, slow = balance(rng, 4) * (0.8, 1.0, 4.0, 2.0)
+    gain, late = rng.uniform(0.0, 1.0, 2)
+    blow, slow = balance(rng, 2) * (4.0, 2.0)
     knock = _tooth_knocks(scene, side, place, 0.03, rng)
     giving_way = np.gradient(np.gradient(window))
     giving_way /= max(float(np.abs(giving_way).max()), 1e-12)
     return Signature(
-        1.0 + sign(rng) * gain * size * window,
+        _swollen(sign(rng) * gain * size, window),
         _late(scene, late * size, window, rng),
         (blow * size * knock, slow * size * giving_way),
     )
 
 
+def _swollen(share: float, window: FloatArray) -> FloatArray:
+    swollen: FloatArray = np.maximum(1.0 + share * window, 0.0)
+    return swollen
+
+
 def _late(scene: Scene, share: float, window: FloatArray, rng: np.random.Generator) -> FloatArray:
-    late: FloatArray = sign(rng) * LARGEST_ADVANCE * share / scene.teeth[0] * window
+    late: FloatArray = sign(rng) * LARGEST_ADVANCE * min(share, 1.0) / scene.teeth[0] * window
     return late
 
 
@@ -58,7 +64,7 @@ def tooth_spall(scene: Scene, size: float, rng: np.random.Generator) -> Signatur
     side = draw_side(rng)
     window, place = _tooth_window(scene, side, float(rng.uniform(0.3, 0.8)), rng)
     blows = _tooth_knocks(scene, side, place, float(rng.uniform(0.05, 0.4)), rng, of=2)
-    return Signature(1.0 + sign(rng) * 0.4 * size * rng.uniform() * window, None, (4.0 * size * blows,))
+    return Signature(_swollen(sign(rng) * 0.4 * size * rng.uniform(), window), None, (4.0 * size * blows,))
 
 
 def chipped_tooth(scene: Scene, size: float, rng: np.random.Generator) -> Signature:
@@ -67,7 +73,7 @@ def chipped_tooth(scene: Scene, size: float, rng: np.random.Generator) -> Signat
     window, place = _tooth_window(scene, side, float(rng.uniform(0.5, 1.2)), rng)
     blow = _tooth_knocks(scene, side, place, 0.08, rng)
     return Signature(
-        1.0 + sign(rng) * size * rng.uniform(0.3, 1.2) * window,
+        _swollen(sign(rng) * size * rng.uniform(0.3, 1.2), window),
         _late(scene, size * rng.uniform(0.3, 1.2), window, rng),
-        (6.0 * size * 10.0 ** -rng.uniform(0.0, 0.7) * blow,),
+        (4.0 * size * 10.0 ** -rng.uniform(0.0, 0.7) * blow,),
     )

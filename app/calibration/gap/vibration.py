@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from app.calibration.gap.paths import PathChange
 from app.calibration.gap.scene import Scene
 from gearsig.checks import FloatArray
 from gearsig.recording.types import Recording
@@ -36,6 +38,8 @@ class Signature:
         modulates it along.
     uneven : array, (n,), or None
         By which share the change of the harmonics is larger at some teeth than at others.
+    paths : sequence of PathChange
+        Of each channel, for all that was there before; none: they are as ever.
     """
 
     gain: FloatArray | None = None
@@ -45,6 +49,7 @@ class Signature:
     paths_scatter: float = 0.0
     around: float = 0.0
     uneven: FloatArray | None = None
+    paths: Sequence[PathChange] = ()
 
 
 def vibrations(recording: Recording) -> list[int]:
@@ -53,9 +58,11 @@ def vibrations(recording: Recording) -> list[int]:
 
 
 def changed(
-    values: FloatArray, signature: Signature, scene: Scene, rng: np.random.Generator, size: float
+    values: FloatArray, signature: Signature, scene: Scene, rng: np.random.Generator, size: float, channel: int = 0
 ) -> FloatArray:
     """Return one channel with an effect's signature; what is added is in units of `size`."""
+    if signature.paths:
+        values = signature.paths[channel].of(values, scene.sampling_rate_hz)
     found = values
     if signature.advance_rev is not None:
         speed = np.gradient(scene.revolutions, scene.time_s)

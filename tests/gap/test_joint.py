@@ -1,0 +1,43 @@
+"""Several operating conditions together."""
+
+from __future__ import annotations
+
+from math import nan
+
+import pytest
+
+from gearsig.gap.joint import NOT_SEEN, joint_probabilities
+from gearsig.gap.types import NONE
+
+SURE = {"backlash": 0.8, "wear": 0.1, NONE: 0.1}
+NOTHING = {"backlash": 0.05, "wear": 0.05, NONE: 0.9}
+LIGHT, LOADED = 5.0, 120.0
+
+
+def test_one_condition_says_what_it_says() -> None:
+    assert joint_probabilities([SURE], [LOADED], SURE) == pytest.approx(SURE)
+
+
+def test_causes_that_may_not_be_named_share_nothing() -> None:
+    assert joint_probabilities([SURE], [LIGHT], ["wear", NONE]) == pytest.approx({"wear": 0.5, NONE: 0.5})
+
+
+def test_an_effect_may_be_unseen_at_one_of_two() -> None:
+    found = joint_probabilities([SURE, NOTHING], [LOADED, LOADED], SURE)
+    products = {name: SURE[name] * NOTHING[name] for name in SURE}
+    assert found["backlash"] > products["backlash"] / sum(products.values())
+    by_hand = {
+        n: ((1 - NOT_SEEN) * SURE[n] + NOT_SEEN * 0.1) * ((1 - NOT_SEEN) * NOTHING[n] + NOT_SEEN * 0.9) for n in SURE
+    }
+    assert found == pytest.approx({n: p / sum(by_hand.values()) for n, p in by_hand.items()})
+
+
+def test_load_that_keeps_the_flanks_together_does_not_speak_against_backlash() -> None:
+    kept_together = joint_probabilities([SURE, NOTHING], [LIGHT, LOADED], SURE)
+    both_light = joint_probabilities([SURE, NOTHING], [LIGHT, LIGHT], SURE)
+    assert kept_together["backlash"] > 1.1 * both_light["backlash"]
+
+
+def test_loads_that_never_let_them_part_or_are_not_known_change_nothing() -> None:
+    loaded, unknown = (joint_probabilities([SURE, NOTHING], [load, load], SURE) for load in (LOADED, nan))
+    assert loaded == pytest.approx(unknown)
