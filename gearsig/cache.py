@@ -16,6 +16,9 @@ from gearsig.errors import InputError
 FRESH = "add --fresh to gearsig simulate, flexible, gear-body or gap, which clears such files away, or delete this one"
 """What makes a file again that another version of the code kept."""
 
+FOLDERS = ("GEARSIG_CACHE", "XDG_CACHE_HOME", "LOCALAPPDATA")
+"""Variables that say where; the first names the folder itself."""
+
 
 class OtherVersionError(InputError):
     """A kept file was made by another version of the code."""

@@ -1,46 +1,19 @@
-"""Runs a benchmark: each case is made, diagnosed by a fresh process in a folder of its own, and forgotten.
-
-Labels and twins exist in the memory of the making processes and of this one only, until every diagnosis has ended; the
-folder of a case has a random name, is removed with the answer, and holds recordings and rig files only. What is kept
-on the way are answers. An answer that is there already is not asked for again; its truth is made anew from the seed.
-"""
+"""`gearsig benchmark gap`: blind cases of a gearbox, made as planned and diagnosed one by one."""
 
 from __future__ import annotations
 
-import hashlib
-import os
-import subprocess
-import sys
-from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
-import app
-from app.benchmark.answer import Answer, from_text, to_text
-from app.benchmark.diagnose_one import ANSWERS
+from app.benchmark.answer import Answer
+from app.benchmark.blind_run import BlindRun, state_of_code
 from app.benchmark.diagnosers import diagnoser
 from app.benchmark.make import Truth, make_case
 from app.benchmark.plan import Plan, PlannedCase
-from app.stopping import Running, stop
 from gearsig import __version__
-from gearsig.checks import count
-from sims.processes import process_pool
-from sims.sweep_run import claimed, written
-
-DEFINITION, ANSWERS_FOLDER = "benchmark.json", "answers"
-LONGEST_S = 900.0
-"""A diagnosis that takes longer has no answer."""
-
-_SHOWS_ONLY = {"plot", "report", "scoring"}
-"""Rooms that neither make a case nor answer one: they may change between an answer and its score."""
-
-_PASSED_ON = ("PATH", "LANG", "LC_ALL", "HOME", "SYSTEMROOT", "VIRTUAL_ENV", "NUMBA_CACHE_DIR")
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-_ROOT = Path(app.__file__).resolve().parents[1]
 
 
 @dataclass(frozen=True)
@@ -97,94 +70,16 @@ def run_benchmark(
 ) -> list[Done]:
     """Make and diagnose all cases, in as many processes; return them in the plan's order.
 
-    After Ctrl-C or SIGTERM the answers so far stay in the folder, and the same call goes on from there.
-
     Raises
     ------
     InputError
-        If the folder holds other things or another benchmark, a diagnoser is not there, or the code has changed.
+        See `app.benchmark.blind_run`; or if a diagnoser is not there, or the code has changed.
     """
-    claimed(folder, wanted.definition(), DEFINITION, "benchmark")
-    (folder / ANSWERS_FOLDER).mkdir(exist_ok=True)
-    workers = count(n_processes, "processes")
-    found: dict[int, Done] = {}
-    running = Running()
-    with process_pool(workers) as makers, ThreadPoolExecutor(workers) as threads:
-        futures = [threads.submit(_one, wanted, planned, folder, makers, running) for planned in wanted.plan.cases()]
-        try:
-            for future in as_completed(futures):
-                done = future.result()
-                found[done.planned.number] = done
-                if on_progress is not None:
-                    on_progress(len(found))
-        finally:
-            for future in futures:
-                future.cancel()
-            running.stop()
-    return [found[number] for number in sorted(found)]
+    cases = {planned.number: planned for planned in wanted.plan.cases()}
+    run = BlindRun(sorted(cases), partial(_make, wanted.plan), wanted.diagnosers, wanted.definition())
+    answered = run.answered(folder, n_processes=n_processes, on_progress=on_progress)
+    return [Done(cases[number], truth, answers) for number, truth, answers in answered]
 
 
-def n_answered(folder: Path) -> int:
-    """Cases whose answers the folder holds."""
-    return len(list((folder / ANSWERS_FOLDER).glob("case_*.json")))
-
-
-def _one(wanted: Wanted, planned: PlannedCase, folder: Path, makers: Executor, running: Running) -> Done:
-    kept = folder / ANSWERS_FOLDER / f"case_{planned.number:04d}.json"
-    if kept.exists():
-        truth = makers.submit(make_case, wanted.plan, planned, None).result()
-        return Done(planned, truth, from_text(kept.read_text(encoding="utf-8")))
-    with TemporaryDirectory(prefix="gearsig-") as name:
-        place = Path(name)
-        truth = makers.submit(make_case, wanted.plan, planned, place).result()
-        answers = diagnosed(place, wanted.diagnosers, running)
-    written(kept, to_text(answers))
-    return Done(planned, truth, answers)
-
-
-def diagnosed(folder: Path, names: Sequence[str], running: Running | None = None) -> dict[str, Answer]:
-    """Return the answers of a fresh process that is given the folder and nothing else.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        If what runs was stopped: that is no answer.
-    """
-    runs = running or Running()
-    process = runs.start(
-        [sys.executable, "-m", "app.benchmark.diagnose_one", *names],
-        cwd=folder,
-        env=environment(folder),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        _, said = process.communicate(timeout=LONGEST_S)
-    except subprocess.TimeoutExpired:
-        return dict.fromkeys(names, Answer("", seconds=LONGEST_S, error=f"no answer within {LONGEST_S:g} s"))
-    finally:
-        stop(process)
-        by_itself = runs.ended(process)
-    if not by_itself:
-        raise KeyboardInterrupt
-    if process.returncode != 0:
-        last = said.strip().rpartition("\n")[2]
-        return dict.fromkeys(names, Answer("", error=f"the process ended with {process.returncode}: {last}"))
-    return from_text((folder / ANSWERS).read_text(encoding="utf-8"))
-
-
-def environment(folder: Path) -> dict[str, str]:
-    """Return all that a diagnosing process finds in its environment."""
-    passed_on = {name: os.environ[name] for name in _PASSED_ON if name in os.environ}
-    return passed_on | dict.fromkeys(_ONE_THREAD, "1") | {"TMPDIR": str(folder), "PYTHONPATH": str(_ROOT)}
-
-
-def state_of_code() -> str:
-    """Return a hash of everything that makes or answers a case: answers of other code are no answers of this one."""
-    found = hashlib.sha256()
-    for room in ("gearsig", "sims", "app/gap", "app/benchmark"):
-        for path in sorted((_ROOT / room).rglob("*")):
-            if path.suffix in (".py", ".json", ".toml", ".npz") and not _SHOWS_ONLY & set(path.parts):
-                found.update(path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes())
-    return found.hexdigest()[:16]
+def _make(plan: Plan, number: int, folder: Path | None) -> Truth:
+    return make_case(plan, next(case for case in plan.cases() if case.number == number), folder)

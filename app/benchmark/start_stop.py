@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from app.benchmark.answer import Answer, from_text, to_text
+from app.benchmark.answer import Answer
+from app.benchmark.blind_run import BlindRun, state_of_code
 from app.benchmark.diagnosers import START_STOP
-from app.benchmark.run import ANSWERS_FOLDER, DEFINITION, diagnosed, state_of_code
 from app.benchmark.start_stop_seen import planned
-from app.stopping import Running
 from gearsig import __version__
 from gearsig.checks import count, one_of
 from sims.blind_drive import CATALOGUE, OUTSIDE, ROLES, draw_case, label_of, record_case
-from sims.processes import process_pool
-from sims.sweep_run import claimed, written
 
 REFERENCES = ("both", "with", "without")
 
@@ -97,43 +93,8 @@ def make_drive_case(plan: DrivePlan, number: int, folder: Path | None) -> dict[s
 def run_drive_benchmark(
     plan: DrivePlan, folder: Path, *, n_processes: int = 2, on_progress: Callable[[int], object] | None = None
 ) -> list[DriveDone]:
-    """Make and diagnose all cases; what is answered in the folder is not asked again.
-
-    Labels are in the memory of the makers and of this process only; a diagnosing process is fresh, and all that it is
-    given is a folder with recordings and rig files.
-    """
-    claimed(folder, plan.definition(), DEFINITION, "benchmark")
-    (folder / ANSWERS_FOLDER).mkdir(exist_ok=True)
-    workers = count(n_processes, "processes")
-    found: dict[int, DriveDone] = {}
-    running = Running()
-    with process_pool(workers) as makers, ThreadPoolExecutor(workers) as threads:
-        futures = [threads.submit(_one, plan, i, folder, makers, running) for i in range(len(_all(plan)))]
-        try:
-            for future in as_completed(futures):
-                done = future.result()
-                found[done.number] = done
-                if on_progress is not None:
-                    on_progress(len(found))
-        finally:
-            for future in futures:
-                future.cancel()
-            running.stop()
-    return [found[number] for number in sorted(found)]
-
-
-def _all(plan: DrivePlan) -> list[tuple[str, str, float]]:
-    return planned(plan.n_cases, plan.seed)
-
-
-def _one(plan: DrivePlan, number: int, folder: Path, makers: Executor, running: Running) -> DriveDone:
-    kept = folder / ANSWERS_FOLDER / f"case_{number:04d}.json"
-    if kept.exists():
-        label = makers.submit(make_drive_case, plan, number, None).result()
-        return DriveDone(number, label, from_text(kept.read_text(encoding="utf-8"))[START_STOP])
-    with TemporaryDirectory(prefix="gearsig-") as name:
-        place = Path(name)
-        label = makers.submit(make_drive_case, plan, number, place).result()
-        answers = diagnosed(place, (START_STOP,), running)
-    written(kept, to_text(answers))
-    return DriveDone(number, label, answers[START_STOP])
+    """Make and diagnose all cases, see `app.benchmark.blind_run`."""
+    numbers = range(len(planned(plan.n_cases, plan.seed)))
+    run = BlindRun(numbers, partial(make_drive_case, plan), (START_STOP,), plan.definition())
+    answered = run.answered(folder, n_processes=n_processes, on_progress=on_progress)
+    return [DriveDone(number, label, answers[START_STOP]) for number, label, answers in answered]

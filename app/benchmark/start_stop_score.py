@@ -11,7 +11,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from app.benchmark.run import ANSWERS_FOLDER, DEFINITION
+from app.benchmark.blind_run import ANSWERS_FOLDER, DEFINITION
 from app.benchmark.scoring.calibration_curve import brier, calibration_error
 from app.benchmark.scoring.intervals import Score, share
 from app.benchmark.start_stop import DriveDone

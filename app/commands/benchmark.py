@@ -123,7 +123,8 @@ def _progress() -> Progress:
 
 
 def _run(wanted: Wanted, output: Path, processes: int) -> list[Done]:
-    from app.benchmark.run import n_answered, run_benchmark
+    from app.benchmark.blind_run import n_answered
+    from app.benchmark.run import run_benchmark
 
     n_cases = len(wanted.plan.cases())
     try:

@@ -14,13 +14,15 @@ import pytest
 
 from app.benchmark import run
 from app.benchmark.answer import Answer, AnsweredCause, AnsweredPlace, AnsweredShrinkage, from_text, to_text
+from app.benchmark.blind_run import ANSWERS_FOLDER, diagnosed
 from app.benchmark.diagnosers import diagnoser
 from app.benchmark.make import make_case
 from app.benchmark.plan import BLIND, SAME, Plan, PlannedCase
-from app.benchmark.run import ANSWERS_FOLDER, Wanted, diagnosed, run_benchmark
+from app.benchmark.run import Wanted, run_benchmark
 from app.benchmark.seen import read_seen
 from app.benchmark.textbook import RULES, USUAL
 from app.cli import main
+from gearsig.cache import FOLDERS
 from gearsig.errors import InputError
 from gearsig.gap.types import NONE, UNKNOWN
 from sims.blind import CATALOGUE, OUTSIDE
@@ -95,9 +97,14 @@ def test_the_diagnosing_process_finds_no_label(folders):
     assert found["recordings"] == ["condition_1.h5"]
     assert found["truths"] == [None, None]
     assert not [m for m in found["modules"] if m.startswith("sims.blind")]
-    assert {"app.benchmark.plan", "app.benchmark.make", "app.benchmark.run"}.isdisjoint(found["modules"])
+    making = {f"app.benchmark.{name}" for name in ("plan", "make", "run", "blind_run")}
+    assert making.isdisjoint(found["modules"])
     # The checkout and the interpreter may lie anywhere: their places are not the case's.
-    own = {k: v for k, v in found["environment"].items() if k not in ("PATH", "HOME", "PYTHONPATH", "VIRTUAL_ENV")}
+    own = {
+        k: v
+        for k, v in found["environment"].items()
+        if k not in ("PATH", "HOME", "PYTHONPATH", "VIRTUAL_ENV", *FOLDERS)
+    }
     assert own.pop("TMPDIR") == found["folder"] == str(folder)
     assert not [w for w in WORDS if w in json.dumps(own).lower()]
     assert answers["majority"].causes[0].name == NONE

@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from app.benchmark.answer import Answer
+from app.benchmark.blind_run import state_of_code
 from app.benchmark.diagnosers import BASELINES
 from app.benchmark.plan import BLIND, SAME
-from app.benchmark.run import Done, state_of_code
+from app.benchmark.run import Done
 from app.benchmark.scoring.calibration_curve import bins_of
 from app.benchmark.scoring.effects_table import confusion_counts, confusions_table, effects_table
 from app.benchmark.scoring.intervals import Score, share
