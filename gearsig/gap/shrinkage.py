@@ -35,6 +35,30 @@ class Fold:
     again: tuple[tuple[Observed, ...], ...] = ()
 
 
+@dataclass(frozen=True)
+class _Score:
+    """How an effect did on one fold.
+
+    Parameters
+    ----------
+    sizes : (float, float, float)
+        Before and after in floors, and the shrink.
+    variances : array, (3,)
+        Of the sizes.
+    slope : float
+        Of observed over predicted.
+    placebo : float
+        The best one's shrink.
+    n_placebos : int
+    """
+
+    sizes: tuple[float, float, float]
+    variances: FloatArray
+    slope: float
+    placebo: float
+    n_placebos: int
+
+
 def own_features(fit: Fit, observed: Observed) -> FloatArray:
     """Return 1 for the features that the fitted effect changes, 0 for the others; its strongest one at least."""
     predicted = np.abs(fit.at(observed.condition) / observed.floors)
@@ -58,16 +82,16 @@ def shrinkage(paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str)
     held_out : str
     """
     scores = [_score(paths, fold) for fold in folds]
-    before, after, shrink, slope, placebo = np.mean([s[:5] for s in scores], axis=0)
-    wide = _t_quantile(folds) * np.sqrt(np.mean([s[6] for s in scores], axis=0))
+    before, after, shrink = np.mean([score.sizes for score in scores], axis=0)
+    wide = _t_quantile(folds) * np.sqrt(np.mean([score.variances for score in scores], axis=0))
     return Shrinkage(
         _interval(before, wide[0], 0.0, np.inf),
         _interval(after, wide[1], 0.0, np.inf),
         _interval(shrink, wide[2], -np.inf, 1.0),
-        float(slope),
-        float(placebo),
+        float(np.mean([score.slope for score in scores])),
+        float(np.mean([score.placebo for score in scores])),
         held_out,
-        n_placebos=max(s[5] for s in scores),
+        n_placebos=max(score.n_placebos for score in scores),
         elsewhere=_mean([_elsewhere(paths, fold) for fold in folds]),
     )
 
@@ -104,21 +128,24 @@ def _t_quantile(folds: Sequence[Fold]) -> float:
     return float(stdtrit(max(n_blocks - 1, 1), 0.95))
 
 
-def _score(paths: Sequence[EffectPath], fold: Fold) -> tuple[float, float, float, float, float, int, FloatArray]:
-    """Return before, after, shrink, slope, the best placebo's shrink, the number of placebos, and variances."""
+def _score(paths: Sequence[EffectPath], fold: Fold) -> _Score:
     fit = fit_effect(paths, fold.fitted)
     used = own_features(fit, fold.scored)
-    before, after, shrink = _before_and_after(fit, fold.scored, used)
     wrong = [fit_path(path, fold.fitted) for path in paths if path.options != fit.path.options]
     placebos = [
         _before_and_after(other, fold.scored, used)[2] for other in wrong if not _is_alike(fit, other, fold.scored)
     ]
-    variance = np.zeros(3)
+    variances = np.zeros(3)
     for group in fold.again:
         rows = np.array([_before_and_after(fit, one, used) for one in group])
-        variance += (len(rows) - 1.0) * rows.var(axis=0)
-    slope = _slope(fit, fold.scored, used)
-    return before, after, shrink, slope, max(placebos, default=0.0), len(placebos), variance
+        variances += (len(rows) - 1.0) * rows.var(axis=0)
+    return _Score(
+        _before_and_after(fit, fold.scored, used),
+        variances,
+        _slope(fit, fold.scored, used),
+        max(placebos, default=0.0),
+        len(placebos),
+    )
 
 
 def _is_alike(fit: Fit, other: Fit, scored: Observed) -> bool:
