@@ -6,6 +6,8 @@ import csv
 from math import isfinite
 from pathlib import Path
 
+import typer
+
 from app.quantities import quantity, span
 from gearsig.errors import InputError
 from sims.machine.operation import Course
@@ -25,10 +27,21 @@ def course(text: str, name: str, unit: str, duration_s: float) -> Course:
     duration_s : float
     """
     if text.strip().lower().endswith(".csv"):
-        return read_course(Path(text.strip()), name)
+        found = read_course(Path(text.strip()), name)
+        for held in _held(found, duration_s):
+            typer.echo(f"Note: {Path(text.strip()).name}: {held}", err=True)
+        return found
     if ".." in text:
         return Course.of([0.0, duration_s], span(text, unit, name))
     return Course.constant(quantity(text, unit, name))
+
+
+def _held(found: Course, duration_s: float) -> list[str]:
+    """Return what is said of a profile that does not span the recording."""
+    first_s, last_s = float(found.times_s[0]), float(found.times_s[-1])
+    begins = f"begins at {first_s:g} s; its first value is held from 0 s"
+    ends = f"ends at {last_s:g} s of {duration_s:g} s; its last value is held"
+    return [begins] * (first_s > 0.0) + [ends] * (last_s < duration_s)
 
 
 def read_course(path: Path, name: str) -> Course:

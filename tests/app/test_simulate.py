@@ -123,6 +123,21 @@ def test_bad_profiles(tmp_path: Path, text: str, named: str) -> None:
     assert "p.csv" in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("duration_s", "said"),
+    [(1.0, ["begins at 0.5 s"]), (2.0, ["begins at 0.5 s", "ends at 1.5 s of 2 s"]), (1.5, ["begins at 0.5 s"])],
+)
+def test_a_profile_that_does_not_span_the_recording_is_held_and_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], duration_s: float, said: list[str]
+) -> None:
+    path = tmp_path / "p.csv"
+    path.write_text("time_s,speed_rpm\n0.5,300\n1.5,600\n")
+    assert course(str(path), "speed_rpm", "rpm", duration_s).at(3.0) == 600.0
+    notes = capsys.readouterr().err.splitlines()
+    assert len(notes) == len(said)
+    assert all(f"p.csv: {text}" in note for text, note in zip(said, notes, strict=True))
+
+
 def test_the_list_names_everything_within_100_columns(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = run(capsys, "simulate", "--list")
     assert code == 0
