@@ -57,6 +57,7 @@ class _Score:
     slope: float
     placebo: float
     n_placebos: int
+    foretold: float
 
 
 def own_features(fit: Fit, observed: Observed) -> FloatArray:
@@ -93,6 +94,7 @@ def shrinkage(paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str)
         held_out,
         n_placebos=max(score.n_placebos for score in scores),
         elsewhere=_mean([_elsewhere(paths, fold) for fold in folds]),
+        foretold=max(score.foretold for score in scores),
     )
 
 
@@ -145,6 +147,7 @@ def _score(paths: Sequence[EffectPath], fold: Fold) -> _Score:
         _slope(fit, fold.scored, used),
         max(placebos, default=0.0),
         len(placebos),
+        float(np.abs(fit.at(fold.scored.condition) / fold.scored.floors).max()),
     )
 
 

@@ -92,6 +92,10 @@ class Interval:
     high: float
 
 
+LEAST_FORETOLD = 0.5
+"""Floors: what a simulator changes by less tells nothing, whether the gap shrinks or grows."""
+
+
 @dataclass(frozen=True)
 class Shrinkage:
     """How far the gap shrinks once an effect is added, on data that its severity was not fitted to.
@@ -114,6 +118,8 @@ class Shrinkage:
     elsewhere : float or None
         The shrink at operating conditions of which nothing but the level was fitted, severity and place being those of
         the others; None with one condition.
+    foretold : float or None
+        The largest change that the simulator foretells of the fitted effect, in floors; None where it is not known.
     """
 
     before: Interval
@@ -124,6 +130,12 @@ class Shrinkage:
     held_out: str
     n_placebos: int = 1
     elsewhere: float | None = None
+    foretold: float | None = None
+
+    @property
+    def is_foretold(self) -> bool:
+        """Whether the simulator shows enough of the effect for a shrink to mean anything."""
+        return self.foretold is None or self.foretold >= LEAST_FORETOLD
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from math import isfinite
 
 from gearsig.gap.posterior import LIKELIER_THAN_NOT
 from gearsig.gap.types import NONE, UNKNOWN, GapCause, GapOutcome, GapPlace, GapReport, Interval
-from gearsig.gap.words import severity_unit
+from gearsig.gap.words import hardly_foretold, severity_unit
 
 
 def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
@@ -97,6 +97,8 @@ def _how_far(report: GapReport) -> str:
     shrinkage = report.causes[0].shrinkage
     if report.outcome in (GapOutcome.NO_GAP, GapOutcome.UNKNOWN) or shrinkage is None:
         return "How far: no effect was added."
+    if not shrinkage.is_foretold:
+        return f"How far: not known; {report.causes[0].title} {hardly_foretold(shrinkage)}."
     s, both = shrinkage.shrink, f"from {shrinkage.before.value:.2g} to {shrinkage.after.value:.2g} structural floors"
     percent = f"{100 * s.value:.0f} % ({100 * s.low:.0f} to {100 * s.high:.0f} %)"
     shrinks = f"shrinks {both}, by {percent} of what exceeds one,"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from gearsig.gap.frame import GearFrame
 from gearsig.gap.gear_lines import SIDES
 from gearsig.gap.spots import shaft_words
+from gearsig.gap.types import Shrinkage
 
 _UNITS = {"um": "µm", "deg": "°", "g mm": "g·mm", "N m": "N·m", "m/s^2": "m/s²", "1": ""}
 
@@ -112,3 +113,8 @@ def feature_words(name: str, frame: GearFrame) -> str:
     if rest.endswith("_shaft"):
         return f"{where}: orders of {shaft_words(frame, SIDES.index(rest.removesuffix('_shaft')))}"
     return f"{where}: {_CYCLIC[rest]}"
+
+
+def hardly_foretold(shrinkage: Shrinkage) -> str:
+    """Return what is said of an effect that the simulator does not make large enough to judge."""
+    return f"hardly shows on the simulator at these conditions (at most {shrinkage.foretold or 0.0:.2g} floors)"

@@ -122,6 +122,7 @@ def _shrinkage(shrinkage: Shrinkage) -> Json:
         "slope": rounded(shrinkage.slope),
         "placebo_shrink": rounded(shrinkage.placebo),
         "shrink_elsewhere": None if shrinkage.elsewhere is None else rounded(shrinkage.elsewhere),
+        "foretold": None if shrinkage.foretold is None else rounded(shrinkage.foretold),
         **members(shrinkage, "held_out", "n_placebos"),
     }
 

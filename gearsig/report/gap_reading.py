@@ -157,10 +157,10 @@ def _added(found: Json) -> Added:
 def _shrinkage(found: Json) -> Shrinkage:
     before, after, shrink = (_interval(found[key]) for key in ("before", "after", "shrink"))
     slope, placebo = _number(found["slope"]), _number(found["placebo_shrink"])
-    elsewhere = found.get("shrink_elsewhere")
+    further = (found.get(name) for name in ("shrink_elsewhere", "foretold"))
     return Shrinkage(
         *(before, after, shrink, slope, placebo, found["held_out"], found.get("n_placebos", 1)),
-        None if elsewhere is None else _number(elsewhere),
+        *(None if value is None else _number(value) for value in further),
     )
 
 

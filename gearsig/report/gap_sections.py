@@ -21,7 +21,7 @@ from gearsig.gap.types import (
     Shrinkage,
 )
 from gearsig.gap.verdict import rivals
-from gearsig.gap.words import severity_unit
+from gearsig.gap.words import hardly_foretold, severity_unit
 from gearsig.report.gap_text import point_text
 from gearsig.report.numbers import readable
 from gearsig.report.sections import Rows, named
@@ -207,6 +207,8 @@ def severity_text(cause: GapCause) -> str:
 def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
     if shrinkage is None:
         return ("It was not fitted: no held-out check.",)
+    if not shrinkage.is_foretold:
+        return (f"How far the gap shrinks is not known: it {hardly_foretold(shrinkage)}.",)
     before, after = interval_text(shrinkage.before), interval_text(shrinkage.after)
     shrink, wrong = shrinkage.shrink, shrinkage.placebo
     taken, low, high = (percent(x) for x in (shrink.value, shrink.low, shrink.high))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -177,3 +179,15 @@ def test_a_severity_from_one_condition_is_tried_at_the_other() -> None:
     assert right.elsewhere > 0.9
     assert wrong.elsewhere < 0.3
     assert shrinkage([effect], [Fold((first,), first)], "").elsewhere is None
+
+
+def test_what_the_simulator_hardly_shows_is_said() -> None:
+    """A table that moves nothing by more than a tenth of a floor."""
+    truth = seen(foretold(path(), 4.0))
+    shows = shrinkage([path()], [Fold((truth,), truth)], "")
+    assert shows.is_foretold
+    assert shows.foretold == pytest.approx(np.abs(foretold(path(), 4.0) / FLOORS).max(), rel=0.3)
+    loudest = float(np.abs(foretold(path(), path().severities[-1]) / FLOORS).max())
+    faint = replace(path(), distances=tuple(0.1 / loudest * table for table in path().distances))
+    hardly = shrinkage([faint], [Fold((truth,), truth)], "")
+    assert not hardly.is_foretold

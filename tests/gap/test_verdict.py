@@ -122,3 +122,13 @@ def test_impacts_without_a_size_are_named_with_the_place_beside_them() -> None:
 
 def test_next_to_an_unknown_cause_is_another_look_at_it() -> None:
     assert "sensor nearer" in replace(unknown_report(), next_recordings=(), references=("healthy.h5",)).verdict[3]
+
+
+def test_a_shrink_that_the_simulator_cannot_show_is_not_claimed() -> None:
+    report = effect_report()
+    first = report.causes[0]
+    assert first.shrinkage is not None
+    faint = replace(first, shrinkage=replace(first.shrinkage, foretold=0.1))
+    said = replace(report, causes=(faint, *report.causes[1:])).verdict[2]
+    assert said.startswith("How far: not known; ")
+    assert "at most 0.1 floors" in said
