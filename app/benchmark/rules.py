@@ -1,20 +1,18 @@
-"""The baseline that applies the rule table of `textbook`."""
+"""The baseline that applies the rule table of `gearsig.gap.textbook`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
 from app.benchmark.bare_report import bare_report
 from app.benchmark.seen import Seen
-from app.benchmark.textbook import LEAST_STRENGTH, RULES, USUAL, Rule
+from app.benchmark.textbook import LEAST_STRENGTH, USUAL
 from gearsig.gap.features import once
 from gearsig.gap.gear_lines import SIDES
+from gearsig.gap.textbook import RULES, rule_strength, sides_of
 from gearsig.gap.types import NONE, GapReport
-
-MOST_OF_A_SIGN = 8.0
-"""In spreads: one sign alone shall not carry a rule of three."""
 
 
 def diagnose(seen: Seen) -> GapReport:
@@ -22,7 +20,7 @@ def diagnose(seen: Seen) -> GapReport:
     found: dict[str, tuple[float, str]] = {NONE: (LEAST_STRENGTH, "")}
     each = list(_deviations(seen))
     for rule in RULES:
-        for side in SIDES if any("{side}" in name for name, _ in rule.signs) else ("",):
+        for side in sides_of(rule):
             strength = float(np.mean([rule_strength(rule, side, deviations) for deviations in each]))
             if strength > found.get(rule.cause, (-np.inf, ""))[0]:
                 found[rule.cause] = strength, side
@@ -30,15 +28,6 @@ def diagnose(seen: Seen) -> GapReport:
     total = sum(weights.values())
     options = {cause: {"gear": side} for cause, (_, side) in found.items() if side}
     return bare_report("rules", {cause: weight / total for cause, weight in weights.items()}, options)
-
-
-def rule_strength(rule: Rule, side: str, deviations: Mapping[str, float]) -> float:
-    """Return the mean of a rule's signs, each over its spread."""
-    signs = []
-    for name, direction in rule.signs:
-        value = deviations[name.format(side=side)]
-        signs.append(min(direction * value if direction else abs(value), MOST_OF_A_SIGN))
-    return float(np.mean(signs))
 
 
 def _deviations(seen: Seen) -> Iterator[dict[str, float]]:

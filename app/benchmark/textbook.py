@@ -1,107 +1,11 @@
-"""The rule table: textbook signatures of the effects, in the features of `gearsig.gap`.
+"""What is usual of the features in the rule table of `gearsig.gap.textbook`, for the baseline that applies it.
 
-Each rule names what rises (or falls, or changes either way) where the effect is; a feature counts by how far it is from
-usual, over its usual spread. With a healthy reference the change against it counts, over the change's usual spread.
-``{side}`` is driver or driven, whichever shows more.
-
-Signatures: R. B. Randall, Vibration-based Condition Monitoring (Wiley, 2011), chapters 2, 5 and 6. Usual: the middle
-and the spread of 24 healthy machines of the development cases, rounded.
+A feature counts by how far it is from usual, over its usual spread. With a healthy reference the change against it
+counts, over the change's usual spread. Usual: the middle and the spread of 24 healthy machines of the development
+cases, rounded.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
-
-from gearsig.gap.types import UNKNOWN
-
-UP, DOWN, EITHER = 1, -1, 0
-
-
-@dataclass(frozen=True)
-class Rule:
-    """A cause and its signs; one cause may have several rules, of which the strongest counts.
-
-    Parameters
-    ----------
-    cause : str
-    signs : tuple of (str, int)
-        Feature and direction; their mean is the rule's strength.
-    words : str
-        What the textbook says.
-    """
-
-    cause: str
-    signs: tuple[tuple[str, int], ...]
-    words: str
-
-
-RULES = (
-    Rule(
-        "root_crack",
-        (("tooth.{side}.prominence", UP), ("tooth.{side}.kurtosis", UP), ("sideband.{side}.6to12", UP)),
-        "once per revolution a dip in stiffness: one tooth in the residual, a wide family of low sidebands",
-    ),
-    Rule(
-        "tooth_spall",
-        (("tooth.{side}.prominence", UP), ("tooth.{side}.kurtosis", UP), ("tooth.{side}.centroid", UP)),
-        "a short impact at one tooth, high in frequency",
-    ),
-    Rule(
-        "chipped_tooth",
-        (("tooth.{side}.peak", UP), ("tooth.{side}.prominence", UP), ("tooth.{side}.second", UP)),
-        "a strong impact at one tooth",
-    ),
-    Rule(
-        "tooth_wear",
-        (("mesh.total", UP), ("mesh.share.2", UP), ("mesh.share.3", UP)),
-        "mesh harmonics rise, the higher ones most",
-    ),
-    Rule(
-        "pitch_error",
-        (("tooth.{side}.elsewhere", UP), ("shaft.{side}.low", UP), ("sideband.{side}.3to5", UP)),
-        "all orders of the shaft rise, at every tooth",
-    ),
-    Rule(
-        "surface_roughness",
-        (("floor.band.3", UP), ("floor.band.4", UP), ("tooth.driver.elsewhere", UP)),
-        "noise rises over a wide band",
-    ),
-    Rule("sliding_friction", (("mesh.share.2", UP), ("mesh.share.4", UP)), "the force reverses at the pitch point"),
-    Rule(
-        "eccentricity",
-        (("sideband.{side}.1", UP), ("shaft.{side}.1", UP)),
-        "first sidebands of the shaft about the mesh, and its first order",
-    ),
-    Rule("unbalance", (("shaft.{side}.1", UP), ("shaft.{side}.1.to_mesh", UP)), "the shaft's first order"),
-    Rule(
-        "misalignment",
-        (("shaft.{side}.2", UP), ("sideband.{side}.2", UP)),
-        "the shaft's second order, second sidebands",
-    ),
-    Rule(
-        "torque_ripple",
-        (("sideband.{side}.strongest", UP), ("shaft.{side}.strongest", UP)),
-        "a single pair of sidebands, a single order of the shaft",
-    ),
-    Rule("speed_fluctuation", (("speed.swing", UP), ("speed.drift", UP)), "the speed wanders"),
-    Rule("backlash", (("mesh.half", UP), ("line.half_mesh", UP)), "half orders of the mesh when teeth part"),
-    Rule("bearing_outer_race", (("envelope.outer", UP),), "envelope lines at the ball pass order of the outer race"),
-    Rule("bearing_inner_race", (("envelope.inner", UP),), "envelope lines at the ball pass order of the inner race"),
-    Rule(
-        "bearing_clearance",
-        (("shaft.{side}.3", UP), ("shaft.{side}.low", UP), ("envelope.cage", UP)),
-        "looseness: many orders of the shaft",
-    ),
-    Rule(
-        "transfer_path",
-        (("floor.band.2", EITHER), ("floor.band.3", EITHER), ("raw.level", EITHER)),
-        "levels of whole bands change, lines and noise alike",
-    ),
-    Rule("mains_hum", (("hum", UP),), "lines at the supply's frequency"),
-    Rule("clipping", (("raw.near_the_extreme", UP), ("raw.kurtosis", DOWN)), "flat tops"),
-    Rule(UNKNOWN, (("envelope.strange", UP),), "a modulation that belongs to no part"),
-    Rule(UNKNOWN, (("line.strange", UP),), "a line that belongs to no part"),
-)
 
 LEAST_STRENGTH = 2.0
 """In spreads: the strength at which "none" stands."""

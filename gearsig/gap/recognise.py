@@ -18,6 +18,7 @@ from gearsig.gap.floors import REPEATABLE, StructuralFloor, soft_size
 from gearsig.gap.kept_recogniser import Fitted, keep_fitted, read_fitted
 from gearsig.gap.population import Population, load_population
 from gearsig.gap.relative import beyond_the_mesh, counted_from_the_mesh
+from gearsig.gap.textbook import NOTHING_SAID, strengths
 from gearsig.gap.trees import LinearRule, Trees
 from gearsig.gap.types import NONE, UNKNOWN
 
@@ -30,6 +31,10 @@ LINEAR_SHARE, LINEAR_SHRINKAGE, LINEAR_REACH = 0.5, 0.2, 8.0
 """Of the probabilities without a reference that a linear discriminant gives; how far its covariance is drawn towards a
 diagonal one; where its input is cut. Without a reference nearly all that is seen is what one machine differs from
 another by: trees cut along single features and miss a small change across it, a pooled covariance takes it out."""
+
+RULES_WEIGHT = 0.3
+"""Of what the textbook's rules say without a reference, p ∝ p_learned exp(w strength): the population's balance of a
+machine's lines is its own, and where nothing cancels what is usual, the rules' few signs hold on any machine."""
 
 LEAST_SIZE = 0.6
 """Structural floors, below which a drawn effect changed nothing that could be learned."""
@@ -86,8 +91,18 @@ class Recogniser:
         if self.linear is not None:
             told = self.linear.probabilities(_within_reach(row))
             found = (1.0 - LINEAR_SHARE) * found + LINEAR_SHARE * told
+            found = found * self._by_the_rules(change)
         found = np.maximum(found, LEAST_PROBABILITY)
         return dict(zip(self.causes, (found / found.sum()).tolist(), strict=True))
+
+    def _by_the_rules(self, change: Features) -> FloatArray:
+        """Return the factors of the causes, by how far features are from usual, in standard deviations."""
+        names = self.floor.names
+        spreads = self.floor.of(names) / REPEATABLE
+        deviations = self.floor.from_centre(names, change.values) / spreads
+        said = strengths(dict(zip(names, deviations.tolist(), strict=True)))
+        factors: FloatArray = np.exp(RULES_WEIGHT * np.array([said.get(name, NOTHING_SAID) for name in self.causes]))
+        return factors
 
 
 def input_rows(

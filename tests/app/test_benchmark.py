@@ -20,10 +20,11 @@ from app.benchmark.make import make_case
 from app.benchmark.plan import BLIND, SAME, Plan, PlannedCase
 from app.benchmark.run import Wanted, run_benchmark
 from app.benchmark.seen import read_seen
-from app.benchmark.textbook import RULES, USUAL
+from app.benchmark.textbook import USUAL
 from app.cli import main
 from gearsig.cache import FOLDERS
 from gearsig.errors import InputError
+from gearsig.gap.textbook import RULES
 from gearsig.gap.types import NONE, UNKNOWN
 from sims.blind import CATALOGUE, OUTSIDE
 from sims.effects import effects
