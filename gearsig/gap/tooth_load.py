@@ -9,7 +9,7 @@ from gearsig.rig.types import GearPair
 USUAL_PRESSURE_ANGLE_DEG = 20.0
 
 LIGHT_LOAD_N_PER_MM = 50.0
-"""Up to which flanks may part and the backlash shows. Source: ISO 6336-1, on the range of its dynamic factor."""
+"""Up to which flanks may part and the backlash shows: where dynamic loads can reach the static one, by order."""
 
 
 def tooth_load_n_per_mm(pair: GearPair, torque_nm: float) -> float:
