@@ -9,7 +9,10 @@ from collections.abc import Callable, Iterable
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
+from zipfile import BadZipFile, ZipFile
+
+import numpy as np
 
 from gearsig.errors import InputError
 
@@ -63,6 +66,18 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
     finally:
         if part:
             Path(part).unlink(missing_ok=True)
+
+
+def read_arrays(path: Path, most_bytes: int) -> dict[str, Any] | None:
+    """Return a kept file's arrays; None where there is no such file, or it is damaged, or unpacks to more than that."""
+    try:
+        with ZipFile(path) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > most_bytes:
+                return None
+        with np.load(path, allow_pickle=False) as data:
+            return {name: data[name] for name in data.files}
+    except (OSError, BadZipFile, EOFError, ValueError):
+        return None
 
 
 def modules_digest(modules: Iterable[str]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -76,10 +76,10 @@ def run_benchmark(
         See `app.benchmark.blind_run`; or if a diagnoser is not there, or the code has changed.
     """
     cases = {planned.number: planned for planned in wanted.plan.cases()}
-    run = BlindRun(sorted(cases), partial(_make, wanted.plan), wanted.diagnosers, wanted.definition())
+    run = BlindRun(sorted(cases), partial(_make, wanted.plan, cases), wanted.diagnosers, wanted.definition())
     answered = run.answered(folder, n_processes=n_processes, on_progress=on_progress)
     return [Done(cases[number], truth, answers) for number, truth, answers in answered]
 
 
-def _make(plan: Plan, number: int, folder: Path | None) -> Truth:
-    return make_case(plan, next(case for case in plan.cases() if case.number == number), folder)
+def _make(plan: Plan, cases: Mapping[int, PlannedCase], number: int, folder: Path | None) -> Truth:
+    return make_case(plan, cases[number], folder)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
-from gearsig.cache import write_whole
+from gearsig.cache import read_arrays, write_whole
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.gap.simulator import Added, Point
@@ -24,14 +23,13 @@ MOST_BYTES = 100_000_000
 
 def read_bank(path: Path, key: str) -> Bank | None:
     """Return the bank that a file holds for this key, None where there is no such file, or it is damaged or foreign."""
+    data = read_arrays(path, MOST_BYTES)
+    if data is None:
+        return None
     try:
-        with ZipFile(path) as archive:
-            if sum(entry.file_size for entry in archive.infolist()) > MOST_BYTES:
-                return None
-        with np.load(path, allow_pickle=False) as data:
-            about = json.loads(str(data["about"]))
-            return _checked(about, {name: data[name] for name in _ARRAYS}) if about["key"] == key else None
-    except (OSError, BadZipFile, EOFError, ValueError, KeyError, TypeError, IndexError):
+        about = json.loads(str(data["about"]))
+        return _checked(about, {name: data[name] for name in _ARRAYS}) if about["key"] == key else None
+    except (ValueError, KeyError, TypeError, IndexError):
         return None
 
 

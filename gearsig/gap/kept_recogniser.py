@@ -6,11 +6,10 @@ from functools import cache
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
-from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
-from gearsig.cache import cache_folder, modules_digest, write_whole
+from gearsig.cache import cache_folder, modules_digest, read_arrays, write_whole
 from gearsig.errors import InputError
 from gearsig.gap.population import FILE
 from gearsig.gap.trees import LinearRule, Trees
@@ -28,17 +27,14 @@ Fitted = tuple[tuple[str, ...], Trees, LinearRule | None]
 
 def read_fitted(name: str) -> Fitted | None:
     """Return what was kept under a name for this very code and population; None where nothing was, or it is damaged."""
+    arrays = read_arrays(_path(name), MOST_BYTES)
+    if arrays is None:
+        return None
     try:
-        path = _path(name)
-        with ZipFile(path) as archive:
-            if sum(entry.file_size for entry in archive.infolist()) > MOST_BYTES:
-                return None
-        with np.load(path, allow_pickle=False) as data:
-            arrays = {key: data[key] for key in data.files}
         trees = Trees(*(arrays[key] for key in _TREES))
         linear = LinearRule(*(arrays[key] for key in _LINEAR)) if _LINEAR[0] in arrays else None
         return tuple(map(str, arrays["causes"])), trees, linear
-    except (OSError, BadZipFile, EOFError, ValueError, KeyError, TypeError):
+    except (KeyError, TypeError):
         return None
 
 
