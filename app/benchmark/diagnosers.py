@@ -12,6 +12,8 @@ from gearsig.gap.types import GapReport
 Diagnoser = Callable[[Seen], GapReport]
 
 GAP, FOREST, MAJORITY, RULES = "gap", "forest", "majority", "rules"
+GAP_UNSEEN, FOREST_UNSEEN = "gap-unseen", "forest-unseen"
+"""The same without what was learned from the independent rig's development gears."""
 START_STOP = "start-stop"
 """Of machines that start and stop, by the model forging."""
 BASELINES = (MAJORITY, RULES)
@@ -20,6 +22,8 @@ _HOMES = {
     FOREST: "app.benchmark.forest:diagnose",
     MAJORITY: "app.benchmark.majority:diagnose",
     RULES: "app.benchmark.rules:diagnose",
+    GAP_UNSEEN: "app.benchmark.unseen:diagnose",
+    FOREST_UNSEEN: "app.benchmark.unseen:recognise",
     START_STOP: "app.benchmark.diagnosers:diagnose_drive",
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,13 +12,18 @@ from app.calibration.rigs import DrawnRig
 from gearsig.recording.types import Recording
 from sims.cracked.linear import default_step_s
 from sims.cracked.simulate import simulate_machine
-from sims.cracked.simulator import CrackedPair
+from sims.cracked.simulator import NAME as CRACKED
+from sims.cracked.simulator import CrackedPair, Prepared
 from sims.effects import EffectSetting, with_effects
 from sims.gear_pair.build import build_rig
 from sims.gear_pair.roughness import draw_roughness
 from sims.machine import Machine
 from sims.machine.operation import Operation
 from sims.measure import MeasuredChannel, ModalPath, PathMode
+from sims.reduced_fe.parameters import PARAMETERS
+from sims.reduced_fe.simulate import simulate_pair
+from sims.reduced_fe.simulator import PreparedPair, ReducedPair
+from sims.reduced_fe.twin import STEP_S, mesh_dof
 
 SAMPLING_RATE_HZ = 20480.0
 MOST_LEAD_REV = 8
@@ -35,6 +41,7 @@ def simulate_rig(
     options: Mapping[str, float | str] | None = None,
     further: Sequence[EffectSetting] = (),
     step_angle_rad: float | None = None,
+    model: str = CRACKED,
 ) -> Recording:
     """Simulate one recording.
 
@@ -54,29 +61,44 @@ def simulate_rig(
     further : sequence of EffectSetting
         Effects that are switched on as well.
     step_angle_rad : float or None
-        Step times the greatest angular eigenfrequency; None: the simulator's own, finer than floors need.
+        Of "cracked": step times the greatest angular eigenfrequency; None: the simulator's own, finer than floors
+        need.
+    model : str
+        "cracked" or "reduced-fe".
     """
     operation = Operation.steady(drawn.speed_rpm * speed_factor, drawn.torque_nm * torque_factor)
     size = drawn.depth_mm if severity is None else severity
     chosen = {"gear": drawn.gear, "tooth": drawn.tooth + 1.0, **(options or {})}
     settings = [EffectSetting(effect, size, chosen)] if size > 0 else []
     draws = np.random.default_rng(drawn.seed)
-    ready = CrackedPair().prepare(drawn.parameters, [], operation, draws, sampling_rate_hz=SAMPLING_RATE_HZ)
+    ready = _prepared(model, drawn, operation, draws)
     machine = with_effects(_with_path(ready.machine, drawn), [*settings, *further], draws)
     machine = _with_fixed_flanks(machine, [drawn.seed, 77 + flanks])
     rng, lead_rev = _beginning(drawn, run)
     lead_s = lead_rev * 60.0 / drawn.speed_rpm
-    recording = simulate_machine(
-        machine,
-        operation,
-        rng=rng,
-        sampling_rate_hz=SAMPLING_RATE_HZ,
-        duration_s=drawn.duration_s + (lead_s if run else 0.0),
-        rig=build_rig(machine, operation, name="drawn"),
-        step_s=None if step_angle_rad is None else default_step_s(machine, operation, step_angle_rad),
-        truth={"depth_mm": size, "effect": effect if size else "", **chosen},
-    )
+    asked: dict[str, Any] = {
+        "rng": rng,
+        "sampling_rate_hz": SAMPLING_RATE_HZ,
+        "duration_s": drawn.duration_s + (lead_s if run else 0.0),
+        "rig": build_rig(machine, operation, name="drawn"),
+        "truth": {"depth_mm": size, "effect": effect if size else "", **chosen},
+    }
+    if isinstance(ready, PreparedPair):
+        recording, _ = simulate_pair(replace(ready.pair, machine=machine), operation, step_s=STEP_S, **asked)
+    else:
+        step_s = None if step_angle_rad is None else default_step_s(machine, operation, step_angle_rad)
+        recording = simulate_machine(machine, operation, step_s=step_s, **asked)
     return _cut(recording, round(lead_s * SAMPLING_RATE_HZ)) if run else recording
+
+
+def _prepared(model: str, drawn: DrawnRig, operation: Operation, rng: np.random.Generator) -> Prepared | PreparedPair:
+    """Return the sound machine; finite-element gears are of full discs, with the mesh of a twin's."""
+    if model == CRACKED:
+        return CrackedPair().prepare(drawn.parameters, [], operation, rng, sampling_rate_hz=SAMPLING_RATE_HZ)
+    known = {p.name for p in PARAMETERS}
+    values = {name: value for name, value in drawn.parameters.items() if name in known}
+    values |= {"roughness_locked_to": "flank", "mesh_dof": float(mesh_dof(drawn.teeth))}
+    return ReducedPair().prepare(values, [], operation, rng, sampling_rate_hz=SAMPLING_RATE_HZ)
 
 
 def turns_before(drawn: DrawnRig, run: int) -> int:

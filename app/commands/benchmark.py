@@ -49,8 +49,8 @@ def gap(
         typer.Option(
             "--diagnoser",
             metavar="NAME",
-            help="gap, forest, majority, rules, or MODULE:FUNCTION; the first is judged, more stand beside it. "
-            "Default: gap.",
+            help="gap, forest, either with -unseen (nothing learned from the rig that makes the cases), majority, "
+            "rules, or MODULE:FUNCTION; the first is judged, more stand beside it. Default: gap.",
         ),
     ] = None,
     longest: Annotated[

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, fields
 from functools import cache, cached_property
 from pathlib import Path
 
@@ -15,6 +18,13 @@ from gearsig.gap.floors import StructuralFloor
 from gearsig.gap.types import NONE
 
 FILE = Path(__file__).with_name("population.npz")
+INDEPENDENT = "independent"
+"""Simulator of the rig that makes blind cases; only its development gears are in the population."""
+BY_HAND = "by hand"
+"""Source of effects that are put into a sound machine's recordings as the literature describes them."""
+
+LEFT_OUT: ContextVar[str] = ContextVar("LEFT_OUT", default="")
+"""Simulator whose machines nothing may be learned from, see `without_machines_of`."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +35,12 @@ class Population:
     ----------
     rigs : array, (n,)
         Which machine a row is of.
+    simulators : array of str, (n,)
+        That the machine is of.
     causes : array of str, (n,)
         Effect, "none" or "unknown".
+    by_hand : bool array, (n,)
+        Effects that no simulator made, see `BY_HAND`.
     change_names, feature_names : tuple of str
         Of the columns; the first changes are the differences of the features.
     changes, change_scatter : arrays, (n, n_changes)
@@ -40,7 +54,9 @@ class Population:
     """
 
     rigs: NDArray[np.int64]
+    simulators: NDArray[np.str_]
     causes: NDArray[np.str_]
+    by_hand: NDArray[np.bool_]
     change_names: tuple[str, ...]
     feature_names: tuple[str, ...]
     changes: FloatArray
@@ -50,6 +66,22 @@ class Population:
     simulated: FloatArray
     simulated_scatter: FloatArray
     loads_n_per_mm: FloatArray
+
+    @cached_property
+    def sources(self) -> NDArray[np.str_]:
+        """Return what made each effect: a simulator, or `BY_HAND`."""
+        return np.where(self.by_hand, BY_HAND, self.simulators)
+
+    def of_rows(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Population:
+        """Return some of the recordings."""
+        whole = ("change_names", "feature_names")
+        return Population(
+            **{
+                field.name: value if field.name in whole else value[rows]
+                for field in fields(self)
+                for value in (getattr(self, field.name),)
+            }
+        )
 
     @cached_property
     def reference_floor(self) -> StructuralFloor:
@@ -103,15 +135,32 @@ def credibility_of(features: FloatArray, simulated: FloatArray) -> FloatArray:
     return np.clip(slope, 0.0, 1.0)
 
 
-@cache
+@contextmanager
+def without_machines_of(simulator: str) -> Iterator[None]:
+    """Let nothing be known of a simulator's machines: how well others prepare for it is seen then."""
+    token = LEFT_OUT.set(simulator)
+    try:
+        yield
+    finally:
+        LEFT_OUT.reset(token)
+
+
 def load_population(path: Path = FILE) -> Population:
-    """Read the population that comes with this version.
+    """Return the population that comes with this version, but for what `without_machines_of` leaves out.
 
     Raises
     ------
     InputError
         If there is no such file or it belongs to other features.
     """
+    return _read(path, LEFT_OUT.get())
+
+
+@cache
+def _read(path: Path, left_out: str) -> Population:
+    if left_out:
+        whole = _read(path, "")
+        return whole.of_rows(whole.simulators != left_out)
     try:
         with np.load(path, allow_pickle=False) as data:
             arrays = {name: data[name] for name in data.files}
@@ -128,7 +177,9 @@ def load_population(path: Path = FILE) -> Population:
     } | {name: np.asarray(arrays[name], dtype=np.float64)[of_rigs] for name in ("simulated", "simulated_scatter")}
     return Population(
         arrays["rigs"],
+        arrays["simulators"],
         arrays["causes"],
+        arrays["by_hand"],
         tuple(map(str, arrays["change_names"])),
         tuple(map(str, arrays["feature_names"])),
         **tables,

@@ -16,7 +16,7 @@ from gearsig.gap.contrasts import mirrored, seen_rows
 from gearsig.gap.features import Features
 from gearsig.gap.floors import REPEATABLE, StructuralFloor, soft_size
 from gearsig.gap.kept_recogniser import Fitted, keep_fitted, read_fitted
-from gearsig.gap.population import Population, load_population
+from gearsig.gap.population import LEFT_OUT, Population, load_population
 from gearsig.gap.relative import beyond_the_mesh, counted_from_the_mesh
 from gearsig.gap.textbook import NOTHING_SAID, strengths
 from gearsig.gap.trees import LinearRule, Trees
@@ -35,6 +35,9 @@ another by: trees cut along single features and miss a small change across it, a
 RULES_WEIGHT = 0.3
 """Of what the textbook's rules say without a reference, p ∝ p_learned exp(w strength): the population's balance of a
 machine's lines is its own, and where nothing cancels what is usual, the rules' few signs hold on any machine."""
+
+EVENNESS = 0.5
+"""0: every row counts alike; 1: every source of a cause does."""
 
 LEAST_SIZE = 0.6
 """Structural floors, below which a drawn effect changed nothing that could be learned."""
@@ -174,7 +177,7 @@ def _fit(population: Population, *, with_reference: bool) -> Fitted:
     loads = np.tile(population.loads_n_per_mm[seen], 2)
     rows = input_rows(floor, changes, scatter, loads).astype(np.float32)
     causes = np.tile(population.causes[seen], 2)
-    forest.fit(rows, causes)
+    forest.fit(rows, causes, sample_weight=np.tile(even_weights(population.sources[seen], population.causes[seen]), 2))
     names = tuple(map(str, forest.classes_))
     if with_reference:
         return names, Trees.of(forest), None
@@ -182,6 +185,17 @@ def _fit(population: Population, *, with_reference: bool) -> Fitted:
     linear = LinearDiscriminantAnalysis(solver="lsqr", shrinkage=LINEAR_SHRINKAGE, priors=even)
     linear.fit(_within_reach(rows), causes)
     return names, Trees.of(forest), LinearRule(linear.coef_, linear.intercept_)
+
+
+def even_weights(sources: NDArray[np.str_], causes: NDArray[np.str_]) -> FloatArray:
+    """Return weights of rows by which the sources of a cause count more alike than they have rows: n^(−`EVENNESS`).
+
+    None of them shows an effect as it is; what they have in common is what holds for a machine.
+    """
+    _, kind, counts = np.unique(np.char.add(np.char.add(sources, "/"), causes), return_inverse=True, return_counts=True)
+    weights: FloatArray = counts[kind] ** -EVENNESS
+    weights /= weights.mean()
+    return weights
 
 
 def _within_reach(rows: FloatArray) -> FloatArray:
@@ -197,11 +211,15 @@ def _visible(floor: StructuralFloor, changes: FloatArray, causes: NDArray[np.str
     return seen
 
 
-@cache
 def load_recogniser(*, with_reference: bool) -> Recogniser:
     """Return the one for the population that comes with this version: fitted once, then kept among the user's files."""
-    population, name = load_population(), "with_reference" if with_reference else "without_reference"
-    fitted = read_fitted(name)
+    return _load(with_reference, LEFT_OUT.get())
+
+
+@cache
+def _load(with_reference: bool, left_out: str) -> Recogniser:
+    name = "_".join(["with" if with_reference else "without", "reference", *([left_out] if left_out else [])])
+    population, fitted = load_population(), read_fitted(name)
     if fitted is None:
         fitted = _fit(population, with_reference=with_reference)
         keep_fitted(name, fitted)

@@ -23,6 +23,11 @@ STEP_S = 8.2e-6
 housing differs from another's."""
 
 
+def mesh_dof(teeth: tuple[int, int]) -> int:
+    """Return the degrees of freedom of each of a twin's gears."""
+    return max(MESH_DOF, MESH_DOF_PER_TOOTH * max(teeth))
+
+
 @dataclass(frozen=True)
 class ReducedTwin(PairTwin):
     """A rig's twin with finite-element gears, full discs; see `sims.gear_pair.twin.PairTwin`."""
@@ -61,8 +66,8 @@ class ReducedTwin(PairTwin):
 
     def _own_parameters(self, values: dict[str, ParameterValue]) -> dict[str, ParameterValue]:
         known = {p.name for p in PARAMETERS}
-        n_dof = max(MESH_DOF, MESH_DOF_PER_TOOTH * max(self.nominal.teeth))
-        return {name: value for name, value in values.items() if name in known} | {"mesh_dof": float(n_dof)}
+        own = {name: value for name, value in values.items() if name in known}
+        return own | {"mesh_dof": float(mesh_dof(self.nominal.teeth))}
 
     def _geometry(self, own: Preset) -> PairGeometry:
         return prepare_preset(own, {}, (), None, np.random.default_rng(0)).pair.machine.mesh.pair

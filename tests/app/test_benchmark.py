@@ -12,7 +12,7 @@ from pathlib import Path
 import h5py
 import pytest
 
-from app.benchmark import run
+from app.benchmark import diagnosers, forest, run, unseen
 from app.benchmark.answer import Answer, AnsweredCause, AnsweredPlace, AnsweredShrinkage, from_text, to_text
 from app.benchmark.blind_run import ANSWERS_FOLDER, diagnosed
 from app.benchmark.diagnosers import diagnoser
@@ -24,6 +24,7 @@ from app.benchmark.textbook import USUAL
 from app.cli import main
 from gearsig.cache import FOLDERS
 from gearsig.errors import InputError
+from gearsig.gap.population import INDEPENDENT, load_population
 from gearsig.gap.textbook import RULES
 from gearsig.gap.types import NONE, UNKNOWN
 from sims.blind import CATALOGUE, OUTSIDE
@@ -259,3 +260,10 @@ def until(holds):
 def is_running(pid):
     state = Path(f"/proc/{pid}/stat")
     return state.exists() and state.read_text().rpartition(")")[2].split()[0] != "Z"
+
+
+def test_the_unseen_know_nothing_of_the_rig_that_makes_the_cases(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (diagnosers, forest):
+        monkeypatch.setattr(module, "diagnose", lambda _: set(load_population().simulators))
+    for ask in (unseen.diagnose, unseen.recognise):
+        assert ask(None) == set(load_population().simulators) - {INDEPENDENT}  # type: ignore[arg-type]  # not looked at

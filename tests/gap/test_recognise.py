@@ -11,8 +11,8 @@ import pytest
 from gearsig.errors import InputError
 from gearsig.gap.features import Features
 from gearsig.gap.kept_recogniser import keep_fitted
-from gearsig.gap.population import Population, load_population
-from gearsig.gap.recognise import Recogniser, fit_recogniser, load_recogniser
+from gearsig.gap.population import BY_HAND, INDEPENDENT, Population, load_population, without_machines_of
+from gearsig.gap.recognise import Recogniser, _load, even_weights, fit_recogniser, load_recogniser
 from gearsig.gap.types import NONE, UNKNOWN
 from sims.effects import effects
 
@@ -25,13 +25,7 @@ def population() -> Population:
 @pytest.fixture(scope="module")
 def on_half(population: Population) -> Recogniser:
     """A forest that has seen the machines of even number only."""
-    return fit_recogniser(some(population, population.rigs % 2 == 0), with_reference=True)
-
-
-def some(population: Population, rows: np.ndarray) -> Population:
-    tables = ("rigs", "causes", "changes", "change_scatter", "features", "feature_scatter")
-    tables += ("simulated", "simulated_scatter", "loads_n_per_mm")
-    return replace(population, **{name: getattr(population, name)[rows] for name in tables})
+    return fit_recogniser(population.of_rows(population.rigs % 2 == 0), with_reference=True)
 
 
 def row(population: Population, i: int) -> Features:
@@ -42,6 +36,29 @@ def test_every_effect_is_in_the_population(population: Population) -> None:
     assert set(effects()) | {NONE, UNKNOWN} == set(population.causes)
     assert len(set(population.rigs)) >= 20
     assert population.change_names[: len(population.feature_names)] == population.feature_names
+
+
+@pytest.mark.parametrize("source", [BY_HAND, "cracked", "reduced-fe", INDEPENDENT])
+def test_every_source_shows_every_effect_that_it_can(population: Population, source: str) -> None:
+    at_the_end = {"clipping", "transfer_path"}
+    missing = set(effects()) - set(population.causes[population.sources == source])
+    assert missing <= ({"mains_hum", "speed_fluctuation"} if source == BY_HAND else at_the_end)
+
+
+def test_machines_can_be_left_out(population: Population) -> None:
+    with without_machines_of(INDEPENDENT):
+        rest = load_population()
+    assert set(population.simulators) - set(rest.simulators) == {INDEPENDENT}
+    assert np.array_equal(rest.changes, population.changes[population.simulators != INDEPENDENT])
+    assert load_population() is population
+
+
+def test_rarer_sources_count_more_each_and_less_together() -> None:
+    sources, causes = np.array(["a"] * 9 + ["b"] + ["a"] * 5), np.array(["x"] * 10 + ["y"] * 5)
+    weights = even_weights(sources, causes)
+    assert weights[9] == pytest.approx(3.0 * weights[0])
+    assert weights[:9].sum() > weights[9]
+    assert weights.mean() == pytest.approx(1.0)
 
 
 def test_a_reference_lowers_the_floor(population: Population) -> None:
@@ -80,9 +97,9 @@ def test_a_kept_one_says_the_same(
 ) -> None:
     monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path))
     keep_fitted("with_reference", (on_half.causes, on_half.trees, None))
-    load_recogniser.cache_clear()
+    _load.cache_clear()
     kept = load_recogniser(with_reference=True)
-    load_recogniser.cache_clear()
+    _load.cache_clear()
     change = row(population, 5)
     assert kept.probabilities(change, 100.0).keys() == on_half.probabilities(change, 100.0).keys()
     assert np.array_equal(kept.trees.shares, on_half.trees.shares)

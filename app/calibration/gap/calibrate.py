@@ -1,6 +1,8 @@
 """Calibrate the gap's probabilities on blind cases: `python -m app.calibration.gap.calibrate --cases N --work FILE`.
 
-Cases of the role "calibration" differ in gear geometry from those that the benchmark judges by. What a case says is
+Cases of the role "calibration" differ in gear geometry from those that the benchmark judges by. Each is weighed twice:
+as the shipped population has it, which knows the independent rig's development gears, and without any machine of that
+rig, since a user's machine may be as strange to all simulators as it is to the others then. What a case says is
 kept in the work file, a line each, so that a stopped run goes on. The forests are asked about every case, which takes
 some seconds; effects are tried on the twin for the first `--tried` cases only, a minute each.
 """
@@ -10,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 from concurrent.futures import ProcessPoolExecutor
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +22,7 @@ import typer
 from app.calibration.gap.fit import WeighedCase, fit_calibration
 from app.gap.weigh import MOST_TRIED
 from gearsig.errors import GearsigError
+from gearsig.gap.population import INDEPENDENT, without_machines_of
 from gearsig.gap.posterior import FILE
 from gearsig.gap.types import NONE, UNKNOWN
 
@@ -61,7 +65,10 @@ def main() -> None:
 
 
 def weigh_case(index: int, most_tried: int) -> list[dict[str, Any]]:
-    """Return what is said of a blind case with its reference and without, and the truth; less where it is refused."""
+    """Return what is said of a blind case with its reference and without, and the truth; less where it is refused.
+
+    Each by all that is known, and by what is known without the machines of the rig that made the case.
+    """
     from app.gap.prepare import conditions_of
     from app.gap.weigh import weigh
     from sims.blind import CATALOGUE, draw_case, record_case
@@ -77,13 +84,16 @@ def weigh_case(index: int, most_tried: int) -> list[dict[str, Any]]:
     rigs = [_rig(r) for r in recorded.conditions]
     simulator = gap_simulator("cracked")
     rows = []
-    for references in (recorded.references, ()):
+    for references, left_out in product((recorded.references, ()), ("", INDEPENDENT)):
         try:
-            twin = simulator.twin_of(rigs[0])
-            conditions, _ = conditions_of(
-                recorded.conditions, rigs, references, [_rig(r) for r in references], twin, (), lambda *_: None
-            )
-            weighed = weigh(conditions, simulator.gap_effects(), (), twin, None, lambda *_: None, most_tried=most_tried)
+            with without_machines_of(left_out):
+                twin = simulator.twin_of(rigs[0])
+                conditions, _ = conditions_of(
+                    recorded.conditions, rigs, references, [_rig(r) for r in references], twin, (), lambda *_: None
+                )
+                weighed = weigh(
+                    conditions, simulator.gap_effects(), (), twin, None, lambda *_: None, most_tried=most_tried
+                )
         except GearsigError as error:
             typer.echo(f"case {index}: {error}")
             continue
@@ -91,6 +101,7 @@ def weigh_case(index: int, most_tried: int) -> list[dict[str, Any]]:
             {
                 "truths": truths,
                 "level": wanted.get("level"),
+                "left_out": left_out,
                 "with_reference": weighed.with_reference,
                 "size": weighed.size,
                 "forest": dict(weighed.forest),

@@ -9,7 +9,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from gearsig.gap.population import FILE
+from gearsig.gap.population import BY_HAND, FILE
 
 TABLES = {
     "changes": "change",
@@ -37,7 +37,9 @@ def main() -> None:
         allow_pickle=False,
         rigs=rigs,
         simulated_rigs=simulated_rigs,
+        simulators=np.concatenate([one["source"] for one in raw]),
         causes=np.concatenate([one["label"] for one in raw]),
+        by_hand=np.concatenate([one["detail"] for one in raw]) == BY_HAND,
         loads_n_per_mm=np.concatenate([one["load_n_per_mm"] for one in raw]).astype(np.float32),
         change_names=raw[0]["change_names"],
         feature_names=raw[0]["feature_names"],

@@ -38,6 +38,7 @@ from app.calibration.gap.tooth_signatures import chipped_tooth, root_crack, toot
 from app.calibration.gap.vibration import N_MESH_HARMONICS, Signature, changed, vibrations
 from app.calibration.rigs import log_uniform
 from gearsig.checks import FloatArray
+from gearsig.gap.tooth_load import LIGHT_LOAD_N_PER_MM, tooth_load_n_per_mm
 from gearsig.recording.types import Recording
 
 SIZES = (0.06, 2.5)
@@ -344,3 +345,11 @@ SIGNATURES: dict[str, Callable[[Scene, float, np.random.Generator], Signature]] 
 }
 HAND_MADE = (*SIGNATURES, "clipping")
 """Effects that have a signature here; the others are as the simulator makes them."""
+
+
+def made_by_hand(sound: Recording, torque_nm: float) -> tuple[str, ...]:
+    """Return whose signatures are put into a machine's sound recordings: no backlash where teeth never part."""
+    if sound.rig is None:
+        raise ValueError("a simulated recording has its rig")
+    light = tooth_load_n_per_mm(sound.rig.pairs[0], torque_nm) < LIGHT_LOAD_N_PER_MM
+    return tuple(name for name in HAND_MADE if light or name != "backlash")
