@@ -14,6 +14,7 @@ import typer
 
 from app.calibration.gap.outside import with_foreign_vibration
 from app.calibration.gap.sample import SEED, Compared, Sample, reduced
+from app.calibration.gap.scene import rig_of
 from app.calibration.gap.signatures import made_by_hand, with_signature
 from app.gap.conditions import run_length_s, with_channels_of
 from gearsig.errors import InputError, RefusalError
@@ -78,10 +79,8 @@ def _recordings(
 
 def _simulated(now: Recording, rig: int, torque_nm: float) -> Gathered:
     """Return a twin that knows the rig file only, at a recording's speed and stated torque."""
-    here = reduced(now, rig)
-    if now.rig is None:
-        raise ValueError("a simulated recording has its rig")
-    twin = CrackedTwin(now.rig, nominal_of(now.rig))
+    here, known = reduced(now, rig), rig_of(now)
+    twin = CrackedTwin(known, nominal_of(known))
     run = twin.run(
         Point(60.0 * here.speed_hz, torque_nm),
         seed=rig,
@@ -89,4 +88,4 @@ def _simulated(now: Recording, rig: int, torque_nm: float) -> Gathered:
         sampling_rate_hz=now.sampling_rate_hz,
         noise=1,
     )
-    return with_channels_of(gather(run, now.rig), here)
+    return with_channels_of(gather(run, known), here)

@@ -14,6 +14,7 @@ from app.calibration.gap.ordinary import Ordinary, mounted_anew
 from app.calibration.gap.outside import with_foreign_vibration
 from app.calibration.gap.paths import draw_path_changes
 from app.calibration.gap.sample import SEED, Compared, Sample, reduced
+from app.calibration.gap.scene import rig_of
 from app.calibration.gap.signatures import HAND_MADE, made_by_hand, with_signature
 from app.calibration.gap.vibration import vibrations
 from app.calibration.rigs import DrawnRig
@@ -68,9 +69,8 @@ def one_rig(model: Model, index: int) -> list[Sample]:
         new = _record(model, first_day(drawn, rng), 0)
         ordinary = Ordinary.of(new, rig)
         reference = ordinary.on(new, 0, rng)
-        if reference.rig is None:
-            raise ValueError("a simulated recording has its rig")
-        twin = CrackedTwin(reference.rig, nominal_of(reference.rig))
+        rig_file = rig_of(reference)
+        twin = CrackedTwin(rig_file, nominal_of(rig_file))
         compared = Compared(model.name, rig, reduced(reference, rig), reduced(_run(twin, drawn, rig), rig))
     except (InputError, RefusalError) as error:
         typer.echo(f"gearbox {rig}: {error}")

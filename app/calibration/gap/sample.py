@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from app.calibration.gap.scene import rig_of
 from gearsig.checks import FloatArray
 from gearsig.gap.change import change_features
 from gearsig.gap.features import features_of
@@ -111,9 +112,7 @@ class Compared:
 
 def reduced(recording: Recording, rig: int) -> Gathered:
     """Return a recording's sums, with the channels that are known of its machine."""
-    if recording.rig is None:
-        raise ValueError("a simulated recording has its rig")
-    found = gather(recording, recording.rig)
+    found = gather(recording, rig_of(recording))
     draw = np.random.default_rng([SEED, rig, 1])
     if draw.uniform() >= ONE_SENSOR_SHARE:
         return found

@@ -9,6 +9,7 @@ import numpy as np
 from app.calibration.rigs import log_uniform
 from gearsig.checks import FloatArray
 from gearsig.recording.types import Recording
+from gearsig.rig.types import Rig
 
 _RINGS = 6.0
 
@@ -41,13 +42,18 @@ class Scene:
         return 1.0, self.teeth[0] / self.teeth[1]
 
 
+def rig_of(recording: Recording) -> Rig:
+    """Return the rig of a simulated recording, which always has one."""
+    if recording.rig is None:
+        raise ValueError("a simulated recording has its rig")
+    return recording.rig
+
+
 def scene_of(recording: Recording) -> Scene:
     """Return the scene of a simulated recording with one gear pair."""
     from gearsig.angle.shaft import find_shaft_angle
 
-    rig = recording.rig
-    if rig is None:
-        raise ValueError("a simulated recording has its rig")
+    rig = rig_of(recording)
     time = np.arange(recording.samples.shape[1]) / recording.sampling_rate_hz
     pair = rig.pairs[0]
     teeth = int(pair.driver_teeth or 0), int(pair.driven_teeth or 0)

@@ -29,6 +29,7 @@ from app.calibration.gap.scene import (
     band_noise,
     knocks,
     passings,
+    rig_of,
     ring,
     scene_of,
     struck,
@@ -349,7 +350,5 @@ HAND_MADE = (*SIGNATURES, "clipping")
 
 def made_by_hand(sound: Recording, torque_nm: float) -> tuple[str, ...]:
     """Return whose signatures are put into a machine's sound recordings: no backlash where teeth never part."""
-    if sound.rig is None:
-        raise ValueError("a simulated recording has its rig")
-    light = tooth_load_n_per_mm(sound.rig.pairs[0], torque_nm) < LIGHT_LOAD_N_PER_MM
+    light = tooth_load_n_per_mm(rig_of(sound).pairs[0], torque_nm) < LIGHT_LOAD_N_PER_MM
     return tuple(name for name in HAND_MADE if light or name != "backlash")
