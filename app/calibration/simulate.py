@@ -20,10 +20,9 @@ from sims.gear_pair.roughness import draw_roughness
 from sims.machine import Machine
 from sims.machine.operation import Operation
 from sims.measure import MeasuredChannel, ModalPath, PathMode
-from sims.reduced_fe.parameters import PARAMETERS
 from sims.reduced_fe.simulate import simulate_pair
 from sims.reduced_fe.simulator import PreparedPair, ReducedPair
-from sims.reduced_fe.twin import STEP_S, mesh_dof
+from sims.reduced_fe.twin import STEP_S, twin_parameters
 
 SAMPLING_RATE_HZ = 20480.0
 MOST_LEAD_REV = 8
@@ -95,9 +94,7 @@ def _prepared(model: str, drawn: DrawnRig, operation: Operation, rng: np.random.
     """Return the sound machine; finite-element gears are of full discs, with the mesh of a twin's."""
     if model == CRACKED:
         return CrackedPair().prepare(drawn.parameters, [], operation, rng, sampling_rate_hz=SAMPLING_RATE_HZ)
-    known = {p.name for p in PARAMETERS}
-    values = {name: value for name, value in drawn.parameters.items() if name in known}
-    values |= {"roughness_locked_to": "flank", "mesh_dof": float(mesh_dof(drawn.teeth))}
+    values = twin_parameters(drawn.parameters, drawn.teeth) | {"roughness_locked_to": "flank"}
     return ReducedPair().prepare(values, [], operation, rng, sampling_rate_hz=SAMPLING_RATE_HZ)
 
 

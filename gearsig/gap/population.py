@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property
 from pathlib import Path
 
@@ -74,14 +74,8 @@ class Population:
 
     def of_rows(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Population:
         """Return some of the recordings."""
-        whole = ("change_names", "feature_names")
-        return Population(
-            **{
-                field.name: value if field.name in whole else value[rows]
-                for field in fields(self)
-                for value in (getattr(self, field.name),)
-            }
-        )
+        by_row = {field.name for field in fields(self)} - {"change_names", "feature_names"}
+        return replace(self, **{name: getattr(self, name)[rows] for name in by_row})
 
     @cached_property
     def reference_floor(self) -> StructuralFloor:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,9 +24,11 @@ STEP_S = 8.2e-6
 housing differs from another's."""
 
 
-def mesh_dof(teeth: tuple[int, int]) -> int:
-    """Return the degrees of freedom of each of a twin's gears."""
-    return max(MESH_DOF, MESH_DOF_PER_TOOTH * max(teeth))
+def twin_parameters(values: Mapping[str, ParameterValue], teeth: tuple[int, int]) -> dict[str, ParameterValue]:
+    """Return those parameters of the 16-DOF pair that this model has, with the mesh of a twin's gears."""
+    known = {p.name for p in PARAMETERS}
+    own = {name: value for name, value in values.items() if name in known}
+    return own | {"mesh_dof": float(max(MESH_DOF, MESH_DOF_PER_TOOTH * max(teeth)))}
 
 
 @dataclass(frozen=True)
@@ -65,9 +68,7 @@ class ReducedTwin(PairTwin):
         return recording
 
     def _own_parameters(self, values: dict[str, ParameterValue]) -> dict[str, ParameterValue]:
-        known = {p.name for p in PARAMETERS}
-        own = {name: value for name, value in values.items() if name in known}
-        return own | {"mesh_dof": float(mesh_dof(self.nominal.teeth))}
+        return twin_parameters(values, self.nominal.teeth)
 
     def _geometry(self, own: Preset) -> PairGeometry:
         return prepare_preset(own, {}, (), None, np.random.default_rng(0)).pair.machine.mesh.pair

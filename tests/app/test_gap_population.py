@@ -41,7 +41,7 @@ def test_a_case_of_the_independent_rig_gives_its_effect_and_the_same_machine_wit
         UNKNOWN: n_conditions,
         BY_HAND: independent.N_BY_HAND * n_conditions,
     }
-    assert {sample.source for sample in outer_race} == {INDEPENDENT}
+    assert {sample.simulator for sample in outer_race} == {INDEPENDENT}
     own, sound = (next(s for s in outer_race if s.label == label) for label in ("bearing_outer_race", NONE))
     assert size(own) > 2.0 * size(sound)
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 from concurrent.futures import ProcessPoolExecutor
-from itertools import product
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +69,7 @@ def weigh_case(index: int, most_tried: int) -> list[dict[str, Any]]:
 
     Each by all that is known, and by what is known without the machines of the rig that made the case.
     """
+    from app.gap.conditions import compare
     from app.gap.prepare import conditions_of
     from app.gap.weigh import weigh
     from sims.blind import CATALOGUE, draw_case, record_case
@@ -84,30 +85,31 @@ def weigh_case(index: int, most_tried: int) -> list[dict[str, Any]]:
     rigs = [_rig(r) for r in recorded.conditions]
     simulator = gap_simulator("cracked")
     rows = []
-    for references, left_out in product((recorded.references, ()), ("", INDEPENDENT)):
+    for references in (recorded.references, ()):
         try:
-            with without_machines_of(left_out):
-                twin = simulator.twin_of(rigs[0])
-                conditions, _ = conditions_of(
-                    recorded.conditions, rigs, references, [_rig(r) for r in references], twin, (), lambda *_: None
-                )
-                weighed = weigh(
-                    conditions, simulator.gap_effects(), (), twin, None, lambda *_: None, most_tried=most_tried
+            twin = simulator.twin_of(rigs[0])
+            conditions, _ = conditions_of(
+                recorded.conditions, rigs, references, [_rig(r) for r in references], twin, (), lambda *_: None
+            )
+            for left_out in ("", INDEPENDENT):
+                with without_machines_of(left_out):
+                    known = [replace(c, change=compare(c.now, c.simulated, c.reference)) for c in conditions]
+                    weighed = weigh(
+                        known, simulator.gap_effects(), (), twin, None, lambda *_: None, most_tried=most_tried
+                    )
+                rows.append(
+                    {
+                        "truths": truths,
+                        "level": wanted.get("level"),
+                        "left_out": left_out,
+                        "with_reference": weighed.with_reference,
+                        "size": weighed.size,
+                        "forest": dict(weighed.forest),
+                        "scores": weighed.scores,
+                    }
                 )
         except GearsigError as error:
             typer.echo(f"case {index}: {error}")
-            continue
-        rows.append(
-            {
-                "truths": truths,
-                "level": wanted.get("level"),
-                "left_out": left_out,
-                "with_reference": weighed.with_reference,
-                "size": weighed.size,
-                "forest": dict(weighed.forest),
-                "scores": weighed.scores,
-            }
-        )
     return rows
 
 

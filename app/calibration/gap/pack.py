@@ -37,7 +37,7 @@ def main() -> None:
         allow_pickle=False,
         rigs=rigs,
         simulated_rigs=simulated_rigs,
-        simulators=np.concatenate([one["source"] for one in raw]),
+        simulators=np.concatenate([one["simulator"] for one in raw]),
         causes=np.concatenate([one["label"] for one in raw]),
         by_hand=np.concatenate([one["detail"] for one in raw]) == BY_HAND,
         loads_n_per_mm=np.concatenate([one["load_n_per_mm"] for one in raw]).astype(np.float32),

@@ -22,7 +22,7 @@ SEED = 4107
 ONE_SENSOR_SHARE = 0.4
 """Machines of which one sensor's signal is known."""
 
-_COLUMNS = ("source", "rig", "label", "detail", "severity", "torque_nm", "load_n_per_mm")
+_COLUMNS = ("simulator", "rig", "label", "detail", "severity", "torque_nm", "load_n_per_mm")
 _TABLES = ("change", "change_scatter", "features", "feature_scatter", "simulated", "simulated_scatter")
 
 
@@ -35,8 +35,8 @@ class Sample:
 
     Parameters
     ----------
-    source : str
-        Simulator of the machine.
+    simulator : str
+        Of the machine.
     rig : int
     label, detail : str
         Effect, "none" or "unknown"; `BY_HAND`, options, or the foreign vibration's name.
@@ -54,7 +54,7 @@ class Sample:
         Of the twin that knows the rig file only.
     """
 
-    source: str
+    simulator: str
     rig: int
     label: str
     detail: str
@@ -76,14 +76,14 @@ class Compared:
 
     Parameters
     ----------
-    source : str
-        Simulator of the machine.
+    simulator : str
+        Of the machine.
     rig : int
     sound, simulated : Gathered
         The reference, and the twin that knows the rig file only.
     """
 
-    source: str
+    simulator: str
     rig: int
     sound: Gathered
     simulated: Gathered
@@ -93,7 +93,7 @@ class Compared:
         now = reduced(recording, self.rig)
         change, own, twin = change_features(now, self.sound), features_of(now), features_of(self.simulated)
         return Sample(
-            self.source,
+            self.simulator,
             self.rig,
             label,
             detail,
