@@ -19,8 +19,9 @@ def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
 NO_SIMULATION = (
     "How far: cannot be told; the simulators have a gear pair and this rig has none, so nothing was simulated."
 )
-NEARLY = 0.75
-"""Of the second cause's probability, from which a third one is as likely as that."""
+TOGETHER, MOST_RIVALS = 0.8, 4
+"""What cannot be told apart: the fewest likeliest effects that have such a share of what all effects have, and not
+more of them than anybody would look at."""
 SOUND_MACHINE = "the same machine when it was sound"
 
 
@@ -50,7 +51,8 @@ def _which(report: GapReport) -> str:
     if report.outcome is GapOutcome.UNKNOWN:
         return _which_unknown(report)
     if report.outcome is GapOutcome.CANNOT_SEPARATE and report.inseparable is not None:
-        named = " or ".join(_titled(report, name) for name in rivals(report))
+        *others, last = (_titled(report, name) for name in rivals(report))
+        named = f"{', '.join(others)} or {last}"
         return f"Which: {named}; these recordings cannot tell them apart."
     size = "" if first.severity is None else f", {_severity(first, first.severity)}"
     place = f" at {first.place}" if first.place else ""
@@ -67,12 +69,16 @@ def _which_unknown(report: GapReport) -> str:
 
 
 def rivals(report: GapReport) -> tuple[str, ...]:
-    """Return the causes that cannot be told apart: the two likeliest, and what is nearly as likely as the second."""
+    """Return the effects that cannot be told apart: the two likeliest, and more until they are `TOGETHER`."""
     both = report.inseparable or ()
-    found = {cause.name: cause.probability for cause in report.causes}
-    least = NEARLY * min((found.get(name, 0.0) for name in both), default=1.0)
-    near = (name for name, p in found.items() if p >= least > 0.0 and name not in (*both, NONE, UNKNOWN))
-    return (*both, *near)
+    effects = {cause.name: cause.probability for cause in report.causes if cause.name not in (NONE, UNKNOWN)}
+    found = list(both)
+    for name in sorted(effects, key=lambda name: -effects[name])[:MOST_RIVALS]:
+        if not both or sum(effects.get(one, 0.0) for one in found) >= TOGETHER * sum(effects.values()):
+            break
+        if name not in found:
+            found.append(name)
+    return tuple(found)
 
 
 def _which_none(report: GapReport, odds: str) -> str:

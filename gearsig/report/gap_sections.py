@@ -254,8 +254,8 @@ def inseparable_text(report: GapReport) -> str:
     if report.inseparable is None:
         return ""
     titles = {cause.name: f"{cause.title} ({percent(cause.probability)})" for cause in report.causes}
-    first, *others = (titles.get(name, name) for name in rivals(report))
-    return f"These recordings cannot tell {first} from {' or '.join(others)}."
+    *others, last = (titles.get(name, name) for name in rivals(report))
+    return f"These recordings cannot tell {', '.join(others)} and {last} apart."
 
 
 def step_rows(report: GapReport) -> tuple[StepRow, ...]:

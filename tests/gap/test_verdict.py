@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gearsig.gap.types import UNKNOWN, GapOutcome, GapPlace, Interval, PlaceKind
+from gearsig.gap.types import UNKNOWN, GapOutcome, GapPlace, GapReport, Interval, PlaceKind
 from gearsig.gap.verdict import rivals
 from tests.gap.example_report import (
     cannot_separate_report,
@@ -25,18 +25,27 @@ def test_a_severity_has_a_unit_for_people_and_no_exponent() -> None:
 def test_causes_that_cannot_be_told_apart_are_named_even_if_one_is_not_among_them() -> None:
     report = replace(cannot_separate_report(), inseparable=("root_crack", "torque_ripple"))
     assert report.verdict[1] == (
-        "Which: crack in a tooth root (48 %) or torque ripple; these recordings cannot tell them apart."
+        "Which: crack in a tooth root (48 %), torque ripple or spall on a tooth flank (41 %); "
+        "these recordings cannot tell them apart."
     )
 
 
-def test_a_third_cause_as_likely_as_the_second_is_named_too() -> None:
+def test_what_cannot_be_told_apart_is_named_until_it_is_nearly_all_that_effects_have() -> None:
     report = cannot_separate_report()
     first, second, third, *_ = report.causes
     names = (first.name, second.name)
-    assert rivals(replace(report, inseparable=names)) == names
-    equal = replace(report, inseparable=names, causes=(first, second, replace(third, probability=second.probability)))
-    assert rivals(equal) == (*names, third.name)
-    assert equal.verdict[1].count(" or ") == 2
+
+    def with_chances(*chances: float) -> GapReport:
+        causes = (replace(cause, probability=p) for cause, p in zip((first, second, third), chances, strict=True))
+        return replace(report, inseparable=names, causes=tuple(causes))
+
+    assert rivals(with_chances(0.48, 0.41, 0.11)) == names
+    assert rivals(with_chances(0.43, 0.35, 0.22)) == (*names, third.name)
+    assert with_chances(0.43, 0.35, 0.22).verdict[1].count(" or ") == 1
+    others = tuple(replace(third, name=f"other {i}", probability=0.1) for i in range(6))
+    many = replace(report, inseparable=names, causes=(replace(first, probability=0.3), second, *others))
+    assert len(rivals(many)) <= 4
+    assert rivals(replace(report, inseparable=None)) == ()
 
 
 def test_what_is_next_says_only_what_was_computed() -> None:

@@ -85,7 +85,7 @@ def test_everything_about_an_effect_is_said(pages):
 
 def test_what_cannot_be_told_apart_is_said_with_what_would(pages):
     text = text_of(pages["cannot separate"])
-    assert "cannot tell crack in a tooth root (48 %) from spall on a tooth flank (41 %)" in text
+    assert "cannot tell crack in a tooth root (48 %) and spall on a tooth flank (41 %) apart" in text
     assert "One operating condition:" in text
     assert "5.4 structural floors apart, against 1.6 now" in text
     assert "twin.toml" not in text
