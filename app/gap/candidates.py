@@ -15,6 +15,7 @@ from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.gap.families import UNFORETOLD, shown_in
 from gearsig.gap.features import once as feature_values
+from gearsig.gap.population import load_population
 from gearsig.gap.prediction import LEVELS_DB, EffectPath, Fit, Observed, fit_effect, paths_of
 from gearsig.gap.shrinkage import Fold, shrinkage
 from gearsig.gap.simulator import Added, CanBeQuiet, GapEffect, Twin
@@ -120,7 +121,8 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
 
     Nothing where theory does not expect it: a simulation changes more, and that is its own.
 
-    The reference shows the baseline; without one it is as far from the twin's as sound machines usually are.
+    The reference shows the baseline; without one it is what the twin, as far as it is credible, lets expect of sound
+    machines. The bank's own sound machine may be a quiet one, and is not asked.
     """
     floor, names = condition.floor, bank.feature_names
     usual = dict(zip(floor.names, (-floor.from_centre(floor.names, np.zeros(len(floor.names)))).tolist(), strict=True))
@@ -128,7 +130,8 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
     if condition.reference is not None:
         compared, real = bank.change_names, dict(zip(*feature_values(condition.reference), strict=True))
     else:
-        compared, real = names, {name: value + usual[name] for name, value in simulated.items()}
+        expected = load_population().credibility * feature_values(condition.simulated)[1]
+        compared, real = names, {name: e + usual[name] for name, e in zip(names, expected.tolist(), strict=True)}
     again = np.zeros(len(bank.change_names))  # a mere second run changes something, too
     again[: len(names)] = bank.sound_changes.mean(axis=0)[: len(names)]
     given = [(bank.changes[bank.added.index(a)].mean(axis=0) - again)[: len(compared)] for a in kept]

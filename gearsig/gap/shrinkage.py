@@ -9,7 +9,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.gap.prediction import FLOOR_IN_DEVIATIONS, EffectPath, Fit, Observed, family_square, fit_effect, fit_path
-from gearsig.gap.types import Interval, Shrinkage
+from gearsig.gap.types import LEAST_FORETOLD, Interval, Shrinkage
 
 ALIKE = 0.8
 """Cosine of the angle between two predictions, in floors, from which they say the same."""
@@ -50,6 +50,8 @@ class _Score:
     placebo : float
         The best one's shrink.
     n_placebos : int
+    foretold : float
+        Largest change that the fit foretells, in floors.
     """
 
     sizes: tuple[float, float, float]
@@ -73,6 +75,9 @@ def shrinkage(paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str)
     shrink = 1 − (r² − n²)/(o² − n²) on the effect's own features: o the gap before, r what is left, n what the floors
     themselves make, o and r no less than n; the effect's severity and options are fitted to the other part of the data.
 
+    Where the fitted effect foretells nothing, idle gears, say, it has no features of its own and nothing can shrink:
+    such folds do not count, unless there are no others.
+
     The intervals hold the scatter of what is scored, from its blocks of revolutions; that of the fit is not in them.
 
     Parameters
@@ -82,7 +87,7 @@ def shrinkage(paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str)
     folds : sequence of Fold
     held_out : str
     """
-    scores = [_score(paths, fold) for fold in folds]
+    folds, scores = _telling(folds, [_score(paths, fold) for fold in folds])
     before, after, shrink = np.mean([score.sizes for score in scores], axis=0)
     wide = _t_quantile(folds) * np.sqrt(np.mean([score.variances for score in scores], axis=0))
     return Shrinkage(
@@ -96,6 +101,12 @@ def shrinkage(paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str)
         elsewhere=_mean([_elsewhere(paths, fold) for fold in folds]),
         foretold=max(score.foretold for score in scores),
     )
+
+
+def _telling(folds: Sequence[Fold], scores: Sequence[_Score]) -> tuple[Sequence[Fold], Sequence[_Score]]:
+    """Return the folds in which the effect shows on the simulator, and their scores; all where it does in none."""
+    shown = [i for i, score in enumerate(scores) if score.foretold >= LEAST_FORETOLD] or range(len(scores))
+    return [folds[i] for i in shown], [scores[i] for i in shown]
 
 
 def _mean(values: Sequence[float | None]) -> float | None:

@@ -18,6 +18,7 @@ from gearsig.recording.types import Recording
 from gearsig.rig.toml import rig_to_dict
 from gearsig.rig.types import OperatingPoint, Rig
 from sims.effects import EffectSetting, effect, effects
+from sims.effects.gear_side import GEARS
 from sims.gear_pair.installed import SensorSeat
 from sims.gear_pair.installed_table import table_of
 from sims.gear_pair.plausible import PLAUSIBLE, Options, Plausible, Surroundings, plausible_of
@@ -25,6 +26,7 @@ from sims.gear_pair.seats import completed, further_seats, installed_of_rig
 from sims.gear_pair.usual import (
     Nominal,
     as_plain,
+    body_on_mounts,
     log_uniform,
     nominal_of,
     specimen_parameters,
@@ -38,6 +40,12 @@ from sims.versions import sources_digest
 
 LONGEST_LEAD_REV = 8.0
 """Of the driver, that another run starts later."""
+EVEN = 0.01
+"""Of a quiet machine's tolerances, what is left: none at all would leave lines of power 0."""
+_UNEVEN = (
+    "pitch_deviation_um",
+    *(f"{what}_{gear}_{unit}" for what, unit in (("runout", "um"), ("unbalance", "g_mm")) for gear in GEARS),
+)
 VIBRATION_S = 0.5
 """Length of the run that tells how strongly the sound machine vibrates."""
 
@@ -55,7 +63,7 @@ class PairTwin:
     further : tuple of SensorSeat
         Sensors beside the rig's own.
     is_quiet : bool
-        Without the vibration of the surroundings.
+        Without the vibration of the surroundings, its gears nearly even.
     """
 
     rig: Rig
@@ -113,7 +121,11 @@ class PairTwin:
         return replace(recording, samples=recording.samples[:, skipped:]) if skipped else recording
 
     def quiet(self) -> Self:
-        """Return the machine where nothing else vibrates: what an effect adds is not lost in noise."""
+        """Return the machine where nothing else vibrates and its own gears hardly do.
+
+        What an effect adds is neither lost in noise nor, as a second unbalance would, weighed up against what the
+        specimen happens to have there.
+        """
         return replace(self, is_quiet=True)
 
     def candidates(self, name: str) -> Sequence[Added]:
@@ -148,9 +160,10 @@ class PairTwin:
         drawn = np.random.default_rng([seed, 1])
         values = usual_parameters(self.nominal) | specimen_parameters(self.nominal, drawn)
         if self.is_quiet:
-            values["noise_mps2"] = 0.0
+            values |= {"noise_mps2": 0.0} | {name: EVEN * float(values[name]) for name in _UNEVEN}
+        body = (body_on_mounts(self.nominal),) if self.is_quiet else ()
         used = [str(a.options["bearing"]) for a in added if "bearing" in a.options]
-        installed = installed_of_rig(self.rig, self.nominal.size, usual_housing(drawn), used)
+        installed = installed_of_rig(self.rig, self.nominal.size, (*body, *usual_housing(drawn)), used)
         installed = replace(installed, sensors=(*installed.sensors, *self.further))
         title = f"Twin of {self.rig.name}" if self.rig.name else "Twin of a rig"
         return Preset(

@@ -93,6 +93,15 @@ def test_an_effect_that_was_fitted_to_one_condition_and_fails_at_the_other_does_
     assert result.slope == pytest.approx(0.0)
 
 
+def test_a_condition_at_which_the_effect_does_nothing_does_not_count() -> None:
+    one = path(n_conditions=2)
+    idle = replace(one, distances=(one.distances[0], np.zeros_like(one.distances[1])))
+    loud, nothing = seen(foretold(idle, 2.0)), seen(0.5 * FLOORS, 1)
+    folds = [Fold((loud, nothing), loud), Fold((loud, nothing), nothing)]
+    assert shrinkage([idle], folds, "").shrink.value == pytest.approx(1.0, abs=0.01)
+    assert shrinkage([idle], folds[1:], "").shrink.value <= 0.0  # there is no other
+
+
 def test_where_there_was_no_gap_none_shrinks_nor_grows() -> None:
     effect = path(0.1 * SHAPE)
     quiet = seen(np.array([0.3, -0.2, 0.5, 0.4, -0.6, 0.1]))

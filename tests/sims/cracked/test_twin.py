@@ -21,7 +21,7 @@ from sims.cracked.twin import CrackedTwin
 from sims.effects import effect, effects
 from sims.gear_pair.plausible import PLAUSIBLE
 from sims.gear_pair.seats import completed
-from sims.gear_pair.usual import nominal_of
+from sims.gear_pair.usual import BODY_KG, nominal_of
 from sims.registry import gap_simulator
 
 FS = 20480.0
@@ -290,3 +290,29 @@ def test_further_sensors_sit_over_the_bearings_that_have_none_and_leave_the_mach
     assert difference(recording, run()) < 0.1  # the noise is another one
     assert more.key != twin().key
     assert more.with_further_sensors()[1] == places
+
+
+def order_one(unbalance_g_mm: float, machine: CrackedTwin) -> float:
+    """Peak acceleration of the driver's first order on the sensor over it, in m/s²."""
+    added = (Added("unbalance", unbalance_g_mm, {"gear": "driver"}),)
+    recording = machine.run(POINT, added, seed=0, noise=1, duration_s=2.0, sampling_rate_hz=FS)
+    lines = gather(recording, machine.rig, ["acc pinion"]).channels["acc pinion"].lines[0].mean(axis=0)
+    return float(abs(lines[1]))
+
+
+def test_on_its_mounts_a_quiet_machine_shakes_as_force_over_mass_and_in_proportion_to_an_unbalance() -> None:
+    quiet = twin().quiet()
+    little, much = (order_one(u, quiet) for u in (80.0, 320.0))
+    assert much / little == pytest.approx(4.0, rel=0.05)  # its own unbalance does not weigh against it
+    force_n = 320e-6 * (2.0 * np.pi * POINT.speed_rpm / 60.0) ** 2
+    body_kg = BODY_KG * quiet.nominal.size**2
+    assert force_n / body_kg / 3.0 < much < 3.0 * force_n / body_kg
+    assert order_one(320.0, twin()) < 0.05 * much  # on rigid ground
+
+
+def test_a_quiet_machine_s_gears_are_nearly_even() -> None:
+    quiet, usual = (machine.preset(POINT).parameters for machine in (twin().quiet(), twin()))
+    assert quiet["noise_mps2"] == 0.0
+    for name in ("pitch_deviation_um", "runout_driver_um", "unbalance_driven_g_mm"):
+        assert 0.0 < quiet[name] < 0.02 * usual[name]
+    assert quiet["tip_relief_um"] == usual["tip_relief_um"]
