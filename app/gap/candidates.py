@@ -16,7 +16,7 @@ from gearsig.errors import RefusalError
 from gearsig.gap.families import UNFORETOLD, shown_in
 from gearsig.gap.features import once as feature_values
 from gearsig.gap.population import load_population
-from gearsig.gap.prediction import LEVELS_DB, EffectPath, Fit, Observed, fit_effect, paths_of
+from gearsig.gap.prediction import WAYS_DB, EffectPath, Fit, Observed, fit_effect, paths_of
 from gearsig.gap.shrinkage import Fold, shrinkage
 from gearsig.gap.simulator import Added, CanBeQuiet, GapEffect, Twin
 from gearsig.gap.transplant import transplanted
@@ -113,11 +113,11 @@ def _paths(banks: Sequence[Bank], conditions: Sequence[Condition], shows_in: tup
     tables = [
         _distances(bank, kept, condition, shows_in)[:, :, :n] for bank, condition in zip(banks, conditions, strict=True)
     ]
-    return paths_of(banks[0].change_names[:n], kept, tables, LEVELS_DB)
+    return paths_of(banks[0].change_names[:n], kept, tables, tuple(level for level, _ in WAYS_DB))
 
 
 def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in: tuple[str, ...]) -> FloatArray:
-    """Return what candidates would change on the sound machine's own baseline, (n_levels, n_candidates, n).
+    """Return what candidates would change on the sound machine's own baseline, (n_ways, n_candidates, n).
 
     Nothing where theory does not expect it: a simulation changes more, and that is its own.
 
@@ -135,8 +135,8 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
     again = np.zeros(len(bank.change_names))  # a mere second run changes something, too
     again[: len(names)] = bank.sound_changes.mean(axis=0)[: len(names)]
     given = [(bank.changes[bank.added.index(a)].mean(axis=0) - again)[: len(compared)] for a in kept]
-    rows = [[transplanted(compared, one, simulated, real, usual, level) for one in given] for level in LEVELS_DB]
-    table = np.array(rows).reshape(len(LEVELS_DB), len(kept), len(compared))
+    rows = [[transplanted(compared, one, simulated, real, usual, *way) for one in given] for way in WAYS_DB]
+    table = np.array(rows).reshape(len(WAYS_DB), len(kept), len(compared))
     return np.where(shown_in(compared, shows_in), table, 0.0)
 
 

@@ -32,8 +32,14 @@ FLOOR_IN_DEVIATIONS = 1.96
 LEVELS_DB = tuple(float(level) for level in (*range(-30, 30, 5), *range(30, 61, 10)))
 LEVEL_SCATTER_DB = 10.0
 """By how much louder than on the twin what an effect adds may be on the real machine, whose path from gears and shafts
-to the sensor nobody knows; and its standard deviation, for each operating condition. Much
-louder it may be: a twin stands on rigid ground, and what shakes a whole machine at low orders hardly shows on it."""
+to the sensor nobody knows; and its standard deviation, for each operating condition."""
+
+GROUNDS_DB = (0.0, -25.0, -50.0)
+"""By how much less a shaft's lowest orders shake a machine than one on soft mounts; the last is rigid ground. None is
+likelier than another."""
+
+WAYS_DB = tuple((level, ground) for ground in GROUNDS_DB for level in LEVELS_DB)
+"""Level and ground: what is not known of how an effect reaches a sensor."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,7 @@ class EffectPath:
     names : tuple of str
         Of the n features.
     levels_db : tuple of float
-        See `LEVELS_DB`.
+        Of each of `WAYS_DB`, or whatever the distances were made for.
     """
 
     name: str
@@ -130,7 +136,8 @@ class Fit:
 
     def at(self, condition: int) -> FloatArray:
         """Return the predicted distances; at a condition that it was not fitted to, at the level of the others."""
-        level = self.levels.get(condition, round(float(np.median(list(self.levels.values())))))
+        by_level = sorted(self.levels.values(), key=lambda way: self.path.levels_db[way])
+        level = self.levels.get(condition, by_level[len(by_level) // 2])
         found: FloatArray = self.path.at(np.array([self.severity.value]), condition)[level, 0]
         return found
 

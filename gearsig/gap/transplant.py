@@ -19,6 +19,12 @@ _RELATIVE = (
 """Powers over that of the mesh, or of its harmonic."""
 
 _ABSOLUTE = (*(f"shaft.{side}.{n}" for side in SIDES for n in (1, 2, 3)), "floor.total")
+_OF_THE_BODY = tuple(f"shaft.{side}.{n}{what}" for side in SIDES for n in (1, 2, 3) for what in ("", ".to_mesh"))
+"""Low orders, at which a machine moves as a whole."""
+
+_STRONGEST = {"shaft.{}.strongest": "shaft.{}.strongest.to_mesh", "sideband.{}.strongest": "sideband.{}.6to12"}
+"""How far the strongest line stands out, and the power by which an effect raises it."""
+
 _BANDS, _KURTOSIS = "floor.band.", "floor.kurtosis."
 _EXCESSES = ("envelope.", "line.")
 _NO_EXCESS = ("envelope.depth",)
@@ -32,6 +38,7 @@ def transplanted(
     real: Mapping[str, float],
     usual: Mapping[str, float],
     level_db: float = 0.0,
+    ground_db: float = 0.0,
 ) -> FloatArray:
     """Return the changes that a simulated effect makes on the real machine's own baseline.
 
@@ -51,6 +58,8 @@ def transplanted(
         `change.…` → what mere repetition gives.
     level_db : float
         By which everything the effect adds is louder on the real machine than on the twin: its path is another.
+    ground_db : float
+        By which the lowest shaft orders are louder still: it stands otherwise.
 
     Returns
     -------
@@ -62,10 +71,11 @@ def transplanted(
     gain_db = real["mesh.total"] - simulated["mesh.total"]
     floor_db = real["floor.total"] - simulated["floor.total"] - gain_db
     for name in names:
+        own_db = level_db + (ground_db if name in _OF_THE_BODY else 0.0)
         if name in _RELATIVE:
-            found[name] = _added(given[name], simulated[name], real[name], level_db)
+            found[name] = _added(given[name], simulated[name], real[name], own_db)
         elif name in _ABSOLUTE or name.startswith(_BANDS):
-            found[name] = _added(given[name], simulated[name], real[name], gain_db + level_db)
+            found[name] = _added(given[name], simulated[name], real[name], gain_db + own_db)
         elif name.startswith(_EXCESSES) and name not in _NO_EXCESS:
             found[name] = _added(given[name], simulated[name], real[name], level_db - floor_db)
     for name in names:
@@ -73,6 +83,9 @@ def transplanted(
             part = _part(found[name.replace(_KURTOSIS, _BANDS)])
             found[name] = part * (simulated[name] + given[name] - real[name])
     for side in SIDES:
+        for name, rose in _STRONGEST.items():
+            own = name.format(side)
+            found[own] = _risen(real[own], simulated[own] + given[own], found[rose.format(side)])
         found |= _tooth(f"tooth.{side}", found, given, simulated, real)
         if f"change.{side}.level" in given:
             found |= _pattern(f"change.{side}", given, usual, real[f"tooth.{side}.level"], level_db)
@@ -96,6 +109,11 @@ def _part(change_db: float) -> float:
     return 1.0 - 1.0 / _power(change_db) if change_db > 0.0 else 0.0
 
 
+def _risen(born_db: float, own_db: float, more_db: float) -> float:
+    """Return by how much the strongest stands out further: as much as it rose, no further than by itself alone."""
+    return min(born_db + max(more_db, 0.0), max(own_db, born_db)) - born_db
+
+
 def _tooth(
     name: str,
     found: Mapping[str, float],
@@ -110,8 +128,7 @@ def _tooth(
         f"{name}.{what}": part * (simulated[f"{name}.{what}"] + given[f"{name}.{what}"] - real[f"{name}.{what}"])
         for what in ("kurtosis", "width", "below_mesh", "centroid")
     }
-    born, own = real[f"{name}.second"], simulated[f"{name}.second"] + given[f"{name}.second"]
-    second = min(born + max(peak, 0.0), max(own, born)) - born  # a burst that reaches the next tooth tells no more
+    second = _risen(real[f"{name}.second"], simulated[f"{name}.second"] + given[f"{name}.second"], peak)
     return {f"{name}.prominence": peak - elsewhere, f"{name}.second": second, **shapes}
 
 

@@ -50,6 +50,25 @@ def test_absolute_levels_follow_the_gain_of_the_path() -> None:
     assert moved({name: 6.0}, louder)[name] == pytest.approx(6.0)
 
 
+def test_only_the_lowest_shaft_orders_hang_on_what_a_machine_stands_on() -> None:
+    names = ("shaft.driver.1", "shaft.driver.2.to_mesh", "sideband.driver.1", "shaft.driver.low")
+    change = np.array([20.0 * (name in names) for name in FEATURES])
+    rigid = dict(zip(FEATURES, transplanted(FEATURES, change, SOUND, SOUND, USUAL, 0.0, -40.0).tolist(), strict=True))
+    assert rigid["shaft.driver.1"] == pytest.approx(10 * np.log10(1.0 + 99e-4))
+    assert rigid["shaft.driver.2.to_mesh"] == pytest.approx(rigid["shaft.driver.1"])
+    assert rigid["sideband.driver.1"] == rigid["shaft.driver.low"] == pytest.approx(20.0)
+
+
+def test_the_strongest_line_stands_out_no_further_than_it_rose_on_the_real_machine() -> None:
+    """A twin with even gears has nothing beside an effect's line; the real one has."""
+    line, rose = "shaft.driver.strongest", "shaft.driver.strongest.to_mesh"
+    louder = {**SOUND, rose: SOUND[rose] + 20.0}
+    found = moved({line: 30.0, rose: 23.0}, louder)
+    assert found[line] == pytest.approx(found[rose])
+    assert found[rose] == pytest.approx(10 * np.log10(1.0 + (10**2.3 - 1.0) / 100.0))
+    assert moved({line: -3.0, rose: 0.0}, SOUND)[line] == 0.0
+
+
 def test_prominence_is_that_of_the_moved_peak() -> None:
     quieter = {**SOUND, "tooth.driver.peak": SOUND["tooth.driver.peak"] - 10.0}
     found = moved({"tooth.driver.peak": 3.0, "tooth.driver.prominence": 3.0}, quieter)
