@@ -100,10 +100,10 @@ class Twin(Protocol):
 
 @runtime_checkable
 class CanBeQuiet(Protocol):
-    """A twin that can also run where nothing but the machine vibrates."""
+    """A twin that can also run where nothing vibrates but what an effect adds."""
 
     def quiet(self) -> Twin:
-        """Return the machine without the noise of its surroundings."""
+        """Return the machine without the noise of its surroundings, its own vibration as small as may be."""
         ...
 
 

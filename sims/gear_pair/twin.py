@@ -63,7 +63,7 @@ class PairTwin:
     further : tuple of SensorSeat
         Sensors beside the rig's own.
     is_quiet : bool
-        Without the vibration of the surroundings, its gears nearly even.
+        On soft mounts, without the vibration of the surroundings, its gears nearly even.
     """
 
     rig: Rig
@@ -121,7 +121,7 @@ class PairTwin:
         return replace(recording, samples=recording.samples[:, skipped:]) if skipped else recording
 
     def quiet(self) -> Self:
-        """Return the machine where nothing else vibrates and its own gears hardly do.
+        """Return the machine on soft mounts where nothing else vibrates and its own gears hardly do.
 
         What an effect adds is neither lost in noise nor, as a second unbalance would, weighed up against what the
         specimen happens to have there.
