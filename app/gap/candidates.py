@@ -14,7 +14,7 @@ from app.gap.conditions import LEAST_BLOCKS, SEED, Condition, compare, halves, o
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.gap.families import UNFORETOLD, shown_in
-from gearsig.gap.features import once as feature_values
+from gearsig.gap.features import whole_and_parts
 from gearsig.gap.population import load_population
 from gearsig.gap.prediction import WAYS_DB, EffectPath, Fit, Observed, fit_effect, paths_of
 from gearsig.gap.shrinkage import Fold, shrinkage
@@ -125,17 +125,19 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
     machines. The bank's own sound machine may be a quiet one, and is not asked.
     """
     floor, names = condition.floor, bank.feature_names
-    usual = dict(zip(floor.names, (-floor.from_centre(floor.names, np.zeros(len(floor.names)))).tolist(), strict=True))
+    usual = -floor.from_centre(floor.names, np.zeros(len(floor.names)))
     simulated = dict(zip(names, bank.sound.mean(axis=0).tolist(), strict=True))
+    own_names, own = whole_and_parts(condition.other)
     if condition.reference is not None:
-        compared, real = bank.change_names, dict(zip(*feature_values(condition.reference), strict=True))
+        compared, baseline = bank.change_names, own[0]
     else:
-        expected = load_population().credibility * feature_values(condition.simulated)[1]
-        compared, real = names, {name: e + usual[name] for name, e in zip(names, expected.tolist(), strict=True)}
+        compared, baseline = names, load_population().credibility * own[0] + usual
+    real = dict(zip(own_names, baseline.tolist(), strict=True))
+    repeated = dict(zip(floor.names, usual.tolist(), strict=True))
     again = np.zeros(len(bank.change_names))  # a mere second run changes something, too
     again[: len(names)] = bank.sound_changes.mean(axis=0)[: len(names)]
     given = [(bank.changes[bank.added.index(a)].mean(axis=0) - again)[: len(compared)] for a in kept]
-    rows = [[transplanted(compared, one, simulated, real, usual, *way) for one in given] for way in WAYS_DB]
+    rows = [[transplanted(compared, one, simulated, real, repeated, *way) for one in given] for way in WAYS_DB]
     table = np.array(rows).reshape(len(WAYS_DB), len(kept), len(compared))
     return np.where(shown_in(compared, shows_in), table, 0.0)
 

@@ -77,7 +77,7 @@ class EffectPath:
     options : mapping
     severities : array, (k,)
         Rising, above 0.
-    distances : tuple of arrays, (n_levels, k, n)
+    distances : tuple of arrays, (n_ways, k, n)
         dB from the sound machine; one per condition.
     names : tuple of str
         Of the n features.
@@ -93,7 +93,7 @@ class EffectPath:
     levels_db: tuple[float, ...] = (0.0,)
 
     def at(self, severities: FloatArray, condition: int) -> FloatArray:
-        """Return the predicted distances, (n_levels, n_severities, n).
+        """Return the predicted distances, (n_ways, n_severities, n).
 
         Straight over ln s between simulations, and proportional to s below them.
         """
@@ -120,14 +120,14 @@ class Fit:
     severity : Interval
     cost : float
         The least: squared distances between observed and predicted, in standard deviations.
-    levels : mapping
-        Condition → which of the path's levels.
+    ways : mapping
+        Condition → which of `WAYS_DB`, or of the path's levels where it was made for others.
     """
 
     path: EffectPath
     severity: Interval
     cost: float
-    levels: Mapping[int, int]
+    ways: Mapping[int, int]
 
     @property
     def added(self) -> Added:
@@ -136,21 +136,21 @@ class Fit:
 
     def at(self, condition: int) -> FloatArray:
         """Return the predicted distances; at a condition that it was not fitted to, at the level of the others."""
-        by_level = sorted(self.levels.values(), key=lambda way: self.path.levels_db[way])
-        level = self.levels.get(condition, by_level[len(by_level) // 2])
-        found: FloatArray = self.path.at(np.array([self.severity.value]), condition)[level, 0]
+        by_level = sorted(self.ways.values(), key=lambda way: self.path.levels_db[way])
+        way = self.ways.get(condition, by_level[len(by_level) // 2])
+        found: FloatArray = self.path.at(np.array([self.severity.value]), condition)[way, 0]
         return found
 
     def at_level_of(self, one: Observed) -> Fit:
         """Return the fit with the level that suits another condition best; severity and options stay."""
         predicted = self.path.at(np.array([self.severity.value]), one.condition)[:, 0]
         costs = _squares(one.distances - predicted, one.floors) @ _family_weights(self.path.names)
-        level = int(np.argmin(costs + _unusual(self.path)))
-        return replace(self, levels={**self.levels, one.condition: level})
+        way = int(np.argmin(costs + _unusual(self.path)))
+        return replace(self, ways={**self.ways, one.condition: way})
 
     def level_db(self, condition: int) -> float:
         """Return by how much louder than on the twin the effect is."""
-        return self.path.levels_db[self.levels[condition]]
+        return self.path.levels_db[self.ways[condition]]
 
 
 def paths_of(
@@ -166,7 +166,7 @@ def paths_of(
     names : tuple of str
         Of the features.
     candidates : sequence of Added
-    distances : sequence of arrays, (n_levels, n_candidates, n)
+    distances : sequence of arrays, (n_ways, n_candidates, n)
         One per condition.
     levels_db : tuple of float
     """
@@ -219,10 +219,10 @@ def fit_path(path: EffectPath, observed: Sequence[Observed]) -> Fit:
     coarse = path.tried()
     low, high = _near_the_best(coarse, _costs(path, coarse, observed)[0])
     tried = np.geomspace(low, high, STEPS)
-    costs, levels = _costs(path, tried, observed)
+    costs, ways = _costs(path, tried, observed)
     likelihood = np.exp(-0.5 * (costs - costs.min()))
     best = round(float(likelihood @ np.arange(len(tried)) / likelihood.sum()))  # they are even in ln s
-    fitted = {one.condition: int(row[best]) for one, row in zip(observed, levels, strict=True)}
+    fitted = {one.condition: int(row[best]) for one, row in zip(observed, ways, strict=True)}
     return Fit(path, Interval(float(tried[best]), *_near_the_best(tried, costs)), float(costs.min()), fitted)
 
 
@@ -235,18 +235,18 @@ def _near_the_best(tried: FloatArray, costs: FloatArray) -> tuple[float, float]:
 def _costs(
     path: EffectPath, severities: FloatArray, observed: Sequence[Observed]
 ) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Return the costs, mean over conditions, (n_severities,), and the best levels, (n_conditions, n_severities).
+    """Return the costs, mean over conditions, (n_severities,), and the best ways, (n_conditions, n_severities).
 
     Σ over families of the mean squared distance, and the squared level over its standard deviation.
     """
     weights = _family_weights(path.names)
-    costs, levels = [], []
+    costs, ways = [], []
     for one in observed:
         left = one.distances - path.at(severities, one.condition)
         each = _squares(left, one.floors) @ weights + _unusual(path)[:, None]
-        levels.append(each.argmin(axis=0))
+        ways.append(each.argmin(axis=0))
         costs.append(each.min(axis=0))
-    return np.mean(costs, axis=0), np.array(levels)
+    return np.mean(costs, axis=0), np.array(ways)
 
 
 def _unusual(path: EffectPath) -> FloatArray:

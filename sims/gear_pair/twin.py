@@ -159,11 +159,12 @@ class PairTwin:
         """Return the specimen `seed` with its effects as a preset."""
         drawn = np.random.default_rng([seed, 1])
         values = usual_parameters(self.nominal) | specimen_parameters(self.nominal, drawn)
+        housing = usual_housing(drawn)
         if self.is_quiet:
             values |= {"noise_mps2": 0.0} | {name: EVEN * float(values[name]) for name in _UNEVEN}
-        body = (body_on_mounts(self.nominal),) if self.is_quiet else ()
+            housing = (body_on_mounts(self.nominal), *housing)
         used = [str(a.options["bearing"]) for a in added if "bearing" in a.options]
-        installed = installed_of_rig(self.rig, self.nominal.size, (*body, *usual_housing(drawn)), used)
+        installed = installed_of_rig(self.rig, self.nominal.size, housing, used)
         installed = replace(installed, sensors=(*installed.sensors, *self.further))
         title = f"Twin of {self.rig.name}" if self.rig.name else "Twin of a rig"
         return Preset(
