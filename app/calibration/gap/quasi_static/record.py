@@ -1,0 +1,168 @@
+"""From a machine's state on a day to a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from app.calibration.gap.quasi_static.contact import at_places, is_in_reach, meeting, static_contact
+from app.calibration.gap.quasi_static.machine import N_CHANNELS, State, StaticMachine, Wave
+from app.calibration.gap.quasi_static.structure import BEARINGS, FRICTION, INSIDE, MESH, SHAFTS, Structure
+from gearsig.checks import FloatArray
+from gearsig.recording.types import Channel, Recording
+from sims.measure.tachometer import Tachometer, pulse_voltage
+
+FINER = 2
+"""Times the recording's rate at which the contact is solved: its corners reach beyond half of that."""
+LEAD_S = 0.3
+"""Before the recording, in which modes settle."""
+OUT_OF_REACH_M = 1.0
+TURNS_BEFORE = 40
+"""Whole turns of the driver, at most, by which the teeth that meet differ from day to day."""
+LOWEST_NOISE_HZ = 20.0
+RIPPLE = 0.3
+"""By which play opens and shuts as elements pass."""
+SPEED_SCATTER, TORQUE_SCATTER, GAIN_SCATTER, NOISE_SCATTER, ANEW_SHARE = 0.005, 0.04, 0.1, 0.12, 0.6
+
+
+@dataclass(frozen=True)
+class Day:
+    """How a machine runs on a day, and how its sensors sit."""
+
+    speed_factor: float
+    torque_factor: float
+    gains: tuple[float, ...]
+    noise_factor: float
+    turns_before: int
+    seed: int
+    anew: bool
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator) -> Day:
+        """Draw one."""
+        speed, torque = (1.0 + s * float(rng.standard_normal()) for s in (SPEED_SCATTER, TORQUE_SCATTER))
+        anew = bool(rng.uniform() < ANEW_SHARE)
+        gains = np.exp(GAIN_SCATTER * rng.standard_normal(N_CHANNELS) * anew)
+        noise = float(np.exp(NOISE_SCATTER * rng.standard_normal()))
+        turns = int(rng.integers(TURNS_BEFORE))
+        return cls(speed, torque, tuple(gains.tolist()), noise, turns, int(rng.integers(2**31)), anew)
+
+
+def record(machine: StaticMachine, state: State, day: Day, levels: Sequence[float] | None) -> Recording:
+    """Return a recording.
+
+    Parameters
+    ----------
+    machine : StaticMachine
+    state : State
+    day : Day
+    levels : sequence of float or None
+        Standard deviation of each channel by which noise is measured; None: no noise.
+    """
+    rng = np.random.default_rng([day.seed, 1])
+    rate = FINER * machine.rate_hz
+    time = np.arange(int((machine.drawn.duration_s + LEAD_S) * rate)) / rate
+    turns = _turns(machine, state, day, time, rng)
+    motions = _motions(machine, state, day, turns, time, rng)
+    structure = state.structure.mounted_anew(np.random.default_rng([day.seed, 2])) if day.anew else state.structure
+    first, rows = round(LEAD_S * machine.rate_hz), []
+    for channel in range(N_CHANNELS):
+        row = _heard(structure, channel, motions, rate)[first:]
+        if levels is not None:
+            inside = _heard(structure, channel, {INSIDE: rng.standard_normal(len(time))}, rate)[first:]
+            row = row + inside * (machine.inside_share[channel] * levels[channel] / inside.std())
+            row = row + _noise(len(row), machine, channel, rng) * levels[channel] * day.noise_factor
+        rows.append(row * day.gains[channel])
+    later = time[::FINER][first:]
+    tacho = _tachometer(turns, time, later, rng)
+    n = min(len(later), len(rows[0]))
+    samples = np.stack([row[:n] for row in (*rows, tacho)])
+    point = machine.rig.operating_point
+    channels = tuple(Channel(s.channel, s.quantity, s.unit, s.position) for s in machine.rig.sensors)
+    return Recording(samples, machine.rate_hz, channels, rig=replace(machine.rig, operating_point=point))
+
+
+def _turns(machine: StaticMachine, state: State, day: Day, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return the driver's angle in revolutions."""
+    speed_hz = machine.drawn.speed_rpm * day.speed_factor / 60.0
+    wander = np.zeros(len(time))
+    for share, hz, phase in state.wander:
+        wander += share / (2 * np.pi * hz) * np.sin(2 * np.pi * hz * time + phase + rng.uniform(0, 2 * np.pi))
+    turns: FloatArray = day.turns_before + rng.uniform() + speed_hz * (time + wander)
+    return turns
+
+
+def _motions(
+    machine: StaticMachine, state: State, day: Day, turns: FloatArray, time: FloatArray, rng: np.random.Generator
+) -> dict[int, FloatArray]:
+    """Return the motion that enters the structure on each way, m."""
+    path, cycle = machine.path, turns * machine.drawn.teeth[0]
+
+    def waves(found: Sequence[Wave]) -> FloatArray:
+        angles = [2 * np.pi * turns * order for order in machine.shaft_orders]
+        return sum((size * np.cos(n * angles[side] + phase) for side, n, size, phase in found), np.zeros(len(turns)))
+
+    first = (0, 0)
+    gaps = meeting(cycle, path, (state.gaps_m[0], state.gaps_m[1]), first)
+    weak = meeting(cycle, path, (state.weak[0], state.weak[1]), first)
+    inside = is_in_reach(cycle, path)
+    own = at_places(cycle, path, machine.stiffness_n_per_m) * (1.0 - state.soft_spots)
+    stiffness = np.where(inside, own * np.maximum(1.0 + waves(state.stiffness), 0.05) / (1.0 + weak), 1e-3)
+    load = machine.load_n * day.torque_factor * np.maximum(1.0 + waves(state.load), 0.02)
+    error, carried = static_contact(stiffness, np.where(inside, gaps, OUT_OF_REACH_M), load)
+    mean = float(machine.stiffness_n_per_m.mean()) * path.ratio
+    shafts = waves(state.force_n) * day.speed_factor**2 / mean
+    off = at_places(cycle, path, path.places - path.pitch_point)
+    rubbing = state.friction * np.sum(carried * np.tanh(off / state.reversal), axis=0) / mean
+    mesh = error + waves(state.runout_m) + state.restless_m * rng.standard_normal(len(turns))
+    pressed = load / mean
+    mesh = _through_play(pressed, mesh - mesh.mean() + shafts, state, turns) - shafts
+    knocked = sum((knock(turns, time, rng) for knock in state.knocks), np.zeros(len(turns))) / mean
+    return {MESH: mesh, SHAFTS: shafts, FRICTION: rubbing, BEARINGS: knocked}
+
+
+def _through_play(pressed: FloatArray, moving: FloatArray, state: State, turns: FloatArray) -> FloatArray:
+    """Return what a bearing with play hands on of a motion about what its load presses out: √(r² + c²) − c."""
+    total = pressed + moving
+    play = state.play * pressed * (1.0 + RIPPLE * np.cos(2 * np.pi * state.passing * turns))
+    found: FloatArray = np.sign(total) * (np.hypot(total, play) - play)
+    return found
+
+
+def _heard(structure: Structure, channel: int, motions: dict[int, FloatArray], rate: float) -> FloatArray:
+    """Return a channel's acceleration at the recording's rate."""
+    from scipy.fft import irfft, rfft, rfftfreq
+
+    n = len(next(iter(motions.values())))
+    frequency = rfftfreq(n, 1.0 / rate)
+    kept = frequency < 0.48 * rate / FINER
+    lines = np.zeros(len(frequency), dtype=np.complex128)
+    for way, motion in motions.items():
+        lines[kept] += rfft(motion - motion.mean())[kept] * structure.accelerations(channel, frequency[kept], way)
+    m = n // FINER
+    vibration: FloatArray = irfft(lines[: m // 2 + 1], m) * (m / n)
+    return vibration
+
+
+def _noise(n: int, machine: StaticMachine, channel: int, rng: np.random.Generator) -> FloatArray:
+    """Return a sensor's noise over its level, falling with frequency as the machine's seed has it."""
+    from scipy.fft import irfft, rfft, rfftfreq
+
+    slope = np.random.default_rng([machine.seed, 3, channel]).uniform(0.0, 1.0)
+    frequency = np.maximum(rfftfreq(n, 1.0 / machine.rate_hz), LOWEST_NOISE_HZ)
+    noise = irfft(rfft(rng.standard_normal(n)) * frequency ** (-slope / 2.0), n)
+    coloured: FloatArray = noise * (machine.noise_share[channel] / noise.std())
+    return coloured
+
+
+def _tachometer(turns: FloatArray, time: FloatArray, at: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return the voltage of a pulse per turn."""
+    tacho = Tachometer(jitter_s=2e-6, noise_v=0.01)
+    whole = np.arange(np.ceil(turns[0]), np.floor(turns[-1]) + 1.0)
+    rising = np.interp(whole, turns, time) + tacho.jitter_s * rng.standard_normal(len(whole))
+    falling = np.interp(whole + tacho.duty, turns, time)
+    volts = pulse_voltage(tacho, rising, falling, at) + tacho.noise_v * rng.standard_normal(len(at))
+    found: FloatArray = volts
+    return found

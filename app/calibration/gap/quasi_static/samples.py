@@ -1,0 +1,73 @@
+"""Rows of the population from drawn machines of the quasi-static simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import typer
+
+from app.calibration.gap.outside import with_foreign_vibration
+from app.calibration.gap.quasi_static.effects import EFFECTS
+from app.calibration.gap.quasi_static.machine import StaticMachine
+from app.calibration.gap.quasi_static.record import Day, record
+from app.calibration.gap.sample import SEED, Compared, Sample, reduced
+from app.calibration.gap.signatures import made_by_hand, with_signature
+from gearsig.errors import InputError, RefusalError
+from gearsig.gap.population import BY_HAND
+from gearsig.gap.simulator import Point
+from gearsig.gap.types import NONE, UNKNOWN
+from gearsig.recording.types import Recording
+from sims.cracked.twin import CrackedTwin
+from sims.gear_pair.usual import nominal_of
+
+NAME = "quasi-static"
+FIRST_RIG = 200_000
+N_SOUND, N_EACH, N_FOREIGN, N_BY_HAND = 2, 1, 2, 3
+
+
+def one_static(index: int) -> list[Sample]:
+    """Return the samples of one drawn machine."""
+    rng, rig = np.random.default_rng([SEED, 3, index]), FIRST_RIG + index
+    machine = StaticMachine.of(rng)
+    torque_nm = machine.drawn.torque_nm
+    levels = record(machine, machine.sound(), Day.drawn(rng), None).samples[:-1].std(axis=1)
+    try:
+        reference = record(machine, machine.sound(), Day.drawn(rng), levels)
+        twin = CrackedTwin(machine.rig, nominal_of(machine.rig)).run(
+            Point(machine.drawn.speed_rpm, torque_nm),
+            seed=rig,
+            duration_s=machine.drawn.duration_s,
+            sampling_rate_hz=machine.rate_hz,
+            noise=1,
+        )
+        compared = Compared(NAME, rig, reduced(reference, rig), reduced(twin, rig))
+    except (InputError, RefusalError) as error:
+        typer.echo(f"machine {rig}: {error}")
+        return []
+    samples = []
+    for label, detail, recording in _recordings(machine, levels, rng):
+        try:
+            samples.append(compared.sample(label, detail, 0.0, recording, torque_nm))
+        except (InputError, RefusalError) as error:
+            typer.echo(f"machine {rig}, {label}: {error}")
+    return samples
+
+
+def _recordings(
+    machine: StaticMachine, levels: np.ndarray, rng: np.random.Generator
+) -> Iterator[tuple[str, str, Recording]]:
+    """Yield label, detail and recording."""
+    sound = [record(machine, machine.sound(), Day.drawn(rng), levels) for _ in range(N_SOUND)]
+    for recording in sound:
+        yield NONE, "", recording
+    for name, effect in EFFECTS.items():
+        for _ in range(N_EACH):
+            state = machine.sound()
+            effect(machine, state, rng)
+            yield name, "", record(machine, state, Day.drawn(rng), levels)
+    for i in range(N_FOREIGN):
+        recording, name = with_foreign_vibration(sound[i % N_SOUND], rng)
+        yield UNKNOWN, name, recording
+    for i, name in enumerate(rng.choice(made_by_hand(sound[0], machine.drawn.torque_nm), N_BY_HAND, replace=False)):
+        yield str(name), BY_HAND, with_signature(sound[i % N_SOUND], str(name), rng)[0]

@@ -1,0 +1,63 @@
+"""The quasi-static simulator of the population: contact by closed forms, a structure's answer, effects that show."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.calibration.gap.quasi_static.contact import N_PAIRS, Path, static_contact
+from app.calibration.gap.quasi_static.effects import EFFECTS
+from app.calibration.gap.quasi_static.machine import StaticMachine
+from app.calibration.gap.quasi_static.record import Day, record
+from app.calibration.gap.quasi_static.structure import MESH, Structure
+from gearsig.gap.gather import gather
+
+
+@given(st.integers(0, 10**6))
+def test_pairs_carry_the_load_and_none_pulls(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    k, gaps = rng.uniform(1e7, 1e9, (N_PAIRS, 5)), rng.normal(0.0, 1e-5, (N_PAIRS, 5))
+    load = rng.uniform(1.0, 1e5, 5)
+    error, carried = static_contact(k, gaps, load)
+    assert carried.sum(axis=0) == pytest.approx(load, rel=1e-9)
+    assert np.all(carried >= 0.0)
+    assert carried == pytest.approx(k * np.maximum(error - gaps, 0.0))
+
+
+def test_the_path_of_contact_is_that_of_the_textbook() -> None:
+    """z = 20/40, module 1, 20°: contact ratio 1.64 (any textbook's formula for standard teeth)."""
+    path = Path.of((20, 40), 1.0, 20.0)
+    assert path.ratio == pytest.approx(1.635, abs=0.005)
+    assert path.base_pitch_m == pytest.approx(2.952e-3, rel=1e-3)
+    assert 0.0 < path.pitch_point < path.ratio
+
+
+def test_a_structure_follows_slow_motion_and_rings_at_its_modes() -> None:
+    one = Structure(np.array([1000.0]), np.array([0.01]), np.array([[[1.0, 0.0]] * 5]))
+    slow, ringing = (abs(one.accelerations(0, np.array([f]), MESH)[0]) / (2 * np.pi * f) ** 2 for f in (10.0, 1000.0))
+    assert slow == pytest.approx(1.0, rel=1e-3)
+    assert ringing == pytest.approx(50.0, rel=1e-3)
+
+
+def machine(seed: int = 3) -> StaticMachine:
+    return StaticMachine.of(np.random.default_rng(seed))
+
+
+def test_the_same_day_is_the_same_recording_and_the_teeth_keep_their_mark() -> None:
+    made, day = machine(), Day.drawn(np.random.default_rng(1))
+    one, again = (record(made, made.sound(), day, None) for _ in range(2))
+    assert np.array_equal(one.samples, again.samples)
+    crest = gather(one, made.rig)
+    assert crest.n_revolutions > 15
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_an_effect_changes_what_is_recorded(name: str) -> None:
+    made, day = machine(), Day.drawn(np.random.default_rng(1))
+    state = made.sound()
+    EFFECTS[name](made, state, np.random.default_rng(2))
+    sound, faulty = record(made, made.sound(), day, None).samples, record(made, state, day, None).samples
+    assert np.all(np.isfinite(faulty))
+    assert np.std(faulty[:-1] - sound[:-1]) > 1e-3 * np.std(sound[:-1])
