@@ -2,26 +2,35 @@
 
 Each drawn gearbox is recorded sound as the reference, sound again on other days, with each effect, with foreign
 vibration, and with each effect's signature by hand; what differs goes into the table, with its label. Gearboxes are
-those of both models of a pair, and the independent rig's with development gears.
+those of both models of a pair, of the quasi-static simulator, and the independent rig's with development gears.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import typer
 
 from app.calibration.gap.independent import one_case
 from app.calibration.gap.modelled import CRACKED, REDUCED, one_rig
+from app.calibration.gap.quasi_static.samples import QUASI_STATIC, one_static
 from app.calibration.gap.sample import Sample, write
 from gearsig.gap.population import INDEPENDENT
 
-MACHINES = {CRACKED.name: 120, REDUCED.name: 45, INDEPENDENT: 400}
+MACHINES = {CRACKED.name: 120, REDUCED.name: 45, INDEPENDENT: 400, QUASI_STATIC: 150}
 """Of each simulator, unless asked for otherwise."""
 
-_MODELS = {model.name: model for model in (CRACKED, REDUCED)}
+_SAMPLES_OF: dict[str, Callable[[int], list[Sample]]] = {
+    CRACKED.name: partial(one_rig, CRACKED),
+    REDUCED.name: partial(one_rig, REDUCED),
+    INDEPENDENT: one_case,
+    QUASI_STATIC: one_static,
+}
+"""What a machine's number makes, by simulator."""
 
 
 def main() -> None:
@@ -44,7 +53,7 @@ def main() -> None:
 
 def _one(job: tuple[str, int]) -> list[Sample]:
     name, index = job
-    return one_case(index) if name == INDEPENDENT else one_rig(_MODELS[name], index)
+    return _SAMPLES_OF[name](index)
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ def _tooth(machine: StaticMachine, rng: np.random.Generator) -> tuple[int, int]:
 
 def _towards_tip(machine: StaticMachine, side: int) -> FloatArray:
     """Return 0 where the path begins or ends at a gear's root, 1 at its tip: the driver's path ends there."""
-    at = np.clip(machine.path.places / machine.path.ratio, 0.0, 1.0)
+    at: FloatArray = np.clip(machine.path.places / machine.path.ratio, 0.0, 1.0)
     return at if side == 0 else 1.0 - at
 
 

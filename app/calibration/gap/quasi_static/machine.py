@@ -16,6 +16,7 @@ from gearsig.checks import FloatArray
 from gearsig.rig.types import Rig
 from sims.cracked.simulator import CrackedPair
 from sims.gear_pair.build import build_rig
+from sims.gear_pair.usual import Nominal, nominal_of
 from sims.machine.operation import Operation
 
 RATES_HZ = (12_800.0, 20_000.0, 20_480.0, 25_600.0)
@@ -85,6 +86,8 @@ class StaticMachine:
         Teeth, speed, torque and length.
     rig : Rig
         What its maker knows.
+    nominal : Nominal
+        Of its pair.
     path : Path
     stiffness_n_per_m : array, (N_PATH,)
         Of one pair over the path.
@@ -96,6 +99,7 @@ class StaticMachine:
 
     drawn: DrawnRig
     rig: Rig
+    nominal: Nominal
     path: Path
     stiffness_n_per_m: FloatArray
     rate_hz: float
@@ -111,14 +115,14 @@ class StaticMachine:
         operation = Operation.steady(drawn.speed_rpm, drawn.torque_nm)
         ready = CrackedPair().prepare(drawn.parameters, [], operation, rng, sampling_rate_hz=max(RATES_HZ))
         rig = build_rig(ready.machine, operation, name="drawn")
-        pair = rig.pairs[0]
-        path = Path.of(drawn.teeth, float(pair.module_mm or 0.0), pair.pressure_angle_deg)
-        width_m = 1e-3 * float(pair.face_width_mm or 0.0)
-        mesh = STIFFNESS_N_PER_M2 * width_m * rng.uniform(0.8, 1.2)
+        nominal = nominal_of(rig)
+        path = Path.of(drawn.teeth, nominal.module_mm, nominal.pressure_angle_deg)
+        mesh = STIFFNESS_N_PER_M2 * 1e-3 * nominal.face_width_mm * rng.uniform(0.8, 1.2)
         noise, inside = ((log_uniform(rng, *span), log_uniform(rng, *span)) for span in ((0.003, 0.1), (0.003, 0.15)))
         return cls(
             drawn,
             rig,
+            nominal,
             path,
             mesh / path.ratio * _shape(path, rng),
             float(rng.choice(RATES_HZ)),
@@ -131,15 +135,13 @@ class StaticMachine:
     @property
     def load_n(self) -> float:
         """Mesh force."""
-        pair = self.rig.pairs[0]
-        radius_m = 0.5e-3 * float(pair.module_mm or 0.0) * self.drawn.teeth[0] * cos(radians(pair.pressure_angle_deg))
-        return self.drawn.torque_nm / radius_m
+        pitch_radius_m = 0.5e-3 * self.nominal.module_mm * self.drawn.teeth[0]
+        return self.drawn.torque_nm / (pitch_radius_m * cos(radians(self.nominal.pressure_angle_deg)))
 
     @property
     def rated_m(self) -> float:
         """Deflection under a usual load: what errors are measured by, whatever the load is now."""
-        module_m = 1e-3 * float(self.rig.pairs[0].module_mm or 0.0)
-        return 50e6 * module_m / STIFFNESS_N_PER_M2
+        return 50e6 * 1e-3 * self.nominal.module_mm / STIFFNESS_N_PER_M2
 
     @property
     def shaft_orders(self) -> tuple[float, float]:
@@ -151,7 +153,7 @@ class StaticMachine:
         rng = np.random.default_rng([self.seed, 1])
         unit = self.rated_m
         profile = _profile(self, rng)
-        gaps = []
+        gaps: list[FloatArray] = []
         for teeth in self.drawn.teeth:
             pitch = log_uniform(rng, 0.01, 0.12) * unit * rng.standard_normal((teeth, 1))
             gaps.append(profile / 2.0 + pitch + textures(teeth, log_uniform(rng, 0.002, 0.04) * unit, rng))
@@ -187,8 +189,7 @@ class StaticMachine:
     @property
     def force_unit_n(self) -> float:
         """What a force on a shaft is measured by: that of a usual load."""
-        pair = self.rig.pairs[0]
-        return 50.0 * float(pair.module_mm or 0.0) * float(pair.face_width_mm or 0.0)
+        return 50.0 * self.nominal.module_mm * self.nominal.face_width_mm
 
 
 def _shape(path: Path, rng: np.random.Generator) -> FloatArray:

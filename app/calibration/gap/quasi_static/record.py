@@ -50,7 +50,7 @@ class Day:
         return cls(speed, torque, tuple(gains.tolist()), noise, turns, int(rng.integers(2**31)), anew)
 
 
-def record(machine: StaticMachine, state: State, day: Day, levels: Sequence[float] | None) -> Recording:
+def record(machine: StaticMachine, state: State, day: Day, levels: FloatArray | None) -> Recording:
     """Return a recording.
 
     Parameters
@@ -58,7 +58,7 @@ def record(machine: StaticMachine, state: State, day: Day, levels: Sequence[floa
     machine : StaticMachine
     state : State
     day : Day
-    levels : sequence of float or None
+    levels : array, (n_channels,), or None
         Standard deviation of each channel by which noise is measured; None: no noise.
     """
     rng = np.random.default_rng([day.seed, 1])

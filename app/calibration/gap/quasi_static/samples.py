@@ -19,9 +19,8 @@ from gearsig.gap.simulator import Point
 from gearsig.gap.types import NONE, UNKNOWN
 from gearsig.recording.types import Recording
 from sims.cracked.twin import CrackedTwin
-from sims.gear_pair.usual import nominal_of
 
-NAME = "quasi-static"
+QUASI_STATIC = "quasi-static"
 FIRST_RIG = 200_000
 N_SOUND, N_EACH, N_FOREIGN, N_BY_HAND = 2, 1, 2, 3
 
@@ -34,14 +33,14 @@ def one_static(index: int) -> list[Sample]:
     levels = record(machine, machine.sound(), Day.drawn(rng), None).samples[:-1].std(axis=1)
     try:
         reference = record(machine, machine.sound(), Day.drawn(rng), levels)
-        twin = CrackedTwin(machine.rig, nominal_of(machine.rig)).run(
+        twin = CrackedTwin(machine.rig, machine.nominal).run(
             Point(machine.drawn.speed_rpm, torque_nm),
             seed=rig,
             duration_s=machine.drawn.duration_s,
             sampling_rate_hz=machine.rate_hz,
             noise=1,
         )
-        compared = Compared(NAME, rig, reduced(reference, rig), reduced(twin, rig))
+        compared = Compared(QUASI_STATIC, rig, reduced(reference, rig), reduced(twin, rig))
     except (InputError, RefusalError) as error:
         typer.echo(f"machine {rig}: {error}")
         return []
