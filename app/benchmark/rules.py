@@ -8,7 +8,7 @@ import numpy as np
 
 from app.benchmark.bare_report import bare_report
 from app.benchmark.seen import Seen
-from app.benchmark.textbook import LEAST_STRENGTH, USUAL
+from app.benchmark.usual_features import LEAST_STRENGTH, USUAL
 from gearsig.gap.features import once
 from gearsig.gap.gear_lines import SIDES
 from gearsig.gap.textbook import RULES, rule_strength, sides_of

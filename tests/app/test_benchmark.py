@@ -20,7 +20,7 @@ from app.benchmark.make import make_case
 from app.benchmark.plan import BLIND, SAME, Plan, PlannedCase
 from app.benchmark.run import Wanted, run_benchmark
 from app.benchmark.seen import read_seen
-from app.benchmark.textbook import USUAL
+from app.benchmark.usual_features import USUAL
 from app.cli import main
 from gearsig.cache import FOLDERS
 from gearsig.errors import InputError

@@ -13,7 +13,6 @@ from gearsig.plot.gap_causes import gap_causes_figure
 from gearsig.plot.gap_evidence import gap_evidence_figure
 from gearsig.plot.gap_lines import gap_lines_figure
 from gearsig.plot.gap_orders import gap_orders_figure
-from gearsig.plot.gap_shares import gap_shares_figure
 from gearsig.plot.gap_teeth import INNER, OUTER, gap_teeth_figure
 from gearsig.plot.gap_waterfall import gap_waterfall_figure
 from gearsig.plot.marks import AngleMark
@@ -59,10 +58,9 @@ def bars(figure: "Figure") -> list[float]:
 
 
 MADE: dict[str, Callable[[], Any]] = {
-    "shares": lambda: gap_shares_figure([replace(REPORT.places[0], title=LONG), *REPORT.places[1:]], title="Where"),
     "waterfall": lambda: gap_waterfall_figure(REPORT.steps, held_out="another operating condition", title="How far"),
     "evidence": lambda: gap_evidence_figure(REPORT.causes[0].evidence, title="Predicted against observed"),
-    "causes": lambda: gap_causes_figure(REPORT.causes, title="Which"),
+    "causes": lambda: gap_causes_figure([replace(REPORT.causes[0], title=LONG), *REPORT.causes[1:]], title="Which"),
     "orders": lambda: gap_orders_figure(REPORT.spectra[0], limits=(40.0, 130.0)),
     "lines": lambda: gap_lines_figure(gearless_report().spectra[0], 3.21),
     "teeth": lambda: gap_teeth_figure(REPORT.angles[0], mark=AngleMark(134.2, "tooth 21, 134°")),
@@ -72,13 +70,6 @@ MADE: dict[str, Callable[[], Any]] = {
 @pytest.mark.parametrize("name", list(MADE))
 def test_nothing_is_cut(name: str) -> None:
     assert_inside(MADE[name]())
-
-
-def test_shares_are_in_percent_with_both_floors() -> None:
-    figure = gap_shares_figure(REPORT.places)
-    assert bars(figure) == pytest.approx([100 * place.share for place in REPORT.places])
-    assert "58 %" in texts(figure)
-    assert "8.7 × structural, 61 × rep." in texts(figure)
 
 
 def test_the_waterfall_goes_from_before_to_what_is_left() -> None:
@@ -147,7 +138,7 @@ def test_the_polar_picture_is_in_decibels_from_the_middling_tooth() -> None:
 
 
 def test_nothing_to_draw_is_an_error() -> None:
-    for draw in (gap_shares_figure, gap_waterfall_figure, gap_evidence_figure, gap_causes_figure):
+    for draw in (gap_waterfall_figure, gap_evidence_figure, gap_causes_figure):
         with pytest.raises(InputError):
             draw([])
     with pytest.raises(InputError, match="hold no order"):
