@@ -29,6 +29,8 @@ LARGEST_TORQUE_DIFFERENCE = 0.25
 
 LONGEST_RUN_S, MOST_REVOLUTIONS = 5.0, 24.0
 """Of a simulation: longer ones say no more; but so many revolutions of the slower shaft at least."""
+TRIAL_S, TRIAL_REVOLUTIONS = 2.0, 20.0
+"""The same of a run that tries an effect: it differs from the sound run by that effect only, not by noise."""
 
 
 @dataclass(frozen=True)
@@ -67,9 +69,9 @@ class Condition:
         return gap_size(self.change, self.floor)
 
     @property
-    def run_s(self) -> float:
-        """Length of a simulation at this point."""
-        return run_length_s(self.now)
+    def trial_s(self) -> float:
+        """Length of a simulation that tries an effect at this point."""
+        return max(TRIAL_S, TRIAL_REVOLUTIONS / _slower_hz(self.now))
 
     @property
     def over_floors(self) -> dict[str, float]:
@@ -83,8 +85,11 @@ LEAST_BLOCKS = 4
 
 def run_length_s(now: Gathered) -> float:
     """Return the length of a simulation that the features can be read from."""
-    slower = min(now.frame.shaft_orders) * now.speed_hz
-    return max(LONGEST_RUN_S, MOST_REVOLUTIONS / slower)
+    return max(LONGEST_RUN_S, MOST_REVOLUTIONS / _slower_hz(now))
+
+
+def _slower_hz(now: Gathered) -> float:
+    return min(now.frame.shaft_orders) * now.speed_hz
 
 
 def simulated(

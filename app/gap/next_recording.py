@@ -50,7 +50,7 @@ def next_recordings(
     here = [condition.facts.point for condition in conditions]
     points = _distinct([*here, *(_rounded(v * base.point.speed_rpm, t * base.point.torque_nm) for v, t in FACTORS)])
     runs = [
-        Run(measured, p, conditions[0].run_s * max(1.0, base.point.speed_rpm / p.speed_rpm), base.sampling_rate_hz, 1)
+        Run(measured, p, conditions[0].trial_s * max(1.0, base.point.speed_rpm / p.speed_rpm), base.sampling_rate_hz, 1)
         for p in points
     ]
     tasks = [Task(run, SEED, tried.fit.added, tuple(places)) for run in runs for tried in (first, second)]
