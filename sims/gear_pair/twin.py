@@ -46,6 +46,7 @@ _UNEVEN = (
     "pitch_deviation_um",
     *(f"{what}_{gear}_{unit}" for what, unit in (("runout", "um"), ("unbalance", "g_mm")) for gear in GEARS),
 )
+_NOISES = ("noise_mps2", "sensor_noise_mps2_per_sqrt_hz")
 VIBRATION_S = 0.5
 """Length of the run that tells how strongly the sound machine vibrates."""
 
@@ -161,8 +162,8 @@ class PairTwin:
         values = usual_parameters(self.nominal) | specimen_parameters(self.nominal, drawn)
         housing = usual_housing(drawn)
         if self.is_quiet:
-            values |= {"noise_mps2": 0.0} | {name: EVEN * float(values[name]) for name in _UNEVEN}
-            housing = (body_on_mounts(self.nominal), *housing)
+            values |= dict.fromkeys(_NOISES, 0.0) | {name: EVEN * float(values[name]) for name in _UNEVEN}
+            housing = (*body_on_mounts(self.nominal), *housing)
         used = [str(a.options["bearing"]) for a in added if "bearing" in a.options]
         installed = installed_of_rig(self.rig, self.nominal.size, housing, used)
         installed = replace(installed, sensors=(*installed.sensors, *self.further))

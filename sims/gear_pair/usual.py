@@ -29,6 +29,8 @@ PITCH_RMS_SHARE, RUNOUT_SHARE = 0.1, 0.3
 """A ground gear's rms pitch deviation over f_pt, its eccentricity over F_r: tolerances of class 5 of ISO 1328."""
 BODY_KG, MOUNTS_HZ, MOUNTS_DAMPING = 40.0, 6.0, 0.3
 """A housing with its bed, of a machine of size 1; below its mounts' frequency nothing that turns is slow enough."""
+BODY_SHAPES = ((1.0, 1.0, 1.0, 1.0), (1.0, -1.0, 1.0, -1.0))
+"""Heave and pitch of that housing at bearings 1 to 4, the first two at the ends of one shaft."""
 UNBALANCE_UM = 30.0
 """Offset of the centre of mass; 40 um are balance grade G 6.3 at 1500 rpm."""
 
@@ -186,15 +188,20 @@ def usual_housing(rng: np.random.Generator) -> tuple[HousingMode, ...]:
     )
 
 
-def body_on_mounts(nominal: Nominal) -> HousingMode:
-    """Return the housing as a rigid body on soft mounts, as which it answers to forces at a shaft's low orders.
+def body_on_mounts(nominal: Nominal) -> tuple[HousingMode, ...]:
+    """Return the housing as a rigid body on soft mounts, as which it answers to a shaft's low orders: heave and pitch.
 
     Above the mounts' frequency a = Σ F/M; with F = k x the force of a bearing whose acceleration is −ω² x, that is a
-    mode of static gain k/(M ω₀²). On rigid ground a machine shakes some 50 dB less at 25 Hz.
+    mode of static gain k/(M ω₀²). On rigid ground a machine shakes some 50 dB less at 25 Hz. A pair of opposite forces
+    on a shaft's two bearings, as a bending moment makes, leaves the sum nothing and turns the body: at arms ±l/2,
+    a = ±(l/2) Σ ±F (l/2)/J with J = M i². A block 1.5 l long and l high has i = 0.52 l, here l/2: the same gain.
+
+    Source: H. Himelblau and S. Rubin, Vibration of a resiliently supported rigid body, in *Harris' Shock and Vibration
+    Handbook*.
     """
     stiffness = float(usual_parameters(nominal)["bearing_stiffness_n_per_m"])
     gain = stiffness / (BODY_KG * nominal.size**2 * (2.0 * pi * MOUNTS_HZ) ** 2)
-    return HousingMode(MOUNTS_HZ, MOUNTS_DAMPING, gain, (1.0, 1.0, 1.0, 1.0))
+    return tuple(HousingMode(MOUNTS_HZ, MOUNTS_DAMPING, gain, shape) for shape in BODY_SHAPES)
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:

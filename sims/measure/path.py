@@ -64,14 +64,16 @@ class ModalPath:
     def apply(self, accelerations: FloatArray, positions: tuple[str, ...], step_s: float) -> FloatArray:
         """Acceleration at the sensor, (n_steps, n_positions) → (n_steps,).
 
-        Exact for accelerations that run straight between steps; for a sine see `sims.measure.hold.hold_error`.
+        Exact for accelerations that run straight between steps; for a sine see `sims.measure.hold.hold_error`. Modes
+        begin settled on the mean: a first value may be the middle of a blow, from which a slow mode would ring long.
         """
+        settled = np.mean(accelerations, axis=0, keepdims=True)
         return apply_bank(
             [low_pass(mode.frequency_hz, mode.damping_ratio, step_s) for mode in self.modes],
             np.array([_weights(mode.gains, positions) for mode in self.modes]).reshape(-1, len(positions)),
-            accelerations,
+            np.concatenate((settled, accelerations)),
             _weights(self.direct, positions),
-        )
+        )[1:]
 
     def response(self, frequency_hz: FloatArray, position: str) -> FloatArray:
         """Complex frequency response from a position, analytic."""

@@ -292,12 +292,15 @@ def test_further_sensors_sit_over_the_bearings_that_have_none_and_leave_the_mach
     assert more.with_further_sensors()[1] == places
 
 
+def driver_orders(added: Added, machine: CrackedTwin) -> np.ndarray:
+    """Peak accelerations of the driver's orders on the sensor over it, in m/s²."""
+    recording = machine.run(POINT, (added,), seed=0, noise=1, duration_s=2.0, sampling_rate_hz=FS)
+    return np.abs(gather(recording, machine.rig, ["acc pinion"]).channels["acc pinion"].lines[0].mean(axis=0))
+
+
 def order_one(unbalance_g_mm: float, machine: CrackedTwin) -> float:
-    """Peak acceleration of the driver's first order on the sensor over it, in m/s²."""
-    added = (Added("unbalance", unbalance_g_mm, {"gear": "driver"}),)
-    recording = machine.run(POINT, added, seed=0, noise=1, duration_s=2.0, sampling_rate_hz=FS)
-    lines = gather(recording, machine.rig, ["acc pinion"]).channels["acc pinion"].lines[0].mean(axis=0)
-    return float(abs(lines[1]))
+    """Of the driver, in m/s²."""
+    return float(driver_orders(Added("unbalance", unbalance_g_mm, {"gear": "driver"}), machine)[1])
 
 
 def test_on_its_mounts_a_quiet_machine_shakes_as_force_over_mass_and_in_proportion_to_an_unbalance() -> None:
@@ -310,9 +313,22 @@ def test_on_its_mounts_a_quiet_machine_shakes_as_force_over_mass_and_in_proporti
     assert order_one(320.0, twin()) < 0.05 * much  # on rigid ground
 
 
+def test_on_its_mounts_a_quiet_machine_pitches_under_a_coupling_s_moment_twice_a_turn() -> None:
+    quiet = twin().quiet()
+    slight, strong = (driver_orders(Added("misalignment", beta, {"shaft": "driver"}), quiet) for beta in (1.0, 4.0))
+    assert strong[2] / slight[2] == pytest.approx(4.0, rel=0.05)
+    # β T/(2 l) on either bearing of the driver, turning as 1 + cos 2θ; a = F l/2/(M (l/2)²) · l/2 for both together.
+    distance_m = 1e-3 * float(quiet.preset(POINT).parameters["bearing_distance_mm"])
+    force_n = np.radians(4.0) * POINT.torque_nm / (2.0 * distance_m)
+    expected = 2.0 * force_n / (BODY_KG * quiet.nominal.size**2)
+    assert expected / 3.0 < strong[2] < 3.0 * expected
+    assert max(strong[1], strong[3]) < 0.02 * strong[2]  # nor does the start leave anything on other orders
+    assert driver_orders(Added("misalignment", 4.0, {"shaft": "driver"}), twin())[2] < 0.05 * strong[2]
+
+
 def test_a_quiet_machine_s_gears_are_nearly_even() -> None:
     quiet, usual = (machine.preset(POINT).parameters for machine in (twin().quiet(), twin()))
-    assert quiet["noise_mps2"] == 0.0
+    assert quiet["noise_mps2"] == quiet["sensor_noise_mps2_per_sqrt_hz"] == 0.0
     for name in ("pitch_deviation_um", "runout_driver_um", "unbalance_driven_g_mm"):
         assert 0.0 < quiet[name] < 0.02 * usual[name]
     assert quiet["tip_relief_um"] == usual["tip_relief_um"]
