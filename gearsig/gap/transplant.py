@@ -59,7 +59,9 @@ def transplanted(
     level_db : float
         By which everything the effect adds is louder on the real machine than on the twin: its path is another.
     ground_db : float
-        By which the lowest shaft orders are louder still: it stands otherwise.
+        By which the lowest shaft orders are louder still: it stands otherwise. There a machine moves as a whole, as
+        force over mass, and not by the path on which the mesh reaches a sensor: what is added does not fall with a
+        mesh that is quieter than the twin's.
 
     Returns
     -------
@@ -71,7 +73,7 @@ def transplanted(
     gain_db = real["mesh.total"] - simulated["mesh.total"]
     floor_db = real["floor.total"] - simulated["floor.total"] - gain_db
     for name in names:
-        own_db = level_db + (ground_db if name in _OF_THE_BODY else 0.0)
+        own_db = level_db + (ground_db - gain_db if name in _OF_THE_BODY else 0.0)
         if name in _RELATIVE:
             found[name] = _added(given[name], simulated[name], real[name], own_db)
         elif name in _ABSOLUTE or name.startswith(_BANDS):

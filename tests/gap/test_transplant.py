@@ -45,7 +45,7 @@ def test_on_a_quieter_baseline_the_same_power_shows_more() -> None:
 
 
 def test_absolute_levels_follow_the_gain_of_the_path() -> None:
-    name = "shaft.driven.1"
+    name = "floor.total"
     louder = {**SOUND, "mesh.total": SOUND["mesh.total"] + 10.0, name: SOUND[name] + 10.0}
     assert moved({name: 6.0}, louder)[name] == pytest.approx(6.0)
 
@@ -84,3 +84,12 @@ def test_nothing_changed_is_nothing_but_repetition() -> None:
     assert named["change.driver.kurtosis"] == pytest.approx(0.0, abs=1e-6)
     assert named["change.driver.agreement"] == pytest.approx(0.0, abs=1e-6)
     assert np.abs(found[:ONLY]).max() == 0.0
+
+
+def test_the_lowest_orders_do_not_get_quieter_with_the_mesh() -> None:
+    """The machine moves as a whole there; the same force adds the same power, whatever the path from the mesh is."""
+    quieter = {**SOUND, "mesh.total": SOUND["mesh.total"] - 20.0, "shaft.driver.1.to_mesh": -50.0}
+    added = moved({"shaft.driver.1": 12.0, "shaft.driver.1.to_mesh": 12.0}, quieter)
+    assert added["shaft.driver.1"] == pytest.approx(12.0)
+    born = 10.0 ** ((SOUND["shaft.driver.1.to_mesh"] + 20.0) / 10.0) * (10.0**1.2 - 1.0)
+    assert added["shaft.driver.1.to_mesh"] == pytest.approx(10.0 * np.log10(1.0 + born / 1e-5))
