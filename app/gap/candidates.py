@@ -103,7 +103,9 @@ def _run(twin: Twin, condition: Condition) -> Run:
     The machine's own baseline is put under it, see `_distances`.
     """
     still = twin.quiet() if isinstance(twin, CanBeQuiet) else twin
-    return Run(still, condition.facts.point, float(f"{condition.trial_s:.3g}"), condition.facts.sampling_rate_hz, noise=1)
+    return Run(
+        still, condition.facts.point, float(f"{condition.trial_s:.3g}"), condition.facts.sampling_rate_hz, noise=1
+    )
 
 
 def _paths(banks: Sequence[Bank], conditions: Sequence[Condition], shows_in: tuple[str, ...]) -> tuple[EffectPath, ...]:
