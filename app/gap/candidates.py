@@ -47,6 +47,11 @@ class Tried:
     fit: Fit
     shrinkage: Shrinkage
 
+    @property
+    def explains(self) -> bool:
+        """Whether the twin shows the effect and comes nearer with it: else severity and place mean nothing."""
+        return self.shrinkage.is_foretold and self.shrinkage.shrink.value > 0.0
+
 
 def try_effects(
     effects: Sequence[GapEffect],

@@ -154,9 +154,9 @@ def matching_reference(
 
 
 def _with_names_of(reference: Gathered, now: Gathered) -> Gathered | None:
-    """Return the reference with the recording's channels: those of equal names, or the only one of each; else None."""
-    if set(reference.channels) == set(now.channels):
-        return reference
+    """Return the reference with those of the recording's channels that it has, or the only one of each; else None."""
+    if common := [name for name in now.channels if name in reference.channels]:
+        return reference.with_channels({name: reference.channels[name] for name in common})
     if len(reference.channels) == len(now.channels) == 1:
         return reference.with_channels(dict(zip(now.channels, reference.channels.values(), strict=True)))
     return None

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
+
+import numpy as np
 
 from app.gap.candidates import Tried, n_compared
 from app.gap.conditions import Condition, observed, simulated
@@ -36,6 +39,7 @@ from gearsig.gap.types import (
     NextRecording,
     group_probabilities,
 )
+from gearsig.gap.verdict import rivals
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 
@@ -49,11 +53,19 @@ OWN_EFFECT = (
     "effects. Its probability is the share of “unknown” that its held-out shrink beyond placebos explains, and is not "
     "calibrated."
 )
+MOMENT_S, MOMENT_HZ = 0.05, 20480.0
+"""Of a run that only shows whether an effect runs."""
 NAMING = (GapOutcome.EFFECT, GapOutcome.CANNOT_SEPARATE)
 """Outcomes that name an effect; nothing is added to the simulator elsewhere."""
 
 NOT_SIMULATED = (
     "The recognition has never seen “{title}”, and it could not be simulated on this rig: nothing is said of it."
+)
+
+
+NOT_NEARER = (
+    "With {title} the twin comes no nearer to data that it was not fitted to: no severity is given, and no twin with "
+    "the effect. What speaks for it is how the recordings changed, by recognition alone."
 )
 
 
@@ -112,12 +124,14 @@ def diagnose_gap(
     tell = on_stage or (lambda _what, _done: None)
     known = simulator.gap_effects()
     _check(recordings, names, effects, known)
-    called = tuple(reference_names) or tuple(f"reference {i + 1}" for i in range(len(references)))
+    called = tuple(reference_names) or _numbered("reference", references)
+    _check_distinct([*recordings, *references], [*(names or _numbered("recording", recordings)), *called])
     own_rigs, other_rigs = _rigs(recordings, rigs), _rigs(references, reference_rigs)
     if is_gearless(own_rigs[0]):
         allowed = {name: effect for name, effect in known.items() if not effects or name in effects}
         return diagnose_gearless(recordings, own_rigs, references, other_rigs, names, called, allowed, tell)
     twin = simulator.twin_of(own_rigs[0])
+    _check_own(twin, effects or tuple(known))
     tell("reading the recordings", 0.02)
     conditions, notices = conditions_of(recordings, own_rigs, references, other_rigs, twin, names, tell, called)
     if not is_calibrated():
@@ -137,15 +151,17 @@ def diagnose_gap(
     standing, remarks = stood_out(recordings[k], own_rigs[k], references, other_rigs, clearest.facts.name)
     notices += remarks
     outcome = weighed.calibration.outcome(probabilities)
-    if standing and outcome is GapOutcome.NO_GAP:
+    if standing and outcome in (GapOutcome.NO_GAP, GapOutcome.UNDECIDED):
         outcome = GapOutcome.UNKNOWN  # impacts that no shaft repeats are a gap, however few features see them
     places = ranked_places(_places(clearest), [standing_place(one, own_rigs[k]) for one in standing])
     causes = tuple(_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items())
     causes = _in_order(causes, outcome)
     fitted = causes[0].fitted if outcome is GapOutcome.EFFECT else None
+    if outcome is GapOutcome.EFFECT and fitted is None and causes[0].shrinkage is not None:
+        notices.append(NOT_NEARER.format(title=causes[0].title))
     after = None if fitted is None else simulated(twin, clearest.facts, clearest.now, (fitted,))
     tell("looking for what would tell more", 0.88)
-    pair = _rivals(causes)
+    pair = _likeliest_two(causes)
     size = clearest.size
     reference = clearest.reference
     return GapReport(
@@ -159,7 +175,7 @@ def diagnose_gap(
         places=places,
         causes=causes,
         groups=group_probabilities(causes),
-        inseparable=pair if outcome is GapOutcome.CANNOT_SEPARATE else None,
+        inseparable=rivals(causes) if outcome is GapOutcome.CANNOT_SEPARATE else None,
         steps=steps_of(conditions, tried, causes) if tried and outcome in NAMING else (),
         next_recordings=_next(pair, known, tried, twin, conditions, outcome),
         spectra=spectrum_curves(
@@ -195,6 +211,26 @@ def _check(
             allowed=", ".join(known),
             remedy=closest_match_hint(strange[0], known),
         )
+
+
+def _check_own(twin: Twin, names: Sequence[str]) -> None:
+    """Run effects that are somebody's own for a moment, before the long work: their files may fail."""
+    for name in sorted(set(names) - set(load_population().causes)):
+        for added in twin.candidates(name)[-1:]:
+            twin.run(twin.point, (added,), seed=0, duration_s=MOMENT_S, sampling_rate_hz=MOMENT_HZ)
+
+
+def _numbered(what: str, recordings: Sequence[Recording]) -> tuple[str, ...]:
+    return tuple(f"{what} {i + 1}" for i in range(len(recordings)))
+
+
+def _check_distinct(recordings: Sequence[Recording], names: Sequence[str]) -> None:
+    """Refuse copies: they tell nothing more, and a recording does not differ from itself."""
+    for (one, name), (other, other_name) in combinations(zip(recordings, names, strict=True), 2):
+        if np.array_equal(one.samples, other.samples):
+            raise InputError(
+                f"holds the same samples as {name}", where=other_name, remedy="give each recording once, in one role"
+            )
 
 
 def _rigs(recordings: Sequence[Recording], rigs: Sequence[Rig]) -> tuple[Rig, ...]:
@@ -260,7 +296,7 @@ def _cause(
         effect.title,
         effect.unit,
         probability,
-        place=cause_place(name, one, conditions, places),
+        place=cause_place(name, one if one is not None and one.explains else None, conditions, places),
         is_nuisance=effect.is_nuisance,
     )
     if one is None:
@@ -268,10 +304,10 @@ def _cause(
     n = n_compared(conditions)
     seen = [observed(c, k, n) for k, c in enumerate(conditions)]
     frame = conditions[0].now.frame
+    if one.explains:
+        base = replace(base, severity=one.fit.severity, fitted=at_its_tooth(one.fit.added, frame, places))
     return replace(
         base,
-        severity=one.fit.severity,
-        fitted=at_its_tooth(one.fit.added, frame, places),
         shrinkage=one.shrinkage,
         evidence=evidence_of(one.fit, seen, frame),
     )
@@ -283,12 +319,14 @@ def _in_order(causes: tuple[GapCause, ...], outcome: GapOutcome) -> tuple[GapCau
         first = next(c for c in causes if c.name == NONE)
     elif outcome is GapOutcome.UNKNOWN:
         first = next(c for c in causes if c.name == UNKNOWN)
+    elif outcome is GapOutcome.UNDECIDED:
+        return causes
     else:
         first = next(c for c in causes if c.name not in (NONE, UNKNOWN))
     return (first, *(c for c in causes if c is not first))
 
 
-def _rivals(causes: Sequence[GapCause]) -> tuple[str, str] | None:
+def _likeliest_two(causes: Sequence[GapCause]) -> tuple[str, str] | None:
     names = [c.name for c in causes if c.name not in (NONE, UNKNOWN)]
     return (names[0], names[1]) if len(names) > 1 else None
 

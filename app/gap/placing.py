@@ -5,15 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from app.gap.candidates import Tried, n_compared
 from app.gap.conditions import Condition, observed
 from gearsig.gap.frame import GearFrame
 from gearsig.gap.gear_lines import SIDES
 from gearsig.gap.prediction import INTERVAL_COST, EffectPath, fit_effect
+from gearsig.gap.ranking import SAME_ORDER
 from gearsig.gap.simulator import Added
 from gearsig.gap.spots import shaft_words
 from gearsig.gap.types import GapPlace, PlaceKind
 from gearsig.gap.which_shaft import ONE_TOOTH, SIGNS, told_options
+
+RACES = {"bearing_outer_race": "outer", "bearing_inner_race": "inner"}
+"""Effect → the order of its bearing that it shows at, see `BearingFrame`."""
 
 
 def place_of(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> str:
@@ -23,7 +29,7 @@ def place_of(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> str:
     """
     options = added.options
     if "bearing" in options:
-        return str(options["bearing"])
+        return " or ".join(_bearings(added.name, str(options["bearing"]), frame, places))
     if "order" in options:
         return _order(frame, places, float(options["order"]))
     side = options.get("gear", options.get("shaft"))
@@ -38,6 +44,19 @@ def place_of(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> str:
         return f"one tooth of the gear on {words}"
     tooth = f"tooth {found.tooth} of the gear on"
     return f"{tooth} {words}" if found.tooth is not None else f"{found.angle_deg:.0f}° of {words}"
+
+
+def _bearings(name: str, fitted: str, frame: GearFrame, places: Sequence[GapPlace]) -> list[str]:
+    """Return the bearings whose race stands out of the recording, or else those that look like the fitted one."""
+    race = RACES.get(name)
+    if race is None:
+        return [fitted]
+    orders = {bearing.name: float(getattr(bearing, race)) for bearing in frame.bearings}
+    seen = [place.orders[0] for place in places if place.kind is PlaceKind.ENVELOPE and place.orders]
+    for one in (*seen, orders.get(fitted, np.nan)):
+        if alike := [other for other, order in orders.items() if abs(one / order - 1.0) < SAME_ORDER]:
+            return alike
+    return [fitted]
 
 
 def cause_place(name: str, tried: Tried | None, conditions: Sequence[Condition], places: Sequence[GapPlace]) -> str:

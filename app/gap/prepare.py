@@ -19,6 +19,9 @@ from gearsig.rig.types import Rig
 CLEAR_WITHOUT = 3.0
 """Structural floors from which a reference that far from the simulator is worth a remark."""
 
+LARGEST_DRIFT = 0.4
+"""Of the speed over a record, relative: more is a run-up; effects that let the speed wander stay far below."""
+
 Stage = Callable[[str, float], object]
 
 
@@ -50,12 +53,13 @@ def conditions_of(
         notices += strange_teeth(now, name)
         facts = facts_of(recording, rig, now, name, twin)
         notices += _assumed(recording, rig, facts)
-        simulation = simulated(twin, facts, now)
         reference, why = matching_reference(now, rig, healthy, healthy_rigs)
         if why:
             notices.append(f"{name} is compared with the simulation: {why}.")
-        if reference is not None and all(reference is not one for one in healthy):
-            notices.append(f"{name}: its only channel is taken for the reference's only one, which has another name.")
+        if reference is not None:
+            now = _with_channels_of(now, reference, healthy, name, notices)
+        _check_steady(now, reference, name)
+        simulation = simulated(twin, facts, now)
         change = compare(now, simulation, reference)
         found.append(Condition(facts, now, simulation, reference, change))
         if reference is not None:
@@ -64,6 +68,31 @@ def conditions_of(
     if not references:
         notices.append("No healthy reference: a recording of the same rig when it was sound would make it much surer.")
     return found, notices
+
+
+def _with_channels_of(
+    now: Gathered, reference: Gathered, healthy: Sequence[Gathered], name: str, notices: list[str]
+) -> Gathered:
+    """Return a recording with the channels that its reference has as well, and say what was made of the others."""
+    if not any(set(reference.channels) & set(one.channels) for one in healthy):
+        notices.append(f"{name}: its only channel is taken for the reference's only one, which has another name.")
+    left_out = [channel for channel in now.channels if channel not in reference.channels]
+    if left_out:
+        notices.append(f"{name}: {', '.join(left_out)} is left out, for the reference has no such channel.")
+    return now.with_channels({channel: now.channels[channel] for channel in reference.channels})
+
+
+def _check_steady(now: Gathered, reference: Gathered | None, name: str) -> None:
+    """Refuse a run-up, but beside one of the reference's: the simulation is at one speed."""
+    drift, usual = now.speed[0], 0.0 if reference is None else reference.speed[0]
+    if abs(drift - usual) > LARGEST_DRIFT:
+        start, end = (60.0 * now.speed_hz * (1.0 + half * drift) for half in (-0.5, 0.5))
+        raise RefusalError(
+            f"{name}: the speed goes from about {start:.0f} to {end:.0f} rpm; the simulation it is compared with is at "
+            "one speed",
+            remedy="cut out parts at steady speed and give them as operating conditions, or give a reference of the "
+            "same run",
+        )
 
 
 def _references(

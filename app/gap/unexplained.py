@@ -8,7 +8,7 @@ from app.gap.standing_out import LINE, Standing, carrying, examined
 from gearsig.angle.types import ShaftAngle
 from gearsig.diagnosis.analyze import analyze
 from gearsig.diagnosis.speed import determine_angle
-from gearsig.diagnosis.types import Analysis, CannotTell, Outcome
+from gearsig.diagnosis.types import Analysis, CannotTell, Kind, Outcome
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 
@@ -19,7 +19,8 @@ def stood_out(
     """Return the families of impacts, beyond the reference's, that no shaft repeats, surest first; and remarks.
 
     The catalogue's effects are compared by features of known places; a strange family is one feature among a hundred
-    there and easily lost. The analysis looks for it by itself. A strange line and a fault of the reference are remarks.
+    there and easily lost. The analysis looks for it by itself. A strange line, a family that may well be chance, and a
+    fault of the reference are remarks.
     """
     now = _analysed(recording, rig)
     if now is None:
@@ -28,12 +29,15 @@ def stood_out(
     healthy = None if nearest is None else _analysed(*nearest)
     found = examined(name, now, [healthy] if healthy is not None else [])
     remarks = [] if healthy is None else _fault_of_reference(healthy[0], name)
+    weak = [one for one in found.standing if one.finding.code == LINE or one.finding.kind is Kind.NOTICE]
     remarks += [
-        f"Not explained by the gear model, in {name}: {standing.finding.title.rstrip('.')}."
-        for standing in found.standing
-        if standing.finding.code == LINE
+        f"Not explained by the gear model, in {name}: {one.finding.title.rstrip('.')}{_odds(one)}." for one in weak
     ]
-    return [standing for standing in found.standing if standing.finding.code != LINE], remarks
+    return [one for one in found.standing if one not in weak], remarks
+
+
+def _odds(one: Standing) -> str:
+    return "" if one.finding.code == LINE else f" (at most {100 * one.finding.confidence:.0f} %)"
 
 
 def _fault_of_reference(analysis: Analysis, name: str) -> list[str]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gearsig.errors import InputError
+from gearsig.errors import InputError, RefusalError
+from gearsig.recording.quality import find_problems
 from gearsig.recording.types import Channel, Recording
 
 _FACTORS = {
@@ -115,3 +116,18 @@ def _factor(own: str, other: str, quantity: str) -> float | None:
         if own in units and other in units:
             return units[own] / units[other]
     return None
+
+
+def check_live(recording: Recording, channels: Sequence[str], which: str) -> None:
+    """Refuse dead channels: their level is that of nothing.
+
+    Raises
+    ------
+    RefusalError
+    """
+    for problem in find_problems(recording):
+        if problem.kind == "dead" and problem.channel in channels:
+            raise RefusalError(
+                f"channel {problem.channel} of the {which} is dead ({problem.evidence})",
+                remedy="check sensor, cable and input, or name other channels with --channel SIM=RECORDED",
+            )

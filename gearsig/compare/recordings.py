@@ -10,7 +10,7 @@ import numpy as np
 from gearsig.checks import one_of
 from gearsig.compare.alignment import align
 from gearsig.compare.averages import HalvedLines, halved_lines
-from gearsig.compare.channels import pair_channels
+from gearsig.compare.channels import check_live, pair_channels
 from gearsig.compare.machine import common_machine, teeth_on, usable_speed
 from gearsig.compare.one_channel import Material, compare_channel, halved_spectra
 from gearsig.compare.remarks import remarks
@@ -62,7 +62,8 @@ def compare_recordings(
     InputError
         If the channels cannot be paired, measure different things, or the gears differ.
     RefusalError
-        If a speed cannot be known, a record is too short, or marks are asked for where there are none.
+        If a channel is dead, a speed cannot be known, a record is too short, or marks are asked for where there are
+        none.
 
     Notes
     -----
@@ -75,6 +76,8 @@ def compare_recordings(
     """
     one_of(align_by, "align_by", ALIGN)
     pairs = pair_channels(simulated, recorded, channels)
+    check_live(simulated, [p.simulated for p in pairs], "simulation")
+    check_live(recorded, [p.recorded for p in pairs], "recording")
     machine = common_machine(simulated, recorded, rig)
     ratios = _ratios(machine.recorded)
     own = make_side(

@@ -104,14 +104,16 @@ class GapCalibration:
         return {name: w / total for name, w in sorted(weights.items(), key=lambda item: -item[1])}
 
     def outcome(self, probabilities: Mapping[str, float]) -> GapOutcome:
-        """Return what may be said."""
+        """Return what may be said; nothing that is less likely than all else together."""
         none, unknown = probabilities[NONE], probabilities[UNKNOWN]
-        if 1.0 - none - unknown < self.named_from:
+        if max(none, unknown) >= LIKELIER_THAN_NOT:
             return GapOutcome.NO_GAP if none >= unknown else GapOutcome.UNKNOWN
+        if 1.0 - none - unknown < self.named_from:
+            return GapOutcome.UNDECIDED
         first, *others = sorted((p for name, p in probabilities.items() if name not in (NONE, UNKNOWN)), reverse=True)
         second = others[0] if others else 0.0
         if first + second < LIKELIER_THAN_NOT:
-            return GapOutcome.UNKNOWN
+            return GapOutcome.UNDECIDED
         alone = first >= LIKELIER_THAN_NOT and first / (first + second) >= self.apart
         return GapOutcome.EFFECT if alone else GapOutcome.CANNOT_SEPARATE
 

@@ -22,6 +22,8 @@ class GapOutcome(Enum):
     EFFECT = "effect"
     CANNOT_SEPARATE = "cannot separate"
     UNKNOWN = "unknown"
+    UNDECIDED = "undecided"
+    """Neither an effect nor its absence is likely enough to be said, and no unknown cause is, either."""
 
 
 class PlaceKind(Enum):
@@ -333,7 +335,7 @@ class GapReport:
         Likeliest first; their probabilities add up to 1.
     groups : mapping
         Group → probability.
-    inseparable : (str, str) or None
+    inseparable : tuple of str or None
         The two causes that these recordings cannot tell apart.
     steps : tuple of GapStep
         Before, with each effect, what is left.
@@ -357,7 +359,7 @@ class GapReport:
     places: tuple[GapPlace, ...]
     causes: tuple[GapCause, ...]
     groups: Mapping[str, float]
-    inseparable: tuple[str, str] | None = None
+    inseparable: tuple[str, ...] | None = None
     steps: tuple[GapStep, ...] = ()
     next_recordings: tuple[NextRecording, ...] = ()
     spectra: tuple[SpectrumCurves, ...] = ()

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import isfinite
+
+import numpy as np
 
 from gearsig.gap.posterior import LIKELIER_THAN_NOT
 from gearsig.gap.types import NONE, UNKNOWN, GapCause, GapOutcome, GapPlace, GapReport, Interval
@@ -26,7 +29,7 @@ SOUND_MACHINE = "the same machine when it was sound"
 
 
 def _where(report: GapReport) -> str:
-    if report.outcome is GapOutcome.NO_GAP and (report.size.value <= 1.0 or not report.places):
+    if report.outcome in (GapOutcome.NO_GAP, GapOutcome.UNDECIDED) and (report.size.value <= 1.0 or not report.places):
         return f"Where: nowhere beyond the floor; the gap is {report.size.value:.2g} structural floors."
     if not report.places:
         return f"Where: spread over all orders and bands, {report.size.value:.2g} structural floors."
@@ -47,11 +50,13 @@ def _which(report: GapReport) -> str:
     first = report.causes[0]
     odds = f"{100 * first.probability:.0f} %"
     if report.outcome is GapOutcome.NO_GAP:
-        return _which_none(report, odds)
+        return f"Which: none ({odds}); what differs is no more than between healthy machines and the simulator."
+    if report.outcome is GapOutcome.UNDECIDED:
+        return _which_undecided(report)
     if report.outcome is GapOutcome.UNKNOWN:
         return _which_unknown(report)
     if report.outcome is GapOutcome.CANNOT_SEPARATE and report.inseparable is not None:
-        *others, last = (_titled(report, name) for name in rivals(report))
+        *others, last = (_titled(report, name) for name in report.inseparable)
         named = f"{', '.join(others)} or {last}"
         return f"Which: {named}; these recordings cannot tell them apart."
     size = "" if first.severity is None else f", {_severity(first, first.severity)}"
@@ -68,25 +73,24 @@ def _which_unknown(report: GapReport) -> str:
     return f"Which: unknown; {best.title} comes nearest ({100 * best.probability:.0f} %), too little to be named."
 
 
-def rivals(report: GapReport) -> tuple[str, ...]:
+def rivals(causes: Sequence[GapCause]) -> tuple[str, ...]:
     """Return the effects that cannot be told apart: the two likeliest, and more until they are `TOGETHER`."""
-    both = report.inseparable or ()
-    effects = {cause.name: cause.probability for cause in report.causes if cause.name not in (NONE, UNKNOWN)}
-    found = list(both)
-    for name in sorted(effects, key=lambda name: -effects[name])[:MOST_RIVALS]:
-        if not both or sum(effects.get(one, 0.0) for one in found) >= TOGETHER * sum(effects.values()):
-            break
-        if name not in found:
-            found.append(name)
-    return tuple(found)
+    effects = sorted((c for c in causes if c.name not in (NONE, UNKNOWN)), key=lambda cause: -cause.probability)
+    shares = np.cumsum([cause.probability for cause in effects])
+    n = int(np.searchsorted(shares, TOGETHER * shares[-1])) + 1 if effects else 0
+    return tuple(cause.name for cause in effects[: int(np.clip(n, 2, MOST_RIVALS))])
 
 
-def _which_none(report: GapReport, odds: str) -> str:
-    rival = max(report.causes[1:], key=lambda cause: cause.probability, default=None)
-    if rival is None or report.causes[0].probability > LIKELIER_THAN_NOT:
-        return f"Which: none ({odds}); what differs is no more than between healthy machines and the simulator."
-    name = "a gap of unknown cause" if rival.name == UNKNOWN else rival.title
-    return f"Which: none is likely enough to be named: no gap {odds}, {name} {100 * rival.probability:.0f} %."
+def _which_undecided(report: GapReport) -> str:
+    """Name the likeliest two, and the group that is likelier than not."""
+    named = {NONE: "no gap", UNKNOWN: "a gap of unknown cause"}
+    likeliest = sorted(report.causes, key=lambda cause: -cause.probability)[:2]
+    parts = [f"{named.get(cause.name, cause.title)} {100 * cause.probability:.0f} %" for cause in likeliest]
+    groups = {name: p for name, p in report.groups.items() if name not in (NONE, UNKNOWN, "")}
+    group = max(groups, key=groups.__getitem__, default="")
+    if group and groups[group] >= LIKELIER_THAN_NOT:
+        parts.append(f"effects of the group “{group}” together {100 * groups[group]:.0f} %")
+    return f"Which: undecided; nothing is likely enough to be named: {', '.join(parts)}."
 
 
 def _severity(cause: GapCause, severity: Interval) -> str:
@@ -101,7 +105,7 @@ def _titled(report: GapReport, name: str) -> str:
 
 def _how_far(report: GapReport) -> str:
     shrinkage = report.causes[0].shrinkage
-    if report.outcome in (GapOutcome.NO_GAP, GapOutcome.UNKNOWN) or shrinkage is None:
+    if report.outcome not in (GapOutcome.EFFECT, GapOutcome.CANNOT_SEPARATE) or shrinkage is None:
         return "How far: no effect was added."
     if not shrinkage.is_foretold:
         return f"How far: not known; {report.causes[0].title} {hardly_foretold(shrinkage)}."
@@ -122,8 +126,10 @@ def _next(report: GapReport) -> str:
         return f"Next: {first} Or {best}" if best else f"Next: {first}"
     if best:
         return f"Next: {best}"
-    if report.outcome is GapOutcome.UNKNOWN:
-        return "Next: another sensor nearer to where it is loudest, or a run-up, which tells orders from resonances."
+    if report.outcome in (GapOutcome.UNKNOWN, GapOutcome.UNDECIDED):
+        return (
+            "Next: another sensor nearer to where it is loudest, or another speed, which tells orders from resonances."
+        )
     if report.outcome is GapOutcome.NO_GAP:
         return "Next: nothing is needed; keep these recordings, later ones are best compared with them."
     if sum(cause.shrinkage is not None for cause in report.causes) < 2:

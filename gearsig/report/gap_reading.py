@@ -77,7 +77,7 @@ def gap_from_dict(found: Json) -> GapReport:
         places=tuple(_place(item) for item in found["places"]),
         causes=tuple(_cause(item) for item in found["causes"]),
         groups={group: _number(value) for group, value in found["groups"].items()},
-        inseparable=_pair(found["inseparable"]) if found["inseparable"] is not None else None,
+        inseparable=tuple(map(str, found["inseparable"])) if found["inseparable"] is not None else None,
         steps=tuple(GapStep(item["label"], _interval(item["left"])) for item in found["steps"]),
         next_recordings=tuple(_next_recording(item) for item in found["next_recordings"]),
         spectra=tuple(_spectrum(item) for item in found["spectra"]),

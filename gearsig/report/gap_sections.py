@@ -20,7 +20,6 @@ from gearsig.gap.types import (
     Interval,
     Shrinkage,
 )
-from gearsig.gap.verdict import rivals
 from gearsig.gap.words import hardly_foretold, severity_unit
 from gearsig.report.gap_text import point_text
 from gearsig.report.numbers import readable
@@ -31,7 +30,13 @@ N_DETAILED = 3
 MOST_ORDERS = 4
 LEAST_SHOWN = 0.01
 """Below this a group is left out, and a share is said to be below one percent."""
-OUTCOME_CLASSES = {"no gap": "no-fault", "effect": "fault", "cannot separate": "suspicion", "unknown": "cannot-tell"}
+OUTCOME_CLASSES = {
+    "no gap": "no-fault",
+    "effect": "fault",
+    "cannot separate": "suspicion",
+    "unknown": "cannot-tell",
+    "undecided": "cannot-tell",
+}
 
 
 @dataclass(frozen=True)
@@ -215,7 +220,7 @@ def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
     checked = f"checked on {shrinkage.held_out}"
     placebo = f"takes away at most {percent(wrong)}" if wrong >= LEAST_SHOWN else "takes away nothing"
     if not shrinkage.n_placebos:
-        placebo = "could not be tried, as the machine has no other place for it"
+        placebo = "could not be tried, as the machine has no other place for it that would look different"
     elsewhere = shrinkage.elsewhere
     return (
         f"Gap on its own features: {before} structural floors without it, {after} with it.",
@@ -254,7 +259,7 @@ def inseparable_text(report: GapReport) -> str:
     if report.inseparable is None:
         return ""
     titles = {cause.name: f"{cause.title} ({percent(cause.probability)})" for cause in report.causes}
-    *others, last = (titles.get(name, name) for name in rivals(report))
+    *others, last = (titles.get(name, name) for name in report.inseparable)
     return f"These recordings cannot tell {', '.join(others)} and {last} apart."
 
 

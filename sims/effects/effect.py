@@ -83,6 +83,21 @@ GEAR_OPTION = Option("gear", "driver", "which gear", choices=("driver", "driven"
 TOOTH_OPTION = Option("tooth", 1.0, "which tooth, from 1 at the mark", low=1.0, high=5000.0, whole=True)
 """Tooth-local effects have it."""
 
+SHOWS_IN = (
+    "mesh_harmonics",
+    "mesh_sidebands",
+    "shaft_orders",
+    "tooth_window",
+    "envelope_orders",
+    "broadband",
+    "mains_lines",
+    "amplitude_tail",
+    "resonances",
+    "speed",
+    "low_load",
+)
+"""Kinds of places that an effect may say it shows in."""
+
 Change = Callable[[Machine, float, Mapping[str, OptionValue], np.random.Generator], Machine]
 
 
@@ -104,8 +119,7 @@ class Effect:
     signature : str
         Where it is expected to show, from theory.
     shows_in : tuple of str
-        The same for programs: of "mesh_harmonics", "mesh_sidebands", "shaft_orders", "tooth_window",
-        "envelope_orders", "broadband", "mains_lines", "amplitude_tail", "resonances", "speed", "low_load".
+        The same for programs: of `SHOWS_IN`.
     change : callable
         (machine, severity, options, rng) → machine, for a severity above 0. Its change vanishes with the severity, and
         what it draws does not depend on it, so that one seed at rising severities shows one fault that grows.
@@ -124,6 +138,8 @@ class Effect:
 
     def __post_init__(self) -> None:
         one_of(self.group, f"group of {self.name}", GROUPS)
+        for shown in self.shows_in:
+            one_of(shown, f"shows_in of {self.name}", SHOWS_IN)
 
     def apply(
         self,

@@ -6,11 +6,17 @@ Their files stand in the environment variable `GEARSIG_EFFECTS`, so that process
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
-from gearsig.errors import InputError
-from sims.effects.effect import Effect
+import numpy as np
+
+from gearsig.errors import GearsigError, InputError
+from sims.effects.effect import Effect, OptionValue
+from sims.machine import Machine
 
 VARIABLE = "GEARSIG_EFFECTS"
 
@@ -49,4 +55,34 @@ def loaded(path: Path) -> Effect:
             where=str(path),
             remedy="set EFFECT = Effect(…), as sims/effects/tooth_wear.py does",
         )
-    return found
+    return replace(found, change=partial(_changed, path, found))
+
+
+def _changed(
+    path: Path,
+    own: Effect,
+    machine: Machine,
+    severity: float,
+    options: Mapping[str, OptionValue],
+    rng: np.random.Generator,
+) -> Machine:
+    """Return what somebody's own effect makes of a machine.
+
+    Raises
+    ------
+    InputError
+        If it fails, or returns no machine.
+    """
+    try:
+        changed = own.change(machine, severity, options, rng)
+    except GearsigError:
+        raise
+    except Exception as error:  # anything: it is somebody else's program
+        raise InputError(f"the effect {own.name!r} fails ({type(error).__name__}: {error})", where=str(path)) from error
+    if not isinstance(changed, Machine):
+        raise InputError(
+            f"the effect {own.name!r} returns {type(changed).__name__} and no machine",
+            where=str(path),
+            remedy="let change return the machine, as sims/effects/tooth_wear.py does",
+        )
+    return changed

@@ -8,13 +8,15 @@ from pathlib import Path
 
 import pytest
 
+from app.gap.candidates import Tried
 from app.gap.conditions import with_channels_of
 from app.gap.diagnose import _without_meaning, diagnose_gap
-from gearsig.errors import InputError
+from app.gap.prepare import _check_steady, _with_channels_of
+from gearsig.errors import InputError, RefusalError
 from gearsig.gap.gather import gather
 from gearsig.gap.posterior import is_calibrated
 from gearsig.gap.simulator import Added, Point
-from gearsig.gap.types import GapOutcome, GapReport
+from gearsig.gap.types import GapOutcome, GapReport, Interval
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 from sims import simulate
@@ -95,6 +97,36 @@ def test_lists_that_do_not_fit_are_errors() -> None:
         diagnose_gap([replace(recording, rig=None)], simulator)
     with pytest.raises(InputError, match="other sensors"):
         diagnose_gap([recording], simulator, rigs=[replace(rig(), sensors=rig().sensors[:1])])
+    with pytest.raises(InputError, match=r"old\.h5: holds the same samples as new\.h5"):
+        diagnose_gap(
+            [recording], simulator, references=[replace(recording)], names=["new.h5"], reference_names=["old.h5"]
+        )
+
+
+def test_a_run_up_is_refused_but_beside_the_same_one() -> None:
+    steady, rising = (replace(gather(run(noise=1), rig()), speed=(drift, 0.0, 0.0, 0.0)) for drift in (0.02, 0.9))
+    _check_steady(steady, None, "now")
+    _check_steady(rising, rising, "now")
+    for reference in (None, steady):
+        with pytest.raises(RefusalError, match="now: the speed goes from about 825 to 2175 rpm"):
+            _check_steady(rising, reference, "now")
+
+
+def test_a_channel_that_the_reference_lacks_is_left_out_and_told() -> None:
+    now, notices = gather(run(noise=1), rig()), list[str]()
+    first, *others = now.channels
+    reference = now.with_channels({first: now.channels[first]})
+    assert list(_with_channels_of(now, reference, [reference], "now", notices).channels) == [first]
+    assert notices == [f"now: {', '.join(others)} is left out, for the reference has no such channel."]
+
+
+def test_what_does_not_bring_the_twin_nearer_says_neither_place_nor_severity(report: GapReport) -> None:
+    told = report.causes[0].shrinkage
+    assert told is not None
+    tried = Tried("eccentricity", (), None, told)  # type: ignore[arg-type]  # its fit is not asked for
+    assert tried.explains
+    assert not replace(tried, shrinkage=replace(told, shrink=Interval(-0.1, -0.3, 0.1))).explains
+    assert not replace(tried, shrinkage=replace(told, foretold=0.1)).explains
 
 
 def test_a_recording_whose_channels_have_other_names_can_be_simulated() -> None:

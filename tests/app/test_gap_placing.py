@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from app.gap.placing import at_its_tooth, place_of
-from gearsig.gap.frame import GearFrame
+from gearsig.gap.frame import BearingFrame, GearFrame
 from gearsig.gap.simulator import Added
 from gearsig.gap.types import GapPlace, PlaceKind
 from gearsig.rig.types import GearPair
@@ -29,6 +31,17 @@ def test_without_a_mark_there_is_an_angle_and_the_simulated_tooth_stays() -> Non
 def test_a_burst_on_the_other_shaft_says_nothing() -> None:
     assert place_of(CRACK, FRAME, [tooth_place(8, "output")]) == "one tooth of the gear on the input shaft"
     assert at_its_tooth(CRACK, FRAME, [tooth_place(8, "output")]) == CRACK
+
+
+def test_bearings_of_one_type_on_a_shaft_cannot_be_told_apart() -> None:
+    alike = [BearingFrame(name, 0, 3.5, 5.5, 2.3, 0.4) for name in ("near", "far")]
+    frame = replace(FRAME, bearings=(*alike, BearingFrame("wheel", 1, 2.2, 3.4, 1.4, 0.25)))
+    race = Added("bearing_outer_race", 0.3, {"bearing": "near"})
+    assert place_of(race, frame, ()) == "near or far"
+    seen = GapPlace(PlaceKind.ENVELOPE, "envelope lines", 20.0, 9.0, 5.0, 0.9, orders=(2.203,))
+    assert place_of(race, frame, [seen]) == "wheel"
+    assert place_of(race, frame, [replace(seen, orders=(7.7,))]) == "near or far"
+    assert place_of(replace(race, options={"bearing": "of unknown size"}), frame, ()) == "of unknown size"
 
 
 def test_other_places() -> None:

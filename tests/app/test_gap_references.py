@@ -32,6 +32,14 @@ def test_the_only_channel_of_each_is_the_same_whatever_its_name() -> None:
     assert found.channels["ch1"] is run(1).channels["a1"]
 
 
+def test_channels_that_only_one_of_them_has_are_left_out() -> None:
+    both, one = run(1), named(0, "a1")
+    found, _ = matching_reference(one, RIG, [both], [RIG])
+    assert found is not None
+    assert tuple(found.channels) == ("a1",)
+    assert matching_reference(run(0), RIG, [named(1, "a1")], [RIG])[0] is not None
+
+
 def test_of_several_channels_with_other_names_nobody_knows_which_is_which() -> None:
     found, why = matching_reference(named(0, "left", "right"), RIG, [run(1)], [RIG])
     assert found is None

@@ -239,6 +239,9 @@ def test_what_cannot_be_compared_is_refused() -> None:
     bare = replace(gear_record(rig=None), speed=None)
     with pytest.raises(RefusalError, match="speed of the recording is not known"):
         compare_recordings(gear_record(rig=None), bare)
+    silent = replace(record, samples=record.samples * np.array([[float(not c.is_vibration)] for c in record.channels]))
+    with pytest.raises(RefusalError, match="channel a1 of the recording is dead"):
+        compare_recordings(record, silent)
     with pytest.raises(RefusalError, match="no shaft has a mark"):
         compare_recordings(gear_record(with_pulses=False), record, align_by="marks")
     with pytest.raises(InputError, match="align_by is 'mark'"):

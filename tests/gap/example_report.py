@@ -130,6 +130,19 @@ def no_gap_report() -> GapReport:
     )
 
 
+def undecided_report() -> GapReport:
+    """A machine whose gap is larger than usual, and nothing likely enough to be its cause."""
+    report = no_gap_report()
+    return replace(
+        report,
+        outcome=GapOutcome.UNDECIDED,
+        size=Interval(1.7, 1.5, 1.9),
+        places=effect_report().places,
+        causes=tuple(replace(c, probability=p) for c, p in zip(report.causes, (0.3, 0.2), strict=True)),
+        groups={"tooth-local": 0.6, "none": 0.3},
+    )
+
+
 def gearless_report() -> GapReport:
     """A damaged outer race on a rig without gears: nothing was simulated, so there are no sizes, curves and steps."""
     nan, nothing = float("nan"), np.zeros(0)
@@ -174,7 +187,7 @@ def gearless_report() -> GapReport:
 
 def all_reports() -> dict[str, GapReport]:
     """Return one report of each outcome, by the outcome's words, and one without a simulation."""
-    reports = (effect_report(), cannot_separate_report(), unknown_report(), no_gap_report())
+    reports = (effect_report(), cannot_separate_report(), unknown_report(), no_gap_report(), undecided_report())
     return {**{report.outcome.value: report for report in reports}, "gearless": gearless_report()}
 
 

@@ -46,7 +46,7 @@ def test_outcomes() -> None:
     assert outcome(root_crack=0.8) is GapOutcome.EFFECT
     assert outcome(root_crack=0.5) is GapOutcome.CANNOT_SEPARATE
     assert PLAIN.outcome(probabilities(root_crack=0.45, unbalance=0.1)) is GapOutcome.CANNOT_SEPARATE
-    assert PLAIN.outcome(probabilities(root_crack=0.4, unbalance=0.05)) is GapOutcome.UNKNOWN
+    assert PLAIN.outcome(probabilities(root_crack=0.4, unbalance=0.05)) is GapOutcome.UNDECIDED
     assert outcome(none=0.7) is GapOutcome.NO_GAP
     assert outcome(unknown=0.7) is GapOutcome.UNKNOWN
 

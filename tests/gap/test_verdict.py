@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gearsig.gap.types import UNKNOWN, GapOutcome, GapPlace, GapReport, Interval, PlaceKind
+from gearsig.gap.types import UNKNOWN, GapCause, GapOutcome, GapPlace, Interval, PlaceKind
 from gearsig.gap.verdict import rivals
 from tests.gap.example_report import (
     cannot_separate_report,
     effect_report,
     no_gap_report,
     shrinkage,
+    undecided_report,
     unknown_report,
 )
 
@@ -25,8 +26,7 @@ def test_a_severity_has_a_unit_for_people_and_no_exponent() -> None:
 def test_causes_that_cannot_be_told_apart_are_named_even_if_one_is_not_among_them() -> None:
     report = replace(cannot_separate_report(), inseparable=("root_crack", "torque_ripple"))
     assert report.verdict[1] == (
-        "Which: crack in a tooth root (48 %), torque ripple or spall on a tooth flank (41 %); "
-        "these recordings cannot tell them apart."
+        "Which: crack in a tooth root (48 %) or torque ripple; these recordings cannot tell them apart."
     )
 
 
@@ -35,17 +35,18 @@ def test_what_cannot_be_told_apart_is_named_until_it_is_nearly_all_that_effects_
     first, second, third, *_ = report.causes
     names = (first.name, second.name)
 
-    def with_chances(*chances: float) -> GapReport:
-        causes = (replace(cause, probability=p) for cause, p in zip((first, second, third), chances, strict=True))
-        return replace(report, inseparable=names, causes=tuple(causes))
+    def with_chances(*chances: float) -> list[GapCause]:
+        return [replace(cause, probability=p) for cause, p in zip((first, second, third), chances, strict=True)]
 
     assert rivals(with_chances(0.48, 0.41, 0.11)) == names
+    assert rivals(with_chances(0.9, 0.06, 0.04)) == names
     assert rivals(with_chances(0.43, 0.35, 0.22)) == (*names, third.name)
-    assert with_chances(0.43, 0.35, 0.22).verdict[1].count(" or ") == 1
-    others = tuple(replace(third, name=f"other {i}", probability=0.1) for i in range(6))
-    many = replace(report, inseparable=names, causes=(replace(first, probability=0.3), second, *others))
-    assert len(rivals(many)) <= 4
-    assert rivals(replace(report, inseparable=None)) == ()
+    three = replace(report, inseparable=(*names, third.name))
+    assert three.verdict[1].count(" or ") == 1
+    assert three.verdict[1].count(",") == 1
+    others = [replace(third, name=f"other {i}", probability=0.1) for i in range(6)]
+    assert len(rivals([replace(first, probability=0.3), second, *others])) == 4
+    assert rivals([]) == ()
 
 
 def test_what_is_next_says_only_what_was_computed() -> None:
@@ -77,13 +78,16 @@ def test_a_small_gap_as_a_whole_may_be_large_in_one_place() -> None:
     assert report.verdict[0].endswith("tooth 21 of the input shaft, 8.7 structural floors (58 % of the gap).")
 
 
-def test_a_gap_that_no_cause_explains_is_told_as_it_is() -> None:
-    report = no_gap_report()
-    causes = (replace(report.causes[0], probability=0.3), replace(report.causes[1], probability=0.2))
-    places = effect_report().places
-    unsure = replace(report, causes=causes, size=Interval(1.7, 1.5, 1.9), places=places)
+def test_what_is_likely_enough_for_nothing_is_undecided() -> None:
+    unsure = undecided_report()
     assert unsure.verdict[0].startswith("Where: a burst")
-    assert unsure.verdict[1] == "Which: none is likely enough to be named: no gap 30 %, spall on a tooth flank 20 %."
+    assert unsure.verdict[1] == (
+        "Which: undecided; nothing is likely enough to be named: no gap 30 %, spall on a tooth flank 20 %, effects of "
+        "the group “tooth-local” together 60 %."
+    )
+    assert unsure.verdict[2] == "How far: no effect was added."
+    assert replace(unsure, groups={"none": 0.3}).verdict[1].endswith("no gap 30 %, spall on a tooth flank 20 %.")
+    assert "another sensor" in unsure.verdict[3]
 
 
 def test_what_comes_nearest_to_an_unknown_cause_is_told_with_its_probability() -> None:

@@ -38,6 +38,7 @@ LOOKS: dict[GapOutcome, tuple[Colour, str]] = {
     GapOutcome.EFFECT: ("red", ":material/error:"),
     GapOutcome.CANNOT_SEPARATE: ("orange", ":material/call_split:"),
     GapOutcome.UNKNOWN: ("gray", ":material/help:"),
+    GapOutcome.UNDECIDED: ("gray", ":material/balance:"),
 }
 TWO_LINES = 72
 """Height of a table's row, in pixels, from which its texts are broken."""

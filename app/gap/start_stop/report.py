@@ -31,6 +31,7 @@ from gearsig.gap.types import (
     Interval,
     group_probabilities,
 )
+from gearsig.gap.verdict import rivals
 
 NORMAL_90 = 1.645
 MOST_EVIDENCE = 6
@@ -96,7 +97,7 @@ def report_of(found: Diagnosis) -> GapReport:
         places=drive_places(compared),
         causes=causes,
         groups=group_probabilities(causes),
-        inseparable=pair if found.outcome is GapOutcome.CANNOT_SEPARATE else None,
+        inseparable=rivals(causes) if found.outcome is GapOutcome.CANNOT_SEPARATE else None,
         steps=_steps(found, causes) if is_gap else (),
         next_recordings=next_drive_recordings(compared, found.predictions[k], found.weighed.fits, pair, titles)
         if pair and is_gap
@@ -111,6 +112,8 @@ def report_of(found: Diagnosis) -> GapReport:
 def _ordered(causes: list[GapCause], outcome: GapOutcome) -> tuple[GapCause, ...]:
     """Put first what the outcome says; the rest by probability."""
     ranked = sorted(causes, key=lambda cause: -cause.probability)
+    if outcome is GapOutcome.UNDECIDED:
+        return tuple(ranked)
     wanted = {GapOutcome.NO_GAP: NONE, GapOutcome.UNKNOWN: UNKNOWN}.get(outcome)
     first = next(c for c in ranked if (c.name == wanted if wanted else c.name not in (NONE, UNKNOWN)))
     return (first, *(c for c in ranked if c is not first))

@@ -109,3 +109,23 @@ def test_a_file_of_no_use_is_an_error_and_leaves_the_catalogue_as_it_was(file: P
 def test_a_file_that_is_not_there_is_an_error(file: Path) -> None:
     with pytest.raises(InputError, match="is no Python file"):
         add_effect(file.with_name("other.py"))
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("raise RuntimeError('boom')", r"seal\.py.*'hissing_seal' fails \(RuntimeError: boom\)"),
+        ("pass", "returns NoneType"),
+    ],
+)
+def test_one_that_fails_says_so_with_its_file(file: Path, body: str, words: str) -> None:
+    file.write_text(FILE.replace("NAME", "hissing_seal").replace("return with_each_channel(machine, louder)", body))
+    own = add_effect(file)
+    with pytest.raises(InputError, match=words):
+        own.apply(spur_pair_machine(), 5.0, {}, np.random.default_rng(0))
+
+
+def test_a_place_that_nothing_can_show_in_is_an_error(file: Path) -> None:
+    file.write_text(FILE.replace("NAME", "hissing_seal").replace("broadband", "everywhere"))
+    with pytest.raises(InputError, match=r"shows_in of hissing_seal.*broadband"):
+        add_effect(file)
