@@ -63,6 +63,11 @@ NOT_SIMULATED = (
 )
 
 
+OF_THE_TWIN = (
+    "The severity is the one with which the twin comes nearest, and its interval is the fit's. The path to a sensor is "
+    "not known: on eleven development cases of another rig the true severity was 0.7 to 33 times the fitted one, in "
+    "the middle 6 times."
+)
 NOT_NEARER = (
     "With {title} the twin comes no nearer to data that it was not fitted to: no severity is given, and no twin with "
     "the effect. What speaks for it is how the recordings changed, by recognition alone."
@@ -157,6 +162,8 @@ def diagnose_gap(
     causes = tuple(_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items())
     causes = _in_order(causes, outcome)
     fitted = causes[0].fitted if outcome is GapOutcome.EFFECT else None
+    if outcome in NAMING and causes[0].severity is not None:
+        notices.append(OF_THE_TWIN)
     if outcome is GapOutcome.EFFECT and fitted is None and causes[0].shrinkage is not None:
         notices.append(NOT_NEARER.format(title=causes[0].title))
     after = None if fitted is None else simulated(twin, clearest.facts, clearest.now, (fitted,))

@@ -12,6 +12,9 @@ from gearsig.diagnosis.types import Analysis, CannotTell, Kind, Outcome
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 
+HIGHEST_HARMONIC, SAME_ORDER = 40, 1e-3
+"""Of a family of impacts, at which a line still belongs to it; relative."""
+
 
 def stood_out(
     recording: Recording, rig: Rig, references: Sequence[Recording], reference_rigs: Sequence[Rig], name: str
@@ -30,10 +33,22 @@ def stood_out(
     found = examined(name, now, [healthy] if healthy is not None else [])
     remarks = [] if healthy is None else _fault_of_reference(healthy[0], name)
     weak = [one for one in found.standing if one.finding.code == LINE or one.finding.kind is Kind.NOTICE]
+    strong = [one for one in found.standing if one not in weak]
     remarks += [
-        f"Not explained by the gear model, in {name}: {one.finding.title.rstrip('.')}{_odds(one)}." for one in weak
+        f"Not explained by the gear model, in {name}: {one.finding.title.rstrip('.')}{_odds(one)}."
+        for one in weak
+        if not (one.finding.code == LINE and any(_is_harmonic(one, family) for family in strong))
     ]
-    return [one for one in found.standing if one not in weak], remarks
+    return strong, remarks
+
+
+def _is_harmonic(line: Standing, family: Standing) -> bool:
+    """Whether a line is a multiple of a family's order: the family explains it."""
+    order, base = line.finding.where.order, family.finding.where.order
+    if not (order and base and line.finding.where.shaft == family.finding.where.shaft):
+        return False
+    n = round(order / base)
+    return 1 <= n <= HIGHEST_HARMONIC and abs(order / (n * base) - 1.0) < SAME_ORDER
 
 
 def _odds(one: Standing) -> str:

@@ -36,6 +36,17 @@ def test_sound_gears_have_nothing_strange() -> None:
     assert stood_out(record(), RIG, [], [], "today") == ([], [])
 
 
+def test_a_line_that_a_family_explains_is_no_remark() -> None:
+    def struck_and_humming(order: float) -> list[str]:
+        def vibration(time: FloatArray, revolutions: FloatArray) -> FloatArray:
+            return knocking(time, revolutions) + 20.0 * np.sin(2 * np.pi * order * revolutions)
+
+        return stood_out(record(vibration), RIG, [], [], "today")[1]
+
+    assert any("order 41.7" in remark for remark in struck_and_humming(41.7))
+    assert not struck_and_humming(9 * STRANGE)
+
+
 def test_orders_of_a_place_are_the_drivers_whatever_shaft_the_speed_is_of() -> None:
     """Shaft "out" is the reference: the family's order there is 37/23 of that of the driver."""
     turned = replace(RIG, shafts=RIG.shafts[::-1])

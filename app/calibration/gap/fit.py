@@ -9,10 +9,13 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.gap.posterior import GapCalibration
-from gearsig.gap.types import NONE, UNKNOWN
+from gearsig.gap.types import NONE, UNKNOWN, GapOutcome
 
 FALSE_ON_NONE, FALSE_ON_UNKNOWN = 0.05, 0.15
 """Parts of the healthy cases, and of those outside the catalogue, on which an effect may be named."""
+
+NAMING = (GapOutcome.EFFECT, GapOutcome.CANNOT_SEPARATE)
+THRESHOLDS = tuple(round(0.5 + 0.01 * i, 2) for i in range(46))
 
 APART = 0.75
 """The likeliest of two effects is named alone from three to one: below that it was right three times in twelve, on
@@ -45,8 +48,15 @@ class WeighedCase:
     size: float = 1.0
 
 
-def fit_calibration(cases: Sequence[WeighedCase]) -> GapCalibration:
+def fit_calibration(cases: Sequence[WeighedCase], strange: Sequence[WeighedCase] = ()) -> GapCalibration:
     """Fit sharpness, what trials say and all biases by likelihood; then the threshold for naming an effect.
+
+    Parameters
+    ----------
+    cases : sequence of WeighedCase
+    strange : sequence of WeighedCase
+        Further ones from outside the catalogue, for the threshold only: as many in the likelihood would make whatever
+        is diagnosed look strange.
 
     J. C. Platt, "Probabilistic outputs for support vector machines", 1999; C. Guo, G. Pleiss, Y. Sun, K. Q. Weinberger,
     "On calibration of modern neural networks", 2017 (one temperature for all classes, a bias for each).
@@ -64,7 +74,7 @@ def fit_calibration(cases: Sequence[WeighedCase]) -> GapCalibration:
 
     best = minimize(loss, start, method="L-BFGS-B", bounds=[*_BOUNDS, *[_BIAS_BOUNDS] * len(effects)]).x
     fitted = _calibration(np.round(best, 3), effects)
-    return replace(fitted, named_from=_named_from(fitted, cases))
+    return replace(fitted, named_from=_named_from(fitted, [*cases, *strange]))
 
 
 def _calibration(x: FloatArray, effects: Sequence[str]) -> GapCalibration:
@@ -76,15 +86,13 @@ def _calibration(x: FloatArray, effects: Sequence[str]) -> GapCalibration:
 
 
 def _named_from(fitted: GapCalibration, cases: Sequence[WeighedCase]) -> float:
-    """Return the least probability of an effect that keeps both false rates, a half at least."""
-    found = [0.5]
-    for cause, rate in ((NONE, FALSE_ON_NONE), (UNKNOWN, FALSE_ON_UNKNOWN)):
-        others = [_effects(fitted, c) for c in cases if c.truths == (cause,)]
-        if others:
-            found.append(float(np.quantile(others, 1.0 - rate)))
-    return float(f"{min(max(found), 0.95):.3f}")
-
-
-def _effects(fitted: GapCalibration, case: WeighedCase) -> float:
-    p = fitted.probabilities(case.forest, case.scores, case.size)
-    return 1.0 - p[NONE] - p[UNKNOWN]
+    """Return the least probability of effects together from which naming keeps both false rates."""
+    without = {
+        rate: [fitted.probabilities(c.forest, c.scores, c.size) for c in cases if c.truths == (cause,)]
+        for cause, rate in ((NONE, FALSE_ON_NONE), (UNKNOWN, FALSE_ON_UNKNOWN))
+    }
+    for threshold in THRESHOLDS:
+        named = replace(fitted, named_from=threshold)
+        if all(sum(named.outcome(p) in NAMING for p in found) <= rate * len(found) for rate, found in without.items()):
+            return threshold
+    return THRESHOLDS[-1]
