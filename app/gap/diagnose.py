@@ -161,10 +161,10 @@ def diagnose_gap(
     places = ranked_places(_places(clearest), [standing_place(one, own_rigs[k]) for one in standing])
     causes = tuple(_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items())
     causes = _in_order(causes, outcome)
-    fitted = causes[0].fitted if outcome is GapOutcome.EFFECT else None
+    fitted = causes[0].fitted if outcome in NAMING else None
     if outcome in NAMING and causes[0].severity is not None:
         notices.append(OF_THE_TWIN)
-    if outcome is GapOutcome.EFFECT and fitted is None and causes[0].shrinkage is not None:
+    if outcome in NAMING and fitted is None and causes[0].shrinkage is not None:
         notices.append(NOT_NEARER.format(title=causes[0].title))
     after = None if fitted is None else simulated(twin, clearest.facts, clearest.now, (fitted,))
     tell("looking for what would tell more", 0.88)

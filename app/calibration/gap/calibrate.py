@@ -40,7 +40,7 @@ def main() -> None:
     """Make cases, weigh them, fit, write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=216)
-    parser.add_argument("--strange", type=int, default=96)
+    parser.add_argument("--strange", type=int, default=64)
     parser.add_argument("--tried", type=int, default=27)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--work", type=Path, required=True, help="keeps what the cases say")
