@@ -19,6 +19,7 @@ from app.commands.options import (
     open_rig,
     stated_speed,
 )
+from gearsig.checks import one_of
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
@@ -79,9 +80,10 @@ def compare(
     """
     from rich.console import Console
 
-    from gearsig.compare.recordings import compare_recordings
+    from gearsig.compare.recordings import ALIGN, compare_recordings
     from gearsig.report.compare_text import comparison_text
 
+    one_of(align, "--align", ALIGN)
     machine = open_rig(rig, recording)
     with Console(stderr=True).status("reading") as status:
         recorded = open_recording(recording, machine, fs, stated_speed(speed_rpm, tach_times, pulses_per_revolution))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import secrets
 import shutil
 from pathlib import Path
@@ -26,8 +25,14 @@ def check_folder(folder: Path) -> None:
     if folder.exists() and not folder.is_dir():
         raise InputError("is a file", where=str(folder), remedy="choose a folder with -o")
     existing = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
-    if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
-        raise InputError("cannot be written", where=str(folder), remedy="choose another with -o")
+    probe = existing / f".{secrets.token_hex(4)}"
+    try:
+        probe.mkdir()  # permissions alone do not tell: there are folders that nothing can be made in
+        probe.rmdir()
+    except OSError as error:
+        raise InputError(
+            f"cannot be written ({error.strerror or error})", where=str(folder), remedy="choose another with -o"
+        ) from None
     if folder.is_dir():
         found = [path for path in folder.iterdir() if path.name not in NAMES]
         if found or (any(folder.iterdir()) and not _is_ours(folder / JSON)):

@@ -94,7 +94,7 @@ def test_nothing_is_written_where_the_page_fails(
         (["model.csv", "measured.csv", "--rig", "gear.toml", "--channel", "a1"], ""),
         (["model.csv", "measured.csv", "--rig", "gear.toml", "--channel", "x"], "'x' is not SIM=RECORDED"),
         (["model.csv", "measured.csv", "--rig", "gear.toml", "--channel", "a1=a2"], "there is no channel 'a2'"),
-        (["model.csv", "measured.csv", "--rig", "gear.toml", "--align", "eye"], "auto, marks, correlation"),
+        (["model.csv", "measured.csv", "--rig", "gear.toml", "--align", "eye"], "--align is 'eye'"),
         (["model.csv", "measured.csv", "--rig", "gear.toml", "--align", "marks"], "no shaft has a mark"),
     ],
 )

@@ -159,6 +159,11 @@ def test_a_folder_that_cannot_be_is_refused(tmp_path, place) -> None:
         check_folder(tmp_path / place)
 
 
+def test_a_folder_that_nothing_can_be_made_in_is_refused() -> None:
+    with pytest.raises(InputError, match=r"/proc/nosuch.*cannot be written.*-o"):
+        check_folder(Path("/proc/nosuch"))
+
+
 def test_a_rig_file_beside_a_recording_overrides_speed_and_torque(tmp_path) -> None:
     slow = copied(tmp_path, "slow", operating_point=OperatingPoint("input", 300.0, 5.0, 40.0))
     half = copied(tmp_path, "half", operating_point=OperatingPoint("input", 250.0))
