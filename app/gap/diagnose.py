@@ -40,6 +40,7 @@ from gearsig.gap.types import (
     group_probabilities,
 )
 from gearsig.gap.verdict import rivals
+from gearsig.recording.si_units import metres_per_second_squared
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 
@@ -190,7 +191,7 @@ def diagnose_gap(
             clearest.simulated,
             after,
             structural=load_population().floor(with_reference=False),
-            unit="m/s^2",
+            unit=_unit(recordings[k]),
         ),
         angles=angle_curves(
             clearest.now,
@@ -225,6 +226,11 @@ def _check_own(twin: Twin, names: Sequence[str]) -> None:
     for name in sorted(set(names) - set(load_population().causes)):
         for added in twin.candidates(name)[-1:]:
             twin.run(twin.point, (added,), seed=0, duration_s=MOMENT_S, sampling_rate_hz=MOMENT_HZ)
+
+
+def _unit(recording: Recording) -> str:
+    known = [metres_per_second_squared(channel) for channel in recording.channels if channel.is_vibration]
+    return "" if None in known else "m/s^2"
 
 
 def _numbered(what: str, recordings: Sequence[Recording]) -> tuple[str, ...]:

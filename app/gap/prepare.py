@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from app.gap.conditions import Condition, compare, facts_of, matching_reference, simulated
 from app.gap.doubts import strange_pattern, strange_teeth
@@ -13,6 +16,7 @@ from gearsig.gap.gathered import Gathered
 from gearsig.gap.population import load_population
 from gearsig.gap.simulator import Twin
 from gearsig.gap.types import ConditionFacts
+from gearsig.recording.si_units import metres_per_second_squared
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 
@@ -124,11 +128,27 @@ def _gathered(recording: Recording, rig: Rig, name: str, notices: list[str]) -> 
         seen = "; ".join(f"{p.channel}: {p.evidence}" for p in dead.values()) or "there is none"
         raise RefusalError(f"{name}: no vibration channel is live ({seen})", remedy="check sensors, cables and inputs")
     try:
-        found = gather(recording, rig, live)
+        found = gather(_in_si(recording, live, name, notices), rig, live)
     except RefusalError as refusal:
         raise RefusalError(f"{name}: {refusal.reason}", remedy=refusal.remedy) from None
     notices += [f"{name}: channel {p.channel} is dead ({p.evidence}) and left out." for p in dead.values()]
     return found
+
+
+def _in_si(recording: Recording, live: Sequence[str], name: str, notices: list[str]) -> Recording:
+    """Return a recording in m/s², as simulations are; say of which channels that cannot be known."""
+    factors = {c.name: metres_per_second_squared(c) for c in recording.channels if c.name in live}
+    unknown = [channel for channel, factor in factors.items() if factor is None]
+    if unknown:
+        notices.append(
+            f"{name}: {', '.join(unknown)} is no acceleration in a known unit; it is compared as if it were m/s², so "
+            "that without a reference its level says nothing."
+        )
+    scale = np.array([factors.get(c.name) or 1.0 for c in recording.channels])
+    if np.all(scale == 1.0):
+        return recording
+    channels = tuple(replace(c, unit="m/s^2") if factors.get(c.name) else c for c in recording.channels)
+    return replace(recording, samples=recording.samples * scale[:, None], channels=channels)
 
 
 def _assumed(recording: Recording, rig: Rig, facts: ConditionFacts) -> list[str]:

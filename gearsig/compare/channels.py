@@ -7,18 +7,8 @@ from dataclasses import dataclass
 
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording.quality import find_problems
+from gearsig.recording.si_units import SI_FACTORS
 from gearsig.recording.types import Channel, Recording
-
-_FACTORS = {
-    "acceleration": {"m/s^2": 1.0, "m/s²": 1.0, "m/s2": 1.0, "mm/s^2": 1e-3, "mm/s²": 1e-3, "g": 9.80665},
-    "velocity": {"m/s": 1.0, "mm/s": 1e-3},
-    "displacement": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
-    "transmission_error": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
-    "sound_pressure": {"Pa": 1.0},
-    "force": {"N": 1.0, "kN": 1e3},
-    "torque": {"N m": 1.0, "Nm": 1.0, "N·m": 1.0, "kN m": 1e3},
-}
-"""SI units in the units that files use, by quantity."""
 
 
 @dataclass(frozen=True)
@@ -111,8 +101,8 @@ def _pair(own: Channel, other: Channel) -> ChannelPair:
 def _factor(own: str, other: str, quantity: str) -> float | None:
     if own == other:
         return 1.0
-    for name in (quantity,) if quantity != "unknown" else tuple(_FACTORS):
-        units = _FACTORS.get(name, {})
+    for name in (quantity,) if quantity != "unknown" else tuple(SI_FACTORS):
+        units = SI_FACTORS.get(name, {})
         if own in units and other in units:
             return units[own] / units[other]
     return None

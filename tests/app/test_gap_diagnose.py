@@ -6,12 +6,13 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.gap.candidates import Tried
 from app.gap.conditions import with_channels_of
 from app.gap.diagnose import _without_meaning, diagnose_gap
-from app.gap.prepare import _check_steady, _with_channels_of
+from app.gap.prepare import _check_steady, _in_si, _with_channels_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap.gather import gather
 from gearsig.gap.posterior import is_calibrated
@@ -110,6 +111,21 @@ def test_a_run_up_is_refused_but_beside_the_same_one() -> None:
     for reference in (None, steady):
         with pytest.raises(RefusalError, match="now: the speed goes from about 825 to 2175 rpm"):
             _check_steady(rising, reference, "now")
+
+
+def test_accelerations_in_g_are_compared_in_si_units_and_unknown_units_are_told() -> None:
+    recording, notices = run(noise=1), list[str]()
+    names = recording.vibration_names()
+    scale = np.array([9.80665 if c.name in names else 1.0 for c in recording.channels])
+    channels = tuple(replace(c, unit="g") if c.name in names else c for c in recording.channels)
+    in_g = replace(recording, samples=recording.samples / scale[:, None], channels=channels)
+    again = _in_si(in_g, names, "now", notices)
+    assert again.samples == pytest.approx(recording.samples)
+    assert again.channels == recording.channels
+    assert (_in_si(recording, names, "now", notices), notices) == (recording, [])
+    bare = replace(recording, channels=tuple(replace(c, unit="") for c in recording.channels))
+    assert _in_si(bare, names, "now", notices) is bare
+    assert "is no acceleration in a known unit" in notices[0]
 
 
 def test_a_channel_that_the_reference_lacks_is_left_out_and_told() -> None:
