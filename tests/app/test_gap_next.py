@@ -37,7 +37,9 @@ class Placed:
 def condition(point: Point = HERE) -> Condition:
     floor = StructuralFloor(NAMES, np.array([1.0, 2.0]))
     facts = SimpleNamespace(point=point, sampling_rate_hz=2e4)
-    return cast("Condition", SimpleNamespace(facts=facts, run_s=5.0, floor=floor, change=SimpleNamespace(names=NAMES)))
+    return cast(
+        "Condition", SimpleNamespace(facts=facts, trial_s=5.0, floor=floor, change=SimpleNamespace(names=NAMES))
+    )
 
 
 @pytest.fixture
