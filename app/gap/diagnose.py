@@ -30,6 +30,7 @@ from gearsig.gap.posterior import is_calibrated
 from gearsig.gap.ranking import ranked_places
 from gearsig.gap.simulator import Added, GapEffect, GapSimulator, Twin
 from gearsig.gap.types import (
+    NAMING,
     NONE,
     UNKNOWN,
     GapCause,
@@ -56,8 +57,6 @@ OWN_EFFECT = (
 )
 MOMENT_S, MOMENT_HZ = 0.05, 20480.0
 """Of a run that only shows whether an effect runs."""
-NAMING = (GapOutcome.EFFECT, GapOutcome.CANNOT_SEPARATE)
-"""Outcomes that name an effect; nothing is added to the simulator elsewhere."""
 
 NOT_SIMULATED = (
     "The recognition has never seen “{title}”, and it could not be simulated on this rig: nothing is said of it."

@@ -26,6 +26,10 @@ class GapOutcome(Enum):
     """Neither an effect nor its absence is likely enough to be said, and no unknown cause is, either."""
 
 
+NAMING = (GapOutcome.EFFECT, GapOutcome.CANNOT_SEPARATE)
+"""Outcomes that name an effect; nothing is added to the simulator elsewhere."""
+
+
 class PlaceKind(Enum):
     """In which way a place of the gap is meant."""
 

@@ -8,7 +8,7 @@ from math import isfinite
 import numpy as np
 
 from gearsig.gap.posterior import LIKELIER_THAN_NOT
-from gearsig.gap.types import NONE, UNKNOWN, GapCause, GapOutcome, GapPlace, GapReport, Interval
+from gearsig.gap.types import NAMING, NONE, UNKNOWN, GapCause, GapOutcome, GapPlace, GapReport, Interval
 from gearsig.gap.words import hardly_foretold, severity_unit
 
 
@@ -105,7 +105,7 @@ def _titled(report: GapReport, name: str) -> str:
 
 def _how_far(report: GapReport) -> str:
     shrinkage = report.causes[0].shrinkage
-    if report.outcome not in (GapOutcome.EFFECT, GapOutcome.CANNOT_SEPARATE) or shrinkage is None:
+    if report.outcome not in NAMING or shrinkage is None:
         return "How far: no effect was added."
     if not shrinkage.is_foretold:
         return f"How far: not known; {report.causes[0].title} {hardly_foretold(shrinkage)}."

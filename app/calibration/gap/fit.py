@@ -9,12 +9,11 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.gap.posterior import GapCalibration
-from gearsig.gap.types import NONE, UNKNOWN, GapOutcome
+from gearsig.gap.types import NAMING, NONE, UNKNOWN
 
 FALSE_ON_NONE, FALSE_ON_UNKNOWN = 0.05, 0.15
 """Parts of the healthy cases, and of those outside the catalogue, on which an effect may be named."""
 
-NAMING = (GapOutcome.EFFECT, GapOutcome.CANNOT_SEPARATE)
 THRESHOLDS = tuple(round(0.5 + 0.01 * i, 2) for i in range(46))
 
 APART = 0.75
@@ -87,12 +86,12 @@ def _calibration(x: FloatArray, effects: Sequence[str]) -> GapCalibration:
 
 def _named_from(fitted: GapCalibration, cases: Sequence[WeighedCase]) -> float:
     """Return the least probability of effects together from which naming keeps both false rates."""
-    without = {
-        rate: [fitted.probabilities(c.forest, c.scores, c.size) for c in cases if c.truths == (cause,)]
+    without = [
+        (rate, [fitted.probabilities(c.forest, c.scores, c.size) for c in cases if c.truths == (cause,)])
         for cause, rate in ((NONE, FALSE_ON_NONE), (UNKNOWN, FALSE_ON_UNKNOWN))
-    }
+    ]
     for threshold in THRESHOLDS:
         named = replace(fitted, named_from=threshold)
-        if all(sum(named.outcome(p) in NAMING for p in found) <= rate * len(found) for rate, found in without.items()):
+        if all(sum(named.outcome(p) in NAMING for p in found) <= rate * len(found) for rate, found in without):
             return threshold
     return THRESHOLDS[-1]

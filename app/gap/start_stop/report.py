@@ -20,6 +20,7 @@ from gearsig.gap.start_stop.floors import FLOOR, DriveFloor
 from gearsig.gap.start_stop.told import NAMES
 from gearsig.gap.start_stop.weigh import Fitted
 from gearsig.gap.types import (
+    NAMING,
     NONE,
     UNKNOWN,
     ConditionFacts,
@@ -80,7 +81,7 @@ def report_of(found: Diagnosis) -> GapReport:
     compared, floor = found.compared[k], found.compared[k].floor()
     causes = _ordered([_cause(found, name, p) for name, p in found.probabilities.items()], found.outcome)
     first = causes[0]
-    fitted = first.fitted if found.outcome in (GapOutcome.EFFECT, GapOutcome.CANNOT_SEPARATE) else None
+    fitted = first.fitted if found.outcome in NAMING else None
     named = [c.name for c in causes if c.name not in (NONE, UNKNOWN)]
     pair = (named[0], named[1]) if len(named) > 1 else None
     is_gap = found.outcome is not GapOutcome.NO_GAP

@@ -10,6 +10,7 @@ from app.calibration.gap.chance import draw_side, partly, sign
 from app.calibration.gap.quasi_static.machine import State, StaticMachine, textures
 from app.calibration.rigs import log_uniform
 from gearsig.checks import FloatArray
+from gearsig.rig.types import Bearing
 
 Knock = Callable[[FloatArray, FloatArray, np.random.Generator], FloatArray]
 
@@ -17,6 +18,12 @@ Knock = Callable[[FloatArray, FloatArray, np.random.Generator], FloatArray]
 def _tooth(machine: StaticMachine, rng: np.random.Generator) -> tuple[int, int]:
     side = draw_side(rng)
     return side, int(rng.integers(machine.drawn.teeth[side]))
+
+
+def _bearing(machine: StaticMachine, rng: np.random.Generator) -> tuple[Bearing, float]:
+    """Draw a bearing; return it with the revolutions of its shaft per revolution of the driver."""
+    bearing = machine.rig.bearings[int(rng.integers(len(machine.rig.bearings)))]
+    return bearing, machine.shaft_orders[0 if bearing.shaft == machine.rig.pairs[0].driver else 1]
 
 
 def _towards_tip(machine: StaticMachine, side: int) -> FloatArray:
@@ -159,8 +166,7 @@ def _speed_fluctuation(machine: StaticMachine, state: State, rng: np.random.Gene
 
 def _race(machine: StaticMachine, state: State, rng: np.random.Generator, name: str) -> None:
     """Elements that drop into a defect and leave it with a blow; on the inner race the load zone passes it."""
-    bearing = machine.rig.bearings[int(rng.integers(len(machine.rig.bearings)))]
-    shaft = machine.shaft_orders[0 if bearing.shaft == machine.rig.pairs[0].driver else 1]
+    bearing, shaft = _bearing(machine, rng)
     order = bearing.orders()[name] * shaft * (1.0 - rng.uniform(0.0, 0.015))
     size = log_uniform(rng, 0.02, 3.0) * (machine.load_n + 0.1 * machine.force_unit_n)
     jitter, uneven, width = log_uniform(rng, 1e-3, 2e-2), rng.uniform(0.05, 0.4), log_uniform(rng, 1e-4, 5e-4)
@@ -196,8 +202,7 @@ def _inner_race(machine: StaticMachine, state: State, rng: np.random.Generator) 
 
 def _bearing_clearance(machine: StaticMachine, state: State, rng: np.random.Generator) -> None:
     """A bearing that is loose: forces reach the housing bent, its support is softer."""
-    bearing = machine.rig.bearings[int(rng.integers(len(machine.rig.bearings)))]
-    shaft = machine.shaft_orders[0 if bearing.shaft == machine.rig.pairs[0].driver else 1]
+    bearing, shaft = _bearing(machine, rng)
     play = log_uniform(rng, 0.3, 30.0)
     state.play += play
     state.passing = bearing.orders()["BPFO"] * shaft * (1.0 - rng.uniform(0.0, 0.01))
