@@ -30,12 +30,16 @@ SOUND_SHARE, SOUND_SHARE_OF_THE_CHECK = 0.2, 0.3
 
 @dataclass(frozen=True)
 class HousingMode:
-    """One mode between bearings and sensors: shape at bearings 1 and 3, where the sensors sit, and at all four."""
+    """One mode between bearings and sensors: shape at bearings 1 and 3, where the sensors sit, and at all four.
+
+    The bearings move it along `direction_deg` from the x axis, across the line of action; None: along the sensors' own.
+    """
 
     frequency_hz: float
     damping_ratio: float
     gain: float
     shape: tuple[float, float, float, float]
+    direction_deg: float | None = None
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import cos, radians, sin
 from typing import Any
 
 import numpy as np
 
-from app.calibration.rigs import DrawnRig
+from app.calibration.rigs import DrawnRig, HousingMode
 from gearsig.recording.types import Recording
 from sims.cracked.linear import default_step_s
 from sims.cracked.simulate import simulate_machine
@@ -127,7 +128,7 @@ def _with_path(machine: Machine, drawn: DrawnRig) -> Machine:
 
 def _with_modes(channel: MeasuredChannel, bearing: int, drawn: DrawnRig) -> MeasuredChannel:
     gain = drawn.sensor_gain
-    x, y = (channel.path.direct[f"bearing {bearing} {axis}"] for axis in "xy")
+    own = tuple(channel.path.direct[f"bearing {bearing} {axis}"] for axis in "xy")
     modes = tuple(
         PathMode(
             mode.frequency_hz,
@@ -135,13 +136,21 @@ def _with_modes(channel: MeasuredChannel, bearing: int, drawn: DrawnRig) -> Meas
             {
                 f"bearing {i + 1} {axis}": gain * mode.gain * mode.shape[bearing - 1] * mode.shape[i] * direction
                 for i in range(4)
-                for axis, direction in (("x", x), ("y", y))
+                for axis, direction in zip("xy", _direction(mode, own), strict=True)
             },
         )
         for mode in drawn.modes
     )
     direct = {name: gain * value for name, value in channel.path.direct.items()}
     return replace(channel, path=ModalPath(direct, modes))
+
+
+def _direction(mode: HousingMode, of_the_sensor: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the parts of a bearing's x and y that move a mode."""
+    if mode.direction_deg is None:
+        return of_the_sensor
+    phi = radians(mode.direction_deg)
+    return cos(phi), sin(phi)
 
 
 def _cut(recording: Recording, first: int) -> Recording:

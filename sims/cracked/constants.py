@@ -60,6 +60,7 @@ PER_SIDE = (
     "rotor_inertia",
     "hooke",
     "hooke_force",
+    "coupling_bending",
 )
 RECORD = np.dtype(
     [(name, np.float64) for name in SCALARS]
@@ -157,6 +158,7 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
         "rotor_inertia": rotors,
         "hooke": hooke_rad**2 / 4.0,
         "hooke_force": hooke_rad / np.array([2.0 * s.bearing_distance_m for s in machine.shafts]),
+        "coupling_bending": np.array([s.coupling_bending_nm_per_rad for s in machine.shafts]),
         "gravity_x": -machine.gravity_mps2 * sin(beta),
         "gravity_y": -machine.gravity_mps2 * cos(beta),
     }

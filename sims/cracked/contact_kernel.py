@@ -102,7 +102,7 @@ def contact_forces(  # noqa: PLR0915  one pass over the pairs: no part of it sta
         if k.friction and total > 0.0:
             rho_1 = k.start_radius + progress * k.base_pitch
             rho_2 = k.action_length - rho_1
-            rubbing = k.friction_factor * contact_friction_n(
+            rubbing = contact_friction_n(
                 total,
                 omega_1 * rho_1,
                 omega_2 * rho_2,
@@ -113,6 +113,8 @@ def contact_forces(  # noqa: PLR0915  one pass over the pairs: no part of it sta
                 k.log10_oil,
                 k.oil_constant,
                 k.sign_threshold,
+                k.friction_factor,
+                k.dry_friction,
             )
             friction += rubbing
             moment_1 += rubbing * rho_1

@@ -93,8 +93,10 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
         twist_rate = rotor_rate - (v[1] if side == 0 else v[2])
         carried = k.torsional_stiffness[side] * twist + k.torsional_damping[side] * twist_rate
         if k.hooke[side] > 0.0:
-            push_x = k.hooke_force[side] * carried * (1.0 + c2)
-            push_y = k.hooke_force[side] * carried * (s2 if side == 0 else -s2)  # the driven shaft turns the other way
+            up = 1.0 if side == 0 else -1.0  # the driven shaft turns the other way
+            bent = k.coupling_bending[side]
+            push_x = k.hooke_force[side] * (carried * (1.0 + c2) - bent * s2)
+            push_y = k.hooke_force[side] * up * (carried * s2 + bent * (1.0 + c2))
         for row, b, sign in ((2 * side, b1, 1.0), (2 * side + 1, b2, -1.0)):
             x, y = q[b], q[b + 1]
             part = 1.0

@@ -7,17 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 
+from gearsig.checks import within
 from sims.effects.effect import Effect, OptionValue, Severity
 from sims.machine import Machine
+from sims.machine.parts import MOST_DRY_FRICTION
 
 
 def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
     """Return the machine with friction added."""
     del options, rng
     oil = machine.lubrication
+    dry = oil.dry_coefficient if oil.friction else 0.0
+    within(severity, f"added_coefficient, beside the {dry:g} there are,", 0.0, MOST_DRY_FRICTION - dry)
     # A machine without friction has factor 0 of the regression, whatever its field says.
-    now = oil.factor if oil.friction else 0.0
-    return replace(machine, lubrication=replace(oil, friction=True, factor=now + severity / 100.0))
+    factor = oil.factor if oil.friction else 0.0
+    return replace(machine, lubrication=replace(oil, friction=True, factor=factor, dry_coefficient=dry + severity))
 
 
 EFFECT = Effect(
@@ -25,17 +29,18 @@ EFFECT = Effect(
     group="flank",
     title="more sliding friction",
     severity=Severity(
-        "added_percent",
-        "%",
+        "added_coefficient",
+        "",
         0.0,
-        1000.0,
-        100.0,
-        "friction that is added, in percent of the coefficient of well lubricated flanks",
+        MOST_DRY_FRICTION,
+        0.1,
+        "friction coefficient that comes on top of the film's; well lubricated flanks have 0.03 to 0.05 in all",
     ),
-    changes="The friction coefficient of every contact, by the regression of Xu and Kahraman, is multiplied by a "
-    "factor that grows by severity/100; a model without friction starts at factor 0. Starved, thinned or aged oil.",
+    changes="Every contact rubs with this coefficient besides what the oil film makes, at every sliding speed "
+    "alike: where oil is starved, thinned or aged, metal touches metal, and that is Coulomb's law.",
     signature="Mesh harmonics, above all across the line of action, where friction is the only force: it turns over "
-    "at the pitch point and jumps where pairs come and go, so the second and higher harmonics gain. No sidebands, "
+    "at the pitch point at once and jumps where pairs come and go, so the second and higher harmonics gain. Far below "
+    "the resonance of the mesh it is the louder force, since gears yield to transmission errors there. No sidebands, "
     "nothing at one tooth. The drive gives a little more torque at the same load: more power is lost. It grows with "
     "the load.",
     shows_in=("mesh_harmonics",),

@@ -61,7 +61,10 @@ def build_machine(values: Values, *, sampling_rate_hz: float = 20480.0, installe
         mesh_damping_ratio=wanted.number("mesh_damping_ratio"),
         half_backlash_um=wanted.number("half_backlash_um"),
         lubrication=Lubrication(
-            wanted.is_on("friction"), wanted.number("viscosity_cp"), wanted.number("friction_factor")
+            wanted.is_on("friction"),
+            wanted.number("viscosity_cp"),
+            wanted.number("friction_factor"),
+            wanted.number("dry_friction"),
         ),
         roughness=Roughness(
             wanted.number("roughness_um"), wanted.word("roughness_locked_to"), wanted.number("roughness_dimension")
@@ -205,6 +208,7 @@ def _shaft(wanted: Wanted, side: int, installed: Installed | None) -> ShaftLine:
         wanted.number("torsional_damping_nm_s_per_rad"),
         wanted.number(f"rotor_inertia_{SHAFTS[side]}_kg_m2"),
         bearing_distance_m=1e-3 * wanted.number("bearing_distance_mm"),
+        coupling_bending_nm_per_rad=wanted.number("coupling_bending_nm_per_rad"),
     )
 
 

@@ -22,6 +22,7 @@ FRICTION_SCALARS = (
     "base_pitch",
     "action_length",
     "friction_factor",
+    "dry_friction",
     "width",
     "reduced_modulus",
     "log10_oil",
@@ -44,6 +45,7 @@ def friction_fields(machine: Machine, operation: Operation, force_n: float) -> d
         "base_pitch": pair.base_pitch_mm * 1e-3,
         "action_length": pair.action_length_mm * 1e-3,
         "friction_factor": machine.lubrication.factor,
+        "dry_friction": machine.lubrication.dry_coefficient,
         "width": mesh.face_width_m,
         "reduced_modulus": reduced_modulus_pa(
             one.youngs_modulus_pa, one.poisson_ratio, two.youngs_modulus_pa, two.poisson_ratio

@@ -62,6 +62,7 @@ _MESH = (
     _number("roughness_dimension", "", "fractal dimension of the rough profile", 1.001, 1.999, 1.5),
     _word("friction", "sliding friction of the flanks", _SWITCH, "on"),
     _number("friction_factor", "", "multiplies the coefficient of friction", 0, 20, 1.0),
+    _number("dry_friction", "", "coefficient that is added at every sliding speed: starved flanks", 0, 0.6, 0.0),
     _number("viscosity_cp", "cP", "dynamic viscosity of the oil at the inlet", 0.1, 1e4, 17.6),
 )
 
@@ -89,6 +90,7 @@ _SHAFTS = (
     _number("rotor_inertia_input_kg_m2", "kg m^2", "moment of inertia of the motor", 1e-7, 1e5, 2e-3),
     _number("rotor_inertia_output_kg_m2", "kg m^2", "moment of inertia of the load", 1e-7, 1e5, 1e-2),
     _number("bearing_distance_mm", "mm", "between the two bearings of a shaft", 5, 10000, 100.0),
+    _number("coupling_bending_nm_per_rad", "N m/rad", "of each coupling, about its stiff axis", 0, 1e7, 0.0),
     _number(
         "governor_nm_s_per_rad",
         "N m s/rad",

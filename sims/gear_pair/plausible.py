@@ -222,7 +222,7 @@ PLAUSIBLE: dict[str, Plausible] = {
     "surface_roughness": Plausible(
         0.3, 2.5, "um: ground flanks have 0.4, hobbed or run-out ones 1 to 3; it does not grow with the gear"
     ),
-    "sliding_friction": Plausible(50.0, 1000.0, "percent: thin oil, 0.03, to dry steel, 0.2 to 0.3"),
+    "sliding_friction": Plausible(0.03, 0.4, "mixed film with worn-out oil to dry, rough steel"),
     "eccentricity": Plausible(
         1.0,
         8.0,

@@ -141,8 +141,15 @@ class PairTwin:
         further = further_seats(installed_of_rig(self.rig, self.nominal.size, ()))
         return replace(self, further=further), {seat.channel: seat.position for seat in further}
 
-    def draw(self, name: str, rng: np.random.Generator) -> Added:
+    def draw(self, name: str, rng: np.random.Generator, *, above: float = 0.0) -> Added:
         """Draw a setting from the range of the candidates, its options at random.
+
+        Parameters
+        ----------
+        name : str
+        rng : numpy.random.Generator
+        above : float
+            Share of the range, in logarithms, that is left out at its lower end.
 
         Raises
         ------
@@ -154,7 +161,7 @@ class PairTwin:
             raise RefusalError(f"the rig has nothing that {name} could be in", remedy="describe its bearings")
         options = plausible.drawn(machine, rng)
         low, high = plausible.reach(name, machine, options)
-        return Added(name, log_uniform(rng, low, high), options)
+        return Added(name, log_uniform(rng, low * (high / low) ** above, high), options)
 
     def preset(self, point: Point, added: Sequence[Added] = (), *, seed: int = 0, notes: Sequence[str] = ()) -> Preset:
         """Return the specimen `seed` with its effects as a preset."""

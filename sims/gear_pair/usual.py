@@ -35,6 +35,9 @@ BODY_SHAPES = ((1.0, 1.0, 1.0, 1.0), (1.0, -1.0, 1.0, -1.0))
 """Heave and pitch of that housing at bearings 1 to 4, the first two at the ends of one shaft."""
 UNBALANCE_UM = 30.0
 """Offset of the centre of mass; 40 um are balance grade G 6.3 at 1500 rpm."""
+COUPLING_BENDING_SHARE = 0.01
+"""A coupling's bending stiffness over the torsional one of shaft and coupling: catalogues have 0.002 (steel discs) to
+0.05 (elastomer)."""
 
 
 @dataclass(frozen=True)
@@ -158,6 +161,7 @@ def usual_parameters(nominal: Nominal) -> dict[str, ParameterValue]:
         "bending_damping_n_s_per_m": 630.0 * size,
         "torsional_stiffness_nm_per_rad": 1.1e4 * size**3,
         "torsional_damping_nm_s_per_rad": 1.5 * size**3,
+        "coupling_bending_nm_per_rad": COUPLING_BENDING_SHARE * 1.1e4 * size**3,
         "rotor_inertia_input_kg_m2": rotor,
         "rotor_inertia_output_kg_m2": rotor,
         "governor_nm_s_per_rad": 1.6 * size**4,

@@ -9,6 +9,9 @@ from gearsig.checks import count, not_negative, one_of, positive, within
 from gearsig.errors import InputError
 from gearsig.rig.types import Bearing
 
+MOST_DRY_FRICTION = 0.6
+"""Coefficient of clean dry steel on steel."""
+
 
 @dataclass(frozen=True)
 class Wheel:
@@ -63,8 +66,11 @@ class ShaftLine:
     rotor_inertia_kg_m2 : float
     coupling_angle_deg : float
         Angle between rotor axis and shaft axis in the coupling, 0 to 5.
+    coupling_bending_nm_per_rad : float
+        Bending stiffness of the coupling about the axis where it is stiff; about the other, a quarter turn away, it
+        has none, so that an angle bends the shaft twice a turn, however little torque it carries.
     bearing_distance_m : float
-        Between the two bearings; it turns the coupling's bending moment into forces on them.
+        Between the two bearings; it turns the coupling's bending moments into forces on them.
     """
 
     name: str
@@ -75,6 +81,7 @@ class ShaftLine:
     rotor_inertia_kg_m2: float
     coupling_angle_deg: float = 0.0
     bearing_distance_m: float = 0.1
+    coupling_bending_nm_per_rad: float = 0.0
 
     def __post_init__(self) -> None:
         positive(self.bending_stiffness_n_per_m, "bending_stiffness_n_per_m", "N/m")
@@ -84,6 +91,7 @@ class ShaftLine:
         positive(self.rotor_inertia_kg_m2, "rotor_inertia_kg_m2", "kg m^2")
         within(self.coupling_angle_deg, "coupling_angle_deg", 0.0, 5.0, "°")
         positive(self.bearing_distance_m, "bearing_distance_m", "m")
+        not_negative(self.coupling_bending_nm_per_rad, "coupling_bending_nm_per_rad", "N m/rad")
 
 
 @dataclass(frozen=True)
@@ -167,15 +175,19 @@ class Lubrication:
         Dynamic viscosity at the oil inlet.
     factor : float
         Multiplies the regression's coefficient: above 1 for starved or aged oil; 0 to 20.
+    dry_coefficient : float
+        Comes on top where the film does not part the flanks, the same at every sliding speed; 0 to 0.6.
     """
 
     friction: bool = True
     viscosity_cp: float = 17.6
     factor: float = 1.0
+    dry_coefficient: float = 0.0
 
     def __post_init__(self) -> None:
         positive(self.viscosity_cp, "viscosity_cp", "cP")
         within(self.factor, "factor of the friction coefficient", 0.0, 20.0)
+        within(self.dry_coefficient, "coefficient of dry friction", 0.0, MOST_DRY_FRICTION)
 
 
 @dataclass(frozen=True)

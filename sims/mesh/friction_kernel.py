@@ -69,9 +69,12 @@ def contact_friction_n(  # type: ignore[no-untyped-def]
     log10_oil,
     constant,
     threshold_mps,
+    film_factor=1.0,
+    dry_coefficient=0.0,
 ):
     """Friction of one tooth pair, μ N sgn(v_s), with v_s = u2 - u1 + vibration, u = ωρ; subtract it from body 1's x.
 
+    μ is `film_factor` times the regression's coefficient, plus `dry_coefficient` at every sliding speed.
     Slide-to-roll ratio and entrainment use the rolling speeds u alone: the film takes no notice of the vibration
     within its own length, and near the pitch point a vibrating sign would make the ratio chatter.
     """
@@ -81,5 +84,8 @@ def contact_friction_n(  # type: ignore[no-untyped-def]
     sliding = surface_2_mps - surface_1_mps
     ratio = abs(sliding) / entrainment if entrainment > 0.0 else 0.0
     pressure = hertz_pressure_gpa(normal_force_n, width_m, radius_m, reduced_modulus_pa)
-    mu = friction_coefficient(ratio, pressure, entrainment, radius_m, log10_oil, constant)
+    mu = (
+        film_factor * friction_coefficient(ratio, pressure, entrainment, radius_m, log10_oil, constant)
+        + dry_coefficient
+    )
     return mu * normal_force_n * smooth_sign(sliding + vibration_mps, threshold_mps)

@@ -58,6 +58,7 @@ _PER_SIDE = (
     "torsional_damping",
     "hooke",
     "hooke_force",
+    "coupling_bending",
 )
 RECORD = np.dtype(
     [(name, np.float64) for name in _SCALARS]
@@ -203,6 +204,7 @@ def constants(
         "torsional_damping": [s.torsional_damping_nm_s_per_rad for s in shafts],
         "hooke": hooke**2 / 4.0,
         "hooke_force": hooke / np.array([2.0 * s.bearing_distance_m for s in shafts]),
+        "coupling_bending": [s.coupling_bending_nm_per_rad for s in shafts],
         "pushes": machine.gravity_mps2 > 0.0 or bool(hooke.any()) or any(w.unbalance_g_mm > 0.0 for w in wheels),
         "rolls": any(b.defect is not None or b.clearance_um > 0.0 for b in machine.bearings),
         "moving_force": moving_force,

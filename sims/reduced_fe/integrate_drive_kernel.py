@@ -35,7 +35,7 @@ def friction_of_pair(k, force, progress, omega, slip_x):
     """(f, fρ1, fρ2) of a pair at ζ; the film knows the set speed `omega`, its sign feels the vibration `slip_x`."""
     rho_1 = k.start_radius + min(max(progress, 0.0), k.contact_ratio) * k.base_pitch
     rho_2 = k.action_length - rho_1
-    rubbing = k.friction_factor * contact_friction_n(
+    rubbing = contact_friction_n(
         force,
         omega * rho_1,
         omega / k.ratio * rho_2,
@@ -46,6 +46,8 @@ def friction_of_pair(k, force, progress, omega, slip_x):
         k.log10_oil,
         k.oil_constant,
         k.sign_threshold,
+        k.friction_factor,
+        k.dry_friction,
     )
     return rubbing, rubbing * rho_1, rubbing * rho_2
 
@@ -73,8 +75,9 @@ def _push(k, side, inputs, angle, omega, drive, out):
         k.torsional_stiffness[side] * k.hooke[side] * s2 + 2.0 * k.torsional_damping[side] * k.hooke[side] * rate * c2
     )
     on_rotor = -kink - 2.0 * k.hooke[side] * c2 * drive
-    couple_x = k.hooke_force[side] * drive * (1.0 + c2)
-    couple_y = k.hooke_force[side] * drive * up * s2
+    bent = k.coupling_bending[side]
+    couple_x = k.hooke_force[side] * (drive * (1.0 + c2) - bent * s2)
+    couple_y = k.hooke_force[side] * up * (drive * s2 + bent * (1.0 + c2))
     for j in range(out.shape[1]):
         out[side, j] += fx * inputs[side, 2, j] + fy * inputs[side, 3, j]
         out[side, j] += on_rotor * inputs[side, 0, j] + kink * inputs[side, 1, j]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import pi
 
 import numpy as np
 
 from app.calibration.rigs import DrawnRig, HousingMode, draw_rig, log_uniform
 from sims.effects import EffectSetting
+from sims.gear_pair.usual import BODY_SHAPES
 
 LIGHT_SHARE, LIGHT_TORQUE = 0.4, (0.0005, 0.3)
 """Machines that run at light load, and their torque over that of the others: down to what idling takes."""
@@ -15,6 +17,13 @@ LIGHT_SHARE, LIGHT_TORQUE = 0.4, (0.0005, 0.3)
 DURATION_S = (3.0, 7.0)
 MOUNTED_ANEW_SHARE = 0.6
 """Recordings between which and their reference the sensors were taken off."""
+
+COUPLING_BENDING_SHARES = (0.002, 0.05)
+"""Bending stiffness of a coupling over its shaft's torsional one, by catalogues of steel discs to elastomers."""
+
+RIGID_SHARE = 0.25
+MOUNTS_HZ, MOUNTS_DAMPING, BODY_KG = (4.0, 40.0), (0.05, 0.3), (20.0, 120.0)
+"""Machines on rigid ground; mounts or frames of the others, and their housings with what moves along, at module 2."""
 
 SPEED_SCATTER, TORQUE_SCATTER = 0.006, 0.05
 GAIN_SCATTER, MODE_SCATTER, MODE_GAIN_SCATTER = 0.10, 0.03, 0.20
@@ -50,11 +59,34 @@ class Day:
 
 
 def draw_machine(rng: np.random.Generator) -> DrawnRig:
-    """Draw a sound gearbox, full or lightly loaded, with the length of its recordings."""
+    """Draw a sound gearbox, full or lightly loaded, with the length of its recordings.
+
+    Gears lie side by side, above each other or aslant, and a housing's modes move each in a direction of their own:
+    what pushes across the line of action is heard as well. Most housings stand on something that yields, so that the
+    low orders of the shafts are heard, too.
+    """
     drawn = draw_rig(rng, for_the_check=False, even=bool(rng.uniform() < 0.1))
+    aslant = np.random.default_rng([drawn.seed, 6])
+    bends = log_uniform(aslant, *COUPLING_BENDING_SHARES) * float(drawn.parameters["torsional_stiffness_nm_per_rad"])
+    lies = {"line_of_action_deg": float(aslant.uniform(-180.0, 180.0)), "coupling_bending_nm_per_rad": bends}
+    modes = (*drawn.modes, *_on_mounts(drawn, aslant))
+    modes = tuple(replace(mode, direction_deg=float(aslant.uniform(0.0, 180.0))) for mode in modes)
+    drawn = replace(drawn, parameters={**drawn.parameters, **lies}, modes=modes)
     if rng.uniform() < LIGHT_SHARE:
         drawn = replace(drawn, torque_nm=drawn.torque_nm * log_uniform(rng, *LIGHT_TORQUE))
     return replace(drawn, depth_mm=0.0, duration_s=float(np.clip(1.2 * drawn.duration_s, *DURATION_S)))
+
+
+def _on_mounts(drawn: DrawnRig, rng: np.random.Generator) -> tuple[HousingMode, ...]:
+    """Return heave and pitch of the housing as a rigid body, see `sims.gear_pair.usual.body_on_mounts`; rarely none."""
+    size = float(drawn.parameters["module_mm"]) / 2.0
+    frequency_hz, damping_ratio = log_uniform(rng, *MOUNTS_HZ), rng.uniform(*MOUNTS_DAMPING)
+    mass_kg = log_uniform(rng, *BODY_KG) * size**2
+    if rng.uniform() < RIGID_SHARE:
+        return ()
+    stiffness = float(drawn.parameters["bearing_stiffness_n_per_m"])
+    gain = stiffness / (mass_kg * (2.0 * pi * frequency_hz) ** 2)
+    return tuple(HousingMode(frequency_hz, damping_ratio, gain, shape) for shape in BODY_SHAPES)
 
 
 def first_day(drawn: DrawnRig, rng: np.random.Generator) -> Day:
@@ -70,7 +102,8 @@ def another_day(drawn: DrawnRig, rng: np.random.Generator) -> Day:
     if rng.uniform() >= MOUNTED_ANEW_SHARE:
         return Day(replace(drawn, parameters=parameters), speed, torque, (1.0, 1.0), wander)
     first, second = np.exp(GAIN_SCATTER * rng.standard_normal(2))
-    modes = tuple(_mounted_anew(mode, rng) for mode in drawn.modes)
+    # Where the whole housing moves, it matters little how a sensor sits.
+    modes = tuple(_mounted_anew(mode, rng) if mode.frequency_hz > MOUNTS_HZ[1] else mode for mode in drawn.modes)
     return Day(replace(drawn, parameters=parameters, modes=modes), speed, torque, (float(first), float(second)), wander)
 
 

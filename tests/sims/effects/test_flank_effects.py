@@ -128,14 +128,21 @@ def test_roughness_there_is_keeps_what_it_returns_with() -> None:
         apply(machine, "surface_roughness", 0.4, locked_to="flank")
 
 
-def test_friction_multiplies_the_coefficient() -> None:
-    machine = replace(spur_pair_machine(), lubrication=Lubrication(factor=2.0))
-    assert apply(machine, "sliding_friction", 50.0).lubrication.factor == 2.5
+def test_friction_comes_on_top_of_the_films() -> None:
+    machine = replace(spur_pair_machine(), lubrication=Lubrication(factor=2.0, dry_coefficient=0.05))
+    oil = apply(machine, "sliding_friction", 0.1).lubrication
+    assert (oil.factor, oil.dry_coefficient) == (2.0, pytest.approx(0.15))
+
+
+def test_no_flanks_rub_more_than_clean_steel() -> None:
+    machine = replace(spur_pair_machine(), lubrication=Lubrication(dry_coefficient=0.3))
+    with pytest.raises(InputError, match=r"beside the 0.3 there are, is 0.4 \(allowed: 0 to 0.3\)"):
+        apply(machine, "sliding_friction", 0.4)
 
 
 def test_friction_starts_at_nothing_where_there_was_none() -> None:
     """Continuous: hardly any severity switches hardly any friction on."""
     machine = replace(spur_pair_machine(), lubrication=Lubrication(friction=False, factor=1.0))
-    oil = apply(machine, "sliding_friction", 0.1).lubrication
+    oil = apply(machine, "sliding_friction", 0.001).lubrication
     assert oil.friction
-    assert oil.factor == pytest.approx(0.001)
+    assert (oil.factor, oil.dry_coefficient) == (0.0, 0.001)

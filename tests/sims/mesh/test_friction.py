@@ -115,14 +115,23 @@ def test_smooth_flanks_still_rub_but_rolling_and_unloaded_ones_do_not():
 
 
 @settings(deadline=None)  # kernels compile in the first example
-@given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-1.0, 1.0), st.floats(-100.0, 1e5))
-def test_friction_takes_energy_out_at_any_motion(u1, u2, vibration, normal):
+@given(*[st.floats(-5.0, 5.0)] * 2, st.floats(-1.0, 1.0), st.floats(-100.0, 1e5), st.floats(0.0, 0.6))
+def test_friction_takes_energy_out_at_any_motion(u1, u2, vibration, normal, dry):
     """The force on body 1 is -f, on body 2 +f: their power is -f v_s, never above zero."""
     terms = kernel.oil_terms(17.6, 0.45)
-    f = kernel.contact_friction_n(normal, u1, u2, vibration, 0.01, 0.02, STEEL_PA, *terms, 1e-3)
+    f = kernel.contact_friction_n(normal, u1, u2, vibration, 0.01, 0.02, STEEL_PA, *terms, 1e-3, 1.0, dry)
     sliding = u2 - u1 + vibration
     assert -f * sliding <= 0.0
-    assert abs(f) <= MOST_FRICTION * max(normal, 0.0)
+    assert abs(f) <= (MOST_FRICTION + dry) * max(normal, 0.0)
+
+
+def test_dry_friction_is_the_same_at_every_sliding_speed():
+    terms = kernel.oil_terms(17.6, 0.45)
+    slow, fast = (
+        kernel.contact_friction_n(1e3, u, 3.0, 0.0, 0.01, 0.02, STEEL_PA, *terms, 1e-4, 0.0, 0.2) for u in (2.9, 0.5)
+    )
+    assert slow == pytest.approx(200.0, rel=1e-5)
+    assert fast == pytest.approx(200.0, rel=1e-5)
 
 
 def test_force_is_positive_in_approach_and_turns_at_the_pitch_point():

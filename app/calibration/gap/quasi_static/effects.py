@@ -128,13 +128,13 @@ def _eccentricity(machine: StaticMachine, state: State, rng: np.random.Generator
 
 def _unbalance(machine: StaticMachine, state: State, rng: np.random.Generator) -> None:
     """A mass off the axis."""
-    size = log_uniform(rng, 0.02, 3.0) * machine.force_unit_n
+    size = log_uniform(rng, 0.1, 3.0) * machine.force_unit_n
     state.force_n.append((draw_side(rng), 1.0, size, rng.uniform(0, 2 * np.pi)))
 
 
 def _misalignment(machine: StaticMachine, state: State, rng: np.random.Generator) -> None:
     """Contact on part of the width, some of it turning with a shaft; a coupling that is forced twice a turn."""
-    side, size = draw_side(rng), log_uniform(rng, 0.03, 0.8)
+    side, size = draw_side(rng), log_uniform(rng, 0.1, 0.8)
     state.soft_spots = size * rng.uniform(0.3, 0.8)
     for order, share in ((1.0, rng.uniform(0.0, 0.6)), (2.0, rng.uniform(0.0, 0.4))):
         state.stiffness.append((side, order, size * share, rng.uniform(0, 2 * np.pi)))
@@ -150,7 +150,7 @@ def _torque_ripple(machine: StaticMachine, state: State, rng: np.random.Generato
     order, side, size = (
         float(round(pulls)) if rng.uniform() < 0.75 else pulls,
         draw_side(rng),
-        log_uniform(rng, 0.004, 0.6),
+        log_uniform(rng, 0.02, 0.6),
     )
     for n, share in ((1.0, 1.0), (2.0, rng.uniform(0.0, 0.4))):
         phase = rng.uniform(0, 2 * np.pi)

@@ -23,6 +23,8 @@ RATES_HZ = (12_800.0, 20_000.0, 20_480.0, 25_600.0)
 STIFFNESS_N_PER_M2 = 14e9
 """Of a mesh of steel gears, per width."""
 N_CHANNELS = 2
+DIRECTNESS = (1.0, 10.0)
+"""Of friction: (resonance of the mesh over its frequency)² where the mesh is slower, 1 where it is not."""
 END_RADII_M = (4e-3, 40e-3)
 """Of the flank that a corner meets off the path's ends: a gap of d²/2R."""
 
@@ -142,6 +144,14 @@ class StaticMachine:
     def rated_m(self) -> float:
         """Deflection under a usual load: what errors are measured by, whatever the load is now."""
         return 50e6 * 1e-3 * self.nominal.module_mm / STIFFNESS_N_PER_M2
+
+    @property
+    def directness(self) -> float:
+        """By how much more a force across the teeth is heard than the same deflection along them.
+
+        Below the resonance of the mesh gears turn out of the way of a transmission error; friction they cannot avoid.
+        """
+        return log_uniform(np.random.default_rng([self.seed, 4]), *DIRECTNESS)
 
     @property
     def shaft_orders(self) -> tuple[float, float]:

@@ -115,7 +115,8 @@ def _motions(
     mean = float(machine.stiffness_n_per_m.mean()) * path.ratio
     shafts = waves(state.force_n) * day.speed_factor**2 / mean
     off = at_places(cycle, path, path.places - path.pitch_point)
-    rubbing = state.friction * np.sum(carried * np.tanh(off / state.reversal), axis=0) / mean
+    turning = np.sum(carried * np.tanh(off / state.reversal), axis=0)
+    rubbing = state.friction * machine.directness * turning / mean
     mesh = error + waves(state.runout_m) + state.restless_m * rng.standard_normal(len(turns))
     pressed = load / mean
     mesh = _through_play(pressed, mesh - mesh.mean() + shafts, state, turns) - shafts
