@@ -24,7 +24,8 @@ LARGEST_DISTANCE = 6.0
 """In floors; what is further from a prediction counts little more: one wild feature must not decide."""
 
 INTERVAL_COST = 2.71
-"""Rise of the cost, a sum of squared standard deviations, that bounds the 90 % interval: 1.645²."""
+"""Rise of the cost, a sum of squared standard deviations, that bounds the 90 % interval, 1.645², where the best fit is as
+near as floors allow, which is a cost of 1 for each family; in proportion more where it is not."""
 
 FLOOR_IN_DEVIATIONS = 1.96
 """A floor holds 19 of 20: so many standard deviations."""
@@ -214,21 +215,27 @@ def fit_path(path: EffectPath, observed: Sequence[Observed]) -> Fit:
     one gearbox show one unbalance 20 dB apart, and so do two speeds. What an effect changes, and which part of it more
     than another, is the simulation's.
 
-    The interval ends at the severities that were simulated, though a larger one may fit as well.
+    Where the best fit misses by more than floors allow, the simulation is wrong by as much, and the interval is as much
+    wider (R. T. Birge, The calculation of errors by the method of least squares, *Phys. Rev.* 40, 1932). It ends at the
+    severities that were simulated, though a larger one may fit as well.
     """
     coarse = path.tried()
-    low, high = _near_the_best(coarse, _costs(path, coarse, observed)[0])
+    low, high = _near_the_best(path, coarse, _costs(path, coarse, observed)[0])
     tried = np.geomspace(low, high, STEPS)
     costs, ways = _costs(path, tried, observed)
     likelihood = np.exp(-0.5 * (costs - costs.min()))
     best = round(float(likelihood @ np.arange(len(tried)) / likelihood.sum()))  # they are even in ln s
     fitted = {one.condition: int(row[best]) for one, row in zip(observed, ways, strict=True)}
-    return Fit(path, Interval(float(tried[best]), *_near_the_best(tried, costs)), float(costs.min()), fitted)
+    return Fit(path, Interval(float(tried[best]), *_near_the_best(path, tried, costs)), float(costs.min()), fitted)
 
 
-def _near_the_best(tried: FloatArray, costs: FloatArray) -> tuple[float, float]:
-    """Return the first severities on either side at which the cost has risen by more than `INTERVAL_COST`."""
-    near = np.flatnonzero(costs <= costs.min() + INTERVAL_COST)
+def _near_the_best(path: EffectPath, tried: FloatArray, costs: FloatArray) -> tuple[float, float]:
+    """Return the first severities on either side at which the cost has risen by more than is likely.
+
+    That is `INTERVAL_COST`, and as many times more as the best fit misses by.
+    """
+    misses = max(1.0, float(costs.min()) / len(family_members(path.names)))
+    near = np.flatnonzero(costs <= costs.min() + misses * INTERVAL_COST)
     return float(tried[max(near[0] - 1, 0)]), float(tried[min(near[-1] + 1, len(tried) - 1)])
 
 

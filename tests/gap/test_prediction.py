@@ -200,3 +200,11 @@ def test_what_the_simulator_hardly_shows_is_said() -> None:
     faint = replace(path(), distances=tuple(0.1 / loudest * table for table in path().distances))
     hardly = shrinkage([faint], [Fold((truth,), truth)], "")
     assert not hardly.is_foretold
+
+
+def test_a_fit_that_misses_has_a_wider_interval() -> None:
+    """What the simulation does not foretell is as large as what it does."""
+    near, wrong = foretold(path(), 2.0), foretold(path(), 2.0)
+    wrong = wrong + 3.0 * FLOORS * np.where(np.arange(len(NAMES)) % 2, 1.0, -1.0)
+    sure, unsure = (fit_path(path(), [seen(values)]).severity for values in (near, wrong))
+    assert unsure.high / unsure.low > 1.5 * sure.high / sure.low
