@@ -24,8 +24,8 @@ LARGEST_DISTANCE = 6.0
 """In floors; what is further from a prediction counts little more: one wild feature must not decide."""
 
 INTERVAL_COST = 2.71
-"""Rise of the cost, a sum of squared standard deviations, that bounds the 90 % interval, 1.645², where the best fit is as
-near as floors allow, which is a cost of 1 for each family; in proportion more where it is not."""
+"""Rise of the cost, a sum of squared standard deviations, that bounds the 90 % interval, 1.645², where the best fit is
+as near as floors allow, which is a cost of 1 for each family; in proportion more where it is not."""
 
 FLOOR_IN_DEVIATIONS = 1.96
 """A floor holds 19 of 20: so many standard deviations."""

@@ -21,7 +21,7 @@ from app.calibration.gap.quasi_static.samples import QUASI_STATIC, one_static
 from app.calibration.gap.sample import Sample, write
 from gearsig.gap.population import INDEPENDENT
 
-MACHINES = {CRACKED.name: 120, REDUCED.name: 45, INDEPENDENT: 400, QUASI_STATIC: 150}
+MACHINES = {CRACKED.name: 80, REDUCED.name: 45, INDEPENDENT: 400, QUASI_STATIC: 150}
 """Of each simulator, unless asked for otherwise."""
 
 _SAMPLES_OF: dict[str, Callable[[int], list[Sample]]] = {
