@@ -22,6 +22,7 @@ from app.gap.unexplained import stood_out
 from app.gap.weigh import weigh
 from gearsig.checks import closest_match_hint
 from gearsig.errors import InputError, RefusalError
+from gearsig.gap.average_curves import average_curves
 from gearsig.gap.curves import angle_curves, spectrum_curves
 from gearsig.gap.evidence import evidence_of
 from gearsig.gap.places import gap_places
@@ -190,6 +191,8 @@ def diagnose_gap(
             clearest.simulated,
             after,
             structural=load_population().floor(with_reference=False),
+            reference=reference,
+            reference_structural=None if reference is None else load_population().floor(with_reference=True),
             unit=_unit(recordings[k]),
         ),
         angles=angle_curves(
@@ -199,6 +202,7 @@ def diagnose_gap(
             sound=reference,
             simulated_sound=clearest.simulated if reference is not None else None,
         ),
+        averages=() if reference is None else average_curves(clearest.now, reference, unit=_unit(recordings[k])),
         notices=tuple(notices),
         twin_toml="" if fitted is None else _preset(twin, clearest, causes[0], fitted),
     )

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.gap.cyclic import floor_ratio
@@ -44,6 +45,8 @@ def spectrum_curves(
     after: Gathered | None = None,
     *,
     structural: StructuralFloor | None = None,
+    reference: Gathered | None = None,
+    reference_structural: StructuralFloor | None = None,
     unit: str = "m/s^2",
     channel: str = "",
 ) -> tuple[SpectrumCurves, ...]:
@@ -57,22 +60,45 @@ def spectrum_curves(
         The simulation with the likeliest effect.
     structural : StructuralFloor or None
         Of the same comparison; each line gets the floor of the feature that it belongs to.
+    reference : Gathered or None
+        The healthy recording, with the same channels.
+    reference_structural : StructuralFloor or None
+        Of the comparison with it.
     unit : str
         Of the channels.
     channel : str
         Empty: root mean square over all channels.
     """
+    runs = _Runs(now, before, after, reference)
     names = (channel,) if channel else tuple(now.channels)
-    averages = (_of_average(side, now, before, after, names, unit) for side in (DRIVER, DRIVEN))
-    found = (*averages, _of_residual(now, before, after, names, unit))
-    if structural is None:
-        return found
+    averages = (_of_average(side, runs, names, unit) for side in (DRIVER, DRIVEN))
+    found = (*averages, _of_residual(runs, names, unit))
     features = [average_features(side, now.frame.teeth[side], len(found[side].orders)) for side in (DRIVER, DRIVEN)]
     features.append(residual_features(now, found[2].orders))
     return tuple(
-        replace(curves, structural_db=structural.of(belonging))
+        replace(
+            curves,
+            structural_db=NOTHING if structural is None else structural.of(belonging),
+            reference_structural_db=NOTHING if reference_structural is None else reference_structural.of(belonging),
+        )
         for curves, belonging in zip(found, features, strict=True)
     )
+
+
+@dataclass(frozen=True)
+class _Runs:
+    """What is drawn together; `before` and what follows as in `spectrum_curves`."""
+
+    now: Gathered
+    before: Gathered
+    after: Gathered | None
+    reference: Gathered | None
+
+    @property
+    def beside(self) -> dict[str, Gathered]:
+        """Those beside the recording that there are, by the name of their curve."""
+        named = {"before": self.before, "after": self.after, "reference": self.reference}
+        return {name: run for name, run in named.items() if run is not None}
 
 
 def average_features(side: int, teeth: int, n: int) -> list[str]:
@@ -99,22 +125,22 @@ def residual_features(now: Gathered, orders: FloatArray) -> list[str]:
     return [f"floor.band.{max(int(band), 1)}" for band in bands]
 
 
-def _of_average(
-    side: int, now: Gathered, before: Gathered, after: Gathered | None, names: Sequence[str], unit: str
-) -> SpectrumCurves:
-    runs = [run for run in (now, before, after) if run is not None]
-    powers, noises = zip(*(_average_power(run, side, names) for run in runs), strict=True)
+def _of_average(side: int, runs: _Runs, names: Sequence[str], unit: str) -> SpectrumCurves:
+    now = runs.now
+    power, noise = _average_power(now, side, names)
+    others = {name: _average_power(run, side, names) for name, run in runs.beside.items()}
     last = int((N_MESH_HARMONICS + BEYOND) * now.frame.teeth[side])
-    n = min(last + 1, *(len(power) for power in powers))
-    amplitudes = [np.sqrt(power[:n]) for power in powers]
+    n = min(last + 1, len(power), *(len(of_other) for of_other, _ in others.values()))
+    floors = {name: np.sqrt(_RARE * (noise[:n] + of_other[:n])) for name, (_, of_other) in others.items()}
+    amplitudes = {name: np.sqrt(of_other[:n]) for name, (of_other, _) in others.items()}
     return SpectrumCurves(
         f"average over {shaft_words(now.frame, side)}",
         unit,
         np.arange(n) * now.frame.shaft_orders[side],
-        amplitudes[0],
-        amplitudes[1],
-        amplitudes[2] if after is not None else NOTHING,
-        np.sqrt(_RARE * (noises[0][:n] + noises[1][:n])),
+        np.sqrt(power[:n]),
+        **{"after": NOTHING, **amplitudes},
+        floor=floors["before"],
+        reference_floor=floors.get("reference", NOTHING),
     )
 
 
@@ -127,32 +153,58 @@ def _average_power(gathered: Gathered, side: int, names: Sequence[str]) -> tuple
     return power, noise
 
 
-def _of_residual(
-    now: Gathered, before: Gathered, after: Gathered | None, names: Sequence[str], unit: str
-) -> SpectrumCurves:
+def _of_residual(runs: _Runs, names: Sequence[str], unit: str) -> SpectrumCurves:
+    now = runs.now
     power = _residual_power(now, names)
-    top = min((N_MESH_HARMONICS + BEYOND) * now.frame.teeth[DRIVER], now.highest_order, before.highest_order)
+    highest = (run.highest_order for run in (now, runs.before, runs.reference) if run is not None)
+    top = min((N_MESH_HARMONICS + BEYOND) * now.frame.teeth[DRIVER], *highest)
     orders = np.arange(min(len(power), int(top / now.order_step) + 1)) * now.order_step
     measured = power[: len(orders)]
-    others = [
-        np.interp(orders, np.arange(len(values)) * run.order_step, values)
-        for run, values in ((run, _residual_power(run, names)) for run in (before, after) if run is not None)
-    ]
+    others = {name: (run.order_step, _residual_power(run, names)) for name, run in runs.beside.items()}
     # 2: squares of peaks from mean squares.
+    amplitudes = {
+        name: np.sqrt(2.0 * np.interp(orders, np.arange(len(values)) * step, values))
+        for name, (step, values) in others.items()
+    }
+    floor = np.sqrt(2.0 * _RARE * measured / floor_ratio(measured[None])[0])
     return SpectrumCurves(
         "what neither shaft repeats",
         unit,
         orders,
         np.sqrt(2.0 * measured),
-        np.sqrt(2.0 * others[0]),
-        np.sqrt(2.0 * others[1]) if after is not None else NOTHING,
-        np.sqrt(2.0 * _RARE * measured / floor_ratio(measured[None])[0]),
+        **{"after": NOTHING, **amplitudes},
+        floor=floor,
+        reference_floor=floor if runs.reference is not None else NOTHING,
     )
 
 
 def _residual_power(gathered: Gathered, names: Sequence[str]) -> FloatArray:
     power: FloatArray = np.mean([gathered.channels[name].residual_power.mean(axis=0) for name in names], axis=0)
     return power
+
+
+def against_reference(curves: SpectrumCurves) -> SpectrumCurves:
+    """Return the curves with the healthy reference, and its floors, in the place of the simulation."""
+    return replace(
+        curves,
+        before=curves.reference,
+        after=NOTHING,
+        floor=curves.reference_floor,
+        structural_db=curves.reference_structural_db,
+    )
+
+
+def lines_beyond(curves: SpectrumCurves) -> tuple[int, int]:
+    """Count the lines whose gap exceeds their structural floor, and those that exceed the repeatability floor."""
+    gap = gap_by_order(curves, curves.before)
+    return int(np.count_nonzero(is_beyond(curves, gap))), int(np.count_nonzero(np.isfinite(gap)))
+
+
+def is_beyond(curves: SpectrumCurves, gap: FloatArray) -> NDArray[np.bool_]:
+    """Return which lines' gaps, in dB, exceed their structural floor; where that is not known, all that have one."""
+    structural = curves.structural_db if len(curves.structural_db) else np.zeros(len(gap))
+    beyond: NDArray[np.bool_] = np.abs(np.nan_to_num(gap)) > structural
+    return beyond
 
 
 def gap_by_order(curves: SpectrumCurves, simulated: FloatArray) -> FloatArray:

@@ -45,21 +45,38 @@ def evidence_of(fit: Fit, observed: Sequence[Observed], frame: GearFrame) -> tup
     ]
     telling = sorted((i for i in best if clear[i]), key=lambda i: -sizes[i])
     return tuple(
-        Evidence(
+        weighed_evidence(
             feature_words(fit.path.names[i], frame),
             float(predicted[i]),
             float(clearest.distances[i]),
             float(clearest.floors[i]),
-            _agrees(float(predicted[i]), float(clearest.distances[i]), float(clearest.floors[i])),
         )
         for i in telling[:MOST]
     )
 
 
-def _agrees(predicted_db: float, observed_db: float, floor_db: float) -> bool:
-    """Whether both are clear, of one sign and of one size; or differ by less than the floor."""
-    if abs(predicted_db) < CLEAR * floor_db:
-        return False  # it was observed, and this effect does not explain it
-    if abs(predicted_db - observed_db) <= floor_db:
-        return True
-    return AGREES <= observed_db / predicted_db <= 1.0 / AGREES
+def weighed_evidence(
+    feature: str, predicted_db: float, observed_db: float, floor_db: float, *, least: float = CLEAR
+) -> Evidence:
+    """Return a predicted change beside the observed one, with what it says of the effect.
+
+    It speaks for the effect where both are of one sign and one size; or, where the prediction is beyond the floor,
+    differ by less than that. What moved the way of such a prediction and more than twice as far is no evidence against
+    it: the simulator's size of the effect is uncertain, and something else may have moved it, too. What was not
+    predicted, did not come, or moved the other way is.
+
+    Parameters
+    ----------
+    feature : str
+        In words.
+    predicted_db, observed_db, floor_db : float
+    least : float
+        Floors from which a prediction is one.
+    """
+    size = abs(predicted_db)
+    if size == 0.0 or size < least * floor_db:
+        return Evidence(feature, predicted_db, observed_db, floor_db, speaks_for=False)
+    ratio, is_clear = observed_db / predicted_db, size >= CLEAR * floor_db
+    agrees = AGREES <= ratio <= 1.0 / AGREES or (is_clear and abs(predicted_db - observed_db) <= floor_db)
+    further = is_clear and not agrees and ratio > 1.0
+    return Evidence(feature, predicted_db, observed_db, floor_db, agrees, further)

@@ -154,6 +154,10 @@ class Evidence:
         In words, e.g. "sidebands of the driver's shaft, 6 to 12 orders away".
     predicted_db, observed_db, floor_db : float
     speaks_for : bool
+        Whether sign and size are those predicted.
+    is_further : bool
+        Whether it moved the predicted way, and further than predicted: the effect does not explain the rest, which is
+        no evidence against it. `speaks_for` is False then.
     """
 
     feature: str
@@ -161,6 +165,7 @@ class Evidence:
     observed_db: float
     floor_db: float
     speaks_for: bool
+    is_further: bool = False
 
 
 @dataclass(frozen=True)
@@ -258,6 +263,9 @@ class SpectrumCurves:
         Repeatability; where nothing was simulated, the noise beside the lines.
     structural_db : array, (n,)
         How far healthy machines lie from what is compared with, line by line; empty: not known.
+    reference, reference_floor, reference_structural_db : arrays, (n,)
+        Peak amplitudes of the healthy reference, the repeatability floor of both recordings, and how far healthy
+        machines change from one recording to another; empty where there is no reference.
     """
 
     label: str
@@ -268,6 +276,9 @@ class SpectrumCurves:
     after: FloatArray
     floor: FloatArray
     structural_db: FloatArray = field(default_factory=lambda: np.zeros(0))
+    reference: FloatArray = field(default_factory=lambda: np.zeros(0))
+    reference_floor: FloatArray = field(default_factory=lambda: np.zeros(0))
+    reference_structural_db: FloatArray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -293,6 +304,32 @@ class AngleCurves:
     measured: FloatArray
     before: FloatArray
     after: FloatArray
+
+
+@dataclass(frozen=True)
+class AverageCurves:
+    """What tells a shaft's teeth apart in its synchronous average, of the recording and of the healthy reference.
+
+    Parameters
+    ----------
+    shaft, unit, channel : str
+    teeth : int
+    has_mark : bool
+        Whether angle 0 is a mark, so that teeth have numbers.
+    angle_deg : array, (n,)
+    measured, reference : arrays, (n,)
+        Without the mesh harmonics, what lies close to them and the first shaft orders; the reference turned so that
+        the same teeth meet, and its gain matched as far as a slightly other speed or load explains it.
+    """
+
+    shaft: str
+    unit: str
+    channel: str
+    teeth: int
+    has_mark: bool
+    angle_deg: FloatArray
+    measured: FloatArray
+    reference: FloatArray
 
 
 @dataclass(frozen=True)
@@ -347,6 +384,8 @@ class GapReport:
         Best first.
     spectra : tuple of SpectrumCurves
     angles : tuple of AngleCurves
+    averages : tuple of AverageCurves
+        Empty where there is no reference.
     notices : tuple of str
         What the reader should know.
     twin_toml : str
@@ -368,6 +407,7 @@ class GapReport:
     next_recordings: tuple[NextRecording, ...] = ()
     spectra: tuple[SpectrumCurves, ...] = ()
     angles: tuple[AngleCurves, ...] = ()
+    averages: tuple[AverageCurves, ...] = ()
     notices: tuple[str, ...] = ()
     twin_toml: str = field(default="", repr=False)
 
@@ -375,6 +415,15 @@ class GapReport:
     def is_simulated(self) -> bool:
         """Whether a simulator could be set to the rig; without one there are no sizes in floors, no steps, no twin."""
         return bool(self.simulator)
+
+    @property
+    def is_beyond(self) -> bool:
+        """Whether an effect is named, or the whole gap exceeds what sound machines show.
+
+        Single places and lines may exceed their own floors all the same, by chance. True where nothing was simulated:
+        there is no whole then.
+        """
+        return self.outcome in NAMING or not self.size.value <= 1.0
 
     @property
     def verdict(self) -> tuple[str, str, str, str]:

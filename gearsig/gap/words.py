@@ -5,7 +5,7 @@ from __future__ import annotations
 from gearsig.gap.frame import GearFrame
 from gearsig.gap.gear_lines import SIDES
 from gearsig.gap.spots import shaft_words
-from gearsig.gap.types import Shrinkage
+from gearsig.gap.types import Evidence, Shrinkage
 
 _UNITS = {"um": "µm", "deg": "°", "g mm": "g·mm", "N m": "N·m", "m/s^2": "m/s²", "1": ""}
 
@@ -118,3 +118,10 @@ def feature_words(name: str, frame: GearFrame) -> str:
 def hardly_foretold(shrinkage: Shrinkage) -> str:
     """Return what is said of an effect that the simulator does not make large enough to judge."""
     return f"hardly shows on the simulator at these conditions (at most {shrinkage.foretold or 0.0:.2g} floors)"
+
+
+def stance_words(evidence: Evidence) -> str:
+    """Return "speaks for it", "further than foretold" or "speaks against it"."""
+    if evidence.speaks_for:
+        return "speaks for it"
+    return "further than foretold" if evidence.is_further else "speaks against it"

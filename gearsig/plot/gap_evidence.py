@@ -44,7 +44,8 @@ def gap_evidence_figure(evidence: Sequence[Evidence], *, title: str = "") -> Fig
     for row, one in enumerate(shown):
         _draw_row(panel.axes, row, one)
         panel.name(row, one.feature)
-        panel.say(row, "for" if one.speaks_for else "against", colour=style.MESH if one.speaks_for else style.FAULT)
+        text, colour = _stance(one)
+        panel.say(row, text, colour=colour)
     panel.axes.axvline(0.0, color=style.QUIET, linewidth=0.9, zorder=1)
     reach = max(max(abs(e.predicted_db), abs(e.observed_db), e.floor_db) for e in shown)
     lowest = min(min(e.predicted_db, e.observed_db, -e.floor_db) for e in shown)
@@ -54,6 +55,13 @@ def gap_evidence_figure(evidence: Sequence[Evidence], *, title: str = "") -> Fig
     series.legend_row(panel.figure, _keys(), left_in=3.6, top_in=0.46)
     series.headline(panel.figure, title)
     return panel.figure
+
+
+def _stance(one: Evidence) -> tuple[str, str]:
+    """Return what stands beside a row, and its colour."""
+    if one.speaks_for:
+        return "for", style.MESH
+    return ("further", style.QUIET) if one.is_further else ("against", style.FAULT)
 
 
 def _draw_row(axes: Axes, row: int, one: Evidence) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from gearsig.gap.curves import gap_by_order
+from gearsig.gap.curves import gap_by_order, is_beyond
 from gearsig.gap.types import SpectrumCurves
 from gearsig.plot import series, style
 from gearsig.plot.display import unit_text
@@ -28,9 +28,14 @@ LEAST_GAP_DB = 12.0
 
 
 def gap_orders_figure(
-    curves: SpectrumCurves, *, limits: tuple[float, float] | None = None, title: str = "", simulated: str = "simulated"
+    curves: SpectrumCurves,
+    *,
+    limits: tuple[float, float] | None = None,
+    title: str = "",
+    beside: str = "simulated",
+    marked: bool = True,
 ) -> Figure:
-    """Draw measured and simulated order spectra, and below them their difference in dB.
+    """Draw the order spectra of a recording and of what it is compared with, and below them their difference in dB.
 
     Parameters
     ----------
@@ -39,15 +44,17 @@ def gap_orders_figure(
         Orders to show; None: all.
     title : str
         Default: the curves' label.
-    simulated : str
-        What is compared with: "simulated", or "sound".
+    beside : str
+        What `curves.before` is of: "simulated", or "reference", see `gearsig.gap.curves.against_reference`.
+    marked : bool
+        Whether lines beyond the structural floor are told from the others.
 
     Returns
     -------
     Figure
         Above: grey is the repeatability floor; lines below it say nothing. Below: lines above that floor, orange where
-        the gap exceeds the structural floor (grey band), quiet where it does not; green dots: what is left with the
-        likeliest effect, where there was a gap.
+        the gap exceeds the structural floor (grey band) and lines are marked, quiet elsewhere; green dots: what is left
+        with the likeliest effect, where the floor was exceeded.
 
     Raises
     ------
@@ -64,20 +71,20 @@ def gap_orders_figure(
     figure = style.new_figure(TOP_IN + SPECTRA_IN + BETWEEN_IN + GAP_IN + BOTTOM_IN)
     above = style.panel(figure, bottom_in=BOTTOM_IN + GAP_IN + BETWEEN_IN, top_in=TOP_IN)
     below = style.panel(figure, bottom_in=BOTTOM_IN, top_in=TOP_IN + SPECTRA_IN + BETWEEN_IN, sharex=above)
-    keys = _draw_spectra(above, x, curves, simulated)
-    _draw_gap(below, x, curves)
+    keys = _draw_spectra(above, x, curves, beside)
+    _draw_gap(below, x, curves, marked=marked)
     above.set_xlim(low, high)
     above.tick_params(labelbottom=False)
     unit = f" ({unit_text(curves.unit)})" if curves.unit else ""
     style.label_axes(above, "", f"peak amplitude{unit}")
-    style.label_axes(below, "order of the driver's shaft", "gap (dB)", f"measured over {simulated}, against the floors")
+    style.label_axes(below, "order of the driver's shaft", "gap (dB)", f"measured over {beside}, against the floors")
     style.no_offset(below)
     series.legend_row(figure, keys, left_in=0.85, top_in=series.NAMES_AT_IN)
     series.headline(figure, title or curves.label)
     return figure
 
 
-def _draw_spectra(axes: Axes, x: FloatArray, curves: SpectrumCurves, simulated: str) -> list[Line2D]:
+def _draw_spectra(axes: Axes, x: FloatArray, curves: SpectrumCurves, beside: str) -> list[Line2D]:
     top = max(float(curves.measured.max()), float(curves.before.max())) or 1.0
     bottom = max(top / 10.0**DECADES, 0.3 * float(np.median(curves.floor)))
     axes.set_yscale("log")
@@ -87,8 +94,9 @@ def _draw_spectra(axes: Axes, x: FloatArray, curves: SpectrumCurves, simulated: 
     drawn: list[tuple[FloatArray, str, float, str | tuple[float, tuple[float, float]], str]]
     drawn = [(curves.measured, style.MEASURED, 1.1, "-", "measured")]
     if len(curves.after):
-        drawn.append((curves.after, style.MESH, 2.0, "-", f"{simulated} with the effect"))
-    drawn.append((curves.before, style.INK, 0.9, (0.0, (3.0, 2.0)), f"{simulated} before"))
+        drawn.append((curves.after, style.MESH, 2.0, "-", f"{beside} with the effect"))
+    name = f"{beside} before" if len(curves.after) else beside
+    drawn.append((curves.before, style.INK, 0.9, (0.0, (3.0, 2.0)), name))
     lines = []
     for values, colour, width, dashes, label in drawn:
         points = thin(x, np.maximum(values, bottom), N_POINTS)
@@ -97,15 +105,16 @@ def _draw_spectra(axes: Axes, x: FloatArray, curves: SpectrumCurves, simulated: 
     return [*lines, *floor]
 
 
-def _draw_gap(axes: Axes, x: FloatArray, curves: SpectrumCurves) -> None:
+def _draw_gap(axes: Axes, x: FloatArray, curves: SpectrumCurves, *, marked: bool) -> None:
     before = gap_by_order(curves, curves.before)
     structural = curves.structural_db if len(curves.structural_db) else np.zeros(len(x))
-    beyond = np.abs(np.nan_to_num(before)) > structural
+    beyond = is_beyond(curves, before)
     largest = 1.15 * max(LEAST_GAP_DB, float(np.max(np.abs(before), initial=0.0, where=np.isfinite(before))))
     if len(curves.structural_db):
         band = np.minimum(structural, largest)
         axes.fill_between(x, -band, band, step="mid", color=style.FLOOR, alpha=0.22, linewidth=0, zorder=1)
-    for chosen, colour, alpha in ((~beyond, style.QUIET, 0.55), (beyond, style.FAULT, 0.95)):
+    strong = beyond & marked
+    for chosen, colour, alpha in ((~strong, style.QUIET, 0.55), (strong, style.FAULT, 0.95)):
         here = chosen & np.isfinite(before)
         axes.vlines(x[here], 0.0, before[here], colors=colour, linewidth=1.0, alpha=alpha, zorder=2)
     if len(curves.after):

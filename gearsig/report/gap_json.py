@@ -13,6 +13,7 @@ from gearsig import __version__
 from gearsig.gap.simulator import Added
 from gearsig.gap.types import (
     AngleCurves,
+    AverageCurves,
     ConditionFacts,
     GapCause,
     GapPlace,
@@ -60,6 +61,7 @@ def gap_to_dict(report: GapReport) -> Json:
         "next_recordings": [_next_recording(one) for one in report.next_recordings],
         "spectra": [_spectrum(curves) for curves in report.spectra],
         "angles": [_angles(curves) for curves in report.angles],
+        "averages": [_average(curves) for curves in report.averages],
         "notices": list(report.notices),
         "twin_toml": report.twin_toml or None,
     }
@@ -143,6 +145,9 @@ def _spectrum(curves: SpectrumCurves) -> Json:
         "after": plain(curves.after) or None,
         "floor": plain(curves.floor),
         "structural_floor_db": plain(curves.structural_db) or None,
+        "reference": plain(curves.reference) or None,
+        "reference_floor": plain(curves.reference_floor) or None,
+        "reference_structural_floor_db": plain(curves.reference_structural_db) or None,
     }
 
 
@@ -154,4 +159,12 @@ def _angles(curves: AngleCurves) -> Json:
         "n_teeth": curves.teeth,
         **members(curves, "has_mark", "angle_deg", "measured", "before"),
         "after": plain(curves.after) or None,
+    }
+
+
+def _average(curves: AverageCurves) -> Json:
+    return {
+        **members(curves, "shaft", "channel", "unit"),
+        "n_teeth": curves.teeth,
+        **members(curves, "has_mark", "angle_deg", "measured", "reference"),
     }

@@ -8,7 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gearsig.gap.types import AngleCurves, GapReport, PlaceKind, SpectrumCurves
+from gearsig.gap.curves import against_reference, lines_beyond
+from gearsig.gap.types import AngleCurves, AverageCurves, GapReport, PlaceKind, SpectrumCurves
 from gearsig.plot.embed import Picture, embed
 from gearsig.plot.marks import AngleMark
 from gearsig.report.gap_sections import detailed_causes
@@ -76,10 +77,42 @@ def gap_figures(report: GapReport) -> Iterator[GapFigure]:
 
     Shares of places and probabilities of causes are no figures: page and dashboard write them as lists with bars.
     """
+    yield from _against_reference(report)
     yield from _spectra(report)
     yield from _teeth(report)
     yield from _evidence(report)
     yield from _waterfall(report)
+
+
+def _against_reference(report: GapReport) -> Iterator[GapFigure]:
+    """Draw what was scored where there is a reference: what has changed since."""
+    from gearsig.plot.gap_averages import gap_averages_figure
+    from gearsig.plot.gap_orders import gap_orders_figure
+
+    for curves in report.spectra:
+        if not len(curves.orders) or not len(curves.reference) or not is_finite(curves):
+            continue
+        view = against_reference(curves)
+        yield GapFigure(
+            "where",
+            gap_orders_figure(
+                view, beside="reference", marked=report.is_beyond, title=f"{curves.label}: recording against reference"
+            ),
+            "Above, lines in the grey repeatability floor say nothing. Below, what has changed since the reference, "
+            f"line by line. {_beyond_text(report, view)}",
+            f"Order spectrum, {curves.label}: recording, healthy reference, and their difference in dB.",
+        )
+    for average in report.averages:
+        if len(average.angle_deg) and is_finite(average):
+            yield GapFigure(
+                "where",
+                gap_averages_figure(average, mark=_mark(report, average)),
+                f"One mean revolution of shaft {average.shaft} without what all teeth have in common, on the sensor "
+                "where most has changed. What one tooth does otherwise stands at its angle; noise and other speeds "
+                "leave a little everywhere.",
+                f"Synchronous average of shaft {average.shaft} without mesh harmonics: recording, healthy reference, "
+                "and their difference.",
+            )
 
 
 def _spectra(report: GapReport) -> Iterator[GapFigure]:
@@ -91,14 +124,36 @@ def _spectra(report: GapReport) -> Iterator[GapFigure]:
         if not len(curves.before):
             yield _lines(report, curves)
             continue
+        scored = not len(curves.reference)
+        title = curves.label if scored else f"{curves.label}: recording against simulation"
+        beyond = _beyond_text(report, curves) if scored else NOT_SCORED
         left = " Green dots: what is left with the likeliest effect." if len(curves.after) else ""
         yield GapFigure(
             "where",
-            gap_orders_figure(curves),
-            "Above, lines in the grey repeatability floor say nothing. Below, the gap line by line: orange where it "
-            f"exceeds the structural floor.{left}",
+            gap_orders_figure(curves, marked=scored and report.is_beyond, title=title),
+            f"Above, lines in the grey repeatability floor say nothing. Below, the gap line by line. {beyond}{left}",
             f"Order spectrum, {curves.label}: measured, simulated, and their difference in dB.",
         )
+
+
+NOT_SCORED = "No line is marked: with a reference, only what has changed since it is scored."
+
+
+def _beyond_text(report: GapReport, curves: SpectrumCurves) -> str:
+    """Say what orange means, and how many lines exceed their floors; or why none is marked."""
+    n, n_all = lines_beyond(curves)
+    if not len(curves.structural_db):
+        return "Orange: above the repeatability floor; how far sound machines differ is not known line by line."
+    many = f"{n} of {n_all} lines"
+    if not report.is_beyond:
+        return (
+            f"The whole gap is within one structural floor, so that no line is marked. {many} alone exceed it (grey "
+            "band): it is the floor of the features that are scored, and single lines scatter more."
+        )
+    return (
+        f"Orange: {many}, which exceed the structural floor (grey band). Single lines scatter more than the features "
+        "that are scored: some exceed it on sound machines, too."
+    )
 
 
 def _lines(report: GapReport, curves: SpectrumCurves) -> GapFigure:
@@ -133,7 +188,7 @@ def _teeth(report: GapReport) -> Iterator[GapFigure]:
         )
 
 
-def _mark(report: GapReport, curves: AngleCurves) -> AngleMark | None:
+def _mark(report: GapReport, curves: AngleCurves | AverageCurves) -> AngleMark | None:
     """Return the tooth that the gap names on this shaft."""
     for place in report.places:
         if place.kind is PlaceKind.TOOTH and place.shaft == curves.shaft and place.angle_deg is not None:
@@ -155,7 +210,8 @@ def _evidence(report: GapReport) -> Iterator[GapFigure]:
             yield GapFigure(
                 "which",
                 gap_evidence_figure(evidence),
-                "Where diamond and bar end together, sign and size are right. Grey: what a healthy machine may change.",
+                "Where diamond and bar end together, sign and size are right; further: it moved the foretold way, and "
+                "more. Grey: what a healthy machine may change.",
                 f"Predicted and observed changes of the own features of {cause.title}.",
                 of=cause.name,
                 vector=True,

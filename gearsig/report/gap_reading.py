@@ -14,6 +14,7 @@ from gearsig.errors import InputError
 from gearsig.gap.simulator import Added, Point
 from gearsig.gap.types import (
     AngleCurves,
+    AverageCurves,
     ConditionFacts,
     Evidence,
     GapCause,
@@ -82,6 +83,7 @@ def gap_from_dict(found: Json) -> GapReport:
         next_recordings=tuple(_next_recording(item) for item in found["next_recordings"]),
         spectra=tuple(_spectrum(item) for item in found["spectra"]),
         angles=tuple(_angles(item) for item in found["angles"]),
+        averages=tuple(_average(item) for item in found.get("averages", ())),
         notices=tuple(found["notices"]),
         twin_toml=found["twin_toml"] or "",
     )
@@ -166,7 +168,7 @@ def _shrinkage(found: Json) -> Shrinkage:
 
 def _evidence(found: Json) -> Evidence:
     predicted, observed, floor = (_number(found[key]) for key in ("predicted_db", "observed_db", "floor_db"))
-    return Evidence(found["feature"], predicted, observed, floor, found["speaks_for"])
+    return Evidence(found["feature"], predicted, observed, floor, found["speaks_for"], found.get("is_further", False))
 
 
 def _next_recording(found: Json) -> NextRecording:
@@ -176,9 +178,15 @@ def _next_recording(found: Json) -> NextRecording:
 
 def _spectrum(found: Json) -> SpectrumCurves:
     curves = (_numbers(found[key]) for key in ("orders", "measured", "before", "after", "floor", "structural_floor_db"))
-    return SpectrumCurves(found["label"], found["unit"], *curves)
+    names = ("reference", "reference_floor", "reference_structural_floor_db")  # earlier versions have none
+    return SpectrumCurves(found["label"], found["unit"], *curves, *(_numbers(found.get(name)) for name in names))
 
 
 def _angles(found: Json) -> AngleCurves:
     curves = (_numbers(found[key]) for key in ("angle_deg", "measured", "before", "after"))
     return AngleCurves(found["shaft"], found["of"], found["n_teeth"], found["has_mark"], *curves)
+
+
+def _average(found: Json) -> AverageCurves:
+    curves = (_numbers(found[key]) for key in ("angle_deg", "measured", "reference"))
+    return AverageCurves(found["shaft"], found["unit"], found["channel"], found["n_teeth"], found["has_mark"], *curves)

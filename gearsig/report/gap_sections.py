@@ -20,7 +20,7 @@ from gearsig.gap.types import (
     Interval,
     Shrinkage,
 )
-from gearsig.gap.words import hardly_foretold, severity_unit
+from gearsig.gap.words import hardly_foretold, severity_unit, stance_words
 from gearsig.report.gap_text import point_text
 from gearsig.report.numbers import readable
 from gearsig.report.sections import Rows, named
@@ -55,13 +55,15 @@ class PlaceRow:
 
 @dataclass(frozen=True)
 class EvidenceRow:
-    """A predicted change beside the observed one, in dB."""
+    """A predicted change beside the observed one, in dB; the stance in words, its sign, and the class of its look."""
 
     feature: str
     predicted: str
     observed: str
     floor: str
-    speaks_for: bool
+    stance: str
+    sign: str
+    look: str
 
 
 @dataclass(frozen=True)
@@ -239,12 +241,15 @@ def _elsewhere_statement(shrink: float) -> str:
 
 
 def _evidence_row(one: Evidence) -> EvidenceRow:
+    sign, look = ("✓", "for") if one.speaks_for else ("↗", "further") if one.is_further else ("✗", "against")
     return EvidenceRow(
         one.feature,
         signed(one.predicted_db),
         signed(one.observed_db),
         readable(one.floor_db, 2),
-        one.speaks_for,
+        stance_words(one),
+        sign,
+        look,
     )
 
 

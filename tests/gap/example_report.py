@@ -9,6 +9,7 @@ import numpy as np
 from gearsig.gap.simulator import Added, Point
 from gearsig.gap.types import (
     AngleCurves,
+    AverageCurves,
     ConditionFacts,
     Evidence,
     GapCause,
@@ -55,8 +56,11 @@ def effect_report(rig: str = RIG, simulator: str = "cracked") -> GapReport:
             GapStep("crack in a tooth root", Interval(1.6, 1.2, 2.1)),
         ),
         next_recordings=next_recordings(),
-        spectra=(spectrum("residual of sensor a1"), spectrum("residual of sensor a2", seed=1)),
+        spectra=tuple(
+            with_reference(spectrum(label, seed)) for seed, label in enumerate(("residual of a1", "residual of a2"))
+        ),
         angles=(angles("input", 55, tooth=21), angles("output", 75)),
+        averages=(average("input", 55, tooth=21), average("output", 75)),
         notices=("The mean torque is the rig file's; it was not measured.",),
         twin_toml=TWIN,
     )
@@ -75,6 +79,8 @@ def cannot_separate_report() -> GapReport:
         causes=(shaken, rival, replace(third, probability=0.06), GapCause("unknown", "", "unknown", "", 0.05)),
         inseparable=("root_crack", "tooth_spall"),
         twin_toml="",
+        spectra=(spectrum("residual of a1"), spectrum("residual of a2", seed=1)),
+        averages=(),
         angles=(replace(angles("input", 55, tooth=21), has_mark=False),),
     )
 
@@ -125,7 +131,10 @@ def no_gap_report() -> GapReport:
         next_recordings=(),
         twin_toml="",
         notices=(),
-        spectra=tuple(replace(s, after=np.zeros(0), measured=1.05 * s.before) for s in report.spectra),
+        spectra=tuple(
+            replace(s, after=np.zeros(0), measured=1.05 * s.before, reference=s.before) for s in report.spectra
+        ),
+        averages=tuple(replace(a, measured=a.reference) for a in report.averages),
         angles=tuple(replace(a, after=np.zeros(0), measured=a.before) for a in report.angles),
     )
 
@@ -267,6 +276,7 @@ def causes() -> tuple[GapCause, ...]:
                 Evidence("kurtosis of the input shaft's residual average", 11.8, 12.4, 1.1, speaks_for=True),
                 Evidence("sidebands of the input shaft, 1 to 6 orders away", 8.0, 9.1, 1.4, speaks_for=True),
                 Evidence("envelope line at 1 × input shaft", 5.9, 6.8, 1.9, speaks_for=True),
+                Evidence("middle of the spectrum", 2.0, 7.0, 1.3, speaks_for=False, is_further=True),
                 Evidence("level of the mesh harmonics", 0.4, 2.3, 1.2, speaks_for=False),
             ),
         ),
@@ -340,6 +350,27 @@ def spectrum(label: str, seed: int = 0) -> SpectrumCurves:
         np.full_like(orders, 0.006),
         np.full_like(orders, 3.0),
     )
+
+
+def with_reference(curves: SpectrumCurves) -> SpectrumCurves:
+    """Return the curves with a reference that is as the simulation before, a little stronger."""
+    return replace(
+        curves,
+        reference=1.02 * curves.before,
+        reference_floor=np.full_like(curves.orders, 0.008),
+        reference_structural_db=np.full_like(curves.orders, 2.0),
+    )
+
+
+def average(shaft: str, teeth: int, tooth: int | None = None) -> AverageCurves:
+    """Return teeth that differ a little, and a burst at a tooth where one is given."""
+    angle = np.arange(1440) / 4.0
+    born = 2.0 * np.sin(np.radians(31 * angle)) + np.sin(np.radians(17 * angle))
+    burst = np.zeros_like(angle)
+    if tooth is not None:
+        away = angle - (tooth - 0.5) * 360.0 / teeth
+        burst = 12.0 * np.exp(-((away / 3.0) ** 2)) * np.cos(np.radians(110 * away))
+    return AverageCurves(shaft, "m/s^2", "a1", teeth, True, angle, born + burst, born)
 
 
 def angles(shaft: str, teeth: int, tooth: int | None = None) -> AngleCurves:

@@ -5,8 +5,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from gearsig.gap.average_curves import average_curves
 from gearsig.gap.change import difference_features
-from gearsig.gap.curves import angle_curves, gap_by_order, spectrum_curves
+from gearsig.gap.curves import against_reference, angle_curves, gap_by_order, lines_beyond, spectrum_curves
 from gearsig.gap.floors import StructuralFloor
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
@@ -97,3 +98,49 @@ def test_without_a_mark_simulated_curves_are_turned_to_the_measured() -> None:
     simulated = gather(record(lambda _, r: 1.5 * ringing(RATIO * r - 0.7), seed=2), RIG)
     driven = angle_curves(measured, simulated)[1]
     assert abs(int(np.argmax(driven.measured)) - int(np.argmax(driven.before))) <= 1
+
+
+def test_the_reference_stands_beside_recording_and_simulation() -> None:
+    reference = gather(record(seed=7), RIG)
+    change = difference_features(knocking(), sound())
+    floor = StructuralFloor(change.names, np.full(len(change.names), 2.0))
+    for curves in spectrum_curves(knocking(), sound(), reference=reference, reference_structural=floor):
+        assert len(curves.reference) == len(curves.reference_floor) == len(curves.orders)
+        assert len(curves.reference_structural_db) == len(curves.orders)
+        assert not len(curves.structural_db)
+        view = against_reference(curves)
+        np.testing.assert_array_equal(view.before, curves.reference)
+        assert not len(view.after)
+    without = spectrum_curves(knocking(), sound())[0]
+    assert not len(without.reference)
+    assert not len(without.reference_floor)
+    driver = spectrum_curves(sound(), knocking(), reference=reference)[0]  # the simulation, not the reference, knocks
+    assert np.nanmax(np.abs(gap_by_order(against_reference(driver), driver.reference))) < 6.0
+    assert np.nanmax(np.abs(gap_by_order(driver, driver.before))) > 10.0
+
+
+def test_lines_beyond_their_floor_are_counted_of_those_that_are_seen() -> None:
+    orders, floor = np.arange(5.0), np.full(5, 0.1)
+    measured, before = np.array([10.0, 1.1, 1.0, 0.05, 0.01]), np.array([1.0, 1.0, 4.0, 0.01, 0.01])
+    curves = SpectrumCurves("a", "", orders, measured, before, np.zeros(0), floor, structural_db=np.full(5, 6.0))
+    assert lines_beyond(curves) == (2, 3)
+
+
+def test_averages_differ_where_the_knock_is() -> None:
+    curves = average_curves(knocking(), sound(), unit="m/s^2")[0]
+    changed = np.abs(curves.measured - curves.reference)
+    away = (curves.angle_deg[np.argmax(changed)] - 0.4 * 360 + 180) % 360 - 180
+    assert abs(away) < 360 / TEETH[0]
+    assert (curves.shaft, curves.teeth, curves.unit) == ("in", TEETH[0], "m/s^2")
+    assert curves.channel in ("a1", "a2")
+    elsewhere = np.abs((curves.angle_deg - 0.4 * 360 + 180) % 360 - 180) > 120
+    assert changed[elsewhere].max() < 0.3 * changed.max()
+
+
+def test_averages_are_peak_amplitudes_of_what_was_put_in() -> None:
+    """A line between the mesh harmonics, 1.5 m/s² in the recording and none in the reference."""
+    order = TEETH[0] + 9
+    added = gather(record(lambda _, r: 1.5 * np.cos(2 * np.pi * order * r), seed=3), RIG)
+    curves = average_curves(added, sound())[0]
+    change = curves.measured - curves.reference
+    assert np.sqrt(2.0 * np.mean(change**2)) == pytest.approx(1.5, rel=0.05)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.gap.evidence import MOST_OF_A_FAMILY, evidence_of
+from gearsig.gap.evidence import MOST_OF_A_FAMILY, evidence_of, weighed_evidence
 from gearsig.gap.frame import gear_frame
 from gearsig.gap.prediction import EffectPath, Fit, Observed
 from gearsig.gap.types import Evidence, Interval
@@ -36,3 +36,26 @@ def test_what_it_would_change_comes_before_a_change_that_is_not_its_own() -> Non
 
 def test_what_stays_within_the_floor_on_both_sides_says_nothing() -> None:
     assert told([0.6] * 6, [0.9] * 6) == ()
+
+
+def test_what_moved_further_than_foretold_is_not_against_it() -> None:
+    said = {
+        (5.0, 12.0): (False, True),  # the right way, more than twice as far
+        (-5.0, -12.0): (False, True),
+        (5.0, 9.0): (True, False),
+        (5.0, 1.0): (False, False),  # it did not come
+        (5.0, -12.0): (False, False),  # the other way
+        (0.5, 12.0): (False, False),  # not predicted beyond the floor
+        (0.0, 12.0): (False, False),
+    }
+    for (predicted, observed), stance in said.items():
+        one = weighed_evidence("kurtosis", predicted, observed, 1.0)
+        assert (one.speaks_for, one.is_further) == stance, (predicted, observed)
+
+
+def test_small_predictions_speak_for_an_effect_by_their_size_alone() -> None:
+    """Where they count from 0.3 floors on, the other sign is within the floor, and no agreement."""
+    assert weighed_evidence("level", 0.4, 0.6, 1.0, least=0.3).speaks_for
+    for observed in (-0.5, 5.0):
+        one = weighed_evidence("level", 0.4, observed, 1.0, least=0.3)
+        assert (one.speaks_for, one.is_further) == (False, False)

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
+from gearsig.gap.curves import against_reference
 from gearsig.gap.types import AngleCurves, GapCause, GapStep, Interval, SpectrumCurves
+from gearsig.plot.gap_averages import gap_averages_figure
 from gearsig.plot.gap_causes import gap_causes_figure
 from gearsig.plot.gap_evidence import gap_evidence_figure
 from gearsig.plot.gap_lines import gap_lines_figure
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 REPORT = effect_report()
+STANCES = ("for", "further", "against")
 LONG = (
     "sidebands of the intermediate shaft of the second stage about 3 × mesh, up by 14 dB, nearest lines only, and more"
 )
@@ -61,6 +64,7 @@ MADE: dict[str, Callable[[], Any]] = {
     "waterfall": lambda: gap_waterfall_figure(REPORT.steps, held_out="another operating condition", title="How far"),
     "evidence": lambda: gap_evidence_figure(REPORT.causes[0].evidence, title="Predicted against observed"),
     "causes": lambda: gap_causes_figure([replace(REPORT.causes[0], title=LONG), *REPORT.causes[1:]], title="Which"),
+    "averages": lambda: gap_averages_figure(REPORT.averages[0], mark=AngleMark(134.2, "tooth 21")),
     "orders": lambda: gap_orders_figure(REPORT.spectra[0], limits=(40.0, 130.0)),
     "lines": lambda: gap_lines_figure(gearless_report().spectra[0], 3.21),
     "teeth": lambda: gap_teeth_figure(REPORT.angles[0], mark=AngleMark(134.2, "tooth 21, 134°")),
@@ -87,7 +91,7 @@ def test_evidence_stands_beside_its_prediction() -> None:
     axes = figure.axes[0]
     diamonds = [float(np.asarray(line.get_xdata())[0]) for line in axes.lines if line.get_marker() == "D"]
     assert diamonds == pytest.approx([one.predicted_db for one in REPORT.causes[0].evidence])
-    assert [t for t in texts(figure) if t in ("for", "against")] == ["for", "for", "for", "against"]
+    assert [t for t in texts(figure) if t in STANCES] == ["for", "for", "for", "further", "against"]
 
 
 def test_unlikely_causes_are_added_up() -> None:
@@ -112,6 +116,30 @@ def test_lines_beyond_the_structural_floor_are_orange() -> None:
     assert [segment[0][0] for segment in strong.get_segments()] == [4.0]
     assert strong.get_segments()[0][1][1] == pytest.approx(20.0)
     assert len(quiet.get_segments()) == 9
+    quiet, strong = (
+        c for c in gap_orders_figure(curves, marked=False).axes[1].collections if isinstance(c, LineCollection)
+    )
+    assert len(quiet.get_segments()) == 10
+    assert not strong.get_segments()
+
+
+def test_what_is_compared_with_has_its_name() -> None:
+    view = against_reference(REPORT.spectra[0])
+    assert {"measured", "reference", "repeatability floor"} <= set(texts(gap_orders_figure(view, beside="reference")))
+    assert "simulated" in texts(gap_orders_figure(replace(REPORT.spectra[0], after=np.zeros(0))))
+    assert "simulated before" in texts(gap_orders_figure(REPORT.spectra[0]))
+
+
+def test_averages_and_their_difference_are_on_one_scale() -> None:
+    curves = REPORT.averages[0]
+    above, below = gap_averages_figure(curves).axes
+    assert above.get_ylim() == below.get_ylim()
+    drawn = {str(line.get_label()): np.asarray(line.get_ydata()) for line in (*above.lines, *below.lines)}
+    change = curves.measured - curves.reference
+    assert drawn["measured less reference"].max() == pytest.approx(change.max())
+    assert drawn["reference"].max() == pytest.approx(curves.reference.max())
+    with pytest.raises(InputError, match="points"):
+        gap_averages_figure(replace(curves, reference=np.ones(3)))
 
 
 def test_multiples_of_the_found_order_are_marked_without_a_simulation() -> None:

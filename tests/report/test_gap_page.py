@@ -9,9 +9,11 @@ import html5lib
 import numpy as np
 import pytest
 
+from gearsig.gap.curves import lines_beyond
 from gearsig.gap.simulator import Point
 from gearsig.gap.types import ConditionFacts, Evidence, GapCause, GapOutcome, GapStep, Interval
 from gearsig.report.gap_page import gap_page_html, write_gap_page
+from gearsig.report.gap_pictures import gap_figures
 from gearsig.report.gap_sections import cause_rows, floors_text
 from gearsig.report.gap_text import condition_advice, gap_text, n_conditions
 from tests.gap.example_report import (
@@ -72,6 +74,7 @@ def test_everything_about_an_effect_is_said(pages):
         "In a wrong place (placebo) it takes away at most 6 %.",
         "kurtosis of the input shaft's residual average ✓ speaks for it +11.8 +12.4 1.1",
         "level of the mesh harmonics ✗ speaks against it",
+        "middle of the spectrum ↗ further than foretold +2.0 +7.0 1.3",
         "+ crack in a tooth root 1.6 1.2 to 2.1 −4.0",
         "900 rpm and 120 N·m crack in a tooth root / spall on a tooth flank 5.4 1.6",
         "condition_2.h5 1998.7 60 199.9 6 20000",
@@ -223,3 +226,30 @@ def test_it_says_what_is_compared_with():
     assert "from one recording to another" in floors_text(with_reference)
     assert "what the simulation of the sound machine lets expect" in floors_text(without)
     assert floors_text(gearless_report()) == ""
+
+
+def captions(report):
+    return [one.look for one in gap_figures(report)]
+
+
+def test_recording_and_reference_are_drawn_where_there_is_one(pages):
+    text = text_of(pages["effect"])
+    assert "what has changed since the reference, line by line" in text
+    assert text.count("One mean revolution of shaft") == 2
+    assert text.count("No line is marked: with a reference, only what has changed since it is scored.") == 2
+    without = text_of(pages["cannot separate"])
+    assert "the reference, line by line" not in without
+    assert "only what has changed since it is scored" not in without
+
+
+def test_no_line_is_marked_where_the_whole_gap_is_within_a_floor():
+    report = cannot_separate_report()
+    n, n_all = lines_beyond(report.spectra[0])
+    assert n > 0
+    assert any(f"Orange: {n} of {n_all} lines, which exceed" in text for text in captions(report))
+    small = replace(report, outcome=GapOutcome.UNDECIDED, size=Interval(0.8, 0.7, 0.9))
+    assert not small.is_beyond
+    (first, *_) = captions(small)
+    assert f"so that no line is marked. {n} of {n_all} lines alone exceed it" in first
+    assert replace(small, outcome=GapOutcome.EFFECT).is_beyond
+    assert gearless_report().is_beyond

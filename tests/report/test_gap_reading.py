@@ -18,12 +18,29 @@ REPORTS = all_reports()
 def test_there_and_back(outcome, tmp_path):
     report = REPORTS[outcome]
     again = read_gap_json(write_gap_json(report, tmp_path / "gap.json"))
-    plain = {"spectra": (), "angles": ()}
+    plain = {"spectra": (), "angles": (), "averages": ()}
     np.testing.assert_equal(asdict(replace(again, **plain)), asdict(replace(report, **plain)))
     for one, other in zip((*again.spectra, *again.angles), (*report.spectra, *report.angles), strict=True):
         np.testing.assert_allclose(one.measured, other.measured, rtol=1e-8)
         np.testing.assert_allclose(one.after, other.after, rtol=1e-8)
+    for one, other in zip((*again.spectra, *again.averages), (*report.spectra, *report.averages), strict=True):
+        np.testing.assert_allclose(one.reference, other.reference, rtol=1e-8)
     assert gap_to_dict(again) == gap_to_dict(report)
+
+
+def test_reports_of_earlier_versions_have_no_reference_curves():
+    found = gap_to_dict(effect_report())
+    del found["averages"]
+    for curves in found["spectra"]:
+        for name in ("reference", "reference_floor", "reference_structural_floor_db"):
+            del curves[name]
+    for cause in found["causes"]:
+        for one in cause["evidence"]:
+            del one["is_further"]
+    again = gap_from_dict(found)
+    assert again.averages == ()
+    assert not any(len(curves.reference) for curves in again.spectra)
+    assert not any(one.is_further for cause in again.causes for one in cause.evidence)
 
 
 def test_null_is_nan():

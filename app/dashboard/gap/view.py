@@ -149,7 +149,7 @@ def _show_evidence(row: CauseRow, finished: Finished) -> None:
                 "predicted (dB)": [one.predicted for one in row.evidence],
                 "observed (dB)": [one.observed for one in row.evidence],
                 "floor (dB)": [one.floor for one in row.evidence],
-                "speaks": ["✓ for it" if one.speaks_for else "✗ against it" for one in row.evidence],
+                "speaks": [f"{one.sign} {one.stance.removeprefix('speaks ')}" for one in row.evidence],
             }
         )
 

@@ -15,6 +15,7 @@ from app.gap.start_stop.next_recording import next_drive_recordings
 from app.gap.start_stop.places import FEATURES, drive_places
 from app.gap.start_stop.predict import Predictions
 from app.gap.start_stop.weighing import Seen, Weighed
+from gearsig.gap.evidence import weighed_evidence
 from gearsig.gap.simulator import Added, GapEffect, Point
 from gearsig.gap.start_stop.floors import FLOOR, DriveFloor
 from gearsig.gap.start_stop.told import NAMES
@@ -154,13 +155,7 @@ def _evidence(fitted: Fitted, change: np.ndarray, floor: DriveFloor) -> tuple[Ev
     told = [i for i in np.argsort(-size) if np.isfinite(change[i])]
     kept = [i for i in told if abs(predicted[i]) > SMALLEST * limit[i] or size[i] > 1.0][:MOST_EVIDENCE]
     return tuple(
-        Evidence(
-            FEATURES[NAMES[i]],
-            float(predicted[i]),
-            float(observed[i]),
-            float(limit[i]),
-            bool(abs(predicted[i]) > SMALLEST * limit[i] and 0.5 <= observed[i] / predicted[i] <= 2.0),
-        )
+        weighed_evidence(FEATURES[NAMES[i]], float(predicted[i]), float(observed[i]), float(limit[i]), least=SMALLEST)
         for i in kept
     )
 
