@@ -8,7 +8,17 @@ import numpy as np
 
 from app.gap.gearless_causes import causes_of
 from app.gap.prepare import Stage
-from app.gap.standing_out import LINE, PARTS, RACES, Examined, Standing, analysed, examined, surest
+from app.gap.standing_out import (
+    LINE,
+    PARTS,
+    RACES,
+    Examined,
+    Standing,
+    analysed,
+    examined,
+    shafts_of_unknown_speed,
+    surest,
+)
 from app.gap.standing_places import NAN, standing_place
 from gearsig.diagnosis.types import Kind
 from gearsig.gap.simulator import GapEffect, Point
@@ -97,10 +107,23 @@ def diagnose_gearless(
             NOT_SIMULATED,
             HOW_SURE,
             *hint,
+            *_loose_shafts(rigs[0]),
             *_limits(standing, every),
             *(text for one in every for text in one.notices),
         ),
     )
+
+
+def _loose_shafts(rig: Rig) -> list[str]:
+    """Say which shafts' orders, and those of their bearings, are not known."""
+    loose = shafts_of_unknown_speed(rig)
+    if not loose:
+        return []
+    remark = (
+        f"The rig file does not tell the speed of {loose}, as it names no gear pair: what turns with it is taken for "
+        "something strange, and its bearings were not looked for. Give the teeth of the pair."
+    )
+    return [remark]
 
 
 def _limits(standing: Sequence[Standing], every: Sequence[Examined]) -> list[str]:

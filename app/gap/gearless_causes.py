@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from app.gap.standing_out import IMPACTS, LINE, PARTS, RACES, Examined, Standing, bearings_text
+from app.gap.standing_out import IMPACTS, LINE, PARTS, RACES, Examined, Standing, bearings_text, shafts_of_unknown_speed
 from gearsig.diagnosis.types import Finding, Kind
 from gearsig.gap.simulator import GapEffect
 from gearsig.gap.types import NONE, UNKNOWN, GapCause, GapOutcome
@@ -38,7 +38,7 @@ def causes_of(
         Those that may be named.
     """
     races = {name: one for one in reversed(standing) if (name := RACES.get(one.finding.code, "")) in effects}
-    outcome, why = _outcome(standing, races, every)
+    outcome, why = _outcome(standing, races, every, rig)
     total = sum(one.finding.confidence for one in races.values())
     left = 1.0 - min(total, 1.0)
     unknown = left * _share_of_unknown(standing, races, every)
@@ -70,12 +70,12 @@ def _sure(races: Races) -> list[Standing]:
     return sorted(found, key=lambda one: -one.finding.confidence)
 
 
-def _outcome(standing: Sequence[Standing], races: Races, every: Sequence[Examined]) -> tuple[GapOutcome, str]:
+def _outcome(standing: Sequence[Standing], races: Races, every: Sequence[Examined], rig: Rig) -> tuple[GapOutcome, str]:
     """Return the outcome and its reason."""
     if _sure(races):
         return GapOutcome.EFFECT, ""
     if standing:
-        return GapOutcome.UNKNOWN, _why_unknown(standing[0], races)
+        return GapOutcome.UNKNOWN, _why_unknown(standing[0], races, rig)
     if all(one.reference is not None for one in every):
         return GapOutcome.NO_GAP, "nothing stands out that the healthy reference does not show"
     if all(one.is_sound for one in every):
@@ -83,7 +83,7 @@ def _outcome(standing: Sequence[Standing], races: Races, every: Sequence[Examine
     return GapOutcome.UNKNOWN, "nothing stands out, but damage of a race might not have"
 
 
-def _why_unknown(one: Standing, races: Races) -> str:
+def _why_unknown(one: Standing, races: Races, rig: Rig) -> str:
     code = one.finding.code
     if code in RACES:
         is_known = one in races.values()
@@ -92,7 +92,9 @@ def _why_unknown(one: Standing, races: Races) -> str:
         )
     if code in PARTS:
         return f"damage of a {PARTS[code][0]} is not in the catalogue"
-    return "what makes the line is not known" if code == LINE else "what makes the impacts is not known"
+    why = "what makes the line is not known" if code == LINE else "what makes the impacts is not known"
+    loose = shafts_of_unknown_speed(rig)
+    return f"{why}; it may turn with {loose}, whose speed the rig file does not tell" if loose else why
 
 
 def _share_of_unknown(standing: Sequence[Standing], races: Races, every: Sequence[Examined]) -> float:

@@ -156,6 +156,11 @@ def bearings_text(finding: Finding, rig: Rig) -> str:
     return named("bearing", " or ".join(alike))
 
 
+def shafts_of_unknown_speed(rig: Rig) -> str:
+    """Name the shafts whose speed the rig file does not tell, as those of a gear pair left out; empty: none."""
+    return named("shaft", " and ".join(shaft.name for shaft in rig.shafts if rig.ratio(shaft.name) is None))
+
+
 def _sureness(one: Standing) -> tuple[float, float]:
     return one.finding.confidence, one.over_floor_db
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.gap.standing_out import LINE, PARTS, Standing, bearings_text
+from app.gap.standing_out import LINE, PARTS, Standing, bearings_text, shafts_of_unknown_speed
 from gearsig.gap.spots import band_words, hertz
 from gearsig.gap.types import GapPlace, PlaceKind
 from gearsig.report.gap_sections import signed
@@ -49,6 +49,8 @@ def _what(one: Standing, rig: Rig) -> str:
         return f"envelope lines of the {PARTS[code][0]} of {bearings_text(one.finding, rig)}"
     if code == LINE:
         return "the strongest line of no known shaft or bearing"
+    loose = shafts_of_unknown_speed(rig)
     parts = [*(["no gear"] if rig.pairs else []), "no shaft", *(["no bearing"] if rig.bearings else [])]
     unknown = "" if rig.bearings else ", the rig file naming no bearing"
-    return f"envelope lines of impacts that {', '.join(parts[:-1])} and {parts[-1]} explains{unknown}"
+    known = f" of known speed explains, perhaps {loose}" if loose else " explains"
+    return f"envelope lines of impacts that {', '.join(parts[:-1])} and {parts[-1]}{known}{unknown}"

@@ -16,6 +16,9 @@ MOST, MOST_OF_A_FAMILY = 10, 3
 CLEAR = 1.0
 """Floors from which a change, predicted or observed, says something."""
 
+SMALLEST = 0.3
+"""Floors from which the sign of a prediction says something."""
+
 OWN_COUNTS = 2.0
 
 AGREES = 0.5
@@ -61,9 +64,9 @@ def weighed_evidence(
     """Return a predicted change beside the observed one, with what it says of the effect.
 
     It speaks for the effect where both are of one sign and one size; or, where the prediction is beyond the floor,
-    differ by less than that. What moved the way of such a prediction and more than twice as far is no evidence against
-    it: the simulator's size of the effect is uncertain, and something else may have moved it, too. What was not
-    predicted, did not come, or moved the other way is.
+    differ by less than that. What moved the predicted way and further is no evidence against it where the prediction is
+    beyond the floor, or what it leaves is within: the simulator's size of the effect is uncertain, and something else
+    may have moved it, too. What was not predicted, did not come, or moved the other way is.
 
     Parameters
     ----------
@@ -71,12 +74,13 @@ def weighed_evidence(
         In words.
     predicted_db, observed_db, floor_db : float
     least : float
-        Floors from which a prediction is one.
+        Floors from which a prediction of the right size speaks for the effect.
     """
-    size = abs(predicted_db)
-    if size == 0.0 or size < least * floor_db:
+    size, left = abs(predicted_db), abs(predicted_db - observed_db)
+    if size == 0.0 or size < SMALLEST * floor_db:
         return Evidence(feature, predicted_db, observed_db, floor_db, speaks_for=False)
     ratio, is_clear = observed_db / predicted_db, size >= CLEAR * floor_db
-    agrees = AGREES <= ratio <= 1.0 / AGREES or (is_clear and abs(predicted_db - observed_db) <= floor_db)
-    further = is_clear and not agrees and ratio > 1.0
+    alike = size >= least * floor_db and AGREES <= ratio <= 1.0 / AGREES
+    agrees = alike or (is_clear and left <= floor_db)
+    further = not agrees and ratio > 1.0 and (is_clear or left <= floor_db)
     return Evidence(feature, predicted_db, observed_db, floor_db, agrees, further)

@@ -207,3 +207,16 @@ def test_two_stages_without_teeth_lack_rig_data(capsys: pytest.CaptureFixture[st
     assert "rig data are missing" in err
     assert "teeth of both gears and module of pair 'first'" in err
     assert not (tmp_path / "gap").exists()
+
+
+def test_a_shaft_of_unknown_speed_may_be_what_knocks() -> None:
+    """Without the gear pair the output shaft's order cannot be known: it is no impact that no shaft explains."""
+    loose = replace(RIG, shafts=(*RIG.shafts, Shaft("output")))
+    report = diagnosed(recording(0.617 * 4), rig=loose)
+    assert report.outcome is GapOutcome.UNKNOWN
+    assert "no shaft and no bearing of known speed explains, perhaps shaft output (" in report.places[0].title
+    assert "it may turn with shaft output" in report.verdict[1]
+    assert any("speed of shaft output" in notice for notice in report.notices)
+    known = diagnosed(recording(0.617 * 4))
+    assert "no shaft and no bearing explains (" in known.places[0].title
+    assert "output" not in " ".join((*known.verdict, *known.notices))

@@ -45,7 +45,9 @@ def test_what_moved_further_than_foretold_is_not_against_it() -> None:
         (5.0, 9.0): (True, False),
         (5.0, 1.0): (False, False),  # it did not come
         (5.0, -12.0): (False, False),  # the other way
-        (0.5, 12.0): (False, False),  # not predicted beyond the floor
+        (0.7, 1.5): (False, True),  # what it leaves is within the floor
+        (0.5, 12.0): (False, False),  # not predicted beyond the floor, and much is left
+        (0.1, 1.05): (False, False),  # hardly predicted
         (0.0, 12.0): (False, False),
     }
     for (predicted, observed), stance in said.items():
