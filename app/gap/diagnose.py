@@ -11,6 +11,7 @@ import numpy as np
 
 from app.gap.candidates import Tried, n_compared
 from app.gap.conditions import Condition, observed, simulated
+from app.gap.doubts import doubts_of
 from app.gap.gearless import diagnose_gearless
 from app.gap.left import steps_of
 from app.gap.next_recording import next_recordings
@@ -154,8 +155,9 @@ def diagnose_gap(
     tell("placing it", 0.82)
     clearest = max(conditions, key=lambda condition: condition.size.structural.value)
     k = conditions.index(clearest)
-    standing, remarks = stood_out(recordings[k], own_rigs[k], references, other_rigs, clearest.facts.name)
+    standing, remarks, faults = stood_out(recordings[k], own_rigs[k], references, other_rigs, clearest.facts.name)
     notices += remarks
+    doubts = (*(text for condition in conditions for text in doubts_of(condition)), *faults)
     outcome = weighed.calibration.outcome(probabilities)
     if standing and outcome in (GapOutcome.NO_GAP, GapOutcome.UNDECIDED):
         outcome = GapOutcome.UNKNOWN  # impacts that no shaft repeats are a gap, however few features see them
@@ -205,6 +207,7 @@ def diagnose_gap(
         averages=() if reference is None else average_curves(clearest.now, reference, unit=_unit(recordings[k])),
         notices=tuple(notices),
         twin_toml="" if fitted is None else _preset(twin, clearest, causes[0], fitted),
+        doubts=doubts,
     )
 
 

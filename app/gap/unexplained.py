@@ -18,28 +18,28 @@ HIGHEST_HARMONIC, SAME_ORDER = 40, 1e-3
 
 def stood_out(
     recording: Recording, rig: Rig, references: Sequence[Recording], reference_rigs: Sequence[Rig], name: str
-) -> tuple[list[Standing], list[str]]:
-    """Return the families of impacts, beyond the reference's, that no shaft repeats, surest first; and remarks.
+) -> tuple[list[Standing], list[str], list[str]]:
+    """Return the families of impacts, beyond the reference's, that no shaft repeats, surest first; remarks; doubts.
 
     The catalogue's effects are compared by features of known places; a strange family is one feature among a hundred
-    there and easily lost. The analysis looks for it by itself. A strange line, a family that may well be chance, and a
-    fault of the reference are remarks.
+    there and easily lost. The analysis looks for it by itself. A strange line and a family that may well be chance are
+    remarks; a fault of the reference is a doubt about everything else.
     """
     now = _analysed(recording, rig)
     if now is None:
-        return [], []
+        return [], [], []
     nearest = _nearest(now[1].mean_speed_rpm, references, reference_rigs)
     healthy = None if nearest is None else _analysed(*nearest)
     found = examined(name, now, [healthy] if healthy is not None else [])
-    remarks = [] if healthy is None else _fault_of_reference(healthy[0], name)
+    doubts = [] if healthy is None else _fault_of_reference(healthy[0], now[0], name)
     weak = [one for one in found.standing if one.finding.code == LINE or one.finding.kind is Kind.NOTICE]
     strong = [one for one in found.standing if one not in weak]
-    remarks += [
+    remarks = [
         f"Not explained by the gear model, in {name}: {one.finding.title.rstrip('.')}{_odds(one)}."
         for one in weak
         if not (one.finding.code == LINE and any(_is_harmonic(one, family) for family in strong))
     ]
-    return strong, remarks
+    return strong, remarks, doubts
 
 
 def _is_harmonic(line: Standing, family: Standing) -> bool:
@@ -55,12 +55,15 @@ def _odds(one: Standing) -> str:
     return "" if one.finding.code == LINE else f" (at most {100 * one.finding.confidence:.0f} %)"
 
 
-def _fault_of_reference(analysis: Analysis, name: str) -> list[str]:
-    if analysis.outcome is not Outcome.FAULT:
+def _fault_of_reference(reference: Analysis, now: Analysis, name: str) -> list[str]:
+    """Say so where the reference shows a fault by itself; most of all where the recording shows none."""
+    if reference.outcome is not Outcome.FAULT:
         return []
+    fault = reference.findings[0].title.rstrip(".")
+    perhaps = "" if now.outcome is Outcome.FAULT else " and the recording shows no fault: they may have been exchanged"
     remark = (
-        f"The reference of {name} does not look healthy: {analysis.findings[0].title.rstrip('.')}. What is named may "
-        "be what the reference has and the recording has not."
+        f"The reference of {name} does not look healthy ({fault}){perhaps}. What is named may be what the "
+        "reference has and the recording has not."
     )
     return [remark]
 

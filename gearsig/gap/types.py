@@ -388,6 +388,9 @@ class GapReport:
         Empty where there is no reference.
     notices : tuple of str
         What the reader should know.
+    doubts : tuple of str
+        What must be checked first, where there is strong evidence of it: a wrong rig file, or recording and reference
+        exchanged. The rest of the report is as if it were not so.
     twin_toml : str
         The simulator with the effect fitted, as a preset; empty where none is named.
     """
@@ -410,6 +413,7 @@ class GapReport:
     averages: tuple[AverageCurves, ...] = ()
     notices: tuple[str, ...] = ()
     twin_toml: str = field(default="", repr=False)
+    doubts: tuple[str, ...] = ()
 
     @property
     def is_simulated(self) -> bool:

@@ -46,9 +46,9 @@ def gap_averages_figure(curves: AverageCurves, *, mark: AngleMark | None = None,
     figure = style.new_figure(TOP_IN + 2 * PANEL_IN + BETWEEN_IN + BOTTOM_IN)
     above = style.panel(figure, bottom_in=BOTTOM_IN + PANEL_IN + BETWEEN_IN, top_in=TOP_IN)
     below = style.panel(figure, bottom_in=BOTTOM_IN, top_in=TOP_IN + PANEL_IN + BETWEEN_IN, sharex=above)
-    keys = above.plot(*thin(angle, measured), color=style.MEASURED, linewidth=1.1, label="measured", alpha=0.85)
-    dashes = (0.0, (3.0, 2.0))
-    keys += above.plot(*thin(angle, reference), color=style.INK, linewidth=0.8, linestyle=dashes, label="reference")
+    (reference_line,) = above.plot(*thin(angle, reference), color=style.QUIET, linewidth=0.9, label="reference")
+    (own,) = above.plot(*thin(angle, measured), color=style.MEASURED, linewidth=0.9, label="measured", alpha=0.8)
+    keys = [own, reference_line]
     keys += below.plot(
         *thin(angle, measured - reference), color=style.SIMULATED, linewidth=1.0, label="measured less reference"
     )

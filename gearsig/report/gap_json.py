@@ -62,6 +62,7 @@ def gap_to_dict(report: GapReport) -> Json:
         "spectra": [_spectrum(curves) for curves in report.spectra],
         "angles": [_angles(curves) for curves in report.angles],
         "averages": [_average(curves) for curves in report.averages],
+        "doubts": list(report.doubts),
         "notices": list(report.notices),
         "twin_toml": report.twin_toml or None,
     }

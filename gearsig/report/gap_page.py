@@ -23,7 +23,7 @@ from gearsig.report.gap_sections import (
     step_rows,
     verdict_rows,
 )
-from gearsig.report.gap_text import condition_advice
+from gearsig.report.gap_text import CHECK_FIRST, condition_advice
 from gearsig.report.render import render
 
 
@@ -58,6 +58,7 @@ def gap_page_html(report: GapReport, *, command: str = "", date: datetime | None
         outcome=report.outcome.value,
         outcome_class=OUTCOME_CLASSES[report.outcome.value],
         verdict=verdict_rows(report),
+        check_first=CHECK_FIRST,
         advice=condition_advice(report),
         size=size_text(report),
         floors=floors_text(report),

@@ -86,6 +86,7 @@ def gap_from_dict(found: Json) -> GapReport:
         averages=tuple(_average(item) for item in found.get("averages", ())),
         notices=tuple(found["notices"]),
         twin_toml=found["twin_toml"] or "",
+        doubts=tuple(found.get("doubts", ())),
     )
 
 

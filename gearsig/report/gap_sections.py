@@ -112,7 +112,7 @@ def floors_text(report: GapReport) -> str:
     if report.references:
         known = f"Compared with the same machine when it was sound ({', '.join(report.references)}). "
         structural = "what healthy machines change by from one recording to another"
-        beside = " The curves show the recording beside the simulation."
+        beside = " The first pictures show the recording beside the reference, the further ones beside the simulation."
     else:
         known = "Compared with what the simulation of the sound machine lets expect, as far as it is credible. "
     return (

@@ -5,14 +5,18 @@ from __future__ import annotations
 from gearsig.gap.simulator import Point
 from gearsig.gap.types import GapOutcome, GapReport
 
+CHECK_FIRST = "Check first"
+"""Before each of the doubts."""
+
 SAME_SPEED, SAME_TORQUE = 0.03, 0.1
 """Relative: recordings nearer than this to each other are of one operating condition."""
 
 
 def gap_text(report: GapReport) -> str:
-    """Return the verdict in four lines, and in a fifth what a second operating condition would give."""
+    """Return the verdict in four lines, what must be checked first, what a second operating condition would give."""
     advice = condition_advice(report)
-    return "\n".join([*report.verdict, *([advice] if advice else [])])
+    doubts = (f"{CHECK_FIRST}: {doubt}" for doubt in report.doubts)
+    return "\n".join([*report.verdict, *doubts, *([advice] if advice else [])])
 
 
 def condition_advice(report: GapReport) -> str:

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from app.gap.doubts import strange_pattern, strange_teeth
+from app.gap.doubts import exchanged, strange_pattern, strange_teeth, wrong_teeth
 from app.gap.prepare import conditions_of
 from app.gap.unexplained import stood_out
 from gearsig.angle.shaft import find_shaft_angle
@@ -66,20 +66,49 @@ def _flawless(seed: int) -> Recording:
     return replace(bare, samples=samples)
 
 
-def test_the_teeth_of_another_rig_are_noticed() -> None:
-    assert strange_teeth(gathered(0, 1), "now") == []
-    assert strange_teeth(gathered(0, 1, chipped=True), "now") == []
-    others = replace(rig(), pairs=(replace(rig().pairs[0], driver_teeth=37, driven_teeth=53),))
-    (remark,) = strange_teeth(gather(recording(0, 1), others), "now")
+def with_teeth(driver: int, driven: int) -> Rig:
+    return replace(rig(), pairs=(replace(rig().pairs[0], driver_teeth=driver, driven_teeth=driven),))
+
+
+def test_the_teeth_of_another_rig_are_noticed_and_the_right_number_is_told() -> None:
+    for right in (gathered(0, 1), gathered(0, 1, chipped=True)):
+        assert strange_teeth(right, "now") == []
+        assert wrong_teeth(right, "now") == []
+    (doubt,) = wrong_teeth(gather(recording(0, 1), with_teeth(37, 53)), "now")
+    assert "29 times a revolution" in doubt
+    assert "37 teeth" in doubt
+    assert strange_teeth(gather(recording(0, 1), with_teeth(37, 53)), "now") == []  # it is said once
+
+
+def test_without_a_mark_on_the_shaft_its_teeth_are_not_counted() -> None:
+    """The average over a shaft whose angle was found by the teeth holds for those teeth only."""
+    assert wrong_teeth(replace(gather(recording(0, 1), with_teeth(37, 53)), marks=(False, False)), "now") == []
+
+
+def test_teeth_that_explain_little_are_a_remark_where_no_other_number_explains_more() -> None:
+    strange = replace(gather(recording(0, 1), with_teeth(37, 53)), marks=(False, False))
+    (remark,) = strange_teeth(strange, "now")
     assert "37/53" in remark
+
+
+def test_recording_and_reference_exchanged_are_noticed_by_the_sign_of_the_change() -> None:
+    sound, chipped = gathered(0, 1), gathered(0, 2, chipped=True)
+    (doubt,) = exchanged(sound, chipped, "now")
+    assert "may have been exchanged" in doubt
+    assert exchanged(chipped, sound, "now") == []
+    assert exchanged(sound, gathered(0, 3), "now") == []
+    assert exchanged(gathered(3, 1), sound, "now") == []  # another specimen is no exchange
 
 
 def test_a_reference_with_a_fault_is_told() -> None:
     damaged = recording(0, 1, CHIPPED)
-    _, texts = stood_out(recording(0, 2), rig(), [recording(0, 3), damaged], [rig(), rig()], "now")
-    assert not any("does not look healthy" in text for text in texts)  # at the same speed, the first is taken
-    _, texts = stood_out(recording(0, 2), rig(), [damaged], [rig()], "now")
-    assert any(text.startswith("The reference of now does not look healthy") for text in texts)
+    _, _, doubts = stood_out(recording(0, 2), rig(), [recording(0, 3), damaged], [rig(), rig()], "now")
+    assert not doubts  # at the same speed, the first is taken
+    (doubt,) = stood_out(recording(0, 2), rig(), [damaged], [rig()], "now")[2]
+    assert doubt.startswith("The reference of now does not look healthy")
+    assert "they may have been exchanged" in doubt
+    (doubt,) = stood_out(recording(0, 2, CHIPPED), rig(), [damaged], [rig()], "now")[2]
+    assert "exchanged" not in doubt
 
 
 def test_a_refusal_names_the_recording_that_is_too_short() -> None:

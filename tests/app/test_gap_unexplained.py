@@ -22,18 +22,18 @@ def knocking(_time: FloatArray, revolutions: FloatArray) -> FloatArray:
 
 def test_impacts_at_a_strange_order_are_named_and_a_reference_that_has_them_silences_them() -> None:
     struck, sound = record(knocking), record(seed=1)
-    standing, _ = stood_out(struck, RIG, [sound], [RIG], "today")
+    standing, *_ = stood_out(struck, RIG, [sound], [RIG], "today")
     place = standing_place(standing[0], RIG)
     assert "order 5.148" in place.title
     assert "no gear, no shaft and no bearing explains (" in place.title
     assert "no shaft explains, the rig file naming no bearing" in standing_place(standing[0], NO_BEARINGS).title
     assert place.orders[0] == pytest.approx(STRANGE, rel=1e-3)
-    again, _ = stood_out(struck, RIG, [record(knocking, seed=2)], [RIG], "today")
+    again, *_ = stood_out(struck, RIG, [record(knocking, seed=2)], [RIG], "today")
     assert not again
 
 
 def test_sound_gears_have_nothing_strange() -> None:
-    assert stood_out(record(), RIG, [], [], "today") == ([], [])
+    assert stood_out(record(), RIG, [], [], "today") == ([], [], [])
 
 
 def test_a_line_that_a_family_explains_is_no_remark() -> None:
@@ -51,6 +51,6 @@ def test_orders_of_a_place_are_the_drivers_whatever_shaft_the_speed_is_of() -> N
     """Shaft "out" is the reference: the family's order there is 37/23 of that of the driver."""
     turned = replace(RIG, shafts=RIG.shafts[::-1])
     assert turned.reference_shaft == "out"
-    standing, _ = stood_out(record(knocking), turned, [], [], "today")
+    standing, *_ = stood_out(record(knocking), turned, [], [], "today")
     assert standing[0].finding.where.order == pytest.approx(STRANGE * 37 / 23, rel=1e-3)
     assert standing_place(standing[0], turned).orders[0] == pytest.approx(STRANGE, rel=1e-3)

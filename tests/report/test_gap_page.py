@@ -253,3 +253,13 @@ def test_no_line_is_marked_where_the_whole_gap_is_within_a_floor():
     assert f"so that no line is marked. {n} of {n_all} lines alone exceed it" in first
     assert replace(small, outcome=GapOutcome.EFFECT).is_beyond
     assert gearless_report().is_beyond
+
+
+def test_doubts_stand_right_under_the_verdict():
+    doubt = "now: the teeth <do not> fit."
+    report = replace(effect_report(), doubts=(doubt,))
+    text = text_of(gap_page_html(report))
+    last = report.verdict[-1].partition(": ")[2]
+    assert text.index(last[1:]) < text.index(f"Check first {doubt}") < text.index(report.notices[0])
+    assert gap_text(report).splitlines()[4] == f"Check first: {doubt}"
+    assert "Check first" not in text_of(gap_page_html(effect_report()))

@@ -31,7 +31,7 @@ from gearsig.report.gap_sections import (
     step_rows,
     verdict_rows,
 )
-from gearsig.report.gap_text import condition_advice
+from gearsig.report.gap_text import CHECK_FIRST, condition_advice
 
 LOOKS: dict[GapOutcome, tuple[Colour, str]] = {
     GapOutcome.NO_GAP: ("green", ":material/check_circle:"),
@@ -69,6 +69,8 @@ def _show_verdict(report: GapReport) -> None:
     st.badge(report.outcome.value, icon=icon, color=colour)
     lines = (f"**{as_typed(word)}.** {as_typed(text)}" for word, text in verdict_rows(report))
     st.markdown("  \n".join(lines))  # two spaces: a new line, not a new paragraph
+    for doubt in report.doubts:
+        st.warning(f"**{CHECK_FIRST}.** {as_typed(doubt)}", icon=":material/report:")
     advice = condition_advice(report)
     if advice:
         st.caption(as_typed(advice))
