@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.gap.frame import DRIVER
+from gearsig.gap.frame import DRIVER, GearFrame
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.gear_lines import (
     MOST_SHAFT_ORDERS,
@@ -22,6 +22,7 @@ from gearsig.gap.gear_lines import (
 )
 from gearsig.gap.spots import Comparison, Spot, by_decibels, shaft_words
 from gearsig.gap.tooth import mesh_power
+from gearsig.gap.words import feature_words
 
 FURTHEST_SIDEBAND = 12
 WORTH_NAMING = 0.25
@@ -45,6 +46,11 @@ def mesh_spot(comparison: Comparison) -> Spot | None:
     if strongest is None:
         return None
     row, best, change = strongest
+    if abs(change) < LEAST_CHANGE_DB:  # the lines hardly moved: what was scored is a ratio, of harmonics or of sensors
+        scored = comparison.strongest("mesh.", "alike.")
+        change = comparison.change_db[scored]
+        by = f", {by_decibels(change)}" if scored.startswith("mesh.") else ""
+        return Spot(f"{feature_words(scored, frame)}{by}", change, _harmonic_order(scored, frame))
     total = comparison.change_db["mesh.total"]
     alike = comparison.is_reference and abs(total) > 0.7 * abs(change) and total * change > 0
     every = f"mesh harmonics, together {by_decibels(total)}, " if alike else "mesh harmonics, "
@@ -52,6 +58,12 @@ def mesh_spot(comparison: Comparison) -> Spot | None:
     if not comparison.is_reference:
         title += " against the other harmonics"
     return Spot(title, change, (float(lines[best]),), channel=_channel(comparison, row))
+
+
+def _harmonic_order(feature: str, frame: GearFrame) -> tuple[float, ...]:
+    """Return the order of the one mesh harmonic that a feature is of; none for what is of all."""
+    harmonic = feature.rpartition(".")[2]
+    return (float(int(harmonic) * frame.teeth[DRIVER]),) if harmonic.isdigit() else ()
 
 
 def sideband_spot(comparison: Comparison, side: int) -> Spot | None:

@@ -22,6 +22,9 @@ STANDS_OUT = 6.0
 """Energy within one pitch over the middling pitch's from which on one tooth is named: of teeth that all
 differ by chance, the largest has some 5."""
 
+ALL_ROUND = (".level", ".elsewhere", ".peak")
+"""Ends of the names of features that say how large a pattern is, and not what shape it has."""
+
 OWN_SHARE = 0.3
 """Of a pattern's power in the shaft's own lines, below which it is no pattern of teeth."""
 
@@ -108,14 +111,16 @@ def tooth_spot(comparison: Comparison, side: int) -> Spot | None:
 
 
 def _all_round(comparison: Comparison, side: int, shaft: str, channel: str) -> Spot:
-    strongest = comparison.strongest(f"tooth.{SIDES[side]}.", f"change.{SIDES[side]}.")
+    """Return that no tooth in particular stands out, with the figure of the feature that was scored."""
+    scored = comparison.strongest(*(f"{kind}.{SIDES[side]}." for kind in ("tooth", "change", "surprise")))
     level = f"tooth.{SIDES[side]}.level"
-    if abs(comparison.size[level]) > 1.0 or strongest.endswith((".level", ".elsewhere", ".peak")):
-        change = comparison.change_db[level]
-        return Spot(f"pattern of the teeth of {shaft} all round, {by_decibels(change)}", change, channel=channel)
-    return Spot(
-        f"shape of the teeth's pattern of {shaft}, no tooth in particular",
-        comparison.change_db[strongest],
-        channel=channel,
-        follows=True,
-    )
+    if not scored.endswith(ALL_ROUND) and abs(comparison.size[level]) > 1.0:
+        scored = level
+    change = comparison.change_db[scored]
+    if not scored.endswith(ALL_ROUND):
+        title = f"shape of the teeth's pattern of {shaft}, no tooth in particular"
+        return Spot(title, change, channel=channel, follows=True)
+    of_difference = not scored.startswith("tooth.")
+    by = f"{by_decibels(change)} against what sound machines change by" if of_difference else by_decibels(change)
+    what = "what has changed of the pattern of the teeth" if of_difference else "pattern of the teeth"
+    return Spot(f"{what} of {shaft} all round, {by}", change, channel=channel)

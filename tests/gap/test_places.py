@@ -16,6 +16,9 @@ from gearsig.gap.gathered import Gathered
 from gearsig.gap.gear_lines import is_synchronous
 from gearsig.gap.places import gap_places
 from gearsig.gap.relative import beyond_the_mesh
+from gearsig.gap.spots import Comparison
+from gearsig.gap.spots_gear import mesh_spot
+from gearsig.gap.spots_tooth import _all_round
 from gearsig.gap.types import GapPlace, PlaceKind
 from tests.gap.synthetic import RIG, SPEED_HZ, TEETH, record, ringing
 
@@ -181,3 +184,32 @@ def test_clipping_is_told_from_a_stray_peak() -> None:
     figures = {"raw.near_the_extreme": 20.0, "raw.kurtosis": -1.0}
     assert "as clipping makes them" in tail_spot(Comparison(clipped, sound(), True, figures, figures)).title
     assert "clipping" not in tail_spot(Comparison(sound(), clipped, True, figures, figures)).title
+
+
+def compared(change_db: dict[str, float]) -> Comparison:
+    """Return two records that differ by noise, with features that are said to have changed; floors of 1 dB."""
+    return Comparison(sound(1), sound(), True, change_db, change_db)
+
+
+def test_the_figure_of_a_place_is_the_one_that_was_scored() -> None:
+    """The level of a pattern hardly moved; what exceeds its floor is how much the patterns differ."""
+    level, apart = "tooth.driven.level", "change.driven.elsewhere"
+    round_it = _all_round(compared({level: 0.18, apart: 6.0}), DRIVEN, "shaft out", "a1")
+    assert round_it.change_db == 6.0
+    assert "up by 6 dB against what sound machines change by" in round_it.title
+    assert "0.18" not in round_it.title
+    louder = _all_round(compared({level: -4.0, apart: 2.0}), DRIVEN, "shaft out", "a1")
+    assert louder.title == "pattern of the teeth of shaft out all round, down by 4 dB"
+    shape = _all_round(compared({level: 0.5, "tooth.driven.kurtosis": 3.0}), DRIVEN, "shaft out", "a1")
+    assert shape.follows
+    assert "dB" not in shape.title
+
+
+def test_mesh_lines_that_hardly_moved_give_way_to_what_was_scored() -> None:
+    spot = mesh_spot(compared({"mesh.total": 0.2, "mesh.share.2": -4.0, "line.half_mesh": 0.0}))
+    assert spot is not None
+    assert (spot.title, spot.change_db) == ("mesh harmonic 2 over all, down by 4 dB", -4.0)
+    assert spot.orders == (2.0 * TEETH[0],)
+    spread = mesh_spot(compared({"mesh.total": 0.2, "alike.mesh.spread": 3.0, "line.half_mesh": 0.0}))
+    assert spread is not None
+    assert "dB" not in spread.title
