@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from gearsig.compare.side import LEAST_REVOLUTIONS, Side
 from gearsig.compare.types import Alignment, ChannelComparison
+from gearsig.compare.verdict import LEAST_REPEATED
 
 SAME_SPEED, OTHER_SPEED = 0.03, 0.10
 """Relative differences of speed: not worth a word; and so large that resonances meet other orders."""
@@ -32,7 +33,8 @@ def remarks(
             f"Shaft {', '.join(left_out)} makes fewer than {LEAST_REVOLUTIONS} revolutions in one of the records: its "
             "average and its lines are left out."
         )
-    texts += _alignment_texts(alignments)
+    told = {s.shaft for channel in channels for s in channel.shafts if s.best_correlation >= LEAST_REPEATED}
+    texts += _alignment_texts([one for one in alignments if one.shaft in told])
     unknown = [channel.name for channel in channels if not channel.levels_compare]
     if unknown:
         texts.append(
@@ -43,26 +45,42 @@ def remarks(
 
 
 def _speed_texts(own: Side, other: Side) -> list[str]:
-    texts = []
+    """Return one text on both speeds: a run-up has no speed of its own that could be compared with another."""
+    if not (_is_steady(own) and _is_steady(other)):
+        unsteady = [name for side, name in ((own, "simulation"), (other, "recording")) if not _is_steady(side)]
+        text = (
+            f"{_speed_words(own, 'The simulation')}, {_speed_words(other, 'the recording')}: levels of the "
+            f"{' and of the '.join(unsteady)} are means over all speeds. At each of them orders meet other resonances, "
+            "and an average need not repeat: parts at one speed compare better."
+        )
+        return [text]
     simulated, recorded = own.angle.mean_speed_rpm, other.angle.mean_speed_rpm
     off = simulated / recorded - 1.0
     if abs(off) > OTHER_SPEED:
-        texts.append(
+        text = (
             f"The simulation turns at {simulated:.5g} rpm, the recording at {recorded:.5g} rpm ({100 * off:+.0f} %): "
             "orders are compared all the same, but each meets other resonances, and forces change with the speed."
         )
-    elif abs(off) > SAME_SPEED:
-        texts.append(
+        return [text]
+    if abs(off) > SAME_SPEED:
+        text = (
             f"The simulation turns {abs(100 * off):.1f} % {'faster' if off > 0 else 'slower'} than the recording: "
             "compared by order; levels near resonances differ for that alone."
         )
-    for side, name in ((own, "simulation"), (other, "recording")):
-        low, high = side.angle.speed_range_rpm
-        if high - low > STEADY * side.angle.mean_speed_rpm:
-            texts.append(
-                f"The speed of the {name} runs from {low:.5g} to {high:.5g} rpm: levels are means over all of it."
-            )
-    return texts
+        return [text]
+    return []
+
+
+def _is_steady(side: Side) -> bool:
+    low, high = side.angle.speed_range_rpm
+    return high - low <= STEADY * side.angle.mean_speed_rpm
+
+
+def _speed_words(side: Side, name: str) -> str:
+    if _is_steady(side):
+        return f"{name} turns at {side.angle.mean_speed_rpm:.5g} rpm"
+    low, high = side.angle.speed_range_rpm
+    return f"{name} runs between {low:.5g} and {high:.5g} rpm"
 
 
 def _alignment_texts(alignments: Sequence[Alignment]) -> list[str]:

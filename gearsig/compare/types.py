@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from gearsig.orders.types import SynchronousAverage
 from gearsig.spectra.types import Spectrum
 
@@ -199,6 +201,11 @@ class ShaftComparison:
     recorded_reliability: float
     agreement: Agreement
     tooth_levels: tuple[LevelPair, ...]
+
+    @property
+    def best_correlation(self) -> float:
+        """The highest correlation that two such averages of the same motion reach."""
+        return float(np.sqrt(self.simulated_reliability * self.recorded_reliability))
 
 
 @dataclass(frozen=True)

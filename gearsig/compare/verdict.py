@@ -21,6 +21,24 @@ LACKING_DB = 6.0
 """And if the other record's noise would let a line half as large be seen."""
 
 
+LEAST_REPEATED = 0.3
+"""Correlation that two averages could reach, below which they say nothing of each other: their halves differ."""
+
+
+def missing_words(line: LineLevel) -> str:
+    """Say which record lacks a line, or would hide it in its own scatter; empty where both show it.
+
+    The level of a line that is not seen is that of the noise: where that is no lower, the line may well be there.
+    """
+    if line.simulated_is_seen:
+        return "" if line.recorded_is_seen else _missing(line.level.difference_db, "recording")
+    return _missing(-line.level.difference_db, "simulation")
+
+
+def _missing(lower_db: float, record: str) -> str:
+    return f"not in the {record}" if lower_db > LACKING_DB else f"hidden by the {record}'s scatter"
+
+
 def verdict_of(channels: Sequence[ChannelComparison]) -> str:
     """Return one sentence per channel on how far the mesh harmonics, or else the shaft orders, are apart."""
     return " ".join(_head(channel, channels) + _levels_text(channel) for channel in channels)
@@ -53,7 +71,12 @@ def _levels_text(channel: ChannelComparison) -> str:
     if not lines:
         return "No line of the recording stands above its own noise: only the floors can be compared."
     where = "mesh harmonics" if lines[0].kind == "mesh" else "shaft orders"
-    return _lines_text(lines, where, levels_compare=channel.levels_compare)
+    told = [line for line in lines if line.simulated_is_seen or missing_words(line).startswith("not")]
+    hidden = len(lines) - len(told)
+    if not told:
+        return f"The simulation's own scatter hides all {where} of the recording: they cannot be compared."
+    text = _lines_text(told, where, levels_compare=channel.levels_compare)
+    return f"{text} {hidden} more are hidden by the simulation's own scatter." if hidden else text
 
 
 def _lines_text(lines: Sequence[LineLevel], where: str, *, levels_compare: bool) -> str:
@@ -95,7 +118,7 @@ def _missing_texts(channel: ChannelComparison) -> list[str]:
         found = [
             line
             for line in (*channel.lines, *channel.other_lines)
-            if getattr(line, seen) and not getattr(line, other) and abs(line.level.difference_db) > LACKING_DB
+            if getattr(line, seen) and not getattr(line, other) and missing_words(line).startswith("not")
         ]
         side = "recorded_db" if seen.startswith("recorded") else "simulated_db"
         strongest = max(getattr(line.level, side) for line in (*channel.lines, *channel.other_lines))
@@ -111,16 +134,25 @@ def _more(n: int) -> str:
 
 
 def _shape_texts(channel: ChannelComparison) -> list[str]:
-    parts = []
+    parts, loose = [], []
     for shaft in channel.shafts:
-        possible = float(np.sqrt(shaft.simulated_reliability * shaft.recorded_reliability))
         name = f" of {shaft.shaft}" if shaft.shaft else ""
-        parts.append(f"{_number(shaft.correlation.value)}{name} ({_number(possible)} is possible)")
+        if shaft.best_correlation < LEAST_REPEATED:
+            loose.append(name)
+        else:
+            parts.append(f"{_number(shaft.correlation.value)}{name} ({_number(shaft.best_correlation)} is possible)")
+    texts = [f"The synchronous averages correlate by {', '.join(parts)}."] if parts else []
+    if loose:
+        texts.append(
+            f"How alike the synchronous averages{' and'.join(loose)} are cannot be told: in one of the records "
+            "the halves do not repeat each other."
+        )
+    locked = channel.locked
     return [
-        f"The synchronous averages correlate by {', '.join(parts)}.",
+        *texts,
         (
-            f"{_percent(channel.locked.recorded.value)} of the recording's energy turns with the shafts, "
-            f"{_percent(channel.locked.simulated.value)} of the simulation's."
+            f"{_percent(locked.recorded.value)} of the recording's energy repeats with the shafts' turns, "
+            f"{_percent(locked.simulated.value)} of the simulation's."
         ),
     ]
 

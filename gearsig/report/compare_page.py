@@ -6,7 +6,16 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from gearsig import __version__
-from gearsig.compare.types import ChannelComparison, Comparison, LevelPair, LineLevel, RecordFacts, Repeated
+from gearsig.compare.types import (
+    ChannelComparison,
+    Comparison,
+    LevelPair,
+    LineLevel,
+    RecordFacts,
+    Repeated,
+    ShaftComparison,
+)
+from gearsig.compare.verdict import LEAST_REPEATED, missing_words
 from gearsig.plot.display import unit_text
 from gearsig.plot.embed import Picture
 from gearsig.report.compare_pictures import channel_pictures
@@ -93,34 +102,36 @@ def channel_rows(channel: ChannelComparison) -> Rows:
     rows = [("overall level, simulated less recorded", _difference(channel.overall))]
     for shaft in channel.shafts:
         name = f" of {shaft.shaft}" if shaft.shaft else ""
-        best = (shaft.simulated_reliability * shaft.recorded_reliability) ** 0.5
         frac = (
             f"complex {_repeated(shaft.agreement.complex_frac)} ({shaft.agreement.complex_by_chance:.3f} by chance), "
             f"magnitudes {_repeated(shaft.agreement.magnitude_frac)}; {shaft.agreement.n_lines} orders"
         )
         rows += [
-            (f"correlation, average{name}", f"{_repeated(shaft.correlation)}; two such averages reach {best:.3f}"),
+            (
+                f"correlation, average{name}",
+                f"{_repeated(shaft.correlation)}; {_possible(shaft)}",
+            ),
             (f"FRAC, average{name}", frac),
         ]
     locked = channel.locked
     rows.append(
         (
-            "energy that turns with the shafts",
+            "energy that repeats with the shafts' turns",
             f"recording {_percent(locked.recorded)}, simulation {_percent(locked.simulated)}",
         )
     )
     return tuple(rows)
 
 
+def _possible(shaft: ShaftComparison) -> str:
+    """Return the correlation that two such averages of one motion reach, or that it means nothing."""
+    if shaft.best_correlation < LEAST_REPEATED:
+        return "says nothing, as one record's halves do not repeat"
+    return f"two such averages reach {shaft.best_correlation:.3f}"
+
+
 def _line_row(line: LineLevel) -> LevelRow:
     level = line.level
-    missing = (
-        "not in the simulation"
-        if not line.simulated_is_seen
-        else "not in the recording"
-        if not line.recorded_is_seen
-        else ""
-    )
     return LevelRow(
         line.label,
         readable(line.order, 6),
@@ -128,7 +139,7 @@ def _line_row(line: LineLevel) -> LevelRow:
         _number(level.simulated_db),
         _signed(level.difference_db),
         f"{2 * level.repeatability_db:.1f}",
-        missing,
+        missing_words(line),
         level.is_beyond,
     )
 

@@ -6,8 +6,9 @@ import csv
 from io import StringIO
 from textwrap import fill
 
+from gearsig.compare.remarks import STEADY
 from gearsig.compare.types import ChannelComparison, Comparison, LevelPair, LineLevel, RecordFacts
-from gearsig.compare.verdict import mesh_lines
+from gearsig.compare.verdict import LEAST_REPEATED, mesh_lines, missing_words
 from gearsig.plot.display import unit_text
 from gearsig.report.numbers import rounded
 
@@ -89,9 +90,11 @@ def _harmless(text: str) -> str:
 
 
 def _record(facts: RecordFacts) -> str:
+    low, high = facts.speed_range_rpm
+    run = f", between {low:.5g} and {high:.5g}" if high - low > STEADY * facts.mean_speed_rpm else ""
     return (
-        f"{facts.source}: {facts.duration_s:.6g} s at {facts.sampling_rate_hz:.6g} Hz, {facts.mean_speed_rpm:.6g} rpm "
-        f"({facts.speed_method}), {facts.n_revolutions:.4g} revolutions"
+        f"{facts.source}: {facts.duration_s:.6g} s at {facts.sampling_rate_hz:.6g} Hz, {facts.mean_speed_rpm:.6g} rpm"
+        f"{' on average' if run else ''}{run} ({facts.speed_method}), {facts.n_revolutions:.4g} revolutions"
     )
 
 
@@ -101,18 +104,20 @@ def _channel_table(channel: ChannelComparison) -> list[str]:
     rows.append(_level_row("overall", channel.overall))
     rows += [_level_row(line.label, line.level, line) for line in mesh_lines(channel)[:MOST_LINES]]
     for shaft in channel.shafts:
-        best = (shaft.simulated_reliability * shaft.recorded_reliability) ** 0.5
+        best = shaft.best_correlation
+        possible = f"at most {best:.3f}" if best >= LEAST_REPEATED else "its halves do not repeat"
         frac = shaft.agreement
         rows.append(
             f"average of {shaft.shaft or 'the shaft'}: correlation {shaft.correlation.value:.3f} "
-            f"± {shaft.correlation.repeatability:.2g} (at most {best:.3f}); FRAC {frac.complex_frac.value:.3f} complex "
+            f"± {shaft.correlation.repeatability:.2g} ({possible}); FRAC {frac.complex_frac.value:.3f} complex "
             f"({frac.complex_by_chance:.3f} by chance), {frac.magnitude_frac.value:.3f} of magnitudes"
         )
     return rows
 
 
 def _level_row(label: str, level: LevelPair, line: LineLevel | None = None) -> str:
-    missing = "" if line is None or line.simulated_is_seen else "  not in the simulation"
+    words = "" if line is None else missing_words(line)
+    missing = f"  {words}" if words else ""
     return (
         f"{label[:30]:<30} {level.recorded_db:>10.1f} {level.simulated_db:>10.1f} {level.difference_db:>+11.1f} "
         f"± {2 * level.repeatability_db:.1f}{missing}"

@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 
 from gearsig.compare.recordings import compare_recordings
 from gearsig.compare.types import Comparison, LineLevel
+from gearsig.compare.verdict import missing_words
 from gearsig.errors import InputError, RefusalError
-from gearsig.recording.types import Channel
+from gearsig.recording.types import Channel, Recording
+from gearsig.rig.speed import PulseTimes
 from gearsig.rig.types import GearPair, Rig, Shaft
 from tests.compare.machines import LINES, RIG, TEETH, gear_record
 
@@ -261,3 +263,38 @@ def test_channels_that_do_not_pair_are_listed_on_both_sides() -> None:
     assert [(c.simulated_name, c.recorded_name) for c in found.channels] == [("a1", "b2")]
     with pytest.raises(InputError, match="no channel 'a9'"):
         compare_recordings(one, two, channels=[("a9", "b2")])
+
+
+def run_up(seed: int = 0) -> Recording:
+    """Return the lines of `gear_record` from 600 to 3000 rpm; a resonance on the way turns all phases by 180°."""
+    time = np.arange(round(8.0 * 8000.0)) / 8000.0
+    speed_hz = 10.0 + 5.0 * time
+    theta = np.cumsum(speed_hz) / 8000.0
+    x = sum(a * np.cos(2 * np.pi * n * theta + n + np.pi * (speed_hz > 30.0)) for n, a in LINES.items())
+    x = x + 0.05 * np.random.default_rng(seed).standard_normal(len(time))
+    pulses = np.interp(np.arange(1, int(theta[-1])), theta, time)
+    return replace(gear_record(duration_s=8.0), samples=x[None, :], speed=PulseTimes(pulses, 1, "in"))
+
+
+def test_a_run_up_has_no_speed_of_its_own_and_its_scatter_is_no_missing_line() -> None:
+    found = compare_recordings(run_up(), gear_record())
+    (speeds,) = [note for note in found.notes if "rpm" in note]
+    assert "The simulation runs between" in speeds
+    assert "the recording turns at 1500 rpm" in speeds
+    assert "levels of the simulation are means" in speeds
+    said = " ".join((found.verdict, *found.findings))
+    assert "too strong" not in said
+    hidden = [x for x in found.channels[0].lines if missing_words(x) == "hidden by the simulation's scatter"]
+    assert {x.order for x in hidden} >= {float(TEETH[0]), 2.0 * TEETH[0]}
+    assert not any(
+        x.label in text for x in hidden for text in found.findings if text.startswith("The simulation lacks")
+    )
+    assert "(0.00 is possible)" not in said
+    assert "halves do not repeat" in said
+    assert not any("would correlate better" in note for note in found.notes)
+
+
+def test_steady_records_at_other_speeds_turn_at_them() -> None:
+    found = compare_recordings(gear_record(speed_rpm=1800.0, seed=1), gear_record())
+    (speeds,) = [note for note in found.notes if "rpm" in note]
+    assert "turns at 1800 rpm, the recording at 1500 rpm (+20 %)" in speeds

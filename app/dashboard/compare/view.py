@@ -12,6 +12,7 @@ from app.dashboard.widgets.download import download
 from app.dashboard.widgets.methods.notes import show_notes
 from app.dashboard.widgets.picture import show_picture
 from gearsig.compare.types import ChannelComparison, Comparison, LineLevel
+from gearsig.compare.verdict import missing_words
 from gearsig.plot.display import unit_text
 from gearsig.report.compare_json import comparison_to_json
 from gearsig.report.compare_page import channel_rows
@@ -99,8 +100,4 @@ def _show_lines(channel: ChannelComparison) -> None:
 
 
 def _remark(line: LineLevel) -> str:
-    if not line.simulated_is_seen:
-        return "not in the simulation"
-    if not line.recorded_is_seen:
-        return "not in the recording"
-    return "" if line.level.is_beyond else "within the scatter"
+    return missing_words(line) or ("" if line.level.is_beyond else "within the scatter")
