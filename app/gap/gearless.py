@@ -21,13 +21,13 @@ from app.gap.standing_out import (
 )
 from app.gap.standing_places import NAN, standing_place
 from gearsig.diagnosis.types import Kind
+from gearsig.gap.curve_types import SpectrumCurves
 from gearsig.gap.simulator import GapEffect, Point
 from gearsig.gap.spots import band_words
 from gearsig.gap.types import (
     ConditionFacts,
     GapReport,
     Interval,
-    SpectrumCurves,
     group_probabilities,
 )
 from gearsig.recording.types import Recording

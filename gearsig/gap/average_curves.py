@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.gap.change import lines_of_shaft, turned_difference
+from gearsig.gap.curve_types import AverageCurves
 from gearsig.gap.frame import DRIVEN, DRIVER
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.tooth import mesh_power, residual_lines
-from gearsig.gap.types import AverageCurves
 from gearsig.severity.calibration import load_calibration
 
 POINTS_PER_PERIOD = 4

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.gap.curve_types import AngleCurves, SpectrumCurves
 from gearsig.gap.cyclic import floor_ratio
 from gearsig.gap.floors import StructuralFloor
 from gearsig.gap.frame import DRIVEN, DRIVER
@@ -24,7 +25,6 @@ from gearsig.gap.gear_lines import (
 from gearsig.gap.spots import shaft_words
 from gearsig.gap.spots_tooth import changed_pattern, own_pattern
 from gearsig.gap.tooth import STEPS_PER_TOOTH
-from gearsig.gap.types import AngleCurves, SpectrumCurves
 from gearsig.severity.calibration import load_calibration
 
 BEYOND = 0.5

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearsig.gap.types import AverageCurves
+from gearsig.gap.curve_types import AverageCurves
 from gearsig.plot import series, style
 from gearsig.plot.display import plain, with_unit
 from gearsig.plot.marks import AngleMark

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearsig.gap.types import SpectrumCurves
+from gearsig.gap.curve_types import SpectrumCurves
 from gearsig.plot import series, style
 from gearsig.plot.display import unit_text
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
+from gearsig.gap.curve_types import SpectrumCurves
 from gearsig.gap.curves import gap_by_order, is_beyond
-from gearsig.gap.types import SpectrumCurves
 from gearsig.plot import series, style
 from gearsig.plot.display import unit_text
 from gearsig.plot.thin import thin

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.gap.types import AngleCurves
+from gearsig.gap.curve_types import AngleCurves
 from gearsig.plot import series, style
 from gearsig.plot.display import plain
 from gearsig.plot.marks import AngleMark

@@ -10,10 +10,9 @@ import json
 from pathlib import Path
 
 from gearsig import __version__
+from gearsig.gap.curve_types import AngleCurves, AverageCurves, SpectrumCurves
 from gearsig.gap.simulator import Added
 from gearsig.gap.types import (
-    AngleCurves,
-    AverageCurves,
     ConditionFacts,
     GapCause,
     GapPlace,
@@ -21,7 +20,6 @@ from gearsig.gap.types import (
     Interval,
     NextRecording,
     Shrinkage,
-    SpectrumCurves,
 )
 from gearsig.report.files import write_text
 from gearsig.report.numbers import rounded

@@ -8,8 +8,12 @@ from typing import Any, Literal
 
 import numpy as np
 
+from gearsig.gap.curve_types import AngleCurves, AverageCurves, SpectrumCurves
 from gearsig.gap.curves import against_reference, lines_beyond
-from gearsig.gap.types import AngleCurves, AverageCurves, GapReport, PlaceKind, SpectrumCurves
+from gearsig.gap.types import (
+    GapReport,
+    PlaceKind,
+)
 from gearsig.plot.embed import Picture, embed
 from gearsig.plot.marks import AngleMark
 from gearsig.report.gap_sections import detailed_causes
@@ -142,14 +146,15 @@ NOT_SCORED = "No line is marked: with a reference, only what has changed since i
 def _beyond_text(report: GapReport, curves: SpectrumCurves) -> str:
     """Say what orange means, and how many lines exceed their floors; or why none is marked."""
     n, n_all = lines_beyond(curves)
-    if not len(curves.structural_db):
-        return "Orange: above the repeatability floor; how far sound machines differ is not known line by line."
-    many = f"{n} of {n_all} lines"
+    known, many = len(curves.structural_db) > 0, f"{n} of {n_all} lines"
     if not report.is_beyond:
-        return (
-            f"The whole gap is within one structural floor, so that no line is marked. {many} alone exceed it (grey "
-            "band): it is the floor of the features that are scored, and single lines scatter more."
+        alone = (
+            f" {many} alone exceed it (grey band): it is the floor of the features that are scored, and single lines "
+            "scatter more."
         )
+        return f"The whole gap is within one structural floor, so that no line is marked.{alone if known else ''}"
+    if not known:
+        return "Orange: above the repeatability floor; how far sound machines differ is not known line by line."
     return (
         f"Orange: {many}, which exceed the structural floor (grey band). Single lines scatter more than the features "
         "that are scored: some exceed it on sound machines, too."

@@ -11,10 +11,9 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
+from gearsig.gap.curve_types import AngleCurves, AverageCurves, SpectrumCurves
 from gearsig.gap.simulator import Added, Point
 from gearsig.gap.types import (
-    AngleCurves,
-    AverageCurves,
     ConditionFacts,
     Evidence,
     GapCause,
@@ -26,7 +25,6 @@ from gearsig.gap.types import (
     NextRecording,
     PlaceKind,
     Shrinkage,
-    SpectrumCurves,
 )
 from gearsig.report.gap_json import SCHEMA, SCHEMA_VERSION
 from gearsig.report.plain import Json

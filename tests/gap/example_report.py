@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from gearsig.gap.curve_types import AngleCurves, AverageCurves, SpectrumCurves
 from gearsig.gap.simulator import Added, Point
 from gearsig.gap.types import (
-    AngleCurves,
-    AverageCurves,
     ConditionFacts,
     Evidence,
     GapCause,
@@ -21,7 +20,6 @@ from gearsig.gap.types import (
     NextRecording,
     PlaceKind,
     Shrinkage,
-    SpectrumCurves,
 )
 
 RIG = "Published pair 55/75"

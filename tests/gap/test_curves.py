@@ -7,11 +7,11 @@ import pytest
 
 from gearsig.gap.average_curves import average_curves
 from gearsig.gap.change import difference_features
+from gearsig.gap.curve_types import SpectrumCurves
 from gearsig.gap.curves import against_reference, angle_curves, gap_by_order, lines_beyond, spectrum_curves
 from gearsig.gap.floors import StructuralFloor
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
-from gearsig.gap.types import SpectrumCurves
 from tests.gap.synthetic import MESH_AMPLITUDES, RIG, TEETH, record, ringing
 
 RATIO = TEETH[0] / TEETH[1]

@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
+from gearsig.gap.curve_types import AngleCurves, SpectrumCurves
 from gearsig.gap.curves import against_reference
-from gearsig.gap.types import AngleCurves, GapCause, GapStep, Interval, SpectrumCurves
+from gearsig.gap.types import (
+    GapCause,
+    GapStep,
+    Interval,
+)
 from gearsig.plot.gap_averages import gap_averages_figure
 from gearsig.plot.gap_causes import gap_causes_figure
 from gearsig.plot.gap_evidence import gap_evidence_figure

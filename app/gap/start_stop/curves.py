@@ -6,10 +6,10 @@ import numpy as np
 
 from app.gap.start_stop.compare import Compared
 from gearsig.checks import FloatArray
+from gearsig.gap.curve_types import AngleCurves, SpectrumCurves
 from gearsig.gap.simulator import Added
 from gearsig.gap.start_stop.floors import FLOOR
 from gearsig.gap.start_stop.told import NAMES
-from gearsig.gap.types import AngleCurves, SpectrumCurves
 
 RIPPLE, CRACK = "torque_ripple", "root_crack"
 
