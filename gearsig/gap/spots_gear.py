@@ -49,8 +49,10 @@ def mesh_spot(comparison: Comparison) -> Spot | None:
     if abs(change) < LEAST_CHANGE_DB:  # the lines hardly moved: what was scored is a ratio, of harmonics or of sensors
         scored = comparison.strongest("mesh.", "alike.")
         change = comparison.change_db[scored]
-        by = f", {by_decibels(change)}" if scored.startswith("mesh.") else ""
-        return Spot(f"{feature_words(scored, frame)}{by}", change, _harmonic_order(scored, frame))
+        title = f"{feature_words(scored, frame)}, {by_decibels(change)}"
+        if scored.startswith("alike."):
+            title = "what lies beside the mesh harmonics, which themselves hardly moved"
+        return Spot(title, change, _harmonic_order(scored, frame))
     total = comparison.change_db["mesh.total"]
     alike = comparison.is_reference and abs(total) > 0.7 * abs(change) and total * change > 0
     every = f"mesh harmonics, together {by_decibels(total)}, " if alike else "mesh harmonics, "

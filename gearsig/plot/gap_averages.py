@@ -28,7 +28,7 @@ def gap_averages_figure(curves: AverageCurves, *, mark: AngleMark | None = None,
     mark : AngleMark or None
         The tooth that the gap names.
     title : str
-        Default: shaft and channel.
+        Default: what it is, with shaft and channel.
 
     Returns
     -------
@@ -73,5 +73,10 @@ def gap_averages_figure(curves: AverageCurves, *, mark: AngleMark | None = None,
     above.tick_params(labelbottom=False)
     style.label_axes(below, f"angle of shaft {plain(curves.shaft, 24)} (deg)", with_unit("change", curves.unit))
     series.legend_row(figure, keys, left_in=0.85, top_in=series.NAMES_AT_IN)
-    series.headline(figure, title or f"shaft {plain(curves.shaft, 24)}, sensor {plain(curves.channel, 24)}")
+    series.headline(figure, title or _title(curves))
     return figure
+
+
+def _title(curves: AverageCurves) -> str:
+    shaft, sensor = plain(curves.shaft, 24), plain(curves.channel, 24)
+    return f"average over shaft {shaft} without mesh harmonics, sensor {sensor}: recording against reference"

@@ -212,4 +212,4 @@ def test_mesh_lines_that_hardly_moved_give_way_to_what_was_scored() -> None:
     assert spot.orders == (2.0 * TEETH[0],)
     spread = mesh_spot(compared({"mesh.total": 0.2, "alike.mesh.spread": 3.0, "line.half_mesh": 0.0}))
     assert spread is not None
-    assert "dB" not in spread.title
+    assert spread.title == "what lies beside the mesh harmonics, which themselves hardly moved"
