@@ -60,7 +60,8 @@ def test_run_look_and_download(gap: playwright.Page, tmp_path: Path) -> None:
         settle(gap)
     gap.get_by_role("tab", name="Where").click()
     settle(gap)
-    assert gap.locator("[data-testid=stImage] img").count() == 4
+    # Spectra against the reference, averages, spectra against the simulation, teeth: two of each.
+    assert gap.locator("[data-testid=stImage] img").count() == 8
     with gap.expect_download() as waiting:
         button(gap, "Report (HTML)").click()
     waiting.value.save_as(tmp_path / "gap.html")
