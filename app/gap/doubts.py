@@ -13,7 +13,7 @@ from gearsig.gap.frame import DRIVEN, DRIVER, GearFrame
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.gear_lines import average_lines, visible_orders
 from gearsig.gap.spots import shaft_words
-from gearsig.gap.tooth import mesh_power, residual_lines, tooth_energy
+from gearsig.gap.tooth import STEPS_PER_TOOTH, mesh_power, residual_lines, tooth_energy
 from gearsig.severity.calibration import load_calibration
 from gearsig.severity.reference import telling_teeth_apart
 from gearsig.severity.shaft_lines import ShaftLines, orders_from_mesh
@@ -35,7 +35,8 @@ specimen of the same drawing has 0.2 and 0.5, and so have two gears that have wo
 
 WELL_EXPLAINED, HARDLY_EXPLAINED = 0.5, 0.15
 """Share, over that by chance, of what repeats with a shaft that mesh harmonics hold. Of the sample recordings, damaged
-ones included, the right number of teeth has 0.35 and more; most wrong ones have less than 0, a few 0.2 to 0.6."""
+ones included, the right number of teeth has 0.35 and more (0.08 with the heaviest damage, and then no other number has
+much); most wrong ones have less than 0, a few 0.2 to 0.6."""
 
 FEWEST_TEETH, MOST_TEETH = 12, 200
 
@@ -43,8 +44,9 @@ LOST_DB, OWN_DB = 10.0, 6.0
 """By how much one tooth's burst has become less since the reference, and by how much it stands above the reference's
 middling tooth: sound teeth that differ by chance have up to 7 dB, and lose nothing from one day to the next."""
 
-CLEAR_CHANGE = 10.0
-"""Energy of the change at one tooth over that at the middling tooth."""
+CLEAR_CHANGE, ALONE = 10.0, 4.0
+"""Energy of the change at one tooth over that at the middling tooth, and over the largest more than a tooth away: worn
+flanks and another path to the sensor change all teeth, some of them much."""
 
 
 def doubts_of(condition: Condition) -> list[str]:
@@ -116,7 +118,9 @@ def exchanged(now: Gathered, reference: Gathered, name: str) -> list[str]:
         )
         at = int(np.argmax(changed))
         lost_db, own_db = _decibel(there[at] / here[at]), _decibel(there[at] / np.median(there))
-        if changed[at] >= CLEAR_CHANGE * np.median(changed) and lost_db >= LOST_DB and own_db >= OWN_DB:
+        elsewhere = np.roll(changed, -at)[2 * STEPS_PER_TOOTH : -2 * STEPS_PER_TOOTH]
+        is_one = changed[at] >= max(CLEAR_CHANGE * float(np.median(changed)), ALONE * float(elsewhere.max()))
+        if is_one and lost_db >= LOST_DB and own_db >= OWN_DB:
             place = (at / len(changed) + (0.5 - load_calibration().lag_pitches) / difference.teeth) % 1.0
             tooth = f"Tooth {int(place * difference.teeth) + 1}" if now.marks[side] else "One tooth"
             remark = (
