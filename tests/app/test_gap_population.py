@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from gearsig.gap.gather import gather
 from gearsig.gap.population import BY_HAND, INDEPENDENT, load_population
 from gearsig.gap.types import NONE, UNKNOWN
 from sims.blind import CATALOGUE
+from sims.effects import EffectSetting
 
 FLOOR = load_population().floor(with_reference=True)
 
@@ -74,3 +76,33 @@ def test_both_models_record_a_drawn_machine() -> None:
         assert np.isfinite(recording.samples).all()
         speeds.append(60.0 * found.speed_hz)
     assert speeds == pytest.approx([drawn.speed_rpm] * 2, rel=0.01)
+
+
+def test_drawn_machines_lie_every_way_and_most_stand_on_mounts() -> None:
+    drawn = [draw_machine(np.random.default_rng([8, i])) for i in range(200)]
+    angles = [float(one.parameters["line_of_action_deg"]) for one in drawn]
+    assert np.histogram(angles, 4, (-180.0, 180.0))[0].min() > 30
+    assert all(mode.direction_deg is not None for one in drawn for mode in one.modes)
+    on_mounts = [sum(mode.frequency_hz <= 40.0 for mode in one.modes) for one in drawn]
+    assert set(on_mounts) == {0, 2}  # heave and pitch
+    assert 130 < np.count_nonzero(on_mounts) < 170
+
+
+def test_an_unbalance_is_heard_where_the_housing_yields() -> None:
+    """A body of mass M takes a force F at a = F/M; on rigid ground a bearing's spring hardly moves."""
+    drawn = next(d for d in (draw_machine(np.random.default_rng([8, i])) for i in range(50)) if d.speed_rpm > 1500.0)
+    rigid = tuple(mode for mode in drawn.modes if mode.frequency_hz > 40.0)
+    mount = next(
+        m
+        for d in (draw_machine(np.random.default_rng([8, i])) for i in range(50))
+        for m in d.modes
+        if m.frequency_hz < 15.0
+    )
+    unbalance = EffectSetting("unbalance", 500.0, {"gear": "driver"})
+    heard = []
+    for modes in (rigid, (*rigid, replace(mount, direction_deg=90.0))):
+        recording = simulate_rig(replace(drawn, modes=modes), severity=0.0, run=0, further=[unbalance])
+        first = recording.samples[0]
+        time = np.arange(len(first)) / recording.sampling_rate_hz
+        heard.append(abs(np.mean(first * np.exp(-2j * np.pi * drawn.speed_rpm / 60.0 * time))))
+    assert heard[1] > 5.0 * heard[0]

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from app.calibration.gap.paths import PathChange
 from app.calibration.gap.quasi_static.contact import N_PAIRS, Path, static_contact
 from app.calibration.gap.quasi_static.effects import EFFECTS
 from app.calibration.gap.quasi_static.machine import StaticMachine
@@ -61,3 +62,18 @@ def test_an_effect_changes_what_is_recorded(name: str) -> None:
     sound, faulty = record(made, made.sound(), day, None).samples, record(made, state, day, None).samples
     assert np.all(np.isfinite(faulty))
     assert np.std(faulty[:-1] - sound[:-1]) > 1e-3 * np.std(sound[:-1])
+
+
+def test_a_changed_path_is_heard_on_its_channel() -> None:
+    made, day = machine(), Day.drawn(np.random.default_rng(1))
+    state = made.sound()
+    state.paths = [PathChange(gain=2.0), PathChange()]
+    before, after = record(made, made.sound(), day, None).samples, record(made, state, day, None).samples
+    assert after[0] == pytest.approx(2.0 * before[0], abs=1e-9 * float(np.abs(before[0]).max()))
+    assert after[1:] == pytest.approx(before[1:], abs=1e-9 * float(np.abs(before[1]).max()))
+
+
+def test_friction_is_louder_the_less_the_gears_can_yield() -> None:
+    made = [machine(seed) for seed in range(200)]
+    assert 1.0 <= min(m.directness for m in made) < 1.2
+    assert 8.0 < max(m.directness for m in made) <= 10.0

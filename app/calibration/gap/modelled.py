@@ -12,7 +12,7 @@ import typer
 from app.calibration.gap.machines import Day, another_day, draw_machine, first_day
 from app.calibration.gap.ordinary import Ordinary, mounted_anew
 from app.calibration.gap.outside import with_foreign_vibration
-from app.calibration.gap.paths import draw_path_changes
+from app.calibration.gap.paths import draw_path_changes, size_of
 from app.calibration.gap.sample import SEED, Compared, Sample, reduced
 from app.calibration.gap.scene import rig_of
 from app.calibration.gap.signatures import made_by_hand, with_signature
@@ -59,6 +59,8 @@ class Model:
 CRACKED = Model("cracked", 0, 4, 7, 3, (0.3, 0.6))
 REDUCED = Model("reduced-fe", 50_000, 3, 4, 1, (0.3, 0.6))
 N_SOUND = 3
+N_PATHS = 2
+"""Changed paths for each signature: nothing else shows them."""
 
 
 def one_rig(model: Model, index: int) -> list[Sample]:
@@ -115,7 +117,7 @@ def _recordings(
         for i in range(model.n_by_hand):
             recording, strength = with_signature(sound[i % N_SOUND], name, _chance(rig, f"{name} {BY_HAND}", i))
             yield name, BY_HAND, strength, recording, drawn.torque_nm
-    for i in range(model.n_by_hand):
+    for i in range(N_PATHS * model.n_by_hand):
         turns, rng = turns_before(drawn, i % N_SOUND + 1), _chance(rig, f"transfer_path {BY_HAND}", i)
         recording, strength = _with_changed_path(ordinary, bare[i % N_SOUND], turns, rng)
         yield "transfer_path", BY_HAND, strength, recording, drawn.torque_nm
@@ -143,8 +145,7 @@ def _with_changed_path(
 ) -> tuple[Recording, float]:
     """Return a recording that came through other paths, and how much other, 0 to 1."""
     strength = float(rng.uniform())
-    size = 10.0 ** (0.8 * (strength - 1.0))
-    paths = draw_path_changes(len(vibrations(bare)), size, bare.sampling_rate_hz, rng)
+    paths = draw_path_changes(len(vibrations(bare)), size_of(strength), bare.sampling_rate_hz, rng)
     return ordinary.on(bare, turns, rng, paths), strength
 
 

@@ -72,6 +72,12 @@ class PathChange:
         return found
 
 
+def size_of(strength: float) -> float:
+    """Return the size, 0.16 to 1, of a change of a strength from 0 to 1: as many per decade."""
+    size: float = 10.0 ** (0.8 * (strength - 1.0))
+    return size
+
+
 def draw_path_changes(
     n_channels: int, size: float, rate_hz: float, rng: np.random.Generator, *, everywhere: bool = False
 ) -> Sequence[PathChange]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import cos, radians
 
 import numpy as np
 
 from app.calibration.gap.machines import draw_machine
+from app.calibration.gap.paths import PathChange
 from app.calibration.gap.quasi_static.contact import N_PATH, Path
 from app.calibration.gap.quasi_static.structure import Structure
 from app.calibration.rigs import DrawnRig, log_uniform
@@ -59,6 +60,8 @@ class State:
     wander : list of (float, float, float)
         Of the speed: share, Hz, phase.
     structure : Structure
+    paths : sequence of PathChange
+        Of each channel, behind all that the machine does; none: they are as ever.
     """
 
     gaps_m: list[FloatArray]
@@ -76,6 +79,7 @@ class State:
     passing: float
     wander: list[tuple[float, float, float]]
     structure: Structure
+    paths: Sequence[PathChange] = ()
 
 
 @dataclass(frozen=True)

@@ -73,6 +73,9 @@ def record(machine: StaticMachine, state: State, day: Day, levels: FloatArray | 
         if levels is not None:
             inside = _heard(structure, channel, {INSIDE: rng.standard_normal(len(time))}, rate)[first:]
             row = row + inside * (machine.inside_share[channel] * levels[channel] / inside.std())
+        if state.paths:
+            row = state.paths[channel].of(row, machine.rate_hz)
+        if levels is not None:
             row = row + _noise(len(row), machine, channel, rng) * levels[channel] * day.noise_factor
         rows.append(row * day.gains[channel])
     later = time[::FINER][first:]

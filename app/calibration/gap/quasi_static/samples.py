@@ -8,8 +8,9 @@ import numpy as np
 import typer
 
 from app.calibration.gap.outside import with_foreign_vibration
+from app.calibration.gap.paths import draw_path_changes, size_of
 from app.calibration.gap.quasi_static.effects import EFFECTS
-from app.calibration.gap.quasi_static.machine import StaticMachine
+from app.calibration.gap.quasi_static.machine import N_CHANNELS, StaticMachine
 from app.calibration.gap.quasi_static.record import Day, record
 from app.calibration.gap.sample import SEED, Compared, Sample, reduced
 from app.calibration.gap.signatures import made_by_hand, with_signature
@@ -22,7 +23,7 @@ from sims.cracked.twin import CrackedTwin
 
 QUASI_STATIC = "quasi-static"
 FIRST_RIG = 200_000
-N_SOUND, N_EACH, N_FOREIGN, N_BY_HAND = 2, 1, 2, 3
+N_SOUND, N_EACH, N_FOREIGN, N_BY_HAND, N_PATHS = 2, 1, 2, 3, 2
 
 
 def one_static(index: int) -> list[Sample]:
@@ -45,7 +46,7 @@ def one_static(index: int) -> list[Sample]:
         typer.echo(f"machine {rig}: {error}")
         return []
     samples = []
-    for label, detail, recording in _recordings(machine, levels, rng):
+    for label, detail, recording in (*_recordings(machine, levels, rng), *_changed_paths(machine, levels)):
         try:
             samples.append(compared.sample(label, detail, 0.0, recording, torque_nm))
         except (InputError, RefusalError) as error:
@@ -70,3 +71,12 @@ def _recordings(
         yield UNKNOWN, name, recording
     for i, name in enumerate(rng.choice(made_by_hand(sound[0], machine.drawn.torque_nm), N_BY_HAND, replace=False)):
         yield str(name), BY_HAND, with_signature(sound[i % N_SOUND], str(name), rng)[0]
+
+
+def _changed_paths(machine: StaticMachine, levels: np.ndarray) -> Iterator[tuple[str, str, Recording]]:
+    """Yield recordings that come through other paths, from a seed of their own."""
+    rng = np.random.default_rng([machine.seed, 5])
+    for _ in range(N_PATHS):
+        state = machine.sound()
+        state.paths = draw_path_changes(N_CHANNELS, size_of(rng.uniform()), machine.rate_hz, rng)
+        yield "transfer_path", "", record(machine, state, Day.drawn(rng), levels)
