@@ -10,6 +10,7 @@ from gearsig.checks import closest_match_hint, within
 from gearsig.errors import InputError
 from sims.effects import EffectSetting, effect
 from sims.forging.drive import WeakTooth
+from sims.forging.parameters import MOST_FRICTION
 from sims.forging.worn import SIDES, gear_pair
 from sims.mesh import GearMesh, RootCrack, mesh_stiffness
 from sims.values import Values
@@ -25,7 +26,7 @@ def with_effects(values: Values, settings: Sequence[EffectSetting]) -> tuple[Val
     - backlash: the play grows by the severity.
     - tooth_wear: the drive flanks of one gear lose material by sliding, most at their ends and nothing at the pitch
       point (`sims.mesh.wear_profile`); pairs touch the later the more they lost.
-    - sliding_friction: multiplies the coefficient by 1 + severity/100; the bristles' deflection stays.
+    - sliding_friction: the coefficient grows by the severity; the bristles' deflection stays.
     - torque_ripple: amplitude and order of the motor's ripple.
     - root_crack: the tooth's pairs lose stiffness in the ratio of their mean stiffness with and without the crack, by
       the potential energy of the tooth (`sims.mesh`); on the drive flank, where the load opens the crack.
@@ -49,7 +50,9 @@ def with_effects(values: Values, settings: Sequence[EffectSetting]) -> tuple[Val
             worn = f"sliding_wear_{options['gear']}_um"
             changed[worn] = wanted.number(worn) + severity
         elif setting.name == "sliding_friction":
-            changed["friction_coefficient"] = wanted.number("friction_coefficient") * (1.0 + severity / 100.0)
+            now = wanted.number("friction_coefficient")
+            within(severity, f"{s.name} of {setting.name}, beside the {now:g} there are,", 0.0, MOST_FRICTION - now)
+            changed["friction_coefficient"] = now + severity
         elif setting.name == "torque_ripple":
             changed["torque_ripple"], changed["torque_ripple_order"] = severity / 100.0, float(options["order"])
         elif severity > 0.0:

@@ -10,6 +10,8 @@ from sims.simulator import Parameter
 STIFFNESSES = ("formula", "table")
 """Two that one source gives for one pair of gears: by its formula, and as its table prints it, a tenth of that."""
 SAMPLINGS = ("instants", "filtered")
+MOST_FRICTION = 0.5
+"""Coefficient of the flanks."""
 
 
 def _number(
@@ -68,7 +70,7 @@ _CONTACT = (
     _number(
         "sliding_wear_driven_um", "um", "worn off the wheel's drive flanks by sliding, where it is most", 0, 1000, 0.0
     ),
-    _number("friction_coefficient", "", "sliding friction of the flanks", 0, 0.5, 0.05),
+    _number("friction_coefficient", "", "sliding friction of the flanks", 0, MOST_FRICTION, 0.05),
     _number("flank_static_ratio", "", "static over sliding friction of the flanks", *STATIC_RATIO_RANGE, 1.2),
     _number("flank_stribeck_mps", "m/s", "sliding speed at which static friction has gone", 1e-4, 1, 0.005),
     _number("flank_presliding_um", "um", "deflection of the flanks' bristles at which they slide", 0.5, 1000, 10.0),

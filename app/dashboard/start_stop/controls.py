@@ -17,13 +17,13 @@ from sims.values import parameter
 
 RATES_HZ = (1000.0, 4000.0, 10000.0)
 CRACK = "root_crack"
-HIGHEST = {CRACK: 2.0, "backlash": 500.0, "tooth_wear": 200.0, "sliding_friction": 400.0, "torque_ripple": 20.0}
+HIGHEST = {CRACK: 2.0, "backlash": 500.0, "tooth_wear": 200.0, "sliding_friction": 0.2, "torque_ripple": 20.0}
 """Ends of the sliders; the crack's is in modules."""
 WORDS = {
     CRACK: "Pairs of the cracked tooth lose stiffness, on the drive flank, where the load opens the crack.",
     "backlash": "Both flanks move apart: longer flights, harder impacts.",
     "tooth_wear": "Worn off the drive flanks where it is most: at their ends, by sliding; nothing at the pitch point.",
-    "sliding_friction": "Of the flanks, over its sound value.",
+    "sliding_friction": "Coefficient of the flanks, beside the sound one.",
     "torque_ripple": "Pistons of the motor, part of its torque.",
 }
 PLACES = {
@@ -93,7 +93,8 @@ def _choose_effect(name: str, chosen: Preset) -> EffectSetting:
     s = found.severity
     if name == CRACK:
         high *= float(chosen.parameters.get("module_mm") or parameter(PARAMETERS, "module_mm").default or 1.0)
-    label = f"{found.title[:1].upper()}{found.title[1:]} ({shown_unit(s.unit)})"
+    unit = shown_unit(s.unit)
+    label = f"{found.title[:1].upper()}{found.title[1:]}" + (f" ({unit})" if unit else "")
     severity = choose_number(label, f"severity of {name} of the drive", 0.0, high, about=WORDS[name])
     if name not in PLACES or severity == 0.0:
         return EffectSetting(name, severity)

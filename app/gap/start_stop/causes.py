@@ -47,7 +47,7 @@ TRIED: Mapping[str, Tried] = {
     "tooth_wear": Tried(
         (12.0, 25.0, 50.0, 100.0, 200.0), ("play", "curve"), ("deflection", "flank_friction", "impact", *_ROUGH)
     ),
-    "sliding_friction": Tried((60.0, 180.0, 400.0), ("flank_friction",), ("curve", *_ROUGH), "torque"),
+    "sliding_friction": Tried((0.03, 0.09, 0.2), ("flank_friction",), ("curve", *_ROUGH), "torque"),
     LOAD_FRICTION: Tried(
         (8.0, 20.0, 45.0), ("load_friction",), (), "torque", needs_reference=True, direct=("load_friction",)
     ),

@@ -21,9 +21,10 @@ def least_seen(compared: Compared, predictions: Predictions) -> tuple[str, ...]:
         least = least_severity(cause, floor)
         unit, title = severity_unit(effects[name].unit), effects[name].title
         if np.isfinite(least):
-            told.append(f"{title} below {readable(least, 2)}{' ' if unit else ''}{unit}")
+            told.append(f"{title} below {readable(least, 2)} {unit}".rstrip())
         else:
-            told.append(f"{title} at all (up to {readable(float(cause.severities[-1]), 2)} {unit} were tried)")
+            most = f"{readable(float(cause.severities[-1]), 2)} {unit}".rstrip()
+            told.append(f"{title} at all (up to {most} were tried)")
     return (f"This recording would not show: {'; '.join(told)}.",) if told else ()
 
 

@@ -215,10 +215,8 @@ def _extra_um(fitted: Fitted | None, compared: Compared) -> float:
 
 def _preset(compared: Compared, cause: GapCause, fitted: Added) -> str:
     within = f"90 % interval {cause.severity.low:.3g} to {cause.severity.high:.3g}; " if cause.severity else ""
-    note = (
-        f"{cause.title}: {fitted.severity:.3g} {cause.unit}, {within}fitted to {compared.name}, probability "
-        f"{cause.probability:.2f}"
-    )
+    severity = f"{fitted.severity:.3g} {cause.unit}".rstrip()
+    note = f"{cause.title}: {severity}, {within}fitted to {compared.name}, probability {cause.probability:.2f}"
     twin = compared.twin
     parameters = parameters_with(cause.name, fitted.severity, twin.parameters)
     if cause.name == TORQUE_GAIN:

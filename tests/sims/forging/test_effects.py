@@ -25,7 +25,7 @@ def recorded(**effects: float) -> Recording:
 
 
 def test_effects_change_their_parameter_and_not_the_rig_file() -> None:
-    faulty = recorded(backlash=80.0, sliding_friction=100.0, torque_ripple=10.0)
+    faulty = recorded(backlash=80.0, sliding_friction=0.05, torque_ripple=10.0)
     assert faulty.truth is not None
     assert faulty.rig is not None
     assert faulty.rig.contact is not None
