@@ -352,10 +352,8 @@ def _likeliest_two(causes: Sequence[GapCause]) -> tuple[str, str] | None:
 
 def _preset(twin: Twin, condition: Condition, cause: GapCause, fitted: Added) -> str:
     within = f"90 % interval {cause.severity.low:.3g} to {cause.severity.high:.3g}; " if cause.severity else ""
-    note = (
-        f"{cause.title}: {fitted.severity:.3g} {cause.unit}, {within}fitted to {condition.facts.name}, "
-        f"probability {cause.probability:.2f}"
-    )
+    severity = f"{fitted.severity:.3g} {cause.unit}".rstrip()
+    note = f"{cause.title}: {severity}, {within}fitted to {condition.facts.name}, probability {cause.probability:.2f}"
     return twin.preset_toml(condition.facts.point, (fitted,), (note,))
 
 
