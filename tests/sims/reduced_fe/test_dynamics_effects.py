@@ -58,6 +58,33 @@ def test_more_friction_is_more_of_the_same():
     assert np.std(two) == pytest.approx(2.0 * np.std(one), rel=0.05)
 
 
+def test_dry_friction_is_a_part_of_the_load_that_does_not_fade_towards_the_pitch_point():
+    """±μ N of every pair; where two carry they are on either side of it, and only what one has more counts."""
+    dry = {"friction": "on", "friction_factor": 0.0}
+    one, two = (settled(pair_of(dry_friction=mu, **dry), ("mesh_force_n", "friction_n")) for mu in (0.1, 0.2))
+    part = two["friction_n"] / two["mesh_force_n"]
+    assert np.abs(part).max() < 0.2
+    pitch_point = 0.877  # in mesh cycles, as the pair has it
+    near = np.abs(two["mesh_cycles"] % 1.0 - pitch_point) < 0.05
+    assert np.abs(part[near]).max() > 0.13
+    assert np.std(two["friction_n"]) == pytest.approx(2.0 * np.std(one["friction_n"]), rel=0.1)
+
+
+@pytest.mark.parametrize("bends", [0.0, 300.0])
+def test_a_misaligned_coupling_shakes_its_bearing_twice_a_turn_by_torque_and_by_its_own_stiffness(bends):
+    """β (T ⊕ K)/(2 L) on either bearing, the two a quarter of a period apart; a spring far below its resonance."""
+    pair = synthetic_pair(bearing_stiffness_n_per_m=2e8, bending_stiffness_n_per_m=2e8)
+    shaft = replace(pair.machine.shafts[0], coupling_angle_deg=1.0, coupling_bending_nm_per_rad=bends)
+    pair = replace(pair, machine=replace(pair.machine, shafts=(shaft, pair.machine.shafts[1])))
+    name = "bearing 1 x acceleration"
+    run = settled(pair, (name,))
+    turns = run["mesh_cycles"] / pair.machine.mesh.pair.driver.teeth
+    window = np.hanning(len(turns)) / np.hanning(len(turns)).sum()
+    line = 2.0 * abs(np.sum(window * run[name] * np.exp(-4j * np.pi * turns)))
+    force = np.radians(1.0) * np.hypot(170.0, bends) / (2.0 * shaft.bearing_distance_m)
+    assert line == pytest.approx((2.0 * 1000.0 * np.pi / 30.0) ** 2 * force / 2e8, rel=0.05)
+
+
 def test_friction_is_against_the_sliding_before_and_after_the_pitch_point():
     """v_s = ω(ρ2 − ρ1): positive in approach, negative in recess; one pair in contact, a load too light for corners."""
     pair = synthetic_pair(friction="on")
