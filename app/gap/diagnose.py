@@ -43,6 +43,7 @@ from gearsig.gap.types import (
     group_probabilities,
 )
 from gearsig.gap.verdict import rivals
+from gearsig.gap.words import fitted_words
 from gearsig.recording.si_units import metres_per_second_squared
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
@@ -351,9 +352,7 @@ def _likeliest_two(causes: Sequence[GapCause]) -> tuple[str, str] | None:
 
 
 def _preset(twin: Twin, condition: Condition, cause: GapCause, fitted: Added) -> str:
-    within = f"90 % interval {cause.severity.low:.3g} to {cause.severity.high:.3g}; " if cause.severity else ""
-    severity = f"{fitted.severity:.3g} {cause.unit}".rstrip()
-    note = f"{cause.title}: {severity}, {within}fitted to {condition.facts.name}, probability {cause.probability:.2f}"
+    note = fitted_words(cause, fitted.severity, condition.facts.name)
     return twin.preset_toml(condition.facts.point, (fitted,), (note,))
 
 

@@ -30,13 +30,16 @@ def missing_words(line: LineLevel) -> str:
 
     The level of a line that is not seen is that of the noise: where that is no lower, the line may well be there.
     """
-    if line.simulated_is_seen:
-        return "" if line.recorded_is_seen else _missing(line.level.difference_db, "recording")
-    return _missing(-line.level.difference_db, "simulation")
+    if line.simulated_is_seen and line.recorded_is_seen:
+        return ""
+    record = "recording" if line.simulated_is_seen else "simulation"
+    return f"hidden by the {record}'s scatter" if _is_hidden(line) else f"not in the {record}"
 
 
-def _missing(lower_db: float, record: str) -> str:
-    return f"not in the {record}" if lower_db > LACKING_DB else f"hidden by the {record}'s scatter"
+def _is_hidden(line: LineLevel) -> bool:
+    """Whether the record that does not show a line would not show it either if it were there."""
+    difference_db = line.level.difference_db
+    return (difference_db if line.simulated_is_seen else -difference_db) <= LACKING_DB
 
 
 def verdict_of(channels: Sequence[ChannelComparison]) -> str:
@@ -71,7 +74,7 @@ def _levels_text(channel: ChannelComparison) -> str:
     if not lines:
         return "No line of the recording stands above its own noise: only the floors can be compared."
     where = "mesh harmonics" if lines[0].kind == "mesh" else "shaft orders"
-    told = [line for line in lines if line.simulated_is_seen or missing_words(line).startswith("not")]
+    told = [line for line in lines if line.simulated_is_seen or not _is_hidden(line)]
     hidden = len(lines) - len(told)
     if not told:
         return f"The simulation's own scatter hides all {where} of the recording: they cannot be compared."
@@ -118,7 +121,7 @@ def _missing_texts(channel: ChannelComparison) -> list[str]:
         found = [
             line
             for line in (*channel.lines, *channel.other_lines)
-            if getattr(line, seen) and not getattr(line, other) and missing_words(line).startswith("not")
+            if getattr(line, seen) and not getattr(line, other) and not _is_hidden(line)
         ]
         side = "recorded_db" if seen.startswith("recorded") else "simulated_db"
         strongest = max(getattr(line.level, side) for line in (*channel.lines, *channel.other_lines))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from gearsig.gap.frame import GearFrame
 from gearsig.gap.gear_lines import SIDES
 from gearsig.gap.spots import shaft_words
-from gearsig.gap.types import Evidence, Shrinkage
+from gearsig.gap.types import Evidence, GapCause, Shrinkage
 
 _UNITS = {"um": "µm", "deg": "°", "g mm": "g·mm", "N m": "N·m", "m/s^2": "m/s²", "1": ""}
 
@@ -125,3 +125,10 @@ def stance_words(evidence: Evidence) -> str:
     if evidence.speaks_for:
         return "speaks for it"
     return "further than foretold" if evidence.is_further else "speaks against it"
+
+
+def fitted_words(cause: GapCause, severity: float, recording: str) -> str:
+    """Return what a twin's file says of the effect in it: severity, interval, what it was fitted to, probability."""
+    within = f"90 % interval {cause.severity.low:.3g} to {cause.severity.high:.3g}; " if cause.severity else ""
+    size = f"{severity:.3g} {cause.unit}".rstrip()
+    return f"{cause.title}: {size}, {within}fitted to {recording}, probability {cause.probability:.2f}"

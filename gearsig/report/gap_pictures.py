@@ -10,10 +10,7 @@ import numpy as np
 
 from gearsig.gap.curve_types import AngleCurves, AverageCurves, SpectrumCurves
 from gearsig.gap.curves import against_reference, lines_beyond
-from gearsig.gap.types import (
-    GapReport,
-    PlaceKind,
-)
+from gearsig.gap.types import GapReport, PlaceKind
 from gearsig.plot.embed import Picture, embed
 from gearsig.plot.marks import AngleMark
 from gearsig.report.gap_sections import detailed_causes

@@ -82,6 +82,7 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
         bend_y = ks * (q[g + 1] - 0.5 * (q[b1 + 1] + q[b2 + 1])) + cs * (v[g + 1] - 0.5 * (v[b1 + 1] + v[b2 + 1]))
         theta = q[1] if side == 0 else q[2]
         rotor, rotor_rate = (q[0], v[0]) if side == 0 else (q[3], v[3])
+        up = 1.0 if side == 0 else -1.0  # the driven shaft turns the other way
         slope = 1.0
         push_x, push_y = 0.0, 0.0
         if k.hooke[side] > 0.0:
@@ -93,7 +94,6 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
         twist_rate = rotor_rate - (v[1] if side == 0 else v[2])
         carried = k.torsional_stiffness[side] * twist + k.torsional_damping[side] * twist_rate
         if k.hooke[side] > 0.0:
-            up = 1.0 if side == 0 else -1.0  # the driven shaft turns the other way
             bent = k.coupling_bending[side]
             push_x = k.hooke_force[side] * (carried * (1.0 + c2) - bent * s2)
             push_y = k.hooke_force[side] * up * (carried * s2 + bent * (1.0 + c2))
@@ -108,9 +108,9 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
             a[b] = (0.5 * bend_x - kb * x - cb * v[b] + sign * push_x) * per_mass + k.gravity_x
             a[b + 1] = (0.5 * bend_y - kb * y - cb * v[b + 1] + sign * push_y) * per_mass + k.gravity_y
         if side == 0:
-            fx, fy, t, up = fx1 - bend_x, fy1 - bend_y, t1 + carried, 1.0
+            fx, fy, t = fx1 - bend_x, fy1 - bend_y, t1 + carried
         else:
-            fx, fy, t, up = fx2 - bend_x, fy2 - bend_y, t2 + carried, -1.0
+            fx, fy, t = fx2 - bend_x, fy2 - bend_y, t2 + carried
         offset = k.mass_offset[side]
         ax, ay = fx * k.per_mass[side], fy * k.per_mass[side]
         if offset > 0.0:

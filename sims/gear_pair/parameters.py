@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sims.machine.parts import MOST_DRY_FRICTION
 from sims.simulator import Parameter
 
 _SWITCH = ("on", "off")
@@ -62,7 +63,14 @@ _MESH = (
     _number("roughness_dimension", "", "fractal dimension of the rough profile", 1.001, 1.999, 1.5),
     _word("friction", "sliding friction of the flanks", _SWITCH, "on"),
     _number("friction_factor", "", "multiplies the coefficient of friction", 0, 20, 1.0),
-    _number("dry_friction", "", "coefficient that is added at every sliding speed: starved flanks", 0, 0.6, 0.0),
+    _number(
+        "dry_friction",
+        "",
+        "coefficient that is added at every sliding speed: starved flanks",
+        0,
+        MOST_DRY_FRICTION,
+        0.0,
+    ),
     _number("viscosity_cp", "cP", "dynamic viscosity of the oil at the inlet", 0.1, 1e4, 17.6),
 )
 

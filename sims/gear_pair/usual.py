@@ -137,6 +137,7 @@ def usual_parameters(nominal: Nominal) -> dict[str, ParameterValue]:
     m, z, size = nominal.module_mm, nominal.teeth, nominal.size
     shifts = [_shift(teeth, nominal.pressure_angle_deg) for teeth in z]
     rotor = 4.5e-3 * size**4 * (sum(z) / 80.0) ** 3
+    torsional = 1.1e4 * size**3
     return {
         "teeth_driver": z[0],
         "teeth_driven": z[1],
@@ -159,9 +160,9 @@ def usual_parameters(nominal: Nominal) -> dict[str, ParameterValue]:
         "bearing_mass_kg": 0.7 * size**2,
         "bending_stiffness_n_per_m": 2.6e8 * size,
         "bending_damping_n_s_per_m": 630.0 * size,
-        "torsional_stiffness_nm_per_rad": 1.1e4 * size**3,
+        "torsional_stiffness_nm_per_rad": torsional,
         "torsional_damping_nm_s_per_rad": 1.5 * size**3,
-        "coupling_bending_nm_per_rad": COUPLING_BENDING_SHARE * 1.1e4 * size**3,
+        "coupling_bending_nm_per_rad": COUPLING_BENDING_SHARE * torsional,
         "rotor_inertia_input_kg_m2": rotor,
         "rotor_inertia_output_kg_m2": rotor,
         "governor_nm_s_per_rad": 1.6 * size**4,
@@ -212,8 +213,13 @@ def body_on_mounts(nominal: Nominal) -> tuple[HousingMode, ...]:
     Handbook*.
     """
     stiffness = float(usual_parameters(nominal)["bearing_stiffness_n_per_m"])
-    gain = stiffness / (BODY_KG * nominal.size**2 * (2.0 * pi * MOUNTS_HZ) ** 2)
+    gain = body_gain(stiffness, BODY_KG * nominal.size**2, MOUNTS_HZ)
     return tuple(HousingMode(MOUNTS_HZ, MOUNTS_DAMPING, gain, shape) for shape in BODY_SHAPES)
+
+
+def body_gain(bearing_stiffness_n_per_m: float, mass_kg: float, mounts_hz: float) -> float:
+    """Return the static gain k/(M ω₀²) of a body on mounts, see `body_on_mounts`."""
+    return bearing_stiffness_n_per_m / (mass_kg * (2.0 * pi * mounts_hz) ** 2)
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:

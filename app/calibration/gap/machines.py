@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import pi
 
 import numpy as np
 
 from app.calibration.rigs import DrawnRig, HousingMode, draw_rig, log_uniform
 from sims.effects import EffectSetting
-from sims.gear_pair.usual import BODY_SHAPES
+from sims.gear_pair.usual import BODY_SHAPES, body_gain
 
 LIGHT_SHARE, LIGHT_TORQUE = 0.4, (0.0005, 0.3)
 """Machines that run at light load, and their torque over that of the others: down to what idling takes."""
@@ -84,8 +83,7 @@ def _on_mounts(drawn: DrawnRig, rng: np.random.Generator) -> tuple[HousingMode, 
     mass_kg = log_uniform(rng, *BODY_KG) * size**2
     if rng.uniform() < RIGID_SHARE:
         return ()
-    stiffness = float(drawn.parameters["bearing_stiffness_n_per_m"])
-    gain = stiffness / (mass_kg * (2.0 * pi * frequency_hz) ** 2)
+    gain = body_gain(float(drawn.parameters["bearing_stiffness_n_per_m"]), mass_kg, frequency_hz)
     return tuple(HousingMode(frequency_hz, damping_ratio, gain, shape) for shape in BODY_SHAPES)
 
 

@@ -34,6 +34,7 @@ from gearsig.gap.types import (
     group_probabilities,
 )
 from gearsig.gap.verdict import rivals
+from gearsig.gap.words import fitted_words
 
 NORMAL_90 = 1.645
 MOST_EVIDENCE = 6
@@ -214,9 +215,7 @@ def _extra_um(fitted: Fitted | None, compared: Compared) -> float:
 
 
 def _preset(compared: Compared, cause: GapCause, fitted: Added) -> str:
-    within = f"90 % interval {cause.severity.low:.3g} to {cause.severity.high:.3g}; " if cause.severity else ""
-    severity = f"{fitted.severity:.3g} {cause.unit}".rstrip()
-    note = f"{cause.title}: {severity}, {within}fitted to {compared.name}, probability {cause.probability:.2f}"
+    note = fitted_words(cause, fitted.severity, compared.name)
     twin = compared.twin
     parameters = parameters_with(cause.name, fitted.severity, twin.parameters)
     if cause.name == TORQUE_GAIN:
