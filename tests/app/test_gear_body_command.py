@@ -11,8 +11,11 @@ from typer.testing import CliRunner
 from app.cli import app
 from gearsig.cache import OtherVersionError
 from gearsig.errors import InputError
+from sims.mesh.geometry import GearGeometry
+from sims.reduced_fe.blank import GearBlank
 from sims.reduced_fe.gear_file import read_gear, write_gear
 from sims.reduced_fe.gear_key import gear_key, gear_name
+from sims.reduced_fe.ready import ready_gear
 from sims.reduced_fe.reduce import plan_for
 
 SMALL = ["--teeth", "16", "--profile-shift", "0.2", "--face", "10mm", "--bore", "8mm", "--dof", "15000"]
@@ -45,21 +48,19 @@ def test_mesh_modes_stress_and_reductions_are_written(tmp_path, monkeypatch):
 def test_a_gear_of_another_version_is_named_until_it_is_cleared_away(tmp_path, monkeypatch):
     monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path / "kept"))
     arguments = ("-o", str(tmp_path / "out"), *SMALL, "--dof", "5000", "--modes", "4", "--reduce")
-    assert _run(*arguments).exit_code == 0
-    (kept,) = (tmp_path / "kept" / "gears").iterdir()
-    gear = read_gear(kept)
-    write_gear(kept, replace(gear, key="of another version"))
-    for path in (tmp_path / "out").iterdir():
-        path.unlink()
+    blank = GearBlank(GearGeometry(16, 3.0, profile_shift=0.2, face_width_mm=10.0, bore_radius_mm=8.0))
+    kept = tmp_path / "kept" / "gears" / f"{gear_name(blank, plan_for(blank, 5000))}.npz"
+    kept.parent.mkdir(parents=True)
+    write_gear(kept, replace(ready_gear("z50_m3"), key="of another version"))
     refused = _run(*arguments)
     assert isinstance(refused.exception, OtherVersionError)
     assert str(kept) in str(refused.exception)
     assert "--fresh" in str(refused.exception)
-    assert not list((tmp_path / "out").iterdir())
+    assert not (tmp_path / "out").exists()
     again = _run(*arguments, "--fresh")
     assert again.exit_code == 0
     assert "1 file of another version cleared away" in again.stderr
-    assert read_gear(kept).key == gear.key
+    assert read_gear(kept).key == gear_key(blank, plan_for(blank, 5000))
 
 
 def test_a_model_that_keeps_nothing_has_nothing_to_clear_away(tmp_path):
