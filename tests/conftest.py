@@ -15,4 +15,7 @@ settings.load_profile("ci" if os.environ.get("CI") else "gearsig")
 @pytest.fixture(scope="session", autouse=True)
 def kept_results_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Keep results of tests apart from the user's, which may be of another state of the code."""
-    os.environ.setdefault("GEARSIG_CACHE", str(tmp_path_factory.mktemp("cache")))
+    own = tmp_path_factory.getbasetemp()
+    # Workers of one run share what each would else make again, the forests above all.
+    shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+    os.environ.setdefault("GEARSIG_CACHE", str(shared / "cache"))

@@ -43,8 +43,9 @@ def transplanted(
     """Return the changes that a simulated effect makes on the real machine's own baseline.
 
     Powers of different causes add: P = P_real + (P_with − P_sound). On a twin whose teeth are rougher than the real
-    ones, or whose floor is lower, the same effect changes the decibels less or more. What falls, and shares of mesh
-    harmonics, change by the same decibels.
+    ones, or whose floor is lower, the same effect changes the decibels less or more. Mesh harmonics pass through the
+    same resonances as those of the sound machine and change by the same decibels each; what they do together hangs on
+    which of them the real machine has. What falls, falls by the same decibels.
 
     Parameters
     ----------
@@ -80,6 +81,7 @@ def transplanted(
             found[name] = _added(given[name], simulated[name], real[name], gain_db + own_db)
         elif name.startswith(_EXCESSES) and name not in _NO_EXCESS:
             found[name] = _added(given[name], simulated[name], real[name], level_db - floor_db)
+    found |= _mesh(given, real, level_db)
     for name in names:
         if name.startswith(_KURTOSIS):
             part = _part(found[name.replace(_KURTOSIS, _BANDS)])
@@ -104,6 +106,20 @@ def _added(change_db: float, simulated_db: float, real_db: float, gain_db: float
         return change_db
     more = (_power(simulated_db + change_db) - _power(simulated_db)) * _power(gain_db)
     return float(10.0 * np.log10(1.0 + more / _power(real_db)))
+
+
+def _mesh(given: Mapping[str, float], real: Mapping[str, float], level_db: float) -> dict[str, float]:
+    """Return the mesh harmonics' changes: what is added comes as much louder, on the harmonics that the machine has."""
+    shares = [name for name in given if name.startswith("mesh.share.")]
+    levels = [_louder(given[name] + given["mesh.total"], level_db) for name in shares]
+    powers = np.array([_power(real[name]) for name in shares])
+    total = float(10.0 * np.log10(powers @ [_power(level) for level in levels] / powers.sum()))
+    return {"mesh.total": total} | {name: level - total for name, level in zip(shares, levels, strict=True)}
+
+
+def _louder(change_db: float, level_db: float) -> float:
+    """Return the change in decibels if what is added were louder by a level; what falls, falls alike."""
+    return _added(change_db, 0.0, 0.0, level_db)
 
 
 def _part(change_db: float) -> float:

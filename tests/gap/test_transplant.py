@@ -20,9 +20,16 @@ USUAL = dict(zip(NAMES, np.median(POPULATION.changes[POPULATION.causes == "none"
 ONLY = len(FEATURES)
 
 
-def moved(change: dict[str, float], real: dict[str, float]) -> dict[str, float]:
+def moved(change: dict[str, float], real: dict[str, float], level_db: float = 0.0) -> dict[str, float]:
     row = np.array([change.get(name, 0.0) for name in FEATURES])
-    return dict(zip(FEATURES, transplanted(FEATURES, row, SOUND, real, USUAL).tolist(), strict=True))
+    return dict(zip(FEATURES, transplanted(FEATURES, row, SOUND, real, USUAL, level_db).tolist(), strict=True))
+
+
+def of_harmonics(levels_db: dict[str, float], powers: dict[str, float]) -> dict[str, float]:
+    """Return the change of the mesh's features that such changes of single harmonics make."""
+    after = {name: power * 10 ** (levels_db.get(name, 0.0) / 10.0) for name, power in powers.items()}
+    total = float(10 * np.log10(sum(after.values()) / sum(powers.values())))
+    return {"mesh.total": total} | {name: levels_db.get(name, 0.0) - total for name in powers}
 
 
 @given(st.floats(0.0, 30.0))
@@ -42,6 +49,29 @@ def test_on_a_quieter_baseline_the_same_power_shows_more() -> None:
     quieter = {**SOUND, name: SOUND[name] - 20.0}
     # 3 dB more is as much again, which is a hundred times the quieter baseline.
     assert moved({name: 10 * np.log10(2.0)}, quieter)[name] == pytest.approx(10 * np.log10(101.0))
+
+
+def test_a_harmonic_rises_by_as_much_on_a_machine_that_has_little_of_it() -> None:
+    names = [name for name in FEATURES if name.startswith("mesh.share.")]
+    powers = {name: 10 ** (SOUND[name] / 10.0) for name in names}
+    rises = {names[1]: 15.0, names[2]: -4.0}
+    given_db = of_harmonics(rises, powers)
+    found = moved(given_db, SOUND)
+    assert {name: found[name] for name in given_db} == pytest.approx(given_db)
+    weaker = {**SOUND, names[1]: SOUND[names[1]] - 20.0}
+    expected = of_harmonics(rises, {**powers, names[1]: powers[names[1]] / 100.0})
+    found = moved(given_db, weaker)
+    assert {name: found[name] for name in given_db} == pytest.approx(expected)
+    assert found["mesh.total"] < given_db["mesh.total"]
+
+
+def test_what_an_effect_adds_to_the_mesh_comes_louder_and_what_it_takes_does_not() -> None:
+    names = [name for name in FEATURES if name.startswith("mesh.share.")]
+    powers = {name: 10 ** (SOUND[name] / 10.0) for name in names}
+    # As much again, ten times as loud, is eleven times the power.
+    expected = of_harmonics({names[1]: 10 * np.log10(11.0), names[2]: -4.0}, powers)
+    found = moved(of_harmonics({names[1]: 10 * np.log10(2.0), names[2]: -4.0}, powers), SOUND, 10.0)
+    assert {name: found[name] for name in expected} == pytest.approx(expected)
 
 
 def test_absolute_levels_follow_the_gain_of_the_path() -> None:
