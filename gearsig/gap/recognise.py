@@ -22,10 +22,11 @@ from gearsig.gap.textbook import NOTHING_SAID, strengths
 from gearsig.gap.trees import LinearRule, Trees
 from gearsig.gap.types import NONE, UNKNOWN
 
-N_TREES = 200
+N_TREES = 400
 ROW_SHARE, FEATURE_SHARE, FEWEST_IN_A_LEAF = 0.4, 0.1, 3
 """Of the rows that each tree is fitted to, of the columns that each split may choose from, and the least rows that a
-split leaves on either side."""
+split leaves on either side. Two forests of 200 trees that differ in their random numbers alone have log losses on blind
+cases that scatter by 0.02, and name three in a hundred differently."""
 
 LINEAR_SHARE, LINEAR_SHRINKAGE, LINEAR_REACH = 0.5, 0.2, 8.0
 """Of the probabilities without a reference that a linear discriminant gives; how far its covariance is drawn towards a

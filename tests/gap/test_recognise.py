@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
+from gearsig.gap import recognise
 from gearsig.gap.features import Features
 from gearsig.gap.kept_recogniser import keep_fitted
 from gearsig.gap.population import BY_HAND, INDEPENDENT, Population, load_population, without_machines_of
@@ -24,8 +25,10 @@ def population() -> Population:
 
 @pytest.fixture(scope="module")
 def on_half(population: Population) -> Recogniser:
-    """A forest that has seen the machines of even number only."""
-    return fit_recogniser(population.of_rows(population.rigs % 2 == 0), with_reference=True)
+    """A forest, smaller than the shipped one, that has seen the machines of even number only."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(recognise, "N_TREES", 60)
+        return fit_recogniser(population.of_rows(population.rigs % 2 == 0), with_reference=True)
 
 
 def row(population: Population, i: int) -> Features:
