@@ -178,7 +178,8 @@ class GapCause:
     probability : float
         Calibrated, over all causes; an upper limit where nothing was simulated.
     severity : Interval or None
-        In the effect's unit.
+        With which the twin comes nearest, in the effect's unit; the interval is the fit's, and the machine's own may
+        lie further off.
     fitted : Added or None
         The setting that fits best.
     place : str

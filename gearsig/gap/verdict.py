@@ -22,7 +22,7 @@ def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
 NO_SIMULATION = (
     "How far: cannot be told; the simulators have a gear pair and this rig has none, so nothing was simulated."
 )
-TOGETHER, MOST_RIVALS = 0.8, 4
+TOGETHER, MOST_RIVALS = 0.9, 4
 """What cannot be told apart: the fewest likeliest effects that have such a share of what all effects have, and not
 more of them than anybody would look at."""
 SOUND_MACHINE = "the same machine when it was sound"

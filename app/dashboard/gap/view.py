@@ -120,7 +120,7 @@ def _show_which(finished: Finished) -> None:
     if text:
         st.warning(as_typed(text), icon=":material/call_split:")
     rows = cause_rows(report)
-    severities = {"severity (90 % interval)": [row.severity for row in rows]} if report.is_simulated else {}
+    severities = {"severity (interval of the fit)": [row.severity for row in rows]} if report.is_simulated else {}
     _table(
         {
             "probability": [row.bar_percent for row in rows],
