@@ -185,7 +185,7 @@ def _show_next(finished: Finished) -> None:
     if rows:
         st.markdown("What to record next, to tell the likeliest causes apart. Distances are in structural floors.")
         columns = zip(("at", "tells apart", "distance there", "now"), zip(*rows, strict=True), strict=True)
-        _table({name: list(values) for name, values in columns})
+        _table({name: list(values) for name, values in columns}, widths={"at": 380, "tells apart": 240})
     names = ("recording", "speed (rpm)", "torque (N·m)", "revolutions", "length (s)", "sampling rate (Hz)")
     facts = condition_rows(report)
     _table({name: [row[i] for row in facts] for i, name in enumerate(names)})
