@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Generator, Mapping, Sequence
+from concurrent.futures import Executor, Future, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gearsig.errors import GearsigError, InputError
+from gearsig.processes import n_processors, process_pool
 
 if TYPE_CHECKING:
     from gearsig.recording.types import Recording
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 Progress = Callable[[int, int, "Entry | Failure"], object]
 
 Results = Generator[tuple[int, "Entry | Failure"], None, None]
-_THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -121,7 +119,7 @@ def report_many(
     files = [Path(path) for path in paths]
     if not files:
         raise InputError("there are no recordings to report on", remedy="name at least one file")
-    workers = min(len(files), _n_processors()) if n_processes is None else count(n_processes, "n_processes")
+    workers = min(len(files), n_processors()) if n_processes is None else count(n_processes, "n_processes")
     folder = made_folder(Path(output_folder))
     sound = Path(reference) if reference is not None else None
     jobs = [
@@ -191,14 +189,14 @@ def _run_local(jobs: Mapping[int, _Job], n_workers: int) -> Results:
     """Run jobs in local processes; where one kills its process, the unfinished ones get a process each."""
     unfinished = dict(jobs)
     try:
-        with _pool(n_workers) as pool:
+        with process_pool(n_workers) as pool:
             for number, result in _collect(pool, jobs):
                 del unfinished[number]
                 yield number, result
     except BrokenProcessPool:
         for number, job in unfinished.items():
             try:
-                with _pool(1) as pool:
+                with process_pool(1) as pool:
                     result = pool.submit(_report_one, job).result()
             except BrokenProcessPool:
                 result = _failure(job, "the process that analysed it was killed: perhaps it ran out of memory")
@@ -213,33 +211,6 @@ def _collect(executor: Executor, jobs: Mapping[int, _Job]) -> Results:
     finally:
         for future in futures:
             future.cancel()
-
-
-@contextmanager
-def _pool(n_workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Open a pool of fresh processes with one computing thread each: more would fight over the processors.
-
-    The libraries read the thread settings when they load, hence the environment; it is restored afterwards.
-    """
-    before = {name: os.environ.get(name) for name in _THREAD_SETTINGS}
-    os.environ.update(dict.fromkeys(_THREAD_SETTINGS, "1"))
-    pool = ProcessPoolExecutor(n_workers, mp_context=get_context("spawn"), initializer=_start_worker)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
-
-
-def _start_worker() -> None:
-    """Let Ctrl-C end a worker at once and without a traceback; the parent tidies up."""
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _report_one(job: _Job) -> Entry | Failure:
@@ -297,10 +268,3 @@ def _sorted_out(results: Mapping[int, Entry | Failure]) -> tuple[tuple[Entry, ..
         tuple(item for item in ordered if isinstance(item, Entry)),
         tuple(item for item in ordered if isinstance(item, Failure)),
     )
-
-
-def _n_processors() -> int:
-    """Return the processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

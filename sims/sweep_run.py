@@ -15,8 +15,8 @@ from typing import Any
 
 from gearsig.checks import count
 from gearsig.errors import GearsigError, InputError
+from gearsig.processes import n_processors, process_pool
 from sims.files import file_set, write_set
-from sims.processes import n_processors, process_pool
 from sims.sweep import Point, Sweep
 
 DEFINITION = "sweep.json"

@@ -61,7 +61,7 @@ def test_the_library_knows_no_simulator_and_no_app() -> None:
 
 
 def test_simulators_use_only_rig_recording_and_the_protocol_of_the_gap_diagnosis() -> None:
-    basic = ("gearsig.checks", "gearsig.errors", "gearsig.cache")
+    basic = ("gearsig.checks", "gearsig.errors", "gearsig.cache", "gearsig.processes")
     allowed = ("gearsig.rig", "gearsig.recording", "gearsig.gap.simulator", *basic)
 
     def wrong(name: str, modules: set[str]) -> set[str]:

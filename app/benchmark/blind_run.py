@@ -24,7 +24,7 @@ from app.benchmark.diagnose_one import ANSWERS
 from app.stopping import Running, stop
 from gearsig.cache import FOLDERS
 from gearsig.checks import count
-from sims.processes import process_pool
+from gearsig.processes import process_pool
 from sims.sweep_run import claimed, written
 
 DEFINITION, ANSWERS_FOLDER = "benchmark.json", "answers"

@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Mapping, Sequence
-from concurrent.futures import as_completed
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,6 @@ from gearsig.checks import FloatArray
 from gearsig.gap.posterior import GapCalibration
 from gearsig.gap.start_stop.floors import FILE, DriveFloor
 from gearsig.gap.types import NONE, UNKNOWN
-from sims.processes import process_pool
 
 ROLE = "calibration"
 NEUTRAL_SHRINK = 0.3
@@ -93,7 +92,7 @@ def main() -> None:
     asked = parser.parse_args()
     rows: list[Row] = []
     plan = planned(asked.cases, asked.seed)
-    with process_pool(asked.processes) as pool:
+    with ProcessPoolExecutor(asked.processes) as pool:
         chosen = numbers_of(asked.numbers, len(plan))
         futures = [pool.submit(collect, ROLE, asked.seed, i, plan[i]) for i in chosen]
         for future in as_completed(futures):

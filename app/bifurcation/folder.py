@@ -13,8 +13,8 @@ from app.bifurcation.kept import Kept, load, save
 from app.bifurcation.measure import measured
 from gearsig.checks import count, one_of, within
 from gearsig.errors import GearsigError
+from gearsig.processes import n_processors, process_pool
 from sims.cracked.continuation import Branch, End
-from sims.processes import n_processors, process_pool
 from sims.sweep_run import claimed
 
 DEFINITION, VALUES = "definition.json", "values"

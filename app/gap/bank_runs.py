@@ -12,6 +12,7 @@ from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError
 from gearsig.gap.gathered import Gathered
 from gearsig.gap.simulator import Added, Point, Twin
+from gearsig.processes import can_be_sent, process_pool
 
 SoundKey = tuple[Point, float, float]
 
@@ -61,12 +62,11 @@ def finished_runs(
 ) -> list[Reduced | str]:
     """Return what each task gave, or why it could not be simulated, in the order of the tasks.
 
-    So many tasks on end go to one process: those that share a sound run then simulate it once.
+    So many tasks on end go to one process: those that share a sound run then simulate it once. A twin that other
+    processes could not know, as it is defined in the caller's script, runs in this one.
     """
-    from sims.processes import process_pool
-
     found: list[Reduced | str] = [""] * len(tasks)
-    if processes == 1:
+    if processes == 1 or not can_be_sent(tasks[:1]):
         known: Known = {}
         for i, task in enumerate(tasks):
             found[i] = _reduced(task, known)

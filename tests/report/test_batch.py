@@ -112,12 +112,10 @@ def test_an_interruption_leaves_whole_pages_only(recordings, tmp_path, monkeypat
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["one.html"]
 
 
-SCRIPT = """
-import os, signal, sys, time
-from pathlib import Path
-from gearsig import batch
-from gearsig.report.entry import Entry
+WORK = """
+import os, signal, time
 from gearsig.diagnosis.types import Outcome
+from gearsig.report.entry import Entry
 
 def work(job):
     if job.name == "killer.csv":
@@ -128,13 +126,17 @@ def work(job):
         time.sleep(60)
     job.page.write_text("page")
     return Entry(job.name, job.page.name, Outcome.NO_FAULT, "fine")
+"""
+
+SCRIPT = """
+import signal, sys
+from gearsig import batch
+from work_of_a_test import work
 
 batch._report_one = work
-
-if __name__ == "__main__":
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever runs the tests may ignore Ctrl-C
-    result = batch.report_many(sys.argv[2:], sys.argv[1], n_processes=2)
-    print([e.name for e in result.entries], [(f.name, f.reason) for f in result.failures])
+signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever runs the tests may ignore Ctrl-C
+result = batch.report_many(sys.argv[2:], sys.argv[1], n_processes=2)
+print([e.name for e in result.entries], [(f.name, f.reason) for f in result.failures])
 """
 
 
@@ -142,6 +144,7 @@ if __name__ == "__main__":
 def script(tmp_path) -> Path:
     path = tmp_path / "script.py"
     path.write_text(SCRIPT)
+    (tmp_path / "work_of_a_test.py").write_text(WORK)  # processes know modules, not scripts
     return path
 
 
