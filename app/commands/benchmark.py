@@ -37,7 +37,8 @@ def gap(
     reference: Annotated[
         bool | None,
         typer.Option(
-            "--with-reference/--without", help="All cases with a healthy reference, or none. Default: half of them."
+            "--with-reference/--without-reference",
+            help="All cases with a healthy reference, or none. Default: half of them.",
         ),
     ] = None,
     same_simulator: Annotated[
