@@ -52,7 +52,7 @@ def gather(recording: Recording, rig: Rig, channels: Sequence[str] = (), angle: 
     Raises
     ------
     RefusalError
-        If the speed cannot be known or there are too few revolutions.
+        If the speed cannot be known, there are too few revolutions, or the mesh lies above what is sampled.
     """
     frame = gear_frame(rig)
     turned = angle if angle is not None else _angle_of(recording, rig)
@@ -66,6 +66,7 @@ def gather(recording: Recording, rig: Rig, channels: Sequence[str] = (), angle: 
             )
     names = tuple(channels) or recording.vibration_names()
     signals = tuple(_over_angle(recording, own, names) for own in shaft_angles)
+    _check_mesh(signals[0], frame, recording, shaft_angles[0].mean_speed_rpm)
     n_blocks = int(np.clip(shaft_angles[0].n_revolutions // REVOLUTIONS_PER_BLOCK, FEWEST_BLOCKS, MOST_BLOCKS))
     speed_hz = shaft_angles[0].mean_speed_rpm / 60.0
     bands = _bands(recording.sampling_rate_hz, signals[0].samples_per_revolution * speed_hz)
@@ -85,6 +86,16 @@ def gather(recording: Recording, rig: Rig, channels: Sequence[str] = (), angle: 
         marks=tuple(has_mark(recording, rig, shaft) for shaft in frame.shafts),  # type: ignore[arg-type]  # two
         n_revolutions=shaft_angles[0].n_revolutions,
     )
+
+
+def _check_mesh(signal: AngleSignal, frame: GearFrame, recording: Recording, speed_rpm: float) -> None:
+    """Refuse a record that was sampled too slowly to hold the mesh and its sidebands, which all is compared with."""
+    if signal.highest_order < frame.teeth[0] + max(frame.shaft_orders):
+        mesh_hz = frame.teeth[0] * speed_rpm / 60.0
+        raise RefusalError(
+            f"the gears mesh at {mesh_hz:.4g} Hz, above what {recording.sampling_rate_hz:.6g} Hz of sampling rate show",
+            remedy=f"sample at {4.0 * mesh_hz:.2g} Hz at least",
+        )
 
 
 def _angle_of(recording: Recording, rig: Rig) -> ShaftAngle:

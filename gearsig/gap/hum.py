@@ -15,12 +15,14 @@ N_HARMONICS = 3
 _TOLERANCE = 0.002  # how far a supply's frequency wanders
 _NEIGHBOURHOOD_HZ = 8.0
 _N_SHAFT_HARMONICS = 8
+_APART = 20.0
+"""Widths between a shaft's orders from which they can be told from the supply in four places of five."""
 
 
 def mains_lines(recording: Recording, names: Sequence[str], speed_hz: float, frame: GearFrame) -> tuple[float, ...]:
     """Return, for each supply, the mean excess in dB of its harmonics over the neighbourhood, on the best channel.
 
-    Harmonics that fall on a shaft's are left out; 0 where none is left.
+    Harmonics that fall on a line of the gears are left out; 0 where none is left.
     """
     return tuple(
         max(_excess(recording.values(name), recording, supply, speed_hz, frame) for name in names)
@@ -37,7 +39,7 @@ def _excess(values: FloatArray, recording: Recording, supply_hz: float, speed_hz
     for k in range(1, N_HARMONICS + 1):
         frequency = k * supply_hz
         width = max(2.0 * step, _TOLERANCE * frequency)
-        if frequency + _NEIGHBOURHOOD_HZ > recording.sampling_rate_hz / 2 or _on_a_shaft(
+        if frequency + _NEIGHBOURHOOD_HZ > recording.sampling_rate_hz / 2 or _on_a_gear_line(
             frequency, width, speed_hz, frame
         ):
             continue
@@ -48,9 +50,16 @@ def _excess(values: FloatArray, recording: Recording, supply_hz: float, speed_hz
     return float(np.mean(found)) if found else 0.0
 
 
-def _on_a_shaft(frequency_hz: float, width_hz: float, speed_hz: float, frame: GearFrame) -> bool:
-    harmonics = np.arange(1, _N_SHAFT_HARMONICS + 1)
-    return any(
-        float(np.min(np.abs(harmonics * order * speed_hz - frequency_hz))) < 2.0 * width_hz
-        for order in frame.shaft_orders
-    )
+def _on_a_gear_line(frequency_hz: float, width_hz: float, speed_hz: float, frame: GearFrame) -> bool:
+    """Whether a frequency falls on a mesh harmonic or a shaft's order.
+
+    Of a slow shaft only the first orders count, which are strong: all of them lie everywhere.
+    """
+    for order in frame.shaft_orders:
+        first_hz = order * speed_hz
+        n = max(round(frequency_hz / first_hz), 1)
+        is_apart = first_hz >= _APART * width_hz or n <= _N_SHAFT_HARMONICS
+        if is_apart and abs(n * first_hz - frequency_hz) < 2.0 * width_hz:
+            return True
+    mesh_hz = frame.teeth[0] * speed_hz
+    return abs(max(round(frequency_hz / mesh_hz), 1) * mesh_hz - frequency_hz) < 2.0 * width_hz

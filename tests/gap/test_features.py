@@ -10,8 +10,11 @@ from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.gap.change import LEAST_SURPRISE, SURPRISE, change_features
 from gearsig.gap.features import Features, features_of
+from gearsig.gap.frame import gear_frame
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
+from gearsig.gap.hum import mains_lines
+from gearsig.recording.types import Channel, Recording
 from tests.gap.synthetic import MESH_AMPLITUDES, RATE_HZ, RIG, SPEED_HZ, TEETH, record, ringing
 
 Added = Callable[[FloatArray, FloatArray], FloatArray]
@@ -133,3 +136,23 @@ def test_teeth_must_be_known() -> None:
     with pytest.raises(RefusalError, match="teeth"):
         gather(record(), unknown)
     assert (RIG.pairs[0].driver_teeth, RIG.pairs[0].driven_teeth) == TEETH
+
+
+@pytest.mark.parametrize(("speed_hz", "is_left_out"), [(50.0 / TEETH[0], True), (50.0 / 3, True), (7.3, False)])
+def test_a_line_of_the_gears_at_the_supply_s_frequency_is_no_hum(speed_hz: float, *, is_left_out: bool) -> None:
+    """The mesh at 50 Hz, a shaft's third, sixth and ninth order, and neither."""
+    rng = np.random.default_rng(1)
+    time = np.arange(round(RATE_HZ * 6.0)) / RATE_HZ
+    lines = sum(np.sin(2 * np.pi * f * time) for f in (50.0, 100.0, 150.0)) + 0.1 * rng.standard_normal(len(time))
+    recording = Recording(lines[None], RATE_HZ, (Channel("a1", "acceleration", "m/s^2"),))
+    excess = mains_lines(recording, ["a1"], speed_hz, gear_frame(RIG))[0]
+    assert (excess == 0.0) is is_left_out
+    assert is_left_out or excess > 30.0
+
+
+def test_a_mesh_above_what_is_sampled_is_refused() -> None:
+    whole = record()
+    slow = replace(whole, samples=whole.samples[:, ::12], sampling_rate_hz=RATE_HZ / 12)
+    with pytest.raises(RefusalError, match=r"mesh at 545\.1 Hz, above what 1066\.67 Hz"):
+        gather(slow, RIG)
+    gather(replace(whole, samples=whole.samples[:, ::6], sampling_rate_hz=RATE_HZ / 6), RIG)
