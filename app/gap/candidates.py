@@ -10,7 +10,7 @@ import numpy as np
 
 from app.gap.bank import Bank, banks_of
 from app.gap.bank_runs import Run
-from app.gap.conditions import LEAST_BLOCKS, SEED, Condition, compare, halves, observed
+from app.gap.conditions import SEED, Condition, compare, halves, observed
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.gap.families import UNFORETOLD, shown_in
@@ -24,8 +24,7 @@ from gearsig.gap.types import Shrinkage
 from gearsig.gap.which_shaft import told_options
 
 PROCESSES = 2
-OTHER_POINT, OTHER_REVOLUTIONS = "another operating condition", "other revolutions of the same recordings"
-SAME_REVOLUTIONS = "the same revolutions, as there are too few to hold some out"
+HELD_OUT = "other revolutions of the same recordings"
 
 
 @dataclass(frozen=True)
@@ -36,8 +35,9 @@ class Tried:
     ----------
     name : str
     paths : tuple of EffectPath
+        On the shaft that the recordings tell by themselves, where they do.
     fit : Fit
-        To all conditions; on the shaft that the recordings tell by themselves, where they do.
+        To all conditions.
     shrinkage : Shrinkage
         On held-out data.
     """
@@ -69,7 +69,7 @@ def try_effects(
     if not effects:
         return {}
     names = [effect.name for effect in effects]
-    folds, held_out = folds_of(conditions)
+    folds = folds_of(conditions)
     where = " and ".join(c.facts.name for c in conditions)
     banks = banks_of(
         [_run(twin, condition) for condition in conditions],
@@ -85,16 +85,25 @@ def try_effects(
     found = {}
     for effect in effects:
         name = effect.name
-        paths = _paths([at[name] for at in banks], conditions, effect.shows_in)
-        if paths:
-            fit = fit_effect(on_shaft(paths, told_options(name, changes, conditions[0].now.frame.teeth)), everything)
-            found[name] = Tried(name, paths, fit, shrinkage(paths, folds, held_out))
+        every = _paths([at[name] for at in banks], conditions, effect.shows_in)
+        if every:
+            paths, excluded = on_shaft(every, told_options(name, changes, conditions[0].now.frame.teeth))
+            shrink = shrinkage(paths, folds, HELD_OUT, excluded)
+            found[name] = Tried(name, paths, fit_effect(paths, everything), shrink)
     return found
 
 
-def on_shaft(paths: Sequence[EffectPath], told: Mapping[str, str]) -> Sequence[EffectPath]:
-    """Return the paths on the shaft that the recordings tell by themselves; all where they do not."""
-    return [path for path in paths if told.items() <= path.options.items()] or paths
+def on_shaft(
+    paths: Sequence[EffectPath], told: Mapping[str, str]
+) -> tuple[tuple[EffectPath, ...], tuple[EffectPath, ...]]:
+    """Return the paths on the shaft that the recordings tell by themselves, and the others; all where they do not."""
+    there = [told.items() <= path.options.items() for path in paths]
+    if not any(there):
+        return tuple(paths), ()
+    kept, others = (
+        tuple(path for path, is_there in zip(paths, there, strict=True) if is_there is kind) for kind in (True, False)
+    )
+    return kept, others
 
 
 def n_compared(conditions: Sequence[Condition]) -> int:
@@ -149,26 +158,17 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
     return np.where(shown_in(compared, shows_in), table, 0.0)
 
 
-def folds_of(conditions: Sequence[Condition]) -> tuple[list[Fold], str]:
+def folds_of(conditions: Sequence[Condition]) -> list[Fold]:
     """Return what to fit to and what to score on: half of the revolutions at a condition, and all but that half."""
     n = n_compared(conditions)
     whole = [observed(c, k, n) for k, c in enumerate(conditions)]
     found = []
     for k, condition in enumerate(conditions):
         others, again = [one for one in whole if one.condition != k], _again(condition, k, n)
-        if condition.now.n_blocks < LEAST_BLOCKS:
-            found.append(Fold((*others, *(() if others else (whole[k],))), whole[k], again))
-            continue
         changes = [compare(part, condition.simulated, condition.reference) for part in halves(condition.now)]
         first, second = (observed(condition, k, n, change) for change in changes)
         found += [Fold((*others, first), second, again), Fold((*others, second), first, again)]
-    return found, _held_out(conditions)
-
-
-def _held_out(conditions: Sequence[Condition]) -> str:
-    if all(c.now.n_blocks >= LEAST_BLOCKS for c in conditions):
-        return OTHER_REVOLUTIONS
-    return OTHER_POINT if len(conditions) > 1 else SAME_REVOLUTIONS
+    return found
 
 
 def _again(condition: Condition, index: int, n: int) -> tuple[tuple[Observed, ...], ...]:
@@ -180,9 +180,10 @@ def _again(condition: Condition, index: int, n: int) -> tuple[tuple[Observed, ..
     )
 
 
-def refuse_without_candidates(tried: dict[str, Tried], names: Sequence[str]) -> None:
-    """Refuse where none of the effects could be simulated."""
-    if names and not tried:
+def refuse_where_none_ran(tried: dict[str, Tried], names: Sequence[str], twin: Twin) -> None:
+    """Refuse where the rig has a place for some of the effects, and none of them could be simulated there."""
+    placed = [name for name in names if twin.candidates(name)]
+    if placed and not tried:
         raise RefusalError(
-            f"none of {', '.join(names)} can be simulated on this rig", remedy="describe the rig more fully"
+            f"none of {', '.join(placed)} can be simulated on this rig", remedy="describe the rig more fully"
         )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from gearsig.errors import InputError
@@ -79,10 +80,6 @@ class Condition:
         return over_floors(self.change, self.floor, is_reference=self.reference is not None)
 
 
-LEAST_BLOCKS = 4
-"""Of revolutions that can be halved: the scatter within a half needs two."""
-
-
 def run_length_s(now: Gathered) -> float:
     """Return the length of a simulation that the features can be read from."""
     return max(LONGEST_RUN_S, MOST_REVOLUTIONS / _slower_hz(now))
@@ -126,31 +123,41 @@ def compare(now: Gathered, simulation: Gathered, reference: Gathered | None) -> 
 
 def facts_of(recording: Recording, rig: Rig, now: Gathered, name: str, twin: Twin) -> ConditionFacts:
     """Return what is known of a recording's operating point: measured speed, stated torque of the driver."""
+    stated_nm = _torque_nm(rig)
     return ConditionFacts(
         name,
-        Point(60.0 * now.speed_hz, _torque_nm(rig) or twin.point.torque_nm),
+        Point(60.0 * now.speed_hz, twin.point.torque_nm if stated_nm is None else stated_nm),
         now.n_revolutions,
         recording.duration_s,
         recording.sampling_rate_hz,
     )
 
 
-def matching_reference(
-    now: Gathered, rig: Rig, references: Sequence[Gathered], rigs: Sequence[Rig]
-) -> tuple[Gathered | None, str]:
-    """Return the reference at the recording's point, or none and why."""
+@dataclass(frozen=True)
+class Healthy:
+    """A sound machine's recording, reduced, with its rig and its name."""
+
+    gathered: Gathered
+    rig: Rig
+    name: str
+
+
+def matching_reference(now: Gathered, rig: Rig, references: Sequence[Healthy]) -> tuple[Healthy | None, str]:
+    """Return the reference at the recording's point, with the channels of both, or none and why."""
     if not references:
         return None, ""
-    nearest = min(range(len(references)), key=lambda i: _distance(now, rig, references[i], rigs[i]))
-    found = references[nearest]
+    nearest = min(references, key=lambda one: _distance(now, rig, one))
+    found = nearest.gathered
     change = now.speed_hz / found.speed_hz - 1.0
     if abs(change) > LARGEST_SPEED_DIFFERENCE:
         return None, f"no reference within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of its speed"
-    here, there = _torque_nm(rig), _torque_nm(rigs[nearest])
-    if here and there and abs(here / there - 1.0) > LARGEST_TORQUE_DIFFERENCE:
+    here, there = _torque_nm(rig), _torque_nm(nearest.rig)
+    if here is not None and there is not None and _torque_difference(here, there) > LARGEST_TORQUE_DIFFERENCE:
         return None, f"the reference at its speed has {there:.3g} N m, the recording {here:.3g} N m"
     named = _with_names_of(found, now)
-    return (named, "") if named is not None else (None, f"the reference has the channels {', '.join(found.channels)}")
+    if named is None:
+        return None, f"the reference has the channels {', '.join(found.channels)}"
+    return replace(nearest, gathered=named), ""
 
 
 def _with_names_of(reference: Gathered, now: Gathered) -> Gathered | None:
@@ -162,10 +169,17 @@ def _with_names_of(reference: Gathered, now: Gathered) -> Gathered | None:
     return None
 
 
-def _distance(now: Gathered, rig: Rig, reference: Gathered, other: Rig) -> float:
-    here, there = _torque_nm(rig), _torque_nm(other)
-    torque = abs(here / there - 1.0) if here and there else 0.0
-    return 10.0 * abs(now.speed_hz / reference.speed_hz - 1.0) + torque
+def _distance(now: Gathered, rig: Rig, reference: Healthy) -> float:
+    here, there = _torque_nm(rig), _torque_nm(reference.rig)
+    torque = 0.0 if here is None or there is None else _torque_difference(here, there)
+    return 10.0 * abs(now.speed_hz / reference.gathered.speed_hz - 1.0) + torque
+
+
+def _torque_difference(here_nm: float, there_nm: float) -> float:
+    """Return by which part of the reference's torque the recording's differs from it."""
+    if there_nm == 0.0:
+        return 0.0 if here_nm == 0.0 else math.inf
+    return abs(here_nm / there_nm - 1.0)
 
 
 def _torque_nm(rig: Rig) -> float | None:
@@ -181,7 +195,7 @@ def observed(condition: Condition, index: int, n: int, change: Features | None =
 
 
 def halves(gathered: Gathered) -> tuple[Gathered, Gathered]:
-    """Return the blocks of revolutions with even and with odd numbers; `LEAST_BLOCKS` at least."""
+    """Return the blocks of revolutions with even and with odd numbers."""
     n = gathered.n_blocks
     first = second = gathered
     for block in reversed(range(n)):

@@ -19,7 +19,7 @@ from app.gap.placing import at_its_tooth, cause_place
 from app.gap.prepare import Stage, conditions_of
 from app.gap.rig_data import is_gearless
 from app.gap.standing_places import standing_place
-from app.gap.unexplained import stood_out
+from app.gap.unexplained import beside_standing, stood_out
 from app.gap.weigh import weigh
 from gearsig.checks import closest_match_hint
 from gearsig.errors import InputError, RefusalError
@@ -160,9 +160,8 @@ def diagnose_gap(
     standing, remarks, faults = stood_out(recordings[k], own_rigs[k], references, other_rigs, clearest.facts.name)
     notices += remarks
     doubts = (*(text for condition in conditions for text in doubts_of(condition)), *faults)
-    outcome = weighed.calibration.outcome(probabilities)
-    if standing and outcome in (GapOutcome.NO_GAP, GapOutcome.UNDECIDED):
-        outcome = GapOutcome.UNKNOWN  # impacts that no shaft repeats are a gap, however few features see them
+    outcome, unseen = beside_standing(weighed.calibration.outcome(probabilities), standing)
+    doubts = (*unseen, *doubts)
     places = ranked_places(_places(clearest), [standing_place(one, own_rigs[k]) for one in standing])
     causes = tuple(_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items())
     causes = _in_order(causes, outcome)
@@ -180,7 +179,7 @@ def diagnose_gap(
         rig=own_rigs[0].name,
         simulator=simulator.name,
         conditions=tuple(c.facts for c in conditions),
-        references=called if weighed.with_reference else (),
+        references=tuple(dict.fromkeys(c.facts.reference for c in conditions if c.facts.reference)),
         outcome=outcome,
         size=size.structural,
         repeatability=size.repeatability.value,

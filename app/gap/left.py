@@ -25,7 +25,7 @@ def steps_of(
     conditions: Sequence[Condition], tried: dict[str, Tried], causes: Sequence[GapCause]
 ) -> tuple[GapStep, ...]:
     """Return the gap before, and what is left with the likeliest effect, then with the next one as well."""
-    folds, _ = folds_of(conditions)
+    folds = folds_of(conditions)
     names = [c.name for c in causes if c.name in tried][:MOST_ADDED]
     steps = [GapStep("before", _left(conditions, folds, []))]
     added: list[Tried] = []

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.gap.conditions import Condition, compare, facts_of, matching_reference, simulated
+from app.gap.conditions import Condition, Healthy, compare, facts_of, matching_reference, simulated
 from app.gap.doubts import strange_pattern, strange_teeth
 from gearsig.errors import RefusalError
 from gearsig.gap.floors import gap_size
@@ -49,7 +49,7 @@ def conditions_of(
     found: list[Condition] = []
     notices: list[str] = []
     called = reference_names or [f"reference {i + 1}" for i in range(len(references))]
-    healthy, healthy_rigs = _references(references, reference_rigs, called, notices)
+    healthy = _references(references, reference_rigs, called, notices)
     for i, (recording, rig) in enumerate(zip(recordings, rigs, strict=True)):
         name = names[i] if names else f"recording {i + 1}"
         tell(f"simulating the sound machine at the point of {name}", 0.05 + 0.15 * i / len(recordings))
@@ -57,11 +57,13 @@ def conditions_of(
         notices += strange_teeth(now, name)
         facts = facts_of(recording, rig, now, name, twin)
         notices += _assumed(recording, rig, facts)
-        reference, why = matching_reference(now, rig, healthy, healthy_rigs)
+        match, why = matching_reference(now, rig, healthy)
         if why:
             notices.append(f"{name} is compared with the simulation: {why}.")
-        if reference is not None:
-            now = _with_channels_of(now, reference, healthy, name, notices)
+        reference = None if match is None else match.gathered
+        if match is not None:
+            facts = replace(facts, reference=match.name)
+            now = _with_channels_of(now, match.gathered, healthy, name, notices)
         _check_steady(now, reference, name)
         simulation = simulated(twin, facts, now)
         change = compare(now, simulation, reference)
@@ -75,10 +77,10 @@ def conditions_of(
 
 
 def _with_channels_of(
-    now: Gathered, reference: Gathered, healthy: Sequence[Gathered], name: str, notices: list[str]
+    now: Gathered, reference: Gathered, healthy: Sequence[Healthy], name: str, notices: list[str]
 ) -> Gathered:
     """Return a recording with the channels that its reference has as well, and say what was made of the others."""
-    if not any(set(reference.channels) & set(one.channels) for one in healthy):
+    if not any(set(reference.channels) & set(one.gathered.channels) for one in healthy):
         notices.append(f"{name}: its only channel is taken for the reference's only one, which has another name.")
     left_out = [channel for channel in now.channels if channel not in reference.channels]
     if left_out:
@@ -101,21 +103,19 @@ def _check_steady(now: Gathered, reference: Gathered | None, name: str) -> None:
 
 def _references(
     references: Sequence[Recording], rigs: Sequence[Rig], names: Sequence[str], notices: list[str]
-) -> tuple[list[Gathered], list[Rig]]:
+) -> list[Healthy]:
     """Reduce the references; one of several that cannot be read is left out, and said."""
-    healthy: list[Gathered] = []
-    kept: list[Rig] = []
+    healthy: list[Healthy] = []
     for recording, rig, name in zip(references, rigs, names, strict=True):
         try:
-            healthy.append(_gathered(recording, rig, name, notices))
+            healthy.append(Healthy(_gathered(recording, rig, name, notices), rig, name))
         except RefusalError as refusal:
             if not healthy and recording is references[-1]:
                 raise
             notices.append(f"{refusal.reason}; this reference is left out.")
             continue
-        kept.append(rig)
-        notices += strange_teeth(healthy[-1], name)
-    return healthy, kept
+        notices += strange_teeth(healthy[-1].gathered, name)
+    return healthy
 
 
 def _gathered(recording: Recording, rig: Rig, name: str, notices: list[str]) -> Gathered:

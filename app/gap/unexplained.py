@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from app.gap.standing_out import LINE, Standing, carrying, examined
+from app.gap.standing_out import LINE, RACES, Standing, carrying, examined
 from gearsig.angle.types import ShaftAngle
 from gearsig.diagnosis.analyze import analyze
 from gearsig.diagnosis.speed import determine_angle
 from gearsig.diagnosis.types import Analysis, CannotTell, Kind, Outcome
+from gearsig.gap.types import GapOutcome
 from gearsig.recording.types import Recording
 from gearsig.rig.types import Rig
 
@@ -40,6 +41,24 @@ def stood_out(
         if not (one.finding.code == LINE and any(_is_harmonic(one, family) for family in strong))
     ]
     return strong, remarks, doubts
+
+
+def beside_standing(outcome: GapOutcome, standing: Sequence[Standing]) -> tuple[GapOutcome, list[str]]:
+    """Return what a diagnosis that names no effect comes to where impacts stand out, and what is to be checked first.
+
+    Impacts that no shaft repeats are a gap, however few features see them: unknown. Those of a bearing's race are in
+    the catalogue; that the forests see too little of them leaves it undecided.
+    """
+    if not standing or outcome not in (GapOutcome.NO_GAP, GapOutcome.UNDECIDED):
+        return outcome, []
+    races = [one for one in standing if one.finding.code in RACES]
+    if len(races) < len(standing):
+        return GapOutcome.UNKNOWN, []
+    return GapOutcome.UNDECIDED, [
+        f"{one.recording}: {one.finding.title.rstrip('.')}{_odds(one)}, by the search for bearing orders; few of the "
+        "features that are compared show it."
+        for one in races
+    ]
 
 
 def _is_harmonic(line: Standing, family: Standing) -> bool:

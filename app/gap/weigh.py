@@ -1,4 +1,8 @@
-"""What speaks for each cause: the forests, and the likeliest effects tried on the twin."""
+"""What speaks for each cause: the forests; of an effect that they do not know, its trial on the twin.
+
+The trials of effects that they do know say how far the gap shrinks. How well one explains it can weigh as well, and the
+calibration gives that the weight 0: on blind cases look-alikes shrink the gap as far as the true effect does.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.gap.candidates import Tried, refuse_without_candidates, try_effects
+from app.gap.candidates import Tried, refuse_where_none_ran, try_effects
 from app.gap.conditions import Condition
 from gearsig.gap.joint import joint_probabilities
 from gearsig.gap.posterior import GapCalibration, load_gap_calibration, score_of
@@ -91,7 +95,7 @@ def weigh(
     Raises
     ------
     RefusalError
-        If none of the likeliest effects can be simulated.
+        If the rig has a place for some of the likeliest effects, and none of them can be simulated there.
     """
     forest = _forest(conditions, effects, known)
     with_reference = all(c.reference is not None for c in conditions)
@@ -102,7 +106,7 @@ def weigh(
     own = [name for name in effects or known if name not in heard_of] if most_tried else []
     likely += own
     tried = try_effects([known[name] for name in likely], twin, conditions, cache, on_progress, fresh=fresh)
-    refuse_without_candidates(tried, likely)
+    refuse_where_none_ran(tried, likely, twin)
     return Weighed(forest, tried, with_reference, size, tuple(own))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -216,27 +217,38 @@ def fit_path(path: EffectPath, observed: Sequence[Observed]) -> Fit:
     than another, is the simulation's.
 
     Where the best fit misses by more than floors allow, the simulation is wrong by as much, and the interval is as much
-    wider (R. T. Birge, The calculation of errors by the method of least squares, *Phys. Rev.* 40, 1932). It ends at the
-    severities that were simulated, though a larger one may fit as well.
+    wider (R. T. Birge, The calculation of errors by the method of least squares, *Phys. Rev.* 40, 1932). Where the
+    largest severity that was simulated fits as well it has no upper end, and where the least does, it begins at 0.
     """
     coarse = path.tried()
-    low, high = _near_the_best(path, coarse, _costs(path, coarse, observed)[0])
-    tried = np.geomspace(low, high, STEPS)
+    tried = np.geomspace(*_about(coarse, _near_the_best(path, _costs(path, coarse, observed)[0])), STEPS)
     costs, ways = _costs(path, tried, observed)
+    near = _near_the_best(path, costs)
+    low, high = _about(tried, near)
+    if near[0] and tried[0] == coarse[0]:
+        low = 0.0
+    if near[-1] and tried[-1] == coarse[-1]:
+        high = math.inf
     likelihood = np.exp(-0.5 * (costs - costs.min()))
     best = round(float(likelihood @ np.arange(len(tried)) / likelihood.sum()))  # they are even in ln s
     fitted = {one.condition: int(row[best]) for one, row in zip(observed, ways, strict=True)}
-    return Fit(path, Interval(float(tried[best]), *_near_the_best(path, tried, costs)), float(costs.min()), fitted)
+    return Fit(path, Interval(float(tried[best]), low, high), float(costs.min()), fitted)
 
 
-def _near_the_best(path: EffectPath, tried: FloatArray, costs: FloatArray) -> tuple[float, float]:
-    """Return the first severities on either side at which the cost has risen by more than is likely.
+def _near_the_best(path: EffectPath, costs: FloatArray) -> NDArray[np.bool_]:
+    """Return at which severities the cost has risen by no more than is likely.
 
     That is `INTERVAL_COST`, and as many times more as the best fit misses by.
     """
     misses = max(1.0, float(costs.min()) / len(family_members(path.names)))
-    near = np.flatnonzero(costs <= costs.min() + misses * INTERVAL_COST)
-    return float(tried[max(near[0] - 1, 0)]), float(tried[min(near[-1] + 1, len(tried) - 1)])
+    near: NDArray[np.bool_] = costs <= costs.min() + misses * INTERVAL_COST
+    return near
+
+
+def _about(tried: FloatArray, near: NDArray[np.bool_]) -> tuple[float, float]:
+    """Return the first severities on either side of those that are near; the ends where there are none."""
+    rows = np.flatnonzero(near)
+    return float(tried[max(rows[0] - 1, 0)]), float(tried[min(rows[-1] + 1, len(tried) - 1)])
 
 
 def _costs(

@@ -69,7 +69,9 @@ def own_features(fit: Fit, observed: Observed) -> FloatArray:
     return used
 
 
-def shrinkage(paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str) -> Shrinkage:
+def shrinkage(
+    paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str, excluded: Sequence[EffectPath] = ()
+) -> Shrinkage:
     """Return the shrinkage of the gap by an effect, mean over folds.
 
     shrink = 1 − (r² − n²)/(o² − n²) on the effect's own features: o the gap before, r what is left, n what the floors
@@ -86,8 +88,10 @@ def shrinkage(paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str)
         Of the effect.
     folds : sequence of Fold
     held_out : str
+    excluded : sequence of EffectPath
+        Of the effect where the recordings tell that it is not: on the other shaft, say. They serve as placebos.
     """
-    folds, scores = _telling(folds, [_score(paths, fold) for fold in folds])
+    folds, scores = _telling(folds, [_score(paths, fold, excluded) for fold in folds])
     before, after, shrink = np.mean([score.sizes for score in scores], axis=0)
     wide = _t_quantile(folds) * np.sqrt(np.mean([score.variances for score in scores], axis=0))
     return Shrinkage(
@@ -141,10 +145,10 @@ def _t_quantile(folds: Sequence[Fold]) -> float:
     return float(stdtrit(max(n_blocks - 1, 1), 0.95))
 
 
-def _score(paths: Sequence[EffectPath], fold: Fold) -> _Score:
+def _score(paths: Sequence[EffectPath], fold: Fold, excluded: Sequence[EffectPath]) -> _Score:
     fit = fit_effect(paths, fold.fitted)
     used = own_features(fit, fold.scored)
-    wrong = [fit_path(path, fold.fitted) for path in paths if path.options != fit.path.options]
+    wrong = [fit_path(path, fold.fitted) for path in (*paths, *excluded) if path.options != fit.path.options]
     placebos = [
         _before_and_after(other, fold.scored, used)[2] for other in wrong if not _is_alike(fit, other, fold.scored)
     ]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from math import isinf
 
 from gearsig.gap.curve_types import AngleCurves, AverageCurves, SpectrumCurves
 from gearsig.gap.simulator import Added, Point
@@ -89,11 +90,24 @@ class GapPlace:
 
 @dataclass(frozen=True)
 class Interval:
-    """A value with its 90 % interval."""
+    """A value with its 90 % interval; `high` is infinite where nothing bounds it."""
 
     value: float
     low: float
     high: float
+
+    def words(self, write: Callable[[float], str]) -> str:
+        """Return the interval in words, its ends as `write` writes them.
+
+        Examples
+        --------
+        >>> ends = ((1.5, 3.0), (1.5, float("inf")), (0.0, float("inf")))
+        >>> [Interval(2.0, *both).words("{:g}".format) for both in ends]
+        ['1.5 to 3', '1.5 or more', 'unbounded']
+        """
+        if isinf(self.high) and self.low == 0.0:
+            return "unbounded"
+        return f"{write(self.low)} or more" if isinf(self.high) else f"{write(self.low)} to {write(self.high)}"
 
 
 LEAST_FORETOLD = 0.5
@@ -258,6 +272,8 @@ class ConditionFacts:
     n_revolutions : float
         Of the driver.
     duration_s, sampling_rate_hz : float
+    reference : str
+        Name of the healthy reference that it is compared with; empty: none.
     """
 
     name: str
@@ -265,6 +281,7 @@ class ConditionFacts:
     n_revolutions: float
     duration_s: float
     sampling_rate_hz: float
+    reference: str = ""
 
 
 @dataclass(frozen=True)

@@ -129,6 +129,6 @@ def stance_words(evidence: Evidence) -> str:
 
 def fitted_words(cause: GapCause, severity: float, recording: str) -> str:
     """Return what a twin's file says of the effect in it: severity, its fit, what it was fitted to, probability."""
-    within = f"interval of the fit {cause.severity.low:.3g} to {cause.severity.high:.3g}; " if cause.severity else ""
+    within = f"interval of the fit {cause.severity.words('{:.3g}'.format)}; " if cause.severity else ""
     size = f"{severity:.3g} {cause.unit}".rstrip()
     return f"{cause.title}: {size}, {within}fitted to {recording}, probability {cause.probability:.2f}"

@@ -87,7 +87,7 @@ def _interval(interval: Interval, unit: str) -> Json:
 
 
 def _condition(facts: ConditionFacts) -> Json:
-    rest = members(facts, "n_revolutions", "duration_s", "sampling_rate_hz")
+    rest = members(facts, "n_revolutions", "duration_s", "sampling_rate_hz", "reference")
     return {"name": facts.name, **plain(facts.point), **rest}
 
 

@@ -109,8 +109,11 @@ def floors_text(report: GapReport) -> str:
     if not report.is_simulated:
         return ""
     structural, beside = "what healthy machines differ by from that", ""
+    alone = [one.name for one in report.conditions if not one.reference]
     if report.references:
         known = f"Compared with the same machine when it was sound ({', '.join(report.references)}). "
+        if 0 < len(alone) < len(report.conditions):
+            known += f"Without a reference at its point, with what the simulation lets expect: {', '.join(alone)}. "
         structural = "what healthy machines change by from one recording to another"
         beside = " The first pictures show the recording beside the reference, the further ones beside the simulation."
     else:
@@ -334,8 +337,8 @@ def references_text(report: GapReport) -> str:
 
 def interval_text(interval: Interval, unit: str = "") -> str:
     """Write a value with its 90 % interval."""
-    value, low, high = (readable(x, 2) for x in (interval.value, interval.low, interval.high))
-    return f"{value}{' ' if unit else ''}{unit} ({low} to {high})"
+    value, within = readable(interval.value, 2), interval.words(lambda end: readable(end, 2))
+    return f"{value}{' ' if unit else ''}{unit} ({within})"
 
 
 def percent(share: float) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.gap.candidates import Tried
-from app.gap.conditions import with_channels_of
+from app.gap.conditions import Healthy, with_channels_of
 from app.gap.diagnose import _without_meaning, diagnose_gap
 from app.gap.prepare import _check_steady, _in_si, _with_channels_of
 from gearsig.errors import InputError, RefusalError
@@ -132,7 +132,8 @@ def test_a_channel_that_the_reference_lacks_is_left_out_and_told() -> None:
     now, notices = gather(run(noise=1), rig()), list[str]()
     first, *others = now.channels
     reference = now.with_channels({first: now.channels[first]})
-    assert list(_with_channels_of(now, reference, [reference], "now", notices).channels) == [first]
+    healthy = [Healthy(reference, rig(), "sound.h5")]
+    assert list(_with_channels_of(now, reference, healthy, "now", notices).channels) == [first]
     assert notices == [f"now: {', '.join(others)} is left out, for the reference has no such channel."]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from app.gap.conditions import matching_reference
+from app.gap.conditions import Healthy, matching_reference
 from gearsig.gap.gather import gather
 from gearsig.gap.gathered import Gathered
 from tests.gap.synthetic import RIG, record
@@ -15,32 +15,35 @@ def run(seed: int) -> Gathered:
     return gather(record(seed=seed), RIG)
 
 
+def sound(gathered: Gathered) -> list[Healthy]:
+    return [Healthy(gathered, RIG, "sound.h5")]
+
+
 def named(seed: int, *names: str) -> Gathered:
     return run(seed).with_channels(dict(zip(names, run(seed).channels.values(), strict=False)))
 
 
 def test_equal_names_are_compared_as_they_are() -> None:
-    sound = run(1)
-    assert matching_reference(run(0), RIG, [sound], [RIG]) == (sound, "")
+    assert matching_reference(run(0), RIG, sound(run(1))) == (Healthy(run(1), RIG, "sound.h5"), "")
 
 
 def test_the_only_channel_of_each_is_the_same_whatever_its_name() -> None:
-    found, why = matching_reference(named(0, "ch1"), RIG, [named(1, "a1")], [RIG])
+    found, why = matching_reference(named(0, "ch1"), RIG, sound(named(1, "a1")))
     assert found is not None
     assert why == ""
-    assert tuple(found.channels) == ("ch1",)
-    assert found.channels["ch1"] is run(1).channels["a1"]
+    assert tuple(found.gathered.channels) == ("ch1",)
+    assert found.gathered.channels["ch1"] is run(1).channels["a1"]
 
 
 def test_channels_that_only_one_of_them_has_are_left_out() -> None:
     both, one = run(1), named(0, "a1")
-    found, _ = matching_reference(one, RIG, [both], [RIG])
+    found, _ = matching_reference(one, RIG, sound(both))
     assert found is not None
-    assert tuple(found.channels) == ("a1",)
-    assert matching_reference(run(0), RIG, [named(1, "a1")], [RIG])[0] is not None
+    assert tuple(found.gathered.channels) == ("a1",)
+    assert matching_reference(run(0), RIG, sound(named(1, "a1")))[0] is not None
 
 
 def test_of_several_channels_with_other_names_nobody_knows_which_is_which() -> None:
-    found, why = matching_reference(named(0, "left", "right"), RIG, [run(1)], [RIG])
+    found, why = matching_reference(named(0, "left", "right"), RIG, sound(run(1)))
     assert found is None
     assert "a1, a2" in why

@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.gap.standing_out import Standing
 from app.gap.standing_places import standing_place
-from app.gap.unexplained import stood_out
+from app.gap.unexplained import beside_standing, stood_out
 from gearsig.checks import FloatArray
+from gearsig.diagnosis.types import Finding, Kind
+from gearsig.gap.types import GapOutcome
 from tests.gap.synthetic import RIG, record, ringing
 
 STRANGE = 5.148
@@ -54,3 +57,17 @@ def test_orders_of_a_place_are_the_drivers_whatever_shaft_the_speed_is_of() -> N
     standing, *_ = stood_out(record(knocking), turned, [], [], "today")
     assert standing[0].finding.where.order == pytest.approx(STRANGE * 37 / 23, rel=1e-3)
     assert standing_place(standing[0], turned).orders[0] == pytest.approx(STRANGE, rel=1e-3)
+
+
+def standing(code: str) -> Standing:
+    return Standing(Finding(code, Kind.FAULT, "Damage of the outer race", confidence=0.9), "today.h5")
+
+
+def test_impacts_of_a_known_race_are_not_called_unknown() -> None:
+    race, strange = standing("bearing-outer-race"), standing("non-synchronous-impacts")
+    outcome, doubts = beside_standing(GapOutcome.NO_GAP, [race])
+    assert outcome is GapOutcome.UNDECIDED
+    assert "today.h5: Damage of the outer race (at most 90 %)" in doubts[0]
+    assert beside_standing(GapOutcome.NO_GAP, [race, strange]) == (GapOutcome.UNKNOWN, [])
+    assert beside_standing(GapOutcome.NO_GAP, []) == (GapOutcome.NO_GAP, [])
+    assert beside_standing(GapOutcome.EFFECT, [race]) == (GapOutcome.EFFECT, [])

@@ -208,3 +208,25 @@ def test_a_fit_that_misses_has_a_wider_interval() -> None:
     wrong = wrong + 3.0 * FLOORS * np.where(np.arange(len(NAMES)) % 2, 1.0, -1.0)
     sure, unsure = (fit_path(path(), [seen(values)]).severity for values in (near, wrong))
     assert unsure.high / unsure.low > 1.5 * sure.high / sure.low
+
+
+def test_what_no_simulated_severity_bounds_has_no_end() -> None:
+    """The largest that was simulated fits; and a change that any small severity makes as well."""
+    largest = fit_path(path(), [seen(foretold(path(), 4.0))]).severity
+    assert largest.high == np.inf
+    assert largest.low > 1.0
+    least = fit_path(path(), [seen(foretold(path(), 0.1))]).severity
+    assert least.low == 0.0
+    assert least.high < 1.0
+    between = fit_path(path(), [seen(foretold(path(), 1.5))]).severity
+    assert 1.0 < between.low < 1.5 < between.high < 4.0
+
+
+def test_an_effect_is_not_fitted_where_the_recordings_tell_that_it_is_not() -> None:
+    here, there = path(gear="driver"), path(SHAPE[[0, 1, 3, 2, 4, 5]], gear="driven")
+    truth = seen(foretold(there, 3.0))
+    free = shrinkage([here, there], [Fold((truth,), truth)], "")
+    told = shrinkage([here], [Fold((truth,), truth)], "", [there])
+    assert free.shrink.value > 0.9
+    assert told.shrink.value < 0.5
+    assert (free.n_placebos, told.n_placebos) == (1, 1)

@@ -11,12 +11,10 @@ from gearsig.errors import InputError
 from gearsig.gap.curve_types import AngleCurves, SpectrumCurves
 from gearsig.gap.curves import against_reference
 from gearsig.gap.types import (
-    GapCause,
     GapStep,
     Interval,
 )
 from gearsig.plot.gap_averages import gap_averages_figure
-from gearsig.plot.gap_causes import gap_causes_figure
 from gearsig.plot.gap_evidence import gap_evidence_figure
 from gearsig.plot.gap_lines import gap_lines_figure
 from gearsig.plot.gap_orders import gap_orders_figure
@@ -68,7 +66,6 @@ def bars(figure: "Figure") -> list[float]:
 MADE: dict[str, Callable[[], Any]] = {
     "waterfall": lambda: gap_waterfall_figure(REPORT.steps, held_out="another operating condition", title="How far"),
     "evidence": lambda: gap_evidence_figure(REPORT.causes[0].evidence, title="Predicted against observed"),
-    "causes": lambda: gap_causes_figure([replace(REPORT.causes[0], title=LONG), *REPORT.causes[1:]], title="Which"),
     "averages": lambda: gap_averages_figure(REPORT.averages[0], mark=AngleMark(134.2, "tooth 21")),
     "orders": lambda: gap_orders_figure(REPORT.spectra[0], limits=(40.0, 130.0)),
     "lines": lambda: gap_lines_figure(gearless_report().spectra[0], 3.21),
@@ -97,14 +94,6 @@ def test_evidence_stands_beside_its_prediction() -> None:
     diamonds = [float(np.asarray(line.get_xdata())[0]) for line in axes.lines if line.get_marker() == "D"]
     assert diamonds == pytest.approx([one.predicted_db for one in REPORT.causes[0].evidence])
     assert [t for t in texts(figure) if t in STANCES] == ["for", "for", "for", "further", "against"]
-
-
-def test_unlikely_causes_are_added_up() -> None:
-    many = [GapCause(f"c{i}", "g", f"cause {i}", "mm", 0.1) for i in range(10)]
-    figure = gap_causes_figure(many)
-    assert bars(figure) == pytest.approx([10.0] * 7 + [30.0])
-    assert "3 others together" in texts(figure)
-    assert "pitch error" in texts(gap_causes_figure(REPORT.causes))
 
 
 def test_lines_beyond_the_structural_floor_are_orange() -> None:
@@ -171,7 +160,7 @@ def test_the_polar_picture_is_in_decibels_from_the_middling_tooth() -> None:
 
 
 def test_nothing_to_draw_is_an_error() -> None:
-    for draw in (gap_waterfall_figure, gap_evidence_figure, gap_causes_figure):
+    for draw in (gap_waterfall_figure, gap_evidence_figure):
         with pytest.raises(InputError):
             draw([])
     with pytest.raises(InputError, match="hold no order"):

@@ -226,6 +226,11 @@ def test_it_says_what_is_compared_with():
     assert "from one recording to another" in floors_text(with_reference)
     assert "what the simulation of the sound machine lets expect" in floors_text(without)
     assert floors_text(gearless_report()) == ""
+    first, *others = with_reference.conditions
+    partly = replace(with_reference, conditions=(replace(first, reference="healthy_1.h5"), *others))
+    assert f"Without a reference at its point, with what the simulation lets expect: {others[0].name}" in floors_text(
+        partly
+    )
 
 
 def captions(report):
