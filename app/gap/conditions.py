@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from gearsig.errors import InputError
+from gearsig.errors import InputError, RefusalError
 from gearsig.gap.change import change_features, difference_features
 from gearsig.gap.features import Features
 from gearsig.gap.floors import REPEATABLE, GapSize, StructuralFloor, gap_size, pooled_scatter
@@ -122,8 +122,20 @@ def compare(now: Gathered, simulation: Gathered, reference: Gathered | None) -> 
 
 
 def facts_of(recording: Recording, rig: Rig, now: Gathered, name: str, twin: Twin) -> ConditionFacts:
-    """Return what is known of a recording's operating point: measured speed, stated torque of the driver."""
+    """Return what is known of a recording's operating point: measured speed, stated torque of the driver.
+
+    Raises
+    ------
+    RefusalError
+        If the stated torque is 0.
+    """
     stated_nm = _torque_nm(rig)
+    if stated_nm == 0.0:
+        raise RefusalError(
+            f"{name}: the rig file states a torque of 0, at which nothing presses the simulated teeth together",
+            remedy="give the drag of the driven side, some percent of the rated torque; without torque_nm a usual one "
+            "is assumed",
+        )
     return ConditionFacts(
         name,
         Point(60.0 * now.speed_hz, twin.point.torque_nm if stated_nm is None else stated_nm),
@@ -177,9 +189,7 @@ def _distance(now: Gathered, rig: Rig, reference: Healthy) -> float:
 
 def _torque_difference(here_nm: float, there_nm: float) -> float:
     """Return by which part of the reference's torque the recording's differs from it."""
-    if there_nm == 0.0:
-        return 0.0 if here_nm == 0.0 else math.inf
-    return abs(here_nm / there_nm - 1.0)
+    return abs(here_nm / there_nm - 1.0) if there_nm else math.inf
 
 
 def _torque_nm(rig: Rig) -> float | None:

@@ -150,6 +150,9 @@ def test_what_was_not_given_of_the_operating_point_is_told() -> None:
     point = replace(rig().operating_point, torque_nm=None)
     _, notices = conditions_of([whole], [replace(rig(), operating_point=point)], [], [], twin, ["now"], nothing)
     assert any(notice.startswith("now: the torque is not given; ") for notice in notices)
+    idle = replace(rig(), operating_point=replace(rig().operating_point, torque_nm=0.0))
+    with pytest.raises(RefusalError, match="now: the rig file states a torque of 0"):
+        conditions_of([whole], [idle], [], [], twin, ["now"], nothing)
 
 
 def nothing(*_: object) -> None:
