@@ -8,9 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from app.bifurcation.measure import Measured
+from gearsig.cache import read_arrays
 from gearsig.phase.types import PoincareSection
 from sims.cracked.continuation import End
 from sims.cracked.respond import State
+
+MOST_BYTES = 1_000_000_000
+"""Of one value's arrays; a usual one has some ten thousand."""
 
 
 @dataclass(frozen=True)
@@ -46,19 +50,19 @@ def save(kept: Kept, path: Path) -> None:
 
 
 def load(path: Path) -> Kept | None:
-    """Read one value; None where it is not there."""
-    if not path.exists():
+    """Read one value; None where it is not there, or damaged."""
+    data = read_arrays(path, MOST_BYTES)
+    if data is None:
         return None
-    with np.load(path, allow_pickle=False) as data:
-        value = float(data["value"])
-        if "points" not in data:
-            return Kept(value, None, None, str(data["reason"]))
-        d, words = data["points"].shape[1], tuple(str(w) for w in data["words"])
-        names, units, (section_name, source) = words[:d], words[d : 2 * d], words[2 * d :]
-        section = PoincareSection(
-            data["points"], data["times_s"], names, units, data["extent"], "locked", section_name, source
-        )
-        period, settled, separated, exponent, k = (float(x) for x in data["numbers"])
-        found = Measured(value, section, int(period), settled, separated, str(data["motion"]), exponent, k)
-        angle, speed, torque = (float(x) for x in data["end"])
-        return Kept(value, found, End(State(data["q"], data["v"], angle), speed, torque))
+    value = float(data["value"])
+    if "points" not in data:
+        return Kept(value, None, None, str(data["reason"]))
+    d, words = data["points"].shape[1], tuple(str(w) for w in data["words"])
+    names, units, (section_name, source) = words[:d], words[d : 2 * d], words[2 * d :]
+    section = PoincareSection(
+        data["points"], data["times_s"], names, units, data["extent"], "locked", section_name, source
+    )
+    period, settled, separated, exponent, k = (float(x) for x in data["numbers"])
+    found = Measured(value, section, int(period), settled, separated, str(data["motion"]), exponent, k)
+    angle, speed, torque = (float(x) for x in data["end"])
+    return Kept(value, found, End(State(data["q"], data["v"], angle), speed, torque))

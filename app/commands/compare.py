@@ -82,8 +82,11 @@ def compare(
 
     from gearsig.compare.recordings import ALIGN, compare_recordings
     from gearsig.report.compare_text import comparison_text
+    from gearsig.report.files import check_writable
 
     one_of(align, "--align", ALIGN)
+    if output is not None:
+        check_writable(output)
     machine = open_rig(rig, recording)
     with Console(stderr=True).status("reading") as status:
         recorded = open_recording(recording, machine, fs, stated_speed(speed_rpm, tach_times, pulses_per_revolution))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from gearsig.errors import InputError
 from gearsig.gap.types import GapReport
+from gearsig.report.files import check_writable
 
 JSON, PAGE, TWIN = "gap.json", "gap.html", "twin.toml"
 NAMES = (JSON, PAGE, TWIN)
@@ -22,17 +23,7 @@ def check_folder(folder: Path) -> None:
     InputError
         If it is no folder, cannot be written, or holds files that belong to no gap diagnosis.
     """
-    if folder.exists() and not folder.is_dir():
-        raise InputError("is a file", where=str(folder), remedy="choose a folder with -o")
-    existing = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
-    probe = existing / f".{secrets.token_hex(4)}"
-    try:
-        probe.mkdir()  # permissions alone do not tell: there are folders that nothing can be made in
-        probe.rmdir()
-    except OSError as error:
-        raise InputError(
-            f"cannot be written ({error.strerror or error})", where=str(folder), remedy="choose another with -o"
-        ) from None
+    check_writable(folder)
     if folder.is_dir():
         found = [path for path in folder.iterdir() if path.name not in NAMES]
         if found or (any(folder.iterdir()) and not _is_ours(folder / JSON)):

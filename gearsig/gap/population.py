@@ -12,12 +12,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from gearsig.cache import read_arrays
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.gap.floors import StructuralFloor
 from gearsig.gap.types import NONE
 
 FILE = Path(__file__).with_name("population.npz")
+MOST_BYTES = 1_000_000_000
+"""Of its arrays; they have nineteen million."""
 INDEPENDENT = "independent"
 """Simulator of the rig that makes blind cases; only its development gears are in the population."""
 BY_HAND = "by hand"
@@ -155,15 +158,13 @@ def _read(path: Path, left_out: str) -> Population:
     if left_out:
         whole = _read(path, "")
         return whole.of_rows(whole.simulators != left_out)
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            arrays = {name: data[name] for name in data.files}
-    except (OSError, ValueError) as error:
+    arrays = read_arrays(path, MOST_BYTES)
+    if arrays is None:
         raise InputError(
-            f"the population cannot be read ({error})",
+            "the population is not there, or damaged",
             where=path.name,
             remedy="make it again: python -m app.calibration.gap.population",
-        ) from None
+        )
     of_rigs = np.searchsorted(arrays["simulated_rigs"], arrays["rigs"])
     tables = {
         name: np.asarray(arrays[name], dtype=np.float64)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import secrets
 from collections.abc import Iterable
+from contextlib import suppress
 from glob import escape
 from pathlib import Path
 
@@ -30,6 +31,25 @@ def page_names(sources: Iterable[str | Path]) -> tuple[str, ...]:
     return tuple(_unique(_safe(str(source)), taken) for source in sources)
 
 
+def check_writable(folder: Path) -> None:
+    """Check, before long work, that files can be written into a folder, which need not exist yet.
+
+    Raises
+    ------
+    InputError
+        If it is a file or cannot be written.
+    """
+    probe = f".{secrets.token_hex(4)}"
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise InputError("is a file", where=str(folder), remedy="choose a folder with -o")
+        existing = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
+        (existing / probe).mkdir()  # permissions alone do not tell: there are folders that nothing can be made in
+        (existing / probe).rmdir()
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+
+
 def made_folder(folder: Path) -> Path:
     """Make a folder where there is none, and return it.
 
@@ -48,16 +68,24 @@ def made_folder(folder: Path) -> Path:
 
 
 def write_text(path: Path, text: str) -> Path:
-    """Write a file beside its place and move it there when it is complete; a failure leaves what was there before."""
+    """Write a file beside its place and move it there when it is complete; a failure leaves what was there before.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
     made_folder(path.parent)
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PART_SUFFIX}")
     try:
         with part.open("x", encoding="utf-8", newline="\n") as file:
             file.write(text)
         part.replace(path)
-    except BaseException:  # also on Ctrl-C
-        part.unlink(missing_ok=True)
-        raise
+    except OSError as error:
+        raise _unwritable(path, error) from None
+    finally:  # also on Ctrl-C
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
     return path
 
 
@@ -66,6 +94,12 @@ def remove_parts(folder: Path, file_names: Iterable[str]) -> None:
     for name in file_names:
         for part in folder.glob(f".{escape(name)}.*{PART_SUFFIX}"):
             part.unlink(missing_ok=True)
+
+
+def _unwritable(path: Path, error: OSError) -> InputError:
+    return InputError(
+        f"cannot be written ({error.strerror or error})", where=str(path), remedy="choose another folder with -o"
+    )
 
 
 def _safe(source: str) -> str:

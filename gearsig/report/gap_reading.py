@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from pathlib import Path
+from reprlib import repr as shortened
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -26,8 +28,19 @@ from gearsig.gap.types import (
     PlaceKind,
     Shrinkage,
 )
-from gearsig.report.gap_json import SCHEMA, SCHEMA_VERSION
+from gearsig.report.gap_json import SCHEMA, SCHEMA_VERSION, gap_schema
 from gearsig.report.plain import Json
+
+_TYPES: dict[str, tuple[type, ...]] = {
+    "object": (dict,),
+    "array": (list,),
+    "string": (str,),
+    "boolean": (bool,),
+    "null": (NoneType,),
+    "integer": (int,),
+    "number": (int, float),
+}
+"""Types that the schema names, as JSON is read."""
 
 
 def read_gap_json(path: str | Path) -> GapReport:
@@ -52,15 +65,17 @@ def read_gap_json(path: str | Path) -> GapReport:
         found = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="check the path") from None
-    except ValueError:
+    except (ValueError, RecursionError):  # some text, or brackets without end
         raise InputError("is not JSON", where=where, remedy="`gearsig gap` writes gap.json") from None
     stated = (found.get("schema"), found.get("schema_version")) if isinstance(found, dict) else (None, None)
     if stated != (SCHEMA, SCHEMA_VERSION):
         raise InputError("is no gap report", where=where, allowed=f"schema {SCHEMA}, version {SCHEMA_VERSION}")
+    schema = gap_schema()
     try:
+        _check_types(found, schema, schema["$defs"])
         return gap_from_dict(found)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"is not complete ({error!r})", where=where, remedy="make it anew") from None
+    except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise InputError(f"is damaged or not complete ({error!r})", where=where, remedy="make it anew") from None
 
 
 def gap_from_dict(found: Json) -> GapReport:
@@ -88,6 +103,29 @@ def gap_from_dict(found: Json) -> GapReport:
     )
 
 
+def _check_types(value: object, schema: Json, kinds: Json, where: str = "report") -> None:
+    """Raise where a value, or one within it, is of another type than the schema says; members may be missing.
+
+    Of the schema's language it knows the words for types that the schema of gap reports has.
+    """
+    if "anyOf" in schema:  # a kind, or null
+        schema = schema["anyOf"][value is None]
+    if "$ref" in schema:
+        schema = kinds[schema["$ref"].rpartition("/")[2]]
+    named = schema.get("type", ())
+    allowed = (named,) if isinstance(named, str) else named
+    if allowed and not any(type(value) in _TYPES[name] for name in allowed):
+        raise TypeError(f"{where} is {shortened(value)}, not {' or '.join(allowed)}")
+    if isinstance(value, dict):
+        others = schema.get("additionalProperties", {})
+        for key, part in value.items():
+            if stated := schema.get("properties", {}).get(key, others):
+                _check_types(part, stated, kinds, f"{where}.{key}")
+    elif isinstance(value, list) and "items" in schema:
+        for place, part in enumerate(value):
+            _check_types(part, schema["items"], kinds, f"{where}[{place}]")
+
+
 def _number(value: float | None) -> float:
     return float("nan") if value is None else float(value)
 
@@ -105,13 +143,22 @@ def _interval(found: Json) -> Interval:
     return Interval(_number(found["value"]), _number(found["low"]), _number(found["high"]))
 
 
+def _severity(found: Json) -> Interval:
+    """JSON knows no infinity: nothing bounds what has no upper end."""
+    return _interval(found if found["high"] is not None else {**found, "high": float("inf")})
+
+
 def _point(found: Json) -> Point:
     return Point(_number(found["speed_rpm"]), _number(found["torque_nm"]))
 
 
+_LENGTHS = ("n_revolutions", "duration_s", "sampling_rate_hz")
+
+
 def _condition(found: Json) -> ConditionFacts:
-    rest = (_number(found[key]) for key in ("n_revolutions", "duration_s", "sampling_rate_hz"))
-    return ConditionFacts(found["name"], _point(found), *rest)
+    n_revolutions, duration_s, rate_hz = (_number(found[key]) for key in _LENGTHS)
+    point = _point(found)
+    return ConditionFacts(found["name"], point, n_revolutions, duration_s, rate_hz, found.get("reference", ""))
 
 
 def _place(found: Json) -> GapPlace:
@@ -140,7 +187,7 @@ def _cause(found: Json) -> GapCause:
         found["title"],
         found["unit"],
         _number(found["probability"]),
-        None if found["severity"] is None else _interval(found["severity"]),
+        None if found["severity"] is None else _severity(found["severity"]),
         None if found["fitted"] is None else _added(found["fitted"]),
         found["place"],
         None if found["shrinkage"] is None else _shrinkage(found["shrinkage"]),

@@ -64,8 +64,19 @@ def rig_file_beside(recording: str | Path) -> Path | None:
     path = Path(recording)
     if not path.name:
         return None
-    beside = path.with_name(path.name.split(".")[0] + ".toml")
+    beside = path.with_name(f"{recording_stem(path.name)}.toml")
     return beside if beside.is_file() else None
+
+
+def recording_stem(name: str) -> str:
+    """Return a file's name without its type.
+
+    Examples
+    --------
+    >>> recording_stem("run.5Nm.csv.gz"), recording_stem("run.5Nm.toml"), recording_stem("run")
+    ('run.5Nm', 'run.5Nm', 'run')
+    """
+    return Path(name.removesuffix(".gz")).stem
 
 
 def rig_from_dict(data: dict[str, Any], where: str = "rig") -> Rig:

@@ -207,6 +207,12 @@ class OperatingPoint:
         if self.speed_rpm is not None:
             not_negative(self.speed_rpm, "operating_point.speed_rpm", "rpm")
         within(self.speed_tolerance_percent, "operating_point.speed_tolerance_percent", 0.01, 90, "%")
+        if self.torque_nm is not None and not isfinite(self.torque_nm):  # a sign is a direction
+            raise InputError(
+                f"operating_point.torque_nm is {self.torque_nm:g} N m",
+                allowed="a finite number",
+                remedy="give its size, or leave it out where it is not known",
+            )
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,10 @@ from functools import cache, lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 
-from gearsig.cache import FRESH, OtherVersionError, cache_folder, write_whole
+from gearsig.cache import FRESH, OtherVersionError, cache_folder, read_arrays, write_whole
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from sims.mesh.crack import RootCrack, check_crack, deepest_crack_mm
@@ -31,6 +30,8 @@ COARSE_SIZE, COARSE_DOF = MeshSize(n_across=6, n_gap=1, n_up=6, n_rim=2, n_body=
 `CRACK_SIZE`."""
 READY_ANGLE_DEG = 45.0
 READY_FILE = FOLDER / "cracks.npz"
+MOST_BYTES = 100_000_000
+"""Of a kept crack's arrays; a usual one has less than one."""
 
 
 def crack_added_m_per_n(gear: ReducedGear, crack: RootCrack) -> FloatArray:
@@ -211,11 +212,8 @@ def _kept(path: Path, solve: Callable[[], FloatArray], grid: tuple[int, int, int
 
 def _read(path: Path) -> tuple[str, FloatArray | None]:
     """Code that made a file, and what it keeps; None if it is not there or damaged."""
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            return str(data["code"]), data["added"]
-    except (OSError, ValueError, EOFError, KeyError, TypeError, AttributeError, BadZipFile):
-        return "", None
+    data = read_arrays(path, MOST_BYTES)
+    return (str(data["code"]), data["added"]) if data is not None and {"code", "added"} <= set(data) else ("", None)
 
 
 @cache

@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
-from gearsig.cache import FRESH, OtherVersionError, write_whole
+from gearsig.cache import FRESH, OtherVersionError, read_arrays, write_whole
 from gearsig.errors import InputError
 from sims.reduced_fe.blank import blank_from_text
 from sims.reduced_fe.gear_key import FORMAT
@@ -54,27 +53,23 @@ def read_gear(path: str | Path) -> ReducedGear:
         If the file is missing, damaged, not a reduced gear, or (`OtherVersionError`) of another version of this format.
     """
     source = Path(path)
+    if not source.exists():
+        raise InputError("no such file", where=str(source))
+    data = read_arrays(source, MOST_BYTES)
+    if data is None:
+        raise _no_gear(source, f"no archive of at most {MOST_BYTES:.0e} bytes")
     try:
-        _check_length(source)
-        with np.load(source, allow_pickle=False) as data:
-            about = json.loads(str(data["about"]))
-            _check_format(about, source)
-            return _gear(about, {name: data[name] for name in (*_ARRAYS, "roll_rad", "z_m")})
-    except FileNotFoundError:
-        raise InputError("no such file", where=str(source)) from None
+        about = json.loads(str(data["about"]))
+        _check_format(about, source)
+        return _gear(about, {name: data[name] for name in (*_ARRAYS, "roll_rad", "z_m")})
     except InputError:
         raise
-    except (OSError, BadZipFile, EOFError, ValueError, KeyError, TypeError) as error:
-        raise InputError(
-            f"is not a reduced gear, or is damaged ({error})", where=str(source), remedy="make it again"
-        ) from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise _no_gear(source, str(error)) from error
 
 
-def _check_length(source: Path) -> None:
-    with ZipFile(source) as archive:
-        n_bytes = sum(entry.file_size for entry in archive.infolist())
-    if n_bytes > MOST_BYTES:
-        raise InputError(f"holds {n_bytes:.1e} bytes", where=str(source), allowed=f"at most {MOST_BYTES:.0e}")
+def _no_gear(source: Path, why: str) -> InputError:
+    return InputError(f"is not a reduced gear, or is damaged ({why})", where=str(source), remedy="make it again")
 
 
 def _check_format(about: dict[str, Any], source: Path) -> None:

@@ -158,6 +158,8 @@ def test_a_value_on_disk_is_what_was_saved(tmp_path):
     assert (again.found.motion, again.found.period) == ("periodic", 1)
     assert again.found.section.units == ("m", "m/s")
     assert load(tmp_path / "b.npz") is None
+    (tmp_path / "a.npz").write_bytes(b"torn")
+    assert load(tmp_path / "a.npz") is None
 
 
 @pytest.mark.parametrize(

@@ -85,6 +85,16 @@ def test_nothing_is_written_where_the_page_fails(
     assert not (tmp_path / "out").exists()
 
 
+def test_a_folder_that_cannot_be_written_is_told_before_the_work(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("")
+    code, out, err = run(capsys, "compare", tmp_path / "no.csv", tmp_path / "no.csv", "-o", tmp_path / "file" / "out")
+    assert (code, out) == (2, "")
+    assert "out: cannot be written" in err
+    assert err.count("\n") == 1
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

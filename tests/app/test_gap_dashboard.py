@@ -9,7 +9,7 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 import app.dashboard
-from app.dashboard.gap.choice import Choice, common_rig, files_of
+from app.dashboard.gap.choice import Choice, common_rig, files_of, own_rig
 from app.dashboard.gap.runner import _FINISHED, _JOB, Finished
 from app.dashboard.state import Upload
 from app.gap.inputs import read_inputs
@@ -90,6 +90,24 @@ def test_two_rig_files_for_all_are_refused() -> None:
         common_rig(choice)
 
 
+def test_names_that_differ_after_a_dot_have_their_own_rigs(tmp_path) -> None:
+    content, own = CRACKED.read_bytes(), RIG.replace("torque_nm = 110.0", "torque_nm = 55.0")
+    names = ("run.5Nm.h5", "run.10Nm.h5")
+    choice = Choice(
+        tuple(upload(name, content) for name in names),
+        rigs=(upload("run.10Nm.toml", text=RIG), upload("run.5Nm.toml", text=own)),
+    )
+    assert common_rig(choice) is None
+    assert [rig.operating_point.torque_nm for rig in read_inputs(files_of(choice, tmp_path)).rigs] == [55.0, 110.0]
+    assert own_rig(upload("run.5Nm.csv.gz"), choice.rigs) is choice.rigs[1]
+
+
+def test_two_rig_files_for_one_recording_are_refused(tmp_path) -> None:
+    twice = (upload("a.toml", text=RIG), upload("a.toml", text=RIG + "\n"))
+    with pytest.raises(InputError, match=r"a\.h5: 2 rig files .*a\.toml, a\.toml.*remove all but one"):
+        files_of(Choice((upload("a.h5"),), rigs=twice), tmp_path)
+
+
 def test_the_only_rig_file_is_for_all_though_it_is_named_as_the_reference() -> None:
     now, sound = upload("now.h5", b"1"), upload("sound.h5", b"2")
     rig = upload("sound.toml", text=RIG)
@@ -147,6 +165,19 @@ def test_why_there_is_no_answer_is_said(stub, outcome, said) -> None:
     assert not page.exception
     assert said in text_of(page)
     assert len(page.error) == 1
+
+
+def test_why_nothing_can_be_started_is_said() -> None:
+    page = opened()
+    page.sidebar.radio(key="gap origin").set_value("Own files").run()
+    page.sidebar.file_uploader(key="gap recordings").upload("a.h5", CRACKED.read_bytes())
+    page.sidebar.file_uploader(key="gap rigs").upload("one.toml", RIG.encode()).upload("two.toml", RIG.encode())
+    page = press(page.run(), "Diagnose")
+    assert not page.exception
+    assert _JOB not in page.session_state
+    assert len(page.error) == 1
+    assert "2 rig files are named as no recording: one.toml, two.toml" in text_of(page)
+    assert not next(button for button in page.button if button.label == "Diagnose").disabled
 
 
 def finished(report) -> Finished:

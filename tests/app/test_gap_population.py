@@ -13,9 +13,10 @@ from app.calibration.gap.machines import draw_machine
 from app.calibration.gap.sample import Sample, write
 from app.calibration.rigs import DrawnRig
 from app.calibration.simulate import simulate_rig
+from gearsig.errors import InputError
 from gearsig.gap.floors import soft_size
 from gearsig.gap.gather import gather
-from gearsig.gap.population import BY_HAND, INDEPENDENT, load_population
+from gearsig.gap.population import BY_HAND, FILE, INDEPENDENT, load_population
 from gearsig.gap.types import NONE, UNKNOWN
 from sims.blind import CATALOGUE
 from sims.effects import EffectSetting
@@ -106,3 +107,9 @@ def test_an_unbalance_is_heard_where_the_housing_yields() -> None:
         time = np.arange(len(first)) / recording.sampling_rate_hz
         heard.append(abs(np.mean(first * np.exp(-2j * np.pi * drawn.speed_rpm / 60.0 * time))))
     assert heard[1] > 5.0 * heard[0]
+
+
+def test_a_damaged_population_is_named(tmp_path) -> None:
+    (tmp_path / "population.npz").write_bytes(FILE.read_bytes()[:10_000])
+    with pytest.raises(InputError, match=r"population\.npz: the population is not there, or damaged; make it again"):
+        load_population(tmp_path / "population.npz")

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.report.files import page_names, remove_parts, write_text
+from gearsig.errors import InputError
+from gearsig.report.files import check_writable, page_names, remove_parts, write_text
 
 
 @given(st.lists(st.text(max_size=300), max_size=20))
@@ -34,6 +35,29 @@ def test_a_failed_write_leaves_what_was_there(tmp_path):
         write_text(path, "x" * 1_000_000 + "\ud800")
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_cannot_be_written_is_named(tmp_path):
+    (tmp_path / "page.html").mkdir()
+    with pytest.raises(InputError, match=r"page\.html: cannot be written \(.+\); choose another folder with -o"):
+        write_text(tmp_path / "page.html", "text")
+    assert list(tmp_path.iterdir()) == [tmp_path / "page.html"]
+
+
+def test_a_folder_is_writable_where_something_can_be_made_in_it_or_in_what_will_hold_it(tmp_path, monkeypatch):
+    check_writable(tmp_path / "there" / "yet")
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "file").write_text("")
+    for place, said in (("file", "is a file"), ("file/folder", "cannot be written")):
+        with pytest.raises(InputError, match=said):
+            check_writable(tmp_path / place)
+
+    def deny(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "mkdir", deny)
+    with pytest.raises(InputError, match=r"cannot be written \(Permission denied\)"):
+        check_writable(tmp_path)
 
 
 def test_an_interrupted_write_is_tidied_up(tmp_path, monkeypatch):

@@ -1,5 +1,6 @@
 """What gap.json says comes back as the report that it was written of."""
 
+import json
 from dataclasses import asdict, replace
 from math import nan
 
@@ -49,6 +50,42 @@ def test_null_is_nan():
 
 
 @pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        pytest.param(("size", "value"), 10**400, "OverflowError", id="too large"),
+        (("size", "low"), "7", r"report\.size\.low is '7', not number or null"),
+        (("rig",), ["a"], r"report\.rig is \['a'\], not string"),
+        (("notices",), "abc", "report.notices is 'abc', not array"),
+        (("notices", 0), 3, r"report\.notices\[0\] is 3, not string"),
+        (("groups", "unknown"), "much", "report.groups.unknown is 'much'"),
+        (("places", 0, "tooth"), "<b>", r"report\.places\[0\]\.tooth is '<b>', not integer or null"),
+        (("places", 0, "tooth"), True, r"tooth is True"),
+        (("places", 0, "follows"), "yes", "follows is 'yes', not boolean"),
+        (("places", 0, "band_hz"), [], "IndexError"),
+        (("causes", 0, "severity"), 3, r"severity is 3, not object"),
+        pytest.param(("angles", 0, "n_teeth"), "x" * 10_000, r"n_teeth is 'x+\.\.\.x+', not integer", id="too long"),
+        (("spectra", 0, "orders", 1), {}, r"report\.spectra\[0\]\.orders\[1\] is {}"),
+    ],
+)
+def test_what_is_not_of_its_type_is_named(tmp_path, path, value, said):
+    found = gap_to_dict(effect_report())
+    *way, last = path
+    part = found
+    for key in way:
+        part = part[key]
+    part[last] = value
+    (tmp_path / "gap.json").write_text(json.dumps(found))
+    with pytest.raises(InputError, match=rf"gap\.json: is damaged or not complete .*{said}"):
+        read_gap_json(tmp_path / "gap.json")
+
+
+def test_members_that_later_versions_add_are_passed_over(tmp_path):
+    deep = json.loads('{"x":' * 300 + "1" + "}" * 300)
+    (tmp_path / "gap.json").write_text(json.dumps({**gap_to_dict(effect_report()), "another": deep}))
+    assert read_gap_json(tmp_path / "gap.json").rig == effect_report().rig
+
+
+@pytest.mark.parametrize(
     "text",
     [
         "",
@@ -56,6 +93,7 @@ def test_null_is_nan():
         "{}",
         '{"schema": "gearsig.gap", "schema_version": 2}',
         '{"schema": "gearsig.gap", "schema_version": 1}',
+        "[" * 100_000,
     ],
 )
 def test_what_is_no_report_is_refused(tmp_path, text):

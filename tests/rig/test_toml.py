@@ -72,6 +72,8 @@ def test_shafts_may_be_left_out() -> None:
         ('[speed]\nsource = "tacho"\n', "did you mean tachometer"),
         ('[speed]\nsource = "pulse times"\n', "--tach-times"),
         ('[speed]\nsource = "constant"\nspeed_rpm = nan\n', "speed_rpm is nan"),
+        ("[operating_point]\ntorque_nm = nan\n", r"\[operating_point\].*torque_nm is nan N m.*its size"),
+        ("[operating_point]\ntorque_nm = inf\n", "torque_nm is inf N m.*a finite number"),
         ('sources = "book"\n', "a list of texts"),
     ],
 )
@@ -82,6 +84,11 @@ def test_errors_name_the_place(tmp_path: Path, text: str, expected: str) -> None
         read_rig(path)
     assert "rig.toml" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("torque_nm", [0.0, -80.0])
+def test_no_load_and_either_direction_are_torques(torque_nm: float) -> None:
+    assert rig_from_dict({"operating_point": {"torque_nm": torque_nm}}).operating_point.torque_nm == torque_nm
 
 
 def test_not_a_text_file(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from app.dashboard.state import Upload
 from app.dashboard.uploads import safe_file_name
 from app.gap.inputs import Asked
 from gearsig.errors import InputError
+from gearsig.rig.toml import recording_stem
 
 Source = Path | Upload
 
@@ -65,12 +66,12 @@ def common_rig(choice: Choice) -> Upload | None:
     Raises
     ------
     InputError
-        If there are several.
+        If there are several, or several that are one recording's own.
     """
     if len(choice.rigs) == 1:  # all recordings are of one rig, whatever its file is called
         return choice.rigs[0]
-    stems = {_stem(name_of(one)) for one in (*choice.recordings, *choice.references)}
-    others = [rig for rig in choice.rigs if _stem(rig.name) not in stems]
+    own = [own_rig(one, choice.rigs) for one in (*choice.recordings, *choice.references)]
+    others = [rig for rig in choice.rigs if rig not in own]
     if len(others) > 1:
         raise InputError(
             f"{len(others)} rig files are named as no recording: {', '.join(rig.name for rig in others)}",
@@ -79,13 +80,32 @@ def common_rig(choice: Choice) -> Upload | None:
     return others[0] if others else None
 
 
+def own_rig(source: Source, rigs: tuple[Upload, ...]) -> Upload | None:
+    """Return the rig file that is named as a recording (`run.5Nm.csv.gz`: `run.5Nm.toml`), None if there is none.
+
+    Raises
+    ------
+    InputError
+        If there are several.
+    """
+    found = [rig for rig in rigs if recording_stem(rig.name) == recording_stem(name_of(source))]
+    if len(found) > 1:
+        raise InputError(
+            f"{len(found)} rig files are named as this recording: {', '.join(rig.name for rig in found)}",
+            where=name_of(source),
+            allowed="one",
+            remedy="remove all but one of them",
+        )
+    return found[0] if found else None
+
+
 def files_of(choice: Choice, folder: Path) -> Asked:
     """Write the uploads into a folder and return what the diagnosis is asked.
 
     Raises
     ------
     InputError
-        If there is more than one rig file for all.
+        If there is more than one rig file for all, or for one recording.
     """
     common = common_rig(choice)
     rig = None
@@ -113,14 +133,10 @@ def _written(source: Source, folder: Path, rigs: tuple[Upload, ...]) -> Path:
     folder.mkdir()
     path = folder / safe_file_name(source.name)
     path.write_bytes(source.content)
-    for rig in rigs:
-        if _stem(rig.name) == _stem(source.name):
-            (folder / f"{_stem(path.name)}.toml").write_text(rig.rig_text, encoding="utf-8")
+    rig = own_rig(source, rigs)
+    if rig is not None:
+        path.with_name(f"{recording_stem(path.name)}.toml").write_text(rig.rig_text, encoding="utf-8")
     return path
-
-
-def _stem(name: str) -> str:
-    return name.partition(".")[0]
 
 
 def _key(source: Source) -> str:

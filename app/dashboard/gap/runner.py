@@ -17,7 +17,7 @@ from gearsig.errors import GearsigError
 from gearsig.gap.types import GapReport
 from gearsig.report.gap_pictures import GapFigure, gap_figures
 
-_JOB, _FINISHED, _STOPPED = "gap job", "gap result", "gap stopped"
+_JOB, _FINISHED, _STOPPED, _REFUSED = "gap job", "gap result", "gap stopped", "gap refused"
 EVERY_S = 0.5
 
 
@@ -55,10 +55,10 @@ def show_running(choice: Choice) -> Finished | None:
     Raises
     ------
     GearsigError
-        Why the job that has just ended has no result.
+        Why the job that has just ended has no result, or why none could be started.
     """
     running: _Running | None = st.session_state.get(_JOB)
-    failed: GearsigError | None = None
+    failed: GearsigError | None = st.session_state.pop(_REFUSED, None)
     if running is not None and not running.job.is_running:
         try:
             _take(running)
@@ -93,15 +93,18 @@ def forget() -> None:
 
 
 def _start(choice: Choice) -> None:
-    """Start a job; an error of the files is told by it as any other."""
+    """Start a job; why none can be started is kept for the page, which runs only afterwards."""
     forget()
     folder = private_folder()
     try:
         asked = files_of(choice, folder)
         job = Job(folder, asked, choice.model, cache=cache_folder("gap"), command=choice.command)
-    except BaseException:
+    except BaseException as error:
         shutil.rmtree(folder, ignore_errors=True)
-        raise
+        if not isinstance(error, GearsigError):
+            raise
+        st.session_state[_REFUSED] = error
+        return
     st.session_state[_JOB] = _Running(choice.key, job)
 
 

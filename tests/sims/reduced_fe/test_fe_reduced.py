@@ -176,11 +176,23 @@ def test_a_gear_survives_its_file(tmp_path: Path) -> None:
         np.testing.assert_array_equal(getattr(again, name), getattr(gear, name))
 
 
+def flip(path: Path) -> None:
+    """Damage two bytes of the packed data, right after the first entry's header and name."""
+    data = bytearray(path.read_bytes())
+    place = 30 + int.from_bytes(data[26:28], "little") + int.from_bytes(data[28:30], "little")
+    data[place : place + 2] = b"\xff\xff"
+    path.write_bytes(data)
+
+
 def test_files_that_do_not_fit_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "gear.npz"
     with pytest.raises(InputError, match="no such file"):
         read_gear(path)
     path.write_bytes(b"not an archive")
+    with pytest.raises(InputError, match="is not a reduced gear"):
+        read_gear(path)
+    write_gear(path, small_reduced())
+    flip(path)
     with pytest.raises(InputError, match="is not a reduced gear"):
         read_gear(path)
     monkeypatch.setattr(gear_file, "FORMAT", 999)

@@ -1,0 +1,44 @@
+"""Kept files: what comes back is what was written, or nothing, whatever became of the bytes."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearsig.cache import read_arrays
+
+ARRAYS = {"about": np.array('{"key": 1}'), "values": np.random.default_rng(0).normal(size=(12, 9))}
+ENOUGH = 1_000_000
+
+
+@pytest.mark.parametrize("save", [np.savez_compressed, np.savez])
+def test_no_damaged_byte_gets_through(tmp_path: Path, save: Callable[..., None]) -> None:
+    path = tmp_path / "kept.npz"
+    save(path, **ARRAYS)
+    whole = path.read_bytes()
+    for place in range(len(whole) - 1):
+        path.write_bytes(whole[:place] + bytes(255 - byte for byte in whole[place : place + 2]) + whole[place + 2 :])
+        found = read_arrays(path, ENOUGH)
+        for name, values in (found or {}).items():  # dates and the like may be wrong
+            np.testing.assert_array_equal(values, ARRAYS[name])
+
+
+@pytest.mark.parametrize(
+    "error", [MemoryError(), NotImplementedError("zip file version 8.8"), RuntimeError("encrypted")]
+)
+def test_whatever_its_reader_raises_is_damage(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    np.savez(tmp_path / "kept.npz", **ARRAYS)
+    monkeypatch.setattr("gearsig.cache.np.load", fail)
+    assert read_arrays(tmp_path / "kept.npz", ENOUGH) is None
+
+
+def test_what_is_missing_or_too_large_is_not_read(tmp_path: Path) -> None:
+    assert read_arrays(tmp_path / "kept.npz", ENOUGH) is None
+    np.savez(tmp_path / "kept.npz", **ARRAYS)
+    assert read_arrays(tmp_path / "kept.npz", 100) is None
