@@ -96,6 +96,11 @@ class Interval:
     low: float
     high: float
 
+    @property
+    def is_unbounded(self) -> bool:
+        """Whether any size fits about as well."""
+        return self.low == 0.0 and isinf(self.high)
+
     def words(self, write: Callable[[float], str]) -> str:
         """Return the interval in words, its ends as `write` writes them.
 
@@ -105,7 +110,7 @@ class Interval:
         >>> [Interval(2.0, *both).words("{:g}".format) for both in ends]
         ['1.5 to 3', '1.5 or more', 'unbounded']
         """
-        if isinf(self.high) and self.low == 0.0:
+        if self.is_unbounded:
             return "unbounded"
         return f"{write(self.low)} or more" if isinf(self.high) else f"{write(self.low)} to {write(self.high)}"
 

@@ -59,7 +59,7 @@ def _which(report: GapReport) -> str:
         *others, last = (_titled(report, name) for name in report.inseparable)
         named = f"{', '.join(others)} or {last}"
         return f"Which: {named}; these recordings cannot tell them apart."
-    size = "" if first.severity is None else f", {_severity(first, first.severity)}"
+    size = f", {_severity(first, first.severity)}" if first.severity and not first.severity.is_unbounded else ""
     place = f" at {first.place}" if first.place else ""
     return f"Which: {first.title}{place}{size} (probability {odds})."
 

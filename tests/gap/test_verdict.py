@@ -19,6 +19,8 @@ from tests.gap.example_report import (
 def test_a_severity_has_a_unit_for_people_and_no_exponent() -> None:
     report = effect_report()
     first = replace(report.causes[0], unit="g mm", severity=Interval(1234.0, 1000.0, 1500.0))
+    anything = replace(first, severity=Interval(1234.0, 0.0, float("inf")))
+    assert "g·mm" not in replace(report, causes=(anything, *report.causes[1:])).verdict[1]
     assert ", 1230 g·mm (probability 88 %)." in replace(report, causes=(first,)).verdict[1]
     assert ", 14 µm (" in replace(report, causes=(report.causes[2],)).verdict[1]
 
