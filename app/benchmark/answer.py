@@ -18,6 +18,7 @@ class AnsweredShrinkage:
     slope: float
     placebo: float
     held_out: str
+    n_placebos: int
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class Answer:
     outcome : str
         Value of `GapOutcome`; empty where it failed.
     causes : tuple of AnsweredCause
-        Likeliest first.
+        As the report has them: what its outcome names first, the others by probability.
     inseparable : tuple of str
     places : tuple of AnsweredPlace
     size : float
@@ -78,6 +79,11 @@ class Answer:
     seconds: float = 0.0
     cpu_seconds: float = 0.0
     error: str = ""
+
+    @property
+    def ranked(self) -> tuple[AnsweredCause, ...]:
+        """The causes by probability, whatever the outcome puts first; of those alike, the first stays first."""
+        return tuple(sorted(self.causes, key=lambda cause: -cause.probability))
 
     def probability(self, name: str) -> float:
         """Probability of a cause; 0 for one that is not listed."""
@@ -111,7 +117,9 @@ def _cause(cause: GapCause) -> AnsweredCause:
 def _shrinkage(found: Shrinkage | None) -> AnsweredShrinkage | None:
     if found is None:
         return None
-    return AnsweredShrinkage(float(found.shrink.value), float(found.slope), float(found.placebo), found.held_out)
+    return AnsweredShrinkage(
+        float(found.shrink.value), float(found.slope), float(found.placebo), found.held_out, found.n_placebos
+    )
 
 
 def to_text(answers: Mapping[str, Answer]) -> str:

@@ -21,6 +21,7 @@ from typing import Any, Generic, TypeVar
 import app
 from app.benchmark.answer import Answer, from_text, to_text
 from app.benchmark.diagnose_one import ANSWERS
+from app.benchmark.diagnosers import folders_of
 from app.stopping import Running, stop
 from gearsig.cache import FOLDERS
 from gearsig.checks import count
@@ -123,7 +124,7 @@ def diagnosed(folder: Path, names: Sequence[str], running: Running | None = None
     process = runs.start(
         [sys.executable, "-m", "app.benchmark.diagnose_one", *names],
         cwd=folder,
-        env=environment(folder),
+        env=environment(folder, names),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
@@ -143,10 +144,15 @@ def diagnosed(folder: Path, names: Sequence[str], running: Running | None = None
     return from_text((folder / ANSWERS).read_text(encoding="utf-8"))
 
 
-def environment(folder: Path) -> dict[str, str]:
-    """Return all that a diagnosing process finds in its environment."""
+def environment(folder: Path, names: Sequence[str]) -> dict[str, str]:
+    """Return all that the process of some diagnosers finds in its environment.
+
+    Of the caller's own PYTHONPATH it gets the folders that these diagnosers' modules lie in and nothing else.
+    """
     passed_on = {name: os.environ[name] for name in _PASSED_ON if name in os.environ}
-    return passed_on | dict.fromkeys(_ONE_THREAD, "1") | {"TMPDIR": str(folder), "PYTHONPATH": str(_ROOT)}
+    modules = dict.fromkeys([_ROOT, *(place for name in names for place in folders_of(name))])
+    path = os.pathsep.join(map(str, modules))
+    return passed_on | dict.fromkeys(_ONE_THREAD, "1") | {"TMPDIR": str(folder), "PYTHONPATH": path}
 
 
 def state_of_code() -> str:
@@ -154,6 +160,7 @@ def state_of_code() -> str:
     found = hashlib.sha256()
     for room in ("gearsig", "sims", "app/gap", "app/benchmark"):
         for path in sorted((_ROOT / room).rglob("*")):
-            if path.suffix in (".py", ".json", ".toml", ".npz") and not _SHOWS_ONLY & set(path.parts):
-                found.update(path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+            own = path.relative_to(_ROOT)
+            if path.suffix in (".py", ".json", ".toml", ".npz") and not _SHOWS_ONLY & set(own.parts):
+                found.update(own.as_posix().encode() + b"\0" + path.read_bytes())
     return found.hexdigest()[:16]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 
 from app.benchmark.seen import Seen
 from gearsig.errors import InputError
@@ -17,6 +19,8 @@ GAP_UNSEEN, FOREST_UNSEEN = "gap-unseen", "forest-unseen"
 START_STOP = "start-stop"
 """Of machines that start and stop, by the model forging."""
 BASELINES = (MAJORITY, RULES)
+MAIN = "__main__"
+"""A module that is another one in every process: the diagnosing process finds nothing of the caller's there."""
 _HOMES = {
     GAP: "app.benchmark.diagnosers:diagnose",
     FOREST: "app.benchmark.forest:diagnose",
@@ -37,8 +41,9 @@ def diagnoser(name: str) -> Diagnoser:
         If there is none.
     """
     module, sign, function = _HOMES.get(name, name).partition(":")
+    is_shared = sign and module != MAIN
     try:
-        found = getattr(import_module(module), function) if sign else None
+        found = getattr(import_module(module), function) if is_shared else None
     except (ImportError, AttributeError):
         found = None
     if not callable(found):
@@ -46,10 +51,18 @@ def diagnoser(name: str) -> Diagnoser:
     return found  # type: ignore[no-any-return]  # what a user's function returns shows when it is called
 
 
+def folders_of(name: str) -> tuple[Path, ...]:
+    """Return the folders that a diagnoser's module is imported from; none where there is no file of it."""
+    top = _HOMES.get(name, name).partition(":")[0].partition(".")[0]
+    spec = None if top == MAIN else find_spec(top)
+    if spec is None:
+        return ()
+    origin = [spec.origin] if spec.has_location and spec.origin else []
+    return tuple(Path(place).absolute().parent for place in spec.submodule_search_locations or origin)
+
+
 def diagnose(seen: Seen) -> GapReport:
     """Diagnose a case with the product itself; what is kept for its rig lies with the case and goes with it."""
-    from pathlib import Path
-
     from app.gap.diagnose import diagnose_gap
     from sims.registry import gap_simulator
 

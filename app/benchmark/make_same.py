@@ -25,7 +25,7 @@ N_DRAWS = 9
 
 def record_same(plan: Plan, planned: PlannedCase, case: Case) -> tuple[CaseRecordings, dict[str, Any]]:
     """Record a case on a specimen of the simulator; return it with its labels, laid out like the blind rig's."""
-    rng = plan.rng_of(planned)
+    rng = plan.rng_of_run(planned)
     first = case.conditions[0]
     twin = cracked_gap_simulator().twin_of(case.rig.description(first.stated_rpm, first.stated_nm))
     added = [_added(twin, fault.name, planned.level, rng) for fault in case.faults]

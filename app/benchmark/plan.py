@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from app.benchmark.shares import SHARES
+from app.benchmark.shares import SHARES, counts_of
 from gearsig.checks import count, one_of, within
 from sims.blind import CATALOGUE, OUTSIDE, ROLES
 
@@ -34,6 +34,8 @@ class PlannedCase:
         0 (barely noticeable) to 1 (strong).
     with_reference : bool
     n_conditions : int
+    repeats : int or None
+        Number of the blind case with the same gears, conditions and effects; None: it is blind itself.
     """
 
     number: int
@@ -43,6 +45,7 @@ class PlannedCase:
     level: float
     with_reference: bool
     n_conditions: int
+    repeats: int | None = None
 
 
 @dataclass(frozen=True)
@@ -100,29 +103,22 @@ class Plan:
             return blind
         again = [c for c in blind if c.kind != "unknown"]
         return blind + [
-            PlannedCase(len(blind) + i, SAME, c.kind, c.effect, c.level, c.with_reference, c.n_conditions)
-            for i, c in enumerate(again, 1)
+            replace(c, number=len(blind) + i, source=SAME, repeats=c.number) for i, c in enumerate(again, 1)
         ]
 
     def rng_of(self, case: PlannedCase) -> np.random.Generator:
-        """Return the generator that a case is drawn from."""
-        return np.random.default_rng([self.seed, 1, case.number])
+        """Return the generator that a case is drawn from: a repeated case is drawn as the blind one was."""
+        return np.random.default_rng([self.seed, 1, case.number if case.repeats is None else case.repeats])
+
+    def rng_of_run(self, case: PlannedCase) -> np.random.Generator:
+        """Return the generator of what the diagnosing simulator draws for itself: severities, places, noise."""
+        return np.random.default_rng([self.seed, 2, case.number])
 
 
 def _shuffled(plan: Plan, rng: np.random.Generator) -> list[PlannedCase]:
-    drawn = [one for kind, n in _counts(plan.n_cases).items() for one in _of_kind(kind, n, plan, rng)]
+    drawn = [one for kind, n in counts_of(SHARES, plan.n_cases).items() for one in _of_kind(kind, n, plan, rng)]
     order = rng.permutation(len(drawn))
     return [PlannedCase(i, BLIND, *drawn[place]) for i, place in enumerate(order, 1)]
-
-
-def _counts(n_cases: int) -> dict[str, int]:
-    """Return whole numbers in the shares, by largest remainder."""
-    exact = {kind: share * n_cases for kind, share in SHARES.items()}
-    counts = {kind: int(value) for kind, value in exact.items()}
-    missing = n_cases - sum(counts.values())
-    for kind in sorted(exact, key=lambda k: counts[k] - exact[k])[:missing]:
-        counts[kind] += 1
-    return counts
 
 
 def _of_kind(

@@ -6,23 +6,29 @@ import csv
 import json
 from collections import Counter
 from collections.abc import Callable, Sequence
+from io import StringIO
 from math import isfinite, nan
 from pathlib import Path
-from statistics import median
 from typing import Any
 
+import numpy as np
+
+from app.benchmark.answer import AnsweredShrinkage
 from app.benchmark.blind_run import ANSWERS_FOLDER, DEFINITION
 from app.benchmark.scoring.calibration_curve import brier, calibration_error
-from app.benchmark.scoring.intervals import Score, share
+from app.benchmark.scoring.intervals import Score, median_of, share
 from app.benchmark.start_stop import DriveDone
 from gearsig.gap.types import NONE, UNKNOWN, GapOutcome
 from sims.blind_drive import CATALOGUE
+from sims.sweep_run import written
 
 TABLE, SCORES, CASES = "table.md", "scores.json", "cases.csv"
 FILES = (TABLE, SCORES, CASES, DEFINITION, ANSWERS_FOLDER)
 NAMING = (GapOutcome.EFFECT.value, GapOutcome.CANNOT_SEPARATE.value)
 STRONG = 0.5
 """Level from which on an effect is in the upper half of its span."""
+SEED = 0
+"""Of the draws with replacement that a median's interval comes from."""
 
 Cases = Sequence[DriveDone]
 
@@ -34,7 +40,7 @@ def truth_of(done: DriveDone) -> str:
 
 def ranked(done: DriveDone) -> list[str]:
     """Return the causes by probability."""
-    return [c.name for c in sorted(done.answer.causes, key=lambda c: -c.probability)]
+    return [c.name for c in done.answer.ranked]
 
 
 def mechanical(done: DriveDone) -> list[str]:
@@ -48,9 +54,10 @@ def names_effect(done: DriveDone) -> bool:
 
 
 def named_effects(done: DriveDone) -> list[str]:
-    """Return what the answer names: one effect, or two that it cannot tell apart."""
-    n_named = {GapOutcome.EFFECT.value: 1, GapOutcome.CANNOT_SEPARATE.value: 2}.get(done.answer.outcome, 0)
-    return mechanical(done)[:n_named]
+    """Return what the answer names: one effect, or all those that it cannot tell apart."""
+    if done.answer.outcome == GapOutcome.CANNOT_SEPARATE.value:
+        return list(done.answer.inseparable)
+    return mechanical(done)[:1] if names_effect(done) else []
 
 
 def figures(cases: Cases) -> dict[str, Score]:
@@ -73,9 +80,9 @@ def figures(cases: Cases) -> dict[str, Score]:
         ),
     }
     shrinks = [s for c in single if (s := _shrink(c, truth_of(c))) is not None]
-    found["held-out shrink by the true effect, median"] = _middle([s[0] for s in shrinks])
-    found["by the same effect elsewhere (placebo), median"] = _middle([s[1] for s in shrinks if s[1] != 0.0])
-    wrong = [s[0] for c in single for n in mechanical(c) if n != truth_of(c) and (s := _shrink(c, n)) is not None]
+    found["held-out shrink by the true effect, median"] = _middle([s.shrink for s in shrinks])
+    found["by the same effect elsewhere (placebo), median"] = _middle([s.placebo for s in shrinks if s.n_placebos])
+    wrong = [s.shrink for c in single for n in mechanical(c) if n != truth_of(c) and (s := _shrink(c, n)) is not None]
     found["by wrong effects, median"] = _middle(wrong)
     answered = [c for c in cases if c.answer.causes]
     sure = [max(k.probability for k in c.answer.causes) for c in answered]
@@ -93,20 +100,19 @@ def figures(cases: Cases) -> dict[str, Score]:
 
 
 def write_scores(cases: Cases, folder: Path, command: str) -> Path:
-    """Write table, scores and cases beside the answers."""
+    """Write table, scores and cases beside the answers, each whole or not at all."""
     with_, without = ([c for c in cases if bool(c.label["with_reference"]) is wanted] for wanted in (True, False))
     parts = {"all": figures(cases), "with reference": figures(with_), "without": figures(without)}
     rows = [f"| {name} | {' | '.join(_cell(parts[part][name]) for part in parts)} |" for name in parts["all"]]
     head = f"| blind start–stop cases | {' | '.join(parts)} |\n|---|{'---|' * len(parts)}\n"
     text = head + "\n".join(rows) + "\n\n" + _effect_table(cases) + f"\n`{command}`\n"
-    (folder / TABLE).write_text(text, encoding="utf-8")
     plain = {
         part: {name: {"value": s.value, "low": s.low, "high": s.high, "n": s.n} for name, s in found.items()}
         for part, found in parts.items()
     }
-    (folder / SCORES).write_text(json.dumps(_finite(plain), indent=1) + "\n", encoding="utf-8")
-    _write_cases(cases, folder / CASES)
-    return folder / TABLE
+    written(folder / CASES, _cases_csv(cases))
+    written(folder / SCORES, json.dumps(_finite(plain), indent=1) + "\n")
+    return written(folder / TABLE, text)
 
 
 def _effect_table(cases: Cases) -> str:
@@ -130,19 +136,12 @@ def _share(cases: Cases, wanted: Callable[[DriveDone], bool]) -> Score:
 
 
 def _middle(values: Sequence[float]) -> Score:
-    known = sorted(v for v in values if isfinite(v))
-    if not known:
-        return Score(nan, nan, nan, 0)
-    n = len(known)
-    low, high = known[max(0, int(0.05 * n))], known[min(n - 1, int(0.95 * n))]
-    return Score(median(known), low, high, n)
+    return median_of(values, np.random.default_rng(SEED))
 
 
-def _shrink(done: DriveDone, name: str) -> tuple[float, float] | None:
+def _shrink(done: DriveDone, name: str) -> AnsweredShrinkage | None:
     cause = done.answer.cause(name)
-    if cause is None or cause.shrinkage is None:
-        return None
-    return cause.shrinkage.shrink, cause.shrinkage.placebo
+    return None if cause is None else cause.shrinkage
 
 
 def _is_placed(done: DriveDone) -> bool:
@@ -164,25 +163,27 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not isfinite(value) else value
 
 
-def _write_cases(cases: Cases, path: Path) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file)
-        rows.writerow(["case", "kind", "effect", "level", "severity", "unit", "with_reference", "n_channels",
-                       "encoder_counts", "outcome", "first", "probability", "second", "seconds", "error"])  # fmt: skip
-        for c in cases:
-            names, label = ranked(c), c.label
-            first = names[0] if names else ""
-            rows.writerow(
-                [
-                    c.number,
-                    *(label[k] for k in ("kind", "effect", "level", "severity", "unit", "with_reference")),
-                    label["n_channels"],
-                    label["encoder_counts"],
-                    c.answer.outcome,
-                    first,
-                    f"{c.answer.probability(first):.3f}",
-                    names[1] if len(names) > 1 else "",
-                    f"{c.answer.seconds:.1f}",
-                    c.answer.error,
-                ]
-            )
+def _cases_csv(cases: Cases) -> str:
+    """Return one line per case."""
+    text = StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(["case", "kind", "effect", "level", "severity", "unit", "with_reference", "n_channels",
+                   "encoder_counts", "outcome", "first", "probability", "second", "seconds", "error"])  # fmt: skip
+    for c in cases:
+        names, label = ranked(c), c.label
+        first = names[0] if names else ""
+        rows.writerow(
+            [
+                c.number,
+                *(label[k] for k in ("kind", "effect", "level", "severity", "unit", "with_reference")),
+                label["n_channels"],
+                label["encoder_counts"],
+                c.answer.outcome,
+                first,
+                f"{c.answer.probability(first):.3f}",
+                names[1] if len(names) > 1 else "",
+                f"{c.answer.seconds:.1f}",
+                c.answer.error,
+            ]
+        )
+    return text.getvalue()

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from app.benchmark.shares import counts_of
 from app.gap.start_stop.diagnose import compared_of, predictions_of
 from app.gap.start_stop.weighing import Seen, seen_of
 from sims.blind_drive import CATALOGUE, OUTSIDE, draw_case, label_of, record_case
@@ -17,8 +18,9 @@ def planned(n_cases: int, seed: int) -> list[tuple[str, str, float]]:
     """Return kind, effect and level of each case: effects in turn, levels drawn."""
     rng = np.random.default_rng([seed, 0])
     found: list[tuple[str, str, float]] = []
-    for kind, names in (("none", ("",)), ("single", tuple(CATALOGUE)), ("unknown", tuple(OUTSIDE))):
-        n = round(SHARES[kind] * n_cases)
+    effects = {"none": ("",), "single": tuple(CATALOGUE), "unknown": tuple(OUTSIDE)}
+    for kind, n in counts_of(SHARES, n_cases).items():
+        names = effects[kind]
         found += [(kind, names[i % len(names)], float(rng.random())) for i in range(n)]
     return [found[i] for i in rng.permutation(len(found))]
 

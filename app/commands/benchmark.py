@@ -81,7 +81,12 @@ def gap(
 
     wished = "both" if reference is None else "with" if reference else "without"
     if one_of(model, "model", ("cracked", "forging")) == "forging":
-        _refuse_others(same_simulator=same_simulator, diagnosers=bool(diagnosers), longest=longest is not None)
+        _refuse_others(
+            same_simulator=same_simulator,
+            diagnosers=bool(diagnosers),
+            longest=longest is not None,
+            least_level=least_level != 0.0,
+        )
         _run_drives(cases, seed, role, wished, output, processes)
         return
     names = tuple(dict.fromkeys([*(diagnosers or [GAP]), *BASELINES]))

@@ -309,7 +309,7 @@ class GapReport:
     places : tuple of GapPlace
         See `gearsig.gap.ranking`.
     causes : tuple of GapCause
-        Likeliest first; their probabilities add up to 1.
+        What the outcome names first, the others by probability; these add up to 1.
     groups : mapping
         Group → probability.
     inseparable : tuple of str or None

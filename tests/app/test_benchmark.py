@@ -12,9 +12,9 @@ from pathlib import Path
 import h5py
 import pytest
 
-from app.benchmark import diagnosers, forest, run, unseen
+from app.benchmark import blind_run, diagnosers, forest, run, unseen
 from app.benchmark.answer import Answer, AnsweredCause, AnsweredPlace, AnsweredShrinkage, from_text, to_text
-from app.benchmark.blind_run import ANSWERS_FOLDER, diagnosed
+from app.benchmark.blind_run import ANSWERS_FOLDER, diagnosed, environment, state_of_code
 from app.benchmark.diagnosers import diagnoser
 from app.benchmark.make import make_case
 from app.benchmark.plan import BLIND, SAME, Plan, PlannedCase
@@ -124,6 +124,17 @@ def test_the_diagnosing_simulator_makes_the_same_cases_too(tmp_path):
     assert largest.startswith(("sideband", "shaft"))
 
 
+def test_the_same_cases_have_the_same_gears_conditions_and_effects():
+    plan = Plan(n_cases=10, seed=4, role="development", same_simulator=True, longest_s=2.0)
+    same = next(c for c in plan.cases() if c.source == SAME and c.kind == "pair" and c.n_conditions == 1)
+    blind = next(c for c in plan.cases() if c.number == same.repeats)
+    ours, theirs = (make_case(plan, planned, None).labels for planned in (same, blind))
+    assert ours["pair"] == theirs["pair"]
+    assert [e["name"] for e in ours["effects"]] == [e["name"] for e in theirs["effects"]]
+    kept = ("true_rpm", "true_nm")
+    assert ours["conditions"] == [{key: c[key] for key in kept} for c in theirs["conditions"]]
+
+
 def test_a_stopped_run_leaves_answers_and_goes_on(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(run, "state_of_code", lambda: "the same")  # others may be at work on it
     wanted = Wanted(SHORT, ("rules", "majority"))
@@ -201,12 +212,18 @@ def test_cases_can_be_strong_ones_only():
 
 
 def test_the_same_simulator_repeats_all_but_the_unknown():
-    cases = Plan(40, same_simulator=True).cases()
+    plan = Plan(40, same_simulator=True)
+    cases = plan.cases()
     blind, same = ([c for c in cases if c.source == source] for source in (BLIND, SAME))
     assert [(c.kind, c.effect, c.level) for c in same] == [
         (c.kind, c.effect, c.level) for c in blind if c.kind != "unknown"
     ]
     assert len({c.number for c in cases}) == len(cases)
+    assert [c.repeats for c in same] == [c.number for c in blind if c.kind != "unknown"]
+    assert not any(c.repeats for c in blind)
+    drawn = {c.number: plan.rng_of(c).random() for c in cases}
+    assert all(drawn[c.number] == drawn[c.repeats] for c in same)
+    assert len({*drawn.values(), *(plan.rng_of_run(c).random() for c in same)}) == len(blind) + len(same)
 
 
 def test_the_rule_table_names_every_effect_and_known_features_only():
@@ -215,7 +232,7 @@ def test_the_rule_table_names_every_effect_and_known_features_only():
 
 
 def test_answers_survive_the_way_through_a_file():
-    shrinkage = AnsweredShrinkage(0.7, 1.1, 0.05, "another operating condition")
+    shrinkage = AnsweredShrinkage(0.7, 1.1, 0.05, "another operating condition", 3)
     causes = (AnsweredCause("root_crack", 0.9, {"gear": "driver", "tooth": 3.0}, shrinkage), AnsweredCause("none", 0.1))
     place = AnsweredPlace("angle of rotation", "input", (1.0, 2.0), 30.0, 3)
     answer = Answer("effect", causes, ("root_crack", "tooth_spall"), (place,), 4.0, 12.0, 20.0)
@@ -227,6 +244,37 @@ def test_a_diagnoser_that_is_not_there_is_named():
         diagnoser("nothing")
     with pytest.raises(InputError, match=r"app\.gap:nothing"):
         diagnoser("app.gap:nothing")
+
+    with pytest.raises(InputError, match="no diagnoser '__main__:main'"):
+        diagnoser("__main__:main")  # of this process, not of the one that would call it
+
+
+def test_a_users_own_diagnoser_is_found_by_the_diagnosing_process(tmp_path, monkeypatch):
+    own, other, case_folder = (tmp_path / name for name in ("own", "out", "case"))
+    for place in (own, other, case_folder):
+        place.mkdir()
+    text = "from gearsig.errors import RefusalError\n\ndef diagnose(seen):\n    raise RefusalError('asked')\n"
+    (own / "my_diagnoser.py").write_text(text, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(other), str(own)]))
+    monkeypatch.syspath_prepend(str(own))
+    diagnoser("my_diagnoser:diagnose")
+    assert diagnosed(case_folder, ["my_diagnoser:diagnose"])["my_diagnoser:diagnose"].error == "asked"
+    assert environment(case_folder, ["my_diagnoser:diagnose"])["PYTHONPATH"].split(os.pathsep) == [str(ROOT), str(own)]
+    assert environment(case_folder, ["gap", "majority", "sys:exit"])["PYTHONPATH"] == str(ROOT)
+
+
+def test_the_state_of_the_code_hangs_on_the_code_and_not_on_where_it_lies(tmp_path, monkeypatch):
+    states = []
+    for place in ("report", "elsewhere"):
+        root = tmp_path / place
+        for folder, text in (("gearsig/gap", "1"), ("gearsig/report", place)):
+            (root / folder).mkdir(parents=True)
+            (root / folder / "a.py").write_text(text, encoding="utf-8")
+        monkeypatch.setattr(blind_run, "_ROOT", root)
+        states.append(state_of_code())
+    assert states[0] == states[1]
+    (root / "gearsig/gap/a.py").write_text("2", encoding="utf-8")
+    assert state_of_code() != states[1]
 
 
 def test_sigterm_leaves_answers_only(tmp_path):

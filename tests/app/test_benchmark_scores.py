@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from app.benchmark.answer import Answer, AnsweredCause, AnsweredPlace, AnsweredShrinkage
 from app.benchmark.make import Truth
 from app.benchmark.scoring.calibration_curve import bins_of, brier, calibration_error, error_by_chance
-from app.benchmark.scoring.intervals import Z, resampled, share
+from app.benchmark.scoring.intervals import Z, median_of, resampled, share
 from app.benchmark.scoring.judged import Row, group_of
 from app.benchmark.scoring.location import Located, located
 from app.benchmark.scoring.scores import judgement, macro_f1, scores, strong_only
@@ -85,6 +85,24 @@ def test_two_that_cannot_be_separated_name_the_mechanical_one():
     assert row("none", [], Answer("cannot separate", said.causes, ("transfer_path", "none"))).named == ""
 
 
+def test_the_likeliest_is_so_by_probability_whatever_the_outcome_puts_first():
+    # As the diagnosis orders it: both effects are named, though none is the likeliest single cause.
+    named_first = AnsweredCause("root_crack", 0.36), AnsweredCause("none", 0.39), AnsweredCause("tooth_spall", 0.25)
+    said = Answer("cannot separate", named_first, ("root_crack", "tooth_spall"))
+    found = row("single", ["root_crack"], said)
+    assert found.ranked == ("none", "root_crack", "tooth_spall")
+    assert (found.first, found.confidence, found.named) == ("none", 0.39, "root_crack")
+    assert scores([found], 1)["top_1"].value == 0.0
+    assert scores([found], 1)["ece"].value == pytest.approx(0.39)
+    # What a verdict names is what stands first, not what is likeliest.
+    assert row("single", ["root_crack"], Answer("effect", named_first)).named == "root_crack"
+
+
+def test_of_two_as_likely_the_first_stays_first():
+    alike = Answer("undecided", tuple(AnsweredCause(name, 0.5) for name in ("tooth_spall", "root_crack")))
+    assert row("none", [], alike).ranked == ("tooth_spall", "root_crack")
+
+
 def test_macro_f1_is_the_mean_over_effects_with_cases():
     # root_crack: 1 hit, 2 misses, 2 false (clipping, none); tooth_spall: 1 hit, 1 false; unbalance: nothing.
     singles = [r for r in ROWS if r.kind != "pair"]
@@ -99,7 +117,7 @@ def test_weak_faults_are_left_out_and_healthy_cases_are_not():
 
 def test_regret_counts_what_the_named_effect_shrinks_less():
     def cause(name, p, shrink):
-        return AnsweredCause(name, p, shrinkage=AnsweredShrinkage(shrink, 1.0, 0.0, "other revolutions"))
+        return AnsweredCause(name, p, shrinkage=AnsweredShrinkage(shrink, 1.0, 0.0, "other revolutions", 1))
 
     wrong = Answer("effect", (cause("tooth_spall", 0.6, 0.3), cause("root_crack", 0.4, 0.8)))
     right = Answer("effect", (cause("root_crack", 0.6, 0.7), cause("tooth_spall", 0.4, 0.9)))
@@ -109,6 +127,26 @@ def test_regret_counts_what_the_named_effect_shrinks_less():
     assert found["regret"].n == 2
     assert found["shrink_true"].value == pytest.approx(0.75)
     assert found["shrink_named"].value == pytest.approx(0.3)
+
+
+def test_an_effect_without_placebos_has_none_that_shrinks_by_nothing():
+    def said(placebo, n_placebos):
+        shrinkage = AnsweredShrinkage(0.8, 1.0, placebo, "other revolutions", n_placebos)
+        return Answer("effect", (AnsweredCause("root_crack", 1.0, shrinkage=shrinkage),))
+
+    rows = [row("single", ["root_crack"], said(*one)) for one in ((0.0, 0), (0.0, 0), (0.2, 3), (0.0, 3))]
+    assert scores(rows, 1)["placebo"].n == 2
+    assert scores(rows, 1)["placebo"].value == pytest.approx(0.1)
+
+
+def test_the_interval_of_a_median_is_narrower_than_its_values():
+    values = [float(v) for v in range(1, 102)]
+    found = median_of([*values, float("nan")], np.random.default_rng(1))
+    assert (found.value, found.n) == (51.0, 101)
+    # The median of n values spread evenly over a span w has the standard error w/(2√n).
+    assert found.high - found.low == pytest.approx(2 * Z * 100 / (2 * np.sqrt(101)), rel=0.25)
+    assert found.low < found.value < found.high
+    assert median_of([], np.random.default_rng(1)).n == 0
 
 
 @given(st.integers(0, 60), st.integers(1, 60))

@@ -9,7 +9,7 @@ import pytest
 from app.benchmark.answer import Answer, AnsweredCause, AnsweredShrinkage
 from app.benchmark.start_stop import DriveDone, DrivePlan, make_drive_case
 from app.benchmark.start_stop_calibrate import numbers_of
-from app.benchmark.start_stop_score import figures, write_scores
+from app.benchmark.start_stop_score import figures, named_effects, write_scores
 from app.benchmark.start_stop_seen import planned
 from app.cli import main
 from gearsig.recording.read import read_recording
@@ -43,16 +43,25 @@ def test_a_case_folder_holds_recordings_and_rigs_and_no_label(tmp_path):
     assert make_drive_case(plan, 0, None) == label
 
 
-def done(number: int, kind: str, effect: str, causes: dict[str, float], outcome: str, shrink: float = 0.8) -> DriveDone:
+def done(
+    number: int,
+    kind: str,
+    effect: str,
+    causes: dict[str, float],
+    outcome: str,
+    shrink: float = 0.8,
+    placebo: float = 0.1,
+    inseparable: tuple[str, ...] = (),
+) -> DriveDone:
     label = {
         "kind": kind, "effect": effect, "level": 0.7, "severity": 1.0, "unit": "um", "place": {"tooth": 3}
         if effect == "root_crack" else {}, "with_reference": number % 2 == 0, "n_channels": 8, "encoder_counts": 2**18,
     }  # fmt: skip
-    found = AnsweredShrinkage(shrink, 1.0, 0.1, "starts and stops")
+    found = AnsweredShrinkage(shrink, 1.0, placebo, "starts and stops", 4 if effect == "root_crack" else 0)
     answered = [
         AnsweredCause(name, p, {"tooth": 3.0} if name == "root_crack" else {}, found) for name, p in causes.items()
     ]
-    return DriveDone(number, label, Answer(outcome, tuple(answered), seconds=5.0, cpu_seconds=4.0))
+    return DriveDone(number, label, Answer(outcome, tuple(answered), inseparable, seconds=5.0, cpu_seconds=4.0))
 
 
 CASES = [
@@ -77,14 +86,55 @@ def test_figures_count_what_they_say():
     assert isnan(figures([])["likeliest effect right"].value)
 
 
+def test_all_effects_that_cannot_be_separated_are_named():
+    said = {"backlash": 0.4, "tooth_wear": 0.3, "root_crack": 0.25, "none": 0.05}
+    three = ("backlash", "tooth_wear", "root_crack")
+    case = done(0, "single", "root_crack", said, "cannot separate", inseparable=three)
+    assert named_effects(case) == list(three)
+    assert figures([case])["named, and right"].value == 1.0
+    assert figures([case])["named, and wrong"].value == 0.0
+
+
+def test_placebos_count_where_there_are_any():
+    crack, play = (
+        ("single", "root_crack", {"root_crack": 1.0}, "effect"),
+        ("single", "backlash", {"backlash": 1.0}, "effect"),
+    )
+    cases = [done(0, *crack, placebo=0.0), done(1, *crack, placebo=0.3), done(2, *play, placebo=0.0)]
+    found = figures(cases)["by the same effect elsewhere (placebo), median"]
+    assert (found.value, found.n) == (pytest.approx(0.15), 2)
+
+
+def test_the_interval_of_a_median_is_its_own_and_not_that_of_its_values():
+    cases = [done(i, "single", "root_crack", {"root_crack": 1.0}, "effect", shrink=0.01 * i) for i in range(1, 102)]
+    found = figures(cases)["held-out shrink by the true effect, median"]
+    assert found.value == pytest.approx(0.51)
+    assert 0.35 < found.low < 0.51 < found.high < 0.67
+
+
+@pytest.mark.parametrize("n_cases", [1, 7, 30, 50, 70, 101])
+def test_as_many_cases_are_planned_as_are_asked_for(n_cases):
+    assert len(planned(n_cases, 3)) == n_cases
+
+
 def test_scores_are_written_whole(tmp_path):
-    table = write_scores(CASES, tmp_path, "gearsig benchmark gap")
+    out = tmp_path / "out"
+    out.mkdir()
+    write_scores(CASES[:1], out, "gearsig benchmark gap")
+    before = {path.name: path.read_text(encoding="utf-8") for path in out.iterdir()}
+    for name in before:  # who has the old file open keeps all of it
+        (tmp_path / name).hardlink_to(out / name)
+    table = write_scores(CASES, out, "gearsig benchmark gap")
+    for name, text in before.items():
+        assert (tmp_path / name).read_text(encoding="utf-8") == text != (out / name).read_text(encoding="utf-8")
     assert "| likeliest effect right | 0.50" in table.read_text()
-    assert json.loads((tmp_path / "scores.json").read_text())["all"]["no answer"]["value"] == 0.0
-    assert len((tmp_path / "cases.csv").read_text().splitlines()) == 1 + len(CASES)
+    assert json.loads((out / "scores.json").read_text())["all"]["no answer"]["value"] == 0.0
+    assert len((out / "cases.csv").read_text().splitlines()) == 1 + len(CASES)
 
 
-@pytest.mark.parametrize("option", [["--same-simulator"], ["--diagnoser", "rules"], ["--longest", "3"]])
+@pytest.mark.parametrize(
+    "option", [["--same-simulator"], ["--diagnoser", "rules"], ["--longest", "3"], ["--least-level", "0.5"]]
+)
 def test_options_of_the_other_benchmark_are_refused(tmp_path, capsys, option):
     assert run(["benchmark", "gap", "--model", "forging", *option, "-o", str(tmp_path / "b")]) == 2
     assert option[0] in capsys.readouterr().err

@@ -10,8 +10,10 @@ import pytest
 
 from app.cli import main
 from app.gap.models import checked_model, gap_effects_of, gap_models
+from app.gap.start_stop import diagnose
 from app.gap.start_stop.causes import TRIED
 from app.gap.start_stop.diagnose import compared_of, diagnose_start_stop
+from app.gap.start_stop.report import report_of
 from app.gap.start_stop.worn import worn_curve_um
 from app.samples import sample_folder
 from gearsig.errors import InputError
@@ -89,6 +91,33 @@ def test_more_play_is_named_measured_and_simulated_again(folder, tmp_path, capsy
     assert truth["backlash_um"] == pytest.approx(420.0, rel=0.05)
 
 
+@pytest.fixture(scope="module")
+def wider():
+    """All that the report of a drive with more play is made of."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(diagnose, "report_of", lambda found: found)
+        return diagnosed(made(2, {"backlash": 120.0}), made(1))
+
+
+def test_what_is_left_is_told_on_cycles_that_the_severity_was_not_fitted_to(wider):
+    before, after = report_of(wider).steps
+    assert (before.label, after.label) == ("before", "more backlash")
+    assert after.left.value < 0.3 * before.left.value
+    # Where the half that is fitted to shows twice as much, twice as much is taken off the other half.
+    seen = wider.seen[0]
+    double = replace(seen, folds=tuple(replace(fold, fitted_to=2.0 * fold.fitted_to) for fold in seen.folds))
+    same, too_much = report_of(replace(wider, seen=(double,))).steps
+    assert same == before
+    assert too_much.left.value == pytest.approx(before.left.value, rel=0.3)
+
+
+@pytest.mark.parametrize("outcome", [GapOutcome.NO_GAP, GapOutcome.UNKNOWN, GapOutcome.UNDECIDED])
+def test_where_no_effect_is_named_none_is_added(wider, outcome):
+    report = report_of(replace(wider, outcome=outcome))
+    assert report.steps == ()
+    assert report.verdict[2] == "How far: no effect was added."
+
+
 def test_a_heavier_load_is_named_by_its_own_name():
     report = diagnosed(made(3, wheel_inertia_kg_m2=80.0), made(4))
     assert report.causes[0].name == "load_inertia"
@@ -103,21 +132,37 @@ def test_a_sound_drive_has_no_gap():
     assert not report.twin_toml
 
 
+WITHOUT_TORQUE = {name for name, tried in TRIED.items() if tried.needs != "torque"}
+
+
+def without_torque(recording):
+    """Keep the angles only."""
+    kept = [i for i, c in enumerate(recording.channels) if c.quantity == "angle"]
+    channels = tuple(recording.channels[i] for i in kept)
+    names = {c.name for c in channels}
+    rig = replace(recording.rig, sensors=tuple(s for s in recording.rig.sensors if s.channel in names))
+    return replace(recording, samples=recording.samples[kept], channels=channels, rig=rig, truth=None)
+
+
 def test_without_torque_the_play_can_still_be_told():
     now, sound = made(7, {"backlash": 150.0}), made(8)
-
-    def without(recording):
-        kept = [i for i, c in enumerate(recording.channels) if c.quantity == "angle"]
-        channels = tuple(recording.channels[i] for i in kept)
-        names = {c.name for c in channels}
-        rig = replace(recording.rig, sensors=tuple(s for s in recording.rig.sensors if s.channel in names))
-        return replace(recording, samples=recording.samples[kept], channels=channels, rig=rig, truth=None)
-
-    report = diagnosed(without(now), without(sound))
+    report = diagnosed(without_torque(now), without_torque(sound))
     ranked = [c.name for c in report.causes if c.severity is not None]
-    assert set(ranked) == {name for name, tried in TRIED.items() if tried.needs != "torque"}
-    assert any("no torque was recorded" in notice for notice in report.notices)
+    assert set(ranked) == WITHOUT_TORQUE
+    assert any("no torque was recorded in now" in notice for notice in report.notices)
     assert report.causes[0].name == "backlash"
+
+
+def test_a_second_recording_without_torque_is_told_about():
+    """Causes are weighed on all recordings, so that what one of them cannot tell is weighed on none."""
+    recordings = [made(7, {"backlash": 150.0}), without_torque(made(8, {"backlash": 150.0}))]
+    rigs = [one.rig for one in recordings]
+    sound = made(9)
+    names = ["first", "second"]
+    report = diagnose_start_stop(recordings, rigs=rigs, references=[sound], reference_rigs=[sound.rig], names=names)
+    assert {c.name for c in report.causes if c.severity is not None} == WITHOUT_TORQUE
+    told = next(text for text in report.notices if text.startswith("Not weighed, as no torque was recorded in second:"))
+    assert "crack in a tooth root" in told
 
 
 @pytest.mark.parametrize(

@@ -77,3 +77,8 @@ def resampled(
     if centred:
         low, high = (max(0.0, value + q - float(np.mean(found))) for q in (low, high))
     return Score(value, float(low), float(high), len(rows))
+
+
+def median_of(values: Sequence[float], rng: np.random.Generator) -> Score:
+    """Return the median of the finite values, with its interval by `resampled`."""
+    return resampled([v for v in values if isfinite(v)], lambda drawn: float(np.median(drawn)), rng)

@@ -49,12 +49,17 @@ class Row:
     @cached_property
     def ranked(self) -> tuple[str, ...]:
         """Causes, likeliest first."""
-        return tuple(c.name for c in self.answer.causes)
+        return tuple(c.name for c in self.answer.ranked)
 
     @property
     def first(self) -> str:
         """The likeliest cause; empty where there is no answer."""
         return self.ranked[0] if self.ranked else ""
+
+    @property
+    def confidence(self) -> float:
+        """Probability of the likeliest cause; nan where there is no answer."""
+        return self.answer.probability(self.first) if self.ranked else float("nan")
 
     @property
     def first_mechanical(self) -> str:
@@ -63,13 +68,11 @@ class Row:
 
     @property
     def named(self) -> str:
-        """The mechanical effect that the verdict names: as the cause, or as one of two that cannot be separated."""
-        if self.answer.outcome == GapOutcome.EFFECT.value:
-            return self.first if self.first in MECHANICAL else ""
-        if self.answer.outcome == GapOutcome.CANNOT_SEPARATE.value:
-            candidates = self.answer.inseparable or self.ranked[:1]
-            return next((name for name in candidates if name in MECHANICAL), "")
-        return ""
+        """The mechanical effect that the verdict names: as the cause, or as one of those that cannot be separated."""
+        first = tuple(c.name for c in self.answer.causes[:1])
+        several = self.answer.inseparable or first
+        named = {GapOutcome.EFFECT.value: first, GapOutcome.CANNOT_SEPARATE.value: several}
+        return next((name for name in named.get(self.answer.outcome, ()) if name in MECHANICAL), "")
 
     @property
     def is_mechanical(self) -> bool:

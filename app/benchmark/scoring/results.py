@@ -115,7 +115,7 @@ def cases_csv(result: Result, cases: Sequence[Done]) -> str:
 
 def _said(row: Row) -> tuple[str, ...]:
     answer: Answer = row.answer
-    first = f"{answer.causes[0].probability:.4f}" if answer.causes else ""
+    first = f"{row.confidence:.4f}" if answer.causes else ""
     second = row.ranked[1] if len(row.ranked) > 1 else ""
     true = f"{sum(answer.probability(name) for name in row.truths):.4f}"
     return first, second, true, row.named, str(int(row.first in row.truths))
@@ -194,7 +194,7 @@ def _calibration(result: Result) -> tuple[Picture, ...]:
     curves = {}
     for name in (result.judged, *(b for b in BASELINES if b in result.rows and b != result.judged)):
         rows = [r for r in result.rows[name] if r.source == BLIND and is_one_answer(r)]
-        found = bins_of([r.answer.causes[0].probability for r in rows], [r.first in r.truths for r in rows])
+        found = bins_of([r.confidence for r in rows], [r.first in r.truths for r in rows])
         ends = [share(round(b.accuracy * b.n), b.n) for b in found]
         if found:
             curves[name] = (

@@ -9,8 +9,9 @@ from math import isfinite
 
 import numpy as np
 
+from app.benchmark.answer import AnsweredShrinkage
 from app.benchmark.scoring.calibration_curve import brier, calibration_error
-from app.benchmark.scoring.intervals import NOTHING, Score, resampled, share
+from app.benchmark.scoring.intervals import NOTHING, Score, median_of, resampled, share
 from app.benchmark.scoring.judged import Row, group_of
 from gearsig.gap.types import GapOutcome
 from sims.blind import MECHANICAL
@@ -74,11 +75,7 @@ def _mean(value: Callable[[Row], float]) -> Measure:
 
 
 def _median(value: Callable[[Row], float]) -> Measure:
-    def measure(rows: Rows, rng: np.random.Generator) -> Score:
-        found = [x for row in rows if isfinite(x := value(row))]
-        return resampled(found, lambda drawn: float(np.median(drawn)), rng)
-
-    return measure
+    return lambda rows, rng: median_of([value(row) for row in rows], rng)
 
 
 def _of_place(part: str) -> Measure:
@@ -111,7 +108,7 @@ def macro_f1(rows: Rows) -> float:
 
 def ece(rows: Rows) -> float:
     """Return the calibration error of the likeliest causes."""
-    return calibration_error([r.answer.causes[0].probability for r in rows], [r.first in r.truths for r in rows])
+    return calibration_error([r.confidence for r in rows], [r.first in r.truths for r in rows])
 
 
 def _brier(row: Row) -> float:
@@ -135,13 +132,18 @@ def _shrink_named(row: Row) -> float:
 
 
 def _placebo(row: Row) -> float:
-    cause = row.answer.cause(row.effects[0]) if row.is_mechanical else None
-    return cause.shrinkage.placebo if cause is not None and cause.shrinkage is not None else float("nan")
+    found = _of_true(row)
+    return found.placebo if found is not None and found.n_placebos else float("nan")
 
 
 def _slope(row: Row) -> float:
+    found = _of_true(row)
+    return found.slope if found is not None else float("nan")
+
+
+def _of_true(row: Row) -> AnsweredShrinkage | None:
     cause = row.answer.cause(row.effects[0]) if row.is_mechanical else None
-    return cause.shrinkage.slope if cause is not None and cause.shrinkage is not None else float("nan")
+    return cause.shrinkage if cause is not None else None
 
 
 def _regret(row: Row) -> float:

@@ -95,7 +95,7 @@ def judge(wanted: Wanted, cases: Sequence[Done]) -> Result:
         for part in PARTS
         for strong in (True, False)
     ]
-    confidence = [r.answer.causes[0].probability for r in first if r.source == BLIND and is_one_answer(r)]
+    confidence = [r.confidence for r in first if r.source == BLIND and is_one_answer(r)]
     return Result(
         wanted,
         rows,

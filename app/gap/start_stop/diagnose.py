@@ -152,15 +152,16 @@ def _compared(name: str, now: Examined, sound: Sequence[Examined]) -> Compared:
     told = now.tell(now.every)
     if not sound:
         return Compared(name, now, None, drive_twin(now.cycles, told, None))
-    nearest = min(sound, key=lambda one: abs(_torque(one) - _torque(now)))
+    nearest = min(sound, key=lambda one: _apart(one, now))
     return Compared(name, now, nearest, drive_twin(now.cycles, told, nearest.tell(nearest.every)))
 
 
-def _torque(one: Examined) -> float:
-    """Return the ordinary torque; without one, the top speed ranks recordings likewise."""
-    m = one.cycles.motion
-    values = m.driver_speed_rad_s if m.torque_nm is None else m.torque_nm
-    return float(abs(values).max())
+def _apart(one: Examined, other: Examined) -> float:
+    """Return by how much the largest torques differ; where one has none, the top speeds rank recordings likewise."""
+    first, second = one.cycles.motion, other.cycles.motion
+    if first.torque_nm is None or second.torque_nm is None:
+        return float(abs(abs(first.driver_speed_rad_s).max() - abs(second.driver_speed_rad_s).max()))
+    return float(abs(abs(first.torque_nm).max() - abs(second.torque_nm).max()))
 
 
 def predictions_of(compared: Compared, tell: Callable[[str, float], object] = lambda *_: None) -> Predictions:
@@ -189,11 +190,13 @@ def tellable(compared: Compared) -> tuple[str, ...]:
 def _notices(compared: Sequence[Compared]) -> list[str]:
     """Say what could not be told, and what was taken for granted."""
     found = [] if is_drive_calibrated() else [UNCALIBRATED]
-    known, effects = set(tellable(compared[0])), drive_effects()
+    known, effects = set.intersection(*(set(tellable(one)) for one in compared)), drive_effects()
     missing = [effects[name].title for name in TRIED if name not in known]
-    no_torque = compared[0].now.cycles.motion.torque_nm is None
     if missing:
-        why = "no torque was recorded" if no_torque else "only a healthy reference tells what is ordinary"
+        lacking = [one.name for one in compared if one.now.cycles.motion.torque_nm is None]
+        why = "only a healthy reference tells what is ordinary"
+        if lacking:
+            why = f"no torque was recorded in {', '.join(lacking)}"
         found.append(f"Not weighed, as {why}: {', '.join(missing)}. Such a cause ends in none or unknown.")
     if compared[0].reference is not None:
         found.append(LIKE_CYCLES)

@@ -14,12 +14,13 @@ from app.gap.start_stop.least import least_seen
 from app.gap.start_stop.next_recording import next_drive_recordings
 from app.gap.start_stop.places import FEATURES, drive_places
 from app.gap.start_stop.predict import Predictions
-from app.gap.start_stop.weighing import Seen, Weighed
+from app.gap.start_stop.weighing import Fold, Seen, Weighed
+from gearsig.checks import FloatArray
 from gearsig.gap.evidence import weighed_evidence
 from gearsig.gap.simulator import Added, GapEffect, Point
 from gearsig.gap.start_stop.floors import FLOOR, DriveFloor
 from gearsig.gap.start_stop.told import NAMES
-from gearsig.gap.start_stop.weigh import Fitted
+from gearsig.gap.start_stop.weigh import Fitted, fit
 from gearsig.gap.types import (
     NAMING,
     NONE,
@@ -101,7 +102,7 @@ def report_of(found: Diagnosis) -> GapReport:
         causes=causes,
         groups=group_probabilities(causes),
         inseparable=rivals(causes) if found.outcome is GapOutcome.CANNOT_SEPARATE else None,
-        steps=_steps(found, causes) if is_gap else (),
+        steps=_steps(found, first) if found.outcome in NAMING else (),
         next_recordings=next_drive_recordings(compared, found.predictions[k], found.weighed.fits, pair, titles)
         if pair and is_gap
         else (),
@@ -174,22 +175,24 @@ def _repeatability(compared: Compared) -> float:
     return float(np.sqrt(np.nanmean(z**2)))
 
 
-def _steps(found: Diagnosis, causes: Sequence[GapCause]) -> tuple[GapStep, ...]:
-    """Return what is left of the whole gap on held-out cycles: before, and with the likeliest effect."""
-    name = next((c.name for c in causes if c.name in found.weighed.fits), None)
-    if name is None:
-        return ()
-    floor = found.compared[found.clearest].floor("half")
-    predicted = found.weighed.fits[name].predicted
-    folds = found.seen[found.clearest].folds
-    rows = {"before": np.zeros_like(predicted), f"with {drive_effects()[name].title}": predicted}
-    steps = []
-    for label, taken in rows.items():
-        value = float(np.mean([floor.size(fold.held_out - taken) for fold in folds]))
-        spread = [np.array([floor.size(row - taken) for row in fold.without]) for fold in folds]
-        half = NORMAL_90 * float(np.sqrt(sum((len(s) - 1.0) * np.var(s) for s in spread))) / len(folds)
-        steps.append(GapStep(label, Interval(value, max(0.0, value - half), value + half)))
-    return tuple(steps)
+def _steps(found: Diagnosis, cause: GapCause) -> tuple[GapStep, ...]:
+    """Return what is left of the whole gap: before, and with an effect, fitted to the other half of the cycles."""
+    seen, floor = found.seen[found.clearest], found.compared[found.clearest].floor("half")
+    fitted = [fit(seen.predicted[cause.name], fold.fitted_to, floor).predicted for fold in seen.folds]
+    nothing = [np.zeros_like(predicted) for predicted in fitted]
+    return (
+        GapStep("before", _left(seen.folds, nothing, floor)),
+        GapStep(cause.title, _left(seen.folds, fitted, floor)),
+    )
+
+
+def _left(folds: Sequence[Fold], taken: Sequence[FloatArray], floor: DriveFloor) -> Interval:
+    """Return the size of what is left on the held-out half once something is taken off, mean over the folds."""
+    pairs = list(zip(folds, taken, strict=True))
+    value = float(np.mean([floor.size(fold.held_out - off) for fold, off in pairs]))
+    spread = [np.array([floor.size(row - off) for row in fold.without]) for fold, off in pairs]
+    half = NORMAL_90 * float(np.sqrt(sum((len(s) - 1.0) * np.var(s) for s in spread))) / len(folds)
+    return Interval(value, max(0.0, value - half), value + half)
 
 
 def _facts(compared: Compared) -> ConditionFacts:
