@@ -6,6 +6,8 @@ from collections.abc import Mapping
 
 from gearsig.gap.simulator import Added
 from gearsig.gap.types import NONE, UNKNOWN, GapCause, GapOutcome, GapReport, Interval
+from gearsig.gap.verdict import rivals
+from gearsig.gap.verdict import rivals
 from sims.effects import effects
 
 NUISANCE_GROUP = "measurement chain"
@@ -34,6 +36,7 @@ def bare_report(
     where = options or {}
     ranked = sorted(probabilities.items(), key=lambda item: -item[1])
     likeliest = {NONE: GapOutcome.NO_GAP, UNKNOWN: GapOutcome.UNKNOWN}.get(ranked[0][0], GapOutcome.EFFECT)
+    causes = tuple(_cause(name, p, where.get(name, {})) for name, p in ranked)
     return GapReport(
         rig="",
         simulator=simulator,
@@ -43,8 +46,9 @@ def bare_report(
         size=_NOTHING,
         repeatability=0.0,
         places=(),
-        causes=tuple(_cause(name, p, where.get(name, {})) for name, p in ranked),
+        causes=causes,
         groups={},
+        inseparable=rivals(causes) if outcome is GapOutcome.CANNOT_SEPARATE else None,
     )
 
 

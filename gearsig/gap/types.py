@@ -313,7 +313,7 @@ class GapReport:
     groups : mapping
         Group → probability.
     inseparable : tuple of str or None
-        The two causes that these recordings cannot tell apart.
+        Causes that these recordings cannot tell apart, likeliest first.
     steps : tuple of GapStep
         Before, with each effect, what is left.
     next_recordings : tuple of NextRecording

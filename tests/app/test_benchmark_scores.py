@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.benchmark.answer import Answer, AnsweredCause, AnsweredPlace, AnsweredShrinkage
+from app.benchmark.bare_report import bare_report
 from app.benchmark.make import Truth
 from app.benchmark.scoring.calibration_curve import bins_of, brier, calibration_error, error_by_chance
 from app.benchmark.scoring.intervals import Z, median_of, resampled, share
@@ -14,6 +15,7 @@ from app.benchmark.scoring.location import Located, located
 from app.benchmark.scoring.scores import judgement, macro_f1, scores, strong_only
 from app.benchmark.scoring.strength import batch_floors, strength
 from gearsig.errors import InputError
+from gearsig.gap.types import GapOutcome
 from gearsig.plot.benchmark import calibration_figure, confusion_figure
 
 PAIR = {"z1": 20, "z2": 40, "module_mm": 2.0}
@@ -264,3 +266,11 @@ def test_figures_show_every_case_and_check_their_table():
     half = np.array([0.5])
     curve = calibration_figure({"gap": (half, half, half - 0.1, half + 0.1)})
     assert curve.axes[0].lines[-1].get_xydata().tolist() == [[50.0, 50.0]]
+
+
+def test_a_diagnoser_of_probabilities_alone_names_what_it_cannot_tell_apart():
+    """As the product's verdict does, also where no gap is likelier than either."""
+    said = {"none": 0.4, "root_crack": 0.3, "chipped_tooth": 0.2, "unknown": 0.1}
+    report = bare_report("forest", said, outcome=GapOutcome.CANNOT_SEPARATE)
+    assert report.inseparable == ("root_crack", "chipped_tooth")
+    assert bare_report("forest", said).inseparable is None
