@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from gearsig.gap.simulator import Added
 from gearsig.gap.types import NONE, UNKNOWN, GapCause, GapOutcome, GapReport, Interval
 from gearsig.gap.verdict import rivals
-from gearsig.gap.verdict import rivals
 from sims.effects import effects
 
 NUISANCE_GROUP = "measurement chain"
