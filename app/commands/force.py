@@ -56,8 +56,11 @@ def force(
     from rich.console import Console
 
     from gearsig.motion.force import estimate_forces
+    from gearsig.report.files import check_writable
     from gearsig.report.force_text import force_json, force_text
 
+    if output is not None:
+        check_writable(output)
     machine = open_rig(rig, recording)
     zero = read_datum(datum)
     with Console(stderr=True).status("reading") as status:

@@ -41,9 +41,11 @@ def start_stop(
     Example: gearsig start-stop drive.h5 --rig drive.toml -o drive
     """
     from gearsig.motion.start_stop import examine_start_stop
-    from gearsig.report.files import write_text
+    from gearsig.report.files import check_writable, write_text
     from gearsig.report.start_stop_text import start_stop_json, start_stop_text
 
+    if output is not None:
+        check_writable(output)
     opened, motion = open_motion(recording, open_rig(rig, recording), fs, use, bandwidth, unwrap)
     examined = examine_start_stop(motion)
     data = start_stop_json(examined, *tooth_levels(opened, examined))

@@ -150,3 +150,14 @@ def test_a_machine_that_is_only_knocked_is_refused(
     knocked = simulate("forging", torque_nm=1.0, duration_s=6.0, sampling_rate_hz=1000.0)
     write_recording(knocked, folder / "knocked.h5")
     assert "the machine stands" in refused(capsys, folder, command, "knocked.h5")
+
+
+@pytest.mark.parametrize("command", ["force", "start-stop"])
+def test_a_folder_that_cannot_be_written_is_told_before_the_work(
+    command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "a_file").write_text("kept")
+    code, _, err = run(capsys, command, tmp_path / "is_not_read.h5", "-o", tmp_path / "a_file" / "out")
+    assert code == 2
+    assert "a_file" in err
+    assert "choose another" in err
