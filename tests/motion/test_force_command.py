@@ -59,7 +59,7 @@ def test_what_was_not_made_is_not_named_and_a_file_is_no_folder(
     assert sorted(p.name for p in (tmp_path / "force").iterdir()) == ["force.csv", "force.json"]
     code, out, err = run(capsys, "force", file, "-o", file)
     assert (code, out) == (2, "")
-    assert "the folder cannot be made" in err.splitlines()[-1]
+    assert "is a file; choose a folder" in err.splitlines()[-1]
 
 
 @pytest.mark.parametrize(
