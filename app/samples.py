@@ -7,6 +7,7 @@ from pathlib import Path
 
 import gearsig
 from gearsig.errors import InputError
+from gearsig.rig.toml import recording_stem
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,6 @@ def samples() -> tuple[Sample, ...]:
     """Return the samples by name; each recording stands beside a rig file of the same stem."""
     found = []
     for rig in sorted(sample_folder().glob("*.toml")):
-        recordings = [p for p in rig.parent.iterdir() if p.name.split(".")[0] == rig.stem and p.suffix != ".toml"]
+        recordings = [p for p in rig.parent.iterdir() if recording_stem(p.name) == rig.stem and p.suffix != ".toml"]
         found += [Sample(path, rig) for path in recordings]
     return tuple(found)

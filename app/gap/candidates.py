@@ -97,13 +97,9 @@ def on_shaft(
     paths: Sequence[EffectPath], told: Mapping[str, str]
 ) -> tuple[tuple[EffectPath, ...], tuple[EffectPath, ...]]:
     """Return the paths on the shaft that the recordings tell by themselves, and the others; all where they do not."""
-    there = [told.items() <= path.options.items() for path in paths]
-    if not any(there):
-        return tuple(paths), ()
-    kept, others = (
-        tuple(path for path, is_there in zip(paths, there, strict=True) if is_there is kind) for kind in (True, False)
-    )
-    return kept, others
+    kept = tuple(path for path in paths if told.items() <= path.options.items())
+    others = tuple(path for path in paths if not told.items() <= path.options.items())
+    return (kept, others) if kept else (others, ())
 
 
 def n_compared(conditions: Sequence[Condition]) -> int:

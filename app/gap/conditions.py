@@ -163,8 +163,8 @@ def matching_reference(now: Gathered, rig: Rig, references: Sequence[Healthy]) -
     change = now.speed_hz / found.speed_hz - 1.0
     if abs(change) > LARGEST_SPEED_DIFFERENCE:
         return None, f"no reference within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of its speed"
-    here, there = _torque_nm(rig), _torque_nm(nearest.rig)
-    if here is not None and there is not None and _torque_difference(here, there) > LARGEST_TORQUE_DIFFERENCE:
+    if _torque_difference(rig, nearest.rig) > LARGEST_TORQUE_DIFFERENCE:
+        here, there = _torque_nm(rig), _torque_nm(nearest.rig)
         return None, f"the reference at its speed has {there:.3g} N m, the recording {here:.3g} N m"
     named = _with_names_of(found, now)
     if named is None:
@@ -182,13 +182,15 @@ def _with_names_of(reference: Gathered, now: Gathered) -> Gathered | None:
 
 
 def _distance(now: Gathered, rig: Rig, reference: Healthy) -> float:
-    here, there = _torque_nm(rig), _torque_nm(reference.rig)
-    torque = 0.0 if here is None or there is None else _torque_difference(here, there)
-    return 10.0 * abs(now.speed_hz / reference.gathered.speed_hz - 1.0) + torque
+    speed = abs(now.speed_hz / reference.gathered.speed_hz - 1.0)
+    return 10.0 * speed + _torque_difference(rig, reference.rig)
 
 
-def _torque_difference(here_nm: float, there_nm: float) -> float:
-    """Return by which part of the reference's torque the recording's differs from it."""
+def _torque_difference(rig: Rig, reference: Rig) -> float:
+    """Return by which part of the reference's torque the recording's differs from it; 0 where one is not stated."""
+    here_nm, there_nm = _torque_nm(rig), _torque_nm(reference)
+    if here_nm is None or there_nm is None:
+        return 0.0
     return abs(here_nm / there_nm - 1.0) if there_nm else math.inf
 
 

@@ -159,9 +159,8 @@ def diagnose_gap(
     k = conditions.index(clearest)
     standing, remarks, faults = stood_out(recordings[k], own_rigs[k], references, other_rigs, clearest.facts.name)
     notices += remarks
-    doubts = (*(text for condition in conditions for text in doubts_of(condition)), *faults)
     outcome, unseen = beside_standing(weighed.calibration.outcome(probabilities), standing)
-    doubts = (*unseen, *doubts)
+    doubts = (*unseen, *(text for condition in conditions for text in doubts_of(condition)), *faults)
     places = ranked_places(_places(clearest), [standing_place(one, own_rigs[k]) for one in standing])
     causes = tuple(_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items())
     causes = _in_order(causes, outcome)

@@ -66,9 +66,9 @@ def gather(recording: Recording, rig: Rig, channels: Sequence[str] = (), angle: 
             )
     names = tuple(channels) or recording.vibration_names()
     signals = tuple(_over_angle(recording, own, names) for own in shaft_angles)
-    _check_mesh(signals[0], frame, recording, shaft_angles[0].mean_speed_rpm)
     n_blocks = int(np.clip(shaft_angles[0].n_revolutions // REVOLUTIONS_PER_BLOCK, FEWEST_BLOCKS, MOST_BLOCKS))
     speed_hz = shaft_angles[0].mean_speed_rpm / 60.0
+    _check_mesh(signals[0], frame, recording, speed_hz)
     bands = _bands(recording.sampling_rate_hz, signals[0].samples_per_revolution * speed_hz)
     sums, steps = {}, (0.0, 0.0)
     for i, name in enumerate(names):
@@ -88,10 +88,10 @@ def gather(recording: Recording, rig: Rig, channels: Sequence[str] = (), angle: 
     )
 
 
-def _check_mesh(signal: AngleSignal, frame: GearFrame, recording: Recording, speed_rpm: float) -> None:
+def _check_mesh(signal: AngleSignal, frame: GearFrame, recording: Recording, speed_hz: float) -> None:
     """Refuse a record that was sampled too slowly to hold the mesh and its sidebands, which all is compared with."""
     if signal.highest_order < frame.teeth[0] + max(frame.shaft_orders):
-        mesh_hz = frame.teeth[0] * speed_rpm / 60.0
+        mesh_hz = frame.teeth[0] * speed_hz
         raise RefusalError(
             f"the gears mesh at {mesh_hz:.4g} Hz, above what {recording.sampling_rate_hz:.6g} Hz of sampling rate show",
             remedy=f"sample at {4.0 * mesh_hz:.2g} Hz at least",

@@ -55,11 +55,11 @@ def _on_a_gear_line(frequency_hz: float, width_hz: float, speed_hz: float, frame
 
     Of a slow shaft only the first orders count, which are strong: all of them lie everywhere.
     """
-    for order in frame.shaft_orders:
-        first_hz = order * speed_hz
-        n = max(round(frequency_hz / first_hz), 1)
-        is_apart = first_hz >= _APART * width_hz or n <= _N_SHAFT_HARMONICS
-        if is_apart and abs(n * first_hz - frequency_hz) < 2.0 * width_hz:
-            return True
-    mesh_hz = frame.teeth[0] * speed_hz
-    return abs(max(round(frequency_hz / mesh_hz), 1) * mesh_hz - frequency_hz) < 2.0 * width_hz
+    shafts_hz = [order * speed_hz for order in frame.shaft_orders]
+    told = [hz for hz in shafts_hz if hz >= _APART * width_hz or round(frequency_hz / hz) <= _N_SHAFT_HARMONICS]
+    return any(_to_a_multiple(frequency_hz, hz) < 2.0 * width_hz for hz in (frame.teeth[0] * speed_hz, *told))
+
+
+def _to_a_multiple(frequency_hz: float, of_hz: float) -> float:
+    """Return the distance to the nearest multiple, from 1 on."""
+    return abs(max(round(frequency_hz / of_hz), 1) * of_hz - frequency_hz)

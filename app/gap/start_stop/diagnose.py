@@ -158,10 +158,11 @@ def _compared(name: str, now: Examined, sound: Sequence[Examined]) -> Compared:
 
 def _apart(one: Examined, other: Examined) -> float:
     """Return by how much the largest torques differ; where one has none, the top speeds rank recordings likewise."""
-    first, second = one.cycles.motion, other.cycles.motion
-    if first.torque_nm is None or second.torque_nm is None:
-        return float(abs(abs(first.driver_speed_rad_s).max() - abs(second.driver_speed_rad_s).max()))
-    return float(abs(abs(first.torque_nm).max() - abs(second.torque_nm).max()))
+    a, b = (each.cycles.motion for each in (one, other))
+    first, second = a.torque_nm, b.torque_nm
+    if first is None or second is None:
+        first, second = a.driver_speed_rad_s, b.driver_speed_rad_s
+    return float(abs(abs(first).max() - abs(second).max()))
 
 
 def predictions_of(compared: Compared, tell: Callable[[str, float], object] = lambda *_: None) -> Predictions:
