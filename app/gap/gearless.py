@@ -21,6 +21,7 @@ from app.gap.standing_out import (
 )
 from app.gap.standing_places import NAN, standing_place
 from gearsig.diagnosis.types import Kind
+from gearsig.formatting import named
 from gearsig.gap.curve_types import SpectrumCurves
 from gearsig.gap.simulator import GapEffect, Point
 from gearsig.gap.spots import band_words
@@ -31,7 +32,6 @@ from gearsig.gap.types import (
     group_probabilities,
 )
 from gearsig.recording.types import Recording
-from gearsig.report.sections import named
 from gearsig.rig.types import Rig
 from gearsig.spectra.floor import noise_floor
 

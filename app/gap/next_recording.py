@@ -13,7 +13,7 @@ from gearsig.checks import FloatArray
 from gearsig.gap.families import family_members
 from gearsig.gap.simulator import HasFurtherPlaces, Point, Twin
 from gearsig.gap.types import NextRecording
-from gearsig.report.gap_text import point_text, same_condition
+from gearsig.gap.words import point_text, same_condition
 
 FACTORS = ((1.0, 0.3), (1.0, 0.6), (0.6, 1.0), (1.4, 1.0))
 """Speeds and torques that are looked at, over those of the first recording, beside the recordings' own."""

@@ -11,8 +11,8 @@ from gearsig.diagnosis.comparison import Earlier, in_reference
 from gearsig.diagnosis.detectors import bearing_family
 from gearsig.diagnosis.types import Analysis, CannotTell, Finding, Kind, Outcome
 from gearsig.errors import RefusalError
+from gearsig.formatting import named
 from gearsig.recording.types import Recording
-from gearsig.report.sections import named
 from gearsig.rig.types import Rig
 from gearsig.severity.reference import LARGEST_SPEED_DIFFERENCE
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from app.gap.standing_out import LINE, PARTS, Standing, bearings_text, shafts_of_unknown_speed
+from gearsig.formatting import signed
 from gearsig.gap.spots import band_words, hertz
 from gearsig.gap.types import GapPlace, PlaceKind
-from gearsig.report.gap_sections import signed
 from gearsig.rig.types import Rig
 
 NAN = float("nan")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from gearsig.gap.frame import GearFrame
 from gearsig.gap.gear_lines import SIDES
+from gearsig.gap.simulator import Point
 from gearsig.gap.spots import shaft_words
 from gearsig.gap.types import Evidence, GapCause, Shrinkage
 
@@ -132,3 +133,19 @@ def fitted_words(cause: GapCause, severity: float, recording: str) -> str:
     within = f"interval of the fit {cause.severity.words('{:.3g}'.format)}; " if cause.severity else ""
     size = f"{severity:.3g} {cause.unit}".rstrip()
     return f"{cause.title}: {size}, {within}fitted to {recording}, probability {cause.probability:.2f}"
+
+
+SAME_SPEED, SAME_TORQUE = 0.03, 0.1
+"""Relative: recordings nearer than this to each other are of one operating condition."""
+
+
+def point_text(point: Point) -> str:
+    """Write an operating point for people."""
+    return f"{float(f'{point.speed_rpm:.4g}'):.6g} rpm and {point.torque_nm:.3g} N·m"
+
+
+def same_condition(one: Point, other: Point) -> bool:
+    """Whether two points are one operating condition."""
+    speed = abs(one.speed_rpm - other.speed_rpm) <= SAME_SPEED * max(abs(one.speed_rpm), abs(other.speed_rpm))
+    torque = abs(one.torque_nm - other.torque_nm) <= SAME_TORQUE * max(abs(one.torque_nm), abs(other.torque_nm))
+    return speed and torque

@@ -16,11 +16,11 @@ from gearsig.compare.types import (
     ShaftComparison,
 )
 from gearsig.compare.verdict import LEAST_REPEATED, missing_words
+from gearsig.formatting import readable
 from gearsig.plot.display import unit_text
 from gearsig.plot.embed import Picture
 from gearsig.report.compare_pictures import channel_pictures
 from gearsig.report.compare_text import alignment_texts
-from gearsig.report.numbers import readable
 from gearsig.report.render import render
 
 Rows = tuple[tuple[str, str], ...]

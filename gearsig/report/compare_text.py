@@ -9,8 +9,8 @@ from textwrap import fill
 from gearsig.compare.remarks import STEADY
 from gearsig.compare.types import ChannelComparison, Comparison, LevelPair, LineLevel, RecordFacts
 from gearsig.compare.verdict import LEAST_REPEATED, mesh_lines, missing_words
+from gearsig.formatting import rounded
 from gearsig.plot.display import unit_text
-from gearsig.report.numbers import rounded
 
 WIDTH = 100
 MOST_LINES = 12

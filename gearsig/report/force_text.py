@@ -22,9 +22,9 @@ from textwrap import fill
 from typing import Any
 
 from gearsig import __version__
+from gearsig.formatting import rounded
 from gearsig.motion.noise_study import NoiseStudy, acceleration_limit_rad_s2
 from gearsig.motion.types import ForceEstimate
-from gearsig.report.numbers import rounded
 
 SCHEMA, SCHEMA_VERSION = "gearsig.force", 1
 WIDTH = 100

@@ -10,6 +10,7 @@ import json
 from pathlib import Path
 
 from gearsig import __version__
+from gearsig.formatting import rounded
 from gearsig.gap.curve_types import AngleCurves, AverageCurves, SpectrumCurves
 from gearsig.gap.simulator import Added
 from gearsig.gap.types import (
@@ -22,7 +23,6 @@ from gearsig.gap.types import (
     Shrinkage,
 )
 from gearsig.report.files import write_text
-from gearsig.report.numbers import rounded
 from gearsig.report.plain import Json, members, plain
 
 SCHEMA, SCHEMA_VERSION = "gearsig.gap", 1

@@ -8,13 +8,13 @@ from typing import Any, Literal
 
 import numpy as np
 
+from gearsig.formatting import readable
 from gearsig.gap.curve_types import AngleCurves, AverageCurves, SpectrumCurves
 from gearsig.gap.curves import against_reference, lines_beyond
 from gearsig.gap.types import GapReport, PlaceKind
 from gearsig.plot.embed import Picture, embed
 from gearsig.plot.marks import AngleMark
 from gearsig.report.gap_sections import detailed_causes
-from gearsig.report.numbers import readable
 
 Question = Literal["where", "which", "how far"]
 QUESTIONS: tuple[Question, ...] = ("where", "which", "how far")

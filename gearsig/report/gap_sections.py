@@ -9,6 +9,7 @@ from importlib.metadata import version
 from math import isfinite
 
 from gearsig import __version__
+from gearsig.formatting import named, readable, signed
 from gearsig.gap.types import (
     NONE,
     UNKNOWN,
@@ -20,10 +21,8 @@ from gearsig.gap.types import (
     Interval,
     Shrinkage,
 )
-from gearsig.gap.words import hardly_foretold, severity_unit, stance_words
-from gearsig.report.gap_text import point_text
-from gearsig.report.numbers import readable
-from gearsig.report.sections import Rows, named
+from gearsig.gap.words import hardly_foretold, point_text, severity_unit, stance_words
+from gearsig.report.sections import Rows
 
 N_DETAILED = 3
 """Causes whose evidence is shown."""
@@ -352,20 +351,6 @@ def percent(share: float) -> str:
     if not isfinite(share):
         return "–"
     return "< 1 %" if 0 < share < LEAST_SHOWN else f"{round(100 * share)} %".replace("-", "−")
-
-
-def signed(value: float, n_decimals: int = 1) -> str:
-    """Write a change with its sign and one decimal; none where it is nothing.
-
-    Examples
-    --------
-    >>> signed(14.23), signed(-3.0), signed(-0.04), signed(float("nan"))
-    ('+14.2', '−3.0', '0.0', '–')
-    """
-    if not isfinite(value):
-        return "–"
-    rounded = round(value, n_decimals) + 0.0
-    return f"{rounded:+.{n_decimals}f}".replace("-", "−") if rounded else f"{0.0:.{n_decimals}f}"
 
 
 def _bar(share: float) -> float:

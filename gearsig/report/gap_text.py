@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from gearsig.gap.simulator import Point
 from gearsig.gap.types import GapOutcome, GapReport
+from gearsig.gap.words import point_text, same_condition
 
 CHECK_FIRST = "Check first"
 """Before each of the doubts."""
-
-SAME_SPEED, SAME_TORQUE = 0.03, 0.1
-"""Relative: recordings nearer than this to each other are of one operating condition."""
 
 
 def gap_text(report: GapReport) -> str:
@@ -44,15 +42,3 @@ def n_conditions(report: GapReport) -> int:
         if not any(same_condition(facts.point, point) for point in distinct):
             distinct.append(facts.point)
     return len(distinct)
-
-
-def point_text(point: Point) -> str:
-    """Write an operating point for people."""
-    return f"{float(f'{point.speed_rpm:.4g}'):.6g} rpm and {point.torque_nm:.3g} N·m"
-
-
-def same_condition(one: Point, other: Point) -> bool:
-    """Whether two points are one operating condition."""
-    speed = abs(one.speed_rpm - other.speed_rpm) <= SAME_SPEED * max(abs(one.speed_rpm), abs(other.speed_rpm))
-    torque = abs(one.torque_nm - other.torque_nm) <= SAME_TORQUE * max(abs(one.torque_nm), abs(other.torque_nm))
-    return speed and torque

@@ -15,10 +15,10 @@ import json
 from textwrap import fill
 
 from gearsig import __version__
+from gearsig.formatting import readable, rounded
 from gearsig.gap.words import severity_unit
 from gearsig.motion.identify_types import FittedParameter, Identification
 from gearsig.plot.display import unit_text
-from gearsig.report.numbers import readable, rounded
 
 SCHEMA, SCHEMA_VERSION = "gearsig.identify", 1
 WIDTH = 100

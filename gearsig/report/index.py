@@ -11,12 +11,12 @@ from urllib.parse import quote
 
 from gearsig import __version__
 from gearsig.diagnosis.types import Outcome
+from gearsig.formatting import readable
 from gearsig.indicators.types import Indicator
 from gearsig.plot.display import unit_text
 from gearsig.plot.embed import Picture, embed
 from gearsig.report.entry import Entry, Failure, by_severity
 from gearsig.report.files import write_text
-from gearsig.report.numbers import readable
 from gearsig.report.render import render
 from gearsig.report.sections import css_class
 

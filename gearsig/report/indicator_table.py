@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gearsig.diagnosis.comparison import Change
+from gearsig.formatting import named, readable
 from gearsig.indicators.types import Indicator
 from gearsig.plot.display import unit_text
-from gearsig.report.numbers import readable
-from gearsig.report.sections import named
 
 Key = tuple[str, str, str, str]
 Compared = tuple[Indicator, Change | None]

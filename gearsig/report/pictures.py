@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from gearsig.angle.types import ShaftAngle
 from gearsig.diagnosis.types import Analysis, ChannelAnalysis, Kind, OrderLevel
+from gearsig.formatting import readable
 from gearsig.orders.types import SynchronousAverage
 from gearsig.plot.cursors import Cursor
 from gearsig.plot.display import unit_text
@@ -20,7 +21,6 @@ from gearsig.report.lines import (
     mesh_windows,
     speed_is_constant,
 )
-from gearsig.report.numbers import readable
 from gearsig.report.start_stop_figures import start_stop_figures
 
 MOST_BYTES = 2_500_000

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gearsig.report.numbers import rounded
+from gearsig.formatting import rounded
 
 Json = dict[str, Any]
 

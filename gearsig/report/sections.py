@@ -11,8 +11,8 @@ from importlib.metadata import version
 from gearsig import __version__
 from gearsig.angle.types import ShaftAngle
 from gearsig.diagnosis.types import Analysis, CannotTell, Finding, Kind, Outcome, Strength, Where
+from gearsig.formatting import named, readable
 from gearsig.plot.display import unit_text
-from gearsig.report.numbers import readable
 from gearsig.rig.types import Bearing, GearPair, Rig
 
 Rows = tuple[tuple[str, str], ...]
@@ -70,11 +70,6 @@ def where_texts(where: Where) -> tuple[str, ...]:
         f"{readable(where.time_s[0])} to {readable(where.time_s[1])} s" if where.time_s is not None else "",
     ]
     return tuple(text for text in texts if text)
-
-
-def named(what: str, name: str) -> str:
-    """Return a name with what it names before it, unless the name says so itself; empty for an empty name."""
-    return name if not name or what.rsplit(maxsplit=1)[-1] in name.lower() else f"{what} {name}"
 
 
 def _tooth_text(where: Where) -> str:

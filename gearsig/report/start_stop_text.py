@@ -29,12 +29,12 @@ from typing import Any
 import numpy as np
 
 from gearsig import __version__
+from gearsig.formatting import readable, rounded
 from gearsig.gap.words import severity_unit
 from gearsig.motion.angle_profile import AngleProfile
 from gearsig.motion.impacts import Impact
 from gearsig.motion.start_stop import StartStop
 from gearsig.plot.display import unit_text
-from gearsig.report.numbers import readable, rounded
 from gearsig.spectra.types import Spectrum
 
 SCHEMA, SCHEMA_VERSION = "gearsig.start_stop", 1

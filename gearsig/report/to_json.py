@@ -35,9 +35,9 @@ from gearsig import __version__
 from gearsig.angle.types import ShaftAngle
 from gearsig.diagnosis.comparison import changes
 from gearsig.diagnosis.types import Analysis, CannotTell, ChannelAnalysis
+from gearsig.formatting import rounded
 from gearsig.recording.types import Recording
 from gearsig.report.files import write_text
-from gearsig.report.numbers import rounded
 from gearsig.report.plain import Json, plain
 from gearsig.rig.speed import SpeedSource
 from gearsig.severity.types import CrackEstimate, NoCrackSeen

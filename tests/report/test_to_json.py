@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.report.numbers import readable, rounded
+from gearsig.formatting import readable, rounded
 from gearsig.report.to_json import analysis_to_dict, analysis_to_json, write_json
 
 MEMBERS = [

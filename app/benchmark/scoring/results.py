@@ -27,9 +27,9 @@ from app.benchmark.scoring.strength import STRONG
 from app.benchmark.scoring.table import Table, beside_table, cost_lines, main_table, markdown, parts_table, same_table
 from app.benchmark.shares import SHARES
 from gearsig import __version__
+from gearsig.formatting import rounded
 from gearsig.plot.embed import Picture, embed
 from gearsig.report.benchmark_page import Section, benchmark_html
-from gearsig.report.numbers import rounded
 from sims.sweep_run import written
 
 COLUMNS = (

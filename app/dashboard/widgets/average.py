@@ -10,10 +10,10 @@ from app.dashboard.as_typed import as_typed
 from app.dashboard.widgets.line_chart import Axes, Line, show_lines
 from app.dashboard.widgets.picture import show_picture
 from gearsig.diagnosis.types import Analysis, ChannelAnalysis
+from gearsig.formatting import readable
 from gearsig.orders.types import SynchronousAverage
 from gearsig.plot.cursors import Cursor
 from gearsig.plot.display import unit_text, with_unit
-from gearsig.report.numbers import readable
 
 N_ANGLES = 2000
 

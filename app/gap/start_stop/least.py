@@ -7,10 +7,10 @@ import numpy as np
 from app.gap.start_stop.causes import drive_effects
 from app.gap.start_stop.compare import Compared
 from app.gap.start_stop.predict import Predictions
+from gearsig.formatting import readable
 from gearsig.gap.start_stop.floors import FLOOR, DriveFloor
 from gearsig.gap.start_stop.weigh import Predicted
 from gearsig.gap.words import severity_unit
-from gearsig.report.numbers import readable
 
 
 def least_seen(compared: Compared, predictions: Predictions) -> tuple[str, ...]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from app.gap.start_stop.compare import Compared
+from gearsig.formatting import readable
 from gearsig.gap.start_stop.floors import FLOOR
 from gearsig.gap.start_stop.prediction_error import COMPRESSION, UNITS, prediction_errors
 from gearsig.gap.start_stop.told import NAMES, Examined
 from gearsig.gap.types import GapPlace, PlaceKind
-from gearsig.report.numbers import readable
 
 LEAST_SHARE = 0.01
 LEAST_CHANGE_DB = 3.0

@@ -13,8 +13,8 @@ from app.dashboard.widgets.methods.mesh_cycles import length_shown
 from app.dashboard.widgets.methods.stretch import Stretch, choose_stretch
 from app.dashboard.widgets.methods.waveforms import Waveforms, choose_window, show_waveforms, waveforms_of
 from gearsig.diagnosis.types import Analysis, ChannelAnalysis
+from gearsig.formatting import readable
 from gearsig.plot.display import unit_text
-from gearsig.report.numbers import readable
 
 if TYPE_CHECKING:
     from gearsig.decompose.wavelet_types import Denoised, DenoiseSettings

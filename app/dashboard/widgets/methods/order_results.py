@@ -19,9 +19,9 @@ from app.dashboard.widgets.methods.stretch import Stretch
 from app.dashboard.widgets.methods.waveforms import Waveforms, choose_window, show_waveforms, waveforms_of
 from gearsig.checks import FloatArray
 from gearsig.diagnosis.types import Analysis
+from gearsig.formatting import readable
 from gearsig.plot.display import unit_text, with_unit
 from gearsig.report.lines import speed_is_constant
-from gearsig.report.numbers import readable
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -1,4 +1,4 @@
-"""Numbers for people and for JSON."""
+"""Numbers and names as people and JSON read them."""
 
 from __future__ import annotations
 
@@ -38,3 +38,22 @@ def readable(value: float, n_digits: int = 4) -> str:
     if "." in text and "e" not in text:
         text = text.rstrip("0").rstrip(".")
     return text.replace("-", "−", 1) if text.startswith("-") else text
+
+
+def signed(value: float, n_decimals: int = 1) -> str:
+    """Write a change with its sign and one decimal; none where it is nothing.
+
+    Examples
+    --------
+    >>> signed(14.23), signed(-3.0), signed(-0.04), signed(float("nan"))
+    ('+14.2', '−3.0', '0.0', '–')
+    """
+    if not isfinite(value):
+        return "–"
+    rounded = round(value, n_decimals) + 0.0
+    return f"{rounded:+.{n_decimals}f}".replace("-", "−") if rounded else f"{0.0:.{n_decimals}f}"
+
+
+def named(what: str, name: str) -> str:
+    """Return a name with what it names before it, unless the name says so itself; empty for an empty name."""
+    return name if not name or what.rsplit(maxsplit=1)[-1] in name.lower() else f"{what} {name}"
