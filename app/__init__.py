@@ -1,1 +1,1 @@
-"""The command line and the dashboard: faces over the library."""
+"""Command line, dashboard, benchmark and studies: faces over the library."""

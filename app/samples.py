@@ -7,11 +7,11 @@ from pathlib import Path
 
 import gearsig
 from gearsig.errors import InputError
-from gearsig.rig.toml import recording_stem
+from gearsig.rig import recording_stem
 
 
 @dataclass(frozen=True)
-class Sample:
+class SampleRecording:
     """A sample recording and its rig file."""
 
     recording: Path
@@ -27,10 +27,10 @@ def sample_folder() -> Path:
     raise InputError("the sample recordings are missing", where=str(package), remedy="install gearsig again")
 
 
-def samples() -> tuple[Sample, ...]:
+def samples() -> tuple[SampleRecording, ...]:
     """Return the samples by name; each recording stands beside a rig file of the same stem."""
     found = []
     for rig in sorted(sample_folder().glob("*.toml")):
         recordings = [p for p in rig.parent.iterdir() if recording_stem(p.name) == rig.stem and p.suffix != ".toml"]
-        found += [Sample(path, rig) for path in recordings]
+        found += [SampleRecording(path, rig) for path in recordings]
     return tuple(found)

@@ -6,7 +6,7 @@ The main job in three lines:
 >>> result = gearsig.analyze(gearsig.read_recording("gearbox.csv", rig=gearsig.read_rig("rig.toml")))  # doctest: +SKIP
 >>> print(gearsig.analysis_text(result))  # doctest: +SKIP
 
-Everything else is imported from its room, e.g. `from gearsig.orders.average import synchronous_average`.
+Everything else is imported from its room, e.g. `from gearsig.orders import synchronous_average`.
 """
 
 from __future__ import annotations
@@ -15,35 +15,43 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gearsig.diagnosis.analyze import analyze
-    from gearsig.diagnosis.settings import AnalysisSettings
+    from gearsig.diagnosis import AnalysisSettings, analyze
     from gearsig.errors import GearsigError, InputError, RefusalError
-    from gearsig.recording.read import read_recording
-    from gearsig.recording.types import Channel, Recording
-    from gearsig.recording.write import write_recording
-    from gearsig.report.text import analysis_text
-    from gearsig.rig.speed import ConstantSpeed, EncoderChannel, PulseTimes, SpeedChannel, TachometerChannel
-    from gearsig.rig.toml import read_rig
-    from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
+    from gearsig.recording import Channel, Recording, read_recording, write_recording
+    from gearsig.report import analysis_text
+    from gearsig.rig import (
+        Bearing,
+        ConstantSpeed,
+        EncoderChannel,
+        GearPair,
+        OperatingPoint,
+        PulseTimes,
+        Rig,
+        Sensor,
+        Shaft,
+        SpeedChannel,
+        TachometerChannel,
+        read_rig,
+    )
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "AnalysisSettings": "gearsig.diagnosis.settings",
-    "analyze": "gearsig.diagnosis.analyze",
-    "analysis_text": "gearsig.report.text",
+    "AnalysisSettings": "gearsig.diagnosis",
+    "analyze": "gearsig.diagnosis",
+    "analysis_text": "gearsig.report",
     "GearsigError": "gearsig.errors",
     "InputError": "gearsig.errors",
     "RefusalError": "gearsig.errors",
-    "read_recording": "gearsig.recording.read",
-    "write_recording": "gearsig.recording.write",
-    "Channel": "gearsig.recording.types",
-    "Recording": "gearsig.recording.types",
-    "read_rig": "gearsig.rig.toml",
+    "read_recording": "gearsig.recording",
+    "write_recording": "gearsig.recording",
+    "Channel": "gearsig.recording",
+    "Recording": "gearsig.recording",
+    "read_rig": "gearsig.rig",
     **dict.fromkeys(
-        ("ConstantSpeed", "EncoderChannel", "PulseTimes", "SpeedChannel", "TachometerChannel"), "gearsig.rig.speed"
+        ("ConstantSpeed", "EncoderChannel", "PulseTimes", "SpeedChannel", "TachometerChannel"), "gearsig.rig"
     ),
-    **dict.fromkeys(("Bearing", "GearPair", "OperatingPoint", "Rig", "Sensor", "Shaft"), "gearsig.rig.types"),
+    **dict.fromkeys(("Bearing", "GearPair", "OperatingPoint", "Rig", "Sensor", "Shaft"), "gearsig.rig"),
 }
 
 __all__ = [

@@ -14,10 +14,9 @@ from gearsig.errors import GearsigError, InputError
 from gearsig.processes import n_processors, process_pool
 
 if TYPE_CHECKING:
-    from gearsig.recording.types import Recording
-    from gearsig.report.entry import Entry, Failure
-    from gearsig.rig.speed import SpeedSource
-    from gearsig.rig.types import Rig
+    from gearsig.recording import Recording
+    from gearsig.report import Entry, Failure
+    from gearsig.rig import Rig, SpeedSource
 
 Progress = Callable[[int, int, "Entry | Failure"], object]
 
@@ -113,8 +112,7 @@ def report_many(
         If there are no paths, `n_processes` is below 1, or the folder cannot be made.
     """
     from gearsig.checks import count
-    from gearsig.report.files import made_folder, remove_parts
-    from gearsig.report.index import write_index
+    from gearsig.report import made_folder, remove_parts, write_index
 
     files = [Path(path) for path in paths]
     if not files:
@@ -154,7 +152,7 @@ def _jobs(
     speed: SpeedSource | None,
     command: str,
 ) -> list[_Job]:
-    from gearsig.report.files import page_names
+    from gearsig.report import page_names
 
     pages = page_names(files)
     names = [file.name for file in files]
@@ -215,11 +213,10 @@ def _collect(executor: Executor, jobs: Mapping[int, _Job]) -> Results:
 
 def _report_one(job: _Job) -> Entry | Failure:
     """Analyse one recording and write its page; every error becomes a reason."""
-    from gearsig.diagnosis.analyze import analyze
-    from gearsig.recording.read import read_recording
-    from gearsig.report.entry import entry_of
-    from gearsig.report.page import write_page
-    from gearsig.rig.toml import read_rig, rig_file_beside
+    from gearsig.diagnosis import analyze
+    from gearsig.recording import read_recording
+    from gearsig.report import entry_of, write_page
+    from gearsig.rig import read_rig, rig_file_beside
 
     try:
         beside = rig_file_beside(job.path) if job.rig is None else None
@@ -239,9 +236,9 @@ def _report_one(job: _Job) -> Entry | Failure:
 
 def _reference_of(job: _Job, rig: Rig | None) -> Recording | None:
     """Read the recording of the sound machine; pulse times would belong to the other one."""
-    from gearsig.diagnosis.comparison import rig_of_reference
-    from gearsig.recording.read import read_recording
-    from gearsig.rig.speed import PulseTimes
+    from gearsig.diagnosis import rig_of_reference
+    from gearsig.recording import read_recording
+    from gearsig.rig import PulseTimes
 
     if job.reference is None:
         return None
@@ -255,13 +252,13 @@ def _is_same_file(one: Path, other: Path) -> bool:
 
 
 def _failure(job: _Job, reason: str) -> Failure:
-    from gearsig.report.entry import Failure
+    from gearsig.report import Failure
 
     return Failure(job.name, reason)
 
 
 def _sorted_out(results: Mapping[int, Entry | Failure]) -> tuple[tuple[Entry, ...], tuple[Failure, ...]]:
-    from gearsig.report.entry import Entry, Failure
+    from gearsig.report import Entry, Failure
 
     ordered = [results[number] for number in sorted(results)]
     return (

@@ -1,6 +1,6 @@
 """The samples that the dynamic model cannot make: two stages, and a drive without tachometer that hunts for its speed.
 
-Their signals come from the kinematic model in `sims.kinematic`.
+Their signals come from the kinematic model in `tests.kinematic`.
 """
 
 from __future__ import annotations
@@ -11,29 +11,26 @@ from typing import Any
 import numpy as np
 from sample_files import Made, Writer, write_csv, write_mat
 
-from gearsig.recording.types import Recording
-from gearsig.rig.speed import TachometerChannel
-from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
-from sims.kinematic import (
+from gearsig.recording import Recording
+from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft, TachometerChannel
+from sims.measure import ColouredNoise, MainsHum, Tachometer
+from tests.kinematic.model import (
     BearingFault,
-    ColouredNoise,
     KinematicModel,
-    MainsHum,
     MeshHarmonics,
-    Modulation,
-    Resonance,
+    MeshModulation,
+    PathResonance,
     SensorChannel,
     ShaftOrder,
-    Tachometer,
     ToothVariation,
     TransferPath,
-    Wander,
-    simulate_kinematic,
 )
+from tests.kinematic.simulate import simulate_kinematic
+from tests.kinematic.speed import Wander
 
 STEP_MPS2 = 2.0**-8  # one step of the 16-bit converter that the samples pretend to come from (±128 m/s²)
 SOURCE = "simulated: sample_data/make_samples.py"
-PATH = TransferPath(1.0, (Resonance(1150.0, 0.04, 1.5), Resonance(2900.0, 0.05, 2.0)))
+PATH = TransferPath(1.0, (PathResonance(1150.0, 0.04, 1.5), PathResonance(2900.0, 0.05, 2.0)))
 NOISE = ColouredNoise(1.2, slope=0.5)
 HUM = MainsHum((0.03, 0.05))
 
@@ -56,8 +53,8 @@ def no_tachometer() -> Made:
     )
     parts = ordinary_gears("stage 1", "input", "output", (6.0, 3.0, 1.5))
     parts["modulations"] = (
-        Modulation("stage 1", "input", 0.25, 0.1),
-        Modulation("stage 1", "output", 0.08, 0.04, angle_rad=1.0),
+        MeshModulation("stage 1", "input", 0.25, 0.1),
+        MeshModulation("stage 1", "output", 0.08, 0.04, angle_rad=1.0),
     )
     channel = SensorChannel("a1", PATH, NOISE, HUM, "input bearing, vertical")
     model = KinematicModel(Wander(1471.3, 0.002, 0.25), **parts, channels=(channel,))
@@ -127,7 +124,10 @@ def ordinary_gears(pair: str, driver: str, driven: str, amplitudes_mps2: tuple[f
     """Mesh of a pair in good order: a little eccentricity and tooth-to-tooth variation on both gears."""
     return {
         "meshes": (MeshHarmonics(pair, amplitudes_mps2, (0.3, 1.1, 2.0, 0.7)[: len(amplitudes_mps2)]),),
-        "modulations": (Modulation(pair, driver, 0.06, 0.03), Modulation(pair, driven, 0.08, 0.04, angle_rad=1.0)),
+        "modulations": (
+            MeshModulation(pair, driver, 0.06, 0.03),
+            MeshModulation(pair, driven, 0.08, 0.04, angle_rad=1.0),
+        ),
         "tooth_variations": (ToothVariation(pair, driver, 0.02, 0.015), ToothVariation(pair, driven, 0.02, 0.015)),
         "shaft_orders": (
             ShaftOrder(driver, 0.25, at_rpm=1500.0, phase_rad=0.4),

@@ -18,21 +18,21 @@ from PIL import Image
 from scipy.interpolate import CubicSpline
 
 from gearsig.checks import FloatArray
-from gearsig.plot.crack import crack_comparison_figure
-from gearsig.plot.mesh import mesh_stiffness_figure
-from gearsig.plot.response import ResponseCase, response_figure
-from gearsig.plot.roughness import backlash_figure, friction_figure
-from gearsig.spectra.amplitude import amplitude_spectrum
-from sims.cracked.respond import Response, respond
-from sims.gear_pair.build import build_machine
-from sims.gear_pair.parameters import PARAMETERS
+from gearsig.plot import (
+    ResponseCase,
+    backlash_figure,
+    crack_comparison_figure,
+    friction_figure,
+    mesh_stiffness_figure,
+    response_figure,
+)
+from gearsig.spectra import amplitude_spectrum
+from sims.cracked import Response, respond
+from sims.gear_pair import PARAMETERS, build_machine
 from sims.machine import Machine
-from sims.mesh import mesh_stiffness
-from sims.mesh.mesh_friction import friction_over_mesh
-from sims.mesh.roughness import FractalSurface, TimeLockedRoughness
+from sims.mesh import FractalSurface, TimeLockedRoughness, friction_over_mesh, mesh_stiffness
 from sims.presets import preset
-from sims.simulator import ParameterValue
-from sims.values import complete_values
+from sims.simulator import ParameterValue, complete_values
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -222,7 +222,7 @@ FIGURES = {
 def bifurcation() -> None:
     """Run the README's command, and keep its figure."""
     with TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "app.cli", "bifurcation", "cracked", "--preset", "symmetric_50_50"]
+        command = [sys.executable, "-m", "app.cli.main", "bifurcation", "cracked", "--preset", "symmetric_50_50"]
         settings = ["--torque", "20Nm", "--set", "roughness_um=0", "--set", "friction=off"]
         run([*command, *settings, "--vary", "speed=1400..2600rpm:49", "-o", folder], check=True)
         save_pixels(Path(folder) / "bifurcation.png", PICTURES / "bifurcation.png")

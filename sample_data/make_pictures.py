@@ -5,13 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import gearsig
-from gearsig.diagnosis.types import Analysis
-from gearsig.plot.average import average_figure
-from gearsig.plot.cursors import order_cursors
-from gearsig.plot.marks import marks_of
-from gearsig.plot.polar import polar_figure
-from gearsig.plot.spectrum import spectrum_figure
-from gearsig.rig.orders import order_lines
+from gearsig.diagnosis import Analysis
+from gearsig.plot import average_figure, marks_of, order_cursors, polar_figure, spectrum_figure
+from gearsig.rig import order_lines
 
 HERE = Path(__file__).parent
 PICTURES = HERE / "pictures"

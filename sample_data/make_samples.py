@@ -16,17 +16,12 @@ import numpy as np
 from kinematic_samples import kinematic_samples
 from sample_files import Made, Writer, wav_writer, write_csv_gz, write_hdf5, write_mat
 
-from gearsig.recording.types import Recording
-from gearsig.rig.speed import TachometerChannel
-from gearsig.rig.toml import write_rig
-from gearsig.rig.types import OperatingPoint, Rig, Sensor
-from sims.cracked.simulate import simulate_machine
-from sims.cracked.simulator import CrackedPair
+from gearsig.recording import Recording
+from gearsig.rig import OperatingPoint, Rig, Sensor, TachometerChannel, write_rig
+from sims.cracked import CrackedPair, simulate_machine
 from sims.effects import EffectSetting
-from sims.gear_pair.build import build_rig
-from sims.gear_pair.roughness import draw_roughness
-from sims.machine import Machine
-from sims.machine.operation import Course, Operation
+from sims.gear_pair import build_rig, draw_roughness
+from sims.machine import Machine, Operation, Profile
 from sims.simulator import ParameterValue
 
 RATE_HZ = 12800.0
@@ -76,7 +71,7 @@ def workshop_samples() -> list[Made]:
     spall = EffectSetting("tooth_spall", 80.0, {"tooth": DAMAGED_TOOTH, "length_mm": 3.0})
     eccentric = EffectSetting("eccentricity", 100.0, {"gear": "driven", "angle_deg": 60.0})
     race = EffectSetting("bearing_outer_race", 0.2)
-    run_up = Operation(Course.of([0.0, 8.0], [600.0, 3000.0]), Course.constant(50.0))
+    run_up = Operation(Profile.of([0.0, 8.0], [600.0, 3000.0]), Profile.constant(50.0))
     name = "Workshop gearbox"
     return [
         workshop("healthy.h5", f"{name} in good order", 101, (), 6.0, write_hdf5),
@@ -114,7 +109,7 @@ def wandering(mean_rpm: float, nominal_rpm: float, torque_nm: float, duration_s:
     times = np.arange(-1.0, duration_s + 1.0, 0.5)
     drawn = np.random.default_rng([seed, 1]).standard_normal(len(times))
     values = mean_rpm + 0.002 * nominal_rpm * np.clip(drawn, -2.0, 2.0)
-    return Operation(Course(times, np.round(values, 2)), Course.constant(torque_nm))
+    return Operation(Profile(times, np.round(values, 2)), Profile.constant(torque_nm))
 
 
 def dynamic(

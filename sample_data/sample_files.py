@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from gearsig.recording.types import Recording
+from gearsig.recording import Recording
 
 STEP_V = 2.0**-8
 """Of the tachometer's converter."""

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from gearsig.recording.types import Recording
-    from sims.effects.effect import EffectSetting
-    from sims.machine.operation import Course
+    from gearsig.recording import Recording
+    from sims.effects import EffectSetting
+    from sims.machine import Profile
     from sims.simulator import ParameterValue
 
-    Profile = float | Sequence[tuple[float, float]] | Course
+    ProfileLike = float | Sequence[tuple[float, float]] | Profile
 
 __all__ = ["simulate"]
 
@@ -22,8 +22,8 @@ def simulate(
     preset: str = "",
     parameters: Mapping[str, ParameterValue] | None = None,
     effects: Mapping[str, float] | Sequence[EffectSetting] | None = None,
-    speed_rpm: Profile | None = None,
-    torque_nm: Profile | None = None,
+    speed_rpm: ProfileLike | None = None,
+    torque_nm: ProfileLike | None = None,
     duration_s: float = 5.0,
     sampling_rate_hz: float = 20480.0,
     seed: int = 0,

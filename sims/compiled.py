@@ -1,6 +1,7 @@
 """How kernels that allocate nothing are compiled."""
 
 # mypy: allow-untyped-calls
+
 from __future__ import annotations
 
 from typing import Any

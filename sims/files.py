@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gearsig.errors import InputError
-from gearsig.recording.types import Recording
-from gearsig.recording.write import WRITERS, write_recording
-from gearsig.rig.toml import write_rig
+from gearsig.recording import WRITERS, Recording, write_recording
+from gearsig.rig import write_rig
 
 
 class FileSet(NamedTuple):

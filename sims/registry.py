@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cache
+from hashlib import sha256
+from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from gearsig.checks import closest_match_hint
+from gearsig.checks import closest_match_hint, within
 from gearsig.errors import InputError
-from gearsig.gap.simulator import GapSimulator
-from sims.effects.effect import EffectSetting
-from sims.machine.operation import Operation
+from gearsig.gap import GapSimulator
+from sims.effects import EffectSetting
+from sims.machine import Machine, Operation
 from sims.simulator import ParameterValue, Simulator
 
 
 @cache
 def simulators() -> dict[str, Simulator]:
     """Return every simulator by its name."""
-    from sims.cracked.simulator import CrackedPair
-    from sims.forging.simulator import ForgingManipulator
-    from sims.reduced_fe.simulator import ReducedPair
+    from sims.cracked import CrackedPair
+    from sims.forging import ForgingManipulator
+    from sims.reduced_fe import ReducedPair
 
     found: tuple[Simulator, ...] = (CrackedPair(), ReducedPair(), ForgingManipulator())
     return {simulator.name: simulator for simulator in found}
@@ -40,8 +42,8 @@ def simulator(name: str) -> Simulator:
 @cache
 def gap_simulators() -> dict[str, GapSimulator]:
     """Return every simulator that takes part in the gap diagnosis, by its name."""
-    from sims.cracked.twin import cracked_gap_simulator
-    from sims.reduced_fe.twin import reduced_gap_simulator
+    from sims.cracked import cracked_gap_simulator
+    from sims.reduced_fe import reduced_gap_simulator
 
     found: tuple[GapSimulator, ...] = (cracked_gap_simulator(), reduced_gap_simulator())
     return {simulator.name: simulator for simulator in found}
@@ -102,3 +104,57 @@ class ChecksConvergence(Protocol):
     ) -> HasText:
         """Check the very machine that would be simulated."""
         ...
+
+
+# --------------------
+# Which state of the simulators' code made a result.
+# --------------------
+
+
+_ROOMS = ("cracked", "effects", "forging", "gear_pair", "machine", "measure", "mesh", "reduced_fe")
+
+
+def sources_digest() -> str:
+    """Return a short hash of the code that simulates: kept results of another state are not taken for this one's."""
+    from sims.effects import own_files
+
+    own = sha256(b"".join(path.read_bytes() for path in own_files())).hexdigest()[:8] if own_files() else ""
+    return _listed_sources() + own
+
+
+@cache
+def _listed_sources() -> str:
+    here = Path(__file__).parent
+    digest = sha256()
+    for room in _ROOMS:
+        for path in sorted((here / room).rglob("*.py")):
+            digest.update(path.relative_to(here).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+# --------------------
+# What a simulated gear pair can be asked for: speeds, loads, sampling rates, durations.
+# --------------------
+
+
+SPEED_RANGE_RPM = (0.0, 30000.0)
+BREAKING_STRESS_PA = 2e9
+"""F/(b m) beyond which any steel tooth would break; rated gears stay below a quarter of it."""
+SAMPLING_RATE_RANGE_HZ = (100.0, 250000.0)
+DURATION_RANGE_S = (0.01, 120.0)
+"""The motion is held in memory: some 30 MB a second."""
+
+
+def check_run(operation: Operation, sampling_rate_hz: float) -> None:
+    """Refuse speeds and sampling rates that no gear pair has."""
+    for value in (operation.speed_rpm.values.min(), operation.speed_rpm.values.max()):
+        within(value, "speed_rpm", *SPEED_RANGE_RPM, "rpm")
+    within(sampling_rate_hz, "sampling_rate_hz", *SAMPLING_RATE_RANGE_HZ, "Hz")
+
+
+def check_load(machine: Machine, operation: Operation) -> None:
+    """Refuse a torque that would break the teeth: far beyond, the linear model means nothing."""
+    pair = machine.mesh.pair
+    section_m2 = pair.face_width_mm * pair.driver.module_mm * 1e-6
+    most_nm = BREAKING_STRESS_PA * section_m2 * pair.driver.pitch_radius_mm * 1e-3
+    within(operation.torque_nm.largest, "torque_nm", 0.0, float(f"{most_nm:.2g}"), "N m")

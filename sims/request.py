@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from gearsig.errors import InputError
-from sims.effects.effect import EffectSetting
-from sims.machine.operation import Course, Operation
-from sims.presets import preset
+from sims.effects import EffectSetting, effect
+from sims.machine import Operation, Profile
+from sims.presets import preset, presets
+from sims.simulator import Parameter, Values
 
 if TYPE_CHECKING:
-    from sims import Profile
+    from sims import ProfileLike
 
 
 def effect_settings(effects: Mapping[str, float] | Sequence[EffectSetting] | None) -> tuple[EffectSetting, ...]:
@@ -26,27 +28,95 @@ def effect_settings(effects: Mapping[str, float] | Sequence[EffectSetting] | Non
 
 
 def operation_of(
-    model: str, preset_name: str, speed_rpm: Profile | None, torque_nm: Profile | None
+    model: str, preset_name: str, speed_rpm: ProfileLike | None, torque_nm: ProfileLike | None
 ) -> Operation | None:
     """Return the wanted operation, the preset's own where only one of the two is given, None where neither is."""
     if speed_rpm is None and torque_nm is None:
         return None
     own = preset(model, preset_name).operation
     return Operation(
-        own.speed_rpm if speed_rpm is None else _course(speed_rpm, "speed_rpm"),
-        own.torque_nm if torque_nm is None else _course(torque_nm, "torque_nm"),
+        own.speed_rpm if speed_rpm is None else _profile(speed_rpm, "speed_rpm"),
+        own.torque_nm if torque_nm is None else _profile(torque_nm, "torque_nm"),
     )
 
 
-def _course(profile: Profile, name: str) -> Course:
-    if isinstance(profile, Course):
+def _profile(profile: ProfileLike, name: str) -> Profile:
+    if isinstance(profile, Profile):
         return profile
     try:
         if isinstance(profile, Sequence):
             times, values = zip(*profile, strict=True)
-            return Course.of(times, values)
-        return Course.constant(profile)
+            return Profile.of(times, values)
+        return Profile.constant(profile)
     except (TypeError, ValueError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{name} is {profile!r}", allowed="a number, or (time in s, value) points") from None
+
+
+# --------------------
+# What was put into a simulation, as plain values.
+# --------------------
+
+
+def truth_of(
+    model: str, preset_name: str, values: Values, settings: Sequence[EffectSetting], operation: Operation
+) -> dict[str, Any]:
+    """Return what was put into a simulation as plain values, for `Recording.truth`."""
+    return {
+        "model": model,
+        "preset": preset_name,
+        "parameters": dict(values),
+        "effects": [
+            {"name": s.name, "severity": s.severity, "unit": effect(s.name).severity.unit, "options": dict(s.options)}
+            for s in settings
+        ],
+        "operation": {"speed_rpm": _plain(operation.speed_rpm), "torque_nm": _plain(operation.torque_nm)},
+    }
+
+
+def _plain(course: Profile) -> dict[str, list[float]]:
+    return {"times_s": course.times_s.tolist(), "values": course.values.tolist()}
+
+
+# --------------------
+# What a simulator states of itself: name, parameters, machines, effects, and where its recordings come from.
+# --------------------
+
+
+@dataclass(frozen=True)
+class Model:
+    """Base of the simulators, which give these fields values of their own.
+
+    Parameters
+    ----------
+    name : str
+        Short, as on the command line.
+    title : str
+        One line for people.
+    parameters : tuple of Parameter
+        All of them.
+    effects : tuple of str
+        Names of the effects that have a meaning.
+    meaningless : tuple of str
+        What of them has none, and why, one sentence each.
+    """
+
+    name: str
+    title: str
+    parameters: tuple[Parameter, ...] = field(repr=False)
+    effects: tuple[str, ...] = field(repr=False)
+    meaningless: tuple[str, ...] = field(default=(), repr=False)
+
+    @property
+    def presets(self) -> tuple[str, ...]:
+        """Names of the machines."""
+        return tuple(presets(self.name))
+
+    def rig_name(self, preset_name: str) -> str:
+        """Return the name of a simulated recording's rig."""
+        return f"simulated: {preset_name}"
+
+    def rig_sources(self, preset_name: str) -> list[str]:
+        """Return what such a rig says of where it comes from."""
+        return [f"simulated with the model {self.name!r}, preset {preset_name!r}; the truth stands in the recording"]

@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import csv
+import json
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
+from io import StringIO
 from itertools import product
 from math import isfinite, prod
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gearsig.checks import count, one_of, positive, within
-from gearsig.errors import InputError
-from gearsig.recording.write import WRITERS
-from sims.effects.effect import EffectSetting, OptionValue
-from sims.machine.operation import Course, Operation
+from gearsig.errors import GearsigError, InputError
+from gearsig.processes import n_processors, process_pool
+from gearsig.recording import WRITERS
+from sims.effects import EffectSetting, OptionValue
+from sims.files import file_set, write_set
+from sims.machine import Operation, Profile
 from sims.simulator import ParameterValue
 
 if TYPE_CHECKING:
-    from gearsig.recording.types import Recording
+    from gearsig.recording import Recording
+
 
 MOST_POINTS = 1_000_000
 OPERATION_AXES = ("speed_rpm", "torque_nm")
@@ -50,7 +60,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Point:
+class SweepPoint:
     """One simulation of a sweep.
 
     Parameters
@@ -95,8 +105,8 @@ class Sweep:
     preset: str = ""
     parameters: Mapping[str, ParameterValue] = field(default_factory=dict)
     effects: tuple[EffectSetting, ...] = ()
-    speed_rpm: Course | None = None
-    torque_nm: Course | None = None
+    speed_rpm: Profile | None = None
+    torque_nm: Profile | None = None
     duration_s: float = 5.0
     sampling_rate_hz: float = 20480.0
     seed: int = 0
@@ -121,12 +131,12 @@ class Sweep:
         """Size of the grid."""
         return prod(len(axis.values) for axis in self.axes)
 
-    def points(self) -> tuple[Point, ...]:
+    def points(self) -> tuple[SweepPoint, ...]:
         """All points, the last axis running fastest."""
         grid = product(*(axis.values for axis in self.axes))
-        return tuple(Point(i, values, self._seed(i)) for i, values in enumerate(grid))
+        return tuple(SweepPoint(i, values, self._seed(i)) for i, values in enumerate(grid))
 
-    def simulate(self, point: Point) -> Recording:
+    def simulate(self, point: SweepPoint) -> Recording:
         """Run one point."""
         import sims
 
@@ -167,7 +177,7 @@ class Sweep:
             return self.seed
         return int(np.random.SeedSequence([self.seed, index]).generate_state(1, np.uint32)[0])
 
-    def at(self, point: Point) -> Sweep:
+    def at(self, point: SweepPoint) -> Sweep:
         """Return the same with a point's values in place."""
         from sims.effects import effects as known_effects
 
@@ -175,9 +185,9 @@ class Sweep:
         speed, torque = self.speed_rpm, self.torque_nm
         for axis, value in zip(self.axes, point.values, strict=True):
             if axis.name == "speed_rpm":
-                speed = Course.constant(value)
+                speed = Profile.constant(value)
             elif axis.name == "torque_nm":
-                torque = Course.constant(value)
+                torque = Profile.constant(value)
             elif axis.name in known_effects():
                 settings.append(EffectSetting(axis.name, value, axis.options))
             else:
@@ -188,13 +198,13 @@ class Sweep:
         """Refuse names that do not exist and values out of their ranges; what the machine allows, each point tells."""
         from sims.effects import effect
         from sims.registry import simulator
-        from sims.values import checked_value, parameter
+        from sims.simulator import checked_value, parameter
 
         model = simulator(self.model)
         for axis in self.axes:
             if axis.name in OPERATION_AXES:
                 for value in axis.values:
-                    Operation(Course.constant(value), Course.constant(value))
+                    Operation(Profile.constant(value), Profile.constant(value))
             elif axis.name in model.effects:
                 s = effect(axis.name).severity
                 effect(axis.name).complete(axis.options)
@@ -205,5 +215,231 @@ class Sweep:
                     checked_value(parameter(model.parameters, axis.name), value)
 
 
-def _plain(course: Course | None) -> dict[str, list[float]] | None:
+def _plain(course: Profile | None) -> dict[str, list[float]] | None:
     return None if course is None else {"times_s": course.times_s.tolist(), "values": course.values.tolist()}
+
+
+# --------------------
+# Runs a sweep on all processors, into a folder, so that it can be stopped and resumed.
+# --------------------
+
+
+DEFINITION = "sweep.json"
+INDEX = "index.csv"
+
+Progress = Callable[[int, int, "SweepOutcome"], object]
+
+
+@dataclass(frozen=True)
+class SweepOutcome:
+    """What became of a point: its recording, or the reason why there is none."""
+
+    point: SweepPoint
+    recording: Path | None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """What a run of a sweep did.
+
+    Parameters
+    ----------
+    n_points : int
+    n_found : int
+        Points that stood in the folder already.
+    outcomes : tuple of Outcome
+        Points of this run, in the order of the grid.
+    index_path : Path
+        Table of all points: index, values, seed, file (empty where there is none), reason.
+    """
+
+    n_points: int
+    n_found: int
+    outcomes: tuple[SweepOutcome, ...]
+    index_path: Path
+
+    @property
+    def failures(self) -> tuple[SweepOutcome, ...]:
+        """Points that gave no recording."""
+        return tuple(o for o in self.outcomes if o.recording is None)
+
+
+def run_sweep(
+    sweep: Sweep, folder: str | Path, *, n_processes: int | None = None, on_progress: Progress | None = None
+) -> SweepResult:
+    """Simulate every point that the folder does not hold yet.
+
+    Each point becomes a recording, its rig file and its truth, all or none. A point that cannot be simulated does not
+    stop the others. After Ctrl-C, whatever is complete stays, and the same call goes on from there.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    folder : str or Path
+        Made if it is not there; empty, or begun by the same sweep.
+    n_processes : int or None
+        None: one per processor. With more than 1 the caller's script needs the usual ``if __name__ == "__main__":``,
+        as processes are spawned.
+    on_progress : callable or None
+        Called as ``on_progress(n_done, n_points, outcome)``, in the order of completion.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made, holds other things, or another sweep.
+    """
+    workers = n_processors() if n_processes is None else count(n_processes, "n_processes")
+    target = claimed(Path(folder), sweep.definition())
+    points = sweep.points()
+    missing = [p for p in points if not recording_path(sweep, target, p).exists()]
+    n_found = len(points) - len(missing)
+    done: dict[int, SweepOutcome] = {}
+    try:
+        with closing(_run(sweep, missing, target, min(workers, max(len(missing), 1)))) as running:
+            for outcome in running:
+                done[outcome.point.index] = outcome
+                if on_progress is not None:
+                    on_progress(n_found + len(done), len(points), outcome)
+    finally:
+        _remove_unfinished(target)
+        index = _write_index(sweep, target, points, done)
+    return SweepResult(len(points), n_found, tuple(done[i] for i in sorted(done)), index)
+
+
+def recording_path(sweep: Sweep, folder: Path, point: SweepPoint) -> Path:
+    """Name of a point's recording."""
+    digits = len(str(max(sweep.n_points - 1, 1)))
+    return folder / f"point_{point.index:0{digits}d}{sweep.extension}"
+
+
+def n_complete(sweep: Sweep, folder: str | Path) -> int:
+    """Points that the folder holds."""
+    return sum(recording_path(sweep, Path(folder), point).exists() for point in sweep.points())
+
+
+def claimed(folder: Path, definition: Mapping[str, Any], name: str = DEFINITION, kind: str = "sweep") -> Path:
+    """Make the folder or accept it; leave the definition in it.
+
+    Parameters
+    ----------
+    folder : Path
+    definition : mapping
+        Plain values that decide the results.
+    name : str
+        Of its file.
+    kind : str
+        What it defines, for the errors.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made, holds other things, or was begun by another definition.
+    """
+    text = json.dumps(definition, indent=2, ensure_ascii=False) + "\n"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if (folder / name).exists():
+            _check_same(folder / name, text, kind)
+        elif any(folder.iterdir()):
+            raise InputError(
+                f"holds files that belong to no {kind}", where=str(folder), remedy="choose another with -o"
+            )
+        else:
+            written(folder / name, text)
+    except OSError as error:
+        raise InputError(
+            f"cannot be written ({error.strerror or error})", where=str(folder), remedy="choose another with -o"
+        ) from None
+    return folder
+
+
+def _check_same(definition: Path, text: str, kind: str) -> None:
+    try:
+        there, wanted = json.loads(definition.read_text(encoding="utf-8")), json.loads(text)
+    except ValueError:
+        raise InputError(
+            f"is not the definition of a {kind}", where=str(definition), remedy="choose another folder"
+        ) from None
+    if there != wanted:
+        differing = [key for key in wanted if not isinstance(there, dict) or there.get(key) != wanted[key]]
+        raise InputError(
+            f"holds another {kind}: {', '.join(differing) or 'its definition'} differs",
+            where=str(definition.parent),
+            remedy="choose another folder, or give the same options as before",
+        )
+
+
+def _run(
+    sweep: Sweep, points: Sequence[SweepPoint], folder: Path, n_workers: int
+) -> Generator[SweepOutcome, None, None]:
+    if n_workers == 1:
+        for point in points:
+            yield _run_one(sweep, point, folder)
+    else:
+        yield from _run_local(sweep, points, folder, n_workers)
+
+
+def _run_local(sweep: Sweep, points: Sequence[SweepPoint], folder: Path, n_workers: int) -> Iterator[SweepOutcome]:
+    """Run points in local processes; where one kills its process, the unfinished ones get a process each."""
+    unfinished = {point.index: point for point in points}
+    try:
+        with process_pool(n_workers) as pool:
+            futures = [pool.submit(_run_one, sweep, point, folder) for point in points]
+            for future in as_completed(futures):
+                outcome = future.result()
+                del unfinished[outcome.point.index]
+                yield outcome
+    except BrokenProcessPool:
+        for point in unfinished.values():
+            try:
+                with process_pool(1) as pool:
+                    outcome = pool.submit(_run_one, sweep, point, folder).result()
+            except BrokenProcessPool:
+                outcome = SweepOutcome(
+                    point, None, "the process that simulated it was killed: perhaps it ran out of memory"
+                )
+            yield outcome
+
+
+def _run_one(sweep: Sweep, point: SweepPoint, folder: Path) -> SweepOutcome:
+    """Simulate a point and write it; every error becomes a reason."""
+    try:
+        names = file_set(recording_path(sweep, folder, point), replace=True)
+        write_set(sweep.simulate(point), names)
+    except GearsigError as error:
+        return SweepOutcome(point, None, str(error))
+    except Exception as error:  # noqa: BLE001 - one point must not stop the others; the reason is passed on
+        text = f"{type(error).__name__}: {' '.join(str(error).split())}"
+        return SweepOutcome(point, None, f"unexpected error, please report: {text}")
+    return SweepOutcome(point, names.recording)
+
+
+def _write_index(sweep: Sweep, folder: Path, points: Sequence[SweepPoint], done: dict[int, SweepOutcome]) -> Path:
+    text = StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["index", *(axis.name for axis in sweep.axes), "seed", "file", "reason"])
+    for point in points:
+        path = recording_path(sweep, folder, point)
+        outcome = done.get(point.index)
+        reason = "" if path.exists() else (outcome.reason if outcome else "not yet simulated")
+        table.writerow(
+            [point.index, *(f"{v:.12g}" for v in point.values), point.seed, path.name if path.exists() else "", reason]
+        )
+    return written(folder / INDEX, text.getvalue())
+
+
+def written(path: Path, text: str) -> Path:
+    """Write a text whole or not at all."""
+    part = path.with_name(f".{path.name}.part")
+    part.write_text(text, encoding="utf-8")
+    return part.replace(path)
+
+
+def _remove_unfinished(folder: Path) -> None:
+    """Remove what workers that were stopped in the middle left."""
+    import shutil
+
+    for part in folder.glob(".point_*-*"):
+        with suppress(OSError):
+            shutil.rmtree(part)

@@ -1,13 +1,17 @@
-"""The house's directions: app → sims → gearsig; figures and Streamlit stay in their rooms; start-up stays light."""
+"""The house's directions: app → sims → gearsig; rooms have faces; figures and Streamlit stay where they belong."""
 
 import ast
 import subprocess
 import sys
+from collections import Counter, defaultdict
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
-FILES = [p for room in ("gearsig", "sims", "app") for p in sorted((ROOT / room).rglob("*.py"))]
+LAYERS = ("gearsig", "sims", "app")
+FILES = [p for layer in LAYERS for p in sorted((ROOT / layer).rglob("*.py"))]
 
 CHAIN = (
     "rig",
@@ -22,7 +26,7 @@ CHAIN = (
     "motion",
     "severity",
     "diagnosis",
-    "compare",
+    "comparison",
     "gap",
     "plot",
     "report",
@@ -30,8 +34,12 @@ CHAIN = (
 """Rooms of gearsig; each may import from rooms to its left. Plot draws what the rooms before it compute."""
 
 
+def name_of(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
 def imported_modules(path: Path) -> set[str]:
-    """Return all modules that a file imports, also inside functions."""
+    """Return all modules that a file imports, also inside functions, and the names it takes from them."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
@@ -42,8 +50,7 @@ def imported_modules(path: Path) -> set[str]:
     return found
 
 
-def name_of(path: Path) -> str:
-    return str(path.relative_to(ROOT))
+IMPORTS = {name_of(p): imported_modules(p) for p in FILES}
 
 
 def starts_with(modules: set[str], *prefixes: str) -> set[str]:
@@ -52,8 +59,13 @@ def starts_with(modules: set[str], *prefixes: str) -> set[str]:
 
 def offences(wrong: Callable[[str, set[str]], set[str]]) -> dict[str, set[str]]:
     """Return what `wrong` finds among each file's imports, by file."""
-    found = {name_of(p): wrong(name_of(p), imported_modules(p)) for p in FILES}
+    found = {name: wrong(name, modules) for name, modules in IMPORTS.items()}
     return {name: modules for name, modules in found.items() if modules}
+
+
+def is_private(module: str) -> bool:
+    """Whether a dotted name goes through a module with a leading underscore."""
+    return any(part.startswith("_") and not part.startswith("__") for part in module.split(".")[:-1])
 
 
 def test_the_library_knows_no_simulator_and_no_app() -> None:
@@ -61,14 +73,15 @@ def test_the_library_knows_no_simulator_and_no_app() -> None:
 
 
 def test_simulators_use_only_rig_recording_and_the_protocol_of_the_gap_diagnosis() -> None:
-    basic = ("gearsig.checks", "gearsig.errors", "gearsig.cache", "gearsig.processes")
-    allowed = ("gearsig.rig", "gearsig.recording", "gearsig.gap.simulator", *basic)
+    basic = ("gearsig.checks", "gearsig.errors", "gearsig.cache", "gearsig.processes", "gearsig.formatting")
+    protocol = {"Added", "Drive", "GapEffect", "GapSimulator", "OperatingCondition", "Twin", "severities"}
+    allowed = ("gearsig.rig", "gearsig.recording", *basic, *(f"gearsig.gap.{name}" for name in protocol))
 
     def wrong(name: str, modules: set[str]) -> set[str]:
         if not name.startswith("sims/"):
             return set()
         return starts_with(modules, "app") | (
-            starts_with(modules, "gearsig") - starts_with(modules, *allowed) - {"gearsig"}
+            starts_with(modules, "gearsig") - starts_with(modules, *allowed) - {"gearsig", "gearsig.gap"}
         )
 
     assert not offences(wrong)
@@ -90,7 +103,8 @@ def test_blind_drives_are_for_the_benchmark_alone() -> None:
 def test_figures_and_streamlit_stay_in_their_rooms() -> None:
     drawing = ("gearsig/plot/", "app/")
     assert not offences(lambda n, m: set() if n.startswith(drawing) else starts_with(m, "matplotlib", "plotly"))
-    assert not offences(lambda n, m: set() if n.startswith("app/") else starts_with(m, "streamlit"))
+    pages = ("app/dashboard/", "app/cli/dashboard.py")
+    assert not offences(lambda n, m: set() if n.startswith(pages) else starts_with(m, "streamlit"))
 
 
 def test_rooms_of_the_chain_look_back_only() -> None:
@@ -103,14 +117,47 @@ def test_rooms_of_the_chain_look_back_only() -> None:
     assert not offences(wrong)
 
 
-def test_files_stay_small() -> None:
-    long = {name_of(p): n for p in FILES if (n := len(p.read_text(encoding="utf-8").splitlines())) > 400}
-    assert not long
+def test_rooms_are_entered_by_their_faces() -> None:
+    def wrong(name: str, modules: set[str]) -> set[str]:
+        own = ".".join(name.split("/")[:2])
+        return {m for m in starts_with(modules, *LAYERS) if is_private(m) and not m.startswith(own + ".")}
+
+    assert not offences(wrong)
 
 
-def test_start_up_is_light() -> None:
-    """`import gearsig` loads none of the heavy libraries; they load when they are used."""
-    heavy = ("scipy", "pandas", "matplotlib", "numba", "h5py", "pyarrow", "streamlit", "plotly")
-    code = f"import gearsig, sys; print([m for m in {heavy!r} if m in sys.modules])"
+def test_faces_list_what_they_offer() -> None:
+    bare = []
+    for path in FILES:
+        room = path.parent.relative_to(ROOT).parts
+        if path.name == "__init__.py" and room[0] != "app" and len(room) == 2:
+            names = [n.targets[0].id for n in ast.parse(path.read_text("utf-8")).body if isinstance(n, ast.Assign)]  # type: ignore[attr-defined]
+            if "__all__" not in names:
+                bare.append(name_of(path))
+    assert not bare
+
+
+def test_a_class_name_exists_once() -> None:
+    places = defaultdict(list)
+    for path in FILES:
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                places[node.name].append(name_of(path))
+    assert not {name: where for name, where in places.items() if len(where) > 1}
+
+
+def test_modules_are_subjects_and_not_scraps() -> None:
+    """A tenth of the modules at most are shorter than sixty lines; none is longer than 1000."""
+    lengths = Counter({name_of(p): len(p.read_text("utf-8").splitlines()) for p in FILES if p.name != "__init__.py"})
+    assert not {name: n for name, n in lengths.items() if n > 1000}
+    effects = [name for name in lengths if name.startswith("sims/effects/")]
+    short = [name for name, n in lengths.items() if n < 60 and name not in effects]
+    assert len(short) <= 0.1 * len(lengths), short
+
+
+@pytest.mark.parametrize("start", ["import gearsig", "import app.cli.main"])
+def test_start_up_is_light(start: str) -> None:
+    """The library and the command line load none of the heavy libraries before they are used."""
+    heavy = ("scipy", "pandas", "matplotlib", "numba", "h5py", "pyarrow", "streamlit", "plotly", "sklearn")
+    code = f"{start}, sys; print([m for m in {heavy!r} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

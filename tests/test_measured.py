@@ -6,11 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearsig.diagnosis.analyze import analyze
-from gearsig.diagnosis.types import Analysis, CannotTell, Finding, Kind
-from gearsig.recording.read import read_recording
-from gearsig.rig.speed import ConstantSpeed
-from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Shaft
+from gearsig.diagnosis import Analysis, CannotTell, Finding, Kind, analyze
+from gearsig.recording import read_recording
+from gearsig.rig import Bearing, ConstantSpeed, GearPair, OperatingPoint, Rig, Shaft
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the measured recordings are not here")

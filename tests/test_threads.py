@@ -6,28 +6,25 @@ from io import BytesIO
 import numpy as np
 import pytest
 
-from gearsig.angle.resample import resample_to_angle
-from gearsig.angle.types import ShaftAngle
-from gearsig.decompose.suggest import suggest_modes
-from gearsig.decompose.types import VmdSettings
-from gearsig.decompose.vmd import variational_modes
-from gearsig.decompose.wavelet_denoise import denoise_channel
-from gearsig.orders.map import order_map
-from gearsig.orders.vold_kalman import track_vold_kalman
-from gearsig.phase.plane import phase_plane
-from gearsig.plot.kurtogram import kurtogram_figure
-from gearsig.plot.time_frequency import time_frequency_figure
-from gearsig.recording.types import Channel, Recording
-from gearsig.spectra.coherence import channel_coherence
-from gearsig.spectra.coherence_order import order_coherence
-from gearsig.spectra.kurtogram import channel_kurtogram, kurtogram_envelope
-from gearsig.timefreq.component import component
-from gearsig.timefreq.cwt import cwt, cwt_map
-from gearsig.timefreq.packets import packet_inverse, wavelet_packets
-from gearsig.timefreq.ridges import ridges
-from gearsig.timefreq.squeezed_cwt import squeezed_cwt, squeezed_cwt_map
-from gearsig.timefreq.squeezed_stft import squeezed_stft_map
-from gearsig.timefreq.stft import stft_map
+from gearsig.angle import ShaftAngle, resample_to_angle
+from gearsig.decompose import VmdSettings, denoise_channel, suggest_modes, variational_modes
+from gearsig.orders import order_map, track_vold_kalman
+from gearsig.phase import phase_plane
+from gearsig.plot import kurtogram_figure, time_frequency_figure
+from gearsig.recording import Channel, Recording
+from gearsig.spectra import channel_coherence, channel_kurtogram, kurtogram_envelope, order_coherence
+from gearsig.timefreq import (
+    component,
+    cwt,
+    cwt_map,
+    packet_inverse,
+    ridges,
+    squeezed_cwt,
+    squeezed_cwt_map,
+    squeezed_stft_map,
+    stft_map,
+    wavelet_packets,
+)
 
 FS, N, N_THREADS = 8192.0, 8192, 4
 

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from gearsig.gap.types import GapCause, GapReport, Shrinkage
+from gearsig.gap import GapCause, GapReport, Shrinkage
 
 
 @dataclass(frozen=True)
 class AnsweredShrinkage:
-    """How far adding the cause shrinks the gap on held-out data; see `gearsig.gap.types.Shrinkage`."""
+    """How far adding the cause shrinks the gap on held-out data; see `gearsig.gap.Shrinkage`."""
 
     shrink: float
     slope: float
@@ -42,7 +42,7 @@ class AnsweredCause:
 
 @dataclass(frozen=True)
 class AnsweredPlace:
-    """A place of the gap; see `gearsig.gap.types.GapPlace`."""
+    """A place of the gap; see `gearsig.gap.GapPlace`."""
 
     kind: str
     shaft: str

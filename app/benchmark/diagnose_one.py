@@ -12,14 +12,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from app.benchmark.answer import Answer, answer_of, to_text
-from app.benchmark.diagnosers import diagnoser
-from app.benchmark.seen import Seen, read_seen
+from app.benchmark.diagnosers import VisibleCase, diagnoser, read_seen
 from gearsig.errors import GearsigError
 
 ANSWERS = "answers.json"
 
 
-def answered(name: str, seen: Seen) -> Answer:
+def answered(name: str, seen: VisibleCase) -> Answer:
     """Return one diagnoser's answer; every error becomes a reason."""
     started, cpu = time.perf_counter(), _cpu_s()
     try:

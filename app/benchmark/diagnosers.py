@@ -2,32 +2,107 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
-from app.benchmark.seen import Seen
+import numpy as np
+
+from app.benchmark.cases import SHARES
 from gearsig.errors import InputError
-from gearsig.gap.types import GapReport
+from gearsig.gap import (
+    INDEPENDENT,
+    NONE,
+    RULES,
+    SIDES,
+    UNKNOWN,
+    Added,
+    GapCause,
+    GapOutcome,
+    GapReport,
+    Interval,
+    ReducedRecording,
+    once,
+    reduce_recording,
+    rivals,
+    rule_strength,
+    sides_of,
+    without_machines_of,
+)
+from gearsig.recording import Recording, read_recording
+from gearsig.rig import Rig, read_rig
+from sims.effects import effects
 
-Diagnoser = Callable[[Seen], GapReport]
+# --------------------
+# What a diagnosing process sees of a case: one folder with recordings and rig files.
+# --------------------
 
-GAP, FOREST, MAJORITY, RULES = "gap", "forest", "majority", "rules"
+
+@dataclass(frozen=True)
+class VisibleCase:
+    """The recordings of a case.
+
+    Parameters
+    ----------
+    recordings, references : tuple of Recording
+        Reference i was recorded where recording i was; none: no reference at all.
+    rigs, reference_rigs : tuple of Rig
+    names : tuple of str
+        Of the recordings.
+    """
+
+    recordings: tuple[Recording, ...]
+    rigs: tuple[Rig, ...]
+    names: tuple[str, ...]
+    references: tuple[Recording, ...]
+    reference_rigs: tuple[Rig, ...]
+
+    @cached_property
+    def gathered(self) -> tuple[ReducedRecording, ...]:
+        """The recordings, reduced."""
+        return tuple(reduce_recording(r, rig) for r, rig in zip(self.recordings, self.rigs, strict=True))
+
+    @cached_property
+    def gathered_references(self) -> tuple[ReducedRecording, ...]:
+        """The references, reduced."""
+        return tuple(reduce_recording(r, rig) for r, rig in zip(self.references, self.reference_rigs, strict=True))
+
+
+def read_seen(folder: Path) -> VisibleCase:
+    """Read condition_1.h5, reference_1.h5 … with the rig files beside them."""
+    conditions, references = (sorted(folder.glob(f"{stem}_*.h5")) for stem in ("condition", "reference"))
+    rigs, reference_rigs = (
+        tuple(read_rig(p.with_suffix(".toml")) for p in paths) for paths in (conditions, references)
+    )
+    return VisibleCase(
+        tuple(read_recording(p, rig=rig) for p, rig in zip(conditions, rigs, strict=True)),
+        rigs,
+        tuple(p.name for p in conditions),
+        tuple(read_recording(p, rig=rig) for p, rig in zip(references, reference_rigs, strict=True)),
+        reference_rigs,
+    )
+
+
+Diagnoser = Callable[[VisibleCase], GapReport]
+
+GAP, FOREST, MAJORITY, DIAGNOSERS_RULES = "gap", "forest", "majority", "rules"
 GAP_UNSEEN, FOREST_UNSEEN = "gap-unseen", "forest-unseen"
 """The same without what was learned from the independent rig's development gears."""
 START_STOP = "start-stop"
 """Of machines that start and stop, by the model forging."""
-BASELINES = (MAJORITY, RULES)
+BASELINES = (MAJORITY, DIAGNOSERS_RULES)
 MAIN = "__main__"
 """A module that is another one in every process: the diagnosing process finds nothing of the caller's there."""
 _HOMES = {
     GAP: "app.benchmark.diagnosers:diagnose",
-    FOREST: "app.benchmark.forest:diagnose",
-    MAJORITY: "app.benchmark.majority:diagnose",
-    RULES: "app.benchmark.rules:diagnose",
-    GAP_UNSEEN: "app.benchmark.unseen:diagnose",
-    FOREST_UNSEEN: "app.benchmark.unseen:recognise",
+    FOREST: "app.benchmark.diagnosers:diagnose",
+    MAJORITY: "app.benchmark.diagnosers:diagnose",
+    DIAGNOSERS_RULES: "app.benchmark.diagnosers:diagnose",
+    GAP_UNSEEN: "app.benchmark.diagnosers:diagnose",
+    FOREST_UNSEEN: "app.benchmark.diagnosers:recognise",
     START_STOP: "app.benchmark.diagnosers:diagnose_drive",
 }
 
@@ -61,9 +136,9 @@ def folders_of(name: str) -> tuple[Path, ...]:
     return tuple(Path(place).absolute().parent for place in spec.submodule_search_locations or origin)
 
 
-def diagnose(seen: Seen) -> GapReport:
+def diagnose(seen: VisibleCase) -> GapReport:
     """Diagnose a case with the product itself; what is kept for its rig lies with the case and goes with it."""
-    from app.gap.diagnose import diagnose_gap
+    from gearsig.gap import diagnose_gap
     from sims.registry import gap_simulator
 
     return diagnose_gap(
@@ -77,9 +152,9 @@ def diagnose(seen: Seen) -> GapReport:
     )
 
 
-def diagnose_drive(seen: Seen) -> GapReport:
+def diagnose_drive(seen: VisibleCase) -> GapReport:
     """Diagnose a case of starts and stops with the product itself."""
-    from app.gap.start_stop.diagnose import diagnose_start_stop
+    from app.gap_start_stop.diagnose import diagnose_start_stop
 
     return diagnose_start_stop(
         seen.recordings,
@@ -88,3 +163,204 @@ def diagnose_drive(seen: Seen) -> GapReport:
         reference_rigs=seen.reference_rigs,
         names=seen.names,
     )
+
+
+# --------------------
+# A gap report of nothing but probabilities: what a baseline can say.
+# --------------------
+
+
+NUISANCE_GROUP = "measurement chain"
+_NOTHING = Interval(0.0, 0.0, 0.0)
+
+
+def bare_report(
+    simulator: str,
+    probabilities: Mapping[str, float],
+    options: Mapping[str, Mapping[str, str]] | None = None,
+    outcome: GapOutcome | None = None,
+) -> GapReport:
+    """Return the report of probabilities.
+
+    Parameters
+    ----------
+    simulator : str
+        Name of the baseline, where a report names its simulator.
+    probabilities : mapping
+        Cause → probability.
+    options : mapping or None
+        Cause → where it is put: gear, bearing.
+    outcome : GapOutcome or None
+        None: the likeliest cause's.
+    """
+    where = options or {}
+    ranked = sorted(probabilities.items(), key=lambda item: -item[1])
+    likeliest = {NONE: GapOutcome.NO_GAP, UNKNOWN: GapOutcome.UNKNOWN}.get(ranked[0][0], GapOutcome.EFFECT)
+    causes = tuple(_cause(name, p, where.get(name, {})) for name, p in ranked)
+    return GapReport(
+        rig="",
+        simulator=simulator,
+        conditions=(),
+        references=(),
+        outcome=outcome or likeliest,
+        size=_NOTHING,
+        repeatability=0.0,
+        places=(),
+        causes=causes,
+        groups={},
+        inseparable=rivals(causes) if outcome is GapOutcome.CANNOT_SEPARATE else None,
+    )
+
+
+def _cause(name: str, probability: float, options: Mapping[str, str]) -> GapCause:
+    known = effects().get(name)
+    if known is None:
+        return GapCause(name, "", name, "", probability)
+    return GapCause(
+        name,
+        known.group,
+        known.title,
+        known.severity.unit,
+        probability,
+        fitted=Added(name, known.severity.typical, options),
+        is_nuisance=known.group == NUISANCE_GROUP,
+    )
+
+
+# --------------------
+# The baseline that asks the forests only: nothing is tried on the rig's twin.
+# --------------------
+
+
+def diagnose_forest(seen: VisibleCase) -> GapReport:
+    """Return the calibrated probabilities of the forests, what may be said of them, and the shaft that shows it."""
+    from gearsig.gap import attribute, conditions_of, told_options
+    from sims.registry import gap_simulator
+
+    simulator = gap_simulator("cracked")
+    twin = simulator.twin_of(seen.rigs[0])
+    conditions, _ = conditions_of(
+        seen.recordings, seen.rigs, seen.references, seen.reference_rigs, twin, seen.names, lambda *_: None
+    )
+    weighed = attribute(conditions, simulator.gap_effects(), (), twin, None, lambda *_: None, most_tried=0)
+    probabilities = weighed.probabilities()
+    changes, teeth = [condition.over_floors for condition in conditions], conditions[0].now.frame.teeth
+    shafts = {name: told_options(name, changes, teeth) for name in probabilities}
+    return bare_report("forest", probabilities, shafts, weighed.calibration.outcome(probabilities))
+
+
+# --------------------
+# The baseline that looks at nothing: it always answers with the shares of the kinds of case.
+# --------------------
+
+
+def diagnose_majority(seen: VisibleCase) -> GapReport:  # noqa: ARG001 - that is the point of it
+    """Return the shares; the likeliest is "none"."""
+    of_each = (SHARES["single"] + SHARES["pair"]) / len(effects())
+    return bare_report(
+        "majority", {NONE: SHARES["none"], UNKNOWN: SHARES["unknown"], **dict.fromkeys(effects(), of_each)}
+    )
+
+
+# --------------------
+# The diagnosis as it is of machines like none that it knows: nothing of the independent rig is in its population.
+# --------------------
+
+
+def diagnose_unseen(seen: VisibleCase) -> GapReport:
+    """Diagnose a case with the product, but for what was learned from the independent rig's development gears."""
+    with without_machines_of(INDEPENDENT):
+        return diagnose(seen)
+
+
+def recognise(seen: VisibleCase) -> GapReport:
+    """Return what the forests say of a case without what was learned from those gears."""
+    with without_machines_of(INDEPENDENT):
+        return diagnose_forest(seen)
+
+
+# --------------------
+# What is usual of the features in the rule table of `gearsig.gap`, for the baseline that applies it.
+#
+# A feature counts by how far it is from usual, over its usual spread. With a healthy reference the change against it
+# counts, over the change's usual spread. Usual: the middle and the spread of 24 healthy machines of the development
+# cases, rounded.
+# --------------------
+
+
+LEAST_STRENGTH = 2.0
+"""In spreads: the strength at which "none" stands."""
+
+USUAL: dict[str, tuple[float, float, float]] = {
+    "mesh.total": (5.0, 16.0, 1.5),
+    "mesh.share.2": (-15.0, 9.0, 1.5),
+    "mesh.share.3": (-28.0, 12.0, 2.0),
+    "mesh.share.4": (-35.0, 12.0, 2.0),
+    "mesh.half": (-60.0, 18.0, 2.0),
+    "sideband.{side}.1": (-27.0, 14.0, 3.0),
+    "sideband.{side}.2": (-29.0, 14.0, 2.5),
+    "sideband.{side}.3to5": (-37.0, 15.0, 2.5),
+    "sideband.{side}.6to12": (-38.0, 15.0, 1.5),
+    "sideband.{side}.strongest": (29.0, 7.0, 2.0),
+    "shaft.{side}.1": (-38.0, 16.0, 3.5),
+    "shaft.{side}.1.to_mesh": (-43.0, 20.0, 4.0),
+    "shaft.{side}.2": (-30.0, 18.0, 2.0),
+    "shaft.{side}.3": (-44.0, 14.0, 4.0),
+    "shaft.{side}.strongest": (19.0, 7.0, 2.5),
+    "shaft.{side}.low": (-40.0, 21.0, 2.0),
+    "tooth.driver.elsewhere": (-16.0, 15.0, 1.0),
+    "tooth.{side}.elsewhere": (-15.0, 15.0, 1.0),
+    "tooth.{side}.peak": (-8.0, 16.0, 1.5),
+    "tooth.{side}.prominence": (6.0, 3.0, 1.5),
+    "tooth.{side}.second": (0.8, 1.4, 1.0),
+    "tooth.{side}.kurtosis": (4.7, 1.3, 0.7),
+    "tooth.{side}.centroid": (1.2, 4.0, 0.3),
+    "envelope.outer": (4.7, 4.0, 1.6),
+    "envelope.inner": (5.4, 3.6, 1.8),
+    "envelope.cage": (4.7, 4.4, 1.8),
+    "envelope.strange": (11.0, 5.4, 2.2),
+    "line.half_mesh": (0.6, 3.2, 1.4),
+    "line.strange": (13.0, 6.0, 2.9),
+    "floor.band.2": (-9.0, 15.0, 3.0),
+    "floor.band.3": (-11.0, 14.0, 1.5),
+    "floor.band.4": (-23.0, 12.0, 1.0),
+    "raw.level": (8.0, 9.0, 1.4),
+    "raw.kurtosis": (3.3, 2.2, 1.0),
+    "raw.near_the_extreme": (-47.0, 2.3, 2.2),
+    "speed.drift": (-61.0, 11.0, 11.0),
+    "speed.swing": (-60.0, 8.0, 3.7),
+    "hum": (8.0, 6.0, 2.0),
+}
+"""Feature → usual value, its spread, and the usual spread of its change against a reference, in dB."""
+
+# --------------------
+# The baseline that applies the rule table of `gearsig.gap`.
+# --------------------
+
+
+def diagnose_rules(seen: VisibleCase) -> GapReport:
+    """Return the rules' strengths as probabilities, by exponentials; conditions count alike."""
+    found: dict[str, tuple[float, str]] = {NONE: (LEAST_STRENGTH, "")}
+    each = list(_deviations(seen))
+    for rule in RULES:
+        for side in sides_of(rule):
+            strength = float(np.mean([rule_strength(rule, side, deviations) for deviations in each]))
+            if strength > found.get(rule.cause, (-np.inf, ""))[0]:
+                found[rule.cause] = strength, side
+    weights = {cause: float(np.exp(strength)) for cause, (strength, _) in found.items()}
+    total = sum(weights.values())
+    options = {cause: {"gear": side} for cause, (_, side) in found.items() if side}
+    return bare_report("rules", {cause: weight / total for cause, weight in weights.items()}, options)
+
+
+def _deviations(seen: VisibleCase) -> Iterator[dict[str, float]]:
+    """Yield, for each condition, how far every feature of the table is from usual, in spreads."""
+    for i, gathered in enumerate(seen.gathered):
+        values = dict(zip(*once(gathered), strict=True))
+        before = dict(zip(*once(seen.gathered_references[i]), strict=True)) if seen.gathered_references else None
+        found = {}
+        for name, (usual, spread, change) in USUAL.items():
+            for side in SIDES:
+                own = name.format(side=side)
+                found[own] = (values[own] - usual) / spread if before is None else (values[own] - before[own]) / change
+        yield found

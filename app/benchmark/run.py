@@ -2,22 +2,180 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import hashlib
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
+from typing import Any, Generic, TypeVar
 
-from app.benchmark.answer import Answer
-from app.benchmark.blind_run import BlindRun, state_of_code
-from app.benchmark.diagnosers import diagnoser
-from app.benchmark.make import Truth, make_case
-from app.benchmark.plan import Plan, PlannedCase
+import app
+from app.benchmark.answer import Answer, from_text, to_text
+from app.benchmark.cases import Plan, PlannedCase, Truth, make_case
+from app.benchmark.diagnose_one import ANSWERS
+from app.benchmark.diagnosers import diagnoser, folders_of
+from app.stopping import Running, stop
 from gearsig import __version__
+from gearsig.cache import FOLDERS
+from gearsig.checks import count
+from gearsig.processes import process_pool
+from sims.sweep import claimed, written
+
+# --------------------
+# Makes cases and has them answered: each by a fresh process in a folder of its own, which is then forgotten.
+#
+# Labels and twins exist in the memory of the making processes and of this one only, until every diagnosis has ended;
+# the folder of a case has a random name, is removed with the answer, and holds recordings and rig files only. What is
+# kept on the way are answers. An answer that is there already is not asked for again; its truth is made anew from the
+# seed.
+# --------------------
+
+
+DEFINITION, ANSWERS_FOLDER = "benchmark.json", "answers"
+LONGEST_S = 900.0
+"""A diagnosis that takes longer has no answer."""
+
+_SHOWS_ONLY = {"plot", "report", "scoring"}
+"""Rooms that neither make a case nor answer one: they may change between an answer and its score."""
+
+_PASSED_ON = ("PATH", "LANG", "LC_ALL", "HOME", "SYSTEMROOT", "VIRTUAL_ENV", "NUMBA_CACHE_DIR", *FOLDERS)
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+_ROOT = Path(app.__file__).resolve().parents[1]
+
+AnyTruth = TypeVar("AnyTruth")
 
 
 @dataclass(frozen=True)
-class Wanted:
+class BlindRun(Generic[AnyTruth]):
+    """Numbered cases, how one is made, and who answers.
+
+    Parameters
+    ----------
+    numbers : sequence of int
+    make : callable
+        Number and folder → truth; writes what may be seen into the folder, nowhere where it is None. Another process
+        calls it.
+    diagnosers : tuple of str
+    definition : mapping
+        What decides the answers, as plain values.
+    """
+
+    numbers: Sequence[int]
+    make: Callable[[int, Path | None], AnyTruth]
+    diagnosers: tuple[str, ...]
+    definition: Mapping[str, Any]
+
+    def answered(
+        self, folder: Path, *, n_processes: int = 2, on_progress: Callable[[int], object] | None = None
+    ) -> Iterable[tuple[int, AnyTruth, dict[str, Answer]]]:
+        """Return number, truth and answers of all cases, in order, made and diagnosed in as many processes.
+
+        After Ctrl-C or SIGTERM the answers so far stay in the folder, and the same call goes on from there.
+
+        Raises
+        ------
+        InputError
+            If the folder holds other things or another benchmark.
+        """
+        claimed(folder, dict(self.definition), DEFINITION, "benchmark")
+        (folder / ANSWERS_FOLDER).mkdir(exist_ok=True)
+        workers = count(n_processes, "processes")
+        found: list[tuple[int, AnyTruth, dict[str, Answer]]] = []
+        running = Running()
+        with process_pool(workers) as makers, ThreadPoolExecutor(workers) as threads:
+            futures = [threads.submit(self._one, number, folder, makers, running) for number in self.numbers]
+            try:
+                for future in as_completed(futures):
+                    found.append(future.result())
+                    if on_progress is not None:
+                        on_progress(len(found))
+            finally:
+                for future in futures:
+                    future.cancel()
+                running.stop()
+        return sorted(found, key=lambda one: one[0])
+
+    def _one(
+        self, number: int, folder: Path, makers: Executor, running: Running
+    ) -> tuple[int, AnyTruth, dict[str, Answer]]:
+        kept = folder / ANSWERS_FOLDER / f"case_{number:04d}.json"
+        if kept.exists():
+            truth = makers.submit(self.make, number, None).result()
+            return number, truth, from_text(kept.read_text(encoding="utf-8"))
+        with TemporaryDirectory(prefix="gearsig-") as name:
+            place = Path(name)
+            truth = makers.submit(self.make, number, place).result()
+            answers = diagnosed(place, self.diagnosers, running)
+        written(kept, to_text(answers))
+        return number, truth, answers
+
+
+def n_answered(folder: Path) -> int:
+    """Cases whose answers the folder holds."""
+    return len(list((folder / ANSWERS_FOLDER).glob("case_*.json")))
+
+
+def diagnosed(folder: Path, names: Sequence[str], running: Running | None = None) -> dict[str, Answer]:
+    """Return the answers of a fresh process that is given the folder and nothing else.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If what runs was stopped: that is no answer.
+    """
+    runs = running or Running()
+    process = runs.start(
+        [sys.executable, "-m", "app.benchmark.diagnose_one", *names],
+        cwd=folder,
+        env=environment(folder, names),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        _, said = process.communicate(timeout=LONGEST_S)
+    except subprocess.TimeoutExpired:
+        return dict.fromkeys(names, Answer("", seconds=LONGEST_S, error=f"no answer within {LONGEST_S:g} s"))
+    finally:
+        stop(process)
+        by_itself = runs.ended(process)
+    if not by_itself:
+        raise KeyboardInterrupt
+    if process.returncode != 0:
+        last = said.strip().rpartition("\n")[2]
+        return dict.fromkeys(names, Answer("", error=f"the process ended with {process.returncode}: {last}"))
+    return from_text((folder / ANSWERS).read_text(encoding="utf-8"))
+
+
+def environment(folder: Path, names: Sequence[str]) -> dict[str, str]:
+    """Return all that the process of some diagnosers finds in its environment.
+
+    Of the caller's own PYTHONPATH it gets the folders that these diagnosers' modules lie in and nothing else.
+    """
+    passed_on = {name: os.environ[name] for name in _PASSED_ON if name in os.environ}
+    modules = dict.fromkeys([_ROOT, *(place for name in names for place in folders_of(name))])
+    path = os.pathsep.join(map(str, modules))
+    return passed_on | dict.fromkeys(_ONE_THREAD, "1") | {"TMPDIR": str(folder), "PYTHONPATH": path}
+
+
+def state_of_code() -> str:
+    """Return a hash of everything that makes or answers a case: answers of other code are no answers of this one."""
+    found = hashlib.sha256()
+    for room in ("gearsig", "sims", "app/gap", "app/benchmark"):
+        for path in sorted((_ROOT / room).rglob("*")):
+            own = path.relative_to(_ROOT)
+            if path.suffix in (".py", ".json", ".toml", ".npz") and not _SHOWS_ONLY & set(own.parts):
+                found.update(own.as_posix().encode() + b"\0" + path.read_bytes())
+    return found.hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class BenchmarkRequest:
     """A benchmark as it is asked for.
 
     Parameters
@@ -66,14 +224,14 @@ class Done:
 
 
 def run_benchmark(
-    wanted: Wanted, folder: Path, *, n_processes: int = 2, on_progress: Callable[[int], object] | None = None
+    wanted: BenchmarkRequest, folder: Path, *, n_processes: int = 2, on_progress: Callable[[int], object] | None = None
 ) -> list[Done]:
     """Make and diagnose all cases, in as many processes; return them in the plan's order.
 
     Raises
     ------
     InputError
-        See `app.benchmark.blind_run`; or if a diagnoser is not there, or the code has changed.
+        See `app.benchmark.run`; or if a diagnoser is not there, or the code has changed.
     """
     cases = {planned.number: planned for planned in wanted.plan.cases()}
     run = BlindRun(sorted(cases), partial(_make, wanted.plan, cases), wanted.diagnosers, wanted.definition())

@@ -15,13 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from app.benchmark.start_stop_seen import collect, planned
-from app.gap.start_stop.compare import HALF
-from app.gap.start_stop.weighing import Seen, Weighed, weigh
+from app.benchmark.start_stop import collect, planned
+from app.gap_start_stop.predict import HALF, DriveAttribution, DriveEvidence, weigh
 from gearsig.checks import FloatArray
-from gearsig.gap.posterior import GapCalibration
-from gearsig.gap.start_stop.floors import FILE, DriveFloor
-from gearsig.gap.types import NONE, UNKNOWN
+from gearsig.gap import FLOORS_FILE, NONE, UNKNOWN, DriveFloor, GapCalibration
 
 ROLE = "calibration"
 NEUTRAL_SHRINK = 0.3
@@ -33,7 +30,7 @@ FALSE_ALARMS = 0.05
 LEAST_NAMED, MOST_NAMED, APART = 0.6, 0.95, 0.7
 LEAST_SHARE = 1e-6
 
-Row = tuple[Mapping[str, Any], Seen]
+Row = tuple[Mapping[str, Any], DriveEvidence]
 
 
 def truth_of(label: Mapping[str, Any]) -> str:
@@ -56,7 +53,7 @@ def fit_part(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def fit_calibration(weighed: Sequence[tuple[str, Weighed]]) -> GapCalibration:
+def fit_calibration(weighed: Sequence[tuple[str, DriveAttribution]]) -> GapCalibration:
     """Fit sharpness, weight of the shrink and both biases to what was true: least −log p, drawn to the start."""
     from scipy.optimize import minimize
 
@@ -78,7 +75,7 @@ def _calibration(values: FloatArray, named_from: float = LEAST_NAMED) -> GapCali
     return GapCalibration(max(sharpness, 0.05), weight, NEUTRAL_SHRINK, none, unknown, named_from, APART)
 
 
-def _probabilities(calibration: GapCalibration, weighed: Weighed) -> dict[str, float]:
+def _probabilities(calibration: GapCalibration, weighed: DriveAttribution) -> dict[str, float]:
     return calibration.probabilities(weighed.shares, weighed.scores)
 
 
@@ -110,7 +107,7 @@ def numbers_of(text: str, n_planned: int) -> list[int]:
 
 def write_floors(rows: Sequence[Row], seed: int, drawn: str) -> None:
     """Write what a seed's cases give into the package."""
-    FILE.write_text(json.dumps(floors_of(rows, seed, drawn), indent=1) + "\n", encoding="utf-8")
+    FLOORS_FILE.write_text(json.dumps(floors_of(rows, seed, drawn), indent=1) + "\n", encoding="utf-8")
 
 
 def floors_of(rows: Sequence[Row], seed: int, drawn: str = "all") -> dict[str, Any]:

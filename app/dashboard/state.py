@@ -7,7 +7,7 @@ from pathlib import Path
 
 import streamlit as st
 
-from gearsig.diagnosis.types import Analysis
+from gearsig.diagnosis import Analysis
 
 ORIGIN, SAMPLE, RECORDING_FILE, RIG_FILE = "origin", "sample", "recording file", "rig file"
 TAB, CHANNEL = "tab", "channel"
@@ -18,7 +18,7 @@ _CHOSEN, _SIMULATED, _UPLOAD, _REFERENCE, _FILES = "chosen", "simulated", "uploa
 
 
 @dataclass(frozen=True)
-class Request:
+class AnalysisRequest:
     """A recording and everything else that decides its analysis: equal requests have equal answers.
 
     Parameters
@@ -52,7 +52,7 @@ class Request:
 class Chosen:
     """A request, and where its bytes are: files of this machine (samples), or in memory (uploads)."""
 
-    request: Request
+    request: AnalysisRequest
     content: Path | memoryview
     reference: Path | memoryview | None = None
 

@@ -16,9 +16,9 @@ from threading import Thread
 from time import monotonic
 from typing import Any
 
-from app.gap.inputs import Asked
+from app.gap.run import GapRequest
 from gearsig.errors import GearsigError, InputError, RefusalError
-from gearsig.report.files import write_text
+from gearsig.report import write_text
 
 REQUEST, PROGRESS, ERROR, RESULTS = "request.json", "progress.json", "error.json", "results"
 EXIT_REFUSED = 2
@@ -28,7 +28,7 @@ EVERY_S = 0.2
 
 def main(folder: Path) -> int:
     """Diagnose what the folder asks for."""
-    from app.gap.results import write_results
+    from app.gap.job import write_results
     from app.gap.run import run_gap
 
     asked, model, cache, command = _request(folder)
@@ -41,7 +41,7 @@ def main(folder: Path) -> int:
     return 0
 
 
-def write_request(folder: Path, asked: Asked, model: str, cache: Path | None, command: str) -> None:
+def write_request(folder: Path, asked: GapRequest, model: str, cache: Path | None, command: str) -> None:
     """Write what the process is to do."""
     found = {"asked": asdict(asked), "model": model, "cache": cache, "command": command}
     write_text(folder / REQUEST, json.dumps(found, default=str))
@@ -76,10 +76,10 @@ class _Progress:
         write_text(self._path, json.dumps({"stage": stage, "done": float(done)}))
 
 
-def _request(folder: Path) -> tuple[Asked, str, Path | None, str]:
+def _request(folder: Path) -> tuple[GapRequest, str, Path | None, str]:
     found: dict[str, Any] = json.loads((folder / REQUEST).read_text(encoding="utf-8"))
     given = found["asked"]
-    asked = Asked(
+    asked = GapRequest(
         tuple(map(Path, given["recordings"])),
         tuple(map(Path, given["references"])),
         Path(given["rig"]) if given["rig"] else None,

@@ -1,1 +1,39 @@
 """Shaft speed and angle, and resampling over angle."""
+
+from gearsig.angle._encoder import encoder_angle, speed_channel_angle
+from gearsig.angle._pulses import clock_tick, count_pulses, find_pulse_edges, pulse_train_angle
+from gearsig.angle._resample import (
+    PASSBAND,
+    REACH,
+    delay_table,
+    doubling_filter,
+    interpolate,
+    resample_to_angle,
+    times_at,
+)
+from gearsig.angle._source import constant_speed_angle, find_shaft_angle
+from gearsig.angle._tachless import comb_evidence, estimate_shaft_angle, refine_by_phase
+from gearsig.angle._types import AngleSignal, ShaftAngle
+
+__all__ = [
+    "PASSBAND",
+    "REACH",
+    "AngleSignal",
+    "ShaftAngle",
+    "clock_tick",
+    "comb_evidence",
+    "constant_speed_angle",
+    "count_pulses",
+    "delay_table",
+    "doubling_filter",
+    "encoder_angle",
+    "estimate_shaft_angle",
+    "find_pulse_edges",
+    "find_shaft_angle",
+    "interpolate",
+    "pulse_train_angle",
+    "refine_by_phase",
+    "resample_to_angle",
+    "speed_channel_angle",
+    "times_at",
+]

@@ -1,1 +1,57 @@
 """Signals taken apart: variational modes, wavelet denoising."""
+
+from gearsig.decompose._long_signals import joined, long_modes, modes_by_block
+from gearsig.decompose._suggestion import ModeSuggestion, ModeTrial, noise_width, suggest_modes
+from gearsig.decompose._types import ModeAxis, Modes, StartName, VmdSettings
+from gearsig.decompose._vmd import (
+    angle_modes,
+    channel_envelope_modes,
+    channel_modes,
+    envelope_modes,
+    mode_spectra,
+    peak_centres,
+    variational_modes,
+)
+from gearsig.decompose._wavelet_denoising import (
+    Denoised,
+    DenoiseSettings,
+    apply,
+    bayes,
+    deepest_level,
+    denoise,
+    denoise_channel,
+    noise_level,
+    sure,
+    universal,
+)
+
+__all__ = [
+    "DenoiseSettings",
+    "Denoised",
+    "ModeAxis",
+    "ModeSuggestion",
+    "ModeTrial",
+    "Modes",
+    "StartName",
+    "VmdSettings",
+    "angle_modes",
+    "apply",
+    "bayes",
+    "channel_envelope_modes",
+    "channel_modes",
+    "deepest_level",
+    "denoise",
+    "denoise_channel",
+    "envelope_modes",
+    "joined",
+    "long_modes",
+    "mode_spectra",
+    "modes_by_block",
+    "noise_level",
+    "noise_width",
+    "peak_centres",
+    "suggest_modes",
+    "sure",
+    "universal",
+    "variational_modes",
+]

@@ -1,1 +1,93 @@
 """Motion in its phase space: portraits, Poincaré sections, embedding, Lyapunov exponents."""
+
+from gearsig.phase._bifurcation import (
+    TwoMotions,
+    bifurcation_diagram,
+    bifurcation_of_recordings,
+    bifurcation_of_runs,
+    coexistence_ranges,
+    step_of,
+    values_apart,
+)
+from gearsig.phase._embedding import (
+    average_mutual_information,
+    delay_embedding,
+    delay_vectors,
+    embed_channel,
+    embedding_dimension,
+)
+from gearsig.phase._kind import (
+    MotionKind,
+    kind_of_motion,
+    mean_square_displacement,
+    translation_walk,
+    zero_one_test,
+    zero_one_test_of_section,
+)
+from gearsig.phase._lyapunov import largest_lyapunov_exponent
+from gearsig.phase._measures import (
+    ChaosTest,
+    EmbeddingDimension,
+    LyapunovExponent,
+    MutualInformation,
+    RecurrenceMeasures,
+    RecurrencePlot,
+)
+from gearsig.phase._neighbours import nearest_apart, spaced
+from gearsig.phase._plane import LEAST_PERIODS, SETTLING_PERIODS, MotionQuantity, phase_plane, phase_plane_of
+from gearsig.phase._recurrence import recurrence_measures, recurrence_plot
+from gearsig.phase._section import (
+    CycleLock,
+    constant_period_lock,
+    find_lock,
+    geometric_section,
+    locked_section,
+    section_period,
+)
+from gearsig.phase._types import BifurcationDiagram, PhasePortrait, PoincareSection
+
+__all__ = [
+    "LEAST_PERIODS",
+    "SETTLING_PERIODS",
+    "BifurcationDiagram",
+    "ChaosTest",
+    "CycleLock",
+    "EmbeddingDimension",
+    "LyapunovExponent",
+    "MotionKind",
+    "MotionQuantity",
+    "MutualInformation",
+    "PhasePortrait",
+    "PoincareSection",
+    "RecurrenceMeasures",
+    "RecurrencePlot",
+    "TwoMotions",
+    "average_mutual_information",
+    "bifurcation_diagram",
+    "bifurcation_of_recordings",
+    "bifurcation_of_runs",
+    "coexistence_ranges",
+    "constant_period_lock",
+    "delay_embedding",
+    "delay_vectors",
+    "embed_channel",
+    "embedding_dimension",
+    "find_lock",
+    "geometric_section",
+    "kind_of_motion",
+    "largest_lyapunov_exponent",
+    "locked_section",
+    "mean_square_displacement",
+    "nearest_apart",
+    "phase_plane",
+    "phase_plane_of",
+    "recurrence_measures",
+    "recurrence_plot",
+    "section_period",
+    "spaced",
+    "step_of",
+    "translation_walk",
+    "values_apart",
+    "zero_one_test",
+    "zero_one_test_of_section",
+]

@@ -1,1 +1,146 @@
 """Figures of results; no arithmetic beyond display units."""
+
+from gearsig.plot._average import average_figure, polar_figure
+from gearsig.plot._benchmark import calibration_figure, confusion_figure
+from gearsig.plot._comparison import average_overlay_figure, band_levels_figure, order_overlay_figure
+from gearsig.plot._cursors import LONGEST, PRIORITY, AngleMark, Cursor, marks_of, n_rows, order_cursors, place
+from gearsig.plot._embed import Captioned, Picture, embed
+from gearsig.plot._fe_gear import draw_shaded, gear_mesh_figure, gear_modes_figure, gear_stress_figure
+from gearsig.plot._flexible import (
+    contact_spreading_figure,
+    frequency_curves_figure,
+    mesh_maps_figure,
+    speed_spectra_figure,
+    speed_sweep_figure,
+)
+from gearsig.plot._gap import (
+    INNER,
+    OUTER,
+    gap_averages_figure,
+    gap_evidence_figure,
+    gap_lines_figure,
+    gap_orders_figure,
+    gap_teeth_figure,
+    gap_waterfall_figure,
+)
+from gearsig.plot._maps import coherence_figure, kurtogram_figure, order_map_figure, time_frequency_figure
+from gearsig.plot._mesh import (
+    backlash_figure,
+    friction_figure,
+    load_sharing_figure,
+    mesh_stiffness_figure,
+    tooth_figure,
+)
+from gearsig.plot._modes import modes_figure
+from gearsig.plot._phase import (
+    bifurcation_figure,
+    chaos_test_figure,
+    divergence_figure,
+    embedding_figure,
+    phase_portrait_figure,
+    recurrence_figure,
+)
+from gearsig.plot._response import ResponseCase, crack_comparison_figure, response_figure
+from gearsig.plot._series import envelope, thin
+from gearsig.plot._spectrum import (
+    LEAST_SPAN,
+    METHODS,
+    order_levels_figure,
+    spectrum_figure,
+    speed_figure,
+    time_figure,
+    trend_figure,
+)
+from gearsig.plot._start_stop import (
+    FAULTY,
+    SOUND,
+    course_figure,
+    force_figure,
+    impacts_figure,
+    noise_figure,
+    start_stop_figure,
+    start_stop_pair_figure,
+)
+from gearsig.plot._style import FAULT, Scale, above_zero, decibels, new_figure, plain, unit_text, with_unit
+
+__all__ = [
+    "FAULT",
+    "FAULTY",
+    "INNER",
+    "LEAST_SPAN",
+    "LONGEST",
+    "METHODS",
+    "OUTER",
+    "PRIORITY",
+    "SOUND",
+    "AngleMark",
+    "Captioned",
+    "Cursor",
+    "Picture",
+    "ResponseCase",
+    "Scale",
+    "above_zero",
+    "average_figure",
+    "average_overlay_figure",
+    "backlash_figure",
+    "band_levels_figure",
+    "bifurcation_figure",
+    "calibration_figure",
+    "chaos_test_figure",
+    "coherence_figure",
+    "confusion_figure",
+    "contact_spreading_figure",
+    "course_figure",
+    "crack_comparison_figure",
+    "decibels",
+    "divergence_figure",
+    "draw_shaded",
+    "embed",
+    "embedding_figure",
+    "envelope",
+    "force_figure",
+    "frequency_curves_figure",
+    "friction_figure",
+    "gap_averages_figure",
+    "gap_evidence_figure",
+    "gap_lines_figure",
+    "gap_orders_figure",
+    "gap_teeth_figure",
+    "gap_waterfall_figure",
+    "gear_mesh_figure",
+    "gear_modes_figure",
+    "gear_stress_figure",
+    "impacts_figure",
+    "kurtogram_figure",
+    "load_sharing_figure",
+    "marks_of",
+    "mesh_maps_figure",
+    "mesh_stiffness_figure",
+    "modes_figure",
+    "n_rows",
+    "new_figure",
+    "noise_figure",
+    "order_cursors",
+    "order_levels_figure",
+    "order_map_figure",
+    "order_overlay_figure",
+    "phase_portrait_figure",
+    "place",
+    "plain",
+    "polar_figure",
+    "recurrence_figure",
+    "response_figure",
+    "spectrum_figure",
+    "speed_figure",
+    "speed_spectra_figure",
+    "speed_sweep_figure",
+    "start_stop_figure",
+    "start_stop_pair_figure",
+    "thin",
+    "time_figure",
+    "time_frequency_figure",
+    "tooth_figure",
+    "trend_figure",
+    "unit_text",
+    "with_unit",
+]

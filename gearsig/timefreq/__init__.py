@@ -1,1 +1,70 @@
 """Spectra over time: STFT, wavelets, synchrosqueezing, over time or shaft angle."""
+
+from gearsig.timefreq._component import component
+from gearsig.timefreq._cwt import cwt, cwt_map, inverse
+from gearsig.timefreq._packets import (
+    WaveletPackets,
+    natural_order,
+    node_path,
+    packet_inverse,
+    wavelet_packet_map,
+    wavelet_packets,
+)
+from gearsig.timefreq._ridges import NOT_HIDDEN, best_path, meetings, ridges, untangled
+from gearsig.timefreq._squeezed import squeeze_lines, squeezed_cwt, squeezed_cwt_map, squeezed_stft, squeezed_stft_map
+from gearsig.timefreq._stft import stft, stft_map
+from gearsig.timefreq._types import Axis, Reduction, Ridge, TimeFrequencyMap, at_label, axis_label
+from gearsig.timefreq._uniform import UniformSignal, uniform
+from gearsig.timefreq._wavelets import (
+    Morlet,
+    Morse,
+    admissibility,
+    band,
+    footprint_periods,
+    half_support,
+    lowest_possible,
+    pieces,
+    plan_groups,
+)
+
+__all__ = [
+    "NOT_HIDDEN",
+    "Axis",
+    "Morlet",
+    "Morse",
+    "Reduction",
+    "Ridge",
+    "TimeFrequencyMap",
+    "UniformSignal",
+    "WaveletPackets",
+    "admissibility",
+    "at_label",
+    "axis_label",
+    "band",
+    "best_path",
+    "component",
+    "cwt",
+    "cwt_map",
+    "footprint_periods",
+    "half_support",
+    "inverse",
+    "lowest_possible",
+    "meetings",
+    "natural_order",
+    "node_path",
+    "packet_inverse",
+    "pieces",
+    "plan_groups",
+    "ridges",
+    "squeeze_lines",
+    "squeezed_cwt",
+    "squeezed_cwt_map",
+    "squeezed_stft",
+    "squeezed_stft_map",
+    "stft",
+    "stft_map",
+    "uniform",
+    "untangled",
+    "wavelet_packet_map",
+    "wavelet_packets",
+]

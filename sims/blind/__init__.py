@@ -52,52 +52,81 @@ Names: `CATALOGUE` (19), `MECHANICAL` (16 of them), `OUTSIDE` (10). For the benc
 `SHAFTS`; `labels` and `write_seen` are the two halves of `write_case`.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from sims.blind.case import Case, CaseRecordings, Fault, draw_case, record_case
-    from sims.blind.changes.catalogue import CATALOGUE, MECHANICAL, OUTSIDE
-    from sims.blind.rig import ROLES, SHAFTS, BlindRig
-    from sims.blind.scene import Condition
-    from sims.blind.write import labels, write_case, write_seen
+from sims.blind._cases import BlindCase, CaseRecordings, Fault, draw_case, labels, record_case, write_case, write_seen
+from sims.blind._changes import (
+    CATALOGUE,
+    EVERY,
+    MECHANICAL,
+    OUTSIDE_CATALOGUE,
+    ROOT_MODULES,
+    crack_compliance,
+    wear_shape,
+)
+from sims.blind._march import march
+from sims.blind._rig import (
+    MODULES_MM,
+    ROLES,
+    SHAFTS,
+    BlindRig,
+    SpurPair,
+    draw_rig,
+    mass_matrix,
+    modes_of,
+    seen_rows,
+    step_coefficients,
+    stiffness_matrix,
+    teeth_of,
+)
+from sims.blind._scene import (
+    BlindMotion,
+    RunCondition,
+    Scene,
+    accelerations,
+    coloured_noise,
+    march_arguments,
+    measure,
+    path_response,
+    run,
+    scene_of,
+)
 
 __all__ = [
     "CATALOGUE",
+    "EVERY",
     "MECHANICAL",
-    "OUTSIDE",
+    "MODULES_MM",
+    "OUTSIDE_CATALOGUE",
     "ROLES",
+    "ROOT_MODULES",
     "SHAFTS",
+    "BlindCase",
+    "BlindMotion",
     "BlindRig",
-    "Case",
     "CaseRecordings",
-    "Condition",
     "Fault",
+    "RunCondition",
+    "Scene",
+    "SpurPair",
+    "accelerations",
+    "coloured_noise",
+    "crack_compliance",
     "draw_case",
+    "draw_rig",
     "labels",
+    "march",
+    "march_arguments",
+    "mass_matrix",
+    "measure",
+    "modes_of",
+    "path_response",
     "record_case",
+    "run",
+    "scene_of",
+    "seen_rows",
+    "step_coefficients",
+    "stiffness_matrix",
+    "teeth_of",
+    "wear_shape",
     "write_case",
     "write_seen",
 ]
-_HOMES = {
-    "CATALOGUE": "changes.catalogue",
-    "MECHANICAL": "changes.catalogue",
-    "OUTSIDE": "changes.catalogue",
-    "ROLES": "rig",
-    "SHAFTS": "rig",
-    "BlindRig": "rig",
-    "Condition": "scene",
-    "labels": "write",
-    "write_case": "write",
-    "write_seen": "write",
-}
-
-
-def __getattr__(name: str) -> Any:
-    """Load what is asked for when it is asked for: SciPy and numba stay out of start-up."""
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module
-
-    return getattr(import_module(f"sims.blind.{_HOMES.get(name, 'case')}"), name)

@@ -6,10 +6,26 @@ whose stiffness follows a parabola over the path, each with its own separation, 
 Kelvin–Voigt damping that fades in with depth; Coulomb–Stribeck friction; valves of first order. Effects are its own.
 """
 
-from __future__ import annotations
+from sims.blind_drive._case import Chain, DriveCase, MadeCase, draw_case, label_of, record_case, run
+from sims.blind_drive._kernel import N_STATES, march
+from sims.blind_drive._machine import CATALOGUE, GEARS, OUTSIDE, ROLES, BlindDrive, build, changed, draw_drawing
 
-from sims.blind_drive.case import DriveCase, MadeCase, draw_case, label_of, record_case
-from sims.blind_drive.changes import CATALOGUE, OUTSIDE
-from sims.blind_drive.machine import ROLES
-
-__all__ = ["CATALOGUE", "OUTSIDE", "ROLES", "DriveCase", "MadeCase", "draw_case", "label_of", "record_case"]
+__all__ = [
+    "CATALOGUE",
+    "GEARS",
+    "N_STATES",
+    "OUTSIDE",
+    "ROLES",
+    "BlindDrive",
+    "Chain",
+    "DriveCase",
+    "MadeCase",
+    "build",
+    "changed",
+    "draw_case",
+    "draw_drawing",
+    "label_of",
+    "march",
+    "record_case",
+    "run",
+]

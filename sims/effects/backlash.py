@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sims.effects.effect import Effect, OptionValue, Severity
+from sims.effects._effect import Effect, OptionValue, Severity
 from sims.machine import Machine
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sims.effects.bearing_choice import BEARING_OPTION, chosen_bearing, with_bearing
-from sims.effects.effect import Effect, OptionValue, Severity
+from sims.effects._effect import Effect, OptionValue, Severity
+from sims.effects._shared import BEARING_OPTION, chosen_bearing, with_bearing
 from sims.machine import Machine
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sims.effects.bearing_choice import RACE_OPTIONS, with_race_defect
-from sims.effects.effect import Effect, OptionValue, Severity
+from sims.effects._effect import Effect, OptionValue, Severity
+from sims.effects._shared import RACE_OPTIONS, with_race_defect
 from sims.machine import Machine
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sims.effects.chain_channels import with_each_channel
-from sims.effects.effect import Effect, OptionValue, Severity
+from sims.effects._effect import Effect, OptionValue, Severity
+from sims.effects._shared import with_each_channel
 from sims.machine import Machine
 from sims.measure import MeasuredChannel
 

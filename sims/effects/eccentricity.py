@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from sims.effects.catalogue import replaced_item
-from sims.effects.effect import GEAR_OPTION, Effect, OptionValue, Severity
-from sims.effects.gear_side import gear_index
-from sims.effects.polar import ANGLE_OPTION, angle_or_drawn_deg, vector_sum
+from sims.effects._catalogue import replaced_item
+from sims.effects._effect import GEAR_OPTION, Effect, OptionValue, Severity
+from sims.effects._shared import ANGLE_OPTION, angle_or_drawn_deg, gear_index, vector_sum
 from sims.machine import Machine
 
 

@@ -10,8 +10,8 @@ from math import pi
 import numpy as np
 
 from gearsig.errors import InputError
-from sims.effects.chain_channels import with_each_channel
-from sims.effects.effect import Effect, Option, OptionValue, Severity
+from sims.effects._effect import Effect, Option, OptionValue, Severity
+from sims.effects._shared import with_each_channel
 from sims.machine import Machine
 from sims.measure import MainsHum, MeasuredChannel
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.checks import within
-from sims.effects.catalogue import replaced_item
-from sims.effects.effect import Effect, Option, OptionValue, Severity
-from sims.effects.gear_side import GEARS, gear_index
+from sims.effects._catalogue import replaced_item
+from sims.effects._effect import Effect, Option, OptionValue, Severity
+from sims.effects._shared import GEARS, gear_index
 from sims.machine import Machine
 
 _MOST_DEG = 5.0  # of a ShaftLine

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.checks import within
-from sims.effects.effect import Effect, OptionValue, Severity
-from sims.machine import Machine
-from sims.machine.parts import MOST_DRY_FRICTION
+from sims.effects._effect import Effect, OptionValue, Severity
+from sims.machine import MOST_DRY_FRICTION, Machine
 
 
 def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:

@@ -9,7 +9,7 @@ from math import hypot
 import numpy as np
 
 from gearsig.errors import InputError
-from sims.effects.effect import Effect, Option, OptionValue, Severity
+from sims.effects._effect import Effect, Option, OptionValue, Severity
 from sims.machine import Machine, Roughness
 
 _AS_IT_IS = "as it is"

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sims.effects.effect import GEAR_OPTION, TOOTH_OPTION, Effect, Option, OptionValue, Severity
-from sims.effects.gear_side import gear_index, tooth_number, with_tooth_fault
+from sims.effects._effect import GEAR_OPTION, TOOTH_OPTION, Effect, Option, OptionValue, Severity
+from sims.effects._shared import gear_index, tooth_number, with_tooth_fault
 from sims.machine import Machine
 from sims.mesh import ToothSpall
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sims.effects.effect import GEAR_OPTION, Effect, OptionValue, Severity
-from sims.effects.gear_side import gear_index, mesh_field, with_mesh_field
+from sims.effects._effect import GEAR_OPTION, Effect, OptionValue, Severity
+from sims.effects._shared import gear_index, mesh_field, with_mesh_field
 from sims.machine import Machine
 from sims.mesh import FlankDeviation
 

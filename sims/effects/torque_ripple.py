@@ -8,7 +8,7 @@ from math import pi
 
 import numpy as np
 
-from sims.effects.effect import Effect, Option, OptionValue, Severity
+from sims.effects._effect import Effect, Option, OptionValue, Severity
 from sims.machine import Machine, TorqueRipple
 
 

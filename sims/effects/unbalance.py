@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.checks import within
-from sims.effects.catalogue import replaced_item
-from sims.effects.effect import GEAR_OPTION, Effect, OptionValue, Severity
-from sims.effects.gear_side import GEARS, gear_geometry, gear_index
-from sims.effects.polar import ANGLE_OPTION, angle_or_drawn_deg, vector_sum
+from sims.effects._catalogue import replaced_item
+from sims.effects._effect import GEAR_OPTION, Effect, OptionValue, Severity
+from sims.effects._shared import ANGLE_OPTION, GEARS, angle_or_drawn_deg, gear_geometry, gear_index, vector_sum
 from sims.machine import Machine
 
 LARGEST_OFFSET = 0.1

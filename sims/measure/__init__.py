@@ -1,14 +1,18 @@
-"""The measurement chain: from a machine's motion to a recording; see `sims.measure.chain`."""
+"""The measurement chain: from a machine's motion to a recording; see `sims.measure`."""
 
-from sims.measure.accelerometer import Accelerometer, Converter
-from sims.measure.chain import MeasuredChannel, MeasurementChain
-from sims.measure.counter import Encoder, PulseCounter
-from sims.measure.hum import MainsHum
-from sims.measure.motion import Motion
-from sims.measure.noise import ColouredNoise
-from sims.measure.path import ModalPath, PathMode
-from sims.measure.sampling import AntiAlias
-from sims.measure.tachometer import Tachometer
+from sims.measure._chain import AntiAlias, MeasuredChannel, MeasurementChain, Motion, plain, ratio_of_rates
+from sims.measure._sensors import (
+    Accelerometer,
+    ColouredNoise,
+    Converter,
+    MainsHum,
+    ModalPath,
+    PathMode,
+    apply,
+    discrete,
+    hold_error,
+)
+from sims.measure._tachometer import Encoder, PulseCounter, Tachometer, disc_edges, pulse_voltage
 
 __all__ = [
     "Accelerometer",
@@ -24,4 +28,11 @@ __all__ = [
     "PathMode",
     "PulseCounter",
     "Tachometer",
+    "apply",
+    "disc_edges",
+    "discrete",
+    "hold_error",
+    "plain",
+    "pulse_voltage",
+    "ratio_of_rates",
 ]

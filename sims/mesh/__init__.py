@@ -1,31 +1,85 @@
 """Shared gear physics: involute geometry and mesh stiffness of spur pairs."""
 
-from sims.mesh.chip import ToothChip, highest_chip_mm
-from sims.mesh.crack import RootCrack, crack_depth_mm, crack_percent, deepest_crack_mm
-from sims.mesh.deviation import FlankDeviation
-from sims.mesh.flank import arc_length_mm, flank_length_mm
-from sims.mesh.gear_mesh import GearMesh, ToothFaults
-from sims.mesh.geometry import GearGeometry, disc_inertia_kg_m2, disc_mass_kg
-from sims.mesh.involute import inverse_involute, involute
-from sims.mesh.material import STEEL, Material
-from sims.mesh.mesh_friction import MeshFriction, friction_over_mesh
-from sims.mesh.pair import PairGeometry
-from sims.mesh.profile import tooth_outline_mm
-from sims.mesh.roughness import FlankRoughness, FractalSurface, TimeLockedRoughness
-from sims.mesh.spall import ToothSpall
-from sims.mesh.stiffness import (
+from sims.mesh._backlash import FlankContact, dead_zone_m
+from sims.mesh._deviation import FlankDeviation, pitch_separation_m, wear_profile
+from sims.mesh._faults import (
+    RootCrack,
+    ToothChip,
+    ToothSpall,
+    check_crack,
+    check_spall,
+    crack_depth_mm,
+    crack_mouth_mm,
+    crack_percent,
+    crack_tip_mm,
+    deepest_crack_mm,
+    effective_flank_mm,
+    highest_chip_mm,
+    spans_face,
+)
+from sims.mesh._friction import (
+    COEFFICIENTS,
+    MOST_FRICTION,
+    MeshFriction,
+    contact_friction_n,
+    friction_coefficient,
+    friction_over_mesh,
+    line_contact_pressure_gpa,
+    oil_terms,
+    reduced_modulus_pa,
+    smooth_sign,
+)
+from sims.mesh._geometry import (
+    STEEL,
+    GearGeometry,
+    Material,
+    Outline,
+    disc_inertia_kg_m2,
+    disc_mass_kg,
+    fillet_outline,
+    inverse_involute,
+    involute,
+    involute_outline,
+    root_half_angle_rad,
+    tooth_outline_mm,
+)
+from sims.mesh._mesh_stiffness import (
     LoadSharing,
     MeshStiffness,
+    MeshTable,
     back_stiffness_n_per_m,
+    cubic,
+    engagement,
+    engagement_and_slope,
     mesh_stiffness,
+    mesh_table,
     one_mesh_cycle,
+    pair_force,
+    pair_states,
+    separation_rows,
     share_torque,
 )
-from sims.mesh.table import MeshTable, mesh_table
-from sims.mesh.wear import wear_profile
+from sims.mesh._pair import PairGeometry, arc_length_mm, curvature_radius_mm, flank_length_mm, part_inside
+from sims.mesh._roughness import FlankRoughness, FractalSurface, TimeLockedRoughness, advance, height_now
+from sims.mesh._stiffness import (
+    SOUND,
+    GearMesh,
+    ToothFaults,
+    cracked_tooth_compliance,
+    foundation_compliance,
+    foundation_factors,
+    foundation_notes,
+    linear_contact_compliance,
+    load_dependent_contact_coefficient,
+    tooth_compliance,
+)
 
 __all__ = [
+    "COEFFICIENTS",
+    "MOST_FRICTION",
+    "SOUND",
     "STEEL",
+    "FlankContact",
     "FlankDeviation",
     "FlankRoughness",
     "FractalSurface",
@@ -36,28 +90,63 @@ __all__ = [
     "MeshFriction",
     "MeshStiffness",
     "MeshTable",
+    "Outline",
     "PairGeometry",
     "RootCrack",
     "TimeLockedRoughness",
     "ToothChip",
     "ToothFaults",
     "ToothSpall",
+    "advance",
     "arc_length_mm",
     "back_stiffness_n_per_m",
+    "check_crack",
+    "check_spall",
+    "contact_friction_n",
     "crack_depth_mm",
+    "crack_mouth_mm",
     "crack_percent",
+    "crack_tip_mm",
+    "cracked_tooth_compliance",
+    "cubic",
+    "curvature_radius_mm",
+    "dead_zone_m",
     "deepest_crack_mm",
     "disc_inertia_kg_m2",
     "disc_mass_kg",
+    "effective_flank_mm",
+    "engagement",
+    "engagement_and_slope",
+    "fillet_outline",
     "flank_length_mm",
+    "foundation_compliance",
+    "foundation_factors",
+    "foundation_notes",
+    "friction_coefficient",
     "friction_over_mesh",
+    "height_now",
     "highest_chip_mm",
     "inverse_involute",
     "involute",
+    "involute_outline",
+    "line_contact_pressure_gpa",
+    "linear_contact_compliance",
+    "load_dependent_contact_coefficient",
     "mesh_stiffness",
     "mesh_table",
+    "oil_terms",
     "one_mesh_cycle",
+    "pair_force",
+    "pair_states",
+    "part_inside",
+    "pitch_separation_m",
+    "reduced_modulus_pa",
+    "root_half_angle_rad",
+    "separation_rows",
     "share_torque",
+    "smooth_sign",
+    "spans_face",
+    "tooth_compliance",
     "tooth_outline_mm",
     "wear_profile",
 ]

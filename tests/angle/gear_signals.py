@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.recording.types import Channel, Recording
-from gearsig.rig.types import GearPair, OperatingPoint, Rig, Shaft
+from gearsig.recording import Channel, Recording
+from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearsig.angle.clock import clock_tick
-from gearsig.angle.pulse_faults import count_pulses
-from gearsig.angle.pulse_train import pulse_train_angle
+from gearsig.angle import clock_tick, count_pulses, pulse_train_angle
 from gearsig.errors import InputError, RefusalError
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "tach_pulses" / "REC3642_tach_pulse_times.csv"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearsig.angle.pulses import find_pulse_edges
+from gearsig.angle import find_pulse_edges
 from gearsig.errors import InputError, RefusalError
 
 RATE = 10_000.0

@@ -10,12 +10,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from gearsig.angle.constant import constant_speed_angle
-from gearsig.angle.inversion import times_at
-from gearsig.angle.resample import resample_to_angle
-from gearsig.angle.types import AngleSignal, ShaftAngle
+from gearsig.angle import AngleSignal, ShaftAngle, constant_speed_angle, resample_to_angle, times_at
 from gearsig.errors import InputError, RefusalError
-from gearsig.recording.types import Channel, Recording
+from gearsig.recording import Channel, Recording
 
 RATE, N = 20_000.0, 100_000
 T = np.arange(N) / RATE

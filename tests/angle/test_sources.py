@@ -5,14 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearsig.angle.constant import constant_speed_angle
-from gearsig.angle.encoder import encoder_angle
-from gearsig.angle.shaft import find_shaft_angle
-from gearsig.angle.speed_channel import speed_channel_angle
+from gearsig.angle import constant_speed_angle, encoder_angle, find_shaft_angle, speed_channel_angle
 from gearsig.errors import InputError, RefusalError
-from gearsig.recording.types import Channel, Recording
-from gearsig.rig.speed import ConstantSpeed, EncoderChannel, PulseTimes, SpeedChannel, SpeedSource, TachometerChannel
-from gearsig.rig.types import GearPair, OperatingPoint, Rig, Shaft
+from gearsig.recording import Channel, Recording
+from gearsig.rig import (
+    ConstantSpeed,
+    EncoderChannel,
+    GearPair,
+    OperatingPoint,
+    PulseTimes,
+    Rig,
+    Shaft,
+    SpeedChannel,
+    SpeedSource,
+    TachometerChannel,
+)
 
 RATE = 10_000.0
 T = np.arange(50_000) / RATE

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearsig.angle.tachless import comb_evidence, estimate_shaft_angle
+from gearsig.angle import comb_evidence, estimate_shaft_angle
 from gearsig.errors import RefusalError
-from gearsig.recording.types import Channel, Recording
+from gearsig.recording import Channel, Recording
 
 # By path: test folders are no package.
 from tests.angle.gear_signals import Motion, gear_recording, rig_of

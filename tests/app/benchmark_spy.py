@@ -7,12 +7,12 @@ import sys
 import time
 from pathlib import Path
 
-from app.benchmark.seen import Seen
+from app.benchmark.diagnosers import VisibleCase
 from gearsig.errors import RefusalError
-from gearsig.gap.types import GapReport
+from gearsig.gap import GapReport
 
 
-def diagnose(seen: Seen) -> GapReport:
+def diagnose(seen: VisibleCase) -> GapReport:
     """Refuse, with all that a diagnosing process could learn from."""
     raise RefusalError(
         json.dumps(
@@ -29,7 +29,7 @@ def diagnose(seen: Seen) -> GapReport:
     )
 
 
-def linger(seen: Seen) -> GapReport:
+def linger(seen: VisibleCase) -> GapReport:
     """Say who it is, start a process, and answer too late."""
     del seen
     child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(100)"])

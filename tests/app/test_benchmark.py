@@ -12,27 +12,35 @@ from pathlib import Path
 import h5py
 import pytest
 
-from app.benchmark import blind_run, diagnosers, forest, run, unseen
+from app.benchmark import diagnosers, run
+from app.benchmark import diagnosers as forest
+from app.benchmark import diagnosers as unseen
+from app.benchmark import run as blind_run
 from app.benchmark.answer import Answer, AnsweredCause, AnsweredPlace, AnsweredShrinkage, from_text, to_text
-from app.benchmark.blind_run import ANSWERS_FOLDER, diagnosed, environment, state_of_code
-from app.benchmark.diagnosers import diagnoser
-from app.benchmark.make import make_case
-from app.benchmark.plan import BLIND, SAME, Plan, PlannedCase
-from app.benchmark.run import Wanted, run_benchmark
-from app.benchmark.seen import read_seen
-from app.benchmark.usual_features import USUAL
-from app.cli import main
+from app.benchmark.cases import BLIND, SAME, Plan, PlannedCase, make_case
+from app.benchmark.diagnosers import USUAL, diagnoser, read_seen
+from app.benchmark.run import ANSWERS_FOLDER, BenchmarkRequest, diagnosed, environment, run_benchmark, state_of_code
+from app.cli.main import main
 from gearsig.cache import FOLDERS
 from gearsig.errors import InputError
-from gearsig.gap.population import INDEPENDENT, load_population
-from gearsig.gap.textbook import RULES
-from gearsig.gap.types import NONE, UNKNOWN
-from sims.blind import CATALOGUE, OUTSIDE
+from gearsig.gap import INDEPENDENT, NONE, RULES, UNKNOWN, load_population
+from sims.blind import CATALOGUE, OUTSIDE_CATALOGUE
 from sims.effects import effects
 
 ROOT = Path(__file__).parents[2]
 SHORT = Plan(n_cases=2, seed=4, role="development", reference="with", longest_s=2.0)
-WORDS = (*CATALOGUE, *OUTSIDE, "single", "pair", "seed", "label", "twin", "development", "evaluation", "blind")
+WORDS = (
+    *CATALOGUE,
+    *OUTSIDE_CATALOGUE,
+    "single",
+    "pair",
+    "seed",
+    "label",
+    "twin",
+    "development",
+    "evaluation",
+    "blind",
+)
 
 
 def case(kind, effect, source=BLIND):
@@ -137,7 +145,7 @@ def test_the_same_cases_have_the_same_gears_conditions_and_effects():
 
 def test_a_stopped_run_leaves_answers_and_goes_on(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(run, "state_of_code", lambda: "the same")  # others may be at work on it
-    wanted = Wanted(SHORT, ("rules", "majority"))
+    wanted = BenchmarkRequest(SHORT, ("rules", "majority"))
     target = tmp_path / "out"
 
     def stop(n_done):
@@ -158,7 +166,7 @@ def test_a_stopped_run_leaves_answers_and_goes_on(tmp_path, capsys, monkeypatch)
     assert "Against the targets" in told
     check_files(target, wanted.plan)
     with pytest.raises(InputError, match="seed differs"):
-        run_benchmark(Wanted(Plan(2, 5, "development", "with", False, 2.0), wanted.diagnosers), target)
+        run_benchmark(BenchmarkRequest(Plan(2, 5, "development", "with", False, 2.0), wanted.diagnosers), target)
 
 
 def check_files(target, plan):
@@ -192,7 +200,7 @@ def test_the_plan_is_balanced_and_repeats():
     singles = Counter(c.effect for c in cases if c.kind == "single")
     assert set(singles) == set(CATALOGUE)
     assert set(singles.values()) == {6, 7}
-    assert Counter(c.effect for c in cases if c.kind == "unknown") == dict.fromkeys(OUTSIDE, 3)
+    assert Counter(c.effect for c in cases if c.kind == "unknown") == dict.fromkeys(OUTSIDE_CATALOGUE, 3)
     assert set(Counter((c.with_reference, c.n_conditions) for c in cases).values()) <= set(range(47, 54))
     cracks = sorted(c.level for c in cases if c.effect == "root_crack")
     assert all(i / len(cracks) <= level <= (i + 1) / len(cracks) for i, level in enumerate(cracks))
@@ -283,7 +291,7 @@ def test_sigterm_leaves_answers_only(tmp_path):
     options = ["--cases", "1", "--role", "development", "--longest", "2", "-j", "1", "-o", str(target)]
     options += ["--diagnoser", "tests.app.benchmark_spy:linger"]
     stopped = subprocess.Popen(
-        [sys.executable, "-m", "app.cli", "benchmark", "gap", *options],
+        [sys.executable, "-m", "app.cli.main", "benchmark", "gap", *options],
         env={**os.environ, "TMPDIR": str(temporary), "HOME": str(tmp_path)},
         cwd=ROOT,
         stderr=subprocess.PIPE,
@@ -313,5 +321,5 @@ def is_running(pid):
 def test_the_unseen_know_nothing_of_the_rig_that_makes_the_cases(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (diagnosers, forest):
         monkeypatch.setattr(module, "diagnose", lambda _: set(load_population().simulators))
-    for ask in (unseen.diagnose, unseen.recognise):
+    for ask in (unseen.diagnose_unseen, unseen.recognise):
         assert ask(None) == set(load_population().simulators) - {INDEPENDENT}  # type: ignore[arg-type]  # not looked at

@@ -6,17 +6,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.benchmark.answer import Answer, AnsweredCause, AnsweredPlace, AnsweredShrinkage
-from app.benchmark.bare_report import bare_report
-from app.benchmark.make import Truth
-from app.benchmark.scoring.calibration_curve import bins_of, brier, calibration_error, error_by_chance
-from app.benchmark.scoring.intervals import Z, median_of, resampled, share
-from app.benchmark.scoring.judged import Row, group_of
-from app.benchmark.scoring.location import Located, located
-from app.benchmark.scoring.scores import judgement, macro_f1, scores, strong_only
-from app.benchmark.scoring.strength import batch_floors, strength
+from app.benchmark.cases import Truth
+from app.benchmark.diagnosers import bare_report
+from app.benchmark.scoring.judged import Located, Row, batch_floors, group_of, located, strength
+from app.benchmark.scoring.scores import (
+    Z,
+    bins_of,
+    brier,
+    calibration_error,
+    error_by_chance,
+    judgement,
+    macro_f1,
+    median_of,
+    resampled,
+    scores,
+    share,
+    strong_only,
+)
 from gearsig.errors import InputError
-from gearsig.gap.types import GapOutcome
-from gearsig.plot.benchmark import calibration_figure, confusion_figure
+from gearsig.gap import GapOutcome
+from gearsig.plot import calibration_figure, confusion_figure
 
 PAIR = {"z1": 20, "z2": 40, "module_mm": 2.0}
 

@@ -7,13 +7,19 @@ from math import isnan
 import pytest
 
 from app.benchmark.answer import Answer, AnsweredCause, AnsweredShrinkage
-from app.benchmark.start_stop import DriveDone, DrivePlan, make_drive_case
+from app.benchmark.start_stop import (
+    DriveDone,
+    DrivePlan,
+    figures,
+    make_drive_case,
+    named_effects,
+    planned,
+    write_scores,
+)
 from app.benchmark.start_stop_calibrate import numbers_of
-from app.benchmark.start_stop_score import figures, named_effects, write_scores
-from app.benchmark.start_stop_seen import planned
-from app.cli import main
-from gearsig.recording.read import read_recording
-from gearsig.rig.toml import read_rig
+from app.cli.main import main
+from gearsig.recording import read_recording
+from gearsig.rig import read_rig
 from sims.blind_drive import CATALOGUE
 
 

@@ -6,14 +6,23 @@ import json
 import numpy as np
 import pytest
 
-from app.bifurcation.folder import Wanted, run_folder, value_path
-from app.bifurcation.kept import Kept, load, save
-from app.bifurcation.measure import Measured, measured, parameter_words
-from app.bifurcation.results import coexistence_lines, motion_lines
-from app.cli import main
+from app.bifurcation import (
+    BifurcationRequest,
+    KeptValue,
+    Measured,
+    coexistence_lines,
+    load,
+    measured,
+    motion_lines,
+    parameter_words,
+    run_folder,
+    save,
+    value_path,
+)
+from app.cli.main import main
 from gearsig.errors import InputError
-from gearsig.phase.types import PoincareSection
-from sims.cracked.continuation import Branch
+from gearsig.phase import PoincareSection
+from sims.cracked import Branch
 from sims.sweep import Axis, Sweep
 
 BASE = ("bifurcation", "cracked", "--preset", "small_30_25", "--set", "roughness_um=0", "--points", "20", "-j", "1")
@@ -58,12 +67,12 @@ def test_kinds_are_told_over_ranges_and_two_motions_with_their_bounds():
     found = [
         Measured(v, points, 1, 0.1, 0.0, "periodic" if v < 3 else "chaotic", 2.0 * v, 0.9) for v in (1.0, 2.0, 3.0)
     ]
-    lines = motion_lines([Kept(one.value, one, None) for one in found], "rpm")
+    lines = motion_lines([KeptValue(one.value, one, None) for one in found], "rpm")
     assert lines == [
         "1 to 2 rpm: periodic (K 0.90, exponent 2 to 4 1/s)",
         "3 rpm: chaotic (K 0.90, exponent 6 1/s)",
     ]
-    assert motion_lines([Kept(1.0, None, None, "no")], "rpm") == []
+    assert motion_lines([KeptValue(1.0, None, None, "no")], "rpm") == []
     ranges = [{"first": 1.0, "last": 2.0}, {"first": 4.0, "last": 4.0}]
     told = coexistence_lines({"coexisting_ranges": ranges, "coexisting_step": 0.5}, "rpm")
     assert told[0] == "Two motions coexist at 1 to 2, 4 rpm; values tried are 0.5 rpm apart."
@@ -72,7 +81,7 @@ def test_kinds_are_told_over_ranges_and_two_motions_with_their_bounds():
 
 
 def test_what_is_there_is_not_run_again(tmp_path, monkeypatch):
-    wanted = Wanted(branch(), "up")
+    wanted = BifurcationRequest(branch(), "up")
     first = run_folder(wanted, tmp_path / "out", n_processes=1)
     value_path(tmp_path / "out", "up", 1).unlink()
     asked_for = []
@@ -89,7 +98,7 @@ def test_what_is_there_is_not_run_again(tmp_path, monkeypatch):
 
 
 def test_an_interrupted_run_goes_on_and_gives_the_same(tmp_path, monkeypatch):
-    wanted, own = Wanted(branch(), "down"), Branch.run
+    wanted, own = BifurcationRequest(branch(), "down"), Branch.run
 
     def stopped(self, value, before=None):
         if before is not None:
@@ -108,13 +117,13 @@ def test_an_interrupted_run_goes_on_and_gives_the_same(tmp_path, monkeypatch):
 
 
 def test_another_bifurcation_s_folder_is_refused(tmp_path):
-    run_folder(Wanted(branch(values=(10.0,)), "rest"), tmp_path / "out", n_processes=1)
+    run_folder(BifurcationRequest(branch(values=(10.0,)), "rest"), tmp_path / "out", n_processes=1)
     with pytest.raises(InputError, match="holds another bifurcation: axes differs"):
-        run_folder(Wanted(branch(values=(11.0,)), "rest"), tmp_path / "out", n_processes=1)
+        run_folder(BifurcationRequest(branch(values=(11.0,)), "rest"), tmp_path / "out", n_processes=1)
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter.txt").write_text("dear")
     with pytest.raises(InputError, match="belong to no bifurcation"):
-        run_folder(Wanted(branch(), "rest"), tmp_path / "mine", n_processes=1)
+        run_folder(BifurcationRequest(branch(), "rest"), tmp_path / "mine", n_processes=1)
 
 
 def test_values_that_cannot_be_run_are_named_and_stop_nothing(tmp_path, capsys):
@@ -150,7 +159,7 @@ def test_wrong_options_are_one_line_with_the_remedy(arguments, words, tmp_path, 
 def test_a_value_on_disk_is_what_was_saved(tmp_path):
     one = branch(values=(10.0,))
     run = one.run(10.0)
-    kept = Kept(10.0, measured(run, one, with_kind=True), run.end)
+    kept = KeptValue(10.0, measured(run, one, with_kind=True), run.end)
     save(kept, tmp_path / "a.npz")
     again = load(tmp_path / "a.npz")
     np.testing.assert_array_equal(again.end.state.v, run.end.state.v)

@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli import main
+from app.cli.main import main
 from app.samples import samples
 from gearsig import __version__
-from gearsig.recording.read import read_recording
-from gearsig.recording.write import write_recording
+from gearsig.recording import read_recording, write_recording
 
 RIG = '[[pair]]\nname = "p"\ndriver = "in"\ndriven = "out"\ndriver_teeth = 23\ndriven_teeth = 47\n'
 

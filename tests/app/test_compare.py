@@ -8,10 +8,10 @@ import html5lib
 import numpy as np
 import pytest
 
-from app.cli import main
-from app.commands.compare import DATA, PAGE, TABLE, read_pair
+from app.cli.compare import DATA, PAGE, TABLE, read_pair
+from app.cli.main import main
 from gearsig.errors import InputError
-from gearsig.recording.types import Channel, Recording
+from gearsig.recording import Channel, Recording
 from tests.compare.machines import LINES, TEETH, gear_record
 
 RIG = f'[[pair]]\nname = "p"\ndriver = "in"\ndriven = "out"\ndriver_teeth = {TEETH[0]}\ndriven_teeth = {TEETH[1]}\n'
@@ -77,7 +77,7 @@ def test_nothing_is_written_where_the_page_fails(
     def fail(*_: object, **__: object) -> str:
         raise InputError("no page today")
 
-    monkeypatch.setattr("gearsig.report.compare_page.comparison_page", fail)
+    monkeypatch.setattr("gearsig.report._comparison.comparison_page", fail)
     arguments = (files / "model.csv", files / "measured.csv", "--rig", files / "gear.toml", "-o", tmp_path / "out")
     code, out, err = run(capsys, "compare", *arguments)
     assert (code, out) == (2, "")

@@ -6,12 +6,10 @@ from streamlit.testing.v1 import AppTest
 
 import app.dashboard
 from app.dashboard import state
-from app.dashboard.compare.cached import command_of
-from app.dashboard.compare.choice import TWIN, Run, SimulatedFile, teeth_of
-from app.dashboard.compare.chooser import MACHINE, ORIGIN
-from app.dashboard.state import Request
+from app.dashboard.compare.choice import MACHINE, ORIGIN, TWIN, SimulatedFile, SimulationToCompare, command_of, teeth_of
+from app.dashboard.state import AnalysisRequest
 from app.samples import samples
-from gearsig.rig.types import GearPair, Rig, Shaft
+from gearsig.rig import GearPair, Rig, Shaft
 
 MAIN = Path(app.dashboard.__file__).parent / "main.py"
 SAMPLES = {sample.rig.stem: sample for sample in samples()}
@@ -73,11 +71,11 @@ def test_a_preset_takes_the_rigs_teeth() -> None:
 
 
 def test_the_command_repeats_the_comparison() -> None:
-    request = Request("my run.csv", "0", "rig.toml", "[[pair]]", speed_rpm=1500.0)
-    file = SimulatedFile(Request("model.h5", "1", "model.toml", "[[pair]]"))
+    request = AnalysisRequest("my run.csv", "0", "rig.toml", "[[pair]]", speed_rpm=1500.0)
+    file = SimulatedFile(AnalysisRequest("model.h5", "1", "model.toml", "[[pair]]"))
     words = command_of(request, file, (("a", "b"),), "correlation")
     assert words == (
         "gearsig compare model.h5 'my run.csv' --rig rig.toml --speed-rpm 1500 --sim-rig model.toml --channel a=b "
         "--align correlation -o comparison"
     )
-    assert command_of(request, Run(TWIN), (), "auto") == ""
+    assert command_of(request, SimulationToCompare(TWIN), (), "auto") == ""

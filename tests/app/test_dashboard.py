@@ -199,7 +199,7 @@ def test_names_from_files_are_shown_as_typed() -> None:
 
 def test_a_reference_changes_verdict_and_indicators_as_on_the_command_line() -> None:
     from app.dashboard.cached import read_and_analyze
-    from app.dashboard.state import Request
+    from app.dashboard.state import AnalysisRequest
     from app.dashboard.widgets.verdict import headline_of
 
     page = opened()
@@ -215,7 +215,7 @@ def test_a_reference_changes_verdict_and_indicators_as_on_the_command_line() -> 
     assert len(rms)
     np.testing.assert_allclose(rms["change (dB)"], 20.0 * np.log10(rms["value"] / rms["reference"]), atol=1e-6)
     sample, sound = SAMPLES["root_crack_1mm"], SAMPLES["root_crack_0mm"]
-    request = Request("now.h5", "1", sample.rig.name, sample.rig.read_text(), reference_name="sound.h5")
+    request = AnalysisRequest("now.h5", "1", sample.rig.name, sample.rig.read_text(), reference_name="sound.h5")
     same = read_and_analyze(
         request, memoryview(sample.recording.read_bytes()), memoryview(sound.recording.read_bytes())
     )

@@ -10,16 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from app.dashboard.as_typed import as_plot_text, as_typed, one_line
-from app.dashboard.cached import command_of, read_and_analyze
-from app.dashboard.state import Request
-from app.dashboard.uploads import read_recording_bytes, read_rig_text, safe_file_name
-from app.dashboard.widgets.indicators import csv_text, indicator_frame
-from app.dashboard.widgets.picture import picture_bytes
+from app.dashboard.cached import command_of, read_and_analyze, read_recording_bytes, read_rig_text, safe_file_name
+from app.dashboard.state import AnalysisRequest
+from app.dashboard.theme import as_plot_text, as_typed, one_line
+from app.dashboard.widgets.charts import picture_bytes
 from app.dashboard.widgets.verdict import headline_of
+from app.dashboard.widgets.views import csv_text, indicator_frame
 from app.samples import samples
 from gearsig.errors import InputError
-from gearsig.indicators.types import Indicator
+from gearsig.indicators import Indicator
 
 CSV = b"time (s),a1 (m/s^2)\n" + b"".join(b"%.3f,%d\n" % (i / 1000, (i * 37) % 101) for i in range(2000))
 
@@ -96,11 +95,11 @@ def test_formulas_do_not_reach_a_spreadsheet() -> None:
 def test_the_command_survives_a_shell() -> None:
     import shlex
 
-    request = Request("a b; rm -rf.csv", "", "rig's.toml", "x = 1", 25600.0, 1500.0)
+    request = AnalysisRequest("a b; rm -rf.csv", "", "rig's.toml", "x = 1", 25600.0, 1500.0)
     words = shlex.split(command_of(request))
     assert words[:5] == ["gearsig", "analyze", "a b; rm -rf.csv", "--rig", "rig's.toml"]
     assert words[5:] == ["--fs", "25600", "--speed-rpm", "1500"]
-    compared = Request("a.h5", "", reference_name="sound; 1.h5", reference_sha256="1", torque_nm=40.0)
+    compared = AnalysisRequest("a.h5", "", reference_name="sound; 1.h5", reference_sha256="1", torque_nm=40.0)
     assert shlex.split(command_of(compared))[3:] == ["--reference", "sound; 1.h5", "--torque", "40Nm"]
 
 
@@ -124,10 +123,10 @@ def test_sessions_can_analyse_at_the_same_time() -> None:
     chosen = [s for s in samples() if s.rig.stem in ("damaged_tooth", "no_tachometer")]
 
     def verdict(job: int) -> str:
-        from gearsig.report.page import page_html
+        from gearsig.report import page_html
 
         sample = chosen[job % len(chosen)]
-        request = Request(sample.recording.name, str(job), sample.rig.name, sample.rig.read_text())
+        request = AnalysisRequest(sample.recording.name, str(job), sample.rig.name, sample.rig.read_text())
         analysis = read_and_analyze(request, memoryview(sample.recording.read_bytes()))
         return f"{len(page_html(analysis)) > 100_000} {analysis.verdict}"
 

@@ -10,7 +10,7 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
-from app.dashboard.widgets.methods.menu import METHODS
+from app.dashboard.methods.menu import METHODS
 from tests.app.test_dashboard import SAMPLES, opened, shown_text, upload
 
 TAB = "More methods"

@@ -7,19 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.gap.bank import Bank, banks_of, rounded
-from app.gap.bank_runs import Run
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap.change import change_once
-from gearsig.gap.features import once
-from gearsig.gap.gather import gather
-from gearsig.gap.simulator import Added, Point
-from gearsig.recording.types import Channel, Recording
-from gearsig.rig.speed import TachometerChannel
-from gearsig.rig.types import GearPair, Rig, Shaft
+from gearsig.gap import Added, Bank, OperatingCondition, TwinRun, banks_of, change_once, once, reduce_recording, rounded
+from gearsig.recording import Channel, Recording
+from gearsig.rig import GearPair, Rig, Shaft, TachometerChannel
 
 FS, DURATION_S, TEETH = 4096.0, 2.0, (20, 31)
-POINT = Point(1800.0, 40.0)
+POINT = OperatingCondition(1800.0, 40.0)
 RIG = Rig("r", (Shaft("a"), Shaft("b")), (GearPair("p", "a", "b", *TEETH),))
 STRONG, WEAK, IMPOSSIBLE = Added("louder", 2.0), Added("louder", 1.1), Added("louder", 1000.0)
 
@@ -33,7 +27,7 @@ class Sines:
 
     def run(
         self,
-        point: Point,
+        point: OperatingCondition,
         added: Sequence[Added] = (),
         *,
         seed: int,
@@ -56,7 +50,7 @@ class Sines:
         """Two strengths, and one that cannot be simulated; "louder 2" has the strong one only."""
         return {"louder": (WEAK, STRONG, IMPOSSIBLE), "louder 2": (STRONG,)}[effect]
 
-    def preset_toml(self, point: Point, added: Sequence[Added], notes: Sequence[str]) -> str:
+    def preset_toml(self, point: OperatingCondition, added: Sequence[Added], notes: Sequence[str]) -> str:
         """No use here."""
         raise NotImplementedError
 
@@ -69,7 +63,7 @@ def bank(
     **changed: object,
 ) -> Bank:
     settings: Mapping[str, object] = {"seeds": (0, 1), "folder": folder, "processes": 1, **changed}
-    run = Run(twin or Sines(), POINT, duration_s, FS, noise)
+    run = TwinRun(twin or Sines(), POINT, duration_s, FS, noise)
     return banks_of([run], ["louder"], **settings)[0]["louder"]  # type: ignore[arg-type]
 
 
@@ -89,7 +83,7 @@ def test_changes_are_those_of_the_features_against_the_same_specimen() -> None:
 
     def gathered(*added: Added, noise: int = 0):  # type: ignore[no-untyped-def]  # of the features' room
         run = Sines().run(rounded(POINT), added, seed=1, duration_s=DURATION_S, sampling_rate_hz=FS, noise=noise)
-        return gather(run, RIG)
+        return reduce_recording(run, RIG)
 
     np.testing.assert_array_equal(found.sound[1], once(gathered())[1])
     np.testing.assert_array_equal(found.changes[1, 1], change_once(gathered(STRONG, noise=3), gathered())[1])
@@ -138,7 +132,11 @@ def test_other_settings_have_another_bank(tmp_path: Path, changed: dict[str, obj
 
 
 def test_points_that_hardly_differ_share_a_bank() -> None:
-    assert rounded(Point(1486.3, 40.02)) == Point(1490.0, 40.0) == rounded(Point(1491.9, 39.98))
+    assert (
+        rounded(OperatingCondition(1486.3, 40.02))
+        == OperatingCondition(1490.0, 40.0)
+        == rounded(OperatingCondition(1491.9, 39.98))
+    )
 
 
 @pytest.mark.parametrize("damage", ["cut", "text", "empty", "foreign key", "other arrays", "pickle"])
@@ -181,7 +179,7 @@ def test_processes_give_the_same_bank() -> None:
 
 
 def test_each_effect_at_each_point_has_a_file_and_what_is_there_is_not_made_again(tmp_path: Path) -> None:
-    runs = [Run(Sines(), Point(speed, 40.0), DURATION_S, FS, 1) for speed in (1800.0, 1500.0)]
+    runs = [TwinRun(Sines(), OperatingCondition(speed, 40.0), DURATION_S, FS, 1) for speed in (1800.0, 1500.0)]
     banks_of(runs[:1], ["louder"], seeds=[0], folder=tmp_path, processes=1)
     made = []
     both = banks_of(

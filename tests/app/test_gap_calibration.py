@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.calibration.gap.fit import FALSE_ON_NONE, WeighedCase, fit_calibration
-from gearsig.gap.posterior import GapCalibration
-from gearsig.gap.types import NONE, UNKNOWN
+from app.studies.gap.calibrate import FALSE_ON_NONE, WeighedCase, fit_calibration
+from gearsig.gap import NONE, UNKNOWN, GapCalibration
 
 CAUSES = ("root_crack", "eccentricity", "unbalance", NONE, UNKNOWN)
 

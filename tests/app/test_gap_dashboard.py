@@ -10,13 +10,12 @@ from streamlit.testing.v1 import AppTest
 
 import app.dashboard
 from app.dashboard.gap.choice import Choice, common_rig, files_of, own_rig
-from app.dashboard.gap.runner import _FINISHED, _JOB, Finished
+from app.dashboard.gap.view import _FINISHED, _JOB, Finished
 from app.dashboard.state import Upload
-from app.gap.inputs import read_inputs
+from app.gap.run import read_inputs
 from app.samples import sample_folder
 from gearsig.errors import InputError
-from gearsig.report.gap_json import gap_to_json
-from gearsig.report.gap_pictures import gap_figures
+from gearsig.report import gap_figures, gap_to_json
 from tests.gap.example_report import all_reports, effect_report
 from tests.gap.stub_diagnosis import OUTCOME, SECONDS, environment
 

@@ -9,22 +9,29 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.gap.candidates import Tried
-from app.gap.conditions import Healthy, with_channels_of
-from app.gap.diagnose import _without_meaning, diagnose_gap
-from app.gap.prepare import _check_steady, _in_si, _with_channels_of
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap.gather import gather
-from gearsig.gap.posterior import is_calibrated
-from gearsig.gap.simulator import Added, Point
-from gearsig.gap.types import GapOutcome, GapReport, Interval
-from gearsig.recording.types import Recording
-from gearsig.rig.types import Rig
+from gearsig.gap import (
+    Added,
+    GapOutcome,
+    GapReport,
+    Healthy,
+    Interval,
+    OperatingCondition,
+    TriedEffect,
+    diagnose_gap,
+    is_calibrated,
+    reduce_recording,
+    with_channels_of,
+)
+from gearsig.gap._conditions import _check_steady, _in_si, _with_channels_of
+from gearsig.gap._diagnose import _without_meaning
+from gearsig.recording import Recording
+from gearsig.rig import Rig
 from sims import simulate
 from sims.presets import preset
 from sims.registry import gap_simulator
 
-POINT = Point(1500.0, 60.0)
+POINT = OperatingCondition(1500.0, 60.0)
 SEVERITY_UM = 90.0
 
 
@@ -105,7 +112,9 @@ def test_lists_that_do_not_fit_are_errors() -> None:
 
 
 def test_a_run_up_is_refused_but_beside_the_same_one() -> None:
-    steady, rising = (replace(gather(run(noise=1), rig()), speed=(drift, 0.0, 0.0, 0.0)) for drift in (0.02, 0.9))
+    steady, rising = (
+        replace(reduce_recording(run(noise=1), rig()), speed=(drift, 0.0, 0.0, 0.0)) for drift in (0.02, 0.9)
+    )
     _check_steady(steady, None, "now")
     _check_steady(rising, rising, "now")
     for reference in (None, steady):
@@ -129,7 +138,7 @@ def test_accelerations_in_g_are_compared_in_si_units_and_unknown_units_are_told(
 
 
 def test_a_channel_that_the_reference_lacks_is_left_out_and_told() -> None:
-    now, notices = gather(run(noise=1), rig()), list[str]()
+    now, notices = reduce_recording(run(noise=1), rig()), list[str]()
     first, *others = now.channels
     reference = now.with_channels({first: now.channels[first]})
     healthy = [Healthy(reference, rig(), "sound.h5")]
@@ -140,7 +149,7 @@ def test_a_channel_that_the_reference_lacks_is_left_out_and_told() -> None:
 def test_what_does_not_bring_the_twin_nearer_says_neither_place_nor_severity(report: GapReport) -> None:
     told = report.causes[0].shrinkage
     assert told is not None
-    tried = Tried("eccentricity", (), None, told)  # type: ignore[arg-type]  # its fit is not asked for
+    tried = TriedEffect("eccentricity", (), None, told)  # type: ignore[arg-type]  # its fit is not asked for
     assert tried.explains
     assert not replace(tried, shrinkage=replace(told, shrink=Interval(-0.1, -0.3, 0.1))).explains
     assert not replace(tried, shrinkage=replace(told, foretold=0.1)).explains
@@ -148,7 +157,7 @@ def test_what_does_not_bring_the_twin_nearer_says_neither_place_nor_severity(rep
 
 def test_a_recording_whose_channels_have_other_names_can_be_simulated() -> None:
     recording = run(noise=1)
-    gathered = gather(recording, rig())
+    gathered = reduce_recording(recording, rig())
     first, *_ = gathered.channels.values()
     renamed = replace(gathered, channels={"Data1": first, "Data2": first, "Data3": first})
     assert list(with_channels_of(gathered, renamed).channels) == ["Data1", "Data2", "Data3"]

@@ -8,20 +8,26 @@ from functools import cache
 import numpy as np
 import pytest
 
-from app.gap.doubts import exchanged, strange_pattern, strange_teeth, wrong_teeth
-from app.gap.prepare import conditions_of
-from app.gap.unexplained import stood_out
-from gearsig.angle.shaft import find_shaft_angle
+from gearsig.angle import find_shaft_angle
 from gearsig.errors import RefusalError
-from gearsig.gap.gather import gather
-from gearsig.gap.gathered import Gathered
-from gearsig.gap.simulator import Added, Point
-from gearsig.recording.types import Recording
-from gearsig.rig.types import Rig
+from gearsig.gap import (
+    Added,
+    OperatingCondition,
+    ReducedRecording,
+    conditions_of,
+    exchanged,
+    reduce_recording,
+    stood_out,
+    strange_pattern,
+    strange_teeth,
+    wrong_teeth,
+)
+from gearsig.recording import Recording
+from gearsig.rig import Rig
 from sims import simulate
 from sims.registry import gap_simulator
 
-POINT = Point(1500.0, 60.0)
+POINT = OperatingCondition(1500.0, 60.0)
 CHIPPED = Added("chipped_tooth", 1.5, {"gear": "driver", "tooth": 3.0, "width_percent": 85.0})
 
 
@@ -38,8 +44,8 @@ def recording(seed: int, noise: int, *added: Added, duration_s: float = 3.0) -> 
 
 
 @cache
-def gathered(seed: int, noise: int, *, chipped: bool = False) -> Gathered:
-    return gather(recording(seed, noise, *([CHIPPED] if chipped else [])), rig())
+def gathered(seed: int, noise: int, *, chipped: bool = False) -> ReducedRecording:
+    return reduce_recording(recording(seed, noise, *([CHIPPED] if chipped else [])), rig())
 
 
 def test_another_specimen_is_noticed_and_a_damaged_gear_is_not_another_machine() -> None:
@@ -51,7 +57,7 @@ def test_another_specimen_is_noticed_and_a_damaged_gear_is_not_another_machine()
 
 
 def test_gears_without_a_pattern_are_not_another_machine() -> None:
-    assert strange_pattern(gather(_flawless(1), rig()), gather(_flawless(2), rig()), "now") == []
+    assert strange_pattern(reduce_recording(_flawless(1), rig()), reduce_recording(_flawless(2), rig()), "now") == []
 
 
 def _flawless(seed: int) -> Recording:
@@ -74,19 +80,21 @@ def test_the_teeth_of_another_rig_are_noticed_and_the_right_number_is_told() -> 
     for right in (gathered(0, 1), gathered(0, 1, chipped=True)):
         assert strange_teeth(right, "now") == []
         assert wrong_teeth(right, "now") == []
-    (doubt,) = wrong_teeth(gather(recording(0, 1), with_teeth(37, 53)), "now")
+    (doubt,) = wrong_teeth(reduce_recording(recording(0, 1), with_teeth(37, 53)), "now")
     assert "29 times a revolution" in doubt
     assert "37 teeth" in doubt
-    assert strange_teeth(gather(recording(0, 1), with_teeth(37, 53)), "now") == []  # it is said once
+    assert strange_teeth(reduce_recording(recording(0, 1), with_teeth(37, 53)), "now") == []  # it is said once
 
 
 def test_without_a_mark_on_the_shaft_its_teeth_are_not_counted() -> None:
     """The average over a shaft whose angle was found by the teeth holds for those teeth only."""
-    assert wrong_teeth(replace(gather(recording(0, 1), with_teeth(37, 53)), marks=(False, False)), "now") == []
+    assert (
+        wrong_teeth(replace(reduce_recording(recording(0, 1), with_teeth(37, 53)), marks=(False, False)), "now") == []
+    )
 
 
 def test_teeth_that_explain_little_are_a_remark_where_no_other_number_explains_more() -> None:
-    strange = replace(gather(recording(0, 1), with_teeth(37, 53)), marks=(False, False))
+    strange = replace(reduce_recording(recording(0, 1), with_teeth(37, 53)), marks=(False, False))
     (remark,) = strange_teeth(strange, "now")
     assert "37/53" in remark
 

@@ -9,17 +9,12 @@ import jsonschema
 import numpy as np
 import pytest
 
-from app.cli import main
-from app.gap.diagnose import diagnose_gap
+from app.cli.main import main
 from gearsig.errors import RefusalError
-from gearsig.gap.types import GapOutcome, GapReport, PlaceKind
-from gearsig.recording.read import read_recording
-from gearsig.recording.types import Channel, Recording
-from gearsig.report.gap_json import gap_schema, gap_to_dict
-from gearsig.report.gap_page import gap_page_html
-from gearsig.rig.speed import ConstantSpeed
-from gearsig.rig.toml import write_rig
-from gearsig.rig.types import Bearing, GearPair, Rig, Shaft
+from gearsig.gap import GapOutcome, GapReport, PlaceKind, diagnose_gap
+from gearsig.recording import Channel, Recording, read_recording
+from gearsig.report import gap_page_html, gap_schema, gap_to_dict
+from gearsig.rig import Bearing, ConstantSpeed, GearPair, Rig, Shaft, write_rig
 from sims.registry import gap_simulator
 
 DATA = Path(__file__).parents[3] / "shared" / "data"

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from app.gap.inputs import Asked
 from app.gap.job import Job, JobFailedError, private_folder
+from app.gap.run import GapRequest
 from app.gap.worker import error_from_dict, error_to_dict
 from app.samples import sample_folder
 from gearsig.errors import GearsigError, InputError, RefusalError
 from tests.gap.example_report import effect_report
 from tests.gap.stub_diagnosis import CHILD, OUTCOME, SECONDS, environment
 
-ASKED = Asked((sample_folder() / "root_crack_3mm.h5",), (sample_folder() / "root_crack_0mm.h5",))
+ASKED = GapRequest((sample_folder() / "root_crack_3mm.h5",), (sample_folder() / "root_crack_0mm.h5",))
 PATIENCE_S = 60
 
 

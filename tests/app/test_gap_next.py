@@ -10,17 +10,23 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-import app.gap.next_recording as room
-from app.gap.bank_runs import Reduced, Task
-from app.gap.candidates import Tried
-from app.gap.conditions import Condition
-from gearsig.gap.floors import StructuralFloor
-from gearsig.gap.simulator import Added, HasFurtherPlaces, Point, Twin
+import gearsig.gap._next_recording as room
+from gearsig.gap import (
+    Added,
+    Condition,
+    HasFurtherPlaces,
+    OperatingCondition,
+    Reduced,
+    StructuralFloor,
+    Task,
+    TriedEffect,
+    Twin,
+)
 
-HERE = Point(1500.0, 60.0)
+HERE = OperatingCondition(1500.0, 60.0)
 NAMES = ("mesh.total", "raw.level")
 CRACK, SPALL = (
-    cast("Tried", SimpleNamespace(name=name, fit=SimpleNamespace(added=Added(name, 1.0))))
+    cast("TriedEffect", SimpleNamespace(name=name, fit=SimpleNamespace(added=Added(name, 1.0))))
     for name in ("root_crack", "tooth_spall")
 )
 TITLES = ("a crack", "a spall")
@@ -34,7 +40,7 @@ class Placed:
         return cast("Twin", self), {"b": "the far end"}
 
 
-def condition(point: Point = HERE) -> Condition:
+def condition(point: OperatingCondition = HERE) -> Condition:
     floor = StructuralFloor(NAMES, np.array([1.0, 2.0]))
     facts = SimpleNamespace(point=point, sampling_rate_hz=2e4)
     return cast(
@@ -68,22 +74,25 @@ def simulated(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Task]]:
     return cast("Callable[..., list[Task]]", answer_with)
 
 
-def found(twin: Any = None, conditions: Sequence[Condition] = ()) -> list[tuple[Point, str, float, float]]:
+def found(twin: Any = None, conditions: Sequence[Condition] = ()) -> list[tuple[OperatingCondition, str, float, float]]:
     answer = room.next_recordings(CRACK, SPALL, TITLES, cast("Twin", twin), conditions or [condition()])
     return [(one.point, one.place, one.standard_deviations, one.now) for one in answer]
 
 
 def test_the_best_point_is_first_and_points_hardly_better_are_left_out(simulated: Callable[..., list[Task]]) -> None:
     simulated({(1.0, 1.0): 2.0, (1.0, 0.3): 9.0, (1.0, 0.6): 2.2, (1.4, 1.0): 4.0})
-    assert found() == [(Point(1500.0, 18.0), "", 9.0, 2.0), (Point(2100.0, 60.0), "", 4.0, 2.0)]
+    assert found() == [
+        (OperatingCondition(1500.0, 18.0), "", 9.0, 2.0),
+        (OperatingCondition(2100.0, 60.0), "", 4.0, 2.0),
+    ]
 
 
 def test_distances_are_held_against_the_same_simulation_at_the_points_there_are(
     simulated: Callable[..., list[Task]],
 ) -> None:
     asked = simulated({(1.0, 1.0): 2.0, (1.0, 0.3): 9.0, (2.0, 1.0): 8.5})
-    assert found(conditions=[condition(), condition(Point(3000.0, 60.0))]) == []
-    assert Point(3000.0, 60.0) in {task.run.point for task in asked}
+    assert found(conditions=[condition(), condition(OperatingCondition(3000.0, 60.0))]) == []
+    assert OperatingCondition(3000.0, 60.0) in {task.run.point for task in asked}
     simulated({(1.0, 0.3): 9.0})
     assert found() == []  # nothing to compare with
 

@@ -7,10 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.calibration.gap.ordinary import Ordinary
-from gearsig.gap.change import change_once
-from gearsig.gap.features import once
-from gearsig.gap.gather import gather
+from app.studies.gap.machines import Ordinary
+from gearsig.gap import change_once, once, reduce_recording
 from tests.gap.synthetic import RATE_HZ, RIG, SPEED_HZ, TEETH, record
 
 SOUND = record()
@@ -27,8 +25,8 @@ def test_a_day_repeats_the_machine_and_not_the_noise() -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_machines_get_sidebands_and_shaft_lines_that_last(seed: int) -> None:
     ordinary = Ordinary.of(SOUND, seed)
-    days = [gather(ordinary.on(record(seed=day), 0, np.random.default_rng(day)), RIG) for day in (1, 2)]
-    names, before = once(gather(SOUND, RIG))
+    days = [reduce_recording(ordinary.on(record(seed=day), 0, np.random.default_rng(day)), RIG) for day in (1, 2)]
+    names, before = once(reduce_recording(SOUND, RIG))
     _, after = once(days[0])
     raised = dict(zip(names, after - before, strict=True))
     assert max(raised[f"shaft.{side}.{n}.to_mesh"] for side in ("driver", "driven") for n in (1, 2, 3)) > 6.0

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.gap.placing import at_its_tooth, place_of
-from gearsig.gap.frame import BearingFrame, GearFrame
-from gearsig.gap.simulator import Added
-from gearsig.gap.types import GapPlace, PlaceKind
-from gearsig.rig.types import GearPair
+from gearsig.gap import Added, BearingFrame, GapPlace, GearFrame, PlaceKind, at_its_tooth, place_of
+from gearsig.rig import GearPair
 
 FRAME = GearFrame(GearPair("stage 1", "input", "output", 29, 47), ("input", "output"), (29, 47), ())
 CRACK = Added("root_crack", 2.0, {"gear": "driver", "tooth": 1.0})

@@ -8,33 +8,38 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.calibration.gap import independent
-from app.calibration.gap.machines import draw_machine
-from app.calibration.gap.sample import Sample, write
-from app.calibration.rigs import DrawnRig
-from app.calibration.simulate import simulate_rig
+from app.studies.crack_cases import DrawnRig, simulate_rig
+from app.studies.gap import rows as independent
+from app.studies.gap.machines import draw_machine
+from app.studies.gap.rows import PopulationSample, write
 from gearsig.errors import InputError
-from gearsig.gap.floors import soft_size
-from gearsig.gap.gather import gather
-from gearsig.gap.population import BY_HAND, FILE, INDEPENDENT, load_population
-from gearsig.gap.types import NONE, UNKNOWN
+from gearsig.gap import (
+    BY_HAND,
+    INDEPENDENT,
+    NONE,
+    POPULATION_FILE,
+    UNKNOWN,
+    load_population,
+    reduce_recording,
+    soft_size,
+)
 from sims.blind import CATALOGUE
 from sims.effects import EffectSetting
 
 FLOOR = load_population().floor(with_reference=True)
 
 
-def size(sample: Sample) -> float:
+def size(sample: PopulationSample) -> float:
     return soft_size(FLOOR.names, FLOOR.from_centre(FLOOR.names, sample.change) / FLOOR.of(FLOOR.names))
 
 
 @pytest.fixture(scope="module")
-def outer_race() -> list[Sample]:
+def outer_race() -> list[PopulationSample]:
     return independent.one_case(list(CATALOGUE).index("bearing_outer_race"))
 
 
 def test_a_case_of_the_independent_rig_gives_its_effect_and_the_same_machine_without_it(
-    outer_race: list[Sample],
+    outer_race: list[PopulationSample],
 ) -> None:
     n_conditions = len({sample.rig for sample in outer_race})
     kinds = Counter(BY_HAND if sample.detail == BY_HAND else sample.label for sample in outer_race)
@@ -49,7 +54,7 @@ def test_a_case_of_the_independent_rig_gives_its_effect_and_the_same_machine_wit
     assert size(own) > 2.0 * size(sound)
 
 
-def test_the_table_is_read_as_it_was_written(outer_race: list[Sample], tmp_path) -> None:
+def test_the_table_is_read_as_it_was_written(outer_race: list[PopulationSample], tmp_path) -> None:
     write(tmp_path / "raw.npz", outer_race)
     with np.load(tmp_path / "raw.npz", allow_pickle=False) as raw:
         assert raw["label"].tolist() == [s.label for s in outer_race]
@@ -72,7 +77,7 @@ def test_both_models_record_a_drawn_machine() -> None:
     for model in ("cracked", "reduced-fe"):
         recording = simulate_rig(drawn, severity=0.0, run=1, model=model)
         assert recording.rig is not None
-        found = gather(recording, recording.rig)
+        found = reduce_recording(recording, recording.rig)
         assert found.frame.teeth == drawn.teeth
         assert np.isfinite(recording.samples).all()
         speeds.append(60.0 * found.speed_hz)
@@ -110,6 +115,6 @@ def test_an_unbalance_is_heard_where_the_housing_yields() -> None:
 
 
 def test_a_damaged_population_is_named(tmp_path) -> None:
-    (tmp_path / "population.npz").write_bytes(FILE.read_bytes()[:10_000])
+    (tmp_path / "population.npz").write_bytes(POPULATION_FILE.read_bytes()[:10_000])
     with pytest.raises(InputError, match=r"population\.npz: the population is not there, or damaged; make it again"):
         load_population(tmp_path / "population.npz")

@@ -7,13 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.calibration.gap.paths import PathChange
-from app.calibration.gap.quasi_static.contact import N_PAIRS, Path, static_contact
-from app.calibration.gap.quasi_static.effects import EFFECTS
-from app.calibration.gap.quasi_static.machine import StaticMachine
-from app.calibration.gap.quasi_static.record import Day, record
-from app.calibration.gap.quasi_static.structure import MESH, Structure
-from gearsig.gap.gather import gather
+from app.studies.gap.quasi_static.machine import EFFECTS, MESH, N_PAIRS, Path, StaticMachine, Structure, static_contact
+from app.studies.gap.quasi_static.record import QuasiStaticDay, record
+from app.studies.gap.signatures import PathChange
+from gearsig.gap import reduce_recording
 
 
 @given(st.integers(0, 10**6))
@@ -47,16 +44,16 @@ def machine(seed: int = 3) -> StaticMachine:
 
 
 def test_the_same_day_is_the_same_recording_and_the_teeth_keep_their_mark() -> None:
-    made, day = machine(), Day.drawn(np.random.default_rng(1))
+    made, day = machine(), QuasiStaticDay.drawn(np.random.default_rng(1))
     one, again = (record(made, made.sound(), day, None) for _ in range(2))
     assert np.array_equal(one.samples, again.samples)
-    crest = gather(one, made.rig)
+    crest = reduce_recording(one, made.rig)
     assert crest.n_revolutions > 15
 
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_an_effect_changes_what_is_recorded(name: str) -> None:
-    made, day = machine(), Day.drawn(np.random.default_rng(1))
+    made, day = machine(), QuasiStaticDay.drawn(np.random.default_rng(1))
     state = made.sound()
     EFFECTS[name](made, state, np.random.default_rng(2))
     sound, faulty = record(made, made.sound(), day, None).samples, record(made, state, day, None).samples
@@ -65,7 +62,7 @@ def test_an_effect_changes_what_is_recorded(name: str) -> None:
 
 
 def test_a_changed_path_is_heard_on_its_channel() -> None:
-    made, day = machine(), Day.drawn(np.random.default_rng(1))
+    made, day = machine(), QuasiStaticDay.drawn(np.random.default_rng(1))
     state = made.sound()
     state.paths = [PathChange(gain=2.0), PathChange()]
     before, after = record(made, made.sound(), day, None).samples, record(made, state, day, None).samples

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from functools import cache
 
-from app.gap.conditions import Healthy, matching_reference
-from gearsig.gap.gather import gather
-from gearsig.gap.gathered import Gathered
+from gearsig.gap import Healthy, ReducedRecording, matching_reference, reduce_recording
 from tests.gap.synthetic import RIG, record
 
 
 @cache
-def run(seed: int) -> Gathered:
-    return gather(record(seed=seed), RIG)
+def run(seed: int) -> ReducedRecording:
+    return reduce_recording(record(seed=seed), RIG)
 
 
-def sound(gathered: Gathered) -> list[Healthy]:
+def sound(gathered: ReducedRecording) -> list[Healthy]:
     return [Healthy(gathered, RIG, "sound.h5")]
 
 
-def named(seed: int, *names: str) -> Gathered:
+def named(seed: int, *names: str) -> ReducedRecording:
     return run(seed).with_channels(dict(zip(names, run(seed).channels.values(), strict=False)))
 
 

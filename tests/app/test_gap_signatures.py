@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.calibration.gap.outside import with_foreign_vibration
-from app.calibration.gap.signatures import HAND_MADE, with_signature
-from gearsig.gap.change import change_once
-from gearsig.gap.gather import gather
+from app.studies.gap.rows import with_foreign_vibration
+from app.studies.gap.signatures import HAND_MADE, with_signature
+from gearsig.gap import change_once, reduce_recording
 from tests.gap.synthetic import RIG, record
 
 SOUND = record()
@@ -41,12 +40,12 @@ def test_only_the_vibration_changes_and_a_seed_repeats_it(name: str) -> None:
 
 @pytest.mark.parametrize("name", EXPECTED)
 def test_strong_ones_move_their_own_features(name: str) -> None:
-    sound = gather(record(seed=1), RIG)
+    sound = reduce_recording(record(seed=1), RIG)
     found = []
     for seed in range(8):
         now, strength = with_signature(SOUND, name, np.random.default_rng(seed))
         if strength > 0.6:
-            change = dict(zip(*change_once(gather(now, RIG), sound), strict=True))
+            change = dict(zip(*change_once(reduce_recording(now, RIG), sound), strict=True))
             found.append(max(change[feature] for feature in EXPECTED[name]))
     assert found
     assert np.median(found) > 3.0

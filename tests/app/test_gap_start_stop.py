@@ -8,20 +8,19 @@ import jsonschema
 import numpy as np
 import pytest
 
-from app.cli import main
-from app.gap.models import checked_model, gap_effects_of, gap_models
-from app.gap.start_stop import diagnose
-from app.gap.start_stop.causes import TRIED
-from app.gap.start_stop.diagnose import compared_of, diagnose_start_stop
-from app.gap.start_stop.report import report_of
-from app.gap.start_stop.worn import worn_curve_um
+from app.cli.main import main
+from app.gap.run import checked_model, gap_effects_of, gap_models
+from app.gap_start_stop import diagnose
+from app.gap_start_stop.diagnose import compared_of, diagnose_start_stop
+from app.gap_start_stop.predict import TRIED
+from app.gap_start_stop.report import report_of
+from app.gap_start_stop.twin import worn_curve_um
 from app.samples import sample_folder
 from gearsig.errors import InputError
-from gearsig.gap.types import NONE, GapOutcome
-from gearsig.recording.write import write_recording
-from gearsig.report.gap_json import gap_schema
-from gearsig.report.gap_reading import read_gap_json
-from gearsig.rig.toml import write_rig
+from gearsig.gap import NONE, GapOutcome
+from gearsig.recording import write_recording
+from gearsig.report import gap_schema, read_gap_json
+from gearsig.rig import write_rig
 from sims import simulate
 from sims.effects import EffectSetting
 

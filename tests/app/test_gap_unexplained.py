@@ -7,12 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.gap.standing_out import Standing
-from app.gap.standing_places import standing_place
-from app.gap.unexplained import beside_standing, stood_out
 from gearsig.checks import FloatArray
-from gearsig.diagnosis.types import Finding, Kind
-from gearsig.gap.types import GapOutcome
+from gearsig.diagnosis import Finding, Kind
+from gearsig.gap import GapOutcome, Standing, beside_standing, standing_place, stood_out
 from tests.gap.synthetic import RIG, record, ringing
 
 STRANGE = 5.148

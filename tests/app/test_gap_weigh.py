@@ -6,11 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.gap.candidates import refuse_where_none_ran
-from app.gap.weigh import shared
 from gearsig.errors import RefusalError
-from gearsig.gap.simulator import Added
-from gearsig.gap.types import NONE, UNKNOWN
+from gearsig.gap import NONE, UNKNOWN, Added, refuse_where_none_ran, shared
 
 FOUND = {UNKNOWN: 0.5, "clipping": 0.3, NONE: 0.2}
 SCORES = st.dictionaries(st.sampled_from(["a", "b", "c"]), st.floats(-1.0, 1.0), max_size=3)

@@ -8,15 +8,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from app.cli import app
+from app.cli.main import app
 from gearsig.cache import OtherVersionError
 from gearsig.errors import InputError
-from sims.mesh.geometry import GearGeometry
-from sims.reduced_fe.blank import GearBlank
-from sims.reduced_fe.gear_file import read_gear, write_gear
-from sims.reduced_fe.gear_key import gear_key, gear_name
-from sims.reduced_fe.ready import ready_gear
-from sims.reduced_fe.reduce import plan_for
+from sims.mesh import GearGeometry
+from sims.reduced_fe import GearBlank, gear_key, gear_name, plan_for, read_gear, ready_gear, write_gear
 
 SMALL = ["--teeth", "16", "--profile-shift", "0.2", "--face", "10mm", "--bore", "8mm", "--dof", "15000"]
 

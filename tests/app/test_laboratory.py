@@ -8,18 +8,13 @@ from streamlit.testing.v1 import AppTest
 
 import app.dashboard
 from app.dashboard import state
-from app.dashboard.laboratory.controls import automatic_s, shown_name
-from app.dashboard.laboratory.effect_controls import WIDEST
-from app.dashboard.laboratory.limits import greatest_severity
-from app.dashboard.laboratory.number import nice_step
-from app.dashboard.laboratory.save import chosen_of
-from app.dashboard.laboratory.setup import MODELS, Setup
-from app.dashboard.laboratory.summary import NUMBERS, change
-from app.dashboard.laboratory.views import NAMES, TAB
+from app.dashboard.laboratory.run import chosen_of
+from app.dashboard.laboratory.setup import MODELS, WIDEST, Setup, automatic_s, greatest_severity, nice_step, shown_name
+from app.dashboard.laboratory.views import NAMES, NUMBERS, TAB, change
 from gearsig.errors import InputError
 from sims.effects import EffectSetting, effects
 from sims.presets import Preset, presets
-from sims.reduced_fe.contact_table import static_table
+from sims.reduced_fe import static_table
 from sims.registry import simulator
 
 FOLDER = Path(app.dashboard.__file__).parent

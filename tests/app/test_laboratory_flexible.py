@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from app.dashboard.laboratory.mesh_view import stiffness
-from app.dashboard.laboratory.run import run_setup
-from app.dashboard.laboratory.save import record
+from app.dashboard.laboratory.run import record, run_setup
 from app.dashboard.laboratory.setup import Setup
-from app.dashboard.laboratory.views import TAB
+from app.dashboard.laboratory.views import TAB, stiffness
 from sims.effects import EffectSetting
 from sims.presets import presets
 from tests.app.test_laboratory import opened, shown_text, slider

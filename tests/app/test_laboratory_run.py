@@ -9,23 +9,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.dashboard.laboratory.envelope_band import telling_band_hz
-from app.dashboard.laboratory.expected import (
+from app.dashboard.laboratory.run import (
+    LaboratoryRun,
     affected_sides,
     bearing_lines_hz,
     entries,
+    record,
+    run_setup,
     spectrum_cursors,
     with_complete_effects,
+    zipped,
 )
-from app.dashboard.laboratory.mesh_view import stiffness
-from app.dashboard.laboratory.phase_view import portrait
-from app.dashboard.laboratory.run import Run, run_setup
-from app.dashboard.laboratory.save import record, zipped
 from app.dashboard.laboratory.setup import Setup
+from app.dashboard.laboratory.views import portrait, stiffness, telling_band_hz
 from gearsig.errors import RefusalError
-from gearsig.recording.read import read_recording
-from gearsig.recording.types import Channel, Recording
-from gearsig.rig.toml import read_rig
+from gearsig.recording import Channel, Recording, read_recording
+from gearsig.rig import read_rig
 from sims.effects import EffectSetting
 
 SMOOTH = Setup("small_30_25", 1800.0, 20.0, (("roughness_um", 0.0),), duration_s=0.3, seed=3)
@@ -36,16 +35,16 @@ def with_effect(name: str, severity: float, **options: float | str) -> Setup:
 
 
 @pytest.fixture(scope="module")
-def healthy() -> Run:
+def healthy() -> LaboratoryRun:
     return run_setup(SMOOTH)
 
 
 @pytest.fixture(scope="module")
-def cracked() -> Run:
+def cracked() -> LaboratoryRun:
     return run_setup(with_effect("root_crack", 1.5, tooth=8.0))
 
 
-def test_the_recording_is_that_of_the_command_line(cracked: Run) -> None:
+def test_the_recording_is_that_of_the_command_line(cracked: LaboratoryRun) -> None:
     """Sample by sample: the page must not show another machine than `gearsig simulate` writes."""
     same = record(cracked.setup)
     assert np.array_equal(cracked.recording.samples, same.samples)
@@ -53,7 +52,7 @@ def test_the_recording_is_that_of_the_command_line(cracked: Run) -> None:
     assert cracked.recording.warnings == same.warnings
 
 
-def test_hum_leaves_the_motion_and_adds_its_lines_only(healthy: Run) -> None:
+def test_hum_leaves_the_motion_and_adds_its_lines_only(healthy: LaboratoryRun) -> None:
     hum = run_setup(with_effect("mains_hum", 2.0, harmonics_percent=0.0))
     for name in healthy.response.signals:
         assert np.array_equal(healthy.response[name], hum.response[name])
@@ -61,7 +60,7 @@ def test_hum_leaves_the_motion_and_adds_its_lines_only(healthy: Run) -> None:
     assert float(np.sqrt(2.0 * np.mean(added**2))) == pytest.approx(2.0, rel=1e-3)  # 15 whole periods
 
 
-def test_a_crack_shows_after_its_tooth_has_entered(healthy: Run, cracked: Run) -> None:
+def test_a_crack_shows_after_its_tooth_has_entered(healthy: LaboratoryRun, cracked: LaboratoryRun) -> None:
     """The twin differs by bursts that begin at the marked times, one revolution apart."""
     marks = np.array([cursor.position for cursor in entries(cracked)])
     assert len(marks) in (8, 9, 10)
@@ -75,7 +74,7 @@ def test_a_crack_shows_after_its_tooth_has_entered(healthy: Run, cracked: Run) -
         assert 0.0 < latest < 2.5 * cycle
 
 
-def test_a_crack_takes_stiffness_from_its_own_tooth_only(healthy: Run, cracked: Run) -> None:
+def test_a_crack_takes_stiffness_from_its_own_tooth_only(healthy: LaboratoryRun, cracked: LaboratoryRun) -> None:
     cycles = np.linspace(0.0, 30.0, 3001)
     ratio = stiffness(cracked, cycles) / stiffness(healthy, cycles)
     contact = 1.8  # above the contact ratio of 30/25 teeth
@@ -84,7 +83,7 @@ def test_a_crack_takes_stiffness_from_its_own_tooth_only(healthy: Run, cracked: 
     assert ratio[~meshing] == pytest.approx(1.0, abs=1e-9)
 
 
-def test_poincare_points_of_a_smooth_machine_fall_together(healthy: Run) -> None:
+def test_poincare_points_of_a_smooth_machine_fall_together(healthy: LaboratoryRun) -> None:
     y, v, y_points, v_points = portrait(healthy, "driver y", 30.0)
     n_periods = 0.3 * 1800.0 / 60.0 * 30.0
     assert len(y_points) == pytest.approx(n_periods, abs=1.5)
@@ -106,7 +105,7 @@ def test_bearing_lines_include_slip() -> None:
     assert found == {"BPFI bearing 3": pytest.approx(inner * turns * 30 / 25)}
 
 
-def test_marks_follow_the_effects(cracked: Run) -> None:
+def test_marks_follow_the_effects(cracked: LaboratoryRun) -> None:
     mesh = [c.position for c in spectrum_cursors(cracked) if c.kind == "mesh"]
     assert mesh == pytest.approx([900.0 * k for k in range(1, 6)])
     assert affected_sides(cracked.setup) == ("driver",)
@@ -129,7 +128,7 @@ def test_the_telling_band_is_where_the_carrier_is() -> None:
         telling_band_hz(recording, "a1", [])
 
 
-def test_files_hold_recording_rig_and_truth(tmp_path: Path, cracked: Run) -> None:
+def test_files_hold_recording_rig_and_truth(tmp_path: Path, cracked: LaboratoryRun) -> None:
     setup = cracked.setup
     content = zipped((setup, setup.healthy), ".h5")
     with zipfile.ZipFile(io.BytesIO(content)) as archive:

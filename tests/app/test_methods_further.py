@@ -14,10 +14,9 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
-from app.dashboard.widgets.methods.downloads import OVER_TIME, recording_of, table_csv, waveforms_file
-from app.dashboard.widgets.methods.menu import METHODS
-from app.dashboard.widgets.methods.waveforms import Waveforms
-from gearsig.recording.read import read_recording
+from app.dashboard.methods.menu import METHODS
+from app.dashboard.methods.signals import OVER_TIME, Waveforms, recording_of, table_csv, waveforms_file
+from gearsig.recording import read_recording
 from tests.app.test_dashboard import SAMPLES, opened, shown_text, upload
 from tests.app.test_dashboard_methods import TAB, choose, curves, opened_at, opened_machine
 
@@ -92,9 +91,8 @@ def test_waveforms_open_with_five_mesh_cycles() -> None:
 
 
 def test_modes_are_numbered_by_rising_centre() -> None:
-    from app.dashboard.widgets.methods.mode_signal import ModeSignal
-    from app.dashboard.widgets.methods.modes import modes_of
-    from gearsig.decompose.types import VmdSettings
+    from app.dashboard.methods.modes import ModeSignal, modes_of
+    from gearsig.decompose import VmdSettings
 
     t = np.arange(8000) / 1000.0
     x = np.cos(2 * np.pi * 300 * t) + 0.5 * np.cos(2 * np.pi * 60 * t)

@@ -2,10 +2,9 @@
 
 import pytest
 
-from app.dashboard.laboratory import bifurcation_view
+from app.dashboard.laboratory import bifurcation as bifurcation_view
 from app.dashboard.laboratory.views import TAB
-from app.dashboard.widgets.methods.phase_embedding import VIEWS
-from app.dashboard.widgets.methods.phase_numbers import two_numbers
+from app.dashboard.methods.phase import VIEWS, two_numbers
 from gearsig.errors import InputError
 from tests.app.test_dashboard import shown_text
 from tests.app.test_dashboard_methods import choose, opened_at

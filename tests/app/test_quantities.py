@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.quantities import quantity, span
+from app.cli.quantities import quantity, span
 from gearsig.errors import InputError
 
 

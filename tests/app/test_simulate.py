@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.profile import course
+from app.cli.quantities import course
 from gearsig.errors import InputError
-from gearsig.recording.read import read_recording
-from gearsig.rig.toml import read_rig
+from gearsig.recording import read_recording
+from gearsig.rig import read_rig
 from sims import simulate
 from sims.effects import effects
-from sims.gear_pair.parameters import PARAMETERS
+from sims.gear_pair import PARAMETERS
 from sims.presets import presets
 from tests.app.test_cli import run
 

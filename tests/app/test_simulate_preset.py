@@ -5,9 +5,9 @@ from pathlib import Path
 
 from typer.testing import CliRunner
 
-from app.cli import app
-from gearsig.gap.simulator import Added, Point
-from gearsig.rig.types import GearPair, Rig, Shaft
+from app.cli.main import app
+from gearsig.gap import Added, OperatingCondition
+from gearsig.rig import GearPair, Rig, Shaft
 from sims.registry import gap_simulator
 
 RIG = Rig("bench", (Shaft("a"), Shaft("b")), (GearPair("p", "a", "b", 21, 50, 2.0),))
@@ -22,7 +22,7 @@ def run(*words: str) -> tuple[int, str]:
 def test_a_twins_preset_runs_and_its_effect_stands_in_the_truth(tmp_path: Path) -> None:
     preset, output = tmp_path / "twin.toml", tmp_path / "again.csv"
     twin = gap_simulator("cracked").twin_of(RIG)
-    preset.write_text(twin.preset_toml(Point(1500.0, 40.0), (CRACK,), ["a note"]), encoding="utf-8")
+    preset.write_text(twin.preset_toml(OperatingCondition(1500.0, 40.0), (CRACK,), ["a note"]), encoding="utf-8")
     code, text = run("--preset", str(preset), "--duration", "0.2s", "-o", str(output))
     assert code == 0, text
     truth = json.loads((tmp_path / "again.truth.json").read_text(encoding="utf-8"))

@@ -6,9 +6,8 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 import app.dashboard
-from app.dashboard.start_stop.controls import HIGHEST
-from app.dashboard.start_stop.setup import DriveSetup
-from app.dashboard.start_stop.view import NUMBERS, VIEWS
+from app.dashboard.laboratory.setup import DriveSetup
+from app.dashboard.start_stop.page import HIGHEST, NUMBERS, VIEWS
 from sims.effects import EffectSetting
 
 MAIN = Path(app.dashboard.__file__).parent / "main.py"

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
-from gearsig.angle.interpolation import delay_table, doubling_filter, interpolate
-from gearsig.angle.resample import resample_to_angle
-from gearsig.angle.types import AngleSignal, ShaftAngle
-from gearsig.recording.types import Channel, Recording
+from gearsig.angle import AngleSignal, ShaftAngle, delay_table, doubling_filter, interpolate, resample_to_angle
+from gearsig.recording import Channel, Recording
 
 N, RATE = 1_000_000, 50_000.0
 DURATION = N / RATE

@@ -9,10 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sims.blind import draw_case, write_case
-from sims.blind.rig import draw_rig
-from sims.blind.scene import Condition, run, scene_of
-from sims.blind.sensing import measure
+from sims.blind import RunCondition, draw_case, draw_rig, measure, run, scene_of, write_case
 
 N_ROUNDS = 6
 
@@ -21,7 +18,7 @@ def one_run(seed: int) -> tuple[float, float]:
     """CPU seconds of the march and of the measuring."""
     rig = replace(draw_rig(np.random.default_rng(seed), "development"), sampling_rate_hz=20000.0)
     nm = 0.6 * rig.rated_nm
-    scene = scene_of(rig, Condition(1500.0, nm, 1500.0, nm, 6.0, seed, seed))
+    scene = scene_of(rig, RunCondition(1500.0, nm, 1500.0, nm, 6.0, seed, seed))
     began = time.process_time()
     motion = run(scene)
     marched = time.process_time()

@@ -16,11 +16,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from sims import simulate
-from sims.cracked.integrate_kernel import derivative
-from sims.cracked.linear import default_step_s
-from sims.cracked.respond import prepare, respond
-from sims.machine import Machine, Roughness
-from sims.machine.operation import Operation
+from sims.cracked import default_step_s, derivative, prepare, respond
+from sims.machine import Machine, Operation, Roughness
 from sims.mesh import RootCrack
 from tests.sims.machines import spur_pair_machine
 

@@ -17,8 +17,7 @@ import time
 import numpy as np
 from vmdpy import VMD
 
-from gearsig.decompose.types import VmdSettings
-from gearsig.decompose.vmd import variational_modes
+from gearsig.decompose import VmdSettings, variational_modes
 
 N_ROUNDS = 3
 N_MODES = 5

@@ -9,15 +9,20 @@ import sys
 from collections.abc import Callable
 from time import process_time
 
-from sims.reduced_fe.craig_bampton import craig_bampton
-from sims.reduced_fe.cyclic import CyclicGear
-from sims.reduced_fe.cyclic_modes import cyclic_modes
-from sims.reduced_fe.full_gear import full_modes
-from sims.reduced_fe.mesh_size import MeshSize, mesh_size_for
-from sims.reduced_fe.one_thread import one_thread
-from sims.reduced_fe.ready import READY
-from sims.reduced_fe.reduce import plan_for, reduce_gear
-from sims.reduced_fe.sector_mesh import SectorMesh, sector_mesh
+from sims.reduced_fe import (
+    READY,
+    CyclicGear,
+    MeshSize,
+    SectorMesh,
+    craig_bampton,
+    cyclic_modes,
+    full_modes,
+    mesh_size_for,
+    one_thread,
+    plan_for,
+    reduce_gear,
+    sector_mesh,
+)
 
 GEAR = READY["z50_m3"]
 WANTED = 277_200

@@ -2,8 +2,7 @@
 
 from time import perf_counter
 
-from sims.forging.respond import respond
-from sims.forging.simulator import ForgingManipulator
+from sims.forging import ForgingManipulator, respond
 
 
 def main() -> None:

@@ -19,9 +19,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.signal import upfirdn
 
-from gearsig.spectra.coherence import spectral_coherence
-from gearsig.spectra.kurtogram import kurtogram
-from gearsig.spectra.kurtogram_filters import splitter
+from gearsig.spectra import kurtogram, spectral_coherence, splitter
 
 N_ROUNDS = 5
 N_LEVELS = 7

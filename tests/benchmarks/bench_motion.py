@@ -6,13 +6,16 @@ or missed, and false ones, over sampling rate; how often the 95 % intervals of f
 
 import numpy as np
 
-from gearsig.motion.backlash import estimate_backlash
-from gearsig.motion.force import HUNT_CROSSLEY, PIECEWISE
-from gearsig.motion.identify import identify
-from gearsig.motion.impacts import find_impacts
-from gearsig.motion.measure import measure_motion
-from gearsig.motion.noise_study import noise_study
-from gearsig.recording.types import Recording
+from gearsig.motion import (
+    HUNT_CROSSLEY,
+    PIECEWISE,
+    estimate_backlash,
+    find_impacts,
+    identify,
+    measure_motion,
+    noise_study,
+)
+from gearsig.recording import Recording
 from sims import simulate
 
 PRESETS = ("manipulator_formula", "manipulator_table")

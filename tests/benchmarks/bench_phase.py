@@ -12,13 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from gearsig.phase.chaos_test import zero_one_test
-from gearsig.phase.dimension import embedding_dimension
-from gearsig.phase.embedding import delay_embedding
-from gearsig.phase.lyapunov import largest_lyapunov_exponent
-from gearsig.phase.mutual_information import average_mutual_information
-from gearsig.phase.neighbours import nearest_apart
-from gearsig.phase.recurrence import recurrence_measures
+from gearsig.phase import (
+    average_mutual_information,
+    delay_embedding,
+    embedding_dimension,
+    largest_lyapunov_exponent,
+    nearest_apart,
+    recurrence_measures,
+    zero_one_test,
+)
 
 ROUNDS = 5
 

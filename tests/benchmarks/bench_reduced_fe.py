@@ -9,9 +9,7 @@ import time
 import numpy as np
 
 from sims.presets import preset
-from sims.reduced_fe.dynamics_constants import FlexiblePair
-from sims.reduced_fe.dynamics_sweep import speed_sweep
-from sims.reduced_fe.simulator import NAME, prepare_preset
+from sims.reduced_fe import NAME, FlexiblePair, prepare_preset, speed_sweep
 
 SWEEP_S = 15.0
 

@@ -7,20 +7,27 @@ from typing import Any
 import numpy as np
 from scipy import ndimage, signal
 
-from gearsig.angle.types import AngleSignal, ShaftAngle
-from gearsig.orders.average import synchronous_average
-from gearsig.orders.map import frequency_map, order_map
-from gearsig.orders.separate import separate
-from gearsig.orders.spectrum import order_spectrum
-from gearsig.orders.track import track_orders
-from gearsig.orders.track_band import track_order_bands
-from gearsig.spectra.amplitude import amplitude_spectrum
-from gearsig.spectra.band_choice import choose_band
-from gearsig.spectra.cepstrum import cepstrum, lifter_families
-from gearsig.spectra.density import power_density
-from gearsig.spectra.envelope import band_envelope, envelope_spectrum
-from gearsig.spectra.floor import noise_floor
-from gearsig.spectra.lines import find_lines
+from gearsig.angle import AngleSignal, ShaftAngle
+from gearsig.orders import (
+    frequency_map,
+    order_map,
+    order_spectrum,
+    separate,
+    synchronous_average,
+    track_order_bands,
+    track_orders,
+)
+from gearsig.spectra import (
+    amplitude_spectrum,
+    band_envelope,
+    cepstrum,
+    choose_band,
+    envelope_spectrum,
+    find_lines,
+    lifter_families,
+    noise_floor,
+    power_density,
+)
 
 FS = 25_600.0
 N = 256_000

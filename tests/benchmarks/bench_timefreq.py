@@ -15,12 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from gearsig.timefreq.cwt import cwt, cwt_map
-from gearsig.timefreq.squeezed_cwt import squeezed_cwt, squeezed_cwt_map
-from gearsig.timefreq.squeezed_stft import squeezed_stft_map
-from gearsig.timefreq.stft import stft_map
-from gearsig.timefreq.uniform import UniformSignal
-from gearsig.timefreq.wavelets import Morlet, Morse
+from gearsig.timefreq import (
+    Morlet,
+    Morse,
+    UniformSignal,
+    cwt,
+    cwt_map,
+    squeezed_cwt,
+    squeezed_cwt_map,
+    squeezed_stft_map,
+    stft_map,
+)
 
 N = 1 << 18
 N_LINES = 100

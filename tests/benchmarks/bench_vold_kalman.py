@@ -26,9 +26,7 @@ from scipy.sparse.linalg import spsolve
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from gearsig.orders.vold_kalman import separate_frequencies
-from gearsig.orders.vold_kalman_solve import solve_envelopes, solve_waveforms
-from gearsig.orders.vold_kalman_weight import waveform_weight, weight_of_bandwidth
+from gearsig.orders import separate_frequencies, solve_envelopes, solve_waveforms, waveform_weight, weight_of_bandwidth
 from tests.orders.test_vold_kalman_exact import (
     RATE_HZ,
     differences,

@@ -13,27 +13,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearsig.diagnosis.analyze import analyze
-from gearsig.diagnosis.types import Analysis, Finding, Kind
-from gearsig.recording.types import Recording
-from gearsig.rig.types import Bearing, GearPair, Rig, Shaft
-from sims.kinematic import (
+from gearsig.diagnosis import Analysis, Finding, Kind, analyze
+from gearsig.recording import Recording
+from gearsig.rig import Bearing, GearPair, Rig, Shaft
+from sims.measure import ColouredNoise, MainsHum, Tachometer
+from tests.kinematic.model import (
     BearingFault,
-    ColouredNoise,
     KinematicModel,
-    MainsHum,
     MeshHarmonics,
-    Modulation,
-    Resonance,
+    MeshModulation,
+    PathResonance,
     SensorChannel,
     ShaftOrder,
-    Tachometer,
     ToothDamage,
     ToothVariation,
     TransferPath,
-    Wander,
-    simulate_kinematic,
 )
+from tests.kinematic.simulate import simulate_kinematic
+from tests.kinematic.speed import Wander
 
 FAULTS = ("none", "tooth", "outer", "inner", "eccentric")
 LEVELS = {"weak": 0.1, "medium": 0.4, "strong": 1.5}
@@ -78,7 +75,7 @@ def _model(rng: np.random.Generator, rpm: float, fault: str, size: float, shaft:
     rms = float(np.sqrt(np.sum(levels**2) / 2))
     noise = rms * rng.uniform(0.05, 0.6)
     path = TransferPath(
-        1.0, (Resonance(rng.uniform(600, 1500), 0.05, 1.5), Resonance(rng.uniform(2000, 5000), 0.04, 2.0))
+        1.0, (PathResonance(rng.uniform(600, 1500), 0.05, 1.5), PathResonance(rng.uniform(2000, 5000), 0.04, 2.0))
     )
     eccentric = {
         s: (size / 2 if fault == "eccentric" and s == shaft else rng.uniform(0.01, 0.1)) for s in ("in", "out")
@@ -88,7 +85,7 @@ def _model(rng: np.random.Generator, rpm: float, fault: str, size: float, shaft:
     return KinematicModel(
         speed=Wander(rpm, rng.uniform(0, 0.01), rng.uniform(0.1, 1.0)),
         meshes=(MeshHarmonics("stage", tuple(levels), tuple(rng.uniform(0, 6.28, 3))),),
-        modulations=tuple(Modulation("stage", s, m, m / 2) for s, m in eccentric.items()),
+        modulations=tuple(MeshModulation("stage", s, m, m / 2) for s, m in eccentric.items()),
         tooth_variations=tuple(ToothVariation("stage", s, rng.uniform(0.005, 0.05), 0.02) for s in ("in", "out")),
         tooth_damages=(
             ToothDamage("stage", shaft, angle, knock, rng.uniform(2000, 5000), 0.05, 0.2, 0.15 * size, 0.1 * size),

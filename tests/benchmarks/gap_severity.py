@@ -15,14 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.benchmark.make import make_case
-from app.benchmark.plan import Plan, PlannedCase
-from app.benchmark.seen import Seen, read_seen
-from app.gap.candidates import try_effects
-from app.gap.prepare import conditions_of
+from app.benchmark.cases import Plan, PlannedCase, make_case
+from app.benchmark.diagnosers import VisibleCase, read_seen
 from gearsig.errors import GearsigError
-from gearsig.gap.simulator import GapEffect
-from gearsig.gap.types import Interval
+from gearsig.gap import GapEffect, Interval, conditions_of, try_effects
 from sims.registry import gap_simulator
 
 LEAST_LEVEL = 0.4
@@ -51,7 +47,7 @@ def fitted(plan: Plan, planned: PlannedCase) -> Fitted | None:
     return None if tried is None else Fitted(known.name, one["severity"], tried)
 
 
-def _tried(seen: Seen, effect: GapEffect) -> Interval | None:
+def _tried(seen: VisibleCase, effect: GapEffect) -> Interval | None:
     twin = gap_simulator("cracked").twin_of(seen.rigs[0])
     try:
         conditions, _notices = conditions_of(

@@ -17,13 +17,10 @@ from math import sqrt
 
 import numpy as np
 
-from app.calibration.cases import RELIEF_ERROR, Case, draw_case, draw_other_fault
-from app.calibration.simulate import simulate_rig
+from app.studies.crack_cases import RELIEF_ERROR, CrackCase, draw_case, draw_other_fault, simulate_rig
 from gearsig.errors import GearsigError, RefusalError
-from gearsig.recording.types import Recording
-from gearsig.severity.estimate import estimate_crack
-from gearsig.severity.kind import CRACKED, KINDS
-from gearsig.severity.types import CrackEstimate, NoCrackSeen
+from gearsig.recording import Recording
+from gearsig.severity import CRACKED, KINDS, CrackEstimate, NoCrackSeen, estimate_crack
 from sims import simulate
 from sims.presets import preset, presets
 
@@ -58,7 +55,7 @@ def ask(recording: Recording, reference: Recording | None, tip_relief_um: float 
 
 
 def outcome(
-    case: Case, recording: Recording, depth_mm: float, reference: Recording | None, relief_um: float | None = None
+    case: CrackCase, recording: Recording, depth_mm: float, reference: Recording | None, relief_um: float | None = None
 ) -> Outcome:
     """Ask for one recording of a drawn case."""
     drawn = case.drawn
@@ -66,7 +63,7 @@ def outcome(
     return Outcome(depth_mm, shaft, drawn.tooth + 1, n_teeth, ask(recording, reference, relief_um))
 
 
-def roughly_known_relief_um(case: Case) -> float:
+def roughly_known_relief_um(case: CrackCase) -> float:
     """Return the tip relief as a drawing has it."""
     error = np.random.default_rng(case.drawn.seed).uniform(-RELIEF_ERROR, RELIEF_ERROR)
     return float(case.drawn.parameters["tip_relief_um"]) * (1.0 + error)
@@ -129,7 +126,7 @@ def share(hits: object) -> str:
     return f"{k} of {n} ({100 * k / n:.0f} %, {100 * max(centre - half, 0):.0f} to {100 * (centre + half):.0f} %)"
 
 
-def print_kinds(cases: list[Case], seed: int, *, with_reference: bool) -> None:
+def print_kinds(cases: list[CrackCase], seed: int, *, with_reference: bool) -> None:
     """Print what is said of cracks, chips and spalls."""
     rows: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
     for i, case in enumerate(cases):
@@ -151,7 +148,7 @@ def said(answer: Answer) -> str:
     return "no crack seen" if isinstance(answer, NoCrackSeen) else "refused"
 
 
-def print_growing(cases: list[Case], *, with_reference: bool) -> None:
+def print_growing(cases: list[CrackCase], *, with_reference: bool) -> None:
     """Print how the same cracks are told as they grow: the estimate, or what is not seen as 0."""
     found: dict[float, list[Answer]] = {depth: [] for depth in GROWING_MM}
     falls = steps = bounds = 0
@@ -179,7 +176,7 @@ def print_growing(cases: list[Case], *, with_reference: bool) -> None:
     print(f"  of {steps} steps, {falls} estimates and {bounds} upper bounds fall")
 
 
-def other_cracks(cases: list[Case]) -> None:
+def other_cracks(cases: list[CrackCase]) -> None:
     """Print what becomes of cracks that are not what the calibration knows."""
     kinds: dict[str, dict[str, float | str]] = {
         "at 30°": {"angle_deg": 30.0},

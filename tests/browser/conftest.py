@@ -34,7 +34,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     folder = tmp_path_factory.mktemp("home")
-    command = [sys.executable, "-m", "app.cli", "dashboard", "--port", str(port), "--no-browser"]
+    command = [sys.executable, "-m", "app.cli.main", "dashboard", "--port", str(port), "--no-browser"]
     log = (folder / "log.txt").open("w+")
     server = subprocess.Popen(command, cwd=folder, stdout=log, stderr=log)
     try:

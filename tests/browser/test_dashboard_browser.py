@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from app.samples import samples
-from gearsig.diagnosis.analyze import analyze
-from gearsig.recording.read import read_recording
-from gearsig.rig.toml import read_rig
+from gearsig.diagnosis import analyze
+from gearsig.recording import read_recording
+from gearsig.rig import read_rig
 from tests.browser.conftest import CHROMIUM, settle
 
 TABS = ("Speed", "Spectrum", "Order spectrum", "Order map", "Envelope", "Synchronous average", "Indicators", "Report")

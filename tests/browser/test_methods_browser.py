@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.dashboard.widgets.methods.menu import METHODS
-from gearsig.decompose.wavelet_denoise import denoise_channel
-from gearsig.recording.read import read_recording
+from app.dashboard.methods.menu import METHODS
+from gearsig.decompose import denoise_channel
+from gearsig.recording import read_recording
 from tests.app.test_dashboard import SAMPLES
 from tests.browser.conftest import CHROMIUM, settle
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearsig.recording.types import Channel, Recording
-from gearsig.rig.speed import ConstantSpeed, PulseTimes, SpeedSource
-from gearsig.rig.types import GearPair, Rig, Shaft
+from gearsig.recording import Channel, Recording
+from gearsig.rig import ConstantSpeed, GearPair, PulseTimes, Rig, Shaft, SpeedSource
 
 TEETH = (23, 31)
 RIG = Rig(name="pair", shafts=(Shaft("in"), Shaft("out")), pairs=(GearPair("p", "in", "out", *TEETH),))

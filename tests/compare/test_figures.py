@@ -7,11 +7,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.compare.agreement import frac, tooth_powers
-from gearsig.compare.averages import HalvedLines, waveform
-from gearsig.compare.bands import band_powers, order_band_limits, third_octave_limits, third_octaves
-from gearsig.compare.levels import power_levels
-from gearsig.spectra.density import power_density
+from gearsig.comparison import (
+    HalvedLines,
+    band_powers,
+    frac,
+    order_band_limits,
+    power_levels,
+    third_octave_limits,
+    third_octaves,
+    tooth_powers,
+    waveform,
+)
+from gearsig.spectra import power_density
 
 COMPLEX = st.complex_numbers(min_magnitude=0.1, max_magnitude=10.0)
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from gearsig.compare.recordings import compare_recordings
-from gearsig.recording.read import read_recording
-from gearsig.rig.types import GearPair, OperatingPoint, Rig, Shaft
+from gearsig.comparison import compare_recordings
+from gearsig.recording import read_recording
+from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "gear_pair_23_46"
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the measured recordings are not here")

@@ -7,13 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearsig.compare.recordings import compare_recordings
-from gearsig.compare.types import Comparison, LineLevel
-from gearsig.compare.verdict import missing_words
+from gearsig.comparison import Comparison, LineLevel, compare_recordings, missing_words
 from gearsig.errors import InputError, RefusalError
-from gearsig.recording.types import Channel, Recording
-from gearsig.rig.speed import PulseTimes
-from gearsig.rig.types import GearPair, Rig, Shaft
+from gearsig.recording import Channel, Recording
+from gearsig.rig import GearPair, PulseTimes, Rig, Shaft
 from tests.compare.machines import LINES, RIG, TEETH, gear_record
 
 

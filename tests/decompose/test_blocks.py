@@ -7,9 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearsig.decompose.blocks import joined, modes_by_block
-from gearsig.decompose.types import VmdSettings
-from gearsig.decompose.vmd import variational_modes
+from gearsig.decompose import VmdSettings, joined, modes_by_block, variational_modes
 from gearsig.errors import InputError
 
 SAMPLES = np.arange(20_000)

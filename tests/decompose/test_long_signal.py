@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearsig.decompose.long_signal import long_modes
-from gearsig.decompose.types import VmdSettings
-from gearsig.decompose.vmd import variational_modes
+from gearsig.decompose import VmdSettings, long_modes, variational_modes
 
 SAMPLES = np.arange(20_000)
 TONES = np.stack([np.cos(0.2 * SAMPLES), 0.5 * np.cos(1.3 * SAMPLES + 0.4)])

@@ -7,13 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearsig.angle.types import AngleSignal, ShaftAngle
-from gearsig.decompose.sources import angle_modes, channel_envelope_modes, channel_modes, envelope_modes
-from gearsig.decompose.types import VmdSettings
+from gearsig.angle import AngleSignal, ShaftAngle
+from gearsig.decompose import VmdSettings, angle_modes, channel_envelope_modes, channel_modes, envelope_modes
 from gearsig.errors import InputError
-from gearsig.recording.read import read_recording
-from gearsig.recording.types import Channel, Recording
-from gearsig.spectra.envelope import band_envelope
+from gearsig.recording import Channel, Recording, read_recording
+from gearsig.spectra import band_envelope
 
 FS = 10_000.0
 TIME = np.arange(20_000) / FS

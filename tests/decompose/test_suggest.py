@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from gearsig.decompose.start import peak_centres
-from gearsig.decompose.suggest import noise_width, suggest_modes
+from gearsig.decompose import noise_width, peak_centres, suggest_modes
 from gearsig.errors import InputError, RefusalError
 
 N = 6000

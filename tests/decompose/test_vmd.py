@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from vmdpy import VMD
 
-from gearsig.decompose.types import VmdSettings
-from gearsig.decompose.vmd import variational_modes
+from gearsig.decompose import VmdSettings, variational_modes
 from gearsig.errors import InputError
 
 INIT = {"zero": 0, "uniform": 1, "random": 2}

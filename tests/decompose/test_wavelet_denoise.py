@@ -8,11 +8,19 @@ import pywt
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearsig.decompose.wavelet_denoise import deepest_level, denoise, denoise_channel
-from gearsig.decompose.wavelet_thresholds import apply, bayes, noise_level, sure, universal
-from gearsig.decompose.wavelet_types import DenoiseSettings
+from gearsig.decompose import (
+    DenoiseSettings,
+    apply,
+    bayes,
+    deepest_level,
+    denoise,
+    denoise_channel,
+    noise_level,
+    sure,
+    universal,
+)
 from gearsig.errors import InputError
-from gearsig.recording.types import Channel, Recording
+from gearsig.recording import Channel, Recording
 
 N = 4096
 RULES = ("soft", "hard", "garrote")

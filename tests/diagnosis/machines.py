@@ -4,20 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearsig.diagnosis.types import Analysis, Finding, Kind
-from gearsig.recording.types import Recording
-from gearsig.rig.types import Bearing, GearPair, Rig, Shaft
-from sims.kinematic import (
-    ColouredNoise,
-    KinematicModel,
-    MeshHarmonics,
-    Modulation,
-    SensorChannel,
-    Tachometer,
-    ToothVariation,
-    Wander,
-    simulate_kinematic,
-)
+from gearsig.diagnosis import Analysis, Finding, Kind
+from gearsig.recording import Recording
+from gearsig.rig import Bearing, GearPair, Rig, Shaft
+from sims.measure import ColouredNoise, Tachometer
+from tests.kinematic.model import KinematicModel, MeshHarmonics, MeshModulation, SensorChannel, ToothVariation
+from tests.kinematic.simulate import simulate_kinematic
+from tests.kinematic.speed import Wander
 
 RIG = Rig(
     name="test gearbox",
@@ -28,7 +21,7 @@ RIG = Rig(
 GOOD = KinematicModel(
     speed=Wander(1320.0, 0.004, 0.4),
     meshes=(MeshHarmonics("stage", (4.0, 2.0, 1.0)),),
-    modulations=(Modulation("stage", "in", 0.05), Modulation("stage", "out", 0.05)),
+    modulations=(MeshModulation("stage", "in", 0.05), MeshModulation("stage", "out", 0.05)),
     tooth_variations=(ToothVariation("stage", "in", 0.02), ToothVariation("stage", "out", 0.02)),
     channels=(SensorChannel("a1", noise=ColouredNoise(0.8)),),
     tachometer=Tachometer("in"),

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsig.diagnosis.analyze import analyze
-from gearsig.diagnosis.types import CannotTell, Kind, Outcome
+from gearsig.diagnosis import CannotTell, Kind, Outcome, analyze
 from gearsig.errors import InputError
-from gearsig.recording.types import Channel, Recording
-from gearsig.report.text import analysis_text
-from gearsig.rig.speed import ConstantSpeed, TachometerChannel
-from gearsig.rig.types import GearPair
-from sims.kinematic import BearingFault, ConstantProfile, LinearRamp, Modulation, Tachometer, ToothDamage
+from gearsig.recording import Channel, Recording
+from gearsig.report import analysis_text
+from gearsig.rig import ConstantSpeed, GearPair, TachometerChannel
+from sims.measure import Tachometer
 from tests.diagnosis.machines import GOOD, RIG, codes, finding, record
+from tests.kinematic.model import BearingFault, MeshModulation, ToothDamage
+from tests.kinematic.speed import ConstantProfile, LinearRamp
 
 
 def test_a_good_machine_is_not_accused() -> None:
@@ -60,7 +60,7 @@ def test_a_bearing_that_is_not_described_is_not_named() -> None:
 
 
 def test_a_wheel_whose_teeth_are_not_given_shows_by_its_sidebands() -> None:
-    model = replace(GOOD, modulations=(Modulation("stage", "out", 0.2),), tooth_variations=())
+    model = replace(GOOD, modulations=(MeshModulation("stage", "out", 0.2),), tooth_variations=())
     unknown = replace(RIG, pairs=(GearPair("stage", "in", "out", 27),), bearings=())
     analysis = analyze(replace(record(model, seconds=8.0), rig=unknown))
     found = finding(analysis, "sidebands-of-unknown-shaft")
@@ -69,7 +69,7 @@ def test_a_wheel_whose_teeth_are_not_given_shows_by_its_sidebands() -> None:
 
 
 def test_strong_modulation_by_a_shaft_is_a_suspicion() -> None:
-    model = replace(GOOD, modulations=(Modulation("stage", "out", 0.6, 0.2),))
+    model = replace(GOOD, modulations=(MeshModulation("stage", "out", 0.6, 0.2),))
     found = finding(analyze(record(model)), "mesh-modulated")
     assert found.kind is Kind.SUSPICION
     assert found.where.shaft == "out"

@@ -5,20 +5,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsig.diagnosis.analyze import analyze
-from gearsig.diagnosis.comb import LineExcess, best_comb
-from gearsig.diagnosis.detectors.bearing_limit import smallest_depth
-from gearsig.diagnosis.detectors.impact_trains import slower_train, stands_out_from_neighbours
-from gearsig.diagnosis.envelopes import BandEnvelope
-from gearsig.diagnosis.signals import floor_of
-from gearsig.diagnosis.speed import determine_angle
-from gearsig.diagnosis.types import CannotTell, Kind
-from gearsig.recording.types import Channel, Recording
-from gearsig.rig.speed import ConstantSpeed, SpeedChannel
-from gearsig.rig.types import Bearing, Rig, Shaft
-from gearsig.spectra.amplitude import amplitude_spectrum
-from sims.kinematic import BearingFault, ColouredNoise, ConstantProfile, KinematicModel, SensorChannel
+from gearsig.diagnosis import (
+    BandEnvelope,
+    CannotTell,
+    Kind,
+    LineExcess,
+    analyze,
+    best_comb,
+    determine_angle,
+    floor_of,
+    slower_train,
+    smallest_depth,
+    stands_out_from_neighbours,
+)
+from gearsig.recording import Channel, Recording
+from gearsig.rig import Bearing, ConstantSpeed, Rig, Shaft, SpeedChannel
+from gearsig.spectra import amplitude_spectrum
+from sims.measure import ColouredNoise
 from tests.diagnosis.machines import GOOD, RIG, SAMPLING_RATE_HZ, codes, finding, record
+from tests.kinematic.model import BearingFault, KinematicModel, SensorChannel
+from tests.kinematic.speed import ConstantProfile
 
 SECONDS = 8.0
 ONE_SHAFT = Rig(shafts=(Shaft("in"),), bearings=RIG.bearings)

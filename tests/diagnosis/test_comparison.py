@@ -6,13 +6,21 @@ from pathlib import Path
 
 import pytest
 
-from gearsig.diagnosis.analyze import analyze
-from gearsig.diagnosis.comparison import beside_reference, changes, rig_of_reference
-from gearsig.diagnosis.types import Analysis, Finding, Kind, Strength, Where
+from gearsig.diagnosis import (
+    Analysis,
+    Finding,
+    Kind,
+    Strength,
+    Where,
+    analyze,
+    beside_reference,
+    changes,
+    rig_of_reference,
+)
 from gearsig.errors import InputError
-from gearsig.rig.toml import write_rig
-from sims.kinematic import BearingFault
+from gearsig.rig import write_rig
 from tests.diagnosis.machines import GOOD, RIG, codes, finding, record, teeth
+from tests.kinematic.model import BearingFault
 
 
 @pytest.fixture(scope="module")

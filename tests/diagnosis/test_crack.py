@@ -4,11 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from gearsig.diagnosis.crack import crack_depth, with_crack
-from gearsig.diagnosis.types import CannotTell, Finding, Kind, Outcome, Where, outcome_of
-from gearsig.diagnosis.verdict import ranked
-from gearsig.rig.types import GearPair, Rig, Shaft
-from gearsig.severity.types import CrackEstimate, NoCrackSeen
+from gearsig.diagnosis import CannotTell, Finding, Kind, Outcome, Where, crack_depth, outcome_of, ranked, with_crack
+from gearsig.rig import GearPair, Rig, Shaft
+from gearsig.severity import CrackEstimate, NoCrackSeen
 from tests.diagnosis.machines import RIG, record
 
 PAIR = Rig(shafts=(Shaft("in"), Shaft("out")), pairs=(GearPair("stage", "in", "out", 20, 40),))

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearsig.diagnosis.localisation import localise
+from gearsig.diagnosis import localise
 
 N = 1024
 ANGLE = np.arange(N) / N

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from gearsig.diagnosis.analyze import analyze
-from gearsig.diagnosis.types import Analysis, Kind
-from gearsig.report.page import page_html
-from sims.kinematic import BearingFault
+from gearsig.diagnosis import Analysis, Kind, analyze
+from gearsig.report import page_html
 from tests.diagnosis.machines import GOOD, RIG, codes, finding, record
+from tests.kinematic.model import BearingFault
 
 RINGS_AT_HZ = 4100.0
 

@@ -6,36 +6,32 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsig.diagnosis.analyze import analyze
-from gearsig.diagnosis.detectors.resonance import detect_resonances
-from gearsig.diagnosis.types import Analysis, OrderLevel
-from gearsig.report.page import page_html
-from gearsig.report.to_json import analysis_to_json
-from gearsig.rig.types import GearPair, Rig, Shaft
-from sims.kinematic import (
-    ColouredNoise,
-    KinematicModel,
-    LinearRamp,
-    MeshHarmonics,
-    Modulation,
-    Resonance,
-    SensorChannel,
-    Tachometer,
-    TransferPath,
-    simulate_kinematic,
-)
+from gearsig.diagnosis import Analysis, OrderLevel, analyze, detect_resonances
+from gearsig.report import analysis_to_json, page_html
+from gearsig.rig import GearPair, Rig, Shaft
+from sims.measure import ColouredNoise, Tachometer
 from tests.diagnosis.machines import codes, finding, record, teeth
+from tests.kinematic.model import (
+    KinematicModel,
+    MeshHarmonics,
+    MeshModulation,
+    PathResonance,
+    SensorChannel,
+    TransferPath,
+)
+from tests.kinematic.simulate import simulate_kinematic
+from tests.kinematic.speed import LinearRamp
 
 AMPLITUDES = (4.0, 2.0, 1.0)
 MESH = 27
 
 
-def run_up(*resonances: Resonance, rpm: tuple[float, float] = (600.0, 2700.0), seed: int = 0) -> Analysis:
+def run_up(*resonances: PathResonance, rpm: tuple[float, float] = (600.0, 2700.0), seed: int = 0) -> Analysis:
     """Analyse a run-up of the test gearbox, its path with the given resonances."""
     model = KinematicModel(
         speed=LinearRamp(*rpm, 8.0),
         meshes=(MeshHarmonics("stage", AMPLITUDES),),
-        modulations=(Modulation("stage", "in", 0.1),),
+        modulations=(MeshModulation("stage", "in", 0.1),),
         channels=(SensorChannel("a1", TransferPath(1.0, resonances), ColouredNoise(0.5)),),
         tachometer=Tachometer("in"),
     )
@@ -46,7 +42,7 @@ def run_up(*resonances: Resonance, rpm: tuple[float, float] = (600.0, 2700.0), s
 
 @pytest.fixture(scope="module")
 def resonant() -> Analysis:
-    return run_up(Resonance(1000.0, 0.02, 6.0))
+    return run_up(PathResonance(1000.0, 0.02, 6.0))
 
 
 @pytest.fixture(scope="module")

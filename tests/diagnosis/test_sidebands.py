@@ -9,31 +9,34 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearsig.angle.types import AngleSignal, ShaftAngle
-from gearsig.diagnosis.analyze import analyze
-from gearsig.diagnosis.comb import LineExcess
-from gearsig.diagnosis.modulation import Modulation as Found
-from gearsig.diagnosis.modulation import modulation_of
-from gearsig.diagnosis.signals import floor_of
-from gearsig.diagnosis.surroundings import level_beside, levels_beside
-from gearsig.diagnosis.types import Analysis, Finding, Kind, Outcome
-from gearsig.orders.spectrum import order_spectrum
-from gearsig.recording.types import Recording
-from gearsig.rig.speed import TachometerChannel
-from gearsig.rig.types import GearPair, Rig, Shaft
-from sims.kinematic import (
-    ColouredNoise,
-    ConstantProfile,
-    KinematicModel,
-    LinearRamp,
-    MeshHarmonics,
-    Modulation,
-    Resonance,
-    SensorChannel,
-    Tachometer,
-    TransferPath,
-    simulate_kinematic,
+from gearsig.angle import AngleSignal, ShaftAngle
+from gearsig.diagnosis import (
+    Analysis,
+    Finding,
+    Kind,
+    LineExcess,
+    Outcome,
+    analyze,
+    floor_of,
+    level_beside,
+    levels_beside,
+    modulation_of,
 )
+from gearsig.diagnosis import Modulation as Found
+from gearsig.orders import order_spectrum
+from gearsig.recording import Recording
+from gearsig.rig import GearPair, Rig, Shaft, TachometerChannel
+from sims.measure import ColouredNoise, Tachometer
+from tests.kinematic.model import (
+    KinematicModel,
+    MeshHarmonics,
+    MeshModulation,
+    PathResonance,
+    SensorChannel,
+    TransferPath,
+)
+from tests.kinematic.simulate import simulate_kinematic
+from tests.kinematic.speed import ConstantProfile, LinearRamp
 
 RATE_HZ = 5120.0
 MODEL = KinematicModel(
@@ -148,7 +151,7 @@ def test_a_weak_mesh_in_noise_is_not_modulated(noise: float) -> None:
 def test_a_lone_tone_beside_the_mesh_is_no_modulation(amplitude: float) -> None:
     # Beside the second harmonic, where the upper sideband of the output shaft is.
     hertz = 22.0 * (2 * 27 + 27 / 43)
-    model = replace(MODEL, modulations=(Modulation("stage", "out", 0.05),))
+    model = replace(MODEL, modulations=(MeshModulation("stage", "out", 0.05),))
     assert not found(analyze(with_tone(record(model), amplitude, hertz)), "mesh-modulated")
 
 
@@ -172,7 +175,7 @@ def test_lines_of_another_pair_or_of_the_carrier_are_no_sidebands(pairs: tuple[G
 
 
 def test_three_modulations_per_revolution_are_told() -> None:
-    model = replace(MODEL, modulations=(Modulation("stage", "in", 0.9, order=3),))
+    model = replace(MODEL, modulations=(MeshModulation("stage", "in", 0.9, order=3),))
     (finding,) = found(analyze(record(model)), "mesh-modulated")
     assert finding.kind is Kind.SUSPICION
     assert "3 times per revolution of shaft in" in finding.title
@@ -181,13 +184,13 @@ def test_three_modulations_per_revolution_are_told() -> None:
 
 def test_a_simple_cause_goes_before_a_multiple_of_a_slower_shaft() -> None:
     machine = rig(20, 40)  # the output shaft's second sidebands are the input shaft's first
-    model = replace(MODEL, modulations=(Modulation("stage", "in", 0.6),))
+    model = replace(MODEL, modulations=(MeshModulation("stage", "in", 0.6),))
     (finding,) = found(analyze(record(model, machine)), "mesh-modulated")
     assert finding.where.shaft == "in"
 
 
 def test_shafts_of_one_speed_are_not_told_apart() -> None:
-    model = replace(MODEL, modulations=(Modulation("stage", "in", 0.6),))
+    model = replace(MODEL, modulations=(MeshModulation("stage", "in", 0.6),))
     findings = found(analyze(record(model, rig(27, 27))), "mesh-modulated")
     assert findings
     assert all(any("cannot be told" in text for text in finding.evidence) for finding in findings)
@@ -195,7 +198,7 @@ def test_shafts_of_one_speed_are_not_told_apart() -> None:
 
 @pytest.mark.parametrize("stated", [24, 25, 26, 28, 29, 30])
 def test_teeth_that_the_lines_contradict(stated: int) -> None:
-    model = replace(MODEL, modulations=(Modulation("stage", "in", 0.1), Modulation("stage", "out", 0.1)))
+    model = replace(MODEL, modulations=(MeshModulation("stage", "in", 0.1), MeshModulation("stage", "out", 0.1)))
     analysis = analyze(replace(record(model), rig=rig(stated)))
     (finding,) = found(analysis, "teeth-disagree")
     assert finding.where.order == pytest.approx(27.0)
@@ -215,7 +218,7 @@ def test_wrong_teeth_of_the_driven_gear_where_the_speed_is_its_own() -> None:
 @pytest.mark.parametrize("am", [0.0, 0.9])
 @pytest.mark.parametrize("pm", [0.5, 1.5, 2.4])
 def test_strong_modulation_does_not_contradict_the_teeth(am: float, pm: float) -> None:
-    analysis = analyze(record(replace(MODEL, modulations=(Modulation("stage", "in", am, pm),))))
+    analysis = analyze(record(replace(MODEL, modulations=(MeshModulation("stage", "in", am, pm),))))
     assert not found(analysis, "teeth-disagree")
     assert "once per revolution of shaft in" in found(analysis, "mesh-modulated")[0].title
 
@@ -231,7 +234,7 @@ def test_another_pair_explains_lines_one_tooth_away() -> None:
 
 
 def test_the_foot_of_a_mesh_line_in_a_run_up_is_no_family() -> None:
-    path = TransferPath(1.0, (Resonance(700.0, 0.01, 30.0),))
+    path = TransferPath(1.0, (PathResonance(700.0, 0.01, 30.0),))
     for seed in range(3):
         model = replace(
             MODEL, speed=LinearRamp(600.0, 1800.0, 6.0), channels=(SensorChannel("a1", path, ColouredNoise(0.3)),)
@@ -246,7 +249,7 @@ def test_pulses_of_which_there_are_twice_as_many_are_doubted() -> None:
         MODEL,
         tachometer=Tachometer("in", pulses_per_revolution=2),
         meshes=(MeshHarmonics("stage", (4.0, 3.0, 2.0, 2.0)),),
-        modulations=(Modulation("stage", "in", 0.2, 0.2),),
+        modulations=(MeshModulation("stage", "in", 0.2, 0.2),),
     )
     recording = record(model, rate_hz=2 * RATE_HZ)
     once = TachometerChannel("tacho", shaft="in")

@@ -5,15 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsig import analyze
-from gearsig.diagnosis.comparison import changes
-from gearsig.diagnosis.types import CannotTell, Kind, Outcome
+from gearsig.diagnosis import CannotTell, Kind, Outcome, analyze, changes
 from gearsig.errors import InputError
-from gearsig.recording.types import Channel, Recording
-from gearsig.report.text import analysis_text
-from gearsig.report.to_json import analysis_to_json
-from gearsig.rig.speed import EncoderChannel, SpeedChannel
-from gearsig.rig.types import GearPair, Rig, Shaft
+from gearsig.recording import Channel, Recording
+from gearsig.report import analysis_text, analysis_to_json
+from gearsig.rig import EncoderChannel, GearPair, Rig, Shaft, SpeedChannel
 from sims import simulate
 from tests.motion.recordings import continuous, start_stop, without
 

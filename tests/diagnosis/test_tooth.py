@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsig.diagnosis.analyze import analyze
-from gearsig.diagnosis.types import Kind, Outcome
-from gearsig.recording.types import Recording
-from gearsig.rig.speed import SpeedChannel, TachometerChannel
-from sims.kinematic import ColouredNoise, ConstantProfile, SensorChannel, ToothDamage, ToothVariation
+from gearsig.diagnosis import Kind, Outcome, analyze
+from gearsig.recording import Recording
+from gearsig.rig import SpeedChannel, TachometerChannel
+from sims.measure import ColouredNoise
 from tests.diagnosis.machines import GOOD, RIG, codes, finding, record, teeth
+from tests.kinematic.model import SensorChannel, ToothDamage, ToothVariation
+from tests.kinematic.speed import ConstantProfile
 
 DAMAGE = ToothDamage("stage", "in", 0.4, impulse_mps2=10.0, resonance_hz=3000.0, mesh_dip_fraction=0.2)
 SHAFT_HZ = 22.0
@@ -117,7 +118,7 @@ def test_a_speed_channel_that_is_a_little_off_leaves_the_teeth_undecided() -> No
 
 
 def test_revolutions_count_within_the_record_only() -> None:
-    from gearsig.rig.speed import PulseTimes
+    from gearsig.rig import PulseTimes
 
     recording = record(STEADY, seconds=0.4)
     pulses = PulseTimes(np.arange(0.01, 20.0, 1 / SHAFT_HZ), shaft="in")

@@ -2,9 +2,7 @@
 
 import pytest
 
-from gearsig.diagnosis.confidence import from_p_value
-from gearsig.diagnosis.types import Finding, Kind
-from gearsig.diagnosis.verdict import ranked, verdict_of
+from gearsig.diagnosis import Finding, Kind, from_p_value, ranked, verdict_of
 
 
 def test_faults_come_first_and_the_surest_of_them() -> None:

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearsig.gap.curve_types import AngleCurves, AverageCurves, SpectrumCurves
-from gearsig.gap.simulator import Added, Point
-from gearsig.gap.types import (
+from gearsig.gap import (
+    Added,
+    AngleCurves,
+    AverageCurves,
     ConditionFacts,
     Evidence,
     GapCause,
@@ -18,13 +19,15 @@ from gearsig.gap.types import (
     GapStep,
     Interval,
     NextRecording,
+    OperatingCondition,
     PlaceKind,
     Shrinkage,
+    SpectrumCurves,
 )
 
 RIG = "Published pair 55/75"
 TWIN = '[about]\nmodel = "cracked"\ntitle = "Twin of Published pair 55/75"\n\n[parameters]\ndriver_teeth = 55\n'
-POINTS = (Point(1504.2, 60.0), Point(1998.7, 60.0))
+POINTS = (OperatingCondition(1504.2, 60.0), OperatingCondition(1998.7, 60.0))
 
 
 def effect_report(rig: str = RIG, simulator: str = "cracked") -> GapReport:
@@ -180,7 +183,7 @@ def gearless_report() -> GapReport:
     return GapReport(
         rig="Bearing test rig",
         simulator="",
-        conditions=(ConditionFacts("outer.mat", Point(1500.0, nan), 75.0, 3.0, 48_828.0),),
+        conditions=(ConditionFacts("outer.mat", OperatingCondition(1500.0, nan), 75.0, 3.0, 48_828.0),),
         references=(),
         outcome=GapOutcome.EFFECT,
         size=Interval(nan, nan, nan),
@@ -317,14 +320,14 @@ def next_recordings() -> tuple[NextRecording, ...]:
     names = ("root_crack", "tooth_spall")
     return (
         NextRecording(
-            Point(900.0, 120.0),
+            OperatingCondition(900.0, 120.0),
             names,
             5.4,
             1.6,
             "record at 900 rpm and 120 N m: there a crack in a tooth root and a spall on a tooth flank lie "
             "5.4 structural floors apart, against 1.6 now.",
         ),
-        NextRecording(Point(1500.0, 120.0), names, 3.8, 1.6, "record at 1500 rpm and 120 N m."),
+        NextRecording(OperatingCondition(1500.0, 120.0), names, 3.8, 1.6, "record at 1500 rpm and 120 N m."),
     )
 
 

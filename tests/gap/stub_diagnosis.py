@@ -23,9 +23,9 @@ def diagnose_gap(*given, **more):
     from tests.gap.stub_diagnosis import diagnose_gap
     return diagnose_gap(*given, **more)
 
-stub = ModuleType("app.gap.diagnose")
+stub = ModuleType("gearsig.gap._diagnose")
 stub.diagnose_gap = diagnose_gap
-sys.modules["app.gap.diagnose"] = stub
+sys.modules["gearsig.gap._diagnose"] = stub
 """
 
 

@@ -7,9 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.recording.types import Channel, Recording
-from gearsig.rig.speed import PulseTimes
-from gearsig.rig.types import Bearing, GearPair, Rig, Shaft
+from gearsig.recording import Channel, Recording
+from gearsig.rig import Bearing, GearPair, PulseTimes, Rig, Shaft
 
 RATE_HZ, DURATION_S, SPEED_HZ = 12800.0, 6.0, 23.7
 TEETH = (23, 37)

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearsig.angle.types import AngleSignal, ShaftAngle
-from gearsig.gap.averages import joint_averages
-from gearsig.gap.frame import gear_frame
-from gearsig.gap.gather import gather
+from gearsig.angle import AngleSignal, ShaftAngle
+from gearsig.gap import gear_frame, joint_averages, reduce_recording
 from tests.gap.synthetic import RIG, TEETH, record
 
 FRAME = gear_frame(RIG)
@@ -45,7 +43,7 @@ def test_neighbouring_orders_of_two_shafts_are_told_apart() -> None:
 
 
 def test_the_mesh_stays_in_both_averages() -> None:
-    gathered = gather(record(), RIG)
+    gathered = reduce_recording(record(), RIG)
     sums = gathered.channels[next(iter(gathered.channels))]
     first = [abs(lines.mean(axis=0)[z]) for lines, z in zip(sums.lines, TEETH, strict=True)]
     assert first[0] == pytest.approx(first[1], rel=0.02)

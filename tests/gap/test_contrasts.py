@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearsig.gap.contrasts import mirrored, seen_rows
-from gearsig.gap.population import load_population
+from gearsig.gap import load_population, mirrored, seen_rows
 
 NAMES = load_population().change_names
 FEATURES = load_population().feature_names

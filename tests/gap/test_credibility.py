@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearsig.gap.population import credibility_of, load_population
-from gearsig.gap.types import NONE
+from gearsig.gap import NONE, credibility_of, load_population
 
 
 def test_what_a_simulation_knows_is_subtracted_and_what_it_guesses_is_not() -> None:

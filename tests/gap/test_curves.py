@@ -5,26 +5,32 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gearsig.gap.average_curves import average_curves
-from gearsig.gap.change import difference_features
-from gearsig.gap.curve_types import SpectrumCurves
-from gearsig.gap.curves import against_reference, angle_curves, gap_by_order, lines_beyond, spectrum_curves
-from gearsig.gap.floors import StructuralFloor
-from gearsig.gap.gather import gather
-from gearsig.gap.gathered import Gathered
+from gearsig.gap import (
+    ReducedRecording,
+    SpectrumCurves,
+    StructuralFloor,
+    against_reference,
+    angle_curves,
+    average_curves,
+    difference_features,
+    gap_by_order,
+    lines_beyond,
+    reduce_recording,
+    spectrum_curves,
+)
 from tests.gap.synthetic import MESH_AMPLITUDES, RIG, TEETH, record, ringing
 
 RATIO = TEETH[0] / TEETH[1]
 
 
 @cache
-def sound() -> Gathered:
-    return gather(record(), RIG)
+def sound() -> ReducedRecording:
+    return reduce_recording(record(), RIG)
 
 
 @cache
-def knocking(size: float = 1.5, seed: int = 1) -> Gathered:
-    return gather(record(lambda _, r: size * ringing(r - 0.4), seed=seed), RIG)
+def knocking(size: float = 1.5, seed: int = 1) -> ReducedRecording:
+    return reduce_recording(record(lambda _, r: size * ringing(r - 0.4), seed=seed), RIG)
 
 
 def test_spectra_are_peak_amplitudes_over_the_drivers_order() -> None:
@@ -42,7 +48,7 @@ def test_spectra_are_peak_amplitudes_over_the_drivers_order() -> None:
 
 def test_noise_stays_below_the_floor() -> None:
     """One line of noise in twenty is above it."""
-    average = spectrum_curves(sound(), gather(record(seed=5), RIG))[0]
+    average = spectrum_curves(sound(), reduce_recording(record(seed=5), RIG))[0]
     empty = (average.orders > 80) & (average.orders < 140)
     assert np.mean(average.measured[empty] > average.floor[empty]) < 0.1
 
@@ -94,14 +100,14 @@ def test_the_simulated_change_has_the_size_of_the_measured_one() -> None:
 
 
 def test_without_a_mark_simulated_curves_are_turned_to_the_measured() -> None:
-    measured = gather(record(lambda _, r: 1.5 * ringing(RATIO * r - 0.3), seed=1), RIG)
-    simulated = gather(record(lambda _, r: 1.5 * ringing(RATIO * r - 0.7), seed=2), RIG)
+    measured = reduce_recording(record(lambda _, r: 1.5 * ringing(RATIO * r - 0.3), seed=1), RIG)
+    simulated = reduce_recording(record(lambda _, r: 1.5 * ringing(RATIO * r - 0.7), seed=2), RIG)
     driven = angle_curves(measured, simulated)[1]
     assert abs(int(np.argmax(driven.measured)) - int(np.argmax(driven.before))) <= 1
 
 
 def test_the_reference_stands_beside_recording_and_simulation() -> None:
-    reference = gather(record(seed=7), RIG)
+    reference = reduce_recording(record(seed=7), RIG)
     change = difference_features(knocking(), sound())
     floor = StructuralFloor(change.names, np.full(len(change.names), 2.0))
     for curves in spectrum_curves(knocking(), sound(), reference=reference, reference_structural=floor):
@@ -140,7 +146,7 @@ def test_averages_differ_where_the_knock_is() -> None:
 def test_averages_are_peak_amplitudes_of_what_was_put_in() -> None:
     """A line between the mesh harmonics, 1.5 m/s² in the recording and none in the reference."""
     order = TEETH[0] + 9
-    added = gather(record(lambda _, r: 1.5 * np.cos(2 * np.pi * order * r), seed=3), RIG)
+    added = reduce_recording(record(lambda _, r: 1.5 * np.cos(2 * np.pi * order * r), seed=3), RIG)
     curves = average_curves(added, sound())[0]
     change = curves.measured - curves.reference
     assert np.sqrt(2.0 * np.mean(change**2)) == pytest.approx(1.5, rel=0.05)

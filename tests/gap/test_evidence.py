@@ -5,10 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.gap.evidence import MOST_OF_A_FAMILY, evidence_of, weighed_evidence
-from gearsig.gap.frame import gear_frame
-from gearsig.gap.prediction import EffectPath, Fit, Observed
-from gearsig.gap.types import Evidence, Interval
+from gearsig.gap import (
+    MOST_OF_A_FAMILY,
+    EffectPath,
+    Evidence,
+    Fit,
+    Interval,
+    ObservedChange,
+    evidence_of,
+    gear_frame,
+    weighed_evidence,
+)
 from tests.gap.synthetic import RIG
 
 NAMES = (*(f"change.driver.{what}" for what in ("level", "peak", "prominence", "second", "kurtosis")), "hum")
@@ -17,7 +24,7 @@ NAMES = (*(f"change.driver.{what}" for what in ("level", "peak", "prominence", "
 def told(predicted: list[float], observed: list[float]) -> tuple[Evidence, ...]:
     table: FloatArray = np.array([predicted])
     path = EffectPath("root_crack", {}, np.array([1.0]), (table[None],), NAMES)
-    seen = Observed(0, np.array(observed), np.ones(len(NAMES)))
+    seen = ObservedChange(0, np.array(observed), np.ones(len(NAMES)))
     return evidence_of(Fit(path, Interval(1.0, 1.0, 1.0), 0.0, {0: 0}), [seen], gear_frame(RIG))
 
 

@@ -8,20 +8,25 @@ import pytest
 
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.gap.change import LEAST_SURPRISE, SURPRISE, change_features
-from gearsig.gap.features import Features, features_of
-from gearsig.gap.frame import gear_frame
-from gearsig.gap.gather import gather
-from gearsig.gap.gathered import Gathered
-from gearsig.gap.hum import mains_lines
-from gearsig.recording.types import Channel, Recording
+from gearsig.gap import (
+    LEAST_SURPRISE,
+    SURPRISE,
+    Features,
+    ReducedRecording,
+    change_features,
+    features_of,
+    gear_frame,
+    mains_lines,
+    reduce_recording,
+)
+from gearsig.recording import Channel, Recording
 from tests.gap.synthetic import MESH_AMPLITUDES, RATE_HZ, RIG, SPEED_HZ, TEETH, record, ringing
 
 Added = Callable[[FloatArray, FloatArray], FloatArray]
 
 
-def reduced(added: Added | None = None, **settings: float) -> Gathered:
-    return gather(record(added, **settings), RIG)  # type: ignore[arg-type]  # seed is whole
+def reduced(added: Added | None = None, **settings: float) -> ReducedRecording:
+    return reduce_recording(record(added, **settings), RIG)  # type: ignore[arg-type]  # seed is whole
 
 
 def as_dict(features: Features) -> dict[str, float]:
@@ -29,11 +34,11 @@ def as_dict(features: Features) -> dict[str, float]:
 
 
 @pytest.fixture(scope="module")
-def sound() -> Gathered:
+def sound() -> ReducedRecording:
     return reduced()
 
 
-def test_mesh_harmonics_and_sidebands_have_their_levels(sound: Gathered) -> None:
+def test_mesh_harmonics_and_sidebands_have_their_levels(sound: ReducedRecording) -> None:
     found = as_dict(features_of(sound))
     powers = np.square(MESH_AMPLITUDES)
     for k, power in enumerate(powers, 1):
@@ -58,7 +63,7 @@ def test_scatter_is_that_of_repeated_records() -> None:
     ("family", "order"),
     [("outer", 9 / 2 * (1 - 7.94 / 39.04)), ("inner", 9 / 2 * (1 + 7.94 / 39.04))],
 )
-def test_a_bearings_train_raises_its_own_family(sound: Gathered, family: str, order: float) -> None:
+def test_a_bearings_train_raises_its_own_family(sound: ReducedRecording, family: str, order: float) -> None:
     changes = as_dict(change_features(reduced(lambda _, r: 0.6 * ringing(0.99 * order * r), seed=1), sound))
     families = {name: changes[f"envelope.{name}"] for name in ("outer", "inner", "ball", "cage")}
     assert families[family] > 10.0
@@ -66,19 +71,19 @@ def test_a_bearings_train_raises_its_own_family(sound: Gathered, family: str, or
     assert abs(changes["mesh.total"]) < 0.1
 
 
-def test_a_train_of_no_known_order_is_strange(sound: Gathered) -> None:
+def test_a_train_of_no_known_order_is_strange(sound: ReducedRecording) -> None:
     changes = as_dict(change_features(reduced(lambda _, r: 0.6 * ringing(2.37 * r), seed=1), sound))
     assert changes["envelope.strange"] > 10.0
 
 
-def test_a_knock_at_one_tooth_stands_out_on_its_own_gear(sound: Gathered) -> None:
+def test_a_knock_at_one_tooth_stands_out_on_its_own_gear(sound: ReducedRecording) -> None:
     changes = as_dict(change_features(reduced(lambda _, r: 0.5 * ringing(r - 0.4), seed=1), sound))
     assert changes["change.driver.prominence"] > 15.0
     assert changes["change.driver.prominence"] > changes["change.driven.prominence"] + 10.0
     assert changes["change.driver.width"] == pytest.approx(0.0, abs=2.0)  # about one pitch
 
 
-def test_hum_and_swing_are_told_from_the_gears(sound: Gathered) -> None:
+def test_hum_and_swing_are_told_from_the_gears(sound: ReducedRecording) -> None:
     hum = as_dict(change_features(reduced(lambda t, _: 0.02 * np.sin(2 * np.pi * 50.0 * t), seed=1), sound))
     assert hum["hum"] > 6.0
     assert abs(hum["shaft.driver.2"]) < 3.0
@@ -88,7 +93,7 @@ def test_hum_and_swing_are_told_from_the_gears(sound: Gathered) -> None:
     assert reduced(seed=1, swing=0.01, swing_hz=1.3).speed[3] == pytest.approx(1.3, abs=0.1)
 
 
-def test_nothing_changes_but_noise(sound: Gathered) -> None:
+def test_nothing_changes_but_noise(sound: ReducedRecording) -> None:
     again = change_features(reduced(seed=5), sound)
     level = [i for i, name in enumerate(again.names) if name.startswith(("mesh.", "sideband.", "floor.band"))]
     assert np.all(np.abs(again.values[level]) < 4.0 * again.scatter[level] + 0.2)
@@ -97,28 +102,28 @@ def test_nothing_changes_but_noise(sound: Gathered) -> None:
 def test_two_gears_of_equal_teeth_leave_nothing_of_their_own_in_one_average() -> None:
     pair = replace(RIG.pairs[0], driven_teeth=TEETH[0])
     rig = replace(RIG, pairs=(pair,))
-    values = as_dict(change_features(*(gather(record(seed=seed), rig) for seed in (1, 0))))
+    values = as_dict(change_features(*(reduce_recording(record(seed=seed), rig) for seed in (1, 0))))
     assert values[f"{SURPRISE}driven.level"] == pytest.approx(10.0 * np.log10(LEAST_SURPRISE))
     assert -10.0 < values[f"{SURPRISE}driver.level"] < 3.0
 
 
-def test_a_longer_record_reads_alike(sound: Gathered) -> None:
+def test_a_longer_record_reads_alike(sound: ReducedRecording) -> None:
     """What is not there has a floor that does not fall with the number of revolutions."""
     whole = record(seed=2)
-    half = gather(replace(whole, samples=whole.samples[:, : whole.n_samples // 2]), RIG)
+    half = reduce_recording(replace(whole, samples=whole.samples[:, : whole.n_samples // 2]), RIG)
     long, short = as_dict(features_of(sound)), as_dict(features_of(half))
     for name in ("shaft.driver.1", "shaft.driven.2", "tooth.driver.level", "sideband.driver.6to12"):
         assert short[name] == pytest.approx(long[name], abs=4.0)
     assert abs(short["envelope.strange"]) < 15.0
 
 
-def test_no_cycle_is_read_beyond_its_band(sound: Gathered) -> None:
+def test_no_cycle_is_read_beyond_its_band(sound: ReducedRecording) -> None:
     assert as_dict(features_of(sound))["envelope.strange"] < 15.0
 
 
 def test_every_feature_has_a_scatter() -> None:
     whole = record(seed=3)
-    short = gather(replace(whole, samples=whole.samples[:, : round(30 * RATE_HZ / SPEED_HZ)]), RIG)
+    short = reduce_recording(replace(whole, samples=whole.samples[:, : round(30 * RATE_HZ / SPEED_HZ)]), RIG)
     found = features_of(short)
     still = {n for n, s in zip(found.names, found.scatter, strict=True) if s == 0.0}
     assert still <= {"mesh.share.6", "mesh.half", "tooth.driver.width", "tooth.driven.width"}  # at a limit, or in steps
@@ -128,13 +133,13 @@ def test_too_few_revolutions_are_refused() -> None:
     whole = record()
     short = replace(whole, samples=whole.samples[:, : int(RATE_HZ / SPEED_HZ * 12)])
     with pytest.raises(RefusalError, match="turns 12 times"):
-        gather(short, RIG)
+        reduce_recording(short, RIG)
 
 
 def test_teeth_must_be_known() -> None:
     unknown = replace(RIG, pairs=(replace(RIG.pairs[0], driven_teeth=None),))
     with pytest.raises(RefusalError, match="teeth"):
-        gather(record(), unknown)
+        reduce_recording(record(), unknown)
     assert (RIG.pairs[0].driver_teeth, RIG.pairs[0].driven_teeth) == TEETH
 
 
@@ -154,5 +159,5 @@ def test_a_mesh_above_what_is_sampled_is_refused() -> None:
     whole = record()
     slow = replace(whole, samples=whole.samples[:, ::12], sampling_rate_hz=RATE_HZ / 12)
     with pytest.raises(RefusalError, match=r"mesh at 545\.1 Hz, above what 1066\.67 Hz"):
-        gather(slow, RIG)
-    gather(replace(whole, samples=whole.samples[:, ::6], sampling_rate_hz=RATE_HZ / 6), RIG)
+        reduce_recording(slow, RIG)
+    reduce_recording(replace(whole, samples=whole.samples[:, ::6], sampling_rate_hz=RATE_HZ / 6), RIG)

@@ -6,10 +6,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from gearsig.gap.families import family_members, family_of
-from gearsig.gap.features import Features
-from gearsig.gap.floors import StructuralFloor, family_size, gap_size, independent_whole, pooled_scatter, soft_size
-from gearsig.gap.types import PlaceKind
+from gearsig.gap import (
+    Features,
+    PlaceKind,
+    StructuralFloor,
+    family_members,
+    family_of,
+    family_size,
+    gap_size,
+    independent_whole,
+    pooled_scatter,
+    soft_size,
+)
 
 NAMES = tuple(
     f"{family}.{side}.{i}"

@@ -6,8 +6,7 @@ from math import nan
 
 import pytest
 
-from gearsig.gap.joint import NOT_SEEN, joint_probabilities
-from gearsig.gap.types import NONE
+from gearsig.gap import NONE, NOT_SEEN, joint_probabilities
 
 SURE = {"backlash": 0.8, "wear": 0.1, NONE: 0.1}
 NOTHING = {"backlash": 0.05, "wear": 0.05, NONE: 0.9}

@@ -8,18 +8,23 @@ import numpy as np
 import pytest
 
 from gearsig.checks import FloatArray
-from gearsig.gap.change import change_features, difference_features
-from gearsig.gap.floors import StructuralFloor
-from gearsig.gap.frame import DRIVEN, DRIVER
-from gearsig.gap.gather import gather
-from gearsig.gap.gathered import Gathered
-from gearsig.gap.gear_lines import is_synchronous
-from gearsig.gap.places import gap_places
-from gearsig.gap.relative import beyond_the_mesh
-from gearsig.gap.spots import Comparison
-from gearsig.gap.spots_gear import mesh_spot
-from gearsig.gap.spots_tooth import _all_round
-from gearsig.gap.types import GapPlace, PlaceKind
+from gearsig.gap import (
+    DRIVEN,
+    DRIVER,
+    ComparedPair,
+    GapPlace,
+    PlaceKind,
+    ReducedRecording,
+    StructuralFloor,
+    beyond_the_mesh,
+    change_features,
+    difference_features,
+    gap_places,
+    is_synchronous,
+    mesh_spot,
+    reduce_recording,
+)
+from gearsig.gap._places import _all_round
 from tests.gap.synthetic import RIG, SPEED_HZ, TEETH, record, ringing
 
 Added = Callable[[FloatArray, FloatArray], FloatArray]
@@ -28,8 +33,8 @@ OUTER = 9 / 2 * (1 - 7.94 / 39.04)
 
 
 @cache
-def sound(seed: int = 0) -> Gathered:
-    return gather(record(seed=seed), RIG)
+def sound(seed: int = 0) -> ReducedRecording:
+    return reduce_recording(record(seed=seed), RIG)
 
 
 @cache
@@ -43,7 +48,7 @@ def floor(is_reference: bool) -> StructuralFloor:
 
 
 def places_of(added: Added | None = None, *, is_reference: bool = True, **settings: float) -> tuple[GapPlace, ...]:
-    now = gather(record(added, seed=1, **settings), RIG)
+    now = reduce_recording(record(added, seed=1, **settings), RIG)
     return gap_places(now, sound(), floor(is_reference), is_reference=is_reference)
 
 
@@ -158,7 +163,7 @@ def test_shares_add_up_to_one_at_most() -> None:
 
 
 def test_what_leaks_into_an_average_is_not_its_own() -> None:
-    leaking = gather(record(tone(7.43, 3.0), seed=1), RIG).channels["a1"]
+    leaking = reduce_recording(record(tone(7.43, 3.0), seed=1), RIG).channels["a1"]
     held = is_synchronous(leaking, DRIVER)
     assert held[TEETH[0]]
     assert held[TEETH[0] + 1]
@@ -176,19 +181,18 @@ def test_few_lines_of_noise_pass_for_a_shafts_own() -> None:
 
 
 def test_clipping_is_told_from_a_stray_peak() -> None:
-    from gearsig.gap.spots import Comparison
-    from gearsig.gap.spots_other import tail_spot
+    from gearsig.gap import ComparedPair, tail_spot
 
     recording = record(seed=1)
-    clipped = gather(replace(recording, samples=np.clip(recording.samples, -4.0, 4.0)), RIG)
+    clipped = reduce_recording(replace(recording, samples=np.clip(recording.samples, -4.0, 4.0)), RIG)
     figures = {"raw.near_the_extreme": 20.0, "raw.kurtosis": -1.0}
-    assert "as clipping makes them" in tail_spot(Comparison(clipped, sound(), True, figures, figures)).title
-    assert "clipping" not in tail_spot(Comparison(sound(), clipped, True, figures, figures)).title
+    assert "as clipping makes them" in tail_spot(ComparedPair(clipped, sound(), True, figures, figures)).title
+    assert "clipping" not in tail_spot(ComparedPair(sound(), clipped, True, figures, figures)).title
 
 
-def compared(change_db: dict[str, float]) -> Comparison:
+def compared(change_db: dict[str, float]) -> ComparedPair:
     """Return two records that differ by noise, with features that are said to have changed; floors of 1 dB."""
-    return Comparison(sound(1), sound(), True, change_db, change_db)
+    return ComparedPair(sound(1), sound(), True, change_db, change_db)
 
 
 def test_the_figure_of_a_place_is_the_one_that_was_scored() -> None:

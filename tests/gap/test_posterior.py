@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.gap.posterior import GapCalibration, load_gap_calibration, score_of
-from gearsig.gap.types import NONE, UNKNOWN, GapOutcome
+from gearsig.gap import NONE, UNKNOWN, GapCalibration, GapOutcome, load_gap_calibration, score_of
 
 PLAIN = GapCalibration(1.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.65)
 FOREST = {"root_crack": 0.5, "eccentricity": 0.2, NONE: 0.2, UNKNOWN: 0.1}

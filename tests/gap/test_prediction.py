@@ -10,9 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from gearsig.gap.prediction import FLOOR_IN_DEVIATIONS, EffectPath, Observed, fit_effect, fit_path, paths_of
-from gearsig.gap.shrinkage import Fold, shrinkage
-from gearsig.gap.simulator import Added
+from gearsig.gap import (
+    FLOOR_IN_DEVIATIONS,
+    Added,
+    EffectPath,
+    Fold,
+    ObservedChange,
+    fit_effect,
+    fit_path,
+    paths_of,
+    shrinkage,
+)
 
 NAMES = ("mesh.total", "mesh.share.1", "sideband.driver.1", "sideband.driven.1", "shaft.driver.1", "hum")
 FLOORS = np.array([2.0, 1.0, 3.0, 3.0, 2.0, 1.0])
@@ -30,8 +38,8 @@ def foretold(effect: EffectPath, severity: float, condition: int = 0, level: int
     return effect.at(np.array([severity]), condition)[level, 0]
 
 
-def seen(distances: np.ndarray, condition: int = 0) -> Observed:
-    return Observed(condition, distances, FLOORS)
+def seen(distances: np.ndarray, condition: int = 0) -> ObservedChange:
+    return ObservedChange(condition, distances, FLOORS)
 
 
 @given(st.floats(1.0, 4.0))
@@ -124,7 +132,7 @@ def test_the_reference_s_scatter_widens_the_interval() -> None:
     rng = np.random.default_rng(4)
     fitted, truth = foretold(path(), 2.0), foretold(path(), 4.0)
 
-    def blocks() -> tuple[Observed, ...]:
+    def blocks() -> tuple[ObservedChange, ...]:
         return tuple(seen(truth + 0.2 * FLOORS * rng.standard_normal(len(NAMES))) for _ in range(6))
 
     recording, reference = blocks(), blocks()

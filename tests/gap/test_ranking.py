@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from gearsig.gap.ranking import ranked_places
-from gearsig.gap.types import GapPlace, PlaceKind
+from gearsig.gap import GapPlace, PlaceKind, ranked_places
 
 NAN = float("nan")
 

@@ -9,12 +9,23 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.gap import recognise
-from gearsig.gap.features import Features
-from gearsig.gap.kept_recogniser import keep_fitted
-from gearsig.gap.population import BY_HAND, INDEPENDENT, Population, load_population, without_machines_of
-from gearsig.gap.recognise import Recogniser, _load, even_weights, fit_recogniser, load_recogniser
-from gearsig.gap.types import NONE, UNKNOWN
+from gearsig.gap import (
+    BY_HAND,
+    INDEPENDENT,
+    NONE,
+    UNKNOWN,
+    Features,
+    Population,
+    Recogniser,
+    even_weights,
+    fit_recogniser,
+    keep_fitted,
+    load_population,
+    load_recogniser,
+    without_machines_of,
+)
+from gearsig.gap import _recognition as recognise
+from gearsig.gap._recognition import _load
 from sims.effects import effects
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearsig.angle.types import ShaftAngle
-from gearsig.gap.speed import SPEED_FIGURES, speed_figures
+from gearsig.angle import ShaftAngle
+from gearsig.gap import SPEED_FIGURES, speed_figures
 
 TURNS_HZ, RATIO = 25.0, 29 / 47
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gearsig.gap.population import load_population
-from gearsig.gap.textbook import MOST_OF_A_SIGN, RULES, strengths
-from gearsig.gap.types import NONE
+from gearsig.gap import MOST_OF_A_SIGN, NONE, RULES, load_population, strengths
 from sims.effects import effects
 
 

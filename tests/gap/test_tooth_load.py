@@ -7,8 +7,8 @@ from math import cos, isnan, radians
 
 import pytest
 
-from gearsig.gap.tooth_load import tooth_load_n_per_mm
-from gearsig.rig.types import GearPair
+from gearsig.gap import tooth_load_n_per_mm
+from gearsig.rig import GearPair
 
 PAIR = GearPair("stage", "in", "out", 50, 50, 3.0, 20.0, 20.0)
 

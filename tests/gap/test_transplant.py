@@ -7,15 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.gap.features import once
-from gearsig.gap.gather import gather
-from gearsig.gap.population import load_population
-from gearsig.gap.transplant import transplanted
+from gearsig.gap import load_population, once, reduce_recording, transplanted
 from tests.gap.synthetic import RIG, record
 
 POPULATION = load_population()
 FEATURES, NAMES = POPULATION.feature_names, POPULATION.change_names
-SOUND = dict(zip(*once(gather(record(), RIG)), strict=True))
+SOUND = dict(zip(*once(reduce_recording(record(), RIG)), strict=True))
 USUAL = dict(zip(NAMES, np.median(POPULATION.changes[POPULATION.causes == "none"], axis=0).tolist(), strict=True))
 ONLY = len(FEATURES)
 

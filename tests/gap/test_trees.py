@@ -9,9 +9,8 @@ import pytest
 from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 from sklearn.ensemble import ExtraTreesClassifier
 
-from gearsig.gap import kept_recogniser
-from gearsig.gap.kept_recogniser import Fitted, keep_fitted, read_fitted
-from gearsig.gap.trees import LinearRule, Trees
+from gearsig.gap import Fitted, LinearRule, Trees, keep_fitted, read_fitted
+from gearsig.gap import _recognition as kept_recogniser
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gearsig.gap.types import UNKNOWN, GapCause, GapOutcome, GapPlace, Interval, PlaceKind
-from gearsig.gap.verdict import rivals
+from gearsig.gap import UNKNOWN, GapCause, GapOutcome, GapPlace, Interval, PlaceKind, rivals
 from tests.gap.example_report import (
     cannot_separate_report,
     effect_report,

@@ -8,14 +8,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.gap.change import change_features
-from gearsig.gap.gather import gather
-from gearsig.gap.gathered import Gathered
-from gearsig.gap.gear_lines import SIDES
-from gearsig.gap.population import load_population
-from gearsig.gap.simulator import Added, Point
-from gearsig.gap.which_shaft import CLEAR, SIGNS, ShaftSigns, over_floors, shaft_signs, told_options
-from gearsig.rig.types import GearPair, OperatingPoint, Rig, Shaft
+from gearsig.gap import (
+    CLEAR,
+    SIDES,
+    SIGNS,
+    Added,
+    OperatingCondition,
+    ReducedRecording,
+    ShaftSigns,
+    change_features,
+    load_population,
+    over_floors,
+    reduce_recording,
+    shaft_signs,
+    told_options,
+)
+from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft
 from sims.registry import gap_simulator
 
 TEETH = (23, 37)
@@ -67,7 +75,7 @@ def test_every_sign_is_a_feature() -> None:
     assert {sign.format(side) for signs in SIGNS.values() for sign in signs for side in SIDES} <= set(names)
 
 
-POINT = Point(1500.0, 50.0)
+POINT = OperatingCondition(1500.0, 50.0)
 PAIR = Rig(
     name="pair",
     shafts=(Shaft("input"), Shaft("output")),
@@ -81,18 +89,18 @@ def twin():
     return gap_simulator("cracked").twin_of(PAIR)
 
 
-def run(*added: Added, noise: int, point: Point) -> Gathered:
+def run(*added: Added, noise: int, point: OperatingCondition) -> ReducedRecording:
     recording = twin().run(point, added, seed=0, duration_s=1.5, sampling_rate_hz=12800.0, noise=noise)
     assert recording.rig is not None
-    return gather(recording, recording.rig)
+    return reduce_recording(recording, recording.rig)
 
 
 @cache
-def sound(point: Point) -> Gathered:
+def sound(point: OperatingCondition) -> ReducedRecording:
     return run(noise=1, point=point)
 
 
-def simulated(*added: Added, point: Point = POINT) -> dict[str, float]:
+def simulated(*added: Added, point: OperatingCondition = POINT) -> dict[str, float]:
     floor = load_population().floor(with_reference=True)
     return over_floors(change_features(run(*added, noise=2, point=point), sound(point)), floor, is_reference=True)
 
@@ -105,10 +113,13 @@ def test_a_simulated_effect_is_put_on_its_shaft(cause: str, side: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("cause", "point"), [("unbalance", Point(4500.0, 50.0)), ("misalignment", Point(3000.0, 200.0))]
+    ("cause", "point"),
+    [("unbalance", OperatingCondition(4500.0, 50.0)), ("misalignment", OperatingCondition(3000.0, 200.0))],
 )
 @pytest.mark.parametrize("side", SIDES)
-def test_what_shows_at_speed_or_load_only_is_put_on_its_shaft_there(cause: str, point: Point, side: str) -> None:
+def test_what_shows_at_speed_or_load_only_is_put_on_its_shaft_there(
+    cause: str, point: OperatingCondition, side: str
+) -> None:
     *_, strong = (a for a in twin().candidates(cause) if a.options.get("gear", a.options.get("shaft")) == side)
     assert list(told_options(cause, [simulated(strong, point=point)], (29, 47)).values()) == [side]
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from gearsig.gap.families import family_of
-from gearsig.gap.frame import gear_frame
-from gearsig.gap.population import load_population
-from gearsig.gap.words import feature_words
+from gearsig.gap import family_of, feature_words, gear_frame, load_population
 from tests.gap.synthetic import RIG
 
 

@@ -8,20 +8,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from gearsig.indicators.gear import (
+from gearsig.indicators import (
     energy_operator,
     energy_ratio,
+    envelope,
     fm0,
     fm4,
     gear_indicators,
+    healthy_records,
     line_amplitude,
     m6a,
     m8a,
+    na4,
+    na4_star,
+    nb4,
+    nb4_star,
     sideband_index,
     sideband_level_factor,
 )
-from gearsig.indicators.trend import envelope, healthy_records, na4, na4_star, nb4, nb4_star
-from gearsig.orders.types import SynchronousAverage
+from gearsig.orders import SynchronousAverage
 
 N, Z = 1024, 29
 THETA = 2 * np.pi * np.arange(N) / N

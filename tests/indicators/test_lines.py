@@ -8,13 +8,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.indicators.bearing import bearing_indicators, defect_orders, envelope_level_over_floor_db
-from gearsig.indicators.lines import find_line, floor_near, noise_reaches
-from gearsig.indicators.mesh import mesh_indicators, mesh_level, sideband_levels, sideband_to_carrier_db
-from gearsig.indicators.shaft import shaft_indicators, shaft_order_level
-from gearsig.orders.types import SynchronousAverage
-from gearsig.rig.types import Bearing, GearPair, Rig, Shaft
-from gearsig.spectra.types import Spectrum
+from gearsig.indicators import (
+    bearing_indicators,
+    defect_orders,
+    envelope_level_over_floor_db,
+    find_line,
+    floor_near,
+    mesh_indicators,
+    mesh_level,
+    noise_reaches,
+    shaft_indicators,
+    shaft_order_level,
+    sideband_levels,
+    sideband_to_carrier_db,
+)
+from gearsig.orders import SynchronousAverage
+from gearsig.rig import Bearing, GearPair, Rig, Shaft
+from gearsig.spectra import Spectrum
 
 N_REV, N = 64, 64 * 256
 REV = np.arange(N) * N_REV / N

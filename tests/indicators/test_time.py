@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from scipy import stats
 
 from gearsig.errors import InputError
-from gearsig.indicators.time import (
+from gearsig.indicators import (
     clearance_factor,
     crest_factor,
     impulse_factor,

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from gearsig.recording.types import Recording
+from gearsig.recording import Recording
 from sims import simulate
 
 QUIET = {

@@ -6,13 +6,18 @@ import numpy as np
 import pytest
 
 from gearsig.errors import RefusalError
-from gearsig.motion.backlash import dependence, estimate_backlash
-from gearsig.motion.bursts import find_bursts
-from gearsig.motion.flight import fit_flight
-from gearsig.motion.impacts import Impact, find_impacts, reduced_mass_kg
-from gearsig.motion.measure import measure_motion
-from gearsig.motion.start_stop import examine_start_stop
-from gearsig.recording.types import Recording
+from gearsig.motion import (
+    Impact,
+    dependence,
+    estimate_backlash,
+    examine_start_stop,
+    find_bursts,
+    find_impacts,
+    fit_flight,
+    measure_motion,
+    reduced_mass_kg,
+)
+from gearsig.recording import Recording
 from sims import simulate
 from tests.motion.recordings import continuous, start_stop, without
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearsig.motion.measure import measure_motion
-from gearsig.recording.write import write_recording
-from gearsig.rig.toml import read_rig, write_rig
+from gearsig.motion import measure_motion
+from gearsig.recording import write_recording
+from gearsig.rig import read_rig, write_rig
 from sims import simulate
 from tests.app.test_cli import run
 from tests.motion.recordings import changed, start_stop, without

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from gearsig.motion.channel_gains import channel_scale
-from gearsig.motion.measure import measure_motion
+from gearsig.motion import channel_scale, measure_motion
 from tests.motion.recordings import changed, continuous, start_stop
 
 RATE_HZ = 1000.0

@@ -6,11 +6,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.motion.angle_profile import angle_profile
-from gearsig.motion.course import find_course, is_start_stop
-from gearsig.motion.hysteresis import torque_twist
-from gearsig.motion.measure import measure_motion
-from gearsig.motion.start_stop import course_of_angle, examine_start_stop
+from gearsig.motion import (
+    angle_profile,
+    course_of_angle,
+    examine_start_stop,
+    find_course,
+    is_start_stop,
+    measure_motion,
+    torque_twist,
+)
 from tests.motion.recordings import continuous, start_stop, without
 
 RATE = 1000.0
@@ -102,8 +106,7 @@ def test_work_and_loss_of_the_loop_are_those_of_the_model() -> None:
     course = course_of_angle(motion.driver_angle_rad, 20_000.0)
     loop = torque_twist(motion, course, 0.0)
     assert loop.n_cycles == 2
-    from sims.forging.respond import respond
-    from sims.forging.simulator import ForgingManipulator
+    from sims.forging import ForgingManipulator, respond
 
     ready = ForgingManipulator().prepare({}, None)
     run = respond(ready.drive, ready.courses(6.0), duration_s=6.0, interval_s=1e-4)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.motion.contact_force import depth, latched_damping, pair_force
-from gearsig.motion.force import (
+from gearsig.motion import (
     AS_PRINTED,
     FROM_TORQUE,
     HUNT_CROSSLEY,
@@ -15,14 +14,19 @@ from gearsig.motion.force import (
     PIECEWISE,
     TEETH,
     TOOTH_FORCE,
+    ForceEstimate,
+    NoiseStudy,
+    acceleration_limit_rad_s2,
+    depth,
     estimate_forces,
     inverse_force_n,
+    latched_damping,
+    measure_motion,
+    noise_study,
+    pair_force,
 )
-from gearsig.motion.measure import measure_motion
-from gearsig.motion.noise_study import NoiseStudy, acceleration_limit_rad_s2, noise_study
-from gearsig.motion.types import ForceEstimate
-from gearsig.recording.types import Recording
-from gearsig.rig.contact import ToothContact
+from gearsig.recording import Recording
+from gearsig.rig import ToothContact
 from tests.motion.recordings import changed, continuous, start_stop, without
 from tests.sims.forging.drives import free_bodies, impact
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearsig.recording.write import write_recording
-from gearsig.rig.toml import write_rig
+from gearsig.recording import write_recording
+from gearsig.rig import write_rig
 from sims.files import file_set, write_set
 from tests.app.test_cli import run
 from tests.motion.recordings import changed, start_stop, without

@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 
 from gearsig.errors import RefusalError
-from gearsig.motion.identify import identify
-from gearsig.motion.identify_types import Identification
-from gearsig.motion.measure import measure_motion
-from gearsig.motion.robust_fit import robust_fit
-from gearsig.recording.types import Recording
-from gearsig.rig.toml import read_rig
+from gearsig.motion import Identification, identify, measure_motion, robust_fit
+from gearsig.recording import Recording
+from gearsig.rig import read_rig
 from sims import simulate
 from sims.files import file_set, write_set
 from tests.app.test_cli import run

@@ -8,12 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.motion.angle_faults import check_angle
-from gearsig.motion.derivatives import LocalPolynomial, local_polynomial
-from gearsig.motion.measure import measure_motion
-from gearsig.motion.roles import find_roles
-from gearsig.recording.types import Channel, Recording
-from gearsig.rig.speed import EncoderChannel
+from gearsig.motion import LocalPolynomial, check_angle, find_roles, local_polynomial, measure_motion
+from gearsig.recording import Channel, Recording
+from gearsig.rig import EncoderChannel
 from tests.motion.recordings import changed, start_stop, without
 
 

@@ -3,10 +3,17 @@
 import numpy as np
 import pytest
 
-from gearsig.motion.course import find_course
-from gearsig.motion.measure import measure_motion
-from gearsig.motion.phases import AT_REST, RUN_DOWN, RUN_UP, RUNNING, find_phases, shaft_speed_rad_s
-from gearsig.motion.start_stop import examine_start_stop
+from gearsig.motion import (
+    AT_REST,
+    RUN_DOWN,
+    RUN_UP,
+    RUNNING,
+    examine_start_stop,
+    find_course,
+    find_phases,
+    measure_motion,
+    shaft_speed_rad_s,
+)
 from tests.motion.recordings import start_stop
 
 RATE = 1000.0

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from gearsig.motion.measure import measure_motion
-from gearsig.motion.start_stop import examine_start_stop
-from gearsig.plot.start_stop import start_stop_figure
+from gearsig.motion import examine_start_stop, measure_motion
+from gearsig.plot import start_stop_figure
 from sims.files import file_set, write_set
 from tests.app.test_cli import run
 from tests.motion.recordings import continuous, start_stop, without

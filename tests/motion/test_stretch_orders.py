@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import RefusalError
-from gearsig.motion.measure import measure_motion
-from gearsig.motion.start_stop import course_of_angle
-from gearsig.motion.stretch_orders import stretch_order_spectrum
+from gearsig.motion import course_of_angle, measure_motion, stretch_order_spectrum
 from tests.motion.recordings import start_stop
 
 RATE = 2000.0
@@ -35,7 +33,7 @@ def test_a_tone_over_angle_is_one_line_though_the_speed_crosses_zero(direction: 
 
 
 def test_over_time_the_same_signal_is_no_line() -> None:
-    from gearsig.spectra.amplitude import amplitude_spectrum
+    from gearsig.spectra import amplitude_spectrum
 
     signal = 1.5 * np.cos(20.0 * swing() + 0.3)
     assert np.max(amplitude_spectrum(signal, RATE).values) < 0.4

@@ -5,18 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsig import analyze
+from gearsig.diagnosis import analyze
 from gearsig.errors import RefusalError
-from gearsig.motion.measure import measure_motion
-from gearsig.motion.tooth_compliance import tooth_compliance
-from gearsig.recording.types import Recording
+from gearsig.motion import measure_motion, tooth_compliance
+from gearsig.recording import Recording
 from sims import simulate
 from sims.effects import EffectSetting
-from sims.forging.build import build_rig
-from sims.forging.drive import WeakTooth
-from sims.forging.measure import record, sensors
-from sims.forging.simulator import ForgingManipulator
-from sims.wanted import Wanted
+from sims.forging import ForgingManipulator, WeakTooth, build_rig, record, sensors
+from sims.simulator import ParameterValues
 from tests.motion.recordings import start_stop, without
 
 
@@ -40,7 +36,7 @@ def test_the_least_loss_parts_what_shows_from_what_does_not(part: float) -> None
     sound = tooth_compliance(measure_motion(cracked(0.0, "manipulator_formula", "start-stop")))
     prepared = ForgingManipulator().prepare({}, None, preset_name="manipulator_formula")
     drive = replace(prepared.drive, weak_tooth=WeakTooth(0, 6, part * sound.least_loss(1.5)))
-    wanted = Wanted(prepared.values)
+    wanted = ParameterValues(prepared.values)
     recording = record(
         drive,
         prepared.courses(13.0),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearsig.angle.types import AngleSignal, ShaftAngle
+from gearsig.angle import AngleSignal, ShaftAngle
 
 
 @pytest.fixture

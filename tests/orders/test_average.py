@@ -6,10 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.orders.average import mean_and_error, synchronous_average
-from gearsig.orders.modulation import mesh_modulation
-from gearsig.orders.separate import band_passed_mesh, separate
-from gearsig.orders.types import SynchronousAverage
+from gearsig.orders import (
+    SynchronousAverage,
+    band_passed_mesh,
+    mean_and_error,
+    mesh_modulation,
+    separate,
+    synchronous_average,
+)
 
 PER_REV = 256
 ANGLE = np.arange(PER_REV) / PER_REV

@@ -5,12 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearsig.angle.types import AngleSignal, ShaftAngle
+from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.errors import InputError, RefusalError
-from gearsig.orders.map import frequency_map, order_map
-from gearsig.orders.revolutions import times_of_revolutions
-from gearsig.orders.spectrum import order_spectrum
-from gearsig.spectra.amplitude import amplitude_spectrum
+from gearsig.orders import frequency_map, order_map, order_spectrum, times_of_revolutions
+from gearsig.spectra import amplitude_spectrum
 
 
 @pytest.mark.parametrize("window", ["hann", "rectangular"])

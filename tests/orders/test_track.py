@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 
-from gearsig.angle.resample import resample_to_angle
-from gearsig.angle.types import ShaftAngle
+from gearsig.angle import ShaftAngle, resample_to_angle
 from gearsig.errors import InputError, RefusalError
-from gearsig.orders.track import amplitude_at_speeds, track_orders
-from gearsig.orders.track_band import track_order_bands
-from gearsig.recording.types import Channel, Recording
+from gearsig.orders import amplitude_at_speeds, track_order_bands, track_orders
+from gearsig.recording import Channel, Recording
 
 AMPLITUDES = {1: 0.5, 2.5: 0.2, 4: 2.0}
 PHASES = {1: 0.3, 2.5: -1.0, 4: 2.0}

@@ -7,19 +7,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearsig.angle.types import ShaftAngle
-from gearsig.orders.vold_kalman import separate_frequencies, track_vold_kalman
-from gearsig.orders.vold_kalman_phasor import cosine_and_sine
-from gearsig.orders.vold_kalman_types import FrequencyTrack
-from gearsig.orders.vold_kalman_weight import (
+from gearsig.angle import ShaftAngle
+from gearsig.orders import (
+    FrequencyTrack,
     bandwidth_of_weight,
+    cosine_and_sine,
     envelope_response,
+    separate_frequencies,
+    track_vold_kalman,
     waveform_weight_of_bandwidth,
     weight_of_bandwidth,
 )
-from gearsig.recording.types import Channel, Recording
-from gearsig.rig.speed import ConstantSpeed
-from gearsig.rig.types import GearPair, Rig, Shaft
+from gearsig.recording import Channel, Recording
+from gearsig.rig import ConstantSpeed, GearPair, Rig, Shaft
 
 RATE_HZ = 5000.0
 

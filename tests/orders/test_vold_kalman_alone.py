@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from gearsig.errors import RefusalError
-from gearsig.orders import vold_kalman_halves
-from gearsig.orders.vold_kalman_alone import envelope_alone, waveform_alone
-from gearsig.orders.vold_kalman_fold import oscillator as write_oscillator
-from gearsig.orders.vold_kalman_solve import error_alone
-from gearsig.orders.vold_kalman_weight import envelope_weight, waveform_weight
+from gearsig.orders import envelope_alone, envelope_weight, error_alone, waveform_alone, waveform_weight
+from gearsig.orders import oscillator as write_oscillator
+from gearsig.orders.vold_kalman import _single as vold_kalman_halves
 from tests.orders.test_vold_kalman_exact import (
     by_dense_least_squares,
     differences,

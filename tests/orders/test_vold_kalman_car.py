@@ -12,12 +12,9 @@ import pytest
 from scipy.io import wavfile
 from scipy.signal import get_window, oaconvolve
 
-from gearsig.angle.resample import resample_to_angle
-from gearsig.angle.types import ShaftAngle
-from gearsig.orders.track import amplitude_at_speeds
-from gearsig.orders.track_band import track_order_bands
-from gearsig.orders.vold_kalman import track_vold_kalman
-from gearsig.recording.types import Channel, Recording
+from gearsig.angle import ShaftAngle, resample_to_angle
+from gearsig.orders import amplitude_at_speeds, track_order_bands, track_vold_kalman
+from gearsig.recording import Channel, Recording
 
 FOLDER = Path(__file__).parents[3] / "shared" / "data" / "car_run_up"
 FULL_SCALE_RPM = 4821.4287

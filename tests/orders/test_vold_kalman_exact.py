@@ -9,12 +9,19 @@ from scipy import sparse
 from scipy.signal import lfilter
 from scipy.sparse.linalg import spsolve
 
-from gearsig.orders.vold_kalman_band import solve_band
-from gearsig.orders.vold_kalman_elimination import eliminate
-from gearsig.orders.vold_kalman_rotations import rotate
-from gearsig.orders.vold_kalman_solve import solve_envelopes, solve_waveforms
-from gearsig.orders.vold_kalman_splines import expected_error, samples_per_cell, solve_by_splines
-from gearsig.orders.vold_kalman_weight import envelope_weight, waveform_weight, weight_of_bandwidth
+from gearsig.orders import (
+    eliminate,
+    envelope_weight,
+    expected_error,
+    rotate,
+    samples_per_cell,
+    solve_band,
+    solve_by_splines,
+    solve_envelopes,
+    solve_waveforms,
+    waveform_weight,
+    weight_of_bandwidth,
+)
 
 RATE_HZ = 20_000.0
 

@@ -5,13 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsig.angle.resample import resample_to_angle
-from gearsig.angle.types import AngleSignal, ShaftAngle
+from gearsig.angle import AngleSignal, ShaftAngle, resample_to_angle
 from gearsig.errors import InputError
-from gearsig.orders.vold_kalman import separate_frequencies, track_vold_kalman
-from gearsig.orders.vold_kalman_types import FrequencyTrack
-from gearsig.orders.vold_kalman_weight import envelope_response, settling_time
-from gearsig.recording.types import Channel, Recording
+from gearsig.orders import FrequencyTrack, envelope_response, separate_frequencies, settling_time, track_vold_kalman
+from gearsig.recording import Channel, Recording
 
 RATE_HZ = 2000.0
 

@@ -3,13 +3,18 @@
 import numpy as np
 import pytest
 
-from gearsig.angle.types import ShaftAngle
+from gearsig.angle import ShaftAngle
 from gearsig.errors import InputError, RefusalError
-from gearsig.orders.vold_kalman import separate_frequencies, track_vold_kalman
-from gearsig.orders.vold_kalman_types import FrequencyTrack
-from gearsig.orders.vold_kalman_weight import bandwidth_of_weight, waveform_weight_of_bandwidth, weight_of_bandwidth
-from gearsig.recording.types import Channel, Recording
-from gearsig.rig.speed import ConstantSpeed
+from gearsig.orders import (
+    FrequencyTrack,
+    bandwidth_of_weight,
+    separate_frequencies,
+    track_vold_kalman,
+    waveform_weight_of_bandwidth,
+    weight_of_bandwidth,
+)
+from gearsig.recording import Channel, Recording
+from gearsig.rig import ConstantSpeed
 
 N, RATE_HZ = 4000, 1000.0
 T = np.arange(N) / RATE_HZ

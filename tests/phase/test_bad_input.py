@@ -4,18 +4,23 @@ import numpy as np
 import pytest
 
 from gearsig.errors import GearsigError, InputError, RefusalError
-from gearsig.phase.bifurcation import bifurcation_of_runs
-from gearsig.phase.chaos_test import translation_walk, zero_one_test
-from gearsig.phase.dimension import embedding_dimension
-from gearsig.phase.embedding import delay_embedding
-from gearsig.phase.lock import constant_period_lock, find_lock
-from gearsig.phase.lyapunov import largest_lyapunov_exponent
-from gearsig.phase.mutual_information import average_mutual_information
-from gearsig.phase.plane import phase_plane_of
-from gearsig.phase.recurrence import recurrence_measures, recurrence_plot
-from gearsig.phase.section import locked_section
-from gearsig.phase.types import PhasePortrait
-from gearsig.recording.types import Channel, Recording
+from gearsig.phase import (
+    PhasePortrait,
+    average_mutual_information,
+    bifurcation_of_runs,
+    constant_period_lock,
+    delay_embedding,
+    embedding_dimension,
+    find_lock,
+    largest_lyapunov_exponent,
+    locked_section,
+    phase_plane_of,
+    recurrence_measures,
+    recurrence_plot,
+    translation_walk,
+    zero_one_test,
+)
+from gearsig.recording import Channel, Recording
 
 SERIES_TOOLS = {
     "mutual information": lambda x: average_mutual_information(x, 1000.0),

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase.chaos_test import (
+from gearsig.phase import (
+    PhasePortrait,
+    constant_period_lock,
+    locked_section,
     mean_square_displacement,
     translation_walk,
     zero_one_test,
     zero_one_test_of_section,
 )
-from gearsig.phase.lock import constant_period_lock
-from gearsig.phase.section import locked_section
-from gearsig.phase.types import PhasePortrait
 from tests.phase.systems import DUFFING_PERIOD_S, duffing, henon, logistic, lorenz, quasi_periodic, rossler
 
 

@@ -5,11 +5,15 @@ import pytest
 from scipy.signal import lfilter
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase.dimension import embedding_dimension
-from gearsig.phase.embedding import delay_embedding, delay_vectors, embed_channel
-from gearsig.phase.mutual_information import average_mutual_information
-from gearsig.phase.neighbours import nearest_apart
-from gearsig.recording.types import Channel, Recording
+from gearsig.phase import (
+    average_mutual_information,
+    delay_embedding,
+    delay_vectors,
+    embed_channel,
+    embedding_dimension,
+    nearest_apart,
+)
+from gearsig.recording import Channel, Recording
 from tests.phase.systems import henon, logistic, lorenz, narrow_band_noise, quasi_periodic, rossler
 
 N = 12_000

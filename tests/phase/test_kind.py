@@ -5,11 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from gearsig.errors import RefusalError
-from gearsig.phase.dimension import embedding_dimension
-from gearsig.phase.kind import kind_of_motion
-from gearsig.phase.lock import constant_period_lock
-from gearsig.phase.plane import phase_plane_of
-from gearsig.phase.types import PhasePortrait
+from gearsig.phase import PhasePortrait, constant_period_lock, embedding_dimension, kind_of_motion, phase_plane_of
 from tests.phase.systems import DUFFING_PERIOD_S, duffing, quasi_periodic
 
 RATE = 64 / DUFFING_PERIOD_S
@@ -98,7 +94,7 @@ def test_a_model_without_noise_needs_no_exponent_to_be_regular(monkeypatch):
     def refuse(_path, **_options):
         raise RefusalError("too short", remedy="longer")
 
-    monkeypatch.setattr("gearsig.phase.kind.largest_lyapunov_exponent", refuse)
+    monkeypatch.setattr("gearsig.phase._kind.largest_lyapunov_exponent", refuse)
     chaos = _duffing(0.5)
     assert kind_of_motion(*chaos).kind == "undecided"
     assert kind_of_motion(*chaos, noise_free=True).kind == "undecided"

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase.embedding import delay_embedding
-from gearsig.phase.lyapunov import largest_lyapunov_exponent
-from gearsig.phase.types import PhasePortrait
+from gearsig.phase import PhasePortrait, delay_embedding, largest_lyapunov_exponent
 from tests.phase.systems import (
     HENON_EXPONENT,
     LORENZ_EXPONENT,

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import RefusalError
-from gearsig.phase.neighbours import nearest_apart, spaced
+from gearsig.phase import nearest_apart, spaced
 
 
 def all_distances(points, library, references, theiler, norm, *, equal_counts):

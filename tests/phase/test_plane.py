@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase.plane import phase_plane, phase_plane_of
-from gearsig.recording.types import Channel, Recording
+from gearsig.phase import phase_plane, phase_plane_of
+from gearsig.recording import Channel, Recording
 
 RATE = 2000.0
 

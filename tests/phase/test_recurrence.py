@@ -6,9 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase.embedding import delay_embedding
-from gearsig.phase.recurrence import recurrence_measures, recurrence_plot
-from gearsig.phase.types import PhasePortrait
+from gearsig.phase import PhasePortrait, delay_embedding, recurrence_measures, recurrence_plot
 from tests.phase.systems import lorenz
 
 

@@ -5,22 +5,29 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsig.angle.types import ShaftAngle
+from gearsig.angle import ShaftAngle
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase.bifurcation import (
+from gearsig.phase import (
+    BifurcationDiagram,
+    CycleLock,
+    PhasePortrait,
+    PoincareSection,
+    TwoMotions,
     bifurcation_diagram,
     bifurcation_of_recordings,
     bifurcation_of_runs,
+    coexistence_ranges,
+    constant_period_lock,
+    find_lock,
+    geometric_section,
+    locked_section,
+    phase_plane,
+    phase_plane_of,
+    section_period,
     values_apart,
 )
-from gearsig.phase.coexistence import TwoMotions, coexistence_ranges
-from gearsig.phase.lock import CycleLock, constant_period_lock, find_lock
-from gearsig.phase.plane import phase_plane, phase_plane_of
-from gearsig.phase.section import geometric_section, locked_section, section_period
-from gearsig.phase.types import BifurcationDiagram, PhasePortrait, PoincareSection
-from gearsig.recording.types import Channel, Recording
-from gearsig.rig.speed import ConstantSpeed
-from gearsig.rig.types import GearPair, Rig, Shaft
+from gearsig.recording import Channel, Recording
+from gearsig.rig import ConstantSpeed, GearPair, Rig, Shaft
 from tests.phase.systems import DUFFING_PERIOD_S, duffing, logistic
 
 PER_PERIOD = 64

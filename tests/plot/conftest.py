@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from gearsig.orders.types import SynchronousAverage
-from gearsig.recording.types import Channel, Recording
-from gearsig.spectra.types import Spectrum
+from gearsig.orders import SynchronousAverage
+from gearsig.recording import Channel, Recording
+from gearsig.spectra import Spectrum
 
 
 @pytest.fixture

@@ -6,13 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsig.compare.types import Agreement, BandLevel, LevelPair, LineLevel, Repeated
+from gearsig.comparison import Agreement, BandLevel, LevelPair, LineLevel, Repeated
 from gearsig.errors import InputError
-from gearsig.orders.types import SynchronousAverage
-from gearsig.plot.compare import order_overlay_figure
-from gearsig.plot.compare_average import average_overlay_figure
-from gearsig.plot.compare_bands import band_levels_figure
-from gearsig.spectra.types import Spectrum
+from gearsig.orders import SynchronousAverage
+from gearsig.plot import average_overlay_figure, band_levels_figure, order_overlay_figure
+from gearsig.spectra import Spectrum
 
 LEVEL = LevelPair(-3.0, 0.0, 0.2)
 

@@ -1,9 +1,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.plot.cursors import PRIORITY, Cursor, n_rows, order_cursors, place
-from gearsig.rig.orders import order_lines
-from gearsig.rig.types import GearPair, Rig, Shaft
+from gearsig.plot import PRIORITY, Cursor, n_rows, order_cursors, place
+from gearsig.rig import GearPair, Rig, Shaft, order_lines
 
 cursors = st.lists(
     st.builds(

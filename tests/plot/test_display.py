@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gearsig.plot.display import decibels, plain, unit_text, with_unit
+from gearsig.plot import decibels, plain, unit_text, with_unit
 
 
 def test_decibels_of_amplitudes_and_powers():

@@ -8,9 +8,7 @@ from matplotlib.text import Text
 from scipy.spatial import Delaunay
 
 from gearsig.errors import InputError
-from gearsig.plot.fe_gear import gear_mesh_figure, gear_modes_figure, gear_stress_figure
-from gearsig.plot.shaded import draw_shaded
-from gearsig.plot.style import new_figure
+from gearsig.plot import draw_shaded, gear_mesh_figure, gear_modes_figure, gear_stress_figure, new_figure
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])

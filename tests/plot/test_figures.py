@@ -9,19 +9,21 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from gearsig.angle.types import ShaftAngle
+from gearsig.angle import ShaftAngle
 from gearsig.errors import InputError
-from gearsig.indicators.types import Indicator
-from gearsig.orders.types import OrderMap
-from gearsig.plot.average import average_figure
-from gearsig.plot.cursors import Cursor
-from gearsig.plot.marks import AngleMark
-from gearsig.plot.order_map import order_map_figure
-from gearsig.plot.polar import polar_figure
-from gearsig.plot.spectrum import spectrum_figure
-from gearsig.plot.speed import speed_figure
-from gearsig.plot.time import time_figure
-from gearsig.plot.trend import trend_figure
+from gearsig.indicators import Indicator
+from gearsig.orders import OrderMap
+from gearsig.plot import (
+    AngleMark,
+    Cursor,
+    average_figure,
+    order_map_figure,
+    polar_figure,
+    spectrum_figure,
+    speed_figure,
+    time_figure,
+    trend_figure,
+)
 
 
 def _drawn(figure):
@@ -132,7 +134,7 @@ def test_polar_without_any_signal_or_scatter(average_of):
 
 
 def test_polar_colours_the_marked_tooth(average_of):
-    from gearsig.plot.style import FAULT
+    from gearsig.plot import FAULT
 
     figure = polar_figure(average_of(np.zeros(64)), n_teeth=8, marks=[AngleMark(100.0, "tooth 3, 100°")])
     assert "tooth 3, 100°" in _drawn(figure)

@@ -7,12 +7,7 @@ import pytest
 from matplotlib.text import Text
 
 from gearsig.errors import InputError
-from gearsig.plot.flexible import (
-    frequency_curves_figure,
-    mesh_maps_figure,
-    speed_spectra_figure,
-    speed_sweep_figure,
-)
+from gearsig.plot import frequency_curves_figure, mesh_maps_figure, speed_spectra_figure, speed_sweep_figure
 
 CYCLES = np.linspace(0.0, 2.0, 81)
 TORQUE = np.linspace(10.0, 500.0, 20)

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.motion.force import estimate_forces
-from gearsig.motion.measure import measure_motion
-from gearsig.motion.noise_study import noise_study
-from gearsig.plot.force import force_figure, noise_figure
+from gearsig.motion import estimate_forces, measure_motion, noise_study
+from gearsig.plot import force_figure, noise_figure
 from tests.motion.recordings import start_stop, without
 
 

@@ -8,19 +8,18 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.gap.curve_types import AngleCurves, SpectrumCurves
-from gearsig.gap.curves import against_reference
-from gearsig.gap.types import (
-    GapStep,
-    Interval,
+from gearsig.gap import AngleCurves, GapStep, Interval, SpectrumCurves, against_reference
+from gearsig.plot import (
+    INNER,
+    OUTER,
+    AngleMark,
+    gap_averages_figure,
+    gap_evidence_figure,
+    gap_lines_figure,
+    gap_orders_figure,
+    gap_teeth_figure,
+    gap_waterfall_figure,
 )
-from gearsig.plot.gap_averages import gap_averages_figure
-from gearsig.plot.gap_evidence import gap_evidence_figure
-from gearsig.plot.gap_lines import gap_lines_figure
-from gearsig.plot.gap_orders import gap_orders_figure
-from gearsig.plot.gap_teeth import INNER, OUTER, gap_teeth_figure
-from gearsig.plot.gap_waterfall import gap_waterfall_figure
-from gearsig.plot.marks import AngleMark
 from tests.gap.example_report import effect_report, gearless_report
 
 if TYPE_CHECKING:

@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.plot.coherence import coherence_figure
-from gearsig.plot.kurtogram import kurtogram_figure
-from gearsig.spectra.coherence import spectral_coherence
-from gearsig.spectra.coherence_types import enhanced_envelope
-from gearsig.spectra.kurtogram import kurtogram
+from gearsig.plot import coherence_figure, kurtogram_figure
+from gearsig.spectra import enhanced_envelope, kurtogram, spectral_coherence
 
 FS = 10_000.0
 

@@ -1,5 +1,5 @@
-from gearsig.diagnosis.types import Finding, Kind, Where
-from gearsig.plot.marks import AngleMark, marks_of
+from gearsig.diagnosis import Finding, Kind, Where
+from gearsig.plot import AngleMark, marks_of
 
 
 def _finding(kind=Kind.FAULT, **where):

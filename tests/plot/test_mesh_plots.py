@@ -8,8 +8,7 @@ import pytest
 from matplotlib.text import Text
 
 from gearsig.errors import InputError
-from gearsig.plot.mesh import load_sharing_figure, mesh_stiffness_figure
-from gearsig.plot.tooth import tooth_figure
+from gearsig.plot import load_sharing_figure, mesh_stiffness_figure, tooth_figure
 
 CYCLES = np.linspace(0.0, 2.0, 401)
 STIFFNESS = {

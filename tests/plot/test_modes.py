@@ -8,11 +8,9 @@ from io import BytesIO
 import numpy as np
 import pytest
 
-from gearsig.decompose.mode_spectra import mode_spectra
-from gearsig.decompose.types import Modes, VmdSettings
-from gearsig.decompose.vmd import variational_modes
+from gearsig.decompose import Modes, VmdSettings, mode_spectra, variational_modes
 from gearsig.errors import InputError
-from gearsig.plot.modes import modes_figure
+from gearsig.plot import modes_figure
 
 FS = 1000.0
 

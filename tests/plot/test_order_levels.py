@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from gearsig.diagnosis.types import OrderLevel
+from gearsig.diagnosis import OrderLevel
 from gearsig.errors import InputError
-from gearsig.plot.order_levels import order_levels_figure
+from gearsig.plot import order_levels_figure
 
 RPM = np.linspace(600.0, 3000.0, 100)
 

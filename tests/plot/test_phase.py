@@ -7,17 +7,19 @@ import pytest
 from matplotlib.text import Text
 
 from gearsig.errors import InputError
-from gearsig.phase.measures import (
+from gearsig.phase import (
+    BifurcationDiagram,
     ChaosTest,
     EmbeddingDimension,
     LyapunovExponent,
     MutualInformation,
+    PhasePortrait,
+    PoincareSection,
     RecurrenceMeasures,
     RecurrencePlot,
 )
-from gearsig.phase.types import BifurcationDiagram, PhasePortrait, PoincareSection
-from gearsig.plot.bifurcation import bifurcation_figure
-from gearsig.plot.phase import (
+from gearsig.plot import (
+    bifurcation_figure,
     chaos_test_figure,
     divergence_figure,
     embedding_figure,

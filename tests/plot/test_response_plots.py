@@ -10,8 +10,7 @@ import pytest
 from matplotlib.text import Text
 
 from gearsig.errors import InputError
-from gearsig.plot.crack import crack_comparison_figure
-from gearsig.plot.response import ResponseCase, response_figure
+from gearsig.plot import ResponseCase, crack_comparison_figure, response_figure
 
 MESH_HZ = 100.0
 TIME = np.arange(2000) / 5000.0

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.text import Text
 
 from gearsig.errors import InputError
-from gearsig.plot.roughness import backlash_figure, friction_figure
+from gearsig.plot import backlash_figure, friction_figure
 
 CYCLES = np.linspace(0.0, 1.7, 341)
 TIME = np.linspace(0.0, 0.5, 1001)

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.motion.measure import measure_motion
-from gearsig.motion.start_stop import StartStop, examine_start_stop
-from gearsig.plot.impacts import impacts_figure
-from gearsig.plot.start_stop_course import course_figure
+from gearsig.motion import StartStop, examine_start_stop, measure_motion
+from gearsig.plot import course_figure, impacts_figure
 from tests.motion.recordings import start_stop, without
 
 

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from gearsig.motion.measure import measure_motion
-from gearsig.motion.start_stop import examine_start_stop
-from gearsig.plot.start_stop_pair import FAULTY, SOUND, start_stop_pair_figure
+from gearsig.motion import examine_start_stop, measure_motion
+from gearsig.plot import FAULTY, SOUND, start_stop_pair_figure
 from tests.motion.recordings import continuous, start_stop
 
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from gearsig.errors import InputError
-from gearsig.plot.thin import envelope, thin
+from gearsig.plot import envelope, thin
 
 lines = arrays(np.float64, st.integers(1, 500), elements=st.floats(-1e6, 1e6, width=32))
 

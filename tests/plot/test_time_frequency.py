@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.plot.time_frequency import time_frequency_figure
-from gearsig.timefreq.types import Ridge, TimeFrequencyMap
+from gearsig.plot import time_frequency_figure
+from gearsig.timefreq import Ridge, TimeFrequencyMap
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import pytest
 from scipy.io import savemat, wavfile
 
 from gearsig.errors import InputError
-from gearsig.recording.read import read_recording
+from gearsig.recording import read_recording
 
 EXTENSIONS = (".csv", ".txt", ".csv.gz", ".mat", ".wav", ".h5", ".parquet", ".tdms", ".uff")
 
@@ -177,7 +177,7 @@ def test_flipped_bytes_give_a_recording_or_one_line(tmp_path, name):
 
 
 def test_packed_bomb_in_mat(tmp_path, monkeypatch):
-    monkeypatch.setattr("gearsig.recording.limits.available_memory_bytes", lambda: 1 << 24)
+    monkeypatch.setattr("gearsig.recording._limits.available_memory_bytes", lambda: 1 << 24)
     savemat(tmp_path / "x.mat", {"s": {"a": np.zeros(1 << 21)}, "fs": 1.0}, do_compression=True)
     assert (tmp_path / "x.mat").stat().st_size < 1 << 15
     refused(tmp_path / "x.mat", "decoded size")

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.recording.read import read_recording
-from gearsig.rig.speed import SpeedChannel
-from gearsig.rig.types import Rig, Sensor
+from gearsig.recording import read_recording
+from gearsig.rig import Rig, Sensor, SpeedChannel
 
 FS_HZ = 25600.0
 

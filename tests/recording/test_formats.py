@@ -14,11 +14,8 @@ from scipy.io import loadmat, savemat, wavfile
 from scipy.sparse import csc_array
 
 from gearsig.errors import InputError
-from gearsig.recording.formats.mat5_elements import variables
-from gearsig.recording.formats.wav_chunks import parse_lea
-from gearsig.recording.read import read_recording
-from gearsig.rig.speed import SpeedChannel
-from gearsig.rig.types import Rig, Sensor
+from gearsig.recording import parse_lea, read_recording, variables
+from gearsig.rig import Rig, Sensor, SpeedChannel
 
 RNG = np.random.default_rng(7)
 X = RNG.standard_normal(1000)

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.recording import free_memory
-from gearsig.recording.limits import check_memory
-from sims.reduced_fe.mesh_size import mesh_size_for
-from sims.reduced_fe.reduce import ReductionPlan, reduce_gear
+from gearsig.recording import _limits as free_memory
+from gearsig.recording import check_memory
+from sims.reduced_fe import ReductionPlan, mesh_size_for, reduce_gear
 from tests.sims.reduced_fe.fe_gears import PAPER
 
 V1 = ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")

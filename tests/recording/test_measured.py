@@ -5,10 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearsig.recording.pulse_file import read_pulse_times
-from gearsig.recording.quality import find_problems
-from gearsig.recording.read import read_recording
-from gearsig.rig.speed import SpeedChannel
+from gearsig.recording import find_problems, read_pulse_times, read_recording
+from gearsig.rig import SpeedChannel
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the measured recordings are not at hand")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.recording.pulse_file import read_pulse_times
+from gearsig.recording import read_pulse_times
 
 
 def test_seconds_and_milliseconds(tmp_path):

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearsig.recording.quality import find_problems
-from gearsig.recording.types import Channel, Recording
+from gearsig.recording import Channel, Recording, find_problems
 
 N = 20_000
 T = np.arange(N)

@@ -7,10 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from gearsig.errors import InputError
-from gearsig.recording.read import read_recording
-from gearsig.recording.types import QUANTITIES, Channel, Recording
-from gearsig.recording.write import write_recording
-from gearsig.rig.speed import ConstantSpeed, EncoderChannel, PulseTimes, SpeedChannel, TachometerChannel
+from gearsig.recording import Channel, Recording, read_recording, write_recording
+from gearsig.rig import QUANTITIES, ConstantSpeed, EncoderChannel, PulseTimes, SpeedChannel, TachometerChannel
 
 EXTENSIONS = (".csv", ".h5", ".parquet", ".wav", ".mat")
 TEXTS = st.text(st.characters(exclude_categories=("Cs",)), max_size=12)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearsig.recording.types import Channel, Recording
-from gearsig.rig.types import Rig, Sensor
+from gearsig.recording import Channel, Recording
+from gearsig.rig import Rig, Sensor
 
 
 def recording(unit: str) -> Recording:

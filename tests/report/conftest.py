@@ -7,13 +7,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from gearsig.angle.types import ShaftAngle
-from gearsig.diagnosis.types import Analysis, CannotTell, ChannelAnalysis, Finding, Kind, Strength, Where
-from gearsig.indicators.types import Indicator
-from gearsig.orders.types import OrderMap, SynchronousAverage
-from gearsig.recording.types import Channel, Provenance, Recording
-from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Shaft
-from gearsig.spectra.types import Spectrum
+from gearsig.angle import ShaftAngle
+from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, Finding, Kind, Strength, Where
+from gearsig.indicators import Indicator
+from gearsig.orders import OrderMap, SynchronousAverage
+from gearsig.recording import Channel, Provenance, Recording
+from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Shaft
+from gearsig.spectra import Spectrum
 
 MESH, RATE_HZ, SPEED_RPM = 23, 25_600.0, 1999.76
 

@@ -4,8 +4,8 @@ from io import BytesIO
 import numpy as np
 from PIL import Image
 
-from gearsig.plot import style
-from gearsig.plot.embed import embed
+from gearsig.plot import _style as style
+from gearsig.plot import embed
 
 
 def _pixels(figure):

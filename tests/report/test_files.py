@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from gearsig.report.files import check_writable, page_names, remove_parts, write_text
+from gearsig.report import check_writable, page_names, remove_parts, write_text
 
 
 @given(st.lists(st.text(max_size=300), max_size=20))

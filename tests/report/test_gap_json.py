@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.gap.types import Evidence, GapCause, GapOutcome, Interval
-from gearsig.report.gap_json import gap_schema, gap_to_dict, gap_to_json, write_gap_json
+from gearsig.gap import Evidence, GapCause, GapOutcome, Interval
+from gearsig.report import gap_schema, gap_to_dict, gap_to_json, write_gap_json
 from tests.gap.example_report import all_reports, effect_report, shrinkage
 
 REPORTS = all_reports()

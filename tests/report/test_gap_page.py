@@ -9,13 +9,26 @@ import html5lib
 import numpy as np
 import pytest
 
-from gearsig.gap.curves import lines_beyond
-from gearsig.gap.simulator import Point
-from gearsig.gap.types import ConditionFacts, Evidence, GapCause, GapOutcome, GapStep, Interval
-from gearsig.report.gap_page import gap_page_html, write_gap_page
-from gearsig.report.gap_pictures import gap_figures
-from gearsig.report.gap_sections import cause_rows, floors_text
-from gearsig.report.gap_text import condition_advice, gap_text, n_conditions
+from gearsig.gap import (
+    ConditionFacts,
+    Evidence,
+    GapCause,
+    GapOutcome,
+    GapStep,
+    Interval,
+    OperatingCondition,
+    lines_beyond,
+)
+from gearsig.report import (
+    cause_rows,
+    condition_advice,
+    floors_text,
+    gap_figures,
+    gap_page_html,
+    gap_text,
+    n_conditions,
+    write_gap_page,
+)
 from tests.gap.example_report import (
     all_reports,
     cannot_separate_report,
@@ -139,7 +152,7 @@ def evil_report(text):
         causes=causes,
         places=tuple(replace(p, title=text, shaft=text, channel=text) for p in report.places),
         groups={text: 0.5},
-        conditions=(ConditionFacts(text, Point(1500.0, 60.0), 1.0, 1.0, 1.0),),
+        conditions=(ConditionFacts(text, OperatingCondition(1500.0, 60.0), 1.0, 1.0, 1.0),),
         references=(text,),
         steps=tuple(GapStep(text, step.left) for step in report.steps),
         next_recordings=tuple(replace(n, text=text, separates=(text, text)) for n in report.next_recordings),
@@ -194,8 +207,8 @@ def test_recordings_of_one_operating_point_are_one_condition():
     report = effect_report()
     assert n_conditions(report) == 2
     first = report.conditions[0]
-    near = replace(first, name="again", point=Point(1.01 * first.point.speed_rpm, first.point.torque_nm))
-    loaded = replace(first, name="loaded", point=Point(first.point.speed_rpm, 2 * first.point.torque_nm))
+    near = replace(first, name="again", point=OperatingCondition(1.01 * first.point.speed_rpm, first.point.torque_nm))
+    loaded = replace(first, name="loaded", point=OperatingCondition(first.point.speed_rpm, 2 * first.point.torque_nm))
     assert n_conditions(replace(report, conditions=(first, near))) == 1
     assert n_conditions(replace(report, conditions=(first, near, loaded))) == 2
 

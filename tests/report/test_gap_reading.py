@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.report.gap_json import gap_to_dict, write_gap_json
-from gearsig.report.gap_reading import gap_from_dict, read_gap_json
+from gearsig.report import gap_from_dict, gap_to_dict, read_gap_json, write_gap_json
 from tests.gap.example_report import all_reports, effect_report
 
 REPORTS = all_reports()

@@ -2,10 +2,9 @@ from dataclasses import replace
 
 import pytest
 
-from gearsig.diagnosis.types import Outcome
-from gearsig.indicators.types import Indicator
-from gearsig.report.entry import Entry, Failure, entry_of
-from gearsig.report.index import write_index
+from gearsig.diagnosis import Outcome
+from gearsig.indicators import Indicator
+from gearsig.report import Entry, Failure, entry_of, write_index
 
 
 def _entry(name, outcome, fm4=3.0, **more):

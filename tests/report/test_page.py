@@ -7,9 +7,9 @@ from html.parser import HTMLParser
 
 import pytest
 
-from gearsig.diagnosis.types import Finding, Kind, Outcome, Where
-from gearsig.indicators.types import Indicator
-from gearsig.report.page import page_html, write_page
+from gearsig.diagnosis import Finding, Kind, Outcome, Where
+from gearsig.indicators import Indicator
+from gearsig.report import page_html, write_page
 
 EVIL = "<script>alert(1)</script>"
 QUOTES = "\"rig\" onload='x' & <b>"

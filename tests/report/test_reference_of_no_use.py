@@ -4,11 +4,8 @@ import json
 
 import pytest
 
-from gearsig.diagnosis.analyze import analyze
-from gearsig.diagnosis.types import Analysis
-from gearsig.report.page import page_html
-from gearsig.report.text import analysis_text
-from gearsig.report.to_json import analysis_to_json
+from gearsig.diagnosis import Analysis, analyze
+from gearsig.report import analysis_text, analysis_to_json, page_html
 from tests.diagnosis.machines import record
 
 REASON = "The depth of a root crack cannot be told: the rig file does not give module_mm"

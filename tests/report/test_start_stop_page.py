@@ -2,9 +2,8 @@
 
 import pytest
 
-from gearsig import analyze
-from gearsig.report.page import page_html
-from gearsig.report.start_stop_figures import start_stop_figures
+from gearsig.diagnosis import analyze
+from gearsig.report import page_html, start_stop_figures
 from tests.motion.recordings import continuous, start_stop, without
 
 

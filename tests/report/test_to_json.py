@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.formatting import readable, rounded
-from gearsig.report.to_json import analysis_to_dict, analysis_to_json, write_json
+from gearsig.report import analysis_to_dict, analysis_to_json, write_json
 
 MEMBERS = [
     "schema", "schema_version", "gearsig_version", "outcome", "verdict", "findings", "speed", "indicators", "recording",

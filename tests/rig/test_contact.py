@@ -5,11 +5,18 @@ from pathlib import Path
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.rig.contact import ToothContact, hertz_stiffness_n_per_m1p5
-from gearsig.rig.describe import describe_rig
-from gearsig.rig.toml import read_rig, rig_from_dict, rig_to_dict
-from gearsig.rig.tooth_pairs import path_of_contact
-from gearsig.rig.types import GearPair, Rig, Shaft
+from gearsig.rig import (
+    GearPair,
+    Rig,
+    Shaft,
+    ToothContact,
+    describe_rig,
+    hertz_stiffness_n_per_m1p5,
+    path_of_contact,
+    read_rig,
+    rig_from_dict,
+    rig_to_dict,
+)
 
 PAIR = GearPair("p", "in", "out", 20, 100, 5.0, 20.0)
 CONTACT = ToothContact(1.8e10, "p", half_backlash_um=150.0, driven_inertia_kg_m2=45.0, motor_inertia_kg_m2=0.05)

@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from gearsig.rig.orders import hunting_tooth_order, order_lines
-from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Shaft
+from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Shaft, hunting_tooth_order, order_lines
 
 TEETH = st.integers(3, 200)
 

@@ -7,10 +7,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from gearsig.rig.describe import describe_rig
-from gearsig.rig.speed import ConstantSpeed, EncoderChannel, SpeedChannel, TachometerChannel
-from gearsig.rig.toml import read_rig, rig_from_dict, rig_to_dict, write_rig
-from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
+from gearsig.rig import (
+    Bearing,
+    ConstantSpeed,
+    EncoderChannel,
+    GearPair,
+    OperatingPoint,
+    Rig,
+    Sensor,
+    Shaft,
+    SpeedChannel,
+    TachometerChannel,
+    describe_rig,
+    read_rig,
+    rig_from_dict,
+    rig_to_dict,
+    write_rig,
+)
 
 NAMES = st.text(min_size=1, max_size=12)
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearsig.severity.shaft_lines import ShaftLines
+from gearsig.severity import ShaftLines
 
 TEETH = 23
 N_ORDERS = 8 * TEETH

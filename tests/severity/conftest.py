@@ -2,7 +2,7 @@
 
 import pytest
 
-from gearsig.recording.types import Recording
+from gearsig.recording import Recording
 from tests.severity.gearbox import SPEED_RPM, Record, record_gearbox
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from functools import cache
 
-from gearsig.recording.types import Recording
+from gearsig.recording import Recording
 from sims import simulate
 
 Record = Callable[..., Recording]

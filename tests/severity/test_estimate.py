@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.recording.types import Recording
-from gearsig.rig.types import GearPair, OperatingPoint, Rig, Shaft
-from gearsig.severity.estimate import estimate_crack
-from gearsig.severity.types import CrackEstimate, NoCrackSeen
+from gearsig.recording import Recording
+from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft
+from gearsig.severity import CrackEstimate, NoCrackSeen, estimate_crack
 from tests.severity.gearbox import SPEED_RPM, Record
 
 DEPTHS_MM = (1.0, 2.0, 3.0)

@@ -5,9 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.severity.event import band_envelopes, find_event, n_bands
-from gearsig.severity.features import FEATURES, Conditions, feature_vector, mesh_energies
-from gearsig.severity.shaft_lines import ShaftLines
+from gearsig.severity import (
+    FEATURES,
+    Conditions,
+    ShaftLines,
+    band_envelopes,
+    feature_vector,
+    find_event,
+    mesh_energies,
+    n_bands,
+)
 from tests.severity.averages import N_ORDERS, TEETH, flat_pulse, mesh_lines, shaft, teeth_pattern
 
 CONDITIONS = Conditions(2.0, 50.0, 575.0)

@@ -5,11 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.calibration.fit_kind import fit_kind
+from app.studies.crack_severity import fit_kind
 from gearsig.errors import InputError
-from gearsig.severity.calibration import load_calibration
-from gearsig.severity.kind import CHIPPED, CRACKED, KIND_FEATURES, KINDS, SPALLED, KindModel
-from gearsig.severity.types import CrackEstimate
+from gearsig.severity import CHIPPED, CRACKED, KIND_FEATURES, KINDS, SPALLED, CrackEstimate, KindModel, load_calibration
 
 N = len(KIND_FEATURES)
 

@@ -8,9 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.severity.calibration import ALONE, FILE, WITH_REFERENCE, Calibration, load_calibration
-from gearsig.severity.features import FEATURES, RISING
-from gearsig.severity.model import DepthModel
+from gearsig.severity import ALONE, FEATURES, FILE, RISING, WITH_REFERENCE, Calibration, DepthModel, load_calibration
 
 MODELS = pytest.mark.parametrize("name", [WITH_REFERENCE, ALONE])
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import RefusalError
-from gearsig.severity.reference import difference_lines
+from gearsig.severity import difference_lines
 from tests.severity.averages import TEETH, flat_pulse, mesh_lines, shaft, teeth_pattern, turned
 
 PATTERN = mesh_lines() + teeth_pattern(7)

@@ -5,10 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearsig.severity.event import find_event, n_bands
-from gearsig.severity.shaft_lines import ShaftLines
-from gearsig.severity.shape import SHAPE, band_signal, event_shape, reach_cycles
-from gearsig.severity.squeezed import squeezed_rise_db
+from gearsig.severity import (
+    SHAPE,
+    ShaftLines,
+    band_signal,
+    event_shape,
+    find_event,
+    n_bands,
+    reach_cycles,
+    squeezed_rise_db,
+)
 from tests.severity.averages import N_ORDERS, TEETH, flat_pulse, mesh_lines, shaft, teeth_pattern
 
 

@@ -4,9 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.severity.tooth_root import percent_per_mm, root_thickness_mm
-from sims.mesh import GearGeometry
-from sims.mesh.crack import crack_mouth_mm, crack_percent
+from gearsig.severity import percent_per_mm, root_thickness_mm
+from sims.mesh import GearGeometry, crack_mouth_mm, crack_percent
 
 TEETH = st.integers(18, 200)
 MODULES = st.floats(0.5, 10.0)

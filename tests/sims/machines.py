@@ -2,7 +2,7 @@
 
 from math import cos, radians, sin
 
-from gearsig.rig.types import Bearing
+from gearsig.rig import Bearing
 from sims.machine import BearingSupport, Drive, Machine, ShaftLine, Wheel
 from sims.measure import MeasuredChannel, MeasurementChain, ModalPath, Tachometer
 from sims.mesh import GearGeometry, GearMesh, PairGeometry, disc_inertia_kg_m2, disc_mass_kg

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearsig.recording.types import Recording
+from gearsig.recording import Recording
 from sims import simulate
 from sims.effects import effects
 from sims.presets import presets

@@ -8,30 +8,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from gearsig.recording.types import Recording
-from gearsig.rig.types import Bearing, GearPair, Rig, Shaft
-from sims.kinematic import (
+from gearsig.recording import Recording
+from gearsig.rig import Bearing, GearPair, Rig, Shaft
+from sims.measure import ColouredNoise, MainsHum, Tachometer
+from tests.kinematic.model import (
     BearingFault,
-    ColouredNoise,
-    ConstantProfile,
     KinematicModel,
-    LinearRamp,
-    MainsHum,
     MeshHarmonics,
-    Modulation,
-    Resonance,
+    MeshModulation,
+    PathResonance,
     SensorChannel,
     ShaftOrder,
-    Tachometer,
     ToothDamage,
     ToothVariation,
     TransferPath,
-    simulate_kinematic,
+    between_teeth,
+    engagement_window,
+    knock_angles,
 )
-from sims.kinematic.bearing import knock_angles
-from sims.kinematic.impulses import ring_down
-from sims.kinematic.mesh import between_teeth
-from sims.kinematic.tooth import engagement_window
+from tests.kinematic.simulate import ring_down, simulate_kinematic
+from tests.kinematic.speed import ConstantProfile, LinearRamp
 
 RATE, DURATION = 10_000.0, 2.0
 RIG = Rig(
@@ -64,7 +60,7 @@ def test_mesh_harmonics_have_their_amplitude_phase_and_order():
 @pytest.mark.parametrize(("shaft", "spacing_hz"), [("input", 25.0), ("output", 12.5)])
 def test_modulation_makes_sidebands_of_its_own_shaft(shaft, spacing_hz):
     mesh = MeshHarmonics("stage 1", (4.0,))
-    r = run(meshes=(mesh,), modulations=(Modulation("stage 1", shaft, 0.3),))
+    r = run(meshes=(mesh,), modulations=(MeshModulation("stage 1", shaft, 0.3),))
     assert abs(line(r, 750.0 - spacing_hz)) == pytest.approx(0.6, rel=1e-9)
     assert abs(line(r, 750.0 + spacing_hz)) == pytest.approx(0.6, rel=1e-9)
     assert abs(line(r, 750.0 + 2 * spacing_hz)) == pytest.approx(0.0, abs=1e-9)
@@ -75,7 +71,7 @@ def test_phase_modulation_grows_with_the_harmonic_as_bessel_functions_say():
 
     r = run(
         meshes=(MeshHarmonics("stage 1", (1.0, 1.0)),),
-        modulations=(Modulation("stage 1", "input", 0.0, phase_deviation_rad=0.4),),
+        modulations=(MeshModulation("stage 1", "input", 0.0, phase_deviation_rad=0.4),),
     )
     for harmonic in (1, 2):
         assert abs(line(r, 750.0 * harmonic)) == pytest.approx(jv(0, 0.4 * harmonic), rel=1e-9)
@@ -95,7 +91,7 @@ def test_run_up_keeps_its_phase_to_the_angle():
 
 
 def test_paths_hum_and_channels():
-    path = TransferPath(0.5, (Resonance(800.0, 0.05, 3.0),))
+    path = TransferPath(0.5, (PathResonance(800.0, 0.05, 3.0),))
     r = run(
         meshes=(MeshHarmonics("stage 1", (2.0,)),),
         channels=(SensorChannel("a1"), SensorChannel("a2", path, hum=MainsHum((0.1,)))),
@@ -107,7 +103,7 @@ def test_paths_hum_and_channels():
 
 
 def test_filters_are_settled_at_time_zero():
-    path = TransferPath(1.0, (Resonance(800.0, 0.02, 3.0),))
+    path = TransferPath(1.0, (PathResonance(800.0, 0.02, 3.0),))
     r = run(meshes=(MeshHarmonics("stage 1", (2.0,)),), channels=(SensorChannel("a1", path),))
     steady = np.real(line(r, 750.0) * np.exp(2j * np.pi * 750.0 * r.time_s()))
     np.testing.assert_allclose(r.values("a1"), steady, atol=1e-6)
@@ -216,7 +212,7 @@ def test_bearing_knocks_show_at_the_order_of_the_race(race):
 
 EVERYTHING = {
     "meshes": (MeshHarmonics("stage 1", (3.0, 1.0)),),
-    "modulations": (Modulation("stage 1", "output", 0.1),),
+    "modulations": (MeshModulation("stage 1", "output", 0.1),),
     "tooth_variations": (ToothVariation("stage 1", "input"), ToothVariation("stage 1", "output")),
     "tooth_damages": (ToothDamage("stage 1", "input", 0.25, 5.0, resonance_hz=2500.0),),
     "bearing_faults": (BearingFault("b", "outer", 2.0),),

@@ -6,17 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from gearsig.rig.types import GearPair, Rig, Shaft
-from sims.kinematic import (
-    CoastDown,
-    ConstantProfile,
-    KinematicModel,
-    LinearRamp,
-    Tachometer,
-    Wander,
-    simulate_kinematic,
-)
-from sims.kinematic.speed import time_at_revolutions
+from gearsig.rig import GearPair, Rig, Shaft
+from sims.measure import Tachometer
+from tests.kinematic.model import KinematicModel
+from tests.kinematic.simulate import simulate_kinematic
+from tests.kinematic.speed import CoastDown, ConstantProfile, LinearRamp, Wander, time_at_revolutions
 
 RIG = Rig(shafts=(Shaft("input"), Shaft("output")), pairs=(GearPair("stage 1", "input", "output", 29, 47),))
 PROFILES = [

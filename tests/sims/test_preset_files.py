@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from sims.cracked.simulator import CrackedPair
-from sims.presets import preset, preset_text
-from sims.presets.read import MOST_BYTES
+from sims.cracked import CrackedPair
+from sims.presets import MOST_BYTES, preset, preset_text
 
 GOOD = """
 [about]

@@ -6,22 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearsig import analyze
+from gearsig.diagnosis import analyze
 from gearsig.errors import InputError
-from gearsig.rig.toml import read_rig, write_rig
-from gearsig.rig.types import Rig
+from gearsig.rig import Rig, read_rig, write_rig
 from sims import simulate
-from sims.cracked.simulator import CrackedPair, Prepared
+from sims.cracked import CrackedPair, PreparedCrackedPair
 from sims.effects import EffectSetting
-from sims.gear_pair.build import build_machine, build_rig
-from sims.gear_pair.parameters import PARAMETERS
-from sims.machine import Machine
-from sims.machine.operation import Course, Operation
+from sims.gear_pair import PARAMETERS, build_machine, build_rig
+from sims.machine import Machine, Operation, Profile
 from sims.measure import Tachometer
 from sims.presets import preset, presets
 from sims.registry import simulator, simulators
-from sims.simulator import ParameterValue
-from sims.values import checked_value, complete_values
+from sims.simulator import ParameterValue, checked_value, complete_values
 
 PRESETS = tuple(presets("cracked"))
 SUFFIXES = {
@@ -33,7 +29,7 @@ SUFFIXES = {
 }  # fmt: skip
 
 
-def prepared(name: str = "", operation: Operation | None = None, **values: ParameterValue) -> Prepared:
+def prepared(name: str = "", operation: Operation | None = None, **values: ParameterValue) -> PreparedCrackedPair:
     return CrackedPair().prepare(values, [], operation, np.random.default_rng(0), preset_name=name)
 
 
@@ -156,7 +152,7 @@ def test_the_diagnosis_names_the_cracked_tooth(tooth: int) -> None:
     assert (first.code, first.where.gear, first.where.tooth) == ("tooth-local-damage", "stage 1/input", tooth)
 
 
-def rig_of(ready: Prepared) -> Rig:
+def rig_of(ready: PreparedCrackedPair) -> Rig:
     return build_rig(ready.machine, ready.operation, name="x", sources=["simulated"])
 
 
@@ -171,7 +167,7 @@ def test_the_rig_file_reads_back_and_tells_no_damage(name: str, tmp_path: Path) 
 
 
 def test_a_varying_speed_is_left_out_of_the_rig() -> None:
-    run_up = Operation(Course.of([0, 1], [300, 1500]), Course.constant(20.0))
+    run_up = Operation(Profile.of([0, 1], [300, 1500]), Profile.constant(20.0))
     point = rig_of(prepared("workshop_29_47", run_up)).operating_point
     assert point.speed_rpm is None
     assert point.torque_nm == 20.0

@@ -8,13 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearsig import analyze
-from gearsig.angle.resample import resample_to_angle
-from gearsig.angle.shaft import find_shaft_angle
-from gearsig.diagnosis.types import Kind
-from gearsig.orders.average import synchronous_average
-from gearsig.recording.read import read_recording
-from gearsig.rig.toml import read_rig
+from gearsig.angle import find_shaft_angle, resample_to_angle
+from gearsig.diagnosis import Kind, analyze
+from gearsig.orders import synchronous_average
+from gearsig.recording import read_recording
+from gearsig.rig import read_rig
 
 FOLDER = Path(__file__).parents[2] / "sample_data"
 TRUTHS = json.loads((FOLDER / "truth.json").read_text(encoding="utf-8"))

@@ -10,14 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from gearsig.recording.read import read_recording
-from gearsig.recording.types import Channel, Recording
-from gearsig.rig.toml import read_rig
-from gearsig.rig.types import Rig
+from gearsig.recording import Channel, Recording, read_recording
+from gearsig.rig import Rig, read_rig
 from sims.effects import EffectSetting
-from sims.machine.operation import Course
-from sims.sweep import Axis, Point, Sweep
-from sims.sweep_run import Outcome, n_complete, run_sweep
+from sims.machine import Profile
+from sims.sweep import Axis, Sweep, SweepOutcome, SweepPoint, n_complete, run_sweep
 
 SPEEDS, DEPTHS = (300.0, 600.0, 900.0), (0.0, 1.0)
 
@@ -28,11 +25,11 @@ def small(**changes: object) -> Sweep:
 
 
 @pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch) -> list[Point]:
+def quick(monkeypatch: pytest.MonkeyPatch) -> list[SweepPoint]:
     """Replace the simulation by noise of the point's seed; points that are asked for are collected."""
-    asked: list[Point] = []
+    asked: list[SweepPoint] = []
 
-    def simulate(_sweep: Sweep, point: Point) -> Recording:
+    def simulate(_sweep: Sweep, point: SweepPoint) -> Recording:
         asked.append(point)
         if point.values[0] == 666.0:
             raise InputError("the crack goes past the tooth")
@@ -73,7 +70,7 @@ def test_a_point_puts_its_values_in_place(monkeypatch: pytest.MonkeyPatch) -> No
         Axis("root_crack", (1.0,), {"gear": "driven"}),
         Axis("half_backlash_um", (60.0,)),
     )
-    ramp = Course.of([0, 1], [300, 900])
+    ramp = Profile.of([0, 1], [300, 900])
     sweep = Sweep(
         "cracked", axes, parameters={"friction": "off"}, effects=(EffectSetting("mains_hum", 1.0),), speed_rpm=ramp
     )
@@ -87,7 +84,7 @@ def test_a_point_puts_its_values_in_place(monkeypatch: pytest.MonkeyPatch) -> No
     assert seen["torque_nm"].values.tolist() == [20.0]  # type: ignore[attr-defined]  # a Course
 
 
-def test_every_point_stands_in_the_folder_with_rig_and_truth(quick: list[Point], tmp_path: Path) -> None:
+def test_every_point_stands_in_the_folder_with_rig_and_truth(quick: list[SweepPoint], tmp_path: Path) -> None:
     sweep, folder = small(), tmp_path / "grid"
     counts = []
     result = run_sweep(sweep, folder, n_processes=1, on_progress=lambda n, total, _: counts.append((n, total)))
@@ -106,10 +103,10 @@ def test_every_point_stands_in_the_folder_with_rig_and_truth(quick: list[Point],
     assert len(list(folder.iterdir())) == expected
 
 
-def test_a_stopped_sweep_goes_on_and_ends_with_the_same_files(quick: list[Point], tmp_path: Path) -> None:
+def test_a_stopped_sweep_goes_on_and_ends_with_the_same_files(quick: list[SweepPoint], tmp_path: Path) -> None:
     sweep, folder, straight = small(extension=".csv"), tmp_path / "grid", tmp_path / "straight"
 
-    def stop(n_done: int, _total: int, _outcome: Outcome) -> None:
+    def stop(n_done: int, _total: int, _outcome: SweepOutcome) -> None:
         if n_done == 4:
             raise KeyboardInterrupt
 
@@ -127,7 +124,7 @@ def test_a_stopped_sweep_goes_on_and_ends_with_the_same_files(quick: list[Point]
     assert run_sweep(sweep, folder, n_processes=1).outcomes == ()
 
 
-def test_a_recording_that_was_lost_is_made_again(quick: list[Point], tmp_path: Path) -> None:
+def test_a_recording_that_was_lost_is_made_again(quick: list[SweepPoint], tmp_path: Path) -> None:
     sweep = small()
     run_sweep(sweep, tmp_path / "grid", n_processes=1)
     (tmp_path / "grid" / "point_3.h5").unlink()
@@ -135,7 +132,7 @@ def test_a_recording_that_was_lost_is_made_again(quick: list[Point], tmp_path: P
     assert len(quick) == 7
 
 
-def test_a_point_that_fails_does_not_stop_the_others(quick: list[Point], tmp_path: Path) -> None:
+def test_a_point_that_fails_does_not_stop_the_others(quick: list[SweepPoint], tmp_path: Path) -> None:
     sweep = Sweep("cracked", (Axis("speed_rpm", (300.0, 666.0, 900.0)),))
     result = run_sweep(sweep, tmp_path / "grid", n_processes=1)
     assert [o.recording is None for o in result.outcomes] == [False, True, False]
@@ -145,7 +142,7 @@ def test_a_point_that_fails_does_not_stop_the_others(quick: list[Point], tmp_pat
     assert len(quick) == 3
 
 
-def test_a_folder_of_another_sweep_is_refused(quick: list[Point], tmp_path: Path) -> None:
+def test_a_folder_of_another_sweep_is_refused(quick: list[SweepPoint], tmp_path: Path) -> None:
     run_sweep(small(), tmp_path / "grid", n_processes=1)
     with pytest.raises(InputError, match="seed differs"):
         run_sweep(small(seed=1), tmp_path / "grid", n_processes=1)

@@ -7,10 +7,15 @@ from hypothesis import strategies as st
 from scipy import signal as scipy_signal
 
 from gearsig.errors import InputError
-from gearsig.recording.types import Channel, Recording
-from gearsig.spectra.amplitude import amplitude_spectrum, channel_spectrum
-from gearsig.spectra.blocks import scaled_unit
-from gearsig.spectra.window import WINDOW_NAMES, make_window, window_response
+from gearsig.recording import Channel, Recording
+from gearsig.spectra import (
+    WINDOW_NAMES,
+    amplitude_spectrum,
+    channel_spectrum,
+    make_window,
+    scaled_unit,
+    window_response,
+)
 
 WINDOWS = ["rectangular", "hann", "hamming", "blackman-harris", "flat top", "kaiser 9"]
 

@@ -5,7 +5,7 @@ import pytest
 from scipy import signal as scipy_signal
 
 from gearsig.errors import RefusalError
-from gearsig.spectra.band_choice import choose_band
+from gearsig.spectra import choose_band
 
 FS, N = 20_000.0, 100_000
 

@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.spectra.amplitude import amplitude_spectrum
-from gearsig.spectra.cepstrum import cepstrum, lifter_families
+from gearsig.spectra import amplitude_spectrum, cepstrum, lifter_families
 
 
 @settings(max_examples=20, deadline=None)

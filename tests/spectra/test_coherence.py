@@ -8,10 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.recording.read import read_recording
-from gearsig.recording.types import Channel, Recording
-from gearsig.spectra.coherence import channel_coherence, spectral_coherence
-from gearsig.spectra.coherence_types import enhanced_envelope
+from gearsig.recording import Channel, Recording, read_recording
+from gearsig.spectra import channel_coherence, enhanced_envelope, spectral_coherence
 
 FS = 10_000.0
 DATA = Path(__file__).parents[3] / "shared" / "data" / "bearing_races"

@@ -3,13 +3,10 @@
 import numpy as np
 import pytest
 
-from gearsig.angle.types import ShaftAngle
+from gearsig.angle import ShaftAngle
 from gearsig.errors import InputError, RefusalError
-from gearsig.recording.types import Channel, Recording
-from gearsig.spectra.coherence import spectral_coherence
-from gearsig.spectra.coherence_order import order_coherence
-from gearsig.spectra.coherence_turns import TurnSums
-from gearsig.spectra.coherence_types import enhanced_envelope
+from gearsig.recording import Channel, Recording
+from gearsig.spectra import TurnSums, enhanced_envelope, order_coherence, spectral_coherence
 
 FS = 10_000.0
 N = (1 << 16) + 1

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import signal as scipy_signal
 
-from gearsig.recording.types import Channel, Recording
-from gearsig.spectra.density import channel_density, power_density
+from gearsig.recording import Channel, Recording
+from gearsig.spectra import channel_density, power_density
 
 
 @pytest.mark.parametrize("n_per_block", [256, 255])

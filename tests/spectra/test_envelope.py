@@ -5,8 +5,8 @@ import pytest
 from scipy import signal as scipy_signal
 
 from gearsig.errors import InputError
-from gearsig.recording.types import Channel, Provenance, Recording
-from gearsig.spectra.envelope import band_envelope, envelope_recording, envelope_spectrum
+from gearsig.recording import Channel, Provenance, Recording
+from gearsig.spectra import band_envelope, envelope_recording, envelope_spectrum
 
 FS, N = 10_000.0, 20_000
 T = np.arange(N) / FS

@@ -7,11 +7,7 @@ from hypothesis import strategies as st
 from scipy import signal as scipy_signal
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.spectra.amplitude import amplitude_spectrum
-from gearsig.spectra.cepstrum import cepstrum
-from gearsig.spectra.density import power_density
-from gearsig.spectra.floor import noise_floor
-from gearsig.spectra.lines import find_lines
+from gearsig.spectra import amplitude_spectrum, cepstrum, find_lines, noise_floor, power_density
 
 
 def _noise(rng, n, pole):

@@ -8,12 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.recording.read import read_recording
-from gearsig.recording.types import Channel, Recording
-from gearsig.spectra.floor import noise_floor
-from gearsig.spectra.kurtogram import best_band, channel_kurtogram, kurtogram, kurtogram_envelope
-from gearsig.spectra.kurtogram_filters import splitter
-from gearsig.spectra.kurtogram_preparation import prepared_signal
+from gearsig.recording import Channel, Recording, read_recording
+from gearsig.spectra import (
+    best_band,
+    channel_kurtogram,
+    kurtogram,
+    kurtogram_envelope,
+    noise_floor,
+    prepared_signal,
+    splitter,
+)
 
 FS = 20_000.0
 DATA = Path(__file__).parents[3] / "shared" / "data" / "bearing_races"

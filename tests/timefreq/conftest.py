@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gearsig.angle.types import AngleSignal, ShaftAngle
-from gearsig.timefreq.uniform import UniformSignal
+from gearsig.angle import AngleSignal, ShaftAngle
+from gearsig.timefreq import UniformSignal
 
 RATE = 2000.0
 

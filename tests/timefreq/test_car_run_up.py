@@ -7,13 +7,9 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
-from gearsig.angle.resample import resample_to_angle
-from gearsig.angle.types import ShaftAngle
-from gearsig.recording.types import Channel, Recording
-from gearsig.timefreq.component import component
-from gearsig.timefreq.ridges import ridges
-from gearsig.timefreq.squeezed_cwt import squeezed_cwt_map
-from gearsig.timefreq.stft import stft_map
+from gearsig.angle import ShaftAngle, resample_to_angle
+from gearsig.recording import Channel, Recording
+from gearsig.timefreq import component, ridges, squeezed_cwt_map, stft_map
 
 FOLDER = Path(__file__).parents[3] / "shared" / "data" / "car_run_up"
 FULL_SCALE_RPM = 4821.4287

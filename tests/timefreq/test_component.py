@@ -4,15 +4,18 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.timefreq.component import component
-from gearsig.timefreq.cwt import cwt, cwt_map
-from gearsig.timefreq.inverse import inverse
-from gearsig.timefreq.lines import lowest_possible
-from gearsig.timefreq.ridges import ridges
-from gearsig.timefreq.stft import stft
-from gearsig.timefreq.types import Ridge
-from gearsig.timefreq.uniform import UniformSignal
-from gearsig.timefreq.wavelets import Morse
+from gearsig.timefreq import (
+    Morse,
+    Ridge,
+    UniformSignal,
+    component,
+    cwt,
+    cwt_map,
+    inverse,
+    lowest_possible,
+    ridges,
+    stft,
+)
 
 T = np.arange(20_001) / 2000.0
 AMPLITUDE = 1 + 0.3 * np.cos(2 * np.pi * 2 * T)

@@ -8,11 +8,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.timefreq.bank import pieces, plan_groups
-from gearsig.timefreq.cwt import cwt, cwt_map
-from gearsig.timefreq.lines import footprint_periods
-from gearsig.timefreq.uniform import UniformSignal
-from gearsig.timefreq.wavelets import Morlet, Morse, admissibility, band, half_support
+from gearsig.timefreq import (
+    Morlet,
+    Morse,
+    UniformSignal,
+    admissibility,
+    band,
+    cwt,
+    cwt_map,
+    footprint_periods,
+    half_support,
+    pieces,
+    plan_groups,
+)
 
 WAVELETS = (Morse(), Morse(60.0), Morse(4.0, 2.0), Morlet(), Morlet(20.0))
 

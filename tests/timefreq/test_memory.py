@@ -5,12 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from gearsig.timefreq.cwt import cwt_map
-from gearsig.timefreq.packets import wavelet_packet_map
-from gearsig.timefreq.squeezed_cwt import squeezed_cwt_map
-from gearsig.timefreq.squeezed_stft import squeezed_stft_map
-from gearsig.timefreq.stft import stft_map
-from gearsig.timefreq.uniform import UniformSignal
+from gearsig.timefreq import UniformSignal, cwt_map, squeezed_cwt_map, squeezed_stft_map, stft_map, wavelet_packet_map
 
 SHORT, LONG = 1 << 17, 1 << 19
 MAPS = {

@@ -7,8 +7,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.timefreq.packets import natural_order, node_path, packet_inverse, wavelet_packet_map, wavelet_packets
-from gearsig.timefreq.uniform import UniformSignal
+from gearsig.timefreq import (
+    UniformSignal,
+    natural_order,
+    node_path,
+    packet_inverse,
+    wavelet_packet_map,
+    wavelet_packets,
+)
 
 
 @given(n=st.integers(700, 5000), level=st.integers(1, 4), wavelet=st.sampled_from(["haar", "db4", "sym12", "coif3"]))

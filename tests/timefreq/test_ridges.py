@@ -4,17 +4,22 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.timefreq.crossings import meetings, untangled
-from gearsig.timefreq.cwt import cwt, cwt_map
-from gearsig.timefreq.ridge_path import NOT_HIDDEN, best_path
-from gearsig.timefreq.ridges import NOT_HIDDEN as NOT_HIDDEN_AGAIN
-from gearsig.timefreq.ridges import ridges
-from gearsig.timefreq.squeezed_cwt import squeezed_cwt_map
-from gearsig.timefreq.squeezed_stft import squeezed_stft_map
-from gearsig.timefreq.stft import stft_map
-from gearsig.timefreq.types import Ridge
-from gearsig.timefreq.uniform import UniformSignal
-from gearsig.timefreq.wavelets import Morse
+from gearsig.timefreq import (
+    NOT_HIDDEN,
+    Morse,
+    Ridge,
+    UniformSignal,
+    best_path,
+    cwt,
+    cwt_map,
+    meetings,
+    ridges,
+    squeezed_cwt_map,
+    squeezed_stft_map,
+    stft_map,
+    untangled,
+)
+from gearsig.timefreq import NOT_HIDDEN as NOT_HIDDEN_AGAIN
 
 MAPS = {
     "CWT": lambda s: cwt_map(s, lowest=50, highest=800, wavelet=Morse(60.0), n_per_octave=32),

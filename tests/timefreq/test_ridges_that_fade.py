@@ -5,16 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearsig.angle.shaft import find_shaft_angle
-from gearsig.recording.read import read_recording
-from gearsig.rig.toml import read_rig
-from gearsig.timefreq.crossings import _tops_beside
-from gearsig.timefreq.cwt import cwt_map
-from gearsig.timefreq.ridges import ridges
-from gearsig.timefreq.squeezed_cwt import squeezed_cwt_map
-from gearsig.timefreq.types import TimeFrequencyMap
-from gearsig.timefreq.uniform import UniformSignal
-from gearsig.timefreq.wavelets import Morse
+from gearsig.angle import find_shaft_angle
+from gearsig.recording import read_recording
+from gearsig.rig import read_rig
+from gearsig.timefreq import Morse, TimeFrequencyMap, UniformSignal, cwt_map, ridges, squeezed_cwt_map
+from gearsig.timefreq._ridges import _tops_beside
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 RATE = 4096.0

@@ -7,14 +7,19 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.timefreq.cwt import cwt_map
-from gearsig.timefreq.inverse import inverse
-from gearsig.timefreq.squeeze_lines import squeeze_lines
-from gearsig.timefreq.squeezed_cwt import squeezed_cwt, squeezed_cwt_map
-from gearsig.timefreq.squeezed_stft import squeezed_stft, squeezed_stft_map
-from gearsig.timefreq.stft import stft_map
-from gearsig.timefreq.uniform import UniformSignal
-from gearsig.timefreq.wavelets import Morlet, Morse
+from gearsig.timefreq import (
+    Morlet,
+    Morse,
+    UniformSignal,
+    cwt_map,
+    inverse,
+    squeeze_lines,
+    squeezed_cwt,
+    squeezed_cwt_map,
+    squeezed_stft,
+    squeezed_stft_map,
+    stft_map,
+)
 
 INSIDE = slice(1500, -1500)
 

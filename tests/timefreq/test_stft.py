@@ -7,9 +7,7 @@ from hypothesis import strategies as st
 from scipy.signal import ShortTimeFFT
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.timefreq.inverse import inverse
-from gearsig.timefreq.stft import stft, stft_map
-from gearsig.timefreq.uniform import UniformSignal
+from gearsig.timefreq import UniformSignal, inverse, stft, stft_map
 
 
 def test_same_as_scipy():

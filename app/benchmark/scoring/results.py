@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from io import StringIO
 from pathlib import Path
@@ -13,24 +14,301 @@ from pathlib import Path
 import numpy as np
 
 from app.benchmark.answer import Answer
-from app.benchmark.blind_run import state_of_code
+from app.benchmark.cases import BLIND, SAME, SHARES
 from app.benchmark.diagnosers import BASELINES
-from app.benchmark.plan import BLIND, SAME
-from app.benchmark.run import Done
-from app.benchmark.scoring.calibration_curve import bins_of
-from app.benchmark.scoring.effects_table import confusion_counts, confusions_table, effects_table
-from app.benchmark.scoring.intervals import Score, share
-from app.benchmark.scoring.judged import Row
-from app.benchmark.scoring.scores import is_one_answer
-from app.benchmark.scoring.strata import WITH, WITHOUT, Result
-from app.benchmark.scoring.strength import STRONG
-from app.benchmark.scoring.table import Table, beside_table, cost_lines, main_table, markdown, parts_table, same_table
-from app.benchmark.shares import SHARES
+from app.benchmark.run import Done, state_of_code
+from app.benchmark.scoring.judged import STRONG, Row
+from app.benchmark.scoring.scores import (
+    FIGURES,
+    WITH,
+    WITHOUT,
+    Figure,
+    Result,
+    Score,
+    bins_of,
+    is_one_answer,
+    judgement,
+    share,
+)
 from gearsig import __version__
 from gearsig.formatting import rounded
-from gearsig.plot.embed import Picture, embed
-from gearsig.report.benchmark_page import Section, benchmark_html
-from sims.sweep_run import written
+from gearsig.gap import NONE, UNKNOWN
+from gearsig.plot import Picture, embed
+from gearsig.report import Section, benchmark_html
+from sims.blind import CATALOGUE, OUTSIDE_CATALOGUE
+from sims.sweep import written
+
+# --------------------
+# Result tables: the README's in Markdown, the same cells for the page.
+# --------------------
+
+
+NO_CASES = "–"
+"""A cell without a case."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells of a table.
+
+    Parameters
+    ----------
+    title, note : str
+    header : tuple of str
+    rows : tuple of tuple of str
+    """
+
+    title: str
+    note: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def main_table(result: Result) -> Table:
+    """Return the figures that have targets or matter beside them, with and without reference."""
+    parts = {name: result.part(name).scores for name in (WITHOUT, WITH)}
+    rows = []
+    for figure in FIGURES:
+        row = [figure.title]
+        for i, name in enumerate((WITHOUT, WITH)):
+            score = parts[name][figure.key]
+            row += [cell(figure, score), target_cell(figure, score, i)]
+        if any(scores[figure.key].n for scores in parts.values()):
+            rows.append(tuple(row))
+    header = ("", WITHOUT, "target", WITH, "target")
+    return Table("Against the targets", _basis(result), header, tuple(rows))
+
+
+def same_table(result: Result) -> Table | None:
+    """Return the figures of the diagnosing simulator's own cases and the drop from them; None if there are none."""
+    if not result.wanted.plan.same_simulator:
+        return None
+    rows = []
+    for figure in FIGURES:
+        row = [figure.title]
+        for name in (WITHOUT, WITH):
+            same, blind = (result.part(name, source=source).scores[figure.key] for source in (SAME, BLIND))
+            row += [cell(figure, same), _drop(figure, same, blind)]
+        if any(text != NO_CASES for text in row[1::2]):
+            rows.append(tuple(row))
+    note = "The same plan of cases, made by the diagnosing simulator; drop: from there to the independent rig."
+    return Table("Same simulator", note, ("", WITHOUT, "drop", WITH, "drop"), tuple(rows))
+
+
+def beside_table(result: Result) -> Table:
+    """Return the same figures of the diagnosers beside, on the very same cases."""
+    names = result.wanted.diagnosers
+    header = ["", *(f"{name}, {part}" for name in names for part in ("without", "with"))]
+    rows = []
+    for figure in FIGURES:
+        found = [result.part(part, diagnoser=name).scores[figure.key] for name in names for part in (WITHOUT, WITH)]
+        if any(score.n for score in found):
+            rows.append((figure.title, *(cell(figure, score, with_n=False) for score in found)))
+    words = {"majority": "majority: always the commonest answer", "rules": "rules: a table of textbook signatures"}
+    note = "; ".join(words[name] for name in BASELINES if name in names)
+    return Table(
+        "Beside other diagnosers",
+        f"On the same cases, without and with reference. {note.capitalize()}.",
+        tuple(header),
+        tuple(rows),
+    )
+
+
+def parts_table(result: Result) -> Table:
+    """Return the figures of one and two conditions, and of faults of every strength."""
+    columns = [
+        *((name, None) for name in ("one condition", "two conditions")),
+        *((name, False) for name in (WITHOUT, WITH)),
+    ]
+    header = ["", "one condition", "two conditions", "every strength, without", "with reference"]
+    rows = []
+    for figure in FIGURES:
+        found = [result.part(name, strong=strong).scores[figure.key] for name, strong in columns]
+        if any(score.n for score in found):
+            rows.append((figure.title, *(cell(figure, score) for score in found)))
+    return Table("By conditions, and with weak faults", "", tuple(header), tuple(rows))
+
+
+def cell(figure: Figure, score: Score, *, with_n: bool = True) -> str:
+    """Return value, interval and number of cases."""
+    if not score.n:
+        return NO_CASES
+    n = f" of {score.n}" if with_n else ""
+    if figure.is_share:
+        return f"{100 * score.value:.0f} % ({100 * score.low:.0f}–{100 * score.high:.0f}){n}"
+    return f"{score.value:.2f} ({score.low:.2f}–{score.high:.2f}){n}".replace("-", "−")
+
+
+def target_cell(figure: Figure, score: Score, column: int) -> str:
+    """Return the target and whether it is met."""
+    if figure.targets is None:
+        return ""
+    target = figure.targets[column]
+    sign = "≥" if figure.is_least else "≤"
+    text = f"{sign} {100 * target:.0f} %" if figure.is_share else f"{sign} {target:.2f}"
+    verdict = judgement(score, target, is_least=figure.is_least)
+    return f"{text}: {verdict}" if verdict else text
+
+
+def _drop(figure: Figure, same: Score, blind: Score) -> str:
+    if not same.n or not blind.n:
+        return NO_CASES
+    drop = blind.value - same.value
+    text = f"{100 * drop:+.0f} points" if figure.is_share else f"{drop:+.2f}"
+    return text.replace("-", "−")
+
+
+def _basis(result: Result) -> str:
+    if result.strengths_known:
+        return (
+            f"Faults of at least {STRONG:g} structural floors, and all healthy cases; value (90 % interval) of "
+            "so many cases; open: the interval holds the target."
+        )
+    return (
+        "Faults of every strength, as there are too few healthy cases for a floor; value (90 % interval) of so many "
+        "cases."
+    )
+
+
+def markdown(result: Result, command: str, date: datetime) -> str:
+    """Return the tables for a README, with date, version and command."""
+    plan = result.wanted.plan
+    text = [
+        f"{plan.n_cases} blind cases, {plan.role}; gearsig {__version__}, {date:%d %B %Y}; `{command}`.",
+        "",
+        *_table(main_table(result)),
+        "",
+        *(_table(same) if (same := same_table(result)) is not None else ()),
+        "",
+        *_table(beside_table(result)),
+        "",
+        *cost_lines(result),
+    ]
+    return "\n".join(text) + "\n"
+
+
+def _table(table: Table) -> Iterator[str]:
+    yield f"**{table.title}.** {table.note}"
+    yield ""
+    yield "| " + " | ".join(table.header) + " |"
+    yield "|" + "---|" * len(table.header)
+    for row in table.rows:
+        yield "| " + " | ".join(row) + " |"
+
+
+def cost_lines(result: Result) -> list[str]:
+    """Return what a diagnosis took, and the calibration error that chance alone would give."""
+    import numpy as np
+
+    answers = [row.answer for row in result.rows[result.judged]]
+    wall = np.array([a.seconds for a in answers])
+    cpu = np.array([a.cpu_seconds for a in answers])
+    took = (
+        f"One diagnosis took {np.median(wall):.1f} s (middle; longest {wall.max():.1f} s), "
+        f"{np.median(cpu):.1f} s of one processor's time (longest {cpu.max():.1f} s)."
+    )
+    chance = (
+        "With so many cases, probabilities that are exactly true would show a calibration error of "
+        f"{result.chance_error:.2f}."
+    )
+    return [took, chance]
+
+
+# --------------------
+# Per effect and per level; and what was taken for what, with what both have in common.
+# --------------------
+
+
+LEVELS = (("weak", 0.0, 1 / 3), ("middle", 1 / 3, 2 / 3), ("strong", 2 / 3, 1.01))
+MOST_CONFUSIONS = 12
+
+
+def effects_table(result: Result) -> Table:
+    """Return, for each effect, how often the likeliest cause was right, by level, strength and reference."""
+    rows = [r for r in result.rows[result.judged] if r.source == BLIND]
+    table = [_effect_row(name, [r for r in rows if r.kind == "single" and r.effects == (name,)]) for name in CATALOGUE]
+    table += [
+        _effect_row(name, [r for r in rows if r.kind == "unknown" and r.effects == (name,)])
+        for name in OUTSIDE_CATALOGUE
+    ]
+    header = (
+        "effect",
+        *(name for name, *_ in LEVELS),
+        f"≥ {STRONG:g} floors, without",
+        "with reference",
+        "strength",
+        "most often taken for",
+    )
+    note = (
+        "Likeliest cause right, of so many: in the weak, middle and strong third of the effect's span, and from "
+        f"{STRONG:g} structural floors on. Strength: the middle, in structural floors. For effects outside the "
+        "catalogue “unknown” is right."
+    )
+    return Table("Effect by effect", note, header, tuple(row for row in table if row))
+
+
+def _effect_row(name: str, rows: Sequence[Row]) -> tuple[str, ...]:
+    if not rows:
+        return ()
+    strong = [r for r in rows if r.strength >= STRONG]
+    wrong = Counter(r.first or "no answer" for r in rows if r.first not in r.truths).most_common(1)
+    known = [r.strength for r in rows if np.isfinite(r.strength)]
+    return (
+        name,
+        *(_right([r for r in rows if low <= r.level < high]) for _, low, high in LEVELS),
+        _right([r for r in strong if not r.has_reference]),
+        _right([r for r in strong if r.has_reference]),
+        f"{np.median(known):.2g}" if known else "–",
+        f"{wrong[0][0]} ({wrong[0][1]})" if wrong else "",
+    )
+
+
+def _right(rows: Sequence[Row]) -> str:
+    return f"{sum(r.first in r.truths for r in rows)} of {len(rows)}" if rows else "–"
+
+
+def confusions_table(result: Result) -> Table:
+    """Return the commonest wrong answers, and in which kinds of features both effects show."""
+    rows = [r for r in result.rows[result.judged] if r.source == BLIND and r.kind != "pair"]
+    if result.strengths_known:
+        rows = [r for r in rows if r.kind == "none" or r.strength >= STRONG]
+    found = Counter(
+        (r.truths[0] if r.kind != "unknown" else r.effects[0], r.first) for r in rows if r.first not in r.truths
+    )
+    table = [(true, said or "no answer", str(n), _common(true, said)) for (true, said), n in found.most_common()]
+    return Table(
+        "What was taken for what",
+        "In common: kinds of features in which theory expects both.",
+        ("it was", "said", "cases", "in common"),
+        tuple(table[:MOST_CONFUSIONS]),
+    )
+
+
+def _common(true: str, said: str) -> str:
+    from sims.effects import effects
+
+    if said == NONE:
+        return "too weak to stand out of the floor"
+    if true in OUTSIDE_CATALOGUE:
+        return "made to be mistaken for it" if OUTSIDE_CATALOGUE[true].resembles == said else ""
+    known = effects()
+    if true in known and said in known:
+        return ", ".join(kind.replace("_", " ") for kind in known[true].shows_in if kind in known[said].shows_in)
+    return "not explained well enough" if said == UNKNOWN else ""
+
+
+def confusion_counts(result: Result) -> tuple[tuple[str, ...], tuple[str, ...], np.ndarray]:
+    """Return what it was, what was said, and the counts, (n_true, n_said), of blind cases with one right answer."""
+    rows = [r for r in result.rows[result.judged] if r.source == BLIND and r.kind != "pair"]
+    if result.strengths_known:
+        rows = [r for r in rows if r.kind == "none" or r.strength >= STRONG]
+    true = (*CATALOGUE, NONE, UNKNOWN)
+    said = (*true, "no answer") if any(not r.first for r in rows) else true
+    counts = np.zeros((len(true), len(said)), dtype=np.int64)
+    for row in rows:
+        counts[true.index(row.truths[0]), said.index(row.first or "no answer")] += 1
+    return true, said, counts
+
 
 COLUMNS = (
     *("number", "source", "kind", "effects", "level", "severity", "unit", "strength"),
@@ -176,7 +454,7 @@ def _provenance(result: Result, command: str) -> list[tuple[str, str]]:
 
 
 def _confusion_picture(result: Result) -> Picture:
-    from gearsig.plot.benchmark import confusion_figure
+    from gearsig.plot import confusion_figure
 
     strong = f", faults of at least {STRONG:g} structural floors" if result.strengths_known else ""
     true, said, counts = confusion_counts(result)
@@ -189,7 +467,7 @@ def _confusion_picture(result: Result) -> Picture:
 
 
 def _calibration(result: Result) -> tuple[Picture, ...]:
-    from gearsig.plot.benchmark import calibration_figure
+    from gearsig.plot import calibration_figure
 
     curves = {}
     for name in (result.judged, *(b for b in BASELINES if b in result.rows and b != result.judged)):

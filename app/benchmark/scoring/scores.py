@@ -3,18 +3,166 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, sqrt
+from typing import TypeVar
 
 import numpy as np
 
 from app.benchmark.answer import AnsweredShrinkage
-from app.benchmark.scoring.calibration_curve import brier, calibration_error
-from app.benchmark.scoring.intervals import NOTHING, Score, median_of, resampled, share
-from app.benchmark.scoring.judged import Row, group_of
-from gearsig.gap.types import GapOutcome
+from app.benchmark.cases import BLIND, SAME
+from app.benchmark.run import BenchmarkRequest, Done
+from app.benchmark.scoring.judged import STRONG, Row, group_of, known_floors, rows_of
+from gearsig.checks import FloatArray
+from gearsig.gap import GapOutcome
 from sims.blind import MECHANICAL
+
+# --------------------
+# 90 % intervals of shares and of anything that is computed from a list of cases.
+# --------------------
+
+
+Z = 1.6448536269514722
+"""Two-sided 90 % of the normal distribution."""
+
+N_RESAMPLES = 500
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Score:
+    """A figure with its 90 % interval and the number of cases it is made of.
+
+    Parameters
+    ----------
+    value, low, high : float
+        nan without cases.
+    n : int
+    """
+
+    value: float
+    low: float
+    high: float
+    n: int
+
+
+NOTHING = Score(float("nan"), float("nan"), float("nan"), 0)
+
+
+def share(n_hits: int, n: int) -> Score:
+    """Return a share with Wilson's score interval.
+
+    (p + z²/2n ± z √(p(1−p)/n + z²/4n²))/(1 + z²/n).
+
+    Source: E. B. Wilson, *Probable inference, the law of succession, and statistical inference* (J. Am. Stat. Assoc.,
+    1927).
+    """
+    if n == 0:
+        return NOTHING
+    p, z2 = n_hits / n, Z**2
+    middle = (p + z2 / (2 * n)) / (1 + z2 / n)
+    half = Z * sqrt(p * (1 - p) / n + z2 / (4 * n**2)) / (1 + z2 / n)
+    # Rounding may leave 1e-17 beyond the ends.
+    return Score(p, max(0.0, min(middle - half, p)), min(1.0, max(middle + half, p)), n)
+
+
+def resampled(
+    rows: Sequence[T],
+    statistic: Callable[[Sequence[T]], float],
+    rng: np.random.Generator,
+    *,
+    centred: bool = False,
+) -> Score:
+    """Return a statistic with the 5 and 95 % quantiles over cases drawn with replacement.
+
+    `centred` is for a sum of absolute errors, to which drawing adds errors of its own: the quantiles are moved by the
+    difference of their mean from the value, not below 0.
+
+    Source: B. Efron, R. J. Tibshirani, *An Introduction to the Bootstrap* (1993), chapter 13.
+    """
+    value = statistic(rows) if rows else float("nan")
+    if not isfinite(value):
+        return NOTHING
+    picks = rng.integers(len(rows), size=(N_RESAMPLES, len(rows)))
+    found = [other for pick in picks if isfinite(other := statistic([rows[i] for i in pick]))]
+    low, high = np.quantile(found, (0.05, 0.95))
+    if centred:
+        low, high = (max(0.0, value + q - float(np.mean(found))) for q in (low, high))
+    return Score(value, float(low), float(high), len(rows))
+
+
+def median_of(values: Sequence[float], rng: np.random.Generator) -> Score:
+    """Return the median of the finite values, with its interval by `resampled`."""
+    return resampled([v for v in values if isfinite(v)], lambda drawn: float(np.median(drawn)), rng)
+
+
+# --------------------
+# Whether probabilities are worth what they say: Brier score, calibration error, calibration curve.
+# --------------------
+
+
+N_BINS = 10
+N_DRAWS = 500
+
+
+@dataclass(frozen=True)
+class CalibrationBin:
+    """Answers of nearly the same confidence.
+
+    Parameters
+    ----------
+    confidence : float
+        Mean probability of the likeliest cause.
+    accuracy : float
+        Share of those that were right.
+    n : int
+    """
+
+    confidence: float
+    accuracy: float
+    n: int
+
+
+def brier(probabilities: Mapping[str, float], truth: str) -> float:
+    """Return Σ_k (p_k − y_k)² over all causes, 0 (sure and right) to 2 (sure and wrong).
+
+    Source: G. W. Brier, *Verification of forecasts expressed in terms of probability* (Monthly Weather Review, 1950).
+    """
+    names = {*probabilities, truth}
+    return float(sum((probabilities.get(name, 0.0) - (name == truth)) ** 2 for name in names))
+
+
+def bins_of(confidence: Sequence[float], right: Sequence[bool], n_bins: int = N_BINS) -> list[CalibrationBin]:
+    """Return bins with equally many answers, by rising confidence."""
+    order = np.argsort(confidence, kind="stable")
+    parts = np.array_split(order, min(n_bins, len(order))) if len(order) else []
+    c, r = np.asarray(confidence, dtype=np.float64), np.asarray(right, dtype=np.float64)
+    return [CalibrationBin(float(c[part].mean()), float(r[part].mean()), len(part)) for part in parts]
+
+
+def calibration_error(confidence: Sequence[float], right: Sequence[bool], n_bins: int = N_BINS) -> float:
+    """Return Σ_b (n_b/n) |accuracy_b − confidence_b| over bins of equal mass.
+
+    It is above 0 by chance even if every probability is true: see `error_by_chance`.
+
+    Source: M. P. Naeini, G. F. Cooper, M. Hauskrecht, *Obtaining well calibrated probabilities using Bayesian binning*
+    (AAAI, 2015), with bins of equal mass.
+    """
+    found = bins_of(confidence, right, n_bins)
+    total = sum(b.n for b in found)
+    return sum(b.n * abs(b.accuracy - b.confidence) for b in found) / total if total else float("nan")
+
+
+def error_by_chance(confidence: Sequence[float], rng: np.random.Generator) -> float:
+    """Return the calibration error that true probabilities would show with so many answers, on average."""
+    if not len(confidence):
+        return float("nan")
+    values: FloatArray = np.asarray(confidence, dtype=np.float64)
+    drawn = rng.random((N_DRAWS, len(values))) < values
+    return float(np.mean([calibration_error(confidence, row.tolist()) for row in drawn]))
+
 
 Rows = Sequence[Row]
 Measure = Callable[[Rows, np.random.Generator], Score]
@@ -281,3 +429,103 @@ def judgement(score: Score, target: float, *, is_least: bool) -> str:
     if score.low < target < score.high:
         return "open"
     return "met" if score.value == target or (score.value > target) == is_least else "missed"
+
+
+# --------------------
+# The parts of the cases that are scored one by one, and the whole result.
+# --------------------
+
+
+WITHOUT, WITH = "without reference", "with reference"
+PARTS: dict[str, Callable[[Row], bool]] = {
+    "all": lambda _: True,
+    WITHOUT: lambda row: not row.has_reference,
+    WITH: lambda row: row.has_reference,
+    "one condition": lambda row: row.n_conditions == 1,
+    "two conditions": lambda row: row.n_conditions == 2,
+}
+"""Name → whether a case belongs to it."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """The figures of one part of the cases.
+
+    Parameters
+    ----------
+    diagnoser, source, name : str
+    strong : bool
+        Whether faults below `STRONG` are left out.
+    n : int
+        Cases.
+    scores : mapping of str to Score
+    """
+
+    diagnoser: str
+    source: str
+    name: str
+    strong: bool
+    n: int
+    scores: Mapping[str, Score]
+
+
+@dataclass(frozen=True)
+class Result:
+    """A benchmark's outcome.
+
+    Parameters
+    ----------
+    wanted : Wanted
+    rows : mapping
+        Diagnoser → its rows.
+    parts : tuple of Part
+    chance_error : float
+        Calibration error that true probabilities would show with so many cases.
+    strengths_known : bool
+        Whether there is a floor to measure strength in; if not, figures are of all faults.
+    """
+
+    wanted: BenchmarkRequest
+    rows: Mapping[str, Sequence[Row]]
+    parts: tuple[Part, ...]
+    chance_error: float
+    strengths_known: bool
+
+    @property
+    def judged(self) -> str:
+        """The diagnoser under judgement."""
+        return self.wanted.diagnosers[0]
+
+    def part(self, name: str, *, diagnoser: str = "", source: str = BLIND, strong: bool | None = None) -> Part:
+        """Return a part; `strong` None: strong faults only, where strength is known."""
+        wanted = self.strengths_known if strong is None else strong
+        own = diagnoser or self.judged
+        return next(p for p in self.parts if (p.diagnoser, p.source, p.name, p.strong) == (own, source, name, wanted))
+
+
+def judge(wanted: BenchmarkRequest, cases: Sequence[Done]) -> Result:
+    """Score all answers."""
+    floors = known_floors([done.truth for done in cases if done.planned.source == BLIND])
+    rows = {name: rows_of(cases, name, floors) for name in wanted.diagnosers}
+    first = rows[wanted.diagnosers[0]]
+    parts = [
+        _part(name, source, part, strong, own, wanted.plan.seed)
+        for name, own in rows.items()
+        for source in ((BLIND, SAME) if wanted.plan.same_simulator else (BLIND,))
+        for part in PARTS
+        for strong in (True, False)
+    ]
+    confidence = [r.confidence for r in first if r.source == BLIND and is_one_answer(r)]
+    return Result(
+        wanted,
+        rows,
+        tuple(parts),
+        error_by_chance(confidence, np.random.default_rng(wanted.plan.seed)),
+        any(isfinite(row.strength) for row in first),
+    )
+
+
+def _part(diagnoser: str, source: str, name: str, strong: bool, rows: Sequence[Row], seed: int) -> Part:
+    own = [row for row in rows if row.source == source and PARTS[name](row)]
+    chosen = strong_only(own, STRONG) if strong else own
+    return Part(diagnoser, source, name, strong, len(chosen), scores(chosen, seed))

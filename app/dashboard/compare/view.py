@@ -7,17 +7,12 @@ from typing import Any
 
 import streamlit as st
 
-from app.dashboard.as_typed import as_typed
-from app.dashboard.widgets.download import download
-from app.dashboard.widgets.methods.notes import show_notes
-from app.dashboard.widgets.picture import show_picture
-from gearsig.compare.types import ChannelComparison, Comparison, LineLevel
-from gearsig.compare.verdict import missing_words
-from gearsig.plot.display import unit_text
-from gearsig.report.compare_json import comparison_to_json
-from gearsig.report.compare_page import channel_rows
-from gearsig.report.compare_pictures import FIGURES
-from gearsig.report.compare_text import alignment_texts, orders_csv
+from app.dashboard.methods.signals import show_notes
+from app.dashboard.theme import as_typed
+from app.dashboard.widgets.charts import download, show_picture
+from gearsig.comparison import ChannelComparison, Comparison, LineLevel, missing_words
+from gearsig.plot import unit_text
+from gearsig.report import FIGURES, alignment_texts, channel_rows, comparison_to_json, orders_csv
 
 LINES = "Lines"
 

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from hashlib import sha256
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
+import streamlit as st
 
+from app.dashboard import state
 from app.dashboard.laboratory.setup import MODEL, Setup
+from app.dashboard.state import AnalysisRequest, Chosen
 from gearsig.checks import FloatArray
-from gearsig.recording.types import Recording
-from gearsig.rig.types import Rig
-from sims.cracked.respond import Response
-from sims.cracked.simulate import simulate_with_motion
-from sims.gear_pair.build import build_rig
-from sims.machine import Machine
-from sims.machine.operation import Operation
-from sims.reduced_fe.dynamics_constants import FlexiblePair
-from sims.reduced_fe.dynamics_respond import FlexResponse
+from gearsig.plot import Cursor, order_cursors
+from gearsig.recording import Recording
+from gearsig.rig import Rig, order_lines
+from sims.cracked import Response, simulate_with_motion
+from sims.effects import completed, effect
+from sims.gear_pair import build_rig
+from sims.machine import Machine, Operation
+from sims.reduced_fe import FlexiblePair, FlexResponse
 
 MOTION = (
     "driver angle",
@@ -35,7 +42,7 @@ MOTION_HZ = 80_000.0
 
 
 @dataclass(frozen=True)
-class Run:
+class LaboratoryRun:
     """A setup and what it gives.
 
     Parameters
@@ -75,7 +82,7 @@ class Run:
         return cycles
 
 
-def run_setup(setup: Setup) -> Run:
+def run_setup(setup: Setup) -> LaboratoryRun:
     """Simulate once, and take both from it: the recording, sample by sample that of `sims.simulate`, and the motion.
 
     Raises
@@ -83,7 +90,7 @@ def run_setup(setup: Setup) -> Run:
     InputError
         If a value is out of its range, or the machine allows less.
     """
-    from sims.cracked.simulator import CrackedPair
+    from sims.cracked import CrackedPair
 
     if setup.model != MODEL:
         return _run_flexible(setup)
@@ -107,13 +114,12 @@ def run_setup(setup: Setup) -> Run:
         truth=ready.truth(),
         also=MOTION,
     )
-    return Run(setup, ready.machine, recording, _shown_part(response, setup.duration_s))
+    return LaboratoryRun(setup, ready.machine, recording, _shown_part(response, setup.duration_s))
 
 
-def _run_flexible(setup: Setup) -> Run:
+def _run_flexible(setup: Setup) -> LaboratoryRun:
     """Simulate the pair of finite-element gears."""
-    from sims.reduced_fe.simulate import simulate_pair
-    from sims.reduced_fe.simulator import ReducedPair
+    from sims.reduced_fe import ReducedPair, simulate_pair
 
     operation = Operation.steady(setup.speed_rpm, setup.torque_nm)
     rng = np.random.default_rng(setup.seed)
@@ -137,7 +143,7 @@ def _run_flexible(setup: Setup) -> Run:
         step_s=ready.step_s,
         also=MOTION,
     )
-    return Run(setup, machine, recording, _shown_part(response, setup.duration_s), ready.pair)
+    return LaboratoryRun(setup, machine, recording, _shown_part(response, setup.duration_s), ready.pair)
 
 
 def _shown_part(response: Response | FlexResponse, duration_s: float) -> Response:
@@ -149,13 +155,243 @@ def _shown_part(response: Response | FlexResponse, duration_s: float) -> Respons
     return Response(float(time[first]), response.interval_s * every, signals, response.step_s, response.energy_j)
 
 
-def lines_per_period(run: Run, n_per_revolution: float) -> FloatArray:
+def lines_per_period(run: LaboratoryRun, n_per_revolution: float) -> FloatArray:
     """Times at which the driver has turned by another 1/n of a revolution (a Poincaré section's strobe)."""
     turned = run.response["driver angle"] * n_per_revolution / (2.0 * np.pi)
     return times_of(run, turned, np.arange(np.ceil(turned[0]), np.floor(turned[-1]) + 1.0))
 
 
-def times_of(run: Run, phase: FloatArray, wanted: FloatArray | Sequence[float]) -> FloatArray:
+def times_of(run: LaboratoryRun, phase: FloatArray, wanted: FloatArray | Sequence[float]) -> FloatArray:
     """Times at which a rising phase takes the wanted values."""
     result: FloatArray = np.interp(wanted, phase, run.response.time_s)
     return result
+
+
+# --------------------
+# Simulations, done once for equal setups and shared between sessions; the number kept is bounded.
+# --------------------
+
+
+N_RUNS = 12
+"""Each holds some MB: a recording and eight signals of the motion at 80 kHz."""
+
+
+def simulated(setup: Setup) -> LaboratoryRun:
+    """Return the run of a setup; it is frozen, so that sessions may share it.
+
+    Raises
+    ------
+    InputError
+        If a value is out of its range, or the machine allows less.
+    """
+    words = "Simulating …" if _is_ready() else "Preparing the simulator; the first time takes half a minute …"
+    with st.spinner(words, show_time=True):
+        run = _cached(setup)
+    _ready.append(True)
+    return run
+
+
+@st.cache_resource(max_entries=N_RUNS, show_spinner=False)
+def _cached(setup: Setup) -> LaboratoryRun:
+    return run_setup(setup)
+
+
+_ready: list[bool] = []
+
+
+def _is_ready() -> bool:
+    return bool(_ready)
+
+
+# --------------------
+# Where theory expects what is switched on: lines of the spectra, and the moments a faulty tooth enters the mesh.
+# --------------------
+
+
+N_MESH_HARMONICS, N_SIDEBANDS, N_BEARING_HARMONICS, N_SHAFT_HARMONICS = 5, 3, 4, 8
+SIDES = ("driver", "driven")
+
+
+def affected_sides(setup: Setup) -> tuple[str, ...]:
+    """Sides whose shaft modulates the mesh: those of the effects; both, where none says so."""
+    named = {str(s.options.get("gear") or s.options.get("shaft") or "") for s in setup.effects}
+    return tuple(side for side in SIDES if side in named) or SIDES
+
+
+def spectrum_cursors(run: LaboratoryRun) -> tuple[Cursor, ...]:
+    """Return mesh harmonics, sidebands of the shafts concerned, and shaft lines, in Hz."""
+    rig, setup = run.rig, run.setup
+    shafts = dict(zip(SIDES, run.machine.shaft_names, strict=True))
+    concerned = {shafts[side] for side in affected_sides(setup)}
+    lines = order_lines(rig, n_mesh_harmonics=N_MESH_HARMONICS, n_sidebands=N_SIDEBANDS)
+    kept = [
+        line
+        for line in lines
+        if line.kind in ("mesh", "shaft") or (line.kind == "sideband" and line.modulating_shaft in concerned)
+    ]
+    return (*order_cursors(kept, setup.revolutions_per_s), *_hum_cursors(setup))
+
+
+def _hum_cursors(setup: Setup) -> tuple[Cursor, ...]:
+    hum = next((s for s in setup.effects if s.name == "mains_hum"), None)
+    if hum is None:
+        return ()
+    mains = float(hum.options["frequency_hz"])
+    return tuple(Cursor(k * mains, "finding", f"{k}× mains" if k > 1 else "mains", k) for k in (1, 2, 3))
+
+
+def envelope_cursors(run: LaboratoryRun) -> tuple[Cursor, ...]:
+    """Return the lines of shafts concerned, and harmonics of the lines of bearings with a defect, in Hz."""
+    concerned = {run.machine.shaft_names[SIDES.index(side)] for side in affected_sides(run.setup)}
+    lines = order_lines(run.rig, n_shaft_harmonics=N_SHAFT_HARMONICS, n_sidebands=0)
+    shaft_lines = [line for line in lines if line.kind == "shaft" and line.element in concerned]
+    cursors = [*order_cursors(shaft_lines, run.setup.revolutions_per_s)]
+    for name, frequency in bearing_lines_hz(run).items():
+        cursors += [
+            Cursor(k * frequency, "bearing", name if k == 1 else f"{k}× {name}", k)
+            for k in range(1, N_BEARING_HARMONICS + 1)
+        ]
+    return tuple(cursors)
+
+
+def shaft_lines_hz(run: LaboratoryRun) -> list[float]:
+    """Return the first orders of the shafts concerned, in Hz."""
+    shafts = dict(zip(SIDES, run.machine.shaft_names, strict=True))
+    turns = [(run.rig.ratio(shafts[side]) or 0.0) * run.setup.revolutions_per_s for side in affected_sides(run.setup)]
+    return [k * f for f in turns if f > 0 for k in range(1, N_BEARING_HARMONICS + 1)]
+
+
+def bearing_lines_hz(run: LaboratoryRun) -> dict[str, float]:
+    """Return the frequencies at which rolling elements strike defects, less slip: name → Hz."""
+    found = {}
+    for support in run.machine.bearings:
+        if support.defect is None:
+            continue
+        name = {"outer": "BPFO", "inner": "BPFI"}[support.defect.race]
+        orders, turns = support.bearing.orders(), run.rig.ratio(support.bearing.shaft) or 1.0
+        # A cage that slips falls behind: fewer elements pass the standing race, and as many more the turning one.
+        slip = support.defect.slip * orders["BPFO"]
+        order = orders[name] + (slip if name == "BPFI" else -slip)
+        found[f"{name} {support.bearing.name}"] = order * turns * run.setup.revolutions_per_s
+    return found
+
+
+def faulty_teeth(setup: Setup) -> tuple[tuple[str, int], ...]:
+    """Return (side, tooth from 1) of the effects that concern one tooth; tooth k of the driver enters at k - 1."""
+    local = [s for s in setup.effects if effect(s.name).group == "tooth-local" and s.severity > 0]
+    return tuple(dict.fromkeys((str(s.options["gear"]), round(float(s.options["tooth"]))) for s in local))
+
+
+def entries(run: LaboratoryRun) -> tuple[Cursor, ...]:
+    """Return the times at which faulty teeth enter the mesh, in s."""
+    pair, cycles = run.machine.mesh.pair, run.mesh_cycles
+    found = []
+    for side, tooth in faulty_teeth(run.setup):
+        n_teeth = pair.driver.teeth if side == "driver" else pair.driven.teeth
+        first = np.ceil((cycles[0] - (tooth - 1)) / n_teeth) * n_teeth + tooth - 1
+        times = times_of(run, cycles, np.arange(first, cycles[-1], n_teeth))
+        found += [Cursor(float(t), "finding", f"{side} tooth {tooth} enters", i) for i, t in enumerate(times)]
+    return tuple(found)
+
+
+def with_complete_effects(setup: Setup) -> Setup:
+    """Return the setup with every option of its effects that has a default."""
+    return replace(setup, effects=completed(setup.effects))
+
+
+# --------------------
+# The simulated machine as a recording: files to keep, or straight to the analysis page.
+# --------------------
+
+
+ENDINGS = (".h5", ".csv", ".parquet", ".mat", ".wav")
+LENGTHS_S = (2.0, 5.0, 10.0, 20.0)
+ANALYSIS_ENDING = ".h5"
+
+
+def show_saving(setup: Setup) -> None:
+    """Offer the files, and the way to the analysis page."""
+    with st.container(horizontal=True, horizontal_alignment="right"):
+        with st.popover("Save as recording", icon=":material/save:"):
+            length = st.segmented_control(
+                "Length (s)", LENGTHS_S, default=5.0, key="length of the saved recording", persist_state="session"
+            )
+            ending = st.selectbox("Format", ENDINGS, key="ending of the saved recording", persist_state="session")
+            twin = st.toggle("With its healthy twin", key="twin of the saved recording", persist_state="session")
+            kept = replace(setup, duration_s=float(length or 5.0))
+            st.download_button(
+                "Download",
+                data=lambda: zipped((kept, kept.healthy) if twin else (kept,), ending),
+                file_name=f"{setup.file_stem}.zip",
+                mime="application/zip",
+                icon=":material/download:",
+                on_click="ignore",
+                type="primary",
+            )
+            st.caption("A zip with the recording, its rig file, and what was put in (truth).")
+        if st.button("Open in the analysis page", icon=":material/troubleshoot:"):
+            with st.spinner("Simulating the recording …"):
+                state.open_simulated(chosen_of(replace(setup, duration_s=float(length or 5.0))))
+            st.switch_page(state.ANALYSIS_PAGE)
+
+
+def record(setup: Setup) -> Recording:
+    """Simulate the recording that the command line makes of the same settings."""
+    from sims import simulate
+
+    return simulate(
+        setup.model,
+        preset=setup.preset,
+        parameters=dict(setup.parameters),
+        effects=setup.effects,
+        speed_rpm=setup.speed_rpm,
+        torque_nm=setup.torque_nm,
+        duration_s=setup.duration_s,
+        sampling_rate_hz=setup.sampling_rate_hz,
+        seed=setup.seed,
+    )
+
+
+def zipped(setups: tuple[Setup, ...], ending: str) -> bytes:
+    """Return a zip file with recording, rig file and truth of each setup."""
+    return zip_of({name: content for setup in _distinct(setups) for name, content in files(setup, ending).items()})
+
+
+def zip_of(contents: dict[str, bytes]) -> bytes:
+    """Return files as one zip file."""
+    buffer = BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in contents.items():
+            archive.writestr(name, content)
+    return buffer.getvalue()
+
+
+def files(setup: Setup, ending: str) -> dict[str, bytes]:
+    """Return recording, rig file and truth, in this order, by file name."""
+    return files_of(record(setup), setup.file_stem, ending)
+
+
+def files_of(recording: Recording, stem: str, ending: str) -> dict[str, bytes]:
+    """Return a simulated recording, its rig file and its truth, in this order, by file name."""
+    from sims.files import file_set, write_set
+
+    with TemporaryDirectory(prefix="gearsig-") as folder:
+        names = file_set(Path(folder) / f"{stem}{ending}")
+        write_set(recording, names)
+        return {path.name: path.read_bytes() for path in names}
+
+
+def chosen_of(setup: Setup) -> Chosen:
+    """Return the recording as the analysis page takes an upload."""
+    return chosen_of_files(files(setup, ANALYSIS_ENDING))
+
+
+def chosen_of_files(contents: dict[str, bytes]) -> Chosen:
+    """Return recording and rig file as the analysis page takes an upload."""
+    (name, content), (rig_name, rig), _ = contents.items()
+    request = AnalysisRequest(name, sha256(content).hexdigest(), rig_name, rig.decode("utf-8"))
+    return Chosen(request, memoryview(content))
+
+
+def _distinct(setups: tuple[Setup, ...]) -> tuple[Setup, ...]:
+    return tuple(setup for place, setup in enumerate(setups) if setup not in setups[:place])

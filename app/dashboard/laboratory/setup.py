@@ -2,10 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from math import floor, log10
+from typing import TYPE_CHECKING
 
-from sims.effects import EffectSetting, effect
-from sims.simulator import ParameterValue
+import numpy as np
+import streamlit as st
+
+from gearsig.errors import InputError
+from sims.effects import Effect, EffectSetting, Option, effect, effects
+from sims.presets import Preset, preset, presets
+from sims.registry import simulator
+from sims.simulator import ParameterValue, parameter
+
+if TYPE_CHECKING:
+    from gearsig.recording import Recording
+    from sims.machine import Machine
+    from sims.reduced_fe import ReducedGear
+
 
 MODEL = "cracked"
 """Whose motion the bifurcation can follow."""
@@ -77,7 +93,447 @@ def effect_text(setting: EffectSetting) -> str:
 
 def shown_unit(unit: str) -> str:
     """Write a unit of the catalogue as people read it."""
-    from gearsig.gap.words import severity_unit
-    from gearsig.plot.display import unit_text
+    from gearsig.gap import severity_unit
+    from gearsig.plot import unit_text
 
     return unit_text(severity_unit(unit))
+
+
+# --------------------
+# A number of the page: a slider over the usual range, or typed, without any bounds but the simulator's.
+# --------------------
+
+
+PREFIX, SUFFIX, TYPED = "lab ", " typed", "lab typed values"
+
+
+def show_typed_toggle() -> None:
+    """Let the user type numbers instead of pulling sliders; the values carry over."""
+    st.toggle(
+        "Type the numbers",
+        key=TYPED,
+        on_change=_carry_over,
+        persist_state="session",
+        help="Exact values, also beyond the sliders. What is not possible is said on the page.",
+    )
+
+
+def choose_number(label: str, name: str, default: float, high: float, *, low: float = 0.0, about: str = "") -> float:
+    """Return a number that the user chooses.
+
+    Parameters
+    ----------
+    label : str
+        With the unit.
+    name : str
+        Of the number, unique on the page.
+    default : float
+    high, low : float
+        Ends of the slider; a value that was typed beyond them widens it.
+    about : str
+        Shown on demand.
+    """
+    key = PREFIX + name
+    step = slider_step(low, high)
+    typed = bool(st.session_state.get(TYPED, False))
+    if typed:
+        key += SUFFIX
+    value = float(st.session_state.setdefault(key, float(default)))
+    if typed:
+        number: float = st.number_input(
+            label, step=step, format="%g", key=key, help=about or None, persist_state="session"
+        )
+        return float(number)
+    ends = min(low, value), max(high, value)
+    return float(st.slider(label, *ends, step=step, format="%g", key=key, help=about or None, persist_state="session"))
+
+
+def slider_step(low: float, high: float) -> float:
+    """Return the step of a slider: some 150 of them from end to end."""
+    return nice_step((high - low) / 150.0)
+
+
+def nice_step(size: float) -> float:
+    """Return the largest of 1, 2, 5 times a power of ten that is no larger than `size`.
+
+    Examples
+    --------
+    >>> nice_step(0.07), nice_step(13.3), nice_step(3.0)
+    (0.05, 10.0, 2.0)
+    """
+    exponent = floor(log10(size))
+    digit = max(d for d in (1, 2, 5) if d <= size / 10.0**exponent * (1 + 1e-9))
+    return float(f"{digit}e{exponent}")
+
+
+def _carry_over() -> None:
+    """Give every number its value on the other kind of widget."""
+    typed = st.session_state[TYPED]
+    for key in [str(k) for k in st.session_state]:
+        value = st.session_state[key]
+        if not key.startswith(PREFIX) or key == TYPED or isinstance(value, bool) or not isinstance(value, float):
+            continue
+        if key.endswith(SUFFIX) and not typed:
+            st.session_state[key.removesuffix(SUFFIX)] = value
+        elif typed and not key.endswith(SUFFIX):
+            st.session_state[key + SUFFIX] = value
+
+
+# --------------------
+# How far a machine lets an effect go: where its slider ends.
+# --------------------
+
+
+Options = tuple[tuple[str, float | str], ...]
+HALVINGS = 20
+
+
+def greatest_severity(chosen: Preset, name: str, high: float, options: Options = ()) -> float:
+    """Return the greatest severity up to `high` that a machine takes, rounded down to the slider's step.
+
+    Parameters
+    ----------
+    chosen : Preset
+        The machine.
+    name : str
+        Of the effect.
+    high : float
+        Above 0: where the slider ends if the machine allows it.
+    options : tuple of (name, value)
+        Of the effect, e.g. on which gear it is. Where they fit no severity at all, the end stays: the page says why.
+    """
+    found = _greatest(chosen.model, chosen.name, name, high, options)
+    step = slider_step(0.0, found)
+    return found if found == high else floor(found / step * (1.0 + 1e-9)) * step
+
+
+@lru_cache(maxsize=256)
+def _greatest(model: str, preset_name: str, name: str, high: float, options: Options) -> float:
+    machine, gears = _machine(model, preset_name)
+
+    def allowed(severity: float) -> bool:
+        try:
+            changed = effect(name).apply(machine, severity, dict(options), np.random.default_rng(0))
+        except InputError:
+            return False
+        return _meshed(changed, gears)
+
+    if allowed(high):
+        return high
+    low, end = 0.0, high
+    for _ in range(HALVINGS):
+        middle = (low + end) / 2.0
+        low, end = (middle, end) if allowed(middle) else (low, middle)
+    return low or high
+
+
+def _meshed(machine: Machine, gears: tuple[ReducedGear, ...]) -> bool:
+    """Whether the finite elements of the gears, if there are any, can follow the cracks."""
+    from sims.reduced_fe import crack_size, deepest_followed_mm
+
+    cracks = (machine.mesh.cracks_1, machine.mesh.cracks_2)
+    return all(
+        crack.depth_mm <= deepest_followed_mm(gear.blank, crack_size(gear), crack.angle_deg)
+        for gear, own in zip(gears, cracks, strict=False)
+        for crack in own
+    )
+
+
+@lru_cache(maxsize=16)
+def _machine(model: str, preset_name: str) -> tuple[Machine, tuple[ReducedGear, ...]]:
+    """Sound machine of a preset, and its reduced gears."""
+    from sims.cracked import CrackedPair
+    from sims.reduced_fe import ReducedPair
+
+    rng, name = np.random.default_rng(0), preset(model, preset_name).name
+    if model == MODEL:
+        return CrackedPair().prepare({}, (), None, rng, preset_name=name).machine, ()
+    pair = ReducedPair().prepare({}, (), None, rng, preset_name=name).pair
+    return pair.machine, pair.gears
+
+
+# --------------------
+# Sliders of the effects: severity with unit and a typical value, options on demand.
+# --------------------
+
+
+CRACK = "root_crack"
+WIDEST = 5.0
+"""Sliders end at so many times the typical value: the catalogue's ranges reach far beyond it. Where the machine ends
+earlier, they do."""
+GROUP_WORDS = {
+    "tooth-local": "tooth",
+    "flank": "flanks",
+    "shaft": "shaft",
+    "drive and load": "drive",
+    "bearing": "bearing",
+    "measurement chain": "measurement",
+}
+N_BEARINGS = 4
+
+
+def choose_crack(preset: Preset) -> list[EffectSetting]:
+    """Return the root crack, whose slider is always there; none while it stands at 0."""
+    setting = _choose_severity(effect(CRACK), preset, start=0.0)
+    return [setting] if setting.severity != 0 else []
+
+
+def choose_effects(preset: Preset, meaningful: Collection[str]) -> list[EffectSetting]:
+    """Return the other effects that the user switched on, of those the model knows; each at its typical value first."""
+    found = {name: one for name, one in effects().items() if name in meaningful}
+    names = st.multiselect(
+        "More effects",
+        [name for name in found if name != CRACK],
+        format_func=_shown_name,
+        key="effects of the laboratory",
+        placeholder="Choose what is wrong …",
+        persist_state="session",
+        help="Any number at once. Each gets a slider of its own.",
+    )
+    ordered = [name for name in found if name in names]
+    return [_choose_severity(found[n], preset, start=found[n].severity.typical) for n in ordered]
+
+
+def _shown_name(name: str) -> str:
+    found = effect(name)
+    return f"{GROUP_WORDS.get(found.group, found.group)}: {found.title}"
+
+
+def _choose_severity(found: Effect, preset: Preset, *, start: float) -> EffectSetting:
+    s = found.severity
+    unit = shown_unit(s.unit)
+    high = greatest_severity(preset, found.name, min(s.high, WIDEST * s.typical), _options_so_far(found))
+    title = found.title[:1].upper() + found.title[1:]
+    severity = choose_number(
+        f"{title} ({unit + ', ' if unit else ''}typical {s.typical:g})",
+        f"severity of {found.name}",
+        min(start, high),
+        high,
+        about=f"{s.meaning[:1].upper()}{s.meaning[1:]}; {s.low:g} to {s.high:g} {unit}, as far as the machine "
+        f"allows.\n\n{found.changes}",
+    )
+    options: dict[str, float | str] = {}
+    if found.options and severity != 0:
+        with st.expander("Where and how", icon=":material/tune:"):
+            options = _choose_options(found)
+    return EffectSetting(found.name, severity, options)
+
+
+def _options_so_far(found: Effect) -> tuple[tuple[str, float | str], ...]:
+    """Options as they stood when the page ran last: their widgets come below the slider."""
+    values = {option.name: st.session_state.get(_option_key(found, option)) for option in found.options}
+    return tuple((name, value) for name, value in values.items() if isinstance(value, float | int | str))
+
+
+def _option_key(found: Effect, option: Option) -> str:
+    return f"{option.name} of {found.name}"
+
+
+def _choose_options(found: Effect) -> dict[str, float | str]:
+    """Return the options; one that is left to be drawn is not in it."""
+    chosen = {option.name: _choose_option(option, _option_key(found, option)) for option in found.options}
+    return {name: value for name, value in chosen.items() if value is not None}
+
+
+def _choose_option(option: Option, key: str) -> float | str | None:
+    unit = shown_unit(option.unit)
+    words = option.name.removesuffix("_deg").removesuffix("_percent").removesuffix("_um").removesuffix("_hz")
+    label = words.replace("_", " ").capitalize() + (f" ({unit})" if unit else "")
+    if isinstance(option.default, str):
+        choices = option.choices or tuple(f"bearing {i + 1}" for i in range(N_BEARINGS))
+        index = choices.index(option.default) if option.default in choices else 0
+        return st.selectbox(label, choices, index=index, key=key, help=option.meaning, persist_state="session")
+    looks = {"key": key, "help": option.meaning, "persist_state": "session"}
+    if option.whole:
+        value = int(option.default or 0)
+        return float(st.number_input(label, min_value=int(option.low or 0), value=value, step=1, **looks))  # type: ignore[call-overload]
+    number = st.number_input(label, value=option.default, placeholder="drawn", format="%g", **looks)  # type: ignore[call-overload]
+    return None if number is None else float(number)
+
+
+# --------------------
+# What is set on the page of the start–stop drive.
+# --------------------
+
+
+SETUP_MODEL = "forging"
+
+
+@dataclass(frozen=True)
+class DriveSetup:
+    """Everything that decides a run: equal setups give equal recordings.
+
+    Parameters
+    ----------
+    preset : str
+    speed_rpm, torque_nm : float
+        Of the pinion: what the flow allows, and the motor's.
+    parameters : tuple of (name, value)
+        What differs from the preset, in the sound drive as well.
+    effects : tuple of EffectSetting
+    duration_s, sampling_rate_hz : float
+    """
+
+    preset: str
+    speed_rpm: float
+    torque_nm: float
+    parameters: tuple[tuple[str, ParameterValue], ...] = ()
+    effects: tuple[EffectSetting, ...] = ()
+    duration_s: float = 6.0
+    sampling_rate_hz: float = 1000.0
+
+    @property
+    def sound(self) -> DriveSetup:
+        """The same drive without effects."""
+        return replace(self, effects=())
+
+    @property
+    def file_stem(self) -> str:
+        """Name of its files, without a dot."""
+        return "_".join([self.preset, *(setting.name for setting in self.effects)])
+
+    def record(self) -> Recording:
+        """Simulate the recording that the command line makes of the same settings."""
+        from sims import simulate
+
+        return simulate(
+            SETUP_MODEL,
+            preset=self.preset,
+            parameters=dict(self.parameters),
+            effects=self.effects,
+            speed_rpm=self.speed_rpm,
+            torque_nm=self.torque_nm,
+            duration_s=self.duration_s,
+            sampling_rate_hz=self.sampling_rate_hz,
+        )
+
+
+# --------------------
+# The sidebar of the laboratory: machine and operating point, flanks and oil, faults, measurement.
+# --------------------
+
+
+Parameters = tuple[tuple[str, ParameterValue], ...]
+
+FIRST = "published_55_75"
+DURATIONS_S = (0.5, 1.0, 2.0, 4.0)
+AUTOMATIC, LONGEST_AUTOMATIC_S, WANTED_REVOLUTIONS = "auto", 1.0, 8.0
+RATES_HZ = (10240.0, 20480.0, 40960.0)
+
+
+def choose_setup(preset: Preset) -> Setup:
+    """Return what the user set in the sidebar; what the sliders do not offer is the preset's."""
+    with st.sidebar:
+        speed, torque = _choose_operation(preset)
+        with st.expander("Flanks and oil", icon=":material/opacity:"):
+            parameters = _choose_flanks(preset)
+        st.markdown("**Faults** · *the healthy twin has none*")
+        found = [*choose_crack(preset), *choose_effects(preset, simulator(preset.model).effects)]
+        with st.expander("Measurement", icon=":material/sensors:"):
+            measured, duration, rate, seed = _choose_measurement(preset, speed)
+        show_typed_toggle()
+    return Setup(preset.name, speed, torque, (*parameters, *measured), tuple(found), duration, rate, seed, preset.model)
+
+
+def shown_name(preset: str) -> str:
+    """Write a preset's name for people.
+
+    Examples
+    --------
+    >>> shown_name("published_55_75"), shown_name("manipulator_formula")
+    ('Published 55/75', 'Manipulator formula')
+    """
+    words = preset.split("_")
+    if not words[-1].isdigit():
+        return " ".join(words).capitalize()
+    return f"{' '.join(words[:-2]).capitalize()} {'/'.join(words[-2:])}"
+
+
+def choose_preset() -> Preset:
+    """Return the machine: pairs that run at a steady speed, and the drive that starts and stops."""
+    found = {name: preset for model in (*MODELS, SETUP_MODEL) for name, preset in presets(model).items()}
+    names = list(found)
+    with st.sidebar:
+        name = st.selectbox(
+            "Machine",
+            names,
+            index=names.index(FIRST) if FIRST in names else 0,
+            format_func=shown_name,
+            key="machine of the laboratory",
+            persist_state="session",
+        )
+        st.caption(found[name].title)
+    return found[name]
+
+
+def _choose_operation(preset: Preset) -> tuple[float, float]:
+    own, high = preset.torque_nm, max(3.0 * preset.speed_rpm, 3000.0)
+    speed = choose_number("Speed of the input shaft (rpm)", f"speed of {preset.name}", preset.speed_rpm, high, low=60.0)
+    torque = choose_number("Torque on the input shaft (N·m)", f"torque of {preset.name}", own, 3.0 * own)
+    return speed, torque
+
+
+def _choose_flanks(preset: Preset) -> Parameters:
+    st.caption("Of the healthy and the faulty machine alike.")
+    rough = choose_number("Flank roughness, rms (µm)", f"roughness of {preset.name}", _own(preset, "roughness_um"), 2.0)
+    if not _has(preset, "friction"):
+        return (("roughness_um", rough),)
+    oil = choose_number(
+        "Oil viscosity at the inlet (cP)", f"oil of {preset.name}", _own(preset, "viscosity_cp"), 100.0, low=1.0
+    )
+    friction = st.toggle(
+        "Sliding friction",
+        value=preset.parameters.get("friction", "on") == "on",
+        key=f"friction of {preset.name}",
+        persist_state="session",
+    )
+    return ("roughness_um", rough), ("viscosity_cp", oil), ("friction", "on" if friction else "off")
+
+
+def _choose_measurement(preset: Preset, speed: float) -> tuple[Parameters, float, float, int]:
+    duration = st.segmented_control(
+        "Length shown (s)",
+        (AUTOMATIC, *DURATIONS_S),
+        default=AUTOMATIC,
+        key="length of the laboratory",
+        persist_state="session",
+        help="A longer signal has a finer spectrum and takes longer to follow the sliders. Auto: eight revolutions of "
+        "the slower shaft, at most a second.",
+    )
+    rate = st.selectbox(
+        "Sampling rate (Hz)", RATES_HZ, index=1, format_func="{:g}".format, key="rate of the laboratory"
+    )
+    own = _own(preset, "noise_mps2")
+    noise = choose_number("Background noise, rms (m/s²)", f"noise of {preset.name}", own, max(2.0, 4.0 * own))
+    seed = st.number_input(
+        "Seed",
+        min_value=0,
+        max_value=10**6,
+        value=0,
+        key="seed of the laboratory",
+        persist_state="session",
+        help="Another one draws other roughness, other noise, other angles. Healthy and faulty always share it.",
+    )
+    limit = choose_number(
+        "Range of the sensors (m/s²)", f"range of {preset.name}", _own(preset, "sensor_range_mps2"), 5e3
+    )
+    measured: Parameters = (("noise_mps2", noise), ("sensor_range_mps2", limit))
+    length = float(duration) if isinstance(duration, float) else automatic_s(preset, speed)
+    return measured, length, float(rate), int(seed)
+
+
+def automatic_s(preset: Preset, speed_rpm: float) -> float:
+    """Return the shortest of `DURATIONS_S` that shows enough revolutions, or the longest that is still quick."""
+    ratio = _own(preset, "teeth_driver") / _own(preset, "teeth_driven")
+    wanted = WANTED_REVOLUTIONS * 60.0 / max(speed_rpm * min(ratio, 1.0), 1e-6)
+    return next((d for d in DURATIONS_S if wanted <= d < LONGEST_AUTOMATIC_S), LONGEST_AUTOMATIC_S)
+
+
+def _own(preset: Preset, name: str) -> float:
+    """Return a number of the preset, or else the model's default."""
+    value = preset.parameters.get(name, parameter(simulator(preset.model).parameters, name).default)
+    return float(value or 0.0)
+
+
+def _has(preset: Preset, name: str) -> bool:
+    return any(p.name == name for p in simulator(preset.model).parameters)

@@ -2,20 +2,467 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
 import streamlit as st
 
-from app.dashboard.laboratory.bifurcation_view import show_safely
-from app.dashboard.laboratory.mesh_view import show_mesh
-from app.dashboard.laboratory.phase_view import show_phase
-from app.dashboard.laboratory.run import Run
-from app.dashboard.laboratory.spectrum_view import show_amplitude, show_envelope
-from app.dashboard.laboratory.time_view import show_time
+from app.dashboard.laboratory.bifurcation import show_safely
+from app.dashboard.laboratory.run import (
+    LaboratoryRun,
+    bearing_lines_hz,
+    entries,
+    envelope_cursors,
+    faulty_teeth,
+    lines_per_period,
+    shaft_lines_hz,
+    spectrum_cursors,
+    times_of,
+)
+from app.dashboard.laboratory.setup import effect_text
+from app.dashboard.theme import as_typed, palette
+from app.dashboard.widgets.charts import CONFIG, Axes, ChartLine, show_lines
+from gearsig.checks import FloatArray
+from gearsig.errors import RefusalError
+from gearsig.indicators import crest_factor, kurtosis, rms
+from gearsig.plot import Cursor, above_zero, envelope, thin, with_unit
+from gearsig.recording import Recording
+from gearsig.spectra import Spectrum
+from sims.effects import EffectSetting, effect
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+
+# --------------------
+# Signals over time: healthy beside faulty on one scale, and what the effect adds.
+# --------------------
+
+
+N_POINTS = 3000
+HEIGHT_PX = 300
+MOTION = {
+    "driver, along the line of action": ("driver y", 1e6, "displacement (µm)"),
+    "driven gear, along the line of action": ("driven y", 1e6, "displacement (µm)"),
+    "transmission error": ("transmission_error_m", 1e6, "transmission error (µm)"),
+    "mesh force": ("mesh_force_n", 1e-3, "mesh force (kN)"),
+}
+STRETCHES = {"1 revolution": 1.0, "3 revolutions": 3.0, "all": float("inf")}
+
+
+def show_time(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
+    """Show a signal of both machines, and the difference."""
+    left, right = st.columns(2)
+    names = (*healthy.vibration_channels, *MOTION)
+    name = left.selectbox("Signal", names, format_func=_shown, key="signal of the laboratory", persist_state="session")
+    shown = right.segmented_control(
+        "Shown, of the input shaft",
+        list(STRETCHES),
+        default="3 revolutions",
+        key="stretch of the laboratory",
+        persist_state="session",
+    )
+    end = _end_s(healthy, STRETCHES[shown or "3 revolutions"])
+    own, unit = signal_of(healthy, name, end)
+    if faulty is None:
+        show_lines([ChartLine(*thin(*own, N_POINTS), "healthy")], Axes("time (s)", unit, (0.0, end)), "time of healthy")
+        return
+    other, _ = signal_of(faulty, name, end)
+    limits = _limits(own[1], other[1])
+    marks = entries(faulty)
+    for column, line, title in zip(st.columns(2), (own, other), ("healthy", "faulty"), strict=True):
+        colour = "measured" if title == "healthy" else "fault"
+        with column:
+            show_lines(
+                [ChartLine(*thin(*line, N_POINTS), title, colour=colour)],  # type: ignore[arg-type]  # one of the two
+                Axes("time (s)", unit, (0.0, end), limits),
+                f"time of {title}",
+                height_px=HEIGHT_PX,
+            )
+    st.markdown("**What the effect adds**: faulty less healthy")
+    difference = other[1] - own[1]
+    show_lines(
+        [ChartLine(*thin(own[0], difference, N_POINTS), "difference", colour="fault")],
+        Axes("time (s)", unit, (0.0, end), _limits(difference)),
+        "time of difference",
+        cursors=marks,
+        height_px=HEIGHT_PX,
+    )
+
+
+def signal_of(run: LaboratoryRun, name: str, end_s: float) -> tuple[tuple[FloatArray, FloatArray], str]:
+    """Return (time, values) of a channel or of the motion up to `end_s`, and the name of the value axis."""
+    if name in MOTION:
+        signal, factor, unit = MOTION[name]
+        time, values = run.response.time_s, factor * run.response[signal]
+    else:
+        values, unit = run.recording.values(name), "acceleration (m/s²)"
+        time = np.arange(len(values)) / run.recording.sampling_rate_hz
+    inside = time <= end_s
+    return (time[inside], values[inside]), unit
+
+
+def _shown(name: str) -> str:
+    return name[:1].upper() + name[1:] if name in MOTION else f"Sensor {name}"
+
+
+def _end_s(run: LaboratoryRun, revolutions: float) -> float:
+    turns = run.setup.revolutions_per_s
+    return min(revolutions / turns if turns > 0 else float("inf"), run.setup.duration_s)
+
+
+def _limits(*values: FloatArray) -> tuple[float, float]:
+    low, high = (float(f([f(v) for v in values])) for f in (np.min, np.max))
+    margin = 0.06 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+# --------------------
+# The band whose envelope shows expected lines best: the answer is known here, so the choice may use it.
+# --------------------
+
+
+N_BANDS = 16
+"""Equal parts of the spectrum, and all runs of one, two and four of them."""
+WIDTHS = (1, 2, 4)
+LINES_PER_BAND = 4.0
+"""A band must be wider than so many times the lowest expected line."""
+
+
+def telling_band_hz(recording: Recording, channel: str, wanted_hz: Sequence[float]) -> tuple[float, float]:
+    """Return the band in whose envelope the wanted lines stand highest above the median of the lines about them.
+
+    Parameters
+    ----------
+    recording : Recording
+    channel : str
+    wanted_hz : sequence of float
+        Expected lines; those that the recording is too short for do not count.
+
+    Raises
+    ------
+    RefusalError
+        If no line is expected, or the signal is too short to tell them apart.
+    """
+    values, rate = recording.values(channel), recording.sampling_rate_hz
+    lines = np.array([f for f in wanted_hz if f * recording.duration_s >= 3.0])
+    if not len(lines):
+        raise RefusalError("the signal is too short for the lines of shafts", remedy="show a longer one")
+    width = rate / 2.0 / N_BANDS
+    bands = [
+        (i * width, (i + n) * width)
+        for n in WIDTHS
+        for i in range(N_BANDS - n + 1)
+        if n * width > LINES_PER_BAND * lines.min()
+    ] or [(0.0, rate / 2.0)]
+    heights = [_height(values, rate, band, lines) for band in bands]
+    return bands[int(np.argmax(heights))]
+
+
+def _height(values: FloatArray, rate_hz: float, band_hz: tuple[float, float], lines_hz: FloatArray) -> float:
+    """Sum of the lines' amplitudes over the median amplitude, in the envelope of a band."""
+    from gearsig.spectra import band_envelope, envelope_spectrum
+
+    spectrum = envelope_spectrum(band_envelope(values, rate_hz, band_hz))
+    inside = spectrum.values[: spectrum.index_of(1.2 * float(lines_hz.max())) + 1]
+    floor = float(np.median(inside))
+    if floor <= 0.0:
+        return 0.0
+    slack = 2.0 * spectrum.resolution
+    found = [spectrum.largest_near(f, slack)[1] for f in lines_hz if f < float(spectrum.positions[-1])]
+    return sum(found) / floor
+
+
+# --------------------
+# Spectra of both machines over each other: amplitude with mesh and sideband marks, envelope with bearing marks.
+# --------------------
+
+
+N_COLUMNS = 1500
+KIND_NAMES = {
+    "mesh": "mesh",
+    "sideband": "sidebands",
+    "shaft": "shafts",
+    "bearing": "bearings",
+    "finding": "mains",
+}
+ENVELOPE_SHAFTS = 12.0
+"""Envelope spectra first show so many revolutions of the input shaft, or all marked bearing lines."""
+
+
+def show_amplitude(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
+    """Show the amplitude spectra of a channel."""
+    from gearsig.spectra import channel_spectrum
+
+    runs = _runs(healthy, faulty)
+    spectra = [channel_spectrum(run.recording, channel) for run in runs]
+    cursors = spectrum_cursors(runs[-1])
+    mesh = max((c.position for c in cursors if c.kind == "mesh"), default=0.0)
+    _show_spectrum_view(spectra, cursors, "spectrum", logarithmic=True, first_end=1.04 * mesh)
+
+
+def show_envelope(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
+    """Show the spectra of the envelope about the band in which the marked lines stand out most."""
+    runs = _runs(healthy, faulty)
+    cursors = envelope_cursors(runs[-1])
+    marked = [c.position for c in cursors if c.kind == "bearing"]
+    wanted = marked or shaft_lines_hz(runs[-1])
+    try:
+        band = telling_band_hz(runs[-1].recording, channel, wanted)
+    except RefusalError as error:
+        st.info(f"There is no envelope spectrum: {error}")
+        return
+    spectra = [_envelope_spectrum(run.recording, channel, band) for run in runs]
+    lines = "defect" if marked else "shaft"
+    st.markdown(
+        f"Squared envelope of {channel} in the band **{band[0]:.0f} to {band[1]:.0f} Hz**, "
+        f"where the lines of the {lines} stand out most."
+    )
+    end = max([ENVELOPE_SHAFTS * healthy.setup.revolutions_per_s, *(1.08 * f for f in marked)])
+    _show_spectrum_view(spectra, cursors, "envelope", logarithmic=False, first_end=end)
+
+
+def _runs(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> list[LaboratoryRun]:
+    return [healthy] if faulty is None else [healthy, faulty]
+
+
+def _envelope_spectrum(recording: Recording, channel: str, band_hz: tuple[float, float]) -> Spectrum:
+    from gearsig.spectra import band_envelope, envelope_spectrum
+
+    values, rate = recording.values(channel), recording.sampling_rate_hz
+    return envelope_spectrum(band_envelope(values, rate, band_hz, unit="m/s^2", source=channel))
+
+
+def _show_spectrum_view(
+    spectra: Sequence[Spectrum], cursors: Sequence[Cursor], name: str, *, logarithmic: bool, first_end: float
+) -> None:
+    kinds = [kind for kind in KIND_NAMES if any(c.kind == kind for c in cursors)]
+    left, right = st.columns(2)
+    chosen = left.pills(
+        "Marked",
+        kinds,
+        default=kinds,
+        selection_mode="multi",
+        format_func=KIND_NAMES.__getitem__,
+        key=f"{name} marks {kinds} of the laboratory",
+    )
+    end = float(spectra[0].positions[-1])
+    limits = right.slider(
+        "Frequency shown (Hz)",
+        0.0,
+        end,
+        (0.0, min(first_end, end) or end),
+        step=end / 1000.0,
+        format="%.5g",
+        key=f"{name} range to {end:g}, first {first_end:.4g}",
+    )
+    if limits[1] <= limits[0]:
+        limits = (0.0, end)
+    lines = [_line(s, limits, i, logarithmic=logarithmic) for i, s in enumerate(spectra)]
+    highest = max(float(line.y.max()) for line in lines)
+    lowest = min(float(np.percentile(line.y, 2)) for line in lines) if logarithmic else 0.0
+    axes = Axes(
+        "frequency (Hz)",
+        with_unit("amplitude" if logarithmic else "squared envelope", spectra[0].unit),
+        limits,
+        (max(lowest, 1e-7 * highest) / 2, 2 * highest) if logarithmic else (0.0, 1.06 * highest or 1.0),
+        logarithmic=logarithmic,
+    )
+    # The faulty machine lies behind: it shows where it stands above the healthy one.
+    show_lines(lines[::-1], axes, f"{name} of the laboratory", cursors=[c for c in cursors if c.kind in chosen])
+    resolution = spectra[0].resolution
+    st.caption(f"Resolution {resolution:.3g} Hz, {spectra[0].window} window. A longer signal refines it.")
+
+
+def _line(spectrum: Spectrum, limits: tuple[float, float], place: int, *, logarithmic: bool) -> ChartLine:
+    start, stop = spectrum.index_of(limits[0]), spectrum.index_of(limits[1]) + 1
+    start = max(start, 2)  # an offset is no vibration
+    stop = max(stop, start + 4)
+    values = above_zero(spectrum.values) if logarithmic else spectrum.values
+    at, _, top = envelope(spectrum.positions[start:stop], values[start:stop], N_COLUMNS)
+    return ChartLine(at, top, ("healthy", "faulty")[place], colour="fault" if place else "measured")
+
+
+# --------------------
+# Mesh stiffness and mesh force over mesh cycles, where the faulty tooth passes.
+# --------------------
+
+
+BEFORE, AFTER = 1.5, 5.5
+POINTS_PER_CYCLE = 250
+
+
+def show_mesh(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
+    """Show stiffness and dynamic force of both machines over the same mesh cycles."""
+    runs = [healthy] if faulty is None else [healthy, faulty]
+    shown, marks = _stretch(runs[-1])
+    cycles = np.linspace(*shown, round((shown[1] - shown[0]) * POINTS_PER_CYCLE) + 1)
+    x = "mesh cycles (tooth k of the driver enters at k − 1)"
+    st.markdown("**Mesh stiffness** of the tooth pairs in contact")
+    if runs[0].setup.torque_nm > 0:
+        curves = [stiffness(run, cycles) * 1e-8 for run in runs]
+        axes = Axes(x, "mesh stiffness (10⁸ N/m)", shown, _limits_mesh_view(curves))
+        show_lines(_lines(cycles, curves), axes, "stiffness of the laboratory", cursors=marks, height_px=HEIGHT_PX)
+        if len(curves) > 1 and np.allclose(curves[0], curves[1], rtol=1e-6):
+            st.caption("What is switched on leaves the stiffness as it is.")
+    else:
+        st.info("Without a load no tooth is pressed on another: there is no stiffness to show.")
+    st.markdown("**Dynamic mesh force** over the same teeth")
+    forces = [_force_kn(run, cycles) for run in runs]
+    axes = Axes(x, "mesh force (kN)", shown, _limits_mesh_view([f for f in forces if np.isfinite(f).any()]))
+    show_lines(_lines(cycles, forces), axes, "force of the laboratory", cursors=marks, height_px=HEIGHT_PX)
+
+
+def stiffness(run: LaboratoryRun, cycles: FloatArray) -> FloatArray:
+    """Tangent stiffness at the static mesh force, N/m."""
+    from sims.mesh import mesh_stiffness
+
+    if run.pair is not None:
+        return run.pair.maps(np.array([run.setup.torque_nm]), cycles).tangent_stiffness_n_per_m[:, 0]
+    mesh = run.machine.mesh
+    force_n = run.setup.torque_nm / (mesh.pair.driver.base_radius_mm * 1e-3)
+    return mesh_stiffness(mesh, cycles, force_n).total_n_per_m
+
+
+def _stretch(run: LaboratoryRun) -> tuple[tuple[float, float], list[Cursor]]:
+    """Return the mesh cycles about the first faulty tooth that passes in the run; without one, the run's first."""
+    teeth, cycles = faulty_teeth(run.setup), run.mesh_cycles
+    pair = run.machine.mesh.pair
+    first = float(np.ceil(cycles[0])) + BEFORE
+    if not teeth:
+        return (first - BEFORE, first + AFTER), []
+    side, tooth = teeth[0]
+    n_teeth = pair.driver.teeth if side == "driver" else pair.driven.teeth
+    enters = tooth - 1 + float(np.ceil((first - tooth + 1) / n_teeth)) * n_teeth
+    return (enters - BEFORE, enters + AFTER), [Cursor(enters, "finding", f"{side} tooth {tooth} enters")]
+
+
+def _force_kn(run: LaboratoryRun, cycles: FloatArray) -> FloatArray:
+    force: FloatArray = np.interp(
+        cycles, run.mesh_cycles, 1e-3 * run.response["mesh_force_n"], left=np.nan, right=np.nan
+    )
+    return force
+
+
+def _lines(x: FloatArray, curves: list[FloatArray]) -> list[ChartLine]:
+    """The faulty line lies above: where both coincide, nothing changed."""
+    lines = []
+    for place, values in enumerate(curves):
+        known = np.isfinite(values)
+        if known.any():
+            name, colour = (("healthy", "measured"), ("faulty", "fault"))[place]
+            lines.append(ChartLine(*thin(x[known], values[known]), name, colour=colour))  # type: ignore[arg-type]
+    return lines
+
+
+def _limits_mesh_view(curves: list[FloatArray]) -> tuple[float, float]:
+    low = min((float(np.nanmin(c)) for c in curves), default=0.0)
+    high = max((float(np.nanmax(c)) for c in curves), default=1.0)
+    margin = 0.06 * (high - low) or 0.1
+    return low - margin, high + margin
+
+
+# --------------------
+# Phase portraits beside each other: displacement against velocity of a gear, with the points of a Poincaré section.
+# --------------------
+
+
+MESH_PERIOD = "mesh period"
+GEARS = {"Driver": "driver y", "Driven gear": "driven y"}
+STROBES = {MESH_PERIOD: None, "revolution of the input shaft": 1.0}
+MOST_POINTS = 10_000
+"""A browser without a graphics card draws so many at once."""
+REVOLUTIONS = 1.3
+"""Of the line, so that every tooth is on it; the points are of the whole run."""
+PHASE_VIEW_HEIGHT_PX = 430
+Limits = tuple[tuple[float, float], tuple[float, float]]
+Portrait = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+
+
+def show_phase(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
+    """Show the portraits of one gear along the line of action."""
+    left, right = st.columns(2)
+    gear = left.segmented_control(
+        "Gear", list(GEARS), default="Driver", key="gear of the laboratory", persist_state="session"
+    )
+    strobe = right.segmented_control(
+        "A point once per",
+        list(STROBES),
+        default=MESH_PERIOD,
+        key="strobe of the laboratory",
+        persist_state="session",
+    )
+    n = STROBES[strobe or MESH_PERIOD] or healthy.machine.mesh.pair.driver.teeth
+    runs = [healthy] if faulty is None else [healthy, faulty]
+    portraits = [portrait(run, GEARS[gear or "Driver"], n) for run in runs]
+    limits = [_limits_phase_view([p[axis] for p in portraits]) for axis in (0, 1)]
+    for column, found, name in zip(st.columns(2), portraits, ("healthy", "faulty"), strict=False):
+        figure = portrait_figure(found, (limits[0], limits[1]), faulty=name == "faulty")
+        words = f"Velocity over displacement of the {name} machine with its Poincaré points"
+        with column:
+            st.plotly_chart(figure, width="stretch", key=f"phase of {name}", config=CONFIG, alt=words)
+    st.caption(
+        "Along the line of action. A closed curve repeats every mesh period, and its points fall together; "
+        "scattered points mean a motion that does not repeat."
+    )
+
+
+def portrait(run: LaboratoryRun, signal: str, n_per_revolution: float) -> Portrait:
+    """Return displacement (µm) and velocity (mm/s), and both at the strobes."""
+    response = run.response
+    y, v = 1e6 * response[signal], 1e3 * response[f"{signal} velocity"]
+    index = times_of(run, response.time_s, lines_per_period(run, n_per_revolution))
+    points = [np.interp(index, response.time_s, values) for values in (y, v)]
+    turned = float(np.ptp(response["driver angle"])) / (2.0 * np.pi)
+    n = len(y) if turned <= REVOLUTIONS else round(len(y) * REVOLUTIONS / turned)
+    every = -(-n // MOST_POINTS)
+    return y[-n::every], v[-n::every], points[0], points[1]
+
+
+def portrait_figure(found: Portrait, limits: Limits, *, faulty: bool) -> Figure:
+    """Draw one portrait."""
+    from plotly.graph_objects import Figure
+
+    colours, figure = palette(), Figure()
+    y, v, y_points, v_points = found
+    figure.add_scatter(
+        x=y,
+        y=v,
+        mode="lines",
+        line={"width": 0.8, "color": colours.fault if faulty else colours.measured},
+        opacity=0.45,
+        hoverinfo="skip",
+    )
+    figure.add_scatter(
+        x=y_points,
+        y=v_points,
+        mode="markers",
+        marker={"size": 5, "color": colours.cursors["shaft"], "line": {"width": 0.5, "color": "black"}},
+        hovertemplate="%{x:.4g} µm, %{y:.4g} mm/s<extra></extra>",
+    )
+    figure.update_layout(
+        height=PHASE_VIEW_HEIGHT_PX,
+        margin={"l": 8, "r": 8, "t": 30, "b": 8},
+        title={"text": "faulty" if faulty else "healthy", "x": 0.5, "font": {"size": 14}},
+        showlegend=False,
+        xaxis={"title": "displacement (µm)", "range": limits[0]},
+        yaxis={"title": "velocity (mm/s)", "range": limits[1]},
+    )
+    return figure
+
+
+def _limits_phase_view(values: list[FloatArray]) -> tuple[float, float]:
+    low, high = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
+    margin = 0.06 * (high - low) or 1.0
+    return low - margin, high + margin
+
 
 NAMES = ("Time", "Spectrum", "Envelope", "Phase portrait", "Bifurcation", "Mesh")
 TAB = "tab of the laboratory"
 
 
-def show_views(healthy: Run, faulty: Run | None, channel: str) -> None:
+def show_views(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
     """Show the views as tabs."""
     for name, tab in zip(NAMES, st.tabs(NAMES, key=TAB, on_change="rerun"), strict=True):
         if tab.open:
@@ -24,7 +471,7 @@ def show_views(healthy: Run, faulty: Run | None, channel: str) -> None:
 
 
 @st.fragment
-def _show(name: str, healthy: Run, faulty: Run | None, channel: str) -> None:
+def _show(name: str, healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
     """Show one view; what the user changes in it reruns only this."""
     if name == "Time":
         show_time(healthy, faulty)
@@ -38,3 +485,108 @@ def _show(name: str, healthy: Run, faulty: Run | None, channel: str) -> None:
         show_safely(healthy, faulty)
     else:
         show_mesh(healthy, faulty)
+
+
+# --------------------
+# The answer on top of the laboratory: what is switched on, where theory expects it, and what changed in numbers.
+# --------------------
+
+
+Number = Callable[[LaboratoryRun, str], float]
+
+
+def _of_channel(function: Callable[[FloatArray], float]) -> Number:
+    return lambda run, channel: function(run.recording.values(channel))
+
+
+NUMBERS: dict[str, tuple[str, Number]] = {
+    "Vibration, rms": ("m/s²", _of_channel(rms)),
+    "Kurtosis": ("", _of_channel(kurtosis)),
+    "Crest factor": ("", _of_channel(crest_factor)),
+    "Mesh force, mean": ("N", lambda run, _: float(run.response["mesh_force_n"].mean())),
+    "Transmission error, range": ("µm", lambda run, _: 1e6 * float(np.ptp(run.response["transmission_error_m"]))),
+}
+
+
+def show_title(healthy: LaboratoryRun, faulty: LaboratoryRun | None, *, impossible: bool) -> None:
+    """Show what is on, and how the machine runs; `impossible` if the faulty machine cannot be."""
+    title = " + ".join(effect_text(setting) for setting in _switched_on(faulty))
+    otherwise = "The healthy machine alone" if impossible else "Healthy: nothing is switched on"
+    st.subheader(as_typed(title[:1].upper() + title[1:] or otherwise), anchor=False)
+    st.caption(" · ".join(frequencies(faulty or healthy)))
+
+
+def show_expectation(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
+    """Show where theory expects what is on, and what to mind."""
+    on = _switched_on(faulty)
+    if not on:
+        st.markdown("Pull the crack slider or choose an effect: the faulty machine appears beside this one.")
+    elif len(on) == 1:
+        st.markdown(as_typed(effect(on[0].name).signature))
+    else:
+        with st.expander("Where theory expects them", icon=":material/menu_book:"):
+            for setting in on:
+                found = effect(setting.name)
+                st.markdown(f"**{as_typed(found.title[:1].upper() + found.title[1:])}.** {as_typed(found.signature)}")
+    for note in (faulty or healthy).recording.warnings:
+        st.caption(f":material/info: {as_typed(note)}")
+
+
+def _switched_on(faulty: LaboratoryRun | None) -> list[EffectSetting]:
+    return [setting for setting in faulty.setup.effects if setting.severity > 0] if faulty else []
+
+
+def frequencies(run: LaboratoryRun) -> list[str]:
+    """Return the frequencies of mesh, shafts and struck bearings, for people."""
+    turns, rig = run.setup.revolutions_per_s, run.rig
+    pair = rig.pairs[0]
+    words = [f"{run.setup.speed_rpm:g} rpm, {run.setup.torque_nm:g} N·m"]
+    words.append(f"mesh {(rig.mesh_order(pair) or 0.0) * turns:.5g} Hz")
+    words += [f"{name} shaft {(rig.ratio(name) or 0.0) * turns:.4g} Hz" for name in rig.shaft_names]
+    words += [f"{as_typed(name)} {frequency:.4g} Hz" for name, frequency in bearing_lines_hz(run).items()]
+    # A number and its unit stay on one line.
+    return [word.replace(" Hz", "\u00a0Hz") for word in words]
+
+
+def show_numbers(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
+    """Show the numbers of the faulty machine, with the healthy one's below them."""
+    with st.container(horizontal=True):
+        for name, (unit, number) in NUMBERS.items():
+            own = number(healthy, channel)
+            if faulty is None:
+                st.metric(name, shown(own, unit))
+                continue
+            value = number(faulty, channel)
+            below = f"healthy {shown(own, unit)}{change(own, value)}"
+            st.metric(name, shown(value, unit), below, delta_color="off", delta_arrow="off")
+
+
+def show_legend() -> None:
+    """Say which colour is which, once for all charts."""
+    colours = palette()
+    swatch = '<span style="color:{}">━━</span> {}'
+    words = (swatch.format(colours.measured, "healthy"), swatch.format(colours.fault, "faulty"))
+    st.html(
+        "&emsp;".join(words) + "&emsp;<small>same random numbers: what differs is the effect</small>", width="content"
+    )
+
+
+def shown(value: float, unit: str) -> str:
+    """Write a number with its unit."""
+    return f"{value:.4g} {unit}".rstrip()
+
+
+def change(old: float, new: float) -> str:
+    """Write a relative change, e.g. " (+12 %)"; nothing where the old value is 0.
+
+    Examples
+    --------
+    >>> change(2.0, 2.5), change(2.0, 2.0001), change(0.0, 1.0)
+    (' (+25 %)', ' (±0 %)', '')
+    """
+    if not old or not np.isfinite(new / old):
+        return ""
+    percent = 100.0 * (new / old - 1.0)
+    return (
+        " (±0 %)" if abs(percent) < 0.05 else f" ({percent:+.2g} %)" if abs(percent) < 100 else f" ({new / old:.3g} ×)"
+    )

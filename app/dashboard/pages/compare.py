@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import streamlit as st
 
-from app.dashboard.as_typed import as_typed
-from app.dashboard.compare.cached import Both, command_of, compared, page_of, recorded_of, simulated_of
-from app.dashboard.compare.chooser import choose_alignment, choose_pairs, choose_simulation
+from app.dashboard.compare.choice import (
+    Both,
+    choose_alignment,
+    choose_pairs,
+    choose_simulation,
+    command_of,
+    compared,
+    page_of,
+    recorded_of,
+    simulated_of,
+)
 from app.dashboard.compare.view import show_comparison, show_downloads
+from app.dashboard.theme import as_typed
 from app.dashboard.widgets.chooser import choose_recording
-from app.dashboard.widgets.errors import show_error
+from app.dashboard.widgets.verdict import show_error
 from gearsig.errors import GearsigError
 
 WELCOME = """

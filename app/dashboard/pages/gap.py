@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import streamlit as st
 
-from app.dashboard.as_typed import as_typed
-from app.dashboard.gap.chooser import choose
-from app.dashboard.gap.runner import show_running
-from app.dashboard.gap.view import show_finished
-from app.dashboard.widgets.errors import show_error
+from app.dashboard.gap.choice import choose
+from app.dashboard.gap.view import show_finished, show_running
+from app.dashboard.theme import as_typed
+from app.dashboard.widgets.verdict import show_error
 from gearsig.errors import GearsigError
 
 WELCOME = """

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import streamlit as st
 
-from app.dashboard.laboratory.cached import simulated
-from app.dashboard.laboratory.controls import choose_preset, choose_setup
-from app.dashboard.laboratory.expected import with_complete_effects
-from app.dashboard.laboratory.run import Run
-from app.dashboard.laboratory.save import show_saving
-from app.dashboard.laboratory.setup import Setup
-from app.dashboard.laboratory.summary import show_expectation, show_legend, show_numbers, show_title
-from app.dashboard.laboratory.views import show_views
+from app.dashboard.laboratory.run import LaboratoryRun, show_saving, simulated, with_complete_effects
+from app.dashboard.laboratory.setup import SETUP_MODEL as DRIVE
+from app.dashboard.laboratory.setup import Setup, choose_preset, choose_setup
+from app.dashboard.laboratory.views import show_expectation, show_legend, show_numbers, show_title, show_views
 from app.dashboard.start_stop.page import show_drive
-from app.dashboard.start_stop.setup import MODEL as DRIVE
-from app.dashboard.widgets.errors import show_error
+from app.dashboard.widgets.verdict import show_error
 from gearsig.errors import GearsigError
 from sims.presets import Preset
 
@@ -44,7 +39,7 @@ def show_pair(preset: Preset) -> None:
     show_views(healthy, faulty, channel)
 
 
-def choose_channel(healthy: Run, faulty: Run | None) -> str:
+def choose_channel(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> str:
     """Return the sensor that numbers and spectra are of; beside it stands which colour is which."""
     channels = healthy.vibration_channels
     with st.container(horizontal=True, vertical_alignment="center", horizontal_alignment="distribute"):
@@ -62,7 +57,7 @@ def choose_channel(healthy: Run, faulty: Run | None) -> str:
     return channel or channels[0]
 
 
-def faulty_run(setup: Setup) -> Run | None:
+def faulty_run(setup: Setup) -> LaboratoryRun | None:
     """Return the faulty twin; None, with the reason on the page, where there is none."""
     try:
         return None if setup.is_healthy else simulated(with_complete_effects(setup))

@@ -2,17 +2,361 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from math import isfinite
+from typing import TYPE_CHECKING
+
+import pandas as pd
 import streamlit as st
 
-from app.dashboard.as_typed import as_typed
-from app.dashboard.laboratory.setup import effect_text
-from app.dashboard.start_stop.controls import choose_drive
-from app.dashboard.start_stop.run import DriveRun, run_drive
-from app.dashboard.start_stop.setup import DriveSetup
-from app.dashboard.start_stop.view import show_numbers, show_saving, show_views
-from app.dashboard.widgets.errors import show_error
+from app.dashboard import state
+from app.dashboard.laboratory.run import ANALYSIS_ENDING, ENDINGS, chosen_of_files, files_of, zip_of
+from app.dashboard.laboratory.setup import DriveSetup, choose_number, effect_text, show_typed_toggle, shown_unit
+from app.dashboard.laboratory.views import change, shown
+from app.dashboard.theme import as_typed
+from app.dashboard.widgets.charts import show_picture
+from app.dashboard.widgets.verdict import show_error
 from gearsig.errors import GearsigError
+from gearsig.rig import DAMPING_LAWS
+from sims.effects import EffectSetting, effect
+from sims.forging import MODES, PARAMETERS
 from sims.presets import Preset
+from sims.simulator import ParameterValue, parameter
+
+if TYPE_CHECKING:
+    from gearsig.checks import FloatArray
+    from gearsig.motion import ForceEstimate, PairMotion, StartStop
+    from gearsig.recording import Recording
+
+
+# --------------------
+# The sidebar of the start–stop drive: machine, cycle, teeth, load, effects, measurement.
+# --------------------
+
+
+RATES_HZ = (1000.0, 4000.0, 10000.0)
+CRACK = "root_crack"
+HIGHEST = {CRACK: 2.0, "backlash": 500.0, "tooth_wear": 200.0, "sliding_friction": 0.2, "torque_ripple": 20.0}
+"""Ends of the sliders; the crack's is in modules."""
+WORDS = {
+    CRACK: "Pairs of the cracked tooth lose stiffness, on the drive flank, where the load opens the crack.",
+    "backlash": "Both flanks move apart: longer flights, harder impacts.",
+    "tooth_wear": "Worn off the drive flanks where it is most: at their ends, by sliding; nothing at the pitch point.",
+    "sliding_friction": "Coefficient of the flanks, beside the sound one.",
+    "torque_ripple": "Pistons of the motor, part of its torque.",
+}
+PLACES = {
+    CRACK: ("tooth", "Cracked tooth of the pinion", 20),
+    "torque_ripple": ("order", "Ripples per revolution", 50),
+}
+"""Effects that sit somewhere: their option, its words, its highest value."""
+Parameters = list[tuple[str, ParameterValue]]
+
+
+def choose_drive(chosen: Preset) -> DriveSetup:
+    """Return what the user set; what is not offered is the preset's."""
+    with st.sidebar:
+        mode = st.segmented_control("Mode", MODES, default=MODES[0], key="mode of the drive", persist_state="session")
+        torque = choose_number("Torque of the motor (N·m)", "torque of the drive", chosen.torque_nm, 300.0)
+        speed = choose_number(
+            "Speed that the flow allows (rpm)", "speed of the drive", chosen.speed_rpm, 300.0, low=10.0
+        )
+        with st.expander("Teeth", icon=":material/settings:"):
+            values = _choose_teeth(chosen)
+        with st.expander("Brake, press and load", icon=":material/weight:"):
+            values += _choose_load(chosen)
+        st.markdown("**Faults** · *the sound drive has none*")
+        effects = _choose_effects(chosen)
+        with st.expander("Measurement", icon=":material/sensors:"):
+            measured, duration, rate = _choose_measurement(chosen)
+        show_typed_toggle()
+    values.append(("mode", mode or MODES[0]))
+    return DriveSetup(chosen.name, speed, torque, tuple(values + measured), tuple(effects), duration, rate)
+
+
+def _choose_teeth(chosen: Preset) -> Parameters:
+    law = st.selectbox(
+        "Damping law",
+        DAMPING_LAWS,
+        index=DAMPING_LAWS.index(str(chosen.parameters.get("damping_law", DAMPING_LAWS[0]))),
+        key=f"law of {chosen.name}",
+        persist_state="session",
+        help="What they really give: 0.947, 0.954 and 0.952 for a restitution of 0.95; 0.470, 0.725 and 0.663 for 0.5.",
+    )
+    return [
+        ("damping_law", law),
+        _value(chosen, "restitution", "Restitution", 1.0, low=0.1),
+        _value(chosen, "half_backlash_um", "Half backlash (µm)", 500.0),
+        _value(chosen, "friction_coefficient", "Friction of the flanks", 0.3),
+    ]
+
+
+def _choose_load(chosen: Preset) -> Parameters:
+    return [
+        _value(chosen, "brake_nm", "Brake (N·m)", 300.0),
+        _value(chosen, "press_nm", "Blow of the press (N·m)", 6000.0),
+        _value(chosen, "piece_mass_kg", "Mass of the piece (kg)", 2000.0),
+        _value(chosen, "piece_offset_mm", "Piece off centre (mm)", 200.0),
+        _value(chosen, "load_friction_nm", "Friction of the gripper (N·m)", 600.0),
+    ]
+
+
+def _choose_effects(chosen: Preset) -> list[EffectSetting]:
+    """Return the faults whose sliders do not stand at 0."""
+    settings = [_choose_effect(name, chosen) for name in HIGHEST]
+    return [setting for setting in settings if setting.severity > 0.0]
+
+
+def _choose_effect(name: str, chosen: Preset) -> EffectSetting:
+    found, high = effect(name), HIGHEST[name]
+    s = found.severity
+    if name == CRACK:
+        high *= float(chosen.parameters.get("module_mm") or parameter(PARAMETERS, "module_mm").default or 1.0)
+    unit = shown_unit(s.unit)
+    label = f"{found.title[:1].upper()}{found.title[1:]}" + (f" ({unit})" if unit else "")
+    severity = choose_number(label, f"severity of {name} of the drive", 0.0, high, about=WORDS[name])
+    if name not in PLACES or severity == 0.0:
+        return EffectSetting(name, severity)
+    option, words, highest = PLACES[name]
+    if name == CRACK:
+        highest = int(float(chosen.parameters.get("teeth_driver") or highest))
+    default = next(int(float(o.default or 1)) for o in found.options if o.name == option)
+    place = st.number_input(
+        words, 1, highest, min(default, highest), key=f"{option} of {name} of the drive", persist_state="session"
+    )
+    return EffectSetting(name, severity, {option: float(place)})
+
+
+def _choose_measurement(chosen: Preset) -> tuple[Parameters, float, float]:
+    duration = choose_number("Length (s)", "length of the drive", 6.0, 30.0, low=3.5)
+    rate = st.selectbox("Sampling rate (Hz)", RATES_HZ, format_func="{:g}".format, key="rate of the drive")
+    counts = st.select_slider(
+        "Counts of the encoders",
+        [2**bits for bits in range(10, 25, 2)],
+        value=2**20,
+        key="counts of the drive",
+        persist_state="session",
+    )
+    noise = _value(chosen, "angle_noise_urad", "Noise of the angles (µrad rms)", 200.0)
+    return [("encoder_counts", float(counts)), noise], duration, float(rate)
+
+
+def _value(chosen: Preset, name: str, label: str, high: float, *, low: float = 0.0) -> tuple[str, ParameterValue]:
+    own = chosen.parameters.get(name, parameter(PARAMETERS, name).default)
+    return name, choose_number(label, f"{name} of {chosen.name}", float(own or 0.0), high, low=low)
+
+
+# --------------------
+# A run of the start–stop drive, once for equal setups: recording, what its motion shows, the force from it.
+# --------------------
+
+
+N_RUNS = 12
+
+
+@dataclass(frozen=True)
+class DriveRun:
+    """What one setup gives.
+
+    Parameters
+    ----------
+    setup : DriveSetup
+    recording : Recording
+    examined : StartStop
+    force : ForceEstimate or None
+    refusal : str
+        Why there is no force.
+    curve_um : array or None
+        Course of the compression over the mesh cycle on the drive flank; None where nothing starts and stops.
+    """
+
+    setup: DriveSetup
+    recording: Recording
+    examined: StartStop
+    force: ForceEstimate | None
+    refusal: str = ""
+    curve_um: FloatArray | None = None
+
+    def number(self, name: str) -> float:
+        """Return an indicator by its name; nan where there is none."""
+        return next((i.value for i in self.examined.indicators if i.name == name), float("nan"))
+
+
+@st.cache_resource(max_entries=N_RUNS, show_spinner="Simulating …")
+def run_drive(setup: DriveSetup) -> DriveRun:
+    """Simulate, measure, examine.
+
+    Raises
+    ------
+    InputError
+        If a value does not fit.
+    """
+    from gearsig.errors import RefusalError
+    from gearsig.motion import estimate_forces, examine_start_stop, measure_motion
+
+    recording = setup.record()
+    motion = measure_motion(recording)
+    try:
+        force, refusal = estimate_forces(motion), ""
+    except RefusalError as error:
+        force, refusal = None, str(error)
+    return DriveRun(setup, recording, examine_start_stop(motion), force, refusal, _curve_um(motion))
+
+
+def _curve_um(motion: PairMotion) -> FloatArray | None:
+    from gearsig.errors import RefusalError
+    from gearsig.gap import PreparedCycles, cut_cycles
+
+    try:
+        cycles = PreparedCycles(cut_cycles(motion))
+    except RefusalError:
+        return None
+    return cycles.tell(cycles.every).contact.curve_um
+
+
+# --------------------
+# What the page of the start–stop drive shows: numbers beside the sound drive's, pictures, impacts, files.
+# --------------------
+
+
+NUMBERS = {
+    "backlash": "µm",
+    "impacts per cycle": "",
+    "back impacts per cycle": "",
+    "hardest impact": "m/s",
+    "impact loss per cycle": "J",
+}
+"""Indicators on top of the page, with the unit for people."""
+TOGETHER = "Sound beside faulty"
+VIEWS = ("Motion", "Force between the teeth", "Impacts", "Indicators")
+
+
+def show_numbers(sound: DriveRun, faulty: DriveRun | None) -> None:
+    """Show the indicators, of the faulty drive with the sound one's below."""
+    with st.container(horizontal=True):
+        for name, unit in NUMBERS.items():
+            own = sound.number(name)
+            label = name[:1].upper() + name[1:]
+            if faulty is None:
+                st.metric(label, _told(own, unit))
+                continue
+            value = faulty.number(name)
+            below = f"sound {_told(own, unit)}{change(own, value)}"
+            st.metric(label, _told(value, unit), below, delta_color="off", delta_arrow="off")
+
+
+def _told(value: float, unit: str) -> str:
+    return shown(value, unit) if isfinite(value) else "not told"
+
+
+def show_views(sound: DriveRun, faulty: DriveRun | None) -> None:
+    """Show one of the views, of either drive."""
+    with st.container(horizontal=True, horizontal_alignment="distribute", vertical_alignment="center"):
+        view = st.segmented_control(
+            "View", VIEWS if faulty is None else (TOGETHER, *VIEWS), default=VIEWS[0] if faulty is None else TOGETHER,
+            key=f"view of the {'sound' if faulty is None else 'faulty'} drive", label_visibility="collapsed",
+            persist_state="session",
+        )  # fmt: skip
+        which = "Faulty"
+        if faulty is not None and view != TOGETHER:
+            which = st.segmented_control(
+                "Drive", ("Faulty", "Sound"), default="Faulty", key="side of the drive", label_visibility="collapsed"
+            ) or "Faulty"  # fmt: skip
+    run = sound if faulty is None or which == "Sound" else faulty
+    if view == TOGETHER and faulty is not None:
+        _show_together(sound, faulty)
+    elif view == VIEWS[1]:
+        _show_force(run)
+    elif view == VIEWS[2]:
+        _show_impacts(run)
+    elif view == VIEWS[3]:
+        st.dataframe(
+            pd.DataFrame([{"indicator": i.name, "value": i.value, "unit": i.unit} for i in run.examined.indicators]),
+            hide_index=True,
+        )
+    else:
+        _show_motion(run)
+    for text in run.examined.refusals:
+        st.caption(f":material/info: {as_typed(f'Cannot tell the {text}')}")
+    for text in run.examined.notes:
+        st.caption(f":material/info: {as_typed(text)}")
+
+
+def show_saving(run: DriveRun) -> None:
+    """Offer the files, and the way to the analysis page."""
+    with st.container(horizontal=True, horizontal_alignment="right"):
+        with st.popover("Save as recording", icon=":material/save:"):
+            ending = st.selectbox("Format", ENDINGS, key="ending of the drive", persist_state="session")
+            st.download_button(
+                "Download",
+                data=lambda: zip_of(files_of(run.recording, run.setup.file_stem, ending)),
+                file_name=f"{run.setup.file_stem}.zip",
+                mime="application/zip",
+                icon=":material/download:",
+                on_click="ignore",
+                type="primary",
+            )
+        if st.button("Open in the analysis page", icon=":material/troubleshoot:", key="analyse the drive"):
+            state.open_simulated(chosen_of_files(files_of(run.recording, run.setup.file_stem, ANALYSIS_ENDING)))
+            st.switch_page(state.ANALYSIS_PAGE)
+
+
+def _show_motion(run: DriveRun) -> None:
+    from gearsig.plot import start_stop_figure
+
+    words = "Speed of the pinion with the impacts, phase plane of the teeth, torque over twist"
+    show_picture(start_stop_figure(run.examined, title=run.setup.preset), words)
+
+
+def _show_together(sound: DriveRun, faulty: DriveRun) -> None:
+    from gearsig.plot import start_stop_pair_figure
+
+    curves = None if sound.curve_um is None or faulty.curve_um is None else (sound.curve_um, faulty.curve_um)
+    words = "Sound and faulty drive: speed, phase plane, torque over twist, drive flank over the mesh cycle, teeth"
+    show_picture(start_stop_pair_figure(sound.examined, faulty.examined, curves_um=curves), words)
+
+
+def _show_force(run: DriveRun) -> None:
+    from gearsig.plot import force_figure
+
+    if run.force is None:
+        st.info(as_typed(run.refusal))
+        return
+    words = "Force between the teeth: measured, piecewise model, Hunt–Crossley; below, the errors"
+    show_picture(force_figure(run.force, title=run.setup.preset), words)
+    rows = [
+        {
+            "model": e.model,
+            "against": e.reference,
+            "rms (N)": round(e.rms_n),
+            "rms (%)": round(100.0 * e.relative_rms, 1),
+        }
+        for e in run.force.errors
+    ]
+    st.dataframe(pd.DataFrame(rows), hide_index=True)
+
+
+def _show_impacts(run: DriveRun) -> None:
+    if not run.examined.impacts:
+        st.info("No impacts were seen.")
+        return
+    from gearsig.plot import impacts_figure
+
+    motion = run.examined.motion
+    figure = impacts_figure(run.examined.impacts, motion.path.teeth[0], restitution=motion.contact.restitution)
+    show_picture(figure, "Energy of the impacts over time and over the tooth, restitution over speed")
+    rows = [
+        {
+            "time (s)": i.time_s,
+            "flank": "drive" if i.flank > 0 else "back",
+            "tooth": i.driver_tooth,
+            "speed (m/s)": i.speed_mps,
+            "energy (J)": i.energy_j,
+            "restitution": i.restitution,
+        }
+        for i in run.examined.impacts
+    ]
+    st.dataframe(pd.DataFrame(rows), hide_index=True)
 
 
 def show_drive(preset: Preset) -> None:

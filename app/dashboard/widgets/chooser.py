@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,17 +10,92 @@ from typing import TYPE_CHECKING
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.as_typed import as_typed
 from app.dashboard.cached import sha256_of_upload
-from app.dashboard.state import Chosen, Request, Upload
-from app.dashboard.widgets.comparison import Comparison, choose_comparison, sample_name
-from app.samples import Sample, samples
+from app.dashboard.state import AnalysisRequest, Chosen, Upload
+from app.dashboard.theme import as_typed
+from app.samples import SampleRecording, samples
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
     from streamlit.runtime.uploaded_file_manager import UploadedFile
 
-EXAMPLE_RIG = Path(__file__).parents[2] / "commands" / "example_rig.toml"
+
+# --------------------
+# What the recording is compared with: the same machine when it was sound, and the torque that depths rest on.
+# --------------------
+
+
+NOTHING, OWN = "None", "Own file"
+
+
+@dataclass(frozen=True)
+class ReferenceAndTorque:
+    """A reference, without a name where there is none, and a torque that the rig does not state."""
+
+    name: str = ""
+    sha256: str = ""
+    content: Path | memoryview | None = None
+    torque_nm: float | None = None
+
+
+def choose_comparison(name: str, source: str) -> ReferenceAndTorque:
+    """Let the user give a reference and the torque; `source` stands for the recording called `name`."""
+    with st.expander("Reference (sound machine)", icon=":material/compare:"):
+        offered = {sample_name(s): s for s in samples() if s.recording.name != name}
+        of = st.selectbox(
+            "Compared with",
+            [NOTHING, OWN, *offered],
+            key=state.source_key("reference", source),
+            persist_state="session",
+            help="The same machine when it was sound: same sensors, speed and load. Cracks of a millimetre show "
+            "against it, and every indicator is compared. It is read with the rig and the numbers stated above.",
+        )
+        name, digest, content = _own(source) if of == OWN else _sample(offered.get(of))
+        torque = st.number_input(
+            "Torque (N·m)",
+            min_value=0.0,
+            value=None,
+            placeholder="from the rig",
+            key=state.source_key("torque", source),
+            persist_state="session",
+            help="For the depth of a crack, instead of the rig's: of the shaft that its operating point names, else of "
+            "the reference shaft.",
+        )
+    return ReferenceAndTorque(name, digest, content, torque or None)
+
+
+def sample_name(sample: SampleRecording) -> str:
+    """Return a sample's name for people."""
+    return sample.rig.stem.replace("_", " ").capitalize()
+
+
+def _sample(sample: SampleRecording | None) -> tuple[str, str, Path | None]:
+    from gearsig.recording import sha256_of
+
+    return ("", "", None) if sample is None else (sample.recording.name, sha256_of(sample.recording), sample.recording)
+
+
+def _own(source: str) -> tuple[str, str, memoryview | None]:
+    from gearsig.recording import FORMAT_OF_EXTENSION
+
+    file = st.file_uploader(
+        "Recording of the sound machine",
+        type=[*FORMAT_OF_EXTENSION, ".gz"],
+        key=state.source_key("reference file", source),
+        on_change=state.keep_reference,
+        args=(source, None),
+    )
+    kept = state.kept_reference(source)
+    if file is not None:
+        content = file.getbuffer()
+        kept = Upload(file.name, sha256_of_upload(file.file_id, content), content)
+        state.keep_reference(source, kept)
+    elif kept is not None:
+        st.caption(f"Still open: {as_typed(kept.name)}")
+    return ("", "", None) if kept is None else (kept.name, kept.sha256, kept.content)
+
+
+EXAMPLE_RIG = Path(__file__).parents[2] / "cli" / "example_rig.toml"
 ORIGINS = ("Sample", "Own file")
 
 
@@ -54,19 +129,21 @@ def _choose_simulated(made: Chosen, with_reference: bool) -> Chosen:
 
 
 def _choose_sample(with_reference: bool) -> Chosen:
-    from gearsig.recording.read import sha256_of
+    from gearsig.recording import sha256_of
 
     found = samples()
     first = next((sample for sample in found if sample.rig.stem == "damaged_tooth"), found[0])
     state.carry_over(state.SAMPLE, first)
-    sample: Sample = st.selectbox("Sample", found, format_func=sample_name, key=state.SAMPLE, persist_state="session")
+    sample: SampleRecording = st.selectbox(
+        "Sample", found, format_func=sample_name, key=state.SAMPLE, persist_state="session"
+    )
     st.caption("Simulated, not measured: what is in it is known.")
     name, digest = sample.recording.name, sha256_of(sample.recording)
     return _described(name, digest, sample.rig.name, sample.rig.read_text("utf-8"), sample.recording, with_reference)
 
 
 def _choose_file(with_reference: bool) -> Chosen | None:
-    from gearsig.recording.identify import FORMAT_OF_EXTENSION
+    from gearsig.recording import FORMAT_OF_EXTENSION
 
     endings = [*FORMAT_OF_EXTENSION, ".gz"]
     kinds = "CSV (also .gz), MAT, WAV, HDF5, Parquet, TDMS or UFF58. It stays on this machine."
@@ -143,8 +220,8 @@ def _described(
             persist_state="session",
             help="Of the reference shaft, if it held still and is known well. It is refined where the signal shows it.",
         )
-    then = choose_comparison(name, digest) if with_reference else Comparison()
-    request = Request(name, digest, rig_name, rig_text, rate, speed, then.name, then.sha256, then.torque_nm)
+    then = choose_comparison(name, digest) if with_reference else ReferenceAndTorque()
+    request = AnalysisRequest(name, digest, rig_name, rig_text, rate, speed, then.name, then.sha256, then.torque_nm)
     return Chosen(request, content, then.content)
 
 

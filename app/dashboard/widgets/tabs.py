@@ -7,17 +7,19 @@ from collections.abc import Callable
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.state import Request
+from app.dashboard.methods.menu import show_methods
+from app.dashboard.state import AnalysisRequest
 from app.dashboard.widgets import views
-from app.dashboard.widgets.average import show_average
-from app.dashboard.widgets.channels import show_channels
-from app.dashboard.widgets.indicators import show_indicators
-from app.dashboard.widgets.methods.menu import show_methods
-from app.dashboard.widgets.order_map import show_order_map
-from app.dashboard.widgets.report import show_report
-from app.dashboard.widgets.speed import show_speed
-from app.dashboard.widgets.start_stop import show_start_stop
-from gearsig.diagnosis.types import Analysis
+from app.dashboard.widgets.spectrum import show_average
+from app.dashboard.widgets.views import (
+    show_channels,
+    show_indicators,
+    show_order_map,
+    show_report,
+    show_speed,
+    show_start_stop,
+)
+from gearsig.diagnosis import Analysis
 
 OF_RECORDING: dict[str, Callable[[Analysis], None]] = {"Channels": show_channels, "Speed": show_speed}
 OF_MOTION: dict[str, Callable[[Analysis], None]] = {"Starts and stops": show_start_stop}
@@ -32,7 +34,7 @@ OF_CHANNEL: dict[str, views.ChannelView] = {
 }
 
 
-def show_tabs(analysis: Analysis, request: Request) -> None:
+def show_tabs(analysis: Analysis, request: AnalysisRequest) -> None:
     """Show the views as tabs."""
     of_motion = OF_MOTION if analysis.motion is not None else {}
     names = (*of_motion, *OF_RECORDING, *OF_CHANNEL, "Indicators", "Report")
@@ -43,7 +45,7 @@ def show_tabs(analysis: Analysis, request: Request) -> None:
 
 
 @st.fragment
-def _show(name: str, analysis: Analysis, request: Request) -> None:
+def _show(name: str, analysis: Analysis, request: AnalysisRequest) -> None:
     """Show one view; what the user changes in it reruns only this."""
     if name in OF_MOTION:
         OF_MOTION[name](analysis)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import streamlit as st
 
-from app.dashboard.as_typed import as_typed
-from gearsig.diagnosis.types import Analysis, Kind, Outcome
-from gearsig.report.sections import reference_text
+from app.dashboard.theme import as_typed
+from gearsig.diagnosis import Analysis, Finding, Kind, Outcome
+from gearsig.errors import GearsigError, InputError
+from gearsig.report import FindingCard, finding_card, reference_text
 
 Colour = Literal["red", "orange", "violet", "gray", "blue", "green"]
 COLOURS: dict[Kind | Outcome, Colour] = {
@@ -77,3 +79,132 @@ def headline_of(verdict: str) -> tuple[str, str]:
 def show_kind(kind: Kind | Outcome) -> None:
     """Show a kind of finding, or an outcome, as a badge."""
     st.badge(kind.value, icon=ICONS[kind], color=COLOURS[kind])
+
+
+# --------------------
+# Findings as cards, most important first.
+# --------------------
+
+
+N_OPEN = 3
+"""Cards shown at once; the rest is a click away."""
+
+
+def show_findings(analysis: Analysis) -> None:
+    """Show the first findings in full, the others folded up; notices come first only where nothing weighs more."""
+    findings = [f for f in analysis.findings if f.kind is not Kind.INFORMATION]
+    weighty = [f for f in findings if f.kind is not Kind.NOTICE] or findings
+    for i, finding in enumerate(weighty[:N_OPEN]):
+        _show_card(finding, with_evidence=i == 0)
+    _show_folded("More findings", [f for f in findings if f not in weighty[:N_OPEN]])
+    _show_folded("Remarks", [f for f in analysis.findings if f.kind is Kind.INFORMATION])
+
+
+def _show_folded(title: str, findings: Sequence[Finding]) -> None:
+    if findings:
+        with st.expander(f"{title} ({len(findings)})"):
+            for finding in findings:
+                _show_card(finding, with_evidence=True)
+
+
+def _show_card(finding: Finding, *, with_evidence: bool = False) -> None:
+    card = finding_card(finding)
+    with st.container(border=True):
+        kind, body = st.columns((1, 7))
+        with kind:
+            show_kind(finding.kind)
+            if card.confidence_percent is not None:
+                st.markdown(f"≤ **{card.confidence_percent} %** sure")
+        with body:
+            st.markdown(f"**{as_typed(card.title)}**")
+            if card.where:
+                st.caption(" · ".join(as_typed(text) for text in card.where))
+            _show_measures(card)
+            _show_evidence(card, folded=not with_evidence)
+
+
+def _show_measures(card: FindingCard) -> None:
+    lines = [
+        ("how strong", card.strength),
+        ("how sure", card.confidence_basis),
+        ("surer with", card.surer),
+    ]
+    text = "  \n".join(f":gray[{name}:] {as_typed(value)}" for name, value in lines if value)
+    if text:
+        st.markdown(text)
+
+
+def _show_evidence(card: FindingCard, *, folded: bool) -> None:
+    text = "\n".join(f"- {as_typed(sentence)}" for sentence in card.evidence)
+    if text and folded:
+        with st.expander(f"Evidence ({len(card.evidence)})"):
+            st.caption(text)
+    elif text:
+        st.caption(text)
+
+
+# --------------------
+# What to do while nothing is open.
+# --------------------
+
+
+TEXT = """
+### Open a recording of your own
+
+1. Drop the **recording** in the sidebar: CSV, MAT, WAV, HDF5, Parquet, TDMS or UFF58.
+2. Drop its **rig file**, or write one under *Rig*, which opens with the recording. Only what is known need be given:
+   teeth add mesh orders, sidebands and tooth pictures; bearings add their orders; a speed source makes orders out of
+   frequencies.
+3. If the file does not state its **sampling rate** or the **speed**, give them under *Not in the file?*
+
+No recording at hand? The *fault laboratory* makes one, with the faults you choose.
+
+Files stay on this machine. They are read in a private folder that is removed at once.
+"""
+
+
+def show_welcome() -> None:
+    """Say how a recording is opened."""
+    st.markdown(TEXT)
+
+
+# --------------------
+# An error as one clear message: what is wrong, where, what is allowed, what to do.
+# --------------------
+
+
+_PLACES = {
+    "--fs": "the sampling rate under 'Not in the file?'",
+    "--speed-rpm": "the speed under 'Not in the file?'",
+    "low_cut_hz": "the lowest frequency",
+    "high_cut_hz": "the highest frequency",
+    "n_modes": "K",
+    "n_levels": "the number of levels",
+    "highest_modulation_hz": "the highest modulation",
+    "highest_alpha_hz": "the highest cyclic frequency",
+    "highest_order": "the highest cyclic order",
+    "window_length": "the window",
+    "half_width": "the band around the ridge",
+    "set lowest to": "set the lowest line shown to",
+}
+"""What the page calls the options of the command line and of functions that messages name."""
+
+
+def show_error(error: GearsigError) -> None:
+    """Show an error of the input; texts in it may come from the file."""
+    if not isinstance(error, InputError):
+        st.error(as_typed(_in_words_of_the_page(str(error))), icon=":material/help:")
+        return
+    what = as_typed(_in_words_of_the_page(error.what))
+    lines = [f"**{as_typed(_PLACES.get(error.where, error.where))}**: {what}" if error.where else what]
+    if error.allowed:
+        lines.append(f"Allowed: {as_typed(error.allowed)}")
+    if error.remedy:
+        lines.append(f"What to do: {as_typed(_in_words_of_the_page(error.remedy))}")
+    st.error("\n\n".join(lines), icon=":material/error:")
+
+
+def _in_words_of_the_page(text: str) -> str:
+    for option, place in _PLACES.items():
+        text = text.replace(option, place)
+    return text

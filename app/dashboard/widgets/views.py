@@ -3,21 +3,78 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite, nan
+from typing import TYPE_CHECKING
 
+import numpy as np
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.as_typed import as_typed
+from app.dashboard.cached import channel_problems, command_of, report_page, safe_file_name
+from app.dashboard.state import AnalysisRequest
+from app.dashboard.theme import as_typed
+from app.dashboard.widgets.charts import Axes, ChartLine, choose_end, choose_range, show_lines, show_picture
 from app.dashboard.widgets.spectrum import show_spectrum
-from app.dashboard.widgets.speed import show_unknown_speed
-from gearsig.diagnosis.types import Analysis, CannotTell, ChannelAnalysis
-from gearsig.report.lines import (
-    bearing_cursors,
-    highest_order_of_interest,
-    line_cursors,
-    marked_positions,
-    speed_is_constant,
-)
+from gearsig.angle import ShaftAngle
+from gearsig.checks import FloatArray
+from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, IndicatorChange, changes
+from gearsig.indicators import Indicator
+from gearsig.plot import LEAST_SPAN, METHODS, thin, unit_text, with_unit
+from gearsig.recording import Recording
+from gearsig.report import bearing_cursors, highest_order_of_interest, line_cursors, marked_positions, speed_is_constant
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+
+# --------------------
+# Shaft speed over time, and how it was found.
+# --------------------
+
+
+def show_speed(analysis: Analysis) -> None:
+    """Show the speed of the reference shaft, or why it is not known."""
+    angle = analysis.shaft_angle
+    if isinstance(angle, CannotTell):
+        show_unknown_speed(angle)
+        return
+    _show_numbers(angle)
+    _show_curve(analysis, angle)
+    if angle.notes:
+        st.markdown("\n".join(f"- {as_typed(note)}" for note in angle.notes))
+
+
+def show_unknown_speed(reason: CannotTell) -> None:
+    """Say why there is no speed and what would give it."""
+    remedy = f"\n\nWhat would give it: {as_typed(reason.remedy)}" if reason.remedy else ""
+    hint = "\n\nA constant speed can be given under *Not in the file?*"
+    st.info(f"The speed is not known: {as_typed(reason.reason)}{remedy}{hint}", icon=":material/help:")
+
+
+def _show_numbers(angle: ShaftAngle) -> None:
+    low, high = angle.speed_range_rpm
+    uncertainty = angle.relative_speed_uncertainty
+    numbers = (
+        ("Mean speed", f"{angle.mean_speed_rpm:.6g} rpm"),
+        ("Lowest to highest", f"{low:.5g} – {high:.5g} rpm"),
+        ("Uncertainty of the mean", f"± {100 * uncertainty:.2g} %" if isfinite(uncertainty) else "not known"),
+        ("Revolutions", f"{angle.n_revolutions:.5g}"),
+        ("Quality", f"{angle.quality:.2f} of 1"),
+    )
+    for column, (name, text) in zip(st.columns(len(numbers)), numbers, strict=True):
+        column.caption(name)
+        column.markdown(f"**{text}**")
+    st.caption(f"Shaft {as_typed(angle.shaft or 'of reference')}, {METHODS[angle.method]}.")
+
+
+def _show_curve(analysis: Analysis, angle: ShaftAngle) -> None:
+    time, speed = thin(angle.time_s, 60 * angle.speed_rev_per_s)
+    low, high = float(speed.min()), float(speed.max())
+    # rounding at constant speed must not look like a fluctuation
+    margin = max(0.06 * (high - low), (LEAST_SPAN * max(abs(angle.mean_speed_rpm), 1) - (high - low)) / 2)
+    axes = Axes("time (s)", "speed (rpm)", (angle.start_s, angle.end_s), (low - margin, high + margin))
+    show_lines([ChartLine(time, speed, "speed")], axes, state.view_key("speed chart", analysis))
+
 
 STARTS_AND_STOPS = (
     "The machine starts and stops: spectra, orders and averages want a speed that lasts. Backlash, impacts and forces "
@@ -95,3 +152,253 @@ def _say_why_no_orders(analysis: Analysis) -> None:
         show_unknown_speed(analysis.shaft_angle)
     else:
         st.info("There are too few revolutions for an order spectrum.")
+
+
+# --------------------
+# Signals over time and what is wrong with them.
+# --------------------
+
+
+N_SHOWN = 4
+N_MOST = 12
+PANEL_PX = 190
+
+
+def show_channels(analysis: Analysis) -> None:
+    """Show chosen channels over a window of time, and the table of channels with their problems."""
+    recording = analysis.recording
+    for warning in recording.warnings:
+        st.warning(as_typed(warning), icon=":material/warning:")
+    _show_quality(analysis)
+    names = st.multiselect(
+        "Channels shown",
+        recording.channel_names,
+        default=recording.channel_names[:N_SHOWN],
+        max_selections=N_MOST,
+        key=state.view_key("channels shown", analysis),
+    )
+    window = choose_range("Time shown (s)", analysis, recording.duration_s, name="time")
+    for name in names:
+        channel = recording.channels[recording.index(name)]
+        time, values = stretch(recording, name, window)
+        st.markdown(f"**{as_typed(name)}** {as_typed(channel.position)}")
+        label = with_unit(
+            channel.quantity.replace("_", " ") if channel.quantity != "unknown" else "value", channel.unit
+        )
+        show_lines(
+            [ChartLine(*thin(time, values), name)],
+            Axes("time (s)", label, window),
+            state.view_key(f"time of {name}", analysis),
+            height_px=PANEL_PX,
+        )
+
+
+def stretch(recording: Recording, name: str, window_s: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """Return times and samples inside a window, at least two samples."""
+    rate, n = recording.sampling_rate_hz, recording.n_samples
+    start = min(max(int(window_s[0] * rate), 0), max(n - 2, 0))
+    stop = min(max(int(np.ceil(window_s[1] * rate)) + 1, start + 2), n)
+    return np.arange(start, stop) / rate, recording.values(name)[start:stop]
+
+
+def _show_quality(analysis: Analysis) -> None:
+    recording = analysis.recording
+    problems = channel_problems(state.view_key("problems", analysis), recording)
+    table = {
+        "channel": recording.channel_names,
+        "quantity": [c.quantity.replace("_", " ") for c in recording.channels],
+        "unit": [unit_text(c.unit) or "not known" for c in recording.channels],
+        "position": [c.position for c in recording.channels],
+        "smallest": [float(row.min()) for row in recording.samples],
+        "mean": [float(row.mean(dtype=np.float64)) for row in recording.samples],
+        "largest": [float(row.max()) for row in recording.samples],
+        "data quality": [
+            ", ".join(p.kind for p in problems if p.channel == c.name) or ("good" if c.is_vibration else "not examined")
+            for c in recording.channels
+        ],
+    }
+    number = st.column_config.NumberColumn(format="%.4g")
+    config = {
+        "channel": st.column_config.TextColumn(width="small"),
+        **dict.fromkeys(("smallest", "mean", "largest"), number),
+    }
+    st.dataframe(table, hide_index=True, column_config=config, width="stretch")
+    for problem in problems:
+        text = f"**{as_typed(problem.channel)}** is {problem.kind}: {as_typed(problem.evidence)}. "
+        st.warning(f"{text}{as_typed(problem.remedy)}.", icon=":material/warning:")
+
+
+# --------------------
+# The table of indicators, to filter and to take away.
+# --------------------
+
+
+_FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
+
+
+def show_indicators(analysis: Analysis) -> None:
+    """Show the indicators with filters, and offer them as CSV."""
+    if not analysis.indicators:
+        st.info("There are no indicators: no vibration channel could be analysed.")
+        return
+    table = indicator_frame(analysis.indicators, changes(analysis) if analysis.reference is not None else ())
+    words, channel, place = st.columns(3, vertical_alignment="bottom")
+    text = words.text_input("Name contains", key=state.view_key("indicator words", analysis))
+    channels = channel.multiselect(
+        "Channels", _values(table, "channel"), key=state.view_key("indicator channels", analysis)
+    )
+    places = place.multiselect(
+        "Gear, shaft or band", _values(table, "of"), key=state.view_key("indicator of", analysis)
+    )
+    kept = table
+    if text:
+        kept = kept[kept["indicator"].str.contains(text, case=False, regex=False)]
+    if channels:
+        kept = kept[kept["channel"].isin(channels)]
+    if places:
+        kept = kept[kept["of"].isin(places)]
+    number = st.column_config.NumberColumn(format="%.5g")
+    config = {"value": number, "reference": number, "change (dB)": st.column_config.NumberColumn(format="%+.1f")}
+    st.dataframe(kept, hide_index=True, width="stretch", height=520, column_config=config)
+    left, right = st.columns((3, 1), vertical_alignment="center")
+    left.caption(f"{len(kept)} of {len(table)} indicators")
+    right.download_button(
+        "Download CSV",
+        csv_text(kept),
+        file_name="indicators.csv",
+        mime="text/csv",
+        on_click="ignore",
+        icon=":material/download:",
+        width="stretch",
+    )
+
+
+def indicator_frame(indicators: tuple[Indicator, ...], compared: tuple[IndicatorChange | None, ...] = ()) -> DataFrame:
+    """Return indicators as a table, one per line; with changes also what they were in the reference."""
+    from pandas import DataFrame
+
+    rows = [
+        {
+            "indicator": i.name,
+            "value": i.value,
+            "unit": unit_text(i.unit),
+            "channel": i.channel,
+            "of": i.gear or i.bearing or i.shaft or i.band,
+            "computed on": i.computed_on,
+            "band": i.band,
+            "remark": i.note,
+        }
+        for i in indicators
+    ]
+    table = DataFrame(rows)
+    if compared:
+        then = [nan if change is None else change.reference_value for change in compared]
+        moved = [nan if change is None or change.change_db is None else change.change_db for change in compared]
+        table.insert(2, "reference", then)
+        table.insert(3, "change (dB)", moved)
+    return table
+
+
+def csv_text(table: DataFrame) -> str:
+    """Return the table as CSV; a name that a spreadsheet would run as a formula gets a quote before it."""
+    texts = table.select_dtypes(exclude="number").columns
+    safe = table.copy()
+    for name in texts:
+        safe[name] = [f"'{v}" if str(v).startswith(_FORMULA_STARTS) else v for v in table[name]]
+    return safe.to_csv(index=False)
+
+
+def _values(table: DataFrame, column: str) -> list[str]:
+    return [str(value) for value in table[column].unique() if value]
+
+
+# --------------------
+# Levels along a run-up, over order and time.
+# --------------------
+
+
+def show_order_map(analysis: Analysis, channel: ChannelAnalysis) -> None:
+    """Show the map of a channel, or say why there is none."""
+    order_map = channel.order_map
+    if order_map is None:
+        st.info("The speed changes by less than 1 %, or is not known. A map is made of a run-up or coast-down.")
+        return
+    from gearsig.plot import order_map_figure
+
+    end = float(order_map.positions[-1])
+    first = end
+    if channel.order_spectrum is not None:
+        first = min(end, highest_order_of_interest(analysis, channel.order_spectrum))
+    label = "Highest order shown" if order_map.axis == "order" else "Highest frequency shown (Hz)"
+    highest = choose_end(label, analysis, end, first)
+    on_orders = order_map.axis == "order"
+    cursors = [c for c in line_cursors(analysis, order_map) if c.kind == "mesh"] if on_orders else []
+    show_picture(
+        order_map_figure(order_map, cursors, highest=highest),
+        f"Levels of {channel.channel} over {order_map.axis} and time, with the speed",
+    )
+    st.caption("Upright lines turn with the shaft; bent bands are resonances that stay at their frequency.")
+
+
+# --------------------
+# A machine that starts and stops: its figures, as in the report.
+# --------------------
+
+
+def show_start_stop(analysis: Analysis) -> None:
+    """Show course, planes of the teeth, impacts and force from motion, one below the other."""
+    from gearsig.report import start_stop_figures
+
+    if analysis.motion is None:
+        return
+    for drawn in start_stop_figures(analysis.motion):
+        show_picture(drawn.figure, drawn.alternative)
+        st.caption(as_typed(drawn.caption))
+
+
+# --------------------
+# The report to take away.
+# --------------------
+
+
+def show_report(analysis: Analysis, request: AnalysisRequest) -> None:
+    """Offer the page that `gearsig report` writes, and the command that repeats the analysis."""
+    st.markdown(
+        "One self-contained HTML page: verdict, findings, figures, indicators, and where everything came from. "
+        "It opens without a network and holds no scripts."
+    )
+    st.download_button(
+        "Download the report",
+        data=lambda: report_page(request, analysis),
+        file_name=f"{safe_file_name(request.name).split('.')[0] or 'recording'}.html",
+        mime="text/html",
+        on_click="ignore",
+        type="primary",
+        icon=":material/download:",
+    )
+    st.markdown("The same diagnosis from the command line:")
+    st.code(command_of(request), language="bash", wrap_lines=True)
+    if request.rig_text.strip():
+        st.download_button(
+            "Download the rig file, with what was changed here",
+            request.rig_text,
+            file_name=f"{safe_file_name(request.rig_name).removesuffix('.toml')}.toml",
+            mime="application/toml",
+            on_click="ignore",
+            icon=":material/download:",
+        )
+    _show_provenance(analysis)
+
+
+def _show_provenance(analysis: Analysis) -> None:
+    recording = analysis.recording
+    rows = [
+        ("file", recording.provenance.source),
+        ("SHA-256", recording.provenance.sha256),
+        ("reader", recording.provenance.reader),
+        *((f"step {i}", step) for i, step in enumerate(recording.provenance.history, 1)),
+        *((name, str(value)) for name, value in analysis.settings.items()),
+    ]
+    table = {"provenance": [name for name, _ in rows], "": [text for _, text in rows]}
+    config = {"provenance": st.column_config.TextColumn(width="small"), "": st.column_config.TextColumn(width="large")}
+    st.dataframe(table, hide_index=True, width="stretch", column_config=config)

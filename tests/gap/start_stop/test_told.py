@@ -7,11 +7,20 @@ import numpy as np
 import pytest
 
 from gearsig.errors import RefusalError
-from gearsig.gap.start_stop.contact_part import _robust
-from gearsig.gap.start_stop.cycles import PHASES, cut_cycles, halves, thin
-from gearsig.gap.start_stop.prediction_error import prediction_errors
-from gearsig.gap.start_stop.told import NAMES, Examined, Spot, change_of, spot_of
-from gearsig.motion.measure import measure_motion
+from gearsig.gap import (
+    NAMES,
+    PHASES,
+    LocatedDriveChange,
+    PreparedCycles,
+    change_of,
+    cut_cycles,
+    halves,
+    prediction_errors,
+    spot_of,
+    thin,
+)
+from gearsig.gap.start_stop._features import _robust
+from gearsig.motion import measure_motion
 from sims import simulate
 
 SHAPE = np.linspace(-1.0, 1.0, 20)
@@ -33,15 +42,15 @@ def motion(effect: str = "", severity: float = 0.0, duration_s: float = 12.0, mo
 
 
 @cache
-def examined(effect: str = "", severity: float = 0.0) -> Examined:
-    return Examined(cut_cycles(motion(effect, severity)))
+def examined(effect: str = "", severity: float = 0.0) -> PreparedCycles:
+    return PreparedCycles(cut_cycles(motion(effect, severity)))
 
 
-def told(one: Examined):
+def told(one: PreparedCycles):
     return one.tell(one.every)
 
 
-def change(name: str, now: Examined, other: Examined, at: Spot | None = None) -> float:
+def change(name: str, now: PreparedCycles, other: PreparedCycles, at: LocatedDriveChange | None = None) -> float:
     return float(change_of(told(now), told(other), SHAPE, at)[NAMES.index(name)])
 
 
@@ -109,7 +118,7 @@ def test_a_tooth_that_gives_way_is_found_by_its_place():
     m = sound.cycles.motion
     extra = np.where(sound.flanks.tooth == 7, 3e-6, 0.0)
     moved = replace(m, driven_angle_rad=m.driven_angle_rad - extra / m.path.base_radii_m[1])
-    now = Examined(replace(sound.cycles, motion=moved))
+    now = PreparedCycles(replace(sound.cycles, motion=moved))
     assert spot_of(told(now), told(sound)).tooth == 7
     assert told(now).contact.teeth_um[7] == pytest.approx(3.0, abs=0.4)
     elsewhere = replace(spot_of(told(now), told(sound)), tooth=12)
@@ -117,7 +126,7 @@ def test_a_tooth_that_gives_way_is_found_by_its_place():
 
 
 def test_without_torque_the_play_is_told_and_the_load_is_not():
-    now = Examined(replace(examined().cycles, motion=replace(examined().cycles.motion, torque_nm=None)))
+    now = PreparedCycles(replace(examined().cycles, motion=replace(examined().cycles.motion, torque_nm=None)))
     found = told(now)
     assert found.contact.play_um == pytest.approx(300.0, rel=0.25)
     assert np.isnan(found.load.inertia_kg_m2)

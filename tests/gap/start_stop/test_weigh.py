@@ -7,11 +7,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.gap.posterior import GapCalibration
-from gearsig.gap.start_stop.floors import FLOOR, DriveFloor, load_floor, load_floors
-from gearsig.gap.start_stop.told import NAMES
-from gearsig.gap.start_stop.weigh import Predicted, evidences, fit, own_features, shares, shrink
-from gearsig.gap.types import NONE, UNKNOWN
+from gearsig.gap import (
+    FLOOR,
+    NAMES,
+    NONE,
+    UNKNOWN,
+    DriveFloor,
+    GapCalibration,
+    Predicted,
+    evidences,
+    fit,
+    load_floor,
+    load_floors,
+    own_features,
+    shares,
+    shrink,
+)
 
 N = len(NAMES)
 FLOOR_OF_ONE = DriveFloor(np.zeros(N), np.ones(N), 1.0)

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import welch
 
-from gearsig.recording.types import Recording
+from gearsig.recording import Recording
 
 PER_TURN = 512
 TURNS = 8

@@ -6,8 +6,17 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from sims.blind import CATALOGUE, MECHANICAL, OUTSIDE, ROLES, Case, draw_case, record_case
-from sims.blind.rig import MODULES_MM, teeth_of
+from sims.blind import (
+    CATALOGUE,
+    MECHANICAL,
+    MODULES_MM,
+    OUTSIDE_CATALOGUE,
+    ROLES,
+    BlindCase,
+    draw_case,
+    record_case,
+    teeth_of,
+)
 
 NAMES = {
     "root_crack", "tooth_spall", "chipped_tooth", "tooth_wear", "pitch_error", "surface_roughness", "sliding_friction",
@@ -16,11 +25,11 @@ NAMES = {
 }  # fmt: skip
 
 
-def draw(seed: int, role: str = "development", **wishes: object) -> Case:
+def draw(seed: int, role: str = "development", **wishes: object) -> BlindCase:
     return draw_case(np.random.default_rng(seed), role, **wishes)
 
 
-def short(case: Case) -> Case:
+def short(case: BlindCase) -> BlindCase:
     """The same case with recordings of one second."""
 
     def cut(conditions: tuple) -> tuple:
@@ -32,10 +41,10 @@ def short(case: Case) -> Case:
 def test_the_catalogue_is_whole() -> None:
     assert set(CATALOGUE) == NAMES
     assert len(MECHANICAL) == 16
-    assert not set(OUTSIDE) & NAMES
-    alike = [c.resembles for c in OUTSIDE.values() if c.resembles]
+    assert not set(OUTSIDE_CATALOGUE) & NAMES
+    alike = [c.resembles for c in OUTSIDE_CATALOGUE.values() if c.resembles]
     assert set(alike) <= NAMES
-    assert 2 * len(alike) >= len(OUTSIDE)
+    assert 2 * len(alike) >= len(OUTSIDE_CATALOGUE)
 
 
 def test_roles_share_no_gear() -> None:
@@ -56,7 +65,7 @@ def test_cases_cover_what_is_asked() -> None:
     kinds = [c.kind for c in cases]
     for kind, share in (("none", 0.2), ("single", 0.5), ("unknown", 0.2), ("pair", 0.1)):
         assert kinds.count(kind) / len(kinds) == pytest.approx(share, abs=0.08)
-    assert {f.name for c in cases for f in c.faults} == NAMES | set(OUTSIDE)
+    assert {f.name for c in cases for f in c.faults} == NAMES | set(OUTSIDE_CATALOGUE)
     for case in cases:
         assert len(case.faults) == {"none": 0, "single": 1, "unknown": 1, "pair": 2}[case.kind]
         assert len(case.references) in (0, len(case.conditions))
@@ -65,7 +74,7 @@ def test_cases_cover_what_is_asked() -> None:
             assert 4 <= c.duration_s <= 8
             assert 0.7 < c.true_nm / c.stated_nm < 1.3
             assert c.true_rpm / 60 * case.rig.pair.z1 < 0.16 * case.rig.sampling_rate_hz
-    unknown = [OUTSIDE[f.name].resembles != "" for c in cases if c.kind == "unknown" for f in c.faults]
+    unknown = [OUTSIDE_CATALOGUE[f.name].resembles != "" for c in cases if c.kind == "unknown" for f in c.faults]
     assert np.mean(unknown) == pytest.approx(0.5, abs=0.15)
     for case in (c for c in cases if c.kind == "pair"):
         assert len({CATALOGUE[f.name].group for f in case.faults}) == 2
@@ -74,7 +83,7 @@ def test_cases_cover_what_is_asked() -> None:
 def test_rig_and_conditions_do_not_know_the_fault() -> None:
     for seed in range(5):
         plain = draw(seed, kind="none", n_conditions=2, with_reference=True)
-        for name in (NAMES | set(OUTSIDE)) - {"backlash"}:
+        for name in (NAMES | set(OUTSIDE_CATALOGUE)) - {"backlash"}:
             other = draw(seed, effect=name, n_conditions=2, with_reference=True)
             assert other.conditions == plain.conditions
             assert other.references == plain.references
@@ -91,7 +100,7 @@ def test_backlash_runs_light_first() -> None:
 
 
 def test_severity_rises_with_level() -> None:
-    for name in NAMES | set(OUTSIDE):
+    for name in NAMES | set(OUTSIDE_CATALOGUE):
         low, mid, high = (draw(1, effect=name, level=x).faults[0].severity for x in (0.0, 0.5, 1.0))
         assert 0 < low < mid < high
         assert mid == pytest.approx(np.sqrt(low * high))

@@ -5,13 +5,21 @@ import pytest
 from scipy.integrate import quad
 from scipy.signal import hilbert
 
-from sims.blind.changes.catalogue import CATALOGUE, EVERY
-from sims.blind.changes.flank import wear_shape
-from sims.blind.changes.tooth import ROOT_MODULES, crack_compliance
-from sims.blind.geometry import SpurPair
-from sims.blind.rig import draw_rig
-from sims.blind.scene import Condition, Motion, Scene, run, scene_of
-from sims.blind.sensing import measure
+from sims.blind import (
+    CATALOGUE,
+    EVERY,
+    ROOT_MODULES,
+    BlindMotion,
+    RunCondition,
+    Scene,
+    SpurPair,
+    crack_compliance,
+    draw_rig,
+    measure,
+    run,
+    scene_of,
+    wear_shape,
+)
 
 PER_TURN = 1024
 RIG = draw_rig(np.random.default_rng(5), "calibration")
@@ -21,17 +29,17 @@ EVERYWHERE = " ".join(f"a{i + 1}" for i in range(len(RIG.chains)))
 
 def scene(share: float = 0.6, rpm: float = 1500.0, duration_s: float = 1.2) -> Scene:
     nm = share * RIG.rated_nm
-    return scene_of(RIG, Condition(rpm, nm, rpm, nm, duration_s, 21, 22))
+    return scene_of(RIG, RunCondition(rpm, nm, rpm, nm, duration_s, 21, 22))
 
 
-def changed(name: str, severity: float, choice: int = 0, **wishes: float) -> tuple[Scene, Motion, dict]:
+def changed(name: str, severity: float, choice: int = 0, **wishes: float) -> tuple[Scene, BlindMotion, dict]:
     made = scene(**wishes)
     place = EVERY[name].apply(made, severity, np.random.default_rng(choice))
     return made, run(made), dict(place)
 
 
 @pytest.fixture(scope="module")
-def healthy() -> Motion:
+def healthy() -> BlindMotion:
     return run(scene())
 
 
@@ -44,7 +52,7 @@ def choice_with(name: str, **wanted: object) -> int:
     )
 
 
-def turns(motion: Motion, x: np.ndarray, shaft: int = 0) -> np.ndarray:
+def turns(motion: BlindMotion, x: np.ndarray, shaft: int = 0) -> np.ndarray:
     """A signal at even angles of a shaft, (n_turns, PER_TURN)."""
     theta = motion.theta[shaft] / (2 * np.pi)
     first, last = int(np.ceil(theta[0])), int(np.floor(theta[-1]))
@@ -52,7 +60,7 @@ def turns(motion: Motion, x: np.ndarray, shaft: int = 0) -> np.ndarray:
     return np.interp(at, theta, x).reshape(last - first, PER_TURN)
 
 
-def line(motion: Motion, x: np.ndarray, order: float, shaft: int = 0) -> float:
+def line(motion: BlindMotion, x: np.ndarray, order: float, shaft: int = 0) -> float:
     """Amplitude at an order of a shaft."""
     whole = turns(motion, x, shaft).ravel()
     whole = (whole - whole.mean()) * np.hanning(len(whole))
@@ -65,7 +73,7 @@ def severity(name: str, level: float) -> float:
 
 
 @pytest.mark.parametrize("name", ["root_crack", "tooth_spall", "chipped_tooth"])
-def test_a_bad_tooth_shows_at_its_angle(name: str, healthy: Motion) -> None:
+def test_a_bad_tooth_shows_at_its_angle(name: str, healthy: BlindMotion) -> None:
     """Most of the change of the mean turn lies within two teeth of the place given, and it grows."""
     choice = choice_with(name, gear="pinion")
     sizes = []
@@ -109,18 +117,18 @@ def test_wear_spares_the_pitch_point() -> None:
     assert min(one.min(), two.min()) >= 0
 
 
-def test_wear_raises_the_mesh_error(healthy: Motion) -> None:
+def test_wear_raises_the_mesh_error(healthy: BlindMotion) -> None:
     """More of the static compression is lost to the worn flanks with every step."""
     means = [changed("tooth_wear", severity("tooth_wear", x))[1].squeeze_m.mean() for x in (0.3, 0.6, 1.0)]
     assert healthy.squeeze_m.mean() < means[0] < means[1] < means[2]
 
 
-def test_pitch_error_draws_shaft_lines(healthy: Motion) -> None:
+def test_pitch_error_draws_shaft_lines(healthy: BlindMotion) -> None:
     """Lines of its shaft that are no mesh lines rise with the severity; those of the mesh much less."""
     choice = choice_with("pitch_error", gear="pinion")
     orders = [k for k in range(3, PAIR.z1) if k != PAIR.z1]
 
-    def energy(motion: Motion) -> float:
+    def energy(motion: BlindMotion) -> float:
         return sum(line(motion, motion.squeeze_m, k) ** 2 for k in orders)
 
     found = [energy(healthy)] + [
@@ -158,7 +166,7 @@ def test_friction_pushes_across_the_line_of_action() -> None:
     assert found[2] - found[1] == pytest.approx(found[1] - found[0], rel=0.25)
 
 
-def test_eccentricity_is_a_once_per_turn_run_out(healthy: Motion) -> None:
+def test_eccentricity_is_a_once_per_turn_run_out(healthy: BlindMotion) -> None:
     for shaft, gear in enumerate(("pinion", "wheel")):
         choice = choice_with("eccentricity", gear=gear)
         _, motion, _ = changed("eccentricity", 40.0, choice)
@@ -172,7 +180,7 @@ def test_eccentricity_is_a_once_per_turn_run_out(healthy: Motion) -> None:
         assert side > 2 * before
 
 
-def test_unbalance_turns_with_its_shaft(healthy: Motion) -> None:
+def test_unbalance_turns_with_its_shaft(healthy: BlindMotion) -> None:
     """Force m e ω² on the bearing at order 1, and at no other shaft's; 90° apart in x and y."""
     choice = choice_with("unbalance", shaft="input")
     _, motion, _ = changed("unbalance", 2000.0, choice)
@@ -186,7 +194,7 @@ def test_unbalance_turns_with_its_shaft(healthy: Motion) -> None:
         )
 
 
-def test_misalignment_doubles_the_shaft_order(healthy: Motion) -> None:
+def test_misalignment_doubles_the_shaft_order(healthy: BlindMotion) -> None:
     choice = choice_with("misalignment", shaft="input")
     twice = [line(healthy, healthy.bearing_n[0], 2.0) + line(healthy, healthy.bearing_n[1], 2.0)]
     for um in (20.0, 60.0):
@@ -195,7 +203,7 @@ def test_misalignment_doubles_the_shaft_order(healthy: Motion) -> None:
     assert twice[0] < twice[1] < twice[2]
 
 
-def test_torque_ripple_at_its_order(healthy: Motion) -> None:
+def test_torque_ripple_at_its_order(healthy: BlindMotion) -> None:
     choice = choice_with("torque_ripple", shaft="output")
     force = []
     for percent in (5.0, 20.0):
@@ -229,14 +237,14 @@ def test_backlash_matters_only_when_teeth_part() -> None:
 
 
 @pytest.mark.parametrize(("name", "key"), [("bearing_outer_race", "BPFO"), ("bearing_inner_race", "BPFI")])
-def test_race_defects_strike_at_the_bearing_order(name: str, key: str, healthy: Motion) -> None:
+def test_race_defects_strike_at_the_bearing_order(name: str, key: str, healthy: BlindMotion) -> None:
     """The envelope of the bearing's force has a line near the order, below it by no more than the cage's slip."""
     choice = choice_with(name, shaft="input")
     _, motion, place = changed(name, 1.5, choice, duration_s=3.0)
     order = RIG.bearing(0).orders()[key]
     assert place["order"] == pytest.approx(order, abs=1e-4)
 
-    def envelope(of: Motion) -> np.ndarray:
+    def envelope(of: BlindMotion) -> np.ndarray:
         x = turns(of, of.bearing_n[0]).ravel()
         x = np.diff(x, 2)
         return np.asarray(np.abs(hilbert(x)))
@@ -250,7 +258,7 @@ def test_race_defects_strike_at_the_bearing_order(name: str, key: str, healthy: 
     assert env.std() > envelope(healthy).std()
 
 
-def test_clearance_lets_the_shaft_move(healthy: Motion) -> None:
+def test_clearance_lets_the_shaft_move(healthy: BlindMotion) -> None:
     """The bearing still carries the load; its force passes more of the elements' passing."""
     choice = choice_with("bearing_clearance", shaft="input")
     _, motion, _ = changed("bearing_clearance", 20.0, choice)

@@ -6,10 +6,7 @@ from math import gcd, lcm
 import numpy as np
 import pytest
 
-from sims.blind.changes.catalogue import EVERY
-from sims.blind.rig import BlindRig, draw_rig
-from sims.blind.scene import Condition, Motion, Scene, run, scene_of
-from sims.blind.sensing import accelerations
+from sims.blind import EVERY, BlindMotion, BlindRig, RunCondition, Scene, accelerations, draw_rig, run, scene_of
 
 PER_TOOTH = 16
 SEEDS = (31, 32, 33)
@@ -28,12 +25,12 @@ COPRIME, FIVES, SIXES = drawn(1), drawn(5), drawn(6)
 def begun(rig: BlindRig, seed: int, *, duration_s: float = 1.5) -> Scene:
     """The rig in good order at a steady speed, the sensors mounted once."""
     nm = 0.6 * rig.rated_nm
-    scene = scene_of(rig, Condition(2000.0, nm, 2000.0, nm, duration_s, seed, 5))
+    scene = scene_of(rig, RunCondition(2000.0, nm, 2000.0, nm, duration_s, seed, 5))
     scene.speed = np.column_stack([np.full(len(scene.speed), scene.omega[0]), np.zeros(len(scene.speed))])
     return scene
 
 
-def mean_turns(rig: BlindRig, motion: Motion, x: np.ndarray) -> list[np.ndarray]:
+def mean_turns(rig: BlindRig, motion: BlindMotion, x: np.ndarray) -> list[np.ndarray]:
     """Spectra of the mean turns of both shafts, the tachometer's pulse first, over whole rounds of all tooth pairs."""
     pair, theta = rig.pair, motion.theta[0] / (2 * np.pi)
     first = np.ceil(theta[0])

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from sims.blind.geometry import SpurPair
+from sims.blind import SpurPair
 
 pairs = st.builds(
     SpurPair, st.integers(22, 70), st.integers(22, 70), st.sampled_from([1.5, 3.0, 6.0]), st.floats(10.0, 60.0)

@@ -5,17 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sims.blind.rig import BlindRig, draw_rig
-from sims.blind.scene import Condition, run, scene_of
-from sims.blind.sensing import coloured_noise, measure, path_response
+from sims.blind import BlindRig, RunCondition, coloured_noise, draw_rig, measure, path_response, run, scene_of
 from tests.sims.blind.order_domain import by_angle, order_power, pulse_times_s
 
 SEEDS = range(8)
 
 
-def steady(rig: BlindRig, rpm: float = 1300.0, share: float = 0.6, duration_s: float = 2.0) -> Condition:
+def steady(rig: BlindRig, rpm: float = 1300.0, share: float = 0.6, duration_s: float = 2.0) -> RunCondition:
     nm = share * rig.rated_nm
-    return Condition(rpm, nm, rpm, nm, duration_s, 11, 12)
+    return RunCondition(rpm, nm, rpm, nm, duration_s, 11, 12)
 
 
 @pytest.fixture(scope="module")

@@ -7,11 +7,22 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sims.blind import march_numbers as at
-from sims.blind.kernel import march
-from sims.blind.rig import BlindRig, draw_rig
-from sims.blind.scene import Condition, Scene, march_arguments, run, scene_of
-from sims.blind.structure import mass_matrix, modes_of, seen_rows, step_coefficients, stiffness_matrix
+from sims.blind import (
+    BlindRig,
+    RunCondition,
+    Scene,
+    draw_rig,
+    march,
+    march_arguments,
+    mass_matrix,
+    modes_of,
+    run,
+    scene_of,
+    seen_rows,
+    step_coefficients,
+    stiffness_matrix,
+)
+from sims.blind import _march as at
 
 NUMBER, MODAL, Q, P, SUPPORTS, TABLES, LINES, SPEED = 4, 5, 6, 7, 8, 9, 11, 12
 
@@ -20,9 +31,9 @@ def rig(seed: int = 3) -> BlindRig:
     return draw_rig(np.random.default_rng(seed), "development")
 
 
-def condition(of: BlindRig, rpm: float = 1200.0, share: float = 0.6, duration_s: float = 0.3) -> Condition:
+def condition(of: BlindRig, rpm: float = 1200.0, share: float = 0.6, duration_s: float = 0.3) -> RunCondition:
     nm = share * of.rated_nm
-    return Condition(rpm, nm, rpm, nm, duration_s, 7, 8)
+    return RunCondition(rpm, nm, rpm, nm, duration_s, 7, 8)
 
 
 def smooth_scene() -> Scene:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsig.recording.types import Recording
-from sims.blind import CATALOGUE, OUTSIDE, draw_case, record_case
+from gearsig.recording import Recording
+from sims.blind import CATALOGUE, OUTSIDE_CATALOGUE, draw_case, record_case
 from tests.sims.blind.order_domain import distance_db
 
 SEED = {"backlash": 6}
@@ -23,7 +23,7 @@ def twins(name: str, level: float) -> tuple[Recording, Recording]:
     return made.conditions[0], made.twins[0]
 
 
-@pytest.mark.parametrize("name", [*CATALOGUE, *OUTSIDE])
+@pytest.mark.parametrize("name", [*CATALOGUE, *OUTSIDE_CATALOGUE])
 def test_the_change_grows_with_the_level(name: str) -> None:
     weak, strong = (distance_db(*twins(name, level)) for level in (0.15, 1.0))
     assert strong > weak

@@ -10,15 +10,16 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.recording.read import read_recording
-from gearsig.rig.toml import read_rig
-from sims.blind import CATALOGUE, OUTSIDE, Case, draw_case, write_case
+from gearsig.recording import read_recording
+from gearsig.rig import read_rig
+from sims.blind import CATALOGUE, OUTSIDE_CATALOGUE, BlindCase, draw_case, write_case
 
-WORDS = [*CATALOGUE, *OUTSIDE, "severity", "seed", "twin", "sims", "blind", "none\"", "single", "unknown_effect",
+WORDS = [*CATALOGUE, *OUTSIDE_CATALOGUE, "severity", "seed", "twin", "sims", "blind", "none\"", "single",
+         "unknown_effect",
          "development", "calibration", "evaluation", "fault", "healthy", "level"]  # fmt: skip
 
 
-def short_case(seed: int, **wishes: object) -> Case:
+def short_case(seed: int, **wishes: object) -> BlindCase:
     case = draw_case(np.random.default_rng(seed), "calibration", n_conditions=2, with_reference=True, **wishes)
     return replace(
         case,
@@ -28,7 +29,7 @@ def short_case(seed: int, **wishes: object) -> Case:
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Case, Path, Path]]:
+def written(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[BlindCase, Path, Path]]:
     made = []
     for i, wishes in enumerate(
         ({"kind": "none"}, {"effect": "root_crack"}, {"effect": "coupling_knock"}, {"effect": "clipping"})

@@ -6,24 +6,35 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gearsig.motion.measure import measure_motion
-from sims.blind_drive import CATALOGUE, OUTSIDE, draw_case, label_of, record_case
-from sims.blind_drive.changes import changed
-from sims.blind_drive.kernel import N_STATES, march
-from sims.blind_drive.machine import GEARS, Machine, build, draw_drawing
-from sims.blind_drive.measure import Chain, run
+from gearsig.motion import measure_motion
+from sims.blind_drive import (
+    CATALOGUE,
+    GEARS,
+    N_STATES,
+    OUTSIDE,
+    BlindDrive,
+    Chain,
+    build,
+    changed,
+    draw_case,
+    draw_drawing,
+    label_of,
+    march,
+    record_case,
+    run,
+)
 
 CLEAN = Chain(2**26, 8, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
 @cache
-def machine(**numbers: float) -> Machine:
+def machine(**numbers: float) -> BlindDrive:
     rng = np.random.default_rng(5)
     made = build(rng, draw_drawing(rng, "development"))
     return replace(made, numbers={**made.numbers, "blow": 0.0, **numbers})
 
 
-def recorded(made: Machine, duration_s: float = 2.0):
+def recorded(made: BlindDrive, duration_s: float = 2.0):
     return run(made, CLEAN, duration_s, np.random.default_rng(1))
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from sims.cracked.constants import Constants
+from sims.cracked import PairConstants
 from sims.machine import Drive, Lubrication, Machine
 from sims.mesh import RootCrack
 
@@ -35,25 +35,25 @@ def cracked(machine: Machine, depth_mm: float) -> Machine:
     return replace(machine, mesh=replace(machine.mesh, cracks_1=(RootCrack(depth_mm),)))
 
 
-def one_lasting_pair(k: Constants) -> Constants:
+def one_lasting_pair(k: PairConstants) -> PairConstants:
     """Return constants in which one tooth pair of constant stiffness touches all the time."""
     k = with_record(k, n_slots=3, contact_ratio=1.0 - 1e-12, ramp=0.0, **FIXED_CENTRES)
     curves = k.curves.copy()
     for kind in range(2):
         curves[k.rows[kind]] = curves[k.rows[kind, 0]].mean()
-    return Constants(k.record, curves, k.rows, k.pitch)
+    return PairConstants(k.record, curves, k.rows, k.pitch)
 
 
 FIXED_CENTRES = {"late_x": 0.0, "late_y": 0.0, "turn_x": 0.0}
 """Tooth pairs enter as if the gears' centres stood still: the force that belongs to it is no part of the model."""
 
 
-def with_record(k: Constants, **values: float) -> Constants:
+def with_record(k: PairConstants, **values: float) -> PairConstants:
     """Return constants with other numbers in their record."""
     record = np.array(k.record, dtype=k.record.dtype)
     for name, value in values.items():
         record[name] = value
-    return Constants(record[()], k.curves, k.rows, k.pitch)
+    return PairConstants(record[()], k.curves, k.rows, k.pitch)
 
 
 def moving_state(rng: np.random.Generator, *, delta_m: float = 2e-5, base_radii_m: Any = None) -> Any:

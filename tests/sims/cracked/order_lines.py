@@ -7,10 +7,9 @@ from functools import cache
 import numpy as np
 
 from gearsig.checks import FloatArray
-from sims.cracked.respond import respond
+from sims.cracked import respond
 from sims.effects import EffectSetting, with_effects
-from sims.machine import Machine
-from sims.machine.operation import Operation
+from sims.machine import Machine, Operation
 from tests.sims.machines import TEETH, spur_pair_machine
 
 OUTPUT_ORDER = TEETH[0] / TEETH[1]

@@ -3,9 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from sims.cracked.respond import Response, respond
-from sims.machine import Machine
-from sims.machine.operation import Operation
+from sims.cracked import Response, respond
+from sims.machine import Machine, Operation
 
 
 def run(

@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from sims.cracked.continuation import DECAYS, Branch
-from sims.cracked.linear import slowest_decay_s
-from sims.cracked.respond import State, respond
-from sims.cracked.simulator import CrackedPair
+from sims.cracked import DECAYS, Branch, CrackedPair, PairState, respond, slowest_decay_s
 from sims.effects import EffectSetting
-from sims.gear_pair.drive import total_inertia_kg_m2
-from sims.machine.operation import Course, Operation
+from sims.gear_pair import total_inertia_kg_m2
+from sims.machine import Operation, Profile
 from sims.sweep import Axis, Sweep
 
 OPERATION = Operation.steady(1500.0, 40.0)
@@ -31,7 +28,7 @@ def branch(name, values, preset="symmetric_50_50", torque_nm=20.0, effects=(), p
         preset=preset,
         parameters=dict(parameters),
         effects=effects,
-        torque_nm=None if name == "torque_nm" else Course.constant(torque_nm),
+        torque_nm=None if name == "torque_nm" else Profile.constant(torque_nm),
         common_seed=True,
     )
     return Branch(sweep, **more)
@@ -66,7 +63,7 @@ def test_a_state_is_not_changed_by_the_run_that_starts_from_it():
 
 def test_a_state_of_another_model_is_refused():
     with pytest.raises(InputError, match="a state of 3 coordinates"):
-        run(State(np.zeros(3), np.zeros(3), 0.0))
+        run(PairState(np.zeros(3), np.zeros(3), 0.0))
 
 
 def test_the_slowest_decay_is_the_drive_s_recovery_or_that_of_the_least_damped_mode():
@@ -151,7 +148,7 @@ def test_a_branch_needs_one_axis_and_steady_speed():
     axes = (Axis("speed_rpm", (500.0,)), Axis("torque_nm", (10.0,)))
     with pytest.raises(InputError, match="2 things are varied"):
         Branch(Sweep("cracked", axes))
-    ramp = Course.of((0.0, 1.0), (300.0, 900.0))
+    ramp = Profile.of((0.0, 1.0), (300.0, 900.0))
     with pytest.raises(InputError, match="speed_rpm changes with time"):
         Branch(Sweep("cracked", axes[1:], speed_rpm=ramp))
     with pytest.raises(InputError, match="a shaft at rest"):

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sims.cracked.respond import respond
-from sims.machine import Drive, Lubrication, SpeedSwing
-from sims.machine.operation import Course, Operation
+from sims.cracked import respond
+from sims.machine import Drive, Lubrication, Operation, Profile, SpeedSwing
 from tests.sims.cracked.machines import frictionless
 from tests.sims.cracked.runs import run
 from tests.sims.machines import spur_pair_machine
@@ -24,7 +23,7 @@ def test_speed_holds_in_spite_of_friction() -> None:
 @pytest.mark.parametrize(("first", "last"), [(300.0, 900.0), (900.0, 300.0)])
 def test_run_up_and_coast_down_follow_the_course(first: float, last: float) -> None:
     machine = spur_pair_machine()
-    operation = Operation(Course.of([0.0, 1.0], [first, last]), Course.constant(50.0))
+    operation = Operation(Profile.of([0.0, 1.0], [first, last]), Profile.constant(50.0))
     response = respond(
         machine,
         operation,
@@ -48,7 +47,7 @@ def test_run_up_and_coast_down_follow_the_course(first: float, last: float) -> N
 
 
 def test_torque_course_sets_the_mesh_force() -> None:
-    operation = Operation(Course.constant(600.0), Course.of([0.0, 0.5], [20.0, 120.0]))
+    operation = Operation(Profile.constant(600.0), Profile.of([0.0, 0.5], [20.0, 120.0]))
     response = respond(
         frictionless(spur_pair_machine()),
         operation,

@@ -5,14 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sims.cracked.constants import Constants
-from sims.cracked.energy_kernel import place_of_entry, potential_energy
-from sims.cracked.integrate_kernel import derivative, integrate
-from sims.cracked.layout import SIGNALS
-from sims.cracked.respond import prepare
-from sims.gear_pair.bearing import bearing_loads_n
-from sims.machine import Machine, Roughness
-from sims.machine.operation import Operation
+from sims.cracked import SIGNALS, PairConstants, derivative, integrate, place_of_entry, potential_energy, prepare
+from sims.gear_pair import bearing_loads_n
+from sims.machine import Machine, Operation, Roughness
 from tests.sims.cracked.machines import (
     FIXED_CENTRES,
     conservative,
@@ -115,7 +110,7 @@ def test_static_force_of_the_bearings_is_what_they_carry() -> None:
     assert loads[2:, 1].sum() > 1900.0
 
 
-def energy_drift(machine: Machine, k: Constants, step_s: float, duration_s: float, kick_mps: float = 0.0) -> float:
+def energy_drift(machine: Machine, k: PairConstants, step_s: float, duration_s: float, kick_mps: float = 0.0) -> float:
     """Greatest change of energy less the work done."""
     ready = prepare(machine, STEADY, np.random.default_rng(0))
     q, v = ready.q.copy(), ready.v.copy()

@@ -5,14 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sims.cracked.constants import mean_stiffness_n_per_m, mesh_mass_kg
-from sims.cracked.contact_kernel import contact_forces, late_entry
-from sims.cracked.linear import eigenfrequencies_hz, matrices
-from sims.cracked.respond import prepare, respond
-from sims.gear_pair.bearing import bearing_fields, bearing_loads_n
-from sims.gear_pair.bearing_kernel import foot
-from sims.machine import Lubrication, Machine, RaceDefect, Roughness
-from sims.machine.operation import Operation
+from sims.cracked import (
+    contact_forces,
+    eigenfrequencies_hz,
+    late_entry,
+    matrices,
+    mean_stiffness_n_per_m,
+    mesh_mass_kg,
+    prepare,
+    respond,
+)
+from sims.gear_pair import bearing_fields, bearing_loads_n, foot
+from sims.machine import Lubrication, Machine, Operation, RaceDefect, Roughness
 from tests.sims.cracked.machines import conservative, frictionless
 from tests.sims.machines import spur_pair_machine
 
@@ -123,8 +127,7 @@ def test_a_mode_dies_out_at_its_modal_damping() -> None:
 
 
 def _energy_of_mesh(machine: Machine, operation: Operation, velocity: np.ndarray) -> np.ndarray:
-    from sims.cracked.integrate_kernel import integrate
-    from sims.cracked.layout import SIGNALS
+    from sims.cracked import SIGNALS, integrate
 
     ready = prepare(machine, operation, np.random.default_rng(0))
     q, v = ready.q.copy(), ready.v.copy()

@@ -7,14 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from gearsig.errors import InputError, RefusalError
-from sims.cracked.convergence import check_convergence
-from sims.cracked.integrate_kernel import derivative
-from sims.cracked.linear import default_step_s, eigenfrequencies_hz
-from sims.cracked.respond import Response, prepare, respond
-from sims.machine import Lubrication, Machine, Roughness
-from sims.machine.operation import Operation
-from sims.mesh import RootCrack, mesh_stiffness
-from sims.mesh.roughness import FractalSurface
+from sims.cracked import Response, check_convergence, default_step_s, derivative, eigenfrequencies_hz, prepare, respond
+from sims.machine import Lubrication, Machine, Operation, Roughness
+from sims.mesh import FractalSurface, RootCrack, mesh_stiffness
 from tests.sims.cracked.machines import cracked, frictionless
 from tests.sims.cracked.runs import by_angle, run
 from tests.sims.machines import spur_pair_machine
@@ -275,7 +270,7 @@ def test_a_solution_that_bursts_is_refused(torque_nm: float) -> None:
 
 def test_a_run_in_parts_is_the_same_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compiled code returns now and then; roughness, set angle and output go on where they were."""
-    from sims.cracked import respond as module
+    from sims.cracked import _respond as module
 
     machine = replace(spur_pair_machine(), roughness=Roughness(0.84, "time"))
     done: list[float] = []

@@ -13,12 +13,12 @@ import pytest
 from scipy.signal import hilbert
 
 from gearsig.checks import FloatArray
-from gearsig.recording.types import Recording
-from sims.cracked.simulate import simulate_machine
+from gearsig.recording import Recording
+from sims.cracked import simulate_machine
 from sims.effects import EffectSetting, with_effects
-from sims.machine.operation import Operation
-from tests.sims.cracked.order_lines import OUTPUT_ORDER, TEETH, Run, healthy, run, run_machine
-from tests.sims.machines import spur_pair_machine
+from sims.machine import Operation
+from tests.sims.cracked.order_lines import OUTPUT_ORDER, Run, healthy, run, run_machine
+from tests.sims.machines import TEETH, spur_pair_machine
 
 Z = TEETH[0]
 SPEED_RPM, TORQUE_NM = 1000.0, 110.0

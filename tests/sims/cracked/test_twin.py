@@ -10,22 +10,17 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap.gather import gather
-from gearsig.gap.simulator import Added, Point, Twin
-from gearsig.recording.types import Recording
-from gearsig.rig.speed import EncoderChannel, TachometerChannel
-from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
+from gearsig.gap import Added, OperatingCondition, Twin, reduce_recording
+from gearsig.recording import Recording
+from gearsig.rig import Bearing, EncoderChannel, GearPair, OperatingPoint, Rig, Sensor, Shaft, TachometerChannel
 from sims import simulate
-from sims.cracked.simulator import prepare_preset
-from sims.cracked.twin import CrackedTwin
+from sims.cracked import CrackedTwin, prepare_preset
 from sims.effects import effect, effects
-from sims.gear_pair.plausible import PLAUSIBLE
-from sims.gear_pair.seats import completed
-from sims.gear_pair.usual import BODY_KG, nominal_of
+from sims.gear_pair import BODY_KG, PLAUSIBLE, completed, nominal_of
 from sims.registry import gap_simulator
 
 FS = 20480.0
-POINT = Point(1800.0, 40.0)
+POINT = OperatingCondition(1800.0, 40.0)
 RIG = Rig(
     "bench",
     (Shaft("pinion"), Shaft("wheel")),
@@ -109,7 +104,7 @@ def test_recordings_have_the_rigs_channels_and_can_be_gathered_with_it() -> None
     assert recording.channel_names == ("acc wheel", "acc pinion", "mark")
     positions = [c.position for c in recording.channels[:2]]
     assert positions == ["wheel bearing, horizontal", "over P1, vertical"]
-    gathered = gather(recording, RIG)
+    gathered = reduce_recording(recording, RIG)
     assert gathered.speed_hz == pytest.approx(30.0, rel=1e-3)
     assert gathered.marks == (False, True)
     assert recording.rig is not None
@@ -134,7 +129,7 @@ def _sensors(made: CrackedTwin):  # type: ignore[no-untyped-def]  # rows of a ta
 def test_an_encoder_gives_the_speed_without_a_mark() -> None:
     rig = replace(RIG, speed=EncoderChannel("angle", shaft="pinion"))
     recording = twin(rig).run(POINT, seed=0, duration_s=1.5, sampling_rate_hz=FS)
-    gathered = gather(recording, rig)
+    gathered = reduce_recording(recording, rig)
     assert gathered.marks == (False, False)
     assert gathered.speed_hz == pytest.approx(30.0, rel=1e-3)
 
@@ -296,7 +291,7 @@ def test_further_sensors_sit_over_the_bearings_that_have_none_and_leave_the_mach
 def driver_orders(added: Added, machine: CrackedTwin) -> np.ndarray:
     """Peak accelerations of the driver's orders on the sensor over it, in m/s²."""
     recording = machine.run(POINT, (added,), seed=0, noise=1, duration_s=2.0, sampling_rate_hz=FS)
-    return np.abs(gather(recording, machine.rig, ["acc pinion"]).channels["acc pinion"].lines[0].mean(axis=0))
+    return np.abs(reduce_recording(recording, machine.rig, ["acc pinion"]).channels["acc pinion"].lines[0].mean(axis=0))
 
 
 def order_one(unbalance_g_mm: float, machine: CrackedTwin) -> float:

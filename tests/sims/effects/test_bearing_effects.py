@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.rig.types import Bearing
-from sims.effects import effect
-from sims.effects.bearing_choice import element_spacing_mm, with_bearing
+from gearsig.rig import Bearing
+from sims.effects import effect, element_spacing_mm, with_bearing
 from sims.machine import Machine
 from tests.sims.machines import spur_pair_machine
 

@@ -8,8 +8,7 @@ import pytest
 
 import sims.effects as package
 from gearsig.errors import InputError
-from sims.effects import EffectSetting, effect, effects, with_effects
-from sims.effects.effect import GROUPS, Effect, Option, Severity
+from sims.effects import GROUPS, Effect, EffectSetting, Option, Severity, effect, effects, with_effects
 from sims.machine import Machine
 from tests.sims.machines import spur_pair_machine
 

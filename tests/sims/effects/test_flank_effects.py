@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from sims.effects import effect
-from sims.effects.pitch_error import cumulative_pitch
+from sims.effects import cumulative_pitch, effect
 from sims.machine import Lubrication, Machine, Roughness
 from sims.mesh import deepest_crack_mm, highest_chip_mm
 from tests.sims.machines import spur_pair_machine

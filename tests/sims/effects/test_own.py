@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.rig.types import GearPair, OperatingPoint, Rig, Shaft
-from sims.effects import EffectSetting, add_effect, effect, effects, is_own, with_effects
-from sims.effects.own import VARIABLE
-from sims.registry import gap_simulator
-from sims.versions import sources_digest
+from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft
+from sims.effects import VARIABLE, EffectSetting, add_effect, effect, effects, is_own, with_effects
+from sims.registry import gap_simulator, sources_digest
 from tests.sims.machines import spur_pair_machine
 
 RIG = Rig(

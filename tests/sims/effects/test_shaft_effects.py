@@ -10,8 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from sims.effects import EffectSetting, effect, with_effects
-from sims.effects.polar import vector_sum
+from sims.effects import EffectSetting, effect, vector_sum, with_effects
 from sims.machine import Machine, Wheel
 from tests.sims.machines import spur_pair_machine
 

@@ -5,23 +5,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearsig.rig.contact import ToothContact
-from sims.forging.build import build_drive
-from sims.forging.drive import Bristle, ForgingDrive, GrippedLoad, HydraulicMotor
-from sims.forging.parameters import PARAMETERS
-from sims.forging.respond import DriveResponse, FirstState, respond
-from sims.forging.schedule import Schedule
-from sims.machine.operation import Course
-from sims.simulator import ParameterValue
-from sims.values import complete_values
-from sims.wanted import Wanted
+from gearsig.rig import ToothContact
+from sims.forging import (
+    PARAMETERS,
+    Bristle,
+    DriveResponse,
+    FirstState,
+    ForgingDrive,
+    GrippedLoad,
+    HydraulicMotor,
+    Schedule,
+    build_drive,
+    respond,
+)
+from sims.machine import Profile
+from sims.simulator import ParameterValue, ParameterValues, complete_values
 
-NOTHING = Course.constant(0.0)
+NOTHING = Profile.constant(0.0)
 AT_REST = Schedule(NOTHING, NOTHING, NOTHING)
 
 
 def drive(speed_limit_rpm: float = 100.0, **values: ParameterValue) -> ForgingDrive:
-    return build_drive(Wanted(complete_values(PARAMETERS, values)), speed_limit_rpm)
+    return build_drive(ParameterValues(complete_values(PARAMETERS, values)), speed_limit_rpm)
 
 
 def free_bodies(contact: Mapping[str, object] | None = None, **values: ParameterValue) -> ForgingDrive:
@@ -44,7 +49,7 @@ def contact_of(made: ForgingDrive, **changes: object) -> ToothContact:
 
 
 def driven_by(torque_nm: float) -> Schedule:
-    return Schedule(Course.of([0.0, 0.02], [0.0, torque_nm]), NOTHING, NOTHING)
+    return Schedule(Profile.of([0.0, 0.02], [0.0, torque_nm]), NOTHING, NOTHING)
 
 
 def largest(values: np.ndarray) -> float:

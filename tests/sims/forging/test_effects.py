@@ -4,19 +4,17 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.motion.backlash import estimate_backlash
-from gearsig.motion.measure import measure_motion
-from gearsig.recording.types import Recording
+from gearsig.motion import estimate_backlash, measure_motion
+from gearsig.recording import Recording
 from sims import simulate
 from sims.effects import EffectSetting
-from sims.forging.respond import respond
-from sims.forging.simulator import ForgingManipulator, Prepared
+from sims.forging import ForgingManipulator, PreparedDrive, respond
 from tests.sims.forging.drives import driven_by, largest
 
 CRACK = EffectSetting("root_crack", 4.0, {"tooth": 7})
 
 
-def made(*settings: EffectSetting) -> Prepared:
+def made(*settings: EffectSetting) -> PreparedDrive:
     return ForgingManipulator().prepare({"mode": "continuous"}, None, settings=settings)
 
 

@@ -7,10 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from sims.forging.friction_kernel import bristle
-from sims.forging.respond import FirstState, respond
-from sims.forging.schedule import Schedule
-from sims.machine.operation import Course
+from sims.forging import FirstState, Schedule, bristle, respond
+from sims.machine import Profile
 from tests.sims.forging.drives import NOTHING, drive, driven_by, free_bodies, largest
 
 
@@ -74,7 +72,7 @@ def test_the_drive_sticks_and_breaks_away_at_the_same_torque_each_time() -> None
     rise = top / slope
     corners = [(0.0, 0.0), (rise, top), (rise + 0.02, 0.0), (period - 0.01, 0.0)]
     times = np.concatenate([[k * period + t for t, _ in corners] for k in range(5)])
-    torque = Course.of(times, np.tile([value for _, value in corners], 5))
+    torque = Profile.of(times, np.tile([value for _, value in corners], 5))
     found = respond(made, Schedule(torque, NOTHING, NOTHING), duration_s=5.0 * period)
     for k in range(5):
         within = (found.time_s >= k * period) & (found.time_s < (k + 1) * period)
@@ -96,7 +94,7 @@ def test_friction_work_of_each_flank_is_that_of_the_loss_factor(flank: float, di
     path = made.path
     torque = 50.0 * flank
     load = -torque * path.base_radii_m[1] / path.base_radii_m[0]
-    courses = Schedule(Course.constant(torque), NOTHING, Course.constant(load))
+    courses = Schedule(Profile.constant(torque), NOTHING, Profile.constant(load))
     start = FirstState(0.0, 40.0 * direction, 2e-5 * flank, 0.0)
     span = 2.0 * np.pi / 40.0  # some revolution of the pinion
     run = respond(made, courses, duration_s=0.2 + 1.5 * span, interval_s=span / 20_000, first=start)

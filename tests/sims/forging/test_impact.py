@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from gearsig.errors import InputError
-from gearsig.rig.contact import DAMPING_LAWS, ToothContact, damping_ratio_s_per_m
+from gearsig.rig import DAMPING_LAWS, ToothContact, damping_ratio_s_per_m
 from tests.sims.forging.drives import drive, free_bodies, impact, largest
 
 PUBLISHED = {
@@ -69,7 +69,7 @@ def test_energy_is_conserved_while_pairs_come_and_go() -> None:
     """Turning loaded by their own spin: the changing number of pairs works on the rotation, not on the balance."""
     made = free_bodies({"restitution": 1.0, "half_backlash_um": 5.0})
     made = replace(made, contact=replace(made.contact, driven_inertia_kg_m2=0.5))
-    from sims.forging.respond import FirstState, respond
+    from sims.forging import FirstState, respond
     from tests.sims.forging.drives import AT_REST
 
     start = FirstState(0.0, 20.0, 3e-5, 0.0)

@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from gearsig.rig.tooth_pairs import standard_path
-from sims.forging.numbers import drive_numbers
-from sims.forging.respond import FirstState, respond
+from gearsig.rig import standard_path
+from sims.forging import FirstState, drive_numbers, respond
 from sims.mesh import GearGeometry, PairGeometry
 from tests.sims.forging.drives import AT_REST, drive, free_bodies
 
@@ -27,7 +26,7 @@ def test_standard_teeth_have_the_known_contact_ratio() -> None:
 @given(angle=st.floats(-50.0, 50.0), flank=st.sampled_from([1.0, -1.0]))
 def test_model_and_rig_count_the_same_pairs(angle: float, flank: float) -> None:
     """The model's pairs come and go over a twentieth of a pitch, the rig's at once: alike away from there."""
-    from sims.forging.contact_kernel import position, weight, younger_pair
+    from sims.forging import position, weight, younger_pair
 
     k = drive_numbers(drive())
     p, _ = position(k, angle, flank, younger_pair(k, angle, flank))

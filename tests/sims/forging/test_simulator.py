@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from scipy.signal import get_window
 
-from gearsig import analyze
-from gearsig.recording.read import read_recording
-from gearsig.recording.types import Recording
-from gearsig.rig.toml import read_rig
+from gearsig.diagnosis import analyze
+from gearsig.recording import Recording, read_recording
+from gearsig.rig import read_rig
 from sims import simulate
-from sims.forging.parameters import PARAMETERS
-from sims.forging.simulator import ForgingManipulator
+from sims.forging import PARAMETERS, ForgingManipulator
 from sims.presets import preset, presets
 from sims.registry import simulators
 from sims.simulator import ParameterValue

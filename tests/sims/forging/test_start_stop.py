@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from sims.forging.respond import DriveResponse, respond
-from sims.forging.schedule import Cycle, schedule
-from sims.machine.operation import Course
+from sims.forging import Cycle, DriveResponse, respond, schedule
+from sims.machine import Profile
 from tests.sims.forging.drives import drive, driven_by, largest
 
 CYCLE = Cycle(brake_nm=60.0, press_nm=1500.0)
@@ -17,7 +16,7 @@ CYCLE = Cycle(brake_nm=60.0, press_nm=1500.0)
 def run(
     duration_s: float = 3.0, cycle: Cycle = CYCLE, interval_s: float = 1e-3, tolerance: float = 1e-6
 ) -> DriveResponse:
-    courses = schedule(cycle, Course.constant(95.0), duration_s)
+    courses = schedule(cycle, Profile.constant(95.0), duration_s)
     return respond(drive(), courses, duration_s=duration_s, interval_s=interval_s, tolerance=tolerance)
 
 
@@ -84,7 +83,7 @@ def test_breakaway_torque_is_that_of_static_friction(torque_nm: float) -> None:
     made = drive(0.0, friction_coefficient=0.0, load_friction_nm=4.0 * torque_nm, press_nm=0.0, half_backlash_um=1.0)
     courses = driven_by(0.0)
     slope = 0.2 * torque_nm  # N m per s
-    courses = replace(courses, torque_nm=Course.of([0.0, 8.0], [0.0, 8.0 * slope]))
+    courses = replace(courses, torque_nm=Profile.of([0.0, 8.0], [0.0, 8.0 * slope]))
     found = respond(made, courses, duration_s=8.0)
     expected = 1.3 * (4.0 * torque_nm / 5.0 + 5.0)
     slips = found.time_s[np.argmax(found["wheel speed"] > 0.03)]
@@ -108,7 +107,7 @@ def test_without_a_brake_it_runs_down_by_its_own_friction() -> None:
     """ω̇ = −(T_c + c ω)/J at the wheel, with 25 times the pinion's inertia and drag, without friction of the teeth."""
     made = drive(0.0, friction_coefficient=0.0)
     cycle = Cycle(off_s=1.9, press_nm=0.0)
-    found = respond(made, schedule(cycle, Course.constant(95.0), 2.0), duration_s=2.0)
+    found = respond(made, schedule(cycle, Profile.constant(95.0), 2.0), duration_s=2.0)
     inertia = 42.0 + 0.5 * 290.0 * 0.15**2 + 25.0 * 0.06
     level, viscous = 300.0 + 5.0 * 5.0, 20.0 + 25.0 * 0.2
     start = np.searchsorted(found.time_s, 1.1)
@@ -121,7 +120,7 @@ def test_without_a_brake_it_runs_down_by_its_own_friction() -> None:
 def test_torque_sensor_feels_the_pinion_and_not_the_motor() -> None:
     """τ = rb1 F + J_p α1 where the teeth do not rub."""
     made = drive(friction_coefficient=0.0)
-    found = respond(made, schedule(CYCLE, Course.constant(95.0), 3.0), duration_s=3.0)
+    found = respond(made, schedule(CYCLE, Profile.constant(95.0), 3.0), duration_s=3.0)
     turn = made.contact.driver_inertia_kg_m2 * found["pinion acceleration"]
     mesh = made.path.base_radii_m[0] * found["interaction force"]
     touching = found["interaction force"] != 0.0
@@ -186,4 +185,4 @@ def test_a_piece_off_centre_swings() -> None:
 )
 def test_cycles_that_cannot_be(changes: dict[str, object], named: str) -> None:
     with pytest.raises(InputError, match=named):
-        schedule(replace(CYCLE, **changes), Course.constant(95.0), 4.0)  # type: ignore[arg-type]  # as named
+        schedule(replace(CYCLE, **changes), Profile.constant(95.0), 4.0)  # type: ignore[arg-type]  # as named

@@ -5,12 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sims.forging.contact_kernel import reach
-from sims.forging.drive import ForgingDrive
-from sims.forging.numbers import drive_numbers
-from sims.forging.respond import FirstState, respond
-from sims.forging.schedule import Cycle, schedule
-from sims.machine.operation import Course
+from sims.forging import Cycle, FirstState, ForgingDrive, drive_numbers, reach, respond, schedule
+from sims.machine import Profile
 from tests.sims.forging.drives import AT_REST, drive, free_bodies, largest
 
 DEPTH_UM = 80.0
@@ -67,7 +63,7 @@ def test_energy_is_conserved_over_worn_flanks_without_losses() -> None:
 
 def test_energy_stays_balanced_at_work() -> None:
     made = worn()
-    courses = schedule(Cycle(brake_nm=60.0, press_nm=1500.0), Course.constant(95.0), 3.0)
+    courses = schedule(Cycle(brake_nm=60.0, press_nm=1500.0), Profile.constant(95.0), 3.0)
     found = respond(made, courses, duration_s=3.0)
     balance = found["energy"] - found["work put in"] + found["lost in contact"] + found["lost in friction"]
     assert largest(balance) < 2e-4

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from sims.measure.accelerometer import Accelerometer, Converter
+from sims.measure import Accelerometer, Converter
 
 STEP = 4e-6
 

@@ -5,11 +5,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from gearsig.angle.pulses import find_pulse_edges
+from gearsig.angle import find_pulse_edges
 from gearsig.errors import InputError
-from sims.measure.counter import Encoder, PulseCounter
-from sims.measure.edges import disc_edges
-from sims.measure.tachometer import Tachometer, pulse_voltage
+from sims.measure import Encoder, PulseCounter, Tachometer, disc_edges, pulse_voltage
 
 T = np.arange(250_001) * 4e-6
 

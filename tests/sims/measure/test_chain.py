@@ -6,18 +6,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsig.angle.shaft import find_shaft_angle
+from gearsig.angle import find_shaft_angle
 from gearsig.errors import InputError
-from gearsig.rig.speed import EncoderChannel, PulseTimes, TachometerChannel
-from gearsig.rig.types import GearPair, Rig, Shaft
-from sims.measure.accelerometer import Accelerometer, Converter
-from sims.measure.chain import MeasuredChannel, MeasurementChain
-from sims.measure.counter import Encoder, PulseCounter
-from sims.measure.hum import MainsHum
-from sims.measure.motion import Motion
-from sims.measure.path import ModalPath, PathMode
-from sims.measure.sampling import AntiAlias
-from sims.measure.tachometer import Tachometer
+from gearsig.rig import EncoderChannel, GearPair, PulseTimes, Rig, Shaft, TachometerChannel
+from sims.measure import (
+    Accelerometer,
+    AntiAlias,
+    Converter,
+    Encoder,
+    MainsHum,
+    MeasuredChannel,
+    MeasurementChain,
+    ModalPath,
+    Motion,
+    PathMode,
+    PulseCounter,
+    Tachometer,
+)
 
 STEP, RATE = 2e-5, 5000.0
 RIG = Rig(shafts=(Shaft("in"), Shaft("out")), pairs=(GearPair("p", "in", "out", 20, 40),))

@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from sims.measure.hold import hold_error
-from sims.measure.path import ModalPath, PathMode
+from sims.measure import ModalPath, PathMode, hold_error
 
 STEP = 4e-6
 PATH = ModalPath({"y": 0.3}, (PathMode(900.0, 0.03, {"y": 1.0}), PathMode(3400.0, 0.02, {"y": -0.5})))

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from sims.measure.sampling import AntiAlias, ratio_of_rates
+from sims.measure import AntiAlias, ratio_of_rates
 
 RATE = 20480.0
 

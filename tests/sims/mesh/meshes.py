@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from sims.mesh import GearGeometry, GearMesh, MeshTable, PairGeometry
-from sims.mesh.stiffness import pair_states
+from sims.mesh import GearGeometry, GearMesh, MeshTable, PairGeometry, pair_states
 
 PAIR = PairGeometry(*(GearGeometry(z, 2.0, face_width_mm=20.0, bore_radius_mm=17.5) for z in (55, 75)))
 MESH = GearMesh(PAIR)

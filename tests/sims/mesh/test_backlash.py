@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from sims.mesh import backlash_kernel as kernel
-from sims.mesh.backlash import FlankContact, dead_zone_m
+from sims.mesh import FlankContact, dead_zone_m
+from sims.mesh import _backlash as kernel
 
 B = 2e-5
 depths = st.floats(-1e-4, 1e-4)

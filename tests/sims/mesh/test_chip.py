@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from sims.mesh import RootCrack, ToothChip, ToothSpall, highest_chip_mm, mesh_table, share_torque
-from sims.mesh.stiffness_tooth import tooth_compliance
+from sims.mesh import RootCrack, ToothChip, ToothSpall, highest_chip_mm, mesh_table, share_torque, tooth_compliance
 from tests.sims.mesh.meshes import MESH, PAIR, own_compliance, own_separation, own_stretch
 
 ENDS = own_stretch(MESH)

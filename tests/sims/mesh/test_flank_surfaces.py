@@ -18,10 +18,10 @@ from sims.mesh import (
     PairGeometry,
     ToothSpall,
     mesh_table,
+    pair_states,
     share_torque,
     wear_profile,
 )
-from sims.mesh.stiffness import pair_states
 from tests.sims.mesh.meshes import MESH, PAIR, PITCH_POINT, SINGLE, own_separation, own_stretch
 
 SURFACE = FractalSurface.of_roughness(0.84)

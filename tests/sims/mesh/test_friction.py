@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from sims.mesh import friction_kernel as kernel
-from sims.mesh.friction import (
+from sims.mesh import (
     COEFFICIENTS,
     MOST_FRICTION,
     friction_coefficient,
@@ -15,6 +14,7 @@ from sims.mesh.friction import (
     reduced_modulus_pa,
     smooth_sign,
 )
+from sims.mesh import _friction as kernel
 
 STEEL_PA = reduced_modulus_pa(206e9, 0.3, 206e9, 0.3)
 OIL = {"viscosity_cp": 10.0, "roughness_um": 0.4}
@@ -81,7 +81,7 @@ def test_coefficients_of_kernel_and_formula_are_the_same():
 @settings(deadline=None)  # kernels compile in the first example
 @given(ratios, pressures, oils, roughnesses, speeds, radii)
 def test_kernel_agrees_with_the_formula(sr, p, nu, s, v, r):
-    compiled = kernel.friction_coefficient(sr, p, v, r, *kernel.oil_terms(nu, s))
+    compiled = kernel.friction_coefficient_friction_kernel(sr, p, v, r, *kernel.oil_terms(nu, s))
     assert compiled == pytest.approx(plain(sr, p, nu, s, v, r), rel=1e-10)
     assert 0.0 < compiled <= MOST_FRICTION
 
@@ -109,9 +109,9 @@ def test_smooth_flanks_still_rub_but_rolling_and_unloaded_ones_do_not():
     assert plain(0.0, 1.0, 10.0, 0.4, 10.0, 0.01) == 0.0
     assert plain(0.3, 0.0, 10.0, 0.4, 10.0, 0.01) == 0.0
     terms = kernel.oil_terms(10.0, 0.4)
-    assert kernel.friction_coefficient(0.0, 1.0, 10.0, 0.01, *terms) == 0.0
-    assert kernel.friction_coefficient(0.3, 0.0, 10.0, 0.01, *terms) == 0.0
-    assert kernel.friction_coefficient(0.3, 1.0, 0.0, 0.01, *terms) == MOST_FRICTION
+    assert kernel.friction_coefficient_friction_kernel(0.0, 1.0, 10.0, 0.01, *terms) == 0.0
+    assert kernel.friction_coefficient_friction_kernel(0.3, 0.0, 10.0, 0.01, *terms) == 0.0
+    assert kernel.friction_coefficient_friction_kernel(0.3, 1.0, 0.0, 0.01, *terms) == MOST_FRICTION
 
 
 @settings(deadline=None)  # kernels compile in the first example
@@ -174,7 +174,7 @@ def test_smooth_sign_is_odd_bounded_and_steepest_at_rest(v, threshold):
     s = float(smooth_sign(v, threshold))
     assert s == -float(smooth_sign(-v, threshold))
     assert abs(s) <= min(1.0, abs(v) / threshold)
-    assert s == pytest.approx(kernel.smooth_sign(v, threshold), rel=1e-12, abs=1e-300)
+    assert s == pytest.approx(kernel.smooth_sign_friction_kernel(v, threshold), rel=1e-12, abs=1e-300)
 
 
 @pytest.mark.parametrize(

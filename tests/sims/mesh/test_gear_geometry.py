@@ -8,8 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from sims.mesh import GearGeometry, disc_inertia_kg_m2, disc_mass_kg, inverse_involute, involute
-from sims.mesh.profile import fillet_outline, involute_outline, root_half_angle_rad, tooth_outline_mm
+from sims.mesh import (
+    GearGeometry,
+    disc_inertia_kg_m2,
+    disc_mass_kg,
+    fillet_outline,
+    inverse_involute,
+    involute,
+    involute_outline,
+    root_half_angle_rad,
+    tooth_outline_mm,
+)
 
 gears = st.builds(
     GearGeometry,

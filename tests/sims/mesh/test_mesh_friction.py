@@ -15,11 +15,13 @@ from sims.mesh import (
     friction_over_mesh,
     mesh_stiffness,
     mesh_table,
+    reduced_modulus_pa,
     share_torque,
-    stiffness,
 )
-from sims.mesh import friction_kernel as kernel
-from sims.mesh.friction import reduced_modulus_pa
+from sims.mesh import _friction as kernel
+from sims.mesh import (
+    _mesh_stiffness as stiffness,
+)
 from tests.sims.mesh.meshes import MESH, PAIR, PITCH_POINT
 
 OIL = (17.6, 0.45)

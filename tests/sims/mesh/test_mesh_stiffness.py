@@ -16,12 +16,13 @@ from sims.mesh import (
     PairGeometry,
     RootCrack,
     ToothFaults,
+    engagement,
     mesh_stiffness,
     mesh_table,
+    pair_force,
+    pair_states,
     share_torque,
 )
-from sims.mesh.load_sharing_kernel import engagement, pair_force
-from sims.mesh.stiffness import pair_states
 
 
 def steel_mesh(

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from sims.mesh import roughness_kernel as kernel
-from sims.mesh.roughness import FlankRoughness, FractalSurface, TimeLockedRoughness
+from sims.mesh import FlankRoughness, FractalSurface, TimeLockedRoughness
+from sims.mesh import _roughness as kernel
 
 # As published for γ = 1.5; read from a spectrum, so the lowest are off by a line of it.
 LISTED_HZ = [17.9, 26.9, 39.4, 59.1, 89.6, 133.4, 200.5, 300.8, 451.2, 667.7, 1016.0, 1524.0]

@@ -16,14 +16,16 @@ from sims.mesh import (
     RootCrack,
     ToothSpall,
     arc_length_mm,
+    check_spall,
+    curvature_radius_mm,
     flank_length_mm,
+    involute_outline,
     mesh_stiffness,
     mesh_table,
+    part_inside,
     share_torque,
+    spans_face,
 )
-from sims.mesh.flank import curvature_radius_mm, part_inside
-from sims.mesh.profile import involute_outline
-from sims.mesh.spall import check_spall, spans_face
 from tests.sims.mesh.meshes import MESH, PAIR, PITCH_POINT, SINGLE, own_compliance, own_separation, own_stretch
 
 DRIVER = PAIR.driver

@@ -6,12 +6,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from sims.mesh import GearGeometry, Material, RootCrack, crack_depth_mm, crack_percent, deepest_crack_mm
-from sims.mesh.crack import crack_mouth_mm, crack_tip_mm, effective_flank_mm
-from sims.mesh.foundation import foundation_compliance, foundation_factors, foundation_notes
-from sims.mesh.profile import involute_outline, tooth_outline_mm
-from sims.mesh.stiffness_hertz import linear_contact_compliance, load_dependent_contact_coefficient
-from sims.mesh.stiffness_tooth import cracked_tooth_compliance, tooth_compliance
+from sims.mesh import (
+    GearGeometry,
+    Material,
+    RootCrack,
+    crack_depth_mm,
+    crack_mouth_mm,
+    crack_percent,
+    crack_tip_mm,
+    cracked_tooth_compliance,
+    deepest_crack_mm,
+    effective_flank_mm,
+    foundation_compliance,
+    foundation_factors,
+    foundation_notes,
+    involute_outline,
+    linear_contact_compliance,
+    load_dependent_contact_coefficient,
+    tooth_compliance,
+    tooth_outline_mm,
+)
 
 STEEL_200 = Material(200.0)
 PINION = GearGeometry(55, 2.0, bore_radius_mm=17.5)

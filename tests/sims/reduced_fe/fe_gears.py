@@ -3,12 +3,7 @@
 from functools import cache
 
 from sims.mesh import GearGeometry
-from sims.reduced_fe.blank import GearBlank
-from sims.reduced_fe.cyclic import CyclicGear
-from sims.reduced_fe.mesh_size import MeshSize
-from sims.reduced_fe.reduce import ReductionPlan, reduce_gear
-from sims.reduced_fe.reduced_gear import ReducedGear
-from sims.reduced_fe.sector_mesh import sector_mesh
+from sims.reduced_fe import CyclicGear, GearBlank, MeshSize, ReducedGear, ReductionPlan, reduce_gear, sector_mesh
 
 SMALL = GearBlank(GearGeometry(12, 3.0, profile_shift=0.4, face_width_mm=12.0, bore_radius_mm=6.0))
 COARSE = MeshSize(2, 1, 3, 1, 1, 1)

@@ -8,9 +8,7 @@ import numpy as np
 
 from sims.mesh import GearMesh, PairGeometry
 from sims.presets import preset
-from sims.reduced_fe.dynamics_constants import FlexiblePair
-from sims.reduced_fe.ready import ready_gear
-from sims.reduced_fe.simulator import NAME, prepare_preset
+from sims.reduced_fe import NAME, FlexiblePair, prepare_preset, ready_gear
 from tests.sims.reduced_fe.synthetic import synthetic_gear
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 from sims.mesh import GearGeometry, PairGeometry
-from sims.reduced_fe.contact_path import corner_separation_m, rolls_rad
+from sims.reduced_fe import corner_separation_m, rolls_rad
 
 PAIRS = (
     PairGeometry(GearGeometry(50, 3.0, bore_radius_mm=20.0), GearGeometry(50, 3.0, bore_radius_mm=20.0)),

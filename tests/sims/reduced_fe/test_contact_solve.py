@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from sims.reduced_fe.contact_kernel import hertz_energy, root, solve_contacts
+from sims.reduced_fe import hertz_energy, root, solve_contacts
 
 HERTZ, SMALL = 2e-9, 1e-2
 

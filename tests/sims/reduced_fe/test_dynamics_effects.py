@@ -7,11 +7,8 @@ import pytest
 
 import sims
 from gearsig.errors import InputError
-from sims.machine import RaceDefect
-from sims.machine.operation import Operation
-from sims.reduced_fe.dynamics_bearings import bearing_springs
-from sims.reduced_fe.dynamics_respond import TRANSMISSION_ERROR, respond
-from sims.reduced_fe.dynamics_start import start_state
+from sims.machine import Operation, RaceDefect
+from sims.reduced_fe import TRANSMISSION_ERROR, bearing_springs, respond, start_state
 from tests.sims.reduced_fe.flexible_pairs import pair_of, synthetic_pair
 
 RUN = Operation.steady(1000.0, 170.0)
@@ -142,7 +139,7 @@ def test_a_shaft_that_would_lift_in_its_bearing_is_refused():
 
 def test_starts_from_rest_have_friction_without_chatter():
     pair = synthetic_pair(friction="on")
-    from sims.reduced_fe.dynamics_constants import constants
+    from sims.reduced_fe import constants
 
     standing = Operation.steady(0.0, 170.0)
     own = constants(pair, standing)

@@ -4,16 +4,24 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from sims.machine.operation import Operation
-from sims.reduced_fe.contact_mirror import mirror_groups
-from sims.reduced_fe.contact_spreading import spreading_check
-from sims.reduced_fe.dynamics_constants import constants
-from sims.reduced_fe.dynamics_linear import eigenfrequencies_hz, torsional_mode
-from sims.reduced_fe.dynamics_respond import respond
-from sims.reduced_fe.dynamics_side import GEAR, HUB, ROTOR, kept_modes, residual_compliance
-from sims.reduced_fe.dynamics_stability import followed_step_s, growth
-from sims.reduced_fe.integrate_coefficients import step_coefficients
-from sims.reduced_fe.ready import ready_gear
+from sims.machine import Operation
+from sims.reduced_fe import (
+    GEAR,
+    HUB,
+    ROTOR,
+    constants,
+    eigenfrequencies_hz,
+    followed_step_s,
+    growth,
+    kept_modes,
+    mirror_groups,
+    ready_gear,
+    residual_compliance,
+    respond,
+    spreading_check,
+    step_coefficients,
+    torsional_mode,
+)
 from tests.sims.reduced_fe.flexible_pairs import pair_of
 
 OPERATION = Operation.steady(2000.0, 170.0)

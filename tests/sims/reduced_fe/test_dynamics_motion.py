@@ -7,15 +7,19 @@ import pytest
 
 from gearsig.errors import InputError
 from sims.effects import EffectSetting
-from sims.machine.operation import Course, Operation
+from sims.machine import Operation, Profile
 from sims.presets import preset
-from sims.reduced_fe import dynamics_respond
-from sims.reduced_fe.dynamics_constants import constants
-from sims.reduced_fe.dynamics_convergence import check_convergence
-from sims.reduced_fe.dynamics_linear import torsional_mode
-from sims.reduced_fe.dynamics_respond import TRANSMISSION_ERROR, respond
-from sims.reduced_fe.dynamics_start import start_state
-from sims.reduced_fe.simulator import NAME, prepare_preset
+from sims.reduced_fe import (
+    NAME,
+    TRANSMISSION_ERROR,
+    check_convergence,
+    constants,
+    prepare_preset,
+    respond,
+    start_state,
+    torsional_mode,
+)
+from sims.reduced_fe import _respond as dynamics_respond
 from tests.sims.reduced_fe.flexible_pairs import pair_of, synthetic_pair
 
 STEADY = Operation.steady(2000.0, 170.0)
@@ -161,12 +165,12 @@ def test_free_decay_has_the_logarithmic_decrement_of_the_damping_ratio(ratio):
 
 def test_reversed_torque_is_carried_by_the_flanks_behind_across_the_backlash():
     pair = pair_of(half_backlash_um=40.0)
-    turned = Operation(Course.constant(600.0), Course.of([0.0, 0.01, 0.02, 1.0], [170.0, 170.0, 0.0, 0.0]))
+    turned = Operation(Profile.constant(600.0), Profile.of([0.0, 0.01, 0.02, 1.0], [170.0, 170.0, 0.0, 0.0]))
     own = constants(pair, turned)
     names = ("mesh_force_n", "back_force_n", TRANSMISSION_ERROR)
     first = respond(pair, turned, duration_s=0.01, signals=names, ready=own)
     # The load's inertia drives back: the governor brakes the input.
-    braking = Operation(Course.of([0.0, 0.2], [600.0, 300.0]), Course.constant(0.0))
+    braking = Operation(Profile.of([0.0, 0.2], [600.0, 300.0]), Profile.constant(0.0))
     coast = respond(pair, braking, duration_s=0.2, signals=names, ready=constants(pair, braking), first=first.last)
     back = coast["back_force_n"] > 0.0
     drive = coast["mesh_force_n"] > 0.0

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from sims.machine.operation import Operation
-from sims.reduced_fe.dynamics_linear import torsional_mode
-from sims.reduced_fe.dynamics_sweep import speed_sweep
+from sims.machine import Operation
+from sims.reduced_fe import speed_sweep, torsional_mode
 from tests.sims.reduced_fe.flexible_pairs import pair_of
 
 

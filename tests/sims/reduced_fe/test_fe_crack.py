@@ -9,29 +9,27 @@ from scipy import sparse
 
 from gearsig.cache import OtherVersionError
 from gearsig.errors import InputError
-from sims.mesh import RootCrack
-from sims.mesh.stiffness_tooth import tooth_compliance
-from sims.reduced_fe.crack_table import (
-    _ready_cracks,
-    crack_added_m_per_n,
-    forget_cracks_of_other_versions,
-    solved_crack_m_per_n,
-)
-from sims.reduced_fe.cracked_tooth import (
+from sims.mesh import RootCrack, tooth_compliance
+from sims.reduced_fe import (
     CRACK_SIZE,
+    MeshSize,
+    crack_added_m_per_n,
     crack_compliance_m_per_n,
     crack_meshes,
+    factorised,
+    flank_grid,
+    flank_rows,
+    forget_cracks_of_other_versions,
+    mesh_quality,
     open_crack,
     other_sectors,
+    ready_gear,
+    sector_matrices,
+    sector_mesh,
+    solved_crack_m_per_n,
     tooth_compliance_with,
 )
-from sims.reduced_fe.cyclic import factorised
-from sims.reduced_fe.elements import sector_matrices
-from sims.reduced_fe.flank_rows import flank_grid, flank_rows
-from sims.reduced_fe.mesh_quality import mesh_quality
-from sims.reduced_fe.mesh_size import MeshSize
-from sims.reduced_fe.ready import ready_gear
-from sims.reduced_fe.sector_mesh import sector_mesh
+from sims.reduced_fe._crack import _ready_cracks
 from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL, small_cyclic, small_reduced
 
 SIZE = MeshSize(4, 1, 4, 2, 1, 2)
@@ -124,7 +122,7 @@ def test_between_solved_depths_and_widths_the_table_is_that_of_the_crack() -> No
 
 def test_cracks_of_other_gears_are_kept_on_disk(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path))
-    monkeypatch.setattr("sims.reduced_fe.crack_table.COARSE_SIZE", SIZE)
+    monkeypatch.setattr("sims.reduced_fe._crack.COARSE_SIZE", SIZE)
     gear, crack = small_reduced(), RootCrack(1.3, 60.0)
     first = crack_added_m_per_n(gear, crack)
     kept = sorted((tmp_path / "cracks").iterdir())

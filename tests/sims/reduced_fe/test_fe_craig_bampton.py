@@ -12,13 +12,17 @@ from scipy.sparse.linalg import splu
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from sims.reduced_fe.accuracy import matched
-from sims.reduced_fe.craig_bampton import CraigBamptonGear, CraigBamptonPlan, craig_bampton
-from sims.reduced_fe.cyclic import CyclicGear
-from sims.reduced_fe.full_gear import full_matrices
-from sims.reduced_fe.mesh_size import mesh_size_for
-from sims.reduced_fe.sector_mesh import sector_mesh
-from sims.reduced_fe.selected_masters import Masters
+from sims.reduced_fe import (
+    CraigBamptonGear,
+    CraigBamptonPlan,
+    CyclicGear,
+    Masters,
+    craig_bampton,
+    full_matrices,
+    matched,
+    mesh_size_for,
+    sector_mesh,
+)
 from tests.sims.reduced_fe.fe_gears import PAPER, small_cyclic
 
 PLAN = CraigBamptonPlan(n_dof=120, n_teeth=2, n_slices=3, n_auxiliary=2, n_shapes=20)

@@ -8,18 +8,29 @@ from scipy.spatial.transform import Rotation
 
 from gearsig.errors import InputError
 from sims.mesh import GearGeometry, Material
-from sims.reduced_fe.blank import GearBlank, blank_from_text
-from sims.reduced_fe.cyclic import CyclicGear
-from sims.reduced_fe.cyclic_modes import cyclic_modes
-from sims.reduced_fe.discretisation import discretisation_error
-from sims.reduced_fe.elements import cell_fields, cylindrical_turn, lame_pa, sector_matrices
-from sims.reduced_fe.memory import check_memory, craig_bampton_bytes, full_bytes, sector_bytes
-from sims.reduced_fe.mesh_quality import mesh_quality
-from sims.reduced_fe.mesh_size import MeshSize, mesh_size_for, n_dof_of
-from sims.reduced_fe.ready import READY
-from sims.reduced_fe.sector_mesh import sector_mesh
-from sims.reduced_fe.tooth_load import load_tooth
-from sims.reduced_fe.tooth_side import outline_error_mm
+from sims.reduced_fe import (
+    READY,
+    CyclicGear,
+    GearBlank,
+    MeshSize,
+    blank_from_text,
+    cell_fields,
+    check_memory,
+    craig_bampton_bytes,
+    cyclic_modes,
+    cylindrical_turn,
+    discretisation_error,
+    full_bytes,
+    lame_pa,
+    load_tooth,
+    mesh_quality,
+    mesh_size_for,
+    n_dof_of,
+    outline_error_mm,
+    sector_bytes,
+    sector_matrices,
+    sector_mesh,
+)
 from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL
 
 WEB = GearBlank(

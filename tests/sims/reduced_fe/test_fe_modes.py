@@ -8,14 +8,19 @@ import pytest
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from sims.mesh import Material
-from sims.reduced_fe.blank import GearBlank
-from sims.reduced_fe.cyclic import CyclicGear
-from sims.reduced_fe.cyclic_modes import CyclicModes, cyclic_modes, modes_of_diameter
-from sims.reduced_fe.full_gear import full_matrices, full_modes
-from sims.reduced_fe.mesh_quality import mesh_quality
-from sims.reduced_fe.mesh_size import mesh_size_for
-from sims.reduced_fe.mode_field import mode_field
-from sims.reduced_fe.sector_mesh import sector_mesh
+from sims.reduced_fe import (
+    CyclicGear,
+    CyclicModes,
+    GearBlank,
+    cyclic_modes,
+    full_matrices,
+    full_modes,
+    mesh_quality,
+    mesh_size_for,
+    mode_field,
+    modes_of_diameter,
+    sector_mesh,
+)
 from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL, small_cyclic
 
 

@@ -9,22 +9,32 @@ import pytest
 from gearsig.cache import OtherVersionError
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from sims.mesh.foundation import foundation_compliance
-from sims.mesh.stiffness_tooth import tooth_compliance
-from sims.reduced_fe import gear_file
-from sims.reduced_fe.cyclic import CyclicGear, factorised
-from sims.reduced_fe.flank_rows import flank_grid, flank_rows
-from sims.reduced_fe.full_gear import full_matrices
-from sims.reduced_fe.gear_cache import cached_gear, forget_gears_of_other_versions
-from sims.reduced_fe.gear_file import read_gear, write_gear
-from sims.reduced_fe.gear_key import gear_name
-from sims.reduced_fe.hub import hub_rows
-from sims.reduced_fe.line_weights import line_weights, parabolic_weights
-from sims.reduced_fe.mesh_size import MeshSize
-from sims.reduced_fe.ready import PLAN, READY, ready_gear
-from sims.reduced_fe.reduce import ReductionPlan, reduce_gear, static_compliance
-from sims.reduced_fe.reduced_gear import ReducedGear
-from sims.reduced_fe.sector_mesh import sector_mesh
+from sims.mesh import foundation_compliance, tooth_compliance
+from sims.reduced_fe import (
+    PLAN,
+    READY,
+    CyclicGear,
+    MeshSize,
+    ReducedGear,
+    ReductionPlan,
+    cached_gear,
+    factorised,
+    flank_grid,
+    flank_rows,
+    forget_gears_of_other_versions,
+    full_matrices,
+    gear_name,
+    hub_rows,
+    line_weights,
+    parabolic_weights,
+    read_gear,
+    ready_gear,
+    reduce_gear,
+    sector_mesh,
+    static_compliance,
+    write_gear,
+)
+from sims.reduced_fe import _store as gear_file
 from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL, small_cyclic, small_reduced
 
 ARRAYS = ("frequencies_hz", "flank_modes", "free_compliance_m_per_n", "clamped_compliance_m_per_n", "hub_compliance")

@@ -9,16 +9,19 @@ import pytest
 
 from gearsig.errors import InputError
 from sims.mesh import GearGeometry
-from sims.reduced_fe.blank import GearBlank
-from sims.reduced_fe.cyclic_modes import cyclic_modes
-from sims.reduced_fe.face_view import face_view
-from sims.reduced_fe.full_gear import full_matrices
-from sims.reduced_fe.mesh_quality import mesh_quality
-from sims.reduced_fe.mesh_size import MeshSize
-from sims.reduced_fe.mode_field import mode_field
-from sims.reduced_fe.sector_mesh import sector_mesh
-from sims.reduced_fe.tooth_load import load_tooth, von_mises_pa
-from sims.reduced_fe.vtk import write_vtk
+from sims.reduced_fe import (
+    GearBlank,
+    MeshSize,
+    cyclic_modes,
+    face_view,
+    full_matrices,
+    load_tooth,
+    mesh_quality,
+    mode_field,
+    sector_mesh,
+    von_mises_pa,
+    write_vtk,
+)
 from tests.sims.reduced_fe.fe_gears import COARSE, SMALL, small_cyclic, small_reduced
 
 

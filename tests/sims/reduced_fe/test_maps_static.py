@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from sims.mesh import GearGeometry, GearMesh, PairGeometry, RootCrack
-from sims.mesh.stiffness_hertz import load_dependent_contact_coefficient
-from sims.reduced_fe.contact_mirror import folded, mirror_groups, mirrors
-from sims.reduced_fe.contact_table import static_table
-from sims.reduced_fe.maps_static import force_map, mesh_maps
+from sims.mesh import GearGeometry, GearMesh, PairGeometry, RootCrack, load_dependent_contact_coefficient
+from sims.reduced_fe import folded, force_map, mesh_maps, mirror_groups, mirrors, static_table
 from tests.sims.reduced_fe.flexible_pairs import ready_mesh
 from tests.sims.reduced_fe.synthetic import synthetic_gear
 

@@ -7,7 +7,7 @@ import sims
 from gearsig.errors import InputError
 from sims.effects import EffectSetting, effect, effects
 from sims.registry import ChecksConvergence, simulator
-from sims.values import complete_values
+from sims.simulator import complete_values
 
 MODEL = "reduced-fe"
 SHORT = {"duration_s": 0.25, "seed": 1}

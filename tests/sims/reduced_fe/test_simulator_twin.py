@@ -8,18 +8,15 @@ import numpy as np
 import pytest
 
 from gearsig.errors import RefusalError
-from gearsig.gap.simulator import Added, Point
-from gearsig.rig.types import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
+from gearsig.gap import Added, OperatingCondition
+from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
 from sims import simulate
 from sims.effects import effects
-from sims.reduced_fe.dynamics_constants import constants
-from sims.reduced_fe.dynamics_respond import TRANSMISSION_ERROR, respond
-from sims.reduced_fe.simulator import prepare_preset
-from sims.reduced_fe.twin import STEP_S, ReducedTwin
+from sims.reduced_fe import TRANSMISSION_ERROR, TWIN_STEP_S, ReducedTwin, constants, prepare_preset, respond
 from sims.registry import gap_simulator
 from tests.sims.reduced_fe.synthetic import synthetic_gear
 
-POINT = Point(1800.0, 40.0)
+POINT = OperatingCondition(1800.0, 40.0)
 RIG = Rig(
     "bench",
     (Shaft("pinion"), Shaft("wheel")),
@@ -35,7 +32,7 @@ CRACK = Added("root_crack", 2.0, {"gear": "driver", "tooth": 4.0})
 def twin() -> Iterator[ReducedTwin]:
     """Of synthetic gears: how gears are reduced is tested elsewhere."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sims.reduced_fe.build._gear", cache(lambda blank, _n_dof: synthetic_gear(blank.geometry)))
+        patch.setattr("sims.reduced_fe._simulator._gear", cache(lambda blank, _n_dof: synthetic_gear(blank.geometry)))
         made = gap_simulator("reduced-fe").twin_of(RIG)
         assert isinstance(made, ReducedTwin)
         yield made
@@ -105,9 +102,11 @@ def test_the_step_is_short_enough_for_what_is_compared(twin):
     own, found = constants(ready.pair, ready.operation), []
     for part in (1, 4):
         signals = ("driver y acceleration", "bearing 1 y acceleration", TRANSMISSION_ERROR)
-        run = respond(ready.pair, ready.operation, duration_s=0.4, signals=signals, step_s=STEP_S / part, ready=own)
+        run = respond(
+            ready.pair, ready.operation, duration_s=0.4, signals=signals, step_s=TWIN_STEP_S / part, ready=own
+        )
         x = np.array([run[name][len(run[name]) // 2 :: part] for name in signals])
-        found.append(np.abs(np.fft.rfft(x * np.hanning(x.shape[1])))[:, : round(1e4 * x.shape[1] * STEP_S)])
+        found.append(np.abs(np.fft.rfft(x * np.hanning(x.shape[1])))[:, : round(1e4 * x.shape[1] * TWIN_STEP_S)])
     for line, (coarse, fine) in enumerate(zip(*found, strict=True)):
         great = fine > 1e-3 * fine.max()
         off = np.abs(20.0 * np.log10(coarse[great] / fine[great]))

@@ -1,0 +1,342 @@
+"""Which cases a benchmark makes: kinds in fixed shares, effects and severities in balance, all in a shuffled order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearsig.checks import count, one_of, within
+from gearsig.errors import RefusalError
+from gearsig.gap import Added, OperatingCondition
+from gearsig.recording import Recording
+from sims.blind import (
+    CATALOGUE,
+    OUTSIDE_CATALOGUE,
+    ROLES,
+    SHAFTS,
+    BlindCase,
+    CaseRecordings,
+    RunCondition,
+    draw_case,
+    labels,
+    record_case,
+    write_seen,
+)
+from sims.cracked import cracked_gap_simulator
+from sims.effects import effect
+from sims.gear_pair import PairTwin
+
+# --------------------
+# Shares of the kinds of case; apart from the plan, since a diagnoser may know them: they are public.
+# --------------------
+
+
+SHARES = {"single": 0.60, "none": 0.15, "unknown": 0.15, "pair": 0.10}
+"""Of all cases; "single" is shared evenly by the catalogue's effects, "unknown" by those outside it."""
+
+
+def counts_of(shares: Mapping[str, float], n_cases: int) -> dict[str, int]:
+    """Return whole numbers of cases in these shares, by largest remainder: together they are `n_cases`."""
+    exact = {kind: share * n_cases for kind, share in shares.items()}
+    counts = {kind: int(value) for kind, value in exact.items()}
+    missing = n_cases - sum(counts.values())
+    for kind in sorted(exact, key=lambda k: counts[k] - exact[k])[:missing]:
+        counts[kind] += 1
+    return counts
+
+
+REFERENCES = ("both", "with", "without")
+BLIND, SAME = "blind", "same"
+"""Where the recordings of a case come from: the independent rig, or the diagnosing simulator itself."""
+
+
+@dataclass(frozen=True)
+class PlannedCase:
+    """One case before it is drawn.
+
+    Parameters
+    ----------
+    number : int
+        From 1, in the order of the run.
+    source : str
+        `BLIND` or `SAME`.
+    kind : str
+    effect : str or None
+        None: nothing, or drawn with the case (pairs).
+    level : float
+        0 (barely noticeable) to 1 (strong).
+    with_reference : bool
+    n_conditions : int
+    repeats : int or None
+        Number of the blind case with the same gears, conditions and effects; None: it is blind itself.
+    """
+
+    number: int
+    source: str
+    kind: str
+    effect: str | None
+    level: float
+    with_reference: bool
+    n_conditions: int
+    repeats: int | None = None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What decides a benchmark's cases.
+
+    Parameters
+    ----------
+    n_cases : int
+        Of the independent rig.
+    seed : int
+    role : str
+        "development", "calibration" or "evaluation"; they share no gear geometry.
+    reference : str
+        "with" or "without" healthy references, or "both" in equal shares.
+    same_simulator : bool
+        Whether the same cases are made by the diagnosing simulator too, but for the unknown, which it cannot make.
+    longest_s : float or None
+        Recordings are cut to this; None: 4 to 8 s as drawn.
+    least_level : float
+        0 (barely noticeable) to 1 (strong), from which the levels of effects go up to 1; above 0 more cases are as
+        strong as the targets ask, which one in thirty is otherwise.
+    """
+
+    n_cases: int = 200
+    seed: int = 1
+    role: str = "evaluation"
+    reference: str = "both"
+    same_simulator: bool = False
+    longest_s: float | None = None
+    least_level: float = 0.0
+
+    def __post_init__(self) -> None:
+        count(self.n_cases, "cases")
+        one_of(self.role, "role", ROLES)
+        one_of(self.reference, "reference", REFERENCES)
+        within(self.least_level, "least level", 0, 1)
+
+    def definition(self) -> dict[str, Any]:
+        """What decides the cases, as plain values."""
+        return {
+            "n_cases": self.n_cases,
+            "seed": self.seed,
+            "role": self.role,
+            "reference": self.reference,
+            "same_simulator": self.same_simulator,
+            "longest_s": self.longest_s,
+            "least_level": self.least_level,
+        }
+
+    def cases(self) -> list[PlannedCase]:
+        """Return the cases in the order of the run."""
+        blind = _shuffled(self, np.random.default_rng([self.seed, 0]))
+        if not self.same_simulator:
+            return blind
+        again = [c for c in blind if c.kind != "unknown"]
+        return blind + [
+            replace(c, number=len(blind) + i, source=SAME, repeats=c.number) for i, c in enumerate(again, 1)
+        ]
+
+    def rng_of(self, case: PlannedCase) -> np.random.Generator:
+        """Return the generator that a case is drawn from: a repeated case is drawn as the blind one was."""
+        return np.random.default_rng([self.seed, 1, case.number if case.repeats is None else case.repeats])
+
+    def rng_of_run(self, case: PlannedCase) -> np.random.Generator:
+        """Return the generator of what the diagnosing simulator draws for itself: severities, places, noise."""
+        return np.random.default_rng([self.seed, 2, case.number])
+
+
+def _shuffled(plan: Plan, rng: np.random.Generator) -> list[PlannedCase]:
+    drawn = [one for kind, n in counts_of(SHARES, plan.n_cases).items() for one in _of_kind(kind, n, plan, rng)]
+    order = rng.permutation(len(drawn))
+    return [PlannedCase(i, BLIND, *drawn[place]) for i, place in enumerate(order, 1)]
+
+
+def _of_kind(
+    kind: str, n: int, plan: Plan, rng: np.random.Generator
+) -> Iterator[tuple[str, str | None, float, bool, int]]:
+    """Yield kind, effect, level, reference, conditions; levels in balance within an effect, the others throughout."""
+    names: Sequence[str | None] = {"single": tuple(CATALOGUE), "unknown": tuple(OUTSIDE_CATALOGUE)}.get(kind, (None,))
+    chosen = [names[i] for i in rng.permutation(len(names))]
+    effects = [chosen[i % len(chosen)] for i in range(n)]
+    turn = int(rng.integers(4))
+    for name in dict.fromkeys(effects):
+        k = effects.count(name)
+        for level in (rng.permutation(k) + rng.random(k)) / k:
+            turn = (turn + 1) % 4
+            reference = turn % 2 == 0 if plan.reference == "both" else plan.reference == "with"
+            yield kind, name, plan.least_level + (1.0 - plan.least_level) * float(level), reference, 1 + turn // 2
+
+
+# --------------------
+# Making one case: what may be seen goes to a folder, the truth stays in memory.
+# --------------------
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the scoring side knows of a case; it is never on disk while anything is being diagnosed.
+
+    Parameters
+    ----------
+    labels : mapping
+        See `sims.blind`.
+    fault_changes : tuple of mappings
+        For each condition: feature → dB between the case and its twin, the same run without the fault.
+    healthy : mapping
+        Of a case with nothing wrong, its first condition: feature → value; else empty.
+    healthy_change : mapping
+        The same against the reference; empty without one.
+    """
+
+    labels: Mapping[str, Any]
+    fault_changes: tuple[Mapping[str, float], ...]
+    healthy: Mapping[str, float]
+    healthy_change: Mapping[str, float]
+
+
+def make_case(plan: Plan, planned: PlannedCase, folder: Path | None) -> Truth:
+    """Draw and record a case; write what may be seen into `folder` (None: nowhere); return the truth."""
+    case = _drawn(plan, planned)
+    if planned.source == SAME:
+        made, label = record_same(plan, planned, case)
+    else:
+        made = record_case(case)
+        label = labels(case, made)
+    if folder is not None:
+        write_seen(made, folder)
+    return _truth(label, made)
+
+
+def _drawn(plan: Plan, planned: PlannedCase) -> BlindCase:
+    case = draw_case(
+        plan.rng_of(planned),
+        plan.role,
+        kind=planned.kind,
+        effect=planned.effect,
+        level=planned.level if planned.kind != "none" else None,
+        n_conditions=planned.n_conditions,
+        with_reference=planned.with_reference,
+    )
+    longest = plan.longest_s
+    if longest is None:
+        return case
+    conditions = tuple(replace(c, duration_s=min(c.duration_s, longest)) for c in case.conditions)
+    references = tuple(replace(c, duration_s=min(c.duration_s, longest)) for c in case.references)
+    return replace(case, conditions=conditions, references=references)
+
+
+def _truth(label: Mapping[str, Any], made: CaseRecordings) -> Truth:
+    if label["effects"]:
+        changes = tuple(_difference(case, twin) for case, twin in zip(made.conditions, made.twins, strict=True))
+        return Truth(label, changes, {}, {})
+    change = _difference(made.conditions[0], made.references[0]) if made.references else {}
+    return Truth(label, (), _features(made.conditions[0]), change)
+
+
+def _difference(now: Recording, before: Recording) -> dict[str, float]:
+    ours, theirs = _features(now), _features(before)
+    return {name: ours[name] - theirs[name] for name in ours if name in theirs}
+
+
+def _features(recording: Recording) -> dict[str, float]:
+    """Return the features by name; none where the recording cannot be reduced."""
+    from gearsig.gap import once, reduce_recording
+
+    if recording.rig is None:
+        return {}
+    try:
+        names, values = once(reduce_recording(recording, recording.rig))
+    except RefusalError:
+        return {}
+    return dict(zip(names, values.tolist(), strict=True))
+
+
+# --------------------
+# The same cases from the diagnosing simulator itself: same gears, conditions and levels, its own form of each effect.
+#
+# What a diagnosis scores on these over the independent rig is what it owes to knowing the generator.
+# --------------------
+
+
+N_DRAWS = 9
+"""Settings drawn per effect, of which the planned level picks one by severity."""
+
+
+def record_same(plan: Plan, planned: PlannedCase, case: BlindCase) -> tuple[CaseRecordings, dict[str, Any]]:
+    """Record a case on a specimen of the simulator; return it with its labels, laid out like the blind rig's."""
+    rng = plan.rng_of_run(planned)
+    first = case.conditions[0]
+    twin = cracked_gap_simulator().twin_of(case.rig.description(first.stated_rpm, first.stated_nm))
+    added = [_added(twin, fault.name, planned.level, rng) for fault in case.faults]
+    seed = int(rng.integers(1, 2**31))
+
+    def run(condition: RunCondition, faults: list[Added], noise: int) -> Recording:
+        recording = twin.run(
+            OperatingCondition(condition.true_rpm, condition.true_nm),
+            faults,
+            seed=seed,
+            duration_s=condition.duration_s,
+            sampling_rate_hz=case.rig.sampling_rate_hz,
+            noise=noise,
+        )
+        return replace(recording, rig=case.rig.description(condition.stated_rpm, condition.stated_nm))
+
+    n = len(case.conditions)
+    made = CaseRecordings(
+        conditions=tuple(run(c, added, 1 + i) for i, c in enumerate(case.conditions)),
+        references=tuple(run(c, [], 1 + n + i) for i, c in enumerate(case.references)),
+        twins=tuple(run(c, [], 1 + i) for i, c in enumerate(case.conditions)) if added else (),
+        places=tuple(_place(one, case) for one in added),
+    )
+    return made, _labels(case, planned, added, made)
+
+
+def _added(twin: PairTwin, name: str, level: float, rng: np.random.Generator) -> Added:
+    drawn = sorted((twin.draw(name, rng) for _ in range(N_DRAWS)), key=lambda one: one.severity)
+    return drawn[min(int(level * N_DRAWS), N_DRAWS - 1)]
+
+
+def _place(added: Added, case: BlindCase) -> dict[str, Any]:
+    """Return where the effect sits, in the words of the blind rig's labels."""
+    found: dict[str, Any] = {}
+    for name in ("gear", "shaft"):
+        if name in added.options:
+            found["shaft"] = SHAFTS[added.options[name] == "driven"]
+    if "bearing" in added.options:
+        bearing = str(added.options["bearing"])
+        found |= {"bearing": bearing, "shaft": SHAFTS[bearing in ("bearing 3", "bearing 4")]}
+    if "tooth" in added.options and found.get("shaft") == SHAFTS[0]:
+        found["angle_deg"] = 360.0 * (float(added.options["tooth"]) - 0.5) / case.rig.pair.z1
+    if "order" in added.options:
+        found |= {"order": float(added.options["order"]), "shaft": SHAFTS[0]}
+    return found
+
+
+def _labels(case: BlindCase, planned: PlannedCase, added: list[Added], made: CaseRecordings) -> dict[str, Any]:
+    def of_effect(one: Added, place: Mapping[str, Any]) -> dict[str, Any]:
+        known = effect(one.name)
+        return {
+            "name": one.name,
+            "group": known.group,
+            "severity": one.severity,
+            "unit": known.severity.unit,
+            "level": planned.level,
+            "resembles": "",
+            "place": dict(place),
+        }
+
+    return {
+        "role": case.role,
+        "kind": case.kind,
+        "effects": [of_effect(one, place) for one, place in zip(added, made.places, strict=True)],
+        "has_reference": bool(case.references),
+        "conditions": [{"true_rpm": c.true_rpm, "true_nm": c.true_nm} for c in case.conditions],
+        "pair": {"z1": case.rig.pair.z1, "z2": case.rig.pair.z2, "module_mm": case.rig.pair.module_mm},
+    }

@@ -1,0 +1,539 @@
+"""A bifurcation into a folder: branches in processes of their own, value by value, to be stopped and resumed."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, wait
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from io import StringIO
+from itertools import groupby
+from math import isfinite, pi
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearsig.cache import read_arrays
+from gearsig.checks import FloatArray, count, one_of, within
+from gearsig.errors import GearsigError, RefusalError
+from gearsig.phase import BifurcationDiagram, PhasePortrait, PoincareSection
+from gearsig.processes import n_processors, process_pool
+from sims.cracked import DECAYS, SIGNALS, TRANSMISSION_ERROR, Branch, End, PairState, SteadyRun
+from sims.gear_pair import COORDINATES
+from sims.sweep import claimed, written
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from gearsig.phase import CycleLock
+
+
+# --------------------
+# One value of a bifurcation: from a steady run to its Poincaré points and what kind of motion they speak for.
+# --------------------
+
+
+LEAST_FOR_KIND = 400
+"""Cycles that the 0–1 test and the exponent need to say something."""
+CYCLES = {"mesh": "mesh cycle", "shaft": "revolution of the input shaft"}
+N_ROTATING = 4
+UNITS = {"um": "µm", "N m": "N·m", "g mm": "g·mm", "deg": "°"}
+"""Units of the catalogue as people read them; the others are read as they are."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What is kept of one value.
+
+    Parameters
+    ----------
+    value : float
+    section : PoincareSection
+    period : int
+        Cycles after which the section repeats; 0: it does not within 16.
+    settled_s : float
+        Time that was left out ahead.
+    separated_share : float
+        Share of the time without a tooth in contact.
+    motion : str
+        Kind of motion; empty where it was not asked for.
+    exponent_per_s, k : float
+        Largest Lyapunov exponent and the 0–1 test's K; nan where there is none.
+    """
+
+    value: float
+    section: PoincareSection
+    period: int
+    settled_s: float
+    separated_share: float
+    motion: str = ""
+    exponent_per_s: float = float("nan")
+    k: float = float("nan")
+
+
+def measured(run: SteadyRun, branch: Branch, *, phase_cycles: float = 0.0, with_kind: bool = False) -> Measured:
+    """Take the Poincaré points of a steady run and, for some seconds more, the kind of motion."""
+    from gearsig.phase import kind_of_motion, locked_section, section_period
+
+    portrait, lock = portrait_of(run, branch), lock_of(run, branch)
+    section = locked_section(portrait, lock, phase_cycles=phase_cycles)
+    kind = kind_of_motion(portrait, lock, noise_free=_is_noise_free(run, branch)) if with_kind else None
+    return Measured(
+        run.value,
+        section,
+        section_period(section),
+        run.settled_s,
+        run.separated_share,
+        kind.kind if kind else "",
+        kind.exponent.exponent_per_s if kind and kind.exponent else float("nan"),
+        kind.chaos_test.k if kind and kind.chaos_test else float("nan"),
+    )
+
+
+def diagram_of(branch: Branch, found: list[Measured]) -> BifurcationDiagram:
+    """Return the diagram of one branch."""
+    from gearsig.phase import bifurcation_diagram
+
+    name, unit = parameter_words(branch)
+    return bifurcation_diagram(((m.value, m.section) for m in found), parameter=name, unit=unit)
+
+
+def parameter_words(branch: Branch) -> tuple[str, str]:
+    """Name and unit of what is varied, for people."""
+    from sims.effects import effect
+    from sims.effects import effects as known_effects
+    from sims.registry import simulator
+    from sims.simulator import parameter
+
+    name = branch.sweep.axes[0].name
+    if name in ("speed_rpm", "torque_nm"):
+        return {"speed_rpm": ("speed", "rpm"), "torque_nm": ("torque", "N·m")}[name]
+    if name in known_effects():
+        severity = effect(name).severity
+        return f"{name.replace('_', ' ')}: {severity.name.replace('_', ' ')}", UNITS.get(severity.unit, severity.unit)
+    unit = parameter(simulator(branch.sweep.model).parameters, name).unit
+    ending = "_" + unit.replace(" ", "_").replace("/", "_per_").replace("^", "").lower()
+    return (name.removesuffix(ending) if unit else name).replace("_", " "), UNITS.get(unit, unit)
+
+
+def portrait_of(run: SteadyRun, branch: Branch) -> PhasePortrait:
+    """Return the path of the wanted signal, with its rate where the model knows it."""
+    response, signal = run.response, branch.signal
+    names: tuple[str, ...] = (signal.replace("_", " "),)
+    units: tuple[str, ...]
+    if signal == TRANSMISSION_ERROR:
+        columns = [response[signal], run.rate_of_transmission_error_mps]
+        names, units = ("transmission error", "its rate"), ("m", "m/s")
+    elif signal in COORDINATES:
+        columns, names = [response[signal], response[f"{signal} velocity"]], (signal, f"{signal} velocity")
+        units = ("rad", "rad/s") if COORDINATES.index(signal) < N_ROTATING else ("m", "m/s")
+    elif signal in SIGNALS:
+        columns, units = [response[signal]], (_unit(signal),)
+    else:
+        return _measured_path(run, signal)
+    rate_hz = 1.0 / response.interval_s
+    return PhasePortrait(np.column_stack(columns), rate_hz, names, units, "states", signal, response.start_s)
+
+
+def lock_of(run: SteadyRun, branch: Branch) -> CycleLock:
+    """Return the cycles of the driver's own angle: they stay those of the teeth whatever the shaft does."""
+    from gearsig.angle import ShaftAngle
+    from gearsig.phase import CycleLock
+
+    response, turn = run.response, 2.0 * pi
+    angle = ShaftAngle(
+        "input",
+        response.time_s,
+        np.maximum.accumulate(response["driver angle"]) / turn,
+        np.maximum(response["driver angle velocity"], 0.0) / turn,
+        "encoder",
+    )
+    per_revolution = float(run.machine.mesh.pair.driver.teeth) if branch.section == "mesh" else 1.0
+    return CycleLock(angle, per_revolution, CYCLES[branch.section])
+
+
+def _measured_path(run: SteadyRun, channel: str) -> PhasePortrait:
+    recording = run.recording
+    assert recording is not None  # noqa: S101 - said to the type checker: a channel's run always has one
+    values: FloatArray = recording.values(channel)
+    unit = recording.channels[recording.index(channel)].unit
+    return PhasePortrait(values[:, None], recording.sampling_rate_hz, (channel,), (unit,), "states", channel)
+
+
+def _unit(signal: str) -> str:
+    if signal.endswith("_m"):
+        return "m"
+    if signal.endswith("_n"):
+        return "N"
+    base = signal.rsplit(" ", 1)[0]
+    length = "rad" if base in COORDINATES[:N_ROTATING] else "m"
+    return f"{length}/s^2" if signal.endswith("acceleration") else f"{length}/s"
+
+
+def _is_noise_free(run: SteadyRun, branch: Branch) -> bool:
+    """Whether nothing random acts while the machine runs: no sensor noise, no roughness that never returns."""
+    rough = run.machine.roughness
+    return branch.signal in SIGNALS and not (rough.locked_to == "time" and rough.rms_um > 0.0)
+
+
+# --------------------
+# Values of a bifurcation on disk, one small file each, so that a run can be stopped and goes on from there.
+# --------------------
+
+
+MOST_BYTES = 1_000_000_000
+"""Of one value's arrays; a usual one has some ten thousand."""
+
+
+@dataclass(frozen=True)
+class KeptValue:
+    """What became of one value: its points and where the run ended, or the reason why there are none."""
+
+    value: float
+    found: Measured | None
+    end: End | None
+    reason: str = ""
+
+
+def save(kept: KeptValue, path: Path) -> None:
+    """Write one value, whole or not at all."""
+    fields: dict[str, np.ndarray] = {"value": np.array(kept.value), "reason": np.array(kept.reason)}
+    if kept.found is not None and kept.end is not None:
+        found, section, end = kept.found, kept.found.section, kept.end
+        fields |= {
+            "points": section.points,
+            "times_s": section.times_s,
+            "extent": section.extent,
+            "words": np.array([*section.axis_names, *section.units, section.section, section.source]),
+            "numbers": np.array([found.period, found.settled_s, found.separated_share, found.exponent_per_s, found.k]),
+            "motion": np.array(found.motion),
+            "q": end.state.q,
+            "v": end.state.v,
+            "end": np.array([end.state.set_angle_rad, end.speed_rpm, end.torque_nm]),
+        }
+    part = path.with_name(f".{path.name}.part")
+    with part.open("wb") as file:
+        np.savez(file, **fields)  # type: ignore[arg-type]  # its stubs take names of options for keys
+    part.replace(path)
+
+
+def load(path: Path) -> KeptValue | None:
+    """Read one value; None where it is not there, or damaged."""
+    data = read_arrays(path, MOST_BYTES)
+    if data is None:
+        return None
+    value = float(data["value"])
+    if "points" not in data:
+        return KeptValue(value, None, None, str(data["reason"]))
+    d, words = data["points"].shape[1], tuple(str(w) for w in data["words"])
+    names, units, (section_name, source) = words[:d], words[d : 2 * d], words[2 * d :]
+    section = PoincareSection(
+        data["points"], data["times_s"], names, units, data["extent"], "locked", section_name, source
+    )
+    period, settled, separated, exponent, k = (float(x) for x in data["numbers"])
+    found = Measured(value, section, int(period), settled, separated, str(data["motion"]), exponent, k)
+    angle, speed, torque = (float(x) for x in data["end"])
+    return KeptValue(value, found, End(PairState(data["q"], data["v"], angle), speed, torque))
+
+
+DEFINITION, VALUES = "definition.json", "values"
+DIRECTIONS = ("both", "up", "down", "rest")
+LOOK_S = 0.3
+"""How often the parent counts what the processes have written."""
+
+
+@dataclass(frozen=True)
+class BifurcationRequest:
+    """A bifurcation as it is asked for.
+
+    Parameters
+    ----------
+    branch : Branch
+    direction : str
+        "up", "down", "both": each value goes on from where the last one ended; "rest": each starts from the static
+        balance, independently of the others.
+    phase_cycles : float
+        Place in the cycle at which the points are taken.
+    with_kind : bool
+        Whether the kind of motion is looked for, for some seconds per value.
+    """
+
+    branch: Branch
+    direction: str = "both"
+    phase_cycles: float = 0.0
+    with_kind: bool = False
+
+    def __post_init__(self) -> None:
+        one_of(self.direction, "direction", DIRECTIONS)
+        within(self.phase_cycles, "phase", 0.0, 1.0, remedy="it is a share of a cycle")
+
+    @property
+    def branches(self) -> tuple[str, ...]:
+        """Names of the branches, as they stand in the results."""
+        return ("up", "down") if self.direction == "both" else (self.direction,)
+
+    @property
+    def n_values(self) -> int:
+        """Runs in all."""
+        return len(self.branches) * len(self.branch.values)
+
+    def definition(self) -> dict[str, Any]:
+        """What decides the results, as plain values."""
+        sweep = self.branch.sweep.definition()
+        for unused in ("duration_s", "common_seed", "extension"):
+            del sweep[unused]
+        return {
+            **sweep,
+            "signal": self.branch.signal,
+            "section": self.branch.section,
+            "n_cycles": self.branch.n_cycles,
+            "direction": self.direction,
+            "phase_cycles": self.phase_cycles,
+            "with_kind": self.with_kind,
+        }
+
+
+def run_folder(
+    wanted: BifurcationRequest,
+    folder: Path,
+    *,
+    n_processes: int | None = None,
+    on_progress: Callable[[int], object] | None = None,
+) -> dict[str, list[KeptValue]]:
+    """Run whatever the folder does not hold yet; return all values by branch, ascending.
+
+    The branches run beside each other; along a branch one value waits for the other. After Ctrl-C what is complete
+    stays, and the same call goes on from there.
+    """
+    workers = n_processors() if n_processes is None else count(n_processes, "n_processes")
+    claimed(folder, wanted.definition(), DEFINITION, "bifurcation")
+    (folder / VALUES).mkdir(exist_ok=True)
+    jobs = _jobs(wanted)
+    try:
+        if workers == 1 or len(jobs) == 1:
+            for name, places in jobs:
+                run_places(wanted, folder, name, places, on_progress)
+        else:
+            with process_pool(min(workers, len(jobs))) as pool:
+                futures = [pool.submit(run_places, wanted, folder, name, places) for name, places in jobs]
+                _follow(futures, wanted, folder, on_progress)
+    finally:
+        for part in (folder / VALUES).glob(".*.part"):
+            with suppress(OSError):
+                part.unlink()
+    return complete(wanted, folder)
+
+
+def complete(wanted: BifurcationRequest, folder: Path) -> dict[str, list[KeptValue]]:
+    """Return the values that the folder holds, by branch, ascending."""
+    n = len(wanted.branch.values)
+    found = {name: [load(value_path(folder, name, place)) for place in range(n)] for name in wanted.branches}
+    return {name: [kept for kept in values if kept is not None] for name, values in found.items()}
+
+
+def n_complete(wanted: BifurcationRequest, folder: Path) -> int:
+    """Values that the folder holds."""
+    n = len(wanted.branch.values)
+    return sum(value_path(folder, name, place).exists() for name in wanted.branches for place in range(n))
+
+
+def value_path(folder: Path, name: str, place: int) -> Path:
+    """Name of one value's file; `place` counts ascending values."""
+    return folder / VALUES / f"{name}_{place:05d}.npz"
+
+
+def run_places(
+    wanted: BifurcationRequest,
+    folder: Path,
+    name: str,
+    places: Sequence[int],
+    on_progress: Callable[[int], object] | None = None,
+) -> None:
+    """Run values in this order, from the first that the folder does not hold."""
+    before: End | None = None
+    for place in places:
+        path = value_path(folder, name, place)
+        kept = load(path)
+        if kept is None:
+            kept = run_value(wanted, wanted.branch.values[place], before)
+            save(kept, path)
+        before = kept.end or before
+        if on_progress is not None:
+            on_progress(n_complete(wanted, folder))
+
+
+def run_value(wanted: BifurcationRequest, value: float, before: End | None) -> KeptValue:
+    """Run one value; what cannot be answered becomes a reason."""
+    try:
+        run = wanted.branch.run(value, before)
+        found = measured(run, wanted.branch, phase_cycles=wanted.phase_cycles, with_kind=wanted.with_kind)
+    except GearsigError as error:
+        return KeptValue(value, None, None, str(error))
+    return KeptValue(value, found, run.end)
+
+
+def _jobs(wanted: BifurcationRequest) -> list[tuple[str, tuple[int, ...]]]:
+    """Return what must be run one after the other."""
+    places = tuple(range(len(wanted.branch.values)))
+    if wanted.direction == "rest":
+        return [("rest", (place,)) for place in places]
+    return [(name, places if name == "up" else places[::-1]) for name in wanted.branches]
+
+
+def _follow(
+    futures: Sequence[Future[None]],
+    wanted: BifurcationRequest,
+    folder: Path,
+    on_progress: Callable[[int], object] | None,
+) -> None:
+    waiting: set[Future[None]] = set(futures)
+    while waiting:
+        done, waiting = wait(waiting, timeout=LOOK_S)
+        for future in done:
+            future.result()
+        if on_progress is not None:
+            on_progress(n_complete(wanted, folder))
+
+
+# --------------------
+# What comes out of a bifurcation: a table of the points, a summary of the values, the figure.
+# --------------------
+
+
+POINTS, SUMMARY, FIGURE = "points.csv", "bifurcation.json", "bifurcation.png"
+DOTS_PER_INCH = 160
+NAMES = {"up": "rising", "down": "falling", "rest": "from rest"}
+TRANSIENT = f"{DECAYS:g} time constants of the machine's slowest decay are left out at each value"
+BOUNDED = "known at the values tried only; a range that begins or ends where the sweep does may go on beyond it"
+
+Found = Mapping[str, Sequence[KeptValue]]
+
+
+def write_results(wanted: BifurcationRequest, found: Found, folder: Path) -> tuple[Path, Path, Path]:
+    """Write table, summary and figure; return their paths.
+
+    Raises
+    ------
+    RefusalError
+        If no value gave points.
+    """
+    figure = figure_of(wanted.branch, found)
+    table = written(folder / POINTS, points_csv(wanted.branch, found))
+    text = json.dumps(summary(wanted, found), indent=2, ensure_ascii=False) + "\n"
+    picture = folder / FIGURE
+    figure.savefig(picture, dpi=DOTS_PER_INCH)
+    return picture, table, written(folder / SUMMARY, text)
+
+
+def diagrams(branch: Branch, found: Found) -> dict[str, BifurcationDiagram]:
+    """Return the diagram of each branch that has points."""
+    with_points = {name: measured_of(kept) for name, kept in found.items()}
+    return {name: diagram_of(branch, values) for name, values in with_points.items() if values}
+
+
+def measured_of(kept: Sequence[KeptValue]) -> list[Measured]:
+    """Return the values that gave points."""
+    return [one.found for one in kept if one.found is not None]
+
+
+def figure_of(branch: Branch, found: Found) -> Figure:
+    """Draw one branch or both."""
+    from gearsig.plot import bifurcation_figure
+
+    drawn = list(diagrams(branch, found).values())
+    if not drawn:
+        reasons = [one.reason for kept in found.values() for one in kept if one.reason]
+        raise RefusalError(
+            f"no value gave points: {reasons[0] if reasons else 'none was run'}", remedy="change the range or settings"
+        )
+    preset = branch.sweep.preset
+    words = f"{drawn[0].axis_name} once per {drawn[0].section} over {drawn[0].parameter_name}, {preset}"
+    return bifurcation_figure(*drawn[:2], title=words)
+
+
+def points_csv(branch: Branch, found: Found) -> str:
+    """Return every point: branch, value of what is varied, coordinates of the path in SI units."""
+    text = StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    first = next(one for kept in found.values() for one in measured_of(kept))
+    axes = zip(first.section.axis_names, first.section.units, strict=True)
+    table.writerow(["branch", branch.sweep.axes[0].name, *(f"{name} ({unit})" for name, unit in axes)])
+    for name, kept in found.items():
+        for one in measured_of(kept):
+            for point in one.section.points:
+                table.writerow([name, f"{one.value:.12g}", *(f"{x:.9g}" for x in point)])
+    return text.getvalue()
+
+
+def summary(wanted: BifurcationRequest, found: Found) -> dict[str, Any]:
+    """Return the values of each branch, and where branches are apart."""
+    from gearsig.phase import coexistence_ranges, step_of, values_apart
+
+    drawn = diagrams(wanted.branch, found)
+    result: dict[str, Any] = {
+        "definition": wanted.definition(),
+        "transient": TRANSIENT,
+        "branches": {name: [_row(one) for one in kept] for name, kept in found.items()},
+    }
+    if {"up", "down"} <= drawn.keys():
+        up, down = drawn["up"], drawn["down"]
+        result["coexisting_at"] = values_apart(up, down).tolist()
+        result["coexisting_ranges"] = [asdict(one) for one in coexistence_ranges(up, down)]
+        result["coexisting_step"] = step_of(up, down)
+        result["coexisting_note"] = BOUNDED
+    return result
+
+
+def coexistence_lines(result: Mapping[str, Any], unit: str) -> list[str]:
+    """Return in words where two motions coexist, from a summary; empty where they do nowhere."""
+    ranges = result.get("coexisting_ranges", [])
+    if not ranges:
+        return []
+    seen = ", ".join(_range_text(one["first"], one["last"]) for one in ranges)
+    step = f"{result['coexisting_step']:g} {unit}".strip()
+    return [f"Two motions coexist at {seen} {unit}".rstrip() + f"; values tried are {step} apart.", f"  ({BOUNDED})"]
+
+
+def motion_lines(kept: Sequence[KeptValue], unit: str) -> list[str]:
+    """Return the kind of motion over ranges of neighbouring values; empty where it was not looked for."""
+    lines: list[str] = []
+    for motion, group in groupby((one for one in measured_of(kept) if one.motion), key=lambda one: one.motion):
+        values = list(group)
+        text = f"{_range_text(values[0].value, values[-1].value)} {unit}".rstrip() + f": {motion}"
+        exponents = [one.exponent_per_s for one in values if isfinite(one.exponent_per_s)]
+        tests = [one.k for one in values if isfinite(one.k)]
+        more = [
+            *([f"K {_range_text(min(tests), max(tests), '.2f')}"] if tests else []),
+            *([f"exponent {_range_text(min(exponents), max(exponents), '.3g')} 1/s"] if exponents else []),
+        ]
+        lines.append(text + (f" ({', '.join(more)})" if more else ""))
+    return lines
+
+
+def _range_text(low: float, high: float, form: str = "g") -> str:
+    first, last = format(low, form), format(high, form)
+    return first if first == last else f"{first} to {last}"
+
+
+def _row(kept: KeptValue) -> dict[str, Any]:
+    one = kept.found
+    if one is None:
+        return {"value": kept.value, "reason": kept.reason}
+    row: dict[str, Any] = {
+        "value": one.value,
+        "period_cycles": one.period,
+        "n_points": one.section.n_points,
+        "std": float(one.section.extent[0]),
+        "lowest": float(one.section.points[:, 0].min()),
+        "highest": float(one.section.points[:, 0].max()),
+        "separated_share": round(one.separated_share, 4),
+        "settled_s": one.settled_s,
+    }
+    if one.motion:
+        row["motion"] = one.motion
+        row["lyapunov_exponent_per_s"] = one.exponent_per_s if isfinite(one.exponent_per_s) else None
+        row["zero_one_k"] = one.k if isfinite(one.k) else None
+    return row

@@ -1,0 +1,1 @@
+"""The `gearsig` command: one module a command."""

@@ -1,0 +1,149 @@
+"""`gearsig compare`: a simulation beside a recording, without looking for causes."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.cli.options import (
+    PulsesOption,
+    RigOption,
+    SamplingRateOption,
+    SpeedOption,
+    TachometerTimesOption,
+    open_recording,
+    open_rig,
+    stated_speed,
+)
+from gearsig.checks import one_of
+from gearsig.errors import InputError
+
+if TYPE_CHECKING:
+    from gearsig.comparison import Comparison
+    from gearsig.recording import Recording
+    from gearsig.rig import Rig
+
+
+PAGE, DATA, TABLE = "compare.html", "compare.json", "orders.csv"
+"""Files that -o makes."""
+
+SimulationRigOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--sim-rig",
+        metavar="FILE",
+        help="Rig file of the simulation. Default: NAME.toml beside it, else the gears of --rig.",
+    ),
+]
+
+
+def compare(
+    simulation: Annotated[Path, typer.Argument(help="Simulated signals: any file that gearsig reads.")],
+    recording: Annotated[Path, typer.Argument(help="The recording to compare with.")],
+    rig: RigOption = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="DIR", help=f"Folder for {PAGE}, {DATA} and {TABLE}.")
+    ] = None,
+    channel: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--channel",
+            metavar="SIM=RECORDED",
+            help="Channels that belong together; repeatable. Default: equal names, or the only one of each.",
+        ),
+    ] = None,
+    align: Annotated[
+        str, typer.Option("--align", help="auto, marks or correlation; auto: marks where both records have them.")
+    ] = "auto",
+    fs: SamplingRateOption = None,
+    speed_rpm: SpeedOption = None,
+    tach_times: TachometerTimesOption = None,
+    pulses_per_revolution: PulsesOption = 1,
+    simulation_rig: SimulationRigOption = None,
+    simulation_fs: Annotated[
+        float | None, typer.Option("--sim-fs", metavar="HZ", help="Sampling rate of the simulation, like --fs.")
+    ] = None,
+    simulation_speed_rpm: Annotated[
+        float | None, typer.Option("--sim-speed-rpm", metavar="RPM", help="Speed of the simulation, like --speed-rpm.")
+    ] = None,
+) -> None:
+    """Compare a simulation with a recording by order, band and angle; every figure with how well it repeats.
+
+    Both are sampled over the shafts' angles, so that speed, sampling rate and length may differ. It prints levels of
+    the mesh harmonics and how alike the synchronous averages are; the page adds order spectra, averages tooth by tooth
+    and band levels. It names no cause.
+
+    Example: gearsig compare model.h5 measured.csv --rig gearbox.toml -o comparison
+    """
+    from rich.console import Console
+
+    from gearsig.comparison import ALIGN, compare_recordings
+    from gearsig.report import check_writable, comparison_text
+
+    one_of(align, "--align", ALIGN)
+    if output is not None:
+        check_writable(output)
+    machine = open_rig(rig, recording)
+    with Console(stderr=True).status("reading") as status:
+        recorded = open_recording(recording, machine, fs, stated_speed(speed_rpm, tach_times, pulses_per_revolution))
+        simulated = open_simulation(simulation, simulation_rig, machine, simulation_fs, simulation_speed_rpm)
+        pairs = [read_pair(text, simulated, recorded) for text in channel or ()]
+        status.update("comparing")
+        result = compare_recordings(simulated, recorded, channels=pairs, align_by=align)
+        if output is not None:
+            status.update("drawing")
+            write_comparison(result, output, "gearsig " + shlex.join(sys.argv[1:]))
+    typer.echo(comparison_text(result))
+    if output is not None:
+        typer.echo(f"\nOpen {output / PAGE} in a browser.")
+
+
+def open_simulation(
+    path: Path, rig: Path | None, machine: Rig | None, sampling_rate_hz: float | None, speed_rpm: float | None
+) -> Recording:
+    """Read the simulation with its own rig file; without one its channels are taken as the file has them.
+
+    The recording's rig then gives the gears only: its sensors' scales and its tachometer belong to the measurement.
+    """
+    from gearsig.comparison import for_simulation
+
+    own = open_rig(rig, path)
+    speed = stated_speed(speed_rpm, None, 1)
+    if own is not None or machine is None:
+        return open_recording(path, own, sampling_rate_hz, speed)
+    return open_recording(path, for_simulation(machine), sampling_rate_hz, speed)
+
+
+def read_pair(text: str, simulated: Recording, recorded: Recording) -> tuple[str, str]:
+    """Return both names of "SIM=RECORDED", or of one name that both records have; names may hold "=" themselves."""
+    if text in simulated.channel_names and text in recorded.channel_names:
+        return text, text
+    parts = text.split("=")
+    cuts = [("=".join(parts[:i]), "=".join(parts[i:])) for i in range(1, len(parts))]
+    known = [cut for cut in cuts if cut[0] in simulated.channel_names and cut[1] in recorded.channel_names]
+    if known:
+        return known[0]
+    if len(parts) != 2:
+        raise InputError(
+            f"{text!r} is not SIM=RECORDED",
+            where="--channel",
+            allowed=f"simulation: {', '.join(simulated.channel_names)}; recording: {', '.join(recorded.channel_names)}",
+        )
+    return parts[0].strip(), parts[1].strip()
+
+
+def write_comparison(comparison: Comparison, folder: Path, command: str) -> None:
+    """Write page, data and table; all are made before the first is written, and each appears when it is complete."""
+    from gearsig.report import comparison_page, comparison_to_json, orders_csv, write_text
+
+    texts = {
+        TABLE: orders_csv(comparison),
+        DATA: comparison_to_json(comparison),
+        PAGE: comparison_page(comparison, command=command),
+    }
+    for name, text in texts.items():
+        write_text(folder / name, text)

@@ -1,0 +1,198 @@
+"""`gearsig flexible`: maps, speed sweeps and spectra of a pair of finite-element gears."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.cli.options import (
+    EffectOption,
+    FreshOption,
+    PresetOption,
+    SeedOption,
+    SetOption,
+    clear_other_versions,
+    read_request,
+)
+from app.cli.quantities import quantity
+from gearsig.checks import FloatArray, one_of, positive
+from gearsig.errors import InputError
+
+MODEL = "reduced-fe"
+
+
+def flexible(
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for figures and tables.")],
+    preset: PresetOption = "",
+    settings: SetOption = None,
+    effects: EffectOption = None,
+    torques: Annotated[str, typer.Option("--torques", metavar="LIST", help="Of the sweeps.")] = "85,170,340Nm",
+    speeds: Annotated[str, typer.Option("--speeds", metavar="RANGE", help="Of the sweeps, up and down.")] = (
+        "900..4100rpm"
+    ),
+    duration: Annotated[
+        str, typer.Option("--duration", metavar="TIME", help="Of one sweep; 15s up and 15s down are six million steps.")
+    ] = "15s",
+    spreading: Annotated[
+        bool, typer.Option("--spreading", help="Also check contact at single nodes against patches (RBE3).")
+    ] = False,
+    seed: SeedOption = 0,
+    fresh: FreshOption = False,
+) -> None:
+    """Study a pair of reduced finite-element gears: stiffness and transmission-error maps, sweeps with jumps, spectra.
+
+    Example: gearsig flexible --preset light_damping_50_50 -o study
+    """
+    import numpy as np
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from app.flexible import RANGE, flexible_study, write_study
+    from sims.presets import preset as preset_named
+    from sims.reduced_fe import ReducedPair
+
+    request = read_request(MODEL, preset, settings, effects, None, None, "1s", "20480Hz", seed)
+    first, last = _range(speeds)
+    wanted = tuple(quantity(f"{t.strip().removesuffix('Nm')}Nm", "N m", "--torques") for t in torques.split(","))
+    if fresh:
+        clear_other_versions(MODEL)
+    ready = ReducedPair().prepare(
+        request.parameters, request.effects, None, np.random.default_rng(seed), preset_name=request.preset
+    )
+    chosen = preset_named(MODEL, request.preset)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("preparing", total=1.0)
+        study = flexible_study(
+            ready.pair,
+            float(ready.operation.torque_nm.values[0]),
+            wanted,
+            sweep_s=quantity(duration, "s", "--duration"),
+            first_rpm=first,
+            last_rpm=last,
+            step_s=ready.step_s,
+            check_spreading=spreading,
+            on_progress=lambda what, done: progress.update(task, description=what, completed=done),
+        )
+        paths = write_study(study, output, chosen.name)
+    typer.echo(f"{output}: {', '.join(path.name for path in paths)}")
+    for torque, (up, down) in study.sweeps.items():
+        natural = study.natural_hz[torque]
+        jumps = [sweep.jump_hz(RANGE[0] * natural, RANGE[1] * natural) for sweep in (up, down)]
+        peaks = [sweep.peak_hz(RANGE[0] * natural, RANGE[1] * natural) for sweep in (up, down)]
+        said = [
+            f"greatest at {peak:.0f} Hz, {'no jump' if jump is None else f'jump at {jump:.0f} Hz'}"
+            for peak, jump in zip(peaks, jumps, strict=True)
+        ]
+        typer.echo(f"{torque:g} N·m: torsional mode {natural:.0f} Hz; sweep up: {said[0]}; sweep down: {said[1]}")
+
+
+def _range(text: str) -> tuple[float, float]:
+    first, dots, last = text.partition("..")
+    if not dots:
+        raise InputError(f"--speeds is {text!r}", allowed="900..4100rpm")
+    return quantity(f"{first.removesuffix('rpm')}rpm", "rpm", "--speeds"), quantity(last, "rpm", "--speeds")
+
+
+# --------------------
+# `gearsig gear-body`: one gear as finite elements.
+# --------------------
+
+
+SPRINGS = {"radial": "2e8N/m", "axial": "1e8N/m", "tilt": "1e5Nm/rad", "twist": "4e4Nm/rad"}
+"""That hold the hub unless others are given."""
+
+
+def gear_body(
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for figures and files.")],
+    teeth: Annotated[int, typer.Option("--teeth")] = 50,
+    module: Annotated[str, typer.Option("--module", metavar="LENGTH")] = "3mm",
+    pressure_angle: Annotated[float, typer.Option("--pressure-angle", help="Degrees.")] = 20.0,
+    profile_shift: Annotated[float, typer.Option("--profile-shift", help="In modules.")] = 0.0,
+    fillet: Annotated[float, typer.Option("--fillet", help="Tip radius of the tool, in modules.")] = 0.38,
+    face: Annotated[str, typer.Option("--face", metavar="LENGTH", help="Face width.")] = "20mm",
+    bore: Annotated[str, typer.Option("--bore", metavar="LENGTH", help="Radius of the bore.")] = "20mm",
+    web: Annotated[str, typer.Option("--web", metavar="LENGTH", help="Thickness of the web; none: full disc.")] = "",
+    rim: Annotated[str, typer.Option("--rim", metavar="LENGTH", help="Thickness of the rim, with a web.")] = "",
+    hub: Annotated[str, typer.Option("--hub", metavar="LENGTH", help="Thickness of the hub, with a web.")] = "",
+    dof: Annotated[int, typer.Option("--dof", help="Degrees of freedom of the mesh, about.")] = 277_200,
+    modes: Annotated[int, typer.Option("--modes", help="Elastic modes to find.")] = 20,
+    held: Annotated[
+        str, typer.Option("--held", help="free, bore or springs: how the gear is held for its modes.")
+    ] = "free",
+    radial: Annotated[str, typer.Option("--radial", metavar="STIFFNESS", help="Springs at the hub, across.")] = SPRINGS[
+        "radial"
+    ],
+    axial: Annotated[str, typer.Option("--axial", metavar="STIFFNESS", help="Along the shaft.")] = SPRINGS["axial"],
+    tilt: Annotated[str, typer.Option("--tilt", metavar="STIFFNESS", help="Against tilting.")] = SPRINGS["tilt"],
+    twist: Annotated[str, typer.Option("--twist", metavar="STIFFNESS", help="About the shaft.")] = SPRINGS["twist"],
+    force: Annotated[str, typer.Option("--force", metavar="FORCE", help="On one tooth, for the stress.")] = "1000N",
+    reduce: Annotated[bool, typer.Option("--reduce", help="Also reduce the gear, with its errors.")] = False,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Clear away reduced gears that another version of gearsig kept.")
+    ] = False,
+    vtk: Annotated[bool, typer.Option("--vtk", help="Also write gear.vtu for other programs.")] = False,
+) -> None:
+    """Mesh one gear with finite elements; show its mesh, modes and stress, and reduce it for the model reduced-fe.
+
+    Example: gearsig gear-body --teeth 50 --module 3mm --web 12mm --reduce -o gear
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from app.cli.options import clear_other_versions
+    from app.gear_body import lines, study_gear, write_gear_body
+    from sims.mesh import GearGeometry
+    from sims.reduced_fe import NAME, GearBlank
+
+    def length(text: str, name: str) -> float | None:
+        return quantity(text, "mm", name) if text else None
+
+    geometry = GearGeometry(
+        teeth,
+        quantity(module, "mm", "--module"),
+        pressure_angle,
+        profile_shift,
+        quantity(face, "mm", "--face"),
+        tool_tip_radius=fillet,
+        bore_radius_mm=quantity(bore, "mm", "--bore"),
+    )
+    blank = GearBlank(geometry, length(web, "--web"), length(rim, "--rim"), length(hub, "--hub"))
+    one_of(held, "--held", ("free", "bore", "springs"))
+    springs = _springs(held, {"radial": radial, "axial": axial, "tilt": tilt, "twist": twist})
+    if fresh:
+        clear_other_versions(NAME)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("mesh", total=1.0)
+        study = study_gear(
+            blank,
+            dof,
+            n_modes=modes,
+            held="bore" if held == "bore" else "free",
+            springs=springs,
+            force_n=quantity(force, "N", "--force"),
+            reduce=reduce,
+            on_progress=lambda what, done: progress.update(task, description=what, completed=done),
+        )
+        paths = write_gear_body(study, output, vtk=vtk)
+    typer.echo("\n".join(lines(study)))
+    typer.echo(f"{output}: {', '.join(path.name for path in paths)}")
+
+
+def _springs(held: str, given: dict[str, str]) -> FloatArray | None:
+    """Stiffness in the six directions of the hub; None where it is not on springs."""
+    import numpy as np
+
+    if held != "springs":
+        for name, text in given.items():
+            if text != SPRINGS[name]:
+                raise InputError(f"--{name} is given, but --held is {held!r}", remedy="add --held springs")
+        return None
+    units = {"radial": "N/m", "axial": "N/m", "tilt": "Nm/rad", "twist": "Nm/rad"}
+    radial, axial, tilt, twist = (
+        positive(quantity(given[name], unit, f"--{name}"), f"--{name}", unit) for name, unit in units.items()
+    )
+    return np.array([radial, radial, axial, tilt, tilt, twist])

@@ -1,0 +1,169 @@
+"""`gearsig gap`: where a recording differs from its simulation, which effect causes it, how far it shrinks with it."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.cli.options import SamplingRateOption, clear_other_versions
+from app.gap.run import GapRequest
+from gearsig.errors import InputError
+
+if TYPE_CHECKING:
+    from gearsig.gap import GapReport
+
+
+TABLE_WIDTH = 110
+"""Columns of the table of effects where it is not printed to a terminal."""
+
+
+def gap(
+    recordings: Annotated[
+        list[Path] | None, typer.Argument(help="Recordings of one rig; more operating conditions tell more.")
+    ] = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            "--rig",
+            help="Rig file (TOML) of all recordings. NAME.toml beside a recording overrides its speed and torque.",
+        ),
+    ] = None,
+    model: Annotated[str, typer.Option("--model", help="Simulator to compare with.")] = "cracked",
+    reference: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--reference", metavar="HEALTHY", help="Recording of the same rig when it was healthy; repeatable."
+        ),
+    ] = None,
+    torque: Annotated[
+        list[str] | None,
+        typer.Option("--torque", metavar="N", help="Of the input shaft, e.g. 60Nm: one for all, or one for each."),
+    ] = None,
+    fs: SamplingRateOption = None,
+    cache: Annotated[
+        Path | None,
+        typer.Option("--cache", metavar="DIR", help="Keeps what is prepared once per rig. Default: your cache folder."),
+    ] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Prepare anew what the cache holds, and keep that.")] = False,
+    effect_file: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--effect-file",
+            metavar="FILE",
+            help="Python file with an effect of your own, which is looked for, too; repeatable. The variable "
+            "GEARSIG_EFFECTS names such files for every command and the dashboard.",
+        ),
+    ] = None,
+    list_effects: Annotated[bool, typer.Option("--list-effects", help="Show the effects that are looked for.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for gap.html, gap.json and twin.toml.")
+    ] = None,
+) -> None:
+    """Say where recordings differ from the simulation of their rig, which effect causes it, how far it shrinks then.
+
+    Give recordings at several speeds and loads if there are any, and recordings of the same rig when it was healthy:
+    both make the answer much surer. It takes up to a minute on two cores; the rig's simulations are kept for the next.
+
+    Example: gearsig gap slow.h5 fast.h5 --rig gearbox.toml --reference healthy.h5 -o gap
+    """
+    if effect_file:
+        from sims.effects import add_effect
+
+        for path in effect_file:
+            add_effect(path)
+    if list_effects:
+        _print_effects(model)
+        return
+    if output is None:
+        raise InputError("no folder for the results is given", remedy="give -o DIR")
+    from app.gap.job import check_folder, write_results
+
+    asked = GapRequest(tuple(recordings or ()), tuple(reference or ()), rig, _torques(torque), fs)
+    check_folder(output)
+    if fresh and model == "reduced-fe":
+        clear_other_versions(model)
+    report = _diagnosed(asked, model, cache, fresh=fresh)
+    written = write_results(report, output, command="gearsig " + shlex.join(sys.argv[1:]))
+    _tell(report, written)
+
+
+def _torques(texts: list[str] | None) -> tuple[float, ...]:
+    from app.cli.options import torque_of
+
+    found = (torque_of(text) for text in texts or ())
+    return tuple(value for value in found if value is not None)
+
+
+def _diagnosed(asked: GapRequest, model: str, cache: Path | None, *, fresh: bool) -> GapReport:
+    """Diagnose with a progress bar, which is shown on a terminal only."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+    from app.gap.run import run_gap
+    from gearsig.cache import cache_folder
+
+    stage = TextColumn("{task.description}", markup=False)  # names of files are no markup
+    columns = (stage, BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("reading", total=1.0)
+        return run_gap(
+            asked,
+            model,
+            cache=cache or cache_folder("gap"),
+            fresh=fresh,
+            on_stage=lambda what, done: progress.update(task, description=what, completed=done),
+        )
+
+
+def _tell(report: GapReport, written: tuple[Path, ...]) -> None:
+    from gearsig.report import gap_text
+
+    typer.echo(gap_text(report))
+    for notice in report.notices:
+        typer.echo(f"Note: {notice}", err=True)
+    page, *others = written
+    typer.echo(f"Open {page} in a browser; beside it: {', '.join(path.name for path in others)}.")
+    if report.twin_toml:
+        twin = shlex.quote(str(others[-1]))
+        run = f"{_own_effects(report)}gearsig simulate {report.simulator} --preset {twin} -o twin.h5"
+        typer.echo(f"Run the simulator with the effect: {run}")
+
+
+def _own_effects(report: GapReport) -> str:
+    """Return what must stand before a command that needs an effect of the user's own."""
+    from sims.effects import VARIABLE, is_own, own_files
+
+    fitted = report.causes[0].fitted
+    if fitted is None or not is_own(fitted.name):
+        return ""
+    return f"{VARIABLE}={shlex.quote(os.pathsep.join(map(str, own_files())))} "
+
+
+def _print_effects(model: str) -> None:
+    """Print the catalogue: group, name, unit of the severity, where it shows."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+
+    from app.gap.run import gap_effects_of
+    from gearsig.gap import severity_unit
+    from sims.effects import is_own
+
+    table = Table("group", "effect", "severity", "shows in", box=SIMPLE_HEAD, pad_edge=False)
+    found = gap_effects_of(model)
+    last = ""
+    for effect in found.values():
+        where = ", ".join(kind.replace("_", " ") for kind in effect.shows_in)
+        group = "" if effect.group == last else effect.group
+        last = effect.group
+        own = "\n  (your own: tried by simulation, not known to the recognition)" if is_own(effect.name) else ""
+        table.add_row(group, f"{effect.name}\n  {effect.title}{own}", severity_unit(effect.unit) or "–", where)
+    width = None if sys.stdout.isatty() else TABLE_WIDTH
+    Console(markup=False, highlight=False, width=width).print(table)
+    typer.echo(f"{len(found)} effects that have a meaning for the model {model}; also: none, unknown.")

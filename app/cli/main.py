@@ -1,0 +1,111 @@
+"""The `gearsig` command."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+
+import typer
+
+from app.cli.analyze import analyze, crack, demo
+from app.cli.benchmark import benchmark_app
+from app.cli.bifurcation import bifurcation
+from app.cli.compare import compare
+from app.cli.dashboard import dashboard
+from app.cli.flexible import flexible, gear_body
+from app.cli.gap import gap
+from app.cli.motion import force, identify, start_stop
+from app.cli.report import report
+from app.cli.rig import rig_app
+from app.cli.simulate import simulate
+from app.cli.sweep import sweep
+from gearsig import __version__
+from gearsig.errors import InputError, RefusalError
+
+EXIT_INPUT_ERROR = 2
+EXIT_INTERRUPTED = 130
+
+app = typer.Typer(
+    name="gearsig",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
+    help="""Signal processing and diagnostics for gear vibration.
+
+    Start with **gearsig demo**; then **gearsig analyze RECORDING --rig RIG** on a recording of your own.
+    A rig file says what is known of the machine: **gearsig rig example** prints one to start from.""",
+)
+app.command()(analyze)
+app.command()(crack)
+app.command()(force)
+app.command()(start_stop)
+app.command()(identify)
+app.command()(compare)
+app.command()(report)
+app.add_typer(rig_app, name="rig")
+app.command()(simulate)
+app.command()(sweep)
+app.command()(bifurcation)
+app.command()(flexible)
+app.command()(gear_body)
+app.command()(gap)
+app.add_typer(benchmark_app, name="benchmark")
+app.command()(demo)
+app.command()(dashboard)
+
+
+USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
+"""Base of all errors of Typer's parser, which it does not export; since version 0.20 it is no longer Click's."""
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"gearsig {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: bool = typer.Option(False, "--version", callback=_show_version, is_eager=True, help="Print the version."),
+) -> None:
+    """Hold the options that belong to no single command."""
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line; an error of the user's input is one line on standard error and exit code 2."""
+    _stop_tidily()
+    try:
+        sys.exit(app(args=list(arguments) if arguments is not None else None, standalone_mode=False))
+    except USAGE_ERROR as error:  # a wrong option or argument: left alone, Typer draws a frame of several lines
+        typer.echo(_usage_text(error), err=True, nl=bool(_usage_text(error)))
+        sys.exit(EXIT_INPUT_ERROR)
+    except (InputError, RefusalError) as error:
+        typer.echo(f"gearsig: {error}", err=True)
+        sys.exit(EXIT_INPUT_ERROR)
+    except (KeyboardInterrupt, typer.Abort):
+        typer.echo("gearsig: stopped", err=True)
+        sys.exit(EXIT_INTERRUPTED)
+    except BrokenPipeError:  # the reader of our output has gone, e.g. `| head`
+        sys.stderr.close()
+        sys.exit(0)
+
+
+def _stop_tidily() -> None:
+    """Let SIGTERM end a command as Ctrl-C does: what it began is tidied up."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
+def _usage_text(error: Exception) -> str:
+    """Return an error of the parser in one line; empty where it has printed the help instead."""
+    what = " ".join(str(getattr(error, "format_message", error.__str__)()).rstrip(".").split())
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context is not None else "gearsig"
+    return f"gearsig: {what}{' See' if what.endswith('?') else '; see'} {command} --help" if what else ""
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,254 @@
+"""`gearsig start-stop`: what the motion of a machine that starts, stops and reverses shows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.cli.options import (
+    BandwidthOption,
+    RigOption,
+    SamplingRateOption,
+    UnwrapOption,
+    UseOption,
+    open_motion,
+    open_rig,
+    read_bandwidth,
+    read_uses,
+)
+from app.cli.quantities import quantity
+from gearsig.errors import InputError
+
+if TYPE_CHECKING:
+    from gearsig.motion import AngleProfile, ForceEstimate, Identification, NoiseStudy, StartStop
+    from gearsig.recording import Recording
+    from gearsig.rig import Rig
+    from gearsig.spectra import Spectrum
+
+
+DATA, PICTURE = "start_stop.json", "start_stop.png"
+"""Files that -o makes."""
+
+
+def start_stop(
+    recording: Annotated[Path, typer.Argument(help="Recording with the motion of both gears, better with torque.")],
+    rig: RigOption = None,
+    use: UseOption = None,
+    bandwidth: BandwidthOption = None,
+    unwrap: UnwrapOption = False,
+    fs: SamplingRateOption = None,
+    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="DIR", help=f"Folder for {DATA} and {PICTURE}.")
+    ] = None,
+) -> None:
+    """Find starts and stops, the backlash, every impact of the flanks, and the loop of torque over twist.
+
+    Nothing of it needs a steady speed. The picture shows the speed with the impacts, the phase plane of the teeth and
+    torque over twist; the JSON has the level of a vibration (else of the torque) tooth by tooth, forwards and backwards
+    apart, and its orders.
+
+    Example: gearsig start-stop drive.h5 --rig drive.toml -o drive
+    """
+    from gearsig.motion import examine_start_stop
+    from gearsig.report import check_writable, start_stop_json, start_stop_text, write_text
+
+    if output is not None:
+        check_writable(output)
+    opened, motion = open_motion(recording, open_rig(rig, recording), fs, use, bandwidth, unwrap)
+    examined = examine_start_stop(motion)
+    data = start_stop_json(examined, *tooth_levels(opened, examined))
+    if output is not None:
+        from gearsig.plot import start_stop_figure
+
+        write_text(output / DATA, data)
+        start_stop_figure(examined).savefig(output / PICTURE)
+    typer.echo(data if json else start_stop_text(examined))
+    if output is not None and not json:
+        typer.echo(f"\nIn {output}: {DATA}, {PICTURE}.")
+
+
+def tooth_levels(recording: Recording, examined: StartStop) -> tuple[AngleProfile | None, str, str, Spectrum | None]:
+    """Return of the first acceleration, else of the torque: level tooth by tooth, channel, unit, orders forwards."""
+    from gearsig.errors import RefusalError
+    from gearsig.motion import angle_profile, stretch_order_spectrum
+
+    fitting = [c for q in ("acceleration", "torque") for c in recording.channels if c.quantity == q]
+    if not fitting:
+        return None, "", "", None
+    channel, motion = fitting[0], examined.motion
+    values, angle = recording.values(channel.name), motion.driver_angle_rad
+    found = angle_profile(values, angle, examined.course, motion.path.teeth[0])
+    try:
+        orders = stretch_order_spectrum(values, angle, examined.course, unit=channel.unit, source=channel.name)
+    except RefusalError:  # no stretch holds a revolution
+        return found, channel.name, channel.unit, None
+    return found, channel.name, channel.unit, orders
+
+
+# --------------------
+# `gearsig force`: force between the teeth from the measured motion of both gears.
+# --------------------
+
+
+FORCE_DATA, TABLE, FORCE_PICTURE, NOISE_PICTURE = "force.json", "force.csv", "force.png", "noise.png"
+"""Files that -o makes."""
+
+DatumOption = Annotated[
+    str,
+    typer.Option(
+        "--datum",
+        metavar="auto|zero|LENGTH",
+        help="Compression at which the teeth stand in the middle of the play: found, zero, or e.g. 12um.",
+    ),
+]
+
+
+def force(
+    recording: Annotated[Path, typer.Argument(help="Recording with the motion of both gears, better with torque.")],
+    rig: RigOption = None,
+    use: UseOption = None,
+    bandwidth: BandwidthOption = None,
+    unwrap: UnwrapOption = False,
+    datum: DatumOption = "auto",
+    noise: Annotated[
+        bool, typer.Option("--noise", help="Also: how much noise until the piecewise model is no longer nearer.")
+    ] = False,
+    fs: SamplingRateOption = None,
+    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")] = False,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help=f"Folder for {FORCE_DATA}, {TABLE}, {FORCE_PICTURE}."),
+    ] = None,
+) -> None:
+    """Estimate the force between the teeth by the piecewise model, by Hunt–Crossley and by Kelvin–Voigt.
+
+    The rig's [contact] table gives stiffness, backlash, restitution, friction and inertias. Where torque was measured,
+    each model is compared with torque over base radius. A speed or acceleration that was not measured is derived, and
+    said how.
+
+    Example: gearsig force drive.h5 --rig drive.toml --noise -o force
+    """
+    from rich.console import Console
+
+    from gearsig.motion import estimate_forces
+    from gearsig.report import check_writable, force_json, force_text
+
+    if output is not None:
+        check_writable(output)
+    machine = open_rig(rig, recording)
+    zero = read_datum(datum)
+    with Console(stderr=True).status("reading") as status:
+        opened, motion = open_motion(recording, machine, fs, use, bandwidth, unwrap)
+        estimate = estimate_forces(motion, datum=zero)
+        study = None
+        if noise:
+            import numpy as np
+
+            from gearsig.motion import noise_study
+
+            status.update("adding noise")
+            rng = np.random.default_rng(0)
+            roles, band = read_uses(use), read_bandwidth(bandwidth)
+            study = noise_study(opened, machine, rng=rng, use=roles, bandwidth_hz=band, unwrap=unwrap, datum=zero)
+        written: tuple[str, ...] = ()
+        if output is not None:
+            status.update("drawing")
+            written = write_force(estimate, study, output)
+    typer.echo(force_json(estimate, study) if json else force_text(estimate, study))
+    if written and not json:
+        typer.echo(f"\nIn {output}: {', '.join(written)}.")
+
+
+def read_datum(text: str) -> str | float:
+    """Return "auto", "zero" or a length in m."""
+    if text in ("auto", "zero"):
+        return text
+    try:
+        return quantity(text, "um", "--datum") * 1e-6
+    except InputError as error:
+        raise InputError(error.what, allowed="auto, zero, or a length, e.g. 12um") from None
+
+
+def write_force(estimate: ForceEstimate, study: NoiseStudy | None, folder: Path) -> tuple[str, ...]:
+    """Write data, table and pictures; return the files' names. Without a reference there is no picture."""
+    from gearsig.plot import force_figure, noise_figure
+    from gearsig.report import force_csv, force_json, write_text
+
+    write_text(folder / FORCE_DATA, force_json(estimate, study))
+    write_text(folder / TABLE, force_csv(estimate))
+    pictures = {}
+    if estimate.references_n:
+        pictures[FORCE_PICTURE] = force_figure(estimate)
+    if study is not None:
+        pictures[NOISE_PICTURE] = noise_figure(study)
+    for name, figure in pictures.items():
+        figure.savefig(folder / name)
+    return (FORCE_DATA, TABLE, *pictures)
+
+
+# --------------------
+# `gearsig identify`: stiffness, damping, backlash, friction and inertia from a recording.
+# --------------------
+
+
+TAKEN = (
+    "half_backlash_um",
+    "stiffness_n_per_m_lambda",
+    "restitution",
+    "driver_inertia_kg_m2",
+    "friction_coefficient",
+    "driven_inertia_kg_m2",
+)
+"""Parameters that a rig file holds."""
+
+
+def identify(
+    recording: Annotated[Path, typer.Argument(help="Recording with the motion of both gears and the driver's torque.")],
+    rig: RigOption = None,
+    use: UseOption = None,
+    bandwidth: BandwidthOption = None,
+    unwrap: UnwrapOption = False,
+    fs: SamplingRateOption = None,
+    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")] = False,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Rig file (.toml) to write, with all that could be told."),
+    ] = None,
+) -> None:
+    """Fit the contact of the teeth and the load to a recording, with 95 % intervals and what it cannot tell.
+
+    The best record starts, runs and stops with a brake: both flanks are loaded, flanks meet at speed, inertias show.
+
+    Example: gearsig identify drive.h5 --rig drive.toml -o fitted.toml
+    """
+    from gearsig.motion import identify as fit
+    from gearsig.report import identify_json, identify_text
+    from gearsig.rig import write_rig
+
+    machine = open_rig(rig, recording)
+    if output is not None and (output.suffix.lower() != ".toml" or not output.parent.is_dir()):
+        raise InputError(f"cannot write {str(output)!r}", allowed="a .toml file in a folder that exists")
+    opened, motion = open_motion(recording, machine, fs, use, bandwidth, unwrap)
+    found = fit(motion)
+    known = machine or opened.rig
+    if output is not None and known is not None:  # motion could not have been measured without a rig
+        write_rig(with_fitted(known, found), output)
+    typer.echo(identify_json(found) if json else identify_text(found))
+    if output is not None and not json:
+        typer.echo(f"\n{output.name}: the rig with what could be told.")
+
+
+def with_fitted(rig: Rig, found: Identification) -> Rig:
+    """Return the rig with the fitted values in its contact, as far as they could be told."""
+    assert rig.contact is not None  # noqa: S101  motion could not have been measured without it
+    told = {p.name: p.value for p in found.parameters if p.is_told and p.name in TAKEN}
+    values = {name: max(value, 0.0) for name, value in told.items()}
+    return replace(
+        rig,
+        contact=replace(rig.contact, **values),  # type: ignore[arg-type]  # all of them are numbers
+        sources=(*rig.sources, f"contact fitted to {found.source or 'a recording'}: {', '.join(sorted(values))}"),
+    )

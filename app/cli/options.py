@@ -1,0 +1,351 @@
+"""Options that several commands share, and how a recording is opened with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.cli.quantities import quantity
+from gearsig.errors import InputError
+
+if TYPE_CHECKING:
+    from gearsig.motion import PairMotion
+    from gearsig.recording import Recording
+    from gearsig.rig import Rig, SpeedSource
+    from sims.effects import Effect, EffectSetting
+    from sims.machine import Profile
+    from sims.simulator import ParameterValue, Simulator
+
+
+RigOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--rig",
+        help="Rig file (TOML): shafts, teeth, bearings, sensors, speed source. Default: NAME.toml beside it.",
+    ),
+]
+SamplingRateOption = Annotated[
+    float | None, typer.Option("--fs", metavar="HZ", help="Sampling rate in Hz, where the file does not state it.")
+]
+SpeedOption = Annotated[
+    float | None,
+    typer.Option("--speed-rpm", metavar="RPM", help="Constant speed of the reference shaft, if it is known well."),
+]
+TachometerTimesOption = Annotated[
+    Path | None, typer.Option("--tach-times", metavar="FILE", help="File with the times of the tachometer pulses in s.")
+]
+PulsesOption = Annotated[int, typer.Option("--pulses-per-revolution", help="Pulses per revolution in --tach-times.")]
+ReferenceOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--reference",
+        metavar="FILE",
+        help="Recording of the same machine when it was sound: same sensors, speed and load.",
+    ),
+]
+TorqueOption = Annotated[
+    str | None,
+    typer.Option(
+        "--torque",
+        help="E.g. 110Nm, instead of the rig's: of the shaft that its operating point names, else the reference shaft.",
+    ),
+]
+
+ChannelsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--channel",
+        metavar="NAME",
+        help="Use this channel only; may be given several times. Default: all accelerations.",
+    ),
+]
+
+
+def open_rig(path: Path | None, recording: Path | None = None) -> Rig | None:
+    """Read the rig file that is given, else the one of the same name beside the recording, and say so."""
+    from gearsig.rig import read_rig, rig_file_beside
+
+    if path is None and recording is not None:
+        path = rig_file_beside(recording)
+        if path is not None:
+            typer.echo(f"Using the rig file {path.name} beside {recording.name}.", err=True)
+    return read_rig(path) if path is not None else None
+
+
+def stated_speed(speed_rpm: float | None, tach_times: Path | None, pulses_per_revolution: int) -> SpeedSource | None:
+    """Return the speed source that the options state, None if they state none."""
+    if speed_rpm is not None and tach_times is not None:
+        raise InputError("--speed-rpm and --tach-times are both given", remedy="give the one that is measured")
+    if tach_times is not None:
+        from gearsig.recording import read_pulse_times
+
+        return read_pulse_times(tach_times, pulses_per_revolution)
+    if speed_rpm is not None:
+        from gearsig.rig import ConstantSpeed
+
+        return ConstantSpeed(speed_rpm)
+    return None
+
+
+def open_recording(
+    path: Path, rig: Rig | None, sampling_rate_hz: float | None, speed: SpeedSource | None = None
+) -> Recording:
+    """Read one recording with what the options say of it."""
+    from gearsig.recording import read_recording
+
+    return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+
+
+def open_reference(
+    path: Path | None, rig: Rig | None, sampling_rate_hz: float | None, speed_rpm: float | None
+) -> Recording | None:
+    """Read the recording of the sound machine, if one is given; pulse times belong to the other recording."""
+    if path is None:
+        return None
+    from gearsig.diagnosis import rig_of_reference
+
+    return open_recording(path, rig_of_reference(path, rig), sampling_rate_hz, stated_speed(speed_rpm, None, 1))
+
+
+def torque_of(text: str | None) -> float | None:
+    """Return the torque that the option states, in N m."""
+    from app.cli.quantities import quantity
+    from gearsig.checks import positive
+
+    return positive(quantity(text, "N m", "--torque"), "--torque", "N m") if text else None
+
+
+# --------------------
+# Options that `simulate` and `sweep` share, and what they ask for.
+# --------------------
+
+
+PresetOption = Annotated[
+    str,
+    typer.Option(
+        "--preset",
+        metavar="NAME",
+        help="Machine to start from, or a preset file, NAME.toml; default: the model's first.",
+    ),
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="Change a parameter, e.g. crack_depth_mm=2mm; repeatable."),
+]
+EffectOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--effect",
+        metavar="NAME=SEVERITY",
+        help="Switch an effect on, e.g. root_crack=2mm or root_crack=2mm,gear=driven,tooth=5; repeatable.",
+    ),
+]
+SpeedOption_simulation_options = Annotated[
+    str | None,
+    typer.Option(
+        "--speed",
+        metavar="SPEED",
+        help="500rpm, 300..1500rpm (over the duration), or a CSV file with time_s,speed_rpm. Default: the preset's.",
+    ),
+]
+TorqueOption_simulation_options = Annotated[
+    str | None,
+    typer.Option("--torque", metavar="TORQUE", help="110Nm, 20..110Nm, or a CSV file with time_s,torque_nm."),
+]
+DurationOption = Annotated[str, typer.Option("--duration", metavar="TIME", help="Length of the recording.")]
+RateOption = Annotated[
+    str,
+    typer.Option(
+        "--fs", metavar="RATE", help="Sampling rate, in Hz or kHz. Default: 20480 Hz; 1 kHz for the model forging."
+    ),
+]
+SeedOption = Annotated[int, typer.Option("--seed", min=0, help="The same seed gives the same recording.")]
+FreshOption = Annotated[
+    bool,
+    typer.Option(
+        "--fresh",
+        help="Model reduced-fe: make reduced gears anew that another version of gearsig kept.",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class SimulationChoices:
+    """What is to be simulated."""
+
+    model: str
+    preset: str
+    parameters: dict[str, ParameterValue]
+    effects: tuple[EffectSetting, ...]
+    speed_rpm: Profile | None
+    torque_nm: Profile | None
+    duration_s: float
+    sampling_rate_hz: float
+    seed: int
+
+
+def read_request(
+    model: str | None,
+    preset: str,
+    settings: Sequence[str] | None,
+    effects: Sequence[str] | None,
+    speed: str | None,
+    torque: str | None,
+    duration: str,
+    fs: str,
+    seed: int,
+) -> SimulationChoices:
+    """Return what the options ask for; names and units are checked here, ranges by the simulator."""
+    from app.cli.quantities import course
+    from sims.presets import is_file
+    from sims.presets import preset as preset_named
+    from sims.registry import simulator, simulators, usual_sampling_rate_hz
+
+    if model is None:
+        raise InputError("no model is named", allowed=", ".join(simulators()), remedy="gearsig simulate --list")
+    chosen = simulator(model)
+    duration_s = quantity(duration, "s", "--duration")
+    return SimulationChoices(
+        model,
+        preset if is_file(preset) else preset_named(model, preset).name,
+        dict(read_parameter(chosen, text) for text in settings or ()),
+        tuple(read_effect(text) for text in effects or ()),
+        None if speed is None else course(speed, "speed_rpm", "rpm", duration_s),
+        None if torque is None else course(torque, "torque_nm", "N m", duration_s),
+        duration_s,
+        quantity(fs, "Hz", "--fs") if fs else usual_sampling_rate_hz(chosen),
+        seed,
+    )
+
+
+def clear_other_versions(model: str | None) -> None:
+    """Delete what other versions kept of finite-element gears, and say so.
+
+    Raises
+    ------
+    InputError
+        If the model keeps nothing.
+    """
+    from sims.reduced_fe import NAME, forget_other_versions
+
+    if model != NAME:
+        raise InputError(f"--fresh is given, but the model {model} keeps nothing", remedy="leave out --fresh")
+    gone = forget_other_versions()
+    if gone:
+        typer.echo(f"{len(gone)} file{'s' if len(gone) > 1 else ''} of another version cleared away", err=True)
+
+
+def read_parameter(chosen: Simulator, text: str) -> tuple[str, ParameterValue]:
+    """Return name and value of "crack_depth_mm=2mm"."""
+    from sims.simulator import parameter
+
+    name, value = _split(text, "--set", "crack_depth_mm=2mm")
+    wanted = parameter(chosen.parameters, name)
+    by_word = wanted.choices or (wanted.default is None and value == "none")
+    return name, (value if by_word else quantity(value, wanted.unit, name))
+
+
+def read_effect(text: str) -> EffectSetting:
+    """Return the setting of "root_crack=2mm,gear=driven,tooth=5"."""
+    from sims.effects import EffectSetting, effect
+
+    first, *rest = text.split(",")
+    name = first.partition("=")[0].strip()
+    wanted = effect(name)
+    s = wanted.severity
+    if "=" not in first:
+        raise InputError(
+            f"effect {name} has no severity",
+            allowed=f"{s.low:g} to {s.high:g} {s.unit}".strip(),
+            remedy=f"write for example {name}={s.typical:g}{s.unit.replace(' ', '')}",
+        )
+    severity = quantity(first.partition("=")[2], s.unit, f"{s.name} of {name}")
+    return EffectSetting(name, severity, read_effect_options(wanted, rest))
+
+
+def read_effect_options(wanted: Effect, texts: Sequence[str]) -> dict[str, float | str]:
+    """Return the options of ["gear=driven", "tooth=5"]."""
+    from gearsig.checks import closest_match_hint
+
+    known = {option.name: option for option in wanted.options}
+    found: dict[str, float | str] = {}
+    for text in texts:
+        name, value = _split(text, f"effect {wanted.name}", "gear=driven")
+        if name not in known:
+            raise InputError(
+                f"{wanted.name} has no option {name!r}",
+                allowed=", ".join(known) or "none",
+                remedy=closest_match_hint(name, known),
+            )
+        option = known[name]
+        is_text = isinstance(option.default, str)
+        found[name] = value if is_text else quantity(value, option.unit, f"{name} of {wanted.name}")
+    return found
+
+
+def _split(text: str, where: str, example: str) -> tuple[str, str]:
+    name, sign, value = text.partition("=")
+    if not sign or not name.strip() or not value.strip():
+        raise InputError(f"{text!r} is not NAME=VALUE", where=where, remedy=f"write for example {example}")
+    return name.strip(), value.strip()
+
+
+# --------------------
+# What the commands share that read the motion of both gears: options, and reading it.
+# --------------------
+
+
+UseOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--use",
+        metavar="ROLE=CHANNEL",
+        help='Which channel is what, e.g. "driven angle=enc2"; "driver speed=" leaves it out. Roles: driver or driven, '
+        "angle, speed or acceleration; torque; force. Default: by quantity, position and name. Repeatable.",
+    ),
+]
+BandwidthOption = Annotated[
+    str | None,
+    typer.Option("--bandwidth", metavar="HZ", help="Smooth all motion to this, by a Savitzky–Golay filter."),
+]
+UnwrapOption = Annotated[bool, typer.Option("--unwrap", help="The angles start again after each revolution.")]
+
+
+def open_motion(
+    recording: Path,
+    machine: Rig | None,
+    fs: float | None,
+    use: Sequence[str] | None,
+    bandwidth: str | None,
+    unwrap: bool,
+) -> tuple[Recording, PairMotion]:
+    """Read a recording and the motion of its pair, as the options say; a machine that only stands is refused."""
+    from gearsig.motion import check_turns, measure_motion
+
+    roles, band = read_uses(use), read_bandwidth(bandwidth)
+    opened = open_recording(recording, machine, fs)
+    motion = measure_motion(opened, machine, use=roles, bandwidth_hz=band, unwrap=unwrap)
+    check_turns(motion)
+    return opened, motion
+
+
+def read_uses(texts: Sequence[str] | None) -> dict[str, str]:
+    """Return role → channel of "driven angle=enc2"; the channel may hold "=" itself."""
+    found = {}
+    for text in texts or ():
+        role, sign, channel = text.partition("=")
+        if not sign:
+            raise InputError(
+                f"--use is {text!r}", allowed="ROLE=CHANNEL", remedy='write for example "driven angle=enc2"'
+            )
+        found[role.strip()] = channel.strip()
+    return found
+
+
+def read_bandwidth(text: str | None) -> float | None:
+    """Return it in Hz."""
+    return quantity(text, "Hz", "--bandwidth") if text else None

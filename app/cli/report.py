@@ -1,0 +1,126 @@
+"""`gearsig report`: HTML pages for many recordings."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.cli.options import (
+    PulsesOption,
+    ReferenceOption,
+    RigOption,
+    SamplingRateOption,
+    SpeedOption,
+    TachometerTimesOption,
+    TorqueOption,
+    open_rig,
+    stated_speed,
+    torque_of,
+)
+from gearsig.errors import InputError
+
+if TYPE_CHECKING:
+    from gearsig.rig import SpeedSource
+
+
+EXIT_SOME_FAILED = 1
+EXIT_NONE_READ = 2
+EXIT_INTERRUPTED = 130
+
+
+def report(
+    files: Annotated[list[Path], typer.Argument(help="Recordings; folders are not searched.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the pages.")],
+    rig: RigOption = None,
+    fs: SamplingRateOption = None,
+    speed_rpm: SpeedOption = None,
+    tach_times: TachometerTimesOption = None,
+    pulses_per_revolution: PulsesOption = 1,
+    reference: ReferenceOption = None,
+    torque: TorqueOption = None,
+    jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one per processor.")] = None,
+) -> None:
+    """Write one self-contained HTML page per recording, and an index page that compares them.
+
+    A file that cannot be read does not stop the others: the index lists it with its reason, and the exit code is 1
+    (2 if no file could be read). With --reference, all recordings are compared with that one.
+
+    Example: gearsig report monday.csv tuesday.csv --rig gearbox.toml -o report
+    """
+    if tach_times is not None and len(files) > 1:
+        raise InputError(
+            f"--tach-times belong to one recording, and there are {len(files)}", remedy="make a report for each"
+        )
+    speed = stated_speed(speed_rpm, tach_times, pulses_per_revolution)
+    command = "gearsig " + shlex.join(sys.argv[1:])
+    failed = make_report(
+        files, output, rig, fs, speed, jobs, command=command, reference=reference, torque_nm=torque_of(torque)
+    )
+    if failed:
+        raise typer.Exit(EXIT_NONE_READ if failed == len(files) else EXIT_SOME_FAILED)
+
+
+def make_report(
+    files: list[Path],
+    output: Path,
+    rig: Path | None,
+    fs: float | None,
+    speed: SpeedSource | None,
+    jobs: int | None,
+    command: str,
+    reference: Path | None = None,
+    torque_nm: float | None = None,
+) -> int:
+    """Write the pages with a progress bar; return how many files failed."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from gearsig.batch import report_many
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    before, n_done = output.exists(), 0
+
+    def advance(*_: object) -> None:
+        nonlocal n_done
+        n_done += 1
+        progress.advance(task)
+
+    try:
+        with Progress(*columns, console=console, transient=True) as progress:
+            task = progress.add_task("analysing", total=len(files))
+            result = report_many(
+                files,
+                output,
+                rig=open_rig(rig),
+                sampling_rate_hz=fs,
+                speed=speed,
+                n_processes=jobs,
+                on_progress=advance,
+                command=command,
+                reference=reference,
+                torque_nm=torque_nm,
+            )
+    except KeyboardInterrupt:
+        typer.echo(f"gearsig: stopped after {n_done} of {len(files)} files; {_kept(output, before)}", err=True)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    for entry in result.entries:
+        typer.echo(f"{entry.name}: {entry.verdict}")
+    for failure in result.failures:
+        typer.echo(f"{failure.name}: not analysed: {failure.reason}", err=True)
+    typer.echo(f"Open {result.index_path} in a browser.")
+    return len(result.failures)
+
+
+def _kept(output: Path, was_there: bool) -> str:
+    """Say what an interrupted report left; a new folder without pages is taken away."""
+    n_pages = len(list(output.glob("*.html"))) if output.is_dir() else 0
+    if n_pages:
+        return f"pages in {output} are whole, the index is not made anew"
+    if not was_there and output.is_dir() and not any(output.iterdir()):
+        output.rmdir()
+    return "nothing was kept"

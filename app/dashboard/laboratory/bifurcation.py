@@ -1,0 +1,282 @@
+"""How the motion changes over one parameter: a bifurcation diagram of the machine that is set."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from time import monotonic
+from typing import TYPE_CHECKING
+
+import numpy as np
+import streamlit as st
+from streamlit.errors import StreamlitAPIException
+
+from app.bifurcation import NAMES, BifurcationRequest, KeptValue, figure_of, measured_of, points_csv, run_value
+from app.dashboard.laboratory.run import LaboratoryRun
+from app.dashboard.laboratory.setup import MODEL, WIDEST, Setup, shown_unit
+from app.dashboard.theme import as_typed
+from app.dashboard.widgets.charts import show_picture
+from app.dashboard.widgets.verdict import show_error
+from gearsig.errors import GearsigError, InputError
+from sims.cracked import DECAYS, RAMP_S, SECTIONS, Branch, slowest_decay_s
+from sims.effects import effect
+from sims.machine import Operation, Profile
+from sims.registry import simulator
+from sims.simulator import parameter
+from sims.sweep import Axis, Sweep
+
+if TYPE_CHECKING:
+    from streamlit.delta_generator import DeltaGenerator
+
+
+# --------------------
+# What a bifurcation of the laboratory varies, over which range, and what it costs.
+# --------------------
+
+
+N_CYCLES = {"mesh": 80, "shaft": 20}
+SPEED, TORQUE = "speed_rpm", "torque_nm"
+FIRST = ("half_backlash_um", "roughness_um", "mesh_damping_ratio", "crack_depth_mm", "friction_factor")
+"""Parameters offered first; all other numbers follow."""
+TEETH = ("teeth_driver", "teeth_driven")
+
+
+@dataclass(frozen=True)
+class Range:
+    """Values of what is varied."""
+
+    name: str
+    title: str
+    values: tuple[float, ...]
+
+
+def parameters_of(setup: Setup) -> dict[str, str]:
+    """Return what can be varied, with a title and a unit: operation, the effects that are on, parameters."""
+    found = {SPEED: "Speed (rpm)", TORQUE: "Torque (N·m)"}
+    for setting in setup.effects:
+        severity = effect(setting.name).severity
+        found[setting.name] = _titled(f"Fault: {effect(setting.name).title}", severity.unit)
+    known = {p.name: p for p in simulator(MODEL).parameters}
+    numbers = [p.name for p in known.values() if not p.choices and not p.whole and p.name not in TEETH]
+    for name in (*FIRST, *(n for n in numbers if n not in FIRST)):
+        meaning = known[name].meaning.split(";")[0]
+        found[name] = _titled(meaning[:1].upper() + meaning[1:], known[name].unit)
+    return found
+
+
+def choose_range(run: LaboratoryRun, name: str, places: Sequence[DeltaGenerator], *, most: int, first: int) -> Range:
+    """Let the user choose from, to, and how many."""
+    low, high = _suggested(run, name)
+    start, stop, number = places
+    key = f"bifurcation {run.setup.preset} {name}"
+    one = start.number_input("From", value=low, format="%g", key=f"{key} from", persist_state="session")
+    other = stop.number_input("To", value=high, format="%g", key=f"{key} to", persist_state="session")
+    n = number.number_input("Values", 3, most, first, step=1, key="bifurcation values", persist_state="session")
+    if one is None or other is None or not one < other:
+        raise InputError(f"the range goes from {one} to {other}", allowed="ascending")
+    values = tuple(float(f"{v:.8g}") for v in np.linspace(float(one), float(other), int(n)))
+    return Range(name, parameters_of(run.setup)[name], values)
+
+
+def branch_of(run: LaboratoryRun, chosen: Range, *, signal: str, section: str) -> Branch:
+    """Return what is run at each value: the machine as it is set, but for what is varied."""
+    setup = run.setup
+    options = next((s.options for s in setup.effects if s.name == chosen.name), {})
+    sweep = Sweep(
+        MODEL,
+        (Axis(chosen.name, chosen.values, options),),
+        preset=setup.preset,
+        parameters=dict(setup.parameters),
+        effects=tuple(s for s in setup.effects if s.name != chosen.name),
+        speed_rpm=Profile.constant(setup.speed_rpm),
+        torque_nm=Profile.constant(setup.torque_nm),
+        sampling_rate_hz=setup.sampling_rate_hz,
+        seed=setup.seed,
+        common_seed=True,
+    )
+    return Branch(sweep, signal, section, N_CYCLES[section])
+
+
+def motion_s(run: LaboratoryRun, wanted: BifurcationRequest) -> float:
+    """Motion that is simulated in all, about."""
+    branch, setup = wanted.branch, run.setup
+    settle_s = RAMP_S + DECAYS * slowest_decay_s(run.machine, Operation.steady(setup.speed_rpm, setup.torque_nm))
+    varied = branch.sweep.axes[0].name == SPEED
+    speeds = np.array(branch.values if varied else [setup.speed_rpm] * len(branch.values))
+    per_revolution = run.machine.mesh.pair.driver.teeth if branch.section == "mesh" else 1
+    cycles_s = branch.n_cycles * 60.0 / (np.maximum(speeds, 1.0) * per_revolution)
+    return float(len(wanted.branches) * np.sum(settle_s + cycles_s))
+
+
+def _suggested(run: LaboratoryRun, name: str) -> tuple[float, float]:
+    setup = run.setup
+    if name in (SPEED, TORQUE):
+        own = setup.speed_rpm if name == SPEED else setup.torque_nm
+        return _rounded(0.5 * own), _rounded(1.5 * own) or 10.0
+    for setting in setup.effects:
+        if setting.name == name:
+            severity = effect(name).severity
+            return float(max(severity.low, 0.0)), _rounded(min(severity.high, WIDEST * severity.typical))
+    wanted = parameter(simulator(MODEL).parameters, name)
+    values = {**_preset_values(setup), **dict(setup.parameters)}
+    own = float(values.get(name, wanted.default) or 0.0)
+    low, high = wanted.low or 0.0, wanted.high or 1.0
+    if own > 0.0:
+        return max(low, _rounded(0.5 * own)), min(high, _rounded(2.0 * own))
+    return low, min(high, max(_rounded(0.02 * high), low))
+
+
+def _preset_values(setup: Setup) -> dict[str, float | str]:
+    from sims.presets import preset
+
+    return dict(preset(MODEL, setup.preset).parameters)
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.2g}")
+
+
+def _titled(title: str, unit: str) -> str:
+    return f"{title} ({shown_unit(unit)})" if unit else title
+
+
+MOST_VALUES, FIRST_VALUES = 80, 25
+MOST_MOTION_S = 240.0
+"""Motion that is simulated at most: a minute or two of waiting."""
+DIRECTIONS = {"both": "up and down", "up": "up", "down": "down", "rest": "from rest"}
+SECTION_WORDS = {"mesh": "mesh cycle", "shaft": "revolution"}
+PASS_S = 2.5
+"""A fragment hears of a click only when it has run: it runs for so long, shows what there is, and goes on."""
+ASKED, FOUND = "bifurcation asked", "bifurcation found"
+Found = dict[str, list[KeptValue]]
+
+
+def show_bifurcation(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
+    """Choose what is varied; run it on demand; show picture and table."""
+    run = faulty or healthy
+    if run.setup.model != MODEL:
+        st.info("Only the model with rigid gears has a bifurcation diagram: choose one of its machines.")
+        return
+    names = parameters_of(run.setup)
+    first, *numbers = st.columns((3, 2, 2, 2))
+    name = first.selectbox("Varied", list(names), format_func=names.__getitem__, key="bifurcation varied")
+    chosen = choose_range(run, name, numbers, most=MOST_VALUES, first=FIRST_VALUES)
+    left, middle, right = st.columns((2, 3, 2))
+    section = left.segmented_control(
+        "A point once per",
+        SECTIONS,
+        default="mesh",
+        format_func=SECTION_WORDS.__getitem__,
+        key="bifurcation section",
+        required=True,
+    )
+    direction = middle.segmented_control(
+        "Direction",
+        list(DIRECTIONS),
+        default="both",
+        format_func=DIRECTIONS.__getitem__,
+        key="bifurcation direction",
+        required=True,
+        help="Up and down: each value goes on from where the last one ended. Where both differ, two motions are "
+        "possible, and it is the past that decides.",
+    )
+    signals = ("transmission_error_m", "driver y", "driven y", "mesh_force_n", *run.vibration_channels)
+    signal = right.selectbox("Signal", signals, format_func=_signal_words, key="bifurcation signal")
+    wanted = BifurcationRequest(branch_of(run, chosen, signal=signal, section=section or "mesh"), direction or "both")
+    _run_and_show(run, wanted, chosen)
+
+
+def _run_and_show(run: LaboratoryRun, wanted: BifurcationRequest, chosen: Range) -> None:
+    """Run what is missing if that was asked for, showing it as it comes; what is complete stays when it is stopped."""
+    question = repr(wanted.definition())
+    with st.container(horizontal=True):
+        st.button("Draw", type="primary", icon=":material/play_arrow:", on_click=_ask, args=(question,))
+        st.button("Stop", icon=":material/stop:", on_click=_ask, args=("",))
+    known, found = st.session_state.get(FOUND, ("", {}))
+    if known != question:
+        found = {name: [] for name in wanted.branches}
+    more = False
+    if st.session_state.get(ASKED) == question:
+        _check(run, wanted)
+        st.session_state[FOUND] = (question, found)
+        more = _fill(wanted, found)
+    if any(measured_of(values) for values in found.values()):
+        _show(wanted, found, chosen)
+    else:
+        st.caption("Nothing is drawn yet: a value takes about half a second, in either direction.")
+    if more:
+        _go_on()
+
+
+def _go_on() -> None:
+    """Run again: the view alone, or the page where the page is what ran (after a change of tab)."""
+    try:
+        st.rerun(scope="fragment")
+    except StreamlitAPIException:
+        st.rerun()
+
+
+def _fill(wanted: BifurcationRequest, found: Found) -> bool:
+    """Run values for a while; return whether some are left."""
+    n, bar, until = wanted.n_values, st.progress(0.0, "Simulating …"), monotonic() + PASS_S
+    for name in wanted.branches:
+        values = wanted.branch.values[:: -1 if name == "down" else 1]
+        for value in values[len(found[name]) :]:
+            done = sum(len(kept) for kept in found.values())
+            bar.progress(done / n, f"{NAMES[name]}: {value:.5g} ({done} of {n} values)")
+            if monotonic() > until:
+                return True
+            ends = [one.end for one in found[name] if one.end is not None]
+            before = ends[-1] if ends and name != "rest" else None
+            found[name].append(run_value(wanted, value, before))
+    bar.empty()
+    return False
+
+
+def _show(wanted: BifurcationRequest, found: Found, chosen: Range) -> None:
+    n_done = sum(len(kept) for kept in found.values())
+    show_picture(figure_of(wanted.branch, found), f"Poincaré points over {chosen.title}")
+    st.caption(
+        "Upper panel: one point per cycle; a single point is a motion that repeats each cycle, two a motion that takes "
+        "two cycles, a smear one that never repeats. Lower panel: how large the motion is. Shaded: two motions are "
+        "possible, as far as the values tried tell: a range that begins or ends where the sweep does may go on."
+        + ("" if n_done == wanted.n_values else f" So far {n_done} of {wanted.n_values} values.")
+    )
+    reasons = [one for kept in found.values() for one in kept if one.reason]
+    if reasons:
+        st.warning(f"{len(reasons)} values gave nothing; at {reasons[0].value:.5g}: {as_typed(reasons[0].reason)}")
+    st.download_button(
+        "Points (CSV)",
+        data=points_csv(wanted.branch, found),
+        file_name=f"bifurcation_{wanted.branch.sweep.preset}_{wanted.branch.sweep.axes[0].name}.csv",
+        mime="text/csv",
+        on_click="ignore",
+        icon=":material/download:",
+    )
+
+
+def _check(run: LaboratoryRun, wanted: BifurcationRequest) -> None:
+    motion = motion_s(run, wanted)
+    if motion > MOST_MOTION_S:
+        raise InputError(
+            f"this needs {motion:.0f} s of motion",
+            allowed=f"up to {MOST_MOTION_S:.0f} s here",
+            remedy="take fewer values, one direction, the mesh cycle, or `gearsig bifurcation` on the command line",
+        )
+
+
+def _ask(question: str) -> None:
+    st.session_state[ASKED] = question
+
+
+def _signal_words(signal: str) -> str:
+    words = {"transmission_error_m": "transmission error", "mesh_force_n": "mesh force"}
+    return words.get(signal, signal if " " in signal else f"sensor {signal}")
+
+
+def show_safely(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
+    """Show the view, or what is wrong with what was asked for."""
+    try:
+        show_bifurcation(healthy, faulty)
+    except GearsigError as error:
+        show_error(error)

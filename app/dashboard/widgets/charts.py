@@ -1,0 +1,311 @@
+"""Lines over one axis that the user can zoom and read off, with named cursors across them (plotly)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import streamlit as st
+
+from app.dashboard import state
+from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_plot_text, as_typed, is_dark, palette
+from gearsig.checks import FloatArray
+from gearsig.diagnosis import Analysis
+from gearsig.plot import LONGEST, Cursor, place, plain
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as PictureFigure
+    from plotly.graph_objects import Figure
+
+
+WIDTH_IN = 10.5
+"""Width for which labels are placed; they keep apart on wider pages as well."""
+HEIGHT_PX = 400
+ROW_PX = 17
+CONFIG = {"displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"], "scrollZoom": False}
+
+
+@dataclass(frozen=True)
+class ChartLine:
+    """A line to draw, already thinned, a pale band (low, high) behind it, and its colour by meaning."""
+
+    x: FloatArray
+    y: FloatArray
+    name: str
+    band: tuple[FloatArray, FloatArray] | None = None
+    colour: Literal["measured", "fault"] = "measured"
+
+
+@dataclass(frozen=True)
+class Axes:
+    """Names, limits and scale; texts may come from files."""
+
+    x: str
+    y: str
+    x_limits: tuple[float, float]
+    y_limits: tuple[float, float] | None = None
+    logarithmic: bool = False
+    x_step: float | None = None
+
+
+def show_lines(
+    lines: Sequence[ChartLine],
+    axes: Axes,
+    key: str,
+    *,
+    cursors: Sequence[Cursor] = (),
+    marked: Sequence[tuple[float, float]] = (),
+    height_px: int = HEIGHT_PX,
+) -> None:
+    """Show lines with cursors and marked points.
+
+    Parameters
+    ----------
+    lines : sequence of Line
+    axes : Axes
+    key : str
+        Of the widget, unique on the page.
+    cursors : sequence of Cursor
+        In the unit of the x axis.
+    marked : sequence of (x, y)
+        Points that findings name.
+    height_px : int
+    """
+    figure = line_figure(lines, axes, cursors=cursors, marked=marked, height_px=height_px)
+    words = as_typed(f"{axes.y} over {axes.x}")
+    st.plotly_chart(figure, width="stretch", key=key, config=CONFIG, alt=words)
+
+
+def line_figure(
+    lines: Sequence[ChartLine],
+    axes: Axes,
+    *,
+    cursors: Sequence[Cursor] = (),
+    marked: Sequence[tuple[float, float]] = (),
+    height_px: int = HEIGHT_PX,
+) -> Figure:
+    """Return the figure that `show_lines` shows."""
+    from plotly.graph_objects import Figure
+
+    colours = palette()
+    figure = Figure()
+    for line in lines:
+        _add_line(figure, line, colours)
+    n_rows = _add_cursors(figure, cursors, axes.x_limits, colours)
+    if marked:
+        ring = {"symbol": "circle-open", "size": 13, "color": colours.fault, "line": {"width": 2}}
+        x, y = zip(*marked, strict=True)
+        figure.add_scatter(x=x, y=y, yaxis="y2", mode="markers", marker=ring, name="finding", hoverinfo="skip")
+    _lay_out(figure, axes, n_rows, height_px)
+    return figure
+
+
+def _add_line(figure: Figure, line: ChartLine, colours: Palette) -> None:
+    name, colour = as_plot_text(line.name), colours.fault if line.colour == "fault" else colours.measured
+    for edge, fill in zip(line.band or (), (None, "tonexty"), strict=False):
+        figure.add_scatter(
+            x=line.x,
+            y=edge,
+            yaxis="y2",
+            mode="lines",
+            line={"width": 0},
+            fill=fill,
+            fillcolor=_pale(colour),
+            hoverinfo="skip",
+        )
+    figure.add_scatter(
+        x=line.x,
+        y=line.y,
+        yaxis="y2",
+        mode="lines",
+        name=name,
+        line={"width": 1.1, "color": colour},
+        hovertemplate="%{x:.6g}: %{y:.4g}<extra></extra>",
+    )
+
+
+def _add_cursors(figure: Figure, cursors: Sequence[Cursor], limits: tuple[float, float], colours: Palette) -> int:
+    """Draw each kind of cursor as one line of many pieces, on a hidden axis from 0 to 1; return the rows of labels."""
+    placed = place(cursors, limits, WIDTH_IN)
+    for kind in dict.fromkeys(cursor.kind for cursor, _ in placed):
+        own = [cursor for cursor, _ in placed if cursor.kind == kind]
+        x = [v for cursor in own for v in (cursor.position, cursor.position, None)]
+        words = [v for cursor in own for v in [as_plot_text(f"{cursor.label}: {cursor.position:.6g}")] * 3]
+        figure.add_scatter(
+            x=x,
+            y=[0, 1, None] * len(own),
+            mode="lines",
+            name=kind,
+            text=words,
+            hovertemplate="%{text}<extra></extra>",
+            line={"color": colours.cursors.get(kind, colours.quiet), "width": 1, "dash": DASHES.get(kind, "dot")},
+            opacity=0.65,
+        )
+    rows = 0
+    for cursor, label in placed:
+        if label is not None:
+            rows = max(rows, label.row + 1)
+            figure.add_annotation(
+                x=cursor.position,
+                y=1,
+                yref="paper",
+                yanchor="bottom",
+                yshift=2 + ROW_PX * label.row,
+                text=as_plot_text(plain(cursor.label, LONGEST)),
+                showarrow=False,
+                font={"size": 12, "color": colours.cursors.get(cursor.kind, colours.quiet)},
+            )
+    return rows
+
+
+def _lay_out(figure: Figure, axes: Axes, n_rows: int, height_px: int) -> None:
+    top = 12 + ROW_PX * n_rows
+    # plotly takes the limits of a logarithmic axis as powers of ten
+    limits = axes.y_limits
+    if limits is not None and axes.logarithmic:
+        limits = (float(np.log10(limits[0])), float(np.log10(limits[1])))
+    figure.update_layout(
+        height=height_px + ROW_PX * n_rows,
+        margin={"l": 8, "r": 8, "t": top, "b": 8},
+        hovermode="closest",
+        showlegend=False,
+        dragmode="zoom",
+        xaxis={"title": as_plot_text(axes.x), "range": axes.x_limits, "exponentformat": "none", "dtick": axes.x_step},
+        yaxis2={
+            "overlaying": "y",
+            "side": "left",
+            "title": as_plot_text(axes.y),
+            "type": "log" if axes.logarithmic else "linear",
+            "range": limits,
+            "exponentformat": "e",
+            "minexponent": 4,
+            **_ticks(axes),
+        },
+        yaxis={"range": [0, 1], "visible": False, "fixedrange": True},  # of the cursors, behind the lines
+    )
+
+
+def _ticks(axes: Axes) -> dict[str, object]:
+    """Return the ticks of the value axis: whole decades where there are several, else plotly's choice of its own.
+
+    Left alone, an overlaying axis would take its ticks from the one below, wherever they fall.
+    """
+    low, high = axes.y_limits or (1.0, 1.0)
+    several = axes.logarithmic and high > 100 * low
+    return {"tickmode": "linear", "tick0": 0, "dtick": 1} if several else {"tickmode": "auto"}
+
+
+def _pale(colour: str) -> str:
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return f"rgba({red},{green},{blue},0.22)"
+
+
+# --------------------
+# A figure of `gearsig.plot` on the page, turned over on dark ground.
+# --------------------
+
+
+DOTS_PER_INCH = 180
+DARK_GROUND = np.frombuffer(bytes.fromhex(DARK_PAPER.removeprefix("#")), np.uint8) / 255
+BRIGHTEST = 0.93
+# Turns the hue by half a circle and keeps the lightness: the matrix of hue-rotate(180deg) in the W3C's Filter Effects
+# Module, with which the reports turn their figures over, too.
+HALF_TURN = np.array([[-0.574, 1.430, 0.144], [0.426, 0.430, 0.144], [0.426, 1.430, -0.856]])
+
+
+def show_picture(figure: PictureFigure, words: str, width: int | Literal["stretch"] = "stretch") -> None:
+    """Show a figure; `words` say what it shows, for those who do not see it."""
+    st.image(picture_bytes(figure, dark=is_dark()), width=width, alt=as_typed(words))
+
+
+def picture_bytes(figure: PictureFigure, *, dark: bool) -> bytes:
+    """Return the figure as PNG; `dark` turns light and dark over and keeps the hues."""
+    from PIL import Image
+
+    pixels, buffer = BytesIO(), BytesIO()
+    figure.savefig(pixels, format="png", dpi=DOTS_PER_INCH, pil_kwargs={"compress_level": 0})
+    image = Image.open(pixels).convert("RGB")
+    if dark:
+        turned = np.clip((1 - np.asarray(image, dtype=np.float32) / 255) @ HALF_TURN.T, 0, 1)
+        image = Image.fromarray((255 * (DARK_GROUND + (BRIGHTEST - DARK_GROUND) * turned)).astype(np.uint8))
+    image.save(buffer, format="png", compress_level=1)
+    return buffer.getvalue()
+
+
+# --------------------
+# A stretch of an axis, chosen with two handles.
+# --------------------
+
+
+N_STEPS = 1000
+
+
+def choose_range(
+    label: str,
+    analysis: Analysis,
+    end: float,
+    *,
+    start: float = 0.0,
+    shown: tuple[float, float] | None = None,
+    name: str = "",
+) -> tuple[float, float]:
+    """Return the chosen stretch between `start` and `end`; never an empty one.
+
+    Parameters
+    ----------
+    label : str
+        Not from a file.
+    analysis : Analysis
+    start, end : float
+        Of the axis.
+    shown : (float, float) or None
+        Chosen at first; None: all of it.
+    name : str
+        Of the view, where the same label occurs in several.
+    """
+    step = (end - start) / N_STEPS
+    first = shown if shown is not None else (start, end)
+    value = (max(start, first[0]), min(end, first[1]))
+    key = state.view_key(f"{name} {label} {start!r} to {end!r}", analysis)
+    low, high = st.slider(label, start, end, value=value, step=step, format="%.5g", key=key)
+    return (low, high) if high > low else (max(start, high - step), min(end, high + step))
+
+
+def choose_end(label: str, analysis: Analysis, end: float, shown: float) -> float:
+    """Return the chosen end of what is shown from zero, `shown` at first."""
+    step = end / N_STEPS
+    key = state.view_key(f"{label} to {end!r}", analysis)
+    return st.slider(label, step, end, value=min(shown, end), step=step, format="%.5g", key=key)
+
+
+# --------------------
+# A button that saves what a page shows.
+# --------------------
+
+
+def download(label: str, data: Any, name: str, mime: str, *, primary: bool = False) -> None:
+    """Show a download button; the page is not run again for it.
+
+    Parameters
+    ----------
+    label : str
+    data : bytes, or callable that returns them
+        A callable is called at the click.
+    name : str
+        Of the file.
+    mime : str
+    primary : bool
+        Whether it is the page's main button.
+    """
+    st.download_button(
+        label,
+        data,
+        file_name=name,
+        mime=mime,
+        on_click="ignore",
+        type="primary" if primary else "secondary",
+        icon=":material/download:",
+    )

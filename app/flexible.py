@@ -1,0 +1,386 @@
+"""What a study of a flexible pair computes: maps over angle and torque, sweeps up and down, spectra over speed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearsig.angle import find_shaft_angle, resample_to_angle
+from gearsig.checks import FloatArray, positive
+from gearsig.orders import OrderMap, order_map
+from gearsig.plot import (
+    contact_spreading_figure,
+    frequency_curves_figure,
+    load_sharing_figure,
+    mesh_maps_figure,
+    order_map_figure,
+    speed_spectra_figure,
+    speed_sweep_figure,
+)
+from sims.gear_pair import build_rig
+from sims.machine import Operation, Profile
+from sims.reduced_fe import (
+    MARGIN,
+    STEP_S,
+    TRANSMISSION_ERROR,
+    FlexiblePair,
+    MeshMaps,
+    SpeedSweep,
+    SpreadingCheck,
+    check_depth,
+    constants,
+    eigenfrequencies_hz,
+    respond,
+    simulate_pair,
+    speed_sweep,
+    spreading_check,
+    torsional_mode,
+)
+from sims.sweep import written
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+SPECTRUM_RPM = (1000.0, 2000.0, 3000.0, 4000.0, 5000.0)
+SETTLED_S, SPECTRUM_S = 0.4, 0.4
+"""Left out ahead of a spectrum, and its length: bins of 2.5 Hz."""
+HIGHEST_HZ = 12000.0
+RUN_UP_S, RUN_UP_RATE_HZ, HIGHEST_ORDER = 6.0, 40960.0, 260.0
+STRIDE = 4
+N_ANGLES = 160
+"""Mesh angles of natural frequencies."""
+
+Progress = Callable[[str, float], object]
+
+
+@dataclass(frozen=True)
+class Study:
+    """Results of a study; see `flexible_study`.
+
+    Parameters
+    ----------
+    maps : MeshMaps
+    sweeps : mapping of torque in N m to (up, down)
+    spectra_hz : array, (n,)
+    spectra_m : mapping of speed in rpm to peak amplitudes, (n,)
+    natural_hz : mapping of torque to the torsional mode's frequency
+    angle_hz : array, (n_c, n_modes)
+        Eigenfrequencies over the mesh cycles `angle_cycles`, at the pair's own torque.
+    uncoupled_hz : array, (n,)
+        Of both sides without contact, rising.
+    spreading : SpreadingCheck or None
+    run_up : OrderMap
+        Of the acceleration that the first sensor reads in a run-up through the sweeps' speeds.
+    """
+
+    torque_nm: float
+    maps: MeshMaps
+    sweeps: dict[float, tuple[SpeedSweep, SpeedSweep]]
+    spectra_hz: FloatArray
+    spectra_m: dict[float, FloatArray]
+    natural_hz: dict[float, float]
+    angle_cycles: FloatArray
+    angle_hz: FloatArray
+    uncoupled_hz: FloatArray
+    spreading: SpreadingCheck | None
+    run_up: OrderMap
+
+
+def flexible_study(
+    pair: FlexiblePair,
+    torque_nm: float,
+    torques_nm: tuple[float, ...],
+    *,
+    sweep_s: float,
+    first_rpm: float = 900.0,
+    last_rpm: float = 4100.0,
+    step_s: float = STEP_S,
+    check_spreading: bool = False,
+    on_progress: Progress = lambda *_: None,
+) -> Study:
+    """Run everything.
+
+    Parameters
+    ----------
+    pair : FlexiblePair
+    torque_nm : float
+        Of spectra and eigenfrequencies.
+    torques_nm : tuple of float
+        Of the sweeps.
+    sweep_s : float
+        Length of one sweep; up and down of 15 s each are six million steps of 5 µs.
+    first_rpm, last_rpm, step_s : float
+    check_spreading : bool
+        Also reduce the gears with contact at single nodes and at patches, see `sims.reduced_fe`.
+    on_progress : callable
+        Told what is done, and which part of the whole.
+    """
+    positive(sweep_s, "sweep_s", "s")
+    for torque in torques_nm:
+        check_depth(pair, Operation.steady(last_rpm, torque))
+    on_progress("maps", 0.0)
+    maps = pair.maps()
+    sweeps, n = {}, 2 * len(torques_nm) + 1
+    for i, torque in enumerate(torques_nm):
+        both = []
+        for j, ends in enumerate(((first_rpm, last_rpm), (last_rpm, first_rpm))):
+            on_progress(f"sweep {'up' if j == 0 else 'down'} at {torque:g} N·m", (2 * i + j) / n)
+            both.append(speed_sweep(pair, torque, *ends, sweep_s, step_s=step_s))
+        sweeps[torque] = (both[0], both[1])
+    on_progress("spectra", (n - 1) / n)
+    spectra = {speed: _spectrum(pair, speed, torque_nm, step_s) for speed in SPECTRUM_RPM}
+    natural = {t: torsional_mode(pair, Operation.steady(last_rpm, t)).frequency_hz for t in (*torques_nm, torque_nm)}
+    cycles = (np.arange(N_ANGLES) + 0.5) / N_ANGLES
+    loaded = Operation.steady(last_rpm, torque_nm)
+    own = constants(pair, loaded)
+    at_angle = eigenfrequencies_hz(pair, loaded, cycles, ready=own)
+    uncoupled = np.sort(np.concatenate([side.omega_rad_s[side.moving] for side in own.sides])) / (2.0 * np.pi)
+    spreading = None
+    if check_spreading:
+        on_progress("contact at nodes and patches", (n - 1) / n)
+        spreading = spreading_check(pair, loaded, cycles)
+    axis = spectra[SPECTRUM_RPM[0]][0]
+    lines = {speed: values for speed, (_, values) in spectra.items()}
+    run_up = _run_up(pair, torque_nm, (first_rpm, last_rpm), min(RUN_UP_S, 2.0 * sweep_s + 0.5), step_s)
+    return Study(torque_nm, maps, sweeps, axis, lines, natural, cycles, at_angle, uncoupled, spreading, run_up)
+
+
+def _run_up(
+    pair: FlexiblePair, torque_nm: float, speeds_rpm: tuple[float, float], duration_s: float, step_s: float
+) -> OrderMap:
+    """Measure a run-up and return its first channel's levels over order and time."""
+    operation = Operation(Profile.of([0.0, duration_s], speeds_rpm), Profile.constant(torque_nm))
+    recording, _ = simulate_pair(
+        pair,
+        operation,
+        rng=np.random.default_rng(0),
+        sampling_rate_hz=RUN_UP_RATE_HZ,
+        duration_s=duration_s,
+        rig=build_rig(pair.machine, operation, name="run-up"),
+        step_s=step_s,
+    )
+    signal = resample_to_angle(recording, find_shaft_angle(recording))
+    return order_map(signal, recording.vibration_names()[0], highest_order=HIGHEST_ORDER)
+
+
+def _spectrum(pair: FlexiblePair, speed_rpm: float, torque_nm: float, step_s: float) -> tuple[FloatArray, FloatArray]:
+    """Peak amplitudes of the dynamic transmission error at constant speed, by a flat-top window."""
+    from scipy import fft
+    from scipy.signal.windows import flattop
+
+    operation = Operation.steady(speed_rpm, torque_nm)
+    run = respond(
+        pair,
+        operation,
+        duration_s=SETTLED_S + SPECTRUM_S,
+        signals=(TRANSMISSION_ERROR,),
+        step_s=step_s,
+        stride=STRIDE,
+        ready=constants(pair, operation),
+    )
+    x = run[TRANSMISSION_ERROR][-round(SPECTRUM_S / run.interval_s) :]
+    window = flattop(len(x), sym=False)
+    amplitude = 2.0 * np.abs(fft.rfft((x - x.mean()) * window)) / window.sum()
+    axis = fft.rfftfreq(len(x), run.interval_s)
+    inside = axis <= HIGHEST_HZ
+    return axis[inside], amplitude[inside]
+
+
+# --------------------
+# Figures and tables of a study of a flexible pair.
+# --------------------
+
+
+DOTS_PER_INCH = 160
+SHARING_NM = 170.0
+HIGHEST_CURVE_HZ = 12000.0
+NAMES = {"node": "line of nodes", "patch": "RBE3 patch", "section": "tooth section"}
+RANGE = (0.52, 1.25)
+"""Of the torsional mode's frequency, in which its jumps are looked for."""
+
+
+def write_study(study: Study, folder: Path, title: str) -> tuple[Path, ...]:
+    """Write all figures as PNG, the sweeps as CSV and a summary as JSON; return the paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for name, figure in figures(study, title).items():
+        paths.append(folder / f"{name}.png")
+        figure.savefig(paths[-1], dpi=DOTS_PER_INCH)
+    paths.append(written(folder / "sweeps.csv", sweeps_csv(study)))
+    paths.append(written(folder / "maps.csv", maps_csv(study.maps)))
+    paths.append(written(folder / "study.json", json.dumps(summary(study), indent=2, ensure_ascii=False) + "\n"))
+    return tuple(paths)
+
+
+def figures(study: Study, title: str) -> dict[str, Figure]:
+    """Return every figure by its file's name."""
+    maps = study.maps
+    twice = np.concatenate((maps.mesh_cycles, maps.mesh_cycles + 1.0))
+    stiffness = {
+        "tangent mesh stiffness (10⁸ N/m)": np.tile(maps.tangent_stiffness_n_per_m, (2, 1)) / 1e8,
+        "secant mesh stiffness (10⁸ N/m)": np.tile(maps.secant_stiffness_n_per_m, (2, 1)) / 1e8,
+    }
+    error = {"static transmission error (µm)": np.tile(maps.transmission_error_m, (2, 1)) * 1e6}
+    found = {
+        "stiffness_map": mesh_maps_figure(twice, maps.torque_nm, stiffness, title=f"Mesh stiffness, {title}"),
+        "pair_stiffness_map": _pair_stiffness(study, title),
+        "transmission_error_map": mesh_maps_figure(
+            twice, maps.torque_nm, error, title=f"Static transmission error, {title}"
+        ),
+        "load_sharing": _sharing(study, title),
+        "spectra": speed_spectra_figure(
+            study.spectra_hz,
+            {f"{speed:g} rpm": values for speed, values in study.spectra_m.items()},
+            mesh_hz=[speed / 60.0 * _teeth(study) for speed in study.spectra_m],
+            natural_hz=study.natural_hz[study.torque_nm],
+            title=f"Spectra of the dynamic transmission error at {study.torque_nm:g} N·m, {title}; dashed: ωₙ",
+        ),
+    }
+    low = study.angle_hz[:, study.angle_hz[0] < HIGHEST_CURVE_HZ]
+    words = f"Natural frequencies over the mesh angle at {study.torque_nm:g} N·m, {title}"
+    uncoupled = study.uncoupled_hz[study.uncoupled_hz < HIGHEST_CURVE_HZ]
+    found["natural_frequencies"] = frequency_curves_figure(study.angle_cycles, low, uncoupled, title=words)
+    if study.spreading is not None:
+        found["contact_spreading"] = _spreading(study.spreading, study.torque_nm, title)
+    words = f"Run-up at {study.torque_nm:g} N·m, {title}: acceleration (m/s²) at sensor {study.run_up.source}"
+    found["run_up"] = order_map_figure(replace(study.run_up, source=words), height_in=4.6)
+    if study.sweeps:
+        found["sweeps"] = _sweeps(study, title)
+    return found
+
+
+def sweeps_csv(study: Study) -> str:
+    """Return every part of every sweep as a line."""
+    lines = ["torque_nm,direction,speed_rpm,mesh_hz,rms_um,least_force_n,lost_part"]
+    for torque, pair in study.sweeps.items():
+        for direction, sweep in zip(("up", "down"), pair, strict=True):
+            columns = (sweep.speed_rpm, sweep.mesh_hz, sweep.rms_m * 1e6, sweep.least_force_n, sweep.lost_part)
+            lines += [
+                f"{torque:g},{direction}," + ",".join(f"{v:.6g}" for v in row) for row in zip(*columns, strict=True)
+            ]
+    return "\n".join(lines) + "\n"
+
+
+def maps_csv(maps: MeshMaps) -> str:
+    """Return every angle and torque as a line: the whole mesh, then each pair, the newest first."""
+    n_slots = maps.pair_forces_n.shape[2]
+    names = ["torque_nm", "mesh_cycles", "transmission_error_um", "tangent_n_per_m", "secant_n_per_m"]
+    whole = (1e6 * maps.transmission_error_m, maps.tangent_stiffness_n_per_m, maps.secant_stiffness_n_per_m)
+    columns = [*np.broadcast_arrays(maps.torque_nm, maps.mesh_cycles[:, None]), *whole]
+    for j in range(n_slots):
+        names += [f"pair_{j}_force_n", f"pair_{j}_load_part", f"pair_{j}_tangent_n_per_m", f"pair_{j}_secant_n_per_m"]
+        pair = (maps.pair_forces_n, maps.load_sharing, maps.contact_tangent_n_per_m, maps.contact_secant_n_per_m)
+        columns += [values[:, :, j] for values in pair]
+    rows = np.column_stack([values.T.ravel() for values in columns])
+    return "\n".join([",".join(names), *(",".join(f"{v:.6g}" for v in row) for row in rows)]) + "\n"
+
+
+def summary(study: Study) -> dict[str, object]:
+    """Return the numbers that matter."""
+    rows = []
+    for torque, (up, down) in study.sweeps.items():
+        natural = study.natural_hz[torque]
+        low, highest = (part * natural for part in RANGE)
+        rows.append(
+            {
+                "torque_nm": torque,
+                "torsional_mode_hz": natural,
+                "peak_up_hz": up.peak_hz(low, highest),
+                "peak_down_hz": down.peak_hz(low, highest),
+                "jump_up_hz": up.jump_hz(low, highest),
+                "jump_down_hz": down.jump_hz(low, highest),
+                "largest_rms_um": [float(up.rms_m.max() * 1e6), float(down.rms_m.max() * 1e6)],
+                "largest_part_without_contact": [float(up.lost_part.max()), float(down.lost_part.max())],
+                "n_steps": up.n_steps + down.n_steps,
+                "step_s": up.step_s,
+            }
+        )
+    maps = study.maps
+    static = [
+        {
+            "torque_nm": float(t),
+            "mean_tangent_n_per_m": float(maps.tangent_stiffness_n_per_m[:, i].mean()),
+            "mean_secant_n_per_m": float(maps.secant_stiffness_n_per_m[:, i].mean()),
+            "transmission_error_um": [
+                float(maps.transmission_error_m[:, i].min() * 1e6),
+                float(maps.transmission_error_m[:, i].max() * 1e6),
+            ],
+        }
+        for i, t in enumerate(maps.torque_nm)
+    ]
+    return {"sweeps": rows, "static": static}
+
+
+def _pair_stiffness(study: Study, title: str) -> Figure:
+    """Contact stiffness of one pair along its way, over the torque; it enters at 1."""
+    maps = study.maps
+    twice = np.concatenate((maps.mesh_cycles, maps.mesh_cycles + 1.0, maps.mesh_cycles + 2.0))
+    slot = np.floor(twice + MARGIN).astype(np.int64) - 1
+    place = np.tile(np.arange(len(maps.mesh_cycles)), 3)
+    there = (slot >= 0) & (slot < maps.pair_forces_n.shape[2])
+
+    def of_pair(values: FloatArray) -> FloatArray:
+        found = values[place, :, np.clip(slot, 0, values.shape[2] - 1)]
+        return np.where(there[:, None], found, 0.0) / 1e8
+
+    kinds = {
+        "tangent contact stiffness (10⁸ N/m)": of_pair(maps.contact_tangent_n_per_m),
+        "secant contact stiffness (10⁸ N/m)": of_pair(maps.contact_secant_n_per_m),
+    }
+    return mesh_maps_figure(
+        twice, maps.torque_nm, kinds, title=f"Contact stiffness of the pair that enters at 1, {title}"
+    )
+
+
+def _sharing(study: Study, title: str) -> Figure:
+    maps = study.maps
+    place = int(np.argmin(np.abs(maps.torque_nm - SHARING_NM)))
+    n_slots = maps.force_n.shape[2]
+    # Over two cycles each pair keeps its name: slot j of cycle c holds pair ⌊c − start⌋ − j.
+    cycles = np.concatenate((maps.mesh_cycles, maps.mesh_cycles + 1.0))
+    newest = np.floor(cycles + MARGIN).astype(int)
+    forces = np.tile(maps.pair_forces_n[:, place], (2, 1))
+    pairs = range(int(newest.min()) - n_slots + 1, int(newest.max()) + 1)
+    curves = {
+        f"pair {k + 2}": np.array(
+            [f[m - k] if 0 <= m - k < n_slots else 0.0 for f, m in zip(forces, newest, strict=True)]
+        )
+        for k in pairs
+    }
+    carried = {name: force for name, force in curves.items() if force.any()}
+    errors = {f"{maps.torque_nm[i]:.3g} N·m": np.tile(maps.transmission_error_m[:, i], 2) for i in _few(maps.torque_nm)}
+    words = f"Load sharing at {maps.torque_nm[place]:.3g} N·m, and static transmission error, {title}"
+    return load_sharing_figure(cycles, carried, errors, title=words)
+
+
+def _spreading(check: SpreadingCheck, torque_nm: float, title: str) -> Figure:
+    curves = {
+        f"{NAMES[spread]}: ripple {100.0 * check.ripple[spread]:.2g} %": values
+        for spread, values in check.frequency_hz.items()
+    }
+    words = f"Contact spread over nodes at {torque_nm:g} N·m, {title}; ripple is that of a tooth's compliance"
+    return contact_spreading_figure(check.mesh_cycles, curves, title=words)
+
+
+def _few(torques: np.ndarray[tuple[int, ...], np.dtype[np.floating]]) -> list[int]:
+    """Places of a few torques over the range."""
+    return [int(i) for i in np.unique(np.linspace(0, len(torques) - 1, 5).round())]
+
+
+def _sweeps(study: Study, title: str) -> Figure:
+    rows = []
+    for torque, (up, down) in study.sweeps.items():
+        rows.append((f"{torque:g} N·m", up.mesh_hz, up.rms_m, down.rms_m[::-1]))
+    natural = float(np.mean([study.natural_hz[t] for t in study.sweeps]))
+    return speed_sweep_figure(rows, natural_hz=natural, title=f"Speed sweeps, {title}")
+
+
+def _teeth(study: Study) -> float:
+    sweep = next(iter(study.sweeps.values()))[0]
+    return float(sweep.mesh_hz[0] / sweep.speed_rpm[0] * 60.0)

@@ -1,1 +1,0 @@
-"""A study of the flexible gear pair: maps, sweeps over speed, spectra, as figures and tables."""

@@ -1,0 +1,288 @@
+"""Mesh a gear, find its modes, push a tooth, and reduce it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearsig.checks import FloatArray, count, within
+from gearsig.plot import gear_mesh_figure, gear_modes_figure, gear_stress_figure
+from gearsig.report import made_folder
+from sims.reduced_fe import (
+    FINER_DOF,
+    N_COMPARED,
+    CraigBamptonGear,
+    CraigBamptonPlan,
+    CyclicGear,
+    CyclicModes,
+    DiscretisationError,
+    FaceView,
+    GearBlank,
+    Held,
+    MeshQuality,
+    ReducedGear,
+    ReductionPlan,
+    SectorMesh,
+    ToothLoad,
+    cached_gear,
+    check_memory,
+    check_reducible,
+    craig_bampton,
+    craig_bampton_bytes,
+    cyclic_modes,
+    discretisation_error,
+    face_view,
+    load_tooth,
+    mesh_quality,
+    mesh_size_for,
+    mode_field,
+    one_thread,
+    point_and_push,
+    rigid_part,
+    sector_bytes,
+    sector_mesh,
+    write_gear,
+    write_vtk,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+MOST_MODES = 300
+"""Beyond, the search takes many minutes, and teeth alone move."""
+N_SLICES = 5
+"""Contact patches along the face, where the mesh has layers enough."""
+
+
+@dataclass(frozen=True)
+class GearBodyStudy:
+    """What was found of one gear.
+
+    Parameters
+    ----------
+    mesh : SectorMesh
+    quality : MeshQuality
+    gear : CyclicGear
+        As it is held for its modes.
+    held : str
+        "free", "bore" or "springs".
+    modes : CyclicModes
+        Elastic ones; of a gear on springs also those in which it moves as a whole.
+    load : ToothLoad
+        A tooth pushed in the middle of its flank, bore held.
+    discretisation : DiscretisationError or None
+        Of a mesh that is much coarser than what it is compared with.
+    reduced : ReducedGear or None
+    craig_bampton : CraigBamptonGear or None
+    """
+
+    mesh: SectorMesh
+    quality: MeshQuality
+    gear: CyclicGear
+    held: str
+    modes: CyclicModes
+    load: ToothLoad
+    discretisation: DiscretisationError | None
+    reduced: ReducedGear | None
+    craig_bampton: CraigBamptonGear | None
+
+
+def study_gear(
+    blank: GearBlank,
+    n_dof: int,
+    *,
+    n_modes: int = 20,
+    held: Held = "free",
+    springs: FloatArray | None = None,
+    force_n: float = 1000.0,
+    reduce: bool = False,
+    on_progress: Callable[[str, float], None] = lambda _what, _done: None,
+) -> GearBodyStudy:
+    """Study one gear.
+
+    Parameters
+    ----------
+    blank : GearBlank
+    n_dof : int
+        Of the whole gear, about.
+    n_modes : int
+        Elastic modes, at least; up to 300.
+    held : str
+        "free" or "bore".
+    springs : array (6,) or None
+        That hold the hub for the modes, see `CyclicGear`; with "free" only.
+    force_n : float
+        On the tooth.
+    reduce : bool
+        Also reduce the gear both ways. The free-interface reduction is kept where the model `reduced-fe` finds it.
+    on_progress : callable
+        Told what is done and how much, 0 to 1.
+    """
+    within(count(n_modes, "n_modes"), "n_modes", 1, MOST_MODES)
+    on_progress("mesh", 0.0)
+    size = mesh_size_for(blank, n_dof)
+    if reduce:
+        check_reducible(blank, size)
+    check_memory(craig_bampton_bytes(blank, size, N_COMPARED) if reduce else sector_bytes(blank, size))
+    mesh = sector_mesh(blank, size)
+    gear = CyclicGear(mesh, springs)
+    on_progress("modes", 0.05)
+    elastic = held == "free" and springs is None
+    with one_thread():
+        modes = cyclic_modes(gear, n_modes, held, elastic=elastic)
+    on_progress("stress", 0.25 if reduce else 0.6)
+    load = load_tooth(mesh, force_n)
+    error = None
+    if mesh.n_dof < FINER_DOF / 2:
+        on_progress("finer mesh", 0.3)
+        error = discretisation_error(gear, modes, load, held, elastic=elastic)
+    reduced = both = None
+    if reduce:
+        on_progress("free-interface reduction", 0.35)
+        reduced = cached_gear(blank, ReductionPlan(size))
+        on_progress("Craig–Bampton reduction", 0.7)
+        both = craig_bampton(mesh, CraigBamptonPlan(n_slices=min(N_SLICES, mesh.tooth.shape[2])))
+    on_progress("done", 1.0)
+    return GearBodyStudy(
+        mesh, mesh_quality(mesh), gear, held if springs is None else "springs", modes, load, error, reduced, both
+    )
+
+
+# --------------------
+# Figures, files and text of a gear's finite elements.
+# --------------------
+
+
+DOTS_PER_INCH = 160
+N_SHOWN = 6
+NEIGHBOURS = (-1, 0, 1)
+PEAKS = "Peaks at the force and in sharp corners grow with a finer mesh."
+"""A line load and corners without a round have no finite stress."""
+HELD = {"free": "free", "bore": "bore held", "springs": "hub on springs"}
+
+
+def write_gear_body(study: GearBodyStudy, folder: Path, *, vtk: bool = False) -> tuple[Path, ...]:
+    """Write the figures as PNG, and where there are: VTK file, reduced gear, table of Craig–Bampton."""
+    made_folder(folder)
+    paths = []
+    for name, figure in figures(study).items():
+        paths.append(folder / f"{name}.png")
+        figure.savefig(paths[-1], dpi=DOTS_PER_INCH)
+    if vtk:
+        paths.append(write_vtk(folder / "gear.vtu", study.mesh, _fields(study)))
+    if study.reduced is not None:
+        paths.append(folder / "reduced.npz")
+        write_gear(paths[-1], study.reduced)
+    if study.craig_bampton is not None:
+        paths.append(folder / "craig_bampton.txt")
+        paths[-1].write_text(study.craig_bampton.accuracy.table() + "\n", encoding="utf-8")
+    return tuple(paths)
+
+
+def figures(study: GearBodyStudy) -> dict[str, Figure]:
+    """Return mesh, modes and stress by their files' names; a mesh of first order has no stress worth showing."""
+    mesh, view = study.mesh, face_view(study.mesh)
+    g = mesh.blank.geometry
+    name = f"{g.teeth} teeth, module {g.module_mm:g} mm"
+    near = (g.root_radius_mm - 3.0 * g.module_mm, g.tip_radius_mm + 0.5 * g.module_mm)
+    across = 0.95 * np.pi * g.module_mm
+    quality = study.quality.scaled_jacobian[view.cells]
+    shapes = {_label(study, k): _shape(study, view, k) for k in range(min(N_SHOWN, len(study.modes.frequencies_hz)))}
+    found = {
+        "mesh": gear_mesh_figure(
+            view.outlines_mm,
+            quality,
+            near_mm=(*near, -across, across),
+            title=f"{name}: {mesh.n_dof} degrees of freedom",
+        ),
+        "modes": gear_modes_figure(
+            view.points_mm, view.triangles, shapes, title=f"{name}: first modes, {HELD[study.held]}"
+        ),
+    }
+    if mesh.size.order > 1:
+        found["stress"] = _stress(study, (*near, -across, across), name)
+    return found
+
+
+def lines(study: GearBodyStudy) -> list[str]:
+    """Return what was found as text."""
+    q = study.quality
+    text = [
+        f"{study.mesh.n_dof} degrees of freedom; {_cells(study)}",
+        f"mass {q.mass_kg:.4g} kg ({1e6 * (q.volume_m3 / q.true_volume_m3 - 1.0):+.0f} ppm of the outline's)",
+        f"polar inertia {q.polar_inertia_kg_m2:.4g} kg m², least scaled Jacobian {q.scaled_jacobian.min():.2f}",
+        f"tooth compliance in mid-flank {study.load.push_m / study.load.force_n:.3g} m/N, bore held",
+        f"modes, {HELD[study.held]}:",
+        *(_label(study, k) for k in range(len(study.modes.frequencies_hz))),
+    ]
+    if study.discretisation is not None:
+        d, size = study.discretisation, study.mesh.size
+        text.append(
+            f"coarse: against {d.finer_dof} degrees of freedom the first frequency is {100.0 * d.frequency[0]:+.1f} %, "
+            f"the worst of {len(d.frequency)} {100.0 * d.frequency[np.argmax(np.abs(d.frequency))]:+.1f} %, a tooth's "
+            f"compliance {100.0 * d.compliance:+.0f} %"
+        )
+        if size.order == 1:
+            text.append(f"edges straight, up to {q.outline_error_mm:.2g} mm off the outline: no stress is shown")
+    if study.reduced is not None:
+        text.append(f"free-interface reduction: {study.reduced.n_modes} elastic modes and the static rest")
+    if study.craig_bampton is not None:
+        a = study.craig_bampton.accuracy
+        text.append(
+            f"Craig–Bampton: {len(study.craig_bampton.mass)} degrees of freedom, worst of {len(a.full_hz)} frequencies "
+            f"{100.0 * a.worst_error:.4f} %, least subspace MAC {a.least_mac:.6f}"
+        )
+    return text
+
+
+def _cells(study: GearBodyStudy) -> str:
+    size = study.mesh.size
+    kind = "27-node hexahedra" if size.order == 2 else "8-node hexahedra with incompatible modes"
+    return f"{kind}: {size.n_across} over a tooth's thickness, {size.n_up} up its flank, {size.n_along} along the face"
+
+
+def _label(study: GearBodyStudy, k: int) -> str:
+    n = int(study.modes.nodal_diameters[k])
+    whole = rigid_part(study.gear, study.modes, k)
+    kind = whole or f"{n} nodal diameter{'s' if n != 1 else ''}"
+    return f"{study.modes.frequencies_hz[k]:.1f} Hz, {kind}"
+
+
+def _shape(study: GearBodyStudy, view: FaceView, k: int) -> FloatArray:
+    """Motion of the view's points in the axes of the whole gear."""
+    field = mode_field(study.gear, study.modes, k)[:, view.nodes]
+    angle = study.mesh.blank.pitch_angle_rad * np.arange(len(field))[:, None]
+    c, s = np.cos(angle), np.sin(angle)
+    x, y, z = np.moveaxis(field, 2, 0)
+    return np.column_stack(((c * x - s * y).ravel(), (s * x + c * y).ravel(), z.ravel()))
+
+
+def _stress(study: GearBodyStudy, near: tuple[float, float, float, float], name: str) -> Figure:
+    load, view = study.load, face_view(study.mesh, NEIGHBOURS)
+    point, push = point_and_push(study.mesh.blank.geometry, load.roll_rad, 1.0)
+    return gear_stress_figure(
+        view.points_mm,
+        view.triangles,
+        view.values(np.array([load.von_mises_pa(k) for k in NEIGHBOURS])),
+        near_mm=near,
+        force=(point * 1e3, push, f"{load.force_n:g} N"),
+        note=PEAKS,
+        title=f"{name}: stress, bore held",
+    )
+
+
+def _fields(study: GearBodyStudy) -> dict[str, FloatArray]:
+    """Values at all nodes for other programs."""
+    z = study.mesh.blank.n_teeth
+    fields = {
+        "displacement_m": study.load.displacement_m,
+        "von_mises_pa": np.array([study.load.von_mises_pa(k) for k in range(z)]),
+    }
+    for k in range(min(N_SHOWN, len(study.modes.frequencies_hz))):
+        fields[f"mode_{k + 1}_{study.modes.frequencies_hz[k]:.0f}_hz"] = mode_field(study.gear, study.modes, k)
+    return fields

@@ -1,1 +1,0 @@
-"""One gear as finite elements: mesh, modes, stress, reductions."""

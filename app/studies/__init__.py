@@ -1,0 +1,1 @@
+"""How the numbers that ship were made: calibrations and the population of the gap diagnosis."""

@@ -1,0 +1,569 @@
+"""Gearboxes drawn at random for the calibration of crack severity, and for its check."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import cos, radians, sin
+from typing import Any
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.errors import InputError, RefusalError
+from gearsig.recording import Recording
+from gearsig.severity import (
+    ALONE,
+    CHIPPED,
+    LARGEST_SPEED_DIFFERENCE,
+    LARGEST_TORQUE_CHANGE,
+    SPALLED,
+    WITH_REFERENCE,
+    GearEvidence,
+    ShaftLines,
+    gear_evidence,
+    pair_facts,
+    pair_lines,
+    percent_per_mm,
+    reach_of,
+)
+from gearsig.severity import (
+    CRACKED as CRACK_KIND,
+)
+from sims.cracked import NAME as CRACKED
+from sims.cracked import CrackedPair, PreparedCrackedPair, default_step_s, simulate_machine
+from sims.effects import EffectSetting, with_effects
+from sims.gear_pair import build_rig, draw_roughness
+from sims.machine import Machine, Operation
+from sims.measure import MeasuredChannel, ModalPath, PathMode
+from sims.mesh import GearGeometry, deepest_crack_mm
+from sims.reduced_fe import TWIN_STEP_S, PreparedPair, ReducedPair, simulate_pair, twin_parameters
+from sims.simulator import ParameterValue
+
+CALIBRATION_MODULES_MM = (1.5, 2.0, 2.5, 3.0, 4.0)
+OTHER_MODULES_MM = (1.75, 2.25, 2.75, 3.5)
+"""Modules of the rigs for the check: none is a module of the calibration."""
+
+DEPTHS_MM = (0.3, 4.0)
+DEPTHS_OF_THE_CHECK_MM = (0.5, 4.0)
+DEEPEST_SHARE = 0.9
+"""Of the deepest crack that the tooth model allows."""
+
+MESH_HZ = (180.0, 1600.0)
+LEAST_REVOLUTIONS = 15
+"""Of the slower shaft."""
+
+SOUND_SHARE, SOUND_SHARE_OF_THE_CHECK = 0.2, 0.3
+"""Rigs that get no crack."""
+
+
+@dataclass(frozen=True)
+class DrawnHousingMode:
+    """One mode between bearings and sensors: shape at bearings 1 and 3, where the sensors sit, and at all four.
+
+    The bearings move it along `direction_deg` from the x axis, across the line of action; None: along the sensors' own.
+    """
+
+    frequency_hz: float
+    damping_ratio: float
+    gain: float
+    shape: tuple[float, float, float, float]
+    direction_deg: float | None = None
+
+
+@dataclass(frozen=True)
+class DrawnRig:
+    """A gearbox with its operation, and the crack that it gets.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Of the simulator "cracked", without the crack.
+    modes : tuple of HousingMode
+    sensor_gain : float
+        Of everything between bearing and recording: the estimator must not need it.
+    speed_rpm, torque_nm : float
+    duration_s : float
+    gear : str
+        "driver" or "driven": which gets the crack.
+    tooth : int
+        From 0, as the simulator counts.
+    depth_mm : float
+        0: none.
+    seed : int
+        Of roughness and noise.
+    """
+
+    parameters: Mapping[str, ParameterValue]
+    modes: tuple[DrawnHousingMode, ...]
+    sensor_gain: float
+    speed_rpm: float
+    torque_nm: float
+    duration_s: float
+    gear: str
+    tooth: int
+    depth_mm: float
+    seed: int
+
+    @property
+    def teeth(self) -> tuple[int, int]:
+        """Of driver and driven gear."""
+        return int(self.parameters["teeth_driver"]), int(self.parameters["teeth_driven"])
+
+
+def is_for_the_check(teeth: tuple[int, int]) -> bool:
+    """Whether a pair of teeth belongs to the rigs of the check; the calibration never sees it."""
+    return sum(teeth) % 3 == 0
+
+
+def draw_rig(rng: np.random.Generator, *, for_the_check: bool, even: bool = False) -> DrawnRig:
+    """Draw a gearbox; those of the check have other teeth and modules than those of the calibration.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    for_the_check : bool
+    even : bool
+        Teeth that hardly differ, as those of the demonstration machines and of master gears; and lower loads.
+    """
+    teeth = _teeth(rng, for_the_check)
+    module = float(rng.choice(OTHER_MODULES_MM if for_the_check else CALIBRATION_MODULES_MM))
+    width = module * rng.uniform(6.0, 12.0)
+    pitch_radius_m = 0.5e-3 * module * teeth[0]
+    load = log_uniform(rng, 20.0, 120.0)  # N/mm², force per face width and module
+    torque = load * width * module * pitch_radius_m
+    speed = _speed_rpm(rng, teeth)
+    gear = str(rng.choice(("driver", "driven")))
+    z = teeth[0] if gear == "driver" else teeth[1]
+    least, most = DEPTHS_OF_THE_CHECK_MM if for_the_check else DEPTHS_MM
+    depth = rng.uniform(least, min(most, DEEPEST_SHARE * deepest_crack_mm(GearGeometry(z, module))))
+    sound = rng.uniform() < (SOUND_SHARE_OF_THE_CHECK if for_the_check else SOUND_SHARE)
+    parameters = _gears(rng, teeth, module, width, load) | _rest(rng, module, teeth)
+    if even:
+        parameters |= _even_teeth(rng)
+        torque *= rng.uniform(0.4, 1.0)
+    return DrawnRig(
+        parameters,
+        _modes(rng),
+        log_uniform(rng, 0.3, 3.0),
+        speed,
+        torque,
+        LEAST_REVOLUTIONS * max(1.0, teeth[1] / teeth[0]) * 60.0 / speed,
+        gear,
+        int(rng.integers(z)),
+        0.0 if sound else float(depth),
+        int(rng.integers(2**31)),
+    )
+
+
+def _teeth(rng: np.random.Generator, for_the_check: bool) -> tuple[int, int]:
+    while True:
+        first = int(rng.integers(18, 56))
+        second = round(first * rng.uniform(0.8, 2.6))
+        if 18 <= second <= 100 and is_for_the_check((first, second)) == for_the_check:
+            return first, second
+
+
+def _speed_rpm(rng: np.random.Generator, teeth: tuple[int, int]) -> float:
+    while True:
+        speed = log_uniform(rng, 500.0, 3000.0)
+        if MESH_HZ[0] <= speed / 60.0 * teeth[0] <= MESH_HZ[1]:
+            return speed
+
+
+def _gears(
+    rng: np.random.Generator, teeth: tuple[int, int], module: float, width: float, load: float
+) -> dict[str, ParameterValue]:
+    deflection_um = load * module / 14.0  # at 14 N/(mm µm), the usual stiffness of a pair of steel gears
+    relief = 0.0 if rng.uniform() < 0.25 else deflection_um * rng.uniform(0.2, 1.4)
+    return {
+        "teeth_driver": teeth[0],
+        "teeth_driven": teeth[1],
+        "module_mm": module,
+        "face_width_mm": width,
+        "bore_radius_driver_mm": 0.35 * module * (0.5 * teeth[0] - 1.25),
+        "bore_radius_driven_mm": 0.35 * module * (0.5 * teeth[1] - 1.25),
+        "contact_law": str(rng.choice(("linear", "load-dependent"))),
+        "mesh_damping_ratio": rng.uniform(0.03, 0.10),
+        "half_backlash_um": rng.uniform(20.0, 80.0),
+        "tip_relief_um": relief,
+        "tip_relief_length_mm": module * rng.uniform(0.7, 1.5),
+        "pitch_deviation_um": log_uniform(rng, 0.1, 1.0),
+        "tolerance_seed": int(rng.integers(10**6)),
+        "roughness_um": log_uniform(rng, 0.03, 0.25),
+        "viscosity_cp": rng.uniform(10.0, 40.0),
+        "runout_driver_um": rng.uniform(0.0, 8.0),
+        "runout_driven_um": rng.uniform(0.0, 8.0),
+        "runout_angle_driver_deg": rng.uniform(0.0, 360.0),
+        "runout_angle_driven_deg": rng.uniform(0.0, 360.0),
+        "unbalance_driver_g_mm": rng.uniform(0.0, 30.0),
+        "unbalance_driven_g_mm": rng.uniform(0.0, 50.0),
+        "unbalance_angle_driver_deg": rng.uniform(0.0, 360.0),
+        "unbalance_angle_driven_deg": rng.uniform(0.0, 360.0),
+    }
+
+
+def _even_teeth(rng: np.random.Generator) -> dict[str, ParameterValue]:
+    locked_to = str(rng.choice(("time", "flank")))
+    return {
+        "pitch_deviation_um": log_uniform(rng, 0.01, 0.1),
+        "roughness_locked_to": locked_to,
+        "roughness_um": log_uniform(rng, 0.05, 0.5) if locked_to == "time" else log_uniform(rng, 0.005, 0.05),
+        "runout_driver_um": rng.uniform(0.0, 2.0),
+        "runout_driven_um": rng.uniform(0.0, 2.0),
+    }
+
+
+def _rest(rng: np.random.Generator, module: float, teeth: tuple[int, int]) -> dict[str, ParameterValue]:
+    """Bearings, shafts and rotors; larger gears sit in larger machines."""
+    size = module / 2.0
+    inertia = 2e-3 * size**4 * (sum(teeth) / 80.0) ** 3
+    return {
+        "bearing_stiffness_n_per_m": size * log_uniform(rng, 7e7, 6e8),
+        "bearing_damping_n_s_per_m": size * log_uniform(rng, 500.0, 3000.0),
+        "bearing_mass_kg": size**2 * log_uniform(rng, 0.3, 1.5),
+        "bending_stiffness_n_per_m": size * log_uniform(rng, 7e7, 1e9),
+        "bending_damping_n_s_per_m": size * log_uniform(rng, 200.0, 2000.0),
+        "torsional_stiffness_nm_per_rad": size**3 * log_uniform(rng, 2e3, 6e4),
+        "torsional_damping_nm_s_per_rad": size**3 * log_uniform(rng, 0.4, 6.0),
+        "rotor_inertia_input_kg_m2": inertia * log_uniform(rng, 0.5, 10.0),
+        "rotor_inertia_output_kg_m2": inertia * log_uniform(rng, 0.5, 10.0),
+        "governor_nm_s_per_rad": 1.0 * size**4 * log_uniform(rng, 0.5, 5.0),
+        "noise_mps2": log_uniform(rng, 0.02, 0.5),
+        "noise_slope": rng.uniform(0.0, 1.0),
+        "sensor_range_mps2": 5000.0,
+    }
+
+
+def _modes(rng: np.random.Generator) -> tuple[DrawnHousingMode, ...]:
+    n = int(rng.integers(2, 6))
+    return tuple(
+        DrawnHousingMode(
+            log_uniform(rng, 600.0, 8000.0),
+            log_uniform(rng, 0.01, 0.05),
+            rng.uniform(0.02, 0.08),
+            tuple(float(s) for s in rng.uniform(-1.0, 1.0, 4)),  # type: ignore[arg-type]  # four of them
+        )
+        for _ in range(n)
+    )
+
+
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """Draw with even chance per decade."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+# --------------------
+# A drawn gearbox, sound or with its crack, as a recording.
+# --------------------
+
+
+SAMPLING_RATE_HZ = 20480.0
+MOST_LEAD_REV = 8
+
+
+def simulate_rig(
+    drawn: DrawnRig,
+    *,
+    effect: str = "root_crack",
+    severity: float | None = None,
+    run: int = 0,
+    speed_factor: float = 1.0,
+    torque_factor: float = 1.0,
+    flanks: int = 0,
+    options: Mapping[str, float | str] | None = None,
+    further: Sequence[EffectSetting] = (),
+    step_angle_rad: float | None = None,
+    model: str = CRACKED,
+) -> Recording:
+    """Simulate one recording.
+
+    Parameters
+    ----------
+    drawn : DrawnRig
+    effect : str
+    severity : float or None
+        None: the drawn depth of the crack; 0: a sound gearbox.
+    run : int
+        Another run has other noise and begins at another place of the driven shaft; the flanks stay the same.
+    speed_factor, torque_factor : float
+    flanks : int
+        Another number draws other profiles of the flanks.
+    options : mapping or None
+        Of the effect, besides or instead of the drawn gear and tooth.
+    further : sequence of EffectSetting
+        Effects that are switched on as well.
+    step_angle_rad : float or None
+        Of "cracked": step times the greatest angular eigenfrequency; None: the simulator's own, finer than floors
+        need.
+    model : str
+        "cracked" or "reduced-fe".
+    """
+    operation = Operation.steady(drawn.speed_rpm * speed_factor, drawn.torque_nm * torque_factor)
+    size = drawn.depth_mm if severity is None else severity
+    chosen = {"gear": drawn.gear, "tooth": drawn.tooth + 1.0, **(options or {})}
+    settings = [EffectSetting(effect, size, chosen)] if size > 0 else []
+    draws = np.random.default_rng(drawn.seed)
+    ready = _prepared(model, drawn, operation, draws)
+    machine = with_effects(_with_path(ready.machine, drawn), [*settings, *further], draws)
+    machine = _with_fixed_flanks(machine, [drawn.seed, 77 + flanks])
+    rng, lead_rev = _beginning(drawn, run)
+    lead_s = lead_rev * 60.0 / drawn.speed_rpm
+    asked: dict[str, Any] = {
+        "rng": rng,
+        "sampling_rate_hz": SAMPLING_RATE_HZ,
+        "duration_s": drawn.duration_s + (lead_s if run else 0.0),
+        "rig": build_rig(machine, operation, name="drawn"),
+        "truth": {"depth_mm": size, "effect": effect if size else "", **chosen},
+    }
+    if isinstance(ready, PreparedPair):
+        recording, _ = simulate_pair(replace(ready.pair, machine=machine), operation, step_s=TWIN_STEP_S, **asked)
+    else:
+        step_s = None if step_angle_rad is None else default_step_s(machine, operation, step_angle_rad)
+        recording = simulate_machine(machine, operation, step_s=step_s, **asked)
+    return _cut(recording, round(lead_s * SAMPLING_RATE_HZ)) if run else recording
+
+
+def _prepared(
+    model: str, drawn: DrawnRig, operation: Operation, rng: np.random.Generator
+) -> PreparedCrackedPair | PreparedPair:
+    """Return the sound machine; finite-element gears are of full discs, with the mesh of a twin's."""
+    if model == CRACKED:
+        return CrackedPair().prepare(drawn.parameters, [], operation, rng, sampling_rate_hz=SAMPLING_RATE_HZ)
+    values = twin_parameters(drawn.parameters, drawn.teeth) | {"roughness_locked_to": "flank"}
+    return ReducedPair().prepare(values, [], operation, rng, sampling_rate_hz=SAMPLING_RATE_HZ)
+
+
+def turns_before(drawn: DrawnRig, run: int) -> int:
+    """Return the whole turns of the driver that a run's recording leaves out at its beginning."""
+    return _beginning(drawn, run)[1] if run else 0
+
+
+def _beginning(drawn: DrawnRig, run: int) -> tuple[np.random.Generator, int]:
+    """Return a run's generator and the first it draws: whole turns before the recording."""
+    rng = np.random.default_rng([drawn.seed, run])
+    return rng, int(rng.integers(0, MOST_LEAD_REV))
+
+
+def _with_fixed_flanks(machine: Machine, seed: list[int]) -> Machine:
+    """Draw the flanks' profiles now: they belong to the gears, and are the same in each run."""
+    if machine.roughness.locked_to != "flank":
+        return machine
+    machine, _ = draw_roughness(machine, np.random.default_rng(seed))
+    return replace(machine, roughness=replace(machine.roughness, locked_to="none"))
+
+
+def _with_path(machine: Machine, drawn: DrawnRig) -> Machine:
+    """Replace the housing's modes by the drawn ones; the sensors stay at bearings 1 and 3."""
+    channels = tuple(
+        _with_modes(channel, bearing, drawn) for channel, bearing in zip(machine.chain.channels, (1, 3), strict=True)
+    )
+    return replace(machine, chain=replace(machine.chain, channels=channels))
+
+
+def _with_modes(channel: MeasuredChannel, bearing: int, drawn: DrawnRig) -> MeasuredChannel:
+    gain = drawn.sensor_gain
+    own = tuple(channel.path.direct[f"bearing {bearing} {axis}"] for axis in "xy")
+    modes = tuple(
+        PathMode(
+            mode.frequency_hz,
+            mode.damping_ratio,
+            {
+                f"bearing {i + 1} {axis}": gain * mode.gain * mode.shape[bearing - 1] * mode.shape[i] * direction
+                for i in range(4)
+                for axis, direction in zip("xy", _direction(mode, own), strict=True)
+            },
+        )
+        for mode in drawn.modes
+    )
+    direct = {name: gain * value for name, value in channel.path.direct.items()}
+    return replace(channel, path=ModalPath(direct, modes))
+
+
+def _direction(mode: DrawnHousingMode, of_the_sensor: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the parts of a bearing's x and y that move a mode."""
+    if mode.direction_deg is None:
+        return of_the_sensor
+    phi = radians(mode.direction_deg)
+    return cos(phi), sin(phi)
+
+
+def _cut(recording: Recording, first: int) -> Recording:
+    return replace(recording, samples=recording.samples[:, first:])
+
+
+# --------------------
+# One case of the calibration: a drawn rig, its recording and its reference, and what they show of either gear.
+# --------------------
+
+
+SPEED_DIFFERENCE = LARGEST_SPEED_DIFFERENCE
+TORQUE_DIFFERENCE = LARGEST_TORQUE_CHANGE
+"""Between a recording and its reference, relative: as far as the estimator takes them."""
+
+OTHER_FLANKS_SHARE = 0.15
+"""Sound machines whose flanks are others than in the reference: run in, or ground again."""
+
+RELIEF_ERROR = 0.2
+"""Largest one of the tip relief that the estimator is told, relative: tips are never ground as they were drawn."""
+
+CHIP_HEIGHT_MODULES = (0.25, 1.5)
+SPALL_WIDTH_PERCENT, SPALL_LENGTH_MODULES = (20.0, 90.0), (0.3, 1.2)
+
+
+@dataclass(frozen=True)
+class CrackCase:
+    """A drawn rig with its recording, a reference of the sound gears, and the sound gears once more."""
+
+    drawn: DrawnRig
+    recording: Recording
+    reference: Recording
+    sound: Recording
+
+
+@dataclass(frozen=True)
+class OtherFault:
+    """A chip or spall on the tooth that has the crack otherwise, as its size was drawn.
+
+    Parameters
+    ----------
+    kind : str
+        "chipped" or "spalled".
+    recording : Recording
+    """
+
+    kind: str
+    recording: Recording
+
+
+@dataclass(frozen=True)
+class Looks:
+    """What one gear shows: its features, and its event's shape; arrays, (n_features,) and (n_shape,)."""
+
+    features: FloatArray
+    shape: FloatArray
+
+
+@dataclass(frozen=True)
+class CaseFeatures:
+    """What a case shows.
+
+    Parameters
+    ----------
+    drawn : DrawnRig
+    gear : int
+        0 or 1: which gear has the crack.
+    percent : float
+        Depth of the crack in percent of the root; 0: none.
+    with_reference, alone, sound, sound_with_reference : arrays, (2, n_features)
+        Of both gears: the recording against its reference, by itself, the reference by itself, and the sound gears once
+        more against the reference.
+    looks : mapping
+        (kind, "with_reference" or "alone") → Looks of the cracked gear, and of the gear with the other fault.
+    lag_pitches : float
+        By how much the event, with a reference, follows the middle of the cracked tooth's engagement; nan where no
+        mark tells.
+    reach : mapping
+        Quantities that limit the calibration.
+    """
+
+    drawn: DrawnRig
+    gear: int
+    percent: float
+    with_reference: FloatArray
+    alone: FloatArray
+    sound: FloatArray
+    sound_with_reference: FloatArray
+    looks: dict[tuple[str, str], Looks]
+    lag_pitches: float
+    reach: dict[str, float]
+
+
+def draw_case(seed: int, index: int, *, for_the_check: bool, even: bool = False) -> CrackCase | None:
+    """Draw and simulate a case; None where the drawn gears cannot be made (undercut, a crack past the tooth)."""
+    rng = np.random.default_rng([seed, index, int(for_the_check)])
+    drawn = draw_rig(rng, for_the_check=for_the_check, even=even)
+    speed = float(rng.uniform(1.0 - SPEED_DIFFERENCE, 1.0 + SPEED_DIFFERENCE))
+    torque = float(rng.uniform(1.0 - TORQUE_DIFFERENCE, 1.0 + TORQUE_DIFFERENCE))
+    flanks = 1 if rng.uniform() < OTHER_FLANKS_SHARE else 0
+    try:
+        return CrackCase(
+            drawn,
+            simulate_rig(drawn),
+            simulate_rig(drawn, severity=0.0, run=1, speed_factor=speed, torque_factor=torque),
+            simulate_rig(drawn, severity=0.0, run=2, flanks=flanks),
+        )
+    except (InputError, RefusalError):
+        return None
+
+
+def draw_other_fault(drawn: DrawnRig, rng: np.random.Generator) -> OtherFault | None:
+    """Draw and simulate a chip or a spall instead of the crack; None where the gears do not allow its size."""
+    module = float(drawn.parameters["module_mm"])
+    if rng.uniform() < 0.5:
+        kind, effect = CHIPPED, "chipped_tooth"
+        severity = module * float(np.exp(rng.uniform(*np.log(CHIP_HEIGHT_MODULES))))
+        options = {"width_percent": 100.0 if rng.uniform() < 0.4 else float(rng.uniform(30.0, 90.0))}
+    else:
+        kind, effect = SPALLED, "tooth_spall"
+        severity = float(rng.uniform(*SPALL_WIDTH_PERCENT))
+        options = {"length_mm": module * float(rng.uniform(*SPALL_LENGTH_MODULES)), "depth_um": 100.0}
+    try:
+        return OtherFault(kind, simulate_rig(drawn, effect=effect, severity=severity, options=options))
+    except (InputError, RefusalError):
+        return None
+
+
+def observe(case: CrackCase, other: OtherFault | None = None, relief_error: float = 0.0) -> CaseFeatures:
+    """Return what a case shows, without any fitted model.
+
+    Parameters
+    ----------
+    case : Case
+    other : OtherFault or None
+    relief_error : float
+        Of the tip relief that the estimator is told, relative.
+    """
+    drawn, rig = case.drawn, case.recording.rig
+    if rig is None:
+        raise InputError("a simulated recording has no rig")
+    facts = pair_facts(rig, None)
+    relief_um = float(drawn.parameters["tip_relief_um"]) * (1.0 + relief_error)
+
+    def lines(recording: Recording) -> tuple[ShaftLines, ...]:
+        return pair_lines(recording, rig, facts.pair, case.recording.vibration_names())
+
+    def seen(a: tuple[ShaftLines, ...], b: tuple[ShaftLines, ...] | None) -> tuple[GearEvidence, ...]:
+        return gear_evidence(a, b, facts.module_mm, facts.load_mpa, relief_um)
+
+    now, sound = lines(case.recording), lines(case.reference)
+    compared, alone, good = seen(now, sound), seen(now, None), seen(sound, None)
+    gear = ("driver", "driven").index(drawn.gear)
+    looks = {(CRACK_KIND, WITH_REFERENCE): _looks(compared[gear]), (CRACK_KIND, ALONE): _looks(alone[gear])}
+    if other is not None:
+        damaged = lines(other.recording)
+        looks[other.kind, WITH_REFERENCE] = _looks(seen(damaged, sound)[gear])
+        looks[other.kind, ALONE] = _looks(seen(damaged, None)[gear])
+    return CaseFeatures(
+        drawn=drawn,
+        gear=gear,
+        percent=drawn.depth_mm * percent_per_mm(drawn.teeth[gear], facts.module_mm),
+        with_reference=np.stack([e.features for e in compared]),
+        alone=np.stack([e.features for e in alone]),
+        sound=np.stack([e.features for e in good]),
+        sound_with_reference=np.stack([e.features for e in seen(lines(case.sound), sound)]),
+        looks=looks,
+        lag_pitches=_lag(compared[gear], drawn.tooth),
+        reach=reach_of(facts, now[0].order_hz * facts.driver_teeth),
+    )
+
+
+def _looks(evidence: GearEvidence) -> Looks:
+    return Looks(evidence.features, evidence.shape)
+
+
+def _lag(evidence: GearEvidence, tooth: int) -> float:
+    if not evidence.shaft.has_mark:
+        return float("nan")
+    z = evidence.shaft.teeth
+    return (evidence.event.centre_rev * z - tooth - 0.5 + z / 2) % z - z / 2

@@ -1,0 +1,420 @@
+"""Make the calibration of crack severity: `python -m app.studies.crack_severity [--cases N] [--to FILE]`.
+
+Draws and simulates gearboxes (some 2.5 s each on one core), each with its crack, sound, and with a chip or spall; fits
+the models, and writes the JSON file that the library reads. Errors on cases that were left out of a fit make the
+intervals.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import typer
+
+from app.studies import crack_cases as rigs
+from app.studies.crack_cases import (
+    CHIP_HEIGHT_MODULES,
+    OTHER_FLANKS_SHARE,
+    RELIEF_ERROR,
+    SPALL_LENGTH_MODULES,
+    SPALL_WIDTH_PERCENT,
+    SPEED_DIFFERENCE,
+    TORQUE_DIFFERENCE,
+    CaseFeatures,
+    draw_case,
+    draw_other_fault,
+    observe,
+)
+from gearsig.checks import FloatArray
+from gearsig.errors import RefusalError
+from gearsig.severity import (
+    ALONE,
+    CRACKED,
+    FEATURES,
+    FILE,
+    KINDS,
+    LEAST_SPREAD,
+    RELIEF,
+    RELIEF_KNOWN,
+    RISING,
+    SHAPE,
+    SHAPED,
+    WITH_REFERENCE,
+    DepthModel,
+    KindModel,
+    kind_vector,
+    segments,
+)
+
+# --------------------
+# From the features of simulated cracks to a model of their depth.
+# --------------------
+
+
+FALSE_ALARMS = 0.02
+"""Part of the sound gear pairs whose score lies above the threshold."""
+
+TAUGHT = 0.10
+"""Part of the sound gear pairs whose score lies above the least one of a crack that the depth is learned from: cracks
+just below the threshold tell as well, and without a reference few are above."""
+
+CLEAR_MM = 1.0
+"""Cracks at least so deep teach the detection what to look for."""
+
+OUTSIDE = 0.01
+"""Part of the calibration's own cracks that count as unlike a crack."""
+
+_RIDGE = 3.0
+_FOLDS = 10
+_KNOTS = (1 / 3, 2 / 3)
+_COVERAGE = (0.05, 0.95)
+_SHAPED = [FEATURES.index(name) for name in SHAPED]
+
+
+@dataclass(frozen=True)
+class Cases:
+    """Cracks with their features, and sound gears.
+
+    Parameters
+    ----------
+    features : array, (n, n_features)
+        Of the cracked gear.
+    percent, depth_mm : arrays, (n,)
+    sound : array, (n_sound, 2, n_features)
+        Of both gears of sound pairs.
+    """
+
+    features: FloatArray
+    percent: FloatArray
+    depth_mm: FloatArray
+    sound: FloatArray
+
+
+def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
+    """Fit detection, depth and spread to all cases, and quantiles to errors of models that did not see the case."""
+    rest = [i for i, name in enumerate(FEATURES) if name not in RISING and (relief_known or name not in RELIEF)]
+    mean, scale = cases.features.mean(axis=0), cases.features.std(axis=0)
+    z = (cases.features - mean) / scale
+    sound = (cases.sound - mean) / scale
+    detection = _detection_weights(z[cases.depth_mm >= CLEAR_MM], sound.reshape(-1, z.shape[1]))
+    sound_scores = np.sort((sound @ detection).max(axis=1))
+    threshold = float(np.quantile(sound_scores, 1.0 - FALSE_ALARMS))
+    taught = z @ detection >= np.quantile(sound_scores, 1.0 - TAUGHT)
+    y = np.log(cases.percent)
+    knots = np.quantile(z[taught][:, _SHAPED], _KNOTS, axis=0).T
+    depth, spread = _depth_and_spread(z[taught], y[taught], knots, rest)
+    intercept, coefficients, slopes = depth
+    precision = _precision(z[taught], rest)
+    distances = np.sqrt(np.einsum("ij,jk,ik->i", z[taught], precision, z[taught]))
+    return DepthModel(
+        mean=mean,
+        scale=scale,
+        intercept=intercept,
+        coefficients=coefficients,
+        knots=knots,
+        slopes=slopes,
+        spread=spread,
+        quantiles=_conformal(_errors_of_others(z[taught], y[taught], knots, rest)),
+        detection=detection,
+        threshold=threshold,
+        sound_scores=sound_scores,
+        precision=precision,
+        largest_distance=float(np.quantile(distances, 1.0 - OUTSIDE)),
+        lowest=cases.features[taught].min(axis=0),
+        highest=cases.features[taught].max(axis=0),
+        percent_range=(float(cases.percent[taught].min()), float(cases.percent[taught].max())),
+    )
+
+
+def _depth_and_spread(
+    z: FloatArray, y: FloatArray, knots: FloatArray, rest: list[int]
+) -> tuple[tuple[float, FloatArray, FloatArray], FloatArray]:
+    depth = _depth_weights(z, y, knots, rest)
+    return depth, _spread_weights(z, np.abs(y - _predicted(depth, z, knots)))
+
+
+def _predicted(depth: tuple[float, FloatArray, FloatArray], z: FloatArray, knots: FloatArray) -> FloatArray:
+    intercept, coefficients, slopes = depth
+    predicted: FloatArray = intercept + z @ coefficients + _curves(z, knots) @ slopes.ravel()
+    return predicted
+
+
+def _errors_of_others(z: FloatArray, y: FloatArray, knots: FloatArray, rest: list[int]) -> FloatArray:
+    """Return (y − ŷ)/σ of each case by the model fitted to the other nine tenths of the cases.
+
+    R. F. Barber, E. J. Candès, A. Ramdas, R. J. Tibshirani, "Predictive inference with the jackknife+", 2021 (CV+).
+    """
+    scaled = np.empty(len(y))
+    fold = np.arange(len(y)) % _FOLDS
+    for k in range(_FOLDS):
+        out = fold == k
+        depth, spread = _depth_and_spread(z[~out], y[~out], knots, rest)
+        sigma = np.maximum(spread[0] + z[out] @ spread[1:], LEAST_SPREAD)
+        scaled[out] = (y[out] - _predicted(depth, z[out], knots)) / sigma
+    return scaled
+
+
+def _detection_weights(cracked: FloatArray, sound: FloatArray) -> FloatArray:
+    """Logistic regression, crack against none, on what a crack raises; weights are not negative."""
+    from scipy.optimize import minimize
+
+    used = [FEATURES.index(name) for name in ("band_excess", "prominence", "pattern_excess")]
+    x = np.vstack([cracked[:, used], sound[:, used]])
+    sign = np.r_[np.ones(len(cracked)), -np.ones(len(sound))]
+    share = np.r_[np.full(len(cracked), 0.5 / len(cracked)), np.full(len(sound), 0.5 / len(sound))]
+
+    def loss(w: FloatArray) -> float:
+        return float(share @ np.logaddexp(0.0, -sign * (x @ w[:-1] + w[-1])) + 0.003 * np.sum(w[:-1] ** 2))
+
+    start = np.r_[np.ones(len(used)), 0.0]
+    best = minimize(loss, start, bounds=[(0.0, None)] * len(used) + [(None, None)]).x
+    weights = np.zeros(len(FEATURES))
+    weights[used] = best[:-1]
+    return weights
+
+
+def _curves(z: FloatArray, knots: FloatArray) -> FloatArray:
+    """Columns of the rising curves, three per shaped feature."""
+    return np.hstack([segments(z[:, i], pair) for i, pair in zip(_SHAPED, knots, strict=True)])
+
+
+def _depth_weights(
+    z: FloatArray, y: FloatArray, knots: FloatArray, rest: list[int]
+) -> tuple[float, FloatArray, FloatArray]:
+    """Ridge regression: rising curves of what the depth is read from, and straight lines of the rest."""
+    from scipy.optimize import lsq_linear
+
+    columns = np.c_[np.ones(len(z)), _curves(z, knots), z[:, rest]]
+    n, n_curves = columns.shape[1], knots.size // 2 * 3
+    rows = np.vstack([columns, np.sqrt(_RIDGE) * np.eye(n)[1:]])
+    low = np.full(n, -np.inf)
+    low[1 : 1 + n_curves] = 0.0
+    result = lsq_linear(rows, np.r_[y, np.zeros(n - 1)], bounds=(low, np.full(n, np.inf))).x
+    coefficients = np.zeros(z.shape[1])
+    coefficients[rest] = result[1 + n_curves :]
+    return float(result[0]), coefficients, np.maximum(result[1 : 1 + n_curves], 0.0).reshape(-1, 3)
+
+
+def _spread_weights(z: FloatArray, error: FloatArray) -> FloatArray:
+    """Linear model of the size of errors over excess and prominence, σ where the error is √(2/π) σ on the mean."""
+    used = [FEATURES.index(name) for name in ("band_excess", "prominence")]
+    rows = np.c_[np.ones(len(z)), z[:, used]]
+    ridge = 30.0 * np.diag([0.0, 1.0, 1.0])
+    best = np.linalg.solve(rows.T @ rows + ridge, rows.T @ error) * np.sqrt(np.pi / 2)
+    spread = np.zeros(len(FEATURES) + 1)
+    spread[[0, *(1 + i for i in used)]] = best
+    return spread
+
+
+def _precision(z: FloatArray, rest: list[int]) -> FloatArray:
+    """Inverse covariance of the features that the depth is read from; 0 for the others."""
+    used = sorted([*_SHAPED, *rest])
+    precision = np.zeros((z.shape[1], z.shape[1]))
+    precision[np.ix_(used, used)] = np.linalg.inv(np.cov(z[:, used].T) + 1e-3 * np.eye(len(used)))
+    return precision
+
+
+def _conformal(scaled: FloatArray) -> tuple[float, float]:
+    """Quantiles of n errors for a new case: the k-th of n + 1, rounded outwards."""
+    ordered, n = np.sort(scaled), len(scaled)
+    low = int(np.floor(_COVERAGE[0] * (n + 1))) - 1
+    high = int(np.ceil(_COVERAGE[1] * (n + 1))) - 1
+    return float(ordered[max(low, 0)]), float(ordered[min(high, n - 1)])
+
+
+# --------------------
+# From the looks of simulated cracks, chips and spalls to a model of which it is.
+# --------------------
+
+
+_FIT_KIND_RIDGE = 2.0
+
+
+def fit_kind(vectors: FloatArray, kinds: list[str]) -> KindModel:
+    """Fit a softmax regression; cracks weigh as much as chips and spalls together.
+
+    Parameters
+    ----------
+    vectors : array, (n, n_features)
+        Of events that are seen; see `gearsig.severity.kind_vector`.
+    kinds : list of str
+        What each is.
+    """
+    from scipy.optimize import minimize
+
+    mean, scale = vectors.mean(axis=0), vectors.std(axis=0)
+    z = np.clip((vectors - mean) / scale, -4.0, 4.0)
+    rows = np.c_[np.ones(len(z)), z]
+    truth = np.array([[kind == name for name in KINDS] for kind in kinds], dtype=np.float64)
+    shares = np.array([0.5 if name == CRACKED else 0.5 / (len(KINDS) - 1) for name in KINDS])
+    weight = truth @ (len(z) * shares / truth.sum(axis=0))
+
+    def loss(flat: FloatArray) -> tuple[float, FloatArray]:
+        weights = flat.reshape(len(KINDS), -1)
+        levels = rows @ weights.T
+        levels -= levels.max(axis=1, keepdims=True)
+        logs = levels - np.log(np.exp(levels).sum(axis=1, keepdims=True))
+        slope = ((np.exp(logs) - truth) * weight[:, None]).T @ rows
+        slope[:, 1:] += 2.0 * _FIT_KIND_RIDGE * weights[:, 1:]
+        return float(
+            -weight @ (truth * logs).sum(axis=1) + _FIT_KIND_RIDGE * np.sum(weights[:, 1:] ** 2)
+        ), slope.ravel()
+
+    best = minimize(loss, np.zeros(len(KINDS) * rows.shape[1]), jac=True, method="L-BFGS-B").x
+    return KindModel(mean, scale, best.reshape(len(KINDS), -1))
+
+
+SEED = 2611
+N_CASES = 540
+EVEN_EVERY = 6
+"""The last of so many cases has teeth that hardly differ."""
+
+BATCH = 20
+_DIGITS = 7
+
+
+def main() -> None:
+    """Simulate, fit, write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=N_CASES)
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--to", type=Path, default=FILE)
+    parser.add_argument("--state", default="", help="the simulator's commit, for the provenance")
+    given = parser.parse_args()
+    observed = observe_all(given.cases, given.processes)
+    text = json.dumps(calibration_of(observed, given.cases, given.state), indent=1)
+    given.to.write_text(text + "\n", encoding="utf-8")
+    typer.echo(f"{len(observed)} of {given.cases} cases; written to {given.to}")
+
+
+def observe_all(n_cases: int, n_processes: int) -> list[tuple[int, CaseFeatures]]:
+    """Return what the drawn cases show, by their index; some cannot be made, or show too few mesh harmonics."""
+    found: list[tuple[int, CaseFeatures]] = []
+    with ProcessPoolExecutor(n_processes) as pool:
+        for first in range(0, n_cases, BATCH):
+            indices = range(first, min(first + BATCH, n_cases))
+            answers = zip(indices, pool.map(observe_one, indices), strict=True)
+            found += [(index, answer) for index, answer in answers if isinstance(answer, CaseFeatures)]
+            typer.echo(f"{indices.stop} of {n_cases} cases drawn")
+    return found
+
+
+def observe_one(index: int) -> CaseFeatures | str:
+    """Return what one case shows, or why it shows nothing."""
+    case = draw_case(SEED, index, for_the_check=False, even=index % EVEN_EVERY == EVEN_EVERY - 1)
+    if case is None:
+        return ""
+    rng = np.random.default_rng([SEED, index, 0, 1])
+    relief_error = float(rng.uniform(-RELIEF_ERROR, RELIEF_ERROR))
+    try:
+        return observe(case, draw_other_fault(case.drawn, rng), relief_error)
+    except RefusalError as refusal:
+        return str(refusal)
+
+
+def calibration_of(observed: Sequence[tuple[int, CaseFeatures]], n_drawn: int, simulator_state: str) -> dict[str, Any]:
+    """Return the calibration as JSON-like values."""
+    models = {
+        name + ending: fit_model(cases_of(observed, name), relief_known=bool(ending))
+        for name in (WITH_REFERENCE, ALONE)
+        for ending in ("", RELIEF_KNOWN)
+    }
+    return {
+        "features": list(FEATURES),
+        "shape": list(SHAPE),
+        "lag_pitches": round(_median_lag(observed, models[WITH_REFERENCE]), 3),
+        "reach": _reach([o for _, o in observed]),
+        "models": {name: _plain(model) for name, model in models.items()},
+        "kinds": {name: _plain(kind_of(observed, name, models[name])) for name in (WITH_REFERENCE, ALONE)},
+        "provenance": _provenance(observed, n_drawn, simulator_state),
+    }
+
+
+def cases_of(observed: Sequence[tuple[int, CaseFeatures]], kind: str) -> Cases:
+    """Return the cases of one model; each machine is there sound, too."""
+    cracked = [(i, o) for i, o in observed if o.percent > 0]
+    sound = [o.sound if kind == ALONE else o.sound_with_reference for _, o in observed]
+    return Cases(
+        np.array([getattr(o, kind)[o.gear] for _, o in cracked]),
+        np.array([o.percent for _, o in cracked]),
+        np.array([o.drawn.depth_mm for _, o in cracked]),
+        np.array(sound),
+    )
+
+
+def kind_of(observed: Sequence[tuple[int, CaseFeatures]], way: str, model: DepthModel) -> KindModel:
+    """Return the model of the kind, from the events that are seen."""
+    seen = [
+        (kind, kind_vector(looks.features, looks.shape))
+        for _, o in observed
+        for (kind, name), looks in o.looks.items()
+        if name == way and (kind != CRACKED or o.percent > 0) and model.score(looks.features) >= model.threshold
+    ]
+    return fit_kind(np.array([vector for _, vector in seen]), [kind for kind, _ in seen])
+
+
+def _median_lag(observed: Sequence[tuple[int, CaseFeatures]], model: DepthModel) -> float:
+    seen = [
+        o.lag_pitches
+        for _, o in observed
+        if o.percent > 0 and model.score(o.with_reference[o.gear]) >= model.threshold and np.isfinite(o.lag_pitches)
+    ]
+    return float(np.median(seen))
+
+
+def _reach(observed: Sequence[CaseFeatures]) -> dict[str, list[float]]:
+    return {
+        name: [float(f"{min(values):.4g}"), float(f"{max(values):.4g}")]
+        for name in observed[0].reach
+        if (values := [o.reach[name] for o in observed])
+    }
+
+
+def _plain(model: DepthModel | KindModel) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for name, value in vars(model).items():
+        array = np.asarray(value, dtype=np.float64)
+        rounded = np.vectorize(lambda v: float(f"{v:.{_DIGITS}g}"))(array)
+        values[name] = rounded.tolist()
+    return values
+
+
+def _provenance(observed: Sequence[tuple[int, CaseFeatures]], n_drawn: int, simulator_state: str) -> dict[str, Any]:
+    from importlib.metadata import version
+
+    cracked = [o for _, o in observed if o.percent > 0]
+    return {
+        "made_by": "python -m app.studies.crack_severity",
+        "version": version("gearsig"),
+        "simulator": "sims.cracked: spur gear pair, 16 degrees of freedom",
+        "simulator_state": simulator_state,
+        "seed": SEED,
+        "n_drawn": n_drawn,
+        "n_used": len(observed),
+        "n_cracked": len(cracked),
+        "even_every": EVEN_EVERY,
+        "false_alarms": FALSE_ALARMS,
+        "depths_mm": list(rigs.DEPTHS_MM),
+        "modules_mm": list(rigs.CALIBRATION_MODULES_MM),
+        "speed_difference": SPEED_DIFFERENCE,
+        "torque_difference": TORQUE_DIFFERENCE,
+        "other_flanks_share": OTHER_FLANKS_SHARE,
+        "tip_relief_error": RELIEF_ERROR,
+        "chip_height_modules": list(CHIP_HEIGHT_MODULES),
+        "spall_width_percent": list(SPALL_WIDTH_PERCENT),
+        "spall_length_modules": list(SPALL_LENGTH_MODULES),
+        "crack": "straight, 45 degrees, through the whole face width",
+        "teeth": "18 to 100, no pair whose teeth add up to a multiple of three",
+        "least_revolutions": rigs.LEAST_REVOLUTIONS,
+    }
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,644 @@
+"""A drawn machine of the quasi-static simulator, and what may be wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from math import cos, pi, radians, sqrt, tan
+
+import numpy as np
+
+from app.studies.crack_cases import DrawnRig, log_uniform
+from app.studies.gap.machines import draw_machine
+from app.studies.gap.signatures import PathChange, draw_side, partly, sign
+from gearsig.checks import FloatArray
+from gearsig.rig import Bearing, Rig
+from sims.cracked import CrackedPair
+from sims.gear_pair import Nominal, build_rig, nominal_of
+from sims.machine import Operation
+
+# --------------------
+# What lies between forces and sensors: modes of the machine, shared by all channels, and each channel's own part.
+# --------------------
+
+
+MESH, SHAFTS, BEARINGS, FRICTION, INSIDE = range(5)
+"""Where a force or motion begins; the last is the machine's own noise."""
+N_WAYS = 5
+
+MODES = (4, 11)
+MODE_HZ, MODE_DAMPING = (120.0, 9000.0), (0.008, 0.1)
+BY_BODY = 0.3
+"""Part of the machine that follows without a mode of its own, beside modes whose parts are of the size of 1."""
+MOVED, LOUDER = 0.02, 0.15
+"""By how much a changed mounting moves and changes a mode: standard deviations of logarithms."""
+MOUNTING_FROM_HZ = 1200.0
+"""Lower modes are the machine's own and do not depend on the mounting of a sensor."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Modes, with each way's part in what each channel sees.
+
+    Parameters
+    ----------
+    frequency_hz, damping_ratio : arrays, (n_modes,)
+    parts : array, (n_channels, N_WAYS, n_modes + 1)
+        The last: what follows without a mode.
+    """
+
+    frequency_hz: FloatArray
+    damping_ratio: FloatArray
+    parts: FloatArray
+
+    @classmethod
+    def drawn(cls, n_channels: int, rng: np.random.Generator) -> Structure:
+        """Draw one."""
+        n = int(rng.integers(*MODES))
+        frequency = np.sort([log_uniform(rng, *MODE_HZ) for _ in range(n)])
+        damping = np.array([log_uniform(rng, *MODE_DAMPING) for _ in range(n)])
+        parts = rng.standard_normal((n_channels, N_WAYS, n + 1))
+        parts[..., -1] *= BY_BODY
+        return cls(frequency, damping, parts)
+
+    def mounted_anew(self, rng: np.random.Generator) -> Structure:
+        """Return it as sensors see it that were taken off and put on again."""
+        touched = self.frequency_hz > MOUNTING_FROM_HZ
+        moved = np.exp(MOVED * rng.standard_normal(len(touched)) * touched)
+        louder = np.exp(LOUDER * rng.standard_normal((len(self.parts), 1, len(touched))) * touched)
+        parts = self.parts.copy()
+        parts[..., :-1] *= louder
+        return replace(self, frequency_hz=self.frequency_hz * moved, parts=parts)
+
+    def softer(self, share: float, below_hz: float) -> Structure:
+        """Return it with modes below a frequency at lower ones, by `share` at most."""
+        lower = self.frequency_hz < below_hz
+        return replace(self, frequency_hz=self.frequency_hz * np.where(lower, 1.0 - share, 1.0))
+
+    def accelerations(self, channel: int, frequency_hz: FloatArray, way: int) -> np.ndarray:
+        """Return what a unit motion becomes, Σ aᵣ ω²/(1 − (f/fᵣ)² + 2iζ f/fᵣ), for each frequency."""
+        total = np.full(len(frequency_hz), self.parts[channel, way, -1], dtype=np.complex128)
+        for f, zeta, part in zip(self.frequency_hz, self.damping_ratio, self.parts[channel, way], strict=False):
+            ratio = frequency_hz / f
+            total += part / (1.0 - ratio**2 + 2j * zeta * ratio)
+        found: np.ndarray = total * -((2.0 * np.pi * frequency_hz) ** 2)
+        return found
+
+
+# --------------------
+# Static contact of all tooth pairs at once: transmission error under load, and what each pair carries.
+# --------------------
+
+
+REACH = 0.35
+"""Base pitches off either end of the path of contact at which a loaded pair may still touch."""
+N_PATH = 96
+"""Points of a table over the path."""
+N_PAIRS = 4
+"""Of teeth that may touch at an instant: contact ratios reach 2."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """The path of contact of a pair without profile shift, in base pitches from its start.
+
+    Parameters
+    ----------
+    ratio : float
+        Contact ratio: where the path ends.
+    pitch_point : float
+    base_pitch_m : float
+    """
+
+    ratio: float
+    pitch_point: float
+    base_pitch_m: float
+
+    @classmethod
+    def of(cls, teeth: tuple[int, int], module_mm: float, pressure_angle_deg: float) -> Path:
+        """Return that of standard teeth, whose addendum is one module."""
+        alpha, module = radians(pressure_angle_deg), 1e-3 * module_mm
+        pitch_m = pi * module * cos(alpha)
+        base = [0.5 * z * module * cos(alpha) for z in teeth]
+        beyond = [
+            sqrt((0.5 * z * module + module) ** 2 - b**2) - b * tan(alpha) for z, b in zip(teeth, base, strict=True)
+        ]
+        # An undercut mate ends the path where its involute begins.
+        beyond = [min(own, other * tan(alpha)) for own, other in zip(beyond, reversed(base), strict=True)]
+        return cls(sum(beyond) / pitch_m, beyond[1] / pitch_m, pitch_m)
+
+    @property
+    def places(self) -> FloatArray:
+        """Of a table's points."""
+        return np.linspace(-REACH, self.ratio + REACH, N_PATH)
+
+
+def meeting(cycle: FloatArray, path: Path, tables: tuple[FloatArray, FloatArray], first: tuple[int, int]) -> FloatArray:
+    """Return the sum of both gears' tables where each pair meets, (N_PAIRS, n).
+
+    Parameters
+    ----------
+    cycle : array, (n,)
+        Mesh cycles since the teeth `first` began to meet.
+    path : Path
+    tables : (array, array)
+        (teeth, N_PATH) of either gear.
+    first : (int, int)
+    """
+    number, spot = _pairs(cycle, path)
+    low = np.clip(spot.astype(np.intp), 0, N_PATH - 2)
+    part = np.clip(spot - low, 0.0, 1.0)
+    total = np.zeros(spot.shape)
+    for table, offset in zip(tables, first, strict=True):
+        flat, row = table.ravel(), (number + offset) % len(table) * N_PATH + low
+        total += (1.0 - part) * flat[row] + part * flat[row + 1]
+    return total
+
+
+def at_places(cycle: FloatArray, path: Path, table: FloatArray) -> FloatArray:
+    """Return a table over the path where each pair is, (N_PAIRS, n)."""
+    _, spot = _pairs(cycle, path)
+    values: FloatArray = np.interp(spot, np.arange(N_PATH), table)
+    return values
+
+
+def _pairs(cycle: FloatArray, path: Path) -> tuple[np.ndarray, FloatArray]:
+    """Return the numbers of the pairs that may touch and where they are, in points of a table."""
+    newest = np.floor(cycle + REACH).astype(np.intp)
+    number = newest[None] - np.arange(N_PAIRS)[:, None]
+    spot = (cycle[None] - number + REACH) * ((N_PATH - 1) / (path.ratio + 2.0 * REACH))
+    return number, spot
+
+
+def is_in_reach(cycle: FloatArray, path: Path) -> np.ndarray:
+    """Return which pairs are between the table's ends."""
+    _, spot = _pairs(cycle, path)
+    inside: np.ndarray = (spot >= 0.0) & (spot <= N_PATH - 1)
+    return inside
+
+
+def static_contact(stiffness: FloatArray, gaps: FloatArray, load: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the transmission error x with Σ kᵢ max(x − gᵢ, 0) = F, and what each pair carries.
+
+    Of the pairs with the m smallest gaps alone, x_m = (F + Σ kᵢ gᵢ)/Σ kᵢ; the left side is convex, so x is the
+    smallest of them.
+
+    Parameters
+    ----------
+    stiffness, gaps : arrays, (N_PAIRS, n)
+        N/m, m.
+    load : array, (n,)
+        N, above 0.
+
+    Returns
+    -------
+    array, (n,), m
+    array, (N_PAIRS, n), N
+    """
+    order = np.argsort(gaps, axis=0)
+    k, g = np.take_along_axis(stiffness, order, axis=0), np.take_along_axis(gaps, order, axis=0)
+    error = ((load + np.cumsum(k * g, axis=0)) / np.cumsum(k, axis=0)).min(axis=0)
+    return error, stiffness * np.maximum(error - gaps, 0.0)
+
+
+RATES_HZ = (12_800.0, 20_000.0, 20_480.0, 25_600.0)
+STIFFNESS_N_PER_M2 = 14e9
+"""Of a mesh of steel gears, per width."""
+N_CHANNELS = 2
+DIRECTNESS = (1.0, 10.0)
+"""Of friction: (resonance of the mesh over its frequency)² where the mesh is slower, 1 where it is not."""
+END_RADII_M = (4e-3, 40e-3)
+"""Of the flank that a corner meets off the path's ends: a gap of d²/2R."""
+
+Wave = tuple[int, float, float, float]
+"""Side of the shaft, order, size, phase in radians."""
+
+
+@dataclass
+class QuasiStaticState:
+    """What a recording is made from; effects change it.
+
+    Parameters
+    ----------
+    gaps_m, weak : [array, array]
+        (teeth, N_PATH) of either gear: separation; compliance that a pair has beside its own, over its own.
+    runout_m, load, stiffness : list of Wave
+        Sums of cosines: separation of all teeth; torque, over the mean; mesh stiffness, over the mean.
+    force_n : list of Wave
+        On a shaft, from outside or by a mass that turns with it.
+    soft_spots : float
+        Share of the mesh stiffness that is lost all round.
+    friction, reversal : float
+        Coefficient; width over which it turns round at the pitch point, in base pitches.
+    restless_m : float
+        Standard deviation of a separation that never repeats.
+    knocks : list of function
+        Of the driver's angle (revolutions), time (s), and generator: forces (n,) on a bearing.
+    play : float
+        Of the bearings, over what their static load presses out.
+    passing : float
+        Order at which the play opens and shuts, of the driver.
+    wander : list of (float, float, float)
+        Of the speed: share, Hz, phase.
+    structure : Structure
+    paths : sequence of PathChange
+        Of each channel, behind all that the machine does; none: they are as ever.
+    """
+
+    gaps_m: list[FloatArray]
+    weak: list[FloatArray]
+    runout_m: list[Wave]
+    load: list[Wave]
+    stiffness: list[Wave]
+    force_n: list[Wave]
+    soft_spots: float
+    friction: float
+    reversal: float
+    restless_m: float
+    knocks: list[Callable[[FloatArray, FloatArray, np.random.Generator], FloatArray]]
+    play: float
+    passing: float
+    wander: list[tuple[float, float, float]]
+    structure: Structure
+    paths: Sequence[PathChange] = ()
+
+
+@dataclass(frozen=True)
+class StaticMachine:
+    """A machine as it was made.
+
+    Parameters
+    ----------
+    drawn : DrawnRig
+        Teeth, speed, torque and length.
+    rig : Rig
+        What its maker knows.
+    nominal : Nominal
+        Of its pair.
+    path : Path
+    stiffness_n_per_m : array, (N_PATH,)
+        Of one pair over the path.
+    rate_hz : float
+    noise_share, inside_share : (float, float)
+        Of the vibration: noise of either sensor, noise of the machine itself.
+    seed : int
+    """
+
+    drawn: DrawnRig
+    rig: Rig
+    nominal: Nominal
+    path: Path
+    stiffness_n_per_m: FloatArray
+    rate_hz: float
+    noise_share: tuple[float, float]
+    inside_share: tuple[float, float]
+    seed: int
+    end_radius_m: float = field(default=END_RADII_M[0])
+
+    @classmethod
+    def of(cls, rng: np.random.Generator) -> StaticMachine:
+        """Draw one."""
+        drawn = draw_machine(rng)
+        operation = Operation.steady(drawn.speed_rpm, drawn.torque_nm)
+        ready = CrackedPair().prepare(drawn.parameters, [], operation, rng, sampling_rate_hz=max(RATES_HZ))
+        rig = build_rig(ready.machine, operation, name="drawn")
+        nominal = nominal_of(rig)
+        path = Path.of(drawn.teeth, nominal.module_mm, nominal.pressure_angle_deg)
+        mesh = STIFFNESS_N_PER_M2 * 1e-3 * nominal.face_width_mm * rng.uniform(0.8, 1.2)
+        noise, inside = ((log_uniform(rng, *span), log_uniform(rng, *span)) for span in ((0.003, 0.1), (0.003, 0.15)))
+        return cls(
+            drawn,
+            rig,
+            nominal,
+            path,
+            mesh / path.ratio * _shape(path, rng),
+            float(rng.choice(RATES_HZ)),
+            noise,
+            inside,
+            int(rng.integers(2**31)),
+            log_uniform(rng, *END_RADII_M),
+        )
+
+    @property
+    def load_n(self) -> float:
+        """Mesh force."""
+        pitch_radius_m = 0.5e-3 * self.nominal.module_mm * self.drawn.teeth[0]
+        return self.drawn.torque_nm / (pitch_radius_m * cos(radians(self.nominal.pressure_angle_deg)))
+
+    @property
+    def rated_m(self) -> float:
+        """Deflection under a usual load: what errors are measured by, whatever the load is now."""
+        return 50e6 * 1e-3 * self.nominal.module_mm / STIFFNESS_N_PER_M2
+
+    @property
+    def directness(self) -> float:
+        """By how much more a force across the teeth is heard than the same deflection along them.
+
+        Below the resonance of the mesh gears turn out of the way of a transmission error; friction they cannot avoid.
+        """
+        return log_uniform(np.random.default_rng([self.seed, 4]), *DIRECTNESS)
+
+    @property
+    def shaft_orders(self) -> tuple[float, float]:
+        """Revolutions of either shaft per revolution of the driver."""
+        return 1.0, self.drawn.teeth[0] / self.drawn.teeth[1]
+
+    def sound(self) -> QuasiStaticState:
+        """Return it with what manufacture left."""
+        rng = np.random.default_rng([self.seed, 1])
+        unit = self.rated_m
+        profile = _profile(self, rng)
+        gaps: list[FloatArray] = []
+        for teeth in self.drawn.teeth:
+            pitch = log_uniform(rng, 0.01, 0.12) * unit * rng.standard_normal((teeth, 1))
+            gaps.append(profile / 2.0 + pitch + textures(teeth, log_uniform(rng, 0.002, 0.04) * unit, rng))
+        runouts, waves = (log_uniform(rng, 0.02, 0.6) * unit for _ in range(2)), rng.uniform(0, 2 * np.pi, 8)
+        pulls = float(rng.choice((1.0, 2.0, 3.0, 4.0, 6.0)))
+        return QuasiStaticState(
+            gaps_m=gaps,
+            weak=[np.zeros((teeth, N_PATH)) for teeth in self.drawn.teeth],
+            runout_m=[(side, 1.0, size, waves[side]) for side, size in enumerate(runouts)],
+            load=[(0, pulls, log_uniform(rng, 1e-4, 5e-3), waves[2])],
+            stiffness=[
+                (0, 1.0, log_uniform(rng, 1e-4, 5e-3), waves[3]),
+                (1, 1.0, log_uniform(rng, 1e-4, 5e-3), waves[4]),
+            ],
+            force_n=[
+                (side, order, share * self.force_unit_n * log_uniform(rng, 3e-3, 0.1), waves[5 + side])
+                for side in (0, 1)
+                for order, share in ((1.0, 1.0), (2.0, 0.2))
+            ],
+            soft_spots=0.0,
+            friction=rng.uniform(0.02, 0.07),
+            reversal=rng.uniform(0.02, 0.3),
+            restless_m=log_uniform(rng, 1e-3, 2e-2) * unit,
+            knocks=[],
+            play=log_uniform(rng, 0.01, 0.3),
+            passing=self.rig.bearings[0].orders()["BPFO"],
+            wander=[
+                (log_uniform(rng, 3e-5, 2e-3), rng.uniform(0.05, 1.0), rng.uniform(0, 2 * np.pi)) for _ in range(2)
+            ],
+            structure=Structure.drawn(N_CHANNELS, rng),
+        )
+
+    @property
+    def force_unit_n(self) -> float:
+        """What a force on a shaft is measured by: that of a usual load."""
+        return 50.0 * self.nominal.module_mm * self.nominal.face_width_mm
+
+
+def _shape(path: Path, rng: np.random.Generator) -> FloatArray:
+    """Return the stiffness of a pair over the path, about 1: least at the ends, not quite alike on both."""
+    off = 2.0 * np.clip(path.places / path.ratio, 0.0, 1.0) - 1.0
+    fall, lean = rng.uniform(0.15, 0.5), rng.uniform(-0.1, 0.1)
+    shape: FloatArray = 1.0 - fall * np.abs(off) ** rng.uniform(1.5, 3.0) + lean * off
+    return shape
+
+
+def _profile(machine: StaticMachine, rng: np.random.Generator) -> FloatArray:
+    """Return the separation that all pairs have: corners beyond the ends, relief, a shape of the profile."""
+    path, unit = machine.path, machine.rated_m
+    beyond = np.maximum(np.maximum(-path.places, path.places - path.ratio), 0.0) * path.base_pitch_m
+    at = np.clip(path.places / path.ratio, 0.0, 1.0)
+    relieved = np.zeros(N_PATH)
+    if rng.uniform() < 0.7:
+        reach, power = rng.uniform(0.12, 0.4), rng.uniform(1.0, 2.0)
+        for end in (at, 1.0 - at):
+            relieved += rng.uniform(0.3, 1.4) * unit * np.maximum(1.0 - end / reach, 0.0) ** power
+    bent = sum(
+        log_uniform(rng, 0.01, 0.15) * unit / k * np.cos(np.pi * k * at + rng.uniform(0, 2 * np.pi)) for k in (1, 2, 3)
+    )
+    profile: FloatArray = beyond**2 / (2.0 * machine.end_radius_m) + relieved + bent
+    return profile
+
+
+def textures(teeth: int, size_m: float, rng: np.random.Generator) -> FloatArray:
+    """Return rough flanks, (teeth, N_PATH): waves from a third of the path down to its points, each as large."""
+    lines = rng.standard_normal((teeth, N_PATH // 2 + 1)) + 1j * rng.standard_normal((teeth, N_PATH // 2 + 1))
+    lines[:, :3] = 0.0
+    lines[:, int(rng.integers(8, N_PATH // 2)) :] = 0.0
+    rough: FloatArray = np.fft.irfft(lines, N_PATH, axis=1)
+    return rough * (size_m / max(float(rough.std()), 1e-300))
+
+
+# --------------------
+# The catalogue's effects on the quasi-static machine, in shapes that are drawn anew for each.
+# --------------------
+
+
+Knock = Callable[[FloatArray, FloatArray, np.random.Generator], FloatArray]
+
+
+def _tooth(machine: StaticMachine, rng: np.random.Generator) -> tuple[int, int]:
+    side = draw_side(rng)
+    return side, int(rng.integers(machine.drawn.teeth[side]))
+
+
+def _bearing(machine: StaticMachine, rng: np.random.Generator) -> tuple[Bearing, float]:
+    """Draw a bearing; return it with the revolutions of its shaft per revolution of the driver."""
+    bearing = machine.rig.bearings[int(rng.integers(len(machine.rig.bearings)))]
+    return bearing, machine.shaft_orders[0 if bearing.shaft == machine.rig.pairs[0].driver else 1]
+
+
+def _towards_tip(machine: StaticMachine, side: int) -> FloatArray:
+    """Return 0 where the path begins or ends at a gear's root, 1 at its tip: the driver's path ends there."""
+    at: FloatArray = np.clip(machine.path.places / machine.path.ratio, 0.0, 1.0)
+    return at if side == 0 else 1.0 - at
+
+
+def _band(machine: StaticMachine, centre: float, width: float, edge: float) -> FloatArray:
+    place = machine.path.places
+    band: FloatArray = 0.5 * (
+        np.tanh((place - centre + width / 2) / edge) - np.tanh((place - centre - width / 2) / edge)
+    )
+    return band
+
+
+def _root_crack(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
+    """A tooth that gives way, the more the nearer to its tip the force is; a deep one stays bent."""
+    side, tooth = _tooth(machine, rng)
+    least, power, softer = rng.uniform(0.0, 0.5), rng.uniform(0.5, 3.0), log_uniform(rng, 0.05, 5.0)
+    state.weak[side][tooth] += softer * (least + (1.0 - least) * _towards_tip(machine, side) ** power)
+    if rng.uniform() < 0.3:
+        state.gaps_m[side][tooth] += log_uniform(rng, 0.02, 0.5) * machine.rated_m * sign(rng)
+
+
+def _tooth_spall(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
+    """A pit near the pitch line: over part of the width less stiffness, over all of it a hole."""
+    side, tooth = _tooth(machine, rng)
+    centre, width = machine.path.pitch_point + rng.uniform(-0.3, 0.3), rng.uniform(0.1, 0.45)
+    band = _band(machine, centre, width, rng.uniform(0.01, 0.06))
+    if rng.uniform() < 0.5:
+        state.weak[side][tooth] += log_uniform(rng, 0.05, 6.0) * band
+    else:
+        state.gaps_m[side][tooth] += log_uniform(rng, 0.1, 8.0) * machine.rated_m * band
+
+
+def _chipped_tooth(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
+    """A tip that is gone, over all of the width or part of it: its pair loses hold early, or takes it late."""
+    side, tooth = _tooth(machine, rng)
+    lost = np.clip((_towards_tip(machine, side) - 1.0 + rng.uniform(0.08, 0.55)) / 0.1, 0.0, None)
+    if rng.uniform() < 0.7:
+        state.gaps_m[side][tooth] += log_uniform(rng, 0.3, 20.0) * machine.rated_m * lost**2
+    else:
+        state.weak[side][tooth] += log_uniform(rng, 0.2, 6.0) * np.minimum(lost, 1.0)
+
+
+def _tooth_wear(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
+    """Flanks that lost most where they slide most, not alike on both gears, nor quite on all teeth."""
+    off = machine.path.places - machine.path.pitch_point
+    depth, power, uneven = (
+        log_uniform(rng, 0.08, 6.0) * machine.rated_m,
+        rng.uniform(0.5, 2.0),
+        log_uniform(rng, 0.01, 0.3),
+    )
+    for side in (0, 1):
+        towards = np.where((off > 0) == (side == 0), rng.uniform(0.2, 1.0), rng.uniform(0.2, 1.0))
+        shape = towards * np.abs(off / np.abs(off).max()) ** power + rng.uniform(0.0, 0.3)
+        scatter = 1.0 + uneven * rng.standard_normal((machine.drawn.teeth[side], 1))
+        state.gaps_m[side] = state.gaps_m[side] + depth * rng.uniform(0.2, 1.0) * shape * scatter
+    state.restless_m *= 1.0 + partly(rng)
+
+
+def _pitch_error(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
+    """Teeth off their places: each by itself, adding up, or in a wave."""
+    side = draw_side(rng)
+    teeth = machine.drawn.teeth[side]
+    kind = rng.uniform()
+    if kind < 0.5:
+        error = rng.standard_normal(teeth)
+    elif kind < 0.75:
+        error = np.cumsum(rng.standard_normal(teeth))
+        error -= np.linspace(0.0, error[-1], teeth)
+    else:
+        error = np.roll(np.linspace(-1.0, 1.0, teeth), int(rng.integers(teeth))) + 0.1 * rng.standard_normal(teeth)
+    size = log_uniform(rng, 0.05, 4.0) * machine.rated_m / max(float(np.diff(error).std()), 1e-9)
+    state.gaps_m[side] = state.gaps_m[side] + size * (error - error.mean())[:, None]
+
+
+def _surface_roughness(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
+    """Rough flanks, that the gears repeat, and what they never do."""
+    size = log_uniform(rng, 0.02, 1.5) * machine.rated_m
+    for side in (0, 1):
+        state.gaps_m[side] = state.gaps_m[side] + textures(machine.drawn.teeth[side], size * rng.uniform(0.3, 1.0), rng)
+    state.restless_m += 0.3 * size * partly(rng)
+    state.friction *= rng.uniform(1.0, 1.8)
+
+
+def _sliding_friction(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:  # noqa: ARG001 - form
+    """Flanks that rub: a force that turns round at the pitch point."""
+    state.friction = log_uniform(rng, 0.1, 0.6)
+    state.reversal = rng.uniform(0.005, 0.3)
+
+
+def _eccentricity(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
+    """A gear off its axis: separation and depth of the teeth once per turn, and its mass off the axis."""
+    side, phase, size = draw_side(rng), rng.uniform(0, 2 * np.pi), log_uniform(rng, 2.0, 60.0)
+    state.runout_m.append((side, 1.0, size * machine.rated_m, phase))
+    state.stiffness.append((side, 1.0, min(size * rng.uniform(5e-4, 1e-2), 0.5), phase + rng.uniform(-1.5, 1.5)))
+    state.load.append((side, 1.0, min(size * rng.uniform(0.0, 5e-3), 0.5), phase + rng.uniform(-1.5, 1.5)))
+    state.force_n.append((side, 1.0, size * machine.force_unit_n * log_uniform(rng, 1e-4, 1e-2), phase))
+
+
+def _unbalance(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
+    """A mass off the axis."""
+    size = log_uniform(rng, 0.1, 3.0) * machine.force_unit_n
+    state.force_n.append((draw_side(rng), 1.0, size, rng.uniform(0, 2 * np.pi)))
+
+
+def _misalignment(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
+    """Contact on part of the width, some of it turning with a shaft; a coupling that is forced twice a turn."""
+    side, size = draw_side(rng), log_uniform(rng, 0.1, 0.8)
+    state.soft_spots = size * rng.uniform(0.3, 0.8)
+    for order, share in ((1.0, rng.uniform(0.0, 0.6)), (2.0, rng.uniform(0.0, 0.4))):
+        state.stiffness.append((side, order, size * share, rng.uniform(0, 2 * np.pi)))
+    force = size * log_uniform(rng, 0.02, 2.0) * machine.force_unit_n
+    for order, share in ((1.0, rng.uniform(0.0, 0.6)), (2.0, 1.0), (3.0, rng.uniform(0.0, 0.4))):
+        state.force_n.append((side, order, force * share, rng.uniform(0, 2 * np.pi)))
+    state.load.append((side, 2.0, size * log_uniform(rng, 1e-3, 0.1), rng.uniform(0, 2 * np.pi)))
+
+
+def _torque_ripple(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
+    """A torque that pulls n times per turn, and a little 2n times; the shaft twists, the frame takes it up."""
+    pulls = log_uniform(rng, 1.0, 12.0)
+    order, side, size = (
+        float(round(pulls)) if rng.uniform() < 0.75 else pulls,
+        draw_side(rng),
+        log_uniform(rng, 0.02, 0.6),
+    )
+    for n, share in ((1.0, 1.0), (2.0, rng.uniform(0.0, 0.4))):
+        phase = rng.uniform(0, 2 * np.pi)
+        state.load.append((side, n * order, share * size, phase))
+        state.force_n.append((side, n * order, share * size * machine.load_n * partly(rng), phase))
+
+
+def _speed_fluctuation(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:  # noqa: ARG001 - form
+    for share in (1.0, rng.uniform(0.0, 0.6)):
+        size = share * log_uniform(rng, 0.004, 0.12) / 2.0
+        state.wander.append((size, log_uniform(rng, 0.2, 4.0), rng.uniform(0, 2 * np.pi)))
+
+
+def _race(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator, name: str) -> None:
+    """Elements that drop into a defect and leave it with a blow; on the inner race the load zone passes it."""
+    bearing, shaft = _bearing(machine, rng)
+    order = bearing.orders()[name] * shaft * (1.0 - rng.uniform(0.0, 0.015))
+    size = log_uniform(rng, 0.02, 3.0) * (machine.load_n + 0.1 * machine.force_unit_n)
+    jitter, uneven, width = log_uniform(rng, 1e-3, 2e-2), rng.uniform(0.05, 0.4), log_uniform(rng, 1e-4, 5e-4)
+    falls, across, sharp = partly(rng), rng.uniform(0.02, 0.3), rng.uniform(0.5, 3.0)
+
+    def knock(turns: FloatArray, time: FloatArray, chance: np.random.Generator) -> FloatArray:
+        passed = turns * order + chance.uniform()
+        numbers = np.arange(np.ceil(passed[0]), np.floor(passed[-1]))
+        at = np.interp(numbers, passed, time) + np.cumsum(jitter * 0.1 * chance.standard_normal(len(numbers))) / 1e3
+        sizes = size * np.maximum(1.0 + uneven * chance.standard_normal(len(at)), 0.1)
+        if name == "BPFI":
+            angle = 2 * np.pi * np.interp(at, time, turns) * shaft
+            sizes *= np.maximum(np.cos(angle + chance.uniform(0, 2 * np.pi)), 0.0) ** sharp
+        step = time[1] - time[0]
+        force = np.zeros(len(time))
+        period = float(np.median(np.diff(at))) if len(at) > 1 else 1.0
+        for shift, weight in ((0.0, 1.0), (-across * period, -0.4 * falls)):
+            np.add.at(force, np.clip(((at + shift) / step).astype(np.intp), 0, len(time) - 1), weight * sizes)
+        pulse = np.hanning(max(3, round(width / step)) + 2)
+        found: FloatArray = np.convolve(force, pulse, mode="same")
+        return found
+
+    state.knocks.append(knock)
+
+
+def _outer_race(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
+    _race(machine, state, rng, "BPFO")
+
+
+def _inner_race(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
+    _race(machine, state, rng, "BPFI")
+
+
+def _bearing_clearance(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
+    """A bearing that is loose: forces reach the housing bent, its support is softer."""
+    bearing, shaft = _bearing(machine, rng)
+    play = log_uniform(rng, 0.3, 30.0)
+    state.play += play
+    state.passing = bearing.orders()["BPFO"] * shaft * (1.0 - rng.uniform(0.0, 0.01))
+    softer = min(0.08 * play, 0.5) * partly(rng)
+    state.structure = state.structure.softer(softer, log_uniform(rng, 500.0, 6000.0))
+    state.restless_m *= 1.0 + min(play, 5.0) * partly(rng)
+
+
+EFFECTS: dict[str, Callable[[StaticMachine, QuasiStaticState, np.random.Generator], None]] = {
+    "root_crack": _root_crack,
+    "tooth_spall": _tooth_spall,
+    "chipped_tooth": _chipped_tooth,
+    "tooth_wear": _tooth_wear,
+    "pitch_error": _pitch_error,
+    "surface_roughness": _surface_roughness,
+    "sliding_friction": _sliding_friction,
+    "eccentricity": _eccentricity,
+    "unbalance": _unbalance,
+    "misalignment": _misalignment,
+    "torque_ripple": _torque_ripple,
+    "speed_fluctuation": _speed_fluctuation,
+    "bearing_outer_race": _outer_race,
+    "bearing_inner_race": _inner_race,
+    "bearing_clearance": _bearing_clearance,
+}

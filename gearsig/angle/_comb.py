@@ -1,0 +1,595 @@
+"""The comb of orders that a gear train puts into a spectrum: mesh harmonics, sidebands, shaft harmonics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gearsig.angle._types import ShaftAngle
+from gearsig.checks import FloatArray, positive
+from gearsig.errors import InputError, RefusalError
+from gearsig.recording import Recording
+from gearsig.rig import Rig, shaft_ratios
+
+N_MESH_HARMONICS = 5
+N_SIDEBANDS = 2
+N_SHAFT_HARMONICS = 3
+IntArray = NDArray[np.integer[Any]]
+BoolArray = NDArray[np.bool_]
+Stages = tuple[tuple[float, tuple[float, ...]], ...]
+
+# Odds that a line of the comb is there at all. They tell a speed from its half: low harmonics and near sidebands are
+# likelier.
+PRESENCE = (0.8, 0.6, 0.4, 0.25)
+_MESH_CLASSES = (0, 1, 2, 2, 3)
+_SIDEBAND_CLASSES = (1, 3)
+_SHAFT_CLASSES = (1, 2, 3)
+
+_SAME = 0.02  # orders closer than this are one line
+
+
+@dataclass(frozen=True)
+class CombLines:
+    """Orders of the reference shaft at which a gear train speaks.
+
+    Parameters
+    ----------
+    orders : array, (n_lines,)
+    presence : array of int, (n_lines,)
+        How likely each line is there, index into `PRESENCE`.
+    is_mesh : array of bool, (n_lines,)
+        Mesh harmonics; the others are sidebands and shaft harmonics, which tell the scale of the speed.
+    stages : tuple of (float, tuple of float)
+        Mesh order and orders of the shafts in mesh, per stage.
+    """
+
+    orders: FloatArray
+    presence: IntArray
+    is_mesh: BoolArray
+    stages: Stages
+
+    @property
+    def meshes(self) -> tuple[float, ...]:
+        """Fundamental mesh orders, lowest first."""
+        return tuple(sorted({m for m, _ in self.stages}))
+
+    @property
+    def highest(self) -> float:
+        """Highest order of all."""
+        return float(self.orders.max())
+
+
+def comb_of_rig(rig: Rig) -> CombLines | None:
+    """Return the comb of a rig, None if no mesh order is known.
+
+    Each mesh that can be related to the reference shaft takes part, with sidebands of the shafts whose ratio is known.
+    """
+    ratios = shaft_ratios(rig)
+    known = [(p, m) for p in rig.pairs if (m := rig.mesh_order(p)) is not None]
+    if not known:
+        return None
+    stages = [(m, tuple(ratios[s] for s in (p.driver, p.driven) if s in ratios)) for p, m in known]
+    return comb_of_stages(tuple(stages))
+
+
+def comb_of_stages(stages: Stages) -> CombLines:
+    """Return the comb of (mesh order, shaft orders) per stage."""
+    turning = {round(s, 9) for _, shafts in stages for s in shafts}
+    lines = [(k * m, _MESH_CLASSES[k - 1]) for m, _ in stages for k in range(1, N_MESH_HARMONICS + 1)]
+    n_mesh = len(lines)
+    lines += [(k * s, _SHAFT_CLASSES[k - 1]) for s in turning for k in range(1, N_SHAFT_HARMONICS + 1)]
+    lines += [
+        (k * m + sign * j * shaft, _SIDEBAND_CLASSES[j - 1])
+        for m, shafts in stages
+        for k in range(1, N_MESH_HARMONICS)
+        for shaft in shafts
+        for j in range(1, N_SIDEBANDS + 1)
+        for sign in (-1, 1)
+    ]
+    orders: list[float] = []
+    classes: list[int] = []
+    is_mesh: list[bool] = []
+    # Where two lines fall together, the likelier one counts: mesh before the rest, then by class.
+    ranked = sorted(enumerate(lines), key=lambda item: (item[0] >= n_mesh, item[1][1], item[1][0]))
+    for place, (order, presence) in ranked:
+        if order > 0.05 and all(abs(order - other) > _SAME for other in orders):
+            orders.append(order)
+            classes.append(presence)
+            is_mesh.append(place < n_mesh)
+    return CombLines(np.array(orders), np.array(classes), np.array(is_mesh), stages)
+
+
+def with_other_teeth(comb: CombLines) -> list[CombLines]:
+    """Return the combs of the same shafts with one to four teeth more or less on each stage's first gear.
+
+    A series of harmonics that has no mesh in it, such as a bearing's, fits them all alike.
+    """
+    others = []
+    for change in (-4, -3, -2, -1, 1, 2, 3, 4):
+        stages = tuple((m + change * (shafts[0] if shafts else 1.0), shafts) for m, shafts in comb.stages)
+        if all(m > 0 for m, _ in stages):
+            others.append(comb_of_stages(stages))
+    return others
+
+
+# --------------------
+# How much each frequency looks like a line: height over the local floor, as log likelihood ratio by rank.
+# --------------------
+
+
+_FLOOR_BINS = 96  # the floor is a median over so many bins
+_HIGHEST_LOG_RATIO = 9.0  # 78 dB in power; beyond it a line is no more of a line
+# A line that is there stands among the top ranks: density a·q^(a-1) of its rank q, with this a.
+_RANK_EXPONENT = 0.3
+
+
+@dataclass(frozen=True)
+class LineEvidence:
+    """Log likelihood ratio of "a line of the comb is here" for each interval between two bins.
+
+    Parameters
+    ----------
+    ratios : array, (n_classes, n_intervals)
+        For each class of `comb_lines.PRESENCE`; interval i spans i to i + 1 bins.
+    log_ratio : array, (n_bins,)
+        ln(power / floor), mean over the channels.
+    bin_width : float
+        Hz, or orders.
+    top : float
+        Upper end of what is looked at.
+    """
+
+    ratios: FloatArray
+    log_ratio: FloatArray
+    bin_width: float
+    top: float
+
+
+def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float) -> LineEvidence:
+    """Return the evidence for lines in all channels together.
+
+    Hann windows of `n_segment` samples at half overlap; mean power over them; heights over the floor averaged over
+    channels.
+
+    Parameters
+    ----------
+    samples : array, (n_channels, n_samples)
+    rate : float
+        Samples per second, or per revolution.
+    n_segment : int
+        Shortened a little to a length that transforms fast.
+    top : float
+        In the unit of `rate`.
+    """
+    from scipy.fft import prev_fast_len
+
+    n_segment = prev_fast_len(n_segment, real=True)
+    n_keep = min(n_segment // 2, int(top / rate * n_segment) + 4)
+    ratios = [_log_ratio(_mean_power(row, n_segment)[:n_keep]) for row in samples]
+    log_ratio = np.mean(ratios, axis=0)
+    peaks = _only_peaks(log_ratio)
+    # Interval i holds the higher of its two ends, so that a candidate may miss a line's middle by half a bin.
+    height = np.maximum(peaks[:-1], peaks[1:])
+    rank = _tail_share(height)
+    return LineEvidence(
+        np.array([_log_likelihood_ratio(rank, present) for present in PRESENCE]),
+        log_ratio,
+        rate / n_segment,
+        top,
+    )
+
+
+@lru_cache(maxsize=8)
+def _hann(n: int) -> FloatArray:
+    """Hann window for spectra; kept, as many blocks of one length follow each other."""
+    window: FloatArray = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(n) / n)
+    return window
+
+
+def _mean_power(x: FloatArray, n_segment: int) -> FloatArray:
+    from scipy.fft import rfft
+
+    window = _hann(n_segment)
+    step = max(1, n_segment // 2)
+    power = np.zeros(n_segment // 2 + 1)
+    for start in range(0, len(x) - n_segment + 1, step):
+        segment = x[start : start + n_segment]
+        power += np.square(np.abs(rfft((segment - segment.mean()) * window)))
+    return power
+
+
+def _log_ratio(power: FloatArray) -> FloatArray:
+    """ln(power/floor); the floor is the median in blocks, straight lines (in decibels) between their middles."""
+    tiny = max(float(power.max()) * 1e-24, 1e-300)
+    log_power = np.log(np.maximum(power, tiny))
+    length = min(_FLOOR_BINS, len(power))
+    n_blocks = len(power) // length
+    medians = np.median(log_power[: n_blocks * length].reshape(n_blocks, length), axis=1)
+    middles = (np.arange(n_blocks) + 0.5) * length
+    over: FloatArray = log_power - np.interp(np.arange(len(power)), middles, medians)
+    return np.clip(over, -2.0, _HIGHEST_LOG_RATIO)
+
+
+def _only_peaks(x: FloatArray) -> FloatArray:
+    """Keep values that are the largest within two bins each way; the flanks of a line are not lines."""
+    largest = x.copy()
+    for k in (1, 2):
+        largest[k:] = np.maximum(largest[k:], x[:-k])
+        largest[:-k] = np.maximum(largest[:-k], x[k:])
+    return np.where((x >= largest) & (x > 0), x, 0.0)
+
+
+def _tail_share(x: FloatArray) -> FloatArray:
+    """Share of values at least as large as each one."""
+    ordered = np.sort(x)
+    share: FloatArray = (len(x) - np.searchsorted(ordered, x, side="left")) / len(x)
+    return share
+
+
+def _log_likelihood_ratio(rank: FloatArray, present: float) -> FloatArray:
+    """ln(1 - p + p·a·q^(a-1)): a line missing costs little, a line of high rank gives a lot, none decides alone."""
+    ratio: FloatArray = np.log(1.0 - present + present * _RANK_EXPONENT * rank ** (_RANK_EXPONENT - 1.0))
+    return ratio
+
+
+# --------------------
+# Scores of comb candidates over speed, and the distribution of the best score by chance.
+# --------------------
+
+
+@dataclass(frozen=True)
+class CombScores:
+    """Score of each candidate speed.
+
+    Parameters
+    ----------
+    speeds : array, (n,)
+        rev/s, or relative speed; equal steps of the logarithm.
+    scores : array, (n,)
+        Sum of the lines' log likelihood ratios.
+    """
+
+    speeds: FloatArray
+    scores: FloatArray
+
+    def best(self) -> tuple[float, float]:
+        """Return (speed, score) of the best candidate."""
+        i = int(np.argmax(self.scores))
+        return float(self.speeds[i]), float(self.scores[i])
+
+    def best_beyond(self, speed: float, relative: float) -> tuple[float, float]:
+        """Return (speed, score) of the best candidate further than `relative` from `speed`, else (0, -inf)."""
+        away = np.abs(self.speeds / speed - 1.0) > relative
+        if not away.any():
+            return 0.0, -np.inf
+        i = int(np.argmax(np.where(away, self.scores, -np.inf)))
+        return float(self.speeds[i]), float(self.scores[i])
+
+
+def candidate_speeds(low: float, high: float, highest_line: float, evidence: LineEvidence) -> FloatArray:
+    """Return speeds in equal ratios, so close that the highest line in sight moves by one bin."""
+    # Lines above the top are not looked at, so the step of the highest line is at most that of the top.
+    reach = min(highest_line * high, evidence.top)
+    step = evidence.bin_width / reach
+    n = int(np.clip(np.ceil(np.log(high / low) / step), 2, 4_000_000))
+    return np.geomspace(low, high, n + 1)
+
+
+def score_speeds(evidence: LineEvidence, comb: CombLines, low: float, high: float) -> CombScores:
+    """Score all speeds between `low` and `high`."""
+    speeds = candidate_speeds(low, high, comb.highest, evidence)
+    return CombScores(speeds, score_candidates(evidence, comb, speeds))
+
+
+def score_candidates(evidence: LineEvidence, comb: CombLines, speeds: FloatArray) -> FloatArray:
+    """Return the score of each given speed, (n_speeds,)."""
+    return _raw(evidence, comb, comb.orders, speeds)
+
+
+def chance_scores(
+    evidence: LineEvidence, comb: CombLines, low: float, high: float, n_trials: int
+) -> tuple[float, float]:
+    """Return mean and standard deviation of the best score of combs whose lines lie at wrong places.
+
+    Each line of the comb is moved by its own random share of up to ± 12 %, which keeps number and spread of the
+    lines but not their harmony. The search range is that of the real comb, so that its many trials are accounted for.
+    """
+    # A fixed seed: the same recording gives the same answer.
+    rng = np.random.default_rng(20_230_501)
+    speeds = candidate_speeds(low, high, comb.highest, evidence)
+    if len(speeds) > 200_000:
+        speeds = speeds[:: len(speeds) // 200_000 + 1]
+    best = [
+        float(_raw(evidence, comb, comb.orders * np.exp(rng.uniform(-0.12, 0.12, len(comb.orders))), speeds).max())
+        for _ in range(n_trials)
+    ]
+    return float(np.mean(best)), max(float(np.std(best, ddof=1)), 1.0)
+
+
+def _raw(evidence: LineEvidence, comb: CombLines, orders: FloatArray, speeds: FloatArray) -> FloatArray:
+    scores = np.empty(len(speeds))
+    _score(evidence.ratios, 1.0 / evidence.bin_width, evidence.top, orders, comb.presence, comb.is_mesh, speeds, scores)
+    return scores
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _score(ratios, per_bin, top, orders, presence, is_mesh, speeds, out):  # type: ignore[no-untyped-def]
+    """out[i] = Σ over lines below top of the log likelihood ratio where order · speed falls."""
+    limit = min(int(top * per_bin), ratios.shape[1] - 1)
+    for i in range(speeds.shape[0]):
+        total = 0.0
+        # Sidebands closer than four bins to their mesh line cannot be told from it.
+        resolved = speeds[i] * per_bin >= 4.0
+        for j in range(orders.shape[0]):
+            k = int(orders[j] * speeds[i] * per_bin)
+            if k < limit and (is_mesh[j] or resolved):
+                total += ratios[presence[j], k]
+        out[i] = total
+
+
+# --------------------
+# Whether the best comb is the true one: against chance, against other speeds, against other teeth.
+# --------------------
+
+
+# Ranges narrower than this ratio come from a known nominal speed: the scale of the speed is then not in question.
+NARROW = 1.35
+_N_CHANCE = 16
+
+
+@dataclass(frozen=True)
+class CombDecision:
+    """The best comb and what speaks for and against it.
+
+    Parameters
+    ----------
+    speed : float
+        In the unit of the evidence: rev/s, or relative speed.
+    score : float
+        Sum of log likelihood ratios.
+    chance_mean, chance_deviation : float
+        Of the best score of wrong combs.
+    runner_up_speed, runner_up_score : float
+        Best other speed.
+    other_teeth_score : float
+        Best score of the same shafts with other teeth.
+    side_score : float
+        Part of the score that sidebands and shaft harmonics carry.
+    narrow : bool
+        Whether the search range left the scale of the speed open (False) or not.
+    bin_width : float
+        Of the spectrum it was found in.
+    coverage : float
+        Share of the recording in which the comb lies where a varying angle says.
+    """
+
+    speed: float
+    score: float
+    chance_mean: float
+    chance_deviation: float
+    runner_up_speed: float
+    runner_up_score: float
+    other_teeth_score: float
+    side_score: float
+    narrow: bool
+    bin_width: float
+    coverage: float = 1.0
+
+    @property
+    def significance(self) -> float:
+        """Score over chance, in standard deviations."""
+        return (self.score - self.chance_mean) / self.chance_deviation
+
+    @property
+    def quality(self) -> float:
+        """0 to 1: product of the confidences that it is no chance, no other speed, no other teeth.
+
+        The scales were set on simulated and measured recordings, see the tests; they are no probabilities from theory.
+        """
+        parts = [_sure(self.significance, 4.0, 3.0), _sure(self.score - self.runner_up_score, 2.0, 4.0)]
+        parts.append(_sure(self.score - self.other_teeth_score, 2.0, 4.0))
+        if not self.narrow:
+            # Mesh lines alone fit any number of teeth at another speed; sidebands tell the scale.
+            parts.append(_sure(self.side_score, 2.0, 4.0))
+        # Speed that was followed rightly most of the time only is no angle to average over.
+        parts.append(self.coverage**12)
+        return float(np.prod(parts))
+
+    def evidence(self, unit: str = "rev/s") -> str:
+        """State the numbers in one sentence."""
+        return (
+            f"best comb at {self.speed:.5g} {unit}: score {self.score:.1f}, by chance {self.chance_mean:.1f} ± "
+            f"{self.chance_deviation:.1f}, next best speed ({self.runner_up_speed / self.speed:.4g} times) "
+            f"{self.runner_up_score:.1f}, other teeth {self.other_teeth_score:.1f}"
+        )
+
+
+def decide(evidence: LineEvidence, comb: CombLines, low: float, high: float) -> CombDecision:
+    """Find the best comb between `low` and `high` and weigh it."""
+    scores = score_speeds(evidence, comb, low, high)
+    speed, score = scores.best()
+    speed = refine_speed(evidence, comb, speed)
+    # Within three bins of the lowest mesh line it is the same comb.
+    same = 3.0 * evidence.bin_width / (comb.meshes[0] * speed)
+    runner_up_speed, runner_up = scores.best_beyond(speed, same)
+    mean, deviation = chance_scores(evidence, comb, low, high, _N_CHANCE)
+    around = (speed * (1 - same / 2), speed * (1 + same / 2))
+    others = max(
+        (score_speeds(evidence, other, *around).best()[1] for other in with_other_teeth(comb)), default=-np.inf
+    )
+    return CombDecision(
+        speed,
+        score,
+        mean,
+        deviation,
+        runner_up_speed,
+        runner_up,
+        others,
+        _side_score(evidence, comb, speed),
+        high / low <= NARROW,
+        evidence.bin_width,
+    )
+
+
+def refine_speed(evidence: LineEvidence, comb: CombLines, speed: float) -> float:
+    """Sharpen a speed by the middles of the lines that are there.
+
+    Parabolas through the logarithm of each line's three highest bins give its frequency; the speed is the
+    least-squares slope of frequency over order, weighted by the lines' heights, lines off by more than a bin left out.
+    """
+    found = [
+        (order, place, height)
+        for order in comb.orders
+        if order * speed < evidence.top and (line := _line_at(evidence, order * speed)) is not None
+        for place, height in (line,)
+    ]
+    if not found:
+        return speed
+    orders, places, weights = np.array(found).T
+    refined = speed
+    for _ in range(3):
+        near = np.abs(places - orders * refined) < 1.5 * evidence.bin_width
+        if not near.any():
+            return speed
+        weight = weights[near]
+        refined = float((weight * orders[near]) @ places[near] / ((weight * orders[near]) @ orders[near]))
+    return refined
+
+
+def _line_at(evidence: LineEvidence, position: float) -> tuple[float, float] | None:
+    """Position and height of the line within a bin or so of `position`, None where nothing stands out."""
+    x = evidence.log_ratio
+    k = int(np.floor(position / evidence.bin_width))
+    if k < 2 or k + 3 >= len(x):
+        return None
+    p = k - 1 + int(np.argmax(x[k - 1 : k + 3]))
+    if x[p] < 3.0 or x[p] < x[p - 1] or x[p] < x[p + 1]:
+        return None
+    bend = x[p - 1] - 2 * x[p] + x[p + 1]
+    shift = 0.5 * (x[p - 1] - x[p + 1]) / bend if bend < 0 else 0.0
+    return float((p + shift) * evidence.bin_width), float(x[p])
+
+
+def _side_score(evidence: LineEvidence, comb: CombLines, speed: float) -> float:
+    places = (comb.orders * speed / evidence.bin_width).astype(int)
+    counts = ~comb.is_mesh & (places < evidence.ratios.shape[1]) & (places * evidence.bin_width < evidence.top)
+    return float(evidence.ratios[comb.presence[counts], places[counts]].sum())
+
+
+def _sure(value: float, zero: float, scale: float) -> float:
+    return 1.0 - float(np.exp(-max(0.0, value - zero) / scale))
+
+
+# --------------------
+# What is searched where, when the speed is read from the vibration.
+# --------------------
+
+
+LOWEST_QUALITY = 0.5
+"""Below it no speed is claimed: on simulated and measured recordings, hardly a wrong speed lies above."""
+
+TOP = 0.45
+"""Share of the sampling rate that is looked at; above it lie the anti-aliasing filters of recorders."""
+
+_WIDEST_RPM = (30.0, 30_000.0)
+_FEWEST_REVOLUTIONS = 20.0
+_DIVISIONS = (1, 4, 16)  # of the recording's length: long segments for steady lines, short ones for wandering lines
+
+
+@dataclass(frozen=True)
+class SpeedSearch:
+    """What is searched where."""
+
+    recording: Recording
+    channels: tuple[str, ...]
+    samples: FloatArray
+    comb: CombLines
+    shaft: str
+    low: float
+    high: float
+
+
+def search_of(
+    recording: Recording,
+    rig: Rig,
+    channels: Sequence[str] | None,
+    speed_range_rpm: tuple[float, float] | None,
+) -> SpeedSearch:
+    """Check what the search rests on: teeth, living channels, a range of speeds with enough revolutions."""
+    comb = comb_of_rig(rig)
+    if comb is None:
+        raise RefusalError(
+            "no mesh order is known: the speed cannot be read from mesh lines",
+            remedy="give the teeth of at least one gear on a shaft whose ratio is known, or a speed source",
+        )
+    names = tuple(channels) if channels is not None else recording.vibration_names()
+    rows = [recording.index(name) for name in names]
+    alive = [i for i in rows if float(np.ptp(recording.samples[i])) > 0.0]
+    if not alive:
+        raise RefusalError("no vibration channel moves", remedy="check sensors and channel quantities")
+    low, high = _range(recording, rig, comb, speed_range_rpm)
+    return SpeedSearch(
+        recording,
+        tuple(recording.channel_names[i] for i in alive),
+        np.asarray(recording.samples[alive], dtype=np.float64),
+        comb,
+        rig.reference_shaft,
+        low,
+        high,
+    )
+
+
+def _range(
+    recording: Recording, rig: Rig, comb: CombLines, speed_range_rpm: tuple[float, float] | None
+) -> tuple[float, float]:
+    """Range of speeds in rev/s."""
+    nominal = rig.nominal_speed_rpm()
+    if speed_range_rpm is not None:
+        low, high = (positive(v, "speed_range_rpm", "rpm") / 60.0 for v in speed_range_rpm)
+        if not low < high:
+            raise InputError(f"speed_range_rpm is {speed_range_rpm}", allowed="(low, high) with low < high")
+    elif nominal is not None:
+        if nominal == 0.0:
+            raise RefusalError("the machine is at rest: its nominal speed is 0 rpm", remedy="record while it turns")
+        share = rig.operating_point.speed_tolerance_percent / 100.0
+        low, high = nominal * (1 - share) / 60.0, nominal * (1 + share) / 60.0
+    else:
+        low, high = (v / 60.0 for v in _WIDEST_RPM)
+        low = max(low, _FEWEST_REVOLUTIONS / recording.duration_s)
+    high = min(high, TOP * recording.sampling_rate_hz / comb.meshes[0])
+    if high * recording.duration_s < _FEWEST_REVOLUTIONS or low >= high:
+        raise RefusalError(
+            f"within {recording.duration_s:.3g} s at {recording.sampling_rate_hz:.6g} Hz there are fewer than "
+            f"{_FEWEST_REVOLUTIONS:.0f} revolutions with a mesh line below {TOP * recording.sampling_rate_hz:.4g} Hz "
+            f"at {60 * low:.4g} to {60 * high:.4g} rpm",
+            remedy="record longer or with a higher sampling rate, or check speed and teeth",
+        )
+    return low, high
+
+
+@dataclass(frozen=True)
+class SpeedCandidate:
+    """An angle, and how its comb weighed."""
+
+    angle: ShaftAngle
+    decision: CombDecision
+
+
+def best_decision(samples: FloatArray, rate: float, comb: CombLines, low: float, high: float) -> CombDecision | None:
+    """Weigh the comb over spectra of several resolutions and return the best, None if the samples are too few.
+
+    `rate` is in samples per second, or per revolution; `low` and `high` accordingly.
+    """
+    decisions = [
+        decide(line_evidence(samples, rate, n, TOP * rate), comb, low, high)
+        for n in (samples.shape[1] // d for d in _DIVISIONS)
+        # Sidebands need four bins between them and the mesh line.
+        if n >= 256 and high * n / rate > 4.0
+    ]
+    return max(decisions, key=lambda d: (d.quality >= LOWEST_QUALITY, d.score), default=None)

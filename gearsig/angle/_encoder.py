@@ -1,0 +1,255 @@
+"""Value and slope of a noisy, densely sampled quantity at sparse knots, by local parabolas."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearsig.angle._types import ShaftAngle
+from gearsig.checks import FloatArray, frozen_array, positive
+from gearsig.errors import InputError, RefusalError
+
+
+def noise_of(x: FloatArray) -> float:
+    """Standard deviation of the noise in a smooth quantity, from its third differences.
+
+    A third difference of independent errors has 1 + 9 + 9 + 1 = 20 times their variance; a smooth course has almost
+    none.
+    """
+    if len(x) < 8:
+        return 0.0
+    third = np.diff(x, 3)
+    # The root mean square as well: in a staircase most differences are zero, and the median says nothing.
+    spread = max(float(np.median(np.abs(third))) / 0.6745, float(np.sqrt(np.mean(np.square(third)))))
+    return float(spread / np.sqrt(20.0))
+
+
+def local_parabolas(x: FloatArray, half_width: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Fit parabolas over 2·half_width + 1 samples around knots every half_width samples.
+
+    Returns
+    -------
+    positions, values, slopes : arrays, (n_knots,)
+        In samples, in x's unit, and in x's unit per sample. The first and the last knot are the first and the last
+        sample, read from the parabola next to them.
+
+    Notes
+    -----
+    Source: A. Savitzky, M. J. E. Golay, *Smoothing and differentiation of data by simplified least squares
+    procedures*, Anal. Chem. 36 (1964).
+    """
+    n, m = len(x), min(half_width, (len(x) - 1) // 2)
+    j = np.arange(-m, m + 1, dtype=np.float64)
+    basis = np.linalg.pinv(np.stack([np.ones_like(j), j, j * j], axis=1))
+    centres = np.append(np.arange(m, n - m - 1, m), n - m - 1)
+    # Values relative to the centre: an angle of thousands of revolutions would lose digits otherwise.
+    windows = np.lib.stride_tricks.sliding_window_view(x, 2 * m + 1)[centres - m] - x[centres][:, None]
+    a, b, c = basis @ windows.T
+    positions = np.concatenate([[0.0], centres, [n - 1.0]])
+    first, last = -float(m), float(m)
+    values = np.concatenate(
+        [
+            [x[centres[0]] + a[0] + b[0] * first + c[0] * first**2],
+            x[centres] + a,
+            [x[centres[-1]] + a[-1] + b[-1] * last + c[-1] * last**2],
+        ]
+    )
+    slopes = np.concatenate([[b[0] + 2 * c[0] * first], b, [b[-1] + 2 * c[-1] * last]])
+    return positions, values, slopes
+
+
+# --------------------
+# From an encoder's angle channel to shaft angle.
+# --------------------
+
+
+# Knots carry a speed error of a thousandth at most where the noise allows, ...
+_WANTED_SPEED_ERROR = 1e-3
+# ... but average over no more than this part of a revolution, so that torsional vibration of low order is kept.
+_LONGEST_AVERAGE_REV = 1.0 / 16.0
+# More than this backwards is a machine that reverses, not noise.
+_MOST_BACKWARDS_REV = 0.05
+
+
+def encoder_angle(
+    values: FloatArray,
+    sampling_rate_hz: float,
+    units_per_revolution: float = 360.0,
+    *,
+    wraps: bool = True,
+    shaft: str = "",
+) -> ShaftAngle:
+    """Turn an angle channel, wrapping or running on, into shaft angle.
+
+    Jumps of a whole revolution are undone; parabolas over a few samples, longer where the angle is noisy or coarse,
+    give angle and speed at knots.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+    sampling_rate_hz : float
+        More than two samples per revolution.
+    units_per_revolution : float
+        360 for degrees, 2π for radians, the line count for counts.
+    wraps : bool
+        Whether the angle starts again after each revolution.
+    shaft : str
+
+    Returns
+    -------
+    ShaftAngle
+        Counting up, also for a shaft that turns backwards.
+
+    Raises
+    ------
+    RefusalError
+        If the shaft stands still, or turns one way and then the other.
+    """
+    x = frozen_array(values, "encoder channel", ndim=1)
+    positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    positive(units_per_revolution, "units_per_revolution")
+    if len(x) < 8:
+        raise InputError(f"the encoder channel has {len(x)} samples", allowed="at least 8")
+    revolutions = np.asarray(x, dtype=np.float64) / units_per_revolution
+    if wraps:
+        revolutions = np.unwrap(revolutions, period=1.0)
+    notes: tuple[str, ...] = ()
+    if revolutions[-1] < revolutions[0]:
+        revolutions = -revolutions
+        notes = ("the encoder counts down; the angle is counted up",)
+    noise = noise_of(revolutions)
+    _check_motion(revolutions, noise)
+    half_width, note = _half_width(revolutions, noise)
+    positions, angle, slopes = local_parabolas(revolutions, half_width)
+    angle = np.maximum.accumulate(angle)
+    duration = (len(x) - 1) / sampling_rate_hz
+    return ShaftAngle(
+        shaft,
+        positions / sampling_rate_hz,
+        angle,
+        np.maximum(slopes, 0.0) * sampling_rate_hz,
+        "encoder",
+        relative_speed_uncertainty=float(
+            np.sqrt(2.0 / half_width) * noise / (duration * abs(angle[-1] - angle[0]) / duration)
+        ),
+        notes=notes + note,
+    )
+
+
+def _check_motion(revolutions: FloatArray, noise: float) -> None:
+    turned = float(revolutions[-1] - revolutions[0])
+    if turned < max(0.01, 10 * noise):
+        raise RefusalError(
+            f"the encoder turns by {turned:.3g} revolutions in the whole recording: the machine is at rest",
+            remedy="check the channel and units_per_revolution",
+        )
+    backwards = float(np.max(np.maximum.accumulate(revolutions) - revolutions))
+    if backwards > _MOST_BACKWARDS_REV + 6 * noise:
+        raise RefusalError(
+            f"the shaft turns back by {backwards:.3g} revolutions",
+            remedy="cut the recording where the direction changes; check units_per_revolution and wraps",
+        )
+
+
+def _half_width(revolutions: FloatArray, noise: float) -> tuple[int, tuple[str, ...]]:
+    """Samples on each side of a knot, and a note where the noise asks for more than the shortest parabola."""
+    n = len(revolutions)
+    per_sample = float(revolutions[-1] - revolutions[0]) / (n - 1)
+    # The slope of a line over 2m + 1 samples has the standard deviation noise·√(3/(2m³)), nearly.
+    m = (1.5 * (noise / (_WANTED_SPEED_ERROR * per_sample)) ** 2) ** (1 / 3)
+    longest = max(2, int(0.5 * _LONGEST_AVERAGE_REV / per_sample))
+    half_width = int(np.clip(np.ceil(m), 2, min(longest, (n - 1) // 2)))
+    if half_width <= 2:
+        return half_width, ()
+    return half_width, (
+        f"the angle scatters by {360 * noise:.2g}° and is smoothed over {360 * per_sample * 2 * half_width:.2g}°",
+    )
+
+
+# --------------------
+# From a speed channel to shaft angle.
+# --------------------
+
+
+# Half the length that a noisy or stepped speed is averaged over: speed channels seldom follow faster than 0.1 s.
+_SMOOTHING_S = 0.05
+
+
+def speed_channel_angle(
+    values: FloatArray, sampling_rate_hz: float, rpm_per_unit: float = 1.0, *, shaft: str = ""
+) -> ShaftAngle:
+    """Integrate a speed channel to shaft angle, zero at the first sample.
+
+    revolutions(t) = ∫ rpm/60 dt, by trapezoids over all samples, knots every 0.05 s; the speed at a knot is a
+    parabola's over ±0.05 s (±2 samples for a slowly sampled channel).
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+        rpm after multiplying by `rpm_per_unit`; negative throughout for a shaft that turns backwards.
+    sampling_rate_hz : float
+    rpm_per_unit : float
+    shaft : str
+
+    Returns
+    -------
+    ShaftAngle
+        Phase between revolutions drifts with any error of the scale, so synchronous averages over many revolutions
+        may smear.
+
+    Raises
+    ------
+    RefusalError
+        If the channel says that the machine is at rest, or that it reverses.
+    """
+    x = frozen_array(values, "speed channel", ndim=1)
+    positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    positive(rpm_per_unit, "rpm_per_unit")
+    if len(x) < 8:
+        raise InputError(f"the speed channel has {len(x)} samples", allowed="at least 8")
+    speed, notes = _forwards(np.asarray(x, dtype=np.float64) * (rpm_per_unit / 60.0))
+    half_width = max(2, round(_SMOOTHING_S * sampling_rate_hz))
+    positions, smooth, _ = local_parabolas(speed, half_width)
+    cumulative = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / sampling_rate_hz
+    angle = np.maximum.accumulate(cumulative[np.round(positions).astype(int)])
+    noise = noise_of(speed)
+    if noise > 0:
+        notes += (
+            f"the speed scatters by {60 * noise:.2g} rpm and is smoothed over ±{half_width / sampling_rate_hz:.2g} s",
+        )
+    return ShaftAngle(
+        shaft,
+        positions / sampling_rate_hz,
+        angle,
+        _monotone(positions / sampling_rate_hz, angle, np.maximum(smooth, 0.0)),
+        "speed channel",
+        notes=(*notes, "the angle is integrated from a speed: its phase is relative"),
+    )
+
+
+def _forwards(speed: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
+    """Return the speed counting up, without noise below zero."""
+    top = float(np.max(np.abs(speed)))
+    if top * 60.0 < 1.0 or float(np.mean(np.abs(speed))) * len(speed) == 0.0:
+        raise RefusalError(
+            f"the speed channel stays within ±{60 * top:.3g} rpm: the machine is at rest",
+            remedy="check the channel and rpm_per_unit",
+        )
+    notes: tuple[str, ...] = ()
+    if speed.mean() < 0:
+        speed, notes = -speed, ("the speed is negative; the angle is counted up",)
+    if speed.min() < -0.05 * top:
+        raise RefusalError(
+            f"the speed channel runs from {60 * speed.min():.4g} to {60 * speed.max():.4g} rpm: the shaft reverses",
+            remedy="cut the recording where the direction changes",
+        )
+    if speed.min() < 0:
+        notes += ("speeds slightly below zero are taken as zero",)
+    return np.maximum(speed, 0.0), notes
+
+
+def _monotone(t: FloatArray, angle: FloatArray, slopes: FloatArray) -> FloatArray:
+    """Limit slopes to three times the smaller adjacent secant, so that the cubic does not decrease."""
+    secants = np.diff(angle) / np.diff(t)
+    limit = 3.0 * np.minimum(np.append(secants, secants[-1]), np.insert(secants, 0, secants[0]))
+    limited: FloatArray = np.minimum(slopes, limit)
+    return limited

@@ -1,0 +1,635 @@
+"""Pulse edges in a tachometer channel: Schmitt trigger with sub-sample edge times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gearsig.angle._types import ShaftAngle, monotone_slopes
+from gearsig.checks import FloatArray, count, frozen_array, one_of, positive
+from gearsig.errors import InputError, RefusalError
+
+# The levels are read at these percentiles: 0.05 % of spikes do no harm, and pulses may be as short as 0.1 % of a
+# period.
+_LOW_PERCENTILE, _HIGH_PERCENTILE = 0.05, 99.95
+# Share of samples in the middle half between the levels: pulses 0 to 0.1, a sine 0.33, uniform noise 0.5, Gaussian 0.9.
+_MOST_IN_THE_MIDDLE = 0.45
+
+
+@dataclass(frozen=True)
+class PulseEdges:
+    """Edges found in a tachometer channel.
+
+    Parameters
+    ----------
+    times_s : array, (n_pulses,)
+        On the recording's time axis.
+    tick_s : float
+        Time step that the edges are quantised to: the sampling interval if the signal jumps from level to level within
+        one sample, 0 if the edges are resolved by interpolation.
+    threshold, hysteresis : float
+        As used, in the channel's unit.
+    low, high : float
+        Levels of the signal.
+    """
+
+    times_s: FloatArray
+    tick_s: float
+    threshold: float
+    hysteresis: float
+    low: float
+    high: float
+
+
+def find_pulse_edges(
+    values: FloatArray,
+    sampling_rate_hz: float,
+    *,
+    threshold: float | None = None,
+    hysteresis: float | None = None,
+    edge: str = "rising",
+) -> PulseEdges:
+    """Find the edges of a pulse signal.
+
+    The trigger is armed below threshold - hysteresis/2 and fires above threshold + hysteresis/2; the edge lies where
+    the straight line between the two samples around the last crossing meets the threshold.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+    sampling_rate_hz : float
+    threshold : float, optional
+        Default: half way between the low and the high level, the 0.05 and the 99.95 percentile.
+    hysteresis : float, optional
+        Full width; default: a quarter of the step from low to high.
+    edge : str
+        "rising" or "falling".
+
+    Returns
+    -------
+    PulseEdges
+        May hold no pulse at all: the pulse train's own check speaks about that.
+
+    Raises
+    ------
+    RefusalError
+        If the levels are to be found and the channel has no two levels: constant, or noise.
+
+    Notes
+    -----
+    Not for a channel that holds an analogue speed or an angle.
+    """
+    x = frozen_array(values, "tachometer channel", ndim=1)
+    positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    one_of(edge, "edge", ("rising", "falling"))
+    low, high = (float(v) for v in np.percentile(x, (_LOW_PERCENTILE, _HIGH_PERCENTILE)))
+    if high - low < 0.1 * float(np.ptp(x)):  # pulses so short or few that the percentiles pass them by
+        low, high = float(x.min()), float(x.max())
+    if threshold is None:
+        _check_two_levels(x, low, high)
+        threshold = 0.5 * (low + high)
+    if hysteresis is None:
+        hysteresis = 0.25 * (high - low)
+    if hysteresis < 0:
+        raise InputError(f"hysteresis is {hysteresis:g}", where="tachometer", allowed=">= 0")
+    sign = 1.0 if edge == "rising" else -1.0
+    positions, jumps = _schmitt(x, sign, sign * threshold, hysteresis / 2, 0.1 * (high - low))
+    tick_s = 0.0
+    if len(jumps) and np.mean(jumps) > 0.8:
+        # A jump within one sample says only between which samples the edge lies; the middle is the best guess.
+        positions = np.where(jumps, np.ceil(positions) - 0.5, positions)
+        tick_s = 1.0 / sampling_rate_hz
+    return PulseEdges(positions / sampling_rate_hz, tick_s, threshold, hysteresis, low, high)
+
+
+def _check_two_levels(x: FloatArray, low: float, high: float) -> None:
+    step = high - low
+    remedy = "check which channel carries the pulses, or give threshold and hysteresis"
+    if step <= 1e-12 * max(abs(low), abs(high)):
+        raise RefusalError(f"the tachometer channel stays at {low:g}: there are no pulses", remedy=remedy)
+    middle = float(np.mean((x > low + 0.25 * step) & (x < low + 0.75 * step)))
+    if middle > _MOST_IN_THE_MIDDLE:
+        raise RefusalError(
+            f"the tachometer channel has no two levels: {100 * middle:.0f} % of its samples lie in the middle "
+            f"between {low:g} and {high:g}",
+            remedy=remedy,
+        )
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _schmitt(x, sign, threshold, half_width, near):  # type: ignore[no-untyped-def]
+    """Return positions (in samples) of upward edges of sign·x, and whether each is a jump from level to level.
+
+    At a jump the two samples around the edge differ by most of the step between the levels (ten times `near`), and the
+    samples before and after change by less than `near`.
+    """
+    n = x.shape[0]
+    positions = np.empty(n // 2 + 1)
+    jumps = np.zeros(n // 2 + 1, dtype=np.bool_)
+    count = 0
+    armed = False
+    crossing = -1.0
+    at = 0
+    for i in range(n):
+        value = sign * x[i]
+        if value < threshold - half_width:
+            armed = True
+        if i > 0 and armed:
+            before = sign * x[i - 1]
+            if before < threshold <= value:
+                crossing = i - 1 + (threshold - before) / (value - before)
+                at = i
+            if value >= threshold + half_width and crossing >= 0.0:
+                positions[count] = crossing
+                flat_before = at < 2 or abs(x[at - 1] - x[at - 2]) < near
+                flat_after = at + 1 >= n or abs(x[at + 1] - x[at]) < near
+                high_step = abs(x[at] - x[at - 1]) > 7 * near
+                jumps[count] = high_step and flat_before and flat_after
+                count += 1
+                armed = False
+                crossing = -1.0
+    return positions[:count], jumps[:count]
+
+
+# --------------------
+# Spurious and missed pulses in a pulse train, told from real changes of speed.
+# --------------------
+
+
+# An interval is suspicious when it is shorter or longer than the local trend says by these factors.
+_SHORT, _LONG = 0.6, 1.5
+# Without a slowdown around it, a longer gap than this many pulses leaves the count open.
+MOST_MISSED_IN_ONE_GAP = 8
+
+
+@dataclass(frozen=True)
+class PulseCount:
+    """A pulse train whose pulses have been counted.
+
+    Parameters
+    ----------
+    times_s : array, (n,)
+        Without the spurious pulses.
+    counts : array of int, (n,)
+        Number of each pulse; it jumps where pulses were missed.
+    spurious_s, missed_s, pauses_s : arrays
+        Times of the pulses taken out, and starts of the gaps that pulses were missed in or the machine stopped in.
+    open_gaps_s : array
+        Starts of gaps in which the number of missed pulses cannot be told.
+    """
+
+    times_s: FloatArray
+    counts: FloatArray
+    spurious_s: FloatArray
+    missed_s: FloatArray
+    pauses_s: FloatArray
+    open_gaps_s: FloatArray
+
+    @property
+    def n_missed(self) -> int:
+        """Pulses that were missed."""
+        return int(self.counts[-1]) + 1 - len(self.counts)
+
+
+def count_pulses(times_s: FloatArray) -> PulseCount:
+    """Number the pulses, leaving out spurious ones and skipping numbers where pulses were missed."""
+    kept, spurious = _without_spurious(times_s)
+    return _numbered(kept, times_s[spurious])
+
+
+def local_trend(intervals: FloatArray) -> FloatArray:
+    """Expected length of each interval from its neighbours; infinite where they point to a standstill.
+
+    At constant acceleration the squared speed grows linearly with angle, so q = 1/interval² is almost linear in the
+    pulse number, from a standing start to a stop. Each interval is predicted by symmetric means (q₋ᵢ + q₊ᵢ)/2, at
+    the ends by extrapolations 2q₁ - q₂; the median over them tolerates faulty neighbours.
+    """
+    n = len(intervals)
+    q = 1.0 / np.square(intervals)
+    predictions = np.full((9, n), np.nan)
+    for i in range(1, 4):
+        if n > 2 * i:
+            predictions[i - 1, i : n - i] = 0.5 * (q[: n - 2 * i] + q[2 * i :])
+    edge = min(3, n)
+    for i in range(1, 4):
+        for k in range(edge):
+            if k + 2 * i < n:
+                predictions[2 + i, k] = 2 * q[k + i] - q[k + 2 * i]
+            if n - 1 - k - 2 * i >= 0:
+                predictions[5 + i, n - 1 - k] = 2 * q[n - 1 - k - i] - q[n - 1 - k - 2 * i]
+    # With four intervals or fewer there may be no prediction: such an interval is taken as it is.
+    predictions = np.where(np.isnan(predictions).all(axis=0), q, predictions)
+    expected_q = np.nanmedian(predictions, axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        trend: FloatArray = np.where(expected_q > 0, 1.0 / np.sqrt(np.abs(expected_q)), np.inf)
+    return trend
+
+
+def _without_spurious(times_s: FloatArray) -> tuple[FloatArray, list[int]]:
+    """Return the times without spurious pulses, and the indices of those."""
+    left = np.arange(len(times_s))
+    removed: list[int] = []
+    # Each round takes out one pulse of every separate group of short intervals; a train worse than that is refused
+    # later.
+    for _ in range(20):
+        t = times_s[left]
+        if len(t) < 6:
+            break
+        d = np.diff(t)
+        trend = local_trend(d)
+        drop = [_spurious_end(t, trend, k) for k in _shortest_of_each_group(d / np.minimum(trend, _of_neighbours(d)))]
+        found = sorted({k for k in drop if k is not None})
+        if not found:
+            break
+        removed += [int(left[k]) for k in found]
+        left = np.delete(left, found)
+    return times_s[left], sorted(removed)
+
+
+def _shortest_of_each_group(ratio: FloatArray) -> list[int]:
+    """Indices of short intervals that are the shortest within three intervals each way."""
+    chosen: list[int] = []
+    blocked = np.zeros(len(ratio), dtype=bool)
+    for k in np.argsort(ratio):
+        if ratio[k] >= _SHORT:
+            break
+        if not blocked[k]:
+            chosen.append(int(k))
+            blocked[max(0, k - 3) : k + 4] = True
+    return chosen
+
+
+def _spurious_end(t: FloatArray, trend: FloatArray, k: int) -> int | None:
+    """Which end of interval k to take out so that its neighbours fit the trend best; None if neither helps."""
+    expected = trend[k]
+    if not np.isfinite(expected):
+        return None
+    best: tuple[float, int] | None = None
+    for pulse in (k + 1, k):
+        near = slice(max(0, pulse - 2), pulse + 3)
+        rest = np.delete(t[near], pulse - near.start)
+        misfit = float(np.abs(np.log(np.diff(rest) / expected)).sum()) if len(rest) > 1 else np.inf
+        before = np.diff(t[near])
+        gain = float(np.abs(np.log(before / expected)).sum()) - misfit
+        if gain > 0.2 and (best is None or misfit < best[0] - 1e-12):
+            best = (misfit, pulse)
+    return None if best is None else best[1]
+
+
+def _numbered(t: FloatArray, spurious_s: FloatArray) -> PulseCount:
+    d = np.diff(t)
+    steps = np.ones(len(d), dtype=np.int64)
+    missed: list[float] = []
+    pauses: list[float] = []
+    gaps: list[float] = []
+    trend = local_trend(d) if len(d) >= 3 else d
+    for k in np.flatnonzero((d > _LONG * trend) & (d > _LONG * _of_neighbours(d))):
+        if _slows_down_around(d, int(k)):
+            pauses.append(float(t[k]))
+            continue
+        exact = float(d[k] / trend[k])
+        whole = round(exact)
+        # The trend is known to a few per cent per pulse; beyond that the count would be a guess.
+        if whole > MOST_MISSED_IN_ONE_GAP + 1 or abs(exact - whole) > 0.35:
+            gaps.append(float(t[k]))
+        elif whole > 1:
+            steps[k] = whole
+            missed.append(float(t[k]))
+    counts = np.concatenate([[0], np.cumsum(steps)])
+    return PulseCount(
+        t, counts, np.asarray(spurious_s), *(np.asarray(list_, dtype=float) for list_ in (missed, pauses, gaps))
+    )
+
+
+def _of_neighbours(d: FloatArray) -> FloatArray:
+    """Return the median of the three intervals on either side of each.
+
+    Where speed swings from one revolution to the next a trend at the ends of the train extrapolates the swing.
+    """
+    if len(d) < 2:
+        return d
+    padded = np.pad(d, 3, constant_values=np.nan)
+    around = np.stack([padded[i : i + len(d)] for i in (0, 1, 2, 4, 5, 6)])
+    medians: FloatArray = np.nanmedian(around, axis=0)
+    return medians
+
+
+def _slows_down_around(d: FloatArray, k: int) -> bool:
+    """Whether speed falls towards interval k from the left and rises after it so that a standstill in it fits."""
+    q = 1.0 / np.square(d)
+    left = k < 2 or 2 * q[k - 1] - q[k - 2] < 0.7 * q[k - 1]
+    right = k > len(d) - 3 or 2 * q[k + 1] - q[k + 2] < 0.7 * q[k + 1]
+    return bool(left and right)
+
+
+# --------------------
+# The clock that pulse times were taken with: find its tick, and fit the angle within its quantisation.
+# --------------------
+
+
+IntArray = NDArray[np.integer[Any]]
+
+# Length in pulses over which the smoothest fit averages; slower changes of speed pass whatever the clock.
+_LONGEST_SMOOTHING = 60.0
+# Rounds of local easing; each eases the penalty by 4, so the last ones interpolate.
+_N_EASINGS = 30
+
+
+def clock_tick(times_s: FloatArray) -> float:
+    """Find the step that all pulse times are multiples of (plus an offset), 0 if there is none.
+
+    The smallest difference between two intervals is a first guess of the tick; it is then sharpened over longer and
+    longer spans, and accepted if the times lie on its grid within a tenth (a uniform scatter would give 0.29).
+
+    Parameters
+    ----------
+    times_s : array, (n,)
+        Strictly increasing.
+
+    Returns
+    -------
+    float
+        In seconds. A tick below a millionth of the shortest interval does no harm and is not looked for.
+    """
+    if len(times_s) < 16:
+        return 0.0
+    t = times_s - times_s[0]
+    intervals = np.diff(t)
+    floor = max(1e-6 * float(intervals.min()), 64 * np.finfo(float).eps * float(np.abs(times_s).max()))
+    steps = np.diff(np.sort(intervals))
+    steps = steps[steps > floor]
+    if len(steps) == 0:
+        return 0.0
+    tick = float(np.median(steps[steps < 1.5 * steps.min()]))
+    for n in np.unique(np.geomspace(4, len(t), 12).astype(int)):
+        ticks = np.round(t[:n] / tick)
+        if ticks[-1] < 1:
+            return 0.0
+        tick = float(ticks @ t[:n] / (ticks @ ticks))
+    off = t / tick - np.round(t / tick)
+    return tick if np.std(off) < 0.1 else 0.0
+
+
+def fit_within_ticks(t: FloatArray, counts: FloatArray, tick_s: float, breaks: IntArray | None = None) -> FloatArray:
+    """Smooth angles (in pulses) at times that are quantised to a tick.
+
+    Minimise Σ wₖ(yₖ - kₖ)² + Σ λⱼ (Δ³y)ⱼ² where Δ³ is the third divided difference scaled by the local interval. Start
+    with a large λ; wherever a pulse's residual, divided by the local speed, exceeds half a tick, λ is eased around it,
+    until all residuals lie within. Constant acceleration passes unchanged. A single pulse that lies off its neighbours'
+    course gets weight wₖ = 0.
+
+    Parameters
+    ----------
+    t : array, (n,)
+        Pulse times, s.
+    counts : array, (n,)
+        Pulse numbers.
+    tick_s : float
+        Above zero.
+    breaks : array, optional
+        Indices of intervals that nothing is smoothed across (standstill).
+
+    Returns
+    -------
+    array, (n,)
+        Fitted angle in pulses at `t`.
+
+    Notes
+    -----
+    Source: the penalised fit with third differences is P. H. C. Eilers, *A perfect smoother*, Anal. Chem. 75 (2003);
+    choosing the penalty by the known error is C. H. Reinsch, *Smoothing by spline functions*, Numer. Math. 10 (1967).
+    Easing it locally is our own addition.
+    """
+    n = len(t)
+    counts = counts.astype(np.float64)
+    if n < 6:
+        return counts
+    rows = _third_differences(t)
+    penalty = np.full(n - 3, (_LONGEST_SMOOTHING / (2 * np.pi)) ** 6)
+    for k in () if breaks is None else breaks:
+        penalty[max(0, int(k) - 2) : int(k) + 1] = 0.0
+    speed = np.gradient(counts, t)
+    weights = np.ones(n)
+    weights[late_pulses(t, counts, tick_s)] = 0.0
+    fitted = counts
+    for _ in range(_N_EASINGS):
+        fitted = counts + _penalised(rows, penalty, weights, -_apply(rows, counts))
+        # A hundredth of a tick of slack: the times themselves are rounded numbers.
+        off = weights * np.abs(fitted - counts) > 0.51 * tick_s * speed
+        if not off.any():
+            return fitted
+        reach = np.convolve(off, np.ones(9), mode="same") > 0
+        touched = reach[:-3] | reach[1:-2] | reach[2:-1] | reach[3:]
+        penalty = np.where(touched, penalty / 4, penalty)
+    return np.where(off, counts, fitted)
+
+
+def late_pulses(t: FloatArray, counts: FloatArray, tick_s: float) -> IntArray:
+    """Indices of single pulses that come early or late by more than quantisation explains, seen from two on each side.
+
+    The cubic through the neighbours carries at most 1.33 ticks of quantisation; a real change of speed shows at the
+    neighbours too.
+    """
+    n = len(t)
+    others = np.array([-2, -1, 1, 2])
+    at = np.arange(2, n - 2)
+    nodes, values = t[at[:, None] + others], counts[at[:, None] + others].astype(np.float64)
+    gaps = nodes[:, :, None] - nodes[:, None, :] + np.eye(4)
+    reach = t[at][:, None] - nodes
+    lagrange = np.prod(reach, axis=1)[:, None] / (reach * np.prod(gaps, axis=2))
+    slope = (values[:, 2] - values[:, 1]) / (nodes[:, 2] - nodes[:, 1])
+    off = np.zeros(n)
+    off[2 : n - 2] = np.abs(counts[at] - (lagrange * values).sum(axis=1)) / slope
+    # A lone late pulse disturbs the prediction of its neighbours by 4/6 at most, one two places away by 1/6.
+    largest = np.maximum.reduce([np.roll(off, k) for k in (-2, -1, 1, 2)])
+    beyond = np.maximum.reduce([np.roll(off, k) for k in (-5, -4, -3, 3, 4, 5)])
+    found: IntArray = np.flatnonzero((off > 1.6 * tick_s) & (off > 1.1 * largest) & (beyond < 0.6 * off))
+    return found
+
+
+def _third_differences(t: FloatArray) -> FloatArray:
+    """Rows (n - 3, 4) of third divided differences times 6 × the mean interval cubed: [-1 3 -3 1] at equal steps."""
+    nodes = np.stack([t[:-3], t[1:-2], t[2:-1], t[3:]], axis=1)
+    gaps = nodes[:, :, None] - nodes[:, None, :] + np.eye(4)
+    scale = 6.0 * ((nodes[:, 3] - nodes[:, 0]) / 3.0) ** 3
+    rows: FloatArray = scale[:, None] / np.prod(gaps, axis=2)
+    return rows
+
+
+def _apply(rows: FloatArray, y: FloatArray) -> FloatArray:
+    n = len(y)
+    result: FloatArray = sum((rows[:, j] * y[j : n - 3 + j] for j in range(4)), start=np.zeros(n - 3))
+    return result
+
+
+def _penalised(rows: FloatArray, penalty: FloatArray, weights: FloatArray, target: FloatArray) -> FloatArray:
+    """Solve (W + DᵀΛD) z = DᵀΛ·target for the correction z; small numbers, so that no digits of the angle are lost."""
+    from scipy.linalg import solveh_banded
+
+    n = len(penalty) + 3
+    band = np.zeros((4, n))
+    band[0] = weights
+    right = np.zeros(n)
+    for i in range(4):
+        right[i : n - 3 + i] += rows[:, i] * penalty * target
+        for j in range(i, 4):
+            band[j - i, i : n - 3 + i] += penalty * rows[:, i] * rows[:, j]
+    solution: FloatArray = solveh_banded(band, right, lower=True)
+    return solution
+
+
+# --------------------
+# From tachometer pulse times to shaft angle and speed.
+# --------------------
+
+
+# A tenth of the pulses: a 36-1 or 60-2 tooth wheel stays below, and so does an occasional glitch.
+_MOST_FAULTY = 0.1
+
+# Pulses are only as good as the recorder's clock, whose scale no pulse can tell: crystals are right to some 50 ppm.
+_CLOCK_SCALE = 5e-5
+
+
+def pulse_train_angle(
+    times_s: FloatArray, pulses_per_revolution: int = 1, *, shaft: str = "", tick_s: float | None = None
+) -> ShaftAngle:
+    """Turn pulse times into shaft angle.
+
+    Pulse k lies at k / pulses_per_revolution revolutions. Spurious pulses are left out and missed ones counted; the
+    notes say how many and where. Times on a clock's grid are smoothed within half a tick, others are taken as exact.
+
+    Parameters
+    ----------
+    times_s : array, (n_pulses,)
+        Increasing.
+    pulses_per_revolution : int
+    shaft : str
+    tick_s : float, optional
+        Step of the clock; 0: exact times. Default: found from the times.
+
+    Returns
+    -------
+    ShaftAngle
+        Knots at the pulses; speed exact at constant acceleration. The uncertainty is the timing error of two pulses
+        (tick/√12 each, or the scatter of the intervals) over the duration, and at least the 5e-5 of a clock.
+
+    Raises
+    ------
+    InputError
+        No pulses, one pulse, or times that do not increase.
+    RefusalError
+        If more than a tenth of the pulses are spurious or missed, or a gap leaves their number open.
+
+    Notes
+    -----
+    Pulses are taken as equally spaced around the shaft. A machine that stops between two pulses is kept: the angle
+    stands still within that interval.
+    """
+    t = frozen_array(times_s, "tachometer pulse times", ndim=1).astype(np.float64)
+    n_per_rev = count(pulses_per_revolution, "pulses_per_revolution")
+    _check_order(t)
+    counted = count_pulses(t)
+    _check_faults(counted, len(t))
+    tick = clock_tick(t) if tick_s is None else float(tick_s)
+    kept = counted.times_s
+    pulses = counted.counts.astype(np.float64)
+    notes = _notes(counted, len(t))
+    if tick > 0:
+        notes += _clock_notes(tick, kept[late_pulses(kept, pulses, tick)] if len(kept) > 5 else kept[:0])
+        breaks = np.searchsorted(kept, counted.pauses_s)
+        pulses = np.maximum.accumulate(fit_within_ticks(kept, pulses, tick, breaks))
+    revolutions = pulses / n_per_rev
+    return ShaftAngle(
+        shaft,
+        kept,
+        revolutions,
+        monotone_slopes(kept, revolutions),
+        "pulses",
+        relative_speed_uncertainty=_uncertainty(kept, tick),
+        quality=max(0.0, 1.0 - 5.0 * (len(counted.spurious_s) + counted.n_missed) / len(t)),
+        notes=notes,
+    )
+
+
+def _check_order(t: FloatArray) -> None:
+    where = "tachometer pulse times"
+    if len(t) < 2:
+        found = "there are no pulses" if len(t) == 0 else "there is only one pulse"
+        raise InputError(
+            found, where=where, allowed="at least two pulses", remedy="check the channel, its threshold and its cabling"
+        )
+    backwards = np.flatnonzero(np.diff(t) <= 0)
+    if len(backwards):
+        k = int(backwards[0]) + 1
+        raise InputError(
+            f"pulse {k} (counted from 0) at {t[k]:.9g} s does not come after pulse {k - 1} at {t[k - 1]:.9g} s",
+            where=where,
+            allowed="increasing times",
+            remedy="check the column and the order of the rows",
+        )
+
+
+def _check_faults(counted: PulseCount, n_pulses: int) -> None:
+    remedy = "check threshold, hysteresis and pulses_per_revolution, or estimate the speed from the vibration"
+    if len(counted.open_gaps_s):
+        raise RefusalError(
+            f"after {counted.open_gaps_s[0]:.4g} s pulses are missing and their number cannot be told from the "
+            f"neighbouring speed ({len(counted.open_gaps_s)} such gap(s))",
+            remedy="analyse the parts before and after by themselves; " + remedy,
+        )
+    n_faulty = len(counted.spurious_s) + counted.n_missed
+    if n_faulty > _MOST_FAULTY * n_pulses + 1:
+        raise RefusalError(
+            f"{len(counted.spurious_s)} spurious and {counted.n_missed} missed pulses among {n_pulses} are too many "
+            "to trust the rest",
+            remedy=remedy,
+        )
+
+
+def _uncertainty(t: FloatArray, tick_s: float) -> float:
+    """Error of first and last pulse over the duration; without a tick, from the times' third differences.
+
+    It is never below the error of the clock's own rate.
+    """
+    if tick_s > 0:
+        timing_s = tick_s / np.sqrt(12.0)
+    elif len(t) >= 5:
+        # A third difference of independent errors has 1 + 9 + 9 + 1 = 20 times their variance.
+        timing_s = float(np.median(np.abs(np.diff(t, 3)))) / 0.6745 / np.sqrt(20.0)
+    else:
+        return float("nan")
+    return max(_CLOCK_SCALE, float(np.sqrt(2.0) * timing_s / (t[-1] - t[0])))
+
+
+def _notes(counted: PulseCount, n_pulses: int) -> tuple[str, ...]:
+    notes = []
+    if len(counted.spurious_s):
+        notes.append(
+            f"{len(counted.spurious_s)} of {n_pulses} pulses were spurious and left out: {_at(counted.spurious_s)}"
+        )
+    if counted.n_missed:
+        notes.append(f"{counted.n_missed} missed pulse(s) were counted in: {_at(counted.missed_s)}")
+    if len(counted.pauses_s):
+        notes.append(
+            f"the machine stands still or nearly so within {len(counted.pauses_s)} interval(s): {_at(counted.pauses_s)}"
+        )
+    return tuple(notes)
+
+
+def _clock_notes(tick_s: float, late_s: FloatArray) -> tuple[str, ...]:
+    note = f"pulse times are quantised to {tick_s * 1e6:.4g} µs; the angle is smoothed within half of that"
+    if not len(late_s):
+        return (note,)
+    return (
+        note,
+        f"{len(late_s)} single pulse(s) lie more than that off their neighbours and are bridged: {_at(late_s)}",
+    )
+
+
+def _at(times_s: FloatArray) -> str:
+    shown = ", ".join(f"{t:.4g}" for t in times_s[:5])
+    return f"at {shown}{' …' if len(times_s) > 5 else ''} s"

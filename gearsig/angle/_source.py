@@ -1,0 +1,164 @@
+"""The angle of a recording's reference shaft, from whatever speed source there is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from gearsig.angle._types import ShaftAngle
+from gearsig.checks import not_negative, positive
+from gearsig.errors import InputError, RefusalError
+from gearsig.recording import Recording
+from gearsig.rig import ConstantSpeed, EncoderChannel, PulseTimes, Rig, SpeedChannel, SpeedSource, TachometerChannel
+
+
+def find_shaft_angle(recording: Recording, rig: Rig | None = None) -> ShaftAngle:
+    """Return the angle of the reference shaft.
+
+    From the recording's speed source, else the rig's, else from the vibration itself. A source on another shaft is
+    converted by the teeth between them.
+
+    Parameters
+    ----------
+    recording : Recording
+    rig : Rig, optional
+        Default: the recording's own.
+
+    Returns
+    -------
+    ShaftAngle
+        Pulses may begin before and end after the recording, or cover a part of it only.
+
+    Raises
+    ------
+    InputError
+        If the source is malformed, or names a channel or shaft that is not there.
+    RefusalError
+        If the machine is at rest or the source does not tell the speed.
+    """
+    rig = rig if rig is not None else recording.rig
+    source = recording.speed if recording.speed is not None else (rig.speed if rig is not None else None)
+    if source is None:
+        return _tachless(recording, rig)
+    angle = _from_source(recording, source)
+    _check_motion(angle)
+    return _to_reference_shaft(angle, source.shaft, rig)
+
+
+def _from_source(recording: Recording, source: SpeedSource) -> ShaftAngle:
+    """Dispatch on the kind of source; each method is loaded when it is used."""
+    rate = recording.sampling_rate_hz
+    match source:
+        case ConstantSpeed():
+            return constant_speed_angle(source.speed_rpm, recording.duration_s)
+        case PulseTimes():
+            from gearsig.angle._pulses import pulse_train_angle
+
+            return pulse_train_angle(source.times_s, source.pulses_per_revolution)
+        case TachometerChannel():
+            return _from_tachometer(recording, source)
+        case EncoderChannel():
+            from gearsig.angle._encoder import encoder_angle
+
+            values = recording.values(source.channel)
+            return encoder_angle(values, rate, source.units_per_revolution, wraps=source.wraps)
+        case SpeedChannel():
+            from gearsig.angle._encoder import speed_channel_angle
+
+            return speed_channel_angle(recording.values(source.channel), rate, source.rpm_per_unit)
+
+
+def _from_tachometer(recording: Recording, source: TachometerChannel) -> ShaftAngle:
+    from gearsig.angle._pulses import find_pulse_edges, pulse_train_angle
+
+    edges = find_pulse_edges(
+        recording.values(source.channel),
+        recording.sampling_rate_hz,
+        threshold=source.threshold,
+        hysteresis=source.hysteresis,
+        edge=source.edge,
+    )
+    if len(edges.times_s) < 2:
+        raise InputError(
+            f"the tachometer has {len(edges.times_s)} pulse(s) in {recording.duration_s:.4g} s",
+            where=f"channel {source.channel!r}",
+            allowed="at least two",
+            remedy=f"the machine stands, or the threshold of {edges.threshold:.4g} does not fit the signal, which runs "
+            f"from {edges.low:.4g} to {edges.high:.4g}",
+        )
+    return pulse_train_angle(edges.times_s, source.pulses_per_revolution, tick_s=edges.tick_s)
+
+
+def _tachless(recording: Recording, rig: Rig | None) -> ShaftAngle:
+    if rig is None or not rig.pairs:
+        raise RefusalError(
+            "there is no speed source, and no gear is described whose mesh lines would tell the speed",
+            remedy="give a tachometer, a speed channel or a constant speed, or the teeth in a rig file",
+        )
+    from gearsig.angle._tachless import estimate_shaft_angle
+
+    return estimate_shaft_angle(recording, rig)
+
+
+def _check_motion(angle: ShaftAngle) -> None:
+    if angle.n_revolutions <= 0.0:
+        raise RefusalError("the machine is at rest: the shaft angle does not move", remedy="record while it turns")
+
+
+def _to_reference_shaft(angle: ShaftAngle, shaft: str, rig: Rig | None) -> ShaftAngle:
+    if rig is None or not rig.shafts:
+        return replace(angle, shaft=shaft)
+    reference = rig.reference_shaft
+    if not shaft or shaft == reference:
+        return replace(angle, shaft=reference)
+    ratio = rig.ratio(reference, to=shaft)
+    if ratio is None:
+        raise InputError(
+            f"the speed is that of shaft {shaft!r}, and the teeth do not tell its ratio to {reference!r}",
+            where="rig",
+            remedy=f"complete the teeth between both shafts, or make {shaft!r} the reference shaft",
+        )
+    converted = angle.of_shaft(reference, ratio)
+    note = f"converted from shaft {shaft!r}, which makes {1 / ratio:.6g} revolutions per revolution of {reference!r}"
+    return replace(converted, notes=(*converted.notes, note))
+
+
+# --------------------
+# Shaft angle at a stated, constant speed.
+# --------------------
+
+
+def constant_speed_angle(speed_rpm: float, duration_s: float, *, shaft: str = "") -> ShaftAngle:
+    """Return the angle of a shaft at constant speed, zero at time zero.
+
+    revolutions = speed · time
+
+    Parameters
+    ----------
+    speed_rpm : float
+        Above zero.
+    duration_s : float
+        Above zero.
+
+    Raises
+    ------
+    RefusalError
+        If the speed is zero: nothing turns, there is no angle to resample over.
+    """
+    not_negative(speed_rpm, "speed_rpm", "rpm")
+    positive(duration_s, "duration_s", "s")
+    if speed_rpm == 0.0:
+        raise RefusalError(
+            "the machine is at rest: the stated speed is 0 rpm",
+            remedy="look at spectra over frequency, or state the true speed",
+        )
+    speed = speed_rpm / 60.0
+    return ShaftAngle(
+        shaft,
+        np.array([0.0, duration_s]),
+        np.array([0.0, speed * duration_s]),
+        np.array([speed, speed]),
+        "constant",
+        notes=("the speed is stated, not measured",),
+    )

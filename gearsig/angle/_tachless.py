@@ -1,0 +1,606 @@
+"""Shaft angle without a tachometer, from the lines that gears put into the vibration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gearsig.angle._comb import (
+    LOWEST_QUALITY,
+    NARROW,
+    TOP,
+    CombDecision,
+    CombLines,
+    SpeedCandidate,
+    SpeedSearch,
+    best_decision,
+    candidate_speeds,
+    line_evidence,
+    score_candidates,
+    score_speeds,
+    search_of,
+)
+from gearsig.angle._resample import resample_to_angle
+from gearsig.angle._types import ShaftAngle, monotone_slopes
+from gearsig.checks import FloatArray, positive
+from gearsig.errors import InputError, RefusalError
+from gearsig.recording import Recording
+from gearsig.rig import Rig
+
+# --------------------
+# Speed over time from short-time comb scores: the path that collects most score without jumping.
+# --------------------
+
+
+# Standard deviation of the change of log speed from block to block, in steps of the speed grid, at least.
+_STEPS = 6.0
+_N_KEPT = 200  # best candidates of each block; the others are not on any good path
+_HIGHEST_COST = 20.0  # of a jump: a few blocks without lines must not decide over the rest
+
+
+@dataclass(frozen=True)
+class SpeedRidge:
+    """Speed at the middles of blocks.
+
+    Parameters
+    ----------
+    time_s, speed_rev_per_s : arrays, (n_blocks,)
+    score : float
+        Mean score per block along the path.
+    """
+
+    time_s: FloatArray
+    speed_rev_per_s: FloatArray
+    score: float
+
+
+def track_speed(
+    samples: FloatArray, rate: float, comb: CombLines, low: float, high: float, top: float, n_block: int, change: float
+) -> SpeedRidge:
+    """Return the most likely course of speed.
+
+    `change` is the standard deviation of the change of log speed from block to block, or six steps of the grid if
+    that is more.
+    Blocks at half overlap are scored for all speeds; the path maximises Σ score - Σ min((Δ ln speed)²/(2σ²), 8),
+    found by dynamic
+    programming over the best candidates of each block (A. J. Viterbi, *Error bounds for convolutional codes …*, IEEE
+    Trans. Inf. Theory 13 (1967)).
+    """
+    starts = np.arange(0, samples.shape[1] - n_block + 1, max(1, n_block // 2))
+    speeds: FloatArray | None = None
+    rows = []
+    for start in starts:
+        evidence = line_evidence(samples[:, start : start + n_block], rate, n_block, top)
+        if speeds is None:
+            speeds = candidate_speeds(low, high, comb.highest, evidence)
+        rows.append(score_candidates(evidence, comb, speeds))
+    assert speeds is not None  # noqa: S101  # there is at least one block: the caller chooses n_block
+    scores = np.array(rows)
+    kept = _best_candidates(scores)
+    kept_scores = np.take_along_axis(scores, kept, axis=1)
+    sigma = max(_STEPS * float(np.log(speeds[1] / speeds[0])), change)
+    path = _best_path(np.log(speeds)[kept] / sigma, kept_scores, _HIGHEST_COST)
+    at = np.arange(len(path))
+    return SpeedRidge((starts + n_block / 2) / rate, speeds[kept[at, path]], float(kept_scores[at, path].mean()))
+
+
+def _best_candidates(scores: FloatArray) -> NDArray[np.intp]:
+    """Indices of each block's best local maxima, (n_blocks, n_kept)."""
+    n_kept = min(_N_KEPT, scores.shape[1])
+    peaks = np.full(scores.shape, -np.inf)
+    peaks[:, 1:-1] = np.where(
+        (scores[:, 1:-1] >= scores[:, :-2]) & (scores[:, 1:-1] >= scores[:, 2:]),
+        scores[:, 1:-1],
+        -1e6 + scores[:, 1:-1],
+    )
+    return np.argpartition(peaks, -n_kept, axis=1)[:, -n_kept:]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _best_path(places, scores, highest_cost):  # type: ignore[no-untyped-def]
+    """Candidate per block on the path with the highest Σ score - Σ min((Δ place)²/2, highest_cost)."""
+    n_blocks, n = scores.shape
+    total = scores[0].copy()
+    came_from = np.zeros((n_blocks, n), dtype=np.int64)
+    for b in range(1, n_blocks):
+        following = np.empty(n)
+        for i in range(n):
+            best = -1e300
+            for j in range(n):
+                value = total[j] - min(0.5 * (places[b, i] - places[b - 1, j]) ** 2, highest_cost)
+                if value > best:
+                    best = value
+                    came_from[b, i] = j
+            following[i] = best + scores[b, i]
+        total = following
+    path = np.empty(n_blocks, dtype=np.int64)
+    path[-1] = np.argmax(total)
+    for b in range(n_blocks - 1, 0, -1):
+        path[b - 1] = came_from[b, path[b]]
+    return path
+
+
+# --------------------
+# A rough shaft angle made exact by the phase of mesh harmonics.
+# --------------------
+
+
+# Half widths around the mesh order, in orders of the shaft: below one, so that the shaft's sidebands stay outside.
+_HALF_WIDTHS = (0.45, 0.45, 0.3, 0.2)
+_MOST_HARMONICS = 3
+# Power of the band over its median line: noise has 0.5. A band of noise must not take part, or it would be bent into
+# a line.
+_LEAST_RATIO, _LEAST_SHARE = 2.0, 0.05
+_PER_WIDTH = 4  # points per reciprocal half width; two would do by the sampling theorem
+
+
+@dataclass(frozen=True)
+class _Harmonic:
+    """Baseband of one mesh harmonic in all channels, (n_channels, n), and how far it stands out."""
+
+    order: float
+    baseband: FloatArray
+    ratio: float
+
+
+def refine_by_phase(
+    recording: Recording, channels: tuple[str, ...], angle: ShaftAngle, orders: tuple[float, ...]
+) -> ShaftAngle:
+    """Return the angle with which the strongest mesh harmonics run at constant phase.
+
+    Over the estimated angle a harmonic of order o has the phase 2πo(θ_true - θ), so θ_true = θ + phase/(2πo). The
+    phase is summed
+    from sample to sample over all channels, weighted over harmonics by o² times their height over the neighbourhood.
+    Repeated, each time over a better angle and with a narrower band.
+
+    Parameters
+    ----------
+    recording : Recording
+    channels : tuple of str
+    angle : ShaftAngle
+        Off by less than half an order of the mesh harmonic, i.e. 2 % for 23 teeth.
+    orders : tuple of float
+        Mesh harmonics.
+
+    Notes
+    -----
+    Source: F. Bonnardot, M. El Badaoui, R. B. Randall, J. Danière, F. Guillet, *Use of the acceleration signal of a
+    gearbox in
+    order to perform angular resampling*, Mech. Syst. Signal Process. 19 (2005); J. Urbanek, T. Barszcz, J. Antoni, *A
+    two-step procedure for estimation of instantaneous rotational speed with large fluctuations*, ibid. 38 (2013).
+    """
+    for half_width in _HALF_WIDTHS:
+        refined = _refined_once(recording, channels, angle, orders, half_width)
+        if refined is None:
+            return angle
+        angle = refined
+    return angle
+
+
+def _refined_once(
+    recording: Recording, channels: tuple[str, ...], angle: ShaftAngle, orders: tuple[float, ...], half_width: float
+) -> ShaftAngle | None:
+    top_speed = angle.speed_range_rpm[1] / 60.0
+    wanted = [o for o in orders if (o + 1) * top_speed < 0.4 * recording.sampling_rate_hz]
+    if not wanted:
+        return None
+    try:
+        signal = resample_to_angle(recording, angle, channels=channels, highest_order=max(wanted) + 2.0)
+    except RefusalError:
+        return None
+    n_per_rev = signal.samples_per_revolution
+    harmonics = [_demodulate(signal.samples, n_per_rev, o, half_width) for o in wanted]
+    best = sorted((h for h in harmonics if h is not None), key=lambda h: -h.ratio)[:_MOST_HARMONICS]
+    best = [h for h in best if h.ratio > max(_LEAST_RATIO, _LEAST_SHARE * best[0].ratio)]
+    if not best or best[0].baseband.shape[1] < 8:
+        return None
+    shift = _common_shift(best)
+    n = best[0].baseband.shape[1]
+    revolutions = signal.start_revolution + np.arange(n) * (signal.samples.shape[1] / n_per_rev / n)
+    times = _times(angle, revolutions)
+    refined = np.maximum.accumulate(revolutions + shift)
+    return ShaftAngle(angle.shaft, times, refined, monotone_slopes(times, refined), "tachless")
+
+
+def _demodulate(samples: FloatArray, n_per_rev: int, order: float, half_width: float) -> _Harmonic | None:
+    """Shift one order to zero and keep ± half_width around it, sampled accordingly."""
+    from scipy.fft import ifft, rfft
+
+    n_samples = samples.shape[1]
+    per_order = n_samples / n_per_rev  # bins per order
+    reach = int(half_width * per_order)
+    middle = round(order * per_order)
+    n = int(per_order * _PER_WIDTH * half_width)
+    if reach < 4 or middle + reach >= n_samples // 2 or middle <= reach:
+        return None
+    taper = 0.5 + 0.5 * np.cos(np.pi * np.arange(-reach, reach + 1) / (reach + 1))
+    basebands = []
+    for row in samples:
+        lines = rfft(row)[middle - reach : middle + reach + 1]
+        # In units of its own neighbourhood, so that no channel drowns the others.
+        floor = float(np.median(np.abs(lines))) or 1.0
+        spread = np.zeros(max(n, 2 * reach + 1), dtype=complex)
+        spread[np.arange(-reach, reach + 1)] = lines * taper / floor
+        basebands.append(ifft(spread) * len(spread))
+    baseband = np.array(basebands)
+    # The middle is a whole number of bins; the rest of the shift is a slow turn.
+    turn = np.exp(
+        2j * np.pi * (middle / per_order - order) * per_order * np.arange(baseband.shape[1]) / baseband.shape[1]
+    )
+    z = baseband * turn
+    power = np.square(np.abs(z)).sum() / (z.size * (2 * reach + 1))
+    return _Harmonic(order, z, float(power))
+
+
+def _common_shift(harmonics: list[_Harmonic]) -> FloatArray:
+    """Angle by which the shaft runs ahead of the estimate, in revolutions, from all harmonics."""
+    n = harmonics[0].baseband.shape[1]
+    total, weights = np.zeros(n), 0.0
+    for h in harmonics:
+        product = (h.baseband[:, 1:] * np.conj(h.baseband[:, :-1])).sum(axis=0)
+        phase = np.concatenate([[0.0], np.cumsum(np.angle(product))])
+        weight = h.order**2 * h.ratio
+        total += weight * phase / (2 * np.pi * h.order)
+        weights += weight
+    shift = total / weights
+    # The band's own ringing spoils both ends: half a reciprocal width of revolutions.
+    edge = min(n // 4, max(1, int(_PER_WIDTH / 2)))
+    shift[:edge] = shift[edge]
+    shift[n - edge :] = shift[n - edge - 1]
+    centred: FloatArray = shift - shift.mean()
+    return centred
+
+
+def _times(angle: ShaftAngle, revolutions: FloatArray) -> FloatArray:
+    from gearsig.angle._resample import times_at
+
+    out = np.empty(len(revolutions))
+    knots, values, slopes = (
+        np.ascontiguousarray(a, dtype=np.float64) for a in (angle.time_s, angle.revolutions, angle.speed_rev_per_s)
+    )
+    k = min(max(0, int(np.searchsorted(values, revolutions[0])) - 1), len(knots) - 2)
+    times_at(knots, values, slopes, k, float(revolutions[0]), float(revolutions[1] - revolutions[0]), out)
+    return out
+
+
+# --------------------
+# Shaft angle of a changing speed: followed block by block, made exact by phase, weighed over orders.
+# --------------------
+
+
+_BLOCKS = (96, 24, 384)  # per recording
+_ACCELERATION_PER_S = 0.04  # standard deviation of the change of log speed
+_CORRECTION_SPANS = (0.05, 0.02)
+_LARGEST_JUMP = 0.2  # of log speed between blocks; a path that changes to a multiple of the speed jumps further
+_LOST = 4.0  # score by which another speed has to win in a part for the angle to be wrong there
+_CLEAR = 0.9  # quality beyond which no other block length is tried
+
+
+def varying_speed(search: SpeedSearch, start: SpeedCandidate | None) -> SpeedCandidate | None:
+    """Best of the refined angles, from the constant one or from tracking with blocks of several lengths."""
+    candidates: list[SpeedCandidate] = []
+    for angle in _starts(search, start):
+        candidate = _refined(search, angle)
+        if candidate is not None and abs(candidate.decision.speed - 1.0) > 0.02:
+            # Over the true course of speed the comb is sharp at its true scale only: take it from there.
+            candidate = _refined(search, angle.of_shaft(angle.shaft, candidate.decision.speed))
+        if candidate is not None and abs(candidate.decision.speed - 1.0) <= 0.02:
+            candidates.append(candidate)
+            if candidate.decision.quality > _CLEAR:
+                break
+    best = max(candidates, key=_rank, default=None)
+    if best is None or best.decision.quality < LOWEST_QUALITY or search.high < NARROW * search.low:
+        return best
+    # With the scale open, half, double and triple speed are refined as well and have to lose.
+    others = [
+        other
+        for factor in (2.0, 0.5, 3.0, 1.0 / 3.0)
+        if search.low <= factor * best.angle.mean_speed_rpm / 60.0 <= search.high
+        and (other := _refined(search, best.angle.of_shaft(best.angle.shaft, factor))) is not None
+        and abs(other.decision.speed - 1.0) <= 0.02
+    ]
+    return max([best, *others], key=_rank)
+
+
+def _starts(search: SpeedSearch, start: SpeedCandidate | None) -> Iterator[ShaftAngle]:
+    """Yield the constant speed where there is one; unless that is beyond doubt, the courses followed as well."""
+    if start is not None:
+        yield start.angle
+    if start is None or start.decision.quality < _CLEAR:
+        # One block length is enough to contradict a steady speed; without one, all are tried.
+        yield from _rough_angles(search, _BLOCKS if start is None else _BLOCKS[:1])
+
+
+def _rank(candidate: SpeedCandidate) -> tuple[bool, float]:
+    return candidate.decision.quality >= LOWEST_QUALITY, candidate.decision.score
+
+
+def _refined(search: SpeedSearch, angle: ShaftAngle) -> SpeedCandidate | None:
+    refined = refine_by_phase(search.recording, search.channels, angle, _mesh_harmonics(search.comb))
+    decision = _decision_over_angle(search, refined)
+    return None if decision is None else SpeedCandidate(refined, decision)
+
+
+def _mesh_harmonics(comb: CombLines) -> tuple[float, ...]:
+    return tuple(k * m for m in comb.meshes for k in (1, 2, 3))
+
+
+def _rough_angles(search: SpeedSearch, block_counts: tuple[int, ...]) -> Iterator[ShaftAngle]:
+    """Follow the speed with blocks of several lengths, the middle one first: it fits most machines."""
+    rate, n = search.recording.sampling_rate_hz, search.samples.shape[1]
+    for n_blocks in block_counts:
+        n_block = 2 * n // n_blocks
+        low = max(search.low, 2.0 * rate / n_block)  # two turns per block, or its spectrum does not show orders
+        if n_block < 512 or low >= search.high:
+            continue
+        change = _ACCELERATION_PER_S * 0.5 * n_block / rate
+        ridge = track_speed(search.samples, rate, search.comb, low, search.high, TOP * rate, n_block, change)
+        if np.abs(np.diff(np.log(ridge.speed_rev_per_s))).max() > _LARGEST_JUMP:
+            continue
+        angle = _integrated(search, ridge.time_s, ridge.speed_rev_per_s)
+        for span in _CORRECTION_SPANS:
+            angle = _corrected(search, angle, span, n_blocks)
+        yield angle
+
+
+def _corrected(search: SpeedSearch, angle: ShaftAngle, span: float, n_blocks: int) -> ShaftAngle:
+    """Follow what is left of the change of speed over the angle found so far, where the lines are already sharper."""
+    try:
+        signal = resample_to_angle(
+            search.recording, angle, channels=search.channels, highest_order=_highest_order(search, angle)
+        )
+    except RefusalError:
+        return angle
+    n_per_rev, n = float(signal.samples_per_revolution), signal.samples.shape[1]
+    n_block = max(512, 2 * n // n_blocks)
+    if n_block > n // 4:
+        return angle
+    ridge = track_speed(signal.samples, n_per_rev, search.comb, 1 - span, 1 + span, TOP * n_per_rev, n_block, 0.0)
+    # The "time" of this ridge is revolutions over the estimated angle.
+    revolutions = signal.start_revolution + ridge.time_s
+    factor = _smooth(ridge.speed_rev_per_s)
+    fine = np.linspace(angle.start_s, angle.end_s, max(len(angle.time_s), 4 * n_blocks))
+    theta = angle.revolutions_at(fine)
+    factor = np.interp(theta, revolutions, factor)
+    corrected = np.concatenate([[0.0], np.cumsum(0.5 * (factor[1:] + factor[:-1]) * np.diff(theta))])
+    return ShaftAngle(search.shaft, fine, corrected, monotone_slopes(fine, corrected), "tachless")
+
+
+def _smooth(speed: FloatArray) -> FloatArray:
+    """Take out the steps of the speed grid by a short running mean."""
+    from scipy.ndimage import gaussian_filter1d
+
+    smooth: FloatArray = gaussian_filter1d(speed, 1.0, mode="nearest")
+    return smooth
+
+
+def _integrated(search: SpeedSearch, time_s: FloatArray, speed: FloatArray) -> ShaftAngle:
+    """Angle from speeds at the middles of blocks."""
+    smooth = _smooth(speed)
+    t = np.concatenate([[0.0], time_s, [search.recording.duration_s]])
+    v = np.concatenate([[smooth[0]], smooth, [smooth[-1]]])
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))])
+    return ShaftAngle(search.shaft, t, angle, monotone_slopes(t, angle), "tachless")
+
+
+def _decision_over_angle(search: SpeedSearch, angle: ShaftAngle) -> CombDecision | None:
+    """Weigh the comb over the order spectrum, where a right angle makes all its lines sharp."""
+    try:
+        signal = resample_to_angle(
+            search.recording, angle, channels=search.channels, highest_order=_highest_order(search, angle)
+        )
+    except RefusalError:
+        return None
+    mean = angle.mean_speed_rpm / 60.0
+    # The search was at least this wide; a known nominal speed leaves a margin for the runner-up.
+    low = max(search.low / mean, 0.15) if search.high / search.low > NARROW else 0.95
+    high = min(search.high / mean, 6.0) if search.high / search.low > NARROW else 1.05
+    n_per_rev = float(signal.samples_per_revolution)
+    decision = best_decision(signal.samples, n_per_rev, search.comb, min(low, 0.95), max(high, 1.05))
+    return None if decision is None else replace(decision, coverage=_coverage(signal.samples, n_per_rev, search.comb))
+
+
+def _highest_order(search: SpeedSearch, angle: ShaftAngle) -> float:
+    """Twice the comb, so that a speed of twice the true one shows itself; less where the recording has no more."""
+    top = TOP * search.recording.sampling_rate_hz / (angle.speed_range_rpm[1] / 60.0)
+    return min(2.0 * search.comb.highest, top)
+
+
+def _coverage(samples: FloatArray, n_per_rev: float, comb: CombLines) -> float:
+    """Share of the recording, in eighths, in which the comb lies where the angle says and not beside."""
+    n_part = samples.shape[1] // 8
+    if n_part < 4 * n_per_rev or n_part < 512:
+        return 1.0
+    right = 0
+    for part in range(8):
+        evidence = line_evidence(samples[:, part * n_part : (part + 1) * n_part], n_per_rev, n_part, TOP * n_per_rev)
+        scores = score_speeds(evidence, comb, 0.94, 1.06)
+        width = 2.0 * evidence.bin_width / comb.meshes[0]
+        here = np.abs(scores.speeds - 1.0) <= width
+        right += scores.best()[1] - scores.scores[here].max() <= _LOST
+    return right / 8.0
+
+
+_GAIN = 3.0  # a varying angle has to score so much better than the constant one
+
+
+def estimate_shaft_angle(
+    recording: Recording,
+    rig: Rig,
+    *,
+    channels: Sequence[str] | None = None,
+    speed_range_rpm: tuple[float, float] | None = None,
+) -> ShaftAngle:
+    """Estimate the angle of the reference shaft from mesh harmonics, their sidebands and shaft harmonics.
+
+    First at constant speed: the comb of orders is laid over a whitened spectrum at each speed of the range. If its
+    lines are smeared, the speed is followed from block to block. Either angle is then made exact by the phase of the
+    mesh harmonics, and weighed by the comb over the order spectrum: against chance, other speeds, other teeth.
+
+    Parameters
+    ----------
+    recording : Recording
+    rig : Rig
+        At least one mesh order must be known.
+    channels : sequence of str, optional
+        Default: the vibration channels.
+    speed_range_rpm : (float, float), optional
+        Of the reference shaft. Default: the rig's nominal speed with its tolerance, else 30 to 30000 rpm as far as
+        sampling rate and duration allow.
+
+    Returns
+    -------
+    ShaftAngle
+        With quality and uncertainty; angle zero is arbitrary.
+
+    Raises
+    ------
+    RefusalError
+        If no teeth are known, the recording is too short, or no comb stands out: noise, a bearing alone, wrong teeth or
+        sampling rate, or a scale of the speed that stays ambiguous.
+
+    Notes
+    -----
+    Not for friction or belt drives, nor for speeds that change by more than a few per cent within a revolution.
+    """
+    search = search_of(recording, rig, channels, speed_range_rpm)
+    steady = _constant_speed(search)
+    varying = varying_speed(search, steady if _is_sharp(search, steady) else None)
+    candidate = _better(search, steady, varying)
+    if candidate is None or candidate.decision.quality < LOWEST_QUALITY:
+        raise _refusal(search, candidate, rig)
+    usual = _range_without_slips(candidate.angle)
+    if usual is None:
+        return _finished(search, candidate)
+    low, high = 60.0 * search.low, 60.0 * search.high
+    if usual[1] - usual[0] > 0.9 * (high - low):  # the range is narrow already, and the course still jumps
+        raise RefusalError(
+            "the speed that follows from the mesh lines jumps for moments, as no shaft does: the phase slips by cycles",
+            remedy="give a tachometer, or a recording with less noise",
+        )
+    return estimate_shaft_angle(recording, rig, channels=channels, speed_range_rpm=usual)
+
+
+def _range_without_slips(angle: ShaftAngle) -> tuple[float, float] | None:
+    """Return the range of speeds (rpm) to search again if the course leaves its usual range for moments; else None.
+
+    A phase that slips by a cycle shows as a short excursion far beyond the speeds of all other times.
+    """
+    speed = angle.speed_rpm_at(np.linspace(angle.start_s, angle.end_s, 4096))
+    low, middle, high = (float(q) for q in np.quantile(speed, (0.05, 0.5, 0.95)))
+    farthest = float(np.abs(speed - middle).max())
+    if farthest < max(3.0 * (high - low), 0.01 * middle):
+        return None
+    margin = max(high - low, 0.002 * middle)
+    return low - margin, high + margin
+
+
+def _is_sharp(search: SpeedSearch, steady: SpeedCandidate | None) -> bool:
+    """Whether a constant speed was found from lines as narrow as the recording's length allows."""
+    return (
+        steady is not None
+        and steady.decision.quality >= LOWEST_QUALITY
+        and steady.decision.bin_width * search.recording.duration_s < 1.5
+    )
+
+
+def _better(
+    search: SpeedSearch, steady: SpeedCandidate | None, varying: SpeedCandidate | None
+) -> SpeedCandidate | None:
+    """Return the varying angle if it is trustworthy and scores better, else the constant one."""
+    if steady is None:
+        return varying
+    if not _is_sharp(search, steady) and not steady.decision.narrow:
+        # Smeared lines of an unknown speed: half and double speed look much alike.
+        steady = replace(steady, decision=replace(steady.decision, coverage=0.95))
+    sure = steady.decision.quality >= LOWEST_QUALITY
+    if varying is not None and varying.decision.quality >= LOWEST_QUALITY:
+        return varying if not sure or varying.decision.score > steady.decision.score + _GAIN else steady
+    return steady if sure or varying is None else varying
+
+
+def comb_evidence(recording: Recording, rig: Rig, stated_speed_rpm: float) -> str:
+    """Say at which multiple of a stated speed the comb of the gears does lie; empty if nowhere.
+
+    For "sampling rate, speed and teeth disagree": a factor of 2, or of two common sampling rates, names the culprit.
+    """
+    positive(stated_speed_rpm, "stated_speed_rpm", "rpm")
+    stated = stated_speed_rpm / 60.0
+    try:
+        search = search_of(recording, rig, None, (stated_speed_rpm / 8.0, stated_speed_rpm * 8.0))
+    except (RefusalError, InputError):
+        return ""
+    found = _constant_speed(search)
+    if found is None or found.decision.quality < LOWEST_QUALITY:
+        return ""
+    factor = found.decision.speed / stated
+    if abs(factor - 1.0) < 0.002:
+        return ""
+    mesh = search.comb.meshes[0]
+    return (
+        f"Mesh lines with sidebands lie at {mesh * found.decision.speed:.5g} Hz and its multiples, {factor:.4g} times "
+        f"where speed and teeth put them ({found.decision.evidence()}): sampling rate, speed or teeth are wrong."
+    )
+
+
+def _constant_speed(search: SpeedSearch) -> SpeedCandidate | None:
+    """Best comb over the spectrum of the whole recording, or of its parts where the lines are wider."""
+    rate = search.recording.sampling_rate_hz
+    decision = best_decision(search.samples, rate, search.comb, search.low, search.high)
+    if decision is None:
+        return None
+    times = np.array([0.0, search.recording.duration_s])
+    angle = ShaftAngle(search.shaft, times, decision.speed * times, np.repeat(decision.speed, 2), "tachless")
+    return SpeedCandidate(angle, decision)
+
+
+def _finished(search: SpeedSearch, found: SpeedCandidate) -> ShaftAngle:
+    decision, angle = found.decision, found.angle
+    constant = len(angle.time_s) == 2
+    notes = [
+        f"estimated from the vibration of {', '.join(search.channels)}: "
+        + decision.evidence("rev/s" if constant else "times the angle's speed")
+    ]
+    if not constant:
+        notes.append("the speed varies; its course follows the phase of the mesh harmonics")
+    notes.append("the angle's zero is arbitrary")
+    if constant and decision.bin_width * search.recording.duration_s > 1.5:
+        share = 50.0 * decision.bin_width / (search.comb.meshes[0] * decision.speed)
+        notes.append(
+            f"the lines are wider than the recording's length explains: the speed may wander by ± {share:.2g} %"
+        )
+    return replace(
+        angle,
+        shaft=search.shaft,
+        relative_speed_uncertainty=_uncertainty(search, found),
+        quality=decision.quality,
+        notes=tuple(notes),
+    )
+
+
+def _uncertainty(search: SpeedSearch, found: SpeedCandidate) -> float:
+    """A tenth of a bin at the mesh order where its line was sharp, half a bin where it was not."""
+    decision, mesh = found.decision, search.comb.meshes[-1]
+    if len(found.angle.time_s) == 2 and decision.bin_width * search.recording.duration_s > 1.5:
+        return float(0.5 * decision.bin_width / (search.comb.meshes[0] * decision.speed))
+    speed = found.angle.mean_speed_rpm / 60.0
+    return float(0.1 / (search.recording.duration_s * mesh * speed))
+
+
+def _refusal(search: SpeedSearch, best: SpeedCandidate | None, rig: Rig) -> RefusalError:
+    """Explain what was searched and found instead, also outside of the nominal range."""
+    reason = f"no comb of mesh lines stands out between {60 * search.low:.4g} and {60 * search.high:.4g} rpm"
+    if best is not None:
+        reason += f" ({best.decision.evidence()}; quality {best.decision.quality:.2f}, needed {LOWEST_QUALITY})"
+    middle = 30.0 * (search.low + search.high)
+    if search.high / search.low < 4.0:
+        elsewhere = comb_evidence(search.recording, rig, middle)
+        if elsewhere:
+            reason += ". " + elsewhere
+    return RefusalError(
+        reason, remedy="give a tachometer or the speed, check teeth and sampling rate, or record longer under load"
+    )

@@ -1,0 +1,230 @@
+"""Shaft angle over time, and signals sampled over it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray, frozen_array, positive
+from gearsig.errors import InputError, RefusalError
+
+AngleMethod = Literal["constant", "pulses", "encoder", "speed channel", "tachless"]
+
+
+@dataclass(frozen=True)
+class ShaftAngle:
+    """Angle of a shaft against time, as a piecewise cubic through knots.
+
+    Parameters
+    ----------
+    shaft : str
+    time_s : array, (n_knots,)
+        Strictly increasing; at least two.
+    revolutions : array, (n_knots,)
+        Shaft angle in revolutions, not decreasing. A shaft that turns backwards counts up as well.
+    speed_rev_per_s : array, (n_knots,)
+        Slope at the knots, not negative; the cubic (Hermite) through value and slope is the angle between them.
+    method : str
+        How it was found.
+    relative_speed_uncertainty : float
+        One standard deviation of the mean speed over the mean speed, as estimated by the method; nan if not known.
+    quality : float
+        0 to 1: the method's own confidence that this is the true angle and not, e.g., another harmonic.
+    notes : tuple of str
+        What was repaired or assumed on the way (missed pulses, …), for the reader of the report.
+    """
+
+    shaft: str
+    time_s: FloatArray
+    revolutions: FloatArray
+    speed_rev_per_s: FloatArray
+    method: AngleMethod
+    relative_speed_uncertainty: float = float("nan")
+    quality: float = 1.0
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("time_s", "revolutions", "speed_rev_per_s"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        if not len(self.time_s) == len(self.revolutions) == len(self.speed_rev_per_s) >= 2:
+            raise InputError("time_s, revolutions and speed_rev_per_s differ in length or have fewer than two knots")
+        if np.any(np.diff(self.time_s) <= 0):
+            raise InputError("time_s of a shaft angle does not increase")
+        if np.any(np.diff(self.revolutions) < 0):
+            raise InputError("revolutions of a shaft angle decrease")
+
+    @property
+    def start_s(self) -> float:
+        """First time at which the angle is known."""
+        return float(self.time_s[0])
+
+    @property
+    def end_s(self) -> float:
+        """Last time at which the angle is known."""
+        return float(self.time_s[-1])
+
+    @property
+    def n_revolutions(self) -> float:
+        """Revolutions from first to last knot."""
+        return float(self.revolutions[-1] - self.revolutions[0])
+
+    @property
+    def mean_speed_rpm(self) -> float:
+        """Revolutions over time, in rpm."""
+        return 60.0 * self.n_revolutions / (self.end_s - self.start_s)
+
+    @property
+    def speed_range_rpm(self) -> tuple[float, float]:
+        """Lowest and highest speed at the knots."""
+        return 60.0 * float(self.speed_rev_per_s.min()), 60.0 * float(self.speed_rev_per_s.max())
+
+    def revolutions_at(self, time_s: FloatArray) -> FloatArray:
+        """Shaft angle in revolutions at `time_s`; beyond the knots it goes on at the last speed."""
+        return self._evaluate(time_s, 0)
+
+    def speed_rpm_at(self, time_s: FloatArray) -> FloatArray:
+        """Speed in rpm at `time_s`; beyond the knots it stays at the last one."""
+        return 60.0 * self._evaluate(time_s, 1)
+
+    def of_shaft(self, shaft: str, ratio: float) -> ShaftAngle:
+        """Return the angle of another shaft that makes `ratio` revolutions per revolution of this one."""
+        positive(ratio, "ratio")
+        return replace(
+            self, shaft=shaft, revolutions=self.revolutions * ratio, speed_rev_per_s=self.speed_rev_per_s * ratio
+        )
+
+    def between(self, start_s: float, end_s: float) -> ShaftAngle:
+        """Return the part of the angle from `start_s` to `end_s`.
+
+        Raises
+        ------
+        RefusalError
+            If the angle is not known in any part of that time.
+        """
+        start, end = max(start_s, self.start_s), min(end_s, self.end_s)
+        if start >= end:
+            raise RefusalError(
+                f"the shaft angle is known from {self.start_s:.4g} to {self.end_s:.4g} s, the recording lasts from "
+                f"{start_s:.4g} to {end_s:.4g} s",
+                remedy="check that both use the same time axis",
+            )
+        if (start, end) == (self.start_s, self.end_s):
+            return self
+        inside = (self.time_s > start) & (self.time_s < end)
+        time = np.concatenate([[start], self.time_s[inside], [end]])
+        return replace(
+            self,
+            time_s=time,
+            revolutions=np.maximum.accumulate(self._evaluate(time, 0)),
+            speed_rev_per_s=np.maximum(self._evaluate(time, 1), 0.0),
+        )
+
+    def _evaluate(self, time_s: FloatArray, derivative: int) -> FloatArray:
+        from scipy.interpolate import CubicHermiteSpline
+
+        t = np.asarray(time_s, dtype=np.float64)
+        inside = np.clip(t, self.time_s[0], self.time_s[-1])
+        spline = CubicHermiteSpline(self.time_s, self.revolutions, self.speed_rev_per_s)
+        result: FloatArray = spline(inside, derivative)
+        if derivative == 0:
+            ends = np.where(t < inside, self.speed_rev_per_s[0], self.speed_rev_per_s[-1])
+            result = result + (t - inside) * ends
+        return result
+
+
+@dataclass(frozen=True)
+class AngleSignal:
+    """Channels sampled at equal steps of a shaft's angle.
+
+    Parameters
+    ----------
+    samples : array, (n_channels, n_samples)
+    samples_per_revolution : int
+    shaft_angle : ShaftAngle
+        The angle it was resampled with; sample 0 lies at `start_revolution`.
+    start_revolution : float
+    channel_names, units : tuples of str
+    highest_order : float
+        Orders above this one are attenuated by the anti-aliasing filter or were never in the recording.
+    """
+
+    samples: FloatArray
+    samples_per_revolution: int
+    shaft_angle: ShaftAngle
+    start_revolution: float
+    channel_names: tuple[str, ...]
+    units: tuple[str, ...]
+    highest_order: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "samples", frozen_array(self.samples, "samples (channel, angle)", ndim=2))
+
+    @property
+    def n_revolutions(self) -> float:
+        """Length in revolutions."""
+        return float(self.samples.shape[1] / self.samples_per_revolution)
+
+    def values(self, name: str) -> FloatArray:
+        """Samples of one channel, (n_samples,)."""
+        if name not in self.channel_names:
+            raise InputError(f"there is no channel {name!r}", allowed=", ".join(self.channel_names))
+        row: FloatArray = self.samples[self.channel_names.index(name)]
+        return row
+
+
+# --------------------
+# Slopes of an angle known at knots: local polynomials, limited so that the cubic between the knots never decreases.
+# --------------------
+
+
+def monotone_slopes(t: FloatArray, y: FloatArray) -> FloatArray:
+    """Return slopes at the knots of non-decreasing data.
+
+    The slope is that of the quartic through the knot and two neighbours on each side (fewer at the ends and for short
+    data), so polynomials up to degree four, and with them constant acceleration, are exact. Slopes are then limited to
+    three times the smaller adjacent secant, which is sufficient for a monotone Hermite cubic.
+
+    Source: F. N. Fritsch, R. E. Carlson, *Monotone piecewise cubic interpolation*, SIAM J. Numer. Anal. 17 (1980).
+    """
+    n = len(t)
+    secants = np.diff(y) / np.diff(t)
+    if n == 2:
+        return np.repeat(secants, 2)
+    slopes = np.empty(n)
+    width = min(5, n)
+    middle = width // 2
+    inner = np.arange(n - width + 1)
+    slopes[inner + middle] = _lagrange_slope(t, y, inner, width, middle)
+    # At the ends a lower degree: a one-sided quartic would amplify timing errors several times.
+    end = min(4, n)
+    for i in range(middle):
+        slopes[i] = _lagrange_slope(t, y, np.array([0]), end, i)[0]
+    for i in range(n - width + middle + 1, n):
+        slopes[i] = _lagrange_slope(t, y, np.array([n - end]), end, i - (n - end))[0]
+    limit = 3.0 * np.minimum(np.append(secants, secants[-1]), np.insert(secants, 0, secants[0]))
+    return np.clip(slopes, 0.0, limit)
+
+
+def _lagrange_slope(t: FloatArray, y: FloatArray, start: NDArray[np.integer[Any]], width: int, at: int) -> FloatArray:
+    """Slope at node `at` of the polynomial through `width` nodes from each `start`.
+
+    With nodes t_j: p'(t_a) = Σ_{j≠a} (y_j - y_a) · w_j/w_a / (t_a - t_j), w the barycentric weights.
+
+    Source: J.-P. Berrut, L. N. Trefethen, *Barycentric Lagrange interpolation*, SIAM Review 46 (2004), eq. 9.4.
+    """
+    nodes = t[start[:, None] + np.arange(width)]
+    values = y[start[:, None] + np.arange(width)]
+    gaps = nodes[:, :, None] - nodes[:, None, :]
+    gaps[:, np.arange(width), np.arange(width)] = 1.0
+    # Scaling by the span keeps the products away from under- and overflow.
+    span = (nodes[:, -1] - nodes[:, 0])[:, None]
+    weights = 1.0 / np.prod(gaps / span[:, :, None], axis=2)
+    slope = np.zeros(len(nodes))
+    for j in range(width):
+        if j != at:
+            step = (values[:, j] - values[:, at]) / (nodes[:, j] - nodes[:, at])
+            slope -= weights[:, j] / weights[:, at] * step
+    return slope

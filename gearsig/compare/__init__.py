@@ -1,1 +1,0 @@
-"""A simulation beside a recording: aligned in angle, compared by order, band and angle. Names no cause."""

@@ -1,0 +1,49 @@
+"""A simulation beside a recording: aligned in angle, compared by order, band and angle. Names no cause."""
+
+from gearsig.comparison._averages import HalvedLines, frac, tooth_powers, waveform
+from gearsig.comparison._compare import ALIGN, compare_recordings
+from gearsig.comparison._lines import band_powers, order_band_limits, third_octave_limits, third_octaves
+from gearsig.comparison._sides import for_simulation
+from gearsig.comparison._types import (
+    BEYOND,
+    Agreement,
+    BandLevel,
+    ChannelComparison,
+    Comparison,
+    LevelPair,
+    LineLevel,
+    RecordFacts,
+    Repeated,
+    ShaftComparison,
+    power_levels,
+)
+from gearsig.comparison._verdict import LEAST_REPEATED, STEADY, mesh_lines, missing_words
+
+__all__ = [
+    "ALIGN",
+    "BEYOND",
+    "LEAST_REPEATED",
+    "STEADY",
+    "Agreement",
+    "BandLevel",
+    "ChannelComparison",
+    "Comparison",
+    "HalvedLines",
+    "LevelPair",
+    "LineLevel",
+    "RecordFacts",
+    "Repeated",
+    "ShaftComparison",
+    "band_powers",
+    "compare_recordings",
+    "for_simulation",
+    "frac",
+    "mesh_lines",
+    "missing_words",
+    "order_band_limits",
+    "power_levels",
+    "third_octave_limits",
+    "third_octaves",
+    "tooth_powers",
+    "waveform",
+]

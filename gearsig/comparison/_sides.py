@@ -1,0 +1,363 @@
+"""One record made ready: its shafts' angles, its channels over them, and both halves of whole revolutions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gearsig.angle import AngleSignal, ShaftAngle
+from gearsig.checks import FloatArray
+from gearsig.errors import InputError, RefusalError
+from gearsig.orders import first_whole_sample
+from gearsig.recording import SI_FACTORS, Channel, Recording, find_problems
+from gearsig.rig import ConstantSpeed, PulseTimes, Rig, SpeedSource
+
+LEAST_REVOLUTIONS = 8
+"""Of a shaft: four in each half. Fewer leave other shafts' orders in its average, and say nothing of scatter."""
+
+
+@dataclass(frozen=True)
+class ComparedSide:
+    """One record.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of the compared channels only, in the common unit.
+    angle : ShaftAngle
+        Of the reference shaft.
+    signals : mapping
+        Shaft (as in the recording's rig) → its signals of the first and of the second half.
+    marked : frozenset of str
+        Shafts whose angle counts from a mark of their own.
+    """
+
+    recording: Recording
+    angle: ShaftAngle
+    signals: Mapping[str, tuple[AngleSignal, AngleSignal]]
+    marked: frozenset[str]
+
+
+def make_side(
+    recording: Recording,
+    values: FloatArray,
+    channels: Sequence[str],
+    rig: Rig,
+    names: Mapping[str, str],
+    ratios: Mapping[str, float],
+    which: str,
+) -> ComparedSide:
+    """Find the speed of a record and sample its channels over each shaft's angle.
+
+    Parameters
+    ----------
+    recording : Recording
+    values : array, (n_channels, n_samples)
+        Of `channels`, in the unit of the comparison.
+    channels : sequence of str
+    rig : Rig
+        Of this side.
+    names : mapping
+        Shaft as the result calls it → as this rig calls it.
+    ratios : mapping
+        Shaft as the result calls it → its revolutions per revolution of the first one.
+    which : str
+        "simulation" or "recording".
+
+    Raises
+    ------
+    RefusalError
+        If the speed cannot be known, or the reference shaft makes too few turns.
+    """
+    from gearsig.angle import resample_to_angle
+    from gearsig.severity import has_mark
+
+    reference = next(iter(ratios))
+    angle = _angle(recording, rig, names.get(reference, reference), which)
+    rows = [recording.index(name) for name in channels]
+    own = replace(recording, samples=values, channels=tuple(recording.channels[i] for i in rows))
+    signals: dict[str, tuple[AngleSignal, AngleSignal]] = {}
+    for shaft, ratio in ratios.items():
+        turned = replace(angle, shaft=shaft) if ratio == 1.0 else angle.of_shaft(shaft, ratio)
+        if turned.n_revolutions < LEAST_REVOLUTIONS:
+            if shaft != reference:
+                continue
+            raise RefusalError(
+                f"the {which} holds {turned.n_revolutions:.3g} revolutions of shaft {shaft or 'of reference'}, "
+                f"{LEAST_REVOLUTIONS} are needed",
+                remedy="make it longer",
+            )
+        halved = halves(resample_to_angle(own, turned, channels=list(channels)))
+        if halved is not None:
+            signals[shaft] = halved
+    if reference not in signals:
+        raise RefusalError(f"the {which} holds too few whole revolutions", remedy="make it longer")
+    marked = {shaft for shaft in signals if rig.shafts and has_mark(recording, rig, names.get(shaft, shaft))}
+    return ComparedSide(own, angle, signals, frozenset(marked))
+
+
+def halves(signal: AngleSignal) -> tuple[AngleSignal, AngleSignal] | None:
+    """Cut a signal into two halves of equally many whole revolutions; None with fewer than four in each."""
+    per_rev = signal.samples_per_revolution
+    start, revolution = first_whole_sample(signal)
+    n_rev = (signal.samples.shape[1] - start) // per_rev // 2
+    if n_rev < LEAST_REVOLUTIONS // 2:
+        return None
+    middle, end = start + n_rev * per_rev, start + 2 * n_rev * per_rev
+    first = replace(signal, samples=signal.samples[:, start:middle], start_revolution=float(revolution))
+    second = replace(signal, samples=signal.samples[:, middle:end], start_revolution=float(revolution + n_rev))
+    return first, second
+
+
+def time_halves(recording: Recording, row: int) -> tuple[FloatArray, FloatArray]:
+    """Return both halves of a channel's samples, each (n_samples // 2,), without the record's mean."""
+    n = recording.n_samples // 2
+    values = np.asarray(recording.samples[row], dtype=np.float64)
+    values = values - values.mean()
+    return values[:n], values[n : 2 * n]
+
+
+def _angle(recording: Recording, rig: Rig, shaft: str, which: str) -> ShaftAngle:
+    """Return the angle of a shaft of this side's rig, found and checked as `analyze` does."""
+    from gearsig.diagnosis import CannotTell, determine_angle, exact_angle
+
+    found = determine_angle(recording, rig)
+    if isinstance(found, CannotTell):
+        raise RefusalError(f"the speed of the {which} is not known: {found.reason}", remedy=found.remedy)
+    angle = exact_angle(recording, rig, found).between(0.0, recording.duration_s)
+    ratio = rig.ratio(shaft, to=angle.shaft) if shaft and angle.shaft else 1.0
+    if ratio is None:
+        raise RefusalError(
+            f"the speed of shaft {shaft!r} does not follow from the teeth of the {which}'s rig",
+            remedy="complete the tooth counts",
+        )
+    return angle if ratio == 1.0 else angle.of_shaft(shaft, ratio)
+
+
+# --------------------
+# Which channel of the simulation belongs to which of the recording, and in what unit.
+# --------------------
+
+
+@dataclass(frozen=True)
+class ChannelPair:
+    """Two channels that measure the same.
+
+    Parameters
+    ----------
+    simulated, recorded : str
+    quantity : str
+    unit : str
+        The recording's; empty where either is not known.
+    factor : float
+        The simulation's values times this are in `unit`.
+    levels_compare : bool
+        Whether both units are known.
+    """
+
+    simulated: str
+    recorded: str
+    quantity: str
+    unit: str
+    factor: float
+    levels_compare: bool
+
+
+def pair_channels(
+    simulated: Recording, recorded: Recording, channels: Sequence[tuple[str, str]] = ()
+) -> tuple[ChannelPair, ...]:
+    """Return the channels that are compared: those named, else those of equal names, else the only one of each.
+
+    Raises
+    ------
+    InputError
+        If it is not clear which belong together, or two measure different things.
+    """
+    names = dict.fromkeys(channels) if channels else _by_name(simulated, recorded)
+    return tuple(
+        _pair(simulated.channels[simulated.index(own)], recorded.channels[recorded.index(other)])
+        for own, other in names
+    )
+
+
+def _by_name(simulated: Recording, recorded: Recording) -> list[tuple[str, str]]:
+    own, other = simulated.vibration_names(), recorded.vibration_names()
+    for side, names in (("simulation", own), ("recording", other)):
+        if not names:
+            raise InputError(
+                f"the {side} has no vibration channel",
+                allowed="a channel of acceleration, velocity, displacement, sound pressure, force or torque",
+                remedy="state the quantity in the rig file's [[sensor]] tables",
+            )
+    common = [(name, name) for name in other if name in own]
+    if common:
+        return common
+    if len(own) == len(other) == 1:
+        return [(own[0], other[0])]
+    raise InputError(
+        f"no channel names agree: the simulation has {', '.join(own)}; the recording has {', '.join(other)}",
+        remedy=f'say which belong together, e.g. --channel "{own[0]}={other[0]}"',
+    )
+
+
+def _pair(own: Channel, other: Channel) -> ChannelPair:
+    names = f"channels {own.name!r} of the simulation and {other.name!r} of the recording"
+    for channel in (own, other):
+        if not channel.is_vibration:
+            raise InputError(
+                f"channel {channel.name!r} is a {channel.quantity.replace('_', ' ')}", allowed="a vibration channel"
+            )
+    if "unknown" not in (own.quantity, other.quantity) and own.quantity != other.quantity:
+        raise InputError(
+            f"{names} measure different things: {own.quantity.replace('_', ' ')} and "
+            f"{other.quantity.replace('_', ' ')}",
+            allowed="the same quantity",
+            remedy="compare other channels with --channel, or integrate one of them first",
+        )
+    quantity = other.quantity if other.quantity != "unknown" else own.quantity
+    known = bool(own.unit and other.unit)
+    factor = _factor(own.unit, other.unit, quantity) if known else 1.0
+    if factor is None:
+        raise InputError(
+            f"{names} are in {own.unit} and {other.unit}",
+            allowed="the same unit, or two of one quantity",
+            remedy="state unit and scale in the rig file's [[sensor]] tables",
+        )
+    return ChannelPair(own.name, other.name, quantity, other.unit if known else "", factor, known)
+
+
+def _factor(own: str, other: str, quantity: str) -> float | None:
+    if own == other:
+        return 1.0
+    for name in (quantity,) if quantity != "unknown" else tuple(SI_FACTORS):
+        units = SI_FACTORS.get(name, {})
+        if own in units and other in units:
+            return units[own] / units[other]
+    return None
+
+
+def check_live(recording: Recording, channels: Sequence[str], which: str) -> None:
+    """Refuse dead channels: their level is that of nothing.
+
+    Raises
+    ------
+    RefusalError
+    """
+    for problem in find_problems(recording):
+        if problem.kind == "dead" and problem.channel in channels:
+            raise RefusalError(
+                f"channel {problem.channel} of the {which} is dead ({problem.evidence})",
+                remedy="check sensor, cable and input, or name other channels with --channel SIM=RECORDED",
+            )
+
+
+# --------------------
+# The machine that both records are of: the recording's rig, and the names its shafts have in the simulation's.
+# --------------------
+
+
+@dataclass(frozen=True)
+class ComparedRigs:
+    """Both sides' rigs.
+
+    Parameters
+    ----------
+    simulated, recorded : Rig
+        Empty where nothing is known. Orders are counted as in `recorded`.
+    names : dict
+        Of shafts: as in the recording's rig → as in the simulation's.
+    notes : tuple of str
+    """
+
+    simulated: Rig
+    recorded: Rig
+    names: dict[str, str]
+    notes: tuple[str, ...]
+
+
+def common_machine(simulated: Recording, recorded: Recording, rig: Rig | None) -> ComparedRigs:
+    """Return the rigs of both sides after checking that they have the same gears.
+
+    A side without a rig takes the other's gears, but not its sensors and its tachometer: those belong to a measurement.
+    A simulation that states no speed takes the rig's, where that is constant.
+
+    Raises
+    ------
+    InputError
+        If the teeth differ, or the shafts of two rigs cannot be told to be the same.
+    """
+    notes: list[str] = []
+    own = simulated.rig if simulated.rig is not None and simulated.rig.shafts else None
+    other = rig if rig is not None else recorded.rig
+    if other is None or not other.shafts:
+        if own is not None:
+            notes.append("The recording has no rig: its gears are taken to be the simulation's.")
+        other = gears_only(own, recorded.speed_source) if own is not None else (other or Rig())
+    if own is None:
+        own = for_simulation(other, simulated.speed_source)
+    if isinstance(own.speed, ConstantSpeed) and own.speed == other.speed and simulated.speed is None:
+        rpm = f"{own.speed.speed_rpm:g} rpm"
+        notes.append(f"The simulation has no tachometer: it is taken to run at {rpm}, as the rig file says.")
+    return ComparedRigs(own, other, _shaft_names(own, other), tuple(notes))
+
+
+def gears_only(rig: Rig, speed: SpeedSource | None = None) -> Rig:
+    """Return what a rig says of the machine, without its measurement; with another speed source."""
+    if speed is not None and speed.shaft and speed.shaft not in rig.shaft_names:
+        speed = None
+    return replace(rig, sensors=(), speed=speed, sampling_rate_hz=None)
+
+
+def for_simulation(rig: Rig, speed: SpeedSource | None = None) -> Rig:
+    """Return what the recording's rig says of a simulation without a rig of its own."""
+    stated = rig.speed if isinstance(rig.speed, ConstantSpeed) else None
+    return gears_only(rig, speed if speed is not None else stated)
+
+
+def usable_speed(rig: Rig, recording: Recording) -> SpeedSource | None:
+    """Return a rig's speed source if the recording has what it names: a constant speed, or a channel."""
+    source = rig.speed
+    if source is None or isinstance(source, ConstantSpeed):
+        return source
+    if isinstance(source, PulseTimes):
+        return None
+    return source if source.channel in recording.channel_names else None
+
+
+def teeth_on(rig: Rig, shaft: str) -> int | None:
+    """Return the teeth of the first gear on a shaft whose teeth are known."""
+    gears = (pair.teeth(shaft) for pair in rig.pairs if shaft in (pair.driver, pair.driven))
+    return next((teeth for teeth in gears if teeth is not None), None)
+
+
+def _shaft_names(own: Rig, other: Rig) -> dict[str, str]:
+    if not own.pairs or not other.pairs:
+        if set(own.shaft_names) == set(other.shaft_names):
+            return {name: name for name in other.shaft_names}
+        if len(own.shafts) == len(other.shafts) == 1:
+            return {other.shafts[0].name: own.shafts[0].name}
+    if len(own.pairs) != len(other.pairs) or not own.pairs:
+        raise InputError(
+            f"the simulation's rig has {_gears(own)}, the recording's {_gears(other)}",
+            allowed="the same machine on both sides",
+            remedy="give the simulation the recording's rig file",
+        )
+    names: dict[str, str] = {}
+    for mine, theirs in zip(own.pairs, other.pairs, strict=True):
+        for a, b in ((mine.driver_teeth, theirs.driver_teeth), (mine.driven_teeth, theirs.driven_teeth)):
+            if a is not None and b is not None and a != b:
+                raise InputError(
+                    f"the simulation is of other gears: {_gears(own)}, the recording's rig has {_gears(other)}",
+                    allowed="the same teeth, pair by pair",
+                    remedy="simulate with the recording's teeth (--set teeth_driver=…), or correct the rig file",
+                )
+        names[theirs.driver], names[theirs.driven] = mine.driver, mine.driven
+    return names
+
+
+def _gears(rig: Rig) -> str:
+    if not rig.pairs:
+        return f"no gears, shafts {', '.join(rig.shaft_names) or 'none'}"
+    return ", ".join(f"{p.driver_teeth or '?'}/{p.driven_teeth or '?'}" for p in rig.pairs) + " teeth"

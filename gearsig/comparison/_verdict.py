@@ -1,0 +1,277 @@
+"""What a comparison comes to, in a few sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from gearsig.comparison._sides import LEAST_REVOLUTIONS, ComparedSide
+from gearsig.comparison._types import Alignment, ChannelComparison, LineLevel
+
+WITHIN_DB = 3.0
+"""Levels this close are called agreement: a factor of √2."""
+
+LARGE_GAIN_DB = 3.0
+"""A common gain beyond it is named on its own: it is the path's or the sensor's, not the gears'."""
+
+WORTH_NAMING_DB = 40.0
+"""A line that one record lacks is named if it is so close to the other's strongest, or closer."""
+
+LACKING_DB = 6.0
+"""And if the other record's noise would let a line half as large be seen."""
+
+
+LEAST_REPEATED = 0.3
+"""Correlation that two averages could reach, below which they say nothing of each other: their halves differ."""
+
+
+def missing_words(line: LineLevel) -> str:
+    """Say which record lacks a line, or would hide it in its own scatter; empty where both show it.
+
+    The level of a line that is not seen is that of the noise: where that is no lower, the line may well be there.
+    """
+    if line.simulated_is_seen and line.recorded_is_seen:
+        return ""
+    record = "recording" if line.simulated_is_seen else "simulation"
+    return f"hidden by the {record}'s scatter" if _is_hidden(line) else f"not in the {record}"
+
+
+def _is_hidden(line: LineLevel) -> bool:
+    """Whether the record that does not show a line would not show it either if it were there."""
+    difference_db = line.level.difference_db
+    return (difference_db if line.simulated_is_seen else -difference_db) <= LACKING_DB
+
+
+def verdict_of(channels: Sequence[ChannelComparison]) -> str:
+    """Return one sentence per channel on how far the mesh harmonics, or else the shaft orders, are apart."""
+    return " ".join(_head(channel, channels) + _levels_text(channel) for channel in channels)
+
+
+def findings_of(channels: Sequence[ChannelComparison]) -> tuple[str, ...]:
+    """Return sentences on the lines that only one side has, the averages' shapes, and the energy that is locked."""
+    texts = []
+    for channel in channels:
+        if mesh_lines(channel):
+            texts += [_head(channel, channels) + text for text in (*_missing_texts(channel), *_shape_texts(channel))]
+    return tuple(texts)
+
+
+def _head(channel: ChannelComparison, channels: Sequence[ChannelComparison]) -> str:
+    return f"{channel.name}: " if len(channels) > 1 else ""
+
+
+def mesh_lines(channel: ChannelComparison) -> tuple[LineLevel, ...]:
+    """Return the mesh harmonics that the recording shows; the shaft orders where it shows none."""
+    for kind in ("mesh", "shaft"):
+        found = tuple(line for line in channel.lines if line.kind == kind and line.recorded_is_seen)
+        if found:
+            return found
+    return ()
+
+
+def _levels_text(channel: ChannelComparison) -> str:
+    lines = mesh_lines(channel)
+    if not lines:
+        return "No line of the recording stands above its own noise: only the floors can be compared."
+    where = "mesh harmonics" if lines[0].kind == "mesh" else "shaft orders"
+    told = [line for line in lines if line.simulated_is_seen or not _is_hidden(line)]
+    hidden = len(lines) - len(told)
+    if not told:
+        return f"The simulation's own scatter hides all {where} of the recording: they cannot be compared."
+    text = _lines_text(told, where, levels_compare=channel.levels_compare)
+    return f"{text} {hidden} more are hidden by the simulation's own scatter." if hidden else text
+
+
+def _lines_text(lines: Sequence[LineLevel], where: str, *, levels_compare: bool) -> str:
+    differences = np.array([line.level.difference_db for line in lines])
+    gain = float(np.median(differences))
+    n = f"{len(lines)} {where}" if len(lines) > 1 else f"one {where[:-1]}"
+    worst = lines[int(np.argmax(np.abs(differences - (gain if not levels_compare else 0.0))))]
+    if not levels_compare:
+        spread = float(np.max(np.abs(differences - gain)))
+        verb = "agree within" if spread <= WITHIN_DB else "differ by up to"
+        return (
+            f"The unit of one side is not known; after a common gain of {_decibels(-gain)}, simulation and recording "
+            f"{verb} {spread:.1f} dB at {n}{_worst(worst, gain) if spread > WITHIN_DB else ''}."
+        )
+    largest = float(np.max(np.abs(differences)))
+    if not any(line.level.is_beyond for line in lines):
+        return f"At {n}, simulation and recording do not differ by more than the records' own scatter."
+    if largest <= WITHIN_DB:
+        return f"Simulation and recording agree within {largest:.1f} dB at {n}."
+    spread = float(np.max(np.abs(differences - gain)))
+    text = f"Simulation and recording differ by up to {largest:.1f} dB at {n}{_worst(worst, 0.0)}"
+    if len(lines) > 1 and abs(gain) > LARGE_GAIN_DB and spread < largest:
+        text += f"; a common gain of {_decibels(-gain)} would bring them within {spread:.1f} dB"
+    return f"{text}."
+
+
+def _worst(line: LineLevel, gain: float) -> str:
+    off = line.level.difference_db - gain
+    return f", the most at {line.label}: {abs(off):.1f} dB too {'weak' if off < 0 else 'strong'}"
+
+
+def _missing_texts(channel: ChannelComparison) -> list[str]:
+    """Name the strongest lines that only one of the two shows."""
+    texts = []
+    for seen, other, words in (
+        ("recorded_is_seen", "simulated_is_seen", "The simulation lacks"),
+        ("simulated_is_seen", "recorded_is_seen", "Only the simulation has"),
+    ):
+        found = [
+            line
+            for line in (*channel.lines, *channel.other_lines)
+            if getattr(line, seen) and not getattr(line, other) and not _is_hidden(line)
+        ]
+        side = "recorded_db" if seen.startswith("recorded") else "simulated_db"
+        strongest = max(getattr(line.level, side) for line in (*channel.lines, *channel.other_lines))
+        found = [line for line in found if getattr(line.level, side) > strongest - WORTH_NAMING_DB]
+        found.sort(key=lambda line: -float(getattr(line.level, side)))
+        if found:
+            texts.append(f"{words} {', '.join(line.label for line in found[:3])}{_more(len(found) - 3)}.")
+    return texts
+
+
+def _more(n: int) -> str:
+    return f" and {n} more lines" if n > 1 else " and one more line" if n == 1 else ""
+
+
+def _shape_texts(channel: ChannelComparison) -> list[str]:
+    parts, loose = [], []
+    for shaft in channel.shafts:
+        name = f" of {shaft.shaft}" if shaft.shaft else ""
+        if shaft.best_correlation < LEAST_REPEATED:
+            loose.append(name)
+        else:
+            parts.append(f"{_number(shaft.correlation.value)}{name} ({_number(shaft.best_correlation)} is possible)")
+    texts = [f"The synchronous averages correlate by {', '.join(parts)}."] if parts else []
+    if loose:
+        texts.append(
+            f"How alike the synchronous averages{' and'.join(loose)} are cannot be told: in one of the records "
+            "the halves do not repeat each other."
+        )
+    locked = channel.locked
+    return [
+        *texts,
+        (
+            f"{_percent(locked.recorded.value)} of the recording's energy repeats with the shafts' turns, "
+            f"{_percent(locked.simulated.value)} of the simulation's."
+        ),
+    ]
+
+
+def _number(value: float) -> str:
+    return f"{value:.2f}".replace("-", "−")
+
+
+def _decibels(value: float) -> str:
+    return f"{value:+.1f} dB".replace("-", "−")
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"
+
+
+# --------------------
+# What the reader of a comparison should know before believing a figure.
+# --------------------
+
+
+SAME_SPEED, OTHER_SPEED = 0.03, 0.10
+"""Relative differences of speed: not worth a word; and so large that resonances meet other orders."""
+
+STEADY = 0.03
+"""Relative range of speed within one record up to which one average stands for all of it."""
+
+WORTH_SAYING = 0.1
+"""Correlation that a turned mark would gain."""
+
+
+def remarks(
+    own: ComparedSide,
+    other: ComparedSide,
+    alignments: Sequence[Alignment],
+    channels: Sequence[ChannelComparison],
+    ratios: Mapping[str, float],
+) -> tuple[str, ...]:
+    """Return remarks on speeds, shafts left out, alignment and units."""
+    texts = _speed_texts(own, other)
+    left_out = [shaft for shaft in ratios if shaft not in {a.shaft for a in alignments}]
+    if left_out:
+        texts.append(
+            f"Shaft {', '.join(left_out)} makes fewer than {LEAST_REVOLUTIONS} revolutions in one of the records: its "
+            "average and its lines are left out."
+        )
+    told = {s.shaft for channel in channels for s in channel.shafts if s.best_correlation >= LEAST_REPEATED}
+    texts += _alignment_texts([one for one in alignments if one.shaft in told])
+    unknown = [channel.name for channel in channels if not channel.levels_compare]
+    if unknown:
+        texts.append(
+            f"The unit of {', '.join(unknown)} is not known on one side: compare shapes and differences of levels "
+            "between lines, not levels."
+        )
+    return tuple(texts)
+
+
+def _speed_texts(own: ComparedSide, other: ComparedSide) -> list[str]:
+    """Return one text on both speeds: a run-up has no speed of its own that could be compared with another."""
+    if not (_is_steady(own) and _is_steady(other)):
+        unsteady = [name for side, name in ((own, "simulation"), (other, "recording")) if not _is_steady(side)]
+        text = (
+            f"{_speed_words(own, 'The simulation')}, {_speed_words(other, 'the recording')}: levels of the "
+            f"{' and of the '.join(unsteady)} are means over all speeds. At each of them orders meet other resonances, "
+            "and an average need not repeat: parts at one speed compare better."
+        )
+        return [text]
+    simulated, recorded = own.angle.mean_speed_rpm, other.angle.mean_speed_rpm
+    off = simulated / recorded - 1.0
+    if abs(off) > OTHER_SPEED:
+        text = (
+            f"The simulation turns at {simulated:.5g} rpm, the recording at {recorded:.5g} rpm ({100 * off:+.0f} %): "
+            "orders are compared all the same, but each meets other resonances, and forces change with the speed."
+        )
+        return [text]
+    if abs(off) > SAME_SPEED:
+        text = (
+            f"The simulation turns {abs(100 * off):.1f} % {'faster' if off > 0 else 'slower'} than the recording: "
+            "compared by order; levels near resonances differ for that alone."
+        )
+        return [text]
+    return []
+
+
+def _is_steady(side: ComparedSide) -> bool:
+    low, high = side.angle.speed_range_rpm
+    return high - low <= STEADY * side.angle.mean_speed_rpm
+
+
+def _speed_words(side: ComparedSide, name: str) -> str:
+    if _is_steady(side):
+        return f"{name} turns at {side.angle.mean_speed_rpm:.5g} rpm"
+    low, high = side.angle.speed_range_rpm
+    return f"{name} runs between {low:.5g} and {high:.5g} rpm"
+
+
+def _alignment_texts(alignments: Sequence[Alignment]) -> list[str]:
+    texts = []
+    for one in alignments:
+        if one.method == "marks" and one.gain > WORTH_SAYING:
+            turned = f"{one.best_shift_deg:+.4g}°".replace("-", "−")
+            texts.append(
+                f"The averages{_of([one])} are aligned by their marks; with the simulation turned by {turned} they "
+                f"would correlate better by {one.gain:.2f}. A simulation's mark need not sit where the rig's does: "
+                "align by correlation then."
+            )
+    loose = [one for one in alignments if one.method != "marks" and one.tooth_is_certain is False]
+    if loose:
+        texts.append(
+            f"No tooth{_of(loose)} stands out enough to tell which is which: the simulation's average is aligned to a "
+            "whole number of teeth, and differences from tooth to tooth mean nothing."
+        )
+    return texts
+
+
+def _of(alignments: Sequence[Alignment]) -> str:
+    names = [one.shaft for one in alignments if one.shaft]
+    return f" of shaft {' or '.join(names)}" if names else ""

@@ -1,0 +1,289 @@
+"""What was tried to find the number of modes and the penalty, and why one pair is suggested."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsig.checks import FloatArray, count, positive
+from gearsig.decompose._types import SAMPLES_PER_MODE, ModeAxis, Modes, VmdSettings, check_supported, half_gain_distance
+from gearsig.decompose._vmd import variational_modes
+from gearsig.errors import InputError, RefusalError
+from gearsig.spectra import checked_signal
+
+
+@dataclass(frozen=True)
+class ModeTrial:
+    """One number of modes at one penalty.
+
+    Parameters
+    ----------
+    settings : VmdSettings
+        With the start that did better: "uniform", or "peaks" where the uniform one met an objection.
+    centres, bandwidths : tuple of float
+        By rising centre, in Hz or orders.
+    reconstruction_error : float
+        Root mean square of the residual over that of the signal.
+    separation : float
+        Smallest distance of two centres over the distance at which a mode's gain is one half; inf for one mode. Below 1
+        two modes share their lines.
+    widest : float
+        Largest bandwidth over the one that white noise alone would give a mode; 1 is noise, a tone is near 0.
+    smallest_share : float
+        Energy of the weakest mode over the signal's.
+    n_iterations : int
+    converged : bool
+    objection : str
+        Why this trial is not suggested; empty if it could be.
+    """
+
+    settings: VmdSettings
+    centres: tuple[float, ...]
+    bandwidths: tuple[float, ...]
+    reconstruction_error: float
+    separation: float
+    widest: float
+    smallest_share: float
+    n_iterations: int
+    converged: bool
+    objection: str
+
+    @property
+    def n_modes(self) -> int:
+        """Number of modes tried."""
+        return self.settings.n_modes
+
+    @property
+    def penalty(self) -> float:
+        """Penalty tried."""
+        return self.settings.penalty
+
+
+@dataclass(frozen=True)
+class ModeSuggestion:
+    """Settings for a signal, with their reasons and everything that was tried.
+
+    Parameters
+    ----------
+    chosen : ModeTrial
+    trials : tuple of ModeTrial
+        By penalty, then number of modes.
+    reasons : tuple of str
+        One sentence each.
+    axis : str
+        "frequency" or "order".
+    source : str
+    """
+
+    chosen: ModeTrial
+    trials: tuple[ModeTrial, ...]
+    reasons: tuple[str, ...]
+    axis: ModeAxis
+    source: str
+
+    @property
+    def settings(self) -> VmdSettings:
+        """The suggested number of modes, penalty and start."""
+        return self.chosen.settings
+
+    def describe(self) -> str:
+        """Return reasons and table as text; the suggested row is marked."""
+        head = "".join(f"{name:>11}" for name in ("penalty", "modes", "start", "residual %", "separation", "widest"))
+        head += f"{'weakest %':>11}  objection"
+        lines = [f"Suggested for {self.source or 'signal'}:", *self.reasons, "", "  " + head]
+        for t in self.trials:
+            mark = ">" if t is self.chosen else " "
+            lines.append(
+                f"{mark} {t.penalty:>11g}{t.n_modes:>11}{t.settings.start!s:>11}{100 * t.reconstruction_error:>11.2f}"
+                f"{t.separation:>11.2f}{t.widest:>11.2f}{100 * t.smallest_share:>11.2g}  {t.objection or '-'}"
+            )
+        return "\n".join(lines)
+
+
+# --------------------
+# How many modes a signal supports, and at which penalty.
+# --------------------
+
+
+PENALTIES = (500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0)
+USUAL_PENALTY = 2000.0
+NOISE_LIKE = 0.75
+"""Modes wider than this share of white noise's width hold no component that stands out of the noise."""
+NARROWEST_LIMIT = 0.3
+"""With few lines in a mode's reach the width of noise scatters, and the limit goes down to this."""
+GIVE_UP_AFTER = 3
+"""Refused trials in a row at one penalty, after which no larger number of modes is tried there."""
+LEAST_SHARE = 1e-4
+"""Modes with less of the signal's energy hold leftovers of their neighbours."""
+
+
+def suggest_modes(
+    values: FloatArray,
+    sampling_rate: float,
+    *,
+    most_modes: int = 8,
+    penalties: Sequence[float] = PENALTIES,
+    longest: int = 2**14,
+    axis: ModeAxis = "frequency",
+    source: str = "",
+) -> ModeSuggestion:
+    """Return the number of modes and the penalty that separate a signal's components.
+
+    Every number of modes up to `most_modes` is tried at every penalty until three in a row are refused, from uniform
+    starts and, where that does not do, from the spectrum's peaks. A trial is refused where two centres lie closer
+    than the distance at which a mode's gain is one half (the modes share lines), where a mode is as wide as white noise
+    alone would make it, or where a mode is all but empty. Of the others, the one with most modes wins; at equal
+    numbers the penalty nearest to 2000.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+    sampling_rate : float
+        Samples per second, or per revolution where `axis` is "order".
+    most_modes : int
+    penalties : sequence of float
+    longest : int
+        A longer signal is tried on this many samples from its middle.
+    axis, source : str
+
+    Returns
+    -------
+    ModeSuggestion
+
+    Raises
+    ------
+    InputError
+        On NaN, a constant, or too few samples.
+    RefusalError
+        If no trial separates anything: noise, broad-band impulses.
+
+    Notes
+    -----
+    White noise between the neighbours of a mode with gain g(x) = 1/(1 + x²), x in half-gain distances, |x| ≤ R, has the
+    root mean square width √[(atan R - R/(1+R²)) / (atan R + R/(1+R²))] half-gain distances; R is half the mean distance
+    of the modes. A suggestion is a start, not a proof: look at the modes.
+    """
+    x = checked_signal(values, minimum=8)
+    fs = positive(sampling_rate, "sampling_rate")
+    count(most_modes, "most_modes")
+    alphas = sorted({positive(p, "penalties") for p in penalties})
+    if not alphas:
+        raise InputError("penalties is empty", allowed="one or more values above zero")
+    part = _middle(x, count(longest, "longest", minimum=64))
+    check_supported(part, 1)
+    most = min(most_modes, len(part) // SAMPLES_PER_MODE)
+    trials = tuple(trial for penalty in alphas for trial in _trials(part, fs, most, penalty))
+    good = [t for t in trials if not t.objection]
+    if not good:
+        raise RefusalError(
+            f"none of {len(trials)} trials separates a component: {_commonest(trials)}",
+            remedy="choose a frequency band first (its envelope for impulses), or set n_modes and penalty by hand",
+        )
+    chosen = max(good, key=lambda t: (t.n_modes, -abs(np.log(t.penalty / USUAL_PENALTY))))
+    reasons = _reasons(chosen, trials, fs, axis)
+    if len(part) < len(x):
+        reasons = (*reasons, f"Tried on {len(part)} of {len(x)} samples, from the middle.")
+    return ModeSuggestion(chosen, trials, reasons, axis, source)
+
+
+def noise_width(penalty: float, n_modes: int) -> float:
+    """Return the root mean square width of a mode that holds white noise, in half-gain distances (see Notes above)."""
+    reach = 0.25 * np.sqrt(penalty) / n_modes
+    angle, fall = np.arctan(reach), reach / (1.0 + reach * reach)
+    return float(np.sqrt((angle - fall) / (angle + fall)))
+
+
+def noise_limit(penalty: float, n_samples: int) -> float:
+    """Return the share of white noise's width up to which a mode counts as a component.
+
+    The width of noise over M = 2n/√penalty lines scatters by about 1/√M; a mode that was started at the highest of many
+    places is narrower than most by several times that.
+    """
+    n_lines = 2.0 * n_samples / np.sqrt(penalty)
+    return float(np.clip(1.0 - 6.0 / np.sqrt(n_lines), NARROWEST_LIMIT, NOISE_LIKE))
+
+
+def _middle(x: FloatArray, longest: int) -> FloatArray:
+    start = max(0, (len(x) - longest) // 2)
+    return x[start : start + longest]
+
+
+def _trials(x: FloatArray, fs: float, most_modes: int, penalty: float) -> list[ModeTrial]:
+    trials: list[ModeTrial] = []
+    for n_modes in range(1, most_modes + 1):
+        trials.append(_better_trial(x, fs, n_modes, penalty))
+        if len(trials) >= GIVE_UP_AFTER and all(t.objection for t in trials[-GIVE_UP_AFTER:]):
+            break
+    return trials
+
+
+def _better_trial(x: FloatArray, fs: float, n_modes: int, penalty: float) -> ModeTrial:
+    """Return the trial from uniform starts, or from the spectrum's peaks if only that one meets no objection."""
+    uniform = _trial(x, fs, VmdSettings(n_modes, penalty))
+    if not uniform.objection:
+        return uniform
+    peaks = _trial(x, fs, VmdSettings(n_modes, penalty, start="peaks"))
+    return uniform if peaks.objection else peaks
+
+
+def _trial(x: FloatArray, fs: float, settings: VmdSettings) -> ModeTrial:
+    modes = variational_modes(x, fs, settings)
+    order = np.array(modes.by_centre())
+    centres, widths = modes.centres[order], modes.bandwidths[order]
+    half_gain = half_gain_distance(settings.penalty, fs)
+    gaps = np.diff(centres) / half_gain
+    relative = widths / (half_gain * noise_width(settings.penalty, settings.n_modes))
+    shares = modes.rms**2 / np.mean(np.square(x, dtype=np.float64))
+    return ModeTrial(
+        settings=settings,
+        centres=tuple(centres.tolist()),
+        bandwidths=tuple(widths.tolist()),
+        reconstruction_error=modes.reconstruction_error,
+        separation=float(gaps.min(initial=np.inf)),
+        widest=float(relative.max()),
+        smallest_share=float(shares.min()),
+        n_iterations=modes.n_iterations,
+        converged=modes.converged,
+        objection=_objection(modes, gaps, relative, shares),
+    )
+
+
+def _objection(modes: Modes, gaps: FloatArray, relative_widths: FloatArray, shares: FloatArray) -> str:
+    if len(gaps) and gaps.min() < 1.0:
+        return "two modes share the same lines"
+    if shares.min() < LEAST_SHARE:
+        return "a mode is all but empty"
+    if relative_widths.max() > noise_limit(modes.settings.penalty, len(modes.residual)):
+        return "a mode is as wide as noise"
+    return "" if modes.converged else "not converged"
+
+
+def _commonest(trials: Sequence[ModeTrial]) -> str:
+    texts = [t.objection for t in trials]
+    best = max(set(texts), key=texts.count)
+    return f"in {texts.count(best)} of them {best}"
+
+
+def _reasons(chosen: ModeTrial, trials: Sequence[ModeTrial], fs: float, axis: ModeAxis) -> tuple[str, ...]:
+    unit = "Hz" if axis == "frequency" else "orders"
+    same = {t.n_modes: t for t in trials if t.penalty == chosen.penalty}
+    reasons = [
+        f"{chosen.n_modes} mode(s) at penalty {chosen.penalty:g}: all narrower than noise, none shares its lines.",
+        f"The modes leave {100 * chosen.reconstruction_error:.2g} % of the signal's rms in the residual.",
+    ]
+    if chosen.n_modes > 1:
+        reasons.append(
+            f"The closest centres are {chosen.separation * half_gain_distance(chosen.penalty, fs):.4g} {unit} apart, "
+            f"{chosen.separation:.3g} times the distance at which a mode's gain is one half."
+        )
+    following = same.get(chosen.n_modes + 1)
+    if following is None:
+        reasons.append("No larger number was tried: the signal may hold more modes.")
+    else:
+        reasons.append(f"With {following.n_modes} modes {following.objection}.")
+    usual = [t for t in trials if t.penalty == USUAL_PENALTY and t.n_modes == chosen.n_modes]
+    if chosen.penalty != USUAL_PENALTY and usual:
+        reasons.append(f"At the usual penalty of {USUAL_PENALTY:g} {usual[0].objection}.")
+    return tuple(reasons)

@@ -1,0 +1,360 @@
+"""Wavelet denoising of signals of any length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from gearsig.checks import FloatArray, count, frozen_array, one_of, positive
+from gearsig.errors import InputError
+from gearsig.recording import Recording
+from gearsig.spectra import checked_signal
+
+# --------------------
+# Thresholds of wavelet coefficients, and the rules that apply them.
+# --------------------
+
+
+MEDIAN_OF_NORMAL = 0.674489750196081743
+"""Median of the magnitude of a standard normal variable."""
+
+
+def noise_level(d: FloatArray) -> float:
+    """Return the standard deviation of Gaussian noise in which few coefficients hold signal: median|d| / 0.6745.
+
+    Source: D. L. Donoho and I. M. Johnstone, "Ideal spatial adaptation by wavelet shrinkage", 1994.
+    """
+    return float(np.median(np.abs(d))) / MEDIAN_OF_NORMAL
+
+
+def universal(sigma: float, n: int) -> float:
+    """Return σ √(2 ln n), which the largest of n noise values hardly exceeds (same source)."""
+    return float(sigma * np.sqrt(2.0 * np.log(max(n, 2))))
+
+
+def sure(d: FloatArray, sigma: float, n: int) -> float:
+    """Return the threshold of least estimated risk of the soft rule, or the universal one on a sparse level.
+
+    SURE(T) = m - 2 #{|d| ≤ T} + Σ min(|d|, T)² in units of σ, least at one of the |d|. A level counts as sparse if
+    Σ d²/m - 1 ≤ (log₂ m)^(3/2) / √m. `n` is the signal's length.
+
+    Source: D. L. Donoho and I. M. Johnstone, "Adapting to unknown smoothness via wavelet shrinkage", 1995.
+    """
+    if sigma == 0.0:
+        return 0.0
+    m = len(d)
+    square = np.sort(np.square(d / sigma))
+    if m < 2 or square.mean() - 1.0 <= np.log2(m) ** 1.5 / np.sqrt(m):
+        return universal(sigma, n)
+    below = np.arange(1, m + 1)
+    risk = m - 2.0 * below + np.cumsum(square) + (m - below) * square
+    return min(float(sigma * np.sqrt(square[int(np.argmin(risk))])), universal(sigma, n))
+
+
+def bayes(d: FloatArray, sigma: float) -> float:
+    """Return σ²/σ_signal, σ_signal² = mean d² - σ²; inf where there is no signal.
+
+    Source: S. G. Chang, B. Yu and M. Vetterli, "Adaptive wavelet thresholding for image denoising and compression",
+    2000.
+    """
+    signal = float(np.mean(np.square(d))) - sigma**2
+    return float(sigma**2 / np.sqrt(signal)) if signal > 0.0 else float("inf")
+
+
+def apply(d: FloatArray, threshold: float, rule: str) -> FloatArray:
+    """Return thresholded coefficients.
+
+    soft: sign(d) (|d| - T); hard: d; garrote: d - T²/d; each for |d| > T, else 0.
+
+    Source of the garrote: H.-Y. Gao, "Wavelet shrinkage denoising using the non-negative garrote", 1998.
+    """
+    kept = np.abs(d) > threshold
+    if rule == "hard":
+        return np.where(kept, d, 0.0)
+    shrunk = np.zeros_like(d)
+    if rule == "soft":
+        return np.subtract(d, np.copysign(threshold, d), out=shrunk, where=kept)
+    ratio = np.divide(threshold, d, out=shrunk, where=kept)
+    return np.where(kept, d - threshold * ratio, 0.0) if kept.any() else ratio
+
+
+# --------------------
+# A signal with its noise taken out by wavelet thresholds, and what was taken out.
+# --------------------
+
+
+ThresholdName = Literal["universal", "sure", "bayes"]
+RuleName = Literal["soft", "hard", "garrote"]
+NoiseScope = Literal["finest level", "each level"]
+
+
+@dataclass(frozen=True)
+class DenoiseSettings:
+    """How wavelet coefficients are thresholded.
+
+    Parameters
+    ----------
+    threshold : str
+        "universal": σ √(2 ln n), next to no noise is left; "sure": least estimated risk of each level, universal where
+        the level is sparse; "bayes": σ²/σ_signal of each level, keeps most.
+    rule : str
+        "soft": kept coefficients d shrink by the threshold T; "hard": they stay; "garrote": d - T²/d, in between.
+        "sure" and "bayes" are derived for "soft".
+    wavelet : str
+        An orthogonal or biorthogonal wavelet of PyWavelets; "sym8" is smooth and nearly symmetric. For biorthogonal
+        wavelets the noise of the coefficients is only nearly what the thresholds assume.
+    n_levels : int or None
+        None: as many as leave eight filter lengths on the coarsest one, `deepest_level` at most.
+    noise : str
+        Where the noise's standard deviation is estimated: "finest level" (white noise), or "each level" by itself
+        (coloured noise; steady tones that fill a level are then taken for noise).
+    noise_rms : float or None
+        The noise's standard deviation where it is known, in the signal's unit; white. None: estimated.
+    n_shifts : int
+        Cycle spinning: the mean over this many shifts of the signal against the wavelet grid. 1: none. More than
+        2^n_levels shifts repeat.
+
+    Raises
+    ------
+    InputError
+        On a value out of range or a wavelet that has no discrete transform.
+    """
+
+    threshold: ThresholdName = "universal"
+    rule: RuleName = "soft"
+    wavelet: str = "sym8"
+    n_levels: int | None = None
+    noise: NoiseScope = "finest level"
+    noise_rms: float | None = None
+    n_shifts: int = 8
+
+    def __post_init__(self) -> None:
+        import pywt
+
+        one_of(self.threshold, "threshold", get_args(ThresholdName))
+        one_of(self.rule, "rule", get_args(RuleName))
+        one_of(self.noise, "noise", get_args(NoiseScope))
+        one_of(self.wavelet, "wavelet", pywt.wavelist(kind="discrete"))
+        count(self.n_shifts, "n_shifts")
+        if self.n_levels is not None:
+            count(self.n_levels, "n_levels")
+        if self.noise_rms is not None:
+            positive(self.noise_rms, "noise_rms")
+            if self.noise == "each level":
+                raise InputError('noise_rms is given with noise "each level"', remedy="leave one of them out")
+
+
+@dataclass(frozen=True)
+class DenoisedLevel:
+    """What happened on one level of the wavelet transform.
+
+    Parameters
+    ----------
+    level : int
+        1 is the finest.
+    band_hz : (float, float)
+        Sampling rate / 2^(level + 1) to twice that: where the level's coefficients come from, roughly.
+    noise : float
+        Estimated standard deviation of the noise in its coefficients, in the signal's unit.
+    threshold : float
+        In the signal's unit; inf where all coefficients were set to zero. Mean over the shifts, as `noise` and
+        `kept_share`.
+    kept_share : float
+        Share of its coefficients that are not zero afterwards.
+    """
+
+    level: int
+    band_hz: tuple[float, float]
+    noise: float
+    threshold: float
+    kept_share: float
+
+
+@dataclass(frozen=True)
+class Denoised:
+    """A signal without its noise.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+    removed : array, (n_samples,)
+        Signal less `values`: look at it for what should not have gone.
+    sampling_rate_hz : float
+    levels : tuple of DenoisedLevel
+        Finest first. What is coarser than the last one is kept as it is.
+    noise_rms : float
+        Estimated standard deviation of the noise: of the finest level, in the signal's unit.
+    settings : DenoiseSettings
+        With the number of levels used.
+    unit, source : str
+    """
+
+    values: FloatArray
+    removed: FloatArray
+    sampling_rate_hz: float
+    levels: tuple[DenoisedLevel, ...]
+    noise_rms: float
+    settings: DenoiseSettings
+    unit: str
+    source: str
+
+    def __post_init__(self) -> None:
+        for name in ("values", "removed"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+
+    @property
+    def removed_share(self) -> float:
+        """Energy of the removed part over that of the signal without its mean."""
+        signal = self.values + self.removed
+        energy = float(np.sum(np.square(signal - signal.mean())))
+        return float(np.sum(np.square(self.removed))) / energy if energy > 0.0 else 0.0
+
+    def describe(self) -> str:
+        """Return the levels as a table in text."""
+        s, unit = self.settings, self.unit or "1"
+        lines = [
+            f"{self.source or 'signal'}: {s.threshold} thresholds, {s.rule}, {s.wavelet}, {s.n_shifts} shift(s)",
+            f"noise {self.noise_rms:.3g} {unit}; removed {100 * self.removed_share:.3g} % of the energy",
+            f"{'level':>5} {'band (Hz)':>20} {f'noise ({unit})':>16} {f'threshold ({unit})':>18} {'kept %':>8}",
+        ]
+        lines += [
+            f"{v.level:>5} {f'{v.band_hz[0]:.4g} to {v.band_hz[1]:.4g}':>20} {v.noise:>16.3g} {v.threshold:>18.3g} "
+            f"{100 * v.kept_share:>8.2f}"
+            for v in self.levels
+        ]
+        return "\n".join(lines)
+
+
+FILTER_LENGTHS_LEFT = 8
+"""The default stops at the level that has this many filter lengths of coefficients: its noise can still be told."""
+
+
+def denoise(
+    values: FloatArray,
+    sampling_rate_hz: float,
+    settings: DenoiseSettings | None = None,
+    *,
+    unit: str = "",
+    source: str = "",
+) -> Denoised:
+    """Take Gaussian noise out of a signal by thresholding its wavelet coefficients.
+
+    x = s + σ z; the discrete wavelet transform leaves white noise white and gathers transients and smooth parts in few
+    large coefficients. Coefficients below a threshold are set to zero, the others kept or shrunk, and the transform is
+    inverted. With cycle spinning the signal is shifted against the wavelet grid, and the results are averaged.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+        Finite, not constant, at least as long as the wavelet's filter. Any length.
+    sampling_rate_hz : float
+    settings : DenoiseSettings or None
+        None: universal threshold, soft, "sym8", eight shifts.
+    unit, source : str
+
+    Returns
+    -------
+    Denoised
+        Values in the signal's unit, double precision; `values + removed` is the signal.
+
+    Raises
+    ------
+    InputError
+        On NaN, a constant, or a signal too short for the level.
+
+    Notes
+    -----
+    The signal is continued at both ends by its mirror image. Memory is about six times the signal's.
+
+    When not to use it: for steady tones in noise (a spectrum or a synchronous average gathers them far better), and
+    before indicators that measure impulsiveness, which thresholds raise by themselves.
+
+    References
+    ----------
+    D. L. Donoho, "De-noising by soft-thresholding", 1995.
+    R. R. Coifman and D. L. Donoho, "Translation-invariant de-noising", 1995.
+    """
+    x = checked_signal(values, minimum=8).astype(np.float64)
+    fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    settings = _with_levels(settings or DenoiseSettings(), x)
+    n_levels, n_shifts = settings.n_levels or 1, settings.n_shifts
+    found = np.zeros((n_levels, 3))  # noise, threshold, kept share
+    clean = np.zeros_like(x)
+    # A power of two leaves every digit as it is, and keeps squares of very small or large values in range.
+    scale = 2.0 ** np.floor(np.log2(np.abs(x).max()))
+    noise_rms = None if settings.noise_rms is None else settings.noise_rms / scale
+    for shift in range(n_shifts):
+        part, numbers = _denoise_shifted(x / scale, shift, n_levels, noise_rms, settings)
+        clean += part * (scale / n_shifts)
+        found += numbers * (np.array([scale, scale, 1.0]) / n_shifts)
+    levels = tuple(
+        DenoisedLevel(j, (fs / 2 ** (j + 1), fs / 2**j), *(float(v) for v in found[j - 1]))
+        for j in range(1, n_levels + 1)
+    )
+    return Denoised(clean, x - clean, fs, levels, levels[0].noise, settings, unit, source)
+
+
+def denoise_channel(recording: Recording, channel: str, settings: DenoiseSettings | None = None) -> Denoised:
+    """Take the noise out of one channel of a recording; see `denoise`."""
+    return denoise(
+        recording.values(channel),
+        recording.sampling_rate_hz,
+        settings,
+        unit=recording.channels[recording.index(channel)].unit,
+        source=channel,
+    )
+
+
+def deepest_level(n_samples: int, wavelet: str) -> int:
+    """Return the deepest level at which a coefficient still sees the signal more than its continuation; 0 if none."""
+    import pywt
+
+    return int(pywt.dwt_max_level(n_samples, pywt.Wavelet(wavelet).dec_len))
+
+
+def _with_levels(settings: DenoiseSettings, x: FloatArray) -> DenoiseSettings:
+    if float(x.min()) == float(x.max()):
+        raise InputError(
+            f"the signal is constant ({x[0]:g})",
+            where="values",
+            remedy="check the channel: there is no noise to remove",
+        )
+    deepest = deepest_level(len(x), settings.wavelet)
+    if deepest < (settings.n_levels or 1):
+        raise InputError(
+            f"n_levels is {settings.n_levels or 1} for {len(x)} samples and wavelet {settings.wavelet}",
+            allowed=f"1 to {deepest}" if deepest else "a longer signal",
+            remedy="take fewer levels, a shorter wavelet (db2, haar) or a longer signal",
+        )
+    if settings.n_levels is not None:
+        return settings
+    return replace(settings, n_levels=max(1, deepest_level(len(x) // FILTER_LENGTHS_LEFT, settings.wavelet)))
+
+
+def _denoise_shifted(
+    x: FloatArray, shift: int, n_levels: int, noise_rms: float | None, settings: DenoiseSettings
+) -> tuple[FloatArray, FloatArray]:
+    """Denoise with the signal moved by `shift` samples; also return noise, threshold and kept share of each level."""
+    import pywt
+
+    n = len(x)
+    moved = np.pad(x, (shift, 0), mode="symmetric")
+    approximation, *details = pywt.wavedec(moved, settings.wavelet, mode="symmetric", level=n_levels)
+    noise = noise_rms if noise_rms is not None else noise_level(details[-1])
+    numbers = np.empty((n_levels, 3))
+    for i, d in enumerate(details):
+        level = n_levels - i
+        sigma = noise_level(d) if settings.noise == "each level" else noise
+        threshold = _threshold(d, sigma, n, settings.threshold)
+        details[i] = apply(d, threshold, settings.rule)
+        numbers[level - 1] = sigma, threshold, np.count_nonzero(details[i]) / len(d)
+    clean = pywt.waverec([approximation, *details], settings.wavelet, mode="symmetric")
+    return clean[shift : shift + n], numbers
+
+
+def _threshold(d: FloatArray, sigma: float, n: int, name: str) -> float:
+    if name == "universal":
+        return universal(sigma, n)
+    return sure(d, sigma, n) if name == "sure" else bayes(d, sigma)

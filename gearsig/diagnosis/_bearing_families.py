@@ -1,0 +1,420 @@
+"""Families of lines in the envelopes: at the orders of known bearing parts, and at others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import exp, gcd
+from typing import TypeGuard
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray
+from gearsig.diagnosis._lines import Comb, LineExcess, best_comb, comb_at
+from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
+from gearsig.rig import Bearing
+
+# --------------------
+# Whether a family of lines is a part of a slower train of impacts, or no better than families beside it.
+#
+# A train of impacts at a low rate has lines everywhere: a multiple of its rate lies near any order one may look at.
+# --------------------
+
+
+LARGEST_DIVISOR = 30
+LARGEST_NUMERATOR = 3
+"""A family may sit on every third line of a train of which it then has two multiples in three."""
+
+FEWEST_LINES_APART = 6
+"""Trains with lines closer than that are not told from noise."""
+
+SEEN = float(np.log(4.0))
+"""Log ratio of a line that counts as seen (6 dB); a widened line of noise has it once in 18."""
+
+SHARE_SEEN = 0.5
+"""Share of a train's further lines that must be seen; sidebands of a race's family make few of them."""
+
+FEWEST_FURTHER = 3
+N_SIDEBANDS = 3
+COST = 0.4
+"""What a line costs, between noise (0) and the family's own mean (1): a train that adds noise lines loses."""
+
+PLACEBO_DISTANCES = (-0.09, -0.05, 0.05, 0.09)
+PLACEBO_RATIO = 0.9
+"""A family that is a part's own scores clearly higher than the best ones beside it."""
+
+
+def slower_train(excess: LineExcess, comb: Comb, shafts: tuple[float, ...] = ()) -> Comb | None:
+    """Return the train of impacts whose lines a family is a part of, or None if the family stands alone.
+
+    Tried are p/q of the family's fundamental (q to 30, p to 3), over the range of the family's own lines. The best is
+    that of the largest sum of log ratios less a cost per line: a train that is too slow pays for lines of noise, one
+    that is too fast leaves lines to others. It counts if at least half of its lines beside the family's are seen, and
+    beside the sidebands of the family: a race that turns through the load has them a shaft's order apart.
+
+    Parameters
+    ----------
+    excess : LineExcess
+    comb : Comb
+        A family of multiples of one fundamental.
+    shafts : tuple of float
+        Orders of the shafts that may modulate the family.
+
+    Returns
+    -------
+    Comb or None
+        With as many multiples as lie within the range; the p-value is that of the family.
+    """
+    if not comb.positions:
+        return None
+    reach = max(comb.positions) + excess.spectrum.resolution
+    own = _unmasked(excess, comb.fundamental, reach)
+    noise = float(np.median(excess.log_ratio[~excess.masked]))
+    cost = noise + COST * (float(own.mean()) - noise) if len(own) else 0.0
+    best, best_score = None, float(np.sum(own - cost))
+    for fraction in _fractions():
+        fundamental = comb.fundamental * fraction
+        if fundamental < FEWEST_LINES_APART * excess.spectrum.resolution:
+            continue
+        score = float(np.sum(_unmasked(excess, fundamental, reach) - cost))
+        if score > best_score and _is_seen_between(excess, fundamental, comb.fundamental, reach, shafts):
+            best, best_score = fundamental, score
+    if best is None:
+        return None
+    return comb_at(excess, best, np.arange(1, int(reach / best) + 1), comb.p_value)
+
+
+def stands_out_from_neighbours(excess: LineExcess, comb: Comb, slip: float, others: tuple[float, ...]) -> bool:
+    """Whether no family at orders a few percent to either side scores as high as this one.
+
+    Neighbours in which one of the `others`, the orders of further parts, lies are left out: they may be families too.
+    """
+    for distance in PLACEBO_DISTANCES:
+        low, high = (comb.fundamental * (1 + distance + side * slip) for side in (-1, 1))
+        if any(low <= other * (1 + side * slip) <= high for other in others for side in (-1, 0, 1)):
+            continue
+        placebo = best_comb(excess, low, high)
+        if placebo is not None and placebo.score >= PLACEBO_RATIO * comb.score:
+            return False
+    return True
+
+
+def _fractions() -> list[float]:
+    """Return the fractions below one, with a numerator to 3 and a denominator to 30."""
+    return sorted(
+        p / q for q in range(2, LARGEST_DIVISOR + 1) for p in range(1, min(q, LARGEST_NUMERATOR + 1)) if gcd(p, q) == 1
+    )
+
+
+def _unmasked(excess: LineExcess, fundamental: float, reach: float) -> FloatArray:
+    """Return the log ratios of the multiples up to `reach` that are not explained already."""
+    index = _lines_of(excess, np.arange(1, int(reach / fundamental) + 1) * fundamental)
+    ratios: FloatArray = excess.log_ratio[index[~excess.masked[index]]]
+    return ratios
+
+
+def _is_seen_between(
+    excess: LineExcess, fundamental: float, family: float, reach: float, shafts: tuple[float, ...]
+) -> bool:
+    """Whether at least half of the train's lines stand out that are none of the family's and none of its sidebands."""
+    places = np.arange(1, int(reach / fundamental) + 1) * fundamental
+    sidebands = [0.0, *(side * k * shaft for shaft in shafts for k in range(1, N_SIDEBANDS + 1) for side in (-1, 1))]
+    explained = np.any([_is_of_family(excess, places, family, sideband) for sideband in sidebands], axis=0)
+    index = _lines_of(excess, places[~explained])
+    further = excess.log_ratio[index[~excess.masked[index]]]
+    return len(further) >= FEWEST_FURTHER and float(np.mean(further >= SEEN)) >= SHARE_SEEN
+
+
+def _is_of_family(excess: LineExcess, places: FloatArray, family: float, sideband: float) -> NDArray[np.bool_]:
+    """Whether a multiple of the family, shifted by `sideband`, is near and meets the peak at least as well."""
+    others = sideband + np.maximum(np.rint((places - sideband) / family), 0) * family
+    near: NDArray[np.bool_] = np.abs(others - places) < 2 * excess.spectrum.resolution
+    if sideband:
+        height, other_height = (excess.spectrum.values[_clipped_lines(excess, x)] for x in (places, others))
+        near = near & (other_height >= height)
+    return near
+
+
+def _clipped_lines(excess: LineExcess, places: FloatArray) -> NDArray[np.int64]:
+    spectrum = excess.spectrum
+    index = np.rint((places - spectrum.positions[0]) / spectrum.resolution).astype(np.int64)
+    clipped: NDArray[np.int64] = np.clip(index, 0, len(spectrum.values) - 1)
+    return clipped
+
+
+def _lines_of(excess: LineExcess, places: FloatArray) -> NDArray[np.int64]:
+    spectrum = excess.spectrum
+    index = np.rint((places - spectrum.positions[0]) / spectrum.resolution).astype(np.int64)
+    inside: NDArray[np.int64] = index[(index >= 0) & (index < len(excess.log_ratio))]
+    return inside
+
+
+PARTS = {
+    "BPFO": ("outer race", 1.0),
+    "BPFI": ("inner race", 1.0),
+    "BSF": ("rolling element", 2.0),
+    "FTF": ("cage", 1.0),
+}
+"""Part that strikes at each order, and strikes per cycle: a damaged rolling element strikes both races each spin."""
+
+TYPICAL_SLIP = 0.007
+"""Standard deviation of the relative distance from the kinematic order, where parts compete for one family of lines."""
+
+UNCONFIRMED_SLIP = 0.05
+"""Range searched where the speed is stated and nothing confirms it: the slip of a motor comes to the bearing's."""
+
+TYPICAL_UNCONFIRMED_SLIP = 0.02
+
+RARE = 0.3
+"""Prior weight of rolling elements and cages against races, which are damaged far more often."""
+
+SAME_ORDER = 1e-3
+"""Relative distance below which two bearings' orders are the same for any record: slip alone scatters more."""
+
+MINIMUM_LINES = 3
+"""Lines of a family over 6 dB that must be there: two may coincide by chance with the harmonics of something else."""
+
+MOST_TRAINS = 3
+"""Trains of impacts looked for, each hidden before the next search."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One family found, and what it may be.
+
+    `twins` are other bearings whose same part has the very same order: no envelope tells them apart. `share` is the
+    part's, twins included, among all that would show at that order.
+    """
+
+    comb: Comb
+    envelope: BandEnvelope
+    p_value: float
+    bearing: Bearing | None = None
+    name: str = ""
+    expected: float = 0.0
+    rivals: tuple[str, ...] = ()
+    twins: tuple[Bearing, ...] = ()
+    share: float = 1.0
+    in_train: bool = False
+
+    @property
+    def modulation(self) -> float:
+        """Amplitude of the strongest line over the mean envelope."""
+        return self.comb.amplitude / self.envelope.mean if self.envelope.mean > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class Families:
+    """What the envelopes show.
+
+    Parameters
+    ----------
+    named : tuple of Candidate
+        Parts of known bearings, surest first.
+    trains : tuple of Candidate
+        Other periodic impacts; without a bearing, or with the one whose cage turns at their rate.
+    unclear : tuple of Candidate
+        Families at a part's order that are no clearer than those beside them.
+    """
+
+    named: tuple[Candidate, ...] = ()
+    trains: tuple[Candidate, ...] = ()
+    unclear: tuple[Candidate, ...] = ()
+
+
+def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Families:
+    """Return the families of the envelopes, each put down to a part of a bearing only if nothing else explains it.
+
+    A family at a part's order that belongs to a slower train of impacts is the train's; the train is then hidden and
+    the search begins anew, so that a damaged part beside it is found.
+    """
+    trains: list[Candidate] = []
+    for _ in range(MOST_TRAINS):
+        named = _significant(signals, envelopes)
+        train = next((t for c in named if (t := _train_of(signals, c)) is not None), None)
+        if train is None:
+            break
+        trains.append(train)
+        envelopes = [replace(e, excess=e.excess.without_multiples(train.comb.fundamental)) for e in envelopes]
+    named = [c for c in named if _train_of(signals, c) is None]
+    clear = [c for c in named if _stands_out(signals, c)]
+    unclear = [c for c in named if c not in clear]
+    if not clear and not trains:  # combinations with shaft orders make further families, which are no second fault
+        free = best_unnamed(signals, envelopes)
+        if free is not None and free.bearing is not None:
+            return Families((free,), (), tuple(unclear))
+        trains = [] if free is None else [free]
+    return Families(tuple(clear), tuple(trains), tuple(unclear))
+
+
+def without_synchronous(signals: AnalysisSignals, excess: LineExcess) -> LineExcess:
+    """Mask the multiples of every known shaft order: gears and shafts, not bearings."""
+    for order in signals.known_shaft_orders.values():
+        excess = excess.without_multiples(order)
+    return excess
+
+
+def speed_is_only_stated(signals: AnalysisSignals) -> bool:
+    """Whether the speed is a stated one that no line of the signal has confirmed."""
+    return signals.angle is not None and signals.angle.method == "constant" and signals.angle.quality <= 0.5
+
+
+def slip_of(signals: AnalysisSignals) -> float:
+    """Return the relative range in which a part's order is sought."""
+    slip = signals.settings.bearing_slip
+    return max(slip, UNCONFIRMED_SLIP) if speed_is_only_stated(signals) else slip
+
+
+def expected_parts(signals: AnalysisSignals) -> list[tuple[Bearing, str, float]]:
+    """Return every known bearing part with the order at which its damage would strike."""
+    return [
+        (bearing, name, order * ratio * PARTS[name][1])
+        for bearing in signals.rig.bearings
+        if (ratio := signals.rig.ratio(bearing.shaft)) is not None
+        for name, order in bearing.orders().items()
+    ]
+
+
+def best_unnamed(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Candidate | None:
+    """Return the clearest family that is no shaft's. Impacts of bearings come about 1.5 to 14 times per revolution.
+
+    Slower trains show by their multiples in that range. It carries a bearing's name if its fundamental is a low
+    harmonic of a known part: paths may hide the first.
+    """
+    slowest = min(signals.known_shaft_orders.values(), default=1.0)
+    fastest = max(signals.known_shaft_orders.values(), default=1.0)
+    best = clearest_family(envelopes, 1.5 * slowest, 14.0 * fastest)
+    if best is None or best.p_value > signals.settings.false_alarm_probability:
+        return None
+    train = slower_train(best.envelope.excess, best.comb, tuple(signals.known_shaft_orders.values()))
+    if train is not None:
+        return _as_cage(signals, replace(best, comb=train, in_train=True))
+    known = _known_multiple(signals, best)
+    return known if known is not None and _stands_out(signals, known) else best
+
+
+def clearest_family(envelopes: list[BandEnvelope], low: float, high: float) -> Candidate | None:
+    """Return the surest family with a fundamental between `low` and `high`, its p-value over all envelopes."""
+    best: Candidate | None = None
+    for envelope in envelopes:
+        comb = best_comb(envelope.excess, low, high)
+        if _is_better(comb, best):
+            best = Candidate(comb, envelope, comb.p_value)
+    return None if best is None else replace(best, p_value=min(1.0, best.p_value * len(envelopes)))
+
+
+def _significant(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> list[Candidate]:
+    """Return the significant bearing parts, surest first; one that shares its lines with a surer one is left out."""
+    slip = slip_of(signals)
+    expected = expected_parts(signals)
+    found = []
+    for bearing, name, order in expected:
+        best = clearest_family(envelopes, order * (1 - slip), order * (1 + slip))
+        if best is not None and _is_within(best.comb, best.envelope, order, slip):
+            p_value = min(1.0, best.p_value * len(expected))
+            if p_value <= signals.settings.false_alarm_probability:
+                found.append(replace(best, p_value=p_value, bearing=bearing, name=name, expected=order))
+    found.sort(key=lambda c: -_weight(signals, c.name, c.comb.fundamental / c.expected - 1))
+    kept: list[Candidate] = []
+    for candidate in found:
+        if not any(_shares_lines(candidate.comb, other.comb) for other in kept):
+            kept.append(_with_rivals(signals, candidate))
+    return sorted(kept, key=lambda c: c.p_value)
+
+
+def _is_within(comb: Comb, envelope: BandEnvelope, order: float, slip: float) -> bool:
+    """Whether the fundamental is still near the order once it is fitted to the lines."""
+    return abs(comb.fundamental - order) <= slip * order + envelope.excess.spectrum.resolution / 6
+
+
+def _train_of(signals: AnalysisSignals, candidate: Candidate) -> Candidate | None:
+    """Return the train of impacts that a candidate's lines are a part of, if it is one."""
+    train = slower_train(candidate.envelope.excess, candidate.comb, tuple(signals.known_shaft_orders.values()))
+    if train is None or _is_modulated_by_cage(signals, candidate, train):
+        return None
+    free = replace(candidate, comb=train, bearing=None, name="", expected=0.0, rivals=(), share=1.0, in_train=True)
+    return _as_cage(signals, free)
+
+
+def _is_modulated_by_cage(signals: AnalysisSignals, candidate: Candidate, train: Comb) -> bool:
+    """Whether the train is that of the candidate's own cage, and weak beside the candidate's lines.
+
+    An outer race is struck by each element in turn: where they differ, lines stand the cage's order apart, between
+    its harmonics.
+    """
+    if candidate.bearing is None or candidate.name != "BPFO":
+        return False
+    cage = next(
+        (o for b, name, o in expected_parts(signals) if b is candidate.bearing and name == "FTF"), candidate.expected
+    )
+    if abs(train.fundamental / cage - 1) > slip_of(signals):
+        return False
+    own = sorted(candidate.comb.ratios_db)[-MINIMUM_LINES]
+    between = [
+        ratio
+        for position, ratio in zip(train.positions, train.ratios_db, strict=True)
+        if abs(position / candidate.comb.fundamental - round(position / candidate.comb.fundamental)) > 0.02
+    ]
+    return len(between) < MINIMUM_LINES or own >= sorted(between)[-MINIMUM_LINES] + 6.0
+
+
+def _as_cage(signals: AnalysisSignals, train: Candidate) -> Candidate:
+    """Return the train with the cage's name, if it is one that turns at the train's rate."""
+    for bearing, name, order in expected_parts(signals):
+        if name == "FTF" and abs(train.comb.fundamental / order - 1) <= signals.settings.bearing_slip:
+            return _with_rivals(signals, replace(train, bearing=bearing, name=name, expected=order))
+    return train
+
+
+def _stands_out(signals: AnalysisSignals, candidate: Candidate) -> bool:
+    others = tuple(order for _, _, order in expected_parts(signals) if order != candidate.expected)
+    slip = signals.settings.bearing_slip
+    return stands_out_from_neighbours(candidate.envelope.excess, candidate.comb, slip, others)
+
+
+def _weight(signals: AnalysisSignals, name: str, slip: float) -> float:
+    """Return how likely a part is, by how far from its kinematic order the lines are."""
+    typical = TYPICAL_UNCONFIRMED_SLIP if speed_is_only_stated(signals) else TYPICAL_SLIP
+    return exp(-0.5 * (slip / typical) ** 2) * (RARE if name in ("BSF", "FTF") else 1.0)
+
+
+def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
+    """Note the other parts whose order is so near, or half or twice, that slip alone could make it this one."""
+    own = _weight(signals, candidate.name, candidate.comb.fundamental / candidate.expected - 1)
+    parts = expected_parts(signals)
+    order_of_part = next(o for b, name, o in parts if (b, name) == (candidate.bearing, candidate.name))
+    others, rivals, twins = 0.0, [], []
+    for bearing, name, order in parts:
+        if (bearing, name) == (candidate.bearing, candidate.name):
+            continue
+        if name == candidate.name and abs(order / order_of_part - 1) < SAME_ORDER:
+            twins.append(bearing)
+            continue
+        slip = min((candidate.comb.fundamental / (order * m) - 1 for m in (0.5, 1.0, 2.0)), key=abs)
+        if abs(slip) <= slip_of(signals):
+            others += _weight(signals, name, slip)
+            rivals.append(f"{PARTS[name][0]} of {bearing.name}")
+    return replace(candidate, rivals=tuple(rivals), twins=tuple(twins), share=own / (own + others))
+
+
+def _known_multiple(signals: AnalysisSignals, candidate: Candidate) -> Candidate | None:
+    """Return the candidate named, if its fundamental is a low harmonic of a known part: paths may hide the first."""
+    for bearing, name, order in expected_parts(signals):
+        for m in (1, 2, 3):
+            if abs(candidate.comb.fundamental / (m * order) - 1) <= signals.settings.bearing_slip:
+                named = replace(candidate, bearing=bearing, name=name, expected=m * order)
+                return _with_rivals(signals, named)
+    return None
+
+
+def _is_better(comb: Comb | None, best: Candidate | None) -> TypeGuard[Comb]:
+    """Whether a family has lines enough and is surer than the best so far."""
+    if comb is None or len(comb.positions) < MINIMUM_LINES:
+        return False
+    return best is None or (comb.p_value, -comb.score) < (best.p_value, -best.comb.score)
+
+
+def _shares_lines(comb: Comb, surer: Comb) -> bool:
+    """Whether most lines of a family are those of a surer one."""
+    shared = [p for p in comb.positions if any(abs(p / q - 1) < 0.005 for q in surer.positions)]
+    return len(shared) >= len(comb.positions) / 2

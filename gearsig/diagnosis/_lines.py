@@ -1,0 +1,382 @@
+"""Families of equally spaced lines in a spectrum, and whether noise could have made them.
+
+The score of a fundamental is the sum, over its harmonics, of the logarithm of line power over local floor, each cut at
+a limit so that one huge line cannot make a family. Its null distribution is not assumed: the terms are drawn from the
+spectrum's own lines, and the distribution of their sum is their convolution.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray
+from gearsig.spectra import Spectrum
+
+LOG_RATIO_LIMIT = 6.0
+"""Natural log of power over floor at which a harmonic counts in full: 26 dB, far above what noise reaches."""
+
+CLEAR_LINE_DB = 6.0
+"""A line that counts as seen: noise exceeds it in 2 % of the lines, so that only several together say anything."""
+
+FOOT_LINES = 3
+"""Lines that one tone reaches to either side: two by the Hann window, and one by the widening of the log ratios."""
+
+N_FITS = 4
+"""Passes of fitting the fundamental to the peaks and looking for the peaks again."""
+
+CHUNK = 1 << 17
+"""Fundamentals tried at a time: long records with wide ranges have millions of them."""
+
+_STEP = 0.05
+"""Width of the cells in which the distribution of the terms is kept."""
+
+
+@dataclass(frozen=True)
+class LineExcess:
+    """How far each line of a spectrum stands above its floor.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Amplitudes.
+    floor : array, (n_lines,)
+        Amplitude of the floor (root of the mean noise power) at each line.
+    log_ratio : array, (n_lines,)
+        ln(power/floor power) of the largest of the line and its two neighbours, 0 to `LOG_RATIO_LIMIT`.
+    masked : array of bool, (n_lines,)
+        Lines that are explained already; their `log_ratio` counts as 0.
+    """
+
+    spectrum: Spectrum
+    floor: FloatArray
+    log_ratio: FloatArray
+    masked: NDArray[np.bool_]
+
+    def without_multiples(
+        self, fundamental: float, *, half_width: float = 0.0, start: float = 0.0, skirt: float = 0.0
+    ) -> LineExcess:
+        """Return the same with the lines around start ± k·fundamental masked.
+
+        At least a line's own foot is masked; `half_width` makes it more, in the axis' unit, and `skirt` in proportion
+        to the position, for lines that smear as the speed wanders.
+        Where the multiples lie so close that most lines would go, nothing is masked: then they cannot be told apart.
+        """
+        reach = max(half_width, FOOT_LINES * self.spectrum.resolution)
+        if fundamental < 4 * reach:
+            return self
+        positions = self.spectrum.positions
+        offset = (positions - start) / fundamental
+        near = np.abs(offset - np.rint(offset)) * fundamental <= np.maximum(reach, skirt * positions)
+        return replace(self, masked=self.masked | near)
+
+    def scores(self) -> FloatArray:
+        """Log ratios with the masked lines at 0."""
+        return np.where(self.masked, 0.0, self.log_ratio)
+
+
+@dataclass(frozen=True)
+class Comb:
+    """The best family of lines in a range of fundamentals.
+
+    Parameters
+    ----------
+    fundamental : float
+        In the axis' unit of the spectrum.
+    score : float
+    p_value : float
+        Probability that the best of all fundamentals tried scores as high where there is no family.
+    positions : tuple of float
+        Harmonics whose line stands at least 6 dB above the floor.
+    ratios_db : tuple of float
+        Their power over the floor.
+    amplitude, floor : float
+        Of the strongest of them.
+    """
+
+    fundamental: float
+    score: float
+    p_value: float
+    positions: tuple[float, ...]
+    ratios_db: tuple[float, ...]
+    amplitude: float
+    floor: float
+
+
+def over_floor_db(amplitude: float, floor: float) -> float:
+    """Return 20 lg(amplitude/floor), of vanishing amplitudes and floors too."""
+    return 20 * float(np.log10(max(amplitude, 1e-300) / max(floor, 1e-300)))
+
+
+def line_excess(spectrum: Spectrum, floor: FloatArray) -> LineExcess:
+    """Return the excess of each line of an amplitude spectrum over its floor."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        log_ratio = 2.0 * np.log(spectrum.values / floor)
+    log_ratio = np.clip(np.nan_to_num(log_ratio, nan=0.0, posinf=LOG_RATIO_LIMIT, neginf=0.0), 0.0, LOG_RATIO_LIMIT)
+    padded = np.pad(log_ratio, 1)
+    widened = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:])
+    return LineExcess(spectrum, np.asarray(floor), widened, np.zeros(len(widened), dtype=np.bool_))
+
+
+def best_comb(
+    excess: LineExcess,
+    low: float,
+    high: float,
+    offsets: NDArray[np.int_] | None = None,
+    centres: FloatArray | None = None,
+) -> Comb | None:
+    """Find the fundamental between `low` and `high` whose family of lines stands out most.
+
+    Parameters
+    ----------
+    excess : LineExcess
+    low, high : float
+        Range of fundamentals, in the axis' unit.
+    offsets : array of int or None
+        Multiples of the fundamental that make the family; default 1 to 6.
+    centres : array or None
+        Positions that the multiples are counted from (mesh harmonics, for sidebands); default 0.
+
+    Returns
+    -------
+    Comb or None
+        None where the range holds no fundamental that the spectrum can resolve.
+    """
+    multiples = np.arange(1, 7) if offsets is None else np.asarray(offsets)
+    starts = np.zeros(1) if centres is None else np.asarray(centres, dtype=np.float64)
+    resolution = excess.spectrum.resolution
+    low = max(low, 3 * resolution)
+    high = min(high, _widest(excess.spectrum, starts, multiples))
+    if high <= low or len(excess.log_ratio) < 16:
+        return None
+    # A step of a third of a line at the highest multiple: no family falls between two candidates.
+    step = resolution / (3 * float(np.abs(multiples).max()))
+    n_candidates = int((high - low) / step) + 2
+    origins, factors = np.repeat(starts, len(multiples)), np.tile(multiples, len(starts))
+    candidates, totals, n_terms = _highest(excess, origins, factors, low, step, n_candidates)
+    if n_terms == 0:
+        return None
+    best = _sharpest(excess, origins, factors, candidates)
+    score = float(totals[best])
+    single = tail_probability(excess, n_terms, score)
+    p_value = float(-np.expm1(independent_trials(n_candidates) * np.log1p(-min(single, 1 - 1e-12))))
+    return _described(excess, origins, factors, candidates[best], score, p_value)
+
+
+def comb_at(excess: LineExcess, fundamental: float, multiples: NDArray[np.int_], p_value: float) -> Comb:
+    """Return the family of the given multiples of a fundamental that was found by other means."""
+    fitted = _described(excess, np.zeros(len(multiples)), multiples, fundamental, 0.0, p_value)
+    scores = excess.scores()
+    index = np.rint((multiples * fitted.fundamental - excess.spectrum.positions[0]) / excess.spectrum.resolution)
+    index = index[(index >= 0) & (index < len(scores))].astype(np.int64)
+    return replace(fitted, score=float(scores[index].sum()))
+
+
+def independent_trials(n_candidates: int) -> int:
+    """Return how many of the fundamentals tried are independent: three fall on one line of the highest multiple."""
+    return max(1, n_candidates // 3)
+
+
+def score_needed(excess: LineExcess, n_terms: int, low: float, high: float, probability: float) -> float:
+    """Return the score that the best family between `low` and `high` reaches by chance with `probability` only.
+
+    Infinite if even lines that all count in full would be likelier than that.
+    """
+    n_candidates = int((high - low) * 3 * n_terms / excess.spectrum.resolution) + 2
+    tail = np.cumsum(_sum_density(excess, n_terms)[::-1])[::-1]
+    allowed = np.flatnonzero(tail <= probability / independent_trials(n_candidates))
+    score = float(allowed[0]) * _STEP + n_terms * _STEP / 2 if len(allowed) else np.inf
+    return score if score <= n_terms * LOG_RATIO_LIMIT else np.inf
+
+
+def _widest(spectrum: Spectrum, starts: FloatArray, multiples: NDArray[np.int_]) -> float:
+    """Return the largest fundamental that has any of its multiples within the axis."""
+    room = np.where(multiples > 0, spectrum.positions[-1] - starts[:, None], starts[:, None])
+    return float(np.max(room / np.abs(multiples)))
+
+
+def _highest(
+    excess: LineExcess, origins: FloatArray, factors: NDArray[np.int_], low: float, step: float, n_candidates: int
+) -> tuple[FloatArray, FloatArray, int]:
+    """Return the fundamentals whose score is as good as the highest, their scores, and the lines that were summed.
+
+    Scores are cut and widened by a line, so that strong families score the same over several candidates.
+    """
+    scores, resolution = excess.scores(), excess.spectrum.resolution
+    inside_once = np.zeros(len(factors), dtype=np.bool_)
+    kept: list[FloatArray] = []
+    highest = -np.inf
+    for begin in range(0, n_candidates, CHUNK):
+        candidates = low + step * np.arange(begin, min(begin + CHUNK, n_candidates))
+        total = np.zeros(len(candidates))
+        for i, (origin, factor) in enumerate(zip(origins, factors, strict=True)):
+            index = np.rint((origin + factor * candidates - excess.spectrum.positions[0]) / resolution).astype(np.int64)
+            inside = (index >= 0) & (index < len(scores))
+            inside_once[i] |= bool(inside.any())
+            total += np.where(inside, scores[np.clip(index, 0, len(scores) - 1)], 0.0)
+        highest = max(highest, float(total.max()))
+        among = np.flatnonzero(total >= highest - 0.5)[:CHUNK]
+        kept.append(np.stack([candidates[among], total[among]]))
+    found = np.concatenate([part[:, part[1] >= highest - 0.5] for part in kept], axis=1)[:, :CHUNK]
+    return found[0], found[1], int(inside_once.sum())
+
+
+def _sharpest(excess: LineExcess, origins: FloatArray, factors: NDArray[np.int_], candidates: FloatArray) -> int:
+    """Return the candidate whose harmonics meet the peaks best."""
+    spectrum = excess.spectrum
+    heights = np.zeros(len(candidates))
+    for origin, factor in zip(origins, factors, strict=True):
+        index = np.rint((origin + factor * candidates - spectrum.positions[0]) / spectrum.resolution).astype(np.int64)
+        index = np.clip(index, 0, len(spectrum.values) - 1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            height = np.log(spectrum.values[index] / excess.floor[index])
+        height = np.nan_to_num(height, nan=0.0, posinf=40.0, neginf=0.0)
+        heights += np.where(excess.masked[index], 0.0, height)
+    return int(np.argmax(heights))
+
+
+def tail_probability(excess: LineExcess, n_terms: int, score: float) -> float:
+    """Return P(sum of n_terms independent draws from the unmasked lines >= score)."""
+    # Draws were floored to their cell, so the sum may lie half a cell per term higher than its cell says.
+    threshold = int(np.floor((score - n_terms * _STEP / 2) / _STEP))
+    return float(np.clip(_sum_density(excess, n_terms)[max(threshold, 0) :].sum(), 0.0, 1.0))
+
+
+def _sum_density(excess: LineExcess, n_terms: int) -> FloatArray:
+    """Return the distribution of a sum of independent draws from the unmasked lines, by convolving their histogram."""
+    n_cells = int(np.ceil(LOG_RATIO_LIMIT / _STEP)) + 1
+    terms = excess.log_ratio[~excess.masked]
+    cells = np.bincount(np.floor(terms / _STEP).astype(np.int64), minlength=n_cells).astype(np.float64)
+    density: FloatArray = (cells + 1e-9) / (cells.sum() + 1e-9 * n_cells)
+    total = density
+    for _ in range(n_terms - 1):
+        total = np.convolve(total, density)
+    return total
+
+
+def _described(
+    excess: LineExcess,
+    origins: FloatArray,
+    multiples: NDArray[np.int_],
+    fundamental: float,
+    score: float,
+    p_value: float,
+) -> Comb:
+    """Fit the fundamental to the peaks, and gather the family's lines."""
+    fitted = float(fundamental)
+    for _ in range(N_FITS):
+        found = _lines_near(excess, origins, multiples, fitted)
+        # Least squares of position - origin = multiple · fundamental, clearer lines counting more.
+        weights = sum(line.weight * line.multiple**2 for line in found)
+        if not weights:
+            break
+        fitted = sum(line.weight * line.multiple * line.distance for line in found) / weights
+    strongest = max(found, key=lambda line: line.ratio_db, default=None)
+    return Comb(
+        fitted,
+        score,
+        p_value,
+        tuple(line.position for line in found),
+        tuple(line.ratio_db for line in found),
+        strongest.amplitude if strongest else 0.0,
+        strongest.floor if strongest else 0.0,
+    )
+
+
+@dataclass(frozen=True)
+class _Line:
+    position: float
+    distance: float
+    multiple: int
+    amplitude: float
+    floor: float
+    ratio_db: float
+
+    @property
+    def weight(self) -> float:
+        """Power over the floor, which the variance of a line's position falls with; cut at 30 dB."""
+        return float(10 ** (min(self.ratio_db, 30.0) / 10))
+
+
+def _lines_near(
+    excess: LineExcess, origins: FloatArray, multiples: NDArray[np.int_], fundamental: float
+) -> list[_Line]:
+    """Return the family's lines that stand clearly above the floor; two lines off is still the same peak."""
+    spectrum = excess.spectrum
+    found = []
+    for origin, multiple in zip(origins, multiples, strict=True):
+        place = float(origin + multiple * fundamental)
+        if not 0 < place <= spectrum.positions[-1]:
+            continue
+        position, amplitude = spectrum.largest_near(place, 2 * spectrum.resolution)
+        i = spectrum.index_of(position)
+        floor = float(excess.floor[i])
+        ratio = over_floor_db(amplitude, floor)
+        if ratio >= CLEAR_LINE_DB and not excess.masked[i]:
+            position = _peak_position(spectrum, i)
+            found.append(_Line(position, position - float(origin), int(multiple), amplitude, floor, ratio))
+    return found
+
+
+def _peak_position(spectrum: Spectrum, i: int) -> float:
+    """Return the vertex of the parabola through the logarithms of a line and its neighbours."""
+    if not 0 < i < len(spectrum.values) - 1:
+        return float(spectrum.positions[i])
+    a, b, c = np.log(np.maximum(spectrum.values[i - 1 : i + 2], 1e-300))
+    curvature = a - 2 * b + c
+    offset = 0.5 * (a - c) / curvature if curvature < 0 else 0.0
+    return float(spectrum.positions[i] + np.clip(offset, -0.5, 0.5) * spectrum.resolution)
+
+
+# --------------------
+# Whether a line stands out of what lies right beside it: the foot of a strong line is above the floor, and no line.
+# --------------------
+
+
+INNER_LINES = 3
+"""Nearer lines belong to the line itself: two by the Hann window, one because it may lie between two."""
+
+OUTER_LINES = 12
+FEWEST_LINES = 6
+"""Of fewer lines the median says too little."""
+
+RUN_UP_FOOT_ORDERS = 0.1
+"""Width of a line's foot over a run-up, where its level changes from resonance to resonance."""
+
+
+def level_beside(spectrum: Spectrum, position: float, outer_lines: float = OUTER_LINES) -> float | None:
+    """Return the amplitude (root of the mean power) of what lies beside a line, None if that is too few lines.
+
+    The mean is taken from the median, P = median/ln 2 for lines of noise: then a neighbouring line does not raise it.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Amplitudes.
+    position : float
+    outer_lines : float
+        How far the surroundings reach, in lines.
+    """
+    i, n = spectrum.index_of(position), len(spectrum.values)
+    reach = int(min(outer_lines, OUTER_LINES))
+    below = spectrum.values[max(i - reach, 0) : max(i - INNER_LINES + 1, 0)]
+    above = spectrum.values[min(i + INNER_LINES, n) : min(i + reach + 1, n)]
+    beside = np.concatenate([below, above])
+    if len(beside) < FEWEST_LINES:
+        return None
+    return float(np.sqrt(np.sort(beside**2)[len(beside) // 2] / log(2)))
+
+
+def levels_beside(spectrum: Spectrum) -> FloatArray:
+    """Return `level_beside` at every line; the ends are mirrored."""
+    from scipy.ndimage import median_filter
+
+    footprint = np.ones(2 * OUTER_LINES + 1, dtype=np.bool_)
+    footprint[OUTER_LINES - INNER_LINES + 1 : OUTER_LINES + INNER_LINES] = False
+    power = np.asarray(spectrum.values, dtype=np.float64) ** 2
+    # As a single row: in one dimension SciPy's filter takes the whole width, holes of the footprint included.
+    medians = median_filter(power[None, :], footprint=footprint[None, :], mode="reflect")[0]
+    return np.asarray(np.sqrt(medians / log(2)))

@@ -1,0 +1,197 @@
+"""A recording beside that of the sound machine: indicators and findings, then and now."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from math import isfinite, log10
+from pathlib import Path
+
+from gearsig.diagnosis._types import Analysis, Finding, Kind, Where
+from gearsig.errors import InputError
+from gearsig.indicators import Indicator
+from gearsig.rig import Rig
+
+SAME_ORDER = 0.02
+"""Relative: a bearing's slip differs from day to day."""
+
+_CLAIMS = (Kind.FAULT, Kind.SUSPICION)
+
+
+@dataclass(frozen=True)
+class IndicatorChange:
+    """An indicator's value in the reference, and how far it has moved.
+
+    Parameters
+    ----------
+    reference_value : float
+    change_db : float or None
+        20 lg(value/reference), or the difference of levels that are in dB already; None where a ratio has no meaning.
+    """
+
+    reference_value: float
+    change_db: float | None
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """A finding's counterpart in the reference.
+
+    Parameters
+    ----------
+    finding : Finding
+    is_comparable : bool
+        Whether both rest on the same channel and band.
+    change_db : float or None
+        Since then; None where levels do not compare.
+    """
+
+    finding: Finding
+    is_comparable: bool
+    change_db: float | None
+
+
+def rig_of_reference(path: str | Path, rig: Rig | None) -> Rig | None:
+    """Return the recording's rig for its reference, with the torque that the rig file beside the reference states.
+
+    Raises
+    ------
+    InputError
+        If that rig file has gears with other teeth.
+    """
+    from gearsig.rig import read_rig, rig_file_beside
+
+    beside = rig_file_beside(path)
+    own = read_rig(beside) if beside is not None else None
+    if own is None or rig is None or not own.pairs:
+        return rig
+    teeth, others = (", ".join(f"{p.driver_teeth}/{p.driven_teeth}" for p in r.pairs) for r in (rig, own))
+    if teeth != others:
+        raise InputError(
+            f"the reference is of another machine: its rig file says teeth {others}, the recording's {teeth}",
+            where=Path(path).name,
+            remedy="give a recording of the same machine when it was sound",
+        )
+    point, then = rig.operating_point, own.operating_point
+    return replace(rig, operating_point=replace(point, torque_nm=then.torque_nm)) if then.shaft == point.shaft else rig
+
+
+def changes(analysis: Analysis) -> tuple[IndicatorChange | None, ...]:
+    """Return for each indicator of an analysis what it was in the reference; None where it has none there.
+
+    Indicators belong together that agree in name, channel, gear, shaft, bearing, band and the signal they rest on.
+    """
+    then = {_key(i): i for i in analysis.reference.indicators} if analysis.reference is not None else {}
+    return tuple(_change(now, then.get(_key(now))) for now in analysis.indicators)
+
+
+def beside_reference(findings: Iterable[Finding], reference: Analysis) -> list[Finding]:
+    """Return the findings, each fault or suspicion with a sentence on what the reference shows of it."""
+    return [replace(f, evidence=(*f.evidence, _then(f, reference))) if f.kind in _CLAIMS else f for f in findings]
+
+
+def in_reference(finding: Finding, reference: Analysis) -> Earlier | None:
+    """Return what the reference shows of the same part, order or frequency; None where it shows nothing."""
+    alike = [f for f in reference.findings if _is_alike(f, finding, reference.rig)]
+    same = [f for f in alike if _has_same_witness(f, finding)]
+    if same:
+        return Earlier(same[0], True, _change_db(same[0], finding))
+    return Earlier(alike[0], False, None) if alike else None  # levels elsewhere are of another size
+
+
+def _then(finding: Finding, reference: Analysis) -> str:
+    earlier = in_reference(finding, reference)
+    if earlier is None or not (earlier.is_comparable or _is_placed(finding)):
+        return "The reference does not show it."
+    if not earlier.is_comparable:
+        return f"The reference shows it as well, but in {_seen_in(earlier.finding)}: the levels do not compare."
+    return _as_well(earlier, finding)
+
+
+def _as_well(earlier: Earlier, new: Finding) -> str:
+    change = earlier.change_db
+    if new.where.angle_deg is not None and not _names_tooth(earlier.finding, new):
+        since = "" if change is None else f", {change:+.1f} dB since then"
+        return f"The reference shows such an event on that shaft{since}; whether at the same tooth, no mark tells."
+    since = "." if change is None else f"; since then it has changed by {change:+.1f} dB."
+    return f"The reference shows it as well{since}"
+
+
+def _change_db(old: Finding, new: Finding) -> float | None:
+    if old.strength is None or new.strength is None or old.strength.unit != new.strength.unit:
+        return None
+    then, now = old.strength.value, new.strength.value
+    return 20 * log10(now / then) if 0 < then < float("inf") and 0 < now < float("inf") else None
+
+
+def _is_alike(old: Finding, new: Finding, rig: Rig | None) -> bool:
+    """Whether two findings say the same of the same part: shaft, gear, tooth, bearing, order or frequency."""
+    then, now = old.where, new.where
+    if (old.code, then.shaft, then.gear, then.bearing) != (new.code, now.shaft, now.gear, now.bearing):
+        return False
+    if not _is_near(then.order, now.order):
+        return False
+    if now.order is None and not _is_near(then.frequency_hz, now.frequency_hz):
+        return False
+    return not _names_tooth(old, new) or _is_same_tooth(then, now, rig)
+
+
+def _has_same_witness(old: Finding, new: Finding) -> bool:
+    """Whether two findings rest on the same channel and band, so that their levels compare.
+
+    What a mesh's sidebands say is a ratio, the median of all channels: of them the channel is no witness.
+    """
+    then, now = old.where, new.where
+    if (then.band_hz is None) != (now.band_hz is None):
+        return False
+    if then.band_hz is not None and now.band_hz is not None and not _overlap(then.band_hz, now.band_hz):
+        return False
+    rests_on_channel = now.band_hz is not None or now.angle_deg is not None or not _is_placed(new)
+    return not rests_on_channel or then.channels == now.channels or bool(set(then.channels) & set(now.channels))
+
+
+def _is_placed(finding: Finding) -> bool:
+    return bool(finding.where.gear or finding.where.bearing or finding.where.shaft)
+
+
+def _is_near(then: float | None, now: float | None) -> bool:
+    if then is None or now is None:
+        return then is now
+    return abs(then - now) <= SAME_ORDER * abs(now)
+
+
+def _overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    return max(one[0], other[0]) < min(one[1], other[1])
+
+
+def _names_tooth(old: Finding, new: Finding) -> bool:
+    """Whether both count teeth from a mark; without one, an angle holds for its own record only."""
+    return old.where.tooth is not None and new.where.tooth is not None
+
+
+def _is_same_tooth(then: Where, now: Where, rig: Rig | None) -> bool:
+    """Whether two teeth are the same or neighbours: either place is good to about one tooth."""
+    off = abs((then.tooth or 0) - (now.tooth or 0))
+    teeth = next(
+        (pair.teeth(now.shaft) for pair in (rig.pairs if rig else ()) if now.gear == f"{pair.name}/{now.shaft}"), None
+    )
+    return min(off, teeth - off if teeth is not None else off) <= 1
+
+
+def _seen_in(finding: Finding) -> str:
+    where = finding.where
+    channels = ", ".join(where.channels) or "another channel"
+    return channels + (f", {where.band_hz[0]:.0f} to {where.band_hz[1]:.0f} Hz" if where.band_hz else "")
+
+
+def _key(i: Indicator) -> tuple[str, ...]:
+    return i.name, i.unit, i.channel, i.computed_on, i.shaft, i.gear, i.bearing, i.band
+
+
+def _change(now: Indicator, then: Indicator | None) -> IndicatorChange | None:
+    if then is None or not (isfinite(now.value) and isfinite(then.value)):
+        return None
+    if now.unit == "dB":
+        return IndicatorChange(then.value, now.value - then.value)
+    positive = now.value > 0 and then.value > 0
+    return IndicatorChange(then.value, 20 * log10(now.value / then.value) if positive else None)

@@ -1,0 +1,358 @@
+"""What an analysis says: findings with place, strength, floor and confidence, or why it cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from math import e, exp, log
+
+from gearsig.angle import ShaftAngle
+from gearsig.checks import FloatArray, count, positive, within
+from gearsig.indicators import Indicator
+from gearsig.motion import StartStop
+from gearsig.orders import OrderMap, SynchronousAverage
+from gearsig.recording import Recording
+from gearsig.rig import Rig
+from gearsig.severity import CrackEstimate, NoCrackSeen
+from gearsig.spectra import BandCandidate, Kurtogram, Spectrum
+
+
+class Kind(Enum):
+    """How much a finding matters; listed most important first."""
+
+    FAULT = "fault"
+    SUSPICION = "suspicion"
+    DATA_PROBLEM = "data problem"
+    CANNOT_TELL = "cannot tell"
+    NOTICE = "notice"
+    INFORMATION = "information"
+
+
+class Outcome(Enum):
+    """What an analysis comes to; listed most severe first."""
+
+    FAULT = "fault"
+    SUSPICION = "suspicion"
+    CANNOT_TELL = "cannot tell"
+    NO_FAULT = "no fault"
+
+
+EXAMINED = ("no-tooth-local-damage", "no-crack-seen", "no-bearing-damage")
+"""Codes of findings that say that something was examined that would have shown a fault."""
+
+HINDERING = ("channel-clipped", "channel-stuck", "channel-dead")
+"""Codes of data problems behind which a fault may hide."""
+
+
+@dataclass(frozen=True)
+class Where:
+    """The place of a finding; what does not apply is None or empty."""
+
+    channels: tuple[str, ...] = ()
+    shaft: str = ""
+    gear: str = ""
+    bearing: str = ""
+    order: float | None = None
+    order_shaft: str = ""
+    frequency_hz: float | None = None
+    band_hz: tuple[float, float] | None = None
+    angle_deg: float | None = None
+    tooth: int | None = None
+    time_s: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Strength:
+    """The size of a finding against the floor it has to exceed.
+
+    `ratio_db` is 20 lg(value/floor) for amplitudes; None where a ratio has no meaning. `against` is what the floor is
+    called: a drawing's value is none.
+    """
+
+    value: float
+    unit: str
+    floor: float
+    floor_is: str
+    ratio_db: float | None = None
+    against: str = "a floor of"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One statement about the machine or the recording.
+
+    Parameters
+    ----------
+    code : str
+        Stable identifier, e.g. "tooth-local-impact".
+    kind : Kind
+    title : str
+        The statement in one sentence.
+    where : Where
+    strength : Strength or None
+    confidence : float
+        0 to 1, that the statement is true.
+    confidence_basis : str
+        What the number rests on.
+    evidence : tuple of str
+        The numbers behind the statement, one sentence each; also those that speak against it.
+    surer : str
+        What would make it surer.
+    """
+
+    code: str
+    kind: Kind
+    title: str
+    where: Where = field(default_factory=Where)
+    strength: Strength | None = None
+    confidence: float = 1.0
+    confidence_basis: str = ""
+    evidence: tuple[str, ...] = ()
+    surer: str = ""
+
+
+@dataclass(frozen=True)
+class CannotTell:
+    """An answer that is not to be had from these data, and what would give it."""
+
+    question: str
+    reason: str
+    remedy: str = ""
+
+
+@dataclass(frozen=True)
+class OrderLevel:
+    """The level of one order over speed, as a Vold–Kalman filter takes it out of a run-up or run-down.
+
+    Parameters
+    ----------
+    name : str
+        "mesh of stage 1" with its harmonic, or "order 2".
+    order : float
+        Of the reference shaft.
+    speed_rpm : array, (n,)
+        Of the reference shaft, ascending; middles of equal steps.
+    amplitude : array, (n,)
+        Peak amplitude, root mean square over the times at that speed.
+    unit : str
+    bandwidth_orders : float
+        Of the filter.
+    pair, harmonic
+        Of a mesh; empty and 0 for another order.
+    """
+
+    name: str
+    order: float
+    speed_rpm: FloatArray
+    amplitude: FloatArray
+    unit: str
+    bandwidth_orders: float
+    pair: str = ""
+    harmonic: int = 0
+
+    @property
+    def frequency_hz(self) -> FloatArray:
+        """Where the order lies at each speed."""
+        frequency: FloatArray = self.speed_rpm / 60.0 * self.order
+        return frequency
+
+    @property
+    def largest(self) -> tuple[float, float, float]:
+        """Largest amplitude, its speed in rpm and its frequency in Hz."""
+        i = int(self.amplitude.argmax())
+        return float(self.amplitude[i]), float(self.speed_rpm[i]), float(self.frequency_hz[i])
+
+
+@dataclass(frozen=True)
+class ChannelAnalysis:
+    """The signals and spectra of one vibration channel.
+
+    `order_spectrum`, `order_map` and `averages` are None or empty where the speed is not known.
+
+    Parameters
+    ----------
+    channel : str
+    spectrum : Spectrum
+        Amplitude peak over frequency.
+    power_density : Spectrum
+        Welch power spectral density.
+    envelope_spectrum : Spectrum or None
+        Of the band `envelope_band_hz`; over order where the speed is known, else over frequency.
+    order_spectrum : Spectrum or None
+    order_map : OrderMap or None
+        Only where the speed varies.
+    averages : mapping
+        (shaft, kind) → SynchronousAverage.
+    kurtogram : Kurtogram or None
+        Of the channel without its tones, where impacts of a bearing were found in its own band.
+    kurtogram_band : BandCandidate or None
+        The band it chooses.
+    order_levels : tuple of OrderLevel
+        Only where the speed runs through a range.
+    """
+
+    channel: str
+    spectrum: Spectrum
+    power_density: Spectrum
+    envelope_spectrum: Spectrum | None = None
+    envelope_band_hz: tuple[float, float] | None = None
+    order_spectrum: Spectrum | None = None
+    order_map: OrderMap | None = None
+    averages: Mapping[tuple[str, str], SynchronousAverage] = field(default_factory=dict)
+    kurtogram: Kurtogram | None = None
+    kurtogram_band: BandCandidate | None = None
+    order_levels: tuple[OrderLevel, ...] = ()
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Everything `analyze` found out about one recording.
+
+    Parameters
+    ----------
+    recording : Recording
+    rig : Rig or None
+    shaft_angle : ShaftAngle or CannotTell
+        Of the reference shaft.
+    channels : tuple of ChannelAnalysis
+        Dead and non-vibration channels are left out; a finding says so.
+    indicators : tuple of Indicator
+    findings : tuple of Finding
+        Most important first.
+    verdict : str
+        One sentence.
+    settings : mapping
+        The parameters that were in force, for the report.
+    crack : CrackEstimate, NoCrackSeen, CannotTell or None
+        Depth of a root crack; None where nobody asked and none is clear.
+    reference : Analysis or None
+        Of the recording of the sound machine that was given to compare with.
+    motion : StartStop or None
+        Of a machine that starts and stops, where its teeth could be examined.
+    """
+
+    recording: Recording
+    rig: Rig | None
+    shaft_angle: ShaftAngle | CannotTell
+    channels: tuple[ChannelAnalysis, ...]
+    indicators: tuple[Indicator, ...]
+    findings: tuple[Finding, ...]
+    verdict: str
+    settings: Mapping[str, str | float | int | None] = field(default_factory=dict)
+    crack: CrackEstimate | NoCrackSeen | CannotTell | None = None
+    reference: Analysis | None = None
+    motion: StartStop | None = None
+
+    @property
+    def outcome(self) -> Outcome:
+        """What the findings come to, in one word."""
+        return outcome_of(self.findings)
+
+
+def outcome_of(findings: Sequence[Finding]) -> Outcome:
+    """Return what findings come to; "no fault" only where all that the rig describes could be examined."""
+    kinds = {finding.kind for finding in findings}
+    if Kind.FAULT in kinds:
+        return Outcome.FAULT
+    if Kind.SUSPICION in kinds:
+        return Outcome.SUSPICION
+    examined = any(f.code in EXAMINED for f in findings)
+    hindered = Kind.CANNOT_TELL in kinds or any(f.code in HINDERING for f in findings)
+    return Outcome.NO_FAULT if examined and not hindered else Outcome.CANNOT_TELL
+
+
+# --------------------
+# The parameters of an analysis, each with its reason.
+# --------------------
+
+
+@dataclass(frozen=True)
+class AnalysisSettings:
+    """What `analyze` may be told.
+
+    Parameters
+    ----------
+    false_alarm_probability : float
+        Of one test over everything it tries (all teeth, all fundamentals, all bands and channels).
+    n_surrogates : int
+        For the test of tooth-local energy.
+    minimum_revolutions : int
+        Fewer revolutions than this are not averaged: 16 lower the noise by 12 dB, and give the jackknife its scatter.
+    bearing_slip : float
+        Relative: bearings turn 1 to 2 % off their kinematic orders.
+    highest_modulation_order : float
+        Of the envelope spectra, in cycles per revolution of the fastest shaft: six harmonics of an inner race with
+        ten rolling elements.
+    seed : int
+        Of the surrogates: the same recording gives the same answer.
+    """
+
+    false_alarm_probability: float = 1e-3
+    n_surrogates: int = 1000
+    minimum_revolutions: int = 16
+    bearing_slip: float = 0.02
+    highest_modulation_order: float = 60.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        within(self.false_alarm_probability, "false_alarm_probability", 1e-12, 0.1)
+        count(self.n_surrogates, "n_surrogates", minimum=99)
+        count(self.minimum_revolutions, "minimum_revolutions", minimum=2)
+        within(self.bearing_slip, "bearing_slip", 0.0, 0.1)
+        positive(self.highest_modulation_order, "highest_modulation_order")
+
+
+# --------------------
+# From a p-value to how sure a statement is.
+# --------------------
+
+
+WITHOUT_REFERENCE = 0.95
+"""Upper limit for a fault claimed from one recording: what is there may have been there when the machine was new."""
+
+WITH_ASSUMED_DATA = 0.5
+"""Factor where the statement rests on data of the machine that are assumed."""
+
+SMALLEST_SHOWN = 1e-6
+"""Smaller p-values are not shown: no model of the noise is known so well in its tails."""
+
+
+def from_p_value(p_value: float, *, prior: float = 0.1, limit: float = WITHOUT_REFERENCE) -> float:
+    """Return an upper bound of the probability that the effect is real, given the p-value of its absence.
+
+    The Bayes factor for "absent" is at least -e p ln p (p < 1/e), so that
+    P(real) <= 1/(1 + (1 - prior)/prior · (-e p ln p)).
+
+    Parameters
+    ----------
+    p_value : float
+        0 to 1, after correction for everything that was tried.
+    prior : float
+        Probability of the effect before looking.
+    limit : float
+        The result is cut here, for what no p-value knows of.
+
+    References
+    ----------
+    T. Sellke, M. J. Bayarri, J. O. Berger, "Calibration of p values for testing precise null hypotheses", 2001.
+
+    Examples
+    --------
+    >>> round(from_p_value(0.01), 2)
+    0.47
+    """
+    p = min(max(p_value, 1e-300), 1.0)
+    bayes_factor = -e * p * log(p) if p < exp(-1) else 1.0
+    return min(limit, 1.0 / (1.0 + (1.0 - prior) / prior * bayes_factor))
+
+
+def p_text(p_value: float) -> str:
+    """Write a p-value with one digit, none below 1e-6.
+
+    Examples
+    --------
+    >>> p_text(3.2e-4), p_text(5e-141)
+    ('3e-04', '< 1e-6')
+    """
+    return "< 1e-6" if p_value < SMALLEST_SHOWN else f"{p_value:.0e}" if p_value < 0.01 else f"{p_value:.1g}"

@@ -1,0 +1,97 @@
+"""Order the findings and put the most important into one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from gearsig.diagnosis._types import EXAMINED, HINDERING, Finding, Kind, Outcome, Where, outcome_of
+from gearsig.recording import Recording
+
+DEPTH_UNKNOWN = "crack-depth-unknown"
+"""Code of the finding that a given reference did not tell the depth of a crack."""
+
+WITHOUT_REFERENCE = "Damage of many teeth would only show against an earlier recording."
+WITH_REFERENCE = "Damage of many teeth would only show in how the indicators have changed since the reference."
+
+_RANK = {kind: i for i, kind in enumerate(Kind)}
+
+
+def ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return the findings, most important first: by kind, then by confidence, then by strength."""
+
+    def key(finding: Finding) -> tuple[int, float, float]:
+        ratio = finding.strength.ratio_db if finding.strength is not None else None
+        return (_RANK[finding.kind], -finding.confidence, -(ratio or 0.0))
+
+    return tuple(sorted(findings, key=key))
+
+
+def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) -> str:
+    """Return the sentence a hurried reader takes away; why a given reference did not help is always part of it."""
+    outcome = outcome_of(findings)
+    unused = [f for f in findings if f.code == DEPTH_UNKNOWN]
+    if outcome in (Outcome.FAULT, Outcome.SUSPICION):
+        kind = Kind.FAULT if outcome is Outcome.FAULT else Kind.SUSPICION
+        claims = _first_and_number([f for f in findings if f.kind is kind])
+        return " ".join(
+            [f"{kind.value.capitalize()}: {_ended(claims) if unused else claims}", *(f.title for f in unused)]
+        )
+    said = [f.title for f in findings if f.code in EXAMINED]
+    if outcome is Outcome.CANNOT_TELL:
+        others = [f for f in findings if f not in unused and (f.code in HINDERING or f.kind is Kind.CANNOT_TELL)]
+        gaps = [*unused, *others]
+        why = " ".join(f.title for f in gaps[:2]) or "Nothing was examined that would show a fault."
+        return " ".join(["Cannot tell.", why, *said, *_remedy(gaps)])
+    return " ".join(["No fault shows.", *said, WITH_REFERENCE if has_reference else WITHOUT_REFERENCE])
+
+
+def _remedy(gaps: list[Finding]) -> list[str]:
+    """Return what would settle the most important of the open questions, in one sentence."""
+    first = next((finding for finding in gaps if finding.surer), None)
+    if first is None:
+        return []
+    surer = first.surer.partition(". ")[0].rstrip(".")
+    if first.code == DEPTH_UNKNOWN:  # says what to do, not what to have
+        return [f"What would help: {surer[:1].lower()}{surer[1:]}."]
+    return [f"Surer with: {surer}."]
+
+
+def _ended(sentence: str) -> str:
+    return sentence if sentence.endswith(".") else f"{sentence}."
+
+
+def _first_and_number(findings: list[Finding]) -> str:
+    more = len(findings) - 1
+    sure = f" (at most {100 * findings[0].confidence:.0f} % sure)" if findings[0].kind is Kind.FAULT else ""
+    first = findings[0].title + sure
+    return first + (f", and {more} more." if more else "")
+
+
+# --------------------
+# What is wrong with the recording itself.
+# --------------------
+
+
+def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset[str]]:
+    """Return findings about the data, and the names of dead channels, which are not analysed further."""
+    from gearsig.recording import find_problems
+
+    problems = find_problems(recording)
+    findings = [
+        Finding(
+            f"channel-{p.kind}",
+            Kind.DATA_PROBLEM,
+            f"Channel {p.channel} is {p.kind}.",
+            Where((p.channel,)),
+            confidence=0.95,
+            confidence_basis="direct inspection of the samples",
+            evidence=(p.evidence,),
+            surer=p.remedy,
+        )
+        for p in problems
+    ]
+    findings += [
+        Finding("reader-note", Kind.NOTICE, text, confidence_basis="stated by the reader of the file")
+        for text in recording.warnings
+    ]
+    return findings, frozenset(p.channel for p in problems if p.kind == "dead")

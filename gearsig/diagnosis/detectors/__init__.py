@@ -1,1 +1,0 @@
-"""One question per file: each detector looks at the signals and returns findings."""

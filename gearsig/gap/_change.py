@@ -1,0 +1,475 @@
+"""Features of a recording against a healthy reference of the same gears."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray
+from gearsig.gap._features import (
+    N_MESH_HARMONICS,
+    NOMINAL_REVOLUTIONS,
+    SIDES,
+    Feature,
+    Features,
+    average_lines,
+    line_power,
+    mesh_lines,
+    mesh_power,
+    once,
+    pattern_features,
+    residual_lines,
+    smooth_power,
+    visible_orders,
+    whole_and_parts,
+    whole_record_variance,
+)
+from gearsig.gap._reduction import DRIVEN, DRIVER, ChannelSums, ReducedRecording
+from gearsig.severity import ShaftLines, difference_lines
+
+# --------------------
+# What changed about each mesh harmonic: the harmonic itself, what either gear repeats beside it, what nothing repeats.
+#
+# A path to a sensor changes all three alike. Flanks that wear alike change the harmonic and leave the rest; friction
+# takes along what is beside it; rough flanks raise what a gear repeats and the noise, and leave the harmonic; teeth
+# that part raise the noise. So each stretch of orders from half a tooth below a harmonic to half a tooth above is
+# compared with what it was when the gears were sound.
+#
+# Source of the separation into what is common to all teeth, to one gear, and to nothing: R. B. Randall,
+# *Vibration-based Condition Monitoring*, 2nd ed., 2021, chapter 5.
+# --------------------
+
+
+ALIKE = "alike."
+"""Of these features; 0 where nothing that they compare stands clear of noise."""
+
+MESH, REPEATED, NOISE = range(3)
+_PARTS = ("mesh", "repeated", "noise")
+_PAIRS = ((MESH, REPEATED), (REPEATED, NOISE), (MESH, NOISE))
+
+CLEAR = (4.0, 0.5)
+"""Power of a harmonic over the noise on its line, and of all repeated lines over the noise on them, to be compared."""
+
+MOST_DB = 30.0
+LEAST_POWER = 1.0
+"""dB²: changes as small as a decibel are alike by chance."""
+
+
+def alike_features(now: ReducedRecording, sound: ReducedRecording) -> Iterator[Feature]:
+    """Yield medians, spreads and differences of the three parts' changes, in dB, over stretches and channels."""
+    changes = stretch_changes(now, sound)
+    for part, name in enumerate(_PARTS):
+        level = changes[..., part]
+        yield f"{ALIKE}{name}", _median(level)
+        yield f"{ALIKE}{name}.spread", _rms(level - _median(level))
+        yield f"{ALIKE}{name}.rise", _rise(level)
+    for first, second in _PAIRS:
+        name = f"{ALIKE}{_PARTS[first]}_{_PARTS[second]}"
+        a, b = changes[..., first], changes[..., second]
+        yield f"{name}.less", _median(a - b)
+        yield f"{name}.apart", _rms(a - b)
+        yield f"{name}.together", _together(a, b)
+
+
+def stretch_changes(now: ReducedRecording, sound: ReducedRecording) -> FloatArray:
+    """Return the changes in dB, (n_channels, n_harmonics, 3); nan where a part does not stand clear of noise."""
+    rows = []
+    for name, sums in now.channels.items():
+        here, before = _stretches(now, sums), _stretches(sound, sound.channels[name])
+        rows.append(np.clip(here - before, -MOST_DB, MOST_DB))
+    changes: FloatArray = np.array(rows)
+    return changes
+
+
+def _stretches(gathered: ReducedRecording, sums: ChannelSums) -> FloatArray:
+    """Return the levels of the three parts of each stretch, (n_harmonics, 3), in dB."""
+    power = np.zeros((N_MESH_HARMONICS, 3))
+    floor = np.zeros((N_MESH_HARMONICS, 2))
+    for side in (DRIVER, DRIVEN):
+        lines, noise = average_lines(sums, side)
+        square, teeth = np.abs(lines) ** 2, gathered.frame.teeth[side]
+        highest = visible_orders(gathered, side, len(square))
+        for k in range(1, N_MESH_HARMONICS + 1):
+            low, high = round((k - 0.5) * teeth) + 1, round((k + 0.5) * teeth)
+            if high > highest:
+                power[k - 1] = np.nan
+                continue
+            own = np.arange(low, high) != k * teeth
+            beside, under = square[low:high][own], noise[low:high][own]
+            power[k - 1, REPEATED] += max(float(np.sum(beside - under)), 0.0)
+            floor[k - 1, 1] += float(under.sum())
+            if side == DRIVER:
+                power[k - 1, MESH], floor[k - 1, 0] = max(square[k * teeth] - noise[k * teeth], 0.0), noise[k * teeth]
+                power[k - 1, NOISE] = float(under.sum()) * float(sums.counts[side].sum())
+    seen = np.column_stack([power[:, :2] > np.array(CLEAR) * floor, power[:, NOISE] > 0.0])
+    levels: FloatArray = 10.0 * np.log10(np.where(seen, power, np.nan))
+    return levels
+
+
+def _seen(values: FloatArray) -> FloatArray:
+    found: FloatArray = values[np.isfinite(values)]
+    return found
+
+
+def _median(values: FloatArray) -> float:
+    seen = _seen(values)
+    return float(np.median(seen)) if len(seen) else 0.0
+
+
+def _rms(values: FloatArray) -> float:
+    seen = _seen(values)
+    return float(np.sqrt(np.mean(seen**2))) if len(seen) else 0.0
+
+
+def _rise(values: FloatArray) -> float:
+    """Return the mean step from one harmonic to the next."""
+    steps = [values[:, b] - values[:, a] for a, b in pairwise(range(values.shape[1]))]
+    seen = _seen(np.array(steps))
+    return float(seen.mean()) if len(seen) else 0.0
+
+
+def _together(a: FloatArray, b: FloatArray) -> float:
+    """Return 10 (2 Σ ab)/(Σ a² + Σ b² + n): 10 where both changed alike and much, −10 where in opposite directions."""
+    both = np.isfinite(a) & np.isfinite(b)
+    x, y = a[both], b[both]
+    return float(20.0 * np.sum(x * y) / (np.sum(x**2 + y**2) + LEAST_POWER * max(len(x), 1)))
+
+
+# --------------------
+# Whether all channels changed alike: the excitation did, or one sensor's path.
+# --------------------
+
+
+APART = "apart."
+"""Of these features; 0 where there is one channel, which no two channels reach."""
+
+
+def apart_features(now: ReducedRecording, sound: ReducedRecording) -> Iterator[Feature]:
+    """Yield by how much the channels' changes differ from each other, rms in dB.
+
+    What drives the gears harder is seen by every sensor, each through its own path; a sensor that was mounted anew, or
+    a bearing that holds its shaft less, changes the paths, and each in its own way.
+    """
+    here, before = _mesh_levels(now), _mesh_levels(sound)
+    n = min(here.shape[1], before.shape[1])  # the faster recording shows fewer
+    yield f"{APART}mesh", _scatter(here[:, :n] - before[:, :n])
+    yield f"{APART}floor", _scatter(_floor_levels(now) - _floor_levels(sound))
+
+
+def _scatter(changes: FloatArray) -> float:
+    """Return the rms, over all, of what the channels' mean leaves."""
+    return float(np.sqrt(np.mean((changes - changes.mean(axis=0)) ** 2))) if len(changes) > 1 else 0.0
+
+
+def _mesh_levels(gathered: ReducedRecording) -> FloatArray:
+    """Return the mesh harmonics' levels, (n_channels, n_harmonics), in dB."""
+    teeth, rows = gathered.frame.teeth[DRIVER], []
+    for sums in gathered.channels.values():
+        power = line_power(sums, DRIVER)
+        highest = visible_orders(gathered, DRIVER, len(power))
+        rows.append(mesh_lines(power, teeth, highest))
+    return _decibels(np.array(rows))
+
+
+def _floor_levels(gathered: ReducedRecording) -> FloatArray:
+    """Return the residual's levels in bands, (n_channels, n_bands), in dB."""
+    return _decibels(np.array([sums.moments.mean(axis=0)[:, 0] for sums in gathered.channels.values()]))
+
+
+def _decibels(power: FloatArray) -> FloatArray:
+    levels: FloatArray = 10.0 * np.log10(np.maximum(power, 1e-300))
+    return levels
+
+
+SURPRISE = "surprise."
+"""Of features that are measured in the two recordings' own noise."""
+
+LEAST_NOISE = 1e-8
+"""Of all lines together over the mesh's power: two gears of equal teeth leave nothing of their own in one average."""
+
+LEAST_SURPRISE = 0.1
+"""Energy below any that a sound machine's own noise makes: of two gears of equal teeth one has no average of its own,
+and what rounding leaves in it says nothing."""
+
+REPEATS = 0.1
+"""Share by which a sound machine's pattern differs on another day, see `surprises`."""
+
+
+def change_features(now: ReducedRecording, sound: ReducedRecording) -> Features:
+    """Return the differences of all features, and features of the difference of the averages.
+
+    The reference's scatter counts as well: variances of both add.
+    """
+    (names, here), before = whole_and_parts(now), whole_and_parts(sound)[1]
+    joined, values = _joined(names, here[0] - before[0], now, sound)
+    return _with_scatter(
+        joined,
+        values,
+        np.stack(
+            [_joined(names, v - before[0], part, sound)[1] for v, part in zip(here[1:], _parts(now), strict=True)]
+        ),
+        np.stack(
+            [_joined(names, here[0] - v, now, part)[1] for v, part in zip(before[1:], _parts(sound), strict=True)]
+        ),
+    )
+
+
+def change_once(now: ReducedRecording, sound: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
+    """Return names and values of the change features, without their scatter."""
+    (names, here), before = once(now), once(sound)[1]
+    return _joined(names, here - before, now, sound)
+
+
+def difference_features(
+    now: ReducedRecording, simulated: ReducedRecording, credibility: FloatArray | float = 1.0
+) -> Features:
+    """Return the differences of all features alone: a simulation's flanks are not this machine's.
+
+    Parameters
+    ----------
+    now, simulated : Gathered
+    credibility : array, (n_features,), or float
+        How much of what the simulation says of each feature is subtracted, see `gearsig.gap`.
+    """
+    (names, here), before = whole_and_parts(now), credibility * whole_and_parts(simulated)[1]
+    return _with_scatter(names, here[0] - before[0], here[1:] - before[0], here[0] - before[1:])
+
+
+def _with_scatter(names: tuple[str, ...], values: FloatArray, *left_out: FloatArray) -> Features:
+    variance = 2.0 * whole_record_variance(names)
+    for rows in left_out:
+        variance += (len(rows) - 1.0) * np.var(rows, axis=0)
+    return Features(names, values, np.sqrt(variance), left_out)
+
+
+def _parts(gathered: ReducedRecording) -> Iterator[ReducedRecording]:
+    return (gathered.without(block) for block in range(gathered.n_blocks))
+
+
+def _joined(
+    names: tuple[str, ...], differences: FloatArray, now: ReducedRecording, sound: ReducedRecording
+) -> tuple[tuple[str, ...], FloatArray]:
+    """Return names and values of the differences and of the patterns' features behind them."""
+    patterns = dict(_patterns(now, sound))
+    return (*names, *patterns), np.concatenate([differences, list(patterns.values())])
+
+
+def _patterns(now: ReducedRecording, sound: ReducedRecording) -> Iterator[Feature]:
+    """Yield the tooth features of the difference of the averages, turned so that the same teeth meet."""
+    differences = [turned_difference(now, sound, side) for side in (DRIVER, DRIVEN)]
+    for side, (turned, agreement) in enumerate(differences):
+        teeth = now.frame.teeth[side]
+        residuals = difference_residuals(now, turned, side)
+        noises = []
+        for lines, name in zip(residuals, now.channels, strict=True):
+            n = turned.lines.shape[1]
+            both = average_lines(now.channels[name], side)[1][:n] + average_lines(sound.channels[name], side)[1][:n]
+            noises.append(both[lines[:n] != 0].sum() / 2.0 / mesh_power(now, now.channels[name], side))
+        shorter = min(float(g.channels[n].counts[side].sum()) for g in (now, sound) for n in now.channels)
+        longer = max(1.0, shorter / NOMINAL_REVOLUTIONS)
+        yield from pattern_features(f"change.{SIDES[side]}", residuals, teeth, float(np.mean(noises)), longer)
+        yield f"change.{SIDES[side]}.agreement", 10.0 * agreement
+    for side, (turned, _) in enumerate(differences):
+        yield from pattern_features(
+            f"{SURPRISE}{SIDES[side]}",
+            surprises(now, sound, turned, side),
+            now.frame.teeth[side],
+            noise=0.0,
+            longer=0.0,
+            least=LEAST_SURPRISE,
+        )
+    yield from apart_features(now, sound)
+    yield from alike_features(now, sound)
+
+
+def turned_difference(now: ReducedRecording, sound: ReducedRecording, side: int) -> tuple[ShaftLines, float]:
+    """Return a shaft's lines less the sound ones, turned so that the same teeth meet, and how well they agreed."""
+    return difference_lines(
+        lines_of_shaft(now, side), lines_of_shaft(sound, side), whole_teeth=now.marks[DRIVER] or now.marks[DRIVEN]
+    )
+
+
+def difference_residuals(now: ReducedRecording, turned: ShaftLines, side: int) -> list[NDArray[np.complex128]]:
+    """Return each channel's difference without its smooth lines, over the mesh's amplitude."""
+    residuals = []
+    for row, sums in zip(turned.lines, now.channels.values(), strict=True):
+        full = np.zeros(sums.lines[side].shape[1], dtype=np.complex128)
+        full[: len(row)] = row
+        scale = mesh_power(now, sums, side)
+        residuals.append(residual_lines(full, turned.teeth, turned.highest_order, turned.other_teeth) / np.sqrt(scale))
+    return residuals
+
+
+def surprises(
+    now: ReducedRecording, sound: ReducedRecording, turned: ShaftLines, side: int
+) -> list[NDArray[np.complex128]]:
+    """Return each channel's difference, line by line over what noise and a mounting of its own would make of it.
+
+    w[n] = d[n] / √(σ²[n] + (s |r[n]|)²), with σ² the power that noise leaves in both averages, |r|² the sound
+    pattern's power about that order, s = `REPEATS`; scaled so that a sound machine's energy is about 1 all round,
+    whatever the machine. A change counts where it is sure, and not where the vibration is loud.
+    """
+    found = []
+    n = turned.lines.shape[1]
+    own = lines_of_shaft(sound, side).lines
+    for row, born, name in zip(turned.lines, own, now.channels, strict=True):
+        noise = average_lines(now.channels[name], side)[1][:n] + average_lines(sound.channels[name], side)[1][:n]
+        noise += LEAST_NOISE * mesh_power(now, now.channels[name], side) / n
+        full = np.zeros(now.channels[name].lines[side].shape[1], dtype=np.complex128)
+        full[:n] = row / np.sqrt(noise + REPEATS**2 * smooth_power(np.abs(born[:n]) ** 2))
+        kept = residual_lines(full, turned.teeth, turned.highest_order, turned.other_teeth)
+        found.append(kept * np.sqrt(2.0 / max(int(np.count_nonzero(kept)), 1)))
+    return found
+
+
+def lines_of_shaft(gathered: ReducedRecording, side: int) -> ShaftLines:
+    """Return the averages' lines in the form that the alignment takes."""
+    lines = [average_lines(sums, side)[0] for sums in gathered.channels.values()]
+    highest = visible_orders(gathered, side, min(len(row) for row in lines))
+    frame = gathered.frame
+    return ShaftLines(
+        frame.shafts[side],
+        frame.teeth[side],
+        frame.teeth[1 - side],
+        np.stack([row[: highest + 1] for row in lines]),
+        int(gathered.n_revolutions * frame.shaft_orders[side]),
+        highest,
+        gathered.speed_hz * frame.shaft_orders[side],
+        tuple(gathered.channels),
+        gathered.marks[side],
+    )
+
+
+# --------------------
+# Levels that are counted relative to the mesh harmonics, and what of their change is their own.
+# --------------------
+
+
+def beyond_the_mesh(names: Sequence[str], distances: FloatArray) -> FloatArray:
+    """Return changes of levels as far as they hold both relative to the mesh harmonics and by themselves.
+
+    If the mesh alone falls by 6 dB, all that is counted relative to it rises by as much, and none of it has changed; if
+    a sensor's gain rises, everything does but the ratios. The smaller of both changes counts, none where signs differ.
+
+    Parameters
+    ----------
+    names : sequence of str
+    distances : array, (…, n)
+        dB.
+    """
+    if "mesh.total" not in names:
+        return distances
+    mesh = distances[..., [list(names).index("mesh.total")]]
+    sign = counted_from_the_mesh(names)
+    another = distances + sign * mesh
+    smaller = np.sign(distances) * np.minimum(np.abs(distances), np.abs(another))
+    held: FloatArray = np.where(sign == 0.0, distances, np.where(distances * another > 0.0, smaller, 0.0))
+    return held
+
+
+def counted_from_the_mesh(names: Sequence[str]) -> FloatArray:
+    """Return +1 for levels relative to the mesh, which added to them gives a level; −1 for levels; 0 for all else."""
+    return np.array([1.0 if _is_relative(name) else -1.0 if _is_shaft_level(name) else 0.0 for name in names])
+
+
+def _is_relative(name: str) -> bool:
+    """Whether a feature is a level relative to the mesh harmonics."""
+    family, _, rest = name.partition(".")
+    last = rest.rpartition(".")[2]
+    if family == "sideband":
+        return last != "strongest"
+    if family in ("tooth", "change"):
+        return last in ("level", "elsewhere", "peak")
+    return family == "shaft" and last in ("to_mesh", "low")
+
+
+def _is_shaft_level(name: str) -> bool:
+    return name.startswith("shaft.") and name.rpartition(".")[2].isdigit()
+
+
+# --------------------
+# What a forest sees of a change: sizes, directions, and which of two places changed more.
+# --------------------
+
+
+_OF_A_SHAFT = (
+    ("shaft.{}.2", "shaft.{}.1"),
+    ("shaft.{}.3", "shaft.{}.2"),
+    ("shaft.{}.strongest.to_mesh", "shaft.{}.1"),
+    ("shaft.{}.strongest.to_mesh", "shaft.{}.2"),
+    ("shaft.{}.1", "sideband.{}.1"),
+    ("shaft.{}.2", "sideband.{}.2"),
+    ("sideband.{}.2", "sideband.{}.1"),
+    ("sideband.{}.3to5", "sideband.{}.1"),
+    ("sideband.{}.6to12", "sideband.{}.1"),
+    ("tooth.{}.level", "sideband.{}.1"),
+    ("tooth.{}.peak", "tooth.{}.level"),
+    ("tooth.{}.prominence", "tooth.{}.level"),
+)
+_OF_A_DIFFERENCE = (
+    ("surprise.{}.level", "sideband.{}.1"),
+    ("surprise.{}.peak", "surprise.{}.level"),
+    ("surprise.{}.kurtosis", "surprise.{}.level"),
+    ("surprise.{}.second", "surprise.{}.prominence"),
+)
+_BETWEEN_SHAFTS = ("sideband.{}.1", "sideband.{}.6to12", "shaft.{}.1", "shaft.{}.2", "tooth.{}.level")
+_OF_ALL = (
+    ("envelope.outer", "envelope.inner"),
+    ("envelope.outer", "envelope.ball"),
+    ("envelope.inner", "envelope.ball"),
+    ("envelope.inner", "envelope.strange"),
+    ("envelope.outer", "envelope.strange"),
+    ("line.outer", "envelope.outer"),
+    ("floor.total", "mesh.total"),
+    ("floor.band.4", "floor.band.1"),
+    ("floor.kurtosis.4", "floor.band.4"),
+    ("raw.near_the_extreme", "raw.kurtosis"),
+)
+
+
+def seen_rows(names: Sequence[str], distances: FloatArray) -> FloatArray:
+    """Return part of the rows that a forest is fitted to.
+
+    Simulators and machines agree on which lines an effect moves and in which direction, not on how far: beside the
+    compressed sizes stand shares of the largest change, and differences of what tells one effect from another.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of changes, see `gearsig.gap` or `gearsig.gap`.
+    distances : array, (n_rows, n)
+        Changes in units that healthy machines reach.
+
+    Returns
+    -------
+    array, (n_rows, m)
+    """
+    size = np.sign(distances) * np.log1p(np.abs(distances))
+    largest = np.maximum(np.abs(size).max(axis=1, keepdims=True), 1e-9)
+    place = {name: i for i, name in enumerate(names)}
+    apart = [size[:, place[a]] - size[:, place[b]] for a, b in _pairs(place)]
+    mesh = np.stack(
+        [size[:, place[f"mesh.share.{k}"]] + size[:, place["mesh.total"]] for k in range(1, N_MESH_HARMONICS + 1)]
+    )
+    rows: FloatArray = np.column_stack([size, size / largest, *apart, mesh.min(axis=0), mesh.max(axis=0)])
+    return rows
+
+
+def _pairs(place: dict[str, int]) -> list[tuple[str, str]]:
+    of_a_shaft = _OF_A_SHAFT + _OF_A_DIFFERENCE
+    found = [(a.format(side), b.format(side)) for side in SIDES for a, b in of_a_shaft]
+    found += [(name.format(SIDES[0]), name.format(SIDES[1])) for name in _BETWEEN_SHAFTS]
+    return [pair for pair in (*found, *_OF_ALL) if pair[0] in place and pair[1] in place]
+
+
+def mirrored(names: Sequence[str]) -> np.ndarray:
+    """Return the places of the features with driver and driven gear exchanged.
+
+    What a fault of the driver does to the driver's features, one of the driven gear does to that gear's.
+    """
+    place = {name: i for i, name in enumerate(names)}
+    first, second = SIDES
+    return np.array([place[name.replace(first, "\0").replace(second, first).replace("\0", second)] for name in names])

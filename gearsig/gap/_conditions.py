@@ -1,0 +1,596 @@
+"""Recordings, references and the twin, reduced and set beside each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray
+from gearsig.errors import InputError, RefusalError
+from gearsig.gap._change import change_features, difference_features, lines_of_shaft, turned_difference
+from gearsig.gap._evidence import over_floors
+from gearsig.gap._features import (
+    STEPS_PER_TOOTH,
+    Features,
+    average_lines,
+    mesh_power,
+    residual_lines,
+    tooth_energy,
+    visible_orders,
+)
+from gearsig.gap._floors import REPEATABLE, GapSize, StructuralFloor, gap_size, load_population, pooled_scatter
+from gearsig.gap._prediction import ObservedChange
+from gearsig.gap._reduction import DRIVEN, DRIVER, GearFrame, ReducedRecording, reduce_recording
+from gearsig.gap._simulator import Added, OperatingCondition, Twin
+from gearsig.gap._types import ConditionFacts
+from gearsig.gap._words import shaft_words
+from gearsig.recording import Recording, metres_per_second_squared
+from gearsig.rig import Rig
+from gearsig.severity import (
+    LARGEST_SPEED_DIFFERENCE,
+    ShaftLines,
+    load_calibration,
+    orders_from_mesh,
+    telling_teeth_apart,
+)
+
+# --------------------
+# The recordings of a gap diagnosis, reduced, each beside what it is compared with.
+# --------------------
+
+
+SEED = 0
+"""Of the twin's specimen: its flanks and housing are not the machine's in any case."""
+
+LARGEST_TORQUE_DIFFERENCE = 0.25
+"""Stated torques of a recording and its reference, relative."""
+
+LONGEST_RUN_S, MOST_REVOLUTIONS = 5.0, 24.0
+"""Of a simulation: longer ones say no more; but so many revolutions of the slower shaft at least."""
+TRIAL_S, TRIAL_REVOLUTIONS = 2.0, 20.0
+"""The same of a run that tries an effect: it differs from the sound run by that effect only, not by noise."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One recording, and what it is compared with.
+
+    Parameters
+    ----------
+    facts : ConditionFacts
+    now, simulated : Gathered
+        The recording, and the sound twin at its point.
+    reference : Gathered or None
+    change : Features
+        Against the reference, or else against the twin.
+    """
+
+    facts: ConditionFacts
+    now: ReducedRecording
+    simulated: ReducedRecording
+    reference: ReducedRecording | None
+    change: Features
+
+    @property
+    def other(self) -> ReducedRecording:
+        """What it is compared with."""
+        return self.reference if self.reference is not None else self.simulated
+
+    @property
+    def floor(self) -> StructuralFloor:
+        """How far healthy machines lie from what it is compared with."""
+        return load_population().floor(with_reference=self.reference is not None)
+
+    @cached_property
+    def size(self) -> GapSize:
+        """How large the whole gap is."""
+        return gap_size(self.change, self.floor)
+
+    @property
+    def trial_s(self) -> float:
+        """Length of a simulation that tries an effect at this point."""
+        return max(TRIAL_S, TRIAL_REVOLUTIONS / _slower_hz(self.now))
+
+    @property
+    def over_floors(self) -> dict[str, float]:
+        """Changes over the larger of both floors, with their signs."""
+        return over_floors(self.change, self.floor, is_reference=self.reference is not None)
+
+
+def run_length_s(now: ReducedRecording) -> float:
+    """Return the length of a simulation that the features can be read from."""
+    return max(LONGEST_RUN_S, MOST_REVOLUTIONS / _slower_hz(now))
+
+
+def _slower_hz(now: ReducedRecording) -> float:
+    return min(now.frame.shaft_orders) * now.speed_hz
+
+
+def simulated(
+    twin: Twin, facts: ConditionFacts, now: ReducedRecording, added: Sequence[Added] = (), noise: int = 0
+) -> ReducedRecording:
+    """Return the twin's run at a recording's point, reduced."""
+    recording = twin.run(
+        facts.point,
+        added,
+        seed=SEED,
+        duration_s=run_length_s(now),
+        sampling_rate_hz=facts.sampling_rate_hz,
+        noise=noise,
+    )
+    if recording.rig is None:
+        raise InputError("the simulator's recording has no rig", remedy="a twin's recordings must carry the rig")
+    return with_channels_of(reduce_recording(recording, recording.rig), now)
+
+
+def with_channels_of(simulation: ReducedRecording, now: ReducedRecording) -> ReducedRecording:
+    """Return a simulation with the recording's channels: those of equal name, or else in their order."""
+    if set(now.channels) <= set(simulation.channels):
+        return simulation.with_channels({name: simulation.channels[name] for name in now.channels})
+    own = list(simulation.channels.values())
+    return simulation.with_channels({name: own[i % len(own)] for i, name in enumerate(now.channels)})
+
+
+def compare(now: ReducedRecording, simulation: ReducedRecording, reference: ReducedRecording | None) -> Features:
+    """Return the change against the reference, or else against the simulation as far as it is credible."""
+    if reference is not None:
+        return change_features(now, reference)
+    return difference_features(now, simulation, load_population().credibility)
+
+
+def facts_of(recording: Recording, rig: Rig, now: ReducedRecording, name: str, twin: Twin) -> ConditionFacts:
+    """Return what is known of a recording's operating point: measured speed, stated torque of the driver.
+
+    Raises
+    ------
+    RefusalError
+        If the stated torque is 0.
+    """
+    stated_nm = _torque_nm(rig)
+    if stated_nm == 0.0:
+        raise RefusalError(
+            f"{name}: the rig file states a torque of 0, at which nothing presses the simulated teeth together",
+            remedy="give the drag of the driven side, some percent of the rated torque; without torque_nm a usual one "
+            "is assumed",
+        )
+    return ConditionFacts(
+        name,
+        OperatingCondition(60.0 * now.speed_hz, twin.point.torque_nm if stated_nm is None else stated_nm),
+        now.n_revolutions,
+        recording.duration_s,
+        recording.sampling_rate_hz,
+    )
+
+
+@dataclass(frozen=True)
+class Healthy:
+    """A sound machine's recording, reduced, with its rig and its name."""
+
+    gathered: ReducedRecording
+    rig: Rig
+    name: str
+
+
+def matching_reference(now: ReducedRecording, rig: Rig, references: Sequence[Healthy]) -> tuple[Healthy | None, str]:
+    """Return the reference at the recording's point, with the channels of both, or none and why."""
+    if not references:
+        return None, ""
+    nearest = min(references, key=lambda one: _distance(now, rig, one))
+    found = nearest.gathered
+    change = now.speed_hz / found.speed_hz - 1.0
+    if abs(change) > LARGEST_SPEED_DIFFERENCE:
+        return None, f"no reference within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of its speed"
+    if _torque_difference(rig, nearest.rig) > LARGEST_TORQUE_DIFFERENCE:
+        here, there = _torque_nm(rig), _torque_nm(nearest.rig)
+        return None, f"the reference at its speed has {there:.3g} N m, the recording {here:.3g} N m"
+    named = _with_names_of(found, now)
+    if named is None:
+        return None, f"the reference has the channels {', '.join(found.channels)}"
+    return replace(nearest, gathered=named), ""
+
+
+def _with_names_of(reference: ReducedRecording, now: ReducedRecording) -> ReducedRecording | None:
+    """Return the reference with those of the recording's channels that it has, or the only one of each; else None."""
+    if common := [name for name in now.channels if name in reference.channels]:
+        return reference.with_channels({name: reference.channels[name] for name in common})
+    if len(reference.channels) == len(now.channels) == 1:
+        return reference.with_channels(dict(zip(now.channels, reference.channels.values(), strict=True)))
+    return None
+
+
+def _distance(now: ReducedRecording, rig: Rig, reference: Healthy) -> float:
+    speed = abs(now.speed_hz / reference.gathered.speed_hz - 1.0)
+    return 10.0 * speed + _torque_difference(rig, reference.rig)
+
+
+def _torque_difference(rig: Rig, reference: Rig) -> float:
+    """Return by which part of the reference's torque the recording's differs from it; 0 where one is not stated."""
+    here_nm, there_nm = _torque_nm(rig), _torque_nm(reference)
+    if here_nm is None or there_nm is None:
+        return 0.0
+    return abs(here_nm / there_nm - 1.0) if there_nm else math.inf
+
+
+def _torque_nm(rig: Rig) -> float | None:
+    return rig.nominal_torque_nm(rig.pairs[0].driver)
+
+
+def observed(condition: Condition, index: int, n: int, change: Features | None = None) -> ObservedChange:
+    """Return a condition's distances and floors of the first `n` features; `change` instead of its own."""
+    used = change or condition.change
+    structural = condition.floor
+    both = (structural.of(used.names) ** 2 + (REPEATABLE * pooled_scatter(used)) ** 2) ** 0.5
+    return ObservedChange(index, structural.from_centre(used.names, used.values)[:n], both[:n])
+
+
+def halves(gathered: ReducedRecording) -> tuple[ReducedRecording, ReducedRecording]:
+    """Return the blocks of revolutions with even and with odd numbers."""
+    n = gathered.n_blocks
+    first = second = gathered
+    for block in reversed(range(n)):
+        first, second = (first.without(block), second) if block % 2 else (first, second.without(block))
+    return first, second
+
+
+# --------------------
+# What can be noticed when recordings are not of the machine that they are said to be of.
+# --------------------
+
+
+NEAR_MESH, SLOW = 2, 5
+"""Orders of a shaft beside a mesh harmonic that belong to it, and orders from 0 that are the shaft's own."""
+
+LEAST_MESH_SHARE = 0.5
+"""Of what repeats with either shaft. Machines of the simulator have 0.7 and more, the heaviest damage included; a pair
+of 55/75 teeth taken for one of 29/47 has 0.45."""
+
+LEAST_PATTERN = 3.0
+"""Power of the lines that tell teeth apart over that of the noise in them: with less, any two patterns differ."""
+
+LEAST_AGREEMENT = 0.6
+"""Of both gears' patterns. One damaged gear lowers its own to 0.2, and leaves the other's at 0.8 and more; another
+specimen of the same drawing has 0.2 and 0.5, and so have two gears that have worn heavily."""
+
+
+WELL_EXPLAINED, HARDLY_EXPLAINED = 0.5, 0.15
+"""Share, over that by chance, of what repeats with a shaft that mesh harmonics hold. Of the sample recordings, damaged
+ones included, the right number of teeth has 0.35 and more (0.08 with the heaviest damage, and then no other number has
+much); most wrong ones have less than 0, a few 0.2 to 0.6."""
+
+FEWEST_TEETH, MOST_TEETH = 12, 200
+
+LOST_DB, OWN_DB = 10.0, 6.0
+"""By how much one tooth's burst has become less since the reference, and by how much it stands above the reference's
+middling tooth: sound teeth that differ by chance have up to 7 dB, and lose nothing from one day to the next."""
+
+CLEAR_CHANGE, ALONE = 10.0, 4.0
+"""Energy of the change at one tooth over that at the middling tooth, and over the largest more than a tooth away: worn
+flanks and another path to the sensor change all teeth, some of them much."""
+
+
+def doubts_of(condition: Condition) -> list[str]:
+    """Return what speaks strongly for a wrong rig file, or for recording and reference exchanged."""
+    name, reference = condition.facts.name, condition.reference
+    texts = wrong_teeth(condition.now, name)
+    if reference is None or texts:
+        return texts
+    return wrong_teeth(reference, f"The reference of {name}") or exchanged(condition.now, reference, name)
+
+
+def wrong_teeth(now: ReducedRecording, name: str) -> list[str]:
+    """Say so where a shaft's own mark shows that its gear has not the rig's teeth but another number.
+
+    Where angle counts from a mark on the very shaft, its average holds for any teeth. Next to nothing of it must lie at
+    the mesh harmonics of the rig's number of teeth, and most of it at those of another one; multiples and divisors of
+    the right number are not noticed.
+    """
+    for side in (DRIVER, DRIVEN):
+        if not now.marks[side]:
+            continue
+        stated, shares = now.frame.teeth[side], _explained(now, side)
+        best = max(shares, key=shares.__getitem__, default=stated)
+        if shares.get(stated, 1.0) < HARDLY_EXPLAINED and shares.get(best, 0.0) > WELL_EXPLAINED:
+            shaft = shaft_words(now.frame, side)
+            remark = (
+                f"{name}: the teeth do not fit. What repeats with {shaft} does so {best} times a revolution, and the "
+                f"rig file gives its gear {stated} teeth. Unless it is a recording of another machine, the rig file is "
+                "wrong; until that is settled nothing here can be relied on."
+            )
+            return [remark]
+    return []
+
+
+def _explained(now: ReducedRecording, side: int) -> dict[int, float]:
+    """Return number of teeth → share of a shaft's average near its mesh harmonics over that by chance, (s − c)/(1 − c).
+
+    Two harmonics must be visible.
+    """
+    whole = []
+    for sums in now.channels.values():
+        power = np.abs(average_lines(sums, side)[0]) ** 2
+        power = power[: visible_orders(now, side, len(power)) + 1]
+        power[: SLOW + 1] = 0.0
+        whole.append(power / max(float(power.sum()), 1e-300))
+    shares = np.mean(whole, axis=0)
+    orders = np.arange(len(shares))
+    found = {}
+    for teeth in range(FEWEST_TEETH, min(MOST_TEETH, len(shares) // 2) + 1):
+        near = orders_from_mesh(orders, teeth) <= NEAR_MESH
+        by_chance = float(near[SLOW + 1 :].mean())
+        found[teeth] = (float(shares[near].sum()) - by_chance) / (1.0 - by_chance)
+    return found
+
+
+def exchanged(now: ReducedRecording, reference: ReducedRecording, name: str) -> list[str]:
+    """Say so where one tooth stands out in the reference and is ordinary in the recording.
+
+    Damage adds a burst to one tooth and takes none away. What the change alone cannot tell, its sign does.
+    """
+    for side in (DRIVER, DRIVEN):
+        try:
+            difference, _ = turned_difference(now, reference, side)
+        except RefusalError:
+            return []
+        own = lines_of_shaft(now, side).lines[:, : difference.lines.shape[1]]
+        changed, here, there = (
+            _energy(now, side, difference, lines) for lines in (difference.lines, own, own - difference.lines)
+        )
+        at = int(np.argmax(changed))
+        lost_db, own_db = _decibel(there[at] / here[at]), _decibel(there[at] / np.median(there))
+        elsewhere = np.roll(changed, -at)[2 * STEPS_PER_TOOTH : -2 * STEPS_PER_TOOTH]
+        is_one = changed[at] >= max(CLEAR_CHANGE * float(np.median(changed)), ALONE * float(elsewhere.max()))
+        if is_one and lost_db >= LOST_DB and own_db >= OWN_DB:
+            place = (at / len(changed) + (0.5 - load_calibration().lag_pitches) / difference.teeth) % 1.0
+            tooth = f"Tooth {int(place * difference.teeth) + 1}" if now.marks[side] else "One tooth"
+            remark = (
+                f"{name}: recording and reference may have been exchanged. {tooth} of {shaft_words(now.frame, side)} "
+                f"(at {360.0 * place:.0f}°) stands {own_db:.0f} dB above the middling one in the reference, and is "
+                f"{lost_db:.0f} dB weaker in the recording; damage adds such a burst and takes none away. If so, what "
+                "is named is what the reference has: give the two the other way round."
+            )
+            return [remark]
+    return []
+
+
+def _energy(now: ReducedRecording, side: int, difference: ShaftLines, lines: NDArray[np.complex128]) -> FloatArray:
+    """Return the energy within one pitch of what tells the teeth apart, mean over channels."""
+    rows = [
+        tooth_energy(
+            residual_lines(row, difference.teeth, difference.highest_order, difference.other_teeth)
+            / np.sqrt(mesh_power(now, sums, side)),
+            difference.teeth,
+        )
+        for row, sums in zip(lines, now.channels.values(), strict=True)
+    ]
+    energy: FloatArray = np.maximum(np.mean(rows, axis=0), 1e-300)
+    return energy
+
+
+def _decibel(ratio: float) -> float:
+    return 10.0 * float(np.log10(ratio))
+
+
+def strange_teeth(now: ReducedRecording, name: str) -> list[str]:
+    """Say so where little of what repeats with the shafts lies at the mesh harmonics of the rig's teeth.
+
+    Gears of less than some 15 teeth are not noticed: any order lies near one of their harmonics.
+    """
+    share = max(_mesh_share(now, side) for side in (DRIVER, DRIVEN))
+    if share >= LEAST_MESH_SHARE or wrong_teeth(now, name):  # that is said by itself
+        return []
+    remark = (
+        f"{name}: only {100 * share:.0f} % of what repeats with a shaft lies at mesh harmonics of the rig's "
+        f"{_teeth(now.frame)} teeth. Is it a recording of this machine?"
+    )
+    return [remark]
+
+
+def strange_pattern(now: ReducedRecording, reference: ReducedRecording, name: str) -> list[str]:
+    """Say so where neither gear's pattern of teeth is that of the reference; flawless gears have none to compare."""
+    if not all(_has_pattern(one, side) for one in (now, reference) for side in (DRIVER, DRIVEN)):
+        return []
+    try:
+        agreements = [turned_difference(now, reference, side)[1] for side in (DRIVER, DRIVEN)]
+    except RefusalError:
+        return []
+    if max(agreements) >= LEAST_AGREEMENT:
+        return []
+    both = " and ".join(f"{max(a, 0.0):.2f}" for a in agreements)
+    remark = (
+        f"{name}: the patterns of the teeth of both gears agree with the reference by {both} only, where 1 is the same "
+        "gears. The reference is of another machine, or both gears have worn since."
+    )
+    return [remark]
+
+
+def _has_pattern(gathered: ReducedRecording, side: int) -> bool:
+    """Return whether what tells a gear's teeth apart stands clear of noise in the channel where it is clearest."""
+    clearest = 0.0
+    for sums in gathered.channels.values():
+        lines, noise = average_lines(sums, side)
+        used = telling_teeth_apart(np.arange(len(lines)), gathered.frame.teeth[side])
+        clearest = max(clearest, float(np.sum(np.abs(lines[used]) ** 2) / np.sum(noise[used])))
+    return clearest >= LEAST_PATTERN
+
+
+def _mesh_share(now: ReducedRecording, side: int) -> float:
+    """Return the share of the average's power near mesh harmonics, mean over channels."""
+    teeth = now.frame.teeth[side]
+    shares = []
+    for sums in now.channels.values():
+        power = np.abs(average_lines(sums, side)[0]) ** 2
+        orders = np.arange(len(power))
+        above = orders > SLOW
+        total = float(power[above].sum())
+        shares.append(
+            float(power[above & (orders_from_mesh(orders, teeth) <= NEAR_MESH)].sum()) / total if total > 0 else 1.0
+        )
+    return float(np.mean(shares))
+
+
+def _teeth(frame: GearFrame) -> str:
+    return "/".join(str(z) for z in frame.teeth)
+
+
+CLEAR_WITHOUT = 3.0
+"""Structural floors from which a reference that far from the simulator is worth a remark."""
+
+LARGEST_DRIFT = 0.4
+"""Of the speed over a record, relative: more is a run-up; effects that let the speed wander stay far below."""
+
+Stage = Callable[[str, float], object]
+
+
+def conditions_of(
+    recordings: Sequence[Recording],
+    rigs: Sequence[Rig],
+    references: Sequence[Recording],
+    reference_rigs: Sequence[Rig],
+    twin: Twin,
+    names: Sequence[str],
+    tell: Stage,
+    reference_names: Sequence[str] = (),
+) -> tuple[list[Condition], list[str]]:
+    """Return the conditions, and what is worth a remark.
+
+    Raises
+    ------
+    RefusalError
+        If a speed cannot be known or there are too few revolutions: in a recording, or in every reference.
+    """
+    found: list[Condition] = []
+    notices: list[str] = []
+    called = reference_names or [f"reference {i + 1}" for i in range(len(references))]
+    healthy = _references(references, reference_rigs, called, notices)
+    for i, (recording, rig) in enumerate(zip(recordings, rigs, strict=True)):
+        name = names[i] if names else f"recording {i + 1}"
+        tell(f"simulating the sound machine at the point of {name}", 0.05 + 0.15 * i / len(recordings))
+        now = _gathered(recording, rig, name, notices)
+        notices += strange_teeth(now, name)
+        facts = facts_of(recording, rig, now, name, twin)
+        notices += _assumed(recording, rig, facts)
+        match, why = matching_reference(now, rig, healthy)
+        if why:
+            notices.append(f"{name} is compared with the simulation: {why}.")
+        reference = None if match is None else match.gathered
+        if match is not None:
+            facts = replace(facts, reference=match.name)
+            now = _with_channels_of(now, match.gathered, healthy, name, notices)
+        _check_steady(now, reference, name)
+        simulation = simulated(twin, facts, now)
+        change = compare(now, simulation, reference)
+        found.append(Condition(facts, now, simulation, reference, change))
+        if reference is not None:
+            notices += strange_pattern(now, reference, name)
+            notices += _strange_reference(reference, simulation, name)
+    if not references:
+        notices.append("No healthy reference: a recording of the same rig when it was sound would make it much surer.")
+    return found, notices
+
+
+def _with_channels_of(
+    now: ReducedRecording, reference: ReducedRecording, healthy: Sequence[Healthy], name: str, notices: list[str]
+) -> ReducedRecording:
+    """Return a recording with the channels that its reference has as well, and say what was made of the others."""
+    if not any(set(reference.channels) & set(one.gathered.channels) for one in healthy):
+        notices.append(f"{name}: its only channel is taken for the reference's only one, which has another name.")
+    left_out = [channel for channel in now.channels if channel not in reference.channels]
+    if left_out:
+        notices.append(f"{name}: {', '.join(left_out)} is left out, for the reference has no such channel.")
+    return now.with_channels({channel: now.channels[channel] for channel in reference.channels})
+
+
+def _check_steady(now: ReducedRecording, reference: ReducedRecording | None, name: str) -> None:
+    """Refuse a run-up, but beside one of the reference's: the simulation is at one speed."""
+    drift, usual = now.speed[0], 0.0 if reference is None else reference.speed[0]
+    if abs(drift - usual) > LARGEST_DRIFT:
+        start, end = (60.0 * now.speed_hz * (1.0 + half * drift) for half in (-0.5, 0.5))
+        raise RefusalError(
+            f"{name}: the speed goes from about {start:.0f} to {end:.0f} rpm; the simulation it is compared with is at "
+            "one speed",
+            remedy="cut out parts at steady speed and give them as operating conditions, or give a reference of the "
+            "same run",
+        )
+
+
+def _references(
+    references: Sequence[Recording], rigs: Sequence[Rig], names: Sequence[str], notices: list[str]
+) -> list[Healthy]:
+    """Reduce the references; one of several that cannot be read is left out, and said."""
+    healthy: list[Healthy] = []
+    for recording, rig, name in zip(references, rigs, names, strict=True):
+        try:
+            healthy.append(Healthy(_gathered(recording, rig, name, notices), rig, name))
+        except RefusalError as refusal:
+            if not healthy and recording is references[-1]:
+                raise
+            notices.append(f"{refusal.reason}; this reference is left out.")
+            continue
+        notices += strange_teeth(healthy[-1].gathered, name)
+    return healthy
+
+
+def _gathered(recording: Recording, rig: Rig, name: str, notices: list[str]) -> ReducedRecording:
+    """Reduce a recording without its dead channels; a refusal names the recording."""
+    from gearsig.recording import find_problems
+
+    dead = {p.channel: p for p in find_problems(recording) if p.kind == "dead"}
+    live = [channel for channel in recording.vibration_names() if channel not in dead]
+    if not live:
+        seen = "; ".join(f"{p.channel}: {p.evidence}" for p in dead.values()) or "there is none"
+        raise RefusalError(f"{name}: no vibration channel is live ({seen})", remedy="check sensors, cables and inputs")
+    try:
+        found = reduce_recording(_in_si(recording, live, name, notices), rig, live)
+    except RefusalError as refusal:
+        raise RefusalError(f"{name}: {refusal.reason}", remedy=refusal.remedy) from None
+    notices += [f"{name}: channel {p.channel} is dead ({p.evidence}) and left out." for p in dead.values()]
+    return found
+
+
+def _in_si(recording: Recording, live: Sequence[str], name: str, notices: list[str]) -> Recording:
+    """Return a recording in m/s², as simulations are; say of which channels that cannot be known."""
+    factors = {c.name: metres_per_second_squared(c) for c in recording.channels if c.name in live}
+    unknown = [channel for channel, factor in factors.items() if factor is None]
+    if unknown:
+        notices.append(
+            f"{name}: {', '.join(unknown)} is no acceleration in a known unit; it is compared as if it were m/s², so "
+            "that without a reference its level says nothing."
+        )
+    scale = np.array([factors.get(c.name) or 1.0 for c in recording.channels])
+    if np.all(scale == 1.0):
+        return recording
+    channels = tuple(replace(c, unit="m/s^2") if factors.get(c.name) else c for c in recording.channels)
+    return replace(recording, samples=recording.samples * scale[:, None], channels=channels)
+
+
+def _assumed(recording: Recording, rig: Rig, facts: ConditionFacts) -> list[str]:
+    """Say what is doubtful of a recording, and what of its operating point was not given."""
+    texts = [f"{facts.name}: {warning}." for warning in recording.warnings]
+    if recording.speed_source is None:
+        texts.append(
+            f"{facts.name}: no tachometer and no known speed; {facts.point.speed_rpm:.4g} rpm were found in the"
+            " vibration."
+        )
+    if rig.nominal_torque_nm(rig.pairs[0].driver) is None:
+        texts.append(
+            f"{facts.name}: the torque is not given; {facts.point.torque_nm:.3g} N·m are usual for the gears' size."
+        )
+    return texts
+
+
+def _strange_reference(reference: ReducedRecording, simulation: ReducedRecording, name: str) -> list[str]:
+    """Say so where the reference itself is far from the simulation of a sound machine."""
+    floor = load_population().simulation_floor
+    size = gap_size(compare(reference, simulation, None), floor).structural.value
+    if size < CLEAR_WITHOUT:
+        return []
+    remark = (
+        f"The reference of {name} is itself {size:.1f} structural floors from the simulation of a sound machine: "
+        "if it was not healthy, only what changed since is seen."
+    )
+    return [remark]

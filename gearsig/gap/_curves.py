@@ -1,0 +1,366 @@
+"""What is drawn of a gap: order spectra and energy over the angle, measured against simulated before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray
+from gearsig.gap._change import lines_of_shaft, turned_difference
+from gearsig.gap._features import (
+    MOST_SHAFT_ORDERS,
+    N_MESH_HARMONICS,
+    SIDEBANDS,
+    SIDES,
+    STEPS_PER_TOOTH,
+    average_lines,
+    floor_ratio,
+    mesh_power,
+    residual_lines,
+    visible_orders,
+)
+from gearsig.gap._floors import StructuralFloor
+from gearsig.gap._places import changed_pattern, own_pattern
+from gearsig.gap._reduction import DRIVEN, DRIVER, ReducedRecording
+from gearsig.gap._types import AngleCurves, AverageCurves, SpectrumCurves
+from gearsig.gap._words import shaft_words
+from gearsig.severity import load_calibration
+
+BEYOND = 0.5
+"""Of a mesh order, past the last harmonic that is shown."""
+
+_RARE = 3.0
+"""Of the noise's power: one line of noise in twenty is stronger (exp(−3) = 0.05)."""
+
+CLOSER_THAN_A_SHAFTS = 0.1
+"""Orders of the driver between lines of a residual; slower driven shafts than this are not built in one stage."""
+
+NOTHING: FloatArray = np.zeros(0)
+
+
+def spectrum_curves(
+    now: ReducedRecording,
+    before: ReducedRecording,
+    after: ReducedRecording | None = None,
+    *,
+    structural: StructuralFloor | None = None,
+    reference: ReducedRecording | None = None,
+    reference_structural: StructuralFloor | None = None,
+    unit: str = "m/s^2",
+    channel: str = "",
+) -> tuple[SpectrumCurves, ...]:
+    """Return the order spectra of both shafts' averages and of what neither repeats.
+
+    Parameters
+    ----------
+    now, before : Gathered
+        Measured, and what it is compared with.
+    after : Gathered or None
+        The simulation with the likeliest effect.
+    structural : StructuralFloor or None
+        Of the same comparison; each line gets the floor of the feature that it belongs to.
+    reference : Gathered or None
+        The healthy recording, with the same channels.
+    reference_structural : StructuralFloor or None
+        Of the comparison with it.
+    unit : str
+        Of the channels.
+    channel : str
+        Empty: root mean square over all channels.
+    """
+    runs = _Runs(now, before, after, reference)
+    names = (channel,) if channel else tuple(now.channels)
+    averages = (_of_average(side, runs, names, unit) for side in (DRIVER, DRIVEN))
+    found = (*averages, _of_residual(runs, names, unit))
+    features = [average_features(side, now.frame.teeth[side], len(found[side].orders)) for side in (DRIVER, DRIVEN)]
+    features.append(residual_features(now, found[2].orders))
+    return tuple(
+        replace(
+            curves,
+            structural_db=NOTHING if structural is None else structural.of(belonging),
+            reference_structural_db=NOTHING if reference_structural is None else reference_structural.of(belonging),
+        )
+        for curves, belonging in zip(found, features, strict=True)
+    )
+
+
+@dataclass(frozen=True)
+class _Runs:
+    """What is drawn together; `before` and what follows as in `spectrum_curves`."""
+
+    now: ReducedRecording
+    before: ReducedRecording
+    after: ReducedRecording | None
+    reference: ReducedRecording | None
+
+    @property
+    def beside(self) -> dict[str, ReducedRecording]:
+        """Those beside the recording that there are, by the name of their curve."""
+        named = {"before": self.before, "after": self.after, "reference": self.reference}
+        return {name: run for name, run in named.items() if run is not None}
+
+
+def average_features(side: int, teeth: int, n: int) -> list[str]:
+    """Return for each order of a shaft the feature that it belongs to."""
+    name = SIDES[side]
+    found = []
+    for order in range(n):
+        harmonic, offset = round(order / teeth), abs((order + teeth // 2) % teeth - teeth // 2)
+        if order <= MOST_SHAFT_ORDERS and 2 * order < teeth:
+            found.append(f"shaft.{name}.{max(order, 1)}" if order <= 3 else f"shaft.{name}.low")
+        elif offset == 0 and harmonic <= N_MESH_HARMONICS:
+            found.append(f"mesh.share.{harmonic}")
+        else:
+            near = (label for label, (first, last) in SIDEBANDS.items() if first <= offset <= last)
+            label = next(near, "")
+            found.append(f"sideband.{name}.{label}" if label else f"tooth.{name}.level")
+    return found
+
+
+def residual_features(now: ReducedRecording, orders: FloatArray) -> list[str]:
+    """Return for each order of the residual the feature of its band."""
+    edges = [low for low, _ in now.bands_hz[:-1]]
+    bands = np.searchsorted(edges, orders * now.speed_hz, side="right")
+    return [f"floor.band.{max(int(band), 1)}" for band in bands]
+
+
+def _of_average(side: int, runs: _Runs, names: Sequence[str], unit: str) -> SpectrumCurves:
+    now = runs.now
+    power, noise = _average_power(now, side, names)
+    others = {name: _average_power(run, side, names) for name, run in runs.beside.items()}
+    last = int((N_MESH_HARMONICS + BEYOND) * now.frame.teeth[side])
+    n = min(last + 1, len(power), *(len(of_other) for of_other, _ in others.values()))
+    floors = {name: np.sqrt(_RARE * (noise[:n] + of_other[:n])) for name, (_, of_other) in others.items()}
+    amplitudes = {name: np.sqrt(of_other[:n]) for name, (of_other, _) in others.items()}
+    return SpectrumCurves(
+        f"average over {shaft_words(now.frame, side)}",
+        unit,
+        np.arange(n) * now.frame.shaft_orders[side],
+        np.sqrt(power[:n]),
+        **{"after": NOTHING, **amplitudes},
+        floor=floors["before"],
+        reference_floor=floors.get("reference", NOTHING),
+    )
+
+
+def _average_power(gathered: ReducedRecording, side: int, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+    """Return lines' power, as squares of peaks, and that of their noise: means over channels."""
+    pairs = [average_lines(gathered.channels[name], side) for name in names]
+    n = visible_orders(gathered, side, min(len(lines) for lines, _ in pairs)) + 1
+    power: FloatArray = np.mean([np.abs(lines[:n]) ** 2 for lines, _ in pairs], axis=0)
+    noise: FloatArray = np.mean([noise[:n] for _, noise in pairs], axis=0)
+    return power, noise
+
+
+def _of_residual(runs: _Runs, names: Sequence[str], unit: str) -> SpectrumCurves:
+    now = runs.now
+    power = _residual_power(now, names)
+    highest = (run.highest_order for run in (now, runs.before, runs.reference) if run is not None)
+    top = min((N_MESH_HARMONICS + BEYOND) * now.frame.teeth[DRIVER], *highest)
+    orders = np.arange(min(len(power), int(top / now.order_step) + 1)) * now.order_step
+    measured = power[: len(orders)]
+    others = {name: (run.order_step, _residual_power(run, names)) for name, run in runs.beside.items()}
+    # 2: squares of peaks from mean squares.
+    amplitudes = {
+        name: np.sqrt(2.0 * np.interp(orders, np.arange(len(values)) * step, values))
+        for name, (step, values) in others.items()
+    }
+    floor = np.sqrt(2.0 * _RARE * measured / floor_ratio(measured[None])[0])
+    return SpectrumCurves(
+        "what neither shaft repeats",
+        unit,
+        orders,
+        np.sqrt(2.0 * measured),
+        **{"after": NOTHING, **amplitudes},
+        floor=floor,
+        reference_floor=floor if runs.reference is not None else NOTHING,
+    )
+
+
+def _residual_power(gathered: ReducedRecording, names: Sequence[str]) -> FloatArray:
+    power: FloatArray = np.mean([gathered.channels[name].residual_power.mean(axis=0) for name in names], axis=0)
+    return power
+
+
+def against_reference(curves: SpectrumCurves) -> SpectrumCurves:
+    """Return the curves with the healthy reference, and its floors, in the place of the simulation."""
+    return replace(
+        curves,
+        before=curves.reference,
+        after=NOTHING,
+        floor=curves.reference_floor,
+        structural_db=curves.reference_structural_db,
+    )
+
+
+def lines_beyond(curves: SpectrumCurves) -> tuple[int, int]:
+    """Count the lines whose gap exceeds their structural floor, and those that exceed the repeatability floor."""
+    gap = gap_by_order(curves, curves.before)
+    return int(np.count_nonzero(is_beyond(curves, gap))), int(np.count_nonzero(np.isfinite(gap)))
+
+
+def is_beyond(curves: SpectrumCurves, gap: FloatArray) -> NDArray[np.bool_]:
+    """Return which lines' gaps, in dB, exceed their structural floor; where that is not known, all that have one."""
+    structural = curves.structural_db if len(curves.structural_db) else np.zeros(len(gap))
+    beyond: NDArray[np.bool_] = np.abs(np.nan_to_num(gap)) > structural
+    return beyond
+
+
+def gap_by_order(curves: SpectrumCurves, simulated: FloatArray) -> FloatArray:
+    """Return 20 lg of measured over simulated amplitudes, each lifted to the floor; nan where neither exceeds it.
+
+    In the residual, whose lines lie closer than a shaft's, a line that moved to its neighbour is the same line.
+    """
+    floor = np.maximum(curves.floor, 1e-300)
+    a, b = (20.0 * np.log10(np.maximum(values, floor)) for values in (curves.measured, simulated))
+    up, down = a - b, a - b
+    if curves.orders[1] - curves.orders[0] < CLOSER_THAN_A_SHAFTS:
+        up, down = a - _largest_of_three(b), _largest_of_three(a) - b
+    gap = np.maximum(up, 0.0) + np.minimum(down, 0.0)
+    return np.where((curves.measured > floor) | (simulated > floor), gap, np.nan)
+
+
+def _largest_of_three(values: FloatArray) -> FloatArray:
+    padded = np.pad(values, 1, mode="edge")
+    largest: FloatArray = np.maximum(np.maximum(padded[:-2], padded[2:]), values)
+    return largest
+
+
+def angle_curves(
+    now: ReducedRecording,
+    before: ReducedRecording,
+    after: ReducedRecording | None = None,
+    *,
+    sound: ReducedRecording | None = None,
+    simulated_sound: ReducedRecording | None = None,
+    unit: str = "",
+) -> tuple[AngleCurves, ...]:
+    """Return, for both shafts, the energy within one pitch over that of the measured middling tooth.
+
+    The angle is that at which a tooth engages: the answer's usual lag is taken off. Simulated curves are turned to
+    where they agree best, unless both have a mark on that shaft.
+
+    Parameters
+    ----------
+    now, before, after : Gathered
+        Measured, simulated without and with the likeliest effect.
+    sound, simulated_sound : Gathered or None
+        Where both are given, the curves are those of the differences from them; a simulation that *is* the sound one
+        has none, and its curve is 0.
+    """
+    compared = sound is not None and simulated_sound is not None
+    found = []
+    for side in (DRIVER, DRIVEN):
+        measured = _energy(now, sound if compared else None, side)
+        middling = max(float(np.median(measured)), 1e-300)
+        simulated = [
+            _turned(
+                _energy(run, simulated_sound if compared else None, side), measured, run.marks[side], now.marks[side]
+            )
+            for run in (before, after)
+            if run is not None
+        ]
+        curves = [values / middling for values in (measured, *simulated)]
+        angle, shift = _angles(now.frame.teeth[side])
+        first, second, third = ([np.roll(values, -shift) for values in curves] + [NOTHING])[:3]
+        frame = now.frame
+        found.append(
+            AngleCurves(frame.shafts[side], unit, frame.teeth[side], now.marks[side], angle, first, second, third)
+        )
+    return tuple(found)
+
+
+def _energy(run: ReducedRecording, sound: ReducedRecording | None, side: int) -> FloatArray:
+    """Return the energy at each start of a pitch, mean over channels; 0 for a run compared with itself."""
+    if sound is run:
+        return np.zeros(run.frame.teeth[side] * STEPS_PER_TOOTH)
+    pattern = own_pattern(run, side) if sound is None else changed_pattern(run, sound, side)
+    energy: FloatArray = pattern.energy.mean(axis=0)
+    return energy
+
+
+def _turned(simulated: FloatArray, measured: FloatArray, *marks: bool) -> FloatArray:
+    """Return the curve turned to its best agreement, unless marks fix it."""
+    if all(marks):
+        return simulated
+    agreement = np.fft.irfft(np.fft.rfft(measured) * np.conj(np.fft.rfft(simulated)), len(measured))
+    turned: FloatArray = np.roll(simulated, int(np.argmax(agreement)))
+    return turned
+
+
+def _angles(teeth: int) -> tuple[FloatArray, int]:
+    """Return ascending angles in degrees from 0 to 360, and which place is the first.
+
+    A window that starts at θ has its middle half a pitch on; the tooth engaged `lag_pitches` before.
+    """
+    n = teeth * STEPS_PER_TOOTH
+    middle = (np.arange(n) / STEPS_PER_TOOTH + 0.5 - load_calibration().lag_pitches) / teeth
+    first = int(np.argmin(middle % 1.0))
+    angle: FloatArray = 360.0 * np.roll(middle % 1.0, -first)
+    return angle, first
+
+
+# --------------------
+# The teeth's patterns of a recording and of the healthy reference, for a picture of both.
+# --------------------
+
+
+POINTS_PER_PERIOD = 4
+"""Of the highest order: the picture's lines are then smooth."""
+
+
+def average_curves(now: ReducedRecording, reference: ReducedRecording, *, unit: str = "") -> tuple[AverageCurves, ...]:
+    """Return what tells the teeth apart in both shafts' averages, of a recording and of its reference.
+
+    Of the channel on which most has changed, over its mesh harmonics. The angle is that at which a tooth engages: the
+    answer's usual lag is taken off, as in `gearsig.gap.angle_curves`.
+
+    Parameters
+    ----------
+    now, reference : Gathered
+        With the same channels.
+    unit : str
+        Of the channels.
+
+    Raises
+    ------
+    RefusalError
+        If the reference was taken at another speed.
+    """
+    return tuple(_of_side(now, reference, side, unit) for side in (DRIVER, DRIVEN))
+
+
+def _of_side(now: ReducedRecording, reference: ReducedRecording, side: int, unit: str) -> AverageCurves:
+    difference, _ = turned_difference(now, reference, side)
+    n = difference.lines.shape[1]
+    own = lines_of_shaft(now, side).lines[:, :n]
+
+    def pattern(lines: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        return residual_lines(lines, difference.teeth, difference.highest_order, difference.other_teeth)
+
+    scales = [mesh_power(now, sums, side) for sums in now.channels.values()]
+    changed = [np.sum(np.abs(pattern(row)) ** 2) / scale for row, scale in zip(difference.lines, scales, strict=True)]
+    row = int(np.argmax(changed))
+    measured = pattern(own[row])
+    lag = load_calibration().lag_pitches / difference.teeth
+    waves = [_wave(lines, lag) for lines in (measured, measured - pattern(difference.lines[row]))]
+    return AverageCurves(
+        now.frame.shafts[side],
+        unit,
+        list(now.channels)[row],
+        now.frame.teeth[side],
+        now.marks[side],
+        np.arange(len(waves[0])) * 360.0 / len(waves[0]),
+        *waves,
+    )
+
+
+def _wave(lines: NDArray[np.complex128], lag_rev: float) -> FloatArray:
+    """Return one revolution of peak amplitudes, moved back by the answer's lag."""
+    n = POINTS_PER_PERIOD * (len(lines) - 1)
+    turned = lines * np.exp(2j * np.pi * np.arange(len(lines)) * lag_rev)
+    wave: FloatArray = np.fft.irfft(turned, n) * (n / 2.0)
+    return wave

@@ -1,0 +1,219 @@
+"""What speaks for an effect and what against it: predicted changes beside observed ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsig.gap._change import beyond_the_mesh
+from gearsig.gap._features import SIDES, Features
+from gearsig.gap._floors import REPEATABLE, StructuralFloor, family_members, pooled_scatter
+from gearsig.gap._prediction import Fit, ObservedChange
+from gearsig.gap._reduction import GearFrame
+from gearsig.gap._types import Evidence
+from gearsig.gap._words import feature_words
+
+MOST, MOST_OF_A_FAMILY = 10, 3
+CLEAR = 1.0
+"""Floors from which a change, predicted or observed, says something."""
+
+SMALLEST = 0.3
+"""Floors from which the sign of a prediction says something."""
+
+OWN_COUNTS = 2.0
+
+AGREES = 0.5
+"""Observed over predicted, from here to its inverse, speaks for the effect."""
+
+
+def evidence_of(fit: Fit, observed: Sequence[ObservedChange], frame: GearFrame) -> tuple[Evidence, ...]:
+    """Return the most telling features of each family, clearest first; of the condition that shows most.
+
+    What the effect would change counts twice as much as what it would not: its own features must be among them.
+
+    Parameters
+    ----------
+    fit : Fit
+    observed : sequence of Observed
+        One per condition.
+    frame : GearFrame
+    """
+    clearest = max(observed, key=lambda one: float(np.abs(one.normalised).max()))
+    predicted = fit.at(clearest.condition)
+    sizes = np.maximum(OWN_COUNTS * np.abs(predicted), np.abs(clearest.distances)) / clearest.floors
+    clear = np.maximum(np.abs(predicted), np.abs(clearest.distances)) >= CLEAR * clearest.floors
+    best = [
+        int(i)
+        for rows in family_members(fit.path.names).values()
+        for i in rows[np.argsort(-sizes[rows], kind="stable")][:MOST_OF_A_FAMILY]
+    ]
+    telling = sorted((i for i in best if clear[i]), key=lambda i: -sizes[i])
+    return tuple(
+        weighed_evidence(
+            feature_words(fit.path.names[i], frame),
+            float(predicted[i]),
+            float(clearest.distances[i]),
+            float(clearest.floors[i]),
+        )
+        for i in telling[:MOST]
+    )
+
+
+def weighed_evidence(
+    feature: str, predicted_db: float, observed_db: float, floor_db: float, *, least: float = CLEAR
+) -> Evidence:
+    """Return a predicted change beside the observed one, with what it says of the effect.
+
+    It speaks for the effect where both are of one sign and one size; or, where the prediction is beyond the floor,
+    differ by less than that. What moved the predicted way and further is no evidence against it where the prediction is
+    beyond the floor, or what it leaves is within: the simulator's size of the effect is uncertain, and something else
+    may have moved it, too. What was not predicted, did not come, or moved the other way is.
+
+    Parameters
+    ----------
+    feature : str
+        In words.
+    predicted_db, observed_db, floor_db : float
+    least : float
+        Floors from which a prediction of the right size speaks for the effect.
+    """
+    size, left = abs(predicted_db), abs(predicted_db - observed_db)
+    if size == 0.0 or size < SMALLEST * floor_db:
+        return Evidence(feature, predicted_db, observed_db, floor_db, speaks_for=False)
+    ratio, is_clear = observed_db / predicted_db, size >= CLEAR * floor_db
+    alike = size >= least * floor_db and AGREES <= ratio <= 1.0 / AGREES
+    agrees = alike or (is_clear and left <= floor_db)
+    further = not agrees and ratio > 1.0 and (is_clear or left <= floor_db)
+    return Evidence(feature, predicted_db, observed_db, floor_db, agrees, further)
+
+
+# --------------------
+# Which of the two shafts a cause sits on, by what changed on either; or that it cannot be told.
+#
+# What turns with a shaft shows at that shaft's own orders and sidebands and in its own synchronous average. Each cause
+# has its signs there; those of both shafts are compared. It needs no simulation, so that it serves any way of naming
+# causes.
+# --------------------
+
+
+ONE_TOOTH = ("root_crack", "tooth_spall", "chipped_tooth")
+"""Causes on a single tooth."""
+
+_BURST = ("change.{}.peak", "change.{}.prominence", "tooth.{}.peak", "tooth.{}.prominence", "tooth.{}.kurtosis")
+_ALL_ROUND = ("change.{}.level", "change.{}.elsewhere", "tooth.{}.level", "tooth.{}.elsewhere", "shaft.{}.low")
+
+SIGNS: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys(ONE_TOOTH, _BURST),
+    "pitch_error": _ALL_ROUND,
+    "eccentricity": ("sideband.{}.1", "sideband.{}.own", "shaft.{}.1", "shaft.{}.1.to_mesh"),
+    "unbalance": ("shaft.{}.1", "shaft.{}.1.to_mesh"),
+    "misalignment": ("shaft.{}.2", "shaft.{}.2.to_mesh", "sideband.{}.2"),
+}
+"""Cause → features that rise on its shaft. Wear and friction change the mesh, which both shafts share."""
+
+FIRST_ORDER = {"misalignment": 2}
+"""Cause → the order of its shaft that it makes first, where it is not 1."""
+
+
+WHICH_SHAFT_MOST = 6.0
+"""Floors that one sign counts for."""
+
+TIMES = 1.5
+"""The signs on the one shaft over those on the other."""
+
+
+@dataclass(frozen=True)
+class ShaftSigns:
+    """How far a cause's signs rose on either shaft.
+
+    Parameters
+    ----------
+    rise : (float, float)
+        Root mean square of the signs that rose, in floors: driver, driven.
+    slow : int or None
+        The shaft whose sign the other cannot make, while its own sign falls on an order of this one; see `_slow`.
+    """
+
+    rise: tuple[float, float]
+    slow: int | None = None
+
+    @property
+    def side(self) -> int | None:
+        """0: driver, 1: driven, None: cannot be told."""
+        if self.slow is not None and TIMES * self.rise[self.slow] > self.rise[1 - self.slow]:
+            return self.slow if self.rise[self.slow] >= CLEAR else None
+        larger = int(np.argmax(self.rise))
+        most, least = self.rise[larger], self.rise[1 - larger]
+        return larger if most >= CLEAR and most >= TIMES * least else None
+
+
+def shaft_signs(cause: str, changes: Sequence[Mapping[str, float]], teeth: tuple[int, int]) -> ShaftSigns | None:
+    """Compare a cause's signs on both shafts; None for a cause that no shaft has to itself.
+
+    r_s = √(mean over conditions and signs of min(max(u, 0), 6)²), u a sign's change on shaft s in floors.
+
+    Parameters
+    ----------
+    cause : str
+        Name of an effect.
+    changes : sequence of mappings
+        Feature → change over its floor, see `over_floors`; one per operating condition.
+    teeth : (int, int)
+        Of driver and driven gear.
+    """
+    if cause not in SIGNS:
+        return None
+    rises = ([rise for change in changes for rise in _rises(SIGNS[cause], side, change)] for side in SIDES)
+    driver, driven = (float(np.sqrt(np.mean(np.square(rise)))) if rise else 0.0 for rise in rises)
+    return ShaftSigns((driver, driven), _slow(cause, teeth))
+
+
+def _slow(cause: str, teeth: tuple[int, int]) -> int | None:
+    """Return the slower shaft where it turns once for a whole number of turns of the other; None elsewhere.
+
+    The faster one's orders are orders of it, too; but its own first is none of the other's, nor is one tooth of it.
+    """
+    slow = int(np.argmax(teeth))
+    ratio, rest = divmod(teeth[slow], teeth[1 - slow])
+    return slow if not rest and FIRST_ORDER.get(cause, 1) % ratio else None
+
+
+def told_options(cause: str, changes: Sequence[Mapping[str, float]], teeth: tuple[int, int]) -> dict[str, str]:
+    """Return the option of the effect that says which shaft it is on, {"gear": "driven"}, say; empty: cannot be told.
+
+    Parameters
+    ----------
+    cause, changes, teeth
+        As of `shaft_signs`.
+    """
+    signs = shaft_signs(cause, changes, teeth)
+    if signs is None or signs.side is None:
+        return {}
+    return {"shaft" if cause == "misalignment" else "gear": SIDES[signs.side]}
+
+
+def over_floors(change: Features, floor: StructuralFloor, *, is_reference: bool) -> dict[str, float]:
+    """Return each feature's change over the larger of both floors, with its sign.
+
+    Parameters
+    ----------
+    change : Features
+        Against a reference or a simulation.
+    floor : StructuralFloor
+        Of that comparison.
+    is_reference : bool
+        Whether it is a reference: a level relative to the mesh then counts as far as it changed by itself.
+    """
+    distances = floor.from_centre(change.names, change.values)
+    if is_reference:
+        distances = beyond_the_mesh(change.names, distances)
+    floors = np.maximum(floor.of(change.names), REPEATABLE * pooled_scatter(change))
+    return dict(zip(change.names, (distances / floors).tolist(), strict=True))
+
+
+def _rises(signs: Sequence[str], side: str, change: Mapping[str, float]) -> list[float]:
+    """Return how far each sign that the comparison has rose on one shaft, `MOST` at most."""
+    names = [sign.format(side) for sign in signs]
+    return [float(np.clip(change[name], 0.0, WHICH_SHAFT_MOST)) for name in names if name in change]

@@ -1,0 +1,529 @@
+"""A recording as named features with the scatter that its own blocks give."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import gcd
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray
+from gearsig.gap._reduction import DRIVEN, DRIVER, ChannelSums, GearFrame, ReducedRecording
+from gearsig.severity import orders_from_mesh
+
+# --------------------
+# Features of the two synchronous averages' lines: mesh harmonics, sidebands, shaft orders.
+# --------------------
+
+
+N_MESH_HARMONICS = 6
+N_SIDEBAND_HARMONICS = 5
+SIDEBANDS = {"1": (1, 1), "2": (2, 2), "3to5": (3, 5), "6to12": (6, 12)}
+MOST_SHAFT_ORDERS = 30
+NOMINAL_REVOLUTIONS = 64.0
+BY_CHANCE = 1e-3
+"""Lines of noise that pass for a shaft's own."""
+SIDES = ("driver", "driven")
+
+Feature = tuple[str, float]
+
+
+def average_lines(sums: ChannelSums, side: int) -> tuple[NDArray[np.complex128], FloatArray]:
+    """Return the complex amplitudes (peak) of a shaft's average and the power that noise leaves on each of them.
+
+    The noise is estimated from how the blocks' averages differ.
+    """
+    counts, blocks = sums.counts[side], sums.lines[side]
+    weights = counts / counts.sum()
+    lines = weights @ blocks
+    scatter = (np.abs(blocks - lines) ** 2 * counts[:, None]).sum(axis=0) / max(len(counts) - 1, 1)
+    noise = scatter / counts.sum()
+    # A line's own scatter is that of few blocks: its neighbourhood says it better.
+    return lines, np.maximum(smooth_power(noise), 1e-300)
+
+
+def smooth_power(power: FloatArray) -> FloatArray:
+    """Return the mean of each line and its four neighbours on either side."""
+    smooth: FloatArray = np.convolve(np.pad(power, 4, mode="edge"), np.ones(9) / 9.0, mode="valid")
+    return smooth
+
+
+def is_synchronous(sums: ChannelSums, side: int) -> NDArray[np.bool_]:
+    """Return which lines keep their phase from block to block: a shaft's own do, what leaks into its average does not.
+
+    |a|² against the power that the same line's scatter over the blocks leaves of it, an F test with 2 and 2(B − 1)
+    degrees of freedom.
+    """
+    counts, blocks = sums.counts[side], sums.lines[side]
+    lines = (counts / counts.sum()) @ blocks
+    degrees = max(len(counts) - 1, 1)
+    scatter = (np.abs(blocks - lines) ** 2 * counts[:, None]).sum(axis=0) / degrees / counts.sum()
+    # The F distribution with 2 and 2m degrees has P(F > f) = (1 + f/m)^(−m).
+    least = degrees * (BY_CHANCE ** (-1.0 / degrees) - 1.0)
+    held: NDArray[np.bool_] = np.abs(lines) ** 2 > least * scatter
+    return held
+
+
+def line_power(sums: ChannelSums, side: int) -> FloatArray:
+    """Return the lines' power over a floor that does not depend on the record's length.
+
+    |a|² holds the noise; what exceeds it counts, and the noise of `NOMINAL_REVOLUTIONS` is put under it. A line that is
+    not there reads alike in records of any length from there on.
+    """
+    lines, noise = average_lines(sums, side)
+    longer = max(1.0, float(sums.counts[side].sum()) / NOMINAL_REVOLUTIONS)
+    power: FloatArray = np.maximum(np.abs(lines) ** 2 - noise, 0.0) + longer * noise
+    return power
+
+
+def visible_orders(gathered: ReducedRecording, side: int, n_lines: int) -> int:
+    """Highest whole order of a shaft whose line is true."""
+    return int(min(gathered.highest_order / gathered.frame.shaft_orders[side], n_lines - 1))
+
+
+def mesh_lines(power: FloatArray, teeth: int, highest: int) -> FloatArray:
+    """Return those of the first mesh harmonics that can be seen, of a shaft's lines."""
+    return power[teeth : N_MESH_HARMONICS * teeth + 1 : teeth][: highest // teeth]
+
+
+def line_features(gathered: ReducedRecording, sums: ChannelSums) -> Iterator[Feature]:
+    """Yield name and value, in dB, of one channel's mesh, sideband and shaft-order features."""
+    total = 0.0
+    for side in (DRIVER, DRIVEN):
+        power = line_power(sums, side)
+        highest = visible_orders(gathered, side, len(power))
+        teeth = gathered.frame.teeth[side]
+        if side == DRIVER:
+            total = float(mesh_lines(power, teeth, highest).sum())
+            yield from _mesh(power, teeth, highest, total)
+        yield from _sidebands(power, teeth, highest, total, SIDES[side])
+        yield from _shaft_orders(power, teeth, highest, total, SIDES[side])
+
+
+def decibel(power: float) -> float:
+    """Return 10 lg of a power."""
+    return float(10.0 * np.log10(max(power, 1e-300)))
+
+
+def _mesh(power: FloatArray, teeth: int, highest: int, total: float) -> Iterator[Feature]:
+    yield "mesh.total", decibel(total)
+    for k in range(1, N_MESH_HARMONICS + 1):
+        line = k * teeth
+        level = decibel(power[line]) if line <= highest else decibel(1e-6 * total)
+        yield f"mesh.share.{k}", max(level - decibel(total), -60.0)
+    half = [(2 * k - 1) * teeth / 2 for k in range(1, 4)]
+    visible = [order for order in half if order <= highest - 1 and order == int(order)]
+    if visible:
+        yield "mesh.half", decibel(float(np.mean([power[int(o)] for o in visible])) / total)
+    else:
+        yield "mesh.half", -60.0
+
+
+def _sidebands(power: FloatArray, teeth: int, highest: int, total: float, side: str) -> Iterator[Feature]:
+    carriers = [k * teeth for k in range(1, N_SIDEBAND_HARMONICS + 1) if k * teeth + 12 <= highest]
+    if not carriers:
+        carriers = [teeth]
+    for label, (first, last) in SIDEBANDS.items():
+        orders = [c + sign * n for c in carriers for n in range(first, last + 1) for sign in (-1, 1)]
+        orders = [o for o in orders if 0 < o <= highest and o % teeth]
+        lines = float(np.mean(power[orders])) if orders else 1e-300
+        yield f"sideband.{side}.{label}", decibel(lines / total)
+    own = [decibel(float(power[c - 1] + power[c + 1]) / max(float(power[c]), 1e-300)) for c in carriers]
+    yield f"sideband.{side}.own", float(np.median(own))
+    far = [
+        o for c in carriers for o in (*range(c - 12, c - 2), *range(c + 3, c + 13)) if 0 < o <= highest and o % teeth
+    ]
+    if far:
+        values = power[far]
+        yield f"sideband.{side}.strongest", decibel(float(values.max() / np.median(values)))
+    else:
+        yield f"sideband.{side}.strongest", 0.0
+
+
+def _shaft_orders(power: FloatArray, teeth: int, highest: int, total: float, side: str) -> Iterator[Feature]:
+    for n in (1, 2, 3):
+        level = decibel(power[n])
+        yield f"shaft.{side}.{n}", level
+        yield f"shaft.{side}.{n}.to_mesh", level - decibel(total)
+    last = min(MOST_SHAFT_ORDERS, teeth - 3, highest)
+    rest = power[4 : last + 1]
+    strongest = int(np.argmax(rest))
+    yield f"shaft.{side}.strongest", decibel(float(rest[strongest] / np.median(rest)))
+    yield f"shaft.{side}.strongest.to_mesh", decibel(float(rest[strongest]) / total)
+    yield f"shaft.{side}.low", decibel(float(rest.mean()) / total)
+
+
+# --------------------
+# Features of single teeth: what a shaft's average holds besides mesh and smooth modulation.
+# --------------------
+
+
+SMOOTH_SIDEBANDS = 2
+"""Mesh lines and as many sidebands on either side are left out: eccentricity makes those."""
+SMOOTH_SHAFT_ORDERS = 3
+FEWEST_APART = 3
+"""Orders between two that both shafts share, for those to be left out."""
+
+STEPS_PER_TOOTH = 4
+
+
+def residual_lines(
+    lines: NDArray[np.complex128], teeth: int, highest: int, other_teeth: int = 1
+) -> NDArray[np.complex128]:
+    """Return the lines without mesh harmonics, their first sidebands and the first shaft orders.
+
+    Orders that the other shaft has, too, are left out unless those are most: which teeth meet depends on them.
+    """
+    orders = np.arange(len(lines))
+    near = orders_from_mesh(orders, teeth) <= SMOOTH_SIDEBANDS
+    out = near | (orders <= SMOOTH_SHAFT_ORDERS) | (orders > highest)
+    apart = teeth // gcd(teeth, other_teeth)
+    if apart >= FEWEST_APART:
+        out |= orders % apart == 0
+    return np.where(out, 0.0, lines)
+
+
+def tooth_energy(lines: NDArray[np.complex128], teeth: int) -> FloatArray:
+    """Return the mean square within one pitch, at `STEPS_PER_TOOTH` places per tooth round the revolution."""
+    n = 2 * (len(lines) - 1)
+    wave = np.fft.irfft(lines, n) * (n / 2.0)
+    total = np.concatenate([[0.0], np.cumsum(np.tile(wave**2, 2))])
+    starts = np.arange(teeth * STEPS_PER_TOOTH) / (teeth * STEPS_PER_TOOTH) * n
+    first = starts.astype(np.intp)
+    width = max(1, round(n / teeth))
+    energy: FloatArray = (total[first + width] - total[first]) / width
+    return energy
+
+
+def tooth_features(gathered: ReducedRecording, sums: Sequence[ChannelSums]) -> Iterator[Feature]:
+    """Yield the tooth features of all channels together, since a tooth shows at one angle on all of them."""
+    for side in (DRIVER, DRIVEN):
+        teeth = gathered.frame.teeth[side]
+        residuals, noises = [], []
+        for channel in sums:
+            lines, noise = average_lines(channel, side)
+            scale = mesh_power(gathered, channel, side)
+            highest = visible_orders(gathered, side, len(lines))
+            residual = residual_lines(lines, teeth, highest, gathered.frame.teeth[1 - side])
+            residuals.append(residual / np.sqrt(scale))
+            noises.append(np.where(residuals[-1] != 0, noise, 0.0).sum() / 2.0 / scale)
+        longer = max(1.0, float(sums[0].counts[side].sum()) / NOMINAL_REVOLUTIONS)
+        yield from pattern_features(f"tooth.{SIDES[side]}", residuals, teeth, float(np.mean(noises)), longer)
+
+
+def mesh_power(gathered: ReducedRecording, channel: ChannelSums, side: int) -> float:
+    """Return the power of the mesh harmonics in a shaft's average."""
+    power = line_power(channel, side)
+    teeth = gathered.frame.teeth[side]
+    highest = visible_orders(gathered, side, len(power))
+    return float(mesh_lines(power, teeth, highest).sum())
+
+
+def pattern_features(
+    name: str,
+    residuals: Sequence[NDArray[np.complex128]],
+    teeth: int,
+    noise: float,
+    longer: float,
+    least: float = 1e-30,
+) -> Iterator[Feature]:
+    """Yield size, prominence, kurtosis, width, centroid of residuals relative to their mesh.
+
+    `noise` is the energy that noise leaves in them; `longer` times it is put under what exceeds it. `least` is the
+    energy that is told apart from nothing.
+    """
+    energy = np.mean([tooth_energy(lines, teeth) for lines in residuals], axis=0)
+    energy = np.maximum(np.maximum(energy - noise, 0.0) + longer * noise, least)
+    best = int(np.argmax(energy))
+    share = energy / energy.max()
+    width = float(np.count_nonzero(share > 0.5)) / STEPS_PER_TOOTH
+    kurtosis = float(np.mean([_kurtosis(lines) for lines in residuals]))
+    away = np.roll(energy, -best)[2 * STEPS_PER_TOOTH : -2 * STEPS_PER_TOOTH]
+    yield f"{name}.level", decibel(float(energy.mean()))
+    yield f"{name}.elsewhere", decibel(float(np.median(away)))
+    yield f"{name}.peak", decibel(float(energy[best]))
+    yield f"{name}.prominence", decibel(float(energy[best] / np.median(away)))
+    yield f"{name}.second", decibel(float(energy[best] / away.max()))
+    yield f"{name}.kurtosis", 10.0 * float(np.log10(max(kurtosis, 0.1)))
+    yield f"{name}.width", 10.0 * float(np.log10(width))
+    power = np.mean([np.abs(lines) ** 2 for lines in residuals], axis=0)
+    orders = np.arange(len(power)) / teeth
+    total = max(float(power.sum()), 1e-30)
+    yield f"{name}.below_mesh", decibel(float(power[orders < 1.0].sum()) / total)
+    yield f"{name}.centroid", 10.0 * float(np.log10(max(float((orders * power).sum()) / total, 0.01)))
+
+
+def _kurtosis(lines: NDArray[np.complex128]) -> float:
+    wave = np.fft.irfft(lines)
+    square = float(np.mean(wave**2))
+    return float(np.mean(wave**4)) / square**2 if square > 0 else 3.0
+
+
+# --------------------
+# Features of what no shaft repeats: bearings' lines in envelope and spectrum, strange lines.
+# --------------------
+
+
+SLIP = 0.015
+"""Rolling elements slip: their orders are sought within this share of the kinematic ones."""
+MOST_SLIPS = 201
+
+Known = tuple[float, float]
+"""An order, and by how much it may slip."""
+
+N_FAMILY = 4
+N_SHAFT_FAMILY = 6
+USED_OF_BAND = 0.7
+"""Of a band's width, the modulation that its envelope carries well."""
+FLOOR_WIDTH = 48
+"""Lines whose median is the floor."""
+LOWEST_STRANGE = 0.4
+"""Order of the driver below which a line may be the window's or the speed's."""
+RACES = {"outer": ("outer", 1.0), "inner": ("inner", 1.0), "ball": ("spin", 2.0), "cage": ("cage", 1.0)}
+"""Family → the bearing's order that it counts, and how often; a ball strikes with both sides."""
+
+
+def floor_ratio(power: FloatArray) -> FloatArray:
+    """Return each line's power over its neighbourhood's median, lines of noise being exponentially distributed.
+
+    Medians of adjoining stretches are joined by straight lines: a running median costs a hundred times as much.
+    """
+    n_stretches = max(1, power.shape[-1] // FLOOR_WIDTH)
+    width = power.shape[-1] // n_stretches
+    medians = np.median(power[:, : n_stretches * width].reshape(len(power), n_stretches, width), axis=2)
+    middles = (np.arange(n_stretches) + 0.5) * width
+    logs = np.log(np.maximum(medians, 1e-300))
+    floors = np.exp([np.interp(np.arange(power.shape[-1]), middles, row) for row in logs])
+    ratio: FloatArray = power * np.log(2.0) / floors
+    return ratio
+
+
+def cyclic_features(gathered: ReducedRecording, channels: Sequence[ChannelSums]) -> Iterator[Feature]:
+    """Yield excesses in dB of families of envelope lines and of residual lines: the largest over channels and bands."""
+    frame = gathered.frame
+    envelopes = np.concatenate([envelope_ratios(gathered, c) for c in channels])
+    step, levels = gathered.cycle_step, excesses(envelopes)
+    known = gear_orders(frame)
+    yield from _families(frame, levels, step, known, "envelope")
+    for side, order in enumerate(frame.shaft_orders):
+        yield f"envelope.{SIDES[side]}_shaft", _family(levels, order, N_SHAFT_FAMILY, step, (), 0.0)
+    yield "envelope.mesh", _family(levels, float(frame.teeth[0]), 1, step, (), 0.0)
+    yield "envelope.strange", _strange(envelopes, step, known_modulation(frame), first=LOWEST_STRANGE)
+    depth = max(float(c.envelope_power.mean(axis=0)[:, 2:].sum(axis=1).max()) for c in channels)
+    yield "envelope.depth", decibel(depth)
+    residuals = residual_ratios(gathered, channels)
+    levels = excesses(residuals)
+    yield from _families(frame, levels, gathered.order_step, known, "line")
+    yield "line.half_mesh", _family(levels, frame.teeth[0] / 2.0, 1, gathered.order_step, (), 0.0)
+    yield "line.strange", _strange(residuals, gathered.order_step, known_lines(frame), first=LOWEST_STRANGE)
+
+
+def envelope_ratios(gathered: ReducedRecording, sums: ChannelSums) -> FloatArray:
+    """Return the lines of each band's envelope over their floor; 1 beyond the band's width, where there is nothing."""
+    ratios = floor_ratio(sums.envelope_power.mean(axis=0))
+    cycles = np.arange(ratios.shape[1]) * gathered.cycle_step
+    for row, (low, high) in zip(ratios, gathered.bands_hz, strict=True):
+        row[cycles > USED_OF_BAND * (high - low) / gathered.speed_hz] = 1.0
+    return ratios
+
+
+def _families(
+    frame: GearFrame, levels: FloatArray, step: float, known: Sequence[float], name: str
+) -> Iterator[Feature]:
+    for kind, (attribute, factor) in RACES.items():
+        orders = [getattr(b, attribute) * factor for b in frame.bearings]
+        scores = [_family(levels, o, N_FAMILY, step, known, SLIP) for o in orders if np.isfinite(o)]
+        yield f"{name}.{kind}", max(scores, default=0.0)
+
+
+def _family(
+    levels: FloatArray, order: float, n_harmonics: int, step: float, known: Sequence[float], slip: float
+) -> float:
+    return best_of_family(levels, order, n_harmonics, step, known, slip)[0]
+
+
+def best_of_family(
+    levels: FloatArray, order: float, n_harmonics: int, step: float, known: Sequence[float], slip: float
+) -> tuple[float, int, float]:
+    """Return the mean excess in dB of a family's lines, the spectrum that shows it best, and its order with slip.
+
+    `levels` are excesses in dB, not below 0; the larger of a line and its neighbours counts.
+    """
+    harmonics = np.arange(1, n_harmonics + 1) * order
+    if known:
+        harmonics = harmonics[np.min(np.abs(np.asarray(known) - harmonics[:, None]), axis=1) >= 1.5 * step]
+    harmonics = harmonics[harmonics * (1.0 + slip) / step < levels.shape[1] - 1]
+    if not len(harmonics):
+        return 0.0, 0, order
+    n_slips = min(MOST_SLIPS, 2 * int(np.ceil(slip * harmonics.max() / step)) + 1)  # a line apart at the highest
+    shifts = np.linspace(-slip, slip, n_slips)
+    places = np.rint(np.outer(1.0 + shifts, harmonics) / step).astype(np.intp)
+    means = levels[:, places].mean(axis=2)
+    row, best = np.unravel_index(int(np.argmax(means)), means.shape)
+    return float(means[row, best]), int(row), order * (1.0 + float(shifts[best]))
+
+
+def excesses(ratios: FloatArray) -> FloatArray:
+    """Return excesses in dB, not below 0, each the largest of a line and its two neighbours."""
+    from scipy.ndimage import maximum_filter1d
+
+    level: FloatArray = 10.0 * np.log10(np.maximum(maximum_filter1d(ratios, 3, axis=1), 1.0))
+    return level
+
+
+def _strange(ratios: FloatArray, step: float, known: Sequence[Known], *, first: float) -> float:
+    """Return the excess in dB of the strongest line that belongs to nothing known."""
+    free = free_lines(ratios.shape[1], step, known, first=first)
+    return max(decibel(float(ratios[:, free].max())), 0.0) if free.any() else 0.0
+
+
+def free_lines(n_lines: int, step: float, known: Sequence[Known], *, first: float) -> NDArray[np.bool_]:
+    """Return which lines belong to nothing known."""
+    positions = np.arange(n_lines) * step
+    near = np.zeros(n_lines, dtype=bool)
+    for order, slip in known:
+        low = np.searchsorted(positions, order - slip - 2.0 * step)
+        near[low : np.searchsorted(positions, order + slip + 2.0 * step)] = True
+    free: NDArray[np.bool_] = ~near & (positions > first)
+    return free
+
+
+def residual_ratios(gathered: ReducedRecording, channels: Sequence[ChannelSums]) -> FloatArray:
+    """Return the residuals' lines over their floor, one row per channel."""
+    ratios = floor_ratio(np.stack([c.residual_power.mean(axis=0) for c in channels]))
+    return ratios[:, : int(gathered.highest_order / gathered.order_step)]
+
+
+def gear_orders(frame: GearFrame) -> list[float]:
+    """Orders of both shafts' first harmonics, and of mesh harmonics with their first sidebands."""
+    shafts = [k * order for order in frame.shaft_orders for k in range(1, 13)]
+    mesh = [k * frame.teeth[0] + j * order for k in range(1, 7) for order in frame.shaft_orders for j in range(-3, 4)]
+    return shafts + mesh
+
+
+def known_modulation(frame: GearFrame) -> list[Known]:
+    """Return what modulates the residual: gears, whose orders are exact, and every bearing's families."""
+    return [*((order, 0.0) for order in gear_orders(frame)), *_bearing_orders(frame)]
+
+
+def known_lines(frame: GearFrame) -> list[Known]:
+    """Return everything that the residual may hold: gears, bearings, and bearings about the mesh harmonics."""
+    bearings = _bearing_orders(frame)
+    mesh = [(k * frame.teeth[0] + s * o, slip) for k in range(1, 7) for o, slip in bearings[:24] for s in (-1, 1)]
+    return [*known_modulation(frame), *mesh]
+
+
+def _bearing_orders(frame: GearFrame) -> list[Known]:
+    """Return the orders of every bearing's families with their sidebands; what rolls may slip."""
+    found = []
+    for bearing in frame.bearings:
+        shaft = frame.shaft_orders[bearing.side]
+        for order, side in (
+            (bearing.outer, 0.0),
+            (bearing.inner, shaft),
+            (2.0 * bearing.spin, bearing.cage),
+            (bearing.cage, 0.0),
+        ):
+            if np.isfinite(order):
+                sidebands = (-1, 0, 1) if side else (0,)
+                found += [(k * order + j * side, SLIP * k * order) for k in range(1, N_FAMILY + 1) for j in sidebands]
+    return found
+
+
+# --------------------
+# Features of the floor and of the amplitudes' distribution.
+# --------------------
+
+
+LEAST_SHARE = 1e-6
+"""Below one sample of any record."""
+
+
+def broadband_features(gathered: ReducedRecording, channels: Sequence[ChannelSums]) -> Iterator[Feature]:
+    """Yield band levels and kurtosis of the residual, tail figures of the raw signal, in dB; means over channels."""
+    moments = np.stack([c.moments.mean(axis=0) for c in channels])  # (channel, band, moment)
+    squares = np.log10(np.maximum(moments[:, :, 0], 1e-300)).mean(axis=0) * 10.0
+    kurtosis = np.log10(np.maximum(moments[:, :, 1] / np.maximum(moments[:, :, 0], 1e-300) ** 2, 1e-3)) * 10.0
+    for i in range(len(gathered.bands_hz) - 1):
+        yield f"floor.band.{i + 1}", float(squares[i])
+        yield f"floor.kurtosis.{i + 1}", float(kurtosis[:, i].max())
+    yield "floor.total", float(squares[-1])
+    raw = np.stack([c.tail.mean(axis=0) for c in channels])
+    yield "floor.to_signal", float(squares[-1] - 10.0 * np.log10(raw[:, 0]).mean())
+    yield "raw.level", float(10.0 * np.log10(raw[:, 0]).mean())
+    yield "raw.kurtosis", float((10.0 * np.log10(raw[:, 1] / raw[:, 0] ** 2)).min())
+    # Without the block that holds the extreme, the share may be 0.
+    yield "raw.near_the_extreme", decibel(max(float(raw[:, 2].max()), LEAST_SHARE))
+
+
+def speed_features(gathered: ReducedRecording) -> Iterator[Feature]:
+    """Yield the figures of the speed and of the supply's hum."""
+    drift, swing, line, _ = gathered.speed
+    yield "speed.drift", decibel(abs(drift) + 1e-5) * 2.0
+    yield "speed.swing", decibel(swing + 1e-6) * 2.0
+    yield "speed.swing_line", decibel(line)
+    yield "hum", max(gathered.hum)
+
+
+WHOLE_RECORD_DB = {"hum": 1.3, "speed.drift": 3.0, "speed.swing": 1.0, "speed.swing_line": 2.0}
+"""Standard errors of features that no block can be left out of, from repeated synthetic records."""
+
+
+@dataclass(frozen=True)
+class Features:
+    """Named figures of one recording.
+
+    Parameters
+    ----------
+    names : tuple of str
+    values : array, (n,)
+        dB, or ten times the decadic logarithm.
+    scatter : array, (n,)
+        Standard error from leaving out blocks of revolutions, one at a time.
+    left_out : tuple of arrays, (n_blocks, n)
+        The values without each block of the recording, and of what it was compared with.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    scatter: FloatArray
+    left_out: tuple[FloatArray, ...] = ()
+
+
+def features_of(gathered: ReducedRecording) -> Features:
+    """Return a recording's features with their standard errors by the jackknife over blocks of revolutions.
+
+    SE² = (B − 1)/B Σ_b (f_(b) − mean)², f_(b) without block b.
+    """
+    names, values = whole_and_parts(gathered)
+    without = values[1:]
+    variance = (len(without) - 1.0) * without.var(axis=0) + whole_record_variance(names)
+    return Features(names, values[0], np.sqrt(variance), (without,))
+
+
+def whole_and_parts(gathered: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
+    """Return names and values, (1 + n_blocks, n): of the whole, and without each of its blocks; computed once."""
+    if not gathered.known:
+        names, values = once(gathered)
+        parts = [once(gathered.without(b))[1] for b in range(gathered.n_blocks)]
+        gathered.known.append((names, np.stack([values, *parts])))
+    return gathered.known[0]
+
+
+def whole_record_variance(names: Sequence[str]) -> FloatArray:
+    """Return the variance of what is taken from the whole record at once, and 0 for all else."""
+    return np.array([WHOLE_RECORD_DB.get(name, 0.0) ** 2 for name in names])
+
+
+def once(gathered: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
+    """Return names and values of the features, without their scatter."""
+    channels = list(gathered.channels.values())
+    per_channel = [dict(line_features(gathered, sums)) for sums in channels]
+    found = {name: float(np.mean([one[name] for one in per_channel])) for name in per_channel[0]}
+    found |= dict(tooth_features(gathered, channels))
+    found |= dict(cyclic_features(gathered, channels))
+    found |= dict(broadband_features(gathered, channels))
+    found |= dict(speed_features(gathered))
+    return tuple(found), np.array(list(found.values()))

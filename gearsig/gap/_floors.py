@@ -1,0 +1,526 @@
+"""How large a gap is: against what repeats, and against what even healthy machines and their simulation differ by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field, fields, replace
+from functools import cache, cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.cache import read_arrays
+from gearsig.checks import FloatArray, frozen_array
+from gearsig.errors import InputError
+from gearsig.gap._features import SIDES, Features
+from gearsig.gap._types import NONE, Interval, PlaceKind
+
+# --------------------
+# Which features say the same thing about which place of the spectrum, angle or signal.
+# --------------------
+
+
+Family = tuple[PlaceKind, str]
+"""The kind of place and "driver", "driven" or nothing."""
+
+_PLAIN = {
+    "mesh": PlaceKind.MESH,
+    "alike": PlaceKind.MESH,
+    "envelope": PlaceKind.ENVELOPE,
+    "line": PlaceKind.LINE,
+    "hum": PlaceKind.LINE,
+    "floor": PlaceKind.BAND,
+    "speed": PlaceKind.SPEED,
+    "raw": PlaceKind.TAIL,
+}
+_APART = {"mesh": PlaceKind.MESH, "floor": PlaceKind.BAND}
+
+UNFORETOLD = ("surprise.", "apart.", "alike.")
+"""Features, the last ones, that hang on noise and sensors: no simulation foretells them, no size is made of them."""
+
+_OF_A_SHAFT = {
+    "sideband": PlaceKind.SIDEBANDS,
+    "shaft": PlaceKind.SHAFT,
+    "tooth": PlaceKind.TOOTH,
+    "change": PlaceKind.TOOTH,
+    "surprise": PlaceKind.TOOTH,
+}
+
+
+_ALL_ROUND = ("level", "elsewhere")
+"""Features of a shaft's pattern that speak of all its orders and not of one tooth."""
+
+_KINDS = {
+    "mesh_harmonics": (PlaceKind.MESH,),
+    "mesh_sidebands": (PlaceKind.SIDEBANDS,),
+    "shaft_orders": (PlaceKind.SHAFT,),
+    "tooth_window": (PlaceKind.TOOTH,),
+    "envelope_orders": (PlaceKind.ENVELOPE,),
+    "broadband": (PlaceKind.BAND,),
+    "resonances": (PlaceKind.BAND, PlaceKind.MESH),
+    "amplitude_tail": (PlaceKind.TAIL,),
+    "speed": (PlaceKind.SPEED,),
+}
+"""What an effect says it shows in (`gearsig.gap.GapEffect.shows_in`), as kinds of places."""
+
+
+def shown_in(names: Sequence[str], shows_in: Sequence[str]) -> np.ndarray:
+    """Return which features are of the kinds that an effect says it shows in; all, if it says none that is known.
+
+    Parameters
+    ----------
+    names : sequence of str
+    shows_in : sequence of str
+        See `gearsig.gap.GapEffect.shows_in`.
+
+    Returns
+    -------
+    array of bool, (n,)
+    """
+    kinds = {kind for shown in shows_in for kind in _KINDS.get(shown, ())}
+    found = np.array([_is_shown(name, kinds, shows_in) for name in names], dtype=np.bool_)
+    return found if found.any() else np.ones(len(names), dtype=np.bool_)
+
+
+def _is_shown(name: str, kinds: set[PlaceKind], shows_in: Sequence[str]) -> bool:
+    kind = family_of(name)[0]
+    if name == "hum":
+        return "mains_lines" in shows_in
+    if kind is PlaceKind.TOOTH and "shaft_orders" in shows_in and name.rpartition(".")[2] in _ALL_ROUND:
+        return True
+    return kind in kinds
+
+
+def family_of(name: str) -> Family:
+    """Return the family of a feature.
+
+    Examples
+    --------
+    >>> family_of("sideband.driven.3to5")
+    (<PlaceKind.SIDEBANDS: 'sidebands'>, 'driven')
+    """
+    first, _, rest = name.partition(".")
+    if name == "line.half_mesh":
+        return PlaceKind.MESH, ""
+    if first == "apart":
+        return _APART[rest], ""
+    if first in _PLAIN:
+        return _PLAIN[first], ""
+    side = rest.partition(".")[0]
+    return _OF_A_SHAFT[first], side if side in SIDES else ""
+
+
+def family_members(names: Sequence[str]) -> dict[Family, np.ndarray]:
+    """Return for each family the positions of its features."""
+    return _members(tuple(names))
+
+
+def sized_members(names: Sequence[str]) -> dict[Family, np.ndarray]:
+    """Return for each family the positions of those of its features that the size of a gap is made of."""
+    return _sized(tuple(names))
+
+
+@cache
+def _sized(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
+    kept = {
+        family: np.array([i for i in rows if not names[i].startswith(UNFORETOLD)], dtype=np.intp)
+        for family, rows in _members(names).items()
+    }
+    return {family: rows for family, rows in kept.items() if len(rows)}
+
+
+@cache
+def _members(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
+    found: dict[Family, list[int]] = {}
+    for i, name in enumerate(names):
+        found.setdefault(family_of(name), []).append(i)
+    return {family: np.array(members, dtype=np.intp) for family, members in found.items()}
+
+
+REPEATABLE = 1.96
+"""Standard errors: 19 of 20 repeated records stay below."""
+
+WITHIN, ACROSS = 8, 4
+"""Orders of the means within a family of features, and of the sum over families."""
+
+PRIOR_WEIGHT = 4.0
+"""Degrees of freedom that a family's median scatter counts for beside a feature's own."""
+
+LEAST_SCATTER_DB = 0.05
+
+_TAIL = 0.05
+
+
+@dataclass(frozen=True)
+class StructuralFloor:
+    """How far healthy machines' features lie from what they are compared with.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of features, see `gearsig.gap`.
+    values : array, (n,), above 0
+        dB: 19 of 20 healthy machines lie within `centres` ± `values`.
+    centres : array, (n,)
+        dB, the healthy machines' median; default 0. Differences have it at 0; features of a difference of patterns,
+        `change.…`, have not: noise alone has a level and a kurtosis.
+    whole : float or None
+        `soft_size` that one healthy machine in twenty exceeds; None: what independent features would make of it.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    centres: FloatArray | None = None
+    whole: float | None = None
+    _row: Mapping[str, int] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.names)
+        if len(set(self.names)) != n:
+            raise InputError("names of the floor repeat", allowed="each feature once")
+        for name, default in (("values", None), ("centres", np.zeros(n))):
+            given = getattr(self, name)
+            array = frozen_array(default if given is None else given, name, ndim=1)
+            if len(array) != n:
+                raise InputError(f"{name} has {len(array)} numbers for {n} features", allowed="one each")
+            object.__setattr__(self, name, array)
+        if n and float(self.values.min()) <= 0.0:
+            raise InputError("a floor is not above 0", where=self.names[int(np.argmin(self.values))], allowed="above 0")
+        object.__setattr__(self, "_row", {name: i for i, name in enumerate(self.names)})
+
+    @classmethod
+    def of_healthy(cls, names: Sequence[str], rows: FloatArray, *, least_db: float = 0.2) -> StructuralFloor:
+        """Return the floor of a table of healthy changes, (n_machines, n): medians, 95 % of distances, and the whole.
+
+        Parameters
+        ----------
+        names : sequence of str
+        rows : array, (n_machines, n)
+            At least 20 of them say something.
+        least_db : float
+            A feature that never moved in the table still may.
+        """
+        table = np.asarray(rows, dtype=np.float64)
+        centres = np.median(table, axis=0)
+        values = np.maximum(np.quantile(np.abs(table - centres), 1.0 - _TAIL, axis=0), least_db)
+        sizes = [soft_size(names, row) for row in (table - centres) / values]
+        return cls(tuple(names), values, centres, float(np.quantile(sizes, 1.0 - _TAIL)))
+
+    def rows_of(self, names: Sequence[str]) -> np.ndarray:
+        """Return the places of features in the table.
+
+        Raises
+        ------
+        InputError
+            If one is not there.
+        """
+        missing = [name for name in names if name not in self._row]
+        if missing:
+            raise InputError(
+                f"the structural floor knows nothing of {', '.join(missing[:3])}",
+                remedy="make the floor's table with the present features",
+            )
+        return np.array([self._row[name] for name in names], dtype=np.intp)
+
+    def of(self, names: Sequence[str]) -> FloatArray:
+        """Return the floors of features, in dB."""
+        floors: FloatArray = self.values[self.rows_of(names)]
+        return floors
+
+    def from_centre(self, names: Sequence[str], values: FloatArray) -> FloatArray:
+        """Return how far changes lie from the healthy machines' median, in dB."""
+        assert self.centres is not None  # noqa: S101 - set above, said to the type checker
+        distances: FloatArray = values - self.centres[self.rows_of(names)]
+        return distances
+
+    def over(self, change: Features) -> FloatArray:
+        """Return changes in structural floors, with their sign."""
+        return self.from_centre(change.names, change.values) / self.of(change.names)
+
+    def whole_of(self, names: Sequence[str]) -> float:
+        """Return the `soft_size` that is one structural floor."""
+        return independent_whole(tuple(names)) if self.whole is None else self.whole
+
+
+@dataclass(frozen=True)
+class GapSize:
+    """How large the whole gap is; 1: one healthy machine, or one repeated record, in twenty is that far.
+
+    Parameters
+    ----------
+    structural, repeatability : Interval
+    """
+
+    structural: Interval
+    repeatability: Interval
+
+
+def gap_size(change: Features, structural: StructuralFloor) -> GapSize:
+    """Return the size of the whole gap in both floors, with 90 % intervals from the blocks of revolutions.
+
+    s = [Σ_f (mean_{i∈f} |d_i/e_i|⁸)^(4/8)]^(1/4)/s_0, families f, changes d, floors e, s_0 the size that is one floor.
+
+    Root mean squares over all features drown a handful of large changes among a hundred that stayed; the largest alone
+    hangs on one number and its jackknife on chance. Means of high order lie between, and are smooth. Features of one
+    family say nearly the same: their mean counts once however many they are; families add.
+
+    The interval is ± t SE, SE² = (B − 1)/B Σ_b (s_(b) − mean)², s_(b) the size without block b: correlated features
+    change together in it, so that nothing is assumed of them.
+
+    Parameters
+    ----------
+    change : Features
+        With `left_out`.
+    structural : StructuralFloor
+    """
+    scatter = REPEATABLE * pooled_scatter(change)
+    floors = structural.of(change.names)
+    return GapSize(
+        _size(change, structural, floors, structural.whole_of(change.names)),
+        _size(change, structural, scatter, independent_whole(change.names)),
+    )
+
+
+def _size(change: Features, structural: StructuralFloor, floors: FloatArray, whole: float) -> Interval:
+    """Return the size with its interval."""
+
+    def size(values: FloatArray) -> float:
+        return soft_size(change.names, structural.from_centre(change.names, values) / floors) / whole
+
+    value = size(change.values)
+    variance = sum((len(rows) - 1.0) * float(np.var([size(row) for row in rows])) for rows in change.left_out)
+    half = _t_quantile(_degrees(change)) * variance**0.5
+    return Interval(value, max(0.0, value - half), value + half)
+
+
+def _degrees(change: Features) -> int:
+    """Return the degrees of freedom of the jackknife with the fewest blocks."""
+    return min((len(rows) for rows in change.left_out), default=2) - 1
+
+
+def _t_quantile(degrees: int) -> float:
+    from scipy.special import stdtrit
+
+    return float(stdtrit(degrees, 0.95))
+
+
+def soft_size(names: Sequence[str], normalised: FloatArray) -> float:
+    """Return [Σ_f (mean_{i∈f} |u_i|⁸)^(4/8)]^(1/4)."""
+    sizes = np.array([family_size(normalised[members]) for members in sized_members(names).values()])
+    largest = float(sizes.max(initial=0.0))
+    return largest * float(np.sum((sizes / largest) ** ACROSS) ** (1 / ACROSS)) if largest > 0.0 else 0.0
+
+
+def family_size(normalised: FloatArray) -> float:
+    """Return (mean |u_i|⁸)^(1/8): nearly the largest; three quarters of it where one of nine moved and no other."""
+    largest = float(np.max(np.abs(normalised), initial=0.0))
+    if largest == 0.0:
+        return 0.0
+    return largest * float(np.mean((np.abs(normalised) / largest) ** WITHIN) ** (1 / WITHIN))
+
+
+def pooled_scatter(change: Features) -> FloatArray:
+    """Return standard errors drawn towards their family's median, as a jackknife over few blocks has some by chance.
+
+    s² = (ν0 s0² + ν s²)/(ν0 + ν).
+
+    Source: G. K. Smyth, *Linear models and empirical Bayes methods for assessing differential expression in microarray
+    experiments* (Statistical Applications in Genetics and Molecular Biology, 2004).
+    """
+    variance = np.maximum(change.scatter, LEAST_SCATTER_DB) ** 2
+    degrees = _degrees(change)
+    pooled = np.empty_like(variance)
+    for members in family_members(change.names).values():
+        typical = float(np.median(variance[members]))
+        pooled[members] = (PRIOR_WEIGHT * typical + degrees * variance[members]) / (PRIOR_WEIGHT + degrees)
+    scatter: FloatArray = np.sqrt(pooled)
+    return scatter
+
+
+_N_DRAWS = 2000
+_known: dict[tuple[str, ...], float] = {}
+
+
+def independent_whole(names: tuple[str, ...]) -> float:
+    """Return the `soft_size` that one in twenty exceeds if features are independent and normal, each at its floor.
+
+    A constant of the features' names, found by counting, so the same numbers are drawn each time.
+    """
+    if names not in _known:
+        draws = np.random.default_rng(0).standard_normal((_N_DRAWS, len(names))) / REPEATABLE
+        total = np.zeros(_N_DRAWS)
+        for members in sized_members(names).values():
+            total += np.mean(np.abs(draws[:, members]) ** WITHIN, axis=1) ** (ACROSS / WITHIN)
+        _known[names] = float(np.quantile(total, 1.0 - _TAIL) ** (1 / ACROSS))
+    return _known[names]
+
+
+# --------------------
+# What is known from the start: drawn machines, sound and with every effect; changes of features and causes.
+# --------------------
+
+
+POPULATION_FILE = Path(__file__).with_name("population.npz")
+MOST_BYTES = 1_000_000_000
+"""Of its arrays; they have nineteen million."""
+INDEPENDENT = "independent"
+"""Simulator of the rig that makes blind cases; only its development gears are in the population."""
+BY_HAND = "by hand"
+"""Source of effects that are put into a sound machine's recordings as the literature describes them."""
+
+LEFT_OUT: ContextVar[str] = ContextVar("LEFT_OUT", default="")
+"""Simulator whose machines nothing may be learned from, see `without_machines_of`."""
+
+
+@dataclass(frozen=True)
+class Population:
+    """Recordings of machines drawn at random, of which the cause of every change is known.
+
+    Parameters
+    ----------
+    rigs : array, (n,)
+        Which machine a row is of.
+    simulators : array of str, (n,)
+        That the machine is of.
+    causes : array of str, (n,)
+        Effect, "none" or "unknown".
+    by_hand : bool array, (n,)
+        Effects that no simulator made, see `BY_HAND`.
+    change_names, feature_names : tuple of str
+        Of the columns; the first changes are the differences of the features.
+    changes, change_scatter : arrays, (n, n_changes)
+        Against a sound recording of the same machine on another day, and standard errors.
+    features, feature_scatter : arrays, (n, n_features)
+        Of the recording itself, and standard errors.
+    simulated, simulated_scatter : arrays, (n, n_features)
+        Of the twin that knows the rig file only.
+    loads_n_per_mm : array, (n,)
+        Of the teeth.
+    """
+
+    rigs: NDArray[np.int64]
+    simulators: NDArray[np.str_]
+    causes: NDArray[np.str_]
+    by_hand: NDArray[np.bool_]
+    change_names: tuple[str, ...]
+    feature_names: tuple[str, ...]
+    changes: FloatArray
+    change_scatter: FloatArray
+    features: FloatArray
+    feature_scatter: FloatArray
+    simulated: FloatArray
+    simulated_scatter: FloatArray
+    loads_n_per_mm: FloatArray
+
+    @cached_property
+    def sources(self) -> NDArray[np.str_]:
+        """Return what made each effect: a simulator, or `BY_HAND`."""
+        return np.where(self.by_hand, BY_HAND, self.simulators)
+
+    def of_rows(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Population:
+        """Return some of the recordings."""
+        by_row = {field.name for field in fields(self)} - {"change_names", "feature_names"}
+        return replace(self, **{name: getattr(self, name)[rows] for name in by_row})
+
+    @cached_property
+    def reference_floor(self) -> StructuralFloor:
+        """By how much sound machines differ from themselves on another day."""
+        sound = self.causes == NONE
+        return StructuralFloor.of_healthy(self.change_names, self.changes[sound])
+
+    @cached_property
+    def credibility(self) -> FloatArray:
+        """How much of what the simulation says of each feature holds for sound machines, 0 to 1, (n_features,)."""
+        sound = self.causes == NONE
+        return credibility_of(self.features[sound], self.simulated[sound])
+
+    @cached_property
+    def gaps(self) -> FloatArray:
+        """What the simulation, as far as it is credible, leaves of the features, (n, n_features)."""
+        gaps: FloatArray = self.features - self.credibility * self.simulated
+        return gaps
+
+    @cached_property
+    def gap_scatter(self) -> FloatArray:
+        """Standard errors of the gaps."""
+        scatter: FloatArray = np.hypot(self.feature_scatter, self.credibility * self.simulated_scatter)
+        return scatter
+
+    @cached_property
+    def simulation_floor(self) -> StructuralFloor:
+        """By how much sound machines differ from what a simulation that knows their rig file lets expect."""
+        sound = self.causes == NONE
+        return StructuralFloor.of_healthy(self.feature_names, self.gaps[sound])
+
+    def floor(self, *, with_reference: bool) -> StructuralFloor:
+        """Return the floor of one way of comparing."""
+        return self.reference_floor if with_reference else self.simulation_floor
+
+
+def credibility_of(features: FloatArray, simulated: FloatArray) -> FloatArray:
+    """Return the slope of sound machines' features over those of their simulations, cut to 0 … 1.
+
+    A simulation knows how a figure goes with geometry, speed and load, and little of how impulsive or how uneven a
+    machine is: subtracting all of what it says adds its own scatter there. The slope is what leaves least.
+
+    Source: the credibility factor of H. Bühlmann, "Experience rating and credibility", ASTIN Bulletin 4 (1967).
+
+    Parameters
+    ----------
+    features, simulated : arrays, (n, n_features)
+    """
+    own, twin = features - features.mean(axis=0), simulated - simulated.mean(axis=0)
+    slope: FloatArray = (own * twin).sum(axis=0) / np.maximum((twin**2).sum(axis=0), 1e-9)
+    return np.clip(slope, 0.0, 1.0)
+
+
+@contextmanager
+def without_machines_of(simulator: str) -> Iterator[None]:
+    """Let nothing be known of a simulator's machines: how well others prepare for it is seen then."""
+    token = LEFT_OUT.set(simulator)
+    try:
+        yield
+    finally:
+        LEFT_OUT.reset(token)
+
+
+def load_population(path: Path = POPULATION_FILE) -> Population:
+    """Return the population that comes with this version, but for what `without_machines_of` leaves out.
+
+    Raises
+    ------
+    InputError
+        If there is no such file or it belongs to other features.
+    """
+    return _read(path, LEFT_OUT.get())
+
+
+@cache
+def _read(path: Path, left_out: str) -> Population:
+    if left_out:
+        whole = _read(path, "")
+        return whole.of_rows(whole.simulators != left_out)
+    arrays = read_arrays(path, MOST_BYTES)
+    if arrays is None:
+        raise InputError(
+            "the population is not there, or damaged",
+            where=path.name,
+            remedy="make it again: python -m app.studies.gap.population",
+        )
+    of_rigs = np.searchsorted(arrays["simulated_rigs"], arrays["rigs"])
+    tables = {
+        name: np.asarray(arrays[name], dtype=np.float64)
+        for name in ("changes", "change_scatter", "features", "feature_scatter", "loads_n_per_mm")
+    } | {name: np.asarray(arrays[name], dtype=np.float64)[of_rigs] for name in ("simulated", "simulated_scatter")}
+    return Population(
+        arrays["rigs"],
+        arrays["simulators"],
+        arrays["causes"],
+        arrays["by_hand"],
+        tuple(map(str, arrays["change_names"])),
+        tuple(map(str, arrays["feature_names"])),
+        **tables,
+    )

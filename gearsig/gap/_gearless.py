@@ -1,0 +1,646 @@
+"""The gap of a rig with bearings and no gear pair: no simulator can be set to it, so only what stands out is named."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gearsig.angle import ShaftAngle
+from gearsig.diagnosis import (
+    Analysis,
+    CannotTell,
+    Earlier,
+    Finding,
+    Kind,
+    Outcome,
+    analyze,
+    determine_angle,
+    in_reference,
+)
+from gearsig.diagnosis import (
+    _bearing_families as bearing_family,
+)
+from gearsig.errors import RefusalError
+from gearsig.formatting import named, signed
+from gearsig.gap._conditions import Stage
+from gearsig.gap._simulator import GapEffect, OperatingCondition
+from gearsig.gap._types import (
+    NONE,
+    UNKNOWN,
+    ConditionFacts,
+    GapCause,
+    GapOutcome,
+    GapPlace,
+    GapReport,
+    Interval,
+    PlaceKind,
+    SpectrumCurves,
+    group_probabilities,
+)
+from gearsig.gap._words import band_words, hertz
+from gearsig.recording import Recording
+from gearsig.rig import Rig
+from gearsig.severity import LARGEST_SPEED_DIFFERENCE
+from gearsig.spectra import noise_floor
+
+# --------------------
+# What stands out of a recording without any simulation: damaged races, other impacts, lines of nothing known.
+# --------------------
+
+
+RACES = {"bearing-outer-race": "bearing_outer_race", "bearing-inner-race": "bearing_inner_race"}
+"""Code of a finding → the effect of the catalogue that it means."""
+
+IMPACTS = ("non-synchronous-impacts", "bearing-rolling-element", "bearing-cage")
+"""Codes of families of impacts that no effect of the catalogue makes."""
+
+LINE = "unexplained-line"
+
+PARTS = {f"bearing-{part.replace(' ', '-')}": (part, name) for name, (part, _) in bearing_family.PARTS.items()}
+"""Code of a finding → part of a bearing, and its order's name."""
+
+SAME_EDGE = 0.1
+"""Relative, of a band's edges."""
+GREW = "Whether it has grown cannot be told."
+
+LEAST_RISE_DB = 6.0
+"""Twice the reference's level: less is between two recordings of the same machine."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A finding beyond what the machine is known to show.
+
+    Parameters
+    ----------
+    finding : Finding
+    recording : str
+        Its name.
+    rise_db : float or None
+        Over the reference, which shows it as well in the same band; None: it does not, or there is none.
+    """
+
+    finding: Finding
+    recording: str
+    rise_db: float | None = None
+
+    @property
+    def over_floor_db(self) -> float:
+        """Strongest line over the noise beside it."""
+        strength = self.finding.strength
+        return float("nan") if strength is None or strength.ratio_db is None else strength.ratio_db
+
+
+@dataclass(frozen=True)
+class ExaminedRecording:
+    """One recording with its analysis, the reference at its speed, and what stands out.
+
+    Parameters
+    ----------
+    name : str
+    analysis : Analysis
+    angle : ShaftAngle
+    reference : Analysis or None
+        Of the sound machine at its speed.
+    standing : tuple of Standing
+        Most important first.
+    notices : tuple of str
+    """
+
+    name: str
+    analysis: Analysis
+    angle: ShaftAngle
+    reference: Analysis | None
+    standing: tuple[Standing, ...]
+    notices: tuple[str, ...]
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether the bearings were examined, and would have shown a damage."""
+        codes = {f.code for f in self.analysis.findings}
+        return "no-bearing-damage" in codes and self.analysis.outcome is Outcome.NO_FAULT
+
+
+def carrying(recording: Recording, rig: Rig) -> Recording:
+    """Return the recording with this rig; one that it carries already has applied its sensors, which are the same."""
+    applied = recording.rig is not None and recording.rig.sensors
+    return replace(recording, rig=rig) if applied else recording.with_rig(rig)
+
+
+def analysed(recording: Recording, rig: Rig, name: str) -> tuple[Analysis, ShaftAngle]:
+    """Analyse a recording whose speed must be known.
+
+    Raises
+    ------
+    RefusalError
+        If there is no speed, no live channel, or too few revolutions.
+    """
+    analysis = analyze(carrying(recording, rig))
+    if isinstance(analysis.shaft_angle, CannotTell):
+        raise RefusalError(f"{name}: {analysis.shaft_angle.reason}", remedy=analysis.shaft_angle.remedy)
+    for finding in analysis.findings:
+        if finding.code in ("all-channels-dead", "bearings-not-examined"):
+            raise RefusalError(f"{name}: {finding.title}", remedy=finding.surer or "check the measurement chain")
+    return analysis, analysis.shaft_angle
+
+
+def examined(
+    name: str, found: tuple[Analysis, ShaftAngle], references: Sequence[tuple[Analysis, ShaftAngle]]
+) -> ExaminedRecording:
+    """Return what stands out of a recording, beyond the reference at its speed where there is one."""
+    analysis, angle = found
+    reference, notices = _reference(name, found, references)
+    standing = []
+    for finding in analysis.findings:
+        if finding.code not in (*RACES, *IMPACTS, LINE):
+            continue
+        earlier = None if reference is None else in_reference(finding, reference)
+        rise_db = None if earlier is None else _rise_db(finding, earlier)
+        if earlier is None or finding.kind is Kind.FAULT or (rise_db is not None and rise_db >= LEAST_RISE_DB):
+            standing.append(Standing(finding, name, rise_db))
+        elif rise_db is None:
+            notices.append(f"{name}: {finding.title.rstrip('.')}; the reference shows it too, in another band. {GREW}")
+    doubts = tuple(f"{name}: {f.title}" for f in analysis.findings if f.kind in (Kind.DATA_PROBLEM, Kind.CANNOT_TELL))
+    return ExaminedRecording(name, analysis, angle, reference, tuple(standing), (*notices, *doubts))
+
+
+def surest(every: Sequence[ExaminedRecording]) -> list[Standing]:
+    """Return what stands out, each part once, from the recording that shows it surest; single lines last."""
+    found: dict[tuple[str, str], Standing] = {}
+    for one in (standing for recording in every for standing in recording.standing):
+        key = (one.finding.code, one.finding.where.bearing)
+        if key not in found or _sureness(one) > _sureness(found[key]):
+            found[key] = one
+    kinds = list(Kind)
+    return sorted(
+        found.values(), key=lambda one: (one.finding.code == LINE, kinds.index(one.finding.kind), -_sureness(one)[0])
+    )
+
+
+def bearings_text(finding: Finding, rig: Rig) -> str:
+    """Name the bearing of a finding, and those whose same part has the same order; empty where there is none."""
+    name = PARTS.get(finding.code, ("", ""))[1]
+    orders = {b.name: b.orders().get(name, 0.0) * (rig.ratio(b.shaft) or 0.0) for b in rig.bearings}
+    own = orders.get(finding.where.bearing)
+    if not own:
+        return ""
+    alike = [other for other, order in orders.items() if abs(order / own - 1.0) < bearing_family.SAME_ORDER]
+    return named("bearing", " or ".join(alike))
+
+
+def shafts_of_unknown_speed(rig: Rig) -> str:
+    """Name the shafts whose speed the rig file does not tell, as those of a gear pair left out; empty: none."""
+    return named("shaft", " and ".join(shaft.name for shaft in rig.shafts if rig.ratio(shaft.name) is None))
+
+
+def _sureness(one: Standing) -> tuple[float, float]:
+    return one.finding.confidence, one.over_floor_db
+
+
+def _rise_db(finding: Finding, earlier: Earlier) -> float | None:
+    """Return the rise since then; None where the bands differ, since the level in a band grows with its width."""
+    bands = finding.where.band_hz or (), earlier.finding.where.band_hz or ()
+    differ = any(abs(now - then) > SAME_EDGE * max(now, then) for now, then in zip(*bands, strict=False))
+    return None if differ else earlier.change_db
+
+
+def _reference(
+    name: str, found: tuple[Analysis, ShaftAngle], references: Sequence[tuple[Analysis, ShaftAngle]]
+) -> tuple[Analysis | None, list[str]]:
+    """Return the healthy reference at the recording's speed, or none and why."""
+    if not references:
+        return None, []
+    analysis, angle = found
+    speed = angle.mean_speed_rpm
+    nearest, its_angle = min(references, key=lambda one: abs(one[1].mean_speed_rpm - speed))
+    why = ""
+    if abs(its_angle.mean_speed_rpm / speed - 1.0) > LARGEST_SPEED_DIFFERENCE:
+        why = f"no reference is within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of its speed"
+    elif missing := set(_channels(analysis)) - set(_channels(nearest)):
+        why = f"the reference has no channel {', '.join(sorted(missing))}"
+    elif nearest.outcome is Outcome.FAULT:
+        why = f"the reference at its speed is not healthy ({nearest.findings[0].title.rstrip('.')})"
+    return (None, [f"{name} is not compared with a reference: {why}."]) if why else (nearest, [])
+
+
+def _channels(analysis: Analysis) -> list[str]:
+    return [channel.channel for channel in analysis.channels]
+
+
+# --------------------
+# Which cause what stands out has, where no simulation could be compared with: probabilities and the outcome.
+# --------------------
+
+
+HIDDEN = 0.2
+"""Probability of something that does not show, where damage of a race would have shown."""
+UNDECIDED = 0.5
+"""Share of unknown in what is left over, where nothing tells it from none."""
+
+Races = Mapping[str, Standing]
+"""Name of an effect → the surest finding of it."""
+
+
+def causes_of(
+    standing: Sequence[Standing], every: Sequence[ExaminedRecording], rig: Rig, effects: Mapping[str, GapEffect]
+) -> tuple[tuple[GapCause, ...], GapOutcome]:
+    """Return the causes, that of the outcome first, and the outcome.
+
+    A race has the confidence c of its finding; of the rest 1 − Σc a share u goes to unknown and 1 − u to none. u is
+    the confidence of other impacts or lines where they stand out alone, 1/2 beside a race, and where nothing stands
+    out 1/5 if a damage would have shown, else 1/2. An effect is named only if the finding is a fault.
+
+    Parameters
+    ----------
+    standing : sequence of Standing
+        Most important first.
+    every : sequence of Examined
+    rig : Rig
+    effects : mapping
+        Those that may be named.
+    """
+    races = {name: one for one in reversed(standing) if (name := RACES.get(one.finding.code, "")) in effects}
+    outcome, why = _outcome(standing, races, every, rig)
+    total = sum(one.finding.confidence for one in races.values())
+    left = 1.0 - min(total, 1.0)
+    unknown = left * _share_of_unknown(standing, races, every)
+    causes = [
+        _race(effects[name], races.get(name), rig, scale=1.0 / max(total, 1.0))
+        for name in RACES.values()
+        if name in effects
+    ]
+    strange = [one.finding for one in standing if one not in races.values()]
+    causes += [
+        GapCause(
+            UNKNOWN,
+            UNKNOWN,
+            why if outcome is GapOutcome.UNKNOWN else "something else",
+            "",
+            unknown,
+            remarks=_remarks(strange[0]) if strange and outcome is GapOutcome.UNKNOWN else (),
+        ),
+        GapCause(NONE, NONE, why if outcome is GapOutcome.NO_GAP else "no damage", "", left - unknown),
+    ]
+    firsts = {GapOutcome.UNKNOWN: UNKNOWN, GapOutcome.NO_GAP: NONE}
+    first = firsts.get(outcome) or RACES[_sure(races)[0].finding.code]
+    return tuple(sorted(causes, key=lambda cause: (cause.name != first, -cause.probability))), outcome
+
+
+def _sure(races: Races) -> list[Standing]:
+    """Return the races whose damage the search is sure of, surest first."""
+    found = [one for one in races.values() if one.finding.kind is Kind.FAULT]
+    return sorted(found, key=lambda one: -one.finding.confidence)
+
+
+def _outcome(
+    standing: Sequence[Standing], races: Races, every: Sequence[ExaminedRecording], rig: Rig
+) -> tuple[GapOutcome, str]:
+    """Return the outcome and its reason."""
+    if _sure(races):
+        return GapOutcome.EFFECT, ""
+    if standing:
+        return GapOutcome.UNKNOWN, _why_unknown(standing[0], races, rig)
+    if all(one.reference is not None for one in every):
+        return GapOutcome.NO_GAP, "nothing stands out that the healthy reference does not show"
+    if all(one.is_sound for one in every):
+        return GapOutcome.NO_GAP, "nothing stands out, and damage of a race would have"
+    return GapOutcome.UNKNOWN, "nothing stands out, but damage of a race might not have"
+
+
+def _why_unknown(one: Standing, races: Races, rig: Rig) -> str:
+    code = one.finding.code
+    if code in RACES:
+        is_known = one in races.values()
+        return (
+            "the lines of the race are not clear enough" if is_known else "the race is not among the effects asked for"
+        )
+    if code in PARTS:
+        return f"damage of a {PARTS[code][0]} is not in the catalogue"
+    why = "what makes the line is not known" if code == LINE else "what makes the impacts is not known"
+    loose = shafts_of_unknown_speed(rig)
+    return f"{why}; it may turn with {loose}, whose speed the rig file does not tell" if loose else why
+
+
+def _share_of_unknown(standing: Sequence[Standing], races: Races, every: Sequence[ExaminedRecording]) -> float:
+    impacts = [one.finding.confidence for one in standing if one.finding.code in IMPACTS]
+    if races:  # a line may be the ringing of the race's impacts, and says nothing beside them
+        return max([UNDECIDED, *impacts])
+    if standing:
+        return max(one.finding.confidence for one in standing)
+    return HIDDEN if all(one.is_sound for one in every) else UNDECIDED
+
+
+def _race(effect: GapEffect, found: Standing | None, rig: Rig, *, scale: float) -> GapCause:
+    if found is None:
+        return GapCause(effect.name, effect.group, effect.title, effect.unit, 0.0)
+    return GapCause(
+        effect.name,
+        effect.group,
+        effect.title,
+        effect.unit,
+        scale * found.finding.confidence,
+        place=bearings_text(found.finding, rig),
+        remarks=_remarks(found.finding),
+    )
+
+
+def _remarks(finding: Finding) -> tuple[str, ...]:
+    basis = finding.confidence_basis
+    return (*finding.evidence, *((f"{basis[:1].upper()}{basis[1:]}.",) if basis else ()))
+
+
+# --------------------
+# What stands out of a recording by itself, as places of a gap.
+# --------------------
+
+
+NAN = float("nan")
+
+
+def standing_place(one: Standing, rig: Rig, *, name: str = "") -> GapPlace:
+    """Return the place of what stands out, without sizes in floors, for nothing is simulated to find it.
+
+    Parameters
+    ----------
+    one : Standing
+    rig : Rig
+    name : str
+        The recording's where there are several.
+    """
+    where = one.finding.where
+    order, frequency = where.order or NAN, where.frequency_hz or NAN
+    over = f"{one.over_floor_db:.0f} dB over their floor" + (
+        f" in {band_words(where.band_hz)}" if where.band_hz else ""
+    )
+    since = "" if one.rise_db is None else f", {signed(one.rise_db)} dB over the reference"
+    seen = f", in {name}" if name else ""
+    driver = rig.ratio(rig.pairs[0].driver) if rig.pairs else 1.0
+    return GapPlace(
+        PlaceKind.LINE if one.finding.code == LINE else PlaceKind.ENVELOPE,
+        f"{_what(one, rig)} (order {order:.4g}, {hertz(frequency)}), {over}{since}{seen}",
+        one.over_floor_db if one.rise_db is None else one.rise_db,
+        repeatability=NAN,
+        structural=NAN,
+        share=NAN,
+        shaft=where.shaft,
+        orders=(order / (driver or 1.0),),
+        band_hz=where.band_hz,
+        channel=where.channels[0] if where.channels else "",
+    )
+
+
+def _what(one: Standing, rig: Rig) -> str:
+    code = one.finding.code
+    if code in PARTS:
+        return f"envelope lines of the {PARTS[code][0]} of {bearings_text(one.finding, rig)}"
+    if code == LINE:
+        return "the strongest line of no known shaft or bearing"
+    loose = shafts_of_unknown_speed(rig)
+    parts = [*(["no gear"] if rig.pairs else []), "no shaft", *(["no bearing"] if rig.bearings else [])]
+    unknown = "" if rig.bearings else ", the rig file naming no bearing"
+    known = f" of known speed explains, perhaps {loose}" if loose else " explains"
+    return f"envelope lines of impacts that {', '.join(parts[:-1])} and {parts[-1]}{known}{unknown}"
+
+
+NOT_SIMULATED = (
+    "The rig has no gear pair, so that no simulator could be set to it: nothing was simulated, and no effect of gears "
+    "is weighed. How large the gap is, how severe its cause and how far it shrinks cannot be told; there is no twin. "
+    "Damaged races of the bearings were looked for; unbalance, misalignment, clearance, drive and load were not."
+)
+HOW_SURE = (
+    "The probabilities are not the calibrated ones of rigs with a gear pair. A race has the confidence of the bearing "
+    "search: an upper limit, from how rarely noise makes such lines and how well other parts or a wrong speed explain "
+    "them. What is left over is shared between unknown and none."
+)
+NO_REFERENCE = "No healthy reference: what stands out may have been there when the machine was sound."
+N_SHOWN = 6.5
+"""Multiples of the found order that a spectrum is shown for."""
+
+
+def diagnose_gearless(
+    recordings: Sequence[Recording],
+    rigs: Sequence[Rig],
+    references: Sequence[Recording],
+    reference_rigs: Sequence[Rig],
+    names: Sequence[str],
+    reference_names: Sequence[str],
+    effects: Mapping[str, GapEffect],
+    tell: Stage,
+) -> GapReport:
+    """Name the damaged race, or say that it is unknown what stands out, or that nothing does.
+
+    Parameters
+    ----------
+    recordings, rigs, references, reference_rigs, names, reference_names
+        As of `gearsig.gap.diagnose_gap`.
+    effects : mapping
+        Those that may be named; of them only damaged races can be.
+    tell : callable
+        Is told what is being done, and which share of the whole is complete.
+
+    Returns
+    -------
+    GapReport
+        Without simulator, sizes, steps and twin.
+
+    Raises
+    ------
+    RefusalError
+        If there is no speed, no live channel, or too few revolutions.
+    """
+    tell("analysing the references", 0.05)
+    healthy = [analysed(*one) for one in zip(references, reference_rigs, reference_names, strict=True)]
+    every = []
+    for i, (recording, rig) in enumerate(zip(recordings, rigs, strict=True)):
+        name = names[i] if names else f"recording {i + 1}"
+        tell(f"analysing {name}", 0.2 + 0.7 * i / len(recordings))
+        every.append(examined(name, analysed(recording, rig, name), healthy))
+    hint = () if references else (NO_REFERENCE,)
+    standing = surest(every)
+    causes, outcome = causes_of(standing, every, rigs[0], effects)
+    return GapReport(
+        rig=rigs[0].name,
+        simulator="",
+        conditions=tuple(_facts(one, rig) for one, rig in zip(every, rigs, strict=True)),
+        references=tuple(reference_names) if any(e.reference for e in every) else (),
+        outcome=outcome,
+        size=Interval(NAN, NAN, NAN),
+        repeatability=NAN,
+        places=tuple(standing_place(one, rigs[0], name=one.recording if len(every) > 1 else "") for one in standing),
+        causes=causes,
+        groups=group_probabilities(causes),
+        spectra=_spectra(standing, every),
+        notices=(
+            NOT_SIMULATED,
+            HOW_SURE,
+            *hint,
+            *_loose_shafts(rigs[0]),
+            *_limits(standing, every),
+            *(text for one in every for text in one.notices),
+        ),
+    )
+
+
+def _loose_shafts(rig: Rig) -> list[str]:
+    """Say which shafts' orders, and those of their bearings, are not known."""
+    loose = shafts_of_unknown_speed(rig)
+    if not loose:
+        return []
+    remark = (
+        f"The rig file does not tell the speed of {loose}, as it names no gear pair: what turns with it is taken for "
+        "something strange, and its bearings were not looked for. Give the teeth of the pair."
+    )
+    return [remark]
+
+
+def _limits(standing: Sequence[Standing], every: Sequence[ExaminedRecording]) -> list[str]:
+    """Say where several races, or several recordings, do not agree on one answer."""
+    faults = [one for one in standing if one.finding.kind is Kind.FAULT]
+    texts = []
+    if len({one.finding.code for one in faults if one.finding.code in RACES}) > 1:
+        texts.append("Both races stand out and may both be damaged: the probabilities, of one cause each, are shared.")
+    for fault in faults:
+        key = (fault.finding.code, fault.finding.where.bearing)
+        others = [
+            one.name for one in every if key not in [(s.finding.code, s.finding.where.bearing) for s in one.standing]
+        ]
+        if others:
+            texts.append(
+                f"{', '.join(others)}: no lines of the {PARTS[key[0]][0]} of {named('bearing', key[1])} stand out."
+            )
+    return texts
+
+
+def _facts(one: ExaminedRecording, rig: Rig) -> ConditionFacts:
+    torque, recording = rig.nominal_torque_nm(), one.analysis.recording
+    return ConditionFacts(
+        one.name,
+        OperatingCondition(one.angle.mean_speed_rpm, NAN if torque is None else torque),
+        one.angle.n_revolutions,
+        recording.duration_s,
+        recording.sampling_rate_hz,
+    )
+
+
+def _spectra(standing: Sequence[Standing], every: Sequence[ExaminedRecording]) -> tuple[SpectrumCurves, ...]:
+    """Return the envelope spectrum that shows the first family; of the first channel where there is none."""
+    families = [one for one in standing if one.finding.code != LINE]
+    name = families[0].recording if families else every[0].name
+    channels = next(one for one in every if one.name == name).analysis.channels
+    wanted = families[0].finding.where.channels if families else ()
+    channel = next((c for c in channels if c.channel in wanted), channels[0])
+    spectrum, band = channel.envelope_spectrum, channel.envelope_band_hz
+    if spectrum is None or band is None:
+        return ()
+    highest = N_SHOWN * (families[0].finding.where.order or NAN) if families else NAN
+    kept = spectrum.positions <= (highest if np.isfinite(highest) else spectrum.positions[-1])
+    label = f"envelope of {channel.channel}, {band_words(band)}" + (f", {name}" if len(every) > 1 else "")
+    nothing = np.zeros(0)
+    return (
+        SpectrumCurves(
+            label,
+            spectrum.unit,
+            spectrum.positions[kept],
+            spectrum.values[kept],
+            nothing,
+            nothing,
+            noise_floor(spectrum).values[kept],
+        ),
+    )
+
+
+# --------------------
+# What stands out of a recording of gears by itself, found by the analysis: impacts, and lines of nothing known.
+# --------------------
+
+
+HIGHEST_HARMONIC, SAME_ORDER = 40, 1e-3
+"""Of a family of impacts, at which a line still belongs to it; relative."""
+
+
+def stood_out(
+    recording: Recording, rig: Rig, references: Sequence[Recording], reference_rigs: Sequence[Rig], name: str
+) -> tuple[list[Standing], list[str], list[str]]:
+    """Return the families of impacts, beyond the reference's, that no shaft repeats, surest first; remarks; doubts.
+
+    The catalogue's effects are compared by features of known places; a strange family is one feature among a hundred
+    there and easily lost. The analysis looks for it by itself. A strange line and a family that may well be chance are
+    remarks; a fault of the reference is a doubt about everything else.
+    """
+    now = _analysed(recording, rig)
+    if now is None:
+        return [], [], []
+    nearest = _nearest(now[1].mean_speed_rpm, references, reference_rigs)
+    healthy = None if nearest is None else _analysed(*nearest)
+    found = examined(name, now, [healthy] if healthy is not None else [])
+    doubts = [] if healthy is None else _fault_of_reference(healthy[0], now[0], name)
+    weak = [one for one in found.standing if one.finding.code == LINE or one.finding.kind is Kind.NOTICE]
+    strong = [one for one in found.standing if one not in weak]
+    remarks = [
+        f"Not explained by the gear model, in {name}: {one.finding.title.rstrip('.')}{_odds(one)}."
+        for one in weak
+        if not (one.finding.code == LINE and any(_is_harmonic(one, family) for family in strong))
+    ]
+    return strong, remarks, doubts
+
+
+def beside_standing(outcome: GapOutcome, standing: Sequence[Standing]) -> tuple[GapOutcome, list[str]]:
+    """Return what a diagnosis that names no effect comes to where impacts stand out, and what is to be checked first.
+
+    Impacts that no shaft repeats are a gap, however few features see them: unknown. Those of a bearing's race are in
+    the catalogue; that the forests see too little of them leaves it undecided.
+    """
+    if not standing or outcome not in (GapOutcome.NO_GAP, GapOutcome.UNDECIDED):
+        return outcome, []
+    races = [one for one in standing if one.finding.code in RACES]
+    if len(races) < len(standing):
+        return GapOutcome.UNKNOWN, []
+    return GapOutcome.UNDECIDED, [
+        f"{one.recording}: {one.finding.title.rstrip('.')}{_odds(one)}, by the search for bearing orders; few of the "
+        "features that are compared show it."
+        for one in races
+    ]
+
+
+def _is_harmonic(line: Standing, family: Standing) -> bool:
+    """Whether a line is a multiple of a family's order: the family explains it."""
+    order, base = line.finding.where.order, family.finding.where.order
+    if not (order and base and line.finding.where.shaft == family.finding.where.shaft):
+        return False
+    n = round(order / base)
+    return 1 <= n <= HIGHEST_HARMONIC and abs(order / (n * base) - 1.0) < SAME_ORDER
+
+
+def _odds(one: Standing) -> str:
+    return "" if one.finding.code == LINE else f" (at most {100 * one.finding.confidence:.0f} %)"
+
+
+def _fault_of_reference(reference: Analysis, now: Analysis, name: str) -> list[str]:
+    """Say so where the reference shows a fault by itself; most of all where the recording shows none."""
+    if reference.outcome is not Outcome.FAULT:
+        return []
+    fault = reference.findings[0].title.rstrip(".")
+    perhaps = "" if now.outcome is Outcome.FAULT else " and the recording shows no fault: they may have been exchanged"
+    remark = (
+        f"The reference of {name} does not look healthy ({fault}){perhaps}. What is named may be what the "
+        "reference has and the recording has not."
+    )
+    return [remark]
+
+
+def _nearest(speed_rpm: float, references: Sequence[Recording], rigs: Sequence[Rig]) -> tuple[Recording, Rig] | None:
+    """Return the reference at the speed nearest to the recording's; only that is analysed."""
+    pairs = list(zip(references, rigs, strict=True))
+    if len(pairs) < 2:
+        return pairs[0] if pairs else None
+    speeds = [determine_angle(carrying(one, rig), rig) for one, rig in pairs]
+    known = [(abs(a.mean_speed_rpm - speed_rpm), i) for i, a in enumerate(speeds) if not isinstance(a, CannotTell)]
+    return pairs[min(known)[1]] if known else None
+
+
+def _analysed(recording: Recording, rig: Rig) -> tuple[Analysis, ShaftAngle] | None:
+    """Return a recording's analysis with its angle; None where it has no speed."""
+    analysis = analyze(carrying(recording, rig))
+    return None if isinstance(analysis.shaft_angle, CannotTell) else (analysis, analysis.shaft_angle)

@@ -1,0 +1,806 @@
+"""Where a recording differs from what it is compared with, place by place, each with its share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray
+from gearsig.gap._change import (
+    APART,
+    beyond_the_mesh,
+    change_features,
+    difference_features,
+    difference_residuals,
+    lines_of_shaft,
+    turned_difference,
+)
+from gearsig.gap._features import (
+    LOWEST_STRANGE,
+    MOST_SHAFT_ORDERS,
+    N_FAMILY,
+    N_MESH_HARMONICS,
+    N_SHAFT_FAMILY,
+    N_SIDEBAND_HARMONICS,
+    RACES,
+    SIDES,
+    SLIP,
+    Features,
+    average_lines,
+    envelope_ratios,
+    is_synchronous,
+    line_power,
+    mesh_power,
+    residual_lines,
+    residual_ratios,
+    tooth_energy,
+    visible_orders,
+)
+from gearsig.gap._floors import REPEATABLE, Family, StructuralFloor, family_members, family_size, pooled_scatter
+from gearsig.gap._reduction import DRIVER, N_HARMONICS, SUPPLIES_HZ, GearFrame, ReducedRecording
+from gearsig.gap._types import GapPlace, PlaceKind
+from gearsig.gap._words import ComparedPair, LocatedChange, band_words, by_decibels, feature_words, hertz, shaft_words
+from gearsig.severity import ShaftLines, find_event, load_calibration
+
+# --------------------
+# Which places of a gap come first: what stands out by itself, then by share, last what only follows from others.
+# --------------------
+
+
+SAME_ORDER = 0.02
+"""Relative: of one family of lines, however they were found."""
+
+
+def ranked_places(places: Sequence[GapPlace], standing: Sequence[GapPlace] = ()) -> tuple[GapPlace, ...]:
+    """Return the places in the order in which somebody at the machine should read them.
+
+    Families of impacts that stand out by themselves come first: no tolerance of a simulator makes them. A place of the
+    gap at the same order is the same family, and gives its sizes to it. Then come the other places, largest share
+    first; last those that say nothing of where or what to look for, since other places make them.
+
+    Parameters
+    ----------
+    places : sequence of GapPlace
+        Of the gap, with sizes and shares.
+    standing : sequence of GapPlace
+        Found without a simulation, surest first.
+    """
+    left, first = list(places), []
+    for one in standing:
+        same = [place for place in left if _same_family(place, one)]
+        first.append(_joined(one, same))
+        left = [place for place in left if place not in same]
+    return (*first, *sorted(left, key=_rank))
+
+
+def _rank(place: GapPlace) -> tuple[bool, float]:
+    return place.follows, -(place.structural if place.follows else place.share)
+
+
+def _same_family(place: GapPlace, standing: GapPlace) -> bool:
+    """Whether a line or an envelope's line lies at the family's order."""
+    if place.kind not in (PlaceKind.ENVELOPE, PlaceKind.LINE) or not place.orders:
+        return False
+    return abs(place.orders[0] / standing.orders[0] - 1.0) < SAME_ORDER
+
+
+def _joined(standing: GapPlace, same: Sequence[GapPlace]) -> GapPlace:
+    """Return what stands out with the sizes of the largest place of the same family, and their shares together."""
+    if not same:
+        return standing
+    largest = max(same, key=lambda place: place.share)
+    share = sum(place.share for place in same)
+    return replace(standing, repeatability=largest.repeatability, structural=largest.structural, share=share)
+
+
+# --------------------
+# Which bearing, race or strange order: lines that no shaft repeats, in envelopes and in the residual.
+# --------------------
+
+
+RACE_WORDS = {"outer": "outer race", "inner": "inner race", "ball": "rolling elements", "cage": "cage"}
+A_FAMILY_IS_HEARD = 0.6
+"""A family's rise over that of the strongest line, from which on the line is taken for one of the family's."""
+LEAST_OF_A_FAMILY_DB = 3.0
+FEWEST_OF_A_FAMILY = 3
+"""Lines free of the shafts' orders, of the four."""
+UPWARDS, N_SLIPS = 0.005, 41
+"""Rolling elements lag behind; only the contact angle brings an outer race's order up a little."""
+HIGHEST_MULTIPLE, MISSED = 12, 0.004
+MOST_OF_A_BAND = 0.5
+"""Of a band's new power in one line: it is a tone, not noise."""
+_SUPPLY_WANDERS = 0.004
+_LINE_WIDTH = 3
+
+
+@dataclass(frozen=True)
+class LineLevels:
+    """Lines over their floor, in dB and not below 0, of both sides of a comparison.
+
+    Parameters
+    ----------
+    now, other : arrays, (n_rows, n_lines)
+        On the same orders.
+    step : float
+        Orders from line to line.
+    taken : array, (n_lines,)
+        Which lie at a multiple of a shaft's order: what the averages left over.
+    """
+
+    now: FloatArray
+    other: FloatArray
+    step: float
+    taken: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class _Found:
+    words: str
+    rise_db: float
+    orders: tuple[float, ...]
+    row: int
+
+
+def envelope_spot(comparison: ComparedPair) -> LocatedChange:
+    """Return whose order modulates what no shaft repeats."""
+    now, names = comparison.now, tuple(comparison.now.channels)
+    both = [np.concatenate([envelope_ratios(g, g.channels[name]) for name in names]) for g in (now, comparison.other)]
+    levels = _levels(comparison, both, now.cycle_step, comparison.other.cycle_step)
+    levels, sign = _upwards(levels, comparison.size[comparison.strongest("envelope.")])
+    found = _told_apart(_best_race(comparison, levels), _strongest(comparison, levels, fundamental=True))
+    found = max(found, *_shafts(comparison, levels), key=lambda one: one.rise_db)
+    bands = now.bands_hz * len(names)
+    change = sign * found.rise_db
+    title = f"envelope lines {found.words}, {by_decibels(change)} in {band_words(bands[found.row])}"
+    channel = names[found.row // len(now.bands_hz)]
+    return LocatedChange(title, change, found.orders, bands[found.row], channel=channel)
+
+
+def line_spot(comparison: ComparedPair) -> LocatedChange:
+    """Return which line of the residual changed most: the supply's, a bearing's, or a strange one."""
+    strongest = comparison.strongest("line.outer", "line.inner", "line.ball", "line.cage", "line.strange", "hum")
+    levels, sign = _upwards(_residual_levels(comparison), comparison.size[strongest])
+    line = _strongest(comparison, levels, fundamental=False)
+    if strongest == "hum" or (_is_the_supplys(comparison, line.orders[0]) and comparison.size["hum"] > 1.0):
+        return _hum(comparison)
+    return _line(comparison, _told_apart(_best_race(comparison, levels), line), sign)
+
+
+def line_within(comparison: ComparedPair, band_hz: tuple[float, float], change_db: float) -> LocatedChange | None:
+    """Return the line that makes up most of what a band of the residual has more; None where it is noise."""
+    if change_db <= 0:
+        return None
+    now = comparison.now
+    powers = [
+        np.stack([g.channels[name].residual_power.mean(axis=0) for name in now.channels])
+        for g in (now, comparison.other)
+    ]
+    orders = np.arange(powers[0].shape[1]) * now.order_step
+    within = (orders * now.speed_hz >= band_hz[0]) & (orders * now.speed_hz <= band_hz[1])
+    row, peak = (int(i) for i in np.unravel_index(int(np.argmax(np.where(within, powers[0], 0.0))), powers[0].shape))
+    line = powers[0][row, max(peak - _LINE_WIDTH, 0) : peak + _LINE_WIDTH + 1].sum()
+    old = np.arange(powers[1].shape[1]) * comparison.other.order_step * now.speed_hz
+    before = powers[1][row, (old >= band_hz[0]) & (old <= band_hz[1])].sum()
+    if line < MOST_OF_A_BAND * max(float(powers[0][row, within].sum() - before), 1e-300):
+        return None
+    order = float(orders[peak])
+    levels = _residual_levels(comparison)
+    rise = float((levels.now - levels.other)[row, min(peak, len(levels.taken) - 1)])
+    words = _strange_words(comparison, order)
+    return replace(_line(comparison, _Found(words, rise, (order,), row), 1.0), kind=PlaceKind.LINE)
+
+
+def _line(comparison: ComparedPair, found: _Found, sign: float) -> LocatedChange:
+    change = sign * found.rise_db
+    title = f"line {found.words} ({hertz(found.orders[0] * comparison.now.speed_hz)}), {by_decibels(change)}"
+    return LocatedChange(title, change, found.orders, channel=list(comparison.now.channels)[found.row])
+
+
+def _residual_levels(comparison: ComparedPair) -> LineLevels:
+    now, other = comparison.now, comparison.other
+    both = [residual_ratios(g, [g.channels[name] for name in now.channels]) for g in (now, other)]
+    return _levels(comparison, both, now.order_step, other.order_step)
+
+
+def _levels(comparison: ComparedPair, ratios: list[FloatArray], step: float, other_step: float) -> LineLevels:
+    now, other = (10.0 * np.log10(np.maximum(rows, 1.0)) for rows in ratios)
+    orders = np.arange(min(now.shape[1], int(other.shape[1] * other_step / step))) * step
+    before = _widened(other)
+    shafts = np.array(comparison.now.frame.shaft_orders)[:, None]
+    away = np.abs(orders / shafts - np.rint(orders / shafts)) * shafts
+    return LineLevels(
+        now[:, : len(orders)],
+        np.stack([np.interp(orders, np.arange(other.shape[1]) * other_step, row) for row in before]),
+        step,
+        (away < 1.5 * step).any(axis=0) | (orders < LOWEST_STRANGE),
+    )
+
+
+def _upwards(levels: LineLevels, size: float) -> tuple[LineLevels, float]:
+    """Return the comparison the other way round, and −1, where it went down."""
+    if size >= 0:
+        return levels, 1.0
+    return replace(levels, now=levels.other, other=_widened(levels.now)), -1.0
+
+
+def _widened(levels: FloatArray) -> FloatArray:
+    """Return each line's largest neighbour, so that a line that moved by one counts as the same."""
+    from scipy.ndimage import maximum_filter1d
+
+    widened: FloatArray = maximum_filter1d(levels, 3, axis=1)
+    return widened
+
+
+def _told_apart(family: _Found, line: _Found) -> _Found:
+    """Return the family if it is heard beside the strongest line, or that line is one of its multiples."""
+    harmonic = family.orders[0] / line.orders[0] if family.orders else 0.0
+    if family.rise_db < LEAST_OF_A_FAMILY_DB or (harmonic > 1.5 and abs(harmonic / round(harmonic) - 1.0) < MISSED):
+        return line  # of a lower line's harmonics, the family has but some
+    multiple = line.orders[0] / family.orders[0]
+    is_one = round(multiple) in range(1, HIGHEST_MULTIPLE + 1) and abs(multiple / round(multiple) - 1.0) < MISSED
+    return family if is_one or family.rise_db > A_FAMILY_IS_HEARD * line.rise_db else line
+
+
+def _best_race(comparison: ComparedPair, levels: LineLevels) -> _Found:
+    """Return the bearing's family whose lines rose most."""
+    found = [_Found("", 0.0, (), 0)]
+    now, other = _widened(levels.now), levels.other
+    for bearing in comparison.now.frame.bearings:
+        for kind, (attribute, factor) in RACES.items():
+            order = getattr(bearing, attribute) * factor
+            if np.isfinite(order):
+                rise, row, slipped = _family_rise(now - other, order, levels)
+                words = f"of the {RACE_WORDS[kind]} of {_bearing(bearing.name)} (order {slipped:.3g})"
+                found.append(_Found(words, rise, _multiples(slipped, N_FAMILY), row))
+    return max(found, key=lambda one: one.rise_db)
+
+
+def _bearing(name: str) -> str:
+    return name if "bearing" in name.lower() else f"bearing {name}"
+
+
+def _family_rise(rise: FloatArray, order: float, levels: LineLevels) -> tuple[float, int, float]:
+    """Return the second smallest rise among a family's lines, its row, and the order with slip.
+
+    One strange line that falls on a harmonic makes no family; one harmonic that is missing does not spoil it.
+    """
+    slips = order * (1.0 + np.linspace(-SLIP, UPWARDS, N_SLIPS))
+    lines = np.rint(np.outer(slips, np.arange(1, N_FAMILY + 1)) / levels.step).astype(np.intp)
+    inside = lines < rise.shape[1]
+    lines = np.minimum(lines, rise.shape[1] - 1)
+    free = inside & ~levels.taken[lines]
+    values = np.where(free, rise[:, lines], np.inf)  # (row, slip, harmonic)
+    second = np.sort(values, axis=2)[:, :, 1]
+    second = np.where(free.sum(axis=1) >= FEWEST_OF_A_FAMILY, second, -np.inf)
+    # Of slips that are as good, the one whose lines are strongest in all.
+    mean = np.where(free, rise[:, lines], 0.0).mean(axis=2)
+    row, best = np.unravel_index(int(np.argmax(second + 1e-3 * mean)), second.shape)
+    return float(max(second[row, best], 0.0)), int(row), float(slips[best])
+
+
+def _shafts(comparison: ComparedPair, levels: LineLevels) -> list[_Found]:
+    """Return the shafts' families, where the features say that they changed."""
+    found, rise = [], _widened(levels.now) - levels.other
+    for side, order in enumerate(comparison.now.frame.shaft_orders):
+        lines = np.rint(order * np.arange(1, N_SHAFT_FAMILY + 1) / levels.step).astype(np.intp)
+        means = rise[:, lines[lines < rise.shape[1]]].mean(axis=1)
+        felt = abs(comparison.size[f"envelope.{SIDES[side]}_shaft"]) > 1.0
+        words = f"at multiples of {shaft_words(comparison.now.frame, side)}"
+        found.append(_Found(words, float(means.max()) if felt else 0.0, _multiples(order, 3), int(np.argmax(means))))
+    return found
+
+
+def _multiples(order: float, n: int) -> tuple[float, ...]:
+    return tuple(float(k * order) for k in range(1, n + 1))
+
+
+def _strongest(comparison: ComparedPair, levels: LineLevels, *, fundamental: bool) -> _Found:
+    """Return the line that rose most of those at no multiple of a shaft's order."""
+    rise = np.where(levels.taken, -np.inf, levels.now - levels.other)
+    row, line = (int(i) for i in np.unravel_index(int(np.argmax(rise)), rise.shape))
+    change = float(rise[row, line])
+    if fundamental:
+        line = _fundamental(levels.now[row], line)
+    order = line * levels.step
+    return _Found(_strange_words(comparison, order), change, (order,), row)
+
+
+def _strange_words(comparison: ComparedPair, order: float) -> str:
+    """Return whose order it is by itself, without a family of multiples."""
+    for bearing in comparison.now.frame.bearings:
+        for kind, (attribute, factor) in RACES.items():
+            if -SLIP < order / (getattr(bearing, attribute) * factor) - 1.0 < UPWARDS:
+                return f"at order {order:.4g}, that of the {RACE_WORDS[kind]} of {_bearing(bearing.name)}"
+    nor = "and no bearing" if comparison.now.frame.bearings else "(the rig names no bearing)"
+    return f"at order {order:.4g}, which belongs to no shaft {nor}"
+
+
+def _fundamental(level: FloatArray, line: int) -> int:
+    """Return the line of which this one is a harmonic, where there is one half as high in dB."""
+    for divisor in range(HIGHEST_MULTIPLE, 1, -1):
+        first = max(round(line / divisor) - 1, 1)
+        lower = first + int(np.argmax(level[first : first + 3]))
+        if lower > 4 and level[lower] > 0.5 * level[line]:
+            return lower
+    return line
+
+
+def _is_the_supplys(comparison: ComparedPair, order: float) -> bool:
+    speed_hz = comparison.now.speed_hz
+    lines = np.array([k * supply for supply in SUPPLIES_HZ for k in range(1, N_HARMONICS + 1)])
+    width = np.maximum(_SUPPLY_WANDERS * lines, comparison.now.order_step * speed_hz)
+    return bool((np.abs(order * speed_hz - lines) < width).any())
+
+
+def _hum(comparison: ComparedPair) -> LocatedChange:
+    now = comparison.now
+    supply = SUPPLIES_HZ[int(np.argmax(now.hum))]
+    change = comparison.change_db["hum"]
+    orders = tuple(k * supply / now.speed_hz for k in range(1, N_HARMONICS + 1))
+    return LocatedChange(f"mains hum at {supply:g} Hz and multiples, {by_decibels(change)}", change, orders)
+
+
+# --------------------
+# Which mesh harmonic, sideband or shaft order changed most: line by line in the synchronous averages.
+# --------------------
+
+
+FURTHEST_SIDEBAND = 12
+WORTH_NAMING = 0.25
+"""Of the largest change of power: what changed by less is not named, be its ratio ever so large."""
+MOST_ORDERS = 6
+LEAST_CHANGE_DB = 1.0
+"""Of a sideband or shaft order; features that saw more saw noise."""
+EXPLAINED = 0.5
+"""Of the largest change of power, what a shaft's own lines must hold of it."""
+
+
+def mesh_spot(comparison: ComparedPair) -> LocatedChange | None:
+    """Return the mesh harmonic that changed most."""
+    frame = comparison.now.frame
+    if comparison.strongest("mesh", "line.half_mesh") in ("mesh.half", "line.half_mesh"):
+        half = comparison.change_db[comparison.strongest("mesh.half", "line.half_mesh")]
+        return LocatedChange(f"half the mesh order, {by_decibels(half)}", half, (frame.teeth[0] / 2.0,))
+    both = _both(comparison, DRIVER, relative=not comparison.is_reference)
+    lines = [k * frame.teeth[0] for k in range(1, N_MESH_HARMONICS + 1) if k * frame.teeth[0] < both[0].power.shape[1]]
+    strongest = _strongest_group(*both, [[line] for line in lines])
+    if strongest is None:
+        return None
+    row, best, change = strongest
+    if abs(change) < LEAST_CHANGE_DB:  # the lines hardly moved: what was scored is a ratio, of harmonics or of sensors
+        scored = comparison.strongest("mesh.", "alike.")
+        change = comparison.change_db[scored]
+        title = f"{feature_words(scored, frame)}, {by_decibels(change)}"
+        if scored.startswith("alike."):
+            title = "what lies beside the mesh harmonics, which themselves hardly moved"
+        return LocatedChange(title, change, _harmonic_order(scored, frame))
+    total = comparison.change_db["mesh.total"]
+    alike = comparison.is_reference and abs(total) > 0.7 * abs(change) and total * change > 0
+    every = f"mesh harmonics, together {by_decibels(total)}, " if alike else "mesh harmonics, "
+    title = f"{every}most at {_times(best + 1)}mesh ({by_decibels(change)})"
+    if not comparison.is_reference:
+        title += " against the other harmonics"
+    return LocatedChange(title, change, (float(lines[best]),), channel=_channel(comparison, row))
+
+
+def _harmonic_order(feature: str, frame: GearFrame) -> tuple[float, ...]:
+    """Return the order of the one mesh harmonic that a feature is of; none for what is of all."""
+    harmonic = feature.rpartition(".")[2]
+    return (float(int(harmonic) * frame.teeth[DRIVER]),) if harmonic.isdigit() else ()
+
+
+def sideband_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
+    """Return about which mesh harmonic a shaft's sidebands changed most, and which of them."""
+    now, other = _both(comparison, side, relative=not comparison.is_reference)
+    frame = comparison.now.frame
+    teeth, n = frame.teeth[side], now.power.shape[1]
+    reach = min(FURTHEST_SIDEBAND, teeth // 2)
+    groups = [
+        [k * teeth + offset for offset in range(-reach, reach + 1) if offset and k * teeth + offset < n]
+        for k in range(1, N_SIDEBAND_HARMONICS + 1)
+        if k * teeth + 1 < n
+    ]
+    strongest = _strongest_group(now, other, groups)
+    if strongest is None or abs(strongest[2]) < LEAST_CHANGE_DB:
+        return None
+    row, best, change = strongest
+    lines = _largest_lines(now.own[row] - other.own[row], groups[best])
+    title = f"sidebands of {shaft_words(frame, side)} about {_times(best + 1)}mesh, {by_decibels(change)}"
+    carrier = (best + 1) * teeth
+    title += _how_far_apart([abs(line - carrier) for line in lines])
+    orders = tuple(float(line * frame.shaft_orders[side]) for line in lines)
+    return LocatedChange(title, change, orders, channel=_channel(comparison, row))
+
+
+def shaft_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
+    """Return the low order of a shaft that changed most."""
+    both = _both(comparison, side, relative=False)
+    frame = comparison.now.frame
+    last = min(MOST_SHAFT_ORDERS, frame.teeth[side] - 3, both[0].power.shape[1] - 1)
+    name = comparison.strongest(f"shaft.{SIDES[side]}").split(".")[2]
+    groups = [[int(name)]] if name.isdigit() else [[order] for order in range(1, last + 1)]
+    strongest = _strongest_group(*both, groups)
+    if strongest is None or abs(strongest[2]) < LEAST_CHANGE_DB:
+        return None
+    row, best, change = strongest
+    order = groups[best][0]
+    title = f"order {order} of {shaft_words(frame, side)}, {by_decibels(change)}"
+    return LocatedChange(title, change, (order * frame.shaft_orders[side],), channel=_channel(comparison, row))
+
+
+@dataclass(frozen=True)
+class _Lines:
+    """Lines of a shaft's average, (n_channels, n_orders): all power, the shaft's own, and the noise put under it."""
+
+    power: FloatArray
+    own: FloatArray
+    floor: FloatArray
+
+    def first(self, n: int) -> _Lines:
+        return _Lines(self.power[:, :n], self.own[:, :n], self.floor[:, :n])
+
+    def of_groups(self, groups: Sequence[list[int]]) -> _Lines:
+        """Return the sums over groups of lines, (n_channels, n_groups)."""
+        sums = [
+            np.stack([values[:, group].sum(axis=1) for group in groups], axis=1)
+            for values in (self.power, self.own, self.floor)
+        ]
+        return _Lines(*sums)
+
+
+def _both(comparison: ComparedPair, side: int, *, relative: bool) -> tuple[_Lines, _Lines]:
+    """Return the lines of both on the same orders; `relative` to each channel's mesh harmonics."""
+    names = tuple(comparison.now.channels)
+    now, other = (_lines(run, names, side, relative=relative) for run in (comparison.now, comparison.other))
+    n = min(now.power.shape[1], other.power.shape[1])
+    return now.first(n), other.first(n)
+
+
+def _lines(gathered: ReducedRecording, names: Sequence[str], side: int, *, relative: bool) -> _Lines:
+    rows = []
+    for name in names:
+        sums = gathered.channels[name]
+        power, (lines, noise) = line_power(sums, side), average_lines(sums, side)
+        own = np.where(is_synchronous(sums, side), np.maximum(np.abs(lines) ** 2 - noise, 0.0), 0.0)
+        floor = power - np.maximum(np.abs(lines) ** 2 - noise, 0.0)
+        scale = mesh_power(gathered, sums, side) if relative else 1.0
+        rows.append([values / scale for values in (power, own, floor)])
+    n = visible_orders(gathered, side, min(len(row[0]) for row in rows)) + 1
+    return _Lines(*(np.stack([row[i][:n] for row in rows]) for i in range(3)))
+
+
+def _strongest_group(now: _Lines, other: _Lines, groups: Sequence[list[int]]) -> tuple[int, int, float] | None:
+    """Return channel, group and change in dB of the largest ratio among those whose power changed much.
+
+    Channels are weighed by their own largest change: a sensor with a small gain sees the same. What changed must be the
+    shaft's own lines; None where it is noise, or leaks into the average.
+    """
+    here, there = now.of_groups(groups), other.of_groups(groups)
+    floor = np.maximum(np.maximum(here.floor, there.floor), 1e-300)
+    ratio = 10.0 * np.log10((here.own + floor) / (there.own + floor))
+    moved, whole = np.abs(here.own - there.own), np.abs(here.power - there.power)
+    explained = moved.max(axis=1, keepdims=True) >= EXPLAINED * whole.max(axis=1, keepdims=True)
+    enough = (moved > 0.0) & (moved >= WORTH_NAMING * moved.max(axis=1, keepdims=True)) & explained
+    if not enough.any():
+        return None
+    row, best = np.unravel_index(int(np.argmax(np.where(enough, np.abs(ratio), -1.0))), ratio.shape)
+    return int(row), int(best), float(ratio[row, best])
+
+
+def _largest_lines(moved: FloatArray, lines: list[int]) -> list[int]:
+    """Return the lines of one group whose power changed most, the largest first."""
+    amounts = np.abs(moved[lines])
+    order = np.argsort(amounts)[::-1][:MOST_ORDERS]
+    return [lines[i] for i in order if amounts[i] >= WORTH_NAMING * amounts.max()]
+
+
+def _how_far_apart(offsets: list[int]) -> str:
+    if max(offsets) <= 2:
+        return ", nearest lines only" if max(offsets) == 1 else ", nearest two lines"
+    return f", up to {max(offsets)} orders away"
+
+
+def _times(harmonic: int) -> str:
+    return "" if harmonic == 1 else f"{harmonic} × "
+
+
+def _channel(comparison: ComparedPair, row: int) -> str:
+    return list(comparison.now.channels)[row]
+
+
+# --------------------
+# Which band, what of the speed, what of the amplitudes.
+# --------------------
+
+
+LEAST_SPEED_CHANGE = 3e-4
+"""Relative; a steadier speed is as good as constant."""
+PILED_UP = 1e-3
+"""Share of samples within half a percent of the extreme; of a vibration with random peaks, some 1e-5 lie there."""
+
+
+def band_spot(comparison: ComparedPair) -> LocatedChange:
+    """Return the band of the residual that changed most: its level, or how impulsive it is."""
+    name = comparison.strongest("floor.band", "floor.kurtosis")
+    _, kind, number = name.split(".")
+    band = comparison.now.bands_hz[int(number) - 1]
+    change = comparison.change_db[name]
+    tone = line_within(comparison, band, change) if kind == "band" else None
+    if tone is not None:
+        return tone
+    what = "noise" if kind == "band" else "kurtosis of the noise"
+    title = f"{what} between {band_words(band).replace(' to ', ' and ')}, {by_decibels(change)}"
+    channel = _loudest(comparison, int(number) - 1, kurtosis=kind != "band")
+    return LocatedChange(title, change, band_hz=band, channel=channel, follows=kind != "band")
+
+
+def _loudest(comparison: ComparedPair, band: int, *, kurtosis: bool) -> str:
+    """Return the channel on which the band changed most."""
+
+    def change(name: str) -> float:
+        both = [g.channels[name].moments.mean(axis=0)[band] for g in (comparison.now, comparison.other)]
+        figures = [fourth / max(square**2, 1e-300) if kurtosis else square for square, fourth in both]
+        return abs(float(np.log(max(figures[0], 1e-300) / max(figures[1], 1e-300))))
+
+    return max(comparison.now.channels, key=change)
+
+
+def speed_spot(comparison: ComparedPair) -> LocatedChange | None:
+    """Return what the speed does otherwise; None where it hardly does anything."""
+    name = comparison.strongest("speed.")
+    change = comparison.change_db[name]
+    drift, swing, _, frequency_hz = comparison.now.speed
+    if max(abs(drift), swing, *(abs(figure) for figure in comparison.other.speed[:2])) < LEAST_SPEED_CHANGE:
+        return None
+    if name == "speed.drift":
+        return LocatedChange(f"speed drifts by {100 * drift:.2g} % along the record", change)
+    orders = (frequency_hz / comparison.now.speed_hz,)
+    return LocatedChange(f"speed swings by {100 * swing:.2g} % rms, most at {frequency_hz:.2g} Hz", change, orders)
+
+
+def tail_spot(comparison: ComparedPair) -> LocatedChange:
+    """Return how the amplitudes are distributed otherwise."""
+    name = comparison.strongest("raw.near", "raw.kurtosis")
+    change = comparison.change_db[name]
+    channel = max(comparison.now.channels, key=lambda c: float(comparison.now.channels[c].tail[:, 2].mean()))
+    if name == "raw.near_the_extreme":
+        piled = float(comparison.now.channels[channel].tail[:, 2].mean()) > PILED_UP
+        clipping = ", as clipping makes them" if change > 0 and piled else ""
+        title = f"samples close to the largest amplitude{clipping}, {by_decibels(change)}"
+        return LocatedChange(title, change, channel=channel, follows=not clipping)
+    tails = "heavier" if change > 0 else "lighter"
+    title = f"{tails} tails of the amplitudes (kurtosis {by_decibels(change)})"
+    return LocatedChange(title, change, channel=channel, follows=True)
+
+
+# --------------------
+# At which angle and tooth a shaft's average changed: energy tooth by tooth.
+# --------------------
+
+
+STANDS_OUT = 6.0
+"""Energy within one pitch over the middling pitch's from which on one tooth is named: of teeth that all
+differ by chance, the largest has some 5."""
+
+ALL_ROUND = (".level", ".elsewhere", ".peak")
+"""Ends of the names of features that say how large a pattern is, and not what shape it has."""
+
+OWN_SHARE = 0.3
+"""Of a pattern's power in the shaft's own lines, below which it is no pattern of teeth."""
+
+
+@dataclass(frozen=True)
+class ToothPattern:
+    """Energy over a shaft's angle, of what tells its teeth apart.
+
+    Parameters
+    ----------
+    energy : array, (n_channels, n)
+        Mean square within one pitch over the mesh harmonics' power.
+    lines : ShaftLines
+        What it was made of.
+    own_share : float
+        Of its power, in lines that keep their phase from block to block.
+    """
+
+    energy: FloatArray
+    lines: ShaftLines
+    own_share: float
+
+    @property
+    def prominence(self) -> float:
+        """Largest energy over the median, of all channels together."""
+        mean = self.energy.mean(axis=0)
+        return float(mean.max() / max(float(np.median(mean)), 1e-300))
+
+    @property
+    def place_rev(self) -> float:
+        """Where the tooth engages that stands out, 0 to 1: the answer follows a little later."""
+        centre = find_event(self.lines).centre_rev
+        return (centre - load_calibration().lag_pitches / self.lines.teeth) % 1.0
+
+
+def own_pattern(gathered: ReducedRecording, side: int) -> ToothPattern:
+    """Return the pattern of a recording by itself."""
+    teeth = gathered.frame.teeth[side]
+    residuals = []
+    for sums in gathered.channels.values():
+        lines = average_lines(sums, side)[0]
+        residual = residual_lines(
+            lines, teeth, visible_orders(gathered, side, len(lines)), gathered.frame.teeth[1 - side]
+        )
+        residuals.append(residual / np.sqrt(mesh_power(gathered, sums, side)))
+    return _pattern(gathered, side, residuals, lines_of_shaft(gathered, side))
+
+
+def changed_pattern(now: ReducedRecording, sound: ReducedRecording, side: int) -> ToothPattern:
+    """Return the pattern of the difference from a sound recording, turned so that the same teeth meet."""
+    turned, _ = turned_difference(now, sound, side)
+    return _pattern(now, side, difference_residuals(now, turned, side), turned)
+
+
+def _pattern(
+    gathered: ReducedRecording, side: int, residuals: Sequence[NDArray[np.complex128]], lines: ShaftLines
+) -> ToothPattern:
+    powers = [np.abs(residual) ** 2 for residual in residuals]
+    held = [is_synchronous(sums, side) for sums in gathered.channels.values()]
+    own = sum(float(power[own].sum()) for power, own in zip(powers, held, strict=True))
+    whole = sum(float(power.sum()) for power in powers)
+    energy = np.stack([tooth_energy(residual, lines.teeth) for residual in residuals])
+    return ToothPattern(energy, lines, own / max(whole, 1e-300))
+
+
+def tooth_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
+    """Return the angle and tooth that stands out, or that the teeth's pattern changed all round.
+
+    None where most of the pattern is noise, or leaks into the average.
+    """
+    frame, now = comparison.now.frame, comparison.now
+    pattern = changed_pattern(now, comparison.other, side) if comparison.is_reference else own_pattern(now, side)
+    shaft, name = shaft_words(frame, side), list(now.channels)[int(np.argmax(pattern.energy.max(axis=1)))]
+    if pattern.own_share < OWN_SHARE:
+        return None
+    if pattern.prominence < STANDS_OUT:
+        return _all_round(comparison, side, shaft, name)
+    place, teeth = pattern.place_rev, frame.teeth[side]
+    above, angle = 10.0 * float(np.log10(pattern.prominence)), 360.0 * place
+    tooth = int(place * teeth) % teeth + 1 if now.marks[side] else None
+    at = f"tooth {tooth} ({angle:.0f}°)" if tooth else f"one tooth (at {angle:.0f}°; no mark)"
+    title = f"burst once per revolution at {at} of {shaft}, {above:.2g} dB above the other teeth"
+    return LocatedChange(title, above, angle_deg=angle, tooth=tooth, channel=name)
+
+
+def _all_round(comparison: ComparedPair, side: int, shaft: str, channel: str) -> LocatedChange:
+    """Return that no tooth in particular stands out, with the figure of the feature that was scored."""
+    scored = comparison.strongest(*(f"{kind}.{SIDES[side]}." for kind in ("tooth", "change", "surprise")))
+    level = f"tooth.{SIDES[side]}.level"
+    if not scored.endswith(ALL_ROUND) and abs(comparison.size[level]) > 1.0:
+        scored = level
+    change = comparison.change_db[scored]
+    if not scored.endswith(ALL_ROUND):
+        title = f"shape of the teeth's pattern of {shaft}, no tooth in particular"
+        return LocatedChange(title, change, channel=channel, follows=True)
+    of_difference = not scored.startswith("tooth.")
+    by = f"{by_decibels(change)} against what sound machines change by" if of_difference else by_decibels(change)
+    what = "what has changed of the pattern of the teeth" if of_difference else "pattern of the teeth"
+    return LocatedChange(f"{what} of {shaft} all round, {by}", change, channel=channel)
+
+
+LEAST_SHARE = 0.01
+
+REPEATED = ("floor.to_signal", "floor.total", "raw.level")
+"""Features that only repeat what others say of a place."""
+
+
+def gap_places(
+    now: ReducedRecording,
+    other: ReducedRecording,
+    structural: StructuralFloor,
+    *,
+    is_reference: bool,
+    change: Features | None = None,
+) -> tuple[GapPlace, ...]:
+    """Return where a recording differs, largest share first; last what only follows from other places.
+
+    A place is a family of features; its size s_f is their mean of high order over the floors, and its share
+    max(s_f² − 1, 0)/Σ max(s² − 1, 0): what does not exceed the larger floor has none, nor has what only follows from
+    other places (nan), which is not in the sum. Shares add up to less than 1
+    where some of what changed is no more than noise and leakage in a place, or below 1 % of the whole.
+
+    Parameters
+    ----------
+    now : Gathered
+    other : Gathered
+        A sound recording of the same machine, or its simulation.
+    structural : StructuralFloor
+    is_reference : bool
+        Whether `other` is a recording of the same machine: the teeth's patterns can then be subtracted.
+    change : Features or None
+        What `change_features` or `difference_features` made of the two; None: made here.
+
+    Raises
+    ------
+    RefusalError
+        If the reference was taken at another speed.
+    """
+    if change is None:
+        change = change_features(now, other) if is_reference else difference_features(now, other)
+    distances = structural.from_centre(change.names, change.values)
+    if is_reference:
+        distances = beyond_the_mesh(change.names, distances)
+    floors = structural.of(change.names), REPEATABLE * pooled_scatter(change)
+    # Healthy machines' differences hold their scatter already; a shorter record's may be larger.
+    both = distances / np.maximum(*floors)
+    comparison = ComparedPair(now, other, is_reference, _named(change.names, distances), _named(change.names, both))
+    members = {family: _telling(change.names, rows) for family, rows in family_members(change.names).items()}
+    energies = {family: max(family_size(both[rows]) ** 2 - 1.0, 0.0) for family, rows in members.items()}
+    least = LEAST_SHARE * sum(energies.values())
+    spots = {family: _spot(comparison, family) for family, energy in energies.items() if energy > least}
+    following = {family for family, spot in spots.items() if spot is not None and spot.follows}
+    total = sum(energy for family, energy in energies.items() if family not in following)
+    found = []
+    for family, spot in spots.items():
+        if spot is not None:
+            sizes = [family_size(distances[members[family]] / floor[members[family]]) for floor in floors]
+            share = float("nan") if family in following else energies[family] / total
+            found.append(_place(family, spot, (sizes[0], sizes[1]), share, now))
+    return ranked_places(_merged(found))
+
+
+def _merged(places: list[GapPlace]) -> list[GapPlace]:
+    """Return the places with those put together to which two families of features led."""
+    merged: dict[tuple[PlaceKind, str, bool], GapPlace] = {}
+    for place in sorted(places, key=lambda one: -one.structural):
+        key = (place.kind, place.shaft, place.follows)
+        if key in merged:
+            merged[key] = replace(merged[key], share=merged[key].share + place.share)
+        else:
+            merged[key] = place
+    return list(merged.values())
+
+
+def _telling(names: tuple[str, ...], rows: np.ndarray) -> np.ndarray:
+    kept = [row for row in rows if names[row] not in REPEATED and not names[row].startswith(APART)]
+    return np.array(kept, dtype=np.intp)
+
+
+def _named(names: tuple[str, ...], values: FloatArray) -> Mapping[str, float]:
+    return dict(zip(names, values.tolist(), strict=True))
+
+
+def _spot(comparison: ComparedPair, family: Family) -> LocatedChange | None:
+    kind, shaft = family
+    of_a_shaft = {PlaceKind.SIDEBANDS: sideband_spot, PlaceKind.SHAFT: shaft_spot, PlaceKind.TOOTH: tooth_spot}
+    plain = {
+        PlaceKind.MESH: mesh_spot,
+        PlaceKind.ENVELOPE: envelope_spot,
+        PlaceKind.LINE: line_spot,
+        PlaceKind.BAND: band_spot,
+        PlaceKind.SPEED: speed_spot,
+        PlaceKind.TAIL: tail_spot,
+    }
+    return of_a_shaft[kind](comparison, SIDES.index(shaft)) if kind in of_a_shaft else plain[kind](comparison)
+
+
+def _place(
+    family: Family, spot: LocatedChange, sizes: tuple[float, float], share: float, now: ReducedRecording
+) -> GapPlace:
+    kind, side = family
+    return GapPlace(
+        spot.kind or kind,
+        spot.title,
+        spot.change_db,
+        repeatability=sizes[1],
+        structural=sizes[0],
+        share=share,
+        shaft=now.frame.shafts[SIDES.index(side)] if side else "",
+        orders=spot.orders,
+        band_hz=spot.band_hz,
+        angle_deg=spot.angle_deg,
+        tooth=spot.tooth,
+        channel=spot.channel,
+        follows=spot.follows,
+    )

@@ -1,0 +1,653 @@
+"""What a simulator says an effect would change, over its severity; and the severity that fits what was observed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray
+from gearsig.errors import InputError
+from gearsig.gap._features import SIDEBANDS, SIDES
+from gearsig.gap._floors import family_members
+from gearsig.gap._simulator import Added
+from gearsig.gap._types import LEAST_FORETOLD, Interval, Shrinkage
+
+STEPS = 41
+"""Severities that are tried, over the whole range and again about the best."""
+
+LEAST_TRIED = 0.3
+"""Times the least simulated severity."""
+
+LARGEST_DISTANCE = 6.0
+"""In floors; what is further from a prediction counts little more: one wild feature must not decide."""
+
+INTERVAL_COST = 2.71
+"""Rise of the cost, a sum of squared standard deviations, that bounds the 90 % interval, 1.645², where the best fit is
+as near as floors allow, which is a cost of 1 for each family; in proportion more where it is not."""
+
+FLOOR_IN_DEVIATIONS = 1.96
+"""A floor holds 19 of 20: so many standard deviations."""
+
+LEVELS_DB = tuple(float(level) for level in (*range(-30, 30, 5), *range(30, 61, 10)))
+LEVEL_SCATTER_DB = 10.0
+"""By how much louder than on the twin what an effect adds may be on the real machine, whose path from gears and shafts
+to the sensor nobody knows; and its standard deviation, for each operating condition."""
+
+GROUNDS_DB = (0.0, -25.0, -50.0)
+"""By how much less a shaft's lowest orders shake a machine than one on soft mounts; the last is rigid ground. None is
+likelier than another."""
+
+WAYS_DB = tuple((level, ground) for ground in GROUNDS_DB for level in LEVELS_DB)
+"""Level and ground: what is not known of how an effect reaches a sensor."""
+
+
+@dataclass(frozen=True)
+class ObservedChange:
+    """One condition's observed distances from what is compared with.
+
+    Parameters
+    ----------
+    condition : int
+        Which operating condition.
+    distances : array, (n,)
+        dB, from where sound machines lie.
+    floors : array, (n,)
+        dB: structural floor and repeatability together.
+    """
+
+    condition: int
+    distances: FloatArray
+    floors: FloatArray
+
+    @property
+    def normalised(self) -> FloatArray:
+        """Distances in floors."""
+        result: FloatArray = self.distances / self.floors
+        return result
+
+
+@dataclass(frozen=True)
+class EffectPath:
+    """An effect with one set of options: the change it makes, over its severity, at every condition.
+
+    Parameters
+    ----------
+    name : str
+    options : mapping
+    severities : array, (k,)
+        Rising, above 0.
+    distances : tuple of arrays, (n_ways, k, n)
+        dB from the sound machine; one per condition.
+    names : tuple of str
+        Of the n features.
+    levels_db : tuple of float
+        Of each of `WAYS_DB`, or whatever the distances were made for.
+    """
+
+    name: str
+    options: Mapping[str, float | str]
+    severities: FloatArray
+    distances: tuple[FloatArray, ...]
+    names: tuple[str, ...]
+    levels_db: tuple[float, ...] = (0.0,)
+
+    def at(self, severities: FloatArray, condition: int) -> FloatArray:
+        """Return the predicted distances, (n_ways, n_severities, n).
+
+        Straight over ln s between simulations, and proportional to s below them.
+        """
+        table = self.distances[condition]
+        place = np.interp(np.log(severities), np.log(self.severities), np.arange(len(self.severities)))
+        first = np.minimum(place.astype(np.intp), max(len(self.severities) - 2, 0))
+        second = np.minimum(first + 1, len(self.severities) - 1)
+        between = table[:, first] + (place - first)[:, None] * (table[:, second] - table[:, first])
+        found: FloatArray = between * np.minimum(severities / self.severities[0], 1.0)[:, None]
+        return found
+
+    def tried(self) -> FloatArray:
+        """Return the severities that a fit looks at."""
+        return np.geomspace(LEAST_TRIED * self.severities[0], self.severities[-1], STEPS)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The severity of a path that fits best.
+
+    Parameters
+    ----------
+    path : EffectPath
+    severity : Interval
+    cost : float
+        The least: squared distances between observed and predicted, in standard deviations.
+    ways : mapping
+        Condition → which of `WAYS_DB`, or of the path's levels where it was made for others.
+    """
+
+    path: EffectPath
+    severity: Interval
+    cost: float
+    ways: Mapping[int, int]
+
+    @property
+    def added(self) -> Added:
+        """The fitted setting."""
+        return Added(self.path.name, float(f"{self.severity.value:.4g}"), dict(self.path.options))
+
+    def at(self, condition: int) -> FloatArray:
+        """Return the predicted distances; at a condition that it was not fitted to, at the level of the others."""
+        by_level = sorted(self.ways.values(), key=lambda way: self.path.levels_db[way])
+        way = self.ways.get(condition, by_level[len(by_level) // 2])
+        found: FloatArray = self.path.at(np.array([self.severity.value]), condition)[way, 0]
+        return found
+
+    def at_level_of(self, one: ObservedChange) -> Fit:
+        """Return the fit with the level that suits another condition best; severity and options stay."""
+        predicted = self.path.at(np.array([self.severity.value]), one.condition)[:, 0]
+        costs = _squares(one.distances - predicted, one.floors) @ _family_weights(self.path.names)
+        way = int(np.argmin(costs + _unusual(self.path)))
+        return replace(self, ways={**self.ways, one.condition: way})
+
+    def level_db(self, condition: int) -> float:
+        """Return by how much louder than on the twin the effect is."""
+        return self.path.levels_db[self.ways[condition]]
+
+
+def paths_of(
+    names: tuple[str, ...],
+    candidates: Sequence[Added],
+    distances: Sequence[FloatArray],
+    levels_db: tuple[float, ...] = (0.0,),
+) -> tuple[EffectPath, ...]:
+    """Return the paths that an effect's candidates make: one for each set of options.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the features.
+    candidates : sequence of Added
+    distances : sequence of arrays, (n_ways, n_candidates, n)
+        One per condition.
+    levels_db : tuple of float
+    """
+    groups: dict[tuple[tuple[str, float | str], ...], list[int]] = {}
+    for i, added in enumerate(candidates):
+        groups.setdefault(tuple(sorted(added.options.items())), []).append(i)
+    found = []
+    for options, rows in groups.items():
+        order = sorted(rows, key=lambda i: candidates[i].severity)
+        severities = np.array([candidates[i].severity for i in order])
+        found.append(
+            EffectPath(
+                candidates[rows[0]].name,
+                dict(options),
+                severities,
+                tuple(table[:, order] for table in distances),
+                names,
+                levels_db,
+            )
+        )
+    return tuple(found)
+
+
+def fit_effect(paths: Iterable[EffectPath], observed: Sequence[ObservedChange]) -> Fit:
+    """Return the best fit over all paths of an effect.
+
+    Raises
+    ------
+    InputError
+        If there is no path.
+    """
+    fits = [fit_path(path, observed) for path in paths]
+    if not fits:
+        raise InputError("the effect has no candidate that can be simulated", remedy="describe the rig more fully")
+    return min(fits, key=lambda fit: fit.cost)
+
+
+def fit_path(path: EffectPath, observed: Sequence[ObservedChange]) -> Fit:
+    """Return the likely severity, with the interval in which the cost rises little.
+
+    s = exp(Σ w_i ln s_i/Σ w_i), w = exp(−(cost − least)/2): where many fit alike, the least cost is one of them by
+    chance.
+
+    How loud the effect is beside the twin's is fitted at each condition, within what paths differ by: two sensors of
+    one gearbox show one unbalance 20 dB apart, and so do two speeds. What an effect changes, and which part of it more
+    than another, is the simulation's.
+
+    Where the best fit misses by more than floors allow, the simulation is wrong by as much, and the interval is as much
+    wider (R. T. Birge, The calculation of errors by the method of least squares, *Phys. Rev.* 40, 1932). Where the
+    largest severity that was simulated fits as well it has no upper end, and where the least does, it begins at 0.
+    """
+    coarse = path.tried()
+    tried = np.geomspace(*_about(coarse, _near_the_best(path, _costs(path, coarse, observed)[0])), STEPS)
+    costs, ways = _costs(path, tried, observed)
+    near = _near_the_best(path, costs)
+    low, high = _about(tried, near)
+    if near[0] and tried[0] == coarse[0]:
+        low = 0.0
+    if near[-1] and tried[-1] == coarse[-1]:
+        high = math.inf
+    likelihood = np.exp(-0.5 * (costs - costs.min()))
+    best = round(float(likelihood @ np.arange(len(tried)) / likelihood.sum()))  # they are even in ln s
+    fitted = {one.condition: int(row[best]) for one, row in zip(observed, ways, strict=True)}
+    return Fit(path, Interval(float(tried[best]), low, high), float(costs.min()), fitted)
+
+
+def _near_the_best(path: EffectPath, costs: FloatArray) -> NDArray[np.bool_]:
+    """Return at which severities the cost has risen by no more than is likely.
+
+    That is `INTERVAL_COST`, and as many times more as the best fit misses by.
+    """
+    misses = max(1.0, float(costs.min()) / len(family_members(path.names)))
+    near: NDArray[np.bool_] = costs <= costs.min() + misses * INTERVAL_COST
+    return near
+
+
+def _about(tried: FloatArray, near: NDArray[np.bool_]) -> tuple[float, float]:
+    """Return the first severities on either side of those that are near; the ends where there are none."""
+    rows = np.flatnonzero(near)
+    return float(tried[max(rows[0] - 1, 0)]), float(tried[min(rows[-1] + 1, len(tried) - 1)])
+
+
+def _costs(
+    path: EffectPath, severities: FloatArray, observed: Sequence[ObservedChange]
+) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Return the costs, mean over conditions, (n_severities,), and the best ways, (n_conditions, n_severities).
+
+    Σ over families of the mean squared distance, and the squared level over its standard deviation.
+    """
+    weights = _family_weights(path.names)
+    costs, ways = [], []
+    for one in observed:
+        left = one.distances - path.at(severities, one.condition)
+        each = _squares(left, one.floors) @ weights + _unusual(path)[:, None]
+        ways.append(each.argmin(axis=0))
+        costs.append(each.min(axis=0))
+    return np.mean(costs, axis=0), np.array(ways)
+
+
+def _unusual(path: EffectPath) -> FloatArray:
+    """Return the levels' squares in standard deviations."""
+    squares: FloatArray = (np.array(path.levels_db) / LEVEL_SCATTER_DB) ** 2
+    return squares
+
+
+def _squares(left: FloatArray, floors: FloatArray) -> FloatArray:
+    """Return ρ(u), u = left/floor, in squared standard deviations: u² up to 6, from there 36 (1 + ln(u²/36)).
+
+    It never ceases to rise: a fit must find its way to a change that is larger than anything that it starts from.
+    """
+    distances = np.abs(left / floors)
+    near = np.minimum(distances, LARGEST_DISTANCE)
+    further = np.maximum(distances / LARGEST_DISTANCE, 1.0)
+    squares: FloatArray = (near * FLOOR_IN_DEVIATIONS) ** 2 * (1.0 + 2.0 * np.log(further))
+    return squares
+
+
+def _family_weights(names: tuple[str, ...]) -> FloatArray:
+    """Return what makes a sum over features one over families of their means."""
+    weights = np.zeros(len(names))
+    for rows in family_members(names).values():
+        weights[rows] = 1.0 / len(rows)
+    return weights
+
+
+def family_square(names: tuple[str, ...], left: FloatArray, observed: ObservedChange, used: FloatArray) -> float:
+    """Return Σ_f mean_{i∈f} ρ(u_i), u = left/floor in standard deviations; `used` is 1 for what counts."""
+    squares, total = _squares(left, observed.floors), 0.0
+    for rows in family_members(names).values():
+        if used[rows].sum() > 0:
+            total += float(used[rows] @ squares[rows] / used[rows].sum())
+    return total
+
+
+# --------------------
+# What an effect that was simulated on a twin would change on the real machine, whose own unevenness is another.
+# --------------------
+
+
+_RELATIVE = (
+    "mesh.half",
+    *(f"sideband.{side}.{label}" for side in SIDES for label in (*SIDEBANDS, "own")),
+    *(f"shaft.{side}.{n}.to_mesh" for side in SIDES for n in (1, 2, 3, "strongest")),
+    *(f"shaft.{side}.low" for side in SIDES),
+    *(f"tooth.{side}.{what}" for side in SIDES for what in ("level", "elsewhere", "peak")),
+)
+"""Powers over that of the mesh, or of its harmonic."""
+
+_ABSOLUTE = (*(f"shaft.{side}.{n}" for side in SIDES for n in (1, 2, 3)), "floor.total")
+_OF_THE_BODY = tuple(f"shaft.{side}.{n}{what}" for side in SIDES for n in (1, 2, 3) for what in ("", ".to_mesh"))
+"""Low orders, at which a machine moves as a whole."""
+
+_STRONGEST = {"shaft.{}.strongest": "shaft.{}.strongest.to_mesh", "sideband.{}.strongest": "sideband.{}.6to12"}
+"""How far the strongest line stands out, and the power by which an effect raises it."""
+
+_BANDS, _KURTOSIS = "floor.band.", "floor.kurtosis."
+_EXCESSES = ("envelope.", "line.")
+_NO_EXCESS = ("envelope.depth",)
+_OF_A_PATTERN = ("prominence", "second", "kurtosis", "width", "below_mesh", "centroid")
+
+
+def transplanted(
+    names: Sequence[str],
+    change: FloatArray,
+    simulated: Mapping[str, float],
+    real: Mapping[str, float],
+    usual: Mapping[str, float],
+    level_db: float = 0.0,
+    ground_db: float = 0.0,
+) -> FloatArray:
+    """Return the changes that a simulated effect makes on the real machine's own baseline.
+
+    Powers of different causes add: P = P_real + (P_with − P_sound). On a twin whose teeth are rougher than the real
+    ones, or whose floor is lower, the same effect changes the decibels less or more. Mesh harmonics pass through the
+    same resonances as those of the sound machine and change by the same decibels each; what they do together hangs on
+    which of them the real machine has. What falls, falls by the same decibels.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the changes, see `gearsig.gap`; those of patterns last, or none.
+    change : array, (n,)
+        dB, with the effect less sound, both simulated. `change.…`: the pattern's own value.
+    simulated, real : mapping
+        Feature → value of the sound twin and of the sound machine.
+    usual : mapping
+        `change.…` → what mere repetition gives.
+    level_db : float
+        By which everything the effect adds is louder on the real machine than on the twin: its path is another.
+    ground_db : float
+        By which the lowest shaft orders are louder still: it stands otherwise. There a machine moves as a whole, as
+        force over mass, and not by the path on which the mesh reaches a sensor: what is added does not fall with a
+        mesh that is quieter than the twin's.
+
+    Returns
+    -------
+    array, (n,)
+        dB; `change.…` from what repetition gives.
+    """
+    given = dict(zip(names, change.tolist(), strict=True))
+    found = dict(given)
+    gain_db = real["mesh.total"] - simulated["mesh.total"]
+    floor_db = real["floor.total"] - simulated["floor.total"] - gain_db
+    for name in names:
+        own_db = level_db + (ground_db - gain_db if name in _OF_THE_BODY else 0.0)
+        if name in _RELATIVE:
+            found[name] = _added(given[name], simulated[name], real[name], own_db)
+        elif name in _ABSOLUTE or name.startswith(_BANDS):
+            found[name] = _added(given[name], simulated[name], real[name], gain_db + own_db)
+        elif name.startswith(_EXCESSES) and name not in _NO_EXCESS:
+            found[name] = _added(given[name], simulated[name], real[name], level_db - floor_db)
+    found |= _mesh(given, real, level_db)
+    for name in names:
+        if name.startswith(_KURTOSIS):
+            part = _part(found[name.replace(_KURTOSIS, _BANDS)])
+            found[name] = part * (simulated[name] + given[name] - real[name])
+    for side in SIDES:
+        for name, rose in _STRONGEST.items():
+            own = name.format(side)
+            found[own] = _risen(real[own], simulated[own] + given[own], found[rose.format(side)])
+        found |= _tooth(f"tooth.{side}", found, given, simulated, real)
+        if f"change.{side}.level" in given:
+            found |= _pattern(f"change.{side}", given, usual, real[f"tooth.{side}.level"], level_db)
+    return np.array([found[name] for name in names])
+
+
+def _power(decibels: float) -> float:
+    return float(10.0 ** (decibels / 10.0))
+
+
+def _added(change_db: float, simulated_db: float, real_db: float, gain_db: float) -> float:
+    """Return the change that the same added power makes on the real baseline."""
+    if change_db <= 0.0:
+        return change_db
+    more = (_power(simulated_db + change_db) - _power(simulated_db)) * _power(gain_db)
+    return float(10.0 * np.log10(1.0 + more / _power(real_db)))
+
+
+def _mesh(given: Mapping[str, float], real: Mapping[str, float], level_db: float) -> dict[str, float]:
+    """Return the mesh harmonics' changes: what is added comes as much louder, on the harmonics that the machine has."""
+    shares = [name for name in given if name.startswith("mesh.share.")]
+    levels = [_louder(given[name] + given["mesh.total"], level_db) for name in shares]
+    powers = np.array([_power(real[name]) for name in shares])
+    total = float(10.0 * np.log10(powers @ [_power(level) for level in levels] / powers.sum()))
+    return {"mesh.total": total} | {name: level - total for name, level in zip(shares, levels, strict=True)}
+
+
+def _louder(change_db: float, level_db: float) -> float:
+    """Return the change in decibels if what is added were louder by a level; what falls, falls alike."""
+    return _added(change_db, 0.0, 0.0, level_db)
+
+
+def _part(change_db: float) -> float:
+    """Return which part of the power is the effect's, if that raised it by so many decibels."""
+    return 1.0 - 1.0 / _power(change_db) if change_db > 0.0 else 0.0
+
+
+def _risen(born_db: float, own_db: float, more_db: float) -> float:
+    """Return by how much the strongest stands out further: as much as it rose, no further than by itself alone."""
+    return min(born_db + max(more_db, 0.0), max(own_db, born_db)) - born_db
+
+
+def _tooth(
+    name: str,
+    found: Mapping[str, float],
+    given: Mapping[str, float],
+    simulated: Mapping[str, float],
+    real: Mapping[str, float],
+) -> dict[str, float]:
+    """Return the shape of a shaft's pattern where the effect's own is added to what the real teeth are born with."""
+    peak, elsewhere = found[f"{name}.peak"], found[f"{name}.elsewhere"]
+    part = _part(found[f"{name}.level"])
+    shapes = {
+        f"{name}.{what}": part * (simulated[f"{name}.{what}"] + given[f"{name}.{what}"] - real[f"{name}.{what}"])
+        for what in ("kurtosis", "width", "below_mesh", "centroid")
+    }
+    second = _risen(real[f"{name}.second"], simulated[f"{name}.second"] + given[f"{name}.second"], peak)
+    return {f"{name}.prominence": peak - elsewhere, f"{name}.second": second, **shapes}
+
+
+def _pattern(
+    name: str, given: Mapping[str, float], usual: Mapping[str, float], own_db: float, level_db: float
+) -> dict[str, float]:
+    """Return how far the pattern of the difference lies from what mere repetition gives."""
+    found = {}
+    for what in ("level", "elsewhere", "peak"):
+        key = f"{name}.{what}"
+        found[key] = float(10.0 * np.log10(1.0 + _power(given[key] + level_db) / _power(usual[key])))
+    part = _part(found[f"{name}.level"])
+    for what in _OF_A_PATTERN:
+        key = f"{name}.{what}"
+        found[key] = part * (given[key] - usual[key])
+    agreement = (1.0 + _power(given[f"{name}.level"] + level_db - own_db)) ** -0.5
+    found[f"{name}.agreement"] = 10.0 * (agreement - 1.0)
+    return found
+
+
+# --------------------
+# How far a gap shrinks once an effect is added, on data that the effect was not fitted to.
+# --------------------
+
+
+ALIKE = 0.8
+"""Cosine of the angle between two predictions, in floors, from which they say the same."""
+
+OWN_FROM = 1.5
+"""Floors that an effect must change a feature by for it to be its own."""
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Observations to fit to, and others to score on.
+
+    Parameters
+    ----------
+    fitted : tuple of Observed
+    scored : Observed
+    again : tuple of tuples of Observed
+        `scored` with a block of revolutions left out, each block in turn: of the recording, and of its reference.
+    """
+
+    fitted: tuple[ObservedChange, ...]
+    scored: ObservedChange
+    again: tuple[tuple[ObservedChange, ...], ...] = ()
+
+
+@dataclass(frozen=True)
+class _Score:
+    """How an effect did on one fold.
+
+    Parameters
+    ----------
+    sizes : (float, float, float)
+        Before and after in floors, and the shrink.
+    variances : array, (3,)
+        Of the sizes.
+    slope : float
+        Of observed over predicted.
+    placebo : float
+        The best one's shrink.
+    n_placebos : int
+    foretold : float
+        Largest change that the fit foretells, in floors.
+    """
+
+    sizes: tuple[float, float, float]
+    variances: FloatArray
+    slope: float
+    placebo: float
+    n_placebos: int
+    foretold: float
+
+
+def own_features(fit: Fit, observed: ObservedChange) -> FloatArray:
+    """Return 1 for the features that the fitted effect changes, 0 for the others; its strongest one at least."""
+    predicted = np.abs(fit.at(observed.condition) / observed.floors)
+    used: FloatArray = (predicted >= min(OWN_FROM, float(predicted.max()))).astype(np.float64)
+    return used
+
+
+def shrinkage(
+    paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str, excluded: Sequence[EffectPath] = ()
+) -> Shrinkage:
+    """Return the shrinkage of the gap by an effect, mean over folds.
+
+    shrink = 1 − (r² − n²)/(o² − n²) on the effect's own features: o the gap before, r what is left, n what the floors
+    themselves make, o and r no less than n; the effect's severity and options are fitted to the other part of the data.
+
+    Where the fitted effect foretells nothing, idle gears, say, it has no features of its own and nothing can shrink:
+    such folds do not count, unless there are no others.
+
+    The intervals hold the scatter of what is scored, from its blocks of revolutions; that of the fit is not in them.
+
+    Parameters
+    ----------
+    paths : sequence of EffectPath
+        Of the effect.
+    folds : sequence of Fold
+    held_out : str
+    excluded : sequence of EffectPath
+        Of the effect where the recordings tell that it is not: on the other shaft, say. They serve as placebos.
+    """
+    folds, scores = _telling(folds, [_score(paths, fold, excluded) for fold in folds])
+    before, after, shrink = np.mean([score.sizes for score in scores], axis=0)
+    wide = _t_quantile(folds) * np.sqrt(np.mean([score.variances for score in scores], axis=0))
+    return Shrinkage(
+        _interval(before, wide[0], 0.0, np.inf),
+        _interval(after, wide[1], 0.0, np.inf),
+        _interval(shrink, wide[2], -np.inf, 1.0),
+        float(np.mean([score.slope for score in scores])),
+        float(np.mean([score.placebo for score in scores])),
+        held_out,
+        n_placebos=max(score.n_placebos for score in scores),
+        elsewhere=_mean([_elsewhere(paths, fold) for fold in folds]),
+        foretold=max(score.foretold for score in scores),
+    )
+
+
+def _telling(folds: Sequence[Fold], scores: Sequence[_Score]) -> tuple[Sequence[Fold], Sequence[_Score]]:
+    """Return the folds in which the effect shows on the simulator, and their scores; all where it does in none."""
+    shown = [i for i, score in enumerate(scores) if score.foretold >= LEAST_FORETOLD] or range(len(scores))
+    return [folds[i] for i in shown], [scores[i] for i in shown]
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
+
+
+def _elsewhere(paths: Sequence[EffectPath], fold: Fold) -> float | None:
+    """Return the shrink where severity and options come from the other conditions alone; None if there is none.
+
+    The level comes from the condition's own other revolutions: no other condition knows the path at this speed.
+    """
+    others = [one for one in fold.fitted if one.condition != fold.scored.condition]
+    if not others:
+        return None
+    fit = fit_effect(paths, others)
+    for one in fold.fitted:
+        if one.condition == fold.scored.condition:
+            fit = fit.at_level_of(one)
+    return _before_and_after(fit, fold.scored, own_features(fit, fold.scored))[2]
+
+
+def _interval(value: float, wide: float, least: float, most: float) -> Interval:
+    return Interval(float(value), float(max(value - wide, least)), float(min(value + wide, most)))
+
+
+def _t_quantile(folds: Sequence[Fold]) -> float:
+    """Return what bounds 90 % with as few blocks as there are."""
+    from scipy.special import stdtrit
+
+    n_blocks = min((len(group) for fold in folds for group in fold.again), default=2)
+    return float(stdtrit(max(n_blocks - 1, 1), 0.95))
+
+
+def _score(paths: Sequence[EffectPath], fold: Fold, excluded: Sequence[EffectPath]) -> _Score:
+    fit = fit_effect(paths, fold.fitted)
+    used = own_features(fit, fold.scored)
+    wrong = [fit_path(path, fold.fitted) for path in (*paths, *excluded) if path.options != fit.path.options]
+    placebos = [
+        _before_and_after(other, fold.scored, used)[2] for other in wrong if not _is_alike(fit, other, fold.scored)
+    ]
+    variances = np.zeros(3)
+    for group in fold.again:
+        rows = np.array([_before_and_after(fit, one, used) for one in group])
+        variances += (len(rows) - 1.0) * rows.var(axis=0)
+    return _Score(
+        _before_and_after(fit, fold.scored, used),
+        variances,
+        _slope(fit, fold.scored, used),
+        max(placebos, default=0.0),
+        len(placebos),
+        float(np.abs(fit.at(fold.scored.condition) / fold.scored.floors).max()),
+    )
+
+
+def _is_alike(fit: Fit, other: Fit, scored: ObservedChange) -> bool:
+    """Whether two places foretell the same: bearings of one type on one shaft do, and are no placebos of each other."""
+    a, b = (one.at(scored.condition) / scored.floors for one in (fit, other))
+    product = float(np.sqrt((a @ a) * (b @ b)))
+    return product > 0.0 and float(a @ b) > ALIKE * product
+
+
+def _before_and_after(fit: Fit, scored: ObservedChange, used: FloatArray) -> tuple[float, float, float]:
+    """Return before and after in floors, and the shrink of what exceeds them."""
+    names = fit.path.names
+    n_families = family_square(names, np.ones_like(used) * scored.floors, scored, used) / FLOOR_IN_DEVIATIONS**2
+    left = scored.distances - fit.at(scored.condition)
+    squares = [family_square(names, d, scored, used) / n_families for d in (scored.distances, left)]
+    excess = max(squares[0] - 1.0, 0.1)
+    shrink = (max(squares[0], 1.0) - max(squares[1], 1.0)) / excess  # where there was no gap, none can shrink
+    before, after = (float(np.sqrt(s)) / FLOOR_IN_DEVIATIONS for s in squares)
+    return before, after, float(np.clip(shrink, -1.0, 1.0))
+
+
+def _slope(fit: Fit, scored: ObservedChange, used: FloatArray) -> float:
+    """Return the slope of observed over predicted distances, in floors, through zero."""
+    predicted = used * fit.at(scored.condition) / scored.floors
+    square = float(predicted @ predicted)
+    return float(predicted @ scored.normalised) / square if square > 0 else 0.0

@@ -1,0 +1,762 @@
+"""The likeliest effects, simulated on the rig's twin and fitted to what was observed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import as_completed
+from dataclasses import dataclass, field, replace
+from functools import cache
+from hashlib import sha256
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearsig.cache import modules_digest, read_arrays, write_whole
+from gearsig.checks import FloatArray, count, positive
+from gearsig.errors import GearsigError, InputError, RefusalError
+from gearsig.gap._conditions import SEED, Condition, compare, halves, observed
+from gearsig.gap._evidence import ONE_TOOTH, SIGNS, told_options
+from gearsig.gap._features import SIDES, whole_and_parts
+from gearsig.gap._floors import UNFORETOLD, gap_size, load_population, shown_in
+from gearsig.gap._places import SAME_ORDER
+from gearsig.gap._prediction import (
+    INTERVAL_COST,
+    WAYS_DB,
+    EffectPath,
+    Fit,
+    Fold,
+    ObservedChange,
+    fit_effect,
+    paths_of,
+    shrinkage,
+    transplanted,
+)
+from gearsig.gap._reduction import GearFrame, ReducedRecording
+from gearsig.gap._simulator import Added, CanBeQuiet, GapEffect, OperatingCondition, Twin
+from gearsig.gap._types import GapCause, GapPlace, GapStep, Interval, PlaceKind, Shrinkage
+from gearsig.gap._words import shaft_words
+from gearsig.processes import can_be_sent, process_pool
+
+# --------------------
+# A bank on disk: arrays without pickles, whole or not at all; a file that does not fit is made again.
+# --------------------
+
+
+_ARRAYS = ("sound", "sound_changes", "changes")
+MOST_BYTES = 100_000_000
+"""Of a bank's arrays; a real one has less than one."""
+
+
+def read_bank(path: Path, key: str) -> Bank | None:
+    """Return the bank that a file holds for this key, None where there is no such file, or it is damaged or foreign."""
+    data = read_arrays(path, MOST_BYTES)
+    if data is None:
+        return None
+    try:
+        about = json.loads(str(data["about"]))
+        return _checked(about, {name: data[name] for name in _ARRAYS}) if about["key"] == key else None
+    except (ValueError, KeyError, TypeError, IndexError):
+        return None
+
+
+def write_bank(path: Path, key: str, bank: Bank) -> None:
+    """Write a bank beside its place and move it there."""
+    about = {
+        "key": key,
+        "point": [bank.point.speed_rpm, bank.point.torque_nm],
+        "feature_names": bank.feature_names,
+        "change_names": bank.change_names,
+        "added": [_plain(a) for a in bank.added],
+        "left_out": [[_plain(a), why] for a, why in bank.left_out],
+    }
+    arrays: dict[str, Any] = {name: getattr(bank, name) for name in _ARRAYS}
+    try:
+        write_whole(path, lambda file: np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays))
+    except InputError as error:
+        raise InputError(error.what, where=str(path.parent), remedy="choose another folder with --cache") from None
+
+
+def _checked(about: dict[str, Any], arrays: dict[str, FloatArray]) -> Bank | None:
+
+    names, changes = tuple(about["feature_names"]), tuple(about["change_names"])
+    added = tuple(_added(row) for row in about["added"])
+    sound, again, changed = (arrays[name] for name in _ARRAYS)
+    n, m = len(names), len(changes)
+    shapes = sound.ndim == again.ndim == 2 and changed.ndim == 3
+    if not shapes or sound.shape[1] != n or again.shape != (len(sound), m) or changed.shape[::2] != (len(added), m):
+        return None
+    if any(a.dtype != np.float64 for a in arrays.values()):
+        return None
+    left_out = tuple((_added(row), str(why)) for row, why in about["left_out"])
+    return Bank(OperatingCondition(*map(float, about["point"])), names, changes, sound, again, added, changed, left_out)
+
+
+def _plain(added: Added) -> list[Any]:
+    return [added.name, added.severity, dict(added.options)]
+
+
+def _added(row: list[Any]) -> Added:
+    name, severity, options = row
+    return Added(str(name), float(severity), dict(options))
+
+
+# --------------------
+# The simulations of a bank, in processes of their own or in this one.
+# --------------------
+
+
+SoundKey = tuple[OperatingCondition, float, float]
+
+
+@dataclass(frozen=True)
+class TwinRun:
+    """Where and how long a twin runs."""
+
+    twin: Twin
+    point: OperatingCondition
+    duration_s: float
+    sampling_rate_hz: float
+    noise: int
+
+    @property
+    def sound_key(self) -> SoundKey:
+        """What the twin's sound runs depend on; twins need not hash."""
+        return self.point, self.duration_s, self.sampling_rate_hz
+
+
+@dataclass(frozen=True)
+class Task:
+    """One simulation: a specimen with an effect, or sound; each of the `further` channels is looked at by itself."""
+
+    run: TwinRun
+    seed: int
+    added: Added | None
+    further: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """One simulation's features, of a sound specimen only, and its change against the specimen's sound first run.
+
+    `alone` has each channel's own change where there are further channels; they have no part in `change`.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    change_names: tuple[str, ...]
+    change: FloatArray
+    alone: Mapping[str, FloatArray] = field(default_factory=dict)
+
+
+def finished_runs(
+    tasks: Sequence[Task], processes: int, on_progress: Callable[[int, int], object], *, n_together: int = 1
+) -> list[Reduced | str]:
+    """Return what each task gave, or why it could not be simulated, in the order of the tasks.
+
+    So many tasks on end go to one process: those that share a sound run then simulate it once. A twin that other
+    processes could not know, as it is defined in the caller's script, runs in this one.
+    """
+    found: list[Reduced | str] = [""] * len(tasks)
+    if processes == 1 or not can_be_sent(tasks[:1]):
+        known: Known = {}
+        for i, task in enumerate(tasks):
+            found[i] = _reduced(task, known)
+            on_progress(i + 1, len(tasks))
+        return found
+    with process_pool(processes) as pool:
+        starts = range(0, len(tasks), n_together)
+        waiting = {pool.submit(reduced_in_worker, tasks[i : i + n_together]): i for i in starts}
+        done = 0
+        for future in as_completed(waiting):
+            rows = future.result()
+            found[waiting[future] : waiting[future] + len(rows)] = rows
+            done += len(rows)
+            on_progress(done, len(tasks))
+    return found
+
+
+Known = dict[tuple[SoundKey, int], ReducedRecording]
+_KNOWN: Known = {}
+"""Sound first runs by point, length and seed, of the one twin that a worker works for."""
+
+
+def reduced_in_worker(tasks: Sequence[Task]) -> list[Reduced | str]:
+    """Return what tasks give, in a process that lives for one twin only."""
+    return [_reduced(task, _KNOWN) for task in tasks]
+
+
+def _reduced(task: Task, known: Known) -> Reduced | str:
+    from gearsig.gap._change import change_once
+    from gearsig.gap._features import once
+
+    run = task.run
+    key = run.sound_key, task.seed
+    try:
+        if key not in known:
+            known[key] = _gathered(run, task.seed, None, 0)
+        sound = known[key]
+        # A sound specimen is measured again with other noise: against itself everything would be zero.
+        now = _gathered(run, task.seed, task.added, run.noise if task.added is not None else max(run.noise, 1))
+        alone = {}
+        if task.further:
+            alone = {name: change_once(_of(now, name), _of(sound, name))[1] for name in sound.channels}
+            own = [name for name in sound.channels if name not in task.further]
+            now, sound = _of(now, *own), _of(sound, *own)
+        names, values = once(sound) if task.added is None else ((), np.empty(0))
+        return Reduced(names, values, *change_once(now, sound), alone)
+    except GearsigError as error:
+        return str(error)
+
+
+def _of(gathered: ReducedRecording, *channels: str) -> ReducedRecording:
+    return gathered.with_channels({name: gathered.channels[name] for name in channels})
+
+
+def _gathered(run: TwinRun, seed: int, added: Added | None, noise: int) -> ReducedRecording:
+    from gearsig.gap._reduction import reduce_recording
+
+    recording = run.twin.run(
+        run.point,
+        () if added is None else (added,),
+        seed=seed,
+        duration_s=run.duration_s,
+        sampling_rate_hz=run.sampling_rate_hz,
+        noise=noise,
+    )
+    assert recording.rig is not None  # noqa: S101  part of the protocol
+    return reduce_recording(recording, recording.rig)
+
+
+# --------------------
+# Which state of the code made the features of a bank.
+# --------------------
+
+
+_MODULES = (
+    *(f"gearsig.gap.{name}" for name in ("_reduction", "_features", "_change")),
+    "gearsig.severity._features",
+    *(f"gearsig.angle.{name}" for name in ("_source", "_resample", "_tachless")),
+)
+"""Those whose code changes a feature."""
+
+
+@cache
+def features_digest() -> str:
+    """Return a short hash of the code that makes features of a recording."""
+    return modules_digest(_MODULES)
+
+
+# --------------------
+# What each effect would change on one rig at one operating point: simulated once, kept on disk.
+# --------------------
+
+
+Progress = Callable[[int, int], object]
+POINT_DIGITS = 3
+"""Speed and torque are rounded to so many digits: recordings of one set point share a bank."""
+
+
+@dataclass(frozen=True)
+class Bank:
+    """Simulated features of the sound machine, and what each candidate of one effect changes in them.
+
+    Parameters
+    ----------
+    point : Point
+        At which it was simulated.
+    feature_names : tuple of str
+        Of `sound`; see `gearsig.gap`.
+    change_names : tuple of str
+        Of the changes, the features' names first; see `gearsig.gap`.
+    sound : array, (n_seeds, n_features)
+        One row per specimen.
+    sound_changes : array, (n_seeds, n_changes)
+        Another run of the sound specimen against its first: what a change is when nothing has changed.
+    added : tuple of Added
+        The candidates that could be simulated.
+    changes : array, (n_added, n_change_seeds, n_changes)
+        Each candidate's run against the sound first run of the same specimen.
+    left_out : tuple of (Added, str)
+        Candidates that could not be simulated, and why.
+    """
+
+    point: OperatingCondition
+    feature_names: tuple[str, ...]
+    change_names: tuple[str, ...]
+    sound: FloatArray
+    sound_changes: FloatArray
+    added: tuple[Added, ...]
+    changes: FloatArray
+    left_out: tuple[tuple[Added, str], ...] = ()
+
+
+def banks_of(
+    runs: Sequence[TwinRun],
+    effects: Sequence[str],
+    *,
+    seeds: Sequence[int],
+    folder: Path | None,
+    n_change_seeds: int = 1,
+    processes: int = 2,
+    fresh: bool = False,
+    on_progress: Progress = lambda _done, _all: None,
+) -> list[dict[str, Bank]]:
+    """Return for each operating point the effects' banks, from disk or simulated and kept.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Twin, point, length of what is simulated; the point is rounded to `POINT_DIGITS` digits. Noise 0: candidates
+        have the noise and start of the sound run, so that only the effect differs.
+    effects : sequence of str
+        Whose candidates are simulated; each has a file of its own.
+    seeds : sequence of int
+        Specimens of the sound machine.
+    folder : Path or None
+        Where they are kept; None: nowhere.
+    n_change_seeds : int
+        On so many of the specimens, the first ones, each candidate is simulated.
+    processes : int
+        1: in this process. Otherwise the twins must pickle.
+    fresh : bool
+        Simulate what is on disk, too, and keep it in its place.
+    on_progress : callable
+        Told how many of all runs are done; what it raises stops the work, and nothing is kept.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made.
+    RefusalError
+        If the sound machine cannot be simulated or its recording is too short for the features.
+    """
+    within = seeds[: min(count(n_change_seeds, "n_change_seeds"), len(seeds))]
+    wanted = [_BankRequest.of(run, name, seeds, within, folder) for run in runs for name in effects]
+    found = {w: read_bank(w.path, w.key) if w.path is not None and not fresh else None for w in wanted}
+    missing = [w for w in wanted if found[w] is None]
+    sound = {w.run.sound_key: w.run for w in missing}
+    tasks = [Task(run, seed, None) for run in sound.values() for seed in seeds]
+    tasks += [Task(w.run, seed, added) for w in missing for added in w.candidates for seed in within]
+    rows = iter(finished_runs(tasks, processes, on_progress) if tasks else ())
+    sound_rows = {key: list(islice(rows, len(seeds))) for key in sound}
+    for w in missing:
+        own = list(islice(rows, len(w.candidates) * len(within)))
+        found[w] = bank = _assembled(w.run.point, w.candidates, len(within), sound_rows[w.run.sound_key], own)
+        if w.path is not None:
+            write_bank(w.path, w.key, bank)
+    banks = iter(found[w] for w in wanted)
+    return [{name: bank for name, bank in zip(effects, banks, strict=False) if bank is not None} for _ in runs]
+
+
+@dataclass(frozen=True, eq=False)
+class _BankRequest:
+    """One effect's bank at one point, and where it is kept."""
+
+    run: TwinRun
+    candidates: tuple[Added, ...]
+    key: str
+    path: Path | None
+
+    @classmethod
+    def of(
+        cls, run: TwinRun, effect: str, seeds: Sequence[int], within: Sequence[int], folder: Path | None
+    ) -> _BankRequest:
+        """Return what is wanted, at the rounded point."""
+        positive(run.duration_s, "duration_s", "s")
+        at = replace(run, point=rounded(run.point))
+        candidates = tuple(run.twin.candidates(effect))
+        key = bank_key(at, candidates, seeds, within)
+        path = None if folder is None else _made(folder) / f"bank-{sha256(key.encode()).hexdigest()[:24]}.npz"
+        return cls(at, candidates, key, path)
+
+
+def rounded(point: OperatingCondition) -> OperatingCondition:
+    """Return the point at which a bank is made."""
+    return OperatingCondition(*(float(f"{v:.{POINT_DIGITS}g}") for v in (point.speed_rpm, point.torque_nm)))
+
+
+def bank_key(run: TwinRun, candidates: Sequence[Added], seeds: Sequence[int], change_seeds: Sequence[int]) -> str:
+    """Return all that a bank's numbers depend on, as text."""
+    settings = [[a.name, a.severity, dict(a.options)] for a in candidates]
+    runs = [list(seeds), list(change_seeds), run.duration_s, run.sampling_rate_hz, run.noise]
+    known = [run.twin.key, features_digest(), [run.point.speed_rpm, run.point.torque_nm], settings, runs]
+    return json.dumps(known, sort_keys=True)
+
+
+def _made(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"cannot be made ({error.strerror})", where=str(folder), remedy="choose another folder with --cache"
+        ) from None
+    return folder
+
+
+def _assembled(
+    point: OperatingCondition,
+    candidates: Sequence[Added],
+    n_seeds: int,
+    sound_rows: Sequence[Reduced | str],
+    rows: Sequence[Reduced | str],
+) -> Bank:
+    sound = [row for row in sound_rows if isinstance(row, Reduced)]
+    if len(sound) < len(sound_rows):
+        why = next(row for row in sound_rows if isinstance(row, str))
+        raise RefusalError(f"the sound machine cannot be simulated: {why}", remedy="check the rig file")
+    first = sound[0]
+    kept, changes, left_out = [], [], []
+    for i, added in enumerate(candidates):
+        own = rows[i * n_seeds : (i + 1) * n_seeds]
+        whole = [row for row in own if isinstance(row, Reduced) and row.change_names == first.change_names]
+        if len(whole) == n_seeds:
+            kept.append(added)
+            changes.append([row.change for row in whole])
+        else:
+            left_out.append((added, next((r for r in own if isinstance(r, str)), "it has other features")))
+    return Bank(
+        point,
+        first.names,
+        first.change_names,
+        np.stack([row.values for row in sound]),
+        np.stack([row.change for row in sound]),
+        tuple(kept),
+        np.array(changes).reshape(len(kept), n_seeds, len(first.change_names)),
+        tuple(left_out),
+    )
+
+
+PROCESSES = 2
+HELD_OUT = "other revolutions of the same recordings"
+
+
+@dataclass(frozen=True)
+class TriedEffect:
+    """One effect as it was tried.
+
+    Parameters
+    ----------
+    name : str
+    paths : tuple of EffectPath
+        On the shaft that the recordings tell by themselves, where they do.
+    fit : Fit
+        To all conditions.
+    shrinkage : Shrinkage
+        On held-out data.
+    """
+
+    name: str
+    paths: tuple[EffectPath, ...]
+    fit: Fit
+    shrinkage: Shrinkage
+
+    @property
+    def explains(self) -> bool:
+        """Whether the twin shows the effect and comes nearer with it: else severity and place mean nothing."""
+        return self.shrinkage.is_foretold and self.shrinkage.shrink.value > 0.0
+
+
+def try_effects(
+    effects: Sequence[GapEffect],
+    twin: Twin,
+    conditions: Sequence[Condition],
+    cache: Path | None,
+    on_progress: Callable[[str, float], object],
+    *,
+    fresh: bool = False,
+) -> dict[str, TriedEffect]:
+    """Simulate each effect at every condition, fit it, and score it on data that it was not fitted to.
+
+    Effects that the rig cannot have, for it lacks a bearing, say, are left out.
+    """
+    if not effects:
+        return {}
+    names = [effect.name for effect in effects]
+    folds = folds_of(conditions)
+    where = " and ".join(c.facts.name for c in conditions)
+    banks = banks_of(
+        [_run(twin, condition) for condition in conditions],
+        names,
+        seeds=[SEED],
+        folder=cache,
+        processes=PROCESSES,
+        fresh=fresh,
+        on_progress=lambda done, of: on_progress(f"simulating {len(names)} effects at the point of {where}", done / of),
+    )
+    everything = [observed(c, k, n_compared(conditions)) for k, c in enumerate(conditions)]
+    changes = [condition.over_floors for condition in conditions]
+    found = {}
+    for effect in effects:
+        name = effect.name
+        every = _paths([at[name] for at in banks], conditions, effect.shows_in)
+        if every:
+            paths, excluded = on_shaft(every, told_options(name, changes, conditions[0].now.frame.teeth))
+            shrink = shrinkage(paths, folds, HELD_OUT, excluded)
+            found[name] = TriedEffect(name, paths, fit_effect(paths, everything), shrink)
+    return found
+
+
+def on_shaft(
+    paths: Sequence[EffectPath], told: Mapping[str, str]
+) -> tuple[tuple[EffectPath, ...], tuple[EffectPath, ...]]:
+    """Return the paths on the shaft that the recordings tell by themselves, and the others; all where they do not."""
+    kept = tuple(path for path in paths if told.items() <= path.options.items())
+    others = tuple(path for path in paths if not told.items() <= path.options.items())
+    return (kept, others) if kept else (others, ())
+
+
+def n_compared(conditions: Sequence[Condition]) -> int:
+    """Return how many features all conditions have and a simulation can foretell; those of patterns need references."""
+    return min(sum(not name.startswith(UNFORETOLD) for name in c.change.names) for c in conditions)
+
+
+def _run(twin: Twin, condition: Condition) -> TwinRun:
+    """Return where an effect is simulated: without noise, if the twin can, in which what it adds would drown.
+
+    The machine's own baseline is put under it, see `_distances`.
+    """
+    still = twin.quiet() if isinstance(twin, CanBeQuiet) else twin
+    return TwinRun(
+        still, condition.facts.point, float(f"{condition.trial_s:.3g}"), condition.facts.sampling_rate_hz, noise=1
+    )
+
+
+def _paths(banks: Sequence[Bank], conditions: Sequence[Condition], shows_in: tuple[str, ...]) -> tuple[EffectPath, ...]:
+    """Return an effect's paths over the candidates that could be simulated at every condition."""
+    n = n_compared(conditions)
+    kept = [a for a in banks[0].added if all(a in bank.added for bank in banks)]
+    tables = [
+        _distances(bank, kept, condition, shows_in)[:, :, :n] for bank, condition in zip(banks, conditions, strict=True)
+    ]
+    return paths_of(banks[0].change_names[:n], kept, tables, tuple(level for level, _ in WAYS_DB))
+
+
+def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in: tuple[str, ...]) -> FloatArray:
+    """Return what candidates would change on the sound machine's own baseline, (n_ways, n_candidates, n).
+
+    Nothing where theory does not expect it: a simulation changes more, and that is its own.
+
+    The reference shows the baseline; without one it is what the twin, as far as it is credible, lets expect of sound
+    machines. The bank's own sound machine may be a quiet one, and is not asked.
+    """
+    floor, names = condition.floor, bank.feature_names
+    usual = -floor.from_centre(floor.names, np.zeros(len(floor.names)))
+    simulated = dict(zip(names, bank.sound.mean(axis=0).tolist(), strict=True))
+    own_names, own = whole_and_parts(condition.other)
+    if condition.reference is not None:
+        compared, baseline = bank.change_names, own[0]
+    else:
+        compared, baseline = names, load_population().credibility * own[0] + usual
+    real = dict(zip(own_names, baseline.tolist(), strict=True))
+    repeated = dict(zip(floor.names, usual.tolist(), strict=True))
+    again = np.zeros(len(bank.change_names))  # a mere second run changes something, too
+    again[: len(names)] = bank.sound_changes.mean(axis=0)[: len(names)]
+    given = [(bank.changes[bank.added.index(a)].mean(axis=0) - again)[: len(compared)] for a in kept]
+    rows = [[transplanted(compared, one, simulated, real, repeated, *way) for one in given] for way in WAYS_DB]
+    table = np.array(rows).reshape(len(WAYS_DB), len(kept), len(compared))
+    return np.where(shown_in(compared, shows_in), table, 0.0)
+
+
+def folds_of(conditions: Sequence[Condition]) -> list[Fold]:
+    """Return what to fit to and what to score on: half of the revolutions at a condition, and all but that half."""
+    n = n_compared(conditions)
+    whole = [observed(c, k, n) for k, c in enumerate(conditions)]
+    found = []
+    for k, condition in enumerate(conditions):
+        others, again = [one for one in whole if one.condition != k], _again(condition, k, n)
+        changes = [compare(part, condition.simulated, condition.reference) for part in halves(condition.now)]
+        first, second = (observed(condition, k, n, change) for change in changes)
+        found += [Fold((*others, first), second, again), Fold((*others, second), first, again)]
+    return found
+
+
+def _again(condition: Condition, index: int, n: int) -> tuple[tuple[ObservedChange, ...], ...]:
+    """Return the condition with each block left out: blocks of the recording, then of what it is compared with."""
+    base, values = observed(condition, index, n), condition.change.values[:n]
+    return tuple(
+        tuple(replace(base, distances=base.distances + row[:n] - values) for row in rows)
+        for rows in condition.change.left_out
+    )
+
+
+def refuse_where_none_ran(tried: dict[str, TriedEffect], names: Sequence[str], twin: Twin) -> None:
+    """Refuse where the rig has a place for some of the effects, and none of them could be simulated there."""
+    placed = [name for name in names if twin.candidates(name)]
+    if placed and not tried:
+        raise RefusalError(
+            f"none of {', '.join(placed)} can be simulated on this rig", remedy="describe the rig more fully"
+        )
+
+
+# --------------------
+# What is left of a gap once effects are added, one after another, on data that they were not fitted to.
+# --------------------
+
+
+WORTH_IT = 0.05
+"""Share of the gap that a further effect must take away to be shown."""
+
+MOST_ADDED = 2
+
+
+def steps_of(
+    conditions: Sequence[Condition], tried: dict[str, TriedEffect], causes: Sequence[GapCause]
+) -> tuple[GapStep, ...]:
+    """Return the gap before, and what is left with the likeliest effect, then with the next one as well."""
+    folds = folds_of(conditions)
+    names = [c.name for c in causes if c.name in tried][:MOST_ADDED]
+    steps = [GapStep("before", _left(conditions, folds, []))]
+    added: list[TriedEffect] = []
+    for name in names:
+        left = _left(conditions, folds, [*added, tried[name]])
+        if added and left.value > (1.0 - WORTH_IT) * steps[-1].left.value:
+            break
+        added.append(tried[name])
+        title = next(c.title for c in causes if c.name == name)
+        steps.append(GapStep(title, left))
+    return tuple(steps)
+
+
+def _left(conditions: Sequence[Condition], folds: Sequence[Fold], added: Sequence[TriedEffect]) -> Interval:
+    """Return the whole gap's size, mean over folds; each effect is fitted to what the ones before it leave."""
+    sizes = []
+    for fold in folds:
+        condition = conditions[fold.scored.condition]
+        total: FloatArray = np.zeros(len(condition.change.names))
+        fits: list[Fit] = []
+        for one in added:
+            fits.append(fit_effect(one.paths, [_without(o, fits) for o in fold.fitted]))
+            total[: n_compared(conditions)] += fits[-1].at(fold.scored.condition)
+        sizes.append(_size(condition, fold.scored, total, n_compared(conditions)))
+    low, value, high = np.mean([[s.low, s.value, s.high] for s in sizes], axis=0)
+    return Interval(float(value), float(low), float(high))
+
+
+def _without(one: ObservedChange, fits: Sequence[Fit]) -> ObservedChange:
+    left = one.distances.copy()
+    for fit in fits:
+        left = left - fit.at(one.condition)
+    return replace(one, distances=left)
+
+
+def _size(condition: Condition, scored: ObservedChange, taken: FloatArray, n: int) -> Interval:
+    """Return the size of what a condition's change leaves, with the scored part's own distances."""
+    change = condition.change
+    structural = condition.floor
+    whole = structural.from_centre(change.names, change.values)
+    shift = np.zeros(len(change.names))
+    shift[:n] = scored.distances - whole[:n]
+    moved = replace(
+        change,
+        values=change.values + shift - taken,
+        left_out=tuple(rows + shift - taken for rows in change.left_out),
+    )
+    return gap_size(moved, structural).structural
+
+
+# --------------------
+# Where on the machine a fitted effect sits, in words.
+# --------------------
+
+
+RACES = {"bearing_outer_race": "outer", "bearing_inner_race": "inner"}
+"""Effect → the order of its bearing that it shows at, see `BearingFrame`."""
+
+
+def place_of(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> str:
+    """Return "tooth 7 of the gear on the input shaft", "bearing 2", "order 6"; empty where the effect has no place.
+
+    The tooth is that of the recording, not of the simulation, which stands for all.
+    """
+    options = added.options
+    if "bearing" in options:
+        return " or ".join(_bearings(added.name, str(options["bearing"]), frame, places))
+    if "order" in options:
+        return _order(frame, places, float(options["order"]))
+    side = options.get("gear", options.get("shaft"))
+    if side not in SIDES:
+        return ""
+    shaft = frame.shafts[SIDES.index(str(side))]
+    words = shaft_words(frame, SIDES.index(str(side)))
+    if "tooth" not in options:
+        return f"the gear on {words}" if "gear" in options else words
+    found = _tooth_place(shaft, places)
+    if found is None or (found.tooth is None and found.angle_deg is None):
+        return f"one tooth of the gear on {words}"
+    tooth = f"tooth {found.tooth} of the gear on"
+    return f"{tooth} {words}" if found.tooth is not None else f"{found.angle_deg:.0f}° of {words}"
+
+
+def _bearings(name: str, fitted: str, frame: GearFrame, places: Sequence[GapPlace]) -> list[str]:
+    """Return the bearings whose race stands out of the recording, or else those that look like the fitted one."""
+    race = RACES.get(name)
+    if race is None:
+        return [fitted]
+    orders = {bearing.name: float(getattr(bearing, race)) for bearing in frame.bearings}
+    seen = [place.orders[0] for place in places if place.kind is PlaceKind.ENVELOPE and place.orders]
+    for one in (*seen, orders.get(fitted, np.nan)):
+        if alike := [other for other, order in orders.items() if abs(one / order - 1.0) < SAME_ORDER]:
+            return alike
+    return [fitted]
+
+
+def cause_place(
+    name: str, tried: TriedEffect | None, conditions: Sequence[Condition], places: Sequence[GapPlace]
+) -> str:
+    """Return where a cause sits, in words; empty where it has no place or nothing is known of it.
+
+    Which shaft, the recordings tell by themselves. Where they do not, a fit tells that is clearly better on one of them
+    than on the other; else that is what it says.
+    """
+    frame = conditions[0].now.frame
+    changes = [condition.over_floors for condition in conditions]
+    told: dict[str, float | str] = {**told_options(name, changes, frame.teeth)}
+    if told or name not in SIGNS:
+        added = tried.fit.added if tried is not None else Added(name, 0.0, _with_a_tooth(name, told))
+        return place_of(added, frame, places)
+    if tried is not None and _is_clear(tried, conditions):
+        return place_of(tried.fit.added, frame, places)
+    either = " or ".join(shaft_words(frame, side) for side in range(len(SIDES)))
+    return f"{either} (which cannot be told)"
+
+
+def _with_a_tooth(name: str, told: dict[str, float | str]) -> dict[str, float | str]:
+    return {**told, "tooth": 1.0} if name in ONE_TOOTH else told
+
+
+def _is_clear(tried: TriedEffect, conditions: Sequence[Condition]) -> bool:
+    """Whether the fit is worse on the other shaft by more than chance."""
+    n = n_compared(conditions)
+    seen = [observed(condition, k, n) for k, condition in enumerate(conditions)]
+    costs = [fit_effect(paths, seen).cost for paths in _by_shaft(tried.paths)]
+    return len(costs) < len(SIDES) or max(costs) - min(costs) > INTERVAL_COST
+
+
+def _by_shaft(paths: Sequence[EffectPath]) -> list[list[EffectPath]]:
+    both = [[path for path in paths if path.options.get("gear", path.options.get("shaft")) == side] for side in SIDES]
+    return [some for some in both if some]
+
+
+def at_its_tooth(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> Added:
+    """Return the setting with the recording's tooth in place of the simulated one, where a mark gives it a number."""
+    if "tooth" not in added.options:
+        return added
+    found = _tooth_place(frame.shafts[SIDES.index(str(added.options["gear"]))], places)
+    if found is None or found.tooth is None:
+        return added
+    return replace(added, options={**added.options, "tooth": float(found.tooth)})
+
+
+def _tooth_place(shaft: str, places: Sequence[GapPlace]) -> GapPlace | None:
+    return next((p for p in places if p.kind is PlaceKind.TOOTH and p.shaft == shaft), None)
+
+
+def _order(frame: GearFrame, places: Sequence[GapPlace], fitted: float) -> str:
+    """Return the order that the recording shows, or else the fitted one."""
+    for place in places:
+        if place.kind is PlaceKind.SHAFT and place.shaft == frame.shafts[0] and place.orders:
+            return f"order {place.orders[0]:.3g}"
+    return f"order {fitted:.3g}"

@@ -1,0 +1,168 @@
+"""A gap report in four sentences: where, which, how far, and what to record next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite
+
+import numpy as np
+
+from gearsig.gap._posterior import LIKELIER_THAN_NOT
+from gearsig.gap._types import NAMING, NONE, UNKNOWN, GapCause, GapOutcome, GapPlace, GapReport, Interval
+from gearsig.gap._words import hardly_foretold, severity_unit
+
+
+def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
+    """Return one line for each question."""
+    if report.is_simulated:
+        return _where(report), _which(report), _how_far(report), _next(report)
+    return _where_seen(report), _which_seen(report), NO_SIMULATION, _next_seen(report)
+
+
+NO_SIMULATION = (
+    "How far: cannot be told; the simulators have a gear pair and this rig has none, so nothing was simulated."
+)
+TOGETHER, MOST_RIVALS = 0.9, 4
+"""What cannot be told apart: the fewest likeliest effects that have such a share of what all effects have, and not
+more of them than anybody would look at."""
+SOUND_MACHINE = "the same machine when it was sound"
+
+
+def _where(report: GapReport) -> str:
+    if report.outcome in (GapOutcome.NO_GAP, GapOutcome.UNDECIDED) and (report.size.value <= 1.0 or not report.places):
+        return f"Where: nowhere beyond the floor; the gap is {report.size.value:.2g} structural floors."
+    if not report.places:
+        return f"Where: spread over all orders and bands, {report.size.value:.2g} structural floors."
+    first, *others = report.places
+    beside = ""
+    if not isfinite(first.structural) and others and isfinite(others[0].share):
+        beside = f"; beside it, {_with_size(others[0])}"
+    return f"Where: {_with_size(first)}{beside}."
+
+
+def _with_size(place: GapPlace) -> str:
+    """Return a place's title, with its size and share as far as it has them."""
+    size = f", {place.structural:.2g} structural floors" if isfinite(place.structural) else ""
+    return f"{place.title}{size}{f' ({100 * place.share:.0f} % of the gap)' if isfinite(place.share) else ''}"
+
+
+def _which(report: GapReport) -> str:
+    first = report.causes[0]
+    odds = f"{100 * first.probability:.0f} %"
+    if report.outcome is GapOutcome.NO_GAP:
+        return f"Which: none ({odds}); what differs is no more than between healthy machines and the simulator."
+    if report.outcome is GapOutcome.UNDECIDED:
+        return _which_undecided(report)
+    if report.outcome is GapOutcome.UNKNOWN:
+        return _which_unknown(report)
+    if report.outcome is GapOutcome.CANNOT_SEPARATE and report.inseparable is not None:
+        *others, last = (_titled(report, name) for name in report.inseparable)
+        named = f"{', '.join(others)} or {last}"
+        return f"Which: {named}; these recordings cannot tell them apart."
+    size = f", {_severity(first, first.severity)}" if first.severity and not first.severity.is_unbounded else ""
+    place = f" at {first.place}" if first.place else ""
+    return f"Which: {first.title}{place}{size} (probability {odds})."
+
+
+def _which_unknown(report: GapReport) -> str:
+    known = [cause for cause in report.causes if cause.name not in (NONE, UNKNOWN)]
+    best = max(known, key=lambda cause: cause.probability, default=None)
+    unknown = next((cause.probability for cause in report.causes if cause.name == UNKNOWN), 1.0)
+    if best is None or best.probability <= unknown:
+        return "Which: unknown; nothing in the catalogue explains it well enough."
+    return f"Which: unknown; {best.title} comes nearest ({100 * best.probability:.0f} %), too little to be named."
+
+
+def rivals(causes: Sequence[GapCause]) -> tuple[str, ...]:
+    """Return the effects that cannot be told apart: the two likeliest, and more until they are `TOGETHER`."""
+    effects = sorted((c for c in causes if c.name not in (NONE, UNKNOWN)), key=lambda cause: -cause.probability)
+    shares = np.cumsum([cause.probability for cause in effects])
+    n = int(np.searchsorted(shares, TOGETHER * shares[-1])) + 1 if effects else 0
+    return tuple(cause.name for cause in effects[: int(np.clip(n, 2, MOST_RIVALS))])
+
+
+def _which_undecided(report: GapReport) -> str:
+    """Name the likeliest two, and the group that is likelier than not."""
+    named = {NONE: "no gap", UNKNOWN: "a gap of unknown cause"}
+    likeliest = sorted(report.causes, key=lambda cause: -cause.probability)[:2]
+    parts = [f"{named.get(cause.name, cause.title)} {100 * cause.probability:.0f} %" for cause in likeliest]
+    groups = {name: p for name, p in report.groups.items() if name not in (NONE, UNKNOWN, "")}
+    group = max(groups, key=groups.__getitem__, default="")
+    if group and groups[group] >= LIKELIER_THAN_NOT:
+        parts.append(f"effects of the group “{group}” together {100 * groups[group]:.0f} %")
+    return f"Which: undecided; nothing is likely enough to be named: {', '.join(parts)}."
+
+
+def _severity(cause: GapCause, severity: Interval) -> str:
+    """Write a severity with three digits, without an exponent, and its unit."""
+    return f"{float(f'{severity.value:.3g}'):.12g} {severity_unit(cause.unit)}".rstrip()
+
+
+def _titled(report: GapReport, name: str) -> str:
+    cause = {c.name: c for c in report.causes}.get(name)
+    return f"{cause.title} ({100 * cause.probability:.0f} %)" if cause is not None else name.replace("_", " ")
+
+
+def _how_far(report: GapReport) -> str:
+    shrinkage = report.causes[0].shrinkage
+    if report.outcome not in NAMING or shrinkage is None:
+        return "How far: no effect was added."
+    if not shrinkage.is_foretold:
+        return f"How far: not known; {report.causes[0].title} {hardly_foretold(shrinkage)}."
+    s, both = shrinkage.shrink, f"from {shrinkage.before.value:.2g} to {shrinkage.after.value:.2g} structural floors"
+    percent = f"{100 * s.value:.0f} % ({100 * s.low:.0f} to {100 * s.high:.0f} %)"
+    shrinks = f"shrinks {both}, by {percent} of what exceeds one,"
+    if s.value <= 0.0:
+        shrinks = "does not shrink"
+    elif shrinkage.after.high < 1.0:
+        shrinks = f"shrinks {both}, within what healthy machines show,"
+    return f"How far: with {report.causes[0].title}, the gap on its own features {shrinks} on {shrinkage.held_out}."
+
+
+def _next(report: GapReport) -> str:
+    best = report.next_recordings[0].text if report.next_recordings else ""
+    if not report.references:
+        first = f"{SOUND_MACHINE}, at the same speed and load; then only what has changed since counts."
+        return f"Next: {first} Or {best}" if best else f"Next: {first}"
+    if best:
+        return f"Next: {best}"
+    if report.outcome in (GapOutcome.UNKNOWN, GapOutcome.UNDECIDED):
+        return (
+            "Next: another sensor nearer to where it is loudest, or another speed, which tells orders from resonances."
+        )
+    if report.outcome is GapOutcome.NO_GAP:
+        return "Next: nothing is needed; keep these recordings, later ones are best compared with them."
+    if sum(cause.shrinkage is not None for cause in report.causes) < 2:
+        return "Next: another speed or load; no two effects are likely enough to compute which would tell most."
+    seen = _place_of_both(report)
+    look = f"look at {seen}; " if seen else ""
+    return f"Next: {look}no other speed or load that was simulated would put the two likeliest effects further apart."
+
+
+def _place_of_both(report: GapReport) -> str:
+    """Return the place that both likeliest effects share, which can be looked at; empty where they have none."""
+    first, second = [cause.place for cause in report.causes if cause.name not in (NONE, UNKNOWN)][:2]
+    return first if first == second and first.startswith("tooth") else ""
+
+
+def _where_seen(report: GapReport) -> str:
+    if report.places:
+        return f"Where: {report.places[0].title}."
+    beyond = " beyond the healthy reference" if report.references else ""
+    return f"Where: nothing stands out{beyond} that is not synchronous with a shaft."
+
+
+def _which_seen(report: GapReport) -> str:
+    first = report.causes[0]
+    odds = f"at most {100 * first.probability:.0f} %"
+    if report.outcome is GapOutcome.UNKNOWN:
+        return f"Which: unknown; {first.title}."
+    place = f" at {first.place}" if first.place else ""
+    name = "none; " if report.outcome is GapOutcome.NO_GAP else ""
+    return f"Which: {name}{first.title}{place} ({odds})."
+
+
+def _next_seen(report: GapReport) -> str:
+    if report.references:
+        return "Next: another sensor nearer to the bearings, or a longer recording."
+    return f"Next: {SOUND_MACHINE}, at the same speed; then only what has changed since is named."

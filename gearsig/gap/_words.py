@@ -1,0 +1,229 @@
+"""What features and units are called in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from gearsig.gap._features import SIDES
+from gearsig.gap._reduction import GearFrame, ReducedRecording
+from gearsig.gap._simulator import OperatingCondition
+from gearsig.gap._types import Evidence, GapCause, PlaceKind, Shrinkage
+
+# --------------------
+# Where exactly within one place: the comparison that is searched, and what is found.
+# --------------------
+
+
+@dataclass(frozen=True)
+class ComparedPair:
+    """A recording and what it is compared with.
+
+    Parameters
+    ----------
+    now, other : Gathered
+    is_reference : bool
+        Whether `other` is a sound recording of the same machine; otherwise a simulation.
+    change_db : mapping
+        Feature → change from what healthy machines change by.
+    size : mapping
+        Feature → the same over the floors, with its sign.
+    """
+
+    now: ReducedRecording
+    other: ReducedRecording
+    is_reference: bool
+    change_db: Mapping[str, float]
+    size: Mapping[str, float]
+
+    def strongest(self, *beginnings: str) -> str:
+        """Return the feature with the largest change over the floors among those whose names begin so."""
+        return max((name for name in self.size if name.startswith(beginnings)), key=lambda name: abs(self.size[name]))
+
+
+@dataclass(frozen=True)
+class LocatedChange:
+    """What `GapPlace` says of where; its sizes are added later.
+
+    `kind` is given where the place turns out to be of another kind than the features that led to it; `follows` where
+    it only follows from what other places say.
+    """
+
+    title: str
+    change_db: float
+    orders: tuple[float, ...] = ()
+    band_hz: tuple[float, float] | None = None
+    angle_deg: float | None = None
+    tooth: int | None = None
+    channel: str = ""
+    kind: PlaceKind | None = None
+    follows: bool = False
+
+
+def shaft_words(frame: GearFrame, side: int) -> str:
+    """Return "the input shaft" or "shaft 2"."""
+    name = frame.shafts[side]
+    if "shaft" in name.lower():
+        return name
+    return f"the {name} shaft" if name.replace(" ", "").isalpha() else f"shaft {name}"
+
+
+def by_decibels(change_db: float) -> str:
+    """Return "up by 14 dB" or "down by 3 dB"."""
+    return f"{'up' if change_db >= 0 else 'down'} by {abs(change_db):.2g} dB"
+
+
+def hertz(frequency_hz: float) -> str:
+    """Return "850 Hz" or "2.1 kHz"."""
+    return f"{frequency_hz / 1e3:.2g} kHz" if frequency_hz >= 999.5 else f"{frequency_hz:.3g} Hz"
+
+
+def band_words(band_hz: tuple[float, float]) -> str:
+    """Return "300 Hz to 2.1 kHz"."""
+    low, high = (hertz(edge) for edge in band_hz)
+    if low[-3:] == high[-3:]:
+        low = low.rpartition(" ")[0]
+    return f"{low} to {high}"
+
+
+_UNITS = {"um": "µm", "deg": "°", "g mm": "g·mm", "N m": "N·m", "m/s^2": "m/s²", "1": ""}
+
+_SIDEBANDS = {
+    "1": "first sidebands",
+    "2": "second sidebands",
+    "3to5": "sidebands 3 to 5",
+    "6to12": "sidebands 6 to 12",
+    "own": "first sidebands over their own mesh harmonic",
+    "strongest": "strongest sideband over the others",
+}
+_SHAFT = {
+    "1": "order 1",
+    "2": "order 2",
+    "3": "order 3",
+    "1.to_mesh": "order 1 over the mesh",
+    "2.to_mesh": "order 2 over the mesh",
+    "3.to_mesh": "order 3 over the mesh",
+    "strongest": "strongest of the orders above 3 over the others",
+    "strongest.to_mesh": "strongest of the orders above 3 over the mesh",
+    "low": "orders above 3",
+}
+_TOOTH = {
+    "level": "level besides the mesh",
+    "elsewhere": "level at the median tooth",
+    "peak": "level of the burst at the strongest tooth",
+    "prominence": "burst over the median tooth",
+    "second": "burst over the next strongest tooth",
+    "kurtosis": "kurtosis",
+    "width": "number of teeth within 3 dB of the strongest",
+    "below_mesh": "part below the mesh order",
+    "centroid": "middle of the spectrum",
+    "agreement": "agreement with the reference",
+}
+_OF_A_SHAFT = {
+    "sideband": ("", _SIDEBANDS),
+    "shaft": ("", _SHAFT),
+    "tooth": ("average, ", _TOOTH),
+    "change": ("change of the average, ", _TOOTH),
+    "surprise": ("change of the average over its noise, ", _TOOTH),
+}
+_CYCLIC = {
+    "outer": "outer races",
+    "inner": "inner races",
+    "ball": "rolling elements",
+    "cage": "cages",
+    "mesh": "mesh order",
+    "strange": "an order that belongs to nothing known",
+    "depth": "depth of modulation",
+    "half_mesh": "half the mesh order",
+}
+_ALIKE_PARTS = {"mesh": "harmonics", "repeated": "what either gear repeats", "noise": "what nothing repeats"}
+_ALIKE = {
+    f"{key}{suffix}": f"{words}{', ' if said else ''}{said}"
+    for key, words in _ALIKE_PARTS.items()
+    for suffix, said in (("", ""), (".spread", "spread"), (".rise", "rise from one to the next"))
+} | {
+    f"{a}_{b}.{suffix}": f"{_ALIKE_PARTS[a]} and {_ALIKE_PARTS[b]}, {said}"
+    for a, b in (("mesh", "repeated"), ("repeated", "noise"), ("mesh", "noise"))
+    for suffix, said in (("less", "the former over the latter"), ("apart", "apart"), ("together", "changed alike"))
+}
+_OTHER = {
+    "mesh.total": "mesh harmonics together",
+    "mesh.half": "half mesh orders",
+    "apart.mesh": "mesh harmonics, difference between sensors",
+    "apart.floor": "floor, difference between sensors",
+    **{f"alike.{key}": f"about the mesh harmonics: {words}" for key, words in _ALIKE.items()},
+    "floor.total": "floor, all bands",
+    "floor.to_signal": "floor over the whole signal",
+    "raw.level": "level of the whole signal",
+    "raw.kurtosis": "kurtosis of the whole signal",
+    "raw.near_the_extreme": "samples close to the extreme",
+    "speed.drift": "drift of the speed",
+    "speed.swing": "swing of the speed",
+    "speed.swing_line": "strongest line of the speed's swing",
+    "hum": "mains lines",
+}
+
+
+def severity_unit(unit: str) -> str:
+    """Write the unit of a severity for people.
+
+    Examples
+    --------
+    >>> severity_unit("um"), severity_unit("mm")
+    ('µm', 'mm')
+    """
+    return _UNITS.get(unit, unit)
+
+
+def feature_words(name: str, frame: GearFrame) -> str:
+    """Return a feature's name in words, e.g. "input shaft: sidebands 6 to 12"."""
+    if name in _OTHER:
+        return _OTHER[name]
+    first, _, rest = name.partition(".")
+    side, _, detail = rest.partition(".")
+    if first == "mesh":
+        return f"mesh harmonic {detail} over all"
+    if first in _OF_A_SHAFT and side in SIDES:
+        what, table = _OF_A_SHAFT[first]
+        return f"{shaft_words(frame, SIDES.index(side))}: {what}{table[detail]}"
+    if first == "floor":
+        return f"floor, band {detail}" if side == "band" else f"kurtosis of the floor, band {detail}"
+    where = "envelope" if first == "envelope" else "lines"
+    if rest.endswith("_shaft"):
+        return f"{where}: orders of {shaft_words(frame, SIDES.index(rest.removesuffix('_shaft')))}"
+    return f"{where}: {_CYCLIC[rest]}"
+
+
+def hardly_foretold(shrinkage: Shrinkage) -> str:
+    """Return what is said of an effect that the simulator does not make large enough to judge."""
+    return f"hardly shows on the simulator at these conditions (at most {shrinkage.foretold or 0.0:.2g} floors)"
+
+
+def stance_words(evidence: Evidence) -> str:
+    """Return "speaks for it", "further than foretold" or "speaks against it"."""
+    if evidence.speaks_for:
+        return "speaks for it"
+    return "further than foretold" if evidence.is_further else "speaks against it"
+
+
+def fitted_words(cause: GapCause, severity: float, recording: str) -> str:
+    """Return what a twin's file says of the effect in it: severity, its fit, what it was fitted to, probability."""
+    within = f"interval of the fit {cause.severity.words('{:.3g}'.format)}; " if cause.severity else ""
+    size = f"{severity:.3g} {cause.unit}".rstrip()
+    return f"{cause.title}: {size}, {within}fitted to {recording}, probability {cause.probability:.2f}"
+
+
+SAME_SPEED, SAME_TORQUE = 0.03, 0.1
+"""Relative: recordings nearer than this to each other are of one operating condition."""
+
+
+def point_text(point: OperatingCondition) -> str:
+    """Write an operating point for people."""
+    return f"{float(f'{point.speed_rpm:.4g}'):.6g} rpm and {point.torque_nm:.3g} N·m"
+
+
+def same_condition(one: OperatingCondition, other: OperatingCondition) -> bool:
+    """Whether two points are one operating condition."""
+    speed = abs(one.speed_rpm - other.speed_rpm) <= SAME_SPEED * max(abs(one.speed_rpm), abs(other.speed_rpm))
+    torque = abs(one.torque_nm - other.torque_nm) <= SAME_TORQUE * max(abs(one.torque_nm), abs(other.torque_nm))
+    return speed and torque

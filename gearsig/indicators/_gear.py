@@ -1,0 +1,481 @@
+"""Gear indicators of a synchronous average and its parts.
+
+Which signal goes in, here and in MATLAB's `gearConditionMetrics`:
+
+============================ ====================================== =====================================
+indicator                    signal here                            MATLAB
+============================ ====================================== =====================================
+FM0                          average                                average; mesh lines from regular
+FM4, M6A, M8A                difference                             difference
+energy ratio                 difference and regular                 difference and regular
+energy operator              average, and band-passed mesh          not there
+sideband index, level factor average                                not there
+NA4                          residual, with history                 residual, with history
+NA4*, NB4, NB4*              residual; envelope of band-passed mesh not there
+============================ ====================================== =====================================
+
+The last column follows MATLAB's documentation of what the function takes (average, difference, regular and residual,
+earlier records for NA4) and returns (RMS, kurtosis and crest factor of the average, FM4, M6A, M8A, FM0, energy ratio,
+NA4); it has not been run side by side. `tsaregular` and `tsadifference` leave a chosen number of shaft harmonics and
+sidebands on the regular side, `gearsig.orders` says which it takes: values agree only where these agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import isnan
+
+import numpy as np
+
+from gearsig.checks import FloatArray, count
+from gearsig.errors import InputError
+from gearsig.indicators._amplitude import Indicator, is_constant, standardised_moment
+from gearsig.orders import SynchronousAverage
+
+# --------------------
+# Gear indicators that compare with earlier records of the same gear: NA4, NA4*, NB4, NB4*.
+#
+# Each is a fourth moment of the present record over a variance that includes earlier records, so that it goes on rising
+# when damage grows, where a plain kurtosis would fall back. With no history NA4 is the kurtosis of the residual.
+# --------------------
+
+
+def na4(residual: SynchronousAverage, history: Sequence[SynchronousAverage] = ()) -> float:
+    """Fourth moment of the residual over the square of its variance averaged over all records so far.
+
+    NA4 = (1/N) Σ_i (r_i - r̄)⁴ / ( (1/M) Σ_{j=1}^{M} v_j )², v_j the variance of record j's residual, M counting the
+    present record.
+
+    Parameters
+    ----------
+    residual : SynchronousAverage
+        The present record's, of kind "residual".
+    history : sequence of SynchronousAverage
+        Residuals of earlier records, same gear, speed and load, in any order.
+
+    Returns
+    -------
+    float
+        3 for Gaussian noise at an unchanged level; nan for a constant residual without history.
+
+    Raises
+    ------
+    InputError
+        On averages of another kind, shaft or channel.
+
+    Notes
+    -----
+    MATLAB's `gearConditionMetrics` takes the residual as well, and the records up to the present one as the history.
+    Not for records at different load: the variance then follows the load.
+
+    References
+    ----------
+    J. J. Zakrajsek, D. P. Townsend, H. J. Decker, "An analysis of gear fault detection methods as applied to pitting
+    fatigue failure data", NASA TM-105950, 1993.
+    """
+    _check(residual, history, "residual")
+    past = [_variance(h.values) for h in history]
+    return _quasi_normalised_kurtosis(residual.values, [*past, _variance(residual.values)])
+
+
+def na4_star(residual: SynchronousAverage, healthy_history: Sequence[SynchronousAverage]) -> float:
+    """Fourth moment of the residual over the square of the variance that the gear had while it was healthy.
+
+    NA4* = (1/N) Σ_i (r_i - r̄)⁴ / (v̄)², v̄ the mean variance of the healthy records only; `healthy_records` finds them.
+
+    Parameters
+    ----------
+    residual : SynchronousAverage
+        Of kind "residual".
+    healthy_history : sequence of SynchronousAverage
+        Residuals of records in good condition.
+
+    Returns
+    -------
+    float
+        nan without a healthy record.
+
+    References
+    ----------
+    H. J. Decker, R. F. Handschuh, J. J. Zakrajsek, "An enhancement to the NA4 gear vibration diagnostic parameter",
+    NASA TM-106553, 1994. Not in MATLAB's `gearConditionMetrics`.
+    """
+    _check(residual, healthy_history, "residual")
+    return _quasi_normalised_kurtosis(residual.values, [_variance(h.values) for h in healthy_history])
+
+
+def nb4(band_passed_mesh: SynchronousAverage, history: Sequence[SynchronousAverage] = ()) -> float:
+    """NA4 of the envelope of the mesh band: fluctuating load on few teeth shows in the envelope.
+
+    s(θ) = |b(θ) + i H[b](θ)|, b the average band-passed about a mesh harmonic and H the Hilbert transform.
+
+    Parameters
+    ----------
+    band_passed_mesh : SynchronousAverage
+        Of kind "band-passed mesh".
+    history : sequence of SynchronousAverage
+        The same of earlier records.
+
+    Returns
+    -------
+    float
+        nan for an unmodulated mesh without history.
+
+    References
+    ----------
+    J. J. Zakrajsek, R. F. Handschuh, H. J. Decker, "Application of fault detection techniques to spiral bevel gear
+    fatigue data", NASA TM-106467, 1994. Not in MATLAB's `gearConditionMetrics`.
+    """
+    _check(band_passed_mesh, history, "band-passed mesh")
+    present = envelope(band_passed_mesh.values)
+    past = [_variance(envelope(h.values)) for h in history]
+    return _quasi_normalised_kurtosis(present, [*past, _variance(present)])
+
+
+def nb4_star(band_passed_mesh: SynchronousAverage, healthy_history: Sequence[SynchronousAverage]) -> float:
+    """NB4 over the variance of healthy records only, as NA4* is to NA4.
+
+    Parameters
+    ----------
+    band_passed_mesh : SynchronousAverage
+        Of kind "band-passed mesh".
+    healthy_history : sequence of SynchronousAverage
+
+    Returns
+    -------
+    float
+        nan without a healthy record.
+    """
+    _check(band_passed_mesh, healthy_history, "band-passed mesh")
+    present = envelope(band_passed_mesh.values)
+    return _quasi_normalised_kurtosis(present, [_variance(envelope(h.values)) for h in healthy_history])
+
+
+def healthy_records(variances: Sequence[float], *, z: float = 2.33, n_first: int = 5) -> tuple[bool, ...]:
+    """Which records count as healthy for NA4* and NB4*: those before the variance leaves its own scatter.
+
+    The first `n_first` records are taken as healthy. From then on, the first record whose variance exceeds mean + z s
+    of those before it ends the healthy ones: later records never change the reference again.
+
+    Parameters
+    ----------
+    variances : sequence of float
+        Of the residuals (or envelopes), oldest first.
+    z : float
+        Standard deviations; 2.33 is exceeded by 1 % of normal records.
+    n_first : int
+        At least 2.
+
+    Returns
+    -------
+    tuple of bool
+
+    Notes
+    -----
+    The test is on the single record; Decker et al. (1994) fix the reference by a test of the same kind.
+    """
+    if n_first < 2:
+        raise InputError(f"n_first is {n_first}", allowed="at least 2")
+    v = np.asarray(variances, dtype=np.float64)
+    for k in range(n_first, len(v)):
+        if v[k] > v[:k].mean() + z * v[:k].std(ddof=1):
+            return (True,) * k + (False,) * (len(v) - k)
+    return (True,) * len(v)
+
+
+def envelope(values: FloatArray) -> FloatArray:
+    """|x + i H[x]| of a periodic signal, by its Fourier lines."""
+    n = len(values)
+    lines = np.fft.fft(values)
+    lines[1 : (n + 1) // 2] *= 2
+    lines[n // 2 + 1 :] = 0
+    magnitude: FloatArray = np.abs(np.fft.ifft(lines))
+    return magnitude
+
+
+def _quasi_normalised_kurtosis(x: FloatArray, variances: Sequence[float]) -> float:
+    reference = float(np.mean(variances)) if len(variances) else 0.0
+    if reference <= 0.0:
+        return float("nan")
+    d = (x - x.mean()) / np.sqrt(reference)
+    return float(np.mean(d**4))
+
+
+def _variance(x: FloatArray) -> float:
+    return 0.0 if is_constant(x) else float(np.var(x))
+
+
+def _check(present: SynchronousAverage, history: Sequence[SynchronousAverage], kind: str) -> None:
+    for a in (present, *history):
+        if a.kind != kind:
+            raise InputError(f"a signal of kind {a.kind!r} was given", allowed=kind, remedy="see gearsig.orders")
+        if (a.shaft, a.channel, a.unit) != (present.shaft, present.channel, present.unit):
+            raise InputError(
+                f"history of shaft {a.shaft!r}, channel {a.channel!r} [{a.unit}] for a record of shaft"
+                f" {present.shaft!r}, channel {present.channel!r} [{present.unit}]",
+                remedy="give earlier records of the same gear, channel and unit",
+            )
+
+
+def fm0(average: SynchronousAverage, teeth: int, *, n_harmonics: int | None = None) -> float:
+    """Zero-order figure of merit: peak-to-peak over the sum of the mesh harmonics' amplitudes.
+
+    FM0 = (max x - min x) / Σ_h A(h z). Rises with heavy wear (mesh harmonics fall) and with breakage (peaks rise).
+
+    Parameters
+    ----------
+    average : SynchronousAverage
+        Of kind "average".
+    teeth : int
+        z.
+    n_harmonics : int or None
+        None: all below the average's highest order.
+
+    Returns
+    -------
+    float
+        2 for one unmodulated mesh harmonic; nan where no mesh harmonic is in the average.
+
+    References
+    ----------
+    R. M. Stewart, "Some useful data analysis techniques for gearbox diagnostics", ISVR, Southampton, 1977.
+    """
+    _check_kind(average, "average")
+    amplitudes = mesh_amplitudes(average, teeth, n_harmonics)
+    total = float(np.sum(amplitudes))
+    span = float(average.values.max() - average.values.min())
+    return span / total if total > 1e-12 * span and total > 0 else float("nan")
+
+
+def fm4(difference: SynchronousAverage, *, size: float | None = None) -> float:
+    """Kurtosis of the difference signal; 3 for Gaussian noise, more where one or two teeth stand out.
+
+    FM4 = N Σ (d - d̄)⁴ / (Σ (d - d̄)²)². `size`: magnitude against which the difference may be mere rounding.
+    Falls back when damage spreads to many teeth. Source: Stewart 1977, see `fm0`.
+    """
+    _check_kind(difference, "difference")
+    return standardised_moment(difference.values, 4, size)
+
+
+def m6a(difference: SynchronousAverage, *, size: float | None = None) -> float:
+    """Sixth standardised moment of the difference signal; 15 for Gaussian noise.
+
+    M6A = N² Σ (d - d̄)⁶ / (Σ (d - d̄)²)³. More sensitive to single peaks than FM4.
+
+    Source: H. R. Martin, "Statistical moment analysis as a means of surface damage detection", 7th International Modal
+    Analysis Conference, 1989.
+    """
+    _check_kind(difference, "difference")
+    return standardised_moment(difference.values, 6, size)
+
+
+def m8a(difference: SynchronousAverage, *, size: float | None = None) -> float:
+    """Eighth standardised moment of the difference signal; 105 for Gaussian noise.
+
+    M8A = N³ Σ (d - d̄)⁸ / (Σ (d - d̄)²)⁴. Source: Martin 1989, see `m6a`.
+    """
+    _check_kind(difference, "difference")
+    return standardised_moment(difference.values, 8, size)
+
+
+def energy_ratio(difference: SynchronousAverage, regular: SynchronousAverage | FloatArray) -> float:
+    """Standard deviation of the difference over that of the regular signal; rises with wear on many teeth.
+
+    ER = σ(d)/σ(y), y the regular signal, or average minus difference as an array. nan for a constant regular signal.
+
+    Source: N. S. Swansson, "Application of vibration signal analysis techniques to signal monitoring", 1980.
+    """
+    _check_kind(difference, "difference")
+    if isinstance(regular, SynchronousAverage):
+        _check_kind(regular, "regular")
+        regular = regular.values
+    size = float(np.abs(regular).max())
+    if is_constant(regular, max(size, float(np.abs(difference.values).max()))):
+        return float("nan")
+    return float(np.std(difference.values) / np.std(regular))
+
+
+def energy_operator(signal: SynchronousAverage) -> float:
+    """Kurtosis of the Teager–Kaiser energy ψ_i = x_i² - x_{i-1} x_{i+1}, the ends joined.
+
+    ψ is about (amplitude × frequency)²: a tooth that changes amplitude or phase locally makes a peak in it.
+
+    Parameters
+    ----------
+    signal : SynchronousAverage
+        The average, as reviews have it, or the band-passed mesh, for which ψ has its meaning of one modulated carrier.
+
+    Returns
+    -------
+    float
+        nan for a pure sine, whose ψ is constant.
+
+    Notes
+    -----
+    Emphasises high orders, with the number of samples per revolution: compare only at the same one.
+
+    References
+    ----------
+    J. Ma, "Energy operator and other demodulation approaches to gear defect detection", 1995.
+    """
+    _check_kind(signal, "average", "band-passed mesh", "residual", "difference")
+    scale = float(np.abs(signal.values).max())
+    if scale == 0.0:
+        return float("nan")
+    x = signal.values / scale
+    return standardised_moment(x * x - np.roll(x, 1) * np.roll(x, -1), 4, size=1.0)
+
+
+def sideband_index(average: SynchronousAverage, teeth: int) -> float:
+    """Mean amplitude of the two first-order sidebands of the mesh fundamental, in the average's unit.
+
+    SI = (A(z-1) + A(z+1))/2; A m/2 for a carrier A with amplitude modulation m at shaft order 1. nan where a sideband
+    lies above the average's highest order.
+
+    Source: P. Večeř, M. Kreidl, R. Šmíd, "Condition indicators for gearbox condition monitoring systems", Acta
+    Polytechnica 45 (2005).
+    """
+    _check_kind(average, "average")
+    z = count(teeth, "teeth", minimum=3)
+    return 0.5 * (line_amplitude(average, z - 1) + line_amplitude(average, z + 1))
+
+
+def sideband_level_factor(average: SynchronousAverage, teeth: int) -> float:
+    """Sum of the two first-order sidebands of the mesh fundamental over the average's standard deviation.
+
+    SLF = (A(z-1) + A(z+1))/σ(x). Source: Večeř et al. 2005, see `sideband_index`.
+    """
+    if is_constant(average.values):
+        return float("nan")
+    return 2 * sideband_index(average, teeth) / float(np.std(average.values))
+
+
+def gear_indicators(
+    average: SynchronousAverage,
+    residual: SynchronousAverage,
+    difference: SynchronousAverage,
+    band_passed_mesh: SynchronousAverage | None = None,
+    *,
+    teeth: int,
+    gear: str = "",
+    history: Sequence[SynchronousAverage] = (),
+    band_history: Sequence[SynchronousAverage] = (),
+    healthy: Sequence[bool] | None = None,
+) -> tuple[Indicator, ...]:
+    """Return all indicators of one gear in one record.
+
+    Parameters
+    ----------
+    average, residual, difference, band_passed_mesh : SynchronousAverage
+        Of those kinds, as `gearsig.orders` makes them. Without the mesh band its indicators are left out.
+    teeth : int
+    gear : str
+        "pair/shaft".
+    history : sequence of SynchronousAverage
+        Residuals of earlier records, oldest first, for NA4 and NA4*.
+    band_history : sequence of SynchronousAverage
+        Their mesh bands, for NB4 and NB4*.
+    healthy : sequence of bool or None
+        Which records of `history` (and `band_history`) were in good condition; None: all, see `healthy_records`.
+
+    Returns
+    -------
+    tuple of Indicator
+        Undefined ones are nan, with a note.
+
+    Raises
+    ------
+    InputError
+        On signals of another kind, or of different gears.
+    """
+    for part in (residual, difference, *([band_passed_mesh] if band_passed_mesh else [])):
+        if (part.shaft, part.channel, len(part.values)) != (average.shaft, average.channel, len(average.values)):
+            raise InputError(
+                f"the {part.kind} belongs to shaft {part.shaft!r}, channel {part.channel!r}",
+                allowed=f"shaft {average.shaft!r}, channel {average.channel!r}, the same number of angles",
+            )
+    size = float(np.abs(average.values).max())
+    rows = [*_single(average, difference, teeth), *_trend(residual, history, healthy, "NA4", "the residual", size)]
+    if band_passed_mesh is not None:
+        rows.append(("energy operator", energy_operator(band_passed_mesh), "", "band-passed mesh", _NO_MODULATION))
+        rows += _trend(band_passed_mesh, band_history, healthy, "NB4", "the mesh band's envelope", size)
+    return tuple(
+        Indicator(name, value, unit, average.channel, computed_on, average.shaft, gear, note=note)
+        for name, value, unit, computed_on, note in _notes_of_undefined_only(rows)
+    )
+
+
+_Row = tuple[str, float, str, str, str]
+
+_NO_MODULATION = "undefined: the signal is one unmodulated order"
+_TREND = "trend indicator"
+
+
+def _single(average: SynchronousAverage, difference: SynchronousAverage, teeth: int) -> Iterator[_Row]:
+    size = float(np.abs(average.values).max())
+    empty = "undefined: the difference holds nothing but rounding"
+    out_of_reach = f"undefined: order {teeth + 1} lies above the average's highest order {average.highest_order:g}"
+    yield ("FM0", fm0(average, teeth), "", "synchronous average", "undefined: no mesh harmonic is in the average")
+    for name, function in (("FM4", fm4), ("M6A", m6a), ("M8A", m8a)):
+        yield (name, function(difference, size=size), "", "difference", empty)
+    regular = average.values - difference.values
+    yield ("energy ratio", energy_ratio(difference, regular), "", "difference", "undefined: no regular signal")
+    yield ("energy operator", energy_operator(average), "", "synchronous average", _NO_MODULATION)
+    yield ("sideband index", sideband_index(average, teeth), average.unit, "synchronous average", out_of_reach)
+    yield ("sideband level factor", sideband_level_factor(average, teeth), "", "synchronous average", out_of_reach)
+
+
+def _trend(
+    signal: SynchronousAverage,
+    history: Sequence[SynchronousAverage],
+    healthy: Sequence[bool] | None,
+    name: str,
+    of: str,
+    size: float,
+) -> Iterator[_Row]:
+    if is_constant(signal.values, size):
+        empty = f"undefined: {signal.kind} holds nothing but rounding"
+        yield from ((n, float("nan"), "", signal.kind, empty) for n in (name, f"{name}*"))
+        return
+    good = list(history) if healthy is None else [h for h, ok in zip(history, healthy, strict=True) if ok]
+    plain, star = (na4, na4_star) if name == "NA4" else (nb4, nb4_star)
+    alone = f"{_TREND} without earlier records: the kurtosis of {of}"
+    note = f"{_TREND} over {len(history)} earlier record(s)" if history else alone
+    yield (name, plain(signal, history), "", signal.kind, note)
+    star_note = f"over the variance of {len(good)} healthy record(s)" if good else "undefined: needs healthy records"
+    yield (f"{name}*", star(signal, good), "", signal.kind, star_note)
+
+
+def _notes_of_undefined_only(rows: Sequence[_Row]) -> Iterator[_Row]:
+    for name, value, unit, computed_on, note in rows:
+        said = note
+        if isnan(value) and not note.startswith("undefined"):
+            said = f"undefined: the signal is constant; {note}"
+        elif not isnan(value) and note.startswith("undefined"):
+            said = ""
+        yield (name, value, unit, computed_on, said)
+
+
+def line_amplitude(average: SynchronousAverage, order: int) -> float:
+    """Peak amplitude of a whole order of the average; nan above its highest order."""
+    n = len(average.values)
+    if order > average.highest_order or 2 * order > n:
+        return float("nan")
+    angle = 2 * np.pi * ((order * np.arange(n)) % n) / n
+    line = np.sum(average.values * np.cos(angle)) - 1j * np.sum(average.values * np.sin(angle))
+    return float(abs(line)) * (1.0 if order == 0 or 2 * order == n else 2.0) / n
+
+
+def mesh_amplitudes(average: SynchronousAverage, teeth: int, n_harmonics: int | None = None) -> FloatArray:
+    """Peak amplitudes of the mesh harmonics that the average holds, (n_harmonics,)."""
+    z = count(teeth, "teeth", minimum=3)
+    highest = min(average.highest_order, len(average.values) / 2)
+    n = int(highest // z) if n_harmonics is None else min(count(n_harmonics, "n_harmonics"), int(highest // z))
+    return np.array([line_amplitude(average, h * z) for h in range(1, n + 1)])
+
+
+def _check_kind(signal: SynchronousAverage, *allowed: str) -> None:
+    if signal.kind not in allowed:
+        raise InputError(
+            f"a signal of kind {signal.kind!r} was given", allowed=", ".join(allowed), remedy="see gearsig.orders"
+        )

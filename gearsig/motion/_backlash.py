@@ -1,0 +1,243 @@
+"""Backlash from reversals of a loaded gear pair: where the flanks would touch without load."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray
+from gearsig.errors import RefusalError
+from gearsig.motion._segments import MotionSegments
+from gearsig.motion._types import PairMotion
+
+LOADED = 0.1
+"""Part of the ordinary load from which on a sample tells where a flank is."""
+LEAST_SAMPLES = 12
+"""On either flank."""
+FAR = 4.0
+"""Standard deviations from the fit beyond which a sample is left out: the middle of a blow, a slipped count."""
+MOST_ROUNDS = 20
+LEAST_PART = 0.5
+"""Of the rig's play: without torque, less is the deflection of one flank and not the way to the other."""
+
+
+@dataclass(frozen=True)
+class BacklashEstimate:
+    """Play between the flanks.
+
+    Parameters
+    ----------
+    backlash_um : float
+        2a along the line of action, from flank to flank, without load.
+    uncertainty_um : float
+        One standard deviation, with the samples' dependence on each other.
+    datum_m : float
+        Compression in the middle of the play.
+    stiffness_n_per_m_lambda : float
+        Of one tooth pair, that came out with it; nan where it was taken from the rig.
+    n_drive, n_back : int
+        Samples on either flank.
+    scatter_um : float
+        Of the samples around the fit.
+    method : str
+    """
+
+    backlash_um: float
+    uncertainty_um: float
+    datum_m: float
+    stiffness_n_per_m_lambda: float
+    n_drive: int
+    n_back: int
+    scatter_um: float
+    method: str
+
+
+def estimate_backlash(motion: PairMotion) -> BacklashEstimate:
+    """Estimate the backlash from a motion that loads both flanks.
+
+    With torque, q = q₀ + s a + s κ (|F|/n)^{1/λ} is fitted to all loaded samples: s the sign of F = (τ − J1 α1)/r_b1, n
+    the pairs in contact, and κ = k^{−1/λ} free, so that the elastic part is measured and not taken from the rig.
+    Outliers beyond four standard deviations are left out. Without torque, the distance between the middle positions on
+    both flanks is given: it contains the deflection of both.
+
+    Raises
+    ------
+    RefusalError
+        If only one flank was loaded, as there was no reversal; or neither, as the machine stood.
+
+    Notes
+    -----
+    The interval knows the noise of the angles, not eccentric gears or bent shafts, which move q within a revolution.
+    """
+    force = motion.tooth_force_from_torque_n
+    if force is None:
+        return _lost_motion(motion)
+    loaded = np.abs(force) > LOADED * float(np.quantile(np.abs(force), 0.9))
+    side = np.sign(force)
+    _check_sides(int(np.sum(loaded & (side > 0))), int(np.sum(loaded & (side < 0))))
+    n_pairs = motion.path.n_pairs(motion.driver_angle_rad, side)
+    elastic = side * (np.abs(force) / n_pairs) ** (1.0 / motion.contact.exponent)
+    design = np.stack([np.ones(len(force)), side, elastic], axis=1)
+    return _fitted(motion, design, loaded)
+
+
+def _fitted(motion: PairMotion, design: FloatArray, loaded: NDArray[np.bool_]) -> BacklashEstimate:
+    q = motion.compression_m
+    keep = loaded
+    for _ in range(MOST_ROUNDS):
+        x, *_ = np.linalg.lstsq(design[keep], q[keep], rcond=None)
+        left = q - design @ x
+        scatter = 1.4826 * float(np.median(np.abs(left[keep]))) or float(np.finfo(float).tiny)
+        again = loaded & (np.abs(left) < FAR * scatter)
+        _check_sides(int(np.sum(again & (design[:, 1] > 0))), int(np.sum(again & (design[:, 1] < 0))))
+        if np.array_equal(again, keep):
+            break
+        keep = again
+    if not x[1] > 0.0:
+        raise RefusalError(
+            f"the flanks come out {2e6 * float(x[1]):.3g} µm apart: torque does not tell which of them carries",
+            remedy="record a start and a braked stop: both flanks must carry",
+        )
+    inverse = np.linalg.pinv(design[keep].T @ design[keep])
+    deviation = float(np.sqrt(np.mean(left[keep] ** 2) * inverse[1, 1] * dependence(left[keep])))
+    stiffness = float(x[2]) ** -motion.contact.exponent if x[2] > 0.0 else float("nan")
+    return BacklashEstimate(
+        2e6 * float(x[1]),
+        2e6 * deviation,
+        float(x[0]),
+        stiffness,
+        int(np.sum(keep & (design[:, 1] > 0))),
+        int(np.sum(keep & (design[:, 1] < 0))),
+        1e6 * scatter,
+        "both flanks under the measured torque, deflection taken out",
+    )
+
+
+def dependence(values: FloatArray, longest: int = 200) -> float:
+    """Factor by which the variance of a mean grows because neighbours are alike: 1 + 2 Σ ρ_k up to the first ρ_k ≤ 0.
+
+    Source: C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992), initial positive sequence.
+    """
+    centred = values - np.mean(values)
+    power = float(np.mean(centred**2))
+    if power == 0.0:
+        return 1.0
+    total = 1.0
+    for lag in range(1, min(longest, len(values) - 1)):
+        rho = float(np.mean(centred[:-lag] * centred[lag:])) / power
+        if rho <= 0.0:
+            break
+        total += 2.0 * rho
+    return total
+
+
+def _lost_motion(motion: PairMotion) -> BacklashEstimate:
+    """Distance between the middle positions on both flanks while the gears turn."""
+    speed = np.abs(motion.driver_speed_rad_s)
+    turning = speed > 0.05 * float(np.quantile(speed, 0.95))
+    q = motion.compression_m
+    low, high = np.quantile(q[turning], [0.01, 0.99])
+    middle = 0.5 * (low + high)
+    near = 0.2 * (high - low)
+    drive, back = q[turning & (q > high - near)], q[turning & (q < low + near)]
+    _check_sides(len(drive), len(back))
+    scatter = 1.4826 * float(np.median(np.abs(drive - np.median(drive))))
+    drawn = 2e-6 * motion.contact.half_backlash_um
+    if high - low < max(6.0 * scatter, LEAST_PART * drawn):
+        raise RefusalError(
+            f"the flanks move by {1e6 * (high - low):.3g} µm against each other, the play drawn is {1e6 * drawn:.3g} "
+            f"µm and the noise {1e6 * scatter:.2g} µm: only one flank was loaded, or it cannot be told",
+            remedy="record a start and a braked stop; better with torque",
+        )
+    deviations = [1.25 * float(np.std(x)) * np.sqrt(dependence(x) / len(x)) for x in (drive, back)]
+    return BacklashEstimate(
+        1e6 * float(np.median(drive) - np.median(back)),
+        1e6 * float(np.hypot(*deviations)),
+        float(middle),
+        float("nan"),
+        len(drive),
+        len(back),
+        1e6 * scatter,
+        "lost motion: distance between both flanks, with the deflection of both",
+    )
+
+
+def _check_sides(n_drive: int, n_back: int) -> None:
+    if min(n_drive, n_back) < LEAST_SAMPLES:
+        raise RefusalError(
+            f"{n_drive} samples load the drive flank and {n_back} the back flank: the play between them does not show",
+            remedy="record a reversal, or a stop with a brake: both flanks must carry",
+        )
+
+
+# --------------------
+# Torque over twist: the loop that play and friction make, and the work it takes.
+# --------------------
+
+
+LIGHT = (0.1, 0.5)
+"""Parts of the ordinary torque between which flanks touch and hardly yield."""
+
+
+@dataclass(frozen=True)
+class TorqueTwist:
+    """The loop of torque over twist of the pair.
+
+    Parameters
+    ----------
+    twist_rad : array, (n,)
+        Driver's angle less the driven gear's times the ratio, from the middle of the play.
+    torque_nm : array, (n,)
+        On the driver's shaft.
+    lost_motion_rad : float
+        Width of the loop at a light load, between both signs of the torque: the play as the driver's shaft feels it;
+        nan where the torque has one sign.
+    loss_per_cycle_j : float
+        ∮ τ dδ per stretch of motion: what contact and friction of the teeth take; nan where the motion neither stops
+        nor reverses, as no loop closes then.
+    work_per_cycle_j : float
+        ∫ τ dθ1 per stretch of motion: what goes through the shaft; nan likewise.
+    n_cycles : int
+    """
+
+    twist_rad: FloatArray
+    torque_nm: FloatArray
+    lost_motion_rad: float
+    loss_per_cycle_j: float
+    work_per_cycle_j: float
+    n_cycles: int
+
+
+def torque_twist(motion: PairMotion, course: MotionSegments, datum_m: float) -> TorqueTwist:
+    """Return the loop of a start–stop motion.
+
+    Raises
+    ------
+    RefusalError
+        If no torque was measured.
+    """
+    if motion.torque_nm is None:
+        raise RefusalError("no torque was measured", remedy="record the torque of the driver's shaft")
+    r1 = motion.path.base_radii_m[0]
+    twist = (motion.compression_m - datum_m) / r1
+    torque = motion.torque_nm
+    n_cycles = len(course.moving) if course.stops_s or course.n_reversals else 0
+    share = 1.0 / (n_cycles * motion.sampling_rate_hz) if n_cycles else float("nan")
+    return TorqueTwist(
+        twist,
+        torque,
+        _width(twist, torque),
+        float(np.trapezoid(torque * motion.compression_rate_mps / r1, dx=share)),
+        float(np.trapezoid(torque * motion.driver_speed_rad_s, dx=share)),
+        n_cycles,
+    )
+
+
+def _width(twist_rad: FloatArray, torque_nm: FloatArray) -> float:
+    """Distance between the median twists at a light torque of either sign."""
+    ordinary = float(np.quantile(np.abs(torque_nm), 0.95))
+    light = (np.abs(torque_nm) > LIGHT[0] * ordinary) & (np.abs(torque_nm) < LIGHT[1] * ordinary)
+    sides = [twist_rad[light & (torque_nm > 0.0)], twist_rad[light & (torque_nm < 0.0)]]
+    return float(np.median(sides[0]) - np.median(sides[1])) if all(len(side) for side in sides) else float("nan")

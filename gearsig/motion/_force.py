@@ -1,0 +1,449 @@
+"""Force between the teeth from measured motion: the piecewise model, Hunt–Crossley, Kelvin–Voigt."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gearsig.checks import FloatArray, count, frozen_array
+from gearsig.errors import InputError, RefusalError
+from gearsig.motion._measure import find_roles, measure_motion, role_values
+from gearsig.motion._types import Datum, ForceError, ForceEstimate, PairMotion
+from gearsig.recording import Recording
+from gearsig.rig import Rig, ToothContact, contact_pair, path_of_contact
+
+# --------------------
+# Force of a contact from depth and closing speed, sample by sample.
+# --------------------
+
+
+SLIDING_SIGN_MPS = 2e-3
+"""Sliding speed below which the sign of friction is brought over smoothly: bristles that bend are not followed."""
+
+
+def depth(compression_m: FloatArray, half_backlash_m: float) -> FloatArray:
+    """g: beyond the backlash, with the flank's sign; 0 in the gap."""
+    g: FloatArray = np.sign(compression_m) * np.maximum(np.abs(compression_m) - half_backlash_m, 0.0)
+    return g
+
+
+def latched_damping(g: FloatArray, rate_mps: FloatArray, contact: ToothContact) -> FloatArray:
+    """β in s/m at each sample, from the speed at the last sample before the flanks touched; 0 in the gap.
+
+    The speed is latched for the whole contact, with the floor: b = f/v of the speed at each instant would grow without
+    bound where the flanks come to rest.
+    """
+    side = np.sign(g)
+    begins = np.flatnonzero((side != 0.0) & (np.concatenate([[0.0], side[:-1]]) != side))
+    if not len(begins):
+        return np.zeros_like(g)
+    speed = np.maximum(np.abs(rate_mps[np.maximum(begins - 1, 0)]), contact.impact_speed_floor_mps)
+    latest = np.searchsorted(begins, np.arange(len(g)), side="right") - 1
+    beta = contact.damping_ratio_at(1.0) * max(1.0, contact.impact_speed_floor_mps) / speed
+    return np.where(side != 0.0, beta[np.maximum(latest, 0)], 0.0)
+
+
+def pair_force(g: FloatArray, rate_mps: FloatArray, damping_s_per_m: FloatArray, contact: ToothContact) -> FloatArray:
+    """Force of one tooth pair, k sgn(g)|g|^λ (1 + β ġ), never tension: above 0 on the drive flank."""
+    side = np.sign(g)
+    growth = np.maximum(1.0 + damping_s_per_m * side * rate_mps, 0.0)
+    force: FloatArray = side * contact.stiffness_n_per_m_lambda * np.abs(g) ** contact.exponent * growth
+    return force
+
+
+def friction_share(motion: PairMotion, g: FloatArray, gear: int = 0) -> FloatArray:
+    """Mean of 1 − μ sgn(v_s) tan α_k over the pairs that touch: what a gear's torque feels of the normal force.
+
+    tan α_k = ρ/r_b at the point of contact, of the driver (gear 0) or the driven gear (1); the sign changes at the
+    pitch point, so that the share is 1 ∓ 0.018 there for μ = 0.05 and 20°.
+    """
+    path = motion.path
+    flank = np.where(g < 0.0, -1.0, 1.0)
+    first = path.position(motion.driver_angle_rad, flank)
+    n = path.n_pairs(motion.driver_angle_rad, flank)
+    total = np.zeros_like(g)
+    for younger in (0.0, 1.0):
+        rho_1 = path.driver_lever_m(first + younger)
+        sliding = flank * (motion.driven_speed_rad_s * (path.length_m - rho_1) - motion.driver_speed_rad_s * rho_1)
+        sign = np.clip(sliding / SLIDING_SIGN_MPS, -1.0, 1.0)
+        lever = (rho_1, path.length_m - rho_1)[gear]
+        share = 1.0 - motion.contact.friction_coefficient * sign * lever / path.base_radii_m[gear]
+        total += np.where((younger == 0.0) | (n > 1.5), share, 0.0)
+    result: FloatArray = total / n
+    return result
+
+
+# --------------------
+# The zero of the compression: encoders start anywhere, and a loaded flank gives way by hundredths of a millimetre.
+# --------------------
+
+
+LOADED = 0.2
+"""Part of the load of one sample in twenty from which on a sample counts as loaded: no single blow decides."""
+LEAST_SAMPLES = 20
+AGREEMENT = 0.35
+"""How far the width between both flanks may be from the rig's backlash, as a part of it, for a datum without torque."""
+
+
+def find_datum(motion: PairMotion, wanted: str | float = "auto") -> Datum:
+    """Return the compression at which the teeth stand in the middle of the backlash.
+
+    Parameters
+    ----------
+    motion : PairMotion
+    wanted : str or float
+        "auto": from the torque where there is one, else midway between the two flanks; "zero": the angles count from
+        the middle of the backlash; a number: that compression in m.
+
+    Raises
+    ------
+    RefusalError
+        If there is no torque and the teeth did not touch both flanks.
+    """
+    if isinstance(wanted, str):
+        if wanted == "zero":
+            return Datum(0.0, float("nan"), "the angles' own zero")
+        if wanted != "auto":
+            raise InputError(f"datum is {wanted!r}", allowed="auto, zero, or a compression")
+        return _from_torque(motion) if motion.torque_nm is not None else _between_flanks(motion)
+    return Datum(float(wanted), float("nan"), "given")
+
+
+def elastic_depth(motion: PairMotion, force_n: FloatArray) -> FloatArray:
+    """Depth with sign at which the pairs that touch carry a force at rest."""
+    contact, path = motion.contact, motion.path
+    n = path.n_pairs(motion.driver_angle_rad, np.sign(force_n))
+    yielding: FloatArray = np.sign(force_n) * (np.abs(force_n) / (n * contact.stiffness_n_per_m_lambda)) ** (
+        1.0 / contact.exponent
+    )
+    return yielding
+
+
+def _from_torque(motion: PairMotion) -> Datum:
+    """Median of q − sgn(F) a − g(F) over loaded samples: the mean depth then carries the measured torque."""
+    force = motion.tooth_force_from_torque_n
+    assert force is not None  # noqa: S101  the caller has looked
+    loaded = np.abs(force) > LOADED * np.quantile(np.abs(force), 0.95)
+    if np.count_nonzero(loaded) < LEAST_SAMPLES or not np.any(force):
+        raise RefusalError(
+            f"{np.count_nonzero(loaded)} samples carry a load: the zero of the compression cannot be found",
+            remedy="record while the machine drives, or tell the zero to gearsig force by --datum",
+        )
+    a = motion.contact.half_backlash_um * 1e-6
+    zero = (motion.compression_m - np.sign(force) * a - elastic_depth(motion, force))[loaded]
+    middle = float(np.median(zero))
+    spread = 1.4826 * float(np.median(np.abs(zero - middle)))
+    return Datum(middle, 1.25 * spread / np.sqrt(len(zero)), f"from the torque, {len(zero)} loaded samples")
+
+
+def _between_flanks(motion: PairMotion) -> Datum:
+    low, high = np.quantile(motion.compression_m, [0.01, 0.99])
+    play = 2e-6 * motion.contact.half_backlash_um
+    if not play or abs(high - low - play) > AGREEMENT * play:
+        raise RefusalError(
+            f"there is no torque, and the distance between the flanks spans {1e6 * (high - low):.4g} µm where the "
+            f"backlash is {1e6 * play:.4g} µm: which flank touches cannot be told",
+            remedy="record the torque, or a start and stop that touches both flanks, or tell the zero to gearsig force "
+            "by --datum",
+        )
+    return Datum(
+        float(low + high) / 2.0,
+        float(high - low - play) / 2.0,
+        "midway between both flanks; they may yield differently",
+    )
+
+
+PIECEWISE = "piecewise"
+AS_PRINTED = "piecewise, as printed"
+HUNT_CROSSLEY = "Hunt–Crossley"
+KELVIN_VOIGT = "Kelvin–Voigt"
+TEETH = "piecewise, teeth alone"
+FROM_TORQUE, TOOTH_FORCE = "torque / rb1", "tooth force"
+
+
+def estimate_forces(motion: PairMotion, *, datum: str | float = "auto") -> ForceEstimate:
+    """Estimate the force between the teeth at every sample.
+
+    - piecewise: Σ over the pairs in contact of k sgn(g)|g|^λ (1 + β ġ)(1 ∓ μ tan α_k), plus J1 α1/r_b1 of what turns
+      between torque sensor and teeth: comparable with τ/r_b1. Pairs by the driver's angle, forwards and backwards.
+    - piecewise, teeth alone: without the inertia and the friction's share, the normal force itself.
+    - piecewise, as printed: with J2/r_b2² · q̈ instead of J1 α1/r_b1. For two free bodies that is the force with the
+      opposite sign; in a driven gear it counts the load's inertia in the pinion's torque.
+    - Hunt–Crossley: k δ^λ (1 + β δ̇) of one pair on the drive flank, δ from where the flanks touch.
+    - Kelvin–Voigt: k' δ + b' δ̇, likewise, k' and b' such that both agree with Hunt–Crossley at the median load.
+
+    Parameters
+    ----------
+    motion : PairMotion
+    datum : str or float
+        See `gearsig.motion.find_datum`.
+
+    Returns
+    -------
+    ForceEstimate
+        With errors against τ/r_b1 and against a measured or simulated tooth force, where there are.
+
+    Notes
+    -----
+    A micrometre of the compression is worth λF/g: some 130 N of 2 kN on stiff teeth. With an encoder of less than some
+    10⁶ counts this is no measurement of force; see `gearsig.motion`.
+
+    Source: Z. Xu, H. Deng, Y. Zhang, Piecewise nonlinear dynamic modeling for gear transmissions with rotary inertia
+    and backlash, with sgn(g)|g|^λ for g^λ, base radii for reference radii, μ tan α_k for μ cot β, one mass also in
+    double contact, and the speed of impact latched.
+    """
+    found = find_datum(motion, datum)
+    contact = motion.contact
+    q = motion.compression_m - found.compression_m
+    g = depth(q, contact.half_backlash_um * 1e-6)
+    rate = motion.compression_rate_mps
+    beta = latched_damping(g, rate, contact)
+    n = np.where(g != 0.0, motion.path.n_pairs(motion.driver_angle_rad, np.sign(g)), 0.0)
+    normal = n * pair_force(g, rate, beta, contact)
+    at_shaft = normal * friction_share(motion, g)
+    r1, r2 = motion.path.base_radii_m
+    forces = {PIECEWISE: at_shaft + contact.driver_inertia_kg_m2 * motion.driver_acceleration_rad_s2 / r1}
+    if motion.force_n is not None:
+        forces[TEETH] = normal
+    if contact.driven_inertia_kg_m2 is not None:
+        forces[AS_PRINTED] = at_shaft + contact.driven_inertia_kg_m2 / r2**2 * motion.compression_acceleration_mps2
+    drive = np.maximum(g, 0.0)
+    drive_beta = np.where(g > 0.0, beta, 0.0)
+    forces[HUNT_CROSSLEY] = pair_force(drive, rate, drive_beta, contact)
+    stiffness, damping = _linear(forces[HUNT_CROSSLEY], drive, contact.damping_ratio_at(0.0))
+    forces[KELVIN_VOIGT] = np.where(g > 0.0, stiffness * drive + damping * rate, 0.0)
+    references = _references(motion)
+    return ForceEstimate(
+        motion,
+        found,
+        g,
+        n,
+        forces,
+        references,
+        _errors(forces, references),
+        _descriptions(motion, stiffness, damping, set(forces)),
+    )
+
+
+def inverse_force_n(
+    acceleration_mps2: FloatArray, contact_force_n: FloatArray, mass_kg: float, ratio: float
+) -> FloatArray:
+    """Return m2 q̈ + γ f, the source's inverse formula; for two free bodies with γ = m2/m1 it is −f.
+
+    q̈ = −f/m1 − f/m2 of free bodies gives m2 q̈ + (m2/m1) f = −f: an identity of the motion, to recover the force from a
+    measured acceleration. As a law of motion it would count the inertia twice.
+    """
+    result: FloatArray = mass_kg * acceleration_mps2 + ratio * contact_force_n
+    return result
+
+
+def compare(model: str, force_n: FloatArray, reference: str, reference_n: FloatArray) -> ForceError:
+    """Return the error of a force against a reference."""
+    error = force_n - reference_n
+    size = float(np.sqrt(np.mean(reference_n**2)))
+    moving = float(np.std(force_n)) > 0.0 and float(np.std(reference_n)) > 0.0
+    rms = float(np.sqrt(np.mean(error**2)))
+    return ForceError(
+        model,
+        reference,
+        rms,
+        rms / size if size > 0.0 else float("nan"),
+        float(np.mean(error)),
+        float(np.max(np.abs(error))),
+        float(np.corrcoef(force_n, reference_n)[0, 1]) if moving else float("nan"),
+    )
+
+
+def _references(motion: PairMotion) -> dict[str, FloatArray]:
+    found: dict[str, FloatArray] = {}
+    if motion.shaft_force_n is not None:
+        found[FROM_TORQUE] = motion.shaft_force_n
+    if motion.force_n is not None:
+        found[TOOTH_FORCE] = motion.force_n
+    return found
+
+
+def _errors(forces: Mapping[str, FloatArray], references: Mapping[str, FloatArray]) -> tuple[ForceError, ...]:
+    """Compare each model with each reference; of the piecewise forms each with what it stands for."""
+    unfit = {(TEETH, FROM_TORQUE), (PIECEWISE, TOOTH_FORCE), (AS_PRINTED, TOOTH_FORCE)}
+    return tuple(
+        compare(model, force, name, reference)
+        for name, reference in references.items()
+        for model, force in forces.items()
+        if (model, name) not in unfit
+    )
+
+
+def _linear(force_n: FloatArray, depth_m: FloatArray, floor_beta: float) -> tuple[float, float]:
+    """Secant stiffness and damping of Hunt–Crossley at the median loaded depth."""
+    loaded = depth_m > 0.0
+    if not np.any(loaded):
+        raise RefusalError(
+            "the drive flanks never touch by this datum, backlash and stiffness",
+            remedy="check half_backlash_um in the rig's [contact] and --datum",
+        )
+    middle, force = float(np.median(depth_m[loaded])), float(np.median(force_n[loaded]))
+    return force / middle, floor_beta * force
+
+
+def _descriptions(motion: PairMotion, stiffness: float, damping: float, names: set[str]) -> dict[str, str]:
+    c = motion.contact
+    law = (
+        f"k {c.stiffness_n_per_m_lambda:.4g} N/m^{c.exponent:g}, λ {c.exponent:g}, half backlash "
+        f"{c.half_backlash_um:.4g} µm, restitution {c.restitution:g} ({c.damping_law})"
+    )
+    r2 = motion.path.base_radii_m[1]
+    texts = {
+        PIECEWISE: f"both flanks, ε {motion.path.contact_ratio:.4g}, μ {c.friction_coefficient:g}, {law}; plus J1 "
+        f"α1/rb1, J1 {c.driver_inertia_kg_m2:.4g} kg m²",
+        TEETH: f"the same, normal force of the teeth alone; {law}",
+        AS_PRINTED: f"the same with J2/rb2² q̈ = {(c.driven_inertia_kg_m2 or 0.0) / r2**2:.4g} kg · q̈ for the inertia",
+        HUNT_CROSSLEY: f"one pair, drive flank; {law}",
+        KELVIN_VOIGT: f"one pair, drive flank; {stiffness:.4g} N/m and {damping:.4g} N s/m, at the median load",
+    }
+    return {name: text for name, text in texts.items() if name in names}
+
+
+# --------------------
+# Noise of the motion at which the piecewise model is no better than Hunt–Crossley.
+# --------------------
+
+
+LEVELS_UM = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+
+
+@dataclass(frozen=True)
+class NoiseStudy:
+    """Errors of the models over added noise.
+
+    Parameters
+    ----------
+    levels_um : array, (n_levels,)
+        Standard deviation of white noise that was added to the compression, from sample to sample.
+    reference : str
+    rms_n : mapping
+        Model → (n_levels,), root mean square error over all draws.
+    crossover_um : float or None
+        Noise at which the piecewise model is as far off as Hunt–Crossley; None: better at all levels, or at none.
+    """
+
+    levels_um: FloatArray
+    reference: str
+    rms_n: Mapping[str, FloatArray]
+    crossover_um: float | None
+
+    @property
+    def text(self) -> str:
+        """The answer in a sentence."""
+        ratio = self.rms_n[PIECEWISE] / self.rms_n[HUNT_CROSSLEY]
+        if self.crossover_um is not None:
+            return (
+                f"The piecewise model is nearer than Hunt–Crossley up to {self.crossover_um:.3g} µm of added noise in "
+                f"the compression; without added noise its error is {100.0 * ratio[0]:.3g} % of Hunt–Crossley's."
+            )
+        if np.all(ratio < 1.0):
+            return f"The piecewise model is nearer than Hunt–Crossley at all levels, up to {self.levels_um[-1]:g} µm."
+        return "The piecewise model is not nearer than Hunt–Crossley, even without added noise."
+
+
+def acceleration_limit_rad_s2(study: NoiseStudy, motion: PairMotion) -> float | None:
+    """Return the white noise on the driver's acceleration up to which the piecewise model is nearer than Hunt–Crossley.
+
+    It adds J1 σ/r_b1 to the piecewise model alone, in squares: σ = (r_b1/J1) √(rms_HC² − rms_piecewise²). None where
+    nothing turns between torque sensor and teeth, where the reference is the tooth force, or where it is never nearer.
+    """
+    inertia, r1 = motion.contact.driver_inertia_kg_m2, motion.path.base_radii_m[0]
+    own, other = float(study.rms_n[PIECEWISE][0]), float(study.rms_n[HUNT_CROSSLEY][0])
+    if inertia == 0.0 or study.reference != FROM_TORQUE or own >= other:
+        return None
+    return r1 / inertia * float(np.sqrt(other**2 - own**2))
+
+
+def noise_study(
+    recording: Recording,
+    rig: Rig | None = None,
+    *,
+    rng: np.random.Generator,
+    levels_um: Sequence[float] = LEVELS_UM,
+    n_draws: int = 3,
+    use: Mapping[str, str] | None = None,
+    bandwidth_hz: float | None = None,
+    unwrap: bool = False,
+    datum: str | float = "auto",
+) -> NoiseStudy:
+    """Add white noise to the driver's angle, and estimate the forces anew as if it had been measured so.
+
+    Parameters
+    ----------
+    recording : Recording
+        With torque or tooth force to compare with.
+    rig : Rig or None
+    rng : numpy.random.Generator
+    levels_um : sequence of float
+        Along the line of action; ascending, the first 0.
+    n_draws : int
+        Per level.
+    use, bandwidth_hz, unwrap, datum
+        As in `measure_motion` and `estimate_forces`.
+
+    Raises
+    ------
+    InputError
+        If the levels do not ascend from 0.
+    RefusalError
+        If there is nothing to compare with, or no angle of the driver.
+    """
+    levels = frozen_array(levels_um, "levels_um", ndim=1)
+    if len(levels) < 2 or levels[0] != 0.0 or np.any(np.diff(levels) <= 0.0):
+        raise InputError(f"levels_um is {levels.tolist()}", allowed="0 and more, ascending")
+    count(n_draws, "n_draws")
+    known = rig or recording.rig or Rig()
+    path = path_of_contact(known)
+    role = "driver angle"
+    name = find_roles(recording, contact_pair(known), use).get(role)
+    if name is None:
+        raise RefusalError("the driver's angle was not measured: there is nothing to add noise to")
+    unit = _unit_of(recording, known, role, name)
+    squares: dict[str, list[list[float]]] = {}
+    reference = ""
+    for level in levels:
+        draws: dict[str, list[float]] = {}
+        for _ in range(n_draws if level else 1):
+            noise = level * 1e-6 / path.base_radii_m[0] / unit * rng.standard_normal(recording.n_samples)
+            noisy = _with_added(recording, name, noise)
+            motion = measure_motion(noisy, known, use=use, bandwidth_hz=bandwidth_hz, unwrap=unwrap)
+            estimate = estimate_forces(motion, datum=datum)
+            if not estimate.references_n:
+                raise RefusalError("neither torque nor tooth force was measured", remedy="record the driver's torque")
+            reference = FROM_TORQUE if FROM_TORQUE in estimate.references_n else TOOTH_FORCE
+            for model in (PIECEWISE, HUNT_CROSSLEY, KELVIN_VOIGT):
+                wanted = TEETH if model == PIECEWISE and reference == TOOTH_FORCE else model
+                draws.setdefault(model, []).append(estimate.error(wanted, reference).rms_n ** 2)
+        for model, values in draws.items():
+            squares.setdefault(model, []).append(values)
+    rms = {model: np.array([np.sqrt(np.mean(v)) for v in values]) for model, values in squares.items()}
+    return NoiseStudy(levels, reference, rms, _crossover(levels, rms[PIECEWISE] / rms[HUNT_CROSSLEY]))
+
+
+def _crossover(levels_um: FloatArray, ratio: FloatArray) -> float | None:
+    """Level at which a ratio below 1 first reaches 1, straight between levels."""
+    above = np.flatnonzero(ratio >= 1.0)
+    if not len(above) or above[0] == 0:
+        return None
+    i = int(above[0])
+    share = (1.0 - ratio[i - 1]) / (ratio[i] - ratio[i - 1])
+    return float(levels_um[i - 1] + share * (levels_um[i] - levels_um[i - 1]))
+
+
+def _unit_of(recording: Recording, rig: Rig, role: str, name: str) -> float:
+    """Radians that one unit of the channel is worth."""
+    one = replace(recording, samples=np.ones((len(recording.channels), 1)))
+    return float(role_values(one, rig, role, name)[0])
+
+
+def _with_added(recording: Recording, name: str, noise: FloatArray) -> Recording:
+    samples = np.array(recording.samples, dtype=np.float64)
+    samples[recording.index(name)] += noise
+    return replace(recording, samples=samples)

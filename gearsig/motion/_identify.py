@@ -1,0 +1,741 @@
+"""Fit stiffness, damping, backlash, friction and inertia to a measured motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray
+from gearsig.errors import InputError, RefusalError
+from gearsig.motion._backlash import LEAST_SAMPLES, dependence, estimate_backlash
+from gearsig.motion._force import find_datum, friction_share
+from gearsig.motion._impacts import meeting_speeds
+from gearsig.motion._types import PairMotion
+from gearsig.rig import damping_ratio_s_per_m
+
+# --------------------
+# Nonlinear least squares without far samples, with a covariance that knows the noise's colour.
+# --------------------
+
+
+FAR = 5.0
+"""Standard deviations beyond which a sample is left out: flanks that just part, counts that slipped."""
+MOST_ROUNDS = 8
+ALIKE = 0.9
+N_BLOCKS = 8
+"""Of the jackknife."""
+
+
+@dataclass(frozen=True)
+class RobustFit:
+    """A solved problem.
+
+    Parameters
+    ----------
+    names : tuple of str
+    values : array, (n,)
+    covariance : array, (n, n)
+        Of the values: residual power times (JᵀJ)⁻¹, times the residuals' dependence on their neighbours; wider where
+        leaving out an eighth of the record moves a value by more than that.
+    condition : float
+        Largest over smallest singular value of the Jacobian, its columns scaled to length 1.
+    n_samples : int
+        That were kept.
+    scatter : float
+        Of their residuals.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+    condition: float
+    n_samples: int
+    scatter: float
+
+    def value(self, name: str) -> float:
+        """Return one value."""
+        return float(self.values[self.names.index(name)])
+
+    def deviation(self, name: str) -> float:
+        """Return its standard deviation."""
+        i = self.names.index(name)
+        return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+
+    def most_like(self, name: str) -> tuple[str, float]:
+        """Return the parameter whose estimate nearly goes with this one, and their correlation; no name: none does."""
+        i = self.names.index(name)
+        deviations = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
+        if not np.isfinite(deviations[i]):
+            return "", 0.0
+        correlation = self.covariance[i] / (deviations[i] * deviations)
+        correlation[i] = 0.0
+        j = int(np.argmax(np.abs(correlation)))
+        return (self.names[j], float(correlation[j])) if abs(correlation[j]) > ALIKE else ("", 0.0)
+
+
+def robust_fit(
+    residuals: Callable[[FloatArray], FloatArray],
+    first: FloatArray,
+    scale: FloatArray,
+    wanted: NDArray[np.bool_],
+    names: tuple[str, ...],
+    *,
+    least_scatter: float = 0.0,
+    with_jackknife: bool = True,
+) -> RobustFit:
+    """Minimise the squares of the wanted residuals; leave out what is far off, and again.
+
+    Parameters
+    ----------
+    residuals : callable
+        Values of the parameters, (n,) → (n_samples,).
+    first, scale : array, (n,)
+        Where to begin, and the parameters' sizes.
+    wanted : array of bool, (n_samples,)
+    names : tuple of str
+    least_scatter : float
+        What the equation itself leaves out: a sample nearer than five times that is never left out.
+    with_jackknife : bool
+        Whether the covariance is widened by it; it costs eight further solutions.
+
+    Raises
+    ------
+    RefusalError
+        If fewer samples are left than five times the parameters.
+    """
+    keep: NDArray[np.bool_] = wanted
+    x: FloatArray = first / scale
+    for _ in range(MOST_ROUNDS):
+        _check_samples(keep, len(names))
+        x, jacobian = _solve(residuals, x, scale, keep)
+        left = residuals(x * scale)
+        scatter = 1.4826 * float(np.median(np.abs(left[keep])))
+        again = wanted & (np.abs(left) <= FAR * max(scatter, least_scatter))
+        if np.array_equal(again, keep):
+            break
+        keep = again
+    _check_samples(keep, len(names))
+    lengths = np.linalg.norm(jacobian, axis=0)
+    singular = np.linalg.svd(jacobian / np.where(lengths > 0.0, lengths, 1.0), compute_uv=False)
+    inverse = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
+    inverse[lengths == 0.0, lengths == 0.0] = np.inf  # nothing depends on it: nothing is known of it
+    power = float(np.mean(left[keep] ** 2)) * dependence(left[keep])
+    covariance = np.where(inverse == 0.0, 0.0, inverse * power)
+    widened: FloatArray = np.ones(len(x))
+    if with_jackknife:
+        widened = _widening(residuals, x, scale, keep, np.sqrt(np.diag(covariance)))
+    return RobustFit(
+        names,
+        x * scale,
+        covariance * np.outer(scale * widened, scale * widened),
+        float(singular[0] / singular[-1]) if singular[-1] > 0.0 else float("inf"),
+        int(np.sum(keep)),
+        scatter,
+    )
+
+
+def _solve(
+    residuals: Callable[[FloatArray], FloatArray], x: FloatArray, scale: FloatArray, keep: NDArray[np.bool_]
+) -> tuple[FloatArray, FloatArray]:
+    """Solution and Jacobian for the samples that are kept, parameters in their scales."""
+    from scipy.optimize import least_squares
+
+    def kept(values: FloatArray) -> FloatArray:
+        left: FloatArray = residuals(values * scale)[keep]
+        return left
+
+    found = least_squares(kept, x, method="lm", x_scale="jac")
+    return np.asarray(found.x), np.asarray(found.jac)
+
+
+def _widening(
+    residuals: Callable[[FloatArray], FloatArray],
+    x: FloatArray,
+    scale: FloatArray,
+    keep: NDArray[np.bool_],
+    deviation: FloatArray,
+) -> FloatArray:
+    """Factors, 1 or more, by which the values move more than they should when a part of the record is left out.
+
+    Delete-a-block jackknife: an equation that holds here and not there shows, which residuals alone hide.
+
+    Source: H. R. Künsch, The jackknife and the bootstrap for general stationary observations, Annals of Statistics 17
+    (1989).
+    """
+    blocks = np.array_split(np.flatnonzero(keep), N_BLOCKS)
+    moved = []
+    for block in blocks:
+        rows = keep.copy()
+        rows[block] = False
+        moved.append(_solve(residuals, x, scale, rows)[0])
+    spread = np.sqrt((N_BLOCKS - 1) / N_BLOCKS * np.sum((np.array(moved) - np.mean(moved, axis=0)) ** 2, axis=0))
+    safe = np.where(np.isfinite(deviation) & (deviation > 0.0), deviation, np.inf)
+    factors: FloatArray = np.maximum(1.0, spread / safe)
+    return factors
+
+
+def _check_samples(keep: NDArray[np.bool_], n_parameters: int) -> None:
+    if np.sum(keep) < 5 * n_parameters:
+        raise RefusalError(
+            f"{np.sum(keep)} samples are left for {n_parameters} parameters", remedy="record longer, under load"
+        )
+
+
+# --------------------
+# The equation of the loaded flanks, for a fit: compression from torque.
+# --------------------
+
+
+EDGE = 0.09
+"""Base pitches around the entry and exit of a pair that are left out: there it carries a part of its load."""
+PITCH_POINT, SLOW = 0.1, 0.15
+"""Base pitches around the pitch point, and part of the ordinary speed, within which the friction of the flanks is not
+known: bristles bend."""
+LOADED = 0.1
+"""Part of the ordinary load from which on a sample is taken."""
+LEAST_SCATTER_M = 2e-8
+"""What the equation leaves out: bristles that bend, a damping that is latched a little early."""
+LONG_CONTACT, MOST_LONG = 40, 8
+"""Samples from which on a contact whose speed of meeting is not known gets a damping of its own, and how many do."""
+NAMES = ("datum", "half_backlash", "log stiffness", "damping", "driver inertia", "friction")
+
+
+@dataclass(frozen=True)
+class ContactEquation:
+    """q = q₀ + s a + s (N/(n k (1 + β ġ)))^{1/λ} with N = |τ − J1 α1|/(r_b1 (1 ∓ μ tan α_k)).
+
+    Parameters
+    ----------
+    motion : PairMotion
+    torque_nm, side, n_pairs, per_friction : array, (n,)
+        s, the pairs in contact, and the slope of the friction's share over μ.
+    meeting_speed_mps : array, (n,)
+    group : array of int, (n,)
+        Number of the damping that belongs to a sample: 0 for c/v of contacts whose speed v of meeting is known.
+    wanted : array of bool, (n,)
+    start : array
+        Values of `NAMES`, then one β for each further group.
+    free : tuple of int
+        Which of them are fitted.
+    """
+
+    motion: PairMotion
+    torque_nm: FloatArray
+    side: FloatArray
+    n_pairs: FloatArray
+    per_friction: FloatArray
+    meeting_speed_mps: FloatArray
+    group: NDArray[np.int64]
+    wanted: NDArray[np.bool_]
+    start: FloatArray
+    free: tuple[int, ...]
+
+    @property
+    def has_both_flanks(self) -> bool:
+        """Whether the play is fitted."""
+        return NAMES.index("half_backlash") in self.free
+
+    def residuals(self, values: FloatArray) -> FloatArray:
+        """Compression that is not explained, in m."""
+        p = self.start.copy()
+        p[list(self.free)] = values
+        zero, a, log_k, damping, inertia, friction = p[: len(NAMES)]
+        m = self.motion
+        share = np.maximum(1.0 + friction * self.per_friction, 0.2)
+        normal = (self.torque_nm - inertia * m.driver_acceleration_rad_s2) / (m.path.base_radii_m[0] * share)
+        betas = np.concatenate([[0.0], p[len(NAMES) :]])[self.group]
+        beta = np.where(self.group == 0, damping / self.meeting_speed_mps, betas)
+        growth = np.maximum(1.0 + beta * self.side * m.compression_rate_mps, 0.05)
+        yielding = (np.abs(normal) / (self.n_pairs * np.exp(log_k) * growth)) ** (1.0 / m.contact.exponent)
+        left: FloatArray = m.compression_m - zero - self.side * (a + yielding)
+        return left
+
+    def solve(self, *, with_jackknife: bool = True) -> RobustFit:
+        """Fit the free parameters; without the jackknife where their intervals are not wanted."""
+        names = (*NAMES, *(f"damping {i}" for i in range(1, len(self.start) - len(NAMES) + 1)))
+        rows = list(self.free)
+        inertia = max(self.motion.contact.driver_inertia_kg_m2, 1e-3)
+        scale = np.array([1e-6, 1e-6, 1.0, 0.01, inertia, 0.05, *[1.0] * (len(self.start) - len(NAMES))])
+        return robust_fit(
+            self.residuals,
+            self.start[rows],
+            scale[rows],
+            self.wanted,
+            tuple(names[i] for i in rows),
+            least_scatter=LEAST_SCATTER_M,
+            with_jackknife=with_jackknife,
+        )
+
+
+def contact_equation(motion: PairMotion) -> ContactEquation:
+    """Return the equation with the samples that it holds for.
+
+    Raises
+    ------
+    RefusalError
+        If too few samples carry a load.
+    """
+    force, torque = motion.tooth_force_from_torque_n, motion.torque_nm
+    assert force is not None  # noqa: S101  the caller has looked
+    assert torque is not None  # noqa: S101
+    side = np.sign(force)
+    wanted = (np.abs(force) > LOADED * float(np.quantile(np.abs(force), 0.95))) & _clear(motion, side)
+    if np.sum(wanted) < 10 * LEAST_SAMPLES:
+        raise RefusalError(f"{np.sum(wanted)} samples carry a load", remedy="record while the machine drives")
+    both = min(np.sum(wanted & (side > 0)), np.sum(wanted & (side < 0))) >= LEAST_SAMPLES
+    start = _start(motion, both_flanks=bool(both))
+    speed = meeting_speeds(motion, float(start[0]), float(start[1]))
+    group, n_groups = _groups(speed, wanted, side)
+    betas = np.full(n_groups, start[NAMES.index("damping")] / 0.1)
+    unit = replace(motion, contact=replace(motion.contact, friction_coefficient=1.0))
+    return ContactEquation(
+        motion,
+        torque,
+        side,
+        motion.path.n_pairs(motion.driver_angle_rad, side),
+        friction_share(unit, side) - 1.0,
+        np.where(np.isnan(speed), 1.0, speed),
+        group,
+        wanted & (group >= 0),
+        np.concatenate([start, betas]),
+        tuple(i for i in range(len(NAMES) + n_groups) if both or i != NAMES.index("half_backlash")),
+    )
+
+
+def _start(motion: PairMotion, *, both_flanks: bool) -> FloatArray:
+    """Begin at what reversals tell, else at the rig's values."""
+    c = motion.contact
+    damping = max(damping_ratio_s_per_m(c.damping_law, c.restitution, 1.0), 1e-3)
+    zero, a, k = 0.0, c.half_backlash_um * 1e-6, c.stiffness_n_per_m_lambda
+    if both_flanks:
+        play = estimate_backlash(motion)
+        zero, a = play.datum_m, 0.5e-6 * play.backlash_um
+        k = play.stiffness_n_per_m_lambda if np.isfinite(play.stiffness_n_per_m_lambda) else k
+    else:
+        zero = find_datum(motion).compression_m
+    return np.array([zero, a, np.log(k), damping, c.driver_inertia_kg_m2, c.friction_coefficient])
+
+
+def _groups(speed: FloatArray, wanted: NDArray[np.bool_], side: FloatArray) -> tuple[NDArray[np.int64], int]:
+    """Number the long contacts whose speed of meeting is not known from 1; −1 for short ones, which are left out."""
+    group = np.where(np.isnan(speed), -1, 0).astype(np.int64)
+    unknown = np.flatnonzero(np.isnan(speed))
+    if not len(unknown):
+        return group, 0
+    parts = np.split(unknown, np.flatnonzero((np.diff(unknown) > 1) | (np.diff(side[unknown]) != 0)) + 1)
+    long = sorted((p for p in parts if np.sum(wanted[p]) >= LONG_CONTACT), key=lambda p: -int(np.sum(wanted[p])))
+    for number, part in enumerate(long[:MOST_LONG], 1):
+        group[part] = number
+    return group, min(len(long), MOST_LONG)
+
+
+def _clear(motion: PairMotion, side: FloatArray) -> NDArray[np.bool_]:
+    """Samples whose pairs and friction are known: no pair comes, goes or turns its friction round."""
+    path = motion.path
+    u = path.position(motion.driver_angle_rad, side)
+    clear: NDArray[np.bool_] = (u > EDGE) & (u < 1.0 - EDGE) & (np.abs(u - (path.contact_ratio - 1.0)) > EDGE)
+    n = path.n_pairs(motion.driver_angle_rad, side)
+    for younger in (0.0, 1.0):
+        turns = np.abs(u + younger - path.pitch_point) < PITCH_POINT
+        clear &= ~(turns & ((younger == 0.0) | (n > 1.5)))
+    speed = np.abs(motion.driver_speed_rad_s)
+    clear &= speed > SLOW * float(np.quantile(speed, 0.95))
+    return clear
+
+
+# --------------------
+# Parameters of a drive from data, with intervals and what cannot be told.
+# --------------------
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """One parameter.
+
+    Parameters
+    ----------
+    name, unit : str
+    value : float
+    interval : (float, float)
+        95 %, from the curvature at the best fit and the residuals' dependence on each other.
+    is_told : bool
+        Whether the record tells it: the interval's half width is below half of the value.
+    why_not : str
+        Else, why.
+    rig_value : float or None
+        What the rig file says.
+    most_like : str
+        Parameter that could take its place, with the correlation of both estimates.
+    """
+
+    name: str
+    unit: str
+    value: float
+    interval: tuple[float, float]
+    is_told: bool
+    why_not: str = ""
+    rig_value: float | None = None
+    most_like: str = ""
+
+
+@dataclass(frozen=True)
+class Identification:
+    """Parameters of contact and load.
+
+    Parameters
+    ----------
+    parameters : tuple of FittedParameter
+    equations : mapping
+        Name of an equation → what was fitted, on how many samples, with what scatter.
+    condition : mapping
+        Name of an equation → ratio of the largest to the smallest singular value of its scaled Jacobian.
+    source : str
+    """
+
+    parameters: tuple[FittedParameter, ...]
+    equations: Mapping[str, str]
+    condition: Mapping[str, float]
+    source: str = ""
+
+    def parameter(self, name: str) -> FittedParameter:
+        """Return one parameter by its name."""
+        for found in self.parameters:
+            if found.name == name:
+                return found
+        raise InputError(f"there is no parameter {name!r}", allowed=", ".join(p.name for p in self.parameters))
+
+
+TOLD = 0.5
+"""Half width of the interval over the value beyond which a parameter cannot be told."""
+NORMAL_95 = 1.96
+TURNING = 0.1
+"""Part of the ordinary speed of the driven gear from which on its friction slides."""
+LEAST_SCATTER = 1e-3
+"""Part of the ordinary acceleration that the load's equation leaves out."""
+ONE_FLANK = "only one flank was loaded: play and zero of the angles cannot be told apart; record a stop with a brake"
+ONE_ZERO = "only one flank was loaded: it is told from the zero of the angles by little; record a stop with a brake"
+NAMES_OF_RESULT = {
+    "datum": "the zero of the angles",
+    "half_backlash": "half_backlash_um",
+    "log stiffness": "stiffness_n_per_m_lambda",
+    "damping": "restitution",
+    "driver inertia": "driver_inertia_kg_m2",
+    "friction": "friction_coefficient",
+    "inverse inertia": "driven_inertia_kg_m2",
+}
+"""For the names of the equations' terms."""
+FALLING = ("damping", "inverse inertia")
+"""Terms that fall as what they stand for grows."""
+MOTOR = "it lies ahead of the torque sensor and does not show in the torque"
+
+
+def identify(motion: PairMotion) -> Identification:
+    """Fit the parameters of contact and load, with 95 % intervals.
+
+    Contact, on loaded samples away from the entry and exit of pairs: see `ContactEquation`; for the zero of the angles,
+    play, stiffness, damping c = β v (v the speed at which the flanks met), inertia behind the sensor and friction.
+    Load, while the driven gear turns: α2 = (r_b2 F − T_c sgn ω2 − c ω2)/J2, for J2, T_c and c.
+
+    The noisy quantity (q, α2) is the response, so that its noise widens the intervals and does not bend the values.
+    What the record cannot tell is marked, with what it is mistaken for.
+
+    Parameters
+    ----------
+    motion : PairMotion
+        With torque. Exponent, damping law and geometry are the rig's.
+
+    Raises
+    ------
+    RefusalError
+        If there is no torque, or it loads the flanks nowhere.
+
+    Notes
+    -----
+    The intervals know the noise and its colour, not an error of the equations: eccentric gears, bending shafts, a wrong
+    exponent. The motor's inertia lies ahead of the torque sensor and cannot be told at all.
+    """
+    if motion.torque_nm is None:
+        raise RefusalError(
+            "no torque was measured: motion alone gives ratios of stiffness, inertia and friction, not their values",
+            remedy="record the driver's torque",
+        )
+    equation = contact_equation(motion)
+    contact = equation.solve()
+    parameters = _contact_parameters(motion, contact, has_both_flanks=equation.has_both_flanks)
+    equations = {"contact": f"{contact.n_samples} samples, scatter {1e6 * contact.scatter:.3g} µm"}
+    condition = {"contact": contact.condition}
+    try:
+        load = _load_with_inertia(motion, contact)
+    except RefusalError as refusal:
+        equations["load"] = str(refusal)
+    else:
+        parameters += _load_parameters(motion, load)
+        equations["load"] = f"{load.n_samples} samples, scatter {load.scatter:.3g} rad/s²"
+        condition["load"] = load.condition
+    motor = motion.contact.motor_inertia_kg_m2
+    parameters.append(
+        FittedParameter("motor_inertia_kg_m2", "kg m^2", float("nan"), (0.0, float("inf")), False, MOTOR, motor)
+    )
+    return Identification(tuple(parameters), equations, condition, motion.source)
+
+
+def _load_with_inertia(motion: PairMotion, contact: RobustFit) -> RobustFit:
+    """Fit the load, and widen its covariance by what the driver's inertia is not known to."""
+    inertia, deviation = contact.value("driver inertia"), contact.deviation("driver inertia")
+    fit = _fit_load(motion, inertia)
+    if not np.isfinite(deviation):
+        return fit
+    moved = _fit_load(motion, inertia + deviation).values - fit.values
+    return replace(fit, covariance=fit.covariance + np.outer(moved, moved))
+
+
+def _fit_load(motion: PairMotion, inertia_kg_m2: float) -> RobustFit:
+    """Fit α2 = (r_b2 F − T_c sgn ω2 − c ω2)/J2, F the driver's tooth force turned by the friction of the flanks."""
+    r1, r2 = motion.path.base_radii_m
+    torque, w = motion.torque_nm, motion.driven_speed_rad_s
+    assert torque is not None  # noqa: S101  the caller has looked
+    force = (torque - inertia_kg_m2 * motion.driver_acceleration_rad_s2) / r1
+    drive = r2 * force * friction_share(motion, force, 1) / friction_share(motion, force, 0)
+    turning = np.abs(w) > TURNING * float(np.quantile(np.abs(w), 0.95))
+    if np.sum(turning) < 10 * LEAST_SAMPLES:
+        raise RefusalError("the driven gear hardly turns", remedy="record a start or a stop")
+
+    def residuals(values: FloatArray) -> FloatArray:
+        inverse, level, viscous = values
+        left: FloatArray = motion.driven_acceleration_rad_s2 - inverse * (drive - level * np.sign(w) - viscous * w)
+        return left
+
+    guess = motion.contact.driven_inertia_kg_m2 or 10.0
+    ordinary = float(np.quantile(np.abs(drive), 0.9)) or 1.0
+    return robust_fit(
+        residuals,
+        np.array([1.0 / guess, 0.5 * ordinary, 0.05 * ordinary]),
+        np.array([1.0 / guess, ordinary, ordinary]),
+        turning,
+        ("inverse inertia", "load_friction_nm", "load_viscous_nm_s_per_rad"),
+        least_scatter=LEAST_SCATTER * ordinary / guess,
+    )
+
+
+def _contact_parameters(motion: PairMotion, fit: RobustFit, *, has_both_flanks: bool) -> list[FittedParameter]:
+    c = motion.contact
+    play = FittedParameter(
+        "half_backlash_um", "um", c.half_backlash_um, (0.0, float("inf")), False, ONE_FLANK, c.half_backlash_um
+    )
+    if has_both_flanks:
+        play = _plain(fit, "half_backlash", "half_backlash_um", "um", c.half_backlash_um, 1e6)
+    return [
+        play,
+        _stiffness(fit, c.stiffness_n_per_m_lambda, has_both_flanks=has_both_flanks),
+        _restitution(fit, c.damping_law, c.restitution),
+        _plain(fit, "driver inertia", "driver_inertia_kg_m2", "kg m^2", c.driver_inertia_kg_m2),
+        _plain(fit, "friction", "friction_coefficient", "", c.friction_coefficient),
+    ]
+
+
+def _load_parameters(motion: PairMotion, fit: RobustFit) -> list[FittedParameter]:
+    inverse, half = fit.value("inverse inertia"), NORMAL_95 * fit.deviation("inverse inertia")
+    told = inverse > 0.0 and half < TOLD * inverse
+    highest = 1.0 / (inverse - half) if inverse > half else float("inf")
+    lowest = 1.0 / (inverse + half) if inverse + half > 0.0 else float("inf")
+    return [
+        FittedParameter(
+            "driven_inertia_kg_m2",
+            "kg m^2",
+            1.0 / inverse if inverse > 0.0 else float("nan"),
+            (lowest, highest),
+            told,
+            "" if told else _why(fit, "inverse inertia"),
+            motion.contact.driven_inertia_kg_m2,
+            _alike(fit, "inverse inertia"),
+        ),
+        _plain(fit, "load_friction_nm", "load_friction_nm", "N m", None),
+        _plain(fit, "load_viscous_nm_s_per_rad", "load_viscous_nm_s_per_rad", "N m s/rad", None),
+    ]
+
+
+def _plain(
+    fit: RobustFit, own: str, name: str, unit: str, rig_value: float | None, factor: float = 1.0
+) -> FittedParameter:
+    value, half = factor * fit.value(own), factor * NORMAL_95 * fit.deviation(own)
+    told = half < TOLD * abs(value)
+    why = "" if told else _why(fit, own)
+    return FittedParameter(name, unit, value, (value - half, value + half), told, why, rig_value, _alike(fit, own))
+
+
+def _stiffness(fit: RobustFit, rig_value: float, *, has_both_flanks: bool) -> FittedParameter:
+    """Return the stiffness; from one flank a filter ahead of the torque's samples feigns it, twenty times too high."""
+    own = "log stiffness"
+    log_k, half = fit.value(own), NORMAL_95 * fit.deviation(own)
+    told = half < TOLD and has_both_flanks
+    low, middle, high = (float(np.exp(min(v, 700.0))) for v in (log_k - half, log_k, log_k + half))
+    why = "" if told else _why(fit, own) if has_both_flanks else ONE_ZERO
+    return FittedParameter(
+        "stiffness_n_per_m_lambda", "N/m^λ", middle, (low, high), told, why, rig_value, _alike(fit, own)
+    )
+
+
+def _restitution(fit: RobustFit, law: str, rig_value: float) -> FittedParameter:
+    """Turn c = β v into the restitution of the rig's law; it is told where c is."""
+    c, half = fit.value("damping"), NORMAL_95 * fit.deviation("damping")
+    told = c > 0.0 and half < TOLD * c
+    grid = np.linspace(0.01, 1.0, 2_001)
+    factors = np.array([damping_ratio_s_per_m(law, float(e), 1.0) for e in grid])
+    low, middle, high = (float(np.interp(v, factors[::-1], grid[::-1])) for v in (c + half, c, c - half))
+    why = "" if told else _why(fit, "damping")
+    return FittedParameter("restitution", "", middle, (low, high), told, why, rig_value, _alike(fit, "damping"))
+
+
+def _alike(fit: RobustFit, own: str) -> str:
+    """Return what could take a parameter's place, by the name that the result gives it; empty where nothing could."""
+    like, correlation = fit.most_like(own)
+    if not like:
+        return ""
+    sign = -1.0 if (own in FALLING) != (like in FALLING) else 1.0
+    return f"{NAMES_OF_RESULT.get(like, like)} (correlation {sign * correlation:.2f})"
+
+
+def _why(fit: RobustFit, own: str) -> str:
+    like = _alike(fit, own)
+    return "the record hardly depends on it" + (f", and it is mistaken for {like}" if like else "")
+
+
+# --------------------
+# Teeth that yield more than the others: from the compression that the fitted contact does not explain.
+# --------------------
+
+
+CERTAIN = 5.0
+"""Standard deviations by which a tooth must stand out of the others."""
+N_PLACES = 12
+"""Parts of the stretch in which a pair carries alone: teeth are compared at equal places of their contact."""
+LEAST_PART = 0.02
+"""Of the mean deflection: teeth differ by that anyway."""
+TOOTH_COMPLIANCE_LEAST_SAMPLES = 4
+"""Of a tooth."""
+
+
+@dataclass(frozen=True)
+class YieldingTeeth:
+    """How much more than the fitted contact each tooth of the driver yields, while it carries alone.
+
+    Parameters
+    ----------
+    extra_um : array, (n_teeth,)
+        Median over the samples of a tooth, less the median of all teeth; nan where it was hardly passed.
+    uncertainty_um : array, (n_teeth,)
+        One standard deviation, from the scatter of the teeth's own samples.
+    deflection_um : float
+        Median deflection of a pair in those samples; with the rig's stiffness where only one flank was loaded.
+    n_samples : array of int, (n_teeth,)
+    weak_teeth : tuple of int
+        Those that stand out, from 1, the weakest first.
+    """
+
+    extra_um: FloatArray
+    uncertainty_um: FloatArray
+    deflection_um: float
+    n_samples: NDArray[np.int64]
+    weak_teeth: tuple[int, ...]
+
+    def stiffness_loss(self, tooth: int, exponent: float) -> float:
+        """Part of the stiffness of a pair that such an extra deflection stands for: 1 − (1 + x/g)^−λ."""
+        return self._loss(float(self.extra_um[tooth - 1]), exponent)
+
+    def least_loss(self, exponent: float) -> float:
+        """Part of its stiffness that an ordinary tooth must have lost to stand out."""
+        ordinary = float(np.nanmedian(self.uncertainty_um))
+        return self._loss(max(CERTAIN * ordinary, LEAST_PART * self.deflection_um), exponent)
+
+    def _loss(self, extra_um: float, exponent: float) -> float:
+        return float(1.0 - (1.0 + extra_um / self.deflection_um) ** -exponent)
+
+
+def tooth_compliance(motion: PairMotion) -> YieldingTeeth:
+    """Return the extra deflection of each tooth of the driver on the drive flank.
+
+    The contact's equation is fitted to the whole record; what is left of the compression where one pair carries alone
+    belongs to one tooth. A cracked tooth yields more each time it comes round.
+
+    Raises
+    ------
+    RefusalError
+        If there is no torque, or fewer than half of the teeth carried alone.
+
+    Notes
+    -----
+    The teeth of the driven gear differ each time round and widen the scatter. Run-out moves the compression over a
+    revolution in a wave: it is in the extra deflection as well, over many teeth.
+    """
+    if motion.torque_nm is None:
+        raise RefusalError("no torque was measured", remedy="record the driver's torque")
+    equation = contact_equation(motion)
+    fit = equation.solve(with_jackknife=False)
+    single = _alone(equation)
+    left = _at_equal_places(equation, equation.residuals(fit.values), single)
+    tooth = (motion.path.tooth(motion.driver_angle_rad) - 1.0).astype(np.int64)
+    n_teeth = motion.path.teeth[0]
+    counts = np.bincount(tooth[single], minlength=n_teeth)
+    n_seen = int(np.sum(counts >= TOOTH_COMPLIANCE_LEAST_SAMPLES))
+    if n_seen < n_teeth // 2:
+        raise RefusalError(
+            f"{n_seen} of {n_teeth} teeth of the driver carried alone for {TOOTH_COMPLIANCE_LEAST_SAMPLES} samples",
+            remedy="record more revolutions, under load",
+        )
+    middle, spread = np.full(n_teeth, np.nan), np.full(n_teeth, np.nan)
+    for j in np.flatnonzero(counts >= TOOTH_COMPLIANCE_LEAST_SAMPLES):
+        own = left[single & (tooth == j)]
+        middle[j] = np.median(own)
+        spread[j] = 1.4826 * np.median(np.abs(own - middle[j]))
+    extra = middle - np.nanmedian(middle)
+    # Neighbouring samples are alike; the teeth's own differences say by how much a median can be off.
+    alone = 1.25 * np.nanmedian(spread) / np.sqrt(np.maximum(counts, 1))
+    among = 1.4826 * float(np.nanmedian(np.abs(extra)))
+    uncertainty = np.where(np.isnan(extra), np.nan, np.maximum(alone, among))
+    known = float(np.log(motion.contact.stiffness_n_per_m_lambda))  # one flank hardly tells it from the angles' zero
+    deflection = _deflection(equation, fit.value("log stiffness") if equation.has_both_flanks else known, single)
+    return YieldingTeeth(
+        1e6 * extra, 1e6 * uncertainty, 1e6 * deflection, counts, _weak(extra, uncertainty, deflection)
+    )
+
+
+def _alone(equation: ContactEquation) -> NDArray[np.bool_]:
+    """Samples in which one pair carries alone on the drive flank, calm enough for its equation."""
+    force, speed = equation.motion.tooth_force_from_torque_n, np.abs(equation.motion.driver_speed_rad_s)
+    assert force is not None  # noqa: S101  there is a torque
+    loaded = force > LOADED * float(np.quantile(np.abs(force), 0.95))
+    moving = speed > SLOW * float(np.quantile(speed, 0.95))
+    alone: NDArray[np.bool_] = loaded & moving & (equation.n_pairs < 1.5) & (equation.group >= 0)
+    return alone
+
+
+def _at_equal_places(equation: ContactEquation, left: FloatArray, single: NDArray[np.bool_]) -> FloatArray:
+    """Take off what all teeth have in common at a place: friction that turns, pairs that come and go."""
+    path = equation.motion.path
+    edge = path.contact_ratio - 1.0
+    u = path.position(equation.motion.driver_angle_rad)
+    place = np.clip(((u - edge) / (1.0 - edge) * N_PLACES).astype(np.int64), 0, N_PLACES - 1)
+    result = left.copy()
+    for p in range(N_PLACES):
+        here = single & (place == p)
+        if np.any(here):
+            result[here] -= np.median(left[here])
+    return result
+
+
+def _deflection(equation: ContactEquation, log_stiffness: float, single: NDArray[np.bool_]) -> float:
+    force = equation.motion.tooth_force_from_torque_n
+    assert force is not None  # noqa: S101  there is a torque
+    g = (np.abs(force[single]) / np.exp(log_stiffness)) ** (1.0 / equation.motion.contact.exponent)
+    return float(np.median(g))
+
+
+def _weak(extra: FloatArray, uncertainty: FloatArray, deflection: float) -> tuple[int, ...]:
+    stands_out = np.nan_to_num(extra) > np.fmax(
+        CERTAIN * np.nan_to_num(uncertainty, nan=np.inf), LEAST_PART * deflection
+    )
+    order = np.argsort(-np.nan_to_num(extra, nan=-np.inf))
+    return tuple(int(j) + 1 for j in order if stands_out[j])

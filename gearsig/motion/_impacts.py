@@ -1,0 +1,330 @@
+"""Impacts of the flanks from the motion of both gears: when, which tooth, how hard, with what restitution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import pi
+
+import numpy as np
+
+from gearsig.checks import FloatArray, positive
+from gearsig.errors import RefusalError
+from gearsig.motion._force import depth
+from gearsig.motion._types import PairMotion
+
+# --------------------
+# The flight of the flanks through the play: a parabola, and the speed at which it meets a flank.
+# --------------------
+
+
+LONGEST_S = 3e-3
+"""Next to the flank: further away, a valve that moves or a friction that turns has changed the acceleration."""
+MOST_SAMPLES = 60
+
+
+@dataclass(frozen=True)
+class FlightFit:
+    """q(t) = c0 + c1 t + c2 t² near one end of a flight, t from `origin_s`."""
+
+    origin_s: float
+    coefficients: tuple[float, float, float]
+
+    def rate(self, time_s: float) -> float:
+        """Compression rate."""
+        _, c1, c2 = self.coefficients
+        return c1 + 2.0 * c2 * (time_s - self.origin_s)
+
+    def crossing(self, level_m: float, low_s: float, high_s: float) -> float:
+        """Time at which the parabola reaches a level within two times; their nearer end where it does not."""
+        c0, c1, c2 = self.coefficients
+        roots = np.roots([c2, c1, c0 - level_m]) if c2 else np.array([(level_m - c0) / c1 if c1 else np.nan])
+        times = roots[np.isreal(roots)].real + self.origin_s
+        inside = times[(times >= low_s) & (times <= high_s)]
+        if len(inside):
+            return float(inside[0])
+        ends = np.array([low_s, high_s])
+        t = ends - self.origin_s
+        return float(ends[np.argmin(np.abs(c0 + c1 * t + c2 * t**2 - level_m))])
+
+
+def fit_flight(
+    compression_m: FloatArray,
+    rate_mps: FloatArray | None,
+    first: int,
+    last: int,
+    sampling_rate_hz: float,
+    scatter: tuple[float, float],
+    *,
+    at_end: bool,
+) -> FlightFit:
+    """Fit a parabola to the samples of a flight next to its end, or its beginning.
+
+    Motor, brake and friction are constant over so few milliseconds, so that the flanks move towards each other at a
+    constant acceleration.
+
+    Parameters
+    ----------
+    compression_m : array
+    rate_mps : array or None
+        Measured by itself; None: derived from the compression, and of no use of its own so near to a blow.
+    first, last : int
+        Samples of the flight; the last is not in it.
+    sampling_rate_hz : float
+    scatter : (float, float)
+        Standard deviations of compression and rate.
+    at_end : bool
+    """
+    most = int(np.clip(round(LONGEST_S * sampling_rate_hz), 3, MOST_SAMPLES))
+    chosen = np.arange(max(first, last - most), last) if at_end else np.arange(first, min(last, first + most))
+    t = (chosen - chosen[0]) / sampling_rate_hz
+    rows = [np.stack([np.ones_like(t), t, t**2], axis=1) / max(scatter[0], 1e-12)]
+    values = [compression_m[chosen] / max(scatter[0], 1e-12)]
+    if rate_mps is not None:
+        rows.append(np.stack([np.zeros_like(t), np.ones_like(t), 2.0 * t], axis=1) / max(scatter[1], 1e-9))
+        values.append(rate_mps[chosen] / max(scatter[1], 1e-9))
+    design = np.vstack(rows)
+    n_terms = min(3, len(design))
+    x, *_ = np.linalg.lstsq(design[:, :n_terms], np.concatenate(values), rcond=None)
+    c0, c1, c2 = np.concatenate([x, np.zeros(3 - n_terms)])
+    return FlightFit(float(chosen[0]) / sampling_rate_hz, (float(c0), float(c1), float(c2)))
+
+
+NOISE_DEPTH = 4.0
+"""Depth that counts as touching, in standard deviations of the compression's noise."""
+LEAST_FLIGHT_SAMPLES = 2
+"""In the play ahead of a contact: fewer, and the speed of impact is that of a contact that never ended."""
+LONGEST_BOUNCE = 6.0
+"""In times of a free elastic impact: a longer contact is carried, not bounced off."""
+
+
+@dataclass(frozen=True)
+class Impact:
+    """Flanks that met.
+
+    Parameters
+    ----------
+    time_s : float
+        Between samples, where the straight line of the approach crosses the flank.
+    flank : int
+        1: drive flank; −1: back flank.
+    driver_tooth, driven_tooth : int
+        That entered last, from 1, counted from the angles' zero.
+    driver_angle_deg : float
+        0 to 360.
+    speed_mps : float
+        Of approach, along the line of action.
+    energy_j : float
+        ½ m v², m the mass of both gears reduced to the line of action; nan where an inertia is not known.
+    restitution : float
+        Speed of parting over speed of approach; nan where the flanks stayed in contact, or where it comes out above 1,
+        which no impact has: see `note`.
+    lost_j : float
+        ½ m v² (1 − e²); nan likewise.
+    peak_force_n : float
+        By the contact's stiffness from the greatest depth; short of the truth where samples are rare.
+    note : str
+        What is wrong with it; empty: nothing.
+    """
+
+    time_s: float
+    flank: int
+    driver_tooth: int
+    driven_tooth: int
+    driver_angle_deg: float
+    speed_mps: float
+    energy_j: float
+    restitution: float
+    lost_j: float
+    peak_force_n: float
+    note: str = ""
+
+
+def find_impacts(
+    motion: PairMotion, datum_m: float, *, half_backlash_m: float | None = None, least_speed_mps: float | None = None
+) -> tuple[Impact, ...]:
+    """Find the moments at which the flanks met after a flight through the play.
+
+    Parameters
+    ----------
+    motion : PairMotion
+    datum_m : float
+        Compression in the middle of the play, from `estimate_backlash` or `find_datum`.
+    half_backlash_m : float or None
+        None: the rig's. A measured one finds flanks that are worn.
+    least_speed_mps : float or None
+        Slower approaches are left out. None: five standard deviations of the compression rate's scatter.
+
+    Raises
+    ------
+    RefusalError
+        If the compression's noise is a quarter of the play or more, or no play is known.
+
+    Notes
+    -----
+    An impact lasts a millisecond or so and its rebounds follow in some more: at 1 kHz those are missed whose flight
+    holds fewer than two samples. The tooth counts from the angles' zero.
+    """
+    a = (
+        motion.contact.half_backlash_um * 1e-6
+        if half_backlash_m is None
+        else positive(half_backlash_m, "half_backlash_m")
+    )
+    if a == 0.0:
+        raise RefusalError(
+            "the rig says that the flanks have no play: there is none to cross",
+            remedy="give half_backlash_um in its [contact] table, or record a braked stop, which shows it",
+        )
+    q, rate = motion.compression_m - datum_m, motion.compression_rate_mps
+    noise = scatter_of(q)
+    if noise > 0.5 * a:
+        raise RefusalError(
+            f"the compression scatters by {1e6 * noise:.3g} µm in a play of {2e6 * a:.3g} µm: flights cannot be seen",
+            remedy="encoders of more counts; where the motion is slow, --bandwidth of gearsig start-stop",
+        )
+    g = depth(q, a)
+    slowest = 5.0 * scatter_of(rate) if least_speed_mps is None else least_speed_mps
+    flights = _Flights(motion, q, a, (noise, scatter_of(rate)))
+    runs = _runs(np.where(np.abs(g) > 0.0, np.sign(g), 0.0).astype(np.int64), g, NOISE_DEPTH * noise)
+    found = []
+    for before, this, after in zip(runs[:-1], runs[1:], [*runs[2:], None][: len(runs) - 1], strict=True):
+        if this[0] == 0 or before[0] != 0 or before[2] - before[1] < LEAST_FLIGHT_SAMPLES:
+            continue
+        impact = _impact(motion, flights, g, before, this, after)
+        if impact.speed_mps > slowest:
+            found.append(impact)
+    return tuple(found)
+
+
+def meeting_speeds(motion: PairMotion, datum_m: float, half_backlash_m: float) -> FloatArray:
+    """Speed at which the flanks of each sample met, (n,): the floor at least; nan where the flight was too short.
+
+    In the play it is the floor, too.
+    """
+    q = motion.compression_m - datum_m
+    scatter = (scatter_of(q), scatter_of(motion.compression_rate_mps))
+    flights = _Flights(motion, q, half_backlash_m, scatter)
+    g = depth(q, half_backlash_m)
+    speeds = np.full(len(q), motion.contact.impact_speed_floor_mps)
+    runs = _runs(np.sign(g).astype(np.int64), g, NOISE_DEPTH * scatter[0])
+    for before, this in pairwise(runs):
+        if this[0] != 0:
+            long_enough = before[0] == 0 and before[2] - before[1] >= LEAST_FLIGHT_SAMPLES
+            speed = flights.meets(before, this[0])[1] if long_enough else np.nan
+            speeds[this[1] : this[2]] = np.maximum(speed, motion.contact.impact_speed_floor_mps)
+    return speeds
+
+
+def reduced_mass_kg(motion: PairMotion) -> float:
+    """1/(r_b1²/J1 + r_b2²/J2), J1 with the motor; nan where an inertia is not known."""
+    contact = motion.contact
+    driver = contact.driver_inertia_kg_m2 + contact.motor_inertia_kg_m2
+    if driver <= 0.0 or contact.driven_inertia_kg_m2 is None:
+        return float("nan")
+    r1, r2 = motion.path.base_radii_m
+    return 1.0 / (r1**2 / driver + r2**2 / contact.driven_inertia_kg_m2)
+
+
+def scatter_of(values: FloatArray) -> float:
+    """Standard deviation of what changes from sample to sample: by the median of second differences, deaf to blows."""
+    moving = np.diff(values, 2)
+    moving = moving[moving != 0.0]
+    return 1.4826 * float(np.median(np.abs(moving))) / np.sqrt(6.0) if len(moving) else 0.0
+
+
+Run = tuple[int, int, int]
+"""Flank or 0, first sample, sample after the last."""
+
+
+def _runs(side: np.ndarray, g: FloatArray, least_depth_m: float) -> list[Run]:
+    """Stretches on one flank or in the play; a touch no deeper than the noise counts as flight."""
+    runs: list[Run] = []
+    edges = np.flatnonzero(np.diff(side)) + 1
+    for first, last in zip(np.concatenate([[0], edges]), np.concatenate([edges, [len(side)]]), strict=True):
+        flank = int(side[first])
+        if flank and float(np.max(np.abs(g[first:last]))) < least_depth_m:
+            flank = 0
+        if runs and runs[-1][0] == flank:
+            runs[-1] = (flank, runs[-1][1], int(last))
+        else:
+            runs.append((flank, int(first), int(last)))
+    return runs
+
+
+@dataclass(frozen=True)
+class _Flights:
+    """Fits flights on either side of a contact."""
+
+    motion: PairMotion
+    compression_m: FloatArray
+    half_backlash_m: float
+    scatter: tuple[float, float]
+
+    def meets(self, flight: Run, flank: int) -> tuple[float, float]:
+        """Time and speed at which a flight ends on a flank."""
+        fit = self._fit(flight, at_end=True)
+        rate = self.motion.sampling_rate_hz
+        time = fit.crossing(flank * self.half_backlash_m, (flight[2] - 1) / rate, flight[2] / rate)
+        return time, flank * fit.rate(time)
+
+    def leaves(self, flight: Run, flank: int) -> float:
+        """Speed at which a flight begins on a flank."""
+        fit = self._fit(flight, at_end=False)
+        rate = self.motion.sampling_rate_hz
+        time = fit.crossing(flank * self.half_backlash_m, (flight[1] - 1) / rate, flight[1] / rate)
+        return -flank * fit.rate(time)
+
+    def _fit(self, flight: Run, *, at_end: bool) -> FlightFit:
+        derived = any("derivative" in self.motion.methods.get(f"{side} speed", "") for side in ("driver", "driven"))
+        rates = None if derived else self.motion.compression_rate_mps
+        return fit_flight(
+            self.compression_m, rates, flight[1], flight[2], self.motion.sampling_rate_hz, self.scatter, at_end=at_end
+        )
+
+
+def _impact(motion: PairMotion, flights: _Flights, g: FloatArray, before: Run, this: Run, after: Run | None) -> Impact:
+    flank, first, last = this
+    time, speed = flights.meets(before, flank)
+    step = 1.0 / motion.sampling_rate_hz
+    mass = reduced_mass_kg(motion)
+    angle = float(np.interp(time, [(first - 1) * step, first * step], motion.driver_angle_rad[first - 1 : first + 1]))
+    restitution, note = float("nan"), ""
+    bounced = after is not None and after[0] == 0 and after[2] - after[1] >= LEAST_FLIGHT_SAMPLES
+    if bounced and speed > 0.0 and (last - first - 1) * step < LONGEST_BOUNCE * _bounce_s(motion, speed, mass):
+        assert after is not None  # noqa: S101  bounced says so
+        restitution = max(flights.leaves(after, flank), 0.0) / speed
+        if restitution > 1.0:
+            note = f"parting is {restitution:.3g} times as fast as approach: noise, or too few samples in the flights"
+            restitution = float("nan")
+    energy = 0.5 * mass * speed**2
+    deepest = float(np.max(np.abs(g[first:last])))
+    contact, path = motion.contact, motion.path
+    z1, z2 = path.teeth
+    pitch = int(np.floor(angle * z1 / (2.0 * pi) - path.phase))
+    n = float(path.n_pairs(np.array(angle), float(flank)))
+    return Impact(
+        time,
+        flank,
+        pitch % z1 + 1,
+        pitch % z2 + 1,
+        float(np.degrees(angle) % 360.0),
+        speed,
+        energy,
+        restitution,
+        energy * (1.0 - restitution**2),
+        n * contact.stiffness_n_per_m_lambda * deepest**contact.exponent,
+        note,
+    )
+
+
+def _bounce_s(motion: PairMotion, speed_mps: float, mass_kg: float) -> float:
+    """Duration of a free elastic impact on one tooth pair, B (m g_max)/(v …): 2.94 g_max/v for λ = 1.5.
+
+    g_max follows from ½ m v² = k g^(λ+1)/(λ+1).
+    """
+    contact = motion.contact
+    if not mass_kg > 0.0:
+        return 5e-3
+    power = contact.exponent + 1.0
+    deepest = (0.5 * power * mass_kg * speed_mps**2 / contact.stiffness_n_per_m_lambda) ** (1.0 / power)
+    return 2.94 * float(deepest) / speed_mps

@@ -1,0 +1,575 @@
+"""From a recording to the motion of a gear pair: channels, units, derivatives, checks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import pi, sqrt
+
+import numpy as np
+
+from gearsig.checks import FloatArray, closest_match_hint, count, positive
+from gearsig.errors import InputError, RefusalError
+from gearsig.motion._types import PairMotion, stands
+from gearsig.recording import Channel, Recording
+from gearsig.rig import EncoderChannel, GearPair, PathOfContact, Rig, contact_pair, path_of_contact
+
+# --------------------
+# Which channel measures which motion of which gear.
+# --------------------
+
+
+QUANTITY_OF = {
+    "angle": ("angle", "encoder"),
+    "speed": ("rotational_speed",),
+    "acceleration": ("angular_acceleration",),
+}
+SIDES = ("driver", "driven")
+ROLES = (*(f"{side} {what}" for what in QUANTITY_OF for side in SIDES), "torque", "force")
+"""What a channel can be: angle, speed and acceleration of either gear, torque of the driver's shaft, tooth force."""
+
+_UNITS = {
+    "angle": {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180.0, "°": pi / 180.0, "rev": 2.0 * pi},
+    "speed": {"rad/s": 1.0, "deg/s": pi / 180.0, "°/s": pi / 180.0, "rpm": pi / 30.0, "1/min": pi / 30.0,
+              "r/min": pi / 30.0, "rev/s": 2.0 * pi},
+    "acceleration": {"rad/s^2": 1.0, "rad/s2": 1.0, "rad/s²": 1.0, "deg/s^2": pi / 180.0, "deg/s²": pi / 180.0},
+    "torque": {"nm": 1.0, "n m": 1.0, "n·m": 1.0, "n*m": 1.0, "knm": 1e3, "kn m": 1e3},
+    "force": {"n": 1.0, "kn": 1e3},
+}  # fmt: skip
+
+
+def find_roles(recording: Recording, pair: GearPair, given: Mapping[str, str] | None = None) -> dict[str, str]:
+    """Return the channel of each role that the recording has.
+
+    A channel belongs to a gear if its position is the name of that gear's shaft, or its own name holds it (or "driver",
+    "driven").
+
+    Parameters
+    ----------
+    recording : Recording
+    pair : GearPair
+    given : mapping or None
+        Role → channel, taken as they stand; an empty channel leaves the role out.
+
+    Raises
+    ------
+    InputError
+        If a role or channel does not exist, or several channels fit one role.
+    """
+    chosen = dict(given or {})
+    for role, name in chosen.items():
+        if role not in ROLES:
+            raise InputError(
+                f"there is no role {role!r}", allowed=", ".join(ROLES), remedy=closest_match_hint(role, ROLES)
+            )
+        if name:
+            recording.index(name)
+    for role in ROLES:
+        fitting = [c.name for c in recording.channels if _fits(c, role, pair)]
+        if role not in chosen and len(fitting) > 1:
+            raise InputError(
+                f"channels {', '.join(map(repr, fitting))} may all be the {role}",
+                where=recording.provenance.source or "recording",
+                remedy=f'say which, e.g. --use "{role}={fitting[0]}", or give positions in their [[sensor]] tables',
+            )
+        if role not in chosen and fitting:
+            chosen[role] = fitting[0]
+    return {role: chosen[role] for role in ROLES if chosen.get(role)}
+
+
+def role_values(recording: Recording, rig: Rig, role: str, name: str) -> FloatArray:
+    """Return a channel's values in rad, rad/s, rad/s², N m or N.
+
+    Raises
+    ------
+    InputError
+        If the unit is not known or measures something else.
+    """
+    channel = recording.channels[recording.index(name)]
+    return np.asarray(recording.values(name), dtype=np.float64) * _worth(channel, rig, role.rpartition(" ")[2])
+
+
+def _worth(channel: Channel, rig: Rig, what: str) -> float:
+    source = rig.speed
+    if what == "angle" and isinstance(source, EncoderChannel) and source.channel == channel.name:
+        return 2.0 * pi / source.units_per_revolution
+    known = _UNITS[what]
+    unit = " ".join(channel.unit.split())
+    for spelt in (unit, unit.casefold()):
+        if spelt in known:
+            return known[spelt]
+    raise InputError(
+        f"the unit of channel {channel.name!r} is {channel.unit!r}",
+        allowed=", ".join(known),
+        remedy="give unit (and scale) in a [[sensor]] table of the rig file",
+    )
+
+
+def _fits(channel: Channel, role: str, pair: GearPair) -> bool:
+    side, _, what = role.rpartition(" ")
+    if not side:
+        return channel.quantity == what
+    if channel.quantity not in QUANTITY_OF[what]:
+        return False
+    return side == _side_of(channel, pair)
+
+
+def _side_of(channel: Channel, pair: GearPair) -> str:
+    """Return "driver", "driven" or nothing; the longer name decides where one shaft's name holds the other's."""
+    names = sorted(((pair.driver, "driver"), (pair.driven, "driven")), key=lambda entry: -len(entry[0]))
+    for shaft, side in names:
+        if channel.position == shaft:
+            return side
+    text = channel.name.casefold()
+    for word, side in (*names, ("driven", "driven"), ("driver", "driver")):
+        if word and word.casefold() in text:
+            return side
+    return ""
+
+
+# --------------------
+# Speed and acceleration channels whose scale is wrong: told by the angle, which a counter cannot misread.
+# --------------------
+
+
+WINDOW_S = 0.05
+"""Over which changes are compared: longer than flanks ring, shorter than a start."""
+FEWEST_WINDOWS = 8
+MOST_OF_ONE = 0.5
+"""Of the sum of squares that a single window may have."""
+ALLOWED = {1: 0.03, 2: 0.06}
+"""Parts by which scales of speeds and of accelerations may differ."""
+LEAST_RATE_HZ = {1: 0.0, 2: 4000.0}
+"""Sampling rates from which on they are compared: slower, an acceleration that rings is folded down, alike in each
+start, so that its sum is off and its scatter does not say so."""
+CERTAIN = 5.0
+"""Standard errors of the scale."""
+
+
+def channel_scale(
+    angle_rad: FloatArray, rate: FloatArray, sampling_rate_hz: float, order: int = 1
+) -> tuple[float, float]:
+    """Return the scale of a speed or acceleration against the angle, and its standard error.
+
+    Speed: ∫ ω dt = s Δθ over windows of a twentieth of a second. Acceleration: the second difference of ∬ α dt² is s
+    times that of θ. Least squares, in which the angle, which a counter gives nearly without noise, explains the
+    rate; the error by leaving out each window (jackknife), as blows between samples spoil single ones.
+
+    Parameters
+    ----------
+    angle_rad : array, (n,)
+    rate : array, (n,)
+        In rad/s or rad/s².
+    sampling_rate_hz : float
+    order : int
+        1: speed, 2: acceleration.
+
+    Returns
+    -------
+    scale, standard_error : float
+        1 where both agree; nan and nan where hardly anything moved, or in one window alone.
+    """
+    step = max(2, round(WINDOW_S * sampling_rate_hz))
+    edges = np.arange(0, len(angle_rad), step)
+    if len(edges) <= FEWEST_WINDOWS:
+        return float("nan"), float("nan")
+    summed = rate
+    for _ in range(order):
+        summed = np.concatenate([[0.0], np.cumsum(0.5 * (summed[1:] + summed[:-1]))]) / sampling_rate_hz
+    x, y = np.diff(angle_rad[edges], order), np.diff(summed[edges], order)
+    powers, products = x * x, x * y
+    total = float(np.sum(powers))
+    if float(np.max(powers)) >= MOST_OF_ONE * total:
+        return float("nan"), float("nan")
+    without = (np.sum(products) - products) / (total - powers)
+    error = sqrt((len(x) - 1.0) * float(np.var(without)))
+    return float(np.sum(products)) / total, error
+
+
+def check_scale(
+    angle_rad: FloatArray, rate: FloatArray, sampling_rate_hz: float, *, order: int, names: tuple[str, str], where: str
+) -> None:
+    """Refuse a speed or acceleration that does not go with the angle.
+
+    Parameters
+    ----------
+    angle_rad, rate : array, (n,)
+    sampling_rate_hz : float
+    order : int
+        1: speed, 2: acceleration.
+    names : (str, str)
+        Of both channels.
+    where : str
+        Recording, for the error.
+
+    Raises
+    ------
+    InputError
+        If the scale is off by more than 3 % (speeds) or 6 % (accelerations, from 4 kHz on), and by five of its standard
+        errors.
+    """
+    if sampling_rate_hz < LEAST_RATE_HZ[order]:
+        return
+    scale, error = channel_scale(angle_rad, rate, sampling_rate_hz, order)
+    if not abs(scale - 1.0) > max(ALLOWED[order], CERTAIN * error):
+        return
+    raise InputError(
+        f"channel {names[1]!r} reads {scale:.3g} times what {names[0]!r} says",
+        where=where,
+        allowed=f"1 ± {ALLOWED[order]:g}",
+        remedy=f"correct unit or scale of {names[1]!r} in its [[sensor]] table, or leave that channel out of the file",
+    )
+
+
+# --------------------
+# Angle channels that wrap or jump: told, not repaired.
+# --------------------
+
+
+LEAST_JUMP_RAD = 2e-3 * pi
+"""A thousandth of a revolution: no gear with its load gets there and stays within one sample."""
+SCATTER = 50.0
+"""Of the ordinary change of the angle's increments: an impact reaches a tenth of that."""
+QUANTA = 4.0
+"""Of a coarse encoder's step."""
+NEARLY = 0.1
+"""Of a revolution, by which a step may differ from a whole one that is an encoder's new beginning."""
+
+
+def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where: str = "") -> None:
+    """Raise where an angle that should run on does not.
+
+    Parameters
+    ----------
+    angle_rad : array, (n,)
+    sampling_rate_hz : float
+    name, where : str
+        Of the channel and of its recording, for the error.
+
+    Raises
+    ------
+    InputError
+        At the first step by nearly a whole revolution (an encoder that wraps), or at a jump.
+    """
+    check_wrap(angle_rad, sampling_rate_hz, name, where)
+    steps, beyond = _steps(angle_rad)
+    moving = np.abs(steps[steps != 0.0])
+    quantum = float(moving.min()) if len(moving) else 0.0
+    limit = max(LEAST_JUMP_RAD, SCATTER * 1.4826 * float(np.median(beyond)), QUANTA * quantum)
+    found = np.flatnonzero(beyond > limit)
+    if len(found):
+        i = int(found[0])
+        raise InputError(
+            f"channel {name!r} jumps by {abs(steps[i]):.4g} rad {_when(i, sampling_rate_hz)} "
+            f"({len(found)} such jump(s))",
+            where=where,
+            allowed="an angle that runs on",
+            remedy="cut the recording there; lost counts make all later forces wrong",
+        )
+
+
+def check_wrap(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where: str = "") -> None:
+    """Raise where an angle steps by nearly a whole revolution: an encoder that starts again after each.
+
+    Parameters
+    ----------
+    angle_rad : array, (n,)
+    sampling_rate_hz : float
+    name, where : str
+        Of the channel and of its recording, for the error.
+
+    Raises
+    ------
+    InputError
+        At the first such step, or if there are fewer than 4 samples.
+    """
+    if len(angle_rad) < 4:
+        raise InputError(f"channel {name!r} has {len(angle_rad)} samples", where=where, allowed="at least 4")
+    turns = _steps(angle_rad)[1] / (2.0 * pi)
+    found = np.flatnonzero(np.abs(turns - 1.0) < NEARLY)
+    if len(found):
+        i = int(found[0])
+        raise InputError(
+            f"channel {name!r} steps by {turns[i]:.3g} revolutions {_when(i, sampling_rate_hz)}: the encoder starts "
+            "again after each revolution",
+            where=where,
+            allowed="an angle that runs on",
+            remedy=f"give wraps = true in the rig file, in [speed] or in the [[sensor]] table of {name!r} (force, "
+            "start-stop and identify also take --unwrap)",
+        )
+
+
+def _steps(angle_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the angle's steps, and what each has beyond the steps around it."""
+    steps = np.diff(angle_rad)
+    # Around it: the middle one of three, so that a jump does not hide itself.
+    around = np.sort(np.stack([np.roll(steps, 1), steps, np.roll(steps, -1)]), axis=0)[1]
+    around[0], around[-1] = steps[1], steps[-2]
+    return steps, np.abs(steps - around)
+
+
+def _when(step: int, sampling_rate_hz: float) -> str:
+    return f"from {step / sampling_rate_hz:.6g} to {(step + 1) / sampling_rate_hz:.6g} s"
+
+
+# --------------------
+# Derivatives of sampled motion by Savitzky–Golay filters of stated bandwidth.
+# --------------------
+
+
+ORDER = 3
+SHORTEST = 7
+"""Samples of the shortest window: cubic through seven."""
+
+
+@dataclass(frozen=True)
+class LocalPolynomial:
+    """A cubic fitted to a sliding window; value and derivatives at its middle.
+
+    Parameters
+    ----------
+    window : int
+        Odd number of samples, 5 or more.
+    sampling_rate_hz : float
+
+    Notes
+    -----
+    Its smoothing is flat to the third power of frequency, its derivatives to the same order; what lies beyond the
+    bandwidth is lost, an impact shorter than the window is smeared over it.
+
+    Source: A. Savitzky, M. J. E. Golay, Smoothing and differentiation of data by simplified least squares procedures,
+    Analytical Chemistry 36 (1964); R. W. Schafer, What is a Savitzky–Golay filter?, IEEE Signal Processing Magazine 28
+    (2011).
+    """
+
+    window: int
+    sampling_rate_hz: float
+
+    def __post_init__(self) -> None:
+        count(self.window, "window", minimum=5)
+        if self.window % 2 == 0:
+            raise InputError(f"window is {self.window}", allowed="an odd number of samples")
+        positive(self.sampling_rate_hz, "sampling_rate_hz", "Hz")
+
+    @property
+    def bandwidth_hz(self) -> float:
+        """Frequency at which smoothing halves the power."""
+        from scipy.signal import freqz, savgol_coeffs
+
+        f, response = freqz(savgol_coeffs(self.window, ORDER), worN=8192, fs=self.sampling_rate_hz)
+        gain = np.abs(response)
+        below = int(np.argmax(gain < np.sqrt(0.5)))
+        share = (gain[below - 1] - np.sqrt(0.5)) / (gain[below - 1] - gain[below])
+        return float(f[below - 1] + share * (f[below] - f[below - 1]))
+
+    @property
+    def text(self) -> str:
+        """For the reader of a result."""
+        return f"Savitzky–Golay, cubic over {self.window} samples, −3 dB at {self.bandwidth_hz:.4g} Hz"
+
+    def apply(self, values: FloatArray, derivative: int = 0) -> FloatArray:
+        """Smoothed values, or their first or second derivative, (n,); the ends are those of the last window's cubic."""
+        from scipy.signal import savgol_filter
+
+        if len(values) < self.window:
+            raise InputError(f"{len(values)} samples are too few", allowed=f"{self.window} or more")
+        result: FloatArray = savgol_filter(
+            values, self.window, ORDER, deriv=derivative, delta=1.0 / self.sampling_rate_hz, mode="interp"
+        )
+        return result
+
+
+def local_polynomial(sampling_rate_hz: float, bandwidth_hz: float | None = None) -> LocalPolynomial:
+    """Return the filter whose bandwidth is nearest below the wanted one; None: the shortest.
+
+    Raises
+    ------
+    InputError
+        If the bandwidth is above that of the shortest window.
+    """
+    shortest = LocalPolynomial(SHORTEST, sampling_rate_hz)
+    if bandwidth_hz is None:
+        return shortest
+    positive(bandwidth_hz, "bandwidth_hz", "Hz")
+    if bandwidth_hz > shortest.bandwidth_hz * 1.001:
+        raise InputError(
+            f"bandwidth_hz is {bandwidth_hz:g} Hz",
+            allowed=f"up to {shortest.bandwidth_hz:.4g} Hz at {sampling_rate_hz:g} Hz sampling rate",
+        )
+    # The bandwidth falls as 1/window, nearly: a start, then step by step.
+    window = int(SHORTEST * shortest.bandwidth_hz / bandwidth_hz) // 2 * 2 + 1
+    window = max(window - 4, SHORTEST)
+    while LocalPolynomial(window, sampling_rate_hz).bandwidth_hz > bandwidth_hz:
+        window += 2
+    return LocalPolynomial(window, sampling_rate_hz)
+
+
+RATIO_TOLERANCE = 0.02
+LEAST_TURN_RAD = 0.2
+"""Turn of the driver below which the ratio of both angles says nothing."""
+MOST_PLAY_TEETH = 0.5
+"""Of a tooth pitch: both angles may differ by the backlash."""
+
+
+def measure_motion(
+    recording: Recording,
+    rig: Rig | None = None,
+    *,
+    use: Mapping[str, str] | None = None,
+    bandwidth_hz: float | None = None,
+    unwrap: bool = False,
+) -> PairMotion:
+    """Return the motion of the gear pair whose contact the rig describes.
+
+    What is measured is taken as it is. A missing speed is the slope of the angle, a missing acceleration that of the
+    speed (else the second derivative of the angle), by a Savitzky–Golay filter. A missing angle is the sum of the
+    speed, which drifts.
+
+    Parameters
+    ----------
+    recording : Recording
+    rig : Rig or None
+        With a contact; default: the recording's own.
+    use : mapping or None
+        Role → channel, see `gearsig.motion.ROLES`; the others are found by name.
+    bandwidth_hz : float or None
+        Everything is smoothed to it. None: what is measured stays as it is, derivatives come from seven samples.
+    unwrap : bool
+        Whether angles start again after each revolution.
+
+    Raises
+    ------
+    InputError
+        If an angle jumps or wraps, both angles do not go together as the teeth want, a speed or acceleration does not
+        go with its angle, or a unit is not known.
+    RefusalError
+        If the rig has no contact, or neither angle nor speed of a gear was measured.
+    """
+    known = rig or recording.rig
+    if known is None:
+        raise RefusalError("no rig is known", remedy="give a rig file with [[pair]] and [contact]")
+    path = path_of_contact(known)
+    roles = find_roles(recording, contact_pair(known), use)
+    smoother = local_polynomial(recording.sampling_rate_hz, bandwidth_hz)
+    reader = _Reader(recording, known, roles, smoother, bandwidth_hz is not None, unwrap)
+    driver, driven = (reader.side(side) for side in SIDES)
+    _check_ratio(driver[0], driven[0], path, recording.provenance.source or "recording")
+    contact = known.contact
+    assert contact is not None  # noqa: S101  path_of_contact has seen to it
+    if not stands(driver[0], path, contact):
+        for side, motion in zip(SIDES, (driver, driven), strict=True):
+            reader.check_scales(side, motion)
+    torque, force = (reader.measured(role) if role in roles else None for role in ("torque", "force"))
+    return PairMotion(
+        recording.sampling_rate_hz,
+        driver[0],
+        driven[0],
+        driver[1],
+        driven[1],
+        driver[2],
+        driven[2],
+        path=path,
+        contact=contact,
+        methods=reader.methods,
+        torque_nm=torque,
+        force_n=force,
+        source=recording.provenance.source,
+        notes=tuple(reader.notes),
+    )
+
+
+@dataclass
+class _Reader:
+    """Reads channels and derives what is missing, keeping book of it."""
+
+    recording: Recording
+    rig: Rig
+    roles: Mapping[str, str]
+    smoother: LocalPolynomial
+    smooths: bool
+    unwrap: bool
+    methods: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def measured(self, role: str) -> FloatArray:
+        """Return a measured channel in SI units, smoothed where a bandwidth is wanted."""
+        name = self.roles[role]
+        values = role_values(self.recording, self.rig, role, name)
+        if role.endswith(" angle"):
+            if self.unwrap or self._wraps(name):
+                values = np.unwrap(values)
+                self.notes.append(f"channel {name!r} was unwrapped")
+            check_angle(values, self.recording.sampling_rate_hz, name, self.recording.provenance.source)
+        self.methods[role] = f"channel {name!r}" + (f", {self.smoother.text}" if self.smooths else "")
+        return self.smoother.apply(values) if self.smooths else values
+
+    def side(self, side: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return angle, speed and acceleration of one gear."""
+        angle_role, speed_role, acceleration_role = (f"{side} {what}" for what in ("angle", "speed", "acceleration"))
+        if angle_role not in self.roles and speed_role not in self.roles:
+            raise RefusalError(
+                f"neither angle nor speed of the {side} gear was measured: how far the flanks are apart is not known",
+                remedy=f'name the channel, e.g. --use "{angle_role}=CHANNEL", or give it quantity = "angle" and the '
+                "shaft's name as position in its [[sensor]] table; an acceleration alone drifts away",
+            )
+        speed = self.measured(speed_role) if speed_role in self.roles else None
+        if angle_role in self.roles:
+            angle = self.measured(angle_role)
+        else:
+            assert speed is not None  # noqa: S101  one of the two was measured
+            angle = self._summed(speed, side)
+        if speed is None:
+            speed = self._derived(speed_role, angle, 1, "angle")
+        if acceleration_role in self.roles:
+            return angle, speed, self.measured(acceleration_role)
+        if speed_role in self.roles:
+            return angle, speed, self._derived(acceleration_role, speed, 1, "speed")
+        return angle, speed, self._derived(acceleration_role, angle, 2, "angle")
+
+    def check_scales(self, side: str, motion: tuple[FloatArray, FloatArray, FloatArray]) -> None:
+        """Refuse a measured speed or acceleration that the measured angle of that gear contradicts."""
+        angle = self.roles.get(f"{side} angle")
+        for order, what in ((1, "speed"), (2, "acceleration")):
+            name = self.roles.get(f"{side} {what}")
+            if angle is not None and name is not None:
+                where, rate = self.recording.provenance.source or "recording", self.recording.sampling_rate_hz
+                check_scale(motion[0], motion[order], rate, order=order, names=(angle, name), where=where)
+
+    def _derived(self, role: str, values: FloatArray, order: int, of: str) -> FloatArray:
+        self.methods[role] = f"{'second ' if order == 2 else ''}derivative of the {of}: {self.smoother.text}"
+        return self.smoother.apply(values, order)
+
+    def _summed(self, speed: FloatArray, side: str) -> FloatArray:
+        self.methods[f"{side} angle"] = "sum of the speed (trapezoids), from 0"
+        self.notes.append(
+            f"the {side} angle is the sum of its speed: an offset of 1 mrad/s moves it by 1 mrad each second"
+        )
+        steps = 0.5 * (speed[1:] + speed[:-1]) / self.recording.sampling_rate_hz
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    def _wraps(self, name: str) -> bool:
+        sources = (self.recording.speed, self.rig.speed)
+        return any(isinstance(s, EncoderChannel) and s.channel == name and s.wraps for s in sources) or any(
+            sensor.channel == name and sensor.wraps for sensor in self.rig.sensors
+        )
+
+
+def _check_ratio(driver_rad: FloatArray, driven_rad: FloatArray, path: PathOfContact, where: str) -> None:
+    """Refuse angles that do not belong to one gear pair: another sense, another unit, another shaft."""
+    z1, z2 = path.teeth
+    first, last = int(np.argmin(driver_rad)), int(np.argmax(driver_rad))
+    turned, follows = driver_rad[last] - driver_rad[first], driven_rad[last] - driven_rad[first]
+    expected = turned * z1 / z2
+    if (
+        turned < LEAST_TURN_RAD
+        or abs(follows - expected) < RATIO_TOLERANCE * expected + MOST_PLAY_TEETH * 2.0 * pi / z2
+    ):
+        return
+    against = abs(follows + expected) < RATIO_TOLERANCE * expected + MOST_PLAY_TEETH * 2.0 * pi / z2
+    raise InputError(
+        f"the driver turns by {turned:.4g} rad and the driven gear by {follows:.4g} rad"
+        + (", the other way round" if against else ""),
+        where=where,
+        allowed=f"{expected:.4g} rad, by {z1} and {z2} teeth, both counted in their gear's own direction",
+        remedy="give scale = -1 in the driven angle's [[sensor]]" if against else "check units, scales and teeth",
+    )

@@ -1,0 +1,203 @@
+"""Everything that start–stop motion of a gear pair shows, in one result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.errors import RefusalError
+from gearsig.indicators import Indicator
+from gearsig.motion._backlash import BacklashEstimate, TorqueTwist, estimate_backlash, torque_twist
+from gearsig.motion._force import find_datum
+from gearsig.motion._identify import YieldingTeeth, tooth_compliance
+from gearsig.motion._impacts import Impact, find_impacts
+from gearsig.motion._segments import MotionSegments, find_course, shaft_speed_rad_s
+from gearsig.motion._types import PairMotion, check_turns
+from gearsig.phase import PhasePortrait
+
+ENOUGH_HZ = 4000.0
+"""All hard impacts of the manipulator are found from here on."""
+
+
+@dataclass(frozen=True)
+class StartStop:
+    """What a start–stop motion shows.
+
+    Parameters
+    ----------
+    motion : PairMotion
+    course : Course
+        Of the driver.
+    backlash : BacklashEstimate or None
+    impacts : tuple of Impact
+    loop : TorqueTwist or None
+    portrait : PhasePortrait or None
+        Compression and its rate, from the middle of the play.
+    teeth : ToothCompliance or None
+        Of the driver's teeth one by one.
+    indicators : tuple of Indicator
+    refusals : tuple of str
+        What could not be told, with the reason.
+    notes : tuple of str
+        What is told in part.
+    """
+
+    motion: PairMotion
+    course: MotionSegments
+    backlash: BacklashEstimate | None
+    impacts: tuple[Impact, ...]
+    loop: TorqueTwist | None
+    portrait: PhasePortrait | None
+    teeth: YieldingTeeth | None
+    indicators: tuple[Indicator, ...]
+    refusals: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+
+
+def examine_start_stop(motion: PairMotion) -> StartStop:
+    """Find stretches, backlash, impacts, the loop of torque over twist and the phase plane of a pair's motion.
+
+    What the record does not allow is left out and said in `refusals`.
+
+    Raises
+    ------
+    RefusalError
+        If the machine stands all the time: its stop is longer than the record.
+    """
+    check_turns(motion)
+    course = course_of_angle(motion.driver_angle_rad, motion.sampling_rate_hz)
+    refusals: list[str] = []
+    backlash: BacklashEstimate | None = None
+    try:
+        backlash = estimate_backlash(motion)
+    except RefusalError as refusal:
+        refusals.append(f"backlash: {refusal}")
+    datum = _datum(motion, backlash, refusals)
+    impacts: tuple[Impact, ...] = ()
+    loop: TorqueTwist | None = None
+    portrait: PhasePortrait | None = None
+    if datum is not None:
+        portrait = phase_plane_of_teeth(motion, datum)
+        half = None if backlash is None else 0.5e-6 * backlash.backlash_um
+        try:
+            impacts = find_impacts(motion, datum, half_backlash_m=half)
+        except RefusalError as refusal:
+            refusals.append(f"impacts: {refusal}")
+        if motion.torque_nm is not None:
+            loop = torque_twist(motion, course, datum)
+    teeth: YieldingTeeth | None = None
+    if motion.torque_nm is not None:
+        try:
+            teeth = tooth_compliance(motion)
+        except RefusalError as refusal:
+            refusals.append(f"stiffness of single teeth: {refusal}")
+    indicators = start_stop_indicators(motion, course, backlash, impacts, loop)
+    return StartStop(
+        motion,
+        course,
+        backlash,
+        impacts,
+        loop,
+        portrait,
+        teeth,
+        indicators,
+        tuple(refusals),
+        _notes(impacts, motion.sampling_rate_hz),
+    )
+
+
+def course_of_angle(angle_rad: FloatArray, sampling_rate_hz: float) -> MotionSegments:
+    """Return the stretches of a shaft's angle, its speed derived within 50 Hz."""
+    return find_course(angle_rad, shaft_speed_rad_s(angle_rad, sampling_rate_hz), sampling_rate_hz)
+
+
+def phase_plane_of_teeth(motion: PairMotion, datum_m: float) -> PhasePortrait:
+    """Return compression and its rate: two walls a backlash apart, with the flights between them."""
+    points = np.stack([motion.compression_m - datum_m, motion.compression_rate_mps], axis=1)
+    return PhasePortrait(
+        points, motion.sampling_rate_hz, ("compression", "compression rate"), ("m", "m/s"), "states", motion.source
+    )
+
+
+def start_stop_indicators(
+    motion: PairMotion,
+    course: MotionSegments,
+    backlash: BacklashEstimate | None,
+    impacts: tuple[Impact, ...],
+    loop: TorqueTwist | None,
+) -> tuple[Indicator, ...]:
+    """Return indicators that need no steady speed.
+
+    Starts, stops, rests, reversals; run-down; backlash; impacts: number, hardest, energy lost per cycle, restitution;
+    loss and work per cycle, lost motion.
+    """
+    n_cycles = max(1, len(course.moving))
+    rows: list[tuple[str, float, str, str]] = [
+        ("starts", float(len(course.starts_s)), "", "motion"),
+        ("stops", float(len(course.stops_s)), "", "motion"),
+        ("reversals", float(course.n_reversals), "", "motion"),
+        ("standing part", course.standing_part, "", "motion"),
+        ("highest speed", max((s.top_speed_rad_s for s in course.moving), default=0.0) * 30.0 / np.pi, "rpm", "motion"),
+        ("run-down", run_down_rad_s2(motion, course), "rad/s^2", "motion"),
+    ]
+    if backlash is not None:
+        rows.append(("backlash", backlash.backlash_um, "um", "compression"))
+    speeds = np.array([i.speed_mps for i in impacts])
+    lost = np.array([i.energy_j if np.isnan(i.lost_j) else i.lost_j for i in impacts])
+    bounces = np.array([i.restitution for i in impacts if not np.isnan(i.restitution)])
+    rows += [
+        ("impacts per cycle", len(impacts) / n_cycles, "", "compression"),
+        ("back impacts per cycle", sum(i.flank < 0 for i in impacts) / n_cycles, "", "compression"),
+        ("hardest impact", float(speeds.max()) if len(speeds) else 0.0, "m/s", "compression"),
+        ("impact loss per cycle", float(lost.sum()) / n_cycles if len(lost) else 0.0, "J", "compression"),
+        ("restitution", float(np.median(bounces)) if len(bounces) else float("nan"), "", "compression"),
+    ]
+    if loop is not None:
+        rows += [
+            ("lost motion", np.degrees(loop.lost_motion_rad), "deg", "torque over twist"),
+            ("loop loss per cycle", loop.loss_per_cycle_j, "J", "torque over twist"),
+            ("work per cycle", loop.work_per_cycle_j, "J", "torque over angle"),
+        ]
+    return tuple(
+        Indicator(name, float(value), unit, computed_on=on, note="" if np.isfinite(value) else "not defined here")
+        for name, value, unit, on in rows
+    )
+
+
+def run_down_rad_s2(motion: PairMotion, course: MotionSegments) -> float:
+    """Median over stops of the driver's mean deceleration from 80 to 20 % of its top speed; nan for none."""
+    found = []
+    for stretch in course.moving:
+        speed = np.abs(motion.driver_speed_rad_s[stretch.first : stretch.last])
+        top = int(np.argmax(speed))
+        falling = speed[top:]
+        high, low = np.flatnonzero(falling < 0.8 * speed[top]), np.flatnonzero(falling < 0.2 * speed[top])
+        if len(high) and len(low) and low[0] > high[0]:
+            found.append(0.6 * speed[top] * motion.sampling_rate_hz / (low[0] - high[0]))
+    return float(np.median(found)) if found else float("nan")
+
+
+def _notes(impacts: tuple[Impact, ...], rate_hz: float) -> tuple[str, ...]:
+    """Say of how many bounces the restitution cannot be read off the samples."""
+    n = sum(bool(i.note) for i in impacts)
+    if not n:
+        return ()
+    known = n + sum(not np.isnan(i.restitution) for i in impacts)
+    remedy = "; record at 4 kHz or more" if rate_hz < ENOUGH_HZ else ""
+    text = (
+        f"The restitution of {n} of {known} bounces cannot be read: they part faster than they met, as noise is too "
+        f"large or samples at {rate_hz:g} Hz are too few for their flights{remedy}."
+    )
+    return (text,)
+
+
+def _datum(motion: PairMotion, backlash: BacklashEstimate | None, refusals: list[str]) -> float | None:
+    if backlash is not None:
+        return backlash.datum_m
+    try:
+        return find_datum(motion).compression_m
+    except RefusalError as refusal:
+        refusals.append(f"impacts and phase plane: {refusal}")
+        return None

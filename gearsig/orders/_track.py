@@ -1,0 +1,245 @@
+"""Level and phase of orders along a change of speed, from the angle-resampled signal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from gearsig.angle import AngleSignal
+from gearsig.checks import FloatArray, frozen_array, not_negative, positive
+from gearsig.errors import InputError, RefusalError
+from gearsig.orders._average import block_times, unit_of
+from gearsig.orders._types import TrackedOrder
+from gearsig.spectra import BATCH_SAMPLES, BlockPlan, ComplexArray, plan_blocks
+
+
+def track_orders(
+    signal: AngleSignal,
+    channel: str,
+    orders: Sequence[float],
+    *,
+    revolutions_per_block: float = 10.0,
+    overlap: float = 0.75,
+    window: str = "hann",
+) -> tuple[TrackedOrder, ...]:
+    """Return amplitude and phase of each order along the signal.
+
+    c(o) = 2 Σ x[n] w[n] exp(-2πi o θ_n) / Σ w[n] over each block, θ the shaft angle in revolutions: the amplitude is
+    |c|, the phase is that of x = A cos(2π o θ + φ). Constant amplitudes are exact but for leakage of other orders.
+
+    Parameters
+    ----------
+    signal : AngleSignal
+    channel : str
+    orders : floats
+        Cycles per revolution; need not be whole.
+    revolutions_per_block : float
+        Above zero. Two orders are told apart if they lie at least two bandwidths apart; a level that changes within
+        the block is smoothed.
+    overlap : float
+        0 to 0.95.
+    window : str
+        See `make_window`.
+
+    Returns
+    -------
+    tuple of TrackedOrder
+        In the order asked for, each with its bandwidth: the window's equivalent noise bandwidth in orders.
+
+    Raises
+    ------
+    RefusalError
+        If an order lies above the signal's highest valid order, or the signal is shorter than a block.
+    InputError
+        On an unknown channel or window, or a negative order.
+
+    Notes
+    -----
+    Not for crossing or close orders of two shafts: a block filter cannot separate them.
+    The speed may change inside the block; the level should not change much.
+
+    References
+    ----------
+    K. R. Fyfe and E. D. S. Munck, "Analysis of computed order tracking", 1997.
+    """
+    wanted, plan = plan_track(signal, channel, orders, revolutions_per_block, overlap, window)
+    cycles = wanted / signal.samples_per_revolution
+    c = order_amplitudes(signal.values(channel), plan, cycles, wanted * signal.start_revolution)
+    return tracked_orders(signal, channel, wanted, plan, c)
+
+
+def plan_track(
+    signal: AngleSignal,
+    channel: str,
+    orders: Sequence[float],
+    revolutions_per_block: float,
+    overlap: float,
+    window: str,
+    *,
+    margin: float = 0.0,
+) -> tuple[FloatArray, BlockPlan]:
+    """Check what is to be tracked; return the orders and the blocks."""
+    wanted = _checked_orders(signal, orders, margin)
+    n = len(signal.values(channel))
+    n_per_block = round(positive(revolutions_per_block, "revolutions_per_block") * signal.samples_per_revolution)
+    if not 2 <= n_per_block <= n:
+        raise RefusalError(
+            f"a block of {revolutions_per_block:g} revolutions does not fit {signal.n_revolutions:.1f} revolutions",
+            remedy="shorten the block or record longer",
+        )
+    return wanted, plan_blocks(n, n_per_block, overlap, window)
+
+
+def tracked_orders(
+    signal: AngleSignal, channel: str, orders: FloatArray, plan: BlockPlan, c: ComplexArray
+) -> tuple[TrackedOrder, ...]:
+    """Wrap complex amplitudes (n_blocks, n_orders) with time, speed and unit."""
+    time_s, speed_rpm = block_times(signal, 0, plan.n_per_block, plan.step, plan.n_blocks)
+    return tuple(
+        TrackedOrder(
+            order=float(order),
+            time_s=time_s,
+            speed_rpm=speed_rpm,
+            amplitude=np.abs(c[:, i]),
+            phase_rad=np.angle(c[:, i]),
+            unit=unit_of(signal, channel),
+            bandwidth_orders=plan.window.noise_bandwidth_bins * signal.samples_per_revolution / plan.n_per_block,
+            source=channel,
+            shaft=signal.shaft_angle.shaft,
+        )
+        for i, order in enumerate(orders)
+    )
+
+
+def order_amplitudes(
+    x: FloatArray, plan: BlockPlan, cycles_per_sample: FloatArray, start_cycles: FloatArray
+) -> ComplexArray:
+    """Return the complex amplitudes c of every block and order, (n_blocks, n_orders), as `track_orders` states.
+
+    One real matrix product per batch of blocks; the phase of each block's start is taken out afterwards.
+    """
+    n, w = plan.n_per_block, plan.window.values
+    turns = 2 * np.pi * np.outer(np.arange(n), cycles_per_sample)
+    basis = np.concatenate([np.cos(turns), -np.sin(turns)], axis=1) * w[:, None]
+    blocks = np.lib.stride_tricks.sliding_window_view(x, n)[:: plan.step]
+    per_batch = max(1, BATCH_SAMPLES // n)
+    parts = np.concatenate(
+        [blocks[i : i + per_batch].astype(np.float64) @ basis for i in range(0, plan.n_blocks, per_batch)]
+    )
+    k = len(cycles_per_sample)
+    at_start = start_cycles + np.outer(np.arange(plan.n_blocks) * plan.step, cycles_per_sample)
+    c: ComplexArray = (parts[:, :k] + 1j * parts[:, k:]) * np.exp(-2j * np.pi * at_start)
+    c *= np.where(cycles_per_sample == 0.0, 1.0, 2.0) / w.sum()
+    return c
+
+
+def amplitude_at_speeds(tracked: TrackedOrder, speeds_rpm: FloatArray) -> FloatArray:
+    """Return a tracked order's peak amplitude at given speeds: linear in power between the blocks.
+
+    Parameters
+    ----------
+    tracked : TrackedOrder
+        Of a run-up or a run-down: the speed must rise or fall all along.
+    speeds_rpm : array, (n,)
+
+    Returns
+    -------
+    array, (n,)
+        nan outside the speeds that were tracked.
+
+    Raises
+    ------
+    RefusalError
+        If the speed rises and falls: an amplitude then belongs to a time, not to a speed.
+    """
+    grid = frozen_array(speeds_rpm, "speeds_rpm", ndim=1)
+    rising = np.diff(tracked.speed_rpm)
+    if not (np.all(rising > 0) or np.all(rising < 0)):
+        raise RefusalError(
+            "the speed does not rise or fall all along",
+            remedy="cut the recording into run-up and run-down, or read the level over time",
+        )
+    along = np.argsort(tracked.speed_rpm)
+    power = np.interp(grid, tracked.speed_rpm[along], tracked.amplitude[along] ** 2, left=np.nan, right=np.nan)
+    amplitude: FloatArray = np.sqrt(power)
+    return amplitude
+
+
+def _checked_orders(signal: AngleSignal, orders: Sequence[float], margin: float) -> FloatArray:
+    if len(orders) == 0:
+        raise InputError("no orders are given", remedy="name at least one")
+    wanted = np.array([not_negative(order, "order") for order in orders])
+    if wanted.max() + margin > signal.highest_order:
+        raise RefusalError(
+            f"order {wanted.max():g} lies above the highest valid order {signal.highest_order:g} of the signal",
+            remedy="resample with more samples per revolution, or record at a higher rate",
+        )
+    return wanted
+
+
+# --------------------
+# Level of orders along a change of speed, as the power in a band of orders around each.
+# --------------------
+
+
+def track_order_bands(
+    signal: AngleSignal,
+    channel: str,
+    orders: Sequence[float],
+    *,
+    bandwidth_orders: float = 0.25,
+    revolutions_per_block: float = 24.0,
+    overlap: float = 0.75,
+    window: str = "hann",
+) -> tuple[TrackedOrder, ...]:
+    """Return the level of each order as the power within a band of orders around it.
+
+    A(o)² = Σ_{|k/R| ≤ b/2} |c(o + k/R)|² / B, with c as in `track_orders`, R revolutions per block, b the bandwidth
+    and B the window's noise bandwidth in lines: a constant sine in the band keeps its amplitude, noise in the band
+    counts with its power. This is what sound and vibration analysers show as "order level": less smoothed than
+    `track_orders` with the same block, for a modulated order's sidebands within the band are kept.
+
+    Parameters
+    ----------
+    signal : AngleSignal
+    channel : str
+    orders : floats
+    bandwidth_orders : float
+        Full width; at least 4/revolutions_per_block, so that the main lobe of the Hann window fits.
+    revolutions_per_block : float
+    overlap : float
+        0 to 0.95.
+    window : str
+
+    Returns
+    -------
+    tuple of TrackedOrder
+        Amplitude is peak (√2 times the rms in the band); the phase is that of the centre line.
+
+    Raises
+    ------
+    RefusalError, InputError
+        As `track_orders`; also on a band that is too narrow or reaches below order zero.
+    """
+    width = positive(bandwidth_orders, "bandwidth_orders")
+    if width * revolutions_per_block < 4.0:
+        raise InputError(
+            f"bandwidth_orders is {width:g} with blocks of {revolutions_per_block:g} revolutions",
+            allowed=f"at least {4.0 / positive(revolutions_per_block, 'revolutions_per_block'):g}",
+            remedy="widen the band or lengthen the block",
+        )
+    wanted, plan = plan_track(signal, channel, orders, revolutions_per_block, overlap, window, margin=width / 2)
+    per_rev = signal.samples_per_revolution
+    half = int(width / 2 * plan.n_per_block / per_rev * (1 + 1e-12))
+    lines = wanted[:, None] + np.arange(-half, half + 1) * per_rev / plan.n_per_block
+    if lines.min() <= 0:
+        raise InputError(
+            f"the band of order {wanted.min():g} reaches down to {lines.min():g}", remedy="narrow it: above order zero"
+        )
+    c = order_amplitudes(signal.values(channel), plan, lines.ravel() / per_rev, lines.ravel() * signal.start_revolution)
+    c = c.reshape(plan.n_blocks, *lines.shape)
+    amplitude: FloatArray = np.sqrt((np.abs(c) ** 2).sum(axis=2) / plan.window.noise_bandwidth_bins)
+    tracked = tracked_orders(signal, channel, wanted, plan, c[:, :, half])
+    return tuple(replace(o, amplitude=amplitude[:, i], bandwidth_orders=width) for i, o in enumerate(tracked))

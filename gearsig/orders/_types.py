@@ -1,0 +1,116 @@
+"""Order maps, tracked orders and synchronous averages, with axes, scaling and units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from gearsig.checks import FloatArray, frozen_array
+from gearsig.errors import InputError
+from gearsig.spectra import Scaling
+
+
+@dataclass(frozen=True)
+class OrderMap:
+    """Spectra along speed or time.
+
+    Parameters
+    ----------
+    values : array, (n_blocks, n_lines)
+    positions : array, (n_lines,)
+        Orders or frequencies (Hz), see `axis`.
+    time_s, speed_rpm : arrays, (n_blocks,)
+        Middle of each block, mean speed in it.
+    axis : str
+        "order" or "frequency".
+    scaling, unit, resolution, source, shaft
+        As in `Spectrum`.
+    """
+
+    values: FloatArray
+    positions: FloatArray
+    time_s: FloatArray
+    speed_rpm: FloatArray
+    axis: Literal["order", "frequency"]
+    scaling: Scaling
+    unit: str
+    resolution: float
+    source: str
+    shaft: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", frozen_array(self.values, "values (block, line)", ndim=2))
+        for name in ("positions", "time_s", "speed_rpm"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        if self.values.shape != (len(self.time_s), len(self.positions)):
+            raise InputError(
+                f"values of shape {self.values.shape} for {len(self.time_s)} blocks × {len(self.positions)} lines"
+            )
+
+
+@dataclass(frozen=True)
+class TrackedOrder:
+    """Level and phase of one order along speed.
+
+    Parameters
+    ----------
+    order : float
+        Cycles per revolution of `shaft`.
+    time_s, speed_rpm : arrays, (n,)
+    amplitude : array, (n,)
+        Peak amplitude of the order in `unit`.
+    phase_rad : array, (n,)
+        Of the cosine against the shaft angle, -π to π.
+    bandwidth_orders : float
+        Width over which the order's energy was collected.
+    """
+
+    order: float
+    time_s: FloatArray
+    speed_rpm: FloatArray
+    amplitude: FloatArray
+    phase_rad: FloatArray
+    unit: str
+    bandwidth_orders: float
+    source: str
+    shaft: str
+
+    def __post_init__(self) -> None:
+        for name in ("time_s", "speed_rpm", "amplitude", "phase_rad"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+
+
+@dataclass(frozen=True)
+class SynchronousAverage:
+    """One mean revolution of a shaft, and how well the revolutions agree on it.
+
+    Parameters
+    ----------
+    values : array, (n_angles,)
+        Mean over the revolutions, at equal steps of angle from 0 to just under 1 revolution.
+    standard_error : array, (n_angles,)
+        Standard deviation of the mean, from the scatter of the revolutions (jackknife over blocks of revolutions).
+    n_revolutions : int
+        Revolutions averaged.
+    shaft, channel, unit : str
+    kind : str
+        "average"; "residual": without mesh harmonics; "difference": without mesh harmonics and their first-order
+        sidebands; "regular": what was taken out for the difference; "band-passed mesh": lines around a mesh harmonic.
+    highest_order : float
+        Orders above it are not in the average.
+    """
+
+    values: FloatArray
+    standard_error: FloatArray
+    n_revolutions: int
+    shaft: str
+    channel: str
+    unit: str
+    kind: Literal["average", "residual", "difference", "regular", "band-passed mesh"]
+    highest_order: float
+
+    def __post_init__(self) -> None:
+        for name in ("values", "standard_error"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        if len(self.values) != len(self.standard_error):
+            raise InputError(f"{len(self.values)} values, {len(self.standard_error)} standard errors")

@@ -1,0 +1,674 @@
+"""Phase, frequency and bandwidth over time of the orders that the Vold–Kalman filter is to separate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, cast
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gearsig.angle import AngleSignal, ShaftAngle
+from gearsig.checks import FloatArray, count, frozen_array, positive, within
+from gearsig.errors import InputError, RefusalError
+from gearsig.orders._average import times_of_revolutions
+from gearsig.orders._types import TrackedOrder
+from gearsig.rig import Rig
+
+# --------------------
+# What the Vold–Kalman filter takes and gives: frequency tracks, separated orders.
+# --------------------
+
+
+Generation = Literal["first", "second"]
+
+
+@dataclass(frozen=True)
+class FrequencyTrack:
+    """A component known by its frequency over time instead of by shaft and order.
+
+    Parameters
+    ----------
+    name : str
+    frequency_hz : array, (n_samples,)
+        At the recording's samples, not negative. Its integral is the phase, zero at the first sample.
+    order : float, optional
+        Cycles per revolution of `shaft`, where that is known: it tells the shaft's speed, so that a bandwidth in orders
+        is one of that shaft, and levels can be read over speed.
+    shaft : str, optional
+    """
+
+    name: str
+    frequency_hz: FloatArray
+    order: float = float("nan")
+    shaft: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self, "frequency_hz", frozen_array(self.frequency_hz, f"frequency_hz of {self.name!r}", ndim=1)
+        )
+        if len(self.frequency_hz) == 0 or self.frequency_hz.min() < 0.0:
+            raise InputError(f"the frequency of track {self.name!r} is empty or negative", allowed=">= 0 Hz")
+        if not np.isnan(self.order):
+            positive(self.order, f"order of track {self.name!r}")
+
+
+@dataclass(frozen=True)
+class SeparatedOrder:
+    """One order taken out of a signal: waveform, and complex envelope over time.
+
+    Parameters
+    ----------
+    name : str
+    shaft : str
+        Empty where not known, for a frequency track.
+    order : float
+        Cycles per revolution of `shaft`; nan where not known, for a frequency track.
+    envelope : array, (n_samples,), complex
+        A e^{iφ} of A cos(2π·cycles + φ), A the peak amplitude in `unit`; nan where not `valid`.
+    waveform : array, (n_samples,)
+        The order's part of the signal; 0 where not `valid`.
+    frequency_hz : array, (n_samples,)
+    bandwidth_hz : array, (n_samples,) or (1,)
+        Between the -3 dB points.
+    valid : array of bool, (n_samples,)
+        Where the whole band lies between zero and half the sampling rate and the shaft angle is known.
+    settled : array of bool, (n_samples,)
+        Where, in addition, the order is known for long enough on both sides: at the ends of the recording, and beside
+        the parts left out, the filter leans on one side only, passes more noise, and its gain is not the closed form's.
+    time_s : array, (n_samples,)
+    unit, source : str
+    """
+
+    name: str
+    shaft: str
+    order: float
+    envelope: NDArray[np.complex128]
+    waveform: FloatArray
+    frequency_hz: FloatArray
+    bandwidth_hz: FloatArray
+    valid: NDArray[np.bool_]
+    settled: NDArray[np.bool_]
+    time_s: FloatArray
+    unit: str
+    source: str
+
+    def __post_init__(self) -> None:
+        for name in ("waveform", "frequency_hz", "bandwidth_hz", "time_s"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        for name in ("envelope", "valid", "settled"):
+            view = getattr(self, name).view()
+            view.flags.writeable = False
+            object.__setattr__(self, name, view)
+        lengths = {len(getattr(self, name)) for name in ("envelope", "waveform", "frequency_hz", "valid", "time_s")}
+        if len(lengths) > 1 or len(self.bandwidth_hz) not in {1, *lengths}:
+            raise InputError(f"parts of order {self.name!r} differ in length")
+
+    @property
+    def amplitude(self) -> FloatArray:
+        """Peak amplitude, (n_samples,); nan where not valid."""
+        amplitude: FloatArray = np.abs(self.envelope)
+        return amplitude
+
+    @property
+    def phase_rad(self) -> FloatArray:
+        """Phase of the cosine against the angle, -π to π, (n_samples,); nan where not valid."""
+        phase: FloatArray = np.angle(self.envelope)
+        return phase
+
+    def tracked(self, *, step: int = 1) -> TrackedOrder:
+        """Return amplitude and phase along speed, every `step`-th valid sample, as `track_orders` gives them.
+
+        Raises
+        ------
+        RefusalError
+            For a frequency track of unknown order.
+        """
+        if not np.isfinite(self.order):
+            raise RefusalError(f"{self.name!r} is a frequency track, without a speed", remedy="read it over time")
+        at = np.flatnonzero(self.valid)[:: count(step, "step")]
+        speed_rev_per_s = self.frequency_hz[at] / self.order
+        width = np.broadcast_to(self.bandwidth_hz, self.valid.shape)[at]
+        return TrackedOrder(
+            order=self.order,
+            time_s=self.time_s[at],
+            speed_rpm=60.0 * speed_rev_per_s,
+            amplitude=np.abs(self.envelope[at]),
+            phase_rad=np.angle(self.envelope[at]),
+            unit=self.unit,
+            bandwidth_orders=float(np.median(width / speed_rev_per_s)),
+            source=self.source,
+            shaft=self.shaft,
+        )
+
+
+@dataclass(frozen=True)
+class OrderSeparation:
+    """A signal as the sum of orders and a residual.
+
+    Parameters
+    ----------
+    orders : tuple of SeparatedOrder
+        In the order asked for.
+    residual : array, (n_samples,)
+        The signal less all waveforms.
+    sampling_rate : float
+        Of the signal that was separated: in Hz, or samples per revolution for an `AngleSignal`.
+    axis : "time" or "angle"
+        Along which the samples are equally spaced.
+    generation : "first" or "second"
+    n_poles : int
+        Of the second generation; the first has two.
+    groups : tuple of tuples of int
+        Positions of the orders that were solved for together.
+    expected_error : float
+        Of the numerical solution, relative to the signal's largest component.
+    notes : tuple of str
+        What the reader should know: masked parts, ends, which orders are close and which were solved for together.
+    """
+
+    orders: tuple[SeparatedOrder, ...]
+    residual: FloatArray
+    sampling_rate: float
+    axis: Literal["time", "angle"]
+    generation: Generation
+    n_poles: int
+    groups: tuple[tuple[int, ...], ...]
+    expected_error: float
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "residual", frozen_array(self.residual, "residual", ndim=1))
+
+    @property
+    def coupled(self) -> bool:
+        """Whether any orders were solved for together."""
+        return any(len(group) > 1 for group in self.groups)
+
+    def time_s(self) -> FloatArray:
+        """Sample times of the recording, (n_samples,)."""
+        return self.orders[0].time_s
+
+
+# --------------------
+# Bandwidth and weighting of the Vold–Kalman filter: closed forms for each pole count and generation.
+# --------------------
+
+
+N_POLES_MAX = 3
+HALF_POWER = np.sqrt(np.sqrt(2.0) - 1.0)
+"""r·|D| at the -3 dB points, for there 1/(1 + r²|D|²) = 1/√2."""
+
+
+def weight_of_bandwidth(bandwidth_hz: float, sampling_rate_hz: float, n_poles: int = 2) -> float:
+    """Return the weighting factor r of the second generation that gives a -3 dB bandwidth.
+
+    r = √(√2 - 1)/(2 sin(πB/2f_s))^p. For narrow bands this is 0.2049/b, 0.0652/b² and 0.0208/b³ with b = B/f_s, for
+    one, two and three poles.
+
+    Parameters
+    ----------
+    bandwidth_hz : float
+        Full width between the -3 dB points, above zero and below the sampling rate.
+    sampling_rate_hz : float
+    n_poles : int
+        1 to 3.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    InputError
+        On a bandwidth or a number of poles that is not allowed.
+
+    References
+    ----------
+    J. Tůma, "Setting the passband width in the Vold-Kalman order tracking filter", 2005.
+    """
+    rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    width = positive(bandwidth_hz, "bandwidth_hz", "Hz")
+    if width >= rate:
+        raise InputError(f"bandwidth_hz is {width:g} Hz", allowed=f"below the sampling rate of {rate:g} Hz")
+    return float(envelope_weight(np.array([width / rate]), checked_poles(n_poles))[0])
+
+
+def bandwidth_of_weight(weight: float, sampling_rate_hz: float, n_poles: int = 2) -> float:
+    """Return the -3 dB bandwidth in Hz of a weighting factor of the second generation.
+
+    B = 2f_s/π · arcsin((√(√2 - 1)/r)^(1/p)/2), the inverse of `weight_of_bandwidth`.
+
+    Raises
+    ------
+    InputError
+        On a weight so small that no frequency is attenuated by 3 dB.
+    """
+    p = checked_poles(n_poles)
+    half_sine = 0.5 * (HALF_POWER / positive(weight, "weight")) ** (1.0 / p)
+    if half_sine >= 1.0:
+        raise InputError(f"weight is {weight:g}", allowed=f"above {HALF_POWER / 2**p:.4g} with {p} pole(s)")
+    return float(2.0 * positive(sampling_rate_hz, "sampling_rate_hz", "Hz") / np.pi * np.arcsin(half_sine))
+
+
+def envelope_response(
+    offset_hz: FloatArray, bandwidth_hz: float, sampling_rate_hz: float, n_poles: int = 2
+) -> FloatArray:
+    """Return the gain of the second generation for a component `offset_hz` away from the order.
+
+    H(f) = 1/(1 + r² (2 sin πf/f_s)^2p): real, no phase shift. It holds for constant bandwidth, away from the ends, for
+    one order or several that lie far apart.
+
+    Parameters
+    ----------
+    offset_hz : array
+    bandwidth_hz, sampling_rate_hz, n_poles
+        As in `weight_of_bandwidth`.
+
+    Returns
+    -------
+    array
+        0 to 1; 1/√2 at ± half the bandwidth.
+    """
+    r = weight_of_bandwidth(bandwidth_hz, sampling_rate_hz, n_poles)
+    difference = 2.0 * np.sin(np.pi * np.asarray(offset_hz, dtype=np.float64) / sampling_rate_hz)
+    gain: FloatArray = 1.0 / (1.0 + (r * difference**n_poles) ** 2)
+    return gain
+
+
+def waveform_weight_of_bandwidth(bandwidth_hz: float, frequency_hz: float, sampling_rate_hz: float) -> float:
+    """Return the weighting factor r of the first generation that gives a -3 dB bandwidth at an order's frequency.
+
+    With h = πB/f_s and ω = 2πf/f_s, r = √(√2 - 1)/(2 tan h √(sin²ω - sin²h)): the -3 dB points of
+    1/(1 + r²(2 cos ω' - 2 cos ω)²) then lie 2h apart, not quite symmetric about ω.
+
+    Raises
+    ------
+    InputError
+        If a -3 dB point would lie below zero frequency or above half the sampling rate.
+    """
+    rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    width = within(positive(bandwidth_hz, "bandwidth_hz", "Hz"), "bandwidth_hz", 0.0, rate / 2, "Hz")
+    lowest = float(lowest_frequency(np.array([width / rate]))[0]) * rate
+    within(frequency_hz, "frequency_hz", lowest * (1 + 1e-9), rate / 2 - lowest, "Hz", remedy="narrow the band")
+    return float(waveform_weight(np.array([width / rate]), np.array([frequency_hz / rate]))[0])
+
+
+def settling_time(bandwidth: FloatArray, skirt_poles: int) -> FloatArray:
+    """Return the time after which the filter's response has decayed to 1 %, in the inverse unit of the bandwidth.
+
+    The slowest pole of 1/(1 + (√2 - 1)(2f/B)^2p) decays as exp(-t/τ), τ = (√2 - 1)^(1/2p)/(πB sin(π/2p)); this is
+    τ ln 100: 0.94/B, 1.66/B and 2.53/B for one, two and three poles. The first generation's skirts have one. Where the
+    bandwidth is 0, as that of an order of a shaft at rest, it is infinite.
+    """
+    slowness = HALF_POWER ** (1.0 / skirt_poles) / (np.pi * np.sin(0.5 * np.pi / skirt_poles))
+    with np.errstate(divide="ignore"):
+        time: FloatArray = np.log(100.0) * slowness / bandwidth
+    return time
+
+
+def envelope_weight(bandwidth: FloatArray, p: int) -> FloatArray:
+    """Return r of the second generation; bandwidth in cycles per sample."""
+    r: FloatArray = HALF_POWER / (2.0 * np.sin(0.5 * np.pi * bandwidth)) ** p
+    return r
+
+
+def waveform_weight(bandwidth: FloatArray, frequency: FloatArray) -> FloatArray:
+    """Return r of the first generation; bandwidth and frequency in cycles per sample."""
+    h, omega = np.pi * bandwidth, 2.0 * np.pi * frequency
+    # sin²ω - sin²h as a product: no digits are lost where the band nearly touches zero frequency.
+    r: FloatArray = HALF_POWER / (2.0 * np.tan(h) * np.sqrt(np.sin(omega - h) * np.sin(omega + h)))
+    return r
+
+
+def lowest_frequency(bandwidth: FloatArray) -> FloatArray:
+    """Return the frequency below which the first generation's band reaches zero; both in cycles per sample.
+
+    cos ω = cos² h: about 0.71 bandwidths, for the band is not symmetric. The same holds below half the sampling rate.
+    """
+    f: FloatArray = np.arccos(np.cos(np.pi * bandwidth) ** 2) / (2.0 * np.pi)
+    return f
+
+
+def checked_poles(n_poles: int) -> int:
+    """Return the number of poles if it is 1, 2 or 3."""
+    p = count(n_poles, "n_poles")
+    if p > N_POLES_MAX:
+        raise InputError(f"n_poles is {p}", allowed="1, 2 or 3")
+    return p
+
+
+BoolArray = NDArray[np.bool_]
+OrderLike = float | tuple[str, float] | FrequencyTrack
+CHUNK_SAMPLES = 2**17
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Phase (cycles) and frequency of each order at the samples, (n_orders, n), and where they are known, (n,).
+
+    Over time, frequencies are in Hz and durations in s; over angle, in orders and in revolutions. `speed_rev_per_s` is
+    that of the angle's shaft, (n,), None where it was not asked for.
+    """
+
+    names: tuple[str, ...]
+    shafts: tuple[str, ...]
+    orders: FloatArray
+    cycles: FloatArray
+    frequency_hz: FloatArray
+    known: BoolArray
+    time_s: FloatArray
+    speed_rev_per_s: FloatArray | None = None
+    unit: str = "Hz"
+    duration_unit: str = "s"
+
+
+def tracks_of_orders(
+    orders: Sequence[OrderLike], angle: ShaftAngle | None, rig: Rig | None, n: int, sampling_rate_hz: float
+) -> Tracks:
+    """Return the tracks of orders given as number (of the angle's shaft), (shaft, number) or frequency track."""
+    if len(orders) == 0:
+        raise InputError("no orders are given", where="orders", remedy="name at least one")
+    cycles, frequency = np.empty((len(orders), n)), np.empty((len(orders), n))
+    names: list[str] = []
+    shafts: list[str] = []
+    numbers: list[float] = []
+    known = np.ones(n, dtype=bool)
+    turned: tuple[FloatArray, FloatArray] | None = None
+    for k, wanted in enumerate(orders):
+        if isinstance(wanted, FrequencyTrack):
+            cycles[k], frequency[k] = _integrated(wanted, n, sampling_rate_hz)
+            names.append(wanted.name)
+            shafts.append(wanted.shaft)
+            numbers.append(wanted.order)
+            continue
+        if angle is None:
+            raise InputError("an order is given without a shaft angle", where="orders", remedy="give frequency tracks")
+        shaft, number = wanted if isinstance(wanted, tuple) else (angle.shaft, wanted)
+        number = positive(number, f"order {number!r}")
+        if turned is None:
+            turned = _sampled_angle(angle, n, sampling_rate_hz)
+            known = _known(angle, n, sampling_rate_hz)
+        factor = number * _ratio(angle, shaft, rig)
+        np.multiply(turned[0], factor, out=cycles[k])
+        np.multiply(turned[1], factor, out=frequency[k])
+        names.append(f"{shaft} {number:g}".strip())
+        shafts.append(shaft)
+        numbers.append(number)
+    if turned is None and angle is not None:
+        turned = _sampled_angle(angle, n, sampling_rate_hz)
+    speed = None if turned is None else turned[1]
+    time_s = np.arange(n) / sampling_rate_hz
+    return Tracks(tuple(names), tuple(shafts), np.array(numbers), cycles, frequency, known, time_s, speed)
+
+
+def tracks_over_angle(orders: Sequence[OrderLike], signal: AngleSignal) -> Tracks:
+    """Return the tracks of orders in a signal over angle, where all have a constant frequency."""
+    if len(orders) == 0:
+        raise InputError("no orders are given", where="orders", remedy="name at least one")
+    angle, n = signal.shaft_angle, signal.samples.shape[1]
+    numbers = []
+    for wanted in orders:
+        if isinstance(wanted, FrequencyTrack):
+            raise InputError(
+                f"{wanted.name!r} is a frequency over time, the signal is one over angle",
+                where="orders",
+                remedy="give the recording and its shaft angle",
+            )
+        shaft, number = wanted if isinstance(wanted, tuple) else (angle.shaft, wanted)
+        numbers.append(positive(number, f"order {number!r}") * _ratio(angle, shaft, None))
+        if numbers[-1] >= signal.highest_order:
+            raise InputError(
+                f"order {numbers[-1]:g} lies above the signal's highest order",
+                where="orders",
+                allowed=f"below {signal.highest_order:.4g}",
+                remedy="resample with more samples per revolution",
+            )
+    revolutions = signal.start_revolution + np.arange(n) / signal.samples_per_revolution
+    times = times_of_revolutions(angle, signal.start_revolution, 1.0 / signal.samples_per_revolution, n)
+    return Tracks(
+        tuple(f"{angle.shaft} {number:g}".strip() for number in numbers),
+        (angle.shaft,) * len(numbers),
+        np.array(numbers),
+        np.multiply.outer(numbers, revolutions),
+        np.broadcast_to(np.array(numbers)[:, None], (len(numbers), n)),
+        np.ones(n, dtype=bool),
+        times,
+        np.asarray(angle.speed_rpm_at(times) / 60.0),
+        "orders",
+        "revolutions",
+    )
+
+
+def bandwidths_of(
+    tracks: Tracks, hz: float | Sequence[float] | None, in_orders: float | Sequence[float] | None
+) -> FloatArray:
+    """Return the bandwidths in the unit of the tracks, (n_orders, 1) if constant, else (n_orders, n)."""
+    if (hz is None) == (in_orders is None):
+        raise InputError("give either bandwidth_hz or bandwidth_orders", where="bandwidth", allowed="one of both")
+    n_orders = len(tracks.names)
+    name = "bandwidth_orders" if hz is None else "bandwidth_hz"
+    given = np.atleast_1d(np.asarray(in_orders if hz is None else hz, dtype=object))
+    if given.shape not in {(1,), (n_orders,)}:
+        raise InputError(f"{name} has shape {given.shape}", allowed=f"one number, or one for each of {n_orders} orders")
+    widths = np.broadcast_to([_width(width, name) for width in given], (n_orders,))
+    over_angle = tracks.unit == "orders"
+    if hz is not None:
+        return _over_angle(tracks, widths) if over_angle else widths[:, None].copy()
+    _check_below_order(tracks, widths)
+    if over_angle:
+        return widths[:, None].copy()
+    return np.stack([width * _speed_of(tracks, k) for k, width in enumerate(widths)])
+
+
+def _width(given: object, name: str) -> float:
+    """Return a bandwidth as float; a text is no number, even one that could be read as such."""
+    unit = name.removeprefix("bandwidth_").replace("hz", "Hz")
+    if isinstance(given, str):
+        raise InputError(f"{name} is {given!r}", allowed=f"a number above 0, in {unit}", remedy="leave the unit out")
+    return positive(cast("float", given), name, unit)
+
+
+def _check_below_order(tracks: Tracks, widths: FloatArray) -> None:
+    """Raise InputError if a bandwidth in orders reaches down to order zero."""
+    for order, width, label in zip(tracks.orders, widths, tracks.names, strict=True):
+        if width >= 2 * order:
+            raise InputError(
+                f"bandwidth_orders is {width:g} for order {label!r}: its band reaches down to order zero",
+                allowed=f"below {2 * order:g}",
+            )
+
+
+def _over_angle(tracks: Tracks, widths_hz: FloatArray) -> FloatArray:
+    """Return bandwidths in Hz as orders, for a signal over angle."""
+    speed = tracks.speed_rev_per_s
+    if speed is None or speed.min() <= 0.0:
+        raise InputError("the shaft stands still in between", where="bandwidth_hz", remedy="give bandwidth_orders")
+    return np.asarray(np.divide.outer(widths_hz, speed))
+
+
+def _speed_of(tracks: Tracks, k: int) -> FloatArray:
+    """Return the speed in rev/s of an order's own shaft, or else of the angle's shaft."""
+    if np.isfinite(tracks.orders[k]):
+        return np.asarray(tracks.frequency_hz[k] / tracks.orders[k])
+    if tracks.speed_rev_per_s is None:
+        raise InputError(
+            f"track {tracks.names[k]!r} has no order, and there is no shaft angle",
+            where="bandwidth_orders",
+            remedy="give the track an order, a shaft angle, or bandwidth_hz",
+        )
+    return tracks.speed_rev_per_s
+
+
+def valid_parts(tracks: Tracks, bandwidth: FloatArray, sampling_rate: float, generation: Generation) -> BoolArray:
+    """Return where each order's whole band lies between zero and half the sampling rate, (n_orders, n).
+
+    Raises
+    ------
+    RefusalError
+        If an order has no such part.
+    """
+    f = tracks.frequency_hz
+    margin: FloatArray = bandwidth / 2
+    if generation == "first":
+        margin = sampling_rate * lowest_frequency(np.minimum(bandwidth / sampling_rate, 0.5))
+    above, below = f + margin >= sampling_rate / 2, f <= margin
+    valid: BoolArray = ~(above | below) & tracks.known
+    for k, name in enumerate(tracks.names):
+        if valid[k].any():
+            continue
+        reach = f"runs from {f[k].min():.4g} to {f[k].max():.4g} {tracks.unit}"
+        if f[k].max() == 0.0:
+            raise RefusalError(f"order {name!r} stands still all the time", remedy="record while the machine turns")
+        if f[k].min() >= sampling_rate / 2:
+            raise RefusalError(
+                f"order {name!r} {reach}, at or above half the sampling rate of {sampling_rate:g} {tracks.unit}",
+                remedy="record at a higher rate",
+            )
+        raise RefusalError(_no_room(f"order {name!r} {reach}", f[k], bandwidth[k], sampling_rate, tracks.unit))
+    return valid
+
+
+def _no_room(order: str, f: FloatArray, bandwidth: FloatArray, sampling_rate: float, unit: str) -> str:
+    """Return that a band does not fit between zero and half the sampling rate, and which one would."""
+    room = 2.0 * float(np.minimum(f, sampling_rate / 2 - f).max())
+    return (
+        f"{order}: its band of {np.max(bandwidth):.4g} {unit} reaches down to zero or up to half the sampling rate of "
+        f"{sampling_rate:g} {unit} all the time; narrow the bandwidth below {room:.4g} {unit}"
+    )
+
+
+def _sampled_angle(angle: ShaftAngle, n: int, sampling_rate_hz: float) -> tuple[FloatArray, FloatArray]:
+    """Return revolutions and revolutions per second at the samples."""
+    revolutions, speed = np.empty(n), np.empty(n)
+    for start in range(0, n, CHUNK_SAMPLES):
+        part = slice(start, min(start + CHUNK_SAMPLES, n))
+        t = np.arange(part.start, part.stop) / sampling_rate_hz
+        revolutions[part] = angle.revolutions_at(t)
+        speed[part] = angle.speed_rpm_at(t) / 60.0
+    # The cubic's slope may round to a little below zero where the machine stands.
+    return revolutions, np.maximum(speed, 0.0)
+
+
+def _known(angle: ShaftAngle, n: int, sampling_rate_hz: float) -> BoolArray:
+    """Return the samples within the angle's time; one sample of tolerance at either end."""
+    known = np.zeros(n, dtype=bool)
+    first = max(0, int(np.ceil(angle.start_s * sampling_rate_hz - 1.0)))
+    last = int(np.floor(angle.end_s * sampling_rate_hz + 1.0))
+    known[first : max(0, last + 1)] = True
+    return known
+
+
+def _ratio(angle: ShaftAngle, shaft: str, rig: Rig | None) -> float:
+    """Return revolutions of `shaft` per revolution of the angle's shaft."""
+    if shaft == angle.shaft:
+        return 1.0
+    ratio = rig.ratio(shaft, to=angle.shaft) if rig is not None and rig.shafts else None
+    if ratio is None:
+        raise InputError(
+            f"the ratio of shaft {shaft!r} to {angle.shaft!r} is not known",
+            where="orders",
+            remedy="give a rig with the teeth between both shafts",
+        )
+    return ratio
+
+
+def _integrated(track: FrequencyTrack, n: int, sampling_rate_hz: float) -> tuple[FloatArray, FloatArray]:
+    """Return phase in cycles (trapezoidal rule from 0) and frequency."""
+    f = track.frequency_hz.astype(np.float64)
+    if len(f) != n:
+        raise InputError(
+            f"track {track.name!r} has {len(f)} samples, the recording {n}",
+            where="orders",
+            remedy="interpolate the frequency to the recording's samples",
+        )
+    cycles = np.zeros(n)
+    np.cumsum((f[1:] + f[:-1]) / (2.0 * sampling_rate_hz), out=cycles[1:])
+    return cycles, f
+
+
+# --------------------
+# Cosine and sine of an angle in revolutions.
+# --------------------
+
+
+S3, S5, S7, S9, S11, S13, S15 = -1 / 6, 1 / 120, -1 / 5040, 1 / 362880, -1 / 39916800, 1 / 6227020800, -1 / 1307674368e3
+C2, C4, C6, C8 = -1 / 2, 1 / 24, -1 / 720, 1 / 40320
+C10, C12, C14, C16 = -1 / 3628800, 1 / 479001600, -1 / 87178291200, 1 / 20922789888e3
+BLOCK = 1000
+QUARTER_TURN_RAD = 1.5707963267948966
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def cosine_and_sine(revolutions: FloatArray, cosine: FloatArray, sine: FloatArray) -> None:
+    """Write cos 2πx and sin 2πx, to about 1e-15.
+
+    Taylor series of a quarter of the angle (at most π/4, where the terms left out are below 1e-16), then doubled twice:
+    without branches, so that the compiler runs several samples at once.
+    """
+    for i in range(len(revolutions)):
+        x = revolutions[i]
+        a = (x - round(x)) * QUARTER_TURN_RAD
+        q = a * a
+        s = a * (1 + q * (S3 + q * (S5 + q * (S7 + q * (S9 + q * (S11 + q * (S13 + q * S15)))))))
+        c = 1 + q * (C2 + q * (C4 + q * (C6 + q * (C8 + q * (C10 + q * (C12 + q * (C14 + q * C16)))))))
+        s2 = 2 * s * c
+        c2 = 1 - 2 * s * s
+        sine[i] = 2 * s2 * c2
+        cosine[i] = 1 - 2 * s2 * s2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def write_phasors(revolutions: FloatArray, out: NDArray[Any]) -> None:
+    """Write e^{2πix}, by way of pieces that lie side by side in the cache: into every other place it is slow."""
+    cosine, sine = np.empty(BLOCK), np.empty(BLOCK)
+    for start in range(0, len(revolutions), BLOCK):
+        n = min(BLOCK, len(revolutions) - start)
+        cosine_and_sine(revolutions[start : start + n], cosine[:n], sine[:n])
+        for i in range(n):
+            out[start + i] = complex(cosine[i], sine[i])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def write_modulated(envelope: NDArray[Any], revolutions: FloatArray, out: FloatArray) -> None:
+    """Write Re(a e^{2πix})."""
+    cosine, sine = np.empty(BLOCK), np.empty(BLOCK)
+    for start in range(0, len(revolutions), BLOCK):
+        n = min(BLOCK, len(revolutions) - start)
+        cosine_and_sine(revolutions[start : start + n], cosine[:n], sine[:n])
+        for i in range(n):
+            a = envelope[start + i]
+            out[start + i] = a.real * cosine[i] - a.imag * sine[i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def write_envelope(waveform: FloatArray, revolutions: FloatArray, out: NDArray[Any]) -> None:
+    """Write the envelope a of x = Re(a e^{2πic}), taken as constant from a sample to its neighbours.
+
+    They are x(n±1) = x cos α± ∓ q sin α±, α± the phase step; both give the quadrature q by least squares, and
+    a = (x + iq) e^{-2πic}.
+    """
+    n = len(waveform)
+    cosine, sine = np.empty(BLOCK), np.empty(BLOCK)
+    step_cosine, step_sine = np.empty(BLOCK + 1), np.empty(BLOCK + 1)
+    for start in range(0, n, BLOCK):
+        stop = min(start + BLOCK, n)
+        cosine_and_sine(revolutions[start:stop], cosine[: stop - start], sine[: stop - start])
+        first, last = max(start - 1, 0), min(stop, n - 1)  # steps from first to last; none beyond the ends
+        steps = revolutions[first + 1 : last + 1] - revolutions[first:last]
+        cosine_and_sine(steps, step_cosine[: last - first], step_sine[: last - first])
+        for i in range(start, stop):
+            x, q, size = waveform[i], 0.0, 0.0
+            if i > 0:
+                c, s = step_cosine[i - 1 - first], step_sine[i - 1 - first]
+                q += (waveform[i - 1] - x * c) * s
+                size += s * s
+            if i < n - 1:
+                c, s = step_cosine[i - first], step_sine[i - first]
+                q -= (waveform[i + 1] - x * c) * s
+                size += s * s
+            if size > 0.0:
+                q /= size
+            out[i] = complex(x, q) * complex(cosine[i - start], -sine[i - start])

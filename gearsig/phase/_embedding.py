@@ -1,0 +1,407 @@
+"""Delay embedding: a path through phase space from one channel."""
+
+from __future__ import annotations
+
+from math import ceil
+
+import numpy as np
+from numba import njit
+
+from gearsig.checks import FloatArray, count, positive, within
+from gearsig.errors import InputError, RefusalError
+from gearsig.phase._measures import EmbeddingDimension, MutualInformation, checked_series, mean_period_samples
+from gearsig.phase._neighbours import nearest_apart, spaced
+from gearsig.phase._types import PhasePortrait
+from gearsig.recording import Recording
+
+
+def delay_embedding(
+    values: FloatArray,
+    sampling_rate_hz: float,
+    *,
+    delay_samples: int | None = None,
+    dimension: int | None = None,
+    unit: str = "",
+    source: str = "",
+) -> PhasePortrait:
+    """Return the path of delayed values: (x(t), x(t + τ), …, x(t + (d-1)τ)).
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+    sampling_rate_hz : float
+    delay_samples : int or None
+        None: the first minimum of the average mutual information.
+    dimension : int or None
+        1 to 20; None: from false nearest neighbours.
+    unit, source : str
+
+    Returns
+    -------
+    PhasePortrait
+        Its points are a view into the signal: an embedding takes no memory of its own.
+
+    Raises
+    ------
+    InputError
+        On NaN, or if the signal is shorter than the embedding.
+    RefusalError
+        If the signal is constant; with dimension None also if no dimension unfolds it, as for noise.
+
+    Source: F. Takens, *Detecting strange attractors in turbulence*, Lecture Notes in Mathematics 898 (1981).
+    """
+    rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    x = checked_series(values, minimum=16)
+    tau = chosen_delay(x, rate) if delay_samples is None else count(delay_samples, "delay_samples")
+    d = _chosen_dimension(x, rate, tau) if dimension is None else _checked_dimension(dimension)
+    return PhasePortrait(
+        points=delay_vectors(x, tau, d),
+        sampling_rate_hz=rate,
+        axis_names=tuple("x(t)" if k == 0 else f"x(t + {k * tau / rate:.4g} s)" for k in range(d)),
+        units=(unit,) * d,
+        kind="delay embedding",
+        source=source,
+        delay_samples=tau,
+    )
+
+
+def embed_channel(
+    recording: Recording, channel: str, *, delay_samples: int | None = None, dimension: int | None = None
+) -> PhasePortrait:
+    """Return the delay embedding of a recording's channel; see `delay_embedding`."""
+    unit = recording.channels[recording.index(channel)].unit
+    return delay_embedding(
+        recording.values(channel),
+        recording.sampling_rate_hz,
+        delay_samples=delay_samples,
+        dimension=dimension,
+        unit=unit,
+        source=channel,
+    )
+
+
+def delay_vectors(x: FloatArray, delay: int, dimension: int) -> FloatArray:
+    """Return the delayed values as a view, (n - (d-1)τ, d).
+
+    Raises
+    ------
+    InputError
+        If fewer than 16 points are left.
+    """
+    n = len(x) - (dimension - 1) * delay
+    if n < 16:
+        raise InputError(
+            f"{len(x)} samples are too few for dimension {dimension} at a delay of {delay} samples",
+            allowed=f"at least {(dimension - 1) * delay + 16} samples",
+            remedy="record longer, or take a smaller delay or dimension",
+        )
+    step = x.strides[0]
+    vectors: FloatArray = np.lib.stride_tricks.as_strided(
+        x, shape=(n, dimension), strides=(step, delay * step), writeable=False
+    )
+    return vectors
+
+
+def chosen_delay(x: FloatArray, rate: float) -> int:
+    """Return the delay at the first minimum of the mutual information."""
+    return average_mutual_information(x, rate).delay_samples
+
+
+def _checked_dimension(dimension: int) -> int:
+    d = count(dimension, "dimension")
+    if d > 20:
+        raise InputError(f"dimension is {d}", allowed="1 to 20")
+    return d
+
+
+def _chosen_dimension(x: FloatArray, rate: float, tau: int) -> int:
+
+    found = embedding_dimension(x, rate, delay_samples=tau)
+    if found.dimension == 0:
+        raise RefusalError(
+            f"no dimension up to {found.dimensions[-1]} unfolds the signal (false neighbours "
+            f"{100 * float(found.false_fraction.min()):.0f} % at best): it looks stochastic",
+            remedy="filter to the motion of interest, average synchronously, or give dimension= knowingly",
+        )
+    return found.dimension
+
+
+# --------------------
+# The delay of an embedding: first minimum of the average mutual information.
+# --------------------
+
+
+N_SAMPLES = 200_000
+"""Longer signals are looked at in their first so many samples: the estimate's error is below 1e-3 nats by then."""
+
+MOST_DELAYS = 400
+MOST_BINS = 48
+SAMPLES_PER_CELL = 12
+PERIODIC_SHARE = 0.4
+"""A periodic signal tells its own future at every delay: its information stays above this share of its entropy."""
+
+
+def average_mutual_information(
+    values: FloatArray, sampling_rate_hz: float, *, longest_delay_samples: int | None = None, source: str = ""
+) -> MutualInformation:
+    """Return the average mutual information over delay, and the delay at its first minimum.
+
+    I(τ) = Σ p(x(t), x(t+τ)) ln[ p(x(t), x(t+τ)) / (p(x(t)) p(x(t+τ))) ], from a histogram whose bins hold equally many
+    samples each (adaptive to the signal's distribution), about 12 samples per cell, less the bias of counting.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+        At least 64.
+    sampling_rate_hz : float
+    longest_delay_samples : int or None
+        None: two mean periods, at most a quarter of the signal.
+    source : str
+
+    Returns
+    -------
+    MutualInformation
+        Its rule is "first minimum": the first delay that is followed by a rise larger than the scatter of the estimate.
+        Where that has no meaning: "one step" for a signal without memory, a map or a section, whose neighbouring values
+        lie farther apart than one standard deviation; "quarter period" for a periodic signal, whose information does
+        not fall below 0.4 of its entropy at any delay; "1/e" of the first value where there is no minimum.
+
+    Raises
+    ------
+    InputError
+        On NaN, too few samples, a delay longer than the signal allows.
+    RefusalError
+        If the signal is constant, or the information has no minimum and does not fall to 1/e of its first value.
+
+    Notes
+    -----
+    For a signal of one sine the first minimum lies near a quarter of its period.
+
+    Source: A. M. Fraser, H. L. Swinney, *Independent coordinates for strange attractors from mutual information*,
+    Physical Review A 33 (1986).
+    """
+    rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    x = checked_series(values, minimum=64)[:N_SAMPLES]
+    longest = _longest_delay(x, longest_delay_samples)
+    step = max(1, ceil(longest / MOST_DELAYS))
+    delays = np.arange(0, longest + 1, step)
+    bins, n_bins = equally_filled_bins(x)
+    information = np.empty(len(delays))
+    mutual_information(bins, n_bins, delays, information)
+    delay, rule = _choose(information, _scatter(len(x) - longest, n_bins), step, x)
+    return MutualInformation(information, step, rate, delay, rule, n_bins, source)
+
+
+def equally_filled_bins(x: FloatArray) -> tuple[np.ndarray, int]:
+    """Return each sample's bin, bounded by quantiles; equal samples always share one (quantised signals)."""
+    n_bins = int(np.clip(np.sqrt(len(x) / SAMPLES_PER_CELL), 4, MOST_BINS))
+    inner = np.quantile(x, np.arange(1, n_bins) / n_bins)
+    return np.searchsorted(inner, x, side="right").astype(np.int64), n_bins
+
+
+def _longest_delay(x: FloatArray, asked: int | None) -> int:
+    if asked is None:
+        return int(np.clip(2.0 * mean_period_samples(x), 4, len(x) // 4))
+    longest = count(asked, "longest_delay_samples", minimum=2)
+    if longest > len(x) // 2:
+        raise RefusalError(
+            f"{len(x)} samples are too few for delays up to {longest}", remedy=f"ask for at most {len(x) // 2}"
+        )
+    return longest
+
+
+def _scatter(n: int, n_bins: int) -> float:
+    """Standard deviation of the estimate for independent samples: 2N·I follows a χ² of (B - 1)² degrees."""
+    return float((n_bins - 1) / (np.sqrt(2.0) * max(n, 1)))
+
+
+def _choose(information: FloatArray, scatter: float, step: int, x: FloatArray) -> tuple[int, str]:
+    """Return the delay in samples and the rule that found it."""
+    if information[1] < 4.0 * scatter or float(np.mean(np.square(np.diff(x)))) > float(np.var(x)):
+        return 1, "one step"
+    if information.min() > PERIODIC_SHARE * information[0]:
+        return max(1, round(mean_period_samples(x) / 4.0)), "quarter period"
+    at = first_minimum(information, scatter)
+    if at:
+        return at * step, "first minimum"
+    below = np.flatnonzero(information < information[1] / np.e)
+    if len(below) == 0:
+        raise RefusalError(
+            "the mutual information has no minimum and does not fall to 1/e within the delays looked at",
+            remedy="give a longer longest_delay_samples, or take the trend out of the signal",
+        )
+    return int(below[0]) * step, "1/e"
+
+
+def first_minimum(information: FloatArray, scatter: float) -> int:
+    """Return the index of the first minimum that a rise above the scatter follows; 0 if there is none."""
+    at = 1
+    for k in range(2, len(information)):
+        if information[k] < information[at]:
+            at = k
+        elif information[k] > information[at] + max(4.0 * scatter, 0.02 * information[at]):
+            return at
+    return 0
+
+
+# --------------------
+# Joint histograms of a signal and its delayed self.
+# --------------------
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def mutual_information(bins, n_bins, delays, out):  # type: ignore[no-untyped-def]
+    """out[k] = Σ p(i, j) ln(p(i, j) / (p(i) p(j))) of bins[t], bins[t + delays[k]], less its bias.
+
+    Counting alone makes the estimate too large by (filled cells - filled rows - filled columns + 1) / 2N.
+
+    Source of the correction: M. S. Roulston, *Estimating the errors on measured entropy and mutual information*,
+    Physica D 125 (1999).
+    """
+    joint = np.empty((n_bins, n_bins), dtype=np.int64)
+    for k in range(delays.shape[0]):
+        n = bins.shape[0] - delays[k]
+        joint[:] = 0
+        for t in range(n):
+            joint[bins[t], bins[t + delays[k]]] += 1
+        rows, columns = joint.sum(axis=1), joint.sum(axis=0)
+        total, filled = 0.0, 0
+        for i in range(n_bins):
+            for j in range(n_bins):
+                c = joint[i, j]
+                if c > 0:
+                    filled += 1
+                    total += c * np.log(c * float(n) / (float(rows[i]) * float(columns[j])))
+        bias = (filled - np.count_nonzero(rows) - np.count_nonzero(columns) + 1) / (2.0 * n)
+        out[k] = max(total / n - bias, 0.0)
+
+
+# --------------------
+# The dimension of an embedding: false nearest neighbours, with Cao's test for randomness beside it.
+# --------------------
+
+
+N_LIBRARY, N_REFERENCES = 20_000, 2_000
+DISTANCE_RATIO, SIZE_RATIO = 15.0, 2.0  # Kennel's R_tol and A_tol
+
+
+def embedding_dimension(
+    values: FloatArray,
+    sampling_rate_hz: float,
+    *,
+    delay_samples: int | None = None,
+    largest: int = 10,
+    threshold: float = 0.02,
+    theiler_samples: int | None = None,
+    source: str = "",
+) -> EmbeddingDimension:
+    """Return the smallest dimension at which (nearly) no nearest neighbour is a false one.
+
+    Kennel: with R_d the distance to the nearest neighbour in d dimensions and Δ that of the next coordinate, the
+    neighbour is false if Δ / R_d > 15 or √(R_d² + Δ²) > 2 σ. Cao: E(d) = mean of ‖·‖_{d+1} / ‖·‖_d (largest
+    coordinate), E1 = E(d+1)/E(d); E*(d) = mean of Δ, E2 = E*(d+1)/E*(d).
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+        At least 200. Of longer signals 20 000 points serve as neighbours, 2000 as references, evenly spread.
+    sampling_rate_hz : float
+    delay_samples : int or None
+        None: first minimum of the mutual information.
+    largest : int
+        Largest dimension tried, 2 to 15.
+    threshold : float
+        Share of false neighbours that counts as none. Noise leaves some: 0.02 allows for noise of about 3 % of the
+        signal's standard deviation.
+    theiler_samples : int or None
+        Points nearer in time are no neighbours; None: one mean period.
+    source : str
+
+    Returns
+    -------
+    EmbeddingDimension
+        Dimension 0 and verdict "stochastic" where no dimension reaches the threshold. Cao's E2 is for reading: near 1
+        at every dimension says random too.
+
+    Notes
+    -----
+    Noise in a narrow band looks like a motion of few dimensions to both criteria; the divergence curve tells it apart,
+    see `largest_lyapunov_exponent`.
+
+    Raises
+    ------
+    InputError, RefusalError
+        On NaN, a constant, or a signal too short for the largest dimension.
+
+    Source: M. B. Kennel, R. Brown, H. D. I. Abarbanel, *Determining embedding dimension for phase-space reconstruction
+    using a geometrical construction*, Physical Review A 45 (1992). L. Cao, *Practical method for determining the
+    minimum embedding dimension of a scalar time series*, Physica D 110 (1997).
+    """
+    rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    x = checked_series(values, minimum=200)
+    tau = chosen_delay(x, rate) if delay_samples is None else count(delay_samples, "delay_samples")
+    within(count(largest, "largest", minimum=2), "largest", 2, 15)
+    within(threshold, "threshold", 0.0, 0.5)
+    window = round(mean_period_samples(x)) if theiler_samples is None else count(theiler_samples, "theiler_samples")
+    n = len(x) - largest * tau
+    if n < 100 + 2 * window:
+        raise RefusalError(
+            f"{len(x)} samples leave {max(n, 0)} points in {largest} dimensions at a delay of {tau} samples",
+            remedy=f"record at least {100 + 2 * window + largest * tau} samples, or lower the largest dimension",
+        )
+    x = (x - x.mean()) / x.std()
+    library, references = spaced(n, N_LIBRARY), spaced(n, N_REFERENCES)
+    finest = _resolution(x[library])
+    steps = [_step(x, tau, d, library, references, window, finest) for d in range(1, largest + 1)]
+    false_fraction = np.array([step[0] for step in steps])
+    growth, determinism = _ratios([step[1] for step in steps]), _ratios([step[2] for step in steps])
+    below = np.flatnonzero(false_fraction <= threshold)
+    dimension = int(below[0]) + 1 if len(below) else 0
+    return EmbeddingDimension(
+        dimensions=tuple(range(1, largest + 1)),
+        false_fraction=false_fraction,
+        growth=growth,
+        determinism=determinism,
+        dimension=dimension,
+        verdict="deterministic" if dimension else "stochastic",
+        threshold=threshold,
+        delay_samples=tau,
+        source=source,
+    )
+
+
+def _step(
+    x: FloatArray,
+    tau: int,
+    d: int,
+    library: np.ndarray,
+    references: np.ndarray,
+    window: int,
+    finest: float,
+) -> tuple[float, float, float]:
+    """Return the share of false neighbours, Cao's E and E* at dimension d; x has a standard deviation of one.
+
+    Distances below the signal's resolution are taken as that: a coarse converter makes many points equal.
+    """
+    vectors = delay_vectors(x, tau, d)
+    distance, near = nearest_apart(vectors, library, references, window, equal_counts=True)
+    found = near >= 0
+    here, there, r = references[found], near[found], np.maximum(distance[found], finest)
+    step = np.abs(x[here + d * tau] - x[there + d * tau])
+    false = (step > DISTANCE_RATIO * r) | (np.hypot(r, step) > SIZE_RATIO)
+    largest, near = nearest_apart(vectors, library, references, window, np.inf, equal_counts=True)
+    found = near >= 0
+    here, there, r = references[found], near[found], np.maximum(largest[found], finest)
+    change = np.abs(x[here + d * tau] - x[there + d * tau])
+    return float(false.mean()), float(np.mean(np.maximum(r, change) / r)), float(change.mean())
+
+
+def _resolution(x: FloatArray) -> float:
+    """Return the smallest step between different values."""
+    return float(np.diff(np.unique(x)).min())
+
+
+def _ratios(values: list[float]) -> FloatArray:
+    v = np.asarray(values)
+    ratios: FloatArray = v[1:] / np.maximum(v[:-1], np.finfo(float).tiny)
+    return ratios

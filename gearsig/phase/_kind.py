@@ -1,0 +1,333 @@
+"""What kind of motion it is: periodic, subharmonic, quasi-periodic, chaotic, or not to be told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, TypeVar
+
+import numpy as np
+
+from gearsig.checks import FloatArray, count, not_negative
+from gearsig.errors import GearsigError, InputError
+from gearsig.phase._embedding import delay_embedding, embedding_dimension
+from gearsig.phase._lyapunov import largest_lyapunov_exponent
+from gearsig.phase._measures import (
+    ChaosTest,
+    ChaosVerdict,
+    EmbeddingDimension,
+    LyapunovExponent,
+    checked_series,
+    mean_period_samples,
+)
+from gearsig.phase._section import CycleLock, locked_section, section_period
+from gearsig.phase._types import PhasePortrait, PoincareSection
+
+# --------------------
+# The 0–1 test for chaos.
+# --------------------
+
+
+LEAST_VALUES, MOST_VALUES = 200, 20_000
+LOWEST_C, HIGHEST_C = np.pi / 5.0, 4.0 * np.pi / 5.0
+REGULAR, IRREGULAR = 0.2, 0.8
+GOLDEN = 0.6180339887498949
+
+
+def zero_one_test(
+    values: FloatArray, *, damping: float = 0.0, n_frequencies: int = 100, every: int | None = None, source: str = ""
+) -> ChaosTest:
+    """Return the 0–1 test of a series: K near 0 for regular motion, near 1 for chaos.
+
+    z(n) = Σ_{j≤n} φ(j) e^{icj}; M(n) = mean over j ≤ N - n_cut of |z(j + n) - z(j)|², n = 1 … n_cut = N/10;
+    D(n) = M(n) - ⟨φ⟩² (1 - cos nc)/(1 - cos c) (modified); D*(n) = D(n) + α σ² sin(√2 n) (damped);
+    K(c) = correlation of D* with n; K = median over c in π/5 … 4π/5.
+
+    Parameters
+    ----------
+    values : array, (n_values,)
+        At least 200. Best the points of a Poincaré section, or a map. Of more than 20 000 the first 20 000 are used.
+    damping : float
+        α, 0 and more. The term keeps a weakly growing M, from measurement noise on regular motion, from being read as
+        chaos; weak chaos is then missed as well. About 1 to 2.5 for noise of some percent.
+    n_frequencies : int
+        Values of c, spread by the golden ratio so that few of them resonate with the motion.
+    every : int or None
+        Every so-many-th value is used; None: the first minimum of the mutual information, 1 for a map, less where
+        fewer than 200 values would be left. Where the values used still lie too close to each other, the verdict is
+        "undecided", and `ChaosTest.reason` says so.
+    source : str
+
+    Returns
+    -------
+    ChaosTest
+        "irregular" means chaos only where the motion is known to be deterministic: noise gives K near 1 as well.
+
+    Raises
+    ------
+    InputError, RefusalError
+        On NaN, a constant, or too few values.
+
+    Notes
+    -----
+    In the damping term the original has ⟨φ⟩², which vanishes for vibration; the variance σ² takes its place here.
+
+    Source: G. A. Gottwald, I. Melbourne, *On the implementation of the 0–1 test for chaos*, SIAM Journal on Applied
+    Dynamical Systems 8 (2009); damping: J. H. P. Dawes, M. C. Freeland, *The '0–1 test for chaos' and strange
+    nonchaotic attractors* (2008).
+    """
+    alpha = not_negative(damping, "damping")
+    count(n_frequencies, "n_frequencies", minimum=10)
+    x = checked_series(values, minimum=LEAST_VALUES)
+    step = _step(x) if every is None else count(every, "every")
+    phi = x[::step][:MOST_VALUES]
+    if len(phi) < LEAST_VALUES:
+        raise InputError(
+            f"{len(phi)} values are left when every {step}-th is taken",
+            allowed=f"at least {LEAST_VALUES}",
+            remedy="record longer",
+        )
+    c = LOWEST_C + (HIGHEST_C - LOWEST_C) * ((np.arange(n_frequencies) + 0.5) * GOLDEN % 1.0)
+    scale = float(phi.std())
+    k_of_c = np.array([_k(phi / scale, float(one), alpha) for one in c])
+    k = float(np.median(k_of_c))
+    verdict, reason = _verdict(k, _oversampled(phi), step)
+    return ChaosTest(
+        k=k,
+        k_of_c=k_of_c,
+        c_rad=c,
+        damping=alpha,
+        n_values=len(phi),
+        verdict=verdict,
+        oversampled=_oversampled(phi),
+        source=source,
+        every=step,
+        reason=reason,
+    )
+
+
+def zero_one_test_of_section(section: PoincareSection, *, axis: int = 0, damping: float = 0.0) -> ChaosTest:
+    """Return the 0–1 test of one coordinate of a Poincaré section; a section of one or few points is regular by itself.
+
+    Points that scatter by less than 1e-6 of the path's size are one point: K = 0.
+    """
+    values = section.points[:, axis]
+    source = f"{section.source}, section {section.section}"
+    if section.n_points >= 2 and float(np.std(values)) < 1e-6 * float(section.extent[axis]):
+        return ChaosTest(0.0, np.zeros(1), np.array([LOWEST_C]), damping, section.n_points, "regular", False, source)
+    every = None if _oversampled(values) else 1  # a section is a map already, unless it drifts slowly
+    return zero_one_test(values, damping=damping, every=every, source=source)
+
+
+def translation_walk(values: FloatArray, c_rad: float, *, every: int = 1) -> FloatArray:
+    """Return the walk (p, q) that the 0–1 test rests on, (n_values, 2): bounded for regular motion, Brownian for chaos.
+
+    p(n) + i q(n) = Σ_{j≤n} (φ(j) - ⟨φ⟩) e^{icj} / σ.
+
+    Parameters
+    ----------
+    values : array, (n_values,)
+        As in `zero_one_test`.
+    c_rad : float
+        One of `ChaosTest.c_rad`.
+    every : int
+        Every so-many-th value is used.
+
+    Notes
+    -----
+    The mean is taken off: it would turn the walk round a circle that says nothing of the motion.
+    """
+    x = checked_series(values, minimum=LEAST_VALUES)
+    phi = x[:: count(every, "every")][:MOST_VALUES]
+    z = np.cumsum((phi - phi.mean()) / phi.std() * np.exp(1j * c_rad * np.arange(1, len(phi) + 1)))
+    return np.column_stack([z.real, z.imag])
+
+
+def _k(phi: FloatArray, c: float, alpha: float) -> float:
+    n_cut = len(phi) // 10
+    n = np.arange(1, n_cut + 1)
+    d = mean_square_displacement(phi, c, n_cut) - phi.mean() ** 2 * (1.0 - np.cos(n * c)) / (1.0 - np.cos(c))
+    d = d + alpha * np.sin(np.sqrt(2.0) * n)
+    deviation = d.std()
+    return float(np.mean((n - n.mean()) * (d - d.mean())) / (n.std() * deviation)) if deviation > 0.0 else 0.0
+
+
+def mean_square_displacement(phi: FloatArray, c: float, n_cut: int) -> FloatArray:
+    """Return M(n) for n = 1 … n_cut, by one correlation instead of n_cut sums.
+
+    Σ|z(j+n) - z(j)|² = Σ|z(j+n)|² + Σ|z(j)|² - 2 Re Σ z(j+n) z*(j), over the same N - n_cut values of j for all n.
+    """
+    from scipy import fft
+
+    z = np.cumsum(phi * np.exp(1j * c * np.arange(1, len(phi) + 1)))
+    z -= z.mean()
+    n_base = len(phi) - n_cut
+    length = fft.next_fast_len(len(z) + n_base)
+    cross = fft.ifft(fft.fft(z, length) * np.conj(fft.fft(z[:n_base], length)))[1 : n_cut + 1].real
+    power = np.concatenate([[0.0], np.cumsum(np.square(z.real) + np.square(z.imag))])
+    shifted = power[n_base + 1 : n_base + n_cut + 1] - power[1 : n_cut + 1]
+    result: FloatArray = (shifted + power[n_base] - 2.0 * cross) / n_base
+    return result
+
+
+def _oversampled(phi: FloatArray) -> bool:
+    """Whether the range is more than ten times the mean step: the rule of thumb in use with this test.
+
+    The range is that of 98 of 100 values: impacts widen the whole one however far apart the values lie.
+    """
+    low, high = np.quantile(phi, (0.01, 0.99))
+    return float(high - low) > 10.0 * float(np.mean(np.abs(np.diff(phi))))
+
+
+def _verdict(k: float, oversampled: bool, step: int) -> tuple[ChaosVerdict, str]:
+    if oversampled:
+        taken = "each value" if step == 1 else f"every {step}-th value"
+        return "undecided", (
+            f"with {taken} taken, neighbours lie too close: chaos would look regular, and noise on regular motion "
+            "irregular; take fewer of them, or record longer"
+        )
+    if k < REGULAR:
+        return "regular", ""
+    return ("irregular", "") if k > IRREGULAR else ("undecided", f"K lies between {REGULAR:g} and {IRREGULAR:g}")
+
+
+def _step(x: FloatArray) -> int:
+    from gearsig.phase._embedding import chosen_delay
+
+    return min(chosen_delay(x, 1.0), len(x) // LEAST_VALUES)
+
+
+T = TypeVar("T")
+Kind = Literal["periodic", "subharmonic", "quasi-periodic", "chaotic", "stochastic", "undecided"]
+
+
+@dataclass(frozen=True)
+class MotionKind:
+    """The kind of a motion with its evidence.
+
+    Parameters
+    ----------
+    kind : str
+        "periodic": repeats each cycle of the lock; "subharmonic": after `period` cycles; "quasi-periodic", "chaotic",
+        "stochastic"; "undecided" where the measures disagree or cannot answer.
+    period : int
+        Cycles after which the motion repeats; 0 if it does not.
+    evidence : tuple of str
+        One sentence per measure.
+    section : PoincareSection
+    exponent : LyapunovExponent or None
+    chaos_test : ChaosTest or None
+    """
+
+    kind: Kind
+    period: int
+    evidence: tuple[str, ...]
+    section: PoincareSection
+    exponent: LyapunovExponent | None = None
+    chaos_test: ChaosTest | None = None
+
+
+def kind_of_motion(
+    portrait: PhasePortrait, lock: CycleLock, *, tolerance: float = 0.05, noise_free: bool = False
+) -> MotionKind:
+    """Return what kind of motion a path is, from its Poincaré section, its Lyapunov exponent and the 0–1 test.
+
+    A section that repeats decides alone. Otherwise: no dimension unfolds the first axis → stochastic; neighbours part
+    and K > 0.8 → chaotic; they do not part and K < 0.2 → quasi-periodic; all else is undecided.
+
+    Parameters
+    ----------
+    portrait : PhasePortrait
+    lock : CycleLock
+    tolerance : float
+        Of the section, in standard deviations of the path; above its scatter from noise.
+    noise_free : bool
+        Whether the path is known to be deterministic, as a model's: the 0–1 test then needs no damping, and a regular
+        one decides alone where the exponent cannot answer.
+
+    Raises
+    ------
+    RefusalError
+        If there is no section (see `locked_section`). Measures that cannot answer are named in the evidence.
+
+    Notes
+    -----
+    Measured gear vibration is periodic with noise and modulation in most cases; "undecided" is then the right answer.
+
+    "stochastic" says that the motion does not unfold. Clean chaos recorded over fewer than about a hundred cycles may
+    not unfold either: record longer, or state `noise_free` where it is a model's, which makes it "undecided".
+    """
+    section = locked_section(portrait, lock)
+    period = section_period(section, tolerance=tolerance)
+    if period:
+        seen = (
+            f"the section repeats after {period} cycle(s) of the {lock.name}, within {tolerance:g} of the path's size"
+        )
+        return MotionKind("periodic" if period == 1 else "subharmonic", period, (seen,), section)
+    evidence = [f"the section of {section.n_points} points does not repeat within 16 cycles of the {lock.name}"]
+    test = _answer(lambda: zero_one_test_of_section(section, damping=0.0 if noise_free else 1.0), "0–1 test", evidence)
+    if test is not None:
+        why = f" ({test.reason})" if test.reason else ""
+        evidence.append(f"0–1 test of the section: K = {test.k:.2f}, {test.verdict}{why}")
+    exponent, stochastic = _exponent(portrait, evidence)
+    return MotionKind(
+        _decide(test, exponent, stochastic, noise_free=noise_free), 0, tuple(evidence), section, exponent, test
+    )
+
+
+def _exponent(portrait: PhasePortrait, evidence: list[str]) -> tuple[LyapunovExponent | None, bool]:
+    """Return the exponent, and whether no dimension unfolds the path; say either in the evidence."""
+    x, rate = np.ascontiguousarray(portrait.points[:, 0]), portrait.sampling_rate_hz
+    found = _answer(lambda: _dimension(x, rate), "embedding dimension", evidence)
+    if found is None:
+        return None, False
+    if found.dimension == 0:
+        evidence.append(
+            f"no dimension up to {found.dimensions[-1]} unfolds the {portrait.axis_names[0]}: noise does this; so does "
+            "clean chaos of a few dozen cycles"
+        )
+        return None, True
+    path = delay_embedding(x, rate, delay_samples=found.delay_samples, dimension=found.dimension)
+    exponent = _answer(lambda: largest_lyapunov_exponent(path), "Lyapunov exponent", evidence)
+    if exponent is not None:
+        size = f"{exponent.exponent_per_s:.3g} ± {exponent.uncertainty_per_s:.2g} 1/s"
+        evidence.append(f"largest Lyapunov exponent {size} in {found.dimension} dimensions: {exponent.verdict}")
+    return exponent, False
+
+
+def _dimension(x: FloatArray, rate: float) -> EmbeddingDimension:
+    """Return the embedding dimension; where the usual delay unfolds nothing, that at a quarter of the mean period.
+
+    The mutual information of chaos may fall for most of a cycle, in which neighbours part too far. A quarter of the
+    mean period leaves 5 % false neighbours or more of filtered noise; an eighth would make it look deterministic.
+    """
+    usual = embedding_dimension(x, rate)
+    shorter = round(mean_period_samples(x) / 4)
+    if usual.dimension or not 1 <= shorter < usual.delay_samples:
+        return usual
+    return embedding_dimension(x, rate, delay_samples=shorter)
+
+
+def _decide(test: ChaosTest | None, exponent: LyapunovExponent | None, stochastic: bool, *, noise_free: bool) -> Kind:
+    silent = exponent is None or exponent.verdict == "undecided"
+    if noise_free and silent and test is not None and test.verdict == "regular":
+        return "quasi-periodic"
+    # Irregular without neighbours that part is not chaos: teeth that differ repeat after the hunting period only.
+    if stochastic:
+        return "undecided" if noise_free else "stochastic"
+    if test is None or exponent is None:
+        return "undecided"
+    if exponent.verdict == "diverging" and test.verdict == "irregular":
+        return "chaotic"
+    if exponent.verdict == "not diverging" and test.verdict == "regular":
+        return "quasi-periodic"
+    return "undecided"
+
+
+def _answer(ask: Callable[[], T], name: str, evidence: list[str]) -> T | None:
+    """Return the answer, or None with the refusal in the evidence."""
+    try:
+        return ask()
+    except GearsigError as error:
+        evidence.append(f"{name}: {error}")
+        return None

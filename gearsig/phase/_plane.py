@@ -1,0 +1,268 @@
+"""The phase plane of one measured channel: displacement and velocity."""
+
+from __future__ import annotations
+
+from math import ceil
+from typing import Literal
+
+import numpy as np
+
+from gearsig.checks import FloatArray, one_of, positive, within
+from gearsig.errors import InputError, RefusalError
+from gearsig.phase._measures import checked_series
+from gearsig.phase._types import PhasePortrait
+from gearsig.recording import Recording
+
+# --------------------
+# Integration and differentiation of a signal inside a frequency band.
+# --------------------
+
+
+FADE_PERIODS, SETTLING_PERIODS = 2.0, 5.0
+"""Periods of the low cut over which either end is faded, and after which the result has settled."""
+
+FADE_SAMPLES, SETTLING_SAMPLES = 64, 256
+"""The same where there is no low cut."""
+
+
+def n_unsettled(sampling_rate_hz: float, low_cut_hz: float) -> int:
+    """Return how many samples at either end of an integrated signal rest on what is not known beyond it."""
+    return ceil(SETTLING_PERIODS * sampling_rate_hz / low_cut_hz) if low_cut_hz > 0.0 else SETTLING_SAMPLES
+
+
+def integrate_band(
+    values: FloatArray, sampling_rate_hz: float, n_times: int, band_hz: tuple[float, float]
+) -> FloatArray:
+    """Return the signal integrated `n_times` (negative: differentiated) within a band.
+
+    Y(f) = X(f) W(f) / (2πi f)ⁿ, with W = 1 from `low` to `high`, rising smoothly from zero at low/4 and falling to zero
+    half way between `high` and half the sampling rate. No phase is added. Both ends are faded first: an abrupt end
+    would put slow parts into the signal, which integration magnifies. Before that the mean is taken off, or, without a
+    low cut, the straight line between both ends, which is put back afterwards.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+        Finite; float64; longer than twice `n_unsettled`.
+    sampling_rate_hz : float
+    n_times : int
+        -2 to 2.
+    band_hz : (float, float)
+        low = 0 keeps the mean, possible for n_times <= 0 only.
+
+    Returns
+    -------
+    array, (n_samples,)
+        Within `n_unsettled` samples of either end the result is disturbed; the caller leaves that out. Beyond, the
+        error is below 5e-4 of the amplitude of displacement for a line anywhere between the low cut and 75 times it.
+
+    Notes
+    -----
+    What lies below the low cut is gone: a slow drift of displacement cannot be had from an accelerometer.
+    """
+    from scipy import fft
+
+    n, (low, high) = len(values), band_hz
+    line = np.zeros(2) if low > 0.0 else _line(values, sampling_rate_hz)
+    n_fade = ceil(FADE_PERIODS * sampling_rate_hz / low) if low > 0.0 else FADE_SAMPLES
+    time = np.arange(n) / sampling_rate_hz
+    x = _faded(values - (values.mean() if low > 0.0 else line[0] + line[1] * time), n_fade)
+    n_fft = fft.next_fast_len(n + n_unsettled(sampling_rate_hz, low), real=True)
+    lines = fft.rfft(x, n_fft)
+    lines *= _gain(np.arange(len(lines)) * (sampling_rate_hz / n_fft), sampling_rate_hz, n_times, low, high)
+    y: FloatArray = fft.irfft(lines, n_fft, overwrite_x=True)[:n]
+    if n_times == 0 and low == 0.0:
+        y = y + line[0] + line[1] * time
+    return y + line[1] if n_times == -1 else y
+
+
+def _line(values: FloatArray, rate: float) -> FloatArray:
+    """Offset and slope per second of the line through the first and the last sample."""
+    return np.array([values[0], (values[-1] - values[0]) * rate / (len(values) - 1)])
+
+
+def _faded(x: FloatArray, n_fade: int) -> FloatArray:
+    """Return x, which is overwritten, with both ends brought to zero."""
+    ramp = _smooth_step((np.arange(n_fade) + 0.5) / n_fade)
+    x[:n_fade] *= ramp
+    x[-n_fade:] *= ramp[::-1]
+    return x
+
+
+def _gain(f: FloatArray, rate: float, n_times: int, low: float, high: float) -> np.ndarray:
+    """W(f) / (2πi f)ⁿ on the lines of the transform."""
+    weight = np.ones(len(f))
+    if low > 0.0:
+        weight *= _smooth_step((f - 0.25 * low) / (0.75 * low))
+    stop = 0.5 * (high + 0.5 * rate)
+    if stop > high:
+        weight *= _smooth_step((stop - f) / (stop - high))
+    if n_times == 0:
+        return weight
+    inside = weight > 0.0
+    gain = np.zeros(len(f), dtype=np.complex128)
+    if n_times < 0:
+        inside &= f > 0.0  # the mean differentiates to zero
+    gain[inside] = weight[inside] * (2j * np.pi * f[inside]) ** (-float(n_times))
+    return gain
+
+
+def _smooth_step(u: FloatArray) -> FloatArray:
+    """Rise from 0 at u = 0 to 1 at u = 1 with three continuous derivatives, so that ringing dies out fast."""
+    v = np.clip(u, 0.0, 1.0)
+    step: FloatArray = v**4 * (35.0 - 84.0 * v + 70.0 * v**2 - 20.0 * v**3)
+    return step
+
+
+MotionQuantity = Literal["acceleration", "velocity", "displacement"]
+
+# Integrations from the measured quantity to displacement; velocity takes one less.
+_INTEGRATIONS = {"acceleration": 2, "velocity": 1, "displacement": 0, "transmission_error": 0}
+
+# Metres (per second, per second squared) in the units that files use.
+_SI = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "g": 9.80665}
+
+LEAST_PERIODS = 4.0
+"""Periods of the low cut that must be left between the disturbed ends."""
+
+
+def phase_plane(
+    recording: Recording,
+    channel: str,
+    *,
+    low_cut_hz: float | None = None,
+    high_cut_hz: float | None = None,
+    quantity: MotionQuantity | None = None,
+) -> PhasePortrait:
+    """Return displacement and velocity of a channel that measures acceleration, velocity or displacement.
+
+    Acceleration is integrated twice and once, velocity once and not at all; displacement (and transmission error) is
+    differentiated. All within the band from `low_cut_hz` to `high_cut_hz`, in the frequency domain, with no phase
+    shift.
+
+    Parameters
+    ----------
+    recording : Recording
+    channel : str
+    low_cut_hz : float or None
+        Lowest frequency kept in full; a quarter of it and less is gone. Needed for acceleration and velocity:
+        integration magnifies whatever is slow. None for a displacement keeps everything slow, the mean included.
+    high_cut_hz : float or None
+        Highest frequency kept in full; None: 0.4 of the sampling rate.
+    quantity : str or None
+        What the channel measures where the recording does not know.
+
+    Returns
+    -------
+    PhasePortrait
+        Axes displacement (m where the unit is known) and velocity. Starts 5/low_cut after the recording's start and
+        ends as much before its end (256 samples without a low cut), as the integral near the ends rests on what is not
+        known; the error is below 5e-4 of the amplitude of displacement.
+
+    Raises
+    ------
+    InputError
+        If the quantity is not one of motion, the low cut is missing, or the band does not lie in the signal's.
+    RefusalError
+        If the channel is constant or too short for the low cut.
+
+    Notes
+    -----
+    Not for judging slow motion: below the low cut nothing is left. A low cut that is too low turns sensor noise into
+    drift; one too high bends the portrait of slow motion.
+
+    Source: L. Meirovitch, *Elements of Vibration Analysis* (1986), for the phase plane; integration: the property of
+    the Fourier transform.
+    """
+    of_channel = recording.channels[recording.index(channel)]
+    known = quantity if quantity is not None else of_channel.quantity
+    values = recording.values(channel)
+    return phase_plane_of(
+        values,
+        recording.sampling_rate_hz,
+        quantity=known,
+        low_cut_hz=low_cut_hz,
+        high_cut_hz=high_cut_hz,
+        unit=of_channel.unit,
+        source=channel,
+    )
+
+
+def phase_plane_of(
+    values: FloatArray,
+    sampling_rate_hz: float,
+    *,
+    quantity: str,
+    low_cut_hz: float | None = None,
+    high_cut_hz: float | None = None,
+    unit: str = "",
+    source: str = "",
+) -> PhasePortrait:
+    """Return displacement and velocity of a plain signal; see `phase_plane`."""
+    rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    n_times = _integrations(quantity, source)
+    x = checked_series(values, minimum=16)
+    low, high = _band(low_cut_hz, high_cut_hz, rate, n_times)
+    n_lost = n_unsettled(rate, low)
+    _check_length(len(x), n_lost, low, rate)
+    factor, length_unit = _length_unit(unit, n_times)
+    kept = slice(n_lost, len(x) - n_lost)
+    axes = [integrate_band(x, rate, n, (low, high))[kept] * factor for n in (n_times, n_times - 1)]
+    return PhasePortrait(
+        points=np.column_stack(axes),
+        sampling_rate_hz=rate,
+        axis_names=("displacement", "velocity"),
+        units=(length_unit, f"{length_unit}/s" if length_unit else ""),
+        kind="phase plane",
+        source=f"{source}, {low:g} to {high:g} Hz".lstrip(", "),
+        start_s=n_lost / rate,
+        band_hz=(low, high),
+    )
+
+
+def _integrations(quantity: str, source: str) -> int:
+    if quantity not in _INTEGRATIONS:
+        raise InputError(
+            f"channel {source!r} measures {quantity}: displacement and velocity do not follow from it",
+            allowed="acceleration, velocity, displacement",
+            remedy="say quantity='acceleration' if it is one, or embed the channel with delays instead",
+        )
+    one_of(quantity, "quantity", _INTEGRATIONS)
+    return _INTEGRATIONS[quantity]
+
+
+def _band(low_cut_hz: float | None, high_cut_hz: float | None, rate: float, n_times: int) -> tuple[float, float]:
+    if low_cut_hz is None and n_times > 0:
+        raise InputError(
+            "low_cut_hz is not given",
+            allowed="> 0 Hz",
+            remedy="integration magnifies what is slow: give half of the lowest frequency you want to see",
+        )
+    high = 0.4 * rate if high_cut_hz is None else within(high_cut_hz, "high_cut_hz", 0.0, 0.5 * rate, "Hz")
+    low = 0.0 if low_cut_hz is None else positive(low_cut_hz, "low_cut_hz", "Hz")
+    if not low < high:
+        raise InputError(f"the band goes from {low:g} to {high:g} Hz", allowed=f"ascending, up to {0.5 * rate:g} Hz")
+    return low, high
+
+
+def _check_length(n: int, n_lost: int, low: float, rate: float) -> None:
+    if low == 0.0 and n < 4 * n_lost:
+        raise InputError(f"values has {n} sample(s)", allowed=f"at least {4 * n_lost}", remedy="record longer")
+    if low > 0.0 and n - 2 * n_lost < LEAST_PERIODS * rate / low:
+        need = (2 * SETTLING_PERIODS + LEAST_PERIODS) / low
+        raise RefusalError(
+            f"{n / rate:.4g} s are too short for a low cut of {low:g} Hz, which needs {need:.4g} s",
+            remedy=f"raise low_cut_hz above {low * need * rate / n:.4g} Hz or record longer",
+        )
+
+
+def _length_unit(unit: str, n_times: int) -> tuple[float, str]:
+    """Return the factor to metres and "m", or 1 and the unit as it follows from the channel's own."""
+    known = unit.replace("²", "^2").replace(" ", "")
+    length = known.split("/")[0]
+    expected = {2: (f"{length}/s^2", "g"), 1: (f"{length}/s",), 0: (length,)}[n_times]
+    if length in _SI and known in expected and (length != "g" or n_times == 2):
+        return _SI[length], "m"
+    if not unit:
+        return 1.0, ""
+    return 1.0, unit if n_times == 0 else f"{unit} s" if n_times == 1 else f"{unit} s^2"

@@ -1,0 +1,251 @@
+"""Recurrence plots and their quantification, bounded in time and memory."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from gearsig.checks import FloatArray, count, positive, within
+from gearsig.errors import InputError, RefusalError
+from gearsig.phase._measures import RecurrenceMeasures, RecurrencePlot, mean_period_samples
+from gearsig.phase._types import PhasePortrait
+
+N_PAIRS = 200_000
+GOLDEN = 0.6180339887498949
+MOST_PLOT_POINTS, MOST_MEASURE_POINTS = 3_000, 20_000
+
+
+def recurrence_plot(
+    portrait: PhasePortrait,
+    *,
+    recurrence_rate: float = 0.05,
+    radius: float | None = None,
+    n_points: int = 1_000,
+    stride: int | None = None,
+) -> RecurrencePlot:
+    """Return which points lie closer to each other than a radius: R(i, j) = |x(i) - x(j)| < ε.
+
+    Parameters
+    ----------
+    portrait : PhasePortrait
+    recurrence_rate : float
+        Share of pairs that the radius is chosen for, 0.001 to 0.5.
+    radius : float or None
+        In standard deviations of the axes; wins over `recurrence_rate`.
+    n_points : int
+        At most so many points from the start of the path (2 to 3000): the matrix never grows with the signal. For
+        another stretch see `PhasePortrait.between`.
+    stride : int or None
+        Every so-many-th point is taken; None: as many as leave 16 in a mean period.
+
+    Raises
+    ------
+    InputError
+        On a radius, rate or number of points out of range.
+    RefusalError
+        If the path does not move.
+
+    Source: J.-P. Eckmann, S. Oliffson Kamphorst, D. Ruelle, *Recurrence plots of dynamical systems*, Europhysics
+    Letters 4 (1987).
+    """
+    within(count(n_points, "n_points", minimum=2), "n_points", 2, MOST_PLOT_POINTS)
+    points, step = _taken(portrait, n_points, stride)
+    limit = _radius(points, recurrence_rate, radius, 0)
+    matrix = np.empty((len(points), len(points)), dtype=np.bool_)
+    recurrence_matrix(points, limit, matrix)
+    times = portrait.start_s + np.arange(len(points)) * (step / portrait.sampling_rate_hz)
+    return RecurrencePlot(matrix, times, limit, step, portrait.source)
+
+
+def recurrence_measures(
+    portrait: PhasePortrait,
+    *,
+    recurrence_rate: float = 0.05,
+    radius: float | None = None,
+    shortest_line: int = 2,
+    theiler_samples: int | None = None,
+    n_points: int = 5_000,
+    stride: int | None = None,
+) -> RecurrenceMeasures:
+    """Return recurrence rate, determinism, line lengths, entropy, laminarity and trapping time.
+
+    With P(l) the number of diagonal lines of length l: DET = Σ_{l≥l_min} l P(l) / Σ l P(l), L = Σ l P / Σ P,
+    ENTR = -Σ p ln p with p = P / Σ P over l ≥ l_min; LAM and TT the same from vertical lines. Pairs near in time
+    (Theiler) count nowhere. Lines that end at the border count as they are.
+
+    Parameters
+    ----------
+    portrait : PhasePortrait
+    recurrence_rate, radius
+        As in `recurrence_plot`.
+    shortest_line : int
+        l_min, at least 2, in points taken.
+    theiler_samples : int or None
+        None: one mean period, and at least one point taken.
+    n_points : int
+        At most so many points from the start of the path (100 to 20 000). Time grows with its square, memory does not:
+        the matrix is never held. For another stretch see `PhasePortrait.between`.
+    stride : int or None
+        Every so-many-th point is taken; None: as many as leave 16 in a mean period. A coarser one loses lines.
+
+    Returns
+    -------
+    RecurrenceMeasures
+        Lengths in seconds.
+
+    Raises
+    ------
+    RefusalError
+        If the path does not move, or is shorter than the Theiler window asks for.
+
+    Notes
+    -----
+    High determinism is no proof: a narrow-band noise has it as well.
+
+    Source: N. Marwan, M. C. Romano, M. Thiel, J. Kurths, *Recurrence plots for the analysis of complex systems*,
+    Physics Reports 438 (2007).
+    """
+    within(count(n_points, "n_points", minimum=100), "n_points", 100, MOST_MEASURE_POINTS)
+    count(shortest_line, "shortest_line", minimum=2)
+    points, taken = _taken(portrait, n_points, stride)
+    window = _theiler(portrait, theiler_samples, taken)
+    if len(points) < 2 * window + 20:
+        raise RefusalError(
+            f"{len(points)} points are too few for a Theiler window of {window}", remedy="record longer or lower it"
+        )
+    limit = _radius(points, recurrence_rate, radius, window)
+    diagonal, vertical = np.zeros(len(points) + 1, dtype=np.int64), np.zeros(len(points) + 1, dtype=np.int64)
+    line_lengths(points, limit, window, diagonal, vertical)
+    step = taken / portrait.sampling_rate_hz
+    n_apart = len(points) - window - 1
+    recurrent = float(np.dot(np.arange(len(diagonal)), diagonal))
+    determinism, mean_line, longest, entropy = _lines(diagonal, shortest_line)
+    laminarity, trapping, _, _ = _lines(vertical, shortest_line)
+    return RecurrenceMeasures(
+        recurrence_rate=recurrent / (0.5 * n_apart * (n_apart + 1)),
+        determinism=determinism,
+        mean_line_s=mean_line * step,
+        longest_line_s=longest * step,
+        entropy_nats=entropy,
+        laminarity=laminarity,
+        trapping_time_s=trapping * step,
+        radius=limit,
+        shortest_line=shortest_line,
+        theiler_points=window,
+        stride=taken,
+        n_points=len(points),
+        duration_s=len(points) * step,
+        source=portrait.source,
+    )
+
+
+def _lines(counts: np.ndarray, shortest: int) -> tuple[float, float, float, float]:
+    """Return the share of points on lines, their mean and longest length, and the entropy of the lengths."""
+    lengths = np.arange(len(counts))
+    total = float(np.dot(lengths, counts))
+    long, n_long = lengths[shortest:], counts[shortest:].astype(np.float64)
+    n = n_long.sum()
+    if total == 0.0 or n == 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    share = n_long[n_long > 0] / n
+    on_lines = float(np.dot(long, n_long))
+    return on_lines / total, on_lines / float(n), float(long[n_long > 0].max()), float(-np.sum(share * np.log(share)))
+
+
+def _taken(portrait: PhasePortrait, n_points: int, stride: int | None) -> tuple[FloatArray, int]:
+    """Return the first points at the stride, in standard deviations of the axes, and the stride."""
+    extent = portrait.extent
+    if not bool((extent > 0.0).any()):
+        raise RefusalError("the path does not move", remedy="take a channel that vibrates")
+    step = max(1, int(_period(portrait) / 16.0)) if stride is None else count(stride, "stride")
+    points = portrait.points[::step][:n_points] / np.where(extent > 0.0, extent, 1.0)
+    return np.ascontiguousarray(points, dtype=np.float64), step
+
+
+def _theiler(portrait: PhasePortrait, asked: int | None, stride: int) -> int:
+    if asked is not None:
+        return -(-count(asked, "theiler_samples", minimum=0) // stride)
+    return max(1, round(_period(portrait) / stride))
+
+
+def _period(portrait: PhasePortrait) -> float:
+    """Mean period along the first axis that moves, in samples."""
+    axis = int(np.argmax(portrait.extent > 0.0))
+    return mean_period_samples(np.ascontiguousarray(portrait.points[:, axis], dtype=np.float64))
+
+
+def _radius(points: FloatArray, rate: float, radius: float | None, theiler: int) -> float:
+    """Return the radius asked for, or the quantile of distances of pairs that are spread evenly over all delays."""
+    if radius is not None:
+        return positive(radius, "radius", "standard deviations")
+    within(rate, "recurrence_rate", 0.001, 0.5)
+    n = len(points)
+    lowest = theiler + 1
+    if n <= lowest + 1:
+        raise InputError(f"the portrait has {n} points", allowed=f"more than {lowest + 1}")
+    # A pair (i, j) is drawn with the weight that the triangle j - i > theiler gives it.
+    u, v = (np.arange(N_PAIRS) + 0.5) / N_PAIRS, (np.arange(N_PAIRS) * GOLDEN) % 1.0
+    lag = lowest + np.minimum(((n - lowest) * (1.0 - np.sqrt(1.0 - u))).astype(np.intp), n - lowest - 1)
+    here = (v * (n - lag)).astype(np.intp)
+    distance = np.linalg.norm(points[here + lag] - points[here], axis=1)
+    found = float(np.quantile(distance, rate))
+    return found if found > 0.0 else float(np.nextafter(0.0, 1.0))
+
+
+# --------------------
+# Recurrent pairs and the lines they form, without the matrix.
+# --------------------
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def recurrence_matrix(points, radius, out):  # type: ignore[no-untyped-def]
+    """out[i, j] = |x(i) - x(j)| < radius, Euclidean."""
+    n, d = points.shape
+    limit = radius * radius
+    for i in range(n):
+        out[i, i] = True
+        for j in range(i):
+            square = 0.0
+            for a in range(d):
+                difference = points[i, a] - points[j, a]
+                square += difference * difference
+            out[i, j] = out[j, i] = square < limit
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def line_lengths(points, radius, theiler, diagonal, vertical):  # type: ignore[no-untyped-def]
+    """Count lines by length: diagonal[l] in the upper triangle, vertical[l] in all columns; index 0 holds no line.
+
+    Pairs within `theiler` points in time count as not recurrent. The matrix is symmetric: a column below the excluded
+    band is a row above it, so one pass over the upper triangle finds the vertical lines of both halves.
+    """
+    n, d = points.shape
+    limit = radius * radius
+    column_run = np.zeros(n, dtype=np.int64)
+    diagonal_run = np.zeros(n, dtype=np.int64)  # by j - i
+    for i in range(n):
+        run = 0
+        for j in range(i + theiler + 1, n):
+            square = 0.0
+            for a in range(d):
+                difference = points[i, a] - points[j, a]
+                square += difference * difference
+            lag = j - i
+            if square < limit:
+                diagonal_run[lag] += 1
+                column_run[j] += 1  # along i at fixed j: column of the upper triangle
+                run += 1  # along j at fixed i: column of the lower triangle
+            else:
+                diagonal[diagonal_run[lag]] += 1
+                diagonal_run[lag] = 0
+                vertical[column_run[j]] += 1
+                column_run[j] = 0
+                vertical[run] += 1
+                run = 0
+        vertical[run] += 1
+        if i + theiler + 1 < n:
+            j = i + theiler + 1  # the next row enters this column's excluded band: its run ends here
+            vertical[column_run[j]] += 1
+            column_run[j] = 0
+    for lag in range(theiler + 1, n):
+        diagonal[diagonal_run[lag]] += 1

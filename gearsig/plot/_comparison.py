@@ -1,0 +1,370 @@
+"""A simulation's order spectrum over a recording's, and the difference of every line that counts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.comparison import BEYOND, BandLevel, LevelPair, LineLevel
+from gearsig.errors import InputError
+from gearsig.orders import SynchronousAverage
+from gearsig.plot import _series as series
+from gearsig.plot import _style as style
+from gearsig.plot._cursors import ROW_IN, Cursor, draw, n_rows, place
+from gearsig.plot._series import envelope, thin
+from gearsig.plot._style import above_zero, plain, unit_text, with_unit
+from gearsig.spectra import Spectrum
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+LEFT_IN, RIGHT_IN = 0.85, 0.2
+UPPER_IN, LOWER_IN, GAP_IN, BOTTOM_IN = 2.3, 1.5, 0.35, 0.55
+TITLE_IN = 0.68
+POINTS = 1200
+KIND_COLOURS = {"mesh": style.MESH, "shaft": style.SHAFT, "sideband": style.FLOOR, "other": style.INK}
+KIND_WORDS = {"mesh": "mesh harmonics", "shaft": "shaft orders", "sideband": "sidebands", "other": "other lines"}
+SIDES = (("recorded", style.MEASURED), ("simulated", style.SIMULATED))
+
+
+def order_overlay_figure(
+    recorded: Spectrum,
+    simulated: Spectrum,
+    lines: Sequence[LineLevel] = (),
+    cursors: Sequence[Cursor] = (),
+    *,
+    limits: tuple[float, float] | None = None,
+    title: str = "",
+) -> Figure:
+    """Draw both spectra in one panel, and below it how far each line of the simulation is off, in dB.
+
+    Parameters
+    ----------
+    recorded, simulated : Spectrum
+        Over the same axis, in the same unit and scaling.
+    lines : sequence of LineLevel
+        Those that neither record shows are left out. Whiskers: twice the repeatability. A triangle: the line is missing
+        on one side, and the difference is at least so large.
+    cursors : sequence of Cursor
+    limits : (float, float) or None
+        Of the axis; None: all that both have.
+    title : str
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InputError
+        If axes, units or scalings differ, or the limits do not ascend.
+    """
+    _check_alike(recorded, simulated)
+    low, high = limits or (0.0, float(min(recorded.positions[-1], simulated.positions[-1])))
+    if not low < high:
+        raise InputError(f"limits are {low:g} to {high:g}", allowed="ascending")
+    shown = [line for line in lines if line.is_seen and low <= line.order <= high]
+    width = style.WIDTH_IN - LEFT_IN - RIGHT_IN
+    placed = place(cursors, (low, high), width)
+    top = TITLE_IN + ROW_IN * n_rows(placed)
+    below = LOWER_IN + GAP_IN if shown else 0.0
+    figure = style.new_figure(BOTTOM_IN + below + UPPER_IN + top)
+    upper = style.panel(figure, left_in=LEFT_IN, right_in=RIGHT_IN, bottom_in=BOTTOM_IN + below, top_in=top)
+    curves = _draw_spectra(upper, (recorded, simulated), (low, high))
+    draw(upper, placed, (width, UPPER_IN))
+    label = recorded.axis_label
+    style.label_axes(upper, "" if shown else label, with_unit(recorded.scaling, recorded.unit))
+    if shown:
+        upper.tick_params(labelbottom=False)
+        above = top + UPPER_IN + GAP_IN
+        lower = style.panel(figure, left_in=LEFT_IN, right_in=RIGHT_IN, bottom_in=BOTTOM_IN, top_in=above, sharex=upper)
+        curves += _draw_differences(lower, shown)
+        style.label_axes(lower, label, "sim. − rec. (dB)")
+    upper.set_xlim(low, high)
+    series.headline(figure, title)
+    series.legend_row(figure, curves, left_in=LEFT_IN, top_in=series.NAMES_AT_IN)
+    return figure
+
+
+def _check_alike(recorded: Spectrum, simulated: Spectrum) -> None:
+    for name in ("axis", "scaling", "unit"):
+        a, b = getattr(recorded, name), getattr(simulated, name)
+        if a != b:
+            raise InputError(f"the spectra differ in {name}: {a!r} and {b!r}", allowed="the same")
+
+
+def _draw_spectra(axes: Axes, spectra: tuple[Spectrum, Spectrum], limits: tuple[float, float]) -> list:  # type: ignore[type-arg]  # of Line2D, imported for checking only
+    curves = []
+    tops, floors = [], []
+    for spectrum, (name, colour) in zip(spectra, SIDES, strict=True):
+        start, stop = spectrum.index_of(limits[0]), spectrum.index_of(limits[1]) + 1
+        # The first lines hold the sensor's offset and the window's foot around it.
+        start = max(start, min(1 + int(2 * spectrum.noise_bandwidth / spectrum.resolution), stop - 2))
+        values = above_zero(spectrum.values[start:stop])
+        at, _, peaks = envelope(spectrum.positions[start:stop], values, POINTS)
+        curves += axes.plot(at, peaks, color=colour, linewidth=0.9, label=name, zorder=2, alpha=0.9)
+        tops.append(float(values.max()))
+        floors.append(float(np.percentile(values, 5)))
+    axes.set_yscale("log")
+    axes.set_ylim(max(min(floors), max(tops) * 1e-7) / 2.0, 2.5 * max(tops))
+    return curves
+
+
+def _draw_differences(axes: Axes, lines: Sequence[LineLevel]) -> list:  # type: ignore[type-arg]  # of Line2D
+    axes.axhline(0.0, color=style.QUIET, linewidth=0.8, zorder=1)
+    marks = []
+    for kind, colour in reversed(KIND_COLOURS.items()):
+        own = [line for line in lines if line.kind == kind]
+        if not own:
+            continue
+        x = np.array([line.order for line in own])
+        y = np.array([line.level.difference_db for line in own])
+        errors = np.array([BEYOND * line.level.repeatability_db for line in own])
+        axes.vlines(x, 0.0, y, color=colour, linewidth=1.0, alpha=0.45, zorder=2)
+        _whiskers(axes, x, y, errors, colour)
+        size = 3.0 if kind == "sideband" else 4.5
+        looks = {"color": colour, "linestyle": "none", "markeredgewidth": 0.0, "markersize": size, "zorder": 3}
+        marks += axes.plot(x, y, "o", label=KIND_WORDS[kind], **looks)  # type: ignore[arg-type]
+        bounds = np.array([not (line.simulated_is_seen and line.recorded_is_seen) for line in own])
+        looks |= {"markersize": size + 1.5}
+        for sign, marker in ((1, "^"), (-1, "v")):
+            which = bounds & (np.sign(y) == sign)
+            axes.plot(x[which], y[which], marker, **looks)  # type: ignore[arg-type]
+    largest = max(6.0, max(abs(line.level.difference_db) for line in lines) * 1.15)
+    axes.set_ylim(-largest, largest)
+    style.no_offset(axes)
+    return marks[::-1]
+
+
+def _whiskers(axes: Axes, x: FloatArray, y: FloatArray, errors: FloatArray, colour: str) -> None:
+    axes.vlines(x, y - errors, y + errors, color=colour, linewidth=2.4, alpha=0.28, zorder=2.2)
+
+
+def difference_bars(axes: Axes, x: FloatArray, levels: Sequence[LevelPair], width: float) -> None:
+    """Draw differences as bars with whiskers of twice the repeatability; those within it are pale."""
+    y = np.array([level.difference_db for level in levels])
+    beyond = np.array([level.is_beyond for level in levels])
+    axes.axhline(0.0, color=style.QUIET, linewidth=0.8, zorder=1)
+    for which, alpha in ((beyond, 0.85), (~beyond, 0.3)):
+        axes.bar(x[which], y[which], width, color=style.SIMULATED, alpha=alpha, linewidth=0, zorder=2)
+    errors = np.array([BEYOND * level.repeatability_db for level in levels])
+    axes.vlines(x, y - errors, y + errors, color=style.INK, linewidth=0.9, zorder=3)
+    largest = max(3.0, float(np.max(np.abs(y) + errors, initial=0.0)) * 1.1)
+    axes.set_ylim(-largest, largest)
+    style.no_offset(axes)
+
+
+# --------------------
+# Two aligned synchronous averages: over a revolution, over some teeth, and tooth by tooth.
+# --------------------
+
+
+COMPARE_AVERAGE_LEFT_IN, COMPARE_AVERAGE_RIGHT_IN, COMPARE_AVERAGE_BOTTOM_IN, TOP_IN = 0.85, 0.2, 0.55, 0.68
+PANEL_IN, COMPARE_AVERAGE_GAP_IN = 1.5, 0.5
+TEETH_ZOOMED, DEGREES_ZOOMED = 4, 60.0
+OWN_SCALE_RATIO = 4.0
+"""From this ratio of sizes on each is drawn over its own rms: else one is a flat line."""
+
+
+def average_overlay_figure(
+    recorded: SynchronousAverage,
+    simulated: SynchronousAverage,
+    tooth_levels: Sequence[LevelPair] = (),
+    *,
+    n_teeth: int | None = None,
+    title: str = "",
+) -> Figure:
+    """Draw both averages over a revolution, the first teeth of it enlarged, and each tooth's difference in dB.
+
+    Parameters
+    ----------
+    recorded, simulated : SynchronousAverage
+        Of one shaft, aligned, at the same angles. Bands: twice the standard error.
+    tooth_levels : sequence of LevelPair
+        One per tooth from angle 0 on; empty: no such panel.
+    n_teeth : int or None
+        Draws a tick per tooth.
+    title : str
+
+    Returns
+    -------
+    Figure
+        Where one is more than four times as large as the other, each is drawn over its own rms, and the axis says so.
+
+    Raises
+    ------
+    InputError
+        If the angles differ.
+    """
+    if len(recorded.values) != len(simulated.values):
+        raise InputError(f"{len(recorded.values)} and {len(simulated.values)} angles", allowed="the same angles")
+    n_panels = 3 if tooth_levels else 2
+    height = TOP_IN + COMPARE_AVERAGE_BOTTOM_IN + n_panels * PANEL_IN + (n_panels - 1) * COMPARE_AVERAGE_GAP_IN
+    figure = style.new_figure(height)
+    panels = [_panel(figure, height, i, n_panels) for i in range(n_panels)]
+    scales, label = _scales(recorded, simulated)
+    end = 360.0 * TEETH_ZOOMED / n_teeth if n_teeth else DEGREES_ZOOMED
+    for axes, limit in zip(panels[:2], (360.0, end), strict=True):
+        curves = _overlay(axes, (recorded, simulated), scales, limit)
+        style.label_axes(axes, "", label)
+        style.no_offset(axes)
+    if n_teeth:
+        panels[0].set_xticks(np.arange(n_teeth + 1) * 360.0 / n_teeth, minor=True)
+    panels[0].set_xticks(range(0, 361, 45))
+    last = f"angle of {recorded.shaft or 'the shaft'} (deg)"
+    style.label_axes(panels[1], last, label)
+    if tooth_levels:
+        difference_bars(panels[2], np.arange(1.0, len(tooth_levels) + 1), tooth_levels, 0.75)
+        panels[2].set_xlim(0.3, len(tooth_levels) + 0.7)
+        style.label_axes(panels[2], "tooth, from angle 0", "sim. − rec. (dB)")
+    series.headline(figure, title)
+    series.legend_row(figure, curves, left_in=COMPARE_AVERAGE_LEFT_IN, top_in=series.NAMES_AT_IN)
+    return figure
+
+
+def _panel(figure: Figure, height: float, i: int, n: int) -> Axes:
+    bottom = COMPARE_AVERAGE_BOTTOM_IN + (n - 1 - i) * (PANEL_IN + COMPARE_AVERAGE_GAP_IN)
+    return style.panel(
+        figure,
+        left_in=COMPARE_AVERAGE_LEFT_IN,
+        right_in=COMPARE_AVERAGE_RIGHT_IN,
+        bottom_in=bottom,
+        top_in=height - bottom - PANEL_IN,
+    )
+
+
+def _scales(recorded: SynchronousAverage, simulated: SynchronousAverage) -> tuple[tuple[float, float], str]:
+    sizes = [float(np.sqrt(np.mean(a.values**2))) for a in (recorded, simulated)]
+    alike = min(sizes) > 0 and max(sizes) / min(sizes) <= OWN_SCALE_RATIO
+    if alike:
+        return (1.0, 1.0), with_unit("average", recorded.unit)
+    return (sizes[0] or 1.0, sizes[1] or 1.0), "over its own rms"
+
+
+def _overlay(
+    axes: Axes, averages: tuple[SynchronousAverage, SynchronousAverage], scales: tuple[float, float], end: float
+) -> list:  # type: ignore[type-arg]  # of Line2D, imported for checking only
+    axes.axhline(0, color=style.QUIET, linewidth=0.6, zorder=1)
+    curves = []
+    for average, scale, (name, colour) in zip(averages, scales, SIDES, strict=True):
+        angle, values, error = _closed(average)
+        shown = angle <= end
+        x, y, e = angle[shown], values[shown] / scale, 2.0 * error[shown] / scale
+        axes.fill_between(x, y - e, y + e, color=colour, alpha=0.2, linewidth=0, zorder=1.5)
+        curves += axes.plot(*thin(x, y), color=colour, linewidth=1.0, label=name, alpha=0.9, zorder=2)
+    axes.set_xlim(0.0, end)
+    return curves
+
+
+def _closed(average: SynchronousAverage) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Angle, values and errors with the first one once more at 360°."""
+    n = len(average.values)
+    around = np.arange(n + 1) % n
+    return np.arange(n + 1) * 360.0 / n, average.values[around], average.standard_error[around]
+
+
+# --------------------
+# Band levels of a simulation beside those of a recording.
+# --------------------
+
+
+COMPARE_BANDS_LEFT_IN, COMPARE_BANDS_RIGHT_IN, COMPARE_BANDS_TOP_IN = 0.85, 0.2, 0.68
+COMPARE_BANDS_PANEL_IN, COMPARE_BANDS_GAP_IN, LABELS_IN = 1.7, 0.3, 0.95
+CHANCE_MAGNITUDE = np.pi**2 / 16
+"""FRAC of the magnitudes of two noises (Rayleigh distributed): (E|x| E|y|)² / (E|x|² E|y|²)."""
+
+
+def band_levels_figure(bands: Sequence[BandLevel], unit: str = "", *, title: str = "") -> Figure:
+    """Draw the levels of bands side by side, their difference below, and below that how alike their lines are.
+
+    Parameters
+    ----------
+    bands : sequence of BandLevel
+        Of one axis, ascending.
+    unit : str
+        That levels are counted from; empty where it is not known.
+    title : str
+
+    Returns
+    -------
+    Figure
+        The panel of FRAC only where bands have one.
+
+    Raises
+    ------
+    InputError
+        Without bands.
+    """
+    if not bands:
+        raise InputError("there are no bands to draw", allowed="at least one")
+    alike = any(band.agreement is not None for band in bands)
+    n_panels = 3 if alike else 2
+    height = (
+        COMPARE_BANDS_TOP_IN + LABELS_IN + n_panels * COMPARE_BANDS_PANEL_IN + (n_panels - 1) * COMPARE_BANDS_GAP_IN
+    )
+    figure = style.new_figure(height)
+    panels = [_panel_compare_bands(figure, height, i, n_panels) for i in range(n_panels)]
+    x = np.arange(len(bands), dtype=np.float64)
+    curves = _draw_levels(panels[0], bands)
+    style.label_axes(panels[0], "", f"level (dB re 1 {unit_text(unit)})" if unit else "level (dB)")
+    difference_bars(panels[1], x, [band.level for band in bands], 0.7)
+    style.label_axes(panels[1], "", "sim. − rec. (dB)")
+    if alike:
+        curves += _draw_agreement(panels[2], bands)
+    for axes in panels:
+        axes.set_xlim(-0.6, len(bands) - 0.4)
+        axes.set_xticks(x, [plain(band.label, 22) for band in bands], rotation=45, ha="right", parse_math=False)
+        axes.tick_params(labelbottom=axes is panels[-1])
+    series.headline(figure, title)
+    series.legend_row(figure, curves, left_in=COMPARE_BANDS_LEFT_IN, top_in=series.NAMES_AT_IN)
+    return figure
+
+
+def _panel_compare_bands(figure: Figure, height: float, i: int, n: int) -> Axes:
+    bottom = LABELS_IN + (n - 1 - i) * (COMPARE_BANDS_PANEL_IN + COMPARE_BANDS_GAP_IN)
+    return style.panel(
+        figure,
+        left_in=COMPARE_BANDS_LEFT_IN,
+        right_in=COMPARE_BANDS_RIGHT_IN,
+        bottom_in=bottom,
+        top_in=height - bottom - COMPARE_BANDS_PANEL_IN,
+    )
+
+
+def _draw_levels(axes: Axes, bands: Sequence[BandLevel]) -> list:  # type: ignore[type-arg]  # of Line2D, imported for checking only
+    edges = np.arange(len(bands) + 1) - 0.5
+    curves = []
+    for (name, colour), key in zip(SIDES, ("recorded_db", "simulated_db"), strict=True):
+        levels = np.array([float(getattr(band.level, key)) for band in bands])
+        steps = (np.repeat(edges, 2)[1:-1], np.repeat(levels, 2))
+        curves += axes.plot(*steps, color=colour, linewidth=1.4, label=name, zorder=2)
+    style.no_offset(axes)
+    return curves
+
+
+def _draw_agreement(axes: Axes, bands: Sequence[BandLevel]) -> list:  # type: ignore[type-arg]  # of Line2D
+    curves = []
+    axes.axhline(CHANCE_MAGNITUDE, color=style.QUIET, linewidth=0.8, linestyle=":", zorder=1)
+    for name, key, marker, colour in (
+        ("FRAC, complex", "complex_frac", "o", style.INK),
+        ("FRAC, magnitudes", "magnitude_frac", "s", style.QUIET),
+    ):
+        found = [(i, getattr(band.agreement, key)) for i, band in enumerate(bands) if band.agreement is not None]
+        x, y = np.array([i for i, _ in found]), np.array([figure.value for _, figure in found])
+        errors = 2.0 * np.array([figure.repeatability for _, figure in found])
+        axes.vlines(x, np.maximum(y - errors, 0), np.minimum(y + errors, 1), color=colour, linewidth=1.0, zorder=2)
+        looks = {"linestyle": "none", "markersize": 5.0, "zorder": 3, "label": name}
+        looks |= {"markerfacecolor": "white"} if marker == "s" else {}
+        curves += axes.plot(x, y, marker, color=colour, **looks)  # type: ignore[arg-type]
+    chance = [(i, band.agreement.complex_by_chance) for i, band in enumerate(bands) if band.agreement is not None]
+    looks = {"linestyle": "none", "markersize": 12, "markeredgewidth": 1.4, "color": style.FLOOR, "zorder": 1.5}
+    curves += axes.plot(*np.array(chance).T, "_", label="complex, by chance", **looks)  # type: ignore[arg-type]
+    axes.set_ylim(-0.04, 1.04)
+    style.label_axes(axes, "", "FRAC (0 to 1)")
+    style.no_offset(axes)
+    return curves

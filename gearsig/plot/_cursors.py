@@ -1,0 +1,248 @@
+"""Marks at known orders or frequencies: mesh harmonics, sidebands, shaft and bearing lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from gearsig.diagnosis import Finding, Kind
+from gearsig.plot import _style as style
+from gearsig.plot._style import plain
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from gearsig.rig import OrderLine
+
+
+PRIORITY = ("mesh", "bearing", "shaft", "hunting", "sideband")
+"""Which kind keeps its place where two marks collide, first wins."""
+
+N_ROWS = 3
+ROW_IN = 0.15
+OVERHANG_IN = 0.4  # a label may reach this far out of the panel
+LONGEST = 24
+LEAST_DISTANCE_IN = 0.03
+CHARACTER_EM = 0.62  # mean width of the font's characters, on the safe side
+LINE_LOOKS = {
+    "mesh": ("-", 0.9, 0.55),
+    "sideband": (":", 0.8, 0.6),
+    "shaft": ("--", 0.8, 0.55),
+    "bearing": ("-.", 0.9, 0.65),
+    "hunting": (":", 0.8, 0.6),
+}
+
+
+@dataclass(frozen=True)
+class LabelPlace:
+    """A label's row above the panel and its extent, in inches from the panel's left edge."""
+
+    row: int
+    line_in: float
+    low_in: float
+    high_in: float
+
+    def collides(self, other: LabelPlace) -> bool:
+        """Whether the labels overlap, or the line up to the higher one crosses the lower one."""
+        if self.row == other.row:
+            return self.low_in < other.high_in and other.low_in < self.high_in
+        lower, higher = (self, other) if self.row < other.row else (other, self)
+        return lower.low_in < higher.line_in < lower.high_in
+
+
+@dataclass(frozen=True)
+class Cursor:
+    """A mark at one position of a spectrum's axis.
+
+    Parameters
+    ----------
+    position : float
+        In the spectrum's own axis: order or frequency (Hz).
+    kind : str
+        "mesh", "sideband", "shaft", "bearing", "hunting".
+    label : str
+    number : int
+        Of the harmonic, or of the sideband counted from its mesh line: the lower one keeps its label in a collision.
+    """
+
+    position: float
+    kind: str
+    label: str
+    number: int = 1
+
+
+def order_cursors(lines: Iterable[OrderLine], revolutions_per_s: float = 1.0) -> tuple[Cursor, ...]:
+    """Turn a rig's order lines into cursors with short labels.
+
+    Names of pairs and bearings are left out where there is only one; a sideband is called by its distance.
+
+    Parameters
+    ----------
+    lines : iterable of OrderLine
+    revolutions_per_s : float
+        1 for an order axis; the speed of the shaft that orders are counted on for a frequency axis (Hz).
+
+    Returns
+    -------
+    tuple of Cursor
+    """
+    lines = tuple(lines)
+    only = {
+        kind: len({line.element for line in lines if line.kind == kind}) == 1 for kind in ("mesh", "bearing", "hunting")
+    }
+    return tuple(_cursor(line, revolutions_per_s, only_one=only.get(line.kind, False)) for line in lines)
+
+
+def place(
+    cursors: Iterable[Cursor], limits: tuple[float, float], width_in: float
+) -> list[tuple[Cursor, LabelPlace | None]]:
+    """Choose the cursors to draw and the places of their labels; None: a line without label.
+
+    A cursor nearly on top of a more important one is left out. Labels fill the rows from the lowest; one that would
+    touch another label, or a line on its way up to one, is left out; its line stays.
+
+    Parameters
+    ----------
+    cursors : iterable of Cursor
+    limits : (float, float)
+        Of the axis.
+    width_in : float
+        Of the panel, in inches.
+
+    Returns
+    -------
+    list of (Cursor, LabelPlace or None)
+        Most important first.
+    """
+    scale = width_in / (limits[1] - limits[0])
+    drawn: list[float] = []
+    taken: list[LabelPlace] = []
+    result: list[tuple[Cursor, LabelPlace | None]] = []
+    for cursor in sorted(cursors, key=_importance):
+        at = (cursor.position - limits[0]) * scale
+        if not limits[0] <= cursor.position <= limits[1] or any(abs(at - other) < LEAST_DISTANCE_IN for other in drawn):
+            continue
+        drawn.append(at)
+        label = _free_place(taken, at, cursor.label, width_in) if cursor.label else None
+        if label is not None:
+            taken.append(label)
+        result.append((cursor, label))
+    return result
+
+
+def n_rows(placed: Iterable[tuple[Cursor, LabelPlace | None]]) -> int:
+    """Return how many rows of labels are used."""
+    return max((label.row + 1 for _, label in placed if label is not None), default=0)
+
+
+def draw(
+    axes: Axes,
+    placed: Iterable[tuple[Cursor, LabelPlace | None]],
+    size_in: tuple[float, float],
+    *,
+    through: bool = True,
+) -> None:
+    """Draw placed cursors into a panel of known size, labels in rows above it; through the panel, or only above it."""
+    width, height = size_in
+    for cursor, label in placed:
+        colour = style.CURSOR_COLOURS.get(cursor.kind, style.QUIET)
+        dashes, thickness, alpha = LINE_LOOKS.get(cursor.kind, LINE_LOOKS["sideband"])
+        base = 0.05 + ROW_IN * (label.row if label else 0)
+        top = 1.0 + (base if label else 0.05) / height
+        low = 0.0 if through else 1.0
+        transform = axes.get_xaxis_transform()
+        ends = ([cursor.position] * 2, [low, top])
+        looks = {"color": colour, "linestyle": dashes, "linewidth": thickness, "alpha": alpha}
+        axes.plot(*ends, **looks, transform=transform, clip_on=False, zorder=1.5)  # type: ignore[arg-type]
+        if label is not None:
+            axes.text(
+                (label.low_in + label.high_in) / 2 / width,
+                1.0 + base / height,
+                plain(cursor.label, LONGEST),
+                transform=axes.transAxes,
+                ha="center",
+                va="bottom",
+                fontsize=style.SMALL_PT,
+                color=colour,
+                parse_math=False,
+            )
+
+
+def _cursor(line: OrderLine, scale: float, *, only_one: bool) -> Cursor:
+    label, number = line.label, line.harmonic
+    if line.kind == "sideband":
+        label = label.partition(line.element)[2].strip().replace("+ ", "+").replace("− ", "−")
+        digits = label.lstrip("+−").partition("×")[0]
+        number = int(digits) if digits.isdecimal() else number
+    elif only_one:
+        label = label.removesuffix(line.element).strip()
+    return Cursor(line.order * scale, line.kind, label, number)
+
+
+def _importance(cursor: Cursor) -> tuple[int, int, float]:
+    rank = PRIORITY.index(cursor.kind) if cursor.kind in PRIORITY else len(PRIORITY)
+    return rank, cursor.number, cursor.position
+
+
+def _free_place(taken: Sequence[LabelPlace], at_in: float, text: str, width_in: float) -> LabelPlace | None:
+    """Return the lowest free place of a label over the line at `at_in`, inside the figure."""
+    half = (len(plain(text, LONGEST)) * CHARACTER_EM + 0.8) * style.SMALL_PT / 72 / 2
+    middle = min(max(at_in, half - OVERHANG_IN), width_in + OVERHANG_IN / 2 - half)
+    for row in range(N_ROWS):
+        new = LabelPlace(row, at_in, middle - half, middle + half)
+        if not any(new.collides(other) for other in taken):
+            return new
+    return None
+
+
+# --------------------
+# Marks at shaft angles and teeth, as findings name them.
+# --------------------
+
+
+@dataclass(frozen=True)
+class AngleMark:
+    """A place on a gear.
+
+    Parameters
+    ----------
+    angle_deg : float
+        Of the shaft, from the start of the average.
+    label : str
+        E.g. "tooth 17".
+    """
+
+    angle_deg: float
+    label: str
+
+
+def marks_of(findings: Iterable[Finding], shaft: str, n_teeth: int | None = None) -> tuple[AngleMark, ...]:
+    """Return the places on one shaft that faults and suspicions name.
+
+    A tooth without angle is marked at its middle: tooth k spans (k - 1)/n to k/n of a revolution.
+
+    Parameters
+    ----------
+    findings : iterable of Finding
+    shaft : str
+    n_teeth : int or None
+        Of the gear on that shaft, where known.
+
+    Returns
+    -------
+    tuple of AngleMark
+    """
+    marks = []
+    for finding in findings:
+        where = finding.where
+        here = where.shaft == shaft or where.gear.rpartition("/")[2] == shaft
+        if finding.kind not in (Kind.FAULT, Kind.SUSPICION) or not here:
+            continue
+        angle = where.angle_deg
+        if angle is None and where.tooth is not None and n_teeth:
+            angle = (where.tooth - 0.5) * 360.0 / n_teeth
+        if angle is not None:
+            tooth = f"tooth {where.tooth}, " if where.tooth is not None else ""
+            marks.append(AngleMark(angle % 360.0, f"{tooth}{angle % 360.0:.0f}°"))
+    return tuple(dict.fromkeys(marks))

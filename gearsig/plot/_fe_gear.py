@@ -1,0 +1,315 @@
+"""A gear's finite elements: the mesh with its quality, mode shapes, stress under load."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.errors import InputError
+from gearsig.plot import _series as series
+from gearsig.plot import _style as style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
+
+
+# --------------------
+# Values at the corners of triangles as an image: long thin ones, which renderers streak, come out smooth.
+# --------------------
+
+
+IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+PIXELS = 640
+"""Of the image, across."""
+SPACING = 0.8
+"""Of the points at which a triangle is sampled, in pixels."""
+
+
+def draw_shaded(
+    axes: Axes,
+    points: FloatArray,
+    triangles: IntArray,
+    values: FloatArray,
+    *,
+    window: tuple[float, float, float, float],
+    limits: tuple[float, float],
+    cmap: str,
+) -> AxesImage:
+    """Draw values that run straight over each triangle; where triangles lie on each other, their mean.
+
+    Parameters
+    ----------
+    points : array, (n, 2)
+    triangles : array of int, (m, 3)
+    values : array, (n,)
+    window : tuple
+        Low and high x, low and high y of what is drawn; the axes are as long for it both ways.
+    limits : tuple
+        Values at the ends of the colours.
+    cmap : str
+    """
+    per_unit = PIXELS / (window[1] - window[0])
+    shape = tuple(round((window[i + 1] - window[i]) * per_unit) for i in (2, 0))
+    corners = (np.asarray(points)[triangles] - [window[0], window[2]]) * per_unit  # (m, 3, 2), in pixels
+    shown = np.all((corners.max(axis=1) >= 0.0) & (corners.min(axis=1) < shape[::-1]), axis=1)
+    # Each triangle begins where its two shorter sides meet: a long thin one is then sampled along its length only.
+    far = np.linalg.norm(np.roll(corners[shown], -1, axis=1) - np.roll(corners[shown], -2, axis=1), axis=2).argmax(
+        axis=1
+    )
+    order = (far[:, None] + np.arange(3)) % 3
+    corners = np.take_along_axis(corners[shown], order[:, :, None], axis=1)
+    values_at = np.asarray(values)[np.take_along_axis(triangles[shown], order, axis=1)]
+    where, which = _samples(corners)
+    sampled = np.einsum("ij,ij->i", values_at[which], where)
+    places = np.einsum("ijk,ij->ik", corners[which], where).astype(np.int64)
+    inside = np.all((places >= 0) & (places < shape[::-1]), axis=1)
+    flat = places[inside, 1] * shape[1] + places[inside, 0]
+    counts = np.bincount(flat, minlength=shape[0] * shape[1])
+    totals = np.bincount(flat, sampled[inside], minlength=shape[0] * shape[1])
+    known = (counts > 0).reshape(shape)
+    image = (totals / np.maximum(counts, 1)).reshape(shape)
+    _close_holes(image, known)
+    return axes.imshow(
+        np.ma.masked_array(image, ~known),
+        origin="lower",
+        extent=window,
+        vmin=limits[0],
+        vmax=limits[1],
+        cmap=cmap,
+        interpolation="antialiased",
+    )
+
+
+def _close_holes(image: FloatArray, known: Any) -> None:
+    """Give pixels between two known ones their mean: oblique samples step over one here and there."""
+    for axis in (0, 1):
+        before, after = (np.roll(image, step, axis) for step in (1, -1))
+        between = ~known & np.roll(known, 1, axis) & np.roll(known, -1, axis)
+        image[between] = (before[between] + after[between]) / 2.0
+        known |= between
+
+
+def _samples(corners: FloatArray) -> tuple[FloatArray, Any]:
+    """Barycentric coordinates (k, 3) of points close enough for pixels, and their triangles (k,)."""
+    sides = np.linalg.norm(corners[:, 1:] - corners[:, :1], axis=2)
+    n = np.maximum(np.ceil(sides / SPACING), 1.0).astype(np.int64)
+    count = (n[:, 0] + 1) * (n[:, 1] + 1)
+    which = np.repeat(np.arange(len(corners)), count)
+    number = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+    i, j = np.divmod(number, n[which, 1] + 1)
+    inside = i * n[which, 1] + j * n[which, 0] <= n[which, 0] * n[which, 1]
+    which = which[inside]
+    u, v = i[inside] / n[which, 0], j[inside] / n[which, 1]
+    return np.column_stack((1.0 - u - v, u, v)), which
+
+
+COLUMNS = 3
+MODE_IN = 2.5
+BAR_IN = 0.16
+TALL_IN = 3.95
+CLOSE_IN = 2.95
+
+
+def gear_mesh_figure(
+    outlines_mm: FloatArray, quality: FloatArray, *, near_mm: tuple[float, float, float, float], title: str = ""
+) -> Figure:
+    """Draw the cells of a gear seen along its shaft, coloured by quality, and a tooth close by.
+
+    Parameters
+    ----------
+    outlines_mm : array, (n_faces, n_edge_points, 2)
+        Round each face.
+    quality : array, (n_faces,)
+        Scaled Jacobian: 1 for a parallelepiped, 0 where a cell folds.
+    near_mm : tuple
+        Low and high x, low and high y of the close view.
+    title : str
+
+    Returns
+    -------
+    Figure
+    """
+    outlines = np.asarray(outlines_mm, dtype=np.float64)
+    if outlines.ndim != 3 or outlines.shape[2] != 2:
+        raise InputError(f"outlines_mm has shape {outlines.shape}", allowed="(n_faces, n_edge_points, 2)")
+    values = series.checked_values(quality, len(outlines), "quality")
+    figure = style.new_figure(4.9)
+    whole = _square(figure, left_in=0.7, width_in=3.95, bottom_in=0.55, height_in=TALL_IN)
+    close = _square(figure, left_in=5.0, width_in=CLOSE_IN, bottom_in=0.55, height_in=TALL_IN)
+    for axes, line in ((whole, 0.15), (close, 0.6)):
+        faces = _faces(axes, outlines, values, line)
+    reach = 1.03 * float(np.abs(outlines).max())
+    whole.set_xlim(-reach, reach)
+    whole.set_ylim(-reach, reach)
+    x_low, x_high, y_low, y_high = near_mm
+    half = max(y_high - y_low, (x_high - x_low) * TALL_IN / CLOSE_IN) / 2.0
+    close.set_xlim(x_high - 2.0 * half * CLOSE_IN / TALL_IN, x_high)
+    close.set_ylim((y_low + y_high) / 2.0 - half, (y_low + y_high) / 2.0 + half)
+    style.label_axes(whole, "x (mm)", "y (mm)")
+    style.label_axes(close, "x (mm)", "")
+    _bar(figure, faces, "scaled Jacobian (1: undistorted)", (8.15, 0.55, TALL_IN))
+    series.headline(figure, title)
+    return figure
+
+
+def gear_modes_figure(
+    points_mm: FloatArray, triangles: IntArray, shapes: Mapping[str, FloatArray], *, title: str = ""
+) -> Figure:
+    """Draw mode shapes seen along the shaft: the motion along it as colour, that across it as form, exaggerated.
+
+    Parameters
+    ----------
+    points_mm : array, (n, 2)
+    triangles : array of int, (m, 3)
+    shapes : mapping
+        Name of the mode, e.g. "3875 Hz, n = 2" → array (n, 3), motion along x, y, z in any unit; each is drawn to its
+        own largest motion.
+    title : str
+
+    Returns
+    -------
+    Figure
+    """
+    points = np.asarray(points_mm, dtype=np.float64)
+    if not shapes:
+        raise InputError("shapes is empty", remedy="give at least one mode")
+    n_rows = -(-len(shapes) // COLUMNS)
+    figure = style.new_figure(0.4 + n_rows * (MODE_IN + 0.3))
+    for place, (name, shape) in enumerate(shapes.items()):
+        motion = np.asarray(shape, dtype=np.float64)
+        if motion.shape != (len(points), 3):
+            raise InputError(f"shape of {name!r} is {motion.shape}", allowed=f"({len(points)}, 3)")
+        row, column = divmod(place, COLUMNS)
+        bottom = 0.1 + (n_rows - 1 - row) * (MODE_IN + 0.3)
+        axes = _square(figure, left_in=0.15 + 2.65 * column, width_in=MODE_IN, bottom_in=bottom, height_in=MODE_IN)
+        drawn = _draw_shape(axes, points, triangles, motion / np.abs(motion).max())
+        series.write(axes, 0.0, 1.0, name, colour=style.INK)
+    height = min(3.0, n_rows * MODE_IN)
+    bottom = (0.1 + n_rows * (MODE_IN + 0.3) - height) / 2.0
+    _bar(figure, drawn, "axial motion (part of the mode's largest motion)", (8.15, bottom, height))
+    series.headline(figure, title)
+    return figure
+
+
+def gear_stress_figure(
+    points_mm: FloatArray,
+    triangles: IntArray,
+    stress_pa: FloatArray,
+    *,
+    near_mm: tuple[float, float, float, float],
+    top_pa: float | None = None,
+    force: tuple[FloatArray, FloatArray, str] | None = None,
+    note: str = "",
+    title: str = "",
+) -> Figure:
+    """Draw the von Mises stress on the end face.
+
+    Parameters
+    ----------
+    points_mm : array, (n, 2)
+        Of the body as it is, or with displacement already added.
+    triangles : array of int, (m, 3)
+    stress_pa : array, (n,)
+    near_mm : tuple
+        Low and high x, low and high y.
+    top_pa : float or None
+        Where the colours end; more is drawn as the last. None: the highest stress shown.
+    force : (place (2,) in mm, direction (2,), text) or None
+        An arrow that ends at the place.
+    note : str
+        Below the title.
+    title : str
+
+    Returns
+    -------
+    Figure
+    """
+    points = np.asarray(points_mm, dtype=np.float64)
+    stress = series.checked_values(stress_pa, len(points), "stress_pa") * 1e-6
+    wide_in = min(6.8, TALL_IN * (near_mm[1] - near_mm[0]) / (near_mm[3] - near_mm[2]))
+    figure = style.new_figure(4.9, max(5.0, 1.9 + wide_in))
+    axes = _square(figure, left_in=0.75, width_in=wide_in, bottom_in=0.55, height_in=TALL_IN)
+    inside = (points[:, 0] > near_mm[0]) & (points[:, 0] < near_mm[1])
+    inside &= (points[:, 1] > near_mm[2]) & (points[:, 1] < near_mm[3])
+    top = float(stress[inside].max()) if top_pa is None else top_pa * 1e-6
+    drawn = draw_shaded(axes, points, triangles, stress, window=near_mm, limits=(0.0, top), cmap="viridis")
+    _draw_border(axes, points, points, triangles)
+    axes.set_xlim(*near_mm[:2])
+    axes.set_ylim(*near_mm[2:])
+    if force is not None:
+        place, direction, text = np.asarray(force[0]), np.asarray(force[1]), force[2]
+        span = 0.16 * (near_mm[3] - near_mm[2])
+        tail = place - span * direction / np.hypot(*direction)
+        ends = [(float(x), float(y)) for x, y in (place, tail)]
+        axes.annotate("", xy=ends[0], xytext=ends[1], arrowprops={"arrowstyle": "-|>", "color": style.FAULT, "lw": 2.0})
+        axes.text(*ends[1], text, color=style.FAULT, fontsize=style.SMALL_PT, ha="center", va="bottom")
+    style.label_axes(axes, "x (mm)", "y (mm)")
+    if note:
+        place_in = (0.75 / figure.get_size_inches()[0], 1.0 - 0.31 / 4.9)
+        figure.text(*place_in, note, fontsize=style.SMALL_PT, color=style.QUIET, va="center", parse_math=False)
+    beyond = top < float(stress[inside].max())
+    _bar(figure, drawn, "von Mises stress (MPa)", (0.95 + wide_in, 0.55, TALL_IN), extend=beyond)
+    series.headline(figure, title)
+    return figure
+
+
+def _faces(axes: Axes, outlines: FloatArray, values: FloatArray, line: float) -> Any:
+    from matplotlib.collections import PolyCollection
+
+    faces = PolyCollection(list(outlines), edgecolors=style.INK, linewidths=line, cmap="viridis")
+    faces.set_array(values)
+    faces.set_clim(0.0, 1.0)
+    axes.add_collection(faces)
+    return faces
+
+
+def _draw_shape(axes: Axes, points: FloatArray, triangles: IntArray, motion: FloatArray) -> Any:
+    reach = float(np.abs(points).max())
+    moved = points + 0.12 * reach * motion[:, :2]
+    end = 1.15 * reach
+    drawn = draw_shaded(
+        axes, moved, triangles, motion[:, 2], window=(-end, end, -end, end), limits=(-1.0, 1.0), cmap="RdBu_r"
+    )
+    _draw_border(axes, moved, points, triangles)
+    axes.set_xlim(-end, end)
+    axes.set_ylim(-end, end)
+    axes.set_axis_off()
+    return drawn
+
+
+def _draw_border(axes: Axes, moved: FloatArray, points: FloatArray, triangles: IntArray) -> None:
+    """Line along edges that belong to one triangle only; points of neighbouring sectors at one place count as one."""
+    from matplotlib.collections import LineCollection
+
+    _, first, same = np.unique(np.round(points, 6), axis=0, return_index=True, return_inverse=True)
+    corners = first[same.ravel()][triangles]
+    edges = np.sort(np.concatenate((corners[:, :2], corners[:, 1:], corners[:, ::2])), axis=1)
+    unique, count = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0, return_counts=True)
+    axes.add_collection(LineCollection(list(moved[unique[count == 1]]), colors=style.QUIET, linewidths=0.5))
+
+
+def _square(figure: Figure, *, left_in: float, width_in: float, bottom_in: float, height_in: float) -> Axes:
+    """Axes on which a millimetre is as long both ways."""
+    width, height = figure.get_size_inches()
+    axes = figure.add_axes((left_in / width, bottom_in / height, width_in / width, height_in / height))
+    axes.set_aspect("equal", adjustable="box")
+    axes.tick_params(colors=style.QUIET, labelcolor=style.INK, labelsize=style.SMALL_PT, width=0.8)
+    for spine in axes.spines.values():
+        spine.set_color(style.QUIET)
+        spine.set_linewidth(0.8)
+    return axes
+
+
+def _bar(figure: Figure, drawn: Any, label: str, at_in: tuple[float, float, float], *, extend: bool = False) -> None:
+    """Colour bar at left, bottom, with a height."""
+    width, height = figure.get_size_inches()
+    left, bottom, tall = at_in
+    axes = figure.add_axes((left / width, bottom / height, BAR_IN / width, tall / height))
+    bar = figure.colorbar(drawn, cax=axes, extend="max" if extend else "neither")
+    bar.set_label(label, fontsize=style.SMALL_PT, color=style.INK)
+    bar.ax.tick_params(labelsize=style.SMALL_PT, colors=style.QUIET, labelcolor=style.INK)

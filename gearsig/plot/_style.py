@@ -1,0 +1,202 @@
+"""One look for all figures: sizes, fonts, and colours that always mean the same.
+
+Everything is set on the figure itself. Matplotlib's global settings and `pyplot` are never touched, so that figures can
+be made in several threads at once and are freed when the last reference goes.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.spectra import Scaling
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.projections.polar import PolarAxes
+
+
+# --------------------
+# Display units: decibels, degrees, and units written as people read them.
+# --------------------
+
+
+Scale = Literal["log", "decibel", "linear"]
+"""How values are drawn: on a logarithmic axis, in decibels on a linear one, or as they are."""
+
+_SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+LOWEST_RATIO = 1e-10
+"""Values below this share of the largest one are drawn there: a logarithm needs a bottom."""
+
+
+def decibels(values: FloatArray, scaling: Scaling) -> FloatArray:
+    """Return values in dB re one unit: 20 lg of amplitudes, 10 lg of powers.
+
+    Zeros are drawn 200 dB (amplitudes) or 100 dB (powers) below the largest value.
+    """
+    factor = 10.0 if scaling in ("power", "power density") else 20.0
+    result: FloatArray = factor * np.log10(above_zero(values))
+    return result
+
+
+def above_zero(values: FloatArray) -> FloatArray:
+    """Return values lifted to a tiny share of the largest one, so that they have a logarithm."""
+    largest = float(np.max(values, initial=0.0))
+    lowest = largest * LOWEST_RATIO if largest > 0 else LOWEST_RATIO
+    return np.maximum(np.asarray(values, dtype=np.float64), max(lowest, float(np.finfo(np.float64).tiny)))
+
+
+def unit_text(unit: str) -> str:
+    """Write a unit with superscripts.
+
+    Examples
+    --------
+    >>> unit_text("(m/s^2)^2/Hz")
+    '(m/s²)²/Hz'
+    """
+    parts = unit.split("^")
+    text = parts[0]
+    for part in parts[1:]:
+        digits = len(part) - len(part.lstrip("-0123456789"))
+        text += part[:digits].translate(_SUPERSCRIPTS) + part[digits:] if digits else "^" + part
+    return text
+
+
+def with_unit(name: str, unit: str) -> str:
+    """Write a quantity with its unit in brackets, or alone where the unit is not known."""
+    return f"{name} ({unit_text(unit)})" if unit else name
+
+
+def plain(text: str, n_max: int = 60) -> str:
+    """Return one line that the figures' font can draw, cut in its middle to `n_max` characters.
+
+    Names come from files: control characters become spaces, and signs the font lacks become "?".
+    """
+    drawable = _drawable_code_points()
+    line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    line = "".join(c if ord(c) in drawable else "?" for c in line)
+    if len(line) <= n_max:
+        return line
+    tail = n_max // 3
+    return f"{line[: n_max - tail - 1]}…{line[-tail:]}"
+
+
+@cache
+def _drawable_code_points() -> frozenset[int]:
+    from matplotlib.font_manager import FontProperties, findfont, get_font
+
+    return frozenset(get_font(findfont(FontProperties(family=["DejaVu Sans"]))).get_charmap())
+
+
+# The colours of Okabe and Ito (Color Universal Design, 2008), which stay apart for colour-blind readers.
+MEASURED = "#0072B2"
+FAULT = "#D55E00"
+SIMULATED = "#C98A00"  # their orange, darkened: beside the blue of what was measured
+FLOOR = "#7A7A7A"
+MESH = "#00795A"  # their bluish green, darkened for thin lines and small print
+SHAFT = "#9A6A00"  # their orange, darkened likewise
+BEARING = "#A8447E"  # their reddish purple, darkened likewise
+INK = "#23272E"
+QUIET = "#5B626C"
+RULE = "#D9DDE2"
+
+CURSOR_COLOURS = {"mesh": MESH, "sideband": MESH, "shaft": SHAFT, "bearing": BEARING, "hunting": QUIET}
+"""Colour of each kind of order line."""
+
+DOTS_PER_INCH = 100
+WIDTH_IN = 9.0
+TEXT_PT = 9.5
+SMALL_PT = 8.5
+LINE_PT = 0.9
+
+
+def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
+    """Return an empty figure, 900 pixels wide unless told."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, facecolor="white")
+
+
+def panel(
+    figure: Figure,
+    *,
+    left_in: float = 0.85,
+    right_in: float = 0.2,
+    bottom_in: float = 0.55,
+    top_in: float = 0.35,
+    sharex: Axes | None = None,
+) -> Axes:
+    """Add axes with fixed margins in inches: places of labels are then known before anything is drawn."""
+    width, height = figure.get_size_inches()
+    rectangle = (
+        left_in / width,
+        bottom_in / height,
+        (width - left_in - right_in) / width,
+        (height - bottom_in - top_in) / height,
+    )
+    axes = figure.add_axes(rectangle, sharex=sharex)
+    axes.set_facecolor("none")
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color(QUIET)
+        axes.spines[side].set_linewidth(0.8)
+    axes.tick_params(which="both", colors=QUIET, labelcolor=INK, labelsize=SMALL_PT, width=0.8, direction="out")
+    axes.tick_params(which="minor", length=2, width=0.5)
+    axes.grid(visible=True, axis="y", which="major", color=RULE, linewidth=0.7)
+    axes.set_axisbelow(True)
+    return axes
+
+
+def polar_panel(figure: Figure) -> PolarAxes:
+    """Add bare polar axes: zero at the top, angle growing clockwise."""
+    from matplotlib.projections.polar import PolarAxes
+
+    axes = figure.add_axes((0.02, 0.02, 0.96, 0.96), projection="polar")
+    assert isinstance(axes, PolarAxes)  # noqa: S101 - what projection="polar" returns, said to the type checker
+    axes.set_facecolor("none")
+    axes.set_theta_zero_location("N")
+    axes.set_theta_direction(-1)
+    axes.set_axis_off()
+    return axes
+
+
+def label_axes(axes: Axes, x: str = "", y: str = "", title: str = "") -> None:
+    """Name the axes and the panel; names from files are never read as markup."""
+    axes.set_xlabel(plain(x, 110), color=INK, fontsize=TEXT_PT, parse_math=False)
+    axes.set_ylabel(plain(y, 60), color=INK, fontsize=TEXT_PT, parse_math=False)
+    if title:
+        axes.set_title(plain(title, 110), loc="left", color=INK, fontsize=TEXT_PT, fontweight="bold", parse_math=False)
+
+
+def no_offset(axes: Axes) -> None:
+    """Write the labels of linear axes in full: "1999.8", not "-0.2 + 2e3"; "8e−05", not "8" and a factor elsewhere."""
+    from matplotlib.ticker import FuncFormatter, ScalarFormatter
+
+    for axis in (axes.xaxis, axes.yaxis):
+        if isinstance(axis.get_major_formatter(), ScalarFormatter):
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.8g}".replace("-", "−")))
+
+
+def note(axes: Axes, text: str) -> None:
+    """Write a quiet remark into the upper right corner, above the panel."""
+    axes.text(
+        1.0,
+        1.0 + 0.06 / _height_in(axes),
+        plain(text, 90),
+        transform=axes.transAxes,
+        ha="right",
+        va="bottom",
+        fontsize=SMALL_PT,
+        color=QUIET,
+        parse_math=False,
+    )
+
+
+def _height_in(axes: Axes) -> float:
+    figure = axes.get_figure(root=True)
+    return float(axes.get_position().height * figure.get_size_inches()[1]) if figure is not None else 1.0

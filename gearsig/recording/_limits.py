@@ -1,0 +1,218 @@
+"""Bounds on memory: a file that would not fit is refused before it is decoded."""
+
+from __future__ import annotations
+
+import gzip
+import os
+import re
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import inf, isfinite
+from pathlib import Path
+
+from gearsig.errors import GearsigError, InputError
+
+# --------------------
+# Memory that programs can still take: of the system, and of the container they run in.
+# --------------------
+
+
+CGROUPS = Path("/sys/fs/cgroup")
+"""Where Linux shows the limits of containers."""
+
+
+def free_memory_bytes() -> float | None:
+    """Memory that programs can still take, of the system and of a container; None where neither tells."""
+    found = [free for free in (_system_free_bytes(), container_free_bytes()) if free is not None]
+    least = min(found, default=inf)
+    return least if isfinite(least) else None
+
+
+def container_free_bytes(own: Path = Path("/proc/self/cgroup"), mount: Path = CGROUPS) -> float | None:
+    """What the control groups of this program, from its own up to the outermost, still allow; None without a limit.
+
+    What is taken counts without cached files, which make way.
+
+    Parameters
+    ----------
+    own : Path
+        Lines "id:controllers:path": version 2 has none between its colons, version 1 has "memory".
+    mount : Path
+        Where the groups are shown; those of version 1 in a folder "memory".
+    """
+    found: list[float | None] = []
+    try:
+        lines = own.read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return None
+    for line in lines:
+        _, _, rest = line.partition(":")
+        controllers, _, path = rest.partition(":")
+        if not controllers:
+            root, names = mount, ("memory.max", "memory.current", "inactive_file")
+        elif "memory" in controllers.split(","):
+            root, names = mount / "memory", ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
+        else:
+            continue
+        inner = root / path.strip("/")
+        # A container may see its own group as the root, whatever its path is called outside.
+        groups = (inner, *(parent for parent in inner.parents if parent == root or root in parent.parents))
+        found += [_group_free_bytes(group, *names) for group in groups]
+    return min((free for free in found if free is not None), default=None)
+
+
+def _group_free_bytes(group: Path, limit_name: str, taken_name: str, cached_name: str) -> float | None:
+    try:
+        limit = float((group / limit_name).read_text(encoding="ascii").replace("max", "inf"))
+        taken = float((group / taken_name).read_text(encoding="ascii"))
+        stat = dict(line.split() for line in (group / "memory.stat").read_text(encoding="ascii").splitlines())
+        return max(limit - taken + float(stat.get(cached_name, 0.0)), 0.0)
+    except (OSError, ValueError):
+        return None
+
+
+def _system_free_bytes() -> float | None:
+    try:
+        with Path("/proc/meminfo").open(encoding="ascii") as file:
+            for line in file:
+                if line.startswith("MemAvailable:"):
+                    return float(line.split()[1]) * 1024.0
+    except (OSError, ValueError, IndexError):
+        pass
+    try:  # where there is no such file, half of what is built in
+        return 0.5 * os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, AttributeError):
+        return None
+
+
+CHUNK_BYTES = 1 << 22
+HEAD_BYTES = 1 << 16
+MAX_GZIP_RATIO = 200
+"""Text of numbers shrinks by 2 to 20; anything far beyond carries no information."""
+GZIP_FREE_BYTES = 1 << 26
+"""Below this decoded size the ratio is not looked at: short files may be very regular."""
+UNTOLD_BYTES = 4 << 30
+"""Taken as free where the system does not tell."""
+
+
+def available_memory_bytes() -> int:
+    """Return the memory that can be had without swapping, a guess of 4 GB where the system does not tell."""
+    free = free_memory_bytes()
+    return UNTOLD_BYTES if free is None else int(free)
+
+
+def check_memory(needed_bytes: int, where: str) -> None:
+    """Raise if decoding needs more than half of the available memory; the other half is for the analysis."""
+    allowed = available_memory_bytes() // 2
+    if needed_bytes > allowed:
+        raise InputError(
+            f"decoded size is about {needed_bytes / 1e9:.3g} GB",
+            where=where,
+            allowed=f"up to {allowed / 1e9:.3g} GB on this machine now",
+            remedy="split the file or export fewer channels",
+        )
+
+
+def read_gzip(path: Path) -> bytes:
+    """Return the decompressed bytes, stopping at a decompression bomb.
+
+    Raises
+    ------
+    InputError
+        If the stream is damaged or cut off, shrinks by more than `MAX_GZIP_RATIO`, or would not fit into memory.
+    """
+    packed = path.stat().st_size
+    largest = max(GZIP_FREE_BYTES, MAX_GZIP_RATIO * packed)
+    chunks: list[bytes] = []
+    size = 0
+    try:
+        with gzip.open(path, "rb") as file:
+            while chunk := file.read(CHUNK_BYTES):
+                size += len(chunk)
+                if size > largest:
+                    raise InputError(
+                        f"decompresses to more than {MAX_GZIP_RATIO} times its size",
+                        where=path.name,
+                        allowed=f"a ratio up to {MAX_GZIP_RATIO}",
+                        remedy="this is no recording; if it is, unpack it first",
+                    )
+                check_memory(2 * size, path.name)
+                refuse_nul(chunk, path.name)
+                chunks.append(chunk)
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        raise InputError(
+            f"the gzip stream is damaged or cut off ({error})",
+            where=path.name,
+            allowed="a complete gzip file",
+            remedy="copy the file again",
+        ) from error
+    return b"".join(chunks)
+
+
+def read_text_bytes(path: Path) -> bytes:
+    """Return the bytes of a text file, plain or gzip; refuse one that holds NUL bytes or would not fit."""
+    with path.open("rb") as file:
+        head = file.read(4)
+        if head[:2] == b"\x1f\x8b":
+            return read_gzip(path)
+        if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            check_memory(4 * path.stat().st_size, path.name)
+            return _from_utf16(path)
+        file.seek(0)
+        # The numbers on the first lines tell how many there will be: 8 bytes each as read and again as samples.
+        first = file.read(HEAD_BYTES)
+        numbers_per_byte = len(re.findall(rb"[^\s,;]+", first)) / len(first)
+        check_memory(int((2 + 16 * numbers_per_byte) * path.stat().st_size), path.name)
+        file.seek(0)
+        chunks = []
+        while chunk := file.read(CHUNK_BYTES):
+            refuse_nul(chunk, path.name)
+            chunks.append(chunk)
+    return b"".join(chunks)
+
+
+def refuse_nul(chunk: bytes, where: str) -> None:
+    """Raise if text holds NUL bytes, as a file that was allocated but never written does."""
+    if b"\0" in chunk:
+        zeros = "only zero bytes" if not chunk.strip(b"\0") else "zero bytes"
+        raise InputError(
+            f"holds {zeros} where text is expected",
+            where=where,
+            allowed="plain text (UTF-8)",
+            remedy="the file was not written completely, or it is no text file: export it again",
+        )
+
+
+def _from_utf16(path: Path) -> bytes:
+    try:
+        return path.read_bytes().decode("utf-16").encode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"starts like UTF-16 text but is not ({error.reason})",
+            where=path.name,
+            allowed="plain text",
+            remedy="export it as UTF-8",
+        ) from None
+
+
+# --------------------
+# Turns the many exceptions of file-format libraries into one-line input errors.
+# --------------------
+
+
+@contextmanager
+def foreign_errors(where: str, file_format: str) -> Iterator[None]:
+    """Raise `InputError` where a library fails inside the block; gearsig's own errors pass."""
+    try:
+        yield
+    except GearsigError:
+        raise
+    except Exception as error:  # parsers raise anything on damaged bytes, one of them bare Exception
+        reason = str(error)[:200] or type(error).__name__
+        raise InputError(
+            f"cannot be read as {file_format} ({reason})",
+            where=where,
+            allowed=f"a complete {file_format} file",
+            remedy="the file is damaged or was cut off: copy or export it again",
+        ) from error

@@ -1,0 +1,329 @@
+"""Finds what is wrong with the samples themselves: dead, clipped, stuck, offset or coarsely quantised channels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray
+from gearsig.recording._types import Channel, Recording
+
+# --------------------
+# The levels a channel's samples take: a converter's steps, if there are any.
+# --------------------
+
+
+GRID_TOLERANCE = 0.02
+"""Largest distance of a level from the grid, in steps: scaling in float32 moves levels a little."""
+
+
+@dataclass(frozen=True)
+class SampleLevels:
+    """Distinct values of a channel.
+
+    Parameters
+    ----------
+    n_used : int
+        Distinct values.
+    step : float or None
+        Distance of the converter's levels; None if the values lie on no grid.
+    n_spanned : int
+        Levels from lowest to highest, both counted; `n_used` if they lie on no grid.
+    """
+
+    n_used: int
+    step: float | None
+    n_spanned: int
+
+
+def find_levels(x: FloatArray) -> SampleLevels:
+    """Return the levels of a channel, (n_samples,).
+
+    The step is the smallest distance between two distinct values if all values are whole multiples of it apart. A
+    signal that never takes neighbouring levels has no step here, and a long float signal has none either.
+    """
+    values = np.unique(x).astype(np.float64)
+    if len(values) < 2:
+        return SampleLevels(1, None, 1)
+    step = float(np.diff(values).min())
+    span = float(values[-1] - values[0])
+    if step < 1e-7 * span:  # finer than 23 bits: rounding of floats, no converter
+        return SampleLevels(len(values), None, len(values))
+    numbers = (values - values[0]) / step
+    # The smallest distance is one of many and a little wrong; the span divided by its number of steps is not.
+    step = span / round(span / step)
+    numbers = (values - values[0]) / step
+    if np.abs(numbers - np.round(numbers)).max() > GRID_TOLERANCE:
+        return SampleLevels(len(values), None, len(values))
+    return SampleLevels(len(values), step, round(span / step) + 1)
+
+
+# --------------------
+# Clipping: a signal that was held at a limit instead of turning round there.
+# --------------------
+
+
+MIN_RUN = 3
+CORNER_DROP = 8.0
+"""Twice the drop of a parabola, see below."""
+HELD_RATIO = 3.0
+PAIR_RATIO = 20.0
+"""How much more frequent than the average value the extreme must be for pairs to count as runs. A tone whose period
+is a whole number of samples has equal pairs too, but of all its values."""
+PILE_WIDTH = 0.005
+"""Width of the bands in the pile-up test, in parts of the range."""
+PILE_RATIO = 6.0
+MIN_PILE_SAMPLES = 20
+MAX_REST_SHARE = 0.48
+"""A level that holds half of the samples is where the signal rests (a pulse train's base, a square wave's level), not
+a limit that it runs into."""
+
+
+@dataclass(frozen=True)
+class Clipping:
+    """Samples held at a limit, and at which."""
+
+    n_samples: int
+    place: str
+
+
+def find_clipping(x: FloatArray, levels: SampleLevels, *, rest: float | None = None) -> Clipping | None:
+    r"""Return where a channel is clipped, or None.
+
+    A smooth peak is a parabola: what stays within a width w of the top for ±h samples has fallen by about 4 w after
+    ±2 h. A run of at least three samples has a *corner* where the signal has fallen by more than 8 w there, on both
+    sides: it was cut, not rounded. Two tests per end of the range look for such runs; either is enough.
+
+    - *Held samples.* Runs of samples equal to the extreme, w being one step of the converter. They must hold three
+      times as many samples as the next step below, as no noise does.
+    - *Pile-up.* Runs in the last 0.5 % of the range, w. That band must hold 6 times as many samples as the 0.5 %
+      before. Near a parabolic maximum, time goes with the square root of the distance from it, so that this ratio
+      is at most
+
+      .. math:: 1 / (\sqrt{2} - 1) = 2.41,
+
+      which a sine reaches; noise stays below 1. It finds limits with a little noise on them, as an amplifier's.
+
+    Parameters
+    ----------
+    x : array, (n_samples,)
+    levels : Levels
+        Those of `x`.
+    rest : float or None
+        Level at which the quantity itself stays for a time, e.g. 0 of a force between parts that come apart: an end of
+        the range there is no limit of the measurement.
+    """
+    low, high = float(x.min()), float(x.max())
+    ends = {}
+    for sign, extreme in ((1.0, high), (-1.0, low)):
+        if extreme == rest:
+            continue
+        distance = sign * (extreme - x)  # 0 at the extreme, positive elsewhere
+        n = max(_n_held(distance, levels), _n_piled(distance, high - low, levels.step))
+        if n and n < MAX_REST_SHARE * len(x):
+            ends[extreme] = n
+    if not ends:
+        return None
+    place = " and ".join(f"{extreme:.4g}" for extreme in ends)
+    return Clipping(sum(ends.values()), place)
+
+
+def _n_held(distance: FloatArray, levels: SampleLevels) -> int:
+    """Count the samples held exactly at the extreme, 0 if they are not more than noise would put there."""
+    q = levels.step if levels.step is not None else float(np.finfo(distance.dtype).eps) * float(distance.max())
+    held = distance == 0
+    usual = len(held) / levels.n_used
+    min_run = MIN_RUN if np.count_nonzero(held) < PAIR_RATIO * usual else 2
+    n = _n_in_cornered_runs(held, distance, q, min_run)
+    n_next = int(np.count_nonzero((distance > 0) & (distance <= 1.5 * q)))
+    return int(np.count_nonzero(held)) if n > HELD_RATIO * n_next else 0
+
+
+def _n_piled(distance: FloatArray, span: float, step: float | None) -> int:
+    """Count the samples in the last band, 0 if it holds not far more than the one before."""
+    width = PILE_WIDTH * span
+    if step is not None and width < 2 * step:
+        return 0  # the bands would hold one level or none
+    in_last = distance < width
+    n_last = _n_in_cornered_runs(in_last, distance, width, MIN_RUN)
+    n_before = int(np.count_nonzero((distance >= width) & (distance < 2 * width)))
+    return int(np.count_nonzero(in_last)) if n_last >= max(MIN_PILE_SAMPLES, PILE_RATIO * n_before) else 0
+
+
+def _n_in_cornered_runs(at_limit: NDArray[np.bool_], distance: FloatArray, width: float, min_run: int) -> int:
+    """Count the samples in runs of a length that end in corners."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], at_limit, [False]))))
+    starts, stops = edges[::2], edges[1::2]
+    long = stops - starts >= min_run
+    starts, stops = starts[long], stops[long]
+    half = -(-(stops - starts) // 2)
+    before, after = starts - half, stops - 1 + half
+    inside = (before >= 0) & (after < len(distance))
+    drop = np.minimum(distance[before[inside]], distance[after[inside]])
+    return int((stops - starts)[inside][drop > CORNER_DROP * width].sum())
+
+
+ProblemKind = Literal["dead", "clipped", "stuck", "offset", "quantised"]
+
+MAX_DEAD_LEVELS = 4
+"""An open input flickers by a step or two of the converter: so many levels at most."""
+DEAD_SHARE = 1e-3
+"""… and far below the channels beside it."""
+MAX_QUANTISED_LEVELS = 64
+"""6 bits: the noise of the rounding is then 37 dB below a full-scale sine, above many a sideband."""
+MAX_OFFSET_RATIO = 3.0
+MIN_STUCK_SAMPLES = 16
+STUCK_RATIO = 10
+CORNER_DISTANCE = 8
+MIN_SAMPLES = 64
+_OFFSET_QUANTITIES = frozenset(("acceleration", "velocity", "sound_pressure", "unknown"))
+
+
+@dataclass(frozen=True)
+class ChannelProblem:
+    """Something that makes a channel worth less.
+
+    Parameters
+    ----------
+    channel : str
+    kind : str
+        "dead", "clipped", "stuck", "offset" or "quantised".
+    share : float
+        Share of the samples that are touched, 0 to 1.
+    evidence : str
+        What was seen, with numbers.
+    remedy : str
+    """
+
+    channel: str
+    kind: ProblemKind
+    share: float
+    evidence: str
+    remedy: str
+
+
+def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
+    """Return the problems of the vibration channels; speed, tachometer and other channels are not looked at.
+
+    - *dead*: constant, or so small that the standard deviation vanishes in double precision; or at most four
+      neighbouring levels and a standard deviation below 1/1000 of the median of the other vibration channels in the
+      same unit.
+    - *clipped*: see `gearsig.recording`.
+    - *stuck*: runs of equal samples away from the extremes, at least 16 long, ten times longer than 99 % of the
+      runs in the channel, and with a corner at both ends (eight samples further the signal is more than eight of the
+      converter's steps away, which it is not at a smooth turning point): a dropout of the measurement chain.
+    - *offset*: the mean is more than three times the standard deviation, for quantities without a static part.
+    - *quantised*: fewer than 64 equidistant levels in use, less than 6 bits.
+
+    Parameters
+    ----------
+    recording : Recording
+
+    Returns
+    -------
+    tuple of ChannelProblem
+        In the order of the channels; empty if nothing was found. Fewer than 64 samples are judged for "dead" only.
+    """
+    found: list[ChannelProblem] = []
+    spreads = {c.name: float(np.std(recording.values(c.name), dtype=np.float64)) for c in recording.channels}
+    for channel in recording.channels:
+        if channel.is_vibration:
+            others = [spreads[c.name] for c in recording.channels if _is_comparable(c, channel)]
+            found += _problems_of(channel, recording.values(channel.name), spreads[channel.name], others)
+    return tuple(found)
+
+
+def _is_comparable(other: Channel, channel: Channel) -> bool:
+    same = (other.quantity, other.unit) == (channel.quantity, channel.unit)
+    return same and other.name != channel.name
+
+
+def _problems_of(channel: Channel, x: FloatArray, spread: float, others: list[float]) -> list[ChannelProblem]:
+    levels = find_levels(x)
+    dead = _dead(channel, x, levels, spread, others)
+    if dead is not None:
+        return [dead]
+    if len(x) < MIN_SAMPLES:
+        return []
+    tests = (
+        _clipped(channel, x, levels),
+        _stuck(channel, x, levels),
+        _offset(channel, x, spread),
+        _quantised(channel, levels),
+    )
+    return [problem for problem in tests if problem is not None]
+
+
+def _dead(
+    channel: Channel, x: FloatArray, levels: SampleLevels, spread: float, others: list[float]
+) -> ChannelProblem | None:
+    remedy = "check sensor, cable and input of this channel, and leave it out"
+    if levels.n_used == 1:
+        return ChannelProblem(channel.name, "dead", 1.0, f"all {len(x)} samples are {x[0]:g}", remedy)
+    if spread == 0:  # values so small that their squares vanish
+        evidence = f"the samples differ, by {np.ptp(x):.2g} at most, too little for a standard deviation"
+        return ChannelProblem(channel.name, "dead", 1.0, evidence, remedy)
+    if not others or levels.n_spanned > MAX_DEAD_LEVELS or spread > DEAD_SHARE * float(np.median(others)):
+        return None
+    evidence = (
+        f"only {levels.n_used} levels, standard deviation {spread:.3g}; "
+        f"the other channels' is {float(np.median(others)):.3g}"
+    )
+    return ChannelProblem(channel.name, "dead", 1.0, evidence, remedy)
+
+
+def _clipped(channel: Channel, x: FloatArray, levels: SampleLevels) -> ChannelProblem | None:
+    # Parts that come apart carry no force, tooth flanks in their play among them.
+    clipping = find_clipping(x, levels, rest=0.0 if channel.quantity == "force" else None)
+    if clipping is None:
+        return None
+    share = clipping.n_samples / len(x)
+    evidence = f"{clipping.n_samples} samples ({100 * share:.2g} %) are held at {clipping.place}"
+    remedy = "measure again with a larger input range; peak, crest factor and kurtosis are not to be trusted"
+    return ChannelProblem(channel.name, "clipped", share, evidence, remedy)
+
+
+def _stuck(channel: Channel, x: FloatArray, levels: SampleLevels) -> ChannelProblem | None:
+    ends = np.flatnonzero(np.diff(x) != 0)
+    lengths = np.diff(np.concatenate(([-1], ends, [len(x) - 1])))
+    starts = np.concatenate(([0], ends + 1))
+    inside = (x[starts] != x.min()) & (x[starts] != x.max())
+    usual = float(np.percentile(lengths, 99))
+    long = inside & (lengths >= max(MIN_STUCK_SAMPLES, STUCK_RATIO * usual))
+    step = levels.step or float(np.finfo(x.dtype).eps * np.abs(x).max())
+    before, after = starts - CORNER_DISTANCE, starts + lengths - 1 + CORNER_DISTANCE
+    long &= (before >= 0) & (after < len(x))
+    held = x[starts[long]]
+    away = np.minimum(np.abs(x[before[long]] - held), np.abs(x[after[long]] - held))
+    long[long] = away > CORNER_DROP * step
+    if not long.any():
+        return None
+    longest = int(np.argmax(np.where(long, lengths, 0)))
+    share = float(lengths[long].sum() / len(x))
+    evidence = (
+        f"{int(long.sum())} run(s) of equal samples, the longest {lengths[longest]} samples "
+        f"from sample {starts[longest]} at {x[starts[longest]]:g}; 99 % of the runs are no longer than {usual:.0f}"
+    )
+    remedy = "check for dropouts of the measurement chain or a machine at rest, and cut these parts out"
+    return ChannelProblem(channel.name, "stuck", share, evidence, remedy)
+
+
+def _offset(channel: Channel, x: FloatArray, spread: float) -> ChannelProblem | None:
+    mean = float(np.mean(x, dtype=np.float64))
+    if channel.quantity not in _OFFSET_QUANTITIES or abs(mean) <= MAX_OFFSET_RATIO * spread:
+        return None
+    evidence = f"the mean, {mean:.4g} {channel.unit}".rstrip() + f", is {abs(mean) / spread:.3g} times the rms about it"
+    return ChannelProblem(
+        channel.name, "offset", 1.0, evidence, "check bias and coupling; only the part about it counts"
+    )
+
+
+def _quantised(channel: Channel, levels: SampleLevels) -> ChannelProblem | None:
+    if levels.step is None or levels.n_spanned >= MAX_QUANTISED_LEVELS:
+        return None
+    evidence = f"only {levels.n_spanned} levels of {levels.step:.3g} are in use ({np.log2(levels.n_spanned):.1f} bits)"
+    remedy = "measure again with a smaller input range: weak sidebands drown in the rounding"
+    return ChannelProblem(channel.name, "quantised", 1.0, evidence, remedy)

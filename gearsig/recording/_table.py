@@ -1,0 +1,363 @@
+"""What a file reader hands over: columns as they stand in the file, nothing judged yet."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray
+from gearsig.errors import InputError
+from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, SPEED_NAMES, plain_name
+from gearsig.rig import SpeedSource
+
+NumberArray = NDArray[Any]
+
+
+def sample_place(row: int) -> str:
+    """Name a row of a file that has no lines."""
+    return f"sample {row}"
+
+
+@dataclass(frozen=True)
+class RawColumn:
+    """One column of a file.
+
+    Parameters
+    ----------
+    name : str
+    values : array, (n_samples,)
+        Numbers in the file's own type.
+    unit, quantity, position : str
+        Empty where the file does not say.
+    """
+
+    name: str
+    values: NumberArray
+    unit: str = ""
+    quantity: str = ""
+    position: str = ""
+
+
+@dataclass(frozen=True)
+class RawTable:
+    """The columns of one file and what the file says about them.
+
+    Parameters
+    ----------
+    columns : tuple of RawColumn
+    reader : str
+        Name of the reader, for the provenance.
+    sampling_rate_hz : float or None
+        As the file states it.
+    time : RawColumn or None
+        The time column where the reader already knows it.
+    is_own_layout : bool
+        Whether gearsig wrote the file: then nothing is guessed from names.
+    warnings : tuple of str
+    speed : SpeedSource or None
+    truth : mapping or None
+    history : tuple of str
+        Processing steps that were done before the file was written.
+    row_place : callable
+        Turns a row number into words that find it in the file, e.g. "line 17".
+    """
+
+    columns: tuple[RawColumn, ...]
+    reader: str
+    sampling_rate_hz: float | None = None
+    time: RawColumn | None = None
+    is_own_layout: bool = False
+    warnings: tuple[str, ...] = ()
+    speed: SpeedSource | None = None
+    truth: Mapping[str, Any] | None = None
+    history: tuple[str, ...] = ()
+    row_place: Callable[[int], str] = sample_place
+
+
+# --------------------
+# Time columns: how they are recognised, and whether they are uniform enough to stand for a sampling rate.
+# --------------------
+
+
+TIME_NAMES = frozenset(
+    (
+        *("time", "t", "zeit", "temps", "tiempo", "tempo", "seconds", "sec", "timestamp", "elapsed_time"),
+        *("time_s", "t_s", "zeit_s", "temps_s", "time_ms", "t_ms"),
+    )
+)
+SECONDS_PER_UNIT = {
+    "": 1.0,
+    "s": 1.0,
+    "sec": 1.0,
+    "second": 1.0,
+    "seconds": 1.0,
+    "sek": 1.0,
+    "ms": 1e-3,
+    "msec": 1e-3,
+    "us": 1e-6,
+    "µs": 1e-6,
+    "μs": 1e-6,
+    "ns": 1e-9,
+    "min": 60.0,
+    "h": 3600.0,
+}
+MAX_JITTER = 0.01
+"""Largest deviation of a time stamp from the uniform grid, in sampling steps."""
+
+
+def seconds_per_unit(name: str, unit: str) -> float | None:
+    """Return the factor to seconds if name and unit are those of a time column, else None.
+
+    Examples
+    --------
+    >>> seconds_per_unit("Zeit", "ms"), seconds_per_unit("T", "°C"), seconds_per_unit("acc", "s")
+    (0.001, None, None)
+    """
+    plain = re.sub(r"[\s\-]+", "_", name.strip().casefold())
+    if plain not in TIME_NAMES or (name.strip() == "T" and not unit):  # a bare capital T is rather a temperature
+        return None
+    suffix = plain.rpartition("_")[2] if "_" in plain else ""
+    return SECONDS_PER_UNIT.get(unit.strip().casefold() or (suffix if suffix in SECONDS_PER_UNIT else ""))
+
+
+def rate_of_time(values: NumberArray, scale_s: float, where: str, row_place: Callable[[int], str]) -> float:
+    r"""Return the sampling rate of a uniform time column.
+
+    .. math:: f_s = (N - 1) / (t_{N-1} - t_0)
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+        Times in the file's unit.
+    scale_s : float
+        Seconds per unit.
+    where : str
+        File and column, for the error.
+    row_place : callable
+        Row number to words.
+
+    Returns
+    -------
+    float
+        In Hz, from the mean step.
+
+    Raises
+    ------
+    InputError
+        If time does not increase, jumps, or leaves the uniform grid by more than 1 % of a step and by more than
+        the column's own rounding.
+    """
+    t: FloatArray = np.asarray(values, dtype=np.float64)
+    _check_usable(t, where, row_place)
+    step = (t[-1] - t[0]) / (len(t) - 1)
+    steps = np.diff(t)
+    worst = int(np.argmin(steps))
+    if steps[worst] <= 0:
+        raise InputError(
+            f"time does not increase at {row_place(worst + 1)}: {t[worst]:.9g} is followed by {t[worst + 1]:.9g}",
+            where=where,
+            allowed="strictly increasing time",
+            remedy="remove doubled rows, export time with more digits, or drop the column and give --fs",
+        )
+    allowed = max(MAX_JITTER * step, 0.51 * _resolution(values, t))
+    if _worst_deviation(t) > allowed:
+        _raise_not_uniform(t, steps, where, row_place)
+    return float(1.0 / (step * scale_s))
+
+
+def _check_usable(t: FloatArray, where: str, row_place: Callable[[int], str]) -> None:
+    if len(t) < 2:
+        raise InputError(
+            f"the time column has {len(t)} value(s)",
+            where=where,
+            allowed="at least two",
+            remedy="the file was cut off; copy or export it again",
+        )
+    bad = np.flatnonzero(~np.isfinite(t))
+    if len(bad):
+        raise InputError(
+            f"time is {t[bad[0]]} at {row_place(int(bad[0]))}",
+            where=where,
+            allowed="finite numbers",
+            remedy="cut the file there or export it again",
+        )
+
+
+def _worst_deviation(t: FloatArray) -> float:
+    """Largest distance of the times from the straight line fitted to them."""
+    k = np.arange(len(t)) - (len(t) - 1) / 2
+    centred = t - t.mean()
+    slope = (k @ centred) / (k @ k)
+    return float(np.abs(centred - slope * k).max())
+
+
+def _resolution(values: NumberArray, t: FloatArray) -> float:
+    """Step of the rounding that the times went through: decimal digits in text, or float32.
+
+    Times printed with too few digits jitter by half a digit about a grid that was uniform when it was sampled.
+    """
+    if np.asarray(values).dtype == np.float32:
+        return float(np.spacing(np.float32(np.abs(t).max())))
+    some = t[:: max(1, len(t) // 2000)]
+    for digits in range(13):
+        scaled = some * 10.0**digits
+        if np.abs(scaled - np.round(scaled)).max() < 1e-5:
+            return float(10.0**-digits)
+    return 0.0
+
+
+def _raise_not_uniform(t: FloatArray, steps: FloatArray, where: str, row_place: Callable[[int], str]) -> None:
+    median = float(np.median(steps))
+    worst = int(np.argmax(np.abs(steps - median)))
+    place = row_place(worst + 1)
+    if steps[worst] > 1.5 * median:
+        raise InputError(
+            f"a gap of {steps[worst]:.6g} before {place} (time {t[worst]:.9g} to {t[worst + 1]:.9g}); "
+            f"the usual step is {median:.6g}",
+            where=where,
+            allowed="time without gaps",
+            remedy="cut the file at the gap and read the parts",
+        )
+    raise InputError(
+        f"time is not uniform: the worst step, {steps[worst]:.6g}, ends at {place}; the usual step is {median:.6g}",
+        where=where,
+        allowed="time stamps within 1 % of a step of a uniform grid",
+        remedy="resample to a uniform rate knowingly, or drop the time column and give --fs",
+    )
+
+
+# --------------------
+# Sorts the named arrays of a MAT or HDF5 file into signals, sampling rate and the rest.
+# --------------------
+
+
+SHORT_SHARE = 0.1
+"""A vector shorter than this share of the longest is no signal beside it but a setting or a result."""
+
+
+@dataclass(frozen=True)
+class NamedArrays:
+    """What a file holds, by path ("bearing.gs").
+
+    Parameters
+    ----------
+    arrays : mapping of str to array
+        Numbers of one or two dimensions.
+    texts : mapping of str to str
+    units : mapping of str to str
+        Units of arrays where the file states them.
+    rates_hz : mapping of str to float
+        Sampling rates that are stated for an array.
+    warnings : tuple of str
+    """
+
+    arrays: Mapping[str, NumberArray]
+    texts: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    rates_hz: Mapping[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+
+def table_from_arrays(found: NamedArrays, reader: str, where: str) -> RawTable:
+    """Return the table of a file of named arrays.
+
+    Arrays with one element are settings; among them the sampling rate is known by its name. Vectors are channels, and
+    a matrix is one channel per column or row, whichever are fewer. Vectors much shorter than the longest are left out.
+
+    Raises
+    ------
+    InputError
+        If no array is a signal, or the file states two sampling rates.
+    """
+    scalars = {path: a for path, a in found.arrays.items() if a.size == 1}
+    signals = {path: a for path, a in found.arrays.items() if a.size > 1 and a.ndim <= 2 and a.dtype.kind in "fiubc"}
+    if not signals:
+        names = ", ".join(list(found.arrays)[:8]) or "nothing"
+        raise InputError(
+            f"holds no signal, only {names}",
+            where=where,
+            allowed="vectors or matrices of numbers",
+            remedy="save the signals as plain arrays (no tables or objects)",
+        )
+    rate_hz = _one_rate(scalars, found.rates_hz, where)
+    longest = max(max(a.shape) for a in signals.values())
+    short = [path for path, a in signals.items() if max(a.shape) < SHORT_SHARE * longest]
+    columns = [c for path, a in signals.items() if path not in short for c in _columns(path, a, found, where)]
+    warnings = [*found.warnings, *_speed_hints(scalars)]
+    if short:
+        warnings.append(f"shorter than a tenth of the longest signal and left out: {', '.join(short[:8])}")
+    return RawTable(tuple(_with_short_names(columns)), reader, sampling_rate_hz=rate_hz, warnings=tuple(warnings))
+
+
+def _columns(path: str, array: NumberArray, found: NamedArrays, where: str) -> list[RawColumn]:
+    unit = found.units.get(path, "") or found.texts.get(f"{path.rpartition('.')[0]}.unit".lstrip("."), "")
+    if 1 in array.shape or array.ndim == 1:
+        return [RawColumn(path, array.reshape(-1), unit)]
+    over_time = array if array.shape[0] < array.shape[1] else array.T
+    if len(over_time) > 0.5 * over_time.shape[1]:
+        raise InputError(
+            f"{path!r} has shape {array.shape}: it is not clear which is time",
+            where=where,
+            allowed="a matrix with many more samples than channels",
+            remedy="save each channel as a vector",
+        )
+    return [RawColumn(f"{path}_{i + 1}", row, unit) for i, row in enumerate(over_time)]
+
+
+def _with_short_names(columns: list[RawColumn]) -> list[RawColumn]:
+    """Call a channel by the last part of its path where that is unique."""
+    from dataclasses import replace
+
+    leaves = [c.name.rpartition(".")[2] for c in columns]
+    return [
+        replace(c, name=leaf if leaves.count(leaf) == 1 else c.name) for c, leaf in zip(columns, leaves, strict=True)
+    ]
+
+
+def _one_rate(scalars: Mapping[str, NumberArray], stated_hz: Mapping[str, float], where: str) -> float | None:
+    """Return the sampling rate from the scalars whose name says so; rates go before intervals."""
+    rates = {path: float(hz) for path, hz in stated_hz.items()}
+    intervals: dict[str, float] = {}
+    for path, array in scalars.items():
+        if array.dtype.kind not in "fiu":
+            continue
+        value = float(array.reshape(-1)[0])
+        if plain_name(path) in RATE_NAMES:
+            rates[path] = value
+        elif plain_name(path) in INTERVAL_NAMES:
+            intervals[path] = value
+    if not rates and intervals:
+        bad = [f"{path} = {dt:g}" for path, dt in intervals.items() if not 0 < dt < np.inf]
+        if bad:
+            raise InputError(
+                f"the sampling interval {bad[0]} s is not positive", where=where, allowed="> 0 s", remedy="give --fs"
+            )
+        rates = {path: 1 / dt for path, dt in intervals.items()}
+    values = list(rates.values())
+    if values and max(values) - min(values) > 1e-3 * abs(max(values)):
+        shown = ", ".join(f"{path} = {hz:g} Hz" for path, hz in list(rates.items())[:4])
+        raise InputError(
+            f"states several sampling rates: {shown}",
+            where=where,
+            allowed="one rate for all channels",
+            remedy="split the file, or correct the one that is wrong",
+        )
+    return values[0] if values else None
+
+
+def _speed_hints(scalars: Mapping[str, NumberArray]) -> list[str]:
+    """Mention scalars that may be a shaft speed: which shaft, and how true, the file does not say."""
+    hints = []
+    for path, array in scalars.items():
+        name = plain_name(path)
+        if (name in SPEED_NAMES or name.endswith("rpm")) and array.dtype.kind in "fiu":
+            unit = "rpm" if "rpm" in name else "Hz or rpm"
+            hints.append(
+                f"{path} = {float(array.reshape(-1)[0]):g} may be a nominal shaft speed ({unit}); it was not used"
+            )
+    return hints

@@ -1,0 +1,420 @@
+"""What a recording is: channels over time, with units, a speed source and where it came from."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from gearsig.checks import FloatArray, closest_match_hint, frozen_array, one_of, positive, within
+from gearsig.errors import InputError
+from gearsig.rig import QUANTITIES, Rig, SpeedSource
+
+# --------------------
+# What names and units of columns mean: sampling rates, quantities, units in brackets.
+# --------------------
+
+
+RATE_NAMES = frozenset(
+    (
+        *("fs", "sr", "fshz", "fsamp", "fsample", "sfreq", "sampfreq", "samplefreq", "samplefrequency", "samplerate"),
+        *("sampleratehz", "samplingfreq", "samplingfrequency", "samplingfrequencyhz", "samplingrate", "samplingratehz"),
+        *("freqsampling", "abtastrate"),
+    )
+)
+"""Names of sampling rates in Hz, lower case, without spaces and underscores."""
+INTERVAL_NAMES = frozenset(
+    (
+        *("dt", "dts", "ts", "deltat", "xinc", "wfincrement", "tsample"),
+        *("sampleinterval", "samplinginterval", "samplingperiod"),
+    )
+)
+"""Names of sampling intervals in seconds."""
+SPEED_NAMES = frozenset(("rpm", "rate", "speed", "shaftspeed", "rotspeed", "speedrpm", "drehzahl", "shaftrate", "hz"))
+"""Names of scalars that may be a shaft speed; told to the user, never used."""
+
+_QUANTITY_OF_UNIT = {
+    "m/s^2": "acceleration",
+    "m/s2": "acceleration",
+    "m/s²": "acceleration",
+    "m/s**2": "acceleration",
+    "ms-2": "acceleration",
+    "mm/s^2": "acceleration",
+    "mm/s²": "acceleration",
+    "g": "acceleration",
+    "gn": "acceleration",
+    "g_n": "acceleration",
+    "mg": "acceleration",
+    "m/s": "velocity",
+    "mm/s": "velocity",
+    "in/s": "velocity",
+    "ips": "velocity",
+    "mm": "displacement",
+    "µm": "displacement",
+    "μm": "displacement",
+    "um": "displacement",
+    "mil": "displacement",
+    "pa": "sound_pressure",
+    "n": "force",
+    "kn": "force",
+    "nm": "torque",
+    "n*m": "torque",
+    "n·m": "torque",
+    "rpm": "rotational_speed",
+    "r/min": "rotational_speed",
+    "tr/min": "rotational_speed",
+    "u/min": "rotational_speed",
+    "1/min": "rotational_speed",
+    "min^-1": "rotational_speed",
+    "rad/s": "rotational_speed",
+    "rad": "angle",
+    "rad/s^2": "angular_acceleration",
+    "rad/s2": "angular_acceleration",
+    "rad/s²": "angular_acceleration",
+    "°c": "temperature",
+    "degc": "temperature",
+    "v": "voltage",
+    "mv": "voltage",
+}
+RPM_UNITS = frozenset(("rpm", "r/min", "tr/min", "u/min", "1/min", "min^-1"))
+
+_RATE_LINE = re.compile(
+    r"[#%/;\s]*(?P<name>[^=:;,\t]+?)\s*[=:;,\t]+\s*"
+    r"(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(?P<unit>k?hz)?[\s;,]*$",
+    re.IGNORECASE,
+)
+_UNIT_AT_END = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\]\[]*)\]|\((?P<round>[^()]*)\))\s*$", re.DOTALL)
+
+
+def plain_name(name: str) -> str:
+    """Return a name folded for comparison with the sets above.
+
+    Examples
+    --------
+    >>> plain_name("Sampling_Rate"), plain_name("Head_1.SampFreq")
+    ('samplingrate', 'sampfreq')
+    """
+    return re.sub(r"[\s_\-]+", "", name.rpartition(".")[2].casefold())
+
+
+def split_unit(header: str) -> tuple[str, str]:
+    """Split "acc [m/s^2]" or "acc (g)" into name and unit; round brackets only where they hold a known unit.
+
+    Examples
+    --------
+    >>> split_unit("acc [m/s^2]"), split_unit("Time (s)"), split_unit("bearing (left)")
+    (('acc', 'm/s^2'), ('Time', 's'), ('bearing (left)', ''))
+    """
+    match = _UNIT_AT_END.match(header.strip())
+    if match is None or not match["name"]:
+        return header.strip(), ""
+    if match["square"] is not None:
+        return match["name"], match["square"].strip()
+    if is_unit(match["round"]):
+        return match["name"], match["round"].strip()
+    return header.strip(), ""
+
+
+def rate_in_line(line: str) -> float | None:
+    """Return the sampling rate that a line of text states, in Hz.
+
+    Examples
+    --------
+    >>> rate_in_line("# fs = 25600"), rate_in_line("Sampling rate [Hz];25.6e3"), rate_in_line("# run 5: good")
+    (25600.0, 25600.0, None)
+    """
+    match = _RATE_LINE.match(line)
+    if match is None or re.sub(r"[\[(]hz[\])]$", "", plain_name(match["name"])) not in RATE_NAMES:
+        return None
+    return float(match["value"]) * (1e3 if (match["unit"] or "").casefold() == "khz" else 1.0)
+
+
+def is_unit(text: str) -> bool:
+    """Whether the text is a unit of a quantity or of time that is known here."""
+    from gearsig.recording._table import SECONDS_PER_UNIT
+
+    word = text.strip().casefold()
+    return word in _QUANTITY_OF_UNIT or (word != "" and word in SECONDS_PER_UNIT)
+
+
+def same_unit(one: str, other: str) -> bool:
+    """Whether two units are one, however they are spelled.
+
+    Examples
+    --------
+    >>> same_unit("m/s²", "m/s^2"), same_unit("m/s2", "m/s**2"), same_unit("g", "m/s^2")
+    (True, True, False)
+    """
+    return _plain_unit(one) == _plain_unit(other)
+
+
+def _plain_unit(unit: str) -> str:
+    squares = unit.strip().casefold().replace("²", "2").replace("**", "").replace("^", "")
+    return re.sub(r"[\s·*]+", "", squares).replace("/s/s", "/s2").replace("μ", "µ").replace("um", "µm")
+
+
+def quantity_of(name: str, unit: str) -> str:
+    """Return the quantity that a unit, or a telling name, stands for; "unknown" where neither tells.
+
+    A pulse channel is known by its name, because its unit is that of a voltage.
+
+    Examples
+    --------
+    >>> quantity_of("a1", "m/s^2"), quantity_of("Tacho", "V"), quantity_of("a1", "")
+    ('acceleration', 'tachometer', 'unknown')
+    """
+    quantity = _QUANTITY_OF_UNIT.get(unit.strip().casefold(), "unknown")
+    if quantity in ("unknown", "voltage") and re.match(r"tach|keyphas", name.strip().casefold()):
+        return "tachometer"
+    if quantity == "unknown" and plain_name(name) in ("rpm", "speedrpm"):
+        return "rotational_speed"
+    return quantity
+
+
+VIBRATION_QUANTITIES = frozenset(
+    {"acceleration", "velocity", "displacement", "sound_pressure", "force", "torque", "transmission_error", "unknown"}
+)
+"""Quantities that the analysis chain treats as vibration; the others describe the motion or the surroundings."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One channel of a recording.
+
+    Parameters
+    ----------
+    name : str
+        Unique in its recording. Text from a file: never markup.
+    quantity : str
+        One of `QUANTITIES`.
+    unit : str
+        As the file or the rig states it, empty where it is not known.
+    position : str
+        Where the sensor sits, e.g. "pinion bearing, vertical".
+    """
+
+    name: str
+    quantity: str = "unknown"
+    unit: str = ""
+    position: str = ""
+
+    def __post_init__(self) -> None:
+        one_of(self.quantity, f"quantity of channel {self.name!r}", QUANTITIES)
+
+    @property
+    def is_vibration(self) -> bool:
+        """Whether the analysis chain looks at this channel for faults."""
+        return self.quantity in VIBRATION_QUANTITIES
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a recording came from, and what was done to it since.
+
+    Parameters
+    ----------
+    source : str
+        File name or simulator; empty if made in memory.
+    sha256 : str
+        Hash of the file's bytes, empty if made in memory.
+    reader : str
+        The reader or simulator with its version.
+    history : tuple of str
+        Processing steps in order.
+    """
+
+    source: str = ""
+    sha256: str = ""
+    reader: str = ""
+    history: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Samples of one or more channels at a constant sampling rate.
+
+    Parameters
+    ----------
+    samples : array, (n_channels, n_samples)
+        In each channel's unit; finite. Kept as float32 or float64, read-only.
+    sampling_rate_hz : float
+        Above zero.
+    channels : tuple of Channel
+        One per row of `samples`, names unique.
+    speed : SpeedSource or None
+        Where shaft speed and angle come from; None if the recording has no such thing. A rig's own `speed` is
+        used where this is None: see `speed_source`.
+    rig : Rig or None
+        The machine, as far as it is known.
+    provenance : Provenance
+    truth : mapping or None
+        What a simulator put in (JSON-like values); None for measured data.
+    warnings : tuple of str
+        What the reader noticed and the user should know, e.g. a doubled variable that was left out.
+
+    Raises
+    ------
+    InputError
+        On a shape, rate, name or value that does not fit.
+
+    Examples
+    --------
+    >>> r = Recording(np.zeros((1, 8)), 4.0, (Channel("a1", "acceleration", "m/s^2"),))
+    >>> r.duration_s
+    2.0
+    """
+
+    samples: FloatArray
+    sampling_rate_hz: float
+    channels: tuple[Channel, ...]
+    speed: SpeedSource | None = None
+    rig: Rig | None = None
+    provenance: Provenance = field(default_factory=Provenance)
+    truth: Mapping[str, Any] | None = None
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        where = self.provenance.source or "recording"
+        remedy = "give --fs or sampling_rate_hz in the rig file"
+        positive(self.sampling_rate_hz, f"{where}: sampling rate", "Hz", remedy=remedy)
+        within(self.sampling_rate_hz, f"{where}: sampling rate", 1e-3, 1e10, "Hz", remedy=remedy)
+        if len(np.shape(self.samples)) == 2 and np.shape(self.samples)[1] == 0:
+            raise InputError("there are no samples", where=where, remedy="check that the file was written completely")
+        try:
+            samples = frozen_array(self.samples, "samples (channel, time)", ndim=2)
+        except InputError as error:
+            raise InputError(error.what, where=where, allowed=error.allowed, remedy=error.remedy) from None
+        object.__setattr__(self, "samples", samples)
+        object.__setattr__(self, "channels", tuple(self.channels))
+        if len(self.channels) != samples.shape[0]:
+            raise InputError(f"{len(self.channels)} channel names for {samples.shape[0]} channels", where=where)
+        names = self.channel_names
+        doubled = sorted({name for name in names if names.count(name) > 1})
+        if doubled:
+            raise InputError(
+                f"channel name(s) {', '.join(doubled)} occur more than once", where=where, remedy="rename the columns"
+            )
+        if self.truth is not None:
+            object.__setattr__(self, "truth", MappingProxyType(dict(self.truth)))
+
+    @property
+    def n_samples(self) -> int:
+        """Samples per channel."""
+        return int(self.samples.shape[1])
+
+    @property
+    def duration_s(self) -> float:
+        """Number of samples over sampling rate."""
+        return self.n_samples / self.sampling_rate_hz
+
+    @property
+    def channel_names(self) -> tuple[str, ...]:
+        """Names in the order of the rows."""
+        return tuple(channel.name for channel in self.channels)
+
+    @property
+    def speed_source(self) -> SpeedSource | None:
+        """The recording's own speed source, or the rig's."""
+        if self.speed is not None:
+            return self.speed
+        return self.rig.speed if self.rig is not None else None
+
+    def time_s(self) -> FloatArray:
+        """Sample times from zero, (n_samples,)."""
+        return np.arange(self.n_samples) / self.sampling_rate_hz
+
+    def index(self, name: str) -> int:
+        """Row of the channel called `name`."""
+        if name not in self.channel_names:
+            raise InputError(
+                f"there is no channel {name!r}",
+                where=self.provenance.source or "recording",
+                allowed=", ".join(self.channel_names),
+                remedy=closest_match_hint(name, self.channel_names),
+            )
+        return self.channel_names.index(name)
+
+    def values(self, name: str) -> FloatArray:
+        """Samples of one channel, (n_samples,), read-only."""
+        row: FloatArray = self.samples[self.index(name)]
+        return row
+
+    def vibration_names(self) -> tuple[str, ...]:
+        """Names of the channels that the analysis looks at for faults."""
+        return tuple(channel.name for channel in self.channels if channel.is_vibration)
+
+    def select(self, names: Iterable[str]) -> Recording:
+        """Return the recording with only the named channels, in that order."""
+        rows = [self.index(name) for name in names]
+        return self._changed(
+            "select " + ", ".join(self.channel_names[i] for i in rows),
+            samples=self.samples[rows],
+            channels=tuple(self.channels[i] for i in rows),
+        )
+
+    def with_rig(self, rig: Rig | None) -> Recording:
+        """Return the recording with another rig; its sensors' quantity, unit, scale and position are applied.
+
+        Sensors apply once, to the values as they were read: give the rig to a recording that has none. Where the file
+        states another unit and the rig no scale between the two, the rig's unit is taken, with a warning.
+        """
+        if rig is None:
+            return replace(self, rig=None)
+        if self.rig is not None and self.rig.sensors and self.rig != rig:
+            raise InputError(
+                "the recording already carries a rig whose sensor scales were applied",
+                remedy="read the file again with the other rig",
+            )
+        if self.rig is rig or not rig.sensors:
+            return replace(self, rig=rig)
+        samples = np.array(self.samples)
+        channels, warnings = list(self.channels), list(self.warnings)
+        for sensor in rig.sensors:
+            if sensor.channel not in self.channel_names:
+                continue  # a rig may describe more sensors than this file holds
+            i = self.index(sensor.channel)
+            scaled, old = sensor.scale != 1.0 or sensor.offset != 0.0, channels[i]
+            if scaled:
+                samples[i] = samples[i] * sensor.scale + sensor.offset
+            elif old.unit and sensor.unit and not same_unit(old.unit, sensor.unit):
+                warnings.append(
+                    f"channel {old.name!r}: the file says {old.unit}, the rig file {sensor.unit} without a scale; "
+                    f"the values are taken as {sensor.unit}"
+                )
+            channels[i] = Channel(
+                old.name,
+                sensor.quantity or old.quantity,
+                sensor.unit or old.unit,
+                sensor.position or old.position,
+            )
+        return replace(self, samples=samples, channels=tuple(channels), rig=rig, warnings=tuple(warnings))
+
+    def _changed(self, step: str, **changes: Any) -> Recording:
+        provenance = replace(self.provenance, history=(*self.provenance.history, step))
+        return replace(self, provenance=provenance, **changes)
+
+
+# --------------------
+# Units that files use, in SI units.
+# --------------------
+
+
+SI_FACTORS = {
+    "acceleration": {"m/s^2": 1.0, "m/s²": 1.0, "m/s2": 1.0, "mm/s^2": 1e-3, "mm/s²": 1e-3, "g": 9.80665},
+    "velocity": {"m/s": 1.0, "mm/s": 1e-3},
+    "displacement": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
+    "transmission_error": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
+    "sound_pressure": {"Pa": 1.0},
+    "force": {"N": 1.0, "kN": 1e3},
+    "torque": {"N m": 1.0, "Nm": 1.0, "N·m": 1.0, "kN m": 1e3},
+}
+"""Quantity → unit → SI unit."""
+
+
+def metres_per_second_squared(channel: Channel) -> float | None:
+    """Return what a channel's values are multiplied by to be m/s²; None where it is no acceleration in a known unit."""
+    return SI_FACTORS["acceleration"].get(channel.unit) if channel.quantity in ("acceleration", "unknown") else None

@@ -1,0 +1,116 @@
+"""Reads HDF5 files, gearsig's own and others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearsig.errors import InputError
+from gearsig.recording._limits import check_memory, foreign_errors
+from gearsig.recording._metadata import table_from_metadata
+from gearsig.recording._table import NamedArrays, NumberArray, RawTable, table_from_arrays
+from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, plain_name
+from gearsig.recording.formats._writers import HDF5_SAMPLES, OWN_NAME
+
+READER = "gearsig HDF5 reader"
+MAX_DEPTH = 8
+MAX_DATASETS = 10_000
+UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "unit_string")
+
+
+def read_hdf5(path: Path) -> RawTable:
+    """Return the signals of an HDF5 file.
+
+    One- and two-dimensional datasets of numbers become channels, single numbers and attributes named like a sampling
+    rate give the rate, an attribute "unit" or "units" of a dataset its unit. Only what the file itself holds is read:
+    external links, external storage and virtual datasets, which could name any file, are not followed.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged or would not fit into memory.
+    """
+    import h5py
+
+    where = path.name
+    with foreign_errors(where, "HDF5"), h5py.File(path, "r", locking=False) as file:
+        arrays: dict[str, NumberArray] = {}
+        units: dict[str, str] = {}
+        rates_hz = _rates_of(file.attrs, "")
+        skipped: list[str] = []
+        datasets = own_datasets(file, skipped)
+        by_path = dict(datasets)
+        if OWN_NAME in by_path and HDF5_SAMPLES in by_path:
+            samples = load_dataset(by_path[HDF5_SAMPLES], where)
+            text = by_path[OWN_NAME].asstr()[()]
+            return table_from_metadata(str(text), list(np.atleast_2d(samples)), READER, where)
+        for dataset_path, dataset in datasets:
+            if dataset.dtype.kind not in "fiubc" or dataset.ndim > 2 or dataset.size == 0:
+                continue
+            arrays[dataset_path] = np.atleast_1d(load_dataset(dataset, where))
+            units[dataset_path] = _unit_of(dataset.attrs)
+            rates_hz |= _rates_of(dataset.attrs, dataset_path)
+    notes = [f"not followed, because they lead out of the file: {', '.join(skipped[:8])}"] if skipped else []
+    return table_from_arrays(NamedArrays(arrays, {}, units, rates_hz, tuple(notes)), READER, where)
+
+
+def own_datasets(group: Any, skipped: list[str], prefix: str = "", depth: int = MAX_DEPTH) -> list[tuple[str, Any]]:
+    """Return the datasets under a group that lie in the file itself, by path with dots."""
+    import h5py
+
+    found: list[tuple[str, Any]] = []
+    for name in group:
+        path = f"{prefix}{name}"
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            skipped.append(path)
+            continue
+        item = group[name]
+        if isinstance(item, h5py.Group) and depth > 1 and not name.startswith("#"):  # "#refs#" is MATLAB's own store
+            found += own_datasets(item, skipped, f"{path}.", depth - 1)
+        elif isinstance(item, h5py.Dataset):
+            if item.is_virtual or item.external:
+                skipped.append(path)
+            else:
+                found.append((path, item))
+        if len(found) > MAX_DATASETS:
+            raise InputError(
+                f"holds more than {MAX_DATASETS} datasets", allowed="one recording", remedy="split the file"
+            )
+    return found
+
+
+def load_dataset(dataset: Any, where: str) -> NumberArray:
+    """Return a dataset's values after checking that they were written and fit into memory."""
+    check_memory(2 * dataset.size * dataset.dtype.itemsize, where)
+    if dataset.size > 1 and dataset.id.get_storage_size() == 0:
+        raise InputError(
+            f"dataset {dataset.name!r} was allocated but never written",
+            where=where,
+            allowed="datasets with data",
+            remedy="the file was not written completely: export it again",
+        )
+    values: NumberArray = np.asarray(dataset[()])
+    return values
+
+
+def _rates_of(attributes: Any, path: str) -> dict[str, float]:
+    rates: dict[str, float] = {}
+    for name, value in attributes.items():
+        if np.size(value) != 1 or np.asarray(value).dtype.kind not in "fiu":
+            continue
+        number = float(np.reshape(value, -1)[0])
+        if plain_name(name) in RATE_NAMES:
+            rates[f"{path}@{name}"] = number
+        elif plain_name(name) in INTERVAL_NAMES and number > 0:
+            rates[f"{path}@{name}"] = 1.0 / number
+    return rates
+
+
+def _unit_of(attributes: Any) -> str:
+    for name in UNIT_ATTRIBUTES:
+        if name in attributes:
+            value = attributes[name]
+            return value.decode("utf-8", errors="replace") if isinstance(value, bytes) else str(value)
+    return ""

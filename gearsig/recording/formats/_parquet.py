@@ -1,0 +1,91 @@
+"""Reads Parquet files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gearsig.errors import InputError
+from gearsig.recording._limits import check_memory, foreign_errors
+from gearsig.recording._metadata import table_from_metadata
+from gearsig.recording._table import RawColumn, RawTable
+from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, plain_name, split_unit
+from gearsig.recording.formats._writers import OWN_NAME
+
+READER = "gearsig Parquet reader"
+
+
+def read_parquet(path: Path) -> RawTable:
+    """Return the columns of numbers of a Parquet file.
+
+    Units stand in the column's metadata ("unit", "units") or in brackets in its name; a key of the file's metadata
+    named like a sampling rate states the rate. The index that pandas writes is left out.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged or would not fit into memory.
+    """
+    from pyarrow import parquet, types
+
+    where = path.name
+    with foreign_errors(where, "Parquet"), path.open("rb") as file:
+        parts = parquet.ParquetFile(file)
+        schema = parts.schema_arrow
+        check_memory(2 * parts.metadata.num_rows * _row_bytes(schema), where)
+        metadata = schema.metadata or {}
+        is_number = (types.is_integer, types.is_floating, types.is_boolean)
+        numeric = [f for f in schema if any(test(f.type) for test in is_number)]
+        kept = [f for f in numeric if not f.name.startswith("__index_level_")]
+        table = parts.read()
+        values = {f.name: table.column(f.name).to_numpy() for f in kept if schema.names.count(f.name) == 1}
+    doubled = [f.name for f in kept if f.name not in values]
+    if doubled:
+        raise InputError(
+            f"column name(s) {', '.join(sorted(set(doubled)))} occur more than once",
+            where=where,
+            remedy="rename the columns",
+        )
+    if OWN_NAME.encode() in metadata:
+        return table_from_metadata(
+            metadata[OWN_NAME.encode()].decode(errors="replace"), list(values.values()), READER, where
+        )
+    left_out = [f.name for f in schema if f not in numeric]
+    notes = (f"column(s) {', '.join(left_out[:8])} hold no numbers and were left out",) if left_out else ()
+    columns = tuple(_column(f, values[f.name]) for f in kept)
+    return RawTable(columns, READER, sampling_rate_hz=_stated_rate(metadata), warnings=notes)
+
+
+def _column(field: Any, values: Any) -> RawColumn:
+    name, unit = split_unit(field.name)
+    facts = field.metadata or {}
+    for key in (b"unit", b"units"):
+        unit = facts.get(key, unit.encode()).decode("utf-8", errors="replace")
+    return RawColumn(name or field.name, values, unit)
+
+
+def _row_bytes(schema: Any) -> int:
+    """Return the decoded bytes of one row; a column whose type has no fixed width counts 32."""
+    return sum(_bytes_of(field.type) for field in schema)
+
+
+def _bytes_of(kind: Any) -> int:
+    try:
+        return max(1, int(kind.bit_width) // 8)
+    except ValueError:
+        return 32
+
+
+def _stated_rate(metadata: Mapping[bytes, bytes]) -> float | None:
+    for key, value in metadata.items():
+        name = plain_name(key.decode("utf-8", errors="replace"))
+        try:
+            number = float(value)
+        except ValueError:
+            continue
+        if name in RATE_NAMES:
+            return number
+        if name in INTERVAL_NAMES and number > 0:
+            return 1.0 / number
+    return None

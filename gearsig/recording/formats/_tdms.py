@@ -1,0 +1,102 @@
+"""Reads National Instruments' TDMS files."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearsig.errors import InputError
+from gearsig.recording._limits import check_memory, foreign_errors
+from gearsig.recording._table import NamedArrays, RawTable, table_from_arrays
+from gearsig.recording._types import RATE_NAMES, plain_name
+
+READER = "gearsig TDMS reader"
+
+
+def read_tdms(path: Path) -> RawTable:
+    """Return the channels of a TDMS file, scaled as its properties say.
+
+    The rate is one over the waveform property "wf_increment", or a property named like a sampling rate; the unit is
+    "unit_string". Channels of text or of time stamps are left out.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged, its channels have several rates, or it would not fit into memory.
+    """
+    from nptdms import TdmsFile
+
+    where = path.name
+    check_memory(3 * path.stat().st_size, where)
+    # The open file is given, not its name: the index file beside it, which may be of another recording, is not read.
+    with foreign_errors(where, "TDMS"), _quiet(), path.open("rb") as stream, TdmsFile.open(stream) as file:
+        _check_complete(file, where)
+        channels = {}
+        units = {}
+        rates_hz = _stated_rates(file.properties, "file")
+        left_out = []
+        for group in file.groups():
+            rates_hz |= _stated_rates(group.properties, group.name)
+            for channel in group.channels():
+                # A dot separates the levels of names elsewhere; within a name it would cut it.
+                name = f"{group.name}.{channel.name.replace('.', '_')}"
+                if channel.dtype.kind not in "fiub":
+                    left_out.append(channel.name)
+                    continue
+                check_memory(2 * len(channel) * 8, where)
+                channels[name] = np.asarray(channel[:])
+                units[name] = str(channel.properties.get("unit_string", ""))
+                rates_hz |= _waveform_rate(channel, name, where) or _stated_rates(channel.properties, name)
+    notes = (f"channel(s) {', '.join(left_out[:8])} hold no numbers and were left out",) if left_out else ()
+    return table_from_arrays(NamedArrays(channels, {}, units, rates_hz, notes), READER, where)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the library from writing to the terminal what is raised here as an error."""
+    from nptdms.log import log_manager
+
+    before = log_manager.log_level
+    log_manager.set_level(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        log_manager.set_level(before)
+
+
+def _check_complete(file: Any, where: str) -> None:
+    """Raise where the last segment ends before its data: the library would return what is there."""
+    if file.file_status.incomplete_final_segment:
+        raise InputError(
+            "the last segment is cut off",
+            where=where,
+            allowed="a complete TDMS file",
+            remedy="the file was not closed or copied completely: copy or export it again",
+        )
+
+
+def _waveform_rate(channel: Any, name: str, where: str) -> dict[str, float]:
+    increment_s = channel.properties.get("wf_increment")
+    if increment_s is None:
+        return {}
+    if not isinstance(increment_s, (int, float)) or not increment_s > 0:
+        raise InputError(
+            f"wf_increment of channel {name!r} is {increment_s!r}",
+            where=where,
+            allowed="> 0 s",
+            remedy="give --fs or correct it in the file",
+        )
+    return {f"{name}, wf_increment": 1.0 / float(increment_s)}
+
+
+def _stated_rates(properties: Any, owner: str) -> dict[str, float]:
+    return {
+        f"{owner}, {name}": float(value)
+        for name, value in properties.items()
+        if plain_name(name) in RATE_NAMES and isinstance(value, (int, float)) and not isinstance(value, bool)
+    }

@@ -1,0 +1,160 @@
+"""Reads WAV files, with channel scales from a LEA chunk where there is one."""
+
+from __future__ import annotations
+
+import math
+import struct
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gearsig.errors import InputError
+from gearsig.recording._limits import check_memory, foreign_errors
+from gearsig.recording._metadata import table_from_metadata
+from gearsig.recording._table import NumberArray, RawColumn, RawTable
+from gearsig.recording.formats._writers import WAV_CHUNK
+
+# --------------------
+# The chunks of a RIFF/WAVE file beside its samples.
+# --------------------
+
+
+MAX_CHUNK_BYTES = 1 << 26
+
+
+@dataclass(frozen=True)
+class LeaChannel:
+    """Name, value of full scale and unit of one channel."""
+
+    name: str
+    scale: float
+    unit: str
+
+
+def find_chunks(path: Path) -> dict[bytes, bytes]:
+    """Return the chunks other than "data" by name; refuse a file whose chunks are longer than the file.
+
+    Raises
+    ------
+    InputError
+        If the file is cut off or has no data chunk.
+    """
+    n_bytes = path.stat().st_size
+    chunks: dict[bytes, bytes] = {}
+    has_data = False
+    with path.open("rb") as file:
+        head = file.read(12)
+        order = ">" if head[:4] == b"RIFX" else "<"
+        if head[:4] == b"RF64":  # 64-bit lengths stand in a chunk of their own; scipy checks them
+            return chunks
+        while len(tag := file.read(8)) == 8:
+            name, size = tag[:4], struct.unpack(order + "I", tag[4:])[0]
+            end = file.tell() + size
+            if end > n_bytes:
+                raise InputError(
+                    f"chunk {name.decode('latin-1')!r} is stated with {size} bytes, {end - n_bytes} are missing",
+                    where=path.name,
+                    allowed="a complete WAV file",
+                    remedy="the file was cut off: copy or record it again",
+                )
+            if name == b"data":
+                has_data = size > 0
+            elif size <= MAX_CHUNK_BYTES:
+                chunks[name] = file.read(size)
+            file.seek(end + (size & 1))  # chunks begin at even bytes
+    if not has_data or b"fmt " not in chunks:
+        missing = "samples" if b"fmt " in chunks else "format description"
+        raise InputError(
+            f"holds no {missing}", where=path.name, allowed="a complete WAV file", remedy="export it again"
+        )
+    return chunks
+
+
+def parse_lea(chunk: bytes) -> list[LeaChannel]:
+    """Return names, scales and units from a LEA chunk, an empty list if it is not as inferred here.
+
+    The layout is not published; it was inferred from one file whose scales are known. Per channel: four bytes "le"
+    and the channel number in two digits, length (uint32), value of full scale (float32), name and unit, each with its
+    length (uint16) before it, two float32 that are not used (in that file: 0, and a figure of at most 1). It is taken
+    only if every length fits exactly.
+    """
+    channels: list[LeaChannel] = []
+    try:
+        while chunk:
+            if chunk[:4] != b"le%02d" % len(channels):
+                return []
+            (size,) = struct.unpack_from("<I", chunk, 4)
+            body, chunk = chunk[8 : 8 + size], chunk[8 + size :]
+            (scale,) = struct.unpack_from("<f", body, 0)
+            name, at = _counted_text(body, 4)
+            unit, at = _counted_text(body, at)
+            if len(body) != size or at + 8 != size or not math.isfinite(scale) or scale <= 0 or not name:
+                return []
+            channels.append(LeaChannel(name, scale, unit))
+    except (struct.error, UnicodeDecodeError):
+        return []
+    return channels
+
+
+def _counted_text(body: bytes, at: int) -> tuple[str, int]:
+    (length,) = struct.unpack_from("<H", body, at)
+    return body[at + 2 : at + 2 + length].decode("utf-8"), at + 2 + length
+
+
+READER = "gearsig WAV reader"
+
+# Zero and full scale of the integer types as scipy returns them; it left-justifies 24 bit in 32.
+_SCALES = {"uint8": (128.0, 128.0), "int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "int64": (0.0, 2.0**63)}
+
+
+def read_wav(path: Path) -> RawTable:
+    """Return the channels of a WAV file, scaled to ±1 full scale.
+
+    Integers of 8 to 32 bit are divided by their full scale, floats are kept. Channels are called "ch1", "ch2", … with
+    the unit "FS" (full scale), unless a LEA chunk states names, scales and units; a rig's sensors give scales else.
+
+    Raises
+    ------
+    InputError
+        If the file is cut off or its coding is not PCM or float.
+    """
+    from scipy.io import wavfile
+
+    where = path.name
+    chunks = find_chunks(path)
+    check_memory(6 * path.stat().st_size, where)
+    with foreign_errors(where, "WAV"), warnings.catch_warnings():
+        warnings.simplefilter("error")  # a warning means a damaged file, and becomes an error
+        # Chunks that scipy does not know are none of its business; find_chunks has checked the lengths.
+        warnings.filterwarnings("ignore", message="Chunk .*not understood")
+        rate_hz, frames = wavfile.read(path)
+    rows = [frames] if frames.ndim == 1 else list(frames.T)
+    if WAV_CHUNK in chunks:
+        return table_from_metadata(chunks[WAV_CHUNK].decode("utf-8", errors="replace"), rows, READER, where)
+    described = parse_lea(chunks.get(b"LEA ", b""))
+    columns = [_column(i, row, described if len(described) == len(rows) else []) for i, row in enumerate(rows)]
+    return RawTable(tuple(columns), READER, sampling_rate_hz=float(rate_hz))
+
+
+def _column(i: int, values: NumberArray, described: list[LeaChannel]) -> RawColumn:
+    scaled = _to_full_scale(values)
+    if not described:
+        return RawColumn(f"ch{i + 1}", scaled, "FS")
+    channel = described[i]
+    return RawColumn(channel.name, scaled * scaled.dtype.type(channel.scale), channel.unit)
+
+
+def _to_full_scale(values: NumberArray) -> NumberArray:
+    """Return ±1 full scale: float32 for up to 24 bit, which it holds exactly, float64 beyond."""
+    if values.dtype.kind == "f":
+        return values
+    if values.dtype.name not in _SCALES:
+        raise InputError(f"coding {values.dtype} is not known", allowed="8, 16, 24, 32 bit integer, 32, 64 bit float")
+    zero, full = _SCALES[values.dtype.name]
+    narrow = values.dtype.itemsize <= 2 or (values.dtype == np.int32 and not np.any(values & 0xFF))
+    scaled: NumberArray = values.astype(np.float32 if narrow else np.float64)
+    scaled -= zero
+    scaled /= full
+    return scaled

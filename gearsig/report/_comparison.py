@@ -1,0 +1,503 @@
+"""A comparison's page: one self-contained HTML file."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import datetime
+from io import StringIO
+from textwrap import fill
+
+from gearsig import __version__
+from gearsig.comparison import (
+    LEAST_REPEATED,
+    STEADY,
+    BandLevel,
+    ChannelComparison,
+    Comparison,
+    LevelPair,
+    LineLevel,
+    RecordFacts,
+    Repeated,
+    ShaftComparison,
+    mesh_lines,
+    missing_words,
+)
+from gearsig.formatting import readable, rounded
+from gearsig.plot import Captioned, Cursor, Picture, embed, unit_text
+from gearsig.report._files import Json, members, plain, render
+
+# --------------------
+# The pictures of a comparison, and what to look at in each.
+# --------------------
+
+
+MESH_HARMONICS_SHOWN = 5.6
+WITHOUT_MESH = 50.0
+"""Highest order drawn, in mesh orders, and where there is no mesh."""
+MOST_CURSORS = 10
+
+LOOK_AT_ORDERS = (
+    "Below: how far each line of the simulation is off. Shaded: twice its repeatability. A triangle marks a line that "
+    "one of the two does not show: there the difference is at least so large."
+)
+LOOK_AT_TEETH = "At the bottom the level tooth by tooth: pale bars are within the records' own scatter."
+LOOK_AT_BANDS = (
+    "FRAC: how alike the lines in a band are, whatever their gain; 1 is the same shape. A dash is what the complex "
+    "one gives by chance, because one line outweighs all others; the dotted line what unrelated magnitudes give."
+)
+LOOK_AT_OCTAVES = "Everything in each band, noise included. At another speed, other orders fall into a band."
+
+
+def channel_pictures(comparison: Comparison, channel: ChannelComparison) -> Iterator[Picture]:
+    """Yield the pictures of one channel: orders, averages of each shaft, bands."""
+    for figures in FIGURES.values():
+        for one in figures(comparison, channel):
+            yield embed(one.figure, one.caption, one.alternative)
+
+
+def order_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[Captioned]:
+    """Yield both order spectra with the differences of their lines."""
+    from gearsig.plot import order_overlay_figure
+
+    figure = order_overlay_figure(
+        channel.recorded_spectrum,
+        channel.simulated_spectrum,
+        (*channel.lines, *channel.other_lines),
+        mesh_cursors(comparison),
+        limits=(0.0, shown_orders(comparison)),
+        title=f"Order spectra, {channel.name}",
+    )
+    shows = f"Order spectra of {channel.name}, recorded and simulated, and the difference of their lines."
+    yield Captioned(figure, LOOK_AT_ORDERS, shows)
+
+
+def angle_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[Captioned]:
+    """Yield the synchronous averages of each shaft."""
+    for shaft in channel.shafts:
+        yield _average(comparison, channel, shaft)
+
+
+def band_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[Captioned]:
+    """Yield the bands over order, and the third octaves."""
+    from gearsig.plot import band_levels_figure
+
+    del comparison  # a maker of figures is given it, and this one needs none of it
+    figure = band_levels_figure(channel.order_bands, channel.unit, title=f"Bands over order, {channel.name}")
+    shows = f"Levels of bands over order of {channel.name}, recorded and simulated, and their agreement."
+    yield Captioned(figure, LOOK_AT_BANDS, shows)
+    if channel.third_octaves:
+        figure = band_levels_figure(channel.third_octaves, channel.unit, title=f"Third octaves, {channel.name}")
+        shows = f"Third-octave levels of {channel.name}, recorded and simulated."
+        yield Captioned(figure, LOOK_AT_OCTAVES, shows)
+
+
+FIGURES: dict[str, Callable[[Comparison, ChannelComparison], Iterator[Captioned]]] = {
+    "Orders": order_figures,
+    "Angle": angle_figures,
+    "Bands": band_figures,
+}
+"""Makers of a channel's figures, by what they are over."""
+
+
+def _average(comparison: Comparison, channel: ChannelComparison, shaft: ShaftComparison) -> Captioned:
+    from gearsig.plot import average_overlay_figure
+
+    name = shaft.shaft or "the shaft"
+    correlation = f"{shaft.correlation.value:.3f}".replace("-", "−")
+    figure = average_overlay_figure(
+        shaft.recorded,
+        shaft.simulated,
+        shaft.tooth_levels,
+        n_teeth=shaft.n_teeth,
+        title=f"Synchronous averages of {name}, {channel.name}: correlation {correlation}",
+    )
+    look = f"One mean revolution of {name}, aligned; below it a piece of it enlarged.{_teeth_text(comparison, shaft)}"
+    shows = f"Synchronous averages of {name}, recorded and simulated, over one revolution."
+    return Captioned(figure, look, shows)
+
+
+def _teeth_text(comparison: Comparison, shaft: ShaftComparison) -> str:
+    """Say what the panel of teeth shows, and when it shows nothing."""
+    if not shaft.tooth_levels:
+        return ""
+    certain = next(one.tooth_is_certain for one in comparison.alignments if one.shaft == shaft.shaft)
+    unknown = " Which tooth of one is which of the other is not known here." if certain is False else ""
+    return f" {LOOK_AT_TEETH}{unknown}"
+
+
+def mesh_cursors(comparison: Comparison) -> tuple[Cursor, ...]:
+    """Return the mesh harmonics; numbered alone where there is one pair."""
+    one = len(comparison.mesh_orders) == 1
+    return tuple(
+        Cursor(k * mesh, "mesh", f"{k}× mesh" if one else f"{k}× mesh {i}", k)
+        for i, mesh in enumerate(comparison.mesh_orders, 1)
+        for k in range(1, MOST_CURSORS + 1)
+    )
+
+
+def shown_orders(comparison: Comparison) -> float:
+    """Return the order up to which spectra are drawn."""
+    meshes = [mesh for mesh in comparison.mesh_orders if mesh <= comparison.highest_order]
+    return min(comparison.highest_order, MESH_HARMONICS_SHOWN * max(meshes) if meshes else WITHOUT_MESH)
+
+
+# --------------------
+# A comparison as text: for the terminal, and its order lines as a table for other programs.
+# --------------------
+
+
+WIDTH = 100
+MOST_LINES = 12
+ORDER_COLUMNS = (
+    "channel",
+    "kind",
+    "label",
+    "order",
+    "shaft",
+    "simulated_db",
+    "recorded_db",
+    "difference_db",
+    "repeatability_db",
+    "simulated_is_seen",
+    "recorded_is_seen",
+)
+
+
+def comparison_text(comparison: Comparison) -> str:
+    """Return both records, the mesh harmonics of each channel and the verdict, in plain text."""
+    lines = [
+        f"simulation {_record(comparison.simulated)}",
+        f"recording  {_record(comparison.recorded)}",
+        *(f"aligned    {text}" for text in alignment_texts(comparison)),
+    ]
+    for channel in comparison.channels:
+        lines += ["", *_channel_table(channel)]
+    lines += ["", fill(comparison.verdict, WIDTH)]
+    lines += [fill(text, WIDTH) for text in comparison.findings]
+    for note in comparison.notes:
+        lines.append(fill(f"Note: {note}", WIDTH, subsequent_indent="      "))
+    return "\n".join(lines)
+
+
+def alignment_texts(comparison: Comparison) -> list[str]:
+    """Return one text per shaft on how the records were aligned."""
+    texts = []
+    for one in comparison.alignments:
+        name = f"shaft {one.shaft}: " if one.shaft else ""
+        if one.method == "marks":
+            texts.append(f"{name}by the marks of both records")
+            continue
+        sure = {None: "", True: ", the same tooth in both", False: ", good to whole teeth only"}[one.tooth_is_certain]
+        within = "" if one.tooth_is_certain is False else f" ± {one.repeatability_deg:.2g}°"
+        turned = f"{one.shift_deg:+.4g}°".replace("-", "−")
+        texts.append(f"{name}by correlation, simulation turned by {turned}{within}{sure}")
+    return texts
+
+
+def orders_csv(comparison: Comparison) -> str:
+    """Return all order lines of all channels as CSV with a heading."""
+    buffer = StringIO()
+    table = csv.writer(buffer, lineterminator="\n")
+    table.writerow(ORDER_COLUMNS)
+    for channel in comparison.channels:
+        for line in (*channel.lines, *channel.other_lines):
+            table.writerow([_harmless(channel.name), *_row(line)])
+    return buffer.getvalue()
+
+
+def _row(line: LineLevel) -> list[object]:
+    numbers = [line.level.simulated_db, line.level.recorded_db, line.level.difference_db, line.level.repeatability_db]
+    return [
+        line.kind,
+        _harmless(line.label),
+        rounded(line.order),
+        _harmless(line.shaft),
+        *(round(number, 3) for number in numbers),
+        str(line.simulated_is_seen).lower(),
+        str(line.recorded_is_seen).lower(),
+    ]
+
+
+def _harmless(text: str) -> str:
+    """Return a name from a file so that no spreadsheet takes it for a formula."""
+    return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t", "\r") else text
+
+
+def _record(facts: RecordFacts) -> str:
+    low, high = facts.speed_range_rpm
+    run = f", between {low:.5g} and {high:.5g}" if high - low > STEADY * facts.mean_speed_rpm else ""
+    return (
+        f"{facts.source}: {facts.duration_s:.6g} s at {facts.sampling_rate_hz:.6g} Hz, {facts.mean_speed_rpm:.6g} rpm"
+        f"{' on average' if run else ''}{run} ({facts.speed_method}), {facts.n_revolutions:.4g} revolutions"
+    )
+
+
+def _channel_table(channel: ChannelComparison) -> list[str]:
+    unit = f" re 1 {unit_text(channel.unit)}" if channel.unit else ""
+    rows = [f"{channel.name:<30} {'recorded':>10} {'simulated':>10} {'difference':>11}   (dB{unit}, rms)"]
+    rows.append(_level_row("overall", channel.overall))
+    rows += [_level_row(line.label, line.level, line) for line in mesh_lines(channel)[:MOST_LINES]]
+    for shaft in channel.shafts:
+        best = shaft.best_correlation
+        possible = f"at most {best:.3f}" if best >= LEAST_REPEATED else "its halves do not repeat"
+        frac = shaft.agreement
+        rows.append(
+            f"average of {shaft.shaft or 'the shaft'}: correlation {shaft.correlation.value:.3f} "
+            f"± {shaft.correlation.repeatability:.2g} ({possible}); FRAC {frac.complex_frac.value:.3f} complex "
+            f"({frac.complex_by_chance:.3f} by chance), {frac.magnitude_frac.value:.3f} of magnitudes"
+        )
+    return rows
+
+
+def _level_row(label: str, level: LevelPair, line: LineLevel | None = None) -> str:
+    words = "" if line is None else missing_words(line)
+    missing = f"  {words}" if words else ""
+    return (
+        f"{label[:30]:<30} {level.recorded_db:>10.1f} {level.simulated_db:>10.1f} {level.difference_db:>+11.1f} "
+        f"± {2 * level.repeatability_db:.1f}{missing}"
+    )
+
+
+Rows = tuple[tuple[str, str], ...]
+N_SIDEBANDS_SHOWN = 40
+MOST_ILLUSTRATED = 4
+"""Channels with pictures: a page of more is too large to send."""
+
+
+@dataclass(frozen=True)
+class LevelRow:
+    """A level as the page shows it."""
+
+    label: str
+    order: str
+    recorded: str
+    simulated: str
+    difference: str
+    scatter: str
+    remark: str
+    is_beyond: bool
+
+
+@dataclass(frozen=True)
+class ChannelSection:
+    """One channel of the page."""
+
+    title: str
+    unit: str
+    figures: Rows
+    pictures: tuple[Picture, ...]
+    main: tuple[LevelRow, ...]
+    sidebands: tuple[LevelRow, ...]
+
+
+def comparison_page(comparison: Comparison, *, command: str = "", date: datetime | None = None) -> str:
+    """Return the page of a comparison: verdict, what was compared, and each channel with figures and tables.
+
+    It is one file without scripts that loads nothing.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    command : str
+        The command that makes it again.
+    date : datetime or None
+        Of the page; None: now.
+    """
+    return render(
+        "compare.html.j2",
+        title=f"{comparison.simulated.source} beside {comparison.recorded.source}",
+        machine_name=comparison.machine,
+        verdict=comparison.verdict,
+        findings=comparison.findings,
+        notes=comparison.notes,
+        simulated=_record_rows(comparison.simulated),
+        recorded=_record_rows(comparison.recorded),
+        alignment=tuple(alignment_texts(comparison)),
+        channels=[_section(comparison, channel, i) for i, channel in enumerate(comparison.channels)],
+        provenance=_provenance(comparison, command, date or datetime.now().astimezone()),
+    )
+
+
+def _section(comparison: Comparison, channel: ChannelComparison, i: int) -> ChannelSection:
+    main = [line for line in (*channel.lines, *channel.other_lines) if line.kind != "sideband" and line.is_seen]
+    sidebands = [line for line in channel.lines if line.kind == "sideband" and line.is_seen]
+    sidebands.sort(key=lambda line: -abs(line.level.difference_db))
+    return ChannelSection(
+        channel.name,
+        f"dB re 1 {unit_text(channel.unit)}, rms" if channel.unit else "dB, unit not known",
+        channel_rows(channel),
+        tuple(channel_pictures(comparison, channel)) if i < MOST_ILLUSTRATED else (),
+        tuple(_line_row(line) for line in main),
+        tuple(_line_row(line) for line in sidebands[:N_SIDEBANDS_SHOWN]),
+    )
+
+
+def channel_rows(channel: ChannelComparison) -> Rows:
+    """Return the agreement figures of a channel as name and text."""
+    rows = [("overall level, simulated less recorded", _difference(channel.overall))]
+    for shaft in channel.shafts:
+        name = f" of {shaft.shaft}" if shaft.shaft else ""
+        frac = (
+            f"complex {_repeated(shaft.agreement.complex_frac)} ({shaft.agreement.complex_by_chance:.3f} by chance), "
+            f"magnitudes {_repeated(shaft.agreement.magnitude_frac)}; {shaft.agreement.n_lines} orders"
+        )
+        rows += [
+            (
+                f"correlation, average{name}",
+                f"{_repeated(shaft.correlation)}; {_possible(shaft)}",
+            ),
+            (f"FRAC, average{name}", frac),
+        ]
+    locked = channel.locked
+    rows.append(
+        (
+            "energy that repeats with the shafts' turns",
+            f"recording {_percent(locked.recorded)}, simulation {_percent(locked.simulated)}",
+        )
+    )
+    return tuple(rows)
+
+
+def _possible(shaft: ShaftComparison) -> str:
+    """Return the correlation that two such averages of one motion reach, or that it means nothing."""
+    if shaft.best_correlation < LEAST_REPEATED:
+        return "says nothing, as one record's halves do not repeat"
+    return f"two such averages reach {shaft.best_correlation:.3f}"
+
+
+def _line_row(line: LineLevel) -> LevelRow:
+    level = line.level
+    return LevelRow(
+        line.label,
+        readable(line.order, 6),
+        _number(level.recorded_db),
+        _number(level.simulated_db),
+        _signed(level.difference_db),
+        f"{2 * level.repeatability_db:.1f}",
+        missing_words(line),
+        level.is_beyond,
+    )
+
+
+def _record_rows(facts: RecordFacts) -> Rows:
+    low, high = (readable(rpm, 6) for rpm in facts.speed_range_rpm)
+    return (
+        ("file", facts.source),
+        ("length", f"{readable(facts.duration_s, 5)} s at {readable(facts.sampling_rate_hz, 7)} Hz"),
+        ("speed", f"{readable(facts.mean_speed_rpm, 6)} rpm, {low} to {high} ({facts.speed_method})"),
+        ("revolutions", readable(facts.n_revolutions, 4)),
+        *(("remark", note) for note in facts.notes),
+    )
+
+
+def _provenance(comparison: Comparison, command: str, date: datetime) -> Rows:
+    rows = (
+        ("SHA-256, simulation", comparison.simulated.sha256),
+        ("SHA-256, recording", comparison.recorded.sha256),
+        ("version", f"gearsig {__version__}"),
+        ("date", date.strftime("%Y-%m-%d %H:%M %Z").strip()),
+        ("command", command),
+    )
+    return tuple((name, text) for name, text in rows if text)
+
+
+def _difference(level: LevelPair) -> str:
+    return f"{_signed(level.difference_db)} ± {2 * level.repeatability_db:.1f} dB"
+
+
+def _repeated(figure: Repeated) -> str:
+    return f"{_number(figure.value, 3)} ± {2 * figure.repeatability:.2g}"
+
+
+def _percent(figure: Repeated) -> str:
+    return f"{100 * figure.value:.1f} ± {200 * figure.repeatability:.1f} %"
+
+
+def _number(value: float, n_decimals: int = 1) -> str:
+    return f"{value:.{n_decimals}f}".replace("-", "−")
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.1f}".replace("-", "−")
+
+
+# --------------------
+# A comparison as JSON, in a schema that stays.
+#
+# The object has these members; names end in their unit, numbers carry nine significant digits, and what is not known or
+# not defined is null. Members may be added within a version, never renamed or removed. Levels are in dB re one unit,
+# rms; every ``difference_db`` is simulated less recorded; every ``repeatability`` is a standard error from the halves
+# of the records.
+#
+# - ``schema``: "gearsig.comparison", ``schema_version``: 1, ``gearsig_version``
+# - ``verdict``: one sentence per channel; ``findings``: more of them; ``notes``: what to know before believing a figure
+# - ``simulated``, ``recorded``: ``source``, ``sha256``, ``duration_s``, ``sampling_rate_hz``, ``mean_speed_rpm``,
+#   ``speed_range_rpm``, ``n_revolutions``, ``speed_method``, ``notes``
+# - ``machine``, ``reference_shaft``, ``mesh_orders``, ``highest_order``
+# - ``alignments``: per shaft ``shaft``, ``method`` ("marks" or "correlation"), ``shift_deg``, ``repeatability_deg``,
+#   ``tooth_is_certain``, ``best_shift_deg``, ``gain``
+# - ``channels``: each with ``simulated_name``, ``recorded_name``, ``quantity``, ``unit``, ``levels_compare``;
+#   ``overall``, a level; ``locked``: shares of energy that turn with the shafts, ``simulated`` and ``recorded``;
+#   ``lines`` and ``other_lines``: ``label``, ``kind``, ``order``, ``shaft``, ``simulated_is_seen``,
+#   ``recorded_is_seen`` and a level; ``order_bands`` and ``third_octaves``: ``label``, ``low``, ``high``, ``axis``, a
+#   level, ``agreement`` (or null); ``shafts``: ``shaft``, ``n_teeth``, ``correlation``, ``simulated_reliability``,
+#   ``recorded_reliability``, ``agreement``, ``tooth_levels``
+# - a level: ``simulated_db``, ``recorded_db``, ``difference_db``, ``repeatability_db``, ``is_beyond``
+# - an agreement: ``complex_frac`` and ``magnitude_frac`` with ``value`` and ``repeatability``, ``complex_by_chance``,
+#   ``n_lines``
+# --------------------
+
+
+SCHEMA, SCHEMA_VERSION = "gearsig.comparison", 1
+
+
+def comparison_to_json(comparison: Comparison) -> str:
+    """Return a comparison as JSON text."""
+    return json.dumps(comparison_to_dict(comparison), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def comparison_to_dict(comparison: Comparison) -> Json:
+    """Return a comparison as plain dictionaries, see the module's description. Waveforms and spectra are left out."""
+    return {
+        "schema": SCHEMA,
+        "schema_version": SCHEMA_VERSION,
+        "gearsig_version": __version__,
+        **members(comparison, "verdict", "findings", "notes"),
+        **members(comparison, "simulated", "recorded", "machine", "reference_shaft", "mesh_orders", "highest_order"),
+        "alignments": plain(comparison.alignments),
+        "channels": [_channel(channel) for channel in comparison.channels],
+    }
+
+
+def _channel(channel: ChannelComparison) -> Json:
+    return {
+        **members(channel, "simulated_name", "recorded_name", "quantity", "unit", "levels_compare"),
+        "overall": _level(channel.overall),
+        "locked": members(channel.locked, "simulated", "recorded"),
+        "lines": [_line(line) for line in channel.lines],
+        "other_lines": [_line(line) for line in channel.other_lines],
+        "order_bands": [_band(band) for band in channel.order_bands],
+        "third_octaves": [_band(band) for band in channel.third_octaves],
+        "shafts": [_shaft(shaft) for shaft in channel.shafts],
+    }
+
+
+def _line(line: LineLevel) -> Json:
+    names = ("label", "kind", "order", "shaft", "simulated_is_seen", "recorded_is_seen")
+    return members(line, *names) | _level(line.level)
+
+
+def _band(band: BandLevel) -> Json:
+    return members(band, "label", "low", "high", "axis") | _level(band.level) | members(band, "agreement")
+
+
+def _shaft(shaft: ShaftComparison) -> Json:
+    names = ("shaft", "n_teeth", "correlation", "simulated_reliability", "recorded_reliability", "agreement")
+    return members(shaft, *names) | {"tooth_levels": [_level(level) for level in shaft.tooth_levels]}
+
+
+def _level(level: LevelPair) -> Json:
+    return members(level, "simulated_db", "recorded_db", "difference_db", "repeatability_db", "is_beyond")

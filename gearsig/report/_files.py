@@ -1,0 +1,209 @@
+"""Names of report files, and writing them so that none is ever half there."""
+
+from __future__ import annotations
+
+import re
+import secrets
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import cache
+from glob import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearsig.errors import InputError
+from gearsig.formatting import rounded
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+
+PART_SUFFIX = ".part"
+LONGEST_NAME = 50  # a letter may take four bytes, and file systems stop at 255
+_RESERVED = {"index", "con", "prn", "aux", "nul"} | {f"{port}{i}" for port in ("com", "lpt") for i in range(1, 10)}
+
+
+def page_names(sources: Iterable[str | Path]) -> tuple[str, ...]:
+    """Return a safe and unique file name, without ending, for each source, in their order.
+
+    Letters, digits, "-", "_" and "." stay; what else may steer a path or a link becomes "-". Two sources that would
+    share a name, also when only case tells them apart, get a number.
+
+    Examples
+    --------
+    >>> page_names(["a/run 1.csv", "b/run 1.csv", "../../etc/passwd", "index.mat", "…"])
+    ('run-1', 'run-1-2', 'passwd', 'index-2', 'recording')
+    """
+    taken = set(_RESERVED)
+    return tuple(_unique(_safe(str(source)), taken) for source in sources)
+
+
+def check_writable(folder: Path) -> None:
+    """Check, before long work, that files can be written into a folder, which need not exist yet.
+
+    Raises
+    ------
+    InputError
+        If it is a file or cannot be written.
+    """
+    probe = f".{secrets.token_hex(4)}"
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise InputError("is a file", where=str(folder), remedy="choose a folder with -o")
+        existing = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
+        (existing / probe).mkdir()  # permissions alone do not tell: there are folders that nothing can be made in
+        (existing / probe).rmdir()
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+
+
+def made_folder(folder: Path) -> Path:
+    """Make a folder where there is none, and return it.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made: a file of that name, a place that may not be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"the folder cannot be made ({error.strerror or error})", where=str(folder), remedy="choose another with -o"
+        ) from error
+    return folder
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a file beside its place and move it there when it is complete; a failure leaves what was there before.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    made_folder(path.parent)
+    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PART_SUFFIX}")
+    try:
+        with part.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        part.replace(path)
+    except OSError as error:
+        raise _unwritable(path, error) from None
+    finally:  # also on Ctrl-C
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+    return path
+
+
+def remove_parts(folder: Path, file_names: Iterable[str]) -> None:
+    """Remove what an interrupted process left of the named files."""
+    for name in file_names:
+        for part in folder.glob(f".{escape(name)}.*{PART_SUFFIX}"):
+            part.unlink(missing_ok=True)
+
+
+def _unwritable(path: Path, error: OSError) -> InputError:
+    return InputError(
+        f"cannot be written ({error.strerror or error})", where=str(path), remedy="choose another folder with -o"
+    )
+
+
+def _safe(source: str) -> str:
+    stem = Path(source.replace("\\", "/")).name
+    for ending in (".gz", Path(stem.removesuffix(".gz")).suffix):
+        stem = stem.removesuffix(ending) or stem
+    return re.sub(r"[^\w.-]+", "-", stem).strip(".-_")[:LONGEST_NAME].strip(".-_") or "recording"
+
+
+def _unique(name: str, taken: set[str]) -> str:
+    choice, number = name, 1
+    while choice.lower() in taken:
+        number += 1
+        choice = f"{name}-{number}"
+    taken.add(choice.lower())
+    return choice
+
+
+# --------------------
+# Results as dictionaries, lists, texts and numbers, which is what JSON knows.
+# --------------------
+
+
+Json = dict[str, Any]
+
+
+def members(value: object, *names: str) -> Json:
+    """Return attributes and properties of a value by name, in this order, each as `plain` writes it.
+
+    Examples
+    --------
+    >>> members(1.0 + 2.0j, "real", "imag")
+    {'real': 1.0, 'imag': 2.0}
+    """
+    return {name: plain(getattr(value, name)) for name in names}
+
+
+def plain(value: Any, *, arrays: bool = True) -> Any:
+    """Return a value as JSON knows it: dataclasses as their fields, numbers of nine digits, nan and infinity as null.
+
+    Parameters
+    ----------
+    value : object
+    arrays : bool
+        Whether arrays come as lists; otherwise as ``{"shape": […]}``.
+    """
+    if isinstance(value, np.ndarray):
+        return _array(value) if arrays else {"shape": list(value.shape)}
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name), arrays=arrays) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item, arrays=arrays) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item, arrays=arrays) for item in value]
+    return _scalar(value)
+
+
+def _scalar(value: Any) -> str | bool | float | None:
+    if isinstance(value, Enum):
+        return str(value.value)
+    if value is None or isinstance(value, (str, bool)):
+        return value
+    return int(value) if isinstance(value, (int, np.integer)) else rounded(value)
+
+
+def _array(values: np.ndarray[Any, np.dtype[Any]]) -> list[Any]:
+    if values.ndim > 1:
+        return [_array(row) for row in values]
+    return [rounded(value) for value in values.tolist()]
+
+
+# --------------------
+# Templates to HTML. Everything that is put in is escaped: texts from files are never markup.
+# --------------------
+
+
+def render(template: str, **values: Any) -> str:
+    """Return the page that a template makes of `values`."""
+    return _environment().get_template(template).render(**values)
+
+
+@cache
+def _environment() -> Environment:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    from gearsig.plot import unit_text
+
+    environment = Environment(
+        loader=PackageLoader("gearsig.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["unit"] = unit_text
+    return environment

@@ -1,0 +1,701 @@
+"""The page of a gap diagnosis: where, which, how far, what to record next."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from datetime import datetime
+from importlib.metadata import version
+from math import isfinite
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from gearsig import __version__
+from gearsig.formatting import named, readable, signed
+from gearsig.gap import (
+    NONE,
+    UNKNOWN,
+    AngleCurves,
+    AverageCurves,
+    Evidence,
+    GapCause,
+    GapOutcome,
+    GapPlace,
+    GapReport,
+    Interval,
+    OperatingCondition,
+    PlaceKind,
+    Shrinkage,
+    SpectrumCurves,
+    against_reference,
+    hardly_foretold,
+    lines_beyond,
+    point_text,
+    same_condition,
+    severity_unit,
+    stance_words,
+)
+from gearsig.plot import AngleMark, Picture, embed
+from gearsig.report._files import render, write_text
+from gearsig.report._sections import Rows
+
+# --------------------
+# The texts and tables of a gap page: places, causes with their evidence, steps, recordings to make, facts.
+# --------------------
+
+
+N_DETAILED = 3
+"""Causes whose evidence is shown."""
+MOST_ORDERS = 4
+LEAST_SHOWN = 0.01
+"""Below this a group is left out, and a share is said to be below one percent."""
+OUTCOME_CLASSES = {
+    "no gap": "no-fault",
+    "effect": "fault",
+    "cannot separate": "suspicion",
+    "unknown": "cannot-tell",
+    "undecided": "cannot-tell",
+}
+
+
+@dataclass(frozen=True)
+class PlaceRow:
+    """A place of the gap as the page shows it."""
+
+    title: str
+    where: tuple[str, ...]
+    change: str
+    repeatability: str
+    structural: str
+    sizes: str
+    share: str
+    bar_percent: float
+
+
+@dataclass(frozen=True)
+class EvidenceRow:
+    """A predicted change beside the observed one, in dB; the stance in words, its sign, and the class of its look."""
+
+    feature: str
+    predicted: str
+    observed: str
+    floor: str
+    stance: str
+    sign: str
+    look: str
+
+
+@dataclass(frozen=True)
+class CauseRow:
+    """A cause as the page shows it; statements and evidence of the first ones only."""
+
+    name: str
+    title: str
+    group: str
+    percent: str
+    bar_percent: float
+    severity: str
+    place: str
+    statements: tuple[str, ...] = ()
+    evidence: tuple[EvidenceRow, ...] = ()
+
+
+@dataclass(frozen=True)
+class StepRow:
+    """A step of the waterfall: what is left, and how much less than before the step."""
+
+    label: str
+    left: str
+    interval: str
+    taken: str
+
+
+def verdict_rows(report: GapReport) -> Rows:
+    """Return the four lines, the word before the colon apart."""
+    lines = [line.partition(": ") for line in report.verdict]
+    return tuple((word, text[:1].upper() + text[1:]) for word, _, text in lines)
+
+
+def size_text(report: GapReport) -> str:
+    """Return the size of the whole gap against both floors; empty where nothing was simulated."""
+    if not report.is_simulated:
+        return ""
+    return f"{interval_text(report.size)} structural floors, {readable(report.repeatability, 2)} repeatability floors"
+
+
+def floors_text(report: GapReport) -> str:
+    """Say what the recordings are compared with, and what the two floors are; empty where nothing was simulated."""
+    if not report.is_simulated:
+        return ""
+    structural, beside = "what healthy machines differ by from that", ""
+    alone = [one.name for one in report.conditions if not one.reference]
+    if report.references:
+        known = f"Compared with the same machine when it was sound ({', '.join(report.references)}). "
+        if 0 < len(alone) < len(report.conditions):
+            known += f"Without a reference at its point, with what the simulation lets expect: {', '.join(alone)}. "
+        structural = "what healthy machines change by from one recording to another"
+        beside = " The first pictures show the recording beside the reference, the further ones beside the simulation."
+    else:
+        known = "Compared with what the simulation of the sound machine lets expect, as far as it is credible. "
+    return (
+        f"{known}A structural floor is {structural}; they exceed 1 once in twenty. A repeatability floor is what this "
+        f"machine differs by from itself, from one stretch to the next. A place counts against its own features alone: "
+        f"one may be many floors where the whole is few.{beside}"
+    )
+
+
+def place_rows(report: GapReport) -> tuple[PlaceRow, ...]:
+    """Return the places in their order."""
+    return tuple(
+        PlaceRow(
+            place.title[:1].upper() + place.title[1:],
+            _where(place),
+            f"{signed(place.change_db)} dB",
+            readable(place.repeatability, 2),
+            readable(place.structural, 2),
+            _sizes(place),
+            percent(place.share),
+            _bar(place.share),
+        )
+        for place in report.places
+    )
+
+
+def _sizes(place: GapPlace) -> str:
+    """Write the change against both floors, or that it was found without them."""
+    if place.follows and not isfinite(place.structural):
+        return f"{signed(place.change_db)} dB over what it is compared with"
+    if not isfinite(place.structural):
+        return "stands out by itself, over the noise beside it"
+    floors = (
+        f"{readable(place.structural, 2)} × structural floor · {readable(place.repeatability, 2)} × repeatability floor"
+    )
+    return f"{signed(place.change_db)} dB · {floors}"
+
+
+def _where(place: GapPlace) -> tuple[str, ...]:
+    orders = ", ".join(readable(order) for order in place.orders[:MOST_ORDERS])
+    more = " …" if len(place.orders) > MOST_ORDERS else ""
+    texts = (
+        place.kind.value,
+        named("shaft", place.shaft),
+        f"tooth {place.tooth}" if place.tooth is not None else "",
+        f"at {readable(place.angle_deg)}°" if place.angle_deg is not None else "",
+        f"{'order' if len(place.orders) == 1 else 'orders'} {orders}{more}" if place.orders else "",
+        f"{readable(place.band_hz[0])} to {readable(place.band_hz[1])} Hz" if place.band_hz is not None else "",
+        named("sensor", place.channel),
+    )
+    return tuple(text for text in texts if text)
+
+
+def cause_rows(report: GapReport) -> tuple[CauseRow, ...]:
+    """Return the causes that have a chance, likeliest first; the first effects with what speaks for and against."""
+    detailed = detailed_causes(report)
+    shown = [cause for cause in report.causes if not cause.probability < LEAST_SHOWN or cause in detailed]
+    return tuple(_cause_row(cause, detailed=cause in detailed) for cause in shown)
+
+
+def others_text(report: GapReport) -> str:
+    """Name the causes that are not among `cause_rows`; empty where there are none."""
+    shown = {row.name for row in cause_rows(report)}
+    titles = [cause.title for cause in report.causes if cause.name not in shown]
+    return f"Below 1 % each: {', '.join(titles)}." if titles else ""
+
+
+def detailed_causes(report: GapReport) -> tuple[GapCause, ...]:
+    """Return the effects whose evidence is shown: the likeliest three, where there is a gap at all.
+
+    Without a simulation, the causes of which there is something to say, unknown among them.
+    """
+    if not report.is_simulated:
+        return tuple(cause for cause in report.causes if cause.remarks)
+    if report.outcome is GapOutcome.NO_GAP:
+        return ()
+    return tuple(cause for cause in report.causes if cause.name not in (NONE, UNKNOWN))[:N_DETAILED]
+
+
+def _cause_row(cause: GapCause, *, detailed: bool) -> CauseRow:
+    return CauseRow(
+        cause.name,
+        cause.title,
+        cause.group,
+        percent(cause.probability),
+        _bar(cause.probability),
+        severity_text(cause),
+        cause.place,
+        (cause.remarks or _statements(cause.shrinkage)) if detailed else (),
+        tuple(_evidence_row(one) for one in cause.evidence) if detailed else (),
+    )
+
+
+def severity_text(cause: GapCause) -> str:
+    """Return the fitted severity with its interval; empty where nothing was fitted."""
+    return "" if cause.severity is None else interval_text(cause.severity, severity_unit(cause.unit))
+
+
+def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
+    if shrinkage is None:
+        return ("It was not fitted: no held-out check.",)
+    if not shrinkage.is_foretold:
+        return (f"How far the gap shrinks is not known: it {hardly_foretold(shrinkage)}.",)
+    before, after = interval_text(shrinkage.before), interval_text(shrinkage.after)
+    shrink, wrong = shrinkage.shrink, shrinkage.placebo
+    taken, low, high = (percent(x) for x in (shrink.value, shrink.low, shrink.high))
+    checked = f"checked on {shrinkage.held_out}"
+    placebo = f"takes away at most {percent(wrong)}" if wrong >= LEAST_SHOWN else "takes away nothing"
+    if not shrinkage.n_placebos:
+        placebo = "could not be tried, as the machine has no other place for it that would look different"
+    elsewhere = shrinkage.elsewhere
+    return (
+        f"Gap on its own features: {before} structural floors without it, {after} with it.",
+        f"It takes away nothing: with it the gap grows, {checked}."
+        if shrink.value < 0.0
+        else f"It takes away {taken} ({low} to {high}) of what exceeds the floor, {checked}.",
+        *(() if elsewhere is None else (_elsewhere_statement(elsewhere),)),
+        f"In a wrong place (placebo) it {placebo}.",
+        f"The observed change is {readable(shrinkage.slope, 2)} times the predicted one; 1 is right.",
+    )
+
+
+def _elsewhere_statement(shrink: float) -> str:
+    taken = f"it takes away {percent(shrink)}" if shrink >= LEAST_SHOWN else "it takes away nothing"
+    return f"At an operating condition of which only its level was fitted {taken}."
+
+
+def _evidence_row(one: Evidence) -> EvidenceRow:
+    sign, look = ("✓", "for") if one.speaks_for else ("↗", "further") if one.is_further else ("✗", "against")
+    return EvidenceRow(
+        one.feature,
+        signed(one.predicted_db),
+        signed(one.observed_db),
+        readable(one.floor_db, 2),
+        stance_words(one),
+        sign,
+        look,
+    )
+
+
+def group_texts(report: GapReport) -> tuple[str, ...]:
+    """Return the groups that have a chance, likeliest first."""
+    ranked = sorted(report.groups.items(), key=lambda item: -item[1] if isfinite(item[1]) else 0.0)
+    return tuple(f"{group} {percent(p)}" for group, p in ranked if p >= LEAST_SHOWN)
+
+
+def inseparable_text(report: GapReport) -> str:
+    """Say which causes cannot be told apart; empty where there are none."""
+    if report.inseparable is None:
+        return ""
+    titles = {cause.name: f"{cause.title} ({percent(cause.probability)})" for cause in report.causes}
+    *others, last = (titles.get(name, name) for name in report.inseparable)
+    return f"These recordings cannot tell {', '.join(others)} and {last} apart."
+
+
+def step_rows(report: GapReport) -> tuple[StepRow, ...]:
+    """Return the steps of the waterfall."""
+    before = (None, *(step.left for step in report.steps))
+    return tuple(
+        StepRow(
+            step.label,
+            readable(step.left.value, 2),
+            f"{readable(step.left.low, 2)} to {readable(step.left.high, 2)}",
+            "" if last is None else signed(step.left.value - last.value, n_decimals=2),
+        )
+        for step, last in zip(report.steps, before, strict=False)
+    )
+
+
+def next_rows(report: GapReport) -> tuple[tuple[str, str, str, str], ...]:
+    """Return operating point and further sensor, the pair that they separate, its distance there and now."""
+    titles = {cause.name: cause.title for cause in report.causes}
+    return tuple(
+        (
+            point_text(one.point) + (f", with a further sensor at {one.place}" if one.place else ""),
+            " / ".join(titles.get(name, name) for name in one.separates),
+            readable(one.standard_deviations, 2),
+            readable(one.now, 2),
+        )
+        for one in report.next_recordings
+    )
+
+
+def condition_rows(report: GapReport) -> tuple[tuple[str, ...], ...]:
+    """Return name, speed, torque, revolutions, length and sampling rate of each recording."""
+    return tuple(
+        (
+            one.name,
+            readable(one.point.speed_rpm, 5),
+            readable(one.point.torque_nm, 3),
+            readable(one.n_revolutions, 4),
+            readable(one.duration_s, 3),
+            readable(one.sampling_rate_hz, 6),
+        )
+        for one in report.conditions
+    )
+
+
+def fact_rows(report: GapReport, command: str, date: datetime) -> Rows:
+    """Return what the diagnosis rests on, and how to repeat it."""
+    versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy"))
+    rows = (
+        ("rig", report.rig),
+        ("simulator", report.simulator or "none: nothing was simulated"),
+        ("healthy references", references_text(report)),
+        ("size of the gap", size_text(report)),
+        ("versions", f"gearsig {__version__}, {versions}, Python {platform.python_version()}"),
+        ("date", date.strftime("%Y-%m-%d %H:%M %Z").strip()),
+        ("command", command),
+    )
+    return tuple((name, text) for name, text in rows if text)
+
+
+def references_text(report: GapReport) -> str:
+    """Return the names of the references, or what is compared with instead."""
+    instead = "none: compared with the simulation itself" if report.is_simulated else "none"
+    return ", ".join(report.references) or instead
+
+
+def interval_text(interval: Interval, unit: str = "") -> str:
+    """Write a value with its 90 % interval."""
+    value, within = readable(interval.value, 2), interval.words(lambda end: readable(end, 2))
+    return f"{value}{' ' if unit else ''}{unit} ({within})"
+
+
+def percent(share: float) -> str:
+    """Write a share in percent: nothing below one is told from another.
+
+    Examples
+    --------
+    >>> percent(0.884), percent(0.003), percent(0.0), percent(float("nan")), percent(-0.1), percent(-0.001)
+    ('88 %', '< 1 %', '0 %', '–', '−10 %', '0 %')
+    """
+    if not isfinite(share):
+        return "–"
+    return "< 1 %" if 0 < share < LEAST_SHOWN else f"{round(100 * share)} %".replace("-", "−")
+
+
+def _bar(share: float) -> float:
+    return round(100 * min(max(share, 0.0), 1.0), 3) if isfinite(share) else 0.0
+
+
+# --------------------
+# Which figures show a gap, under which question, and what to look at in each: of the page and of the dashboard.
+# --------------------
+
+
+Question = Literal["where", "which", "how far"]
+QUESTIONS: tuple[Question, ...] = ("where", "which", "how far")
+
+
+@dataclass(frozen=True)
+class GapFigure:
+    """A figure and its words.
+
+    Parameters
+    ----------
+    question : str
+        "where", "which" or "how far": under which heading it stands.
+    figure : Figure
+        Of `gearsig.plot`.
+    look : str
+        What to look at.
+    shows : str
+        What it shows, for those who do not see it.
+    of : str
+        Name of the cause that it belongs to; empty: to none.
+    is_small : bool
+        Whether it stands beside others.
+    vector : bool
+        Whether it has few lines.
+    """
+
+    question: Question
+    figure: Any  # the drawing library's type is known in gearsig.plot alone
+    look: str
+    shows: str
+    of: str = ""
+    is_small: bool = False
+    vector: bool = False
+
+
+@dataclass(frozen=True)
+class GapGallery:
+    """The pictures of one question: one per line, side by side, and by the cause that they belong to."""
+
+    wide: tuple[Picture, ...]
+    small: tuple[Picture, ...]
+    of: Mapping[str, Picture]
+
+
+def gap_galleries(report: GapReport) -> dict[str, GapGallery]:
+    """Return the pictures of a page by question."""
+    drawn = [(one, embed(one.figure, one.look, one.shows, vector=one.vector)) for one in gap_figures(report)]
+    return {
+        question: GapGallery(
+            tuple(p for one, p in drawn if one.question == question and not one.is_small and not one.of),
+            tuple(p for one, p in drawn if one.question == question and one.is_small),
+            {one.of: p for one, p in drawn if one.question == question and one.of},
+        )
+        for question in QUESTIONS
+    }
+
+
+def gap_figures(report: GapReport) -> Iterator[GapFigure]:
+    """Draw every figure that the report has finite numbers for, in the order of the page.
+
+    Shares of places and probabilities of causes are no figures: page and dashboard write them as lists with bars.
+    """
+    yield from _against_reference(report)
+    yield from _spectra(report)
+    yield from _teeth(report)
+    yield from _evidence(report)
+    yield from _waterfall(report)
+
+
+def _against_reference(report: GapReport) -> Iterator[GapFigure]:
+    """Draw what was scored where there is a reference: what has changed since."""
+    from gearsig.plot import gap_averages_figure, gap_orders_figure
+
+    for curves in report.spectra:
+        if not len(curves.orders) or not len(curves.reference) or not is_finite(curves):
+            continue
+        view = against_reference(curves)
+        yield GapFigure(
+            "where",
+            gap_orders_figure(
+                view, beside="reference", marked=report.is_beyond, title=f"{curves.label}: recording against reference"
+            ),
+            "Above, lines in the grey repeatability floor say nothing. Below, what has changed since the reference, "
+            f"line by line. {_beyond_text(report, view)}",
+            f"Order spectrum, {curves.label}: recording, healthy reference, and their difference in dB.",
+        )
+    for average in report.averages:
+        if len(average.angle_deg) and is_finite(average):
+            yield GapFigure(
+                "where",
+                gap_averages_figure(average, mark=_mark(report, average)),
+                f"One mean revolution of shaft {average.shaft} without what all teeth have in common, on the sensor "
+                "where most has changed. What one tooth does otherwise stands at its angle; noise and other speeds "
+                "leave a little everywhere.",
+                f"Synchronous average of shaft {average.shaft} without mesh harmonics: recording, healthy reference, "
+                "and their difference.",
+            )
+
+
+def _spectra(report: GapReport) -> Iterator[GapFigure]:
+    from gearsig.plot import gap_orders_figure
+
+    for curves in report.spectra:
+        if not len(curves.orders) or not is_finite(curves):
+            continue
+        if not len(curves.before):
+            yield _lines(report, curves)
+            continue
+        scored = not len(curves.reference)
+        title = curves.label if scored else f"{curves.label}: recording against simulation"
+        beyond = _beyond_text(report, curves) if scored else NOT_SCORED
+        left = " Green dots: what is left with the likeliest effect." if len(curves.after) else ""
+        yield GapFigure(
+            "where",
+            gap_orders_figure(curves, marked=scored and report.is_beyond, title=title),
+            f"Above, lines in the grey repeatability floor say nothing. Below, the gap line by line. {beyond}{left}",
+            f"Order spectrum, {curves.label}: measured, simulated, and their difference in dB.",
+        )
+
+
+NOT_SCORED = "No line is marked: with a reference, only what has changed since it is scored."
+
+
+def _beyond_text(report: GapReport, curves: SpectrumCurves) -> str:
+    """Say what orange means, and how many lines exceed their floors; or why none is marked."""
+    n, n_all = lines_beyond(curves)
+    known, many = len(curves.structural_db) > 0, f"{n} of {n_all} lines"
+    if not report.is_beyond:
+        alone = (
+            f" {many} alone exceed it (grey band): it is the floor of the features that are scored, and single lines "
+            "scatter more."
+        )
+        return f"The whole gap is within one structural floor, so that no line is marked.{alone if known else ''}"
+    if not known:
+        return "Orange: above the repeatability floor; how far sound machines differ is not known line by line."
+    return (
+        f"Orange: {many}, which exceed the structural floor (grey band). Single lines scatter more than the features "
+        "that are scored: some exceed it on sound machines, too."
+    )
+
+
+def _lines(report: GapReport, curves: SpectrumCurves) -> GapFigure:
+    """Draw an envelope spectrum that there is no simulation beside."""
+    from gearsig.plot import gap_lines_figure
+
+    families = [place.orders[0] for place in report.places if place.kind is PlaceKind.ENVELOPE and place.orders]
+    marks = "Triangles: multiples of the order that was found. " if families else ""
+    return GapFigure(
+        "where",
+        gap_lines_figure(curves, families[0] if families else None),
+        f"{marks}Lines in the grey noise floor say nothing; nothing was simulated beside it.",
+        f"Spectrum, {curves.label}: measured, and the noise floor.",
+    )
+
+
+def _teeth(report: GapReport) -> Iterator[GapFigure]:
+    from gearsig.plot import gap_teeth_figure
+
+    for curves in report.angles:
+        if not len(curves.angle_deg) or not is_finite(curves):
+            continue
+        numbers = (
+            "" if curves.has_mark else " The shaft has no mark: teeth have no numbers, and the start is arbitrary."
+        )
+        yield GapFigure(
+            "where",
+            gap_teeth_figure(curves, mark=_mark(report, curves)),
+            f"Shaft {curves.shaft}, tooth by tooth: sound teeth draw an even ring, a damaged one swings out.{numbers}",
+            f"Energy around one revolution of shaft {curves.shaft}, measured and simulated.",
+            is_small=True,
+        )
+
+
+def _mark(report: GapReport, curves: AngleCurves | AverageCurves) -> AngleMark | None:
+    """Return the tooth that the gap names on this shaft."""
+    for place in report.places:
+        if place.kind is PlaceKind.TOOTH and place.shaft == curves.shaft and place.angle_deg is not None:
+            label = (
+                f"tooth {place.tooth}"
+                if place.tooth is not None and curves.has_mark
+                else f"{readable(place.angle_deg)}°"
+            )
+            return AngleMark(place.angle_deg, label) if np.isfinite(place.angle_deg) else None
+    return None
+
+
+def _evidence(report: GapReport) -> Iterator[GapFigure]:
+    from gearsig.plot import gap_evidence_figure
+
+    for cause in detailed_causes(report):
+        evidence = [one for one in cause.evidence if is_finite(one)]
+        if evidence:
+            yield GapFigure(
+                "which",
+                gap_evidence_figure(evidence),
+                "Where diamond and bar end together, sign and size are right; further: it moved the foretold way, and "
+                "more. Grey: what a healthy machine may change.",
+                f"Predicted and observed changes of the own features of {cause.title}.",
+                of=cause.name,
+                vector=True,
+            )
+
+
+def _waterfall(report: GapReport) -> Iterator[GapFigure]:
+    from gearsig.plot import gap_waterfall_figure
+
+    if len(report.steps) > 1 and all(is_finite(step) for step in report.steps):
+        shrinkage = report.causes[0].shrinkage if report.causes else None
+        yield GapFigure(
+            "how far",
+            gap_waterfall_figure(report.steps, held_out=shrinkage.held_out if shrinkage is not None else ""),
+            "What each effect takes away. Within the shaded structural floor there is nothing left to explain.",
+            "The gap before, what each added effect takes away, and what is left.",
+            vector=True,
+        )
+
+
+def is_finite(value: Any) -> bool:
+    """Whether all numbers in a dataclass, however deep, are finite."""
+    if is_dataclass(value):
+        return all(is_finite(getattr(value, field.name)) for field in fields(value))
+    return not isinstance(value, (float, np.ndarray)) or bool(np.isfinite(value).all())
+
+
+# --------------------
+# A gap report in a few lines: the verdict, and what a further operating condition would give.
+# --------------------
+
+
+CHECK_FIRST = "Check first"
+"""Before each of the doubts."""
+
+
+def gap_text(report: GapReport) -> str:
+    """Return the verdict in four lines, what must be checked first, what a second operating condition would give."""
+    advice = condition_advice(report)
+    doubts = (f"{CHECK_FIRST}: {doubt}" for doubt in report.doubts)
+    return "\n".join([*report.verdict, *doubts, *([advice] if advice else [])])
+
+
+def condition_advice(report: GapReport) -> str:
+    """Say what a second operating condition would give; empty where there are several, or none would tell more."""
+    if not report.is_simulated or n_conditions(report) > 1:
+        return ""
+    start = "One operating condition: "
+    if report.outcome is GapOutcome.NO_GAP:
+        return start + "whether the machine also agrees at another speed or load was not looked at."
+    held_out = next((c.shrinkage.held_out for c in report.causes if c.shrinkage), "other revolutions")
+    where = held_out if "starts" in held_out else "other revolutions of the same recordings"
+    checked = f"the result could be checked on {where} only. "
+    here = report.conditions[0].point
+    best = next((one for one in report.next_recordings if not same_condition(one.point, here)), None)
+    if best is None:
+        return f"{start}{checked}A second one would check it at another speed or load."
+    apart = f"{best.standard_deviations:.2g} structural floors apart, against {best.now:.2g} now"
+    return f"{start}{checked}A second one, at {point_text(best.point)}, would put the two likeliest causes {apart}."
+
+
+def n_conditions(report: GapReport) -> int:
+    """Count operating conditions: recordings at nearly the same speed and torque are one."""
+    distinct: list[OperatingCondition] = []
+    for facts in report.conditions:
+        if not any(same_condition(facts.point, point) for point in distinct):
+            distinct.append(facts.point)
+    return len(distinct)
+
+
+def write_gap_page(report: GapReport, path: str | Path, *, command: str = "", date: datetime | None = None) -> Path:
+    """Write the page of a gap diagnosis.
+
+    The page is one file without scripts; it loads nothing, from nowhere. It appears only when it is complete.
+
+    Parameters
+    ----------
+    report : GapReport
+    path : str or Path
+        Folders on the way are made.
+    command : str
+        The command that makes the page again.
+    date : datetime or None
+        Of the page; None: now.
+
+    Returns
+    -------
+    Path
+        Of the page.
+    """
+    return write_text(Path(path), gap_page_html(report, command=command, date=date))
+
+
+def gap_page_html(report: GapReport, *, command: str = "", date: datetime | None = None) -> str:
+    """Return the page that `write_gap_page` writes."""
+    return render(
+        "gap.html.j2",
+        report=report,
+        outcome=report.outcome.value,
+        outcome_class=OUTCOME_CLASSES[report.outcome.value],
+        verdict=verdict_rows(report),
+        check_first=CHECK_FIRST,
+        advice=condition_advice(report),
+        size=size_text(report),
+        floors=floors_text(report),
+        has_after=any(len(curves.after) for curves in report.spectra),
+        places=place_rows(report),
+        causes=cause_rows(report),
+        others=others_text(report),
+        groups=group_texts(report),
+        inseparable=inseparable_text(report),
+        steps=step_rows(report),
+        next_recordings=next_rows(report),
+        conditions=condition_rows(report),
+        facts_rows=fact_rows(report, command, date or datetime.now().astimezone()),
+        galleries=gap_galleries(report),
+    )

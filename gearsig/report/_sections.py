@@ -1,0 +1,354 @@
+"""The texts and tables of a page: findings, machine and recording, indicators, provenance."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from importlib.metadata import version
+from textwrap import fill
+
+from gearsig import __version__
+from gearsig.angle import ShaftAngle
+from gearsig.diagnosis import Analysis, CannotTell, Finding, IndicatorChange, Kind, Outcome, Strength, Where, changes
+from gearsig.formatting import named, readable
+from gearsig.indicators import Indicator
+from gearsig.plot import unit_text
+from gearsig.rig import Bearing, GearPair, Rig
+
+Rows = tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class FindingCard:
+    """A finding as the page shows it."""
+
+    kind: str
+    css_class: str
+    title: str
+    where: tuple[str, ...]
+    strength: str
+    floor_percent: float | None
+    confidence_percent: int | None
+    confidence_basis: str
+    evidence: tuple[str, ...]
+    surer: str
+    code: str
+
+
+def finding_card(finding: Finding) -> FindingCard:
+    """Put a finding into words."""
+    stated = finding.kind in (Kind.FAULT, Kind.SUSPICION) or finding.confidence < 1.0
+    return FindingCard(
+        finding.kind.value,
+        css_class(finding.kind),
+        finding.title,
+        where_texts(finding.where),
+        strength_text(finding.strength),
+        _floor_percent(finding.strength),
+        round(100 * finding.confidence) if stated else None,
+        finding.confidence_basis,
+        finding.evidence,
+        finding.surer,
+        finding.code,
+    )
+
+
+def css_class(kind: Kind | Outcome) -> str:
+    """Return the style class of a kind or an outcome: its value without spaces."""
+    return str(kind.value).replace(" ", "-")
+
+
+def where_texts(where: Where) -> tuple[str, ...]:
+    """Return the place of a finding, one text per part of it."""
+    texts = [
+        ("channel " if len(where.channels) == 1 else "channels ") + ", ".join(where.channels) if where.channels else "",
+        named("gear", where.gear) if where.gear else named("shaft", where.shaft),
+        named("bearing", where.bearing),
+        _tooth_text(where),
+        _order_text(where),
+        f"{readable(where.frequency_hz, 6)} Hz" if where.frequency_hz is not None else "",
+        f"{readable(where.time_s[0])} to {readable(where.time_s[1])} s" if where.time_s is not None else "",
+    ]
+    return tuple(text for text in texts if text)
+
+
+def _tooth_text(where: Where) -> str:
+    angle = f"{readable(where.angle_deg)}°" if where.angle_deg is not None else ""
+    if where.tooth is None:
+        return f"at {angle}" if angle else ""
+    return f"tooth {where.tooth}" + (f" at {angle}" if angle else "")
+
+
+def _order_text(where: Where) -> str:
+    if where.order is None:
+        return ""
+    return f"order {readable(where.order, 5)}" + (f" of {where.order_shaft}" if where.order_shaft else "")
+
+
+def strength_text(strength: Strength | None) -> str:
+    """Return the size of a finding against its floor, in words."""
+    if strength is None:
+        return ""
+    unit = f" {unit_text(strength.unit)}" if strength.unit else ""
+    floor = f"{strength.against} {readable(strength.floor)}{unit}".strip()
+    text = f"{readable(strength.value)}{unit} against {floor} ({strength.floor_is})"
+    return text if strength.ratio_db is None else f"{text}: {readable(strength.ratio_db, 3)}\u00a0dB"
+
+
+def _floor_percent(strength: Strength | None) -> float | None:
+    """Return where the floor lies on a bar whose full length is the larger of value and floor; None without a bar."""
+    if strength is None or strength.ratio_db is None or not 0 < strength.floor < strength.value < float("inf"):
+        return None
+    return round(100 * strength.floor / strength.value, 1)
+
+
+def machine_rows(rig: Rig | None) -> Rows:
+    """Return what is known of the machine."""
+    if rig is None:
+        return ()
+    rows = [("machine", rig.name), ("shafts", ", ".join(rig.shaft_names))]
+    rows += [(named("gear pair", pair.name), _pair_text(pair)) for pair in rig.pairs]
+    rows += [(named("bearing", bearing.name), _bearing_text(bearing)) for bearing in rig.bearings]
+    nominal = rig.nominal_speed_rpm()
+    rows += [
+        ("nominal speed", f"{readable(nominal, 6)} rpm of {rig.reference_shaft}" if nominal is not None else ""),
+        ("sources", "; ".join(rig.sources)),
+        ("assumed, not known", ", ".join(rig.assumed)),
+    ]
+    return tuple((name, text) for name, text in rows if text)
+
+
+def _pair_text(pair: GearPair) -> str:
+    driver, driven = (str(teeth) if teeth is not None else "?" for teeth in (pair.driver_teeth, pair.driven_teeth))
+    text = f"{driver} teeth on {pair.driver} drive {driven} on {pair.driven}"
+    extra = [
+        f"module {readable(pair.module_mm)} mm" if pair.module_mm is not None else "",
+        f"pressure angle {readable(pair.pressure_angle_deg)}°" if pair.pressure_angle_deg is not None else "",
+        f"face width {readable(pair.face_width_mm)} mm" if pair.face_width_mm is not None else "",
+    ]
+    return ", ".join([text, *(item for item in extra if item)])
+
+
+def _bearing_text(bearing: Bearing) -> str:
+    orders = ", ".join(f"{name} {readable(order)}" for name, order in bearing.orders().items())
+    return f"on {bearing.shaft}" + (f"; orders {orders}" if orders else "")
+
+
+def speed_rows(angle: ShaftAngle | CannotTell) -> Rows:
+    """Return what is known of the speed, or why it is not."""
+    if isinstance(angle, CannotTell):
+        rows = [("speed", f"not known: {angle.reason}"), ("what would give it", angle.remedy)]
+        return tuple((name, text) for name, text in rows if text)
+    low, high = angle.speed_range_rpm
+    uncertainty = angle.relative_speed_uncertainty
+    known = f" ± {readable(100 * uncertainty, 2)} %" if uncertainty < float("inf") else ""
+    span = f", {readable(low, 6)} to {readable(high, 6)} rpm" if high > low else ""
+    from gearsig.plot import METHODS
+
+    return (
+        (
+            "speed" + (f" of {angle.shaft}" if angle.shaft else ""),
+            f"mean {readable(angle.mean_speed_rpm, 6)} rpm{known}{span}",
+        ),
+        ("how it was found", METHODS[angle.method] + f"; quality {readable(angle.quality, 2)} of 1"),
+        ("revolutions", readable(angle.n_revolutions, 5)),
+        *(("remark on the speed", note) for note in angle.notes),
+    )
+
+
+def provenance_rows(analysis: Analysis, command: str, date: datetime) -> Rows:
+    """Return everything needed to make the page again."""
+    recording = analysis.recording
+    origin = recording.provenance
+    versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy"))
+    rows = [
+        ("file", origin.source),
+        ("SHA-256", origin.sha256),
+        ("reader", origin.reader),
+        ("history", "; ".join(origin.history)),
+        ("sampling rate", f"{recording.sampling_rate_hz:.10g} Hz"),
+        ("parameters", ", ".join(f"{name} = {_setting(value)}" for name, value in analysis.settings.items())),
+        ("versions", f"gearsig {__version__}, {versions}, Python {platform.python_version()}"),
+        ("date", date.strftime("%Y-%m-%d %H:%M %Z").strip()),
+        ("command", command),
+    ]
+    return tuple((name, text) for name, text in rows if text)
+
+
+def _setting(value: str | float | int | None) -> str:
+    if isinstance(value, float):
+        return f"{value:.10g}"
+    return "none" if value is None else str(value)
+
+
+def reference_text(reference: Analysis | None) -> str:
+    """Return which recording was compared with; empty without one. A reference that is not sound itself is told."""
+    if reference is None:
+        return ""
+    text = f"Compared with {reference.recording.provenance.source or 'a reference'}"
+    if reference.outcome in (Outcome.FAULT, Outcome.SUSPICION):
+        return f"{text}, which is not sound itself: {reference.verdict}"
+    return f"{text}."
+
+
+def truth_rows(truth: Mapping[str, object] | None) -> Rows:
+    """Return what a simulator put in, for simulated recordings."""
+    return tuple((name, str(value)[:200]) for name, value in (truth or {}).items())
+
+
+# --------------------
+# Indicators as tables: one per gear or shaft, channels side by side.
+# --------------------
+
+
+Key = tuple[str, str, str, str]
+Compared = tuple[Indicator, IndicatorChange | None]
+
+
+@dataclass(frozen=True)
+class IndicatorRow:
+    """One indicator on all channels."""
+
+    name: str
+    unit: str
+    computed_on: str
+    band: str
+    values: tuple[str, ...]
+    note: str
+    references: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class IndicatorTable:
+    """The indicators of one place: a gear, a shaft, or the channels as a whole."""
+
+    title: str
+    channels: tuple[str, ...]
+    rows: tuple[IndicatorRow, ...]
+
+
+def indicator_tables(
+    indicators: Sequence[Indicator], then: Sequence[IndicatorChange | None] = ()
+) -> tuple[IndicatorTable, ...]:
+    """Group indicators by what they belong to; each row then compares the channels, and these with the reference."""
+    places: dict[str, list[Compared]] = {}
+    for indicator, change in zip(indicators, then or [None] * len(indicators), strict=True):
+        places.setdefault(_place(indicator), []).append((indicator, change))
+    return tuple(_table(title, items) for title, items in places.items())
+
+
+def _place(indicator: Indicator) -> str:
+    if indicator.gear:
+        return _capital(named("gear", indicator.gear))
+    if indicator.bearing:
+        return _capital(named("bearing", indicator.bearing))
+    return _capital(named("shaft", indicator.shaft)) or "Channels as a whole"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:] if text.startswith(("gear ", "bearing ", "shaft ")) else text
+
+
+def _table(title: str, items: list[Compared]) -> IndicatorTable:
+    channels = tuple(dict.fromkeys(item.channel for item, _ in items))
+    rows: dict[Key, dict[str, Compared]] = {}
+    for item, change in items:
+        rows.setdefault((item.name, item.unit, item.computed_on, item.band), {})[item.channel] = item, change
+    return IndicatorTable(title, channels, tuple(_row(key, row, channels) for key, row in rows.items()))
+
+
+def _row(key: Key, row: dict[str, Compared], channels: tuple[str, ...]) -> IndicatorRow:
+    values = tuple(readable(row[channel][0].value) if channel in row else "" for channel in channels)
+    references = tuple(_reference_text(row[channel][1]) if channel in row else "" for channel in channels)
+    notes: dict[str, list[str]] = {}
+    for channel, (item, _) in row.items():
+        if item.note:
+            notes.setdefault(item.note, []).append(channel)
+    texts = [note if len(named) == len(row) else f"{', '.join(named)}: {note}" for note, named in notes.items()]
+    name, unit, computed_on, band = key
+    return IndicatorRow(name, unit_text(unit), computed_on, band, values, "; ".join(texts), references)
+
+
+def _reference_text(change: IndicatorChange | None) -> str:
+    if change is None:
+        return ""
+    text = f"was {readable(change.reference_value)}"
+    if change.change_db is None:
+        return text
+    sign = "+" if change.change_db >= 0 else "−"
+    return f"{text}, {sign}{abs(change.change_db):.1f} dB"
+
+
+# --------------------
+# An analysis as text for the terminal.
+# --------------------
+
+
+WIDTH = 100
+_SHORT = (Kind.NOTICE, Kind.INFORMATION)
+"""Kinds that get their evidence only in the report."""
+
+
+_CLAIMS = (Kind.FAULT, Kind.SUSPICION)
+
+
+def analysis_text(analysis: Analysis, *, with_indicators: bool = False) -> str:
+    """Return the verdict and the findings, most important first, in plain text."""
+    recording = analysis.recording
+    machine = (analysis.rig.name or "rig without a name") if analysis.rig is not None else "no rig file"
+    size = f"{len(recording.channels)} channel(s), {recording.duration_s:.6g} s at {recording.sampling_rate_hz:.6g} Hz"
+    lines = [
+        f"{recording.provenance.source or 'recording'}: {size}, {machine}",
+        *([_paragraph(compared, "", first="")] if (compared := reference_text(analysis.reference)) else []),
+        "",
+        fill(analysis.verdict, WIDTH),
+        "",
+    ]
+    for number, finding in enumerate(analysis.findings, 1):
+        lines += _finding_lines(number, finding)
+    if with_indicators:
+        lines += ["", *_indicator_lines(analysis)]
+    return "\n".join(lines)
+
+
+def _finding_lines(number: int, finding: Finding) -> list[str]:
+    lines = [_paragraph(f"{number:2}. [{finding.kind.value}] {finding.title}", "    ", first="")]
+    place = "; ".join(where_texts(finding.where))
+    if finding.kind not in _SHORT and place:
+        lines.append(_paragraph(f"where: {place}"))
+    if finding.strength is not None:
+        lines.append(_paragraph(f"how strong: {strength_text(finding.strength)}"))
+    if finding.kind in _SHORT:
+        # How the speed was found, and what was repaired on the way, is worth a line of its own.
+        return lines + [_paragraph(text) for text in finding.evidence if finding.code == "speed"]
+    if finding.confidence_basis:
+        stated = finding.kind not in _CLAIMS or finding.confidence_basis.startswith("at most")
+        sure = "" if stated else f"at most {100 * finding.confidence:.0f} %; "
+        lines.append(_paragraph(f"how sure: {sure}{finding.confidence_basis}"))
+    lines += [_paragraph(f"evidence: {text}") for text in finding.evidence]
+    if finding.surer:
+        lines.append(_paragraph(f"surer with: {finding.surer}"))
+    return [*lines, ""]
+
+
+def _paragraph(text: str, indent: str = "      ", *, first: str | None = None) -> str:
+    return fill(text, WIDTH, initial_indent="    " if first is None else first, subsequent_indent=indent)
+
+
+def _indicator_lines(analysis: Analysis) -> list[str]:
+    compared = analysis.reference is not None
+    more = f" {'reference':>12} {'dB':>6}" if compared else ""
+    lines = [f"{'indicator':<24} {'value':>12}{more} {'unit':<10} {'channel':<12} {'of':<20} computed on"]
+    for i, change in zip(analysis.indicators, changes(analysis), strict=True):
+        of = i.gear or i.bearing or i.shaft or i.band
+        more = f" {_change_text(change):<19}" if compared else ""
+        lines.append(f"{i.name:<24} {i.value:>12.5g}{more} {i.unit:<10} {i.channel:<12} {of:<20} {i.computed_on}")
+    return lines
+
+
+def _change_text(change: IndicatorChange | None) -> str:
+    if change is None:
+        return ""
+    return f"{change.reference_value:>12.5g} " + (f"{change.change_db:>+6.1f}" if change.change_db is not None else "")

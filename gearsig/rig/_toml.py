@@ -1,0 +1,227 @@
+"""Rig files: TOML in, TOML out."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import MISSING, fields
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, get_args, get_type_hints
+
+from gearsig.checks import closest_match_hint
+from gearsig.errors import InputError
+from gearsig.rig._contact import ToothContact
+from gearsig.rig._types import (
+    Bearing,
+    ConstantSpeed,
+    EncoderChannel,
+    GearPair,
+    OperatingPoint,
+    PulseTimes,
+    Rig,
+    Sensor,
+    Shaft,
+    SpeedChannel,
+    SpeedSource,
+    TachometerChannel,
+)
+
+MAX_RIG_FILE_BYTES = 1_000_000
+"""A rig file is a page of text; anything larger is something else."""
+
+_LISTS = {"shaft": Shaft, "pair": GearPair, "bearing": Bearing, "sensor": Sensor}
+_PLAIN = ("name", "sources", "assumed", "sampling_rate_hz")
+_SPEED_SOURCES: dict[str, type] = {
+    "constant": ConstantSpeed,
+    "tachometer": TachometerChannel,
+    "encoder": EncoderChannel,
+    "speed channel": SpeedChannel,
+}
+
+
+def read_rig(path: str | Path) -> Rig:
+    """Read a rig file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file; the README lists its tables and keys. Where no [[shaft]] is given, the pairs name the shafts.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is not TOML, holds a key that does not exist (with the closest that does) or a value
+        that does not fit; it names the file, the table and the key.
+    """
+    path = Path(path)
+    try:
+        if path.stat().st_size > MAX_RIG_FILE_BYTES:
+            raise InputError(
+                f"{path.stat().st_size} bytes is too long for a rig file", where=path.name, allowed="up to 1 MB"
+            )
+        data = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="check the path") from None
+    except UnicodeDecodeError:
+        raise InputError("is not text in UTF-8", where=path.name, remedy="save the rig file as UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(
+            f"is not valid TOML: {error}", where=path.name, remedy="`gearsig rig example` prints one to start from"
+        ) from None
+    return rig_from_dict(data, where=path.name)
+
+
+def rig_file_beside(recording: str | Path) -> Path | None:
+    """Return the rig file of the same name beside a recording (`x.csv.gz`: `x.toml`), None if there is none."""
+    path = Path(recording)
+    if not path.name:
+        return None
+    beside = path.with_name(f"{recording_stem(path.name)}.toml")
+    return beside if beside.is_file() else None
+
+
+def recording_stem(name: str) -> str:
+    """Return a file's name without its type.
+
+    Examples
+    --------
+    >>> recording_stem("run.5Nm.csv.gz"), recording_stem("run.5Nm.toml"), recording_stem("run")
+    ('run.5Nm', 'run.5Nm', 'run')
+    """
+    return Path(name.removesuffix(".gz")).stem
+
+
+def rig_from_dict(data: dict[str, Any], where: str = "rig") -> Rig:
+    """Build a rig from the tables of a rig file (or of any mapping of the same shape)."""
+    allowed = (*_LISTS, *_PLAIN, "operating_point", "speed", "contact")
+    for key in data:
+        if key not in allowed:
+            raise InputError(
+                f"there is no {key!r}", where=where, allowed=", ".join(allowed), remedy=closest_match_hint(key, allowed)
+            )
+    parts: dict[str, Any] = {}
+    for name, kind in _LISTS.items():
+        tables = data.get(name, [])
+        if not isinstance(tables, list) or not all(isinstance(t, dict) for t in tables):
+            raise InputError(f"{name!r} is not a list of tables", where=where, remedy=f"write [[{name}]]")
+        parts[name + "s"] = tuple(from_table(kind, t, f"{where}: [[{name}]] {i}") for i, t in enumerate(tables, 1))
+    parts["shafts"] = _with_implied_shafts(parts["shafts"], parts["pairs"], parts["bearings"])
+    if "operating_point" in data:
+        parts["operating_point"] = from_table(OperatingPoint, data["operating_point"], f"{where}: [operating_point]")
+    if "contact" in data:
+        parts["contact"] = from_table(ToothContact, data["contact"], f"{where}: [contact]")
+    if "speed" in data:
+        parts["speed"] = _speed(data["speed"], f"{where}: [speed]")
+    plain = {key: data[key] for key in _PLAIN if key in data}
+    return from_table(Rig, plain, where, **parts)  # type: ignore[no-any-return]
+
+
+def rig_to_dict(rig: Rig) -> dict[str, Any]:
+    """Return tables that `rig_from_dict` reads back to the same rig; pulse times are left out: a record's own."""
+    data: dict[str, Any] = {key: value for key in _PLAIN if (value := _plain(getattr(rig, key)))}
+    for name in _LISTS:
+        items = [to_table(item) for item in getattr(rig, name + "s")]
+        if items:
+            data[name] = items
+    if rig.operating_point != OperatingPoint():
+        data["operating_point"] = to_table(rig.operating_point)
+    if rig.contact is not None:
+        data["contact"] = to_table(rig.contact)
+    if rig.speed is not None and not isinstance(rig.speed, PulseTimes):
+        source = next(name for name, kind in _SPEED_SOURCES.items() if kind is type(rig.speed))
+        data["speed"] = {"source": source} | to_table(rig.speed)
+    return data
+
+
+def write_rig(rig: Rig, path: str | Path) -> None:
+    """Write `rig` as a rig file that `read_rig` reads back to the same rig."""
+    import tomli_w
+
+    Path(path).write_text(tomli_w.dumps(rig_to_dict(rig)), encoding="utf-8")
+
+
+def _speed(table: Any, where: str) -> SpeedSource | None:
+    if not isinstance(table, dict) or not isinstance(table.get("source"), str):
+        raise InputError("has no source", where=where, allowed=", ".join((*_SPEED_SOURCES, "none")))
+    source, rest = table["source"], {k: v for k, v in table.items() if k != "source"}
+    if source == "none":
+        return None
+    if source == "pulse times":
+        raise InputError(
+            "pulse times belong to one recording, not to the rig",
+            where=where,
+            remedy="give them with --tach-times FILE",
+        )
+    if source not in _SPEED_SOURCES:
+        raise InputError(
+            f"source is {source!r}",
+            where=where,
+            allowed=", ".join((*_SPEED_SOURCES, "none")),
+            remedy=closest_match_hint(source, _SPEED_SOURCES),
+        )
+    return from_table(_SPEED_SOURCES[source], rest, where)  # type: ignore[no-any-return]
+
+
+def from_table(kind: type, table: Any, where: str, **ready: Any) -> Any:
+    """Make one dataclass from a TOML table after checking its keys and the types of its values; `where` names it."""
+    if not isinstance(table, dict):
+        raise InputError("is not a table", where=where, allowed="key = value lines")
+    known = {f.name: f for f in fields(kind)}
+    hints = get_type_hints(kind)
+    values = {}
+    for key, value in table.items():
+        if key not in known:
+            hint = closest_match_hint(key, known)
+            raise InputError(f"there is no key {key!r}", where=where, allowed=", ".join(known), remedy=hint)
+        values[key] = _typed(value, hints[key], f"{where}: {key}")
+    missing = [
+        n for n, f in known.items() if f.default is MISSING and f.default_factory is MISSING and n not in values | ready
+    ]
+    if missing:
+        raise InputError(f"{', '.join(missing)} must be given", where=where)
+    try:
+        return kind(**values, **ready)
+    except InputError as error:
+        place = f"{where}: {error.where}" if error.where and error.where != "rig" else where
+        raise InputError(error.what, where=place, allowed=error.allowed, remedy=error.remedy) from None
+
+
+def _typed(value: Any, hint: Any, where: str) -> Any:
+    """Return the value in the type of the field, or say which type is wanted. TOML has no null: None never occurs."""
+    wanted = [t for t in get_args(hint) if t is not NoneType] if isinstance(hint, UnionType) else [hint]
+    kind = wanted[0]
+    if kind is float and isinstance(value, (int, float)) and not isinstance(value, bool):
+        return float(value)
+    if kind in (str, bool) and isinstance(value, kind):
+        return value
+    if kind is int and isinstance(value, int) and not isinstance(value, bool):
+        return value
+    if get_args(kind)[:1] == (str,) and isinstance(value, list) and all(isinstance(v, str) for v in value):
+        return tuple(value)
+    if get_args(kind)[:1] == (float,) and isinstance(value, list):
+        return tuple(_typed(v, float, where) for v in value)
+    names = {float: "a number", int: "a whole number", str: "text in quotes", bool: "true or false"}
+    raise InputError(f"is {value!r}", where=where, allowed=names.get(kind, "a list of texts"))
+
+
+def _with_implied_shafts(
+    shafts: tuple[Shaft, ...], pairs: tuple[GearPair, ...], bearings: tuple[Bearing, ...]
+) -> tuple[Shaft, ...]:
+    """Add shafts that gear pairs name; where there is no shaft and no pair at all, also those of bearings.
+
+    A bearing on a shaft that nothing else names is more often a misspelling than a shaft of its own.
+    """
+    names = [n for p in pairs for n in (p.driver, p.driven)] if pairs else [b.shaft for b in bearings if not shafts]
+    new = [name for name in dict.fromkeys(names) if name not in {s.name for s in shafts}]
+    if shafts and new:
+        return shafts  # some are listed: a name that is not among them is reported by the rig's own check
+    return (*shafts, *(Shaft(name) for name in new))
+
+
+def to_table(item: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass that differ from their defaults: `from_table` reads them back."""
+    return {f.name: _plain(v) for f in fields(item) if (v := getattr(item, f.name)) is not None and v != f.default}
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value

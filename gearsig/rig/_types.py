@@ -1,0 +1,508 @@
+"""What the machine is: shafts, gear pairs, bearings, sensors, operating point. Only what is known need be given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import cos, isclose, isfinite, radians
+
+from gearsig.checks import FloatArray, closest_match_hint, count, frozen_array, not_negative, one_of, positive, within
+from gearsig.errors import InputError
+from gearsig.rig._contact import ToothContact
+
+# --------------------
+# Speed ratios of all shafts, from the teeth along the gear train.
+# --------------------
+
+
+def shaft_ratios(rig: Rig) -> dict[str, float]:
+    """Return revolutions of each shaft per revolution of the reference shaft.
+
+    A shaft that cannot be reached because a tooth count is missing is left out. Exact fractions are carried through the
+    train, so that a loop of pairs is checked without rounding.
+
+    Raises
+    ------
+    InputError
+        If the pairs fall into parts that share no shaft, or a loop of pairs contradicts itself.
+    """
+    if not rig.shafts:
+        return {}
+    known: dict[str, Fraction] = {rig.reference_shaft: Fraction(1)}
+    reached = {rig.reference_shaft}
+    if rig.pairs and rig.reference_shaft not in {s for p in rig.pairs for s in (p.driver, p.driven)}:
+        reached = set()
+    waiting = list(rig.pairs)
+    while waiting:
+        touching = [p for p in waiting if not reached or p.driver in reached or p.driven in reached]
+        if not touching:
+            names = ", ".join(repr(p.name) for p in waiting)
+            raise InputError(
+                f"pair(s) {names} share no shaft with the rest of the gear train",
+                where="rig",
+                remedy="use the same shaft name where two gears sit on one shaft, or describe two rigs",
+            )
+        # A pair with a known shaft first, so that a chain is followed outwards and a loop is closed last.
+        pair = next((p for p in touching if p.driver in known or p.driven in known), touching[0])
+        waiting.remove(pair)
+        reached |= {pair.driver, pair.driven}
+        _follow(pair, known)
+    return {name: float(ratio) for name, ratio in known.items()}
+
+
+def _follow(pair: GearPair, known: dict[str, Fraction]) -> None:
+    """Add the shaft at the other end of one pair, or check it if both are known."""
+    driver, driven, z1, z2 = pair.driver, pair.driven, pair.driver_teeth, pair.driven_teeth
+    if z1 is None or z2 is None:
+        return
+    ratio = Fraction(z1, z2)
+    if driver in known and driven in known:
+        if known[driven] != known[driver] * ratio:
+            raise InputError(
+                f"pair {pair.name!r} ({z1}/{z2}) contradicts the ratio of its shafts by the other pairs",
+                where="rig",
+                allowed=f"a ratio of {known[driven] / known[driver]}",
+                remedy="check the teeth",
+            )
+    elif driver in known:
+        known[driven] = known[driver] * ratio
+    elif driven in known:
+        known[driver] = known[driven] / ratio
+
+
+# --------------------
+# Where shaft speed and angle come from.
+# --------------------
+
+
+@dataclass(frozen=True)
+class ConstantSpeed:
+    """The speed is stated and constant."""
+
+    speed_rpm: float
+    shaft: str = ""
+
+    def __post_init__(self) -> None:
+        not_negative(self.speed_rpm, "speed_rpm", "rpm")
+
+
+@dataclass(frozen=True)
+class PulseTimes:
+    """Times of tachometer pulses, on the recording's own time axis.
+
+    Parameters
+    ----------
+    times_s : array, (n_pulses,)
+        Checked where they are turned into speed, so that a bad train is reported with its pulses.
+    pulses_per_revolution : int
+    """
+
+    times_s: FloatArray
+    pulses_per_revolution: int = 1
+    shaft: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "times_s", frozen_array(self.times_s, "tachometer pulse times", ndim=1))
+        count(self.pulses_per_revolution, "pulses_per_revolution")
+
+
+@dataclass(frozen=True)
+class TachometerChannel:
+    """A channel with tachometer pulses.
+
+    Parameters
+    ----------
+    channel : str
+    pulses_per_revolution : int
+    threshold : float or None
+        In the channel's unit; None: half way between the low and the high level.
+    hysteresis : float or None
+        Full width in the channel's unit; None: a quarter of the step from low to high.
+    edge : str
+        "rising" or "falling".
+    """
+
+    channel: str
+    pulses_per_revolution: int = 1
+    threshold: float | None = None
+    hysteresis: float | None = None
+    edge: str = "rising"
+    shaft: str = ""
+
+    def __post_init__(self) -> None:
+        count(self.pulses_per_revolution, "pulses_per_revolution")
+
+
+@dataclass(frozen=True)
+class EncoderChannel:
+    """A channel with the shaft angle, wrapping or running on.
+
+    Parameters
+    ----------
+    channel : str
+    units_per_revolution : float
+        360 for degrees, 2π for radians, 1 for revolutions, the line count for counts.
+    wraps : bool
+        Whether the angle starts again after each revolution.
+    """
+
+    channel: str
+    units_per_revolution: float = 360.0
+    wraps: bool = True
+    shaft: str = ""
+
+    def __post_init__(self) -> None:
+        positive(self.units_per_revolution, "units_per_revolution")
+
+
+@dataclass(frozen=True)
+class SpeedChannel:
+    """A channel with the speed, in rpm after multiplying by `rpm_per_unit`."""
+
+    channel: str
+    rpm_per_unit: float = 1.0
+    shaft: str = ""
+
+    def __post_init__(self) -> None:
+        positive(self.rpm_per_unit, "rpm_per_unit")
+
+
+SpeedSource = ConstantSpeed | PulseTimes | TachometerChannel | EncoderChannel | SpeedChannel
+"""Any of the ways to know the speed; None stands for none."""
+
+MOST_TEETH = 5000
+"""More than any slewing ring has."""
+
+QUANTITIES = (
+    "acceleration",
+    "velocity",
+    "displacement",
+    "sound_pressure",
+    "force",
+    "torque",
+    "transmission_error",
+    "tachometer",
+    "encoder",
+    "angle",
+    "rotational_speed",
+    "angular_acceleration",
+    "temperature",
+    "voltage",
+    "unknown",
+)
+"""What a channel may measure."""
+
+
+@dataclass(frozen=True)
+class Shaft:
+    """A rotating shaft.
+
+    Parameters
+    ----------
+    name : str
+    direction : str
+        "ccw" or "cw" seen from the drive end; empty if not known.
+    """
+
+    name: str
+    direction: str = ""
+
+    def __post_init__(self) -> None:
+        if self.direction:
+            one_of(self.direction, f"direction of shaft {self.name!r}", ("ccw", "cw"))
+
+
+@dataclass(frozen=True)
+class GearPair:
+    """Two gears in mesh.
+
+    Parameters
+    ----------
+    name : str
+    driver, driven : str
+        Names of the shafts that carry the gears.
+    driver_teeth, driven_teeth : int or None
+        At least 3 where known. The mesh order needs one of them; the driven shaft's order needs both.
+    module_mm, face_width_mm : float or None
+        Above zero where known.
+    pressure_angle_deg : float or None
+        10 to 35.
+    """
+
+    name: str
+    driver: str
+    driven: str
+    driver_teeth: int | None = None
+    driven_teeth: int | None = None
+    module_mm: float | None = None
+    pressure_angle_deg: float | None = None
+    face_width_mm: float | None = None
+
+    def __post_init__(self) -> None:
+        for label, teeth in (("driver", self.driver_teeth), ("driven", self.driven_teeth)):
+            if teeth is not None and teeth > MOST_TEETH:
+                raise InputError(f"{label} teeth of pair {self.name!r} is {teeth}", allowed=f"3 to {MOST_TEETH}")
+            if teeth is not None:
+                count(
+                    teeth, f"{label} teeth of pair {self.name!r}", minimum=3, remedy="leave it out if it is not known"
+                )
+        for label, value in (("module_mm", self.module_mm), ("face_width_mm", self.face_width_mm)):
+            if value is not None:
+                positive(value, f"{label} of pair {self.name!r}", "mm")
+        if self.pressure_angle_deg is not None:
+            within(self.pressure_angle_deg, f"pressure_angle_deg of pair {self.name!r}", 10, 35, "deg")
+        if self.driver == self.driven:
+            raise InputError(f"pair {self.name!r} meshes shaft {self.driver!r} with itself", remedy="name two shafts")
+
+    def teeth(self, shaft: str) -> int | None:
+        """Teeth of the gear on `shaft`, None if not known."""
+        if shaft not in (self.driver, self.driven):
+            raise InputError(
+                f"pair {self.name!r} has no gear on shaft {shaft!r}", allowed=f"{self.driver}, {self.driven}"
+            )
+        return self.driver_teeth if shaft == self.driver else self.driven_teeth
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """A rolling-element bearing with a turning inner ring and a standing outer ring.
+
+    Give the geometry (`n_rolling_elements`, both diameters, contact angle) or the orders from a catalogue; orders win
+    where both are given. Orders are cycles per revolution of the bearing's own shaft.
+    """
+
+    name: str
+    shaft: str
+    n_rolling_elements: int | None = None
+    rolling_element_diameter_mm: float | None = None
+    pitch_diameter_mm: float | None = None
+    contact_angle_deg: float = 0.0
+    bpfo_order: float | None = None
+    bpfi_order: float | None = None
+    bsf_order: float | None = None
+    ftf_order: float | None = None
+
+    def __post_init__(self) -> None:
+        where = f"of bearing {self.name!r}"
+        geometry = (self.n_rolling_elements, self.rolling_element_diameter_mm, self.pitch_diameter_mm)
+        if any(v is not None for v in geometry) and not all(v is not None for v in geometry):
+            raise InputError(
+                f"the geometry {where} is incomplete",
+                allowed="all three or none: n_rolling_elements, rolling_element_diameter_mm, pitch_diameter_mm",
+            )
+        if self.n_rolling_elements is not None:
+            count(self.n_rolling_elements, f"n_rolling_elements {where}", minimum=3)
+            ball = positive(self.rolling_element_diameter_mm or 0.0, f"rolling_element_diameter_mm {where}", "mm")
+            pitch = positive(self.pitch_diameter_mm or 0.0, f"pitch_diameter_mm {where}", "mm")
+            if ball >= pitch:
+                raise InputError(
+                    f"rolling elements {where} are not smaller than the pitch diameter ({ball:g} >= {pitch:g} mm)"
+                )
+        within(self.contact_angle_deg, f"contact_angle_deg {where}", 0, 89, "deg")
+        for key in ("bpfo_order", "bpfi_order", "bsf_order", "ftf_order"):
+            value = getattr(self, key)
+            if value is not None:
+                positive(value, f"{key} {where}")
+
+    def orders(self) -> dict[str, float]:
+        """Return the orders that are known, by name: BPFO, BPFI, BSF, FTF.
+
+        With n elements of diameter d on pitch diameter D and contact angle a, and g = d cos(a)/D:
+        BPFO = n(1 - g)/2, BPFI = n(1 + g)/2, BSF = (D/2d)(1 - g²), FTF = (1 - g)/2.
+        BSF is the rolling element's spin; a defect on it strikes both races: twice per spin.
+
+        Source: T. A. Harris, *Rolling Bearing Analysis*, 4th ed., ch. 2 (kinematics without slip).
+        """
+        found: dict[str, float] = {}
+        if self.n_rolling_elements is not None:
+            ball, pitch = self.rolling_element_diameter_mm or 0.0, self.pitch_diameter_mm or 0.0
+            g = ball * cos(radians(self.contact_angle_deg)) / pitch
+            n = self.n_rolling_elements
+            found = {
+                "BPFO": n * (1 - g) / 2,
+                "BPFI": n * (1 + g) / 2,
+                "BSF": pitch / (2 * ball) * (1 - g * g),
+                "FTF": (1 - g) / 2,
+            }
+        stated = {"BPFO": self.bpfo_order, "BPFI": self.bpfi_order, "BSF": self.bsf_order, "FTF": self.ftf_order}
+        return found | {name: order for name, order in stated.items() if order is not None}
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """What a channel of the recordings measures: value = number in the file × scale + offset.
+
+    `wraps` says that an angle starts again after each revolution.
+    """
+
+    channel: str
+    quantity: str = ""
+    unit: str = ""
+    position: str = ""
+    scale: float = 1.0
+    offset: float = 0.0
+    wraps: bool = False
+
+    def __post_init__(self) -> None:
+        if self.quantity:
+            one_of(self.quantity, f"quantity of sensor {self.channel!r}", QUANTITIES)
+        for label, value in (("scale", self.scale), ("offset", self.offset)):
+            if not isfinite(value) or (label == "scale" and value == 0.0):
+                raise InputError(
+                    f"{label} of sensor {self.channel!r} is {value:g}", allowed="a finite number, scale not 0"
+                )
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """The nominal running condition; its speed guides the search for the true one and is not taken as measured."""
+
+    shaft: str = ""
+    speed_rpm: float | None = None
+    speed_tolerance_percent: float = 5.0
+    torque_nm: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.speed_rpm is not None:
+            not_negative(self.speed_rpm, "operating_point.speed_rpm", "rpm")
+        within(self.speed_tolerance_percent, "operating_point.speed_tolerance_percent", 0.01, 90, "%")
+        if self.torque_nm is not None and not isfinite(self.torque_nm):  # a sign is a direction
+            raise InputError(
+                f"operating_point.torque_nm is {self.torque_nm:g} N m",
+                allowed="a finite number",
+                remedy="give its size, or leave it out where it is not known",
+            )
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A machine, as far as it is known; validated when it is made.
+
+    Parameters
+    ----------
+    name : str
+    shafts, pairs, bearings, sensors : tuples
+        Pairs and bearings name their shafts. Where there are several pairs, they must connect.
+    operating_point : OperatingPoint
+    speed : SpeedSource or None
+        How recordings of this rig tell the speed.
+    sampling_rate_hz : float or None
+        For files that do not state it.
+    sources : tuple of str
+        Where the data come from.
+    assumed : tuple of str
+        Names of facts that were inferred or guessed ("teeth", "sampling_rate_hz", …): a diagnosis that rests on
+        them is worth less, and says so.
+    contact : ToothContact or None
+        How the teeth of one pair touch, and what turns with them: for forces from measured motion.
+    """
+
+    name: str = ""
+    shafts: tuple[Shaft, ...] = ()
+    pairs: tuple[GearPair, ...] = ()
+    bearings: tuple[Bearing, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
+    operating_point: OperatingPoint = OperatingPoint()
+    speed: SpeedSource | None = None
+    sampling_rate_hz: float | None = None
+    sources: tuple[str, ...] = ()
+    assumed: tuple[str, ...] = ()
+    contact: ToothContact | None = None
+
+    def __post_init__(self) -> None:
+        for kind, items in (("shaft", self.shafts), ("pair", self.pairs), ("bearing", self.bearings)):
+            names = [item.name for item in items]
+            doubled = sorted({n for n in names if names.count(n) > 1})
+            if doubled:
+                raise InputError(
+                    f"{kind} name(s) {', '.join(doubled)} occur more than once", remedy="give each its own name"
+                )
+        for pair in self.pairs:
+            for shaft in (pair.driver, pair.driven):
+                self._check_shaft(shaft, f"pair {pair.name!r}")
+        for bearing in self.bearings:
+            self._check_shaft(bearing.shaft, f"bearing {bearing.name!r}")
+        if self.operating_point.shaft:
+            self._check_shaft(self.operating_point.shaft, "operating_point")
+        if self.speed is not None and self.speed.shaft:
+            self._check_shaft(self.speed.shaft, "speed")
+        if self.sampling_rate_hz is not None:
+            positive(self.sampling_rate_hz, "sampling_rate_hz", "Hz")
+        if self.contact is not None and self.contact.pair:
+            self.pair(self.contact.pair)  # says so where there is no such pair
+        shaft_ratios(self)  # raises where the pairs do not connect or contradict each other
+
+    def _check_shaft(self, name: str, user: str) -> None:
+        if name not in self.shaft_names:
+            raise InputError(
+                f"{user} names shaft {name!r}, which is not described",
+                allowed=", ".join(self.shaft_names) or "none: no [[shaft]] is given",
+                remedy=closest_match_hint(name, self.shaft_names) or "add a [[shaft]] with that name",
+            )
+
+    @property
+    def shaft_names(self) -> tuple[str, ...]:
+        """Names in the order given."""
+        return tuple(shaft.name for shaft in self.shafts)
+
+    @property
+    def reference_shaft(self) -> str:
+        """The shaft that orders are counted on: the speed source's, else the operating point's, else the first."""
+        if self.speed is not None and self.speed.shaft:
+            return self.speed.shaft
+        if self.operating_point.shaft:
+            return self.operating_point.shaft
+        return self.shafts[0].name if self.shafts else ""
+
+    def ratio(self, shaft: str, to: str = "") -> float | None:
+        """Revolutions of `shaft` per revolution of `to` (default: the reference shaft); None if not known."""
+        self._check_shaft(shaft, "ratio")
+        ratios = shaft_ratios(self)
+        own, other = ratios.get(shaft), ratios.get(to or self.reference_shaft)
+        if shaft == (to or self.reference_shaft):
+            return 1.0
+        return None if own is None or other is None else own / other
+
+    def nominal_speed_rpm(self, shaft: str = "") -> float | None:
+        """Nominal speed of `shaft` (default: the reference shaft), None if not known."""
+        point = self.operating_point
+        if point.speed_rpm is None:
+            return None
+        ratio = self.ratio(shaft or self.reference_shaft, to=point.shaft or self.reference_shaft)
+        return None if ratio is None else point.speed_rpm * ratio
+
+    def nominal_torque_nm(self, shaft: str = "") -> float | None:
+        """Magnitude of the nominal torque as `shaft` (default: the reference shaft) feels it; None if not known.
+
+        The same power everywhere: torque falls as speed rises.
+        """
+        point = self.operating_point
+        if point.torque_nm is None:
+            return None
+        ratio = self.ratio(point.shaft or self.reference_shaft, to=shaft or self.reference_shaft)
+        return None if ratio is None else abs(point.torque_nm) * ratio
+
+    def pair(self, name: str) -> GearPair:
+        """Return the pair called `name`."""
+        for pair in self.pairs:
+            if pair.name == name:
+                return pair
+        names = [pair.name for pair in self.pairs]
+        raise InputError(f"there is no pair {name!r}", allowed=", ".join(names), remedy=closest_match_hint(name, names))
+
+    def mesh_order(self, pair: GearPair, shaft: str = "") -> float | None:
+        """Mesh cycles of `pair` per revolution of `shaft` (default: the reference shaft); None if it cannot be known.
+
+        Teeth of either gear times that gear's shaft ratio; both give the same where both are known.
+        """
+        orders = [
+            teeth * ratio
+            for gear_shaft in (pair.driver, pair.driven)
+            if (teeth := pair.teeth(gear_shaft)) is not None
+            and (ratio := self.ratio(gear_shaft, to=shaft or self.reference_shaft)) is not None
+        ]
+        if len(orders) == 2 and not isclose(orders[0], orders[1], rel_tol=1e-9):
+            raise InputError(
+                f"pair {pair.name!r} gives two mesh orders, {orders[0]:g} and {orders[1]:g}", remedy="check the teeth"
+            )
+        return orders[0] if orders else None

@@ -1,0 +1,667 @@
+"""The numbers that the depth of a crack is read from: ratios in which gains and smooth paths cancel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.angle import ShaftAngle
+from gearsig.checks import FloatArray
+from gearsig.errors import RefusalError
+from gearsig.recording import Recording
+from gearsig.rig import GearPair, PulseTimes, Rig, TachometerChannel
+
+# --------------------
+# Synchronous averages of the two shafts of a gear pair, as spectra over the order of each shaft.
+# --------------------
+
+
+LEAST_REVOLUTIONS = 13
+"""Of either shaft: fewer leave the other shaft's orders in its average, and the calibration has no fewer."""
+
+
+@dataclass(frozen=True)
+class ShaftLines:
+    """The lines of a shaft's synchronous average.
+
+    Parameters
+    ----------
+    shaft : str
+    teeth, other_teeth : int
+        Of the gear on it, and of its mate.
+    lines : complex array, (n_channels, n_orders)
+        lines[c, n] is the complex amplitude (peak) of order n of this shaft.
+    n_revolutions : int
+    highest_order : int
+    order_hz : float
+        Mean frequency of the shaft.
+    channels : tuple of str
+    has_mark : bool
+        Whether order phases count from a mark on this very shaft.
+    """
+
+    shaft: str
+    teeth: int
+    other_teeth: int
+    lines: NDArray[np.complex128]
+    n_revolutions: int
+    highest_order: int
+    order_hz: float
+    channels: tuple[str, ...]
+    has_mark: bool = False
+
+
+def shaft_lines(
+    recording: Recording, rig: Rig, pair: GearPair, shaft: str, angle: ShaftAngle, channels: Sequence[str]
+) -> ShaftLines:
+    """Return the lines of the shaft's average for each channel.
+
+    Raises
+    ------
+    RefusalError
+        If there are too few revolutions.
+    """
+    from gearsig.angle import resample_to_angle
+    from gearsig.orders import synchronous_average
+
+    ratio = rig.ratio(shaft)
+    own, other = pair.teeth(shaft), pair.teeth(pair.driven if shaft == pair.driver else pair.driver)
+    if ratio is None or own is None or other is None:
+        raise RefusalError("the teeth of both gears are not known", remedy="state them in the rig file")
+    turned = angle if ratio == 1.0 else angle.of_shaft(shaft, ratio)
+    if turned.n_revolutions < LEAST_REVOLUTIONS:
+        raise RefusalError(
+            f"the record holds {turned.n_revolutions:.3g} revolutions of shaft {shaft!r}, "
+            f"{LEAST_REVOLUTIONS} are needed",
+            remedy="record longer",
+        )
+    signal = resample_to_angle(recording, turned, channels=list(channels))
+    averages = [synchronous_average(signal, name) for name in channels]
+    n = len(averages[0].values)
+    highest = min(int(averages[0].highest_order), (n - 1) // 2)
+    lines = np.stack([2.0 * np.fft.rfft(a.values)[: highest + 1] / n for a in averages])
+    return ShaftLines(
+        shaft,
+        own,
+        other,
+        lines,
+        averages[0].n_revolutions,
+        highest,
+        turned.mean_speed_rpm / 60.0,
+        tuple(channels),
+        has_mark(recording, rig, shaft),
+    )
+
+
+def orders_from_mesh(orders: NDArray[np.intp], teeth: int) -> NDArray[np.intp]:
+    """Return how many orders of a shaft lie between each order and the nearest mesh harmonic."""
+    distance: NDArray[np.intp] = np.abs((orders + teeth // 2) % teeth - teeth // 2)
+    return distance
+
+
+def has_mark(recording: Recording, rig: Rig, shaft: str) -> bool:
+    """Say whether angle 0 of a shaft is a mark on that very shaft: one pulse per revolution."""
+    source = recording.speed_source
+    if not isinstance(source, PulseTimes | TachometerChannel) or source.pulses_per_revolution != 1:
+        return False
+    return (source.shaft or rig.reference_shaft) == shaft
+
+
+# --------------------
+# The tooth at which a shaft's vibration differs most from that at the other teeth.
+# --------------------
+
+
+MOST_BANDS = 10
+"""One band about each mesh harmonic. A band's ratio to its mesh line scatters by some 8 dB, for the line is one number
+that hangs on tip relief and resonances: many bands average it out."""
+
+WINDOW_PITCHES = 1.5
+"""A tooth is in mesh for as long as the contact ratio says, and the answer rings on a little."""
+
+_SIDEBANDS = 2
+"""Lines this near to a mesh harmonic are run-out, not a tooth."""
+
+_LOWEST_ORDER = 4
+"""Below: unbalance, misalignment, run-out."""
+
+_STEPS_PER_TOOTH = 32
+
+
+@dataclass(frozen=True)
+class ToothEvent:
+    """The window with the most energy.
+
+    Parameters
+    ----------
+    centre_rev : float
+        Middle of the window, 0 to 1.
+    prominence : float
+        Its energy over the median window's, mean over bands and channels; 1: nothing stands out.
+    window, background : arrays, (n_bands, n_channels)
+        Mean square envelope of each band in the window and in the median window. Band 0 lies below the first mesh
+        harmonic, band k about the k-th.
+    """
+
+    centre_rev: float
+    prominence: float
+    window: FloatArray
+    background: FloatArray
+
+
+def n_bands(shaft: ShaftLines) -> int:
+    """Return how many mesh harmonics have a whole band below the highest order, 10 at most."""
+    return min(MOST_BANDS, int((shaft.highest_order - shaft.teeth // 2) / shaft.teeth))
+
+
+def find_event(shaft: ShaftLines) -> ToothEvent:
+    """Find the window of 1.5 tooth pitches with the most energy.
+
+    Each band's mean square envelope is divided by its median over the revolution before bands and channels are added:
+    what a resonance or a gain multiplies, it multiplies at all teeth.
+    """
+    envelopes = band_envelopes(shaft)
+    n = envelopes.shape[-1]
+    width = round(WINDOW_PITCHES * n / shaft.teeth)
+    energy = sliding_mean(envelopes, width)
+    median = np.median(energy, axis=-1, keepdims=True)
+    relative = np.divide(energy, median, out=np.ones_like(energy), where=median > 0).mean(axis=(0, 1))
+    start = int(np.argmax(relative))
+    return ToothEvent(
+        centre_rev=float((start + width / 2) / n % 1.0),
+        prominence=float(relative[start] / np.median(relative)),
+        window=energy[:, :, start],
+        background=median[:, :, 0],
+    )
+
+
+def event_windows(shaft: ShaftLines, event: ToothEvent) -> tuple[FloatArray, FloatArray]:
+    """Return each band's mean square envelope in the event's window and the median one, (n_bands + 1, n_channels)."""
+    envelopes = band_envelopes(shaft)
+    n = envelopes.shape[-1]
+    width = round(WINDOW_PITCHES * n / shaft.teeth)
+    energy = sliding_mean(envelopes, width)
+    return energy[:, :, round(event.centre_rev * n - width / 2) % n], np.median(energy, axis=-1)
+
+
+def band_envelopes(shaft: ShaftLines) -> FloatArray:
+    """Return squared envelopes over one revolution, (n_bands + 1, n_channels, 32 z).
+
+    e_k(θ) = |Σ_n x[kz + n] e^{2πi nθ}|², |n| <= z/2, without mesh lines, their nearest sidebands and the lowest orders.
+    """
+    z = shaft.teeth
+    n = _STEPS_PER_TOOTH * z
+    lines = without_regular_lines(shaft)
+    bands = []
+    for k in range(n_bands(shaft) + 1):
+        orders = np.arange(max(_LOWEST_ORDER, k * z - z // 2), k * z + z // 2 + 1)
+        shifted = np.zeros((len(lines), n), dtype=complex)
+        shifted[:, (orders - k * z) % n] = lines[:, orders]
+        bands.append(np.abs(np.fft.ifft(shifted, axis=1) * n) ** 2)
+    return np.stack(bands)
+
+
+def without_regular_lines(shaft: ShaftLines) -> np.ndarray:
+    """Return the lines with those set to 0 that belong to all teeth alike: shaft orders, mesh, nearest sidebands."""
+    lines = shaft.lines.copy()
+    orders = np.arange(lines.shape[1])
+    z = shaft.teeth
+    near_mesh = orders_from_mesh(orders, z) <= _SIDEBANDS
+    lines[:, (orders < _LOWEST_ORDER) | near_mesh] = 0.0
+    return lines
+
+
+def sliding_mean(values: FloatArray, width: int) -> FloatArray:
+    """Return the mean over the window that starts at each sample of a periodic signal."""
+    doubled = np.concatenate([np.zeros((*values.shape[:-1], 1)), values, values[..., :width]], axis=-1).cumsum(axis=-1)
+    mean: FloatArray = (doubled[..., width:-1] - doubled[..., : values.shape[-1]]) / width
+    return mean
+
+
+FEATURES = (
+    "band_excess",
+    "line_excess",
+    "prominence",
+    "pattern_excess",
+    "event_slope",
+    "mesh_slope",
+    "event_spread",
+    "mesh_spread",
+    "log_load",
+    "log_teeth",
+    "log_other_teeth",
+    "log_mesh_hz",
+    "log_module",
+    "relief_share",
+    "relief_share_squared",
+)
+"""Order of the entries of a feature vector; see `feature_vector`."""
+
+SHAPED = ("band_excess", "line_excess", "prominence")
+"""Features that the depth is read from, by curves that never fall."""
+
+RISING = (*SHAPED, "pattern_excess")
+"""Features that a deeper crack raises, all else the same. The last one serves to detect only: how much teeth differ
+from birth must not decide on a depth."""
+
+RELIEF = ("relief_share", "relief_share_squared")
+"""Of the models that know the tip relief only; 0 where it is not known."""
+
+MOST_RELIEF_SHARE = 2.0
+"""Beyond, the tips never touch: more relief changes nothing."""
+
+STIFFNESS_N_PER_MM_UM = 14.0
+"""Usual stiffness of a pair of steel gears per face width: by this, teeth yield load × module / 14."""
+
+GATE_PITCHES = 4.0
+_SUB_BANDS = 4
+"""Per mesh harmonic."""
+_LEAST_SHARE = 0.1
+"""What is left of an energy at least when the background's is taken off: a logarithm follows."""
+_N_OTHER_GATES = 6
+_MESH_WEIGHT = 0.25
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What the rig file says of the gear with the event.
+
+    Parameters
+    ----------
+    module_mm : float
+    load_mpa : float
+        Tangential force per face width and module.
+    mesh_hz : float
+    tip_relief_um : float or None
+        Metal taken off at the tips of either gear; None: not known.
+    """
+
+    module_mm: float
+    load_mpa: float
+    mesh_hz: float
+    tip_relief_um: float | None = None
+
+    @property
+    def relief_share(self) -> float:
+        """Tip relief over what the teeth yield under the load, at most 2; 0 where the relief is not known."""
+        yield_um = self.load_mpa * self.module_mm / STIFFNESS_N_PER_MM_UM
+        return min((self.tip_relief_um or 0.0) / yield_um, MOST_RELIEF_SHARE)
+
+
+def feature_vector(
+    shaft: ShaftLines, sound: ShaftLines, mesh: FloatArray, event: ToothEvent, conditions: Conditions
+) -> FloatArray:
+    """Return the features in the order of `FEATURES`.
+
+    - band_excess: ln of the event's energy in the band about a mesh harmonic over that harmonic's energy; mean over
+      bands and channels, strong harmonics weighing more.
+    - line_excess: ln of the spectrum of the event by itself (gated, four pitches) over mesh energies interpolated
+      between harmonics; mean over quarter bands. A resonance counts in few of them.
+    - prominence: ln of the event's energy over that at the other teeth.
+    - pattern_excess: ln of the event's energy over that by which all teeth differ (on the sound gear, where there is a
+      reference); mean over bands and channels. What resonances multiply cancels entirely.
+    - event_slope, mesh_slope: change of the logarithms per mesh harmonic; event_spread, mesh_spread: their standard
+      deviations over the bands.
+    - relief_share: tip relief over the teeth's deflection, see `Conditions`; it decides how strong the mesh is that the
+      event is compared with.
+    - the rest are logarithms of what the rig file and the speed say.
+
+    Parameters
+    ----------
+    shaft : ShaftLines
+        Whose event it is: the average itself, or its difference from a sound gear's.
+    sound : ShaftLines
+        The reference's average, or the average itself.
+    mesh : array, (n_harmonics, n_channels)
+        Energies of the mesh lines.
+    event : ToothEvent
+    conditions : Conditions
+    """
+    excess, weights = _band_excess(event, mesh)
+    positions, event_levels = _gated_levels(shaft, event, len(mesh))
+    mesh_levels = np.log(mesh)
+    harmonics = np.arange(1, len(mesh) + 1)
+    between = np.stack([np.interp(positions, harmonics, column) for column in mesh_levels.T], axis=1)
+    return np.array(
+        [
+            float(np.sum(weights * excess) / np.sum(weights)),
+            float(np.mean(event_levels - between)),
+            np.log(event.prominence),
+            float(np.mean(np.log(_event_energy(event) / _pattern_energies(sound, len(mesh))))),
+            np.polyfit(positions, event_levels.mean(axis=1), 1)[0],
+            np.polyfit(harmonics, mesh_levels.mean(axis=1), 1)[0],
+            event_levels.std(axis=0).mean(),
+            mesh_levels.std(axis=0).mean(),
+            np.log(conditions.load_mpa),
+            np.log(shaft.teeth),
+            np.log(shaft.other_teeth),
+            np.log(conditions.mesh_hz),
+            np.log(conditions.module_mm),
+            conditions.relief_share,
+            conditions.relief_share**2,
+        ]
+    )
+
+
+def mesh_energies(shaft: ShaftLines, n_harmonics: int) -> FloatArray:
+    """Return |x[kz]|² for k = 1 …, (n_harmonics, n_channels)."""
+    energies: FloatArray = np.abs(shaft.lines[:, shaft.teeth * np.arange(1, n_harmonics + 1)].T) ** 2
+    return energies
+
+
+def _band_excess(event: ToothEvent, mesh: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return ln(event/mesh) of each band and channel, and weights that no gain of a channel changes."""
+    return np.log(_event_energy(event) / mesh), (mesh / mesh.max(axis=0)) ** _MESH_WEIGHT
+
+
+def _event_energy(event: ToothEvent) -> FloatArray:
+    """Return the mean square in the window that is the event's, (n_harmonics, n_channels)."""
+    energy: FloatArray = _less_background(event.window[1:], event.background[1:])
+    return energy
+
+
+def _pattern_energies(sound: ShaftLines, n_harmonics: int) -> FloatArray:
+    """Return the mean square envelope over all teeth of each band, (n_harmonics, n_channels)."""
+    z, lines = sound.teeth, without_regular_lines(sound)
+    bands = [lines[:, k * z - z // 2 : k * z + z // 2 + 1] for k in range(1, n_harmonics + 1)]
+    return np.array([np.sum(np.abs(band) ** 2, axis=1) for band in bands])
+
+
+def _gated_levels(shaft: ShaftLines, event: ToothEvent, n_harmonics: int) -> tuple[FloatArray, FloatArray]:
+    """Return (position in mesh harmonics, ln of mean energy per line) of quarter bands, (n,) and (n, n_channels)."""
+    z = shaft.teeth
+    highest = min(shaft.highest_order, round((n_harmonics + 0.5) * z))
+    n = 1 << int(np.ceil(np.log2(2.2 * highest + 8)))
+    lines = np.zeros((shaft.lines.shape[0], n // 2 + 1), dtype=complex)
+    lines[:, : highest + 1] = without_regular_lines(shaft)[:, : highest + 1]
+    signal = np.fft.irfft(lines, n, axis=1) * n / 2
+    angle = (np.arange(n) / n - event.centre_rev + 0.5) % 1.0 - 0.5
+    inside = np.abs(angle) * z < GATE_PITCHES / 2
+    gate = np.where(inside, np.cos(np.pi * angle * z / GATE_PITCHES) ** 2, 0.0)
+    energy = _energy_spectrum(signal * gate)
+    elsewhere = [np.roll(gate, round((0.2 + 0.1 * i) * n)) for i in range(_N_OTHER_GATES)]
+    background = np.median([_energy_spectrum(signal * g) for g in elsewhere], axis=0)
+    edges = np.arange(_SUB_BANDS // 2, round((n_harmonics + 0.5) * _SUB_BANDS) + 1)
+    positions = (edges[:-1] + 0.5) / _SUB_BANDS
+    limits = (edges * z) // _SUB_BANDS
+    means = [
+        _less_background(energy[:, i:j].mean(axis=1), background[:, i:j].mean(axis=1)) for i, j in pairwise(limits)
+    ]
+    return positions, np.log(np.array(means) * z)
+
+
+def _energy_spectrum(signal: FloatArray) -> FloatArray:
+    energy: FloatArray = np.abs(np.fft.rfft(signal, axis=1)) ** 2 * (2.0 / signal.shape[1]) ** 2
+    return energy
+
+
+def _less_background(energy: FloatArray, background: FloatArray) -> FloatArray:
+    left: FloatArray = np.maximum(energy - background, _LEAST_SHARE * energy)
+    return left
+
+
+# --------------------
+# The difference between a shaft's average and that of the sound gear: what every tooth is born with cancels.
+# --------------------
+
+
+LARGEST_SPEED_DIFFERENCE = 0.02
+"""Relative, as in the calibration; beyond, resonances amplify both recordings differently."""
+
+LARGEST_GAIN_CHANGE = 0.15
+
+_MESH_HARMONICS = 6
+_FINE_STEPS_PER_TOOTH = 16
+_SHAFT_ORDERS = 4
+
+
+def difference_lines(now: ShaftLines, sound: ShaftLines, *, whole_teeth: bool) -> tuple[ShaftLines, float]:
+    """Return the lines of `now` less those of the sound gear, turned so that the same teeth meet.
+
+    d[n] = x[n] − r[n] e^{−2πi n s}, with the shift s that gives the largest Σ w[n] Re(x[n] r*[n] e^{2πi n s}).
+
+    Parameters
+    ----------
+    now, sound : ShaftLines
+        Of the same shaft and channels.
+    whole_teeth : bool
+        Whether the shift can only be a whole number of teeth: the mate's mark fixes the phase of the mesh. Without a
+        mark anywhere it is searched in sixteenths of a tooth; where both have a mark on this shaft, it is 0.
+
+    Returns
+    -------
+    ShaftLines
+    agreement : float
+        Σ w Re(…)/Σ w |…| at the shift: 1 where the teeth's pattern is the same. A deep crack lowers it, too.
+
+    Raises
+    ------
+    RefusalError
+        If the speeds differ too much.
+    """
+    check_same_speed(now, sound)
+    highest = min(now.highest_order, sound.highest_order)
+    orders = np.arange(highest + 1)
+    x, r = now.lines[:, : highest + 1], sound.lines[:, : highest + 1]
+    cross = _weighted_cross(x, r, now.teeth)
+    shifts = _shifts(now, sound, whole_teeth)
+    scores = np.real(np.exp(2j * np.pi * np.outer(shifts, orders)) @ cross)
+    best = int(np.argmax(scores))
+    agreement = float(scores[best] / np.abs(cross).sum()) if np.any(cross) else 0.0
+    turned = r * np.exp(-2j * np.pi * orders * shifts[best])
+    return replace(now, lines=x - _matched(turned, x, now.teeth), highest_order=highest), agreement
+
+
+def check_same_speed(now: ShaftLines, sound: ShaftLines) -> None:
+    """Refuse a reference at another speed."""
+    change = abs(now.order_hz / sound.order_hz - 1.0)
+    if change > LARGEST_SPEED_DIFFERENCE:
+        rpm = tuple(60.0 * shaft.order_hz for shaft in (sound, now))
+        raise RefusalError(
+            f"the reference was taken at a speed {100 * change:.1f} % off: shaft {now.shaft!r} turns at {rpm[0]:.5g} "
+            f"rpm there, at {rpm[1]:.5g} rpm in the recording",
+            remedy=f"take it within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of the same speed, at the same load",
+        )
+
+
+def _matched(reference: np.ndarray, x: np.ndarray, teeth: int) -> np.ndarray:
+    """Return the reference, each mesh harmonic's band of each channel times the complex gain that fits `x` best.
+
+    A slightly other speed or load changes amplitude and phase of the teeth's pattern a little, alike within a band.
+    g = Σ x r*/Σ|r|², held within `LARGEST_GAIN_CHANGE` of 1: more would take the crack for a gain.
+    """
+    orders = np.arange(x.shape[1])
+    used = telling_teeth_apart(orders, teeth)
+    fitted = reference.copy()
+    for k in range(x.shape[1] // teeth + 1):
+        band = (orders + teeth // 2) // teeth == k
+        fit = band & used
+        power = np.sum(np.abs(reference[:, fit]) ** 2, axis=1)
+        product = np.sum(x[:, fit] * np.conj(reference[:, fit]), axis=1)
+        change = np.divide(product, power, out=np.ones_like(product), where=power > 0) - 1.0
+        change *= np.minimum(1.0, LARGEST_GAIN_CHANGE / np.maximum(np.abs(change), 1e-12))
+        fitted[:, band] *= (1.0 + change)[:, None]
+    return fitted
+
+
+def telling_teeth_apart(orders: np.ndarray, teeth: int) -> np.ndarray:
+    """Return which orders tell one tooth from another; shaft orders, mesh lines and their sidebands hardly do."""
+    used: np.ndarray = (orders > _SHAFT_ORDERS) & (orders_from_mesh(orders, teeth) > 1)
+    return used
+
+
+def _shifts(now: ShaftLines, sound: ShaftLines, whole_teeth: bool) -> FloatArray:
+    if now.has_mark and sound.has_mark:
+        return np.zeros(1)
+    n = now.teeth * (1 if whole_teeth else _FINE_STEPS_PER_TOOTH)
+    return np.arange(n) / n
+
+
+def _weighted_cross(x: np.ndarray, r: np.ndarray, teeth: int) -> np.ndarray:
+    """Cross spectrum, summed over channels; strong lines count by their root."""
+    orders = np.arange(x.shape[1])
+    used = telling_teeth_apart(orders, teeth) & (orders <= _MESH_HARMONICS * teeth)
+    size = np.sqrt(np.abs(x) * np.abs(r))
+    cross: np.ndarray = np.divide(x * np.conj(r), size, out=np.zeros_like(x), where=(size > 0) & used).sum(axis=0)
+    return cross
+
+
+# --------------------
+# What an event looks like in its tooth's engagement: by this a crack is told from a chipped or spalled tooth.
+# --------------------
+
+
+SHAPE = ("lead", "tail", "duration", "kurtosis", "peak", "window_slope")
+"""Order of the entries of `event_shape`."""
+
+REACH_LEVEL = 4.0
+"""Energy over that at the middling tooth down to which an event lasts: sound teeth reach it now and then."""
+
+_SHAPE_STEPS_PER_TOOTH = 64
+_NEAR_PITCHES = 2.5
+_MOST_HARMONICS = 8
+_LEAST = 1e-12
+
+
+def event_shape(searched: ShaftLines, event: ToothEvent) -> FloatArray:
+    """Return the numbers in the order of `SHAPE`.
+
+    - lead, tail: ln of the energy one to three pitches before and after the event over its largest.
+    - duration: ln of the energy's standard deviation about its middle, in pitches; kurtosis: ln of it; peak: ln of the
+      largest energy density. A spall is short, a crack lasts as long as its tooth is in mesh.
+    - window_slope: change of the window's ln energy per mesh harmonic.
+
+    The event's phase against the mesh is left out: it tells chips apart on machines like those of the calibration, and
+    misleads where the mesh harmonics pass a resonance.
+
+    Parameters
+    ----------
+    searched : ShaftLines
+        The average, or its difference from the sound gear's.
+    event : ToothEvent
+    """
+    levels = np.log(np.maximum(event.window, _LEAST * event.window.max())).mean(axis=1)
+    slope = float(np.polyfit(np.arange(len(levels)), levels, 1)[0])
+    return np.array([*_around(searched, event), *_durations(searched, event), slope])
+
+
+def reach_cycles(searched: ShaftLines, event: ToothEvent) -> float:
+    """Return for how many mesh cycles after its middle the event has four times the energy of a middling other tooth.
+
+    Parameters
+    ----------
+    searched : ShaftLines
+        The average, or its difference from the sound gear's.
+    event : ToothEvent
+    """
+    energy = _relative_energy(searched, event)
+    after = energy[len(energy) // 2 :]
+    below = np.flatnonzero(after < REACH_LEVEL)
+    steps = len(energy) / searched.teeth
+    return float((below[0] if len(below) else len(after)) / steps)
+
+
+def _relative_energy(searched: ShaftLines, event: ToothEvent) -> FloatArray:
+    """Return the energy in windows of one pitch over the middling one, the event in the middle."""
+    envelopes = band_envelopes(searched)
+    median = np.median(envelopes, axis=-1, keepdims=True)
+    relative = np.divide(envelopes, median, out=np.ones_like(envelopes), where=median > 0).mean(axis=(0, 1))
+    width = round(len(relative) / searched.teeth)
+    energy = sliding_mean(relative, width)
+    shift = len(energy) // 2 - round(event.centre_rev * len(energy)) + width // 2
+    relative_energy: FloatArray = np.roll(energy, shift) / np.median(energy)
+    return relative_energy
+
+
+def _around(searched: ShaftLines, event: ToothEvent) -> tuple[float, float]:
+    energy = _relative_energy(searched, event)
+    middle, pitch = len(energy) // 2, round(len(energy) / searched.teeth)
+    largest = energy[middle - 3 * pitch // 4 : middle + 3 * pitch // 4].max()
+    before, after = energy[middle - 3 * pitch : middle - pitch], energy[middle + pitch : middle + 3 * pitch]
+    return float(np.log(before.mean() / largest)), float(np.log(after.mean() / largest))
+
+
+def _durations(searched: ShaftLines, event: ToothEvent) -> tuple[float, float, float]:
+    """Return the logarithms of width, kurtosis and peak of the energy near the event."""
+    z, highest = searched.teeth, min(n_bands(searched), _MOST_HARMONICS) + 0.5
+    energy = band_signal(searched, 0.5, highest, event.centre_rev) ** 2
+    level = np.median(sliding_mean(energy, _SHAPE_STEPS_PER_TOOTH), axis=1)
+    relative = np.divide(energy, level[:, None], out=np.zeros_like(energy), where=level[:, None] > 0).mean(axis=0)
+    pitches = (np.arange(len(relative)) - len(relative) // 2) / _SHAPE_STEPS_PER_TOOTH
+    near = np.abs(pitches) < min(_NEAR_PITCHES, z / 4)
+    density = np.maximum(relative[near] - np.median(relative[~near]), 0.0) + _LEAST
+    density /= density.sum()
+    off = pitches[near] - density @ pitches[near]
+    variance = max(float(density @ off**2), _LEAST)
+    kurtosis = max(float(density @ off**4) / variance**2, _LEAST)
+    return 0.5 * float(np.log(variance)), float(np.log(kurtosis)), float(np.log(density.max() * _SHAPE_STEPS_PER_TOOTH))
+
+
+def band_signal(searched: ShaftLines, lowest: float, highest: float, centre_rev: float) -> FloatArray:
+    """Return one revolution of what tells teeth apart, between two mesh harmonics, `centre_rev` in its middle.
+
+    Returns
+    -------
+    array, (n_channels, 64 z)
+    """
+    z, n = searched.teeth, _SHAPE_STEPS_PER_TOOTH * searched.teeth
+    lines = without_regular_lines(searched)
+    orders = np.arange(lines.shape[1])
+    spectrum = np.zeros((len(lines), n // 2 + 1), dtype=complex)
+    used = orders[(orders >= lowest * z) & (orders <= highest * z) & (orders < n // 2)]
+    spectrum[:, used] = lines[:, used]
+    signal: FloatArray = np.roll(np.fft.irfft(spectrum, n, axis=1) * n / 2, n // 2 - round(centre_rev * n), axis=1)
+    return signal
+
+
+# --------------------
+# How far the synchrosqueezed plane rises at high orders near the tooth.
+# --------------------
+
+
+LOWEST_HARMONIC = 3.5
+"""High orders: from between the third and fourth mesh harmonic on."""
+
+SQUEEZED_WINDOW_PITCHES = 2.0
+_STEP = 4
+
+
+def squeezed_rise_db(searched: ShaftLines, sound: ShaftLines, event: ToothEvent) -> float:
+    """Return 10 log₁₀ of the squeezed energy near the tooth over that of a middling sound tooth, mean over channels.
+
+    E = Σ |T(o, θ)|² over orders o above 3.5 mesh harmonics and the two pitches about the event. It grows with a crack's
+    depth on one machine. Between machines it says no more of the depth than the energies that `features` holds: the
+    squeezing moves energy between orders, not between angles.
+
+    Parameters
+    ----------
+    searched : ShaftLines
+        The average, or its difference from the sound gear's.
+    sound : ShaftLines
+        The sound gear's average, or the average itself: whose middling tooth is compared with.
+    event : ToothEvent
+    """
+    highest = min(n_bands(searched), n_bands(sound)) + 0.5
+    near = [windows[len(windows) // 2] for windows in _windows(searched, highest, event)]
+    middling = [np.median(windows) for windows in _windows(sound, highest, event)]
+    return 10.0 * float(np.mean(np.log10(np.divide(near, middling))))
+
+
+def _windows(shaft: ShaftLines, highest: float, event: ToothEvent) -> list[FloatArray]:
+    """Return the mean energy in the window about each angle, the event in the middle, one array per channel."""
+    from gearsig.timefreq import UniformSignal, squeezed_cwt
+
+    found = []
+    for values in band_signal(shaft, LOWEST_HARMONIC, highest, event.centre_rev):
+        largest = float(np.abs(values).max())
+        signal = UniformSignal(values / largest, len(values), "order", highest=highest * shaft.teeth)
+        lowest = LOWEST_HARMONIC * shaft.teeth
+        plane = squeezed_cwt(signal, lowest=lowest, highest=highest * shaft.teeth, step=_STEP).values
+        energy = largest**2 * np.sum(np.abs(plane).astype(np.float64) ** 2, axis=0)
+        width = round(SQUEEZED_WINDOW_PITCHES * len(energy) / shaft.teeth)
+        found.append(np.roll(sliding_mean(energy, width), width // 2))
+    return found

@@ -1,0 +1,535 @@
+"""Amplitude and power spectra over frequency."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from gearsig.checks import FloatArray, one_of, positive, within
+from gearsig.errors import InputError, RefusalError
+from gearsig.recording import Recording
+from gearsig.spectra._types import (
+    Scaling,
+    Spectrum,
+    checked_signal,
+    mean_power,
+    plan_blocks,
+    scaled,
+    scaled_unit,
+    window_response,
+)
+
+AMPLITUDE_SCALINGS = ("amplitude peak", "amplitude rms", "power")
+
+
+def amplitude_spectrum(
+    values: FloatArray,
+    sampling_rate_hz: float,
+    *,
+    unit: str = "",
+    source: str = "",
+    window: str = "hann",
+    scaling: Scaling = "amplitude peak",
+    n_per_block: int | None = None,
+    overlap: float = 0.5,
+) -> Spectrum:
+    """Return the amplitude or power spectrum of a signal, of one block or as the rms mean over blocks.
+
+    A_k = 2 |Σ x[n] w[n] exp(-2πi k n/N)| / Σ w[n]; half of that at DC and at Nyquist.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+        The mean is not removed: it stands at line 0.
+    sampling_rate_hz : float
+    unit, source : str
+        Of the signal.
+    window : str
+        See `make_window`.
+    scaling : str
+        "amplitude peak" (a bin-centred sine of amplitude 1 reads 1), "amplitude rms" (1/√2) or "power" (1/2).
+    n_per_block : int or None
+        Block length; None takes the whole signal as one block, with the finest resolution and no averaging.
+    overlap : float
+        0 to 0.95, the part of a block that the next one repeats.
+
+    Returns
+    -------
+    Spectrum
+        Over frequency. Parseval: with a rectangular window and one block, the sum of "power" is the mean square;
+        with another window, the sum over the noise bandwidth in lines is the mean square of x·w over that of w.
+
+    Raises
+    ------
+    InputError
+        On a wrong shape, rate, window, scaling or block length.
+
+    Notes
+    -----
+    Not for noise levels: they depend on the window and the block length here. Use `power_density`.
+    Not for a speed that changes by more than a line over the block: use an order spectrum.
+
+    Examples
+    --------
+    >>> t = np.arange(1000) / 1000
+    >>> spectrum = amplitude_spectrum(3 * np.sin(2 * np.pi * 50 * t), 1000.0)
+    >>> round(float(spectrum.values[50]), 9)
+    3.0
+    """
+    x = checked_signal(values)
+    fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    one_of(scaling, "scaling", AMPLITUDE_SCALINGS)
+    plan = plan_blocks(len(x), n_per_block, overlap, window)
+    resolution = fs / plan.n_per_block
+    bandwidth = plan.window.noise_bandwidth_bins * resolution
+    power = mean_power(x, plan)
+    return Spectrum(
+        values=scaled(power, scaling, bandwidth, plan.n_per_block),
+        positions=np.arange(len(power)) * resolution,
+        axis="frequency",
+        scaling=scaling,
+        unit=scaled_unit(unit, scaling),
+        resolution=resolution,
+        noise_bandwidth=bandwidth,
+        window=plan.window.name,
+        n_averages=plan.n_averages,
+        source=source,
+    )
+
+
+def channel_spectrum(
+    recording: Recording,
+    channel: str,
+    *,
+    window: str = "hann",
+    scaling: Scaling = "amplitude peak",
+    n_per_block: int | None = None,
+    overlap: float = 0.5,
+) -> Spectrum:
+    """Return `amplitude_spectrum` of one channel of a recording, with its unit and name."""
+    row = recording.channels[recording.index(channel)]
+    return amplitude_spectrum(
+        recording.values(channel),
+        recording.sampling_rate_hz,
+        unit=row.unit,
+        source=row.name,
+        window=window,
+        scaling=scaling,
+        n_per_block=n_per_block,
+        overlap=overlap,
+    )
+
+
+# --------------------
+# Power spectral density over frequency by Welch's method.
+# --------------------
+
+
+DEFAULT_BLOCK = 8192
+
+
+def power_density(
+    values: FloatArray,
+    sampling_rate_hz: float,
+    *,
+    unit: str = "",
+    source: str = "",
+    window: str = "hann",
+    n_per_block: int | None = None,
+    overlap: float = 0.5,
+) -> Spectrum:
+    """Return the one-sided power spectral density, averaged over windowed overlapping blocks.
+
+    S_k = c_k mean |Σ x[n] w[n] exp(-2πi k n/N)|² / (fs Σ w[n]²), c_k = 2 but at DC and Nyquist 1.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+        The mean is not removed.
+    sampling_rate_hz : float
+    unit, source : str
+        Of the signal.
+    window : str
+        See `make_window`.
+    n_per_block : int or None
+        Block length; None takes 8192 samples, or an eighth of a shorter signal.
+    overlap : float
+        0 to 0.95.
+
+    Returns
+    -------
+    Spectrum
+        Scaling "power density", unit e.g. "(m/s^2)^2/Hz"; its integral over frequency is the mean square.
+
+    Raises
+    ------
+    InputError
+        On a wrong shape, rate, window or block length.
+
+    Notes
+    -----
+    Not for the level of a tone: its density grows with the block length. Use `amplitude_spectrum`.
+
+    References
+    ----------
+    P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", 1967.
+    """
+    x = checked_signal(values)
+    fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    n = n_per_block if n_per_block is not None else min(DEFAULT_BLOCK, max(2, len(x) // 8))
+    plan = plan_blocks(len(x), n, overlap, window)
+    resolution = fs / plan.n_per_block
+    bandwidth = plan.window.noise_bandwidth_bins * resolution
+    power = mean_power(x, plan)
+    return Spectrum(
+        values=scaled(power, "power density", bandwidth, plan.n_per_block),
+        positions=np.arange(len(power)) * resolution,
+        axis="frequency",
+        scaling="power density",
+        unit=scaled_unit(unit, "power density"),
+        resolution=resolution,
+        noise_bandwidth=bandwidth,
+        window=plan.window.name,
+        n_averages=plan.n_averages,
+        source=source,
+    )
+
+
+def channel_density(
+    recording: Recording,
+    channel: str,
+    *,
+    window: str = "hann",
+    n_per_block: int | None = None,
+    overlap: float = 0.5,
+) -> Spectrum:
+    """Return `power_density` of one channel of a recording, with its unit and name."""
+    row = recording.channels[recording.index(channel)]
+    return power_density(
+        recording.values(channel),
+        recording.sampling_rate_hz,
+        unit=row.unit,
+        source=row.name,
+        window=window,
+        n_per_block=n_per_block,
+        overlap=overlap,
+    )
+
+
+# --------------------
+# Local noise floor of a spectrum, robust against its lines.
+# --------------------
+
+
+FEWEST_LINES = 16
+"""Fewer lines than that per block make the quantile too uncertain (35 % with one average)."""
+
+
+def noise_floor(spectrum: Spectrum, *, width: float | None = None, quantile: float = 0.5) -> Spectrum:
+    """Return the mean noise at each line of a spectrum, estimated from a quantile of its neighbourhood.
+
+    Under Gaussian noise of smooth density, the power of a line averaged K times follows a gamma distribution of
+    shape K (K = 1: exponential; the amplitude's is Rayleigh). Its quantile q is mean · G⁻¹(q; K)/K, so that
+    floor = Q_q / (G⁻¹(q; K)/K) is the mean noise power; for K = 1 and the median the divisor is ln 2. Lines of tones
+    only shift the quantile by their share of the neighbourhood, whatever their height. Block quantiles every half
+    width are joined by straight lines over log power; towards either end the blocks get shorter.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Of any scaling but "dimensionless".
+    width : float or None
+        Of the neighbourhood, in the axis' unit; at least 16 lines. It should hold many more noise lines than
+        tones, and the density should change little over it. None takes 1/200 of the lines, but at least 256 lines
+        (fewer, down to 48, where the spectrum is an average).
+    quantile : float
+        0.05 to 0.95. Lower ones bear more tones (at 0.25, three in four lines may be tones) but scatter more.
+
+    Returns
+    -------
+    Spectrum
+        Same axis and scaling. For amplitudes, it is the root of the mean squared amplitude, so that
+        20 lg(amplitude/floor) = 10 lg(power/mean noise power).
+
+    Raises
+    ------
+    RefusalError
+        With fewer than 16 lines.
+    InputError
+        On a cepstrum, or a width below 16 lines.
+
+    Notes
+    -----
+    Not for a spectrum without noise (a simulation's): the floor is then its rounding or leakage. DC and the window's
+    leakage around it count as lines do.
+
+    References
+    ----------
+    A. Leon-Garcia, *Probability, Statistics, and Random Processes for Electrical Engineering*, 3rd ed. (gamma
+    distribution of averaged periodograms); the quantile's correction follows from it.
+    """
+    if spectrum.scaling == "dimensionless":
+        raise InputError("a cepstrum has no noise floor", allowed="an amplitude or power spectrum")
+    n_lines = len(spectrum.values)
+    if n_lines < FEWEST_LINES:
+        raise RefusalError(f"{n_lines} lines are too few for a floor", remedy="take a longer block")
+    q = within(quantile, "quantile", 0.05, 0.95)
+    block = _block_lines(spectrum, width)
+    power = line_powers(spectrum)
+    floor = _running_quantile(power, block, q) / gamma_quantile(q, spectrum.n_averages)
+    is_amplitude = spectrum.scaling in ("amplitude peak", "amplitude rms")
+    return replace(
+        spectrum,
+        values=np.sqrt(floor) if is_amplitude else floor,
+        source=f"noise floor of {spectrum.source or 'spectrum'}",
+    )
+
+
+def line_powers(spectrum: Spectrum) -> FloatArray:
+    """Return the values, squared if they are amplitudes."""
+    values: FloatArray = np.asarray(spectrum.values, dtype=np.float64)
+    return values**2 if spectrum.scaling in ("amplitude peak", "amplitude rms") else values
+
+
+def gamma_quantile(q: float, n_averages: int) -> float:
+    """Return the quantile q of a line's power over its mean, for n independent averages; ln 2 for the median and one.
+
+    Examples
+    --------
+    >>> round(gamma_quantile(0.5, 1), 6)
+    0.693147
+    """
+    from scipy.special import gammaincinv
+
+    return float(gammaincinv(n_averages, q)) / n_averages
+
+
+def _block_lines(spectrum: Spectrum, width: float | None) -> int:
+    n_lines = len(spectrum.values)
+    if width is None:
+        # The floor's own scatter multiplies the false-alarm rate of a search above it; so many lines keep that small.
+        return min(n_lines, max(48, 256 // spectrum.n_averages, n_lines // 200))
+    block = round(positive(width, "width") / spectrum.resolution)
+    if block < FEWEST_LINES:
+        raise InputError(
+            f"width {width:g} holds {block} lines of {spectrum.resolution:g}",
+            allowed=f"at least {FEWEST_LINES * spectrum.resolution:g}",
+            remedy="widen it, or take a longer block",
+        )
+    return min(block, n_lines)
+
+
+def _running_quantile(power: FloatArray, block: int, q: float) -> FloatArray:
+    """Return block quantiles every half block, interpolated over log power at every line."""
+    n = len(power)
+    half = block // 2
+    blocks = np.lib.stride_tricks.sliding_window_view(power, block)[::half]
+    centres = np.arange(len(blocks)) * half + (block - 1) / 2
+    levels = np.quantile(blocks, q, axis=1)
+    short = [s for s in (half, half // 2) if s >= FEWEST_LINES // 2]
+    left = [(float(np.quantile(power[:s], q)), (s - 1) / 2) for s in reversed(short)]
+    right = [(float(np.quantile(power[-s:], q)), n - (s + 1) / 2) for s in short]
+    last = float(np.quantile(power[-block:], q)), n - (block + 1) / 2
+    if last[1] > centres[-1]:
+        right.insert(0, last)
+    x = np.concatenate([[c for _, c in left], centres, [c for _, c in right]])
+    y = np.concatenate([[v for v, _ in left], levels, [v for v, _ in right]])
+    # Zeros (a dead stretch of a simulated spectrum) have no logarithm; the least positive double stands for them.
+    logs = np.log(np.maximum(y, np.finfo(np.float64).tiny))
+    order = np.argsort(x, kind="stable")
+    result: FloatArray = np.exp(np.interp(np.arange(n), x[order], logs[order]))
+    return result
+
+
+# --------------------
+# Lines of a spectrum that stand above its noise floor.
+# --------------------
+
+
+SKIRT_BINS = 200
+"""How far a strong line's leakage is followed."""
+
+SKIRT_MARGIN = 2.0
+"""Leakage is tested against this times its envelope, in amplitude: noise on top of a skirt is not a line."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line that stands above the noise floor.
+
+    Parameters
+    ----------
+    position : float
+        Frequency or order, interpolated between the spectrum's lines.
+    value : float
+        In the spectrum's scaling, corrected for the loss between two lines; a density's is that of its line.
+    floor : float
+        Mean noise there, in the same scaling.
+    ratio_db : float
+        20 lg of the amplitude ratio, 10 lg of the power ratio, of the highest line to the floor.
+    """
+
+    position: float
+    value: float
+    floor: float
+    ratio_db: float
+
+
+def find_lines(
+    spectrum: Spectrum,
+    floor: Spectrum | None = None,
+    *,
+    false_alarm: float = 0.01,
+    threshold_db: float | None = None,
+) -> tuple[Line, ...]:
+    """Return the lines above the noise floor, in order of position.
+
+    A line is a local maximum above floor + threshold that is not leakage of a stronger one. Without `threshold_db`,
+    the threshold holds the probability of any false line in the whole spectrum at `false_alarm`: under Gaussian noise
+    the power of one of n lines, averaged K times, exceeds t times its mean with probability Q(K, K t) (for K = 1,
+    exp(-t)), so that Q(K, K t) = false_alarm/n.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Over frequency or order.
+    floor : Spectrum or None
+        From `noise_floor` of the same spectrum; None takes its defaults.
+    false_alarm : float
+        1e-12 to 0.5, for the whole spectrum.
+    threshold_db : float or None
+        Overrides `false_alarm`.
+
+    Returns
+    -------
+    tuple of Line
+        Positions are exact for a single steady tone without noise. They come from the ratio of the two highest lines
+        and the window's transform; so does the correction of the value.
+
+    Raises
+    ------
+    InputError
+        On a floor that does not belong to the spectrum, or a cepstrum.
+
+    Notes
+    -----
+    The rate holds for Gaussian noise with a floor that follows its density; impulses and a modulated carrier's skirts
+    are neither. A floor from few lines scatters and raises the rate: 256 lines about 1.3 times, 64 lines 2.5 times.
+    The lines at DC and Nyquist and the window's main lobe around DC are left out.
+
+    References
+    ----------
+    D. C. Rife and G. A. Vincent, "Use of the discrete Fourier transform in the measurement of frequencies and levels
+    of tones", 1970 (interpolation by the window's transform). C. E. Bonferroni's inequality bounds the rate.
+
+    Examples
+    --------
+    >>> from gearsig.spectra import amplitude_spectrum
+    >>> t = np.arange(20000) / 1000
+    >>> x = 0.3 * np.sin(2 * np.pi * 50.02 * t) + np.random.default_rng(1).normal(size=len(t))
+    >>> [(round(line.position, 2), round(line.value, 1)) for line in find_lines(amplitude_spectrum(x, 1000.0))]
+    [(50.02, 0.3)]
+    """
+    base = noise_floor(spectrum) if floor is None else floor
+    if len(base.values) != len(spectrum.values) or base.scaling != spectrum.scaling:
+        raise InputError("the floor does not belong to the spectrum", remedy="take noise_floor of the same spectrum")
+    power, mean_noise = line_powers(spectrum), line_powers(base)
+    first = 1 + int(np.ceil(_half_lobe(spectrum.window)))
+    if threshold_db is not None:
+        threshold = 10.0 ** (float(threshold_db) / 10.0)
+    else:
+        rate = within(false_alarm, "false_alarm", 1e-12, 0.5)
+        threshold = false_alarm_ratio(rate / max(1, len(power) - first - 1), spectrum.n_averages)
+    with np.errstate(divide="ignore", invalid="ignore"):  # a floor of zero: only what is above zero is infinite
+        ratio = np.where(power > 0, power / mean_noise, 0.0)
+    peaks = _local_maxima(power, first)
+    peaks = peaks[ratio[peaks] > threshold]
+    peaks = _without_leakage(peaks, power, mean_noise, spectrum.window)
+    return tuple(_line(spectrum, power, base, int(k), float(ratio[k])) for k in peaks)
+
+
+def false_alarm_ratio(probability: float, n_averages: int) -> float:
+    """Return the ratio to its mean that a noise line's power exceeds with the given probability.
+
+    Examples
+    --------
+    >>> round(false_alarm_ratio(1e-3, 1), 4)
+    6.9078
+    """
+    from scipy.special import gammainccinv
+
+    return float(gammainccinv(n_averages, probability)) / n_averages
+
+
+def _local_maxima(power: FloatArray, first: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    """Return indices of lines above both neighbours, from `first` to the last but one."""
+    inner = power[1:-1]
+    peaks = np.flatnonzero((inner > power[:-2]) & (inner >= power[2:])) + 1
+    return peaks[peaks >= first]
+
+
+def _without_leakage(
+    peaks: np.ndarray[tuple[int], np.dtype[np.intp]], power: FloatArray, mean_noise: FloatArray, window: str
+) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    """Drop peaks that a stronger one's leakage explains: power below margin² · envelope² · that peak's power."""
+    envelope = (SKIRT_MARGIN * _leakage_envelope(window)) ** 2
+    explained = np.zeros_like(power)
+    strong = peaks[power[peaks] * envelope[2] > mean_noise[peaks]]  # others leak less than the noise
+    for k in strong[np.argsort(-power[strong])]:
+        if power[k] <= explained[k]:
+            continue
+        low, high = max(0, k - SKIRT_BINS), min(len(power), k + SKIRT_BINS + 1)
+        skirt = power[k] * envelope[np.abs(np.arange(low, high) - k)]
+        skirt[k - low] = 0.0
+        np.maximum(explained[low:high], skirt, out=explained[low:high])
+    return peaks[power[peaks] > explained[peaks]]
+
+
+def _line(spectrum: Spectrum, power: FloatArray, base: Spectrum, k: int, ratio: float) -> Line:
+    offset, loss = _interpolate(power[k - 1 : k + 2], spectrum.window)
+    is_density = spectrum.scaling == "power density"
+    gain = 1.0 if is_density else 1.0 / loss if spectrum.scaling != "power" else 1.0 / loss**2
+    return Line(
+        position=float(spectrum.positions[0]) + (k + offset) * spectrum.resolution,
+        value=float(spectrum.values[k]) * gain,
+        floor=float(base.values[k]),
+        ratio_db=float(10 * np.log10(ratio)),
+    )
+
+
+def _interpolate(three: FloatArray, window: str) -> tuple[float, float]:
+    """Return (offset in lines from the middle one, window response there) from three lines' powers."""
+    side = 1 if three[2] >= three[0] else -1
+    offsets, ratios, responses = _ratio_table(window)
+    ratio = np.sqrt(three[1 + side] / three[1])
+    offset = float(np.interp(ratio, ratios, offsets))
+    return side * offset, float(np.interp(offset, offsets, responses))
+
+
+@lru_cache(maxsize=8)
+def _ratio_table(window: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return offsets 0 … 0.5 of a tone from its highest line, neighbour-to-highest ratio, response at the highest."""
+    offsets = np.linspace(0.0, 0.5, 501)
+    own, neighbour = window_response(window, offsets), window_response(window, 1.0 - offsets)
+    return offsets, neighbour / own, own
+
+
+@lru_cache(maxsize=8)
+def _leakage_envelope(window: str) -> FloatArray:
+    """Return the largest response at or beyond each distance in lines, for a tone anywhere between two lines.
+
+    Relative to the tone's highest line, which is up to half a line off.
+    """
+    fine = window_response(window, np.arange(0, 8 * (SKIRT_BINS + 9)) / 8.0)
+    beyond = np.maximum.accumulate(fine[::-1])[::-1]
+    distance = np.maximum(np.arange(SKIRT_BINS + 1) * 8 - 4, 0)
+    envelope: FloatArray = beyond[distance] / fine[4]
+    return envelope
+
+
+def _half_lobe(window: str) -> float:
+    """Return half the main lobe's width in lines: where the response first falls below 1 %."""
+    fine = window_response(window, np.arange(0, 128) / 8.0)
+    return float(np.argmax(fine < 0.01)) / 8.0

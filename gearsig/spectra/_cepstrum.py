@@ -1,0 +1,184 @@
+"""Real and power cepstrum, and what editing a cepstrum does to families of harmonics and sidebands."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from gearsig.checks import FloatArray, count, one_of, positive
+from gearsig.errors import InputError, RefusalError
+from gearsig.spectra._types import ComplexArray, Spectrum, checked_signal
+
+LOWEST_RELATIVE_MAGNITUDE = 1e-12
+"""Lines of zero have no logarithm: magnitudes are kept above this part of the largest."""
+
+
+def cepstrum(
+    values: FloatArray,
+    sampling_rate_hz: float,
+    *,
+    kind: Literal["real", "power"] = "real",
+    source: str = "",
+) -> Spectrum:
+    """Return the cepstrum of a signal: the inverse transform of its log spectrum, over quefrency.
+
+    Real: c(τ) = F⁻¹{ln|X(f)|}. Power: |F⁻¹{ln|X(f)|²}|² = 4 c(τ)². A family of harmonics or sidebands Δf apart,
+    however many, shows as peaks at 1/Δf and its multiples (rahmonics).
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+    sampling_rate_hz : float
+    kind : str
+        "real" (signed) or "power".
+    source : str
+
+    Returns
+    -------
+    Spectrum
+        Axis "quefrency" in s from 0 to half the signal's length, dimensionless (natural logarithm).
+
+    Raises
+    ------
+    RefusalError
+        On a signal of zeros.
+    InputError
+        On a wrong shape or rate.
+
+    Notes
+    -----
+    Not for levels: a transfer path only adds to low quefrencies, but so does any change of the floor's shape. The
+    speed must not change by more than a line of the spectrum at the highest harmonic; use an angle signal otherwise
+    (quefrency then counts revolutions).
+
+    References
+    ----------
+    R. B. Randall, "A history of cepstrum analysis and its application to mechanical problems", 2017.
+
+    Examples
+    --------
+    >>> x = np.zeros(1000)
+    >>> x[::50] = 1.0
+    >>> c = cepstrum(x + 1e-3 * np.random.default_rng(0).normal(size=1000), 1000.0)
+    >>> round(c.largest_near(0.05, 0.02)[0], 3)
+    0.05
+    """
+    x = checked_signal(values, minimum=4)
+    fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    one_of(kind, "kind", ("real", "power"))
+    c = real_cepstrum(_transform(x), len(x))[: len(x) // 2 + 1]
+    return Spectrum(
+        values=c if kind == "real" else 4.0 * c**2,
+        positions=np.arange(len(c)) / fs,
+        axis="quefrency",
+        scaling="dimensionless",
+        unit="",
+        resolution=1.0 / fs,
+        noise_bandwidth=1.0 / fs,
+        window="rectangular",
+        n_averages=1,
+        source=f"{kind} cepstrum of {source or 'signal'}",
+    )
+
+
+def lifter_families(
+    values: FloatArray,
+    sampling_rate_hz: float,
+    spacing_hz: float,
+    *,
+    keep: bool,
+    n_rahmonics: int | None = None,
+    half_width_s: float | None = None,
+) -> FloatArray:
+    """Return a signal in which families of lines `spacing_hz` apart are all that is kept, or are removed.
+
+    The real cepstrum is set to zero at (or, for `keep`, outside of) the rahmonics k/Δf ± half width; the edited log
+    magnitude goes back to time with the original phase. Removal levels the family's lines with their neighbourhood
+    whether or not they are exactly periodic.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+    sampling_rate_hz, spacing_hz : float
+    keep : bool
+        True keeps the families (and the mean level, quefrency 0), False removes them.
+    n_rahmonics : int or None
+        None takes all up to half the signal's length.
+    half_width_s : float or None
+        Around each rahmonic; None is one sample at the first, growing in proportion (the speed's uncertainty does).
+
+    Returns
+    -------
+    array, (n_samples,)
+        In the signal's unit.
+
+    Raises
+    ------
+    RefusalError, InputError
+        As `cepstrum`; also if the spacing does not fit the signal.
+
+    References
+    ----------
+    R. B. Randall and N. Sawalhi, "A new method for separating discrete components from a signal", 2011.
+    """
+    x = checked_signal(values, minimum=4)
+    fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    period = fs / positive(spacing_hz, "spacing_hz", "Hz")
+    if not 2.0 <= period <= len(x) / 2:
+        raise InputError(
+            f"spacing_hz is {spacing_hz:g}", allowed=f"{2 * fs / len(x):g} to {fs / 2:g} Hz for this signal"
+        )
+    lines = _transform(x)
+    c = real_cepstrum(lines, len(x))
+    mask = _rahmonic_mask(len(x), period, n_rahmonics, None if half_width_s is None else half_width_s * fs)
+    if keep:
+        mask = ~mask
+        mask[0] = False
+    c[mask] = 0.0
+    return _with_magnitude(lines, c, len(x))
+
+
+def real_cepstrum(lines: ComplexArray, n: int) -> FloatArray:
+    """Return F⁻¹{ln|X|} of a one-sided transform, (n,)."""
+    from scipy.fft import irfft
+
+    magnitude = np.abs(lines)
+    result: FloatArray = irfft(np.log(np.maximum(magnitude, LOWEST_RELATIVE_MAGNITUDE * magnitude.max())), n)
+    return result
+
+
+def _transform(x: FloatArray) -> ComplexArray:
+    from scipy.fft import rfft
+
+    lines: ComplexArray = rfft(x.astype(np.float64))
+    if not np.any(lines):
+        raise RefusalError("the signal is zero throughout: it has no logarithm", remedy="check the channel")
+    return lines
+
+
+def _rahmonic_mask(
+    n: int, period: float, n_rahmonics: int | None, half_width: float | None
+) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Mark the rahmonics on both sides of a cepstrum of n samples, symmetric as the cepstrum is."""
+    most = int(n / 2 / period)
+    k = np.arange(1, (most if n_rahmonics is None else min(most, count(n_rahmonics, "n_rahmonics"))) + 1)
+    widths = k.astype(np.float64) if half_width is None else np.full(len(k), max(half_width, 0.5))
+    widths = np.minimum(widths, period / 4)  # neighbours must not merge
+    q = np.arange(n // 2 + 1, dtype=np.float64)
+    nearest = np.clip(np.rint(q / period).astype(np.intp), 1, len(k))
+    half = np.abs(q - nearest * period) <= widths[nearest - 1]
+    mask = np.zeros(n, dtype=np.bool_)
+    mask[: n // 2 + 1] = half
+    mask[n - n // 2 :] |= half[1:][::-1]
+    return mask
+
+
+def _with_magnitude(lines: ComplexArray, c: FloatArray, n: int) -> FloatArray:
+    """Return the signal whose log magnitude has cepstrum c, with the phase of `lines`."""
+    from scipy.fft import irfft, rfft
+
+    magnitude = np.abs(lines)
+    phase = np.divide(lines, magnitude, out=np.zeros_like(lines), where=magnitude > 0)
+    result: FloatArray = irfft(phase * np.exp(rfft(c).real), n)
+    return result

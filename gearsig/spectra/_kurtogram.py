@@ -1,0 +1,700 @@
+"""Fast kurtogram, the band it chooses, and the envelope spectrum in that band."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from numba import njit
+
+from gearsig.checks import FloatArray, count, frozen_array, not_negative, positive
+from gearsig.errors import InputError, RefusalError
+from gearsig.recording import Recording
+from gearsig.spectra._envelope import (
+    BandCandidate,
+    Envelope,
+    EnvelopeKind,
+    Preparation,
+    band_envelope,
+    envelope_spectrum,
+    prepared_signal,
+)
+from gearsig.spectra._types import Spectrum, checked_signal
+
+# --------------------
+# What Gaussian noise alone does to the spectral kurtosis of a kurtogram's bands.
+# --------------------
+
+
+OVERLAP = 1.66
+"""Σ|ρ(m)|⁴ over the envelope's lags for the tree's filters (1.60 to 1.75 by path): samples per independent one."""
+REAL_BIAS = 0.01
+"""Kurtosis that a real signal's bands at 0 and half the rate show: the mirror image is close."""
+
+
+def kurtosis_error(n_bands: int, n_samples: int) -> float:
+    """Return the standard error of the kurtosis of white Gaussian noise.
+
+    The influence function of ⟨|z|⁴⟩/⟨|z|²⟩² is 2 L₂(|z|²), Laguerre's polynomial, whose covariance is 4|ρ(m)|⁴, hence
+    Var K = (4/n) Σ|ρ(m)|⁴. The whole real band has Hermite's H₄ instead: Var K = 24/n.
+    """
+    return float(np.sqrt((24.0 if n_bands == 1 else 4.0 * OVERLAP) / n_samples))
+
+
+def noise_limit(n_samples: FloatArray, standard_error: FloatArray, probability: float) -> FloatArray:
+    """Return the kurtosis that noise exceeds in any of the bands with at most about `probability`.
+
+    Bonferroni's quantile q of the normal distribution, bent by the third and fourth moments of 2 L₂: skewness 10/√m and
+    excess 294/m for m independent samples (Cornish and Fisher's expansion).
+    """
+    from scipy.special import ndtri
+
+    q = float(-ndtri(probability / len(n_samples)))
+    m = n_samples / OVERLAP
+    skewness = 10.0 / np.sqrt(m)
+    bent = q + skewness * (q**2 - 1) / 6 + 294.0 / m * (q**3 - 3 * q) / 24 - skewness**2 * (2 * q**3 - 5 * q) / 36
+    result: FloatArray = bent * standard_error + REAL_BIAS
+    return result
+
+
+# --------------------
+# A kurtogram: how impulsive each band of a tree of bands is.
+# --------------------
+
+
+LARGE_SHARE = 0.2
+"""Share of the fourth moment from which on a single envelope sample makes a kurtosis a doubtful guide."""
+
+WEAK_KURTOSIS = 0.3
+"""Kurtosis that is more than chance in long signals, yet no sign of impacts: slow changes of level do as much."""
+
+
+@dataclass(frozen=True)
+class Kurtogram:
+    """Spectral kurtosis over the bands of a tree of halves and thirds.
+
+    K = ⟨|z|⁴⟩/⟨|z|²⟩² - 2 of a band's complex envelope z; 0 for stationary Gaussian noise, -1 for a steady sine. For
+    the whole band (level 0), x being real, K = ⟨x⁴⟩/⟨x²⟩² - 3.
+
+    Parameters
+    ----------
+    low_hz, high_hz : arrays, (n_bands,)
+    level : array, (n_bands,)
+        log2 of the number of bands that the spectrum is cut into: 0, 1, log2 3, 2, 1 + log2 3, …; ascending.
+    kurtosis : array, (n_bands,)
+    standard_error : array, (n_bands,)
+        Of the kurtosis under Gaussian noise, white within the band.
+    largest_share : array, (n_bands,)
+        Share of Σ|z|⁴ that the largest envelope sample has: 1 if all the kurtosis is one event.
+    n_envelope_samples : array, (n_bands,)
+        Samples of z that the kurtosis rests on, about twice the number of independent ones.
+    preparation : str
+        What was done to the signal first.
+    source : str
+    """
+
+    low_hz: FloatArray
+    high_hz: FloatArray
+    level: FloatArray
+    kurtosis: FloatArray
+    standard_error: FloatArray
+    largest_share: FloatArray
+    n_envelope_samples: FloatArray
+    preparation: str = "none"
+    source: str = field(default="")
+
+    def __post_init__(self) -> None:
+        arrays = ("low_hz", "high_hz", "level", "kurtosis", "standard_error", "largest_share", "n_envelope_samples")
+        for name in arrays:
+            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        if len({len(getattr(self, name)) for name in arrays}) != 1:
+            raise InputError("the arrays of a kurtogram differ in length")
+
+    @property
+    def centre_hz(self) -> FloatArray:
+        """Middle of each band."""
+        return (self.low_hz + self.high_hz) / 2
+
+    @property
+    def bandwidth_hz(self) -> FloatArray:
+        """Width of each band."""
+        return self.high_hz - self.low_hz
+
+    @property
+    def noise_limit(self) -> FloatArray:
+        """Kurtosis that stationary Gaussian noise exceeds in any band at all in one kurtogram of 20."""
+        return noise_limit(self.n_envelope_samples, self.standard_error, 0.05)
+
+    @property
+    def levels(self) -> FloatArray:
+        """The levels, each once, ascending."""
+        return np.unique(self.level)
+
+    def best_band(
+        self, *, narrowest_hz: float = 0.0, lowest_hz: float = 0.0, highest_hz: float | None = None
+    ) -> BandCandidate:
+        """Return the band of the largest kurtosis among those allowed; of equals, the widest.
+
+        Parameters
+        ----------
+        narrowest_hz : float
+            Bands are at least that wide: three times the highest modulation frequency sought, or more.
+        lowest_hz, highest_hz : float
+            Bands lie between these; None is half the sampling rate.
+
+        Raises
+        ------
+        RefusalError
+            If no band fits.
+        """
+        top = float(self.high_hz.max()) if highest_hz is None else not_negative(highest_hz, "highest_hz", "Hz")
+        rounding = 1e-9 * float(self.high_hz.max())
+        allowed = (
+            (self.bandwidth_hz >= not_negative(narrowest_hz, "narrowest_hz", "Hz") - rounding)
+            & (self.low_hz >= not_negative(lowest_hz, "lowest_hz", "Hz") - rounding)
+            & (self.high_hz <= top + rounding)
+        )
+        if not allowed.any():
+            raise RefusalError(
+                f"no band of the kurtogram lies from {lowest_hz:g} to {top:g} Hz and is {narrowest_hz:g} Hz wide",
+                remedy="widen the range or allow narrower bands",
+            )
+        i = int(np.argmax(np.where(allowed, self.kurtosis, -np.inf)))
+        numbers = (float(a[i]) for a in (self.low_hz, self.high_hz, self.level, self.kurtosis, self.standard_error))
+        return BandCandidate(*numbers)
+
+    def remarks(self, band: BandCandidate) -> tuple[str, ...]:
+        """Return what speaks against trusting a band's kurtosis: chance, few samples, a single event."""
+        i = int(np.argmin(np.abs(self.low_hz - band.low_hz) + np.abs(self.high_hz - band.high_hz)))
+        n, share = int(self.n_envelope_samples[i]), float(self.largest_share[i])
+        remarks = []
+        limit = float(self.noise_limit[i])
+        if band.kurtosis <= limit:
+            remarks.append(
+                f"kurtosis {band.kurtosis:.2g} is what noise alone reaches ({limit:.2g} in one kurtogram of 20): "
+                "no band stands out"
+            )
+        elif band.kurtosis <= max(2.0 * limit, WEAK_KURTOSIS):
+            remarks.append(f"kurtosis {band.kurtosis:.2g} is small: the band hardly stands out from noise")
+        if band.standard_error > 0.1:
+            remarks.append(
+                f"rests on {n} envelope samples: noise alone scatters by {band.standard_error:.2g}; record longer or "
+                "allow wider bands only"
+            )
+        if share > LARGE_SHARE:
+            remarks.append(
+                f"one envelope sample carries {100 * share:.0f} % of the fourth moment: a single event, not a train "
+                "of impulses, may have chosen the band"
+            )
+        return tuple(remarks)
+
+
+# --------------------
+# Filters that split a complex band into halves and thirds.
+# --------------------
+
+
+@dataclass(frozen=True)
+class Splitter:
+    """A low-pass turned to the middle of each part of the band 0 to 1/2 (cycles per sample).
+
+    The parts' middles lie symmetrically about 1/4, so that the products with the cosines and sines of the first part
+    serve the last one too, with the signs of the odd taps reversed; the middle of three lies at 1/4 itself.
+
+    Parameters
+    ----------
+    n_parts : int
+        2 or 3; also the factor by which the rate falls.
+    cosine, sine : arrays, (n_side + 1,)
+        Taps 0 … n_side of the first part's filter; the cosine continues evenly to negative ones, the sine oddly.
+    middle : array, (n_side + 1,)
+        Taps of the middle part: even ones real, odd ones imaginary. Zero for halves.
+    """
+
+    n_parts: int
+    cosine: FloatArray
+    sine: FloatArray
+    middle: FloatArray
+
+    @property
+    def n_taps(self) -> int:
+        """Length of the filters."""
+        return 2 * len(self.cosine) - 1
+
+    def responses(self, frequencies: FloatArray) -> FloatArray:
+        """Return the magnitude of each part's filter, (n_parts, n), at `frequencies` in cycles per sample."""
+        k = np.arange(1 - len(self.cosine), len(self.cosine))
+        low_pass = np.hypot(self.cosine, self.sine)[np.abs(k)] * _sign(self, np.abs(k))
+        middles = (2 * np.arange(self.n_parts) + 1) / (4.0 * self.n_parts)
+        turned = low_pass * np.exp(2j * np.pi * middles[:, None] * k)
+        result: FloatArray = np.abs(turned @ np.exp(-2j * np.pi * np.outer(k, frequencies)))
+        return result
+
+
+@lru_cache(maxsize=2)
+def splitter(n_parts: int) -> Splitter:
+    """Return the filters for halves or thirds.
+
+    h(k) = w(k) sin(2π f_c k)/(πk), f_c = 1/(4 n_parts), w Hamming's window up to the sine's third zero on either
+    side. The response is 1/2 at a part's borders and below 0.3 % from 0.35 of its width beyond them; sampled at twice
+    its width, it does not alias.
+    """
+    n_side = 6 * n_parts - 1  # the next tap is a zero of the sine
+    k = np.arange(n_side + 1)
+    window = 0.54 + 0.46 * np.cos(np.pi * k / (n_side + 1))
+    h = window * np.sinc(k / (2.0 * n_parts)) / (2.0 * n_parts)
+    h[2 * n_parts :: 2 * n_parts] = 0.0
+    h /= h[0] + 2.0 * h[1:].sum()
+    turn = np.pi * k / (2 * n_parts)
+    quarter = np.where(k % 4 < 2, 1.0, -1.0) * (n_parts == 3)  # cos(πk/2) of even, sin(πk/2) of odd taps
+    return Splitter(n_parts, h * np.cos(turn), h * np.sin(turn), h * quarter)
+
+
+def _sign(split: Splitter, k: FloatArray) -> FloatArray:
+    """Return the sign of the low-pass at taps k: that of the sine over k, which changes every 2 n_parts taps."""
+    result: FloatArray = np.where((k // (2 * split.n_parts)) % 2 == 0, 1.0, -1.0)
+    return result
+
+
+# --------------------
+# The tree of halves and thirds, fed piece by piece.
+# --------------------
+
+
+PIECE_SAMPLES = 1 << 16
+"""Samples that go down the tree at once: a level's bands stay near the caches, whatever the signal's length."""
+
+
+class Stage:
+    """All bands of one level, each split into parts; keeps what the next piece's filters still need."""
+
+    def __init__(self, n_bands: int, n_parts: int, *, keep: bool) -> None:
+        self.split: Splitter = splitter(n_parts)
+        self.moments = np.zeros((n_bands * n_parts, 3))
+        self.n_outputs = 0
+        self._tail = np.empty((n_bands, 2, 0))
+        self._keep = keep
+
+    def push(self, x: FloatArray) -> FloatArray:
+        """Take a piece of the bands, (n_bands, 2, n), and return that of the parts, (n_bands·n_parts, 2, n_out)."""
+        s = self.split
+        joined = np.concatenate([self._tail, x], axis=2)
+        n_out = max(0, (joined.shape[2] - s.n_taps) // s.n_parts + 1)
+        parts = np.empty((len(self.moments) if self._keep else 0, 2, n_out))
+        odd = self.n_outputs % 2 == 1
+        split(joined, s.cosine, s.sine, s.middle, s.n_parts, n_out, odd, parts, self.moments)
+        self._tail = joined[:, :, n_out * s.n_parts :].copy()
+        self.n_outputs += n_out
+        return parts
+
+
+def tree_moments(x: FloatArray, n_levels: int, mean: float, scale: float) -> list[tuple[int, FloatArray, int]]:
+    """Return (number of bands, their moments Σ|z|², Σ|z|⁴, max|z|², number of samples) for each row of the tree.
+
+    Row 0 is the real signal itself, then 2, 3, 4, 6 … 2^L, 3·2^(L-1) bands. Outputs are only taken where a filter lies
+    within the signal. Moments are those of (x - mean)/scale.
+    """
+    halves = [Stage(2**k, 2, keep=k < n_levels - 1) for k in range(n_levels)]
+    thirds = [Stage(2**k, 3, keep=False) for k in range(n_levels)]
+    whole = np.zeros(3)
+    for start in range(0, len(x), PIECE_SAMPLES):
+        piece = x[start : start + PIECE_SAMPLES].astype(np.float64)
+        piece -= mean
+        piece /= scale
+        power = piece * piece
+        whole += (power.sum(), float(np.dot(power, power)), 0.0)
+        whole[2] = max(whole[2], float(power.max()))
+        band: FloatArray = np.zeros((1, 2, len(piece)))
+        band[0, 0] = piece
+        for half, third in zip(halves, thirds, strict=True):
+            third.push(band)
+            band = half.push(band)
+    rows: list[tuple[int, FloatArray, int]] = [(1, whole[None, :], len(x))]
+    for half, third in zip(halves, thirds, strict=True):
+        rows += [(len(stage.moments), stage.moments, stage.n_outputs) for stage in (half, third)]
+    return rows
+
+
+FEWEST_SAMPLES = 512
+"""Of a finest band's envelope: below it the kurtosis of noise alone scatters by more than 0.1."""
+DEFAULT_LEVELS = 7
+FEWEST_LINES = 8
+"""Of an envelope's spectrum."""
+
+
+@dataclass(frozen=True)
+class ChosenBand:
+    """A band with the kurtogram that chose it, and the envelope and its spectrum there.
+
+    Parameters
+    ----------
+    band : BandCandidate
+    kurtogram : Kurtogram
+    envelope : Envelope
+    spectrum : Spectrum
+        Of the envelope, over modulation frequency.
+    remarks : tuple of str
+        What speaks against the choice; empty if nothing does.
+    reason : str
+        Why the band was chosen; empty if it was given.
+    """
+
+    band: BandCandidate
+    kurtogram: Kurtogram
+    envelope: Envelope
+    spectrum: Spectrum
+    remarks: tuple[str, ...]
+    reason: str = ""
+
+
+def kurtogram(
+    values: FloatArray,
+    sampling_rate_hz: float,
+    *,
+    n_levels: int | None = None,
+    preparation: Preparation = "none",
+    source: str = "",
+) -> Kurtogram:
+    """Return the fast kurtogram: the spectral kurtosis of 1, 2, 3, 4, 6 … 2^L, 3·2^(L-1) bands.
+
+    K = ⟨|z|⁴⟩/⟨|z|²⟩² - 2, z the complex envelope from a tree of filters that halve the band and the rate, each node
+    also cut into thirds. The mean is removed first.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+    sampling_rate_hz : float
+    n_levels : int or None
+        L, the number of halvings. None is 7 (128 and 192 bands), or what the length allows: envelopes have at
+        least 512 samples.
+    preparation : str
+        "none", "tones removed" or "whitened", see `prepared_signal`.
+    source : str
+
+    Returns
+    -------
+    Kurtogram
+
+    Raises
+    ------
+    InputError
+        On a wrong shape, rate or number of levels.
+    RefusalError
+        On a signal that is constant or too short for two bands.
+
+    Notes
+    -----
+    Not for few strong shocks among many small impulses: the shocks choose the band. Read `remarks`.
+    Borders between bands are half-amplitude points of filters with a skirt of a third of a band on either side. The
+    memory needed does not grow with the length unless the signal is prepared.
+
+    References
+    ----------
+    J. Antoni, "The spectral kurtosis: a useful tool for characterising non-stationary signals", 2006.
+    J. Antoni, "Fast computation of the kurtogram for the detection of transient faults", 2007. The filters are longer
+    than there (23 and 35 taps) and cut off at the bands' borders.
+
+    Examples
+    --------
+    >>> t = np.arange(40000) / 10000.0
+    >>> knocks = np.exp(-400 * (t % 0.05)) * np.sin(2 * np.pi * 3000 * (t % 0.05))
+    >>> x = knocks + 0.1 * np.random.default_rng(0).normal(size=len(t))
+    >>> low, high = kurtogram(x, 10000.0).best_band(narrowest_hz=300).band_hz
+    >>> low <= 3000 <= high
+    True
+    """
+    x = checked_signal(values, minimum=64)
+    fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    n_levels = _checked_levels(len(x), n_levels)
+    x = prepared_signal(x, fs, preparation)
+    low, high, mean = float(x.min()), float(x.max()), float(np.mean(x, dtype=np.float64))
+    spread = max(high - mean, mean - low)
+    if spread <= 1e-7 * max(-low, high) or spread == 0.0:
+        raise RefusalError("the signal is constant: it has no impulses", remedy="check the channel")
+    rows = [_row_of_bands(fs, *row) for row in tree_moments(x, n_levels, mean, spread)]
+    lows, highs, level, kurtosis, error, share, n = (np.concatenate(column) for column in zip(*rows, strict=True))
+    return Kurtogram(lows, highs, level, kurtosis, error, share, n, preparation, source or "signal")
+
+
+def best_band(
+    recording: Recording,
+    channel: str,
+    *,
+    n_levels: int | None = None,
+    preparation: Preparation = "none",
+    narrowest_hz: float = 0.0,
+    lowest_hz: float = 0.0,
+    highest_hz: float | None = None,
+) -> BandCandidate:
+    """Return the most impulsive band of a channel, by its kurtogram; see `kurtogram` and `Kurtogram.best_band`."""
+    found = channel_kurtogram(recording, channel, n_levels=n_levels, preparation=preparation)
+    return found.best_band(narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
+
+
+def channel_kurtogram(
+    recording: Recording, channel: str, *, n_levels: int | None = None, preparation: Preparation = "none"
+) -> Kurtogram:
+    """Return the kurtogram of a recording's channel, see `kurtogram`."""
+    x = recording.values(channel)
+    return kurtogram(x, recording.sampling_rate_hz, n_levels=n_levels, preparation=preparation, source=channel)
+
+
+def kurtogram_envelope(
+    recording: Recording,
+    channel: str,
+    *,
+    n_levels: int | None = None,
+    preparation: Preparation = "none",
+    narrowest_hz: float = 0.0,
+    lowest_hz: float = 0.0,
+    highest_hz: float | None = None,
+    highest_modulation_hz: float | None = None,
+    kind: EnvelopeKind = "squared",
+    band_hz: tuple[float, float] | None = None,
+) -> ChosenBand:
+    """Return the envelope spectrum in the band that the channel's own kurtogram chooses, or in a given one.
+
+    Parameters
+    ----------
+    recording : Recording
+    channel : str
+    n_levels, preparation
+        As in `kurtogram`. The envelope is that of the prepared signal.
+    narrowest_hz, lowest_hz, highest_hz : float
+        As in `Kurtogram.best_band`.
+    highest_modulation_hz : float or None
+        Lines of the envelope spectrum above it are left out; the band is at least three times as wide.
+    kind : str
+        Of the envelope, "squared" or "magnitude".
+    band_hz : (float, float) or None
+        Overrides the choice; `narrowest_hz`, `lowest_hz` and `highest_hz` then mean nothing.
+
+    Returns
+    -------
+    ChosenBand
+
+    Raises
+    ------
+    InputError
+        As `kurtogram`; also if `band_hz` lies outside of the spectrum.
+    RefusalError
+        As `kurtogram`; also if no band is allowed.
+    """
+    fs, unit = recording.sampling_rate_hz, recording.channels[recording.index(channel)].unit
+    x = prepared_signal(recording.values(channel), fs, preparation)
+    grid = kurtogram(x, fs, n_levels=n_levels, source=f"{channel}, {preparation}" if preparation != "none" else channel)
+    if highest_modulation_hz is not None:
+        narrowest_hz = max(narrowest_hz, 3.0 * _checked_modulation(highest_modulation_hz, fs, len(x)))
+    reason = ""
+    if band_hz is None:
+        band = grid.best_band(narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
+        reason = _reason(grid, band, narrowest_hz, of_modulation=highest_modulation_hz is not None)
+    else:
+        band = given_band(x, fs, band_hz)
+    unit = "" if preparation == "whitened" else unit
+    envelope = band_envelope(x, fs, band.band_hz, kind=kind, unit=unit, source=channel)
+    spectrum = envelope_spectrum(envelope, highest_hz=highest_modulation_hz)
+    return ChosenBand(band, grid, envelope, spectrum, grid.remarks(band), reason)
+
+
+def _reason(grid: Kurtogram, band: BandCandidate, narrowest_hz: float, *, of_modulation: bool) -> str:
+    """Return why a band was chosen, above all where others have more kurtosis."""
+    text = "It has the largest kurtosis"
+    if narrowest_hz > 0.0:
+        text += f" of the bands at least {narrowest_hz:.4g} Hz wide"
+        text += ", three times the highest modulation" if of_modulation else ""
+    narrower = grid.kurtosis[grid.bandwidth_hz < narrowest_hz * (1.0 - 1e-9)]
+    if narrower.size and float(narrower.max()) > band.kurtosis:
+        text += f". Narrower ones reach {narrower.max():.3g}, but their envelopes are too slow to show so fast a rhythm"
+    return text + "."
+
+
+def _checked_modulation(highest_hz: float, fs: float, n: int) -> float:
+    least = FEWEST_LINES * fs / n
+    if not least <= positive(highest_hz, "highest_modulation_hz", "Hz") <= fs / 6.0:
+        raise InputError(
+            f"highest_modulation_hz is {highest_hz:g} Hz",
+            allowed=f"{least:.4g} Hz, {FEWEST_LINES} over the length, to {fs / 6.0:.4g} Hz, a third of the spectrum",
+        )
+    return highest_hz
+
+
+def given_band(values: FloatArray, sampling_rate_hz: float, band_hz: tuple[float, float]) -> BandCandidate:
+    """Return the kurtosis of a band that was not chosen from the tree, see `Kurtogram` for its definition.
+
+    Raises
+    ------
+    InputError
+        If the band lies outside of the spectrum or holds fewer than three lines.
+    RefusalError
+        If there is nothing in the band.
+    """
+    square = band_envelope(values, sampling_rate_hz, band_hz, kind="squared").values
+    mean = float(np.mean(square))
+    if mean <= 0.0:
+        raise RefusalError("there is no signal in the band", remedy="choose another band")
+    n_bands = sampling_rate_hz / 2.0 / (band_hz[1] - band_hz[0])
+    kurtosis = float(np.mean(np.square(square / mean))) - 2.0
+    error = kurtosis_error(2, max(1, round(len(values) / n_bands)))
+    return BandCandidate(float(band_hz[0]), float(band_hz[1]), float(np.log2(n_bands)), kurtosis, error)
+
+
+def _checked_levels(n_samples: int, n_levels: int | None) -> int:
+    most = int(np.floor(np.log2(n_samples / FEWEST_SAMPLES))) if n_samples >= FEWEST_SAMPLES else 0
+    if most < 1:
+        raise RefusalError(
+            f"{n_samples} samples are too few for a kurtogram", remedy=f"record at least {2 * FEWEST_SAMPLES} samples"
+        )
+    if n_levels is None:
+        return min(DEFAULT_LEVELS, most)
+    if count(n_levels, "n_levels") > most:
+        raise InputError(
+            f"n_levels is {n_levels} for {n_samples} samples",
+            allowed=f"1 to {most}",
+            remedy=f"record at least {FEWEST_SAMPLES * 2**n_levels} samples, or take fewer levels",
+        )
+    return n_levels
+
+
+def _row_of_bands(fs: float, n_bands: int, moments: FloatArray, n: int) -> tuple[FloatArray, ...]:
+    """Return low, high, level, kurtosis, standard error, share of the largest, samples; each (n_bands,)."""
+    second, fourth, largest = moments.T
+    gaussian = 3.0 if n_bands == 1 else 2.0
+    nothing = second <= 0.0
+    ratio = np.divide(n * fourth, second**2, out=np.full(n_bands, gaussian), where=~nothing)
+    share = np.divide(largest**2, fourth, out=np.zeros(n_bands), where=~nothing)
+    edges = np.arange(n_bands + 1) * (fs / 2 / n_bands)
+    full = [np.full(n_bands, value) for value in (np.log2(n_bands), kurtosis_error(n_bands, n), float(n))]
+    return edges[:-1], edges[1:], full[0], ratio - gaussian, full[1], share, full[2]
+
+
+# --------------------
+# Splitting of bands into halves or thirds, with the moments of the parts, compiled.
+# --------------------
+
+
+# Reordering sums lets the compiler use vector instructions.
+_REORDER = {"contract", "reassoc", "nsz"}
+_TILE = 256
+"""Outputs at a time: all of a tile's sums stay in the nearest cache."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def split(x, cosine, sine, middle, n_parts, n_out, first_is_odd, parts, moments):  # type: ignore[no-untyped-def]
+    """Filter each row of x into its parts and add up their moments.
+
+    Row r of `x` (n_rows, 2, n: real and imaginary parts) gives rows n_parts·r … of `parts`, lowest band first, each
+    again a signal on 0 to 1/2 of its own rate; `parts` of no rows keeps nothing. `moments` (n_rows·n_parts, 3)
+    gathers Σ|z|², Σ|z|⁴ and the largest |z|². `first_is_odd` tells the parity of the first output's number.
+    """
+    n_side = len(cosine) - 1
+    turned = np.empty((n_parts, 2, _TILE + (2 * n_side) // n_parts + 1))
+    sums = np.empty((6, 2, _TILE))
+    z = np.empty((3, 2, _TILE))
+    for row in range(x.shape[0]):
+        for start in range(0, n_out, _TILE):
+            n = min(_TILE, n_out - start)
+            _take_phases(x[row], start * n_parts, n * n_parts + 2 * n_side + 1, n_parts, turned)
+            _filter(turned, cosine, sine, middle, n_parts, n, sums)
+            _combine(sums, n_parts, n, z)
+            for part in range(n_parts):
+                _add_moments(z[part], n, moments[row * n_parts + part])
+            if parts.shape[0] > 0:
+                for part in range(n_parts):
+                    sign = part % 2 == 1  # bands that start at odd multiples of half the new rate
+                    _store(z[part], n, sign, (start % 2 == 1) != first_is_odd, parts[row * n_parts + part], start)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def _take_phases(x, start, n, n_parts, turned):  # type: ignore[no-untyped-def]
+    """Deal the samples from `start` on out to n_parts phases: neighbouring outputs then read neighbouring samples."""
+    available = min(n, x.shape[1] - start)
+    for component in range(2):
+        for phase in range(n_parts):
+            source = x[component, start + phase : start + available : n_parts]
+            turned[phase, component, : len(source)] = source
+
+
+@njit(cache=True, nogil=True, fastmath=_REORDER, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def _filter(turned, cosine, sine, middle, n_parts, n, sums):  # type: ignore[no-untyped-def]
+    """Sum the products with cosine and sine taps, even and odd ones apart (0 to 3), and the middle's (4, 5)."""
+    n_side = len(cosine) - 1
+    sums[:, :, :n] = 0.0
+    for component in range(2):
+        centre = turned[n_side % n_parts, component, n_side // n_parts :]
+        for m in range(n):
+            sums[0, component, m] = cosine[0] * centre[m]
+            sums[4, component, m] = middle[0] * centre[m]
+        for k in range(1, n_side + 1):
+            a, b, c = cosine[k], sine[k], middle[k]
+            if a == 0.0 and b == 0.0:
+                continue
+            before = turned[(n_side - k) % n_parts, component, (n_side - k) // n_parts :]
+            after = turned[(n_side + k) % n_parts, component, (n_side + k) // n_parts :]
+            odd = k % 2
+            even_sum, odd_sum = sums[odd, component], sums[2 + odd, component]
+            if n_parts == 2:
+                _add_pair(before, after, a, b, n, even_sum, odd_sum)
+            elif odd == 0:
+                _add_three(before, after, a, b, c, 0.0, n, even_sum, odd_sum, sums[4, component])
+            else:
+                _add_three(before, after, a, b, 0.0, c, n, even_sum, odd_sum, sums[5, component])
+
+
+@njit(cache=True, nogil=True, fastmath=_REORDER, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def _add_pair(before, after, a, b, n, even_sum, odd_sum):  # type: ignore[no-untyped-def]
+    for m in range(n):
+        even_sum[m] += a * (after[m] + before[m])
+        odd_sum[m] += b * (after[m] - before[m])
+
+
+@njit(cache=True, nogil=True, fastmath=_REORDER, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def _add_three(before, after, a, b, c, d, n, even_sum, odd_sum, middle_sum):  # type: ignore[no-untyped-def]
+    for m in range(n):
+        s, t = after[m] + before[m], after[m] - before[m]
+        even_sum[m] += a * s
+        odd_sum[m] += b * t
+        middle_sum[m] += c * s + d * t
+
+
+@njit(cache=True, nogil=True, fastmath=_REORDER, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def _combine(sums, n_parts, n, z):  # type: ignore[no-untyped-def]
+    """Form the parts: first = C - iS; last likewise with the odd taps of C and the even taps of S reversed."""
+    last = n_parts - 1
+    for m in range(n):
+        for component in range(2):
+            other = 1 - component
+            sign = 1.0 if component == 0 else -1.0  # -i(p + iq) = q - ip
+            even_c, odd_c = sums[0, component, m], sums[1, component, m]
+            even_s, odd_s = sign * sums[2, other, m], sign * sums[3, other, m]
+            z[0, component, m] = even_c + odd_c + even_s + odd_s
+            z[last, component, m] = even_c - odd_c - even_s + odd_s
+            if n_parts == 3:
+                z[1, component, m] = sums[4, component, m] + sign * sums[5, other, m]
+
+
+@njit(cache=True, nogil=True, fastmath=_REORDER, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def _add_moments(z, n, moments):  # type: ignore[no-untyped-def]
+    second, fourth, largest = 0.0, 0.0, moments[2]
+    for m in range(n):
+        power = z[0, m] * z[0, m] + z[1, m] * z[1, m]
+        second += power
+        fourth += power * power
+        largest = max(largest, power)
+    moments[0] += second
+    moments[1] += fourth
+    moments[2] = largest
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def _store(z, n, alternating, starts_odd, part, start):  # type: ignore[no-untyped-def]
+    """Write z; where it alternates, times (-1)^m, which shifts the band by half the rate to 0."""
+    for component in range(2):
+        if not alternating:
+            part[component, start : start + n] = z[component, :n]
+            continue
+        sign = -1.0 if starts_odd else 1.0
+        for m in range(n):
+            part[component, start + m] = sign * z[component, m]
+            sign = -sign

@@ -1,0 +1,339 @@
+"""A spectrum that knows its scaling."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray, closest_match_hint, count, frozen_array, not_negative, within
+from gearsig.errors import InputError
+
+Scaling = Literal["amplitude peak", "amplitude rms", "power", "power density", "dimensionless"]
+Axis = Literal["frequency", "order", "quefrency"]
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Values over frequency (Hz), order (cycles per revolution) or quefrency (s).
+
+    Parameters
+    ----------
+    values : array, (n_lines,)
+    positions : array, (n_lines,)
+        Equally spaced, from zero.
+    axis : str
+        "frequency", "order" or "quefrency".
+    scaling : str
+        "amplitude peak": a bin-centred sine of amplitude 1 reads 1; "amplitude rms": it reads 1/√2; "power": 1/2 (mean
+        square); "power density": mean square per unit of the axis; "dimensionless" for cepstra.
+    unit : str
+        Of the values, written out with the scaling, e.g. "m/s^2", "(m/s^2)^2/Hz".
+    resolution : float
+        Spacing of the lines.
+    noise_bandwidth : float
+        Equivalent noise bandwidth of the window, in the axis' unit.
+    window : str
+    n_averages : int
+    source : str
+        The signal it was computed on: channel, and what was done to it.
+    shaft : str
+        The shaft that orders are counted on; empty for frequencies.
+    """
+
+    values: FloatArray
+    positions: FloatArray
+    axis: Axis
+    scaling: Scaling
+    unit: str
+    resolution: float
+    noise_bandwidth: float
+    window: str
+    n_averages: int
+    source: str
+    shaft: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("values", "positions"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        if len(self.values) != len(self.positions):
+            raise InputError(f"{len(self.values)} values for {len(self.positions)} positions")
+
+    @property
+    def axis_label(self) -> str:
+        """Axis with unit, for figures and tables."""
+        if self.axis == "order":
+            return f"order (cycles per revolution of {self.shaft or 'the shaft'})"
+        return {"frequency": "frequency (Hz)", "quefrency": "quefrency (s)"}[self.axis]
+
+    def index_of(self, position: float) -> int:
+        """Index of the line nearest to `position`."""
+        return int(np.clip(round((position - float(self.positions[0])) / self.resolution), 0, len(self.values) - 1))
+
+    def largest_near(self, position: float, half_width: float) -> tuple[float, float]:
+        """Return (position, value) of the largest line within `half_width` of `position`."""
+        low, high = self.index_of(position - half_width), self.index_of(position + half_width)
+        best = low + int(np.argmax(self.values[low : high + 1]))
+        return float(self.positions[best]), float(self.values[best])
+
+
+# --------------------
+# Windows with their coherent gain, equivalent noise bandwidth and transform.
+# --------------------
+
+
+# Coefficients a_m of w[n] = sum over m of (-1)^m a_m cos(2 pi m n / N).
+COSINE_SUMS: dict[str, tuple[float, ...]] = {
+    "rectangular": (1.0,),
+    "hann": (0.5, 0.5),
+    "hamming": (0.54, 0.46),
+    "blackman-harris": (0.35875, 0.48829, 0.14128, 0.01168),
+    "flat top": (0.21557895, 0.41663158, 0.277263158, 0.083578947, 0.006947368),
+}
+WINDOW_NAMES = (*COSINE_SUMS, "kaiser BETA")
+
+
+@dataclass(frozen=True)
+class Window:
+    """A window of n samples, periodic: the sample after the last would equal the first.
+
+    Parameters
+    ----------
+    name : str
+    values : array, (n,)
+    coherent_gain : float
+        Mean of the values: what a bin-centred sine is multiplied by.
+    noise_bandwidth_bins : float
+        Equivalent noise bandwidth in lines, n Σw² / (Σw)²: 1 for rectangular, 1.5 for Hann.
+    """
+
+    name: str
+    values: FloatArray
+    coherent_gain: float
+    noise_bandwidth_bins: float
+
+
+def make_window(name: str, n_samples: int) -> Window:
+    """Return the window called `name` with `n_samples` samples.
+
+    Rectangular for what repeats exactly in the block, Hann for all else, flat top to read levels off a spectrum
+    without interpolation, Blackman–Harris or Kaiser for a weak line beside a strong one.
+
+    Parameters
+    ----------
+    name : str
+        "rectangular", "hann", "hamming", "blackman-harris", "flat top", or "kaiser BETA", e.g. "kaiser 9".
+    n_samples : int
+        At least 1.
+
+    Raises
+    ------
+    InputError
+        On an unknown name or a length below 1.
+
+    References
+    ----------
+    F. J. Harris, "On the use of windows for harmonic analysis with the discrete Fourier transform", 1978.
+    The flat top is that of G. D'Antona and A. Ferrero, *Digital Signal Processing for Measurement Systems*, 2006.
+
+    Examples
+    --------
+    >>> make_window("hann", 1024).noise_bandwidth_bins
+    1.5
+    """
+    return _make_window(checked_window_name(name), count(n_samples, "number of window samples"))
+
+
+def checked_window_name(name: str) -> str:
+    """Return `name` if there is such a window."""
+    if name in COSINE_SUMS:
+        return name
+    if name.startswith("kaiser "):
+        not_negative(_kaiser_beta(name), "beta of the Kaiser window")
+        return name
+    hint = closest_match_hint(name, WINDOW_NAMES) if name != "kaiser" else "give its beta: 'kaiser 9'"
+    raise InputError(f"window is {name!r}", allowed=", ".join(WINDOW_NAMES), remedy=hint)
+
+
+@lru_cache(maxsize=8)
+def _make_window(name: str, n: int) -> Window:
+    w = _window_values(name, n)
+    gain = float(w.mean())
+    bandwidth = float(n * np.dot(w, w) / w.sum() ** 2)
+    return Window(name, frozen_array(w, "window", ndim=1), gain, round(bandwidth, 12))
+
+
+def _window_values(name: str, n: int) -> FloatArray:
+    if name in COSINE_SUMS:
+        return _cosine_sum(COSINE_SUMS[name], n)
+    kaiser: FloatArray = np.kaiser(n + 1, _kaiser_beta(name))[:n]
+    return kaiser
+
+
+def _cosine_sum(coefficients: tuple[float, ...], n: int) -> FloatArray:
+    """Return Σ (-1)^m a_m cos(2π m k/n), by Chebyshev's recurrence so that one cosine is enough."""
+    w = np.full(n, coefficients[0])
+    if len(coefficients) == 1:
+        return w
+    c = np.cos(2 * np.pi / n * np.arange(n))
+    before, now = np.ones(n), c
+    for m, a in enumerate(coefficients[1:], start=1):
+        w += (-1) ** m * a * now
+        before, now = now, 2 * c * now - before
+    return w
+
+
+def _kaiser_beta(name: str) -> float:
+    try:
+        return float(name.removeprefix("kaiser "))
+    except ValueError:
+        raise InputError(f"window is {name!r}", allowed=", ".join(WINDOW_NAMES), remedy="e.g. 'kaiser 9'") from None
+
+
+def window_response(name: str, offset_bins: FloatArray) -> FloatArray:
+    """Return the window's transform at `offset_bins` lines from its centre, relative to the centre.
+
+    W(d) = |Σ w[n] exp(-2πi d n/N)| / Σ w[n]. It is what a sine between two lines loses (scalloping), and what it
+    leaks elsewhere. The response hardly depends on N; it is evaluated at N = 512.
+    """
+    n = 512
+    w = _window_values(checked_window_name(name), n)
+    k = np.arange(n) - n / 2
+    offsets = np.atleast_1d(np.asarray(offset_bins, dtype=np.float64))
+    response: FloatArray = np.abs(np.exp(-2j * np.pi / n * np.outer(offsets, k)) @ w) / w.sum()
+    return response
+
+
+# --------------------
+# Mean power of windowed blocks of a signal: the one transform behind amplitude spectra and densities.
+# --------------------
+
+
+ComplexArray = NDArray[np.complexfloating[Any, Any]]
+
+BATCH_SAMPLES = 1 << 19
+"""Samples transformed at once: 4 MB of float64, which stays near the caches and bounds the memory."""
+
+
+@dataclass(frozen=True)
+class BlockPlan:
+    """How a signal is cut into blocks.
+
+    `n_averages` is the number of *independent* blocks: overlapping ones share data, see `independent_averages`.
+    """
+
+    window: Window
+    n_per_block: int
+    step: int
+    n_blocks: int
+    n_averages: int
+
+
+def checked_signal(values: FloatArray, *, minimum: int = 2) -> FloatArray:
+    """Return `values` as a one-dimensional finite array with at least `minimum` samples."""
+    x = frozen_array(values, "values", ndim=1)
+    if len(x) < minimum:
+        raise InputError(f"values has {len(x)} sample(s)", allowed=f"at least {minimum}", remedy="record longer")
+    return x
+
+
+def plan_blocks(n_samples: int, n_per_block: int | None, overlap: float, window: str) -> BlockPlan:
+    """Lay blocks of `n_per_block` samples over the signal; None is one block of everything."""
+    n = n_samples if n_per_block is None else count(n_per_block, "n_per_block", minimum=2)
+    if n > n_samples:
+        raise InputError(
+            f"n_per_block is {n} for {n_samples} samples", allowed=f"2 to {n_samples}", remedy="shorten the block"
+        )
+    within(overlap, "overlap", 0.0, 0.95)
+    step = max(1, round(n * (1.0 - overlap)))
+    w = make_window(window, n)
+    n_blocks = 1 + (n_samples - n) // step
+    return BlockPlan(w, n, step, n_blocks, independent_averages(w.values, step, n_blocks))
+
+
+def independent_averages(w: FloatArray, step: int, n_blocks: int) -> int:
+    """Return how many independent blocks would average noise as well as `n_blocks` overlapping ones, rounded down.
+
+    K_eff = K / (1 + 2 Σ_m (1 - m/K) ρ²(m)), with ρ(m) = Σ w[n] w[n + m·step] / Σ w².
+
+    References
+    ----------
+    P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", 1967.
+    """
+    if n_blocks == 1:
+        return 1
+    energy = float(np.dot(w, w))
+    inflation = 1.0
+    for m in range(1, min(n_blocks, (len(w) - 1) // step + 1)):
+        rho = float(np.dot(w[: -m * step], w[m * step :])) / energy
+        inflation += 2.0 * (1.0 - m / n_blocks) * rho * rho
+    return max(1, int(n_blocks / inflation + 1e-9))
+
+
+def mean_power(x: FloatArray, plan: BlockPlan) -> FloatArray:
+    """Return the one-sided mean power per line, averaged over the blocks: a bin-centred sine reads A²/2.
+
+    P_k = c_k |X_k|² / (Σw)², c_k = 2 but for DC and, where the block length is even, Nyquist, which have no mirror
+    image. Computed in double precision whatever the input.
+    """
+    total = np.zeros(plan.n_per_block // 2 + 1)
+    for power in block_powers(x, plan):
+        total += power.sum(axis=0)
+    return total / plan.n_blocks
+
+
+def block_powers(x: FloatArray, plan: BlockPlan, n_lines: int | None = None) -> Iterator[FloatArray]:
+    """Yield the one-sided power of some blocks after the other, (n_blocks_in_batch, n_lines)."""
+    from scipy.fft import rfft
+
+    w = plan.window.values
+    blocks = np.lib.stride_tricks.sliding_window_view(x, plan.n_per_block)[:: plan.step]
+    without_mirror = [0] if plan.n_per_block % 2 else [0, plan.n_per_block // 2]
+    per_batch = max(1, BATCH_SAMPLES // plan.n_per_block)
+    for start in range(0, plan.n_blocks, per_batch):
+        batch = blocks[start : start + per_batch].astype(np.float64)
+        batch *= w
+        lines = rfft(batch, axis=1, overwrite_x=True)
+        power = lines.real**2
+        power += lines.imag**2
+        power *= 2.0 / float(w.sum()) ** 2
+        power[:, without_mirror] /= 2.0
+        yield power[:, :n_lines]
+
+
+def scaled(power: FloatArray, scaling: Scaling, noise_bandwidth: float, n_per_block: int) -> FloatArray:
+    """Return one-sided mean power in another scaling.
+
+    Peak amplitude is √2 times the rms amplitude, but at DC and Nyquist, where both are the value itself.
+    """
+    if scaling == "power":
+        return power
+    if scaling == "power density":
+        return power / noise_bandwidth
+    rms: FloatArray = np.sqrt(power)
+    if scaling == "amplitude peak":
+        rms[..., 1 : (n_per_block + 1) // 2] *= np.sqrt(2.0)
+    return rms
+
+
+def scaled_unit(unit: str, scaling: Scaling, per: str = "Hz") -> str:
+    """Return the unit of a spectrum written out, e.g. "(m/s^2)^2/Hz".
+
+    Examples
+    --------
+    >>> scaled_unit("m/s^2", "power density"), scaled_unit("Pa", "power"), scaled_unit("g", "amplitude rms")
+    ('(m/s^2)^2/Hz', 'Pa^2', 'g')
+    """
+    if scaling not in ("power", "power density"):
+        return unit
+    square = squared_unit(unit)
+    return f"{square or 1}/{per}" if scaling == "power density" else square
+
+
+def squared_unit(unit: str) -> str:
+    """Return the square of a unit, in brackets where it is compound; nothing for no unit."""
+    return f"({unit})^2" if any(c in unit for c in "/*^ ") else unit and f"{unit}^2"

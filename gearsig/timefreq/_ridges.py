@@ -1,0 +1,638 @@
+"""Ridges: the momentary frequency and amplitude of each component of a transform."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray, count, not_negative, positive
+from gearsig.errors import InputError, RefusalError
+from gearsig.timefreq._types import Coefficients, Ridge, TimeFrequencyMap
+
+# --------------------
+# How likely each cell of a transform lies on a ridge.
+# --------------------
+
+
+SQUEEZED_REACH = 2
+"""Lines on either side over which a squeezed component's share may scatter."""
+_FLOOR_OVER_MEDIAN = 4.0
+_FLOOR_UNDER_TOP = 1e-5
+_COLUMNS_OF_FLOOR = 8
+_REACHES_OF_FLOOR = 5  # lines to either side over the reach of one component, few enough to follow coloured noise
+_DILATION = ((0, 1.0), (1, 0.7), (-1, 0.7), (2, 0.3), (-2, 0.3))
+
+
+def ridge_power(power: FloatArray, *, squeezed: bool) -> FloatArray:
+    """Return the power that one component has at each line: of squeezed ones, the sum over its lines."""
+    if not squeezed:
+        return power
+    from scipy.ndimage import uniform_filter1d
+
+    width = 2 * SQUEEZED_REACH + 1
+    summed: FloatArray = uniform_filter1d(power, width, axis=0, mode="constant") * width
+    return np.maximum(summed, 0.0)  # the running sum may round below zero
+
+
+def _surroundings(power: FloatArray, n_reach: int) -> FloatArray:
+    """Return the median power of the lines around each cell, in means over a few columns."""
+    from scipy.ndimage import median_filter
+
+    starts = np.arange(0, power.shape[1], _COLUMNS_OF_FLOOR)
+    n_columns = np.diff(starts, append=power.shape[1])
+    mean = np.add.reduceat(power, starts, axis=1) / n_columns
+    around = median_filter(mean, size=(2 * _REACHES_OF_FLOOR * n_reach + 1, 1), mode="nearest")
+    return np.repeat(around, n_columns, axis=1)
+
+
+def ridge_scores(power: FloatArray, n_reach: int) -> FloatArray:
+    """Return scores from 0 to 1: near 1 on local maxima over frequency that stand out from the lines around them.
+
+    The score saturates: a weak component on its own ridge counts about as much as a strong one, so that nothing is won
+    by changing over to the stronger one. Skirts of strong components are no maxima and count nothing.
+
+    Parameters
+    ----------
+    power : array, (n_lines, n_columns)
+    n_reach : int
+    """
+    from scipy.ndimage import maximum_filter1d
+
+    largest = float(power.max())
+    if largest <= 0:
+        return np.zeros_like(power)
+    floor = np.maximum(_FLOOR_OVER_MEDIAN * _surroundings(power, n_reach), _FLOOR_UNDER_TOP * largest)
+    top = power >= maximum_filter1d(power, 2 * n_reach + 1, axis=0, mode="constant")
+    height = np.where(top, power / (power + floor), 0.0)
+    result = np.zeros_like(height)
+    n = len(height)
+    for shift, share in _DILATION:
+        low, high = max(0, shift), min(n, n + shift)
+        part = result[low:high]
+        np.maximum(part, share * height[low - shift : high - shift], out=part)
+    return result
+
+
+# --------------------
+# Which path goes on as which, where two come together.
+# --------------------
+
+
+_N_FIT = 24
+_LEAST_FIT = 4
+_OF_MEETING = 8
+"""A slope is read over so large a share of the meeting that it must tell about."""
+_SEEN_FROM = (3.0, 2.2, 1.6, 1.2, 1.0)
+"""Gaps at which a meeting is looked at; from afar, the paths there are known better."""
+_VALLEY = 0.8
+"""Share of the power beside it below which nothing crosses; where two cross, it is above 0.95, in any phase."""
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """Columns [start, stop) in which two paths are closer than they can be told apart."""
+
+    start: int
+    stop: int
+
+
+def meetings(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting]:
+    """Return the stretches where |a - b| <= gap, those less than a few columns apart taken as one."""
+    near = np.abs(a - b) <= gap
+    steps = np.diff(near.astype(np.int8), prepend=0, append=0)
+    starts, stops = np.flatnonzero(steps == 1), np.flatnonzero(steps == -1)
+    found: list[Meeting] = []
+    for start, stop in zip(starts, stops, strict=True):
+        if found and start - found[-1].stop < _N_FIT // 2:
+            found[-1] = Meeting(found[-1].start, int(stop))
+        else:
+            found.append(Meeting(int(start), int(stop)))
+    return found
+
+
+def untangled(
+    paths: list[FloatArray],
+    levels: list[FloatArray],
+    gap: float,
+    level_weight: float,
+    power: FloatArray | None = None,
+) -> list[FloatArray]:
+    """Return the paths with their tails exchanged wherever both then go on more smoothly.
+
+    Across a meeting of length L, cubics join place and slope on either side; a cubic's bending ∫ p''² dt is
+    4 (u² + u v + v²) / L, u and v being its end slopes less its mean slope. The pairing with the smaller
+    L³ Σ bending + weight² Σ (change of level)² is kept; where tails are exchanged, the cubics replace the paths. If the
+    power shows a valley all through the place where they would cross, they part again whatever the cubics say.
+
+    Parameters
+    ----------
+    paths : list of arrays, (n_columns,)
+        Lines.
+    levels : list of arrays, (n_columns,)
+        Natural logarithm of the amplitude along each path.
+    gap : float
+        Lines within which two components cannot be told apart. A meeting is looked at from up to three times as far,
+        less where it would reach an end of the paths.
+    level_weight : float
+        Lines that a change of level by a factor e is worth.
+    power : array, (n_lines, n_columns), or None
+    """
+    paths, levels = [p.copy() for p in paths], [v.copy() for v in levels]
+    for i in range(len(paths)):
+        for j in range(i + 1, len(paths)):
+            for meeting in _settled_from_afar(paths[i], paths[j], gap):
+                _settle((paths[i], levels[i]), (paths[j], levels[j]), meeting, level_weight, _Ground(power, gap))
+    return paths
+
+
+def _settled_from_afar(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting]:
+    """Return the meetings, each in the widest of several gaps that leaves columns to compare on both sides."""
+    found: list[Meeting] = []
+    for share in _SEEN_FROM:
+        for meeting in meetings(a, b, share * gap):
+            room = min(meeting.start, len(a) - meeting.stop)
+            known = any(m.start <= meeting.start and meeting.stop <= m.stop for m in found)
+            if not known and room >= (_N_FIT if share > _SEEN_FROM[-1] else _LEAST_FIT):
+                found.append(meeting)
+    return found
+
+
+def shared_columns(paths: list[FloatArray], gap: float) -> list[NDArray[np.bool_]]:
+    """Return where each path has another one within `gap` lines."""
+    result = [np.zeros(len(p), dtype=np.bool_) for p in paths]
+    for i in range(len(paths)):
+        for j in range(i + 1, len(paths)):
+            near = np.abs(paths[i] - paths[j]) <= gap
+            result[i] |= near
+            result[j] |= near
+    return result
+
+
+_Track = tuple[FloatArray, FloatArray]
+
+
+@dataclass(frozen=True)
+class _End:
+    """Place, slope (lines per column) and level of a path at one side of a meeting."""
+
+    place: float
+    slope: float
+    level: float
+
+
+@dataclass(frozen=True)
+class _Ground:
+    """What the paths run over, and the lines within which two components cannot be told apart."""
+
+    power: FloatArray | None
+    gap: float
+
+
+def _settle(a: _Track, b: _Track, meeting: Meeting, level_weight: float, ground: _Ground) -> None:
+    """Let two paths cross or part again after a meeting, in place, whichever goes on more smoothly."""
+    start, stop, n = meeting.start, meeting.stop, len(a[0])
+    first, last = start - 1, stop
+    n_fit = max(_N_FIT, (stop - start) // _OF_MEETING)
+    before = [_end(track, max(0, start - n_fit), start, first) for track in (a, b)]
+    after = [_end(track, stop, min(n, stop + n_fit), last) for track in (a, b)]
+    inside = np.arange(start, stop)
+    keep, swap = (
+        [_cubic(p, q, first, last, inside) for p, q in zip(before, ends, strict=True)] for ends in (after, after[::-1])
+    )
+    crosses_now = (before[0].place - before[1].place) * (after[0].place - after[1].place) < 0
+    crossed, parted = (keep, swap) if crosses_now else (swap, keep)
+    if ground.power is not None and _valley(ground.power, crossed, start, ground.gap):
+        if crosses_now:
+            _exchange(a, b, meeting, _tops_beside(ground.power, parted, start))
+        return
+    cost = [[_change(p, q, last - first, level_weight) for q in after] for p in before]
+    if cost[0][1] + cost[1][0] < cost[0][0] + cost[1][1]:
+        _exchange(a, b, meeting, swap)
+
+
+def _exchange(a: _Track, b: _Track, meeting: Meeting, between: list[FloatArray]) -> None:
+    stop = meeting.stop
+    for one, other in zip(a, b, strict=True):
+        one[stop:], other[stop:] = other[stop:].copy(), one[stop:].copy()
+    for (path, _), piece in zip((a, b), between, strict=True):
+        path[meeting.start : stop] = piece
+
+
+def _valley(power: FloatArray, crossed: list[FloatArray], start: int, gap: float) -> bool:
+    """Return whether little lies where two paths would cross, compared with what lies beside it."""
+    columns = np.flatnonzero(np.abs(crossed[0] - crossed[1]) <= gap / 2)
+    middle = np.round((crossed[0] + crossed[1])[columns] / 2).astype(np.int64)
+    centre, around = (_largest_near(power, middle, columns + start, reach) for reach in (gap / 4, 2 * gap))
+    return len(columns) > 0 and float(centre.mean()) < _VALLEY * float(around.mean())
+
+
+def _largest_near(power: FloatArray, lines: NDArray[np.int64], columns: NDArray[np.int64], reach: float) -> FloatArray:
+    shifts = np.arange(-int(reach), int(reach) + 1)[:, None]
+    result: FloatArray = power[np.clip(lines + shifts, 0, len(power) - 1), columns].max(axis=0)
+    return result
+
+
+def _tops_beside(power: FloatArray, parted: list[FloatArray], start: int) -> list[FloatArray]:
+    """Return the largest power's line on either side of the middle between two paths that part again."""
+    middle = np.clip(np.round((parted[0] + parted[1]) / 2), 0, len(power) - 1).astype(np.int64)
+    half = np.ceil(np.abs(parted[0] - parted[1])).astype(np.int64)
+    result = [p.copy() for p in parted]
+    for i in range(len(middle)):
+        above = slice(middle[i], min(middle[i] + half[i], len(power) - 1) + 1)
+        below = slice(max(middle[i] - half[i], 0), middle[i] + 1)
+        top, bottom = (result[0], result[1]) if parted[0][i] > parted[1][i] else (result[1], result[0])
+        top[i] = above.start + np.argmax(power[above, start + i])
+        bottom[i] = below.start + np.argmax(power[below, start + i])
+    return result
+
+
+def _end(track: _Track, start: int, stop: int, at: int) -> _End:
+    path, level = track
+    slope, place = np.polyfit(np.arange(start, stop) - at, path[start:stop], 1)
+    return _End(float(place), float(slope), float(level[start:stop].mean()))
+
+
+def _change(p: _End, q: _End, length: int, level_weight: float) -> float:
+    mean = (q.place - p.place) / length
+    u, v = p.slope - mean, q.slope - mean
+    bending = 4.0 * (u * u + u * v + v * v) / length
+    return length**3 * bending + (level_weight * (q.level - p.level)) ** 2
+
+
+def _cubic(p: _End, q: _End, first: int, last: int, columns: NDArray[np.int64]) -> FloatArray:
+    from scipy.interpolate import CubicHermiteSpline
+
+    result: FloatArray = CubicHermiteSpline([first, last], [p.place, q.place], [p.slope, q.slope])(columns)
+    return result
+
+
+NOT_HIDDEN = -(1 << 14)
+"""Mark of cells that no path covers, as in `ridge_path`; written here so that its compiler loads only on use."""
+MOST_COLUMNS = 4000
+"""Columns that the search for a path works on; longer transforms are pooled."""
+_SPARE = 8
+"""Ridges looked for beyond those asked, of which the strongest are kept: the clearest need not be strong."""
+_LEAST_SEEN = 0.6  # share of its columns in which a path is not covered by others
+_LEAST_SCORE = 0.25  # mean score of a path: below, it hops between maxima of noise
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Power and complex values (where there are any) over line and column, at most `MOST_COLUMNS` of them."""
+
+    power: FloatArray
+    at: FloatArray
+    n_reach: int
+    squeezed: bool
+
+
+def ridges(
+    transform: Coefficients | TimeFrequencyMap,
+    n_ridges: int = 1,
+    *,
+    steepest: float = 2.0,
+    stiffness: float = 1.0,
+    lowest: float | None = None,
+    highest: float | None = None,
+) -> tuple[Ridge, ...]:
+    """Return the `n_ridges` strongest of the clear ridges, which go straight on where they cross.
+
+    Paths are found one after the other by dynamic programming over place and slope, with a price on changes of slope;
+    what a path covers is taken out before the next one. Eight more than asked are looked for, and those of most power
+    kept. Where two of them meet, they are then looked at together: if
+    the power shows a valley all through the meeting, they part again; otherwise tails are exchanged if place, slope and
+    level go on more evenly so. Places between lines come from a parabola through the logarithm of the power (or its
+    centre of gravity where the transform is squeezed).
+
+    Parameters
+    ----------
+    transform : Coefficients or TimeFrequencyMap
+        More than 4000 columns are pooled to their mean power first.
+    n_ridges : int
+    steepest : float
+        Lines per (pooled) column that a ridge may rise or fall.
+    stiffness : float
+        Price of changing the slope by two lines per eight columns, in columns on the ridge; twice that is the price of
+        a line where no ridge is. Raise it for chirps in noise, lower it for fast modulation.
+    lowest, highest : float or None
+        Hz or orders between which to look.
+
+    Returns
+    -------
+    tuple of Ridge
+        The largest rms amplitude first; fewer than asked where the rest of the map shows no further ridge.
+
+    Raises
+    ------
+    InputError
+        On numbers out of range; also on more ridges than lie side by side within the lines.
+    RefusalError
+        If the map holds no ridge at all.
+
+    Notes
+    -----
+    Two components that come closer than the transform tells them apart, and turn back, look like two that cross: which
+    is which is then not in the data, and the ridges cross. See `shared`, and take a longer wavelet or window. A ridge
+    runs through the whole transform: one that begins or ends within it, or that noise covers for long, is carried on
+    along what is nearest, so cut the recording, or look at `amplitude`. A component shows as long as its amplitude is
+    above that of the noise within the wavelet's or window's band; a longer one has a narrower band.
+
+    Source: R. A. Carmona, W. L. Hwang, B. Torrésani, *Multiridge detection and time-frequency reconstruction*, IEEE
+    Transactions on Signal Processing 47 (1999), for ridges as penalised paths; the state with slope and the
+    exchange of tails are this package's own.
+    """
+    count(n_ridges, "n_ridges")
+    positive(steepest, "steepest")
+    not_negative(stiffness, "stiffness")
+    part = _lines_between(transform.positions, lowest, highest)
+    _check_room(n_ridges, part, transform.n_reach)
+    grid = _grid(transform, part)
+    paths, power = _paths(grid, n_ridges, steepest, stiffness)
+    if not paths:
+        raise RefusalError(
+            "no ridge stands out from the rest of the transform",
+            remedy="look between other lines (lowest, highest), take a longer wavelet or window, or average more",
+        )
+    shared = shared_columns(paths, 2.0 * grid.n_reach)
+    found = [_ridge(transform, grid, power, part, p, s) for p, s in zip(paths, shared, strict=True)]
+    return tuple(sorted(found, key=lambda r: -float(np.mean(r.amplitude**2))))
+
+
+def _lines_between(positions: FloatArray, lowest: float | None, highest: float | None) -> slice:
+    low = 0 if lowest is None else int(np.searchsorted(positions, lowest))
+    high = len(positions) if highest is None else int(np.searchsorted(positions, highest, side="right"))
+    if high - low < 3:
+        raise RefusalError(
+            f"fewer than three of the transform's {len(positions)} lines are looked at",
+            remedy="widen the range or compute more lines",
+        )
+    return slice(low, high)
+
+
+def _check_room(n_ridges: int, part: slice, n_reach: int) -> None:
+    """Raise InputError if so many ridges cannot be told apart on the lines."""
+    most = max(1, (part.stop - part.start) // (2 * n_reach + 1))
+    if n_ridges > most:
+        raise InputError(
+            f"n_ridges is {n_ridges} on {part.stop - part.start} lines, each ridge covering {2 * n_reach + 1} of them",
+            allowed=f"1 to {most}",
+            remedy="ask for fewer, or compute more lines",
+        )
+
+
+def _grid(transform: Coefficients | TimeFrequencyMap, part: slice) -> _Grid:
+    if isinstance(transform, TimeFrequencyMap):
+        values = transform.values[:, part].T
+        power = values**2 if transform.scaling == "amplitude peak" else 2.0 * values
+        return _pooled(np.asarray(power, dtype=np.float64), transform.at, transform)
+    n = len(transform.at)
+    n_per = -(-n // MOST_COLUMNS)
+    starts = np.arange(0, n, n_per)
+    power = np.empty((part.stop - part.start, len(starts)))
+    for row, line in enumerate(transform.values[part]):  # one line at a time: the whole may be large
+        power[row] = np.add.reduceat(line.real**2 + line.imag**2, starts) / np.diff(starts, append=n)
+    ends = np.append(starts[1:], n) - 1
+    at = (transform.at[starts] + transform.at[ends]) / 2
+    return _Grid(power, at, transform.n_reach, transform.squeezed)
+
+
+def _pooled(power: FloatArray, at: FloatArray, transform: TimeFrequencyMap) -> _Grid:
+    n_per = -(-len(at) // MOST_COLUMNS)
+    starts = np.arange(0, len(at), n_per)
+    ends = np.append(starts[1:], len(at)) - 1
+    mean = np.add.reduceat(power, starts, axis=1) / (ends - starts + 1)
+    return _Grid(mean, (at[starts] + at[ends]) / 2, transform.n_reach, transform.squeezed)
+
+
+def _paths(grid: _Grid, n_ridges: int, steepest: float, stiffness: float) -> tuple[list[FloatArray], FloatArray]:
+    """Return paths, and the power of a component at each cell."""
+    power = ridge_power(grid.power, squeezed=grid.squeezed)
+    scores = ridge_scores(power, grid.n_reach)
+    found: list[FloatArray] = []
+    strengths: list[float] = []
+    for _ in range(n_ridges + _SPARE):
+        hidden = _hidden(scores.shape, found, grid.n_reach)
+        path = _seen_path(scores, hidden, steepest, stiffness)
+        seen = _along(hidden, path) == NOT_HIDDEN
+        if not seen.any() or float(_along(scores, path)[seen].mean()) < _LEAST_SCORE:
+            break
+        found.append(path)
+        strengths.append(float(_along(power, path)[seen].mean()))
+    strongest = sorted(range(len(found)), key=lambda i: -strengths[i])[:n_ridges]
+    paths = [found[i] for i in sorted(strongest)]
+    others = [found[i] for i in range(len(found)) if i not in strongest]
+    if len(paths) > 1:
+        paths = _settled(paths, grid, power)
+        for i in range(len(paths)):  # once more, now that each knows where the others go
+            hidden = _hidden(scores.shape, others + paths[:i] + paths[i + 1 :], grid.n_reach)
+            paths[i] = _seen_path(scores, hidden, steepest, stiffness)
+        paths = _settled(paths, grid, power)
+    return paths, power
+
+
+def _seen_path(scores: FloatArray, hidden: NDArray[np.int16], steepest: float, stiffness: float) -> FloatArray:
+    """Return the best path; one that hides behind others, by weaving across them, is searched without credit."""
+    path = best_path(scores, hidden, steepest, stiffness)
+    if float(np.mean(_along(hidden, path) == NOT_HIDDEN)) >= _LEAST_SEEN:
+        return path
+    return best_path(scores, hidden, steepest, stiffness, credit=0.0)
+
+
+def _settled(paths: list[FloatArray], grid: _Grid, power: FloatArray) -> list[FloatArray]:
+    """Return the paths, read between the lines, each going on as what it was before it met another one."""
+    paths = [_read(grid, power, p)[0] for p in paths]
+    levels: list[FloatArray] = [np.log(np.maximum(_along(power, p), np.finfo(np.float64).tiny)) / 2 for p in paths]
+    return untangled(paths, levels, 2.0 * grid.n_reach, float(grid.n_reach), power)
+
+
+def _hidden(shape: tuple[int, ...], paths: list[FloatArray], n_cover: int) -> NDArray[np.int16]:
+    """Return the slope of the path that covers each cell, in lines per node."""
+    result = np.full(shape, NOT_HIDDEN, dtype=np.int16)
+    q = nodes_apart(shape[1])
+    columns = np.arange(shape[1])
+    before, after = np.maximum(columns - q, 0), np.minimum(columns + q, shape[1] - 1)
+    for path in paths:
+        slope = np.round((path[after] - path[before]) / np.maximum(after - before, 1) * q).astype(np.int16)
+        near = np.abs(np.arange(shape[0])[:, None] - path[None, :]) <= n_cover
+        np.copyto(result, slope[None, :], where=near)
+    return result
+
+
+def _ridge(
+    transform: Coefficients | TimeFrequencyMap,
+    grid: _Grid,
+    power: FloatArray,
+    part: slice,
+    path: FloatArray,
+    shared: np.ndarray[tuple[int], np.dtype[np.bool_]],
+) -> Ridge:
+    places, peak = _read(grid, power, path)
+    alone = ~shared
+    if alone.any() and shared.any():
+        columns, known = np.arange(len(path)), np.flatnonzero(alone)
+        between = shared & (columns > known[0]) & (columns < known[-1])  # what meets until an end stays as it was read
+        places = np.where(between, np.interp(columns, known, places[known]), places)
+    lines = transform.positions[part]
+    index = np.arange(len(lines))
+    if transform.spacing == "logarithmic":
+        positions = np.exp(np.interp(places, index, np.log(lines)))
+    else:
+        positions = np.interp(places, index, lines)
+    return Ridge(
+        grid.at, positions, np.sqrt(peak), shared, transform.axis, _unit(transform), transform.source, transform.shaft
+    )
+
+
+def _read(grid: _Grid, power: FloatArray, path: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return place, between the lines, and peak power next to a path."""
+    return _centres(grid, path) if grid.squeezed else _parabolas(power, path)
+
+
+def _parabolas(power: FloatArray, path: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return place and height of the parabola through the log power around the local maximum next to the path."""
+    n, columns = len(power), np.arange(len(path))
+    near = np.clip(np.round(path).astype(np.int64)[None, :] + np.arange(-2, 3)[:, None], 1, n - 2)
+    best = near[np.argmax(power[near, columns[None, :]], axis=0), columns]
+    lowest = float(np.finfo(np.float64).tiny)
+    a, b, c = (np.log(np.maximum(power[best + shift, columns], lowest)) for shift in (-1, 0, 1))
+    bend = a - 2 * b + c
+    shift = np.where(bend < 0, np.clip((a - c) / 2 / np.where(bend < 0, bend, -1.0), -0.5, 0.5), 0.0)
+    return best + shift, np.exp(b - (a - c) * shift / 4)
+
+
+def _centres(grid: _Grid, path: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return centre of gravity and sum of the power within reach of the path."""
+    n, columns = len(grid.power), np.arange(len(path))
+    near = np.round(path).astype(np.int64)[None, :] + np.arange(-SQUEEZED_REACH, SQUEEZED_REACH + 1)[:, None]
+    inside = (near >= 0) & (near < n)
+    power = np.where(inside, grid.power[np.clip(near, 0, n - 1), columns[None, :]], 0.0)
+    total = power.sum(axis=0)
+    centre = (power * near).sum(axis=0) / np.where(total > 0, total, 1.0)
+    return np.where(total > 0, centre, path), total
+
+
+def _along(table: NDArray[Any], path: FloatArray) -> FloatArray:
+    lines = np.clip(np.round(path).astype(np.int64), 0, len(table) - 1)
+    result: FloatArray = table[lines, np.arange(len(path))]
+    return result
+
+
+def _unit(transform: Coefficients | TimeFrequencyMap) -> str:
+    if isinstance(transform, TimeFrequencyMap) and transform.scaling == "power":
+        return transform.unit.removesuffix("^2").removeprefix("(").removesuffix(")")
+    return transform.unit
+
+
+# --------------------
+# The best smooth path through a table of scores, by dynamic programming over place and slope.
+# --------------------
+
+
+_MOST_COLUMNS_PER_NODE = 8
+_FEWEST_NODES = 48
+_MOST_BEND = 4
+
+
+CREDIT = 0.3  # score of a hidden cell for a path that crosses: what lies there cannot be seen
+_NOTHING = 0.1  # score below which a cell holds no ridge
+_ASTRAY = 2.0  # columns that a line costs where no ridge is: else paths leap to whatever is clearer for a while
+_LEAST_ANGLE = 2  # lines per node by which slopes must differ to cross
+
+
+def nodes_apart(n_columns: int) -> int:
+    """Return how many columns lie between nodes: eight, fewer in short tables."""
+    return min(_MOST_COLUMNS_PER_NODE, max(1, n_columns // _FEWEST_NODES))
+
+
+def best_path(
+    scores: FloatArray, hidden: NDArray[np.int16], steepest: float, stiffness: float, *, credit: float = CREDIT
+) -> FloatArray:
+    """Return the line of the path in each column.
+
+    The path is a chain of straight pieces over q columns each (eight, fewer in short tables), each rising by s lines.
+    It maximises Σ scores along the path - `stiffness` Σ max(|s' - s| - 1, 0)²: it pays for changes of slope and not for
+    slope, so that it goes straight through a crossing instead of turning into the other branch. Changes by one are
+    free, as slopes between whole numbers need them. Where no ridge is, each line that it travels costs two columns: so
+    it waits for a component that fades, and leaps to another one only if that is clearer for long.
+
+    Parameters
+    ----------
+    scores : array, (n_lines, n_columns)
+        0 to 1.
+    hidden : array, (n_lines, n_columns)
+        Slope, in lines per node, of the path that covers the cell, or `NOT_HIDDEN`. Covered cells score for paths that
+        cross that one, and not for paths along it.
+    steepest : float
+        Lines per column.
+    stiffness : float
+    credit : float
+        Score of a covered cell for a path that crosses. With one, a path may weave to and fro across another.
+    """
+    q = nodes_apart(scores.shape[1])
+    n_slopes = min(max(1, int(np.ceil(steepest * q))), scores.shape[0] - 1)
+    table = np.ascontiguousarray(scores, dtype=np.float32)
+    path: FloatArray = _search(table, hidden, n_slopes, np.float32(stiffness), np.float32(credit), q).astype(np.float64)
+    return path
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _search(scores, hidden, S, stiffness, credit, q):  # type: ignore[no-untyped-def]
+    """Viterbi recursion over states (line, slope index s + S)."""
+    n_lines, n_columns = scores.shape
+    n_nodes = (n_columns + q - 1) // q
+    n_s = 2 * S + 1
+    best = np.zeros((n_lines, n_s), dtype=np.float32)
+    came = np.zeros((n_nodes, n_lines, n_s), dtype=np.int16)
+    moved = np.empty((n_lines, n_s), dtype=np.float32)
+    for node in range(n_nodes):
+        moved[:] = -1e30
+        for k in range(n_lines):
+            for i in range(n_s):
+                to = k + i - S
+                if to < 0 or to >= n_lines:
+                    continue
+                total = best[k, i]
+                for c in range(min(q, n_columns - node * q)):
+                    line, column = _at(k, i - S, c, q), node * q + c
+                    if hidden[line, column] == NOT_HIDDEN:
+                        total += scores[line, column]
+                        if scores[line, column] < _NOTHING:
+                            total -= stiffness * _ASTRAY * abs(i - S) / q
+                    elif abs(i - S - hidden[line, column]) >= _LEAST_ANGLE:
+                        total += credit
+                moved[to, i] = total
+        for k in range(n_lines):
+            for i in range(n_s):
+                top, source = np.float32(-1e30), i
+                for j in range(max(0, i - _MOST_BEND), min(n_s, i + _MOST_BEND + 1)):
+                    bend = max(abs(i - j) - 1, 0)
+                    value = moved[k, j] - stiffness * bend * bend
+                    if value > top:
+                        top, source = value, j
+                best[k, i] = top
+                came[node, k, i] = source
+    return _read_back(best, came, n_columns, S, q)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _read_back(best, came, n_columns, S, q):  # type: ignore[no-untyped-def]
+    """Follow the best final state back to the first column."""
+    flat = np.argmax(best)
+    k, i = flat // best.shape[1], flat % best.shape[1]
+    path = np.empty(n_columns, dtype=np.int64)
+    for node in range(came.shape[0] - 1, -1, -1):
+        i = came[node, k, i]
+        k -= i - S
+        for c in range(min(q, n_columns - node * q)):
+            path[node * q + c] = _at(k, i - S, c, q)
+    return path
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _at(k, s, c, q):  # type: ignore[no-untyped-def]
+    """Line after c of q columns on the way from k to k + s, rounded."""
+    return k + (2 * s * c + q) // (2 * q)

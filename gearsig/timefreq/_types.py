@@ -1,0 +1,203 @@
+"""Maps for display, complex coefficients and ridges over time–frequency or angle–order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray, frozen_array
+from gearsig.errors import InputError
+from gearsig.spectra import Scaling
+
+Axis = Literal["frequency", "order"]
+Spacing = Literal["linear", "logarithmic"]
+Reduction = Literal["mean", "max"]
+ComplexArray = NDArray[np.complexfloating[Any, Any]]
+
+
+@dataclass(frozen=True)
+class TimeFrequencyMap:
+    """Levels over time and frequency, or shaft angle and order, small enough to draw.
+
+    Parameters
+    ----------
+    values : array, (n_columns, n_lines)
+        Each is the mean or the maximum of the power in a stretch of the signal, in `scaling`.
+    positions : array, (n_lines,)
+        Frequencies in Hz or orders, increasing; see `axis`.
+    at : array, (n_columns,)
+        Middle of each stretch: seconds from the start, or revolutions of the shaft.
+    axis : str
+        "frequency" over time, or "order" over shaft angle.
+    spacing : str
+        Of the lines: "linear" or "logarithmic".
+    scaling : str
+        "amplitude peak": a unit sine reads 1 on its ridge; "power": it reads 1/2.
+    unit : str
+        Of the values, written out with the scaling.
+    method : str
+        Transform with its wavelet or window.
+    reduction : str
+        "mean" or "max" of the power in each stretch.
+    edge : array, (n_lines,)
+        How far from both ends, in the unit of `at`, a line is touched by what was assumed beyond them.
+    n_reach : int
+        Lines on either side of a ridge that one component covers.
+    squeezed : bool
+        Whether a component's share is moved to its momentary frequency: it is then the sum over a few lines.
+    source, shaft : str
+        Channel; the shaft that orders and revolutions are counted on, empty over time.
+    """
+
+    values: FloatArray
+    positions: FloatArray
+    at: FloatArray
+    axis: Axis
+    spacing: Spacing
+    scaling: Scaling
+    unit: str
+    method: str
+    reduction: Reduction
+    edge: FloatArray
+    n_reach: int = 1
+    squeezed: bool = False
+    source: str = ""
+    shaft: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", frozen_array(self.values, "values (column, line)", ndim=2))
+        for name in ("positions", "at", "edge"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        if self.values.shape != (len(self.at), len(self.positions)) or len(self.edge) != len(self.positions):
+            raise InputError(
+                f"values of shape {self.values.shape} and {len(self.edge)} edges for {len(self.at)} columns × "
+                f"{len(self.positions)} lines"
+            )
+
+    @property
+    def at_label(self) -> str:
+        """What `at` counts, with unit."""
+        return at_label(self.axis, self.shaft)
+
+    @property
+    def axis_label(self) -> str:
+        """What `positions` count, with unit."""
+        return axis_label(self.axis, self.shaft)
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """Complex coefficients of a transform at equal steps of time or angle.
+
+    Parameters
+    ----------
+    values : complex array, (n_lines, n_columns)
+        Modulus: peak amplitude; a unit sine reads 1 on its ridge. Phase: of the cosine, at the column's instant.
+    positions : array, (n_lines,)
+        Frequencies in Hz or orders, increasing.
+    at : array, (n_columns,)
+        Instants: seconds from the start, or revolutions of the shaft.
+    axis, spacing, unit, method, source, shaft
+        As in `TimeFrequencyMap`; the unit is the signal's own.
+    weights : array, (n_lines,)
+        Real part of Σ weights · values over the lines: the signal at the columns.
+    n_reach, squeezed
+        As in `TimeFrequencyMap`.
+    """
+
+    values: ComplexArray
+    positions: FloatArray
+    at: FloatArray
+    axis: Axis
+    spacing: Spacing
+    unit: str
+    method: str
+    weights: FloatArray
+    n_reach: int = 1
+    squeezed: bool = False
+    source: str = ""
+    shaft: str = ""
+
+    def __post_init__(self) -> None:
+        view = np.asarray(self.values).view()
+        view.flags.writeable = False
+        object.__setattr__(self, "values", view)
+        for name in ("positions", "at", "weights"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        if view.shape != (len(self.positions), len(self.at)):
+            raise InputError(f"values of shape {view.shape} for {len(self.positions)} lines × {len(self.at)} columns")
+
+
+@dataclass(frozen=True)
+class Ridge:
+    """Frequency and amplitude of one component along time, or order along shaft angle.
+
+    Parameters
+    ----------
+    at : array, (n,)
+        Seconds from the start, or revolutions.
+    positions : array, (n,)
+        Momentary frequency in Hz, or order.
+    amplitude : array, (n,)
+        Peak amplitude in `unit`, from the largest coefficient near the path, or from the sum over it where the
+        transform was squeezed.
+    shared : boolean array, (n,)
+        Where another ridge lies within reach: the amplitude there is of both together.
+    axis, unit, source, shaft
+        As in `Coefficients`.
+    """
+
+    at: FloatArray
+    positions: FloatArray
+    amplitude: FloatArray
+    shared: NDArray[np.bool_]
+    axis: Axis
+    unit: str
+    source: str = ""
+    shaft: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("at", "positions", "amplitude"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        shared = np.asarray(self.shared, dtype=np.bool_).view()
+        shared.flags.writeable = False
+        object.__setattr__(self, "shared", shared)
+        if not len(self.at) == len(self.positions) == len(self.amplitude) == len(shared):
+            raise InputError("at, positions, amplitude and shared of a ridge differ in length")
+
+    def position_at(self, at: FloatArray) -> FloatArray:
+        """Return the frequency or order at other instants, by straight lines; constant beyond the ends."""
+        return np.interp(at, self.at, self.positions)
+
+
+def at_label(axis: Axis, shaft: str) -> str:
+    """Name the direction in which the signal runs."""
+    return "time (s)" if axis == "frequency" else f"angle (revolutions of {shaft or 'the shaft'})"
+
+
+def axis_label(axis: Axis, shaft: str) -> str:
+    """Name the direction of the lines."""
+    return "frequency (Hz)" if axis == "frequency" else f"order (of {shaft or 'the shaft'})"
+
+
+# --------------------
+# How many coefficients may be held at once.
+# --------------------
+
+
+MOST_COEFFICIENTS = 1 << 28
+"""Complex coefficients that are held at once: 2 GB."""
+
+
+def check_size(n_lines: int, n_columns: int) -> None:
+    """Raise if the coefficients would take more than 2 GB."""
+    if n_lines * n_columns > MOST_COEFFICIENTS:
+        raise InputError(
+            f"{n_lines} lines × {n_columns} columns make {8e-9 * n_lines * n_columns:.3g} GB of coefficients",
+            where="step",
+            allowed=f"at most {8e-9 * MOST_COEFFICIENTS:.2g} GB",
+            remedy=f"set step to {-(-n_lines * n_columns // MOST_COEFFICIENTS)} times as much, or take the map",
+        )

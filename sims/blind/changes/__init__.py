@@ -1,1 +1,0 @@
-"""What may be wrong with the blind rig, one family per file."""

@@ -1,0 +1,68 @@
+"""The cracked spur pair: 16 degrees of freedom, contact tooth pair by tooth pair, cracks, friction, backlash."""
+
+from sims.cracked._continuation import DECAYS, RAMP_S, SECTIONS, TRANSMISSION_ERROR, Branch, End, SteadyRun
+from sims.cracked._convergence import check_convergence
+from sims.cracked._kernels import contact_forces, derivative, integrate, late_entry, place_of_entry, potential_energy
+from sims.cracked._respond import (
+    SIGNALS,
+    PairConstants,
+    PairState,
+    Response,
+    default_step_s,
+    eigenfrequencies_hz,
+    matrices,
+    mean_stiffness_n_per_m,
+    mesh_mass_kg,
+    prepare,
+    respond,
+    slowest_decay_s,
+)
+from sims.cracked._simulator import (
+    NAME,
+    STEP_ANGLE_RAD,
+    CrackedPair,
+    CrackedTwin,
+    PreparedCrackedPair,
+    cracked_gap_simulator,
+    prepare_preset,
+    simulate_machine,
+    simulate_with_motion,
+)
+
+__all__ = [
+    "DECAYS",
+    "NAME",
+    "RAMP_S",
+    "SECTIONS",
+    "SIGNALS",
+    "STEP_ANGLE_RAD",
+    "TRANSMISSION_ERROR",
+    "Branch",
+    "CrackedPair",
+    "CrackedTwin",
+    "End",
+    "PairConstants",
+    "PairState",
+    "PreparedCrackedPair",
+    "Response",
+    "SteadyRun",
+    "check_convergence",
+    "contact_forces",
+    "cracked_gap_simulator",
+    "default_step_s",
+    "derivative",
+    "eigenfrequencies_hz",
+    "integrate",
+    "late_entry",
+    "matrices",
+    "mean_stiffness_n_per_m",
+    "mesh_mass_kg",
+    "place_of_entry",
+    "potential_energy",
+    "prepare",
+    "prepare_preset",
+    "respond",
+    "simulate_machine",
+    "simulate_with_motion",
+    "slowest_decay_s",
+]

@@ -1,0 +1,475 @@
+"""Compiled: the classic Runge–Kutta method of fourth order at a fixed step, for the sixteen coordinates."""
+
+# mypy: allow-untyped-defs, allow-untyped-calls
+
+from __future__ import annotations
+
+from math import cos, sin
+
+import numpy as np
+from numba import njit
+
+from sims.gear_pair import carried_part, foot
+from sims.machine import course_value, set_speed
+from sims.mesh import advance, contact_friction_n, cubic, engagement_and_slope, height_now, pair_force
+
+# --------------------
+# Compiled contact of the gear pair: forces of all tooth pairs that touch, on either flank.
+#
+# Each pair k with progress ζ = c − k, c = z1 θ1/2π, has the energy U = w(ζ) u(d; C(ζ)), d = δ − E(ζ) − Δb(t), and the
+# normal force N = w n(d; C) from d = C n + B(n). Its forces on the coordinates are −∂U/∂q; besides N along the line of
+# action that gives the driver a torque −∂U/∂c · ∂c/∂θ1, as stiffness and flank shape move past under load. Without it a
+# pair would take energy from the drive that appears nowhere (Oh, Grosh, Barber 2005). ∂u/∂C at constant d is −n²/2
+# whatever the contact's law is.
+#
+# Gears that move apart by Δa stretch the line between their base circles by Δa/sin α_w: a pair enters late by that, as
+# the path of contact begins at the driven gear's tip. The line also turns, by Δx/(a sin α_w) where Δx is how far the
+# driven gear has moved off the line of action, and with it all contacts shift by r_b1 times that. So run-out changes
+# contact ratio and phase once per revolution. The forces −∂U/∂(Δx, Δy) are left out: they would follow from the width
+# that is assumed for the ramp, where the geometry of a corner contact gives a tenth of it, and they work over the
+# run-out alone.
+# --------------------
+
+
+MOST_CYCLES = 1e12
+"""Mesh cycles beyond which a run has burst; until then, single cycles are resolved to 1e-4."""
+MOST_LATE = 0.12
+"""Base pitches by which an entry may be late or early; the places of gears that move further count as that far."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def late_entry(k, dx, dy):
+    """Base pitches by which pairs enter late, from the driver's centre less the driven gear's."""
+    late = -(k.late_x * dx + k.late_y * dy)
+    return min(max(late, -MOST_LATE), MOST_LATE)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def contact_forces(  # noqa: PLR0915  one pass over the pairs: no part of it stands alone
+    k, curves, rows, pitch, delta, delta_rate, late, cycles, cycle_rate, omega_1, omega_2, slip_x, rough, rough_rate
+):
+    """(ΣN, torque −∂U/∂c, Σf, Σfρ1, Σfρ2) of the driving flanks.
+
+    `k` … `pitch`: see `sims.cracked`. `late`: base pitches by which a pair enters late.
+    `slip_x`: ẋ1 − ẋ2. `rough`, `rough_rate`: Δb and its rate.
+    """
+    normal, along_cycles, friction, moment_1, moment_2 = 0.0, 0.0, 0.0, 0.0, 0.0
+    if not abs(cycles) < MOST_CYCLES:  # a solution that bursts, or NaN, must not be taken for a tooth's number
+        return np.nan, np.nan, np.nan, np.nan, np.nan
+    newest = np.floor(cycles + 0.5 * k.ramp + MOST_LATE)
+    z1, z2 = float(k.teeth[0]), float(k.teeth[1])
+    columns = curves.shape[1]
+    for slot in range(k.n_slots):
+        pair = newest - slot
+        progress = cycles - pair
+        weight, weight_slope = engagement_and_slope(progress, late, k.contact_ratio, k.ramp)
+        if weight <= 0.0:
+            continue
+        # By floats: the remainder of whole numbers takes several times as long.
+        tooth_1, tooth_2 = int(pair - z1 * np.floor(pair / z1)), int(pair - z2 * np.floor(pair / z2))
+        # An early entry lies ahead of the table: its first cubic ends there.
+        place = max((progress - k.table_start) / k.table_step, 1.0)
+        i = min(max(int(place), 1), columns - 3)
+        t = place - i
+        # Lagrange's cubic through four columns, and its slope.
+        wa, wb = -t * (t - 1.0) * (t - 2.0) / 6.0, (t * t - 1.0) * (t - 2.0) / 2.0
+        wc, wd = -t * (t + 1.0) * (t - 2.0) / 2.0, t * (t * t - 1.0) / 6.0
+        step = 1.0 / k.table_step
+        sa, sb = -(3.0 * t * t - 6.0 * t + 2.0) / 6.0 * step, (3.0 * t * t - 4.0 * t - 1.0) / 2.0 * step
+        sc, sd = -(3.0 * t * t - 2.0 * t - 2.0) / 2.0 * step, (3.0 * t * t - 1.0) / 6.0 * step
+        row_1, row_2 = rows[0, tooth_1], rows[1, tooth_2]
+        a, b = curves[row_1, i - 1] + curves[row_2, i - 1], curves[row_1, i] + curves[row_2, i]
+        c, d = (
+            curves[row_1, i + 1] + curves[row_2, i + 1],
+            curves[row_1, i + 2] + curves[row_2, i + 2],
+        )
+        compliance = wa * a + wb * b + wc * c + wd * d
+        compliance_slope = sa * a + sb * b + sc * c + sd * d
+        row_1, row_2 = rows[2, tooth_1], rows[3, tooth_2]
+        a, b = curves[row_1, i - 1] + curves[row_2, i - 1], curves[row_1, i] + curves[row_2, i]
+        c, d = (
+            curves[row_1, i + 1] + curves[row_2, i + 1],
+            curves[row_1, i + 2] + curves[row_2, i + 2],
+        )
+        depth = delta - rough - (wa * a + wb * b + wc * c + wd * d) - pitch[0, tooth_1] - pitch[1, tooth_2]
+        if depth <= 0.0:
+            continue
+        shape_slope = sa * a + sb * b + sc * c + sd * d
+        force, stiffness = pair_force(depth, compliance, k.contact_coefficient, k.load_dependent, 1.0)
+        gate = 1.0
+        if depth < k.damping_ramp:
+            u = depth / k.damping_ramp
+            gate = u * u * (3.0 - 2.0 * u)
+        depth_rate = delta_rate - rough_rate - shape_slope * cycle_rate
+        total = weight * (force + k.damping_time * gate * stiffness * depth_rate)
+        total = max(total, 0.0)
+        normal += total
+        along_cycles += total * shape_slope + weight * 0.5 * force * force * compliance_slope
+        if weight_slope != 0.0:
+            along_cycles -= weight_slope * energy_of_pair(depth, compliance, force, k.load_dependent)
+        if k.friction and total > 0.0:
+            rho_1 = k.start_radius + progress * k.base_pitch
+            rho_2 = k.action_length - rho_1
+            rubbing = contact_friction_n(
+                total,
+                omega_1 * rho_1,
+                omega_2 * rho_2,
+                slip_x,
+                rho_1 * rho_2 / k.action_length,
+                k.width,
+                k.reduced_modulus,
+                k.log10_oil,
+                k.oil_constant,
+                k.sign_threshold,
+                k.friction_factor,
+                k.dry_friction,
+            )
+            friction += rubbing
+            moment_1 += rubbing * rho_1
+            moment_2 += rubbing * rho_2
+    return normal, along_cycles, friction, moment_1, moment_2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def energy_of_pair(depth, compliance, force, load_dependent):
+    """U = n d − C n²/2 − ∫B, without the engagement weight."""
+    if load_dependent:
+        return force * (0.5 * compliance * force + (depth - compliance * force) * 0.9 / 1.9)
+    return 0.5 * force * depth
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def stored_energy(k, curves, rows, pitch, delta, late, cycles, rough):
+    """ΣU of the driving flanks, in J; for checks."""
+    total = 0.0
+    newest = int(np.floor(cycles + 0.5 * k.ramp + MOST_LATE))
+    for slot in range(k.n_slots):
+        pair = newest - slot
+        progress = cycles - pair
+        weight = engagement_and_slope(progress, late, k.contact_ratio, k.ramp)[0]
+        one, two = pair % k.teeth[0], pair % k.teeth[1]
+        compliance = cubic(curves[rows[0, one]], k.table_start, k.table_step, progress)
+        compliance += cubic(curves[rows[1, two]], k.table_start, k.table_step, progress)
+        shape = cubic(curves[rows[2, one]], k.table_start, k.table_step, progress) + pitch[0, one]
+        shape += cubic(curves[rows[3, two]], k.table_start, k.table_step, progress) + pitch[1, two]
+        depth = delta - rough - shape
+        if weight > 0.0 and depth > 0.0:
+            force, _ = pair_force(depth, compliance, k.contact_coefficient, k.load_dependent, 1.0)
+            total += weight * energy_of_pair(depth, compliance, force, k.load_dependent)
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def back_flank_force(k, depth, rate):
+    """(N', U') of the flanks behind, pressed by `depth`: one constant stiffness, its damping as on the driving side."""
+    if depth <= 0.0:
+        return 0.0, 0.0
+    gate = 1.0
+    if depth < k.damping_ramp:
+        u = depth / k.damping_ramp
+        gate = u * u * (3.0 - 2.0 * u)
+    force = k.back_stiffness * (depth + k.damping_time * gate * rate)
+    return max(force, 0.0), 0.5 * k.back_stiffness * depth * depth
+
+
+# --------------------
+# Compiled equations of motion of the sixteen coordinates; see `sims.cracked` for their order.
+#
+# Driver (counter-clockwise; c, s of the angle of its centre of mass, ρ its distance from the axis)
+#     ẍ = F_x/m + ρ(θ̈ s + θ̇² c),  ÿ = F_y/m + ρ(−θ̈ c + θ̇² s),  J θ̈ = T + ρ(s F_x − c F_y),
+# where F holds every force but gravity: gravity acts at the centre of mass and has no moment about it. The driven gear
+# turns clockwise: the signs of its y terms are reversed.
+# Its pitch circle's centre lies ε off the axis: y1 + ε1 sin φ1 and y2 − ε2 sin φ2 take the places of y1 and y2 in the
+# compression, and the torque is −N ∂δ/∂θ. Forces on the teeth: `sims.cracked`, and on the flanks behind
+# along their own line of action, 2α_w away from that of the driving flanks.
+# --------------------
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
+    k, curves, rows, pitch, q, v, torque, set_angle, speed, speed_rate, rough, rough_rate, a, extra
+):
+    """Fill `a` (16) with the accelerations and `extra` (5) with the signals that follow.
+
+    k, curves, rows, pitch : see `sims.cracked`.
+    q, v : (16,).
+    torque, set_angle, speed, speed_rate : set values of the input at this time, in N m, rad, rad/s, rad/s².
+    rough, rough_rate : Δb and its rate.
+    """
+    rb1, rb2 = k.base_radius[0], k.base_radius[1]
+    # Places of the pitch circles' centres: ε (cos φ1, sin φ1) and ε (cos φ2, −sin φ2).
+    cx1, cy1, cx2, cy2 = 0.0, 0.0, 0.0, 0.0
+    if k.turns:
+        cx1, cy1 = k.runout[0] * cos(q[1] + k.runout_angle[0]), k.runout[0] * sin(q[1] + k.runout_angle[0])
+        cx2, cy2 = k.runout[1] * cos(q[2] + k.runout_angle[1]), -k.runout[1] * sin(q[2] + k.runout_angle[1])
+    error = rb1 * q[1] - rb2 * q[2]
+    arm1, arm2 = rb1 + cx1, rb2 - cx2  # ∂δ/∂θ1 and −∂δ/∂θ2
+    delta_rate = arm1 * v[1] - arm2 * v[2] + v[5] - v[7]
+    dx, dy = q[4] + cx1 - q[6] - cx2, q[5] + cy1 - q[7] - cy2
+    delta, late = error + dy, late_entry(k, dx, dy)
+    normal, along, friction, moment_1, moment_2 = contact_forces(
+        k,
+        curves,
+        rows,
+        pitch,
+        delta,
+        delta_rate,
+        late,
+        k.cycles_per_rad * q[1] - k.turn_x * dx,
+        k.cycles_per_rad * v[1],
+        v[1],
+        v[2],
+        v[4] - v[6],
+        rough,
+        rough_rate,
+    )
+    back = 0.0
+    depth = -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough
+    if depth > 0.0:  # also while the driving flanks touch: run-out may take up all play
+        # Velocities of the pitch circles' centres: θ̇ times their places turned by a quarter.
+        vx = v[4] - cy1 * v[1] - v[6] - cy2 * v[2]
+        vy = v[5] + cx1 * v[1] - v[7] + cx2 * v[2]
+        rate = -rb1 * v[1] + rb2 * v[2] - k.cos_back * vy + k.sin_back * vx - rough_rate
+        back, _ = back_flank_force(k, depth, rate)
+    fx1, fy1 = -friction - k.sin_back * back, -normal + k.cos_back * back
+    fx2, fy2 = friction + k.sin_back * back, normal - k.cos_back * back
+    t1 = -arm1 * normal + k.cycles_per_rad * along + moment_1
+    t2 = arm2 * normal - moment_2
+    if back > 0.0:
+        t1 += back * (rb1 + k.cos_back * cx1 + k.sin_back * cy1)
+        t2 += back * (-rb2 + k.cos_back * cx2 + k.sin_back * cy2)
+
+    # Shafts: bending to the mean of the two bearings, torsion to the rotors.
+    for side in range(2):
+        g, b1, b2 = 4 + 2 * side, 8 + 4 * side, 10 + 4 * side
+        ks, cs = k.bending_stiffness[side], k.bending_damping[side]
+        bend_x = ks * (q[g] - 0.5 * (q[b1] + q[b2])) + cs * (v[g] - 0.5 * (v[b1] + v[b2]))
+        bend_y = ks * (q[g + 1] - 0.5 * (q[b1 + 1] + q[b2 + 1])) + cs * (v[g + 1] - 0.5 * (v[b1 + 1] + v[b2 + 1]))
+        theta = q[1] if side == 0 else q[2]
+        rotor, rotor_rate = (q[0], v[0]) if side == 0 else (q[3], v[3])
+        up = 1.0 if side == 0 else -1.0  # the driven shaft turns the other way
+        slope = 1.0
+        push_x, push_y = 0.0, 0.0
+        if k.hooke[side] > 0.0:
+            c2, s2 = cos(2.0 * rotor), sin(2.0 * rotor)
+            slope = 1.0 + 2.0 * k.hooke[side] * c2
+            rotor += k.hooke[side] * s2
+            rotor_rate *= slope
+        twist = rotor - theta
+        twist_rate = rotor_rate - (v[1] if side == 0 else v[2])
+        carried = k.torsional_stiffness[side] * twist + k.torsional_damping[side] * twist_rate
+        if k.hooke[side] > 0.0:
+            bent = k.coupling_bending[side]
+            push_x = k.hooke_force[side] * (carried * (1.0 + c2) - bent * s2)
+            push_y = k.hooke_force[side] * up * (carried * s2 + bent * (1.0 + c2))
+        for row, b, sign in ((2 * side, b1, 1.0), (2 * side + 1, b2, -1.0)):
+            x, y = q[b], q[b + 1]
+            part = 1.0
+            if k.special[row] > 0:
+                foot_x, foot_y = foot(k, row, theta, x, y)
+                x, y = x - foot_x, y - foot_y
+                part = carried_part(k, row, x, y)
+            kb, cb, per_mass = part * k.bearing_stiffness[row], k.bearing_damping[row], k.per_bearing_mass[row]
+            a[b] = (0.5 * bend_x - kb * x - cb * v[b] + sign * push_x) * per_mass + k.gravity_x
+            a[b + 1] = (0.5 * bend_y - kb * y - cb * v[b + 1] + sign * push_y) * per_mass + k.gravity_y
+        if side == 0:
+            fx, fy, t = fx1 - bend_x, fy1 - bend_y, t1 + carried
+        else:
+            fx, fy, t = fx2 - bend_x, fy2 - bend_y, t2 + carried
+        offset = k.mass_offset[side]
+        ax, ay = fx * k.per_mass[side], fy * k.per_mass[side]
+        if offset > 0.0:
+            omega = v[1] if side == 0 else v[2]
+            c, s = cos(theta + k.mass_angle[side]), sin(theta + k.mass_angle[side])
+            t += offset * (s * fx - up * c * fy)
+            alpha = t * k.per_inertia[side]
+            ax += offset * (alpha * s + omega * omega * c)
+            ay += up * offset * (-alpha * c + omega * omega * s)
+        a[1 + side] = t * k.per_inertia[side]
+        a[g], a[g + 1] = ax + k.gravity_x, ay + k.gravity_y
+        if side == 0:
+            drive = torque * _ripple(k, q[0]) + k.total_inertia * speed_rate
+            drive += k.governor * (speed - v[0]) + k.governor_spring * (set_angle - q[0])
+            a[0] = (drive - slope * carried) * k.per_rotor[0]
+        else:
+            a[3] = (-torque * k.ratio - slope * carried) * k.per_rotor[1]
+    extra[0], extra[1], extra[2], extra[3] = error, delta, normal - back, friction
+    extra[4] = rough
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _ripple(k, theta):
+    """Drive torque over its set value."""
+    factor = 1.0
+    for i in range(k.n_ripples):
+        factor += k.ripples[i, 1] * cos(k.ripples[i, 0] * theta + k.ripples[i, 2])
+    return factor
+
+
+# --------------------
+# Compiled: energy of the machine, for checks. Valid for bearings without clearance or defect.
+# --------------------
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def potential_energy(k, curves, rows, pitch, q, late, turned, rough):
+    """Springs, tooth pairs and weight, in J; `late`, `turned`: see `place_of_entry`."""
+    cx1, cy1 = k.runout[0] * cos(q[1] + k.runout_angle[0]), k.runout[0] * sin(q[1] + k.runout_angle[0])
+    cx2, cy2 = k.runout[1] * cos(q[2] + k.runout_angle[1]), -k.runout[1] * sin(q[2] + k.runout_angle[1])
+    error = k.base_radius[0] * q[1] - k.base_radius[1] * q[2]
+    dx, dy = q[4] + cx1 - q[6] - cx2, q[5] + cy1 - q[7] - cy2
+    total = stored_energy(k, curves, rows, pitch, error + dy, late, k.cycles_per_rad * q[1] - turned, rough)
+    total += back_flank_force(k, -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough, 0.0)[1]
+    for side in range(2):
+        g, b1, b2 = 4 + 2 * side, 8 + 4 * side, 10 + 4 * side
+        theta, rotor = q[1 + side], q[3 * side]
+        twist = rotor + k.hooke[side] * sin(2.0 * rotor) - theta
+        total += 0.5 * k.torsional_stiffness[side] * twist * twist
+        angle, up = theta + k.mass_angle[side], 1.0 - 2.0 * side
+        for axis in range(2):
+            bend = q[g + axis] - 0.5 * (q[b1 + axis] + q[b2 + axis])
+            total += 0.5 * k.bending_stiffness[side] * bend * bend
+            pull = k.gravity_x if axis == 0 else k.gravity_y
+            centre = q[g + axis] + k.mass_offset[side] * (cos(angle) if axis == 0 else up * sin(angle))
+            total -= k.mass[side] * pull * centre
+            for b, row in ((b1, 2 * side), (b2, 2 * side + 1)):
+                place = q[b + axis]
+                total += 0.5 * k.bearing_stiffness[row] * place * place - k.bearing_mass[row] * pull * place
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def place_of_entry(k, q):
+    """Late entry of pairs, and shift of all contacts, in base pitches, at the places q."""
+    dx = q[4] + k.runout[0] * cos(q[1] + k.runout_angle[0]) - q[6] - k.runout[1] * cos(q[2] + k.runout_angle[1])
+    dy = q[5] + k.runout[0] * sin(q[1] + k.runout_angle[0]) - q[7] + k.runout[1] * sin(q[2] + k.runout_angle[1])
+    return late_entry(k, dx, dy), k.turn_x * dx
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def kinetic_energy(k, v, q):
+    """½ Σ m v² of all bodies, in J; for checks."""
+    total = 0.5 * (k.rotor_inertia[0] * v[0] ** 2 + k.rotor_inertia[1] * v[3] ** 2)
+    for side in range(2):
+        up, g = (1.0 if side == 0 else -1.0), 4 + 2 * side
+        phi = q[1 + side] + k.mass_angle[side]
+        vx = v[g] - k.mass_offset[side] * sin(phi) * v[1 + side]
+        vy = v[g + 1] + up * k.mass_offset[side] * cos(phi) * v[1 + side]
+        total += 0.5 * k.inertia[side] * v[1 + side] ** 2 + 0.5 * k.mass[side] * (vx * vx + vy * vy)
+    for row in range(4):
+        total += 0.5 * k.bearing_mass[row] * (v[8 + 2 * row] ** 2 + v[9 + 2 * row] ** 2)
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def integrate(  # noqa: PLR0915  four stages written out
+    k, curves, rows, pitch, q, v, set_angle, start, step, n_steps, stride, speed, torque, rough, select, found, energies
+):
+    """Run `n_steps` steps from time `start`; fill `found` with the selected signals at every `stride`-th step.
+
+    k, curves, rows, pitch : see `sims.cracked`.
+    q, v, set_angle : (16,), (16,), (1,); left at the last step's state, for the next call to go on from.
+    speed, torque : (2, n) times and values of the set courses, in rad/s and N m.
+    rough : phasors of a roughness locked to time at `start`, stepped by half of `step`, left at the end; see
+        `TimeLockedRoughness`.
+    select : places of the wanted signals in `sims.cracked.SIGNALS`.
+    found : (n_out, n_selected).
+    energies : (n_out,) or (0,): total energy in J, not computed where empty.
+    Returns the number of rows that were filled: fewer where the state is no longer finite.
+    """
+    re, im, omega, half_cos, half_sin = rough
+    a = np.empty(16)
+    extra = np.empty(5)
+    q1, v1 = np.empty(16), np.empty(16)
+    sum_q, sum_v = np.empty(16), np.empty(16)
+    signals = np.empty(53)
+    n_rows = 0
+    h0, r0 = height_now(re, im, omega)
+    angle = set_angle[0]
+    for step_number in range(n_steps):
+        t = start + step_number * step
+        w0, d0 = set_speed(k, speed, t)
+        wh, dh = set_speed(k, speed, t + 0.5 * step)
+        w1, d1 = set_speed(k, speed, t + step)
+        # The set angle by Simpson's rule, and by the parabola through the same three speeds half way.
+        angle_h = angle + step / 24.0 * (5.0 * w0 + 8.0 * wh - w1)
+        angle_1 = angle + step / 6.0 * (w0 + 4.0 * wh + w1)
+        m0, mh, m1 = course_value(torque, t), course_value(torque, t + 0.5 * step), course_value(torque, t + step)
+        advance(re, im, half_cos, half_sin)
+        hh, rh = height_now(re, im, omega)
+        advance(re, im, half_cos, half_sin)
+        h1, r1 = height_now(re, im, omega)
+        accelerations(k, curves, rows, pitch, q, v, m0, angle, w0, d0, h0, r0, a, extra)
+        if step_number % stride == 0:
+            for i in range(16):
+                signals[i], signals[16 + i], signals[32 + i] = q[i], v[i], a[i]
+            for i in range(5):
+                signals[48 + i] = extra[i]
+            for i in range(select.shape[0]):
+                found[n_rows, i] = signals[select[i]]
+            if energies.shape[0] > 0:
+                late, turned = place_of_entry(k, q)
+                energies[n_rows] = potential_energy(k, curves, rows, pitch, q, late, turned, h0)
+                energies[n_rows] += kinetic_energy(k, v, q)
+            if not np.isfinite(a[1] + a[5] + a[7] + a[2]):
+                return n_rows
+            n_rows += 1
+        half = 0.5 * step
+        for i in range(16):
+            sum_q[i], sum_v[i] = v[i], a[i]
+            q1[i], v1[i] = q[i] + half * v[i], v[i] + half * a[i]
+        accelerations(k, curves, rows, pitch, q1, v1, mh, angle_h, wh, dh, hh, rh, a, extra)
+        for i in range(16):
+            sum_q[i] += 2.0 * v1[i]
+            sum_v[i] += 2.0 * a[i]
+            q1[i] = q[i] + half * v1[i]
+            v1[i] = v[i] + half * a[i]
+        accelerations(k, curves, rows, pitch, q1, v1, mh, angle_h, wh, dh, hh, rh, a, extra)
+        for i in range(16):
+            sum_q[i] += 2.0 * v1[i]
+            sum_v[i] += 2.0 * a[i]
+            q1[i] = q[i] + step * v1[i]
+            v1[i] = v[i] + step * a[i]
+        accelerations(k, curves, rows, pitch, q1, v1, m1, angle_1, w1, d1, h1, r1, a, extra)
+        sixth = step / 6.0
+        for i in range(16):
+            q[i] += sixth * (sum_q[i] + v1[i])
+            v[i] += sixth * (sum_v[i] + a[i])
+        h0, r0, angle = h1, r1, angle_1
+    set_angle[0] = angle
+    return n_rows
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def derivative(k, curves, rows, pitch, t, state, speed, torque, first_angle, rough, rate):
+    """Fill `rate` (32) with the derivative of `state` (q, v) at any time t: for other integrators and checks.
+
+    first_angle : set angle at time 0; the set speed must be constant.
+    rough : (amplitudes, ω, phases) of a roughness locked to time.
+    """
+    amplitude, omega, phase = rough
+    height, height_rate = 0.0, 0.0
+    for n in range(amplitude.shape[0]):
+        height += amplitude[n] * cos(omega[n] * t + phase[n])
+        height_rate -= amplitude[n] * omega[n] * sin(omega[n] * t + phase[n])
+    w, d = set_speed(k, speed, t)
+    angle = first_angle + w * t
+    extra = np.empty(5)
+    accelerations(
+        k,
+        curves,
+        rows,
+        pitch,
+        state[:16],
+        state[16:],
+        course_value(torque, t),
+        angle,
+        w,
+        d,
+        height,
+        height_rate,
+        rate[16:],
+        extra,
+    )
+    rate[:16] = state[16:]
+    return extra

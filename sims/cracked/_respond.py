@@ -1,0 +1,613 @@
+"""Run the model and return what it does: displacements, velocities, accelerations, mesh force, transmission error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil, cos, floor, pi, radians, sin, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray, closest_match_hint, count, positive
+from gearsig.errors import InputError, RefusalError
+from sims.cracked._kernels import MOST_LATE
+from sims.gear_pair import (
+    BEARING_FIELDS,
+    COORDINATES,
+    DRIVE_FIELDS,
+    DRIVE_SCALARS,
+    FRICTION_SCALARS,
+    bearing_fields,
+    bearing_loads_n,
+    draw_roughness,
+    drive_fields,
+    friction_fields,
+    governor_nm_s_per_rad,
+    total_inertia_kg_m2,
+)
+from sims.machine import Machine, Operation, Profile
+from sims.mesh import MeshTable, TimeLockedRoughness, back_stiffness_n_per_m, mesh_stiffness, mesh_table, share_torque
+
+# --------------------
+# Numbers of the sixteen coordinates and of the signals that a run can give.
+# --------------------
+
+
+__all__ = ["COORDINATES", "N_COORDINATES", "SIGNALS"]
+
+N_COORDINATES = len(COORDINATES)
+
+SIGNALS = (
+    *COORDINATES,
+    *(f"{name} velocity" for name in COORDINATES),
+    *(f"{name} acceleration" for name in COORDINATES),
+    "transmission_error_m",
+    "compression_m",
+    "mesh_force_n",
+    "friction_n",
+    "backlash_change_m",
+)
+"""What a run can give, by the place in the kernel's row.
+
+transmission_error_m: r_b1 θ1 − r_b2 θ2. compression_m: that plus what the gears' centres add. mesh_force_n: sum of the
+tooth pairs' normal forces, below 0 on the back flank. friction_n: sum of the friction forces. backlash_change_m: Δb
+of a roughness locked to time.
+"""
+
+# --------------------
+# The machine as plain numbers, which compiled code reads.
+# --------------------
+
+
+DAMPING_RAMP_M = 2e-7
+"""Depth over which the contact's damping comes in."""
+SCALARS = (
+    "table_start",
+    "table_step",
+    "contact_coefficient",
+    "contact_ratio",
+    "ramp",
+    "cycles_per_rad",
+    "damping_time",
+    "damping_ramp",
+    "backlash",
+    "back_stiffness",
+    "late_x",
+    "late_y",
+    "turn_x",
+    "cos_back",
+    "sin_back",
+    *FRICTION_SCALARS,
+    "gravity_x",
+    "gravity_y",
+    *DRIVE_SCALARS,
+)
+PER_SIDE = (
+    "base_radius",
+    "mass",
+    "inertia",
+    "per_mass",
+    "per_inertia",
+    "per_rotor",
+    "mass_offset",
+    "mass_angle",
+    "runout",
+    "runout_angle",
+    "bending_stiffness",
+    "bending_damping",
+    "torsional_stiffness",
+    "torsional_damping",
+    "rotor_inertia",
+    "hooke",
+    "hooke_force",
+    "coupling_bending",
+)
+RECORD = np.dtype(
+    [(name, np.float64) for name in SCALARS]
+    + [(name, np.float64, (2,)) for name in PER_SIDE]
+    + [
+        ("load_dependent", np.bool_),
+        ("friction", np.bool_),
+        ("turns", np.bool_),
+        ("n_slots", np.int64),
+        ("teeth", np.int64, (2,)),
+    ]
+    + DRIVE_FIELDS
+    + BEARING_FIELDS,
+    align=True,
+)
+"""Numbers in SI units, those of a side in pairs (driver, driven), those of bearings in fours;
+per_… are reciprocals, since compiled code multiplies faster than it divides. A record, since compiled
+code passes one by its address, while it copies every member of a tuple at each call."""
+
+
+@dataclass(frozen=True)
+class PairConstants:
+    """What compiled code reads.
+
+    Parameters
+    ----------
+    record : one `RECORD`
+    curves : array, (n_curves, n)
+        Compliance (m/N) and separation (m) of single teeth over the progress of contact, see `MeshTable`.
+    rows : int array, (4, z)
+        Which curve holds the compliance of each tooth of the driver, of the driven gear, then their separations.
+    pitch : array, (2, z)
+        Pitch deviation of each tooth, in m. One array of each kind, since compiled code counts its references to every
+        array in a tuple, which took as long as the mechanics.
+    """
+
+    record: Any
+    curves: FloatArray
+    rows: NDArray[np.int64]
+    pitch: FloatArray
+
+    @property
+    def arguments(self) -> tuple[Any, FloatArray, NDArray[np.int64], FloatArray]:
+        """The four, as kernels take them."""
+        return self.record, self.curves, self.rows, self.pitch
+
+
+def constants(machine: Machine, operation: Operation, rng: np.random.Generator) -> PairConstants:
+    """Turn a machine into plain numbers; draws the places of rolling elements in bearings with a defect."""
+    pair, mesh = machine.mesh.pair, machine.mesh
+    table = mesh_table(mesh)
+    base_radius = np.array([pair.driver.base_radius_mm, pair.driven.base_radius_mm]) * 1e-3
+    force = operation.torque_nm.largest / base_radius[0]
+    mean_stiffness = mean_stiffness_n_per_m(machine, force)
+    inertia = np.array([w.inertia_kg_m2 for w in machine.wheels])
+    mass = np.array([w.mass_kg for w in machine.wheels])
+    alpha, beta = pair.working_pressure_angle_rad, radians(machine.line_of_action_deg)
+    hooke_rad = np.array([radians(s.coupling_angle_deg) for s in machine.shafts])
+    rotors = np.array([s.rotor_inertia_kg_m2 for s in machine.shafts])
+    values: dict[str, Any] = {
+        "table_start": table.start,
+        "table_step": table.step,
+        "contact_coefficient": table.contact_coefficient,
+        "load_dependent": table.load_dependent,
+        "contact_ratio": table.contact_ratio,
+        "ramp": table.ramp,
+        "n_slots": floor(table.contact_ratio + table.ramp + 2.0 * MOST_LATE) + 1,
+        "teeth": (pair.driver.teeth, pair.driven.teeth),
+        "base_radius": base_radius,
+        "cycles_per_rad": pair.driver.teeth / (2.0 * pi),
+        "damping_time": 2.0 * machine.mesh_damping_ratio * sqrt(mesh_mass_kg(machine) / mean_stiffness),
+        "damping_ramp": DAMPING_RAMP_M,
+        "backlash": 2e-6 * machine.half_backlash_um,
+        "back_stiffness": back_stiffness_n_per_m(mesh),
+        # Base pitches per metre that the gears stand apart along their line of centres, (cos α, sin α).
+        "late_x": cos(alpha) / (sin(alpha) * pair.base_pitch_mm * 1e-3),
+        "late_y": 1.0 / (pair.base_pitch_mm * 1e-3),
+        "turn_x": base_radius[0] / (pair.action_length_mm * pair.base_pitch_mm * 1e-6),
+        "cos_back": cos(2.0 * alpha),
+        "sin_back": sin(2.0 * alpha),
+        "mass": mass,
+        "inertia": inertia,
+        "per_mass": 1.0 / mass,
+        "per_inertia": 1.0 / inertia,
+        "per_rotor": 1.0 / rotors,
+        "mass_offset": np.array([w.mass_offset_m for w in machine.wheels]),
+        "mass_angle": np.radians([w.unbalance_angle_deg for w in machine.wheels]),
+        "runout": np.array([w.runout_um * 1e-6 for w in machine.wheels]),
+        "runout_angle": np.radians([w.runout_angle_deg for w in machine.wheels]),
+        "turns": any(w.runout_um > 0 or w.unbalance_g_mm > 0 for w in machine.wheels),
+        "bending_stiffness": np.array([s.bending_stiffness_n_per_m for s in machine.shafts]),
+        "bending_damping": np.array([s.bending_damping_n_s_per_m for s in machine.shafts]),
+        "torsional_stiffness": np.array([s.torsional_stiffness_nm_per_rad for s in machine.shafts]),
+        "torsional_damping": np.array([s.torsional_damping_nm_s_per_rad for s in machine.shafts]),
+        "rotor_inertia": rotors,
+        "hooke": hooke_rad**2 / 4.0,
+        "hooke_force": hooke_rad / np.array([2.0 * s.bearing_distance_m for s in machine.shafts]),
+        "coupling_bending": np.array([s.coupling_bending_nm_per_rad for s in machine.shafts]),
+        "gravity_x": -machine.gravity_mps2 * sin(beta),
+        "gravity_y": -machine.gravity_mps2 * cos(beta),
+    }
+    record = np.zeros((), RECORD)
+    values |= drive_fields(machine) | friction_fields(machine, operation, force) | bearing_fields(machine, force, rng)
+    for name, value in values.items():
+        record[name] = value
+    curves, rows, pitch = _stacked(table)
+    return PairConstants(record[()], curves, rows, pitch)
+
+
+def mesh_mass_kg(machine: Machine) -> float:
+    """Mass that the two gears put against each other along the line of action, 1/(r_b1²/J1 + r_b2²/J2)."""
+    pair = machine.mesh.pair
+    radii = (pair.driver.base_radius_mm * 1e-3, pair.driven.base_radius_mm * 1e-3)
+    return 1.0 / sum(r**2 / w.inertia_kg_m2 for r, w in zip(radii, machine.wheels, strict=True))
+
+
+def mean_stiffness_n_per_m(machine: Machine, force_n: float) -> float:
+    """Mean mesh stiffness over a cycle of sound teeth, at the set force where contact stiffens with the load."""
+    from dataclasses import replace
+
+    sound = replace(machine.mesh, cracks_1=(), cracks_2=(), spalls_1=(), spalls_2=(), chips_1=(), chips_2=())
+    if sound.contact_law == "linear":
+        return mesh_stiffness(sound).mean_n_per_m
+    return mesh_stiffness(sound, force_n=max(force_n, 1.0)).mean_n_per_m
+
+
+def _stacked(table: MeshTable) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
+    """Curves, rows and pitch of a table; see `Constants`."""
+    kinds = (
+        (table.compliance_1, table.variant_1),
+        (table.compliance_2, table.variant_2),
+        (table.separation_1_m, table.surface_1),
+        (table.separation_2_m, table.surface_2),
+    )
+    most = max(len(which) for _, which in kinds)
+    rows, first = np.zeros((4, most), dtype=np.int64), 0
+    for kind, (curves, which) in enumerate(kinds):
+        rows[kind, : len(which)] = first + which
+        first += len(curves)
+    pitch = np.zeros((2, most))
+    for side, values in enumerate((table.pitch_1_m, table.pitch_2_m)):
+        pitch[side, : len(values)] = values
+    return np.ascontiguousarray(np.vstack([curves for curves, _ in kinds])), rows, pitch
+
+
+# --------------------
+# Where a run starts: the static balance at the first torque and speed, so that no blow has to die out.
+# --------------------
+
+
+def start_state(machine: Machine, operation: Operation, start_s: float) -> tuple[FloatArray, FloatArray]:
+    """Coordinates and velocities at `start_s`, (16,) each: driver tooth 0 at its entry, everything turning evenly.
+
+    Friction, roughness, run-out and unbalance are left out of the balance; what they change settles in a few cycles.
+    """
+    pair = machine.mesh.pair
+    torque = float(operation.torque_nm.at(start_s))
+    omega = float(operation.speed_rpm.at(start_s)) * pi / 30.0
+    r1, r2 = pair.driver.base_radius_mm * 1e-3, pair.driven.base_radius_mm * 1e-3
+    force = torque / r1
+    delta = 0.0
+    if torque > 0.0:
+        delta = float(share_torque(machine.mesh, torque, np.zeros(1)).transmission_error_m[0])
+    q, v = np.zeros(N_COORDINATES), np.zeros(N_COORDINATES)
+    loads = bearing_loads_n(machine, force)
+    for row, support in enumerate(machine.bearings):
+        size = float(np.hypot(*loads[row]))
+        foot = loads[row] / support.stiffness_n_per_m
+        if size > 0.0:
+            foot = foot + 1e-6 * support.clearance_um * loads[row] / size
+        q[8 + 2 * row : 10 + 2 * row] = foot
+    beta = np.radians(machine.line_of_action_deg)
+    down = -machine.gravity_mps2 * np.array([np.sin(beta), np.cos(beta)])
+    for side in range(2):
+        place = slice(4 + 2 * side, 6 + 2 * side)
+        mesh = np.array([0.0, -force if side == 0 else force])
+        load = mesh + machine.wheels[side].mass_kg * down
+        bearings = 0.5 * (q[8 + 4 * side : 10 + 4 * side] + q[10 + 4 * side : 12 + 4 * side])
+        q[place] = bearings + load / machine.shafts[side].bending_stiffness_n_per_m
+    # δ = r1 θ1 − r2 θ2 + y1 − y2 with θ1 = 0.
+    q[2] = (q[5] - q[7] - delta) / r2
+    q[0] = torque / machine.shafts[0].torsional_stiffness_nm_per_rad
+    q[3] = q[2] - torque * machine.ratio / machine.shafts[1].torsional_stiffness_nm_per_rad
+    v[0] = v[1] = omega
+    v[2] = v[3] = omega / machine.ratio
+    return q, v
+
+
+# --------------------
+# The linearised machine: mass and stiffness matrices, eigenfrequencies, and the step that follows from them.
+# --------------------
+
+
+STEP_ANGLE_RAD = 0.28
+"""Step times the greatest angular eigenfrequency. RK4 is stable up to 2.8 of it; at 0.28 it misses 3e-4 of the
+accelerations and 1e-6 to 1e-5 of the transmission error's rms, 1e-4 where teeth rattle: `sims.cracked`."""
+STABLE = 2.0
+"""Step times the fastest rate of the damped machine; RK4 bursts from 2.8 on."""
+STEPS_PER_RAMP = 6
+"""Least number of steps in which a tooth pair takes up its load."""
+
+
+def matrices(machine: Machine, force_n: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """M, K and C of small motions about the loaded state, with the mean mesh stiffness, (16, 16) each."""
+    wheels, shafts, bearings = machine.wheels, machine.shafts, machine.bearings
+    masses = [shafts[0].rotor_inertia_kg_m2, *(w.inertia_kg_m2 for w in wheels), shafts[1].rotor_inertia_kg_m2]
+    masses += [w.mass_kg for w in wheels for _ in range(2)] + [b.mass_kg for b in bearings for _ in range(2)]
+    mesh = mean_stiffness_n_per_m(machine, force_n)
+    stiffness = _assembled(
+        machine,
+        mesh,
+        [s.torsional_stiffness_nm_per_rad for s in shafts],
+        [s.bending_stiffness_n_per_m for s in shafts],
+        [b.stiffness_n_per_m for b in bearings],
+    )
+    damping = _assembled(
+        machine,
+        2.0 * machine.mesh_damping_ratio * sqrt(mesh * mesh_mass_kg(machine)),
+        [s.torsional_damping_nm_s_per_rad for s in shafts],
+        [s.bending_damping_n_s_per_m for s in shafts],
+        [b.damping_n_s_per_m for b in bearings],
+    )
+    damping[0, 0] += governor_nm_s_per_rad(machine)
+    return np.diag(masses), stiffness, damping
+
+
+def _assembled(
+    machine: Machine, mesh: float, torsion: list[float], bending: list[float], bearings: list[float]
+) -> FloatArray:
+    """Sum of the springs, or of the dampers, each between the coordinates it joins."""
+    pair, total = machine.mesh.pair, np.zeros((N_COORDINATES,) * 2)
+
+    def join(places: list[int], signs: list[float], size: float) -> None:
+        line = np.zeros(N_COORDINATES)
+        line[places] = signs
+        total[:] += size * np.outer(line, line)
+
+    join([1, 2, 5, 7], [pair.driver.base_radius_mm * 1e-3, -pair.driven.base_radius_mm * 1e-3, 1.0, -1.0], mesh)
+    for side in range(2):
+        join([3 * side, 1 + side], [1.0, -1.0], torsion[side])
+        for axis in range(2):
+            places = [4 + 2 * side + axis, 8 + 4 * side + axis, 10 + 4 * side + axis]
+            join(places, [1.0, -0.5, -0.5], bending[side])
+    for row, size in enumerate(bearings):
+        for axis in range(2):
+            join([8 + 2 * row + axis], [1.0], size)
+    return total
+
+
+def eigenfrequencies_hz(machine: Machine, force_n: float = 0.0) -> FloatArray:
+    """Undamped eigenfrequencies in rising order, (16,); the first is the rigid rotation, 0."""
+    m, k, _ = matrices(machine, force_n)
+    return _frequencies_hz(m, k)
+
+
+def _frequencies_hz(m: FloatArray, k: FloatArray) -> FloatArray:
+    from scipy.linalg import eigh
+
+    squares = eigh(k, m, eigvals_only=True)
+    result: FloatArray = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * pi)
+    return result
+
+
+def _fastest_rate_per_s(m: FloatArray, k: FloatArray, c: FloatArray) -> float:
+    """Largest magnitude of an eigenvalue of the damped machine: heavy dampers are as stiff as springs to a solver."""
+    return float(np.max(np.abs(_eigenvalues_per_s(m, k, c))))
+
+
+def _eigenvalues_per_s(m: FloatArray, k: FloatArray, c: FloatArray) -> NDArray[np.complex128]:
+    n, per_mass = N_COORDINATES, 1.0 / np.diag(m)[:, None]
+    state = np.zeros((2 * n, 2 * n))
+    state[:n, n:] = np.eye(n)
+    state[n:, :n], state[n:, n:] = -per_mass * k, -per_mass * c
+    return np.linalg.eigvals(state).astype(np.complex128)
+
+
+def slowest_decay_s(machine: Machine, operation: Operation) -> float:
+    """Time in which the least damped motion falls to 1/e: of the vibrations, or of the speed that the drive holds."""
+    force = operation.torque_nm.largest / (machine.mesh.pair.driver.base_radius_mm * 1e-3)
+    found = _eigenvalues_per_s(*matrices(machine, force))
+    ringing = found[np.abs(found.imag) > 1.0]
+    recovery = 2.0 * total_inertia_kg_m2(machine) / governor_nm_s_per_rad(machine)
+    return max(recovery, 1.0 / max(float(-ringing.real.max()), 1e-3) if len(ringing) else 0.0)
+
+
+def default_step_s(machine: Machine, operation: Operation, step_angle_rad: float = STEP_ANGLE_RAD) -> float:
+    """Step that stiffness, damping and tooth passage allow."""
+    force = operation.torque_nm.largest / (machine.mesh.pair.driver.base_radius_mm * 1e-3)
+    m, k, c = matrices(machine, force)
+    fastest = 2.0 * pi * float(_frequencies_hz(m, k)[-1])
+    step = min(step_angle_rad / fastest, STABLE / _fastest_rate_per_s(m, k, c))
+    mesh_hz = operation.speed_rpm.largest / 60.0 * machine.mesh.pair.driver.teeth
+    if mesh_hz > 0.0 and machine.mesh.ramp > 0.0:
+        step = min(step, machine.mesh.ramp / mesh_hz / STEPS_PER_RAMP)
+    return step
+
+
+MOST_STEPS = 400_000_000
+"""Ten minutes of computing or so; more is taken for a mistake."""
+
+
+STEPS_PER_CALL = 200_000
+"""Compiled code cannot be interrupted: it comes back for a look every quarter of a second or so."""
+
+
+@dataclass(frozen=True)
+class PairState:
+    """Where a machine is: what a later run needs to go on from there.
+
+    Parameters
+    ----------
+    q, v : array, (16,)
+        Coordinates and velocities, see `sims.cracked.COORDINATES`.
+    set_angle_rad : float
+        Angle at which the drive wants its rotor to be.
+    """
+
+    q: FloatArray
+    v: FloatArray
+    set_angle_rad: float
+
+
+@dataclass(frozen=True)
+class Response:
+    """Signals of a run on an even grid of time.
+
+    Parameters
+    ----------
+    start_s, interval_s : float
+    signals : mapping
+        Name (see `sims.cracked.SIGNALS`) → (n,), in m, rad, s, N.
+    step_s : float
+        Of the integrator.
+    energy_j : array
+        Potential, kinetic and gravitational energy, (n,), or empty where it was not asked for.
+    last : State or None
+        At the end of the last step: one step after the last point where every step is kept.
+    """
+
+    start_s: float
+    interval_s: float
+    signals: Mapping[str, FloatArray]
+    step_s: float
+    energy_j: FloatArray
+    last: PairState | None = None
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Times of the points."""
+        n = len(next(iter(self.signals.values())))
+        return self.start_s + self.interval_s * np.arange(n)
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Return a signal by its name."""
+        return self.signals[name]
+
+
+@dataclass(frozen=True)
+class PreparedRun:
+    """A run that is ready to start: numbers, first state, set courses, roughness."""
+
+    constants: PairConstants
+    q: FloatArray
+    v: FloatArray
+    speed: FloatArray
+    torque: FloatArray
+    roughness: TimeLockedRoughness
+
+
+def prepare(machine: Machine, operation: Operation, rng: np.random.Generator, start_s: float = 0.0) -> PreparedRun:
+    """Draw what is random, tabulate the machine, find the first state."""
+    rough_rng, bearing_rng = rng.spawn(2)  # each keeps what it draws, whatever the other does
+    machine, roughness = draw_roughness(machine, rough_rng)
+    q, v = start_state(machine, operation, start_s)
+    return PreparedRun(
+        constants(machine, operation, bearing_rng),
+        q,
+        v,
+        _points(operation.speed_rpm, pi / 30.0),
+        _points(operation.torque_nm, 1.0),
+        roughness,
+    )
+
+
+def respond(
+    machine: Machine,
+    operation: Operation,
+    *,
+    duration_s: float,
+    rng: np.random.Generator,
+    signals: Sequence[str] = ("driver y", "driver y velocity", "driver y acceleration", "transmission_error_m"),
+    start_s: float = 0.0,
+    step_s: float | None = None,
+    stride: int = 1,
+    with_energy: bool = False,
+    first: PairState | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> Response:
+    """Integrate the sixteen coordinates from the static balance on, or from where another run ended.
+
+    Parameters
+    ----------
+    machine : Machine
+    operation : Operation
+        Set speed and torque; time 0 of their courses is time 0 here.
+    duration_s : float
+    rng : numpy.random.Generator
+        Draws the roughness, then the rolling elements' places.
+    signals : sequence of str
+        Of `sims.cracked.SIGNALS`.
+    start_s : float
+        First time; below 0 for a lead-in.
+    step_s : float or None
+        None: `sims.cracked.default_step_s`.
+    stride : int
+        Every how many steps a point is kept.
+    with_energy : bool
+    first : State or None
+        `Response.last` of another run; None: the static balance at `start_s`.
+    on_progress : callable or None
+        Called now and then with the part that is done, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        On an unknown signal, or a run of more than `MOST_STEPS` steps.
+    RefusalError
+        If the solution grows beyond all bounds: the step is too long.
+
+    Notes
+    -----
+    Classic Runge–Kutta method, fourth order. Where a tooth pair loses contact its force has a kink, and the order drops
+    for that step.
+    """
+    from sims.cracked._kernels import integrate
+
+    positive(duration_s, "duration_s", "s")
+    step = default_step_s(machine, operation) if step_s is None else positive(step_s, "step_s", "s")
+    n_steps = ceil(duration_s / step - 1e-9)
+    if n_steps > MOST_STEPS:
+        raise InputError(
+            f"{n_steps:.3g} steps of {step:.3g} s",
+            where="duration_s",
+            allowed=f"at most {MOST_STEPS:.0e} steps",
+            remedy="simulate a shorter time, or in parts",
+        )
+    every = count(stride, "stride")
+    ready = prepare(machine, operation, rng, start_s)
+    q, v, set_angle = _first_state(ready, first)
+    rows = np.empty((-(-n_steps // every), len(signals)))
+    energies = np.empty(len(rows) if with_energy else 0)
+    select = np.array([_place(name) for name in signals], dtype=np.int64)
+    phasors = ready.roughness.phasors(step / 2.0)
+    per_call = every * max(STEPS_PER_CALL // every, 1)
+    for begun in range(0, n_steps, per_call):
+        n = min(per_call, n_steps - begun)
+        part = slice(begun // every, begun // every + -(-n // every))
+        filled = integrate(
+            *ready.constants.arguments,
+            q,
+            v,
+            set_angle,
+            start_s + begun * step,
+            step,
+            n,
+            every,
+            ready.speed,
+            ready.torque,
+            phasors,
+            select,
+            rows[part],
+            energies[part] if with_energy else energies,
+        )
+        if filled < len(rows[part]) or not np.isfinite(rows[part][-1]).all():
+            raise RefusalError(
+                f"the solution grows beyond all bounds after {(begun + filled * every) * step:.3g} s "
+                f"at a step of {step:.3g} s",
+                remedy="look for stiffness, damping and inertia that do not go together, or give a shorter step_s",
+            )
+        if on_progress is not None:
+            on_progress((begun + n) / n_steps)
+    last = PairState(q, v, float(set_angle[0]))
+    return Response(start_s, step * every, dict(zip(signals, rows.T, strict=True)), step, energies, last)
+
+
+def _first_state(ready: PreparedRun, given: PairState | None) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return copies, which the kernel overwrites, of coordinates, velocities and the set angle."""
+    if given is None:
+        return ready.q, ready.v, ready.q[:1].copy()
+    if given.q.shape != ready.q.shape or given.v.shape != ready.v.shape:
+        raise InputError(
+            f"a state of {given.q.size} coordinates", where="first", allowed=f"{ready.q.size}: another run's last"
+        )
+    return given.q.copy(), given.v.copy(), np.array([given.set_angle_rad])
+
+
+def _points(course: Profile, factor: float) -> FloatArray:
+    return np.ascontiguousarray(np.vstack((course.times_s, factor * np.asarray(course.values))), dtype=np.float64)
+
+
+def _place(name: str) -> int:
+    if name not in SIGNALS:
+        raise InputError(
+            f"there is no signal {name!r}",
+            allowed="names of sims.cracked.SIGNALS",
+            remedy=closest_match_hint(name, SIGNALS),
+        )
+    return SIGNALS.index(name)

@@ -1,0 +1,321 @@
+"""The cracked spur pair as a simulator: preset and values → machine → effects → recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearsig.gap import OperatingCondition
+from gearsig.recording import Recording
+from gearsig.rig import Rig
+from sims.cracked._respond import PairState, Response, default_step_s, eigenfrequencies_hz, respond
+from sims.effects import EffectSetting, effects, with_effects
+from sims.gear_pair import PARAMETERS, Measurement, PairGapSimulator, PairModel, PairTwin, ReadyPair, SimulationRequest
+from sims.machine import Machine, Operation
+from sims.measure import plain
+from sims.mesh import PairGeometry, friction_over_mesh
+from sims.presets import Preset
+from sims.registry import check_load
+from sims.simulator import Parameter, ParameterValue
+
+if TYPE_CHECKING:
+    from sims.cracked._convergence import Convergence
+
+
+NAME = "cracked"
+
+
+@dataclass(frozen=True)
+class PreparedCrackedPair(ReadyPair):
+    """A machine with its effects switched on, ready to run.
+
+    Parameters
+    ----------
+    asked : Asked
+    made : Machine
+        With its effects.
+    """
+
+    made: Machine
+
+    @property
+    def machine(self) -> Machine:
+        """The machine, effects included."""
+        return self.made
+
+
+@dataclass(frozen=True)
+class CrackedPair(PairModel[PreparedCrackedPair]):
+    """Spur gear pair on four bearings between two rotors, 16 degrees of freedom; see `sims.cracked`."""
+
+    name: str = NAME
+    title: str = "spur gear pair with root crack: 16 degrees of freedom, friction, backlash, roughness"
+    parameters: tuple[Parameter, ...] = field(default=PARAMETERS, repr=False)
+    effects: tuple[str, ...] = field(default_factory=lambda: tuple(effects()), repr=False)
+
+    def _built(
+        self, asked: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float
+    ) -> PreparedCrackedPair:
+        return _prepared(asked, rng, sampling_rate_hz)
+
+    def _recorded(
+        self,
+        ready: PreparedCrackedPair,
+        rig: Rig,
+        rng: np.random.Generator,
+        *,
+        sampling_rate_hz: float,
+        duration_s: float,
+    ) -> Recording:
+
+        return simulate_machine(
+            ready.machine,
+            ready.operation,
+            rng=rng,
+            sampling_rate_hz=sampling_rate_hz,
+            duration_s=duration_s,
+            rig=rig,
+            truth=ready.truth(),
+        )
+
+    def check_convergence(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        effects: Sequence[EffectSetting],
+        operation: Operation | None,
+        rng: np.random.Generator,
+        *,
+        preset: str = "",
+    ) -> Convergence:
+        """Tell how far a smaller step of the integrator changes the result of this very machine."""
+        from sims.cracked._convergence import check_convergence
+
+        ready = self.prepare(parameters, effects, operation, rng, preset_name=preset)
+        return check_convergence(ready.machine, ready.operation, rng)
+
+
+def prepare_preset(
+    chosen: Preset,
+    parameters: Mapping[str, ParameterValue],
+    settings: Sequence[EffectSetting],
+    operation: Operation | None,
+    rng: np.random.Generator,
+    *,
+    sampling_rate_hz: float = 20480.0,
+) -> PreparedCrackedPair:
+    """Build a preset's machine and switch on its effects and `settings`; one number is drawn from `rng`."""
+    return _prepared(
+        SimulationRequest.of(chosen, PARAMETERS, parameters, settings, operation, sampling_rate_hz),
+        rng,
+        sampling_rate_hz,
+    )
+
+
+def _prepared(asked: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> PreparedCrackedPair:
+    from sims.gear_pair import build_machine
+
+    sound = build_machine(asked.values, sampling_rate_hz=sampling_rate_hz, installed=asked.installed)
+    check_load(sound, asked.operation)
+    return PreparedCrackedPair(asked, with_effects(sound, asked.effects, rng))
+
+
+# --------------------
+# From a machine to a recording: run the model, then measure it.
+# --------------------
+
+
+def simulate_machine(
+    machine: Machine,
+    operation: Operation,
+    *,
+    rng: np.random.Generator,
+    sampling_rate_hz: float,
+    duration_s: float,
+    rig: Rig | None = None,
+    truth: Mapping[str, Any] | None = None,
+    step_s: float | None = None,
+    noise_rng: np.random.Generator | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> Recording:
+    """Simulate the sixteen coordinates and measure them; see `simulate_with_motion`."""
+    recording, _ = simulate_with_motion(
+        machine,
+        operation,
+        rng=rng,
+        sampling_rate_hz=sampling_rate_hz,
+        duration_s=duration_s,
+        rig=rig,
+        truth=truth,
+        step_s=step_s,
+        noise_rng=noise_rng,
+        on_progress=on_progress,
+    )
+    return recording
+
+
+def simulate_with_motion(
+    machine: Machine,
+    operation: Operation,
+    *,
+    rng: np.random.Generator,
+    sampling_rate_hz: float,
+    duration_s: float,
+    rig: Rig | None = None,
+    truth: Mapping[str, Any] | None = None,
+    step_s: float | None = None,
+    also: Sequence[str] = (),
+    first: PairState | None = None,
+    noise_rng: np.random.Generator | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> tuple[Recording, Response]:
+    """Simulate the sixteen coordinates and measure them; return the recording and the motion behind it.
+
+    Parameters
+    ----------
+    machine : Machine
+    operation : Operation
+        Its time 0 is the recording's start.
+    rng : numpy.random.Generator
+        Two streams are made of it, one for the machine and one for the chain: the same seed gives the same noise
+        whatever the machine draws.
+    sampling_rate_hz, duration_s : float
+    rig : Rig or None
+        Goes with the recording.
+    truth : mapping or None
+        What was asked for; "machine" and "solver" are added.
+    step_s : float or None
+        Longest step; None: `sims.cracked.default_step_s`. It is shortened to a whole part of the sampling
+        interval.
+    also : sequence of str
+        Signals of `sims.cracked.SIGNALS` wanted in the motion besides those that are measured.
+    first : State or None
+        Where the lead-in starts; None: at the static balance.
+    noise_rng : numpy.random.Generator or None
+        For the chain, instead of the stream made of `rng`: the same machine with other noise.
+    on_progress : callable or None
+        Called now and then with the part of the motion that is done, 0 to 1.
+
+    Returns
+    -------
+    recording : Recording
+        With notes of the model as warnings: where a formula is used outside its range.
+    motion : Response
+        Lead-in included: it begins before time 0.
+    """
+    longest = default_step_s(machine, operation) if step_s is None else step_s
+    measured = Measurement.of(machine, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s, longest_step_s=longest)
+    machine_rng, chain_rng = rng.spawn(2)
+    response = respond(
+        machine,
+        operation,
+        duration_s=measured.motion_s,
+        rng=machine_rng,
+        signals=measured.signals(also),
+        start_s=-measured.lead_in_s,
+        step_s=measured.step_s,
+        stride=measured.stride,
+        first=first,
+        on_progress=on_progress,
+    )
+    known = {
+        "machine": plain(replace(machine, chain=None)),  # type: ignore[arg-type]  # the chain stands under "measurement"
+        "solver": {
+            "step_s": response.step_s,
+            "eigenfrequencies_hz": [float(f) for f in eigenfrequencies_hz(machine, _force_n(machine, operation))],
+        },
+    }
+    recording = measured.record(
+        response,
+        rng=chain_rng if noise_rng is None else noise_rng,
+        rig=rig,
+        truth={**(truth or {}), **known},
+        source="simulation: cracked 16-DOF spur pair",
+        reader="sims.cracked",
+    )
+    return replace(recording, warnings=(*recording.warnings, *model_notes(machine, operation))), response
+
+
+def model_notes(machine: Machine, operation: Operation) -> tuple[str, ...]:
+    """Where formulas are used outside the range they were made for."""
+    notes = list(machine.mesh.notes)
+    speed, torque = operation.speed_rpm.largest, operation.torque_nm.largest
+    if machine.lubrication.friction and speed > 0.0 and torque > 0.0:
+        oil = machine.lubrication.viscosity_cp, machine.roughness.rms_um
+        notes += friction_over_mesh(machine.mesh, torque, speed, *oil).notes
+    mesh_hz = speed / 60.0 * machine.mesh.pair.driver.teeth
+    if mesh_hz > 0.8 * float(eigenfrequencies_hz(machine)[-1]):
+        notes.append(
+            f"the mesh frequency reaches {mesh_hz:.0f} Hz, near or above the model's highest eigenfrequency: "
+            "modes of gear bodies and teeth, which it lacks, would take part"
+        )
+    return tuple(notes)
+
+
+def _force_n(machine: Machine, operation: Operation) -> float:
+    return operation.torque_nm.largest / (machine.mesh.pair.driver.base_radius_mm * 1e-3)
+
+
+# --------------------
+# The cracked pair set to a rig, for the gap diagnosis: see `gearsig.gap`.
+# --------------------
+
+
+STEP_ANGLE_RAD = 0.9
+"""Step times the greatest angular eigenfrequency: three times that of a single simulation, see `_step_s`."""
+
+
+@dataclass(frozen=True)
+class CrackedTwin(PairTwin):
+    """A rig's twin with 16 degrees of freedom; see `sims.gear_pair.PairTwin`."""
+
+    @property
+    def model(self) -> str:
+        """Name of the model whose preset the twin is."""
+        return NAME
+
+    def _simulated(
+        self,
+        own: Preset,
+        point: OperatingCondition,
+        seed: int,
+        *,
+        sampling_rate_hz: float,
+        duration_s: float,
+        noise_rng: np.random.Generator | None,
+    ) -> Recording:
+        """Run a specimen and measure it."""
+        rng = np.random.default_rng(seed)
+        ready = prepare_preset(own, {}, (), None, rng, sampling_rate_hz=sampling_rate_hz)
+        return simulate_machine(
+            ready.machine,
+            ready.operation,
+            rng=rng,
+            sampling_rate_hz=sampling_rate_hz,
+            duration_s=duration_s,
+            rig=self._rig_at(point),
+            truth=ready.truth(),
+            step_s=self._step_s(own),
+            noise_rng=noise_rng,
+        )
+
+    def _geometry(self, own: Preset) -> PairGeometry:
+        """Return the geometry of a specimen's pair."""
+        return prepare_preset(own, {}, (), None, np.random.default_rng(0)).machine.mesh.pair
+
+    def _step_s(self, own: Preset) -> float:
+        """Step of the integrator: that of the sound machine, so that effects leave the drawn noise as it is.
+
+        It is longer than that of a single simulation; the accelerations miss 2 to 4 parts in a thousand.
+        """
+        from sims.cracked._respond import default_step_s
+
+        sound = prepare_preset(replace(own, effects=()), {}, (), None, np.random.default_rng(0))
+        return default_step_s(sound.machine, sound.operation, STEP_ANGLE_RAD)
+
+
+def cracked_gap_simulator() -> PairGapSimulator:
+    """Return the model "cracked" as the gap diagnosis takes it."""
+    return PairGapSimulator(NAME, CrackedTwin)

@@ -1,0 +1,51 @@
+"""The forging manipulator's rotary drive: starts and stops, backlash, impacts, stick–slip."""
+
+from sims.forging._drive import (
+    MODES,
+    PARAMETERS,
+    Bristle,
+    Cycle,
+    ForgingDrive,
+    GrippedLoad,
+    HydraulicMotor,
+    Schedule,
+    WeakTooth,
+    build_drive,
+    build_rig,
+    schedule,
+)
+from sims.forging._kernels import bristle, position, reach, weight, younger_pair
+from sims.forging._measure import record, sensors
+from sims.forging._respond import DriveResponse, FirstState, drive_numbers, respond
+from sims.forging._simulator import NAME, WITH_MEANING, ForgingManipulator, PreparedDrive, with_effects
+
+__all__ = [
+    "MODES",
+    "NAME",
+    "PARAMETERS",
+    "WITH_MEANING",
+    "Bristle",
+    "Cycle",
+    "DriveResponse",
+    "FirstState",
+    "ForgingDrive",
+    "ForgingManipulator",
+    "GrippedLoad",
+    "HydraulicMotor",
+    "PreparedDrive",
+    "Schedule",
+    "WeakTooth",
+    "bristle",
+    "build_drive",
+    "build_rig",
+    "drive_numbers",
+    "position",
+    "reach",
+    "record",
+    "respond",
+    "schedule",
+    "sensors",
+    "weight",
+    "with_effects",
+    "younger_pair",
+]

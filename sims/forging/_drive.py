@@ -1,0 +1,669 @@
+"""The parts of a forging manipulator's rotary drive."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi, radians, sqrt
+
+import numpy as np
+
+from gearsig.checks import FloatArray, not_negative, one_of, positive, within
+from gearsig.errors import InputError
+from gearsig.rig import (
+    DAMPING_LAWS,
+    EncoderChannel,
+    GearPair,
+    OperatingPoint,
+    PathOfContact,
+    Rig,
+    Sensor,
+    Shaft,
+    ToothContact,
+    hertz_stiffness_n_per_m1p5,
+    standard_path,
+)
+from sims.machine import Operation, Profile
+from sims.mesh import GearGeometry, PairGeometry, wear_profile
+from sims.simulator import Parameter, ParameterValues
+
+STATIC_RATIO_RANGE = (1.0, 10.0)
+SPEED_BAND_RANGE = (0.01, 1.0)
+MESH_RAMP_RANGE = (0.005, 0.1)
+LEAST_CONTACT_RATIO = 1.1
+
+
+@dataclass(frozen=True)
+class Bristle:
+    """LuGre friction: elastic bristles that bend, then slide; static friction above sliding friction.
+
+    z' = (v − |v| z/h(v))/x₀,  F = L (z + τ z' e^{−(v/v_s)²}) + c v,  h = 1 + (r − 1) e^{−(v/v_s)²}
+
+    Parameters
+    ----------
+    level : float
+        L, sliding friction in N m (for tooth flanks: 1, times μN).
+    static_ratio : float
+        r, static over sliding friction; 1 or more.
+    stribeck_speed : float
+        v_s, above 0, in rad/s (flanks: m/s).
+    presliding : float
+        x₀, deflection at which a bristle slides, in rad (flanks: m). The stiffness near rest is L/x₀.
+    damping_time_s : float
+        τ of the bristles.
+    viscous : float
+        c in N m s/rad.
+
+    Notes
+    -----
+    Source: C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky, A new model for control of systems with friction,
+    IEEE Transactions on Automatic Control 40 (1995). The bristle is counted in units of the sliding friction, so that a
+    level that changes (a brake, a normal force) scales its force.
+    """
+
+    level: float
+    static_ratio: float
+    stribeck_speed: float
+    presliding: float
+    damping_time_s: float = 0.0
+    viscous: float = 0.0
+
+    def __post_init__(self) -> None:
+        not_negative(self.level, "level of the friction")
+        within(self.static_ratio, "static_ratio of the friction", *STATIC_RATIO_RANGE)
+        positive(self.stribeck_speed, "stribeck_speed of the friction")
+        positive(self.presliding, "presliding of the friction")
+        not_negative(self.damping_time_s, "damping_time_s of the friction", "s")
+        not_negative(self.viscous, "viscous friction")
+
+
+@dataclass(frozen=True)
+class HydraulicMotor:
+    """A hydraulic motor behind a proportional valve: torque up to the speed that its flow allows.
+
+    T = T_set(t) · (1 + ε cos(n θ1)) · clip((ω_lim − ω1)/(b ω_lim), −1, 1)
+
+    Parameters
+    ----------
+    inertia_kg_m2 : float
+        Of the motor, ahead of the torque sensor.
+    drag : Bristle
+        Friction of motor and bearings; the brake adds to its level.
+    speed_band : float
+        b: part of the speed limit over which the torque falls from full to none.
+    ripple_fraction, ripple_order : float
+        ε and n: pistons make the torque ripple.
+    """
+
+    inertia_kg_m2: float
+    drag: Bristle
+    speed_band: float = 0.3
+    ripple_fraction: float = 0.0
+    ripple_order: float = 9.0
+
+    def __post_init__(self) -> None:
+        not_negative(self.inertia_kg_m2, "inertia_kg_m2 of the motor", "kg m^2")
+        within(self.speed_band, "speed_band of the motor", *SPEED_BAND_RANGE)
+        within(self.ripple_fraction, "ripple_fraction of the motor", 0.0, 1.0)
+        positive(self.ripple_order, "ripple_order of the motor")
+
+
+@dataclass(frozen=True)
+class GrippedLoad:
+    """What the wheel turns besides its inertia: friction of the gripper's bearings, weight of a piece off centre.
+
+    Parameters
+    ----------
+    friction : Bristle
+    unbalance_nm : float
+        Weight times distance from the axis.
+    unbalance_angle_rad : float
+        Angle from below at which the piece hangs when the wheel is at 0.
+    """
+
+    friction: Bristle
+    unbalance_nm: float = 0.0
+    unbalance_angle_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        not_negative(self.unbalance_nm, "unbalance_nm", "N m")
+
+
+@dataclass(frozen=True)
+class WeakTooth:
+    """A tooth that yields more than the others on its drive flank.
+
+    Parameters
+    ----------
+    gear : int
+        0: pinion, 1: wheel.
+    tooth : int
+        From 0 at the angles' zero.
+    loss : float
+        Part of a pair's stiffness that is gone, 0 to below 1.
+    """
+
+    gear: int
+    tooth: int
+    loss: float
+
+    def __post_init__(self) -> None:
+        within(self.gear, "gear of the weak tooth", 0, 1)
+        not_negative(self.tooth, "tooth of the weak tooth")
+        within(self.loss, "loss of the weak tooth", 0.0, 0.99)
+
+
+@dataclass(frozen=True)
+class ForgingDrive:
+    """Pinion with motor, wheel with gripper and piece; one turning freedom each.
+
+    Parameters
+    ----------
+    path : PathOfContact
+    contact : ToothContact
+        Its inertias are those of the pinion and of the wheel with gripper and piece.
+    motor : HydraulicMotor
+    load : GrippedLoad
+    flanks : Bristle
+        Of the tooth flanks, level 1: their friction is μN.
+    speed_limit_rad_s : float
+        ω_lim of the pinion that the flow allows; 0: no limit.
+    mesh_ramp : float
+        Base pitches over which a pair takes up its load, 0.005 to 0.1.
+    weak_tooth : WeakTooth or None
+    wear_um : tuple of float
+        Worn off both drive flanks together, at equal steps of the path of contact from where a pair enters to where it
+        leaves; empty: nothing. All teeth alike; the pitch point is crossed smoothly over a 64th of the path.
+
+    Notes
+    -----
+    Left out: bending of shafts and of the torque sensor (the paper takes them as stiff), bearings, profile errors, wear
+    that differs from tooth to tooth or grows while the drive runs (the paper takes all teeth alike), oil between the
+    flanks; teeth never break or
+    yield, however large the torque: neither strength nor hardness of the teeth is stated.
+    """
+
+    path: PathOfContact
+    contact: ToothContact
+    motor: HydraulicMotor
+    load: GrippedLoad
+    flanks: Bristle
+    speed_limit_rad_s: float = 0.0
+    mesh_ramp: float = 0.05
+    weak_tooth: WeakTooth | None = None
+    wear_um: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        not_negative(self.speed_limit_rad_s, "speed_limit_rad_s", "rad/s")
+        within(self.mesh_ramp, "mesh_ramp", *MESH_RAMP_RANGE)
+        for depth in self.wear_um:
+            not_negative(depth, "wear_um", "um")
+        highest = 1.9 - self.mesh_ramp
+        within(self.path.contact_ratio, "contact_ratio", LEAST_CONTACT_RATIO, highest, remedy="one to two pairs touch")
+        if self.contact.driven_inertia_kg_m2 is None or self.pinion_side_inertia_kg_m2 <= 0.0:
+            raise InputError("an inertia is missing", where="forging drive", allowed="above 0 kg m^2 on either side")
+
+    @property
+    def pinion_side_inertia_kg_m2(self) -> float:
+        """Of motor and pinion."""
+        return self.motor.inertia_kg_m2 + self.contact.driver_inertia_kg_m2
+
+    @property
+    def reduced_mass_kg(self) -> float:
+        """1/(rb1²/J1 + rb2²/J2): the mass that an impact along the line of action feels."""
+        r1, r2 = self.path.base_radii_m
+        driven = self.contact.driven_inertia_kg_m2 or 0.0
+        return 1.0 / (r1**2 / self.pinion_side_inertia_kg_m2 + r2**2 / driven)
+
+
+# --------------------
+# When the motor drives, when the brake holds, when the press strikes.
+# --------------------
+
+
+START_STOP, CONTINUOUS = MODES = ("start-stop", "continuous")
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """How the manipulator works: drive, stop, forge, again; or drive all the time.
+
+    Parameters
+    ----------
+    mode : str
+        One of `MODES`.
+    on_s, off_s : float
+        How long the torque is on, then off; above 0.
+    rise_s : float
+        In which the valve opens or closes; above 0.
+    brake_nm : float
+        On the motor's shaft while the torque is off.
+    brake_delay_s : float
+        From closed valve to brake.
+    press_nm : float
+        Largest torque of a press blow on the wheel, positive forwards; a parabola over time.
+    press_delay_s, press_duration_s : float
+        From the torque's end to the blow, and its length.
+    """
+
+    mode: str = START_STOP
+    on_s: float = 1.0
+    off_s: float = 2.0
+    rise_s: float = 0.02
+    brake_nm: float = 0.0
+    brake_delay_s: float = 0.0
+    press_nm: float = 0.0
+    press_delay_s: float = 1.0
+    press_duration_s: float = 0.02
+
+    def __post_init__(self) -> None:
+        one_of(self.mode, "mode", MODES)
+        for name in ("on_s", "off_s", "rise_s", "press_duration_s"):
+            positive(getattr(self, name), name, "s")
+        for name in ("brake_delay_s", "press_delay_s"):
+            not_negative(getattr(self, name), name, "s")
+        not_negative(self.brake_nm, "brake_nm", "N m")
+        if self.mode == START_STOP:
+            self._check_times()
+
+    def _check_times(self) -> None:
+        if self.rise_s >= min(self.on_s, self.off_s):
+            raise InputError(f"rise_s is {self.rise_s:g} s", allowed="less than on_s and off_s")
+        if self.press_nm and self.press_delay_s + self.press_duration_s > self.off_s:
+            raise InputError(
+                f"the press blow ends {self.press_delay_s + self.press_duration_s:g} s after the torque",
+                allowed=f"within off_s, {self.off_s:g} s",
+            )
+        if self.brake_nm and self.brake_delay_s + 2.0 * self.rise_s >= self.off_s:
+            raise InputError(f"brake_delay_s is {self.brake_delay_s:g} s", allowed=f"well within {self.off_s:g} s")
+
+    def starts_s(self, duration_s: float) -> FloatArray:
+        """Times at which the torque comes on."""
+        if self.mode == CONTINUOUS:
+            return np.zeros(1)
+        return np.arange(0.0, duration_s, self.on_s + self.off_s)
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Courses of a run: torque and brake of the motor, torque of the press on the wheel, in N m."""
+
+    torque_nm: Profile
+    brake_nm: Profile
+    press_nm: Profile
+
+    def stretches(self, duration_s: float) -> FloatArray:
+        """Times between which all courses are straight, from 0 to `duration_s`."""
+        knots = np.concatenate([c.times_s for c in (self.torque_nm, self.brake_nm, self.press_nm)])
+        inside = knots[(knots > 0.0) & (knots < duration_s)]
+        return np.unique(np.round(np.concatenate([[0.0], inside, [duration_s]]), 12))
+
+    def straight(self, start_s: float, end_s: float) -> FloatArray:
+        """Start time, then value and slope of torque, brake and press over one stretch."""
+        values = [start_s]
+        for course in (self.torque_nm, self.brake_nm, self.press_nm):
+            first, last = (float(course.at(time)) for time in (start_s, end_s))
+            values += [first, (last - first) / (end_s - start_s)]
+        return np.array(values)
+
+
+def schedule(cycle: Cycle, torque_nm: Profile, duration_s: float) -> Schedule:
+    """Return the courses of a run from rest; a stop must fit into the record.
+
+    Raises
+    ------
+    InputError
+        If a stop is longer than the record.
+    """
+    positive(duration_s, "duration_s", "s")
+    if cycle.mode == CONTINUOUS:
+        gate = Profile.of([0.0, cycle.rise_s], [0.0, 1.0])
+        nothing = Profile.constant(0.0)
+        return Schedule(_product(torque_nm, gate), nothing, nothing)
+    if cycle.off_s >= duration_s:
+        raise InputError(
+            f"a stop of off_s = {cycle.off_s:g} s is longer than the record of {duration_s:g} s",
+            allowed="a stop that ends within the record",
+            remedy="raise --duration or lower off_s",
+        )
+    starts = cycle.starts_s(duration_s)
+    ends = starts + cycle.on_s
+    gate = _pulses(starts, ends, cycle.rise_s)
+    brake_on = ends + cycle.rise_s + cycle.brake_delay_s
+    brake = _pulses(brake_on, starts + cycle.on_s + cycle.off_s - cycle.rise_s, cycle.rise_s, cycle.brake_nm)
+    return Schedule(_product(torque_nm, gate), brake, _blows(ends + cycle.press_delay_s, cycle))
+
+
+def _pulses(starts: FloatArray, ends: FloatArray, rise_s: float, height: float = 1.0) -> Profile:
+    """Rise from each start, fall from each end, in `rise_s`."""
+    if height == 0.0:
+        return Profile.constant(0.0)
+    times = np.stack([starts, starts + rise_s, ends, ends + rise_s], axis=1).ravel()
+    values = np.tile([0.0, height, height, 0.0], len(starts))
+    keep = np.concatenate([[True], np.diff(times) > 1e-12])
+    return Profile.of(times[keep], values[keep])
+
+
+def _blows(starts: FloatArray, cycle: Cycle, n_points: int = 9) -> Profile:
+    """Parabolas of the press's torque, as straight pieces."""
+    if cycle.press_nm == 0.0:
+        return Profile.constant(0.0)
+    x = np.linspace(0.0, 1.0, n_points)
+    times = (starts[:, None] + cycle.press_duration_s * x).ravel()
+    return Profile.of(times, np.tile(4.0 * cycle.press_nm * x * (1.0 - x), len(starts)))
+
+
+def _product(first: Profile, second: Profile) -> Profile:
+    """Product at the knots of both, straight between."""
+    times = np.unique(np.concatenate([first.times_s, second.times_s]))
+    return Profile.of(times, first.at(times) * second.at(times))
+
+
+# --------------------
+# The parameters of the forging manipulator's drive: unit, range, meaning, default.
+# --------------------
+
+
+STIFFNESSES = ("formula", "table")
+"""Two that one source gives for one pair of gears: by its formula, and as its table prints it, a tenth of that."""
+SAMPLINGS = ("instants", "filtered")
+MOST_FRICTION = 0.5
+"""Coefficient of the flanks."""
+
+
+def _number(
+    name: str, unit: str, meaning: str, low: float, high: float, default: float | None, *, whole: bool = False
+) -> Parameter:
+    return Parameter(name, unit, meaning, low, high, default, whole=whole)
+
+
+def _word(name: str, meaning: str, choices: tuple[str, ...], default: str) -> Parameter:
+    return Parameter(name, "", meaning, default=default, choices=choices)
+
+
+_CYCLE = (
+    _word("mode", "drive, stop, forge, again; or drive all the time", MODES, "start-stop"),
+    _number("on_s", "s", "time the torque is on in each cycle", 0.01, 1e3, 1.0),
+    _number("off_s", "s", "time the torque is off in each cycle", 0.01, 1e3, 2.0),
+    _number("valve_rise_s", "s", "time in which the valve opens or closes", 1e-4, 10, 0.02),
+    _number("brake_nm", "N m", "brake on the motor's shaft while the torque is off", 0, 1e5, 60.0),
+    _number("brake_delay_s", "s", "from the closed valve to the brake", 0, 100, 0.0),
+    _number("press_nm", "N m", "largest torque of the press blow on the wheel; 0: no blow", -1e6, 1e6, 1500.0),
+    _number("press_delay_s", "s", "from the end of the torque to the blow", 0, 1e3, 1.0),
+    _number("press_duration_s", "s", "length of the blow", 1e-3, 10, 0.02),
+)
+
+_GEARS = (
+    _number("teeth_driver", "", "teeth of the pinion", 8, 200, 20, whole=True),
+    _number("teeth_driven", "", "teeth of the wheel", 8, 1000, 100, whole=True),
+    _number("module_mm", "mm", "module of both gears", 0.3, 50, 5.0),
+    _number("pressure_angle_deg", "deg", "pressure angle", 14, 30, 20.0),
+    _number("face_width_mm", "mm", "face width; for the rig file only", 1, 1000, 80.0),
+    _number("contact_ratio", "", "mean pairs in contact; none: of standard teeth", LEAST_CONTACT_RATIO, 1.85, None),
+    _number("mesh_ramp", "", "base pitches over which a pair takes up its load", *MESH_RAMP_RANGE, 0.05),
+    _number("mesh_phase", "", "pinion's angle, in tooth pitches, at which a pair enters", 0, 1, 0.0),
+)
+
+_CONTACT = (
+    _word(
+        "contact_stiffness",
+        "Hertzian point contact at the pitch point (1.8366e10 N/m^1.5 for the source's gears), or the source's table "
+        "(1.72e9, printed as N/m)",
+        STIFFNESSES,
+        "formula",
+    ),
+    _number(
+        "stiffness_n_per_m_lambda", "N/m^λ", "of one tooth pair, instead of either; none: as above", 1e5, 1e14, None
+    ),
+    _number("exponent", "", "λ: force grows as depth^λ", 1, 2, 1.5),
+    _number("restitution", "", "speed after a free impact over speed before", 0.05, 1, 0.95),
+    _word("damping_law", "damping that follows from the restitution", DAMPING_LAWS, DAMPING_LAWS[0]),
+    _number("impact_speed_floor_mps", "m/s", "least speed of impact in the damping law", 1e-4, 10, 0.01),
+    _number("half_backlash_um", "um", "half of the play along the line of action, new", 0, 5000, 150.0),
+    _number("wear_um", "um", "worn off both drive flanks together, all over; it widens the play by that", 0, 5000, 0.0),
+    _number(
+        "sliding_wear_driver_um", "um", "worn off the pinion's drive flanks by sliding, where it is most", 0, 1000, 0.0
+    ),
+    _number(
+        "sliding_wear_driven_um", "um", "worn off the wheel's drive flanks by sliding, where it is most", 0, 1000, 0.0
+    ),
+    _number("friction_coefficient", "", "sliding friction of the flanks", 0, MOST_FRICTION, 0.05),
+    _number("flank_static_ratio", "", "static over sliding friction of the flanks", *STATIC_RATIO_RANGE, 1.2),
+    _number("flank_stribeck_mps", "m/s", "sliding speed at which static friction has gone", 1e-4, 1, 0.005),
+    _number("flank_presliding_um", "um", "deflection of the flanks' bristles at which they slide", 0.5, 1000, 10.0),
+)
+
+_MASSES = (
+    _number("motor_inertia_kg_m2", "kg m^2", "motor, ahead of the torque sensor", 0, 1e4, 0.05),
+    _number("pinion_inertia_kg_m2", "kg m^2", "pinion, behind the torque sensor", 1e-6, 1e4, 0.01),
+    _number("wheel_inertia_kg_m2", "kg m^2", "wheel and gripper", 1e-5, 1e6, 42.0),
+    _number("piece_mass_kg", "kg", "forge piece, a round bar", 0, 1e6, 290.0),
+    _number("piece_radius_mm", "mm", "of the bar", 1, 5000, 150.0),
+    _number("piece_offset_mm", "mm", "distance of the piece's centre from the axis", 0, 5000, 0.0),
+    _number("piece_angle_deg", "deg", "where it hangs at the start, from below", -360, 360, 0.0),
+)
+
+_DRIVE = (
+    _number(
+        "motor_speed_band", "", "part of the speed limit over which the torque falls to nothing", *SPEED_BAND_RANGE, 0.3
+    ),
+    _number("torque_ripple", "", "ripple of the motor, part of its torque", 0, 1, 0.0),
+    _number("torque_ripple_order", "", "ripples per revolution: pistons", 0.1, 1000, 9.0),
+    _number("drag_nm", "N m", "sliding friction of motor and pinion shaft", 0, 1e5, 5.0),
+    _number("drag_viscous_nm_s_per_rad", "N m s/rad", "viscous friction of them", 0, 1e5, 0.2),
+    _number("load_friction_nm", "N m", "sliding friction of the gripper's bearings", 0, 1e6, 300.0),
+    _number("load_viscous_nm_s_per_rad", "N m s/rad", "viscous friction of them", 0, 1e6, 20.0),
+    _number("static_ratio", "", "static over sliding friction of both shafts", *STATIC_RATIO_RANGE, 1.3),
+    _number("drag_stribeck_rad_per_s", "rad/s", "speed at which the motor's static friction has gone", 1e-4, 100, 0.1),
+    _number("load_stribeck_rad_per_s", "rad/s", "the same of the gripper", 1e-4, 100, 0.02),
+    _number("drag_presliding_rad", "rad", "deflection of the motor's bristles at which they slide", 1e-6, 0.1, 5e-4),
+    _number("load_presliding_rad", "rad", "the same of the gripper", 1e-6, 0.1, 2e-4),
+)
+
+_CHAIN = (
+    _word(
+        "slow_channels",
+        "torque, force, speeds and accelerations: instants, as a motion controller stores them and as forces from "
+        "motion want them; or filtered below half the sampling rate, as a data logger does and as spectra want them",
+        SAMPLINGS,
+        "instants",
+    ),
+    _number(
+        "encoder_counts", "", "counts per revolution of both encoders; 0: no rounding", 0, 2**30, 2**20, whole=True
+    ),
+    _number("angle_noise_urad", "urad", "rms noise of the angles", 0, 1e6, 1.0),
+    _number("speed_noise_mrad_per_s", "mrad/s", "rms noise of the speeds", 0, 1e6, 1.0),
+    _number("acceleration_noise_rad_per_s2", "rad/s^2", "rms noise of the angular accelerations", 0, 1e6, 0.5),
+    _number("torque_noise_nm", "N m", "rms noise of the torque sensor", 0, 1e5, 0.2),
+    _number("torque_gain", "", "reading of the torque sensor over the torque", 0.05, 20, 1.0),
+    _number("vibration_noise_mps2", "m/s^2", "rms noise of the accelerometer", 0, 1e3, 0.05),
+    _number("housing_mass_kg", "kg", "that moves with the pinion's bearing", 1, 1e5, 150.0),
+    _number("housing_frequency_hz", "Hz", "its natural frequency on the frame", 20, 5000, 640.0),
+    _number("housing_damping_ratio", "", "its damping ratio", 1e-3, 1, 0.03),
+)
+
+PARAMETERS: tuple[Parameter, ...] = (*_CYCLE, *_GEARS, *_CONTACT, *_MASSES, *_DRIVE, *_CHAIN)
+"""All of them, by part of the machine."""
+
+# --------------------
+# What sliding has worn off the drive flanks, over the path of contact.
+# --------------------
+
+
+SIDES = ("driver", "driven")
+N_PLACES = 65
+
+
+def gear_pair(wanted: ParameterValues) -> PairGeometry:
+    """Return the teeth of both gears as `sims.mesh` knows them."""
+    module, angle, width = (wanted.number(n) for n in ("module_mm", "pressure_angle_deg", "face_width_mm"))
+    gears = [GearGeometry(wanted.whole(f"teeth_{side}"), module, angle, face_width_mm=width) for side in SIDES]
+    return PairGeometry(gears[0], gears[1])
+
+
+def worn_um(wanted: ParameterValues, path: PathOfContact) -> tuple[float, ...]:
+    """Return the depth that both drive flanks of a pair lost together, from where it enters to where it leaves.
+
+    Each gear's share has the shape of Archard's law, see `sims.mesh.wear_profile`: greatest at the ends of the path,
+    nothing at the pitch point. Empty where nothing is worn.
+    """
+    deepest = [wanted.number(f"sliding_wear_{side}_um") for side in SIDES]
+    if not any(deepest):
+        return ()
+    pair = gear_pair(wanted)
+    driver_mm = 1e3 * path.driver_lever_m(np.linspace(0.0, path.contact_ratio, N_PLACES))
+    rolls = (driver_mm, 1e3 * path.length_m - driver_mm)
+    shares = [
+        depth * wear_profile(pair, side, roll)
+        for side, depth, roll in zip((1, 2), deepest, rolls, strict=True)
+        if depth
+    ]
+    return tuple(float(depth) for depth in np.sum(shares, axis=0))
+
+
+# --------------------
+# From parameter values to the drive, its cycle, and its rig.
+# --------------------
+
+
+TABLE_STIFFNESS = 1.72e9
+"""As the source's table prints it, there in N/m; taken as N/m^1.5."""
+SHAFTS = ("pinion", "wheel")
+GRAVITY_MPS2 = 9.81
+BRISTLE_DAMPING = 0.5
+"""Damping ratio of an inertia that swings on its bristles at rest."""
+
+
+def build_drive(wanted: ParameterValues, speed_limit_rpm: float, weak_tooth: WeakTooth | None = None) -> ForgingDrive:
+    """Return the drive that complete values of `PARAMETERS` describe."""
+    path = standard_path(
+        (wanted.whole("teeth_driver"), wanted.whole("teeth_driven")),
+        wanted.number("module_mm") * 1e-3,
+        radians(wanted.number("pressure_angle_deg")),
+        phase=wanted.number("mesh_phase"),
+        contact_ratio=wanted.optional("contact_ratio"),
+    )
+    contact = build_contact(wanted, path)
+    brake = wanted.number("brake_nm")
+    drag, held = wanted.number("drag_nm"), wanted.number("load_friction_nm")
+    pinion_side = contact.motor_inertia_kg_m2 + contact.driver_inertia_kg_m2
+    motor = HydraulicMotor(
+        contact.motor_inertia_kg_m2,
+        _bristle(wanted, "drag", drag, drag + brake, pinion_side),
+        wanted.number("motor_speed_band"),
+        wanted.number("torque_ripple"),
+        wanted.number("torque_ripple_order"),
+    )
+    load = GrippedLoad(
+        _bristle(wanted, "load", held, held, contact.driven_inertia_kg_m2 or 0.0),
+        wanted.number("piece_mass_kg") * GRAVITY_MPS2 * wanted.number("piece_offset_mm") * 1e-3,
+        radians(wanted.number("piece_angle_deg")),
+    )
+    flanks = Bristle(
+        1.0,
+        wanted.number("flank_static_ratio"),
+        wanted.number("flank_stribeck_mps"),
+        wanted.number("flank_presliding_um") * 1e-6,
+    )
+    limit = speed_limit_rpm * pi / 30.0
+    ramp, worn = wanted.number("mesh_ramp"), worn_um(wanted, path)
+    return ForgingDrive(path, contact, motor, load, flanks, limit, ramp, weak_tooth, worn)
+
+
+def build_contact(wanted: ParameterValues, path: PathOfContact) -> ToothContact:
+    """Return the contact of the flanks, with the inertias behind them."""
+    piece = 0.5 * wanted.number("piece_mass_kg") * (wanted.number("piece_radius_mm") * 1e-3) ** 2
+    offset = wanted.number("piece_mass_kg") * (wanted.number("piece_offset_mm") * 1e-3) ** 2
+    return ToothContact(
+        _stiffness(wanted, path),
+        "stage 1",
+        wanted.number("exponent"),
+        wanted.number("half_backlash_um") + 0.5 * wanted.number("wear_um"),
+        wanted.number("restitution"),
+        wanted.word("damping_law"),
+        wanted.number("impact_speed_floor_mps"),
+        wanted.number("friction_coefficient"),
+        wanted.number("pinion_inertia_kg_m2"),
+        wanted.number("wheel_inertia_kg_m2") + piece + offset,
+        path.phase,
+        path.contact_ratio,
+        wanted.number("motor_inertia_kg_m2"),
+    )
+
+
+def build_cycle(wanted: ParameterValues) -> Cycle:
+    """Return when the drive works and stands."""
+    return Cycle(
+        wanted.word("mode"),
+        wanted.number("on_s"),
+        wanted.number("off_s"),
+        wanted.number("valve_rise_s"),
+        wanted.number("brake_nm"),
+        wanted.number("brake_delay_s"),
+        wanted.number("press_nm"),
+        wanted.number("press_delay_s"),
+        wanted.number("press_duration_s"),
+    )
+
+
+def build_rig(
+    drive: ForgingDrive,
+    wanted: ParameterValues,
+    operation: Operation,
+    sensors: Sequence[Sensor],
+    *,
+    name: str = "",
+    sources: Sequence[str] = (),
+) -> Rig:
+    """Return what somebody who knows the machine's drawing would write into a rig file; wear is not in it."""
+    contact = build_contact(ParameterValues(wanted.values | {"wear_um": 0.0}), drive.path)
+    torque = operation.torque_nm
+    pair = GearPair(
+        "stage 1",
+        *SHAFTS,
+        *drive.path.teeth,
+        wanted.number("module_mm"),
+        wanted.number("pressure_angle_deg"),
+        wanted.number("face_width_mm"),
+    )
+    return Rig(
+        name=name,
+        shafts=(Shaft(SHAFTS[0], "ccw"), Shaft(SHAFTS[1], "cw")),
+        pairs=(pair,),
+        sensors=tuple(sensors),
+        operating_point=OperatingPoint(SHAFTS[0], torque_nm=torque.largest if len(torque.values) == 1 else None),
+        speed=EncoderChannel("pinion angle", 2.0 * pi, wraps=False, shaft=SHAFTS[0]),
+        sources=tuple(sources),
+        contact=contact,
+    )
+
+
+def _stiffness(wanted: ParameterValues, path: PathOfContact) -> float:
+    own = wanted.optional("stiffness_n_per_m_lambda")
+    if own is not None:
+        return own
+    if wanted.number("exponent") != 1.5:
+        raise InputError(
+            f"exponent is {wanted.number('exponent'):g}, and both named stiffnesses hold for 1.5",
+            remedy="give stiffness_n_per_m_lambda",
+        )
+    if wanted.word("contact_stiffness") == "table":
+        return TABLE_STIFFNESS
+    z1, z2 = path.teeth
+    return hertz_stiffness_n_per_m1p5(
+        z2 / z1, 0.5 * z1 * wanted.number("module_mm") * 1e-3, radians(wanted.number("pressure_angle_deg"))
+    )
+
+
+def _bristle(wanted: ParameterValues, name: str, level: float, held: float, inertia_kg_m2: float) -> Bristle:
+    """Friction of a shaft; its bristles are damped for the inertia that swings on them while it is held."""
+    presliding = wanted.number(f"{name}_presliding_rad")
+    swing = sqrt(held / presliding / inertia_kg_m2) if held > 0.0 else 0.0
+    return Bristle(
+        level,
+        wanted.number("static_ratio"),
+        wanted.number(f"{name}_stribeck_rad_per_s"),
+        presliding,
+        2.0 * BRISTLE_DAMPING / swing if swing > 0.0 else 0.0,
+        wanted.number(f"{name}_viscous_nm_s_per_rad"),
+    )

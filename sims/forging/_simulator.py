@@ -1,0 +1,270 @@
+"""The forging manipulator's drive as a simulator: preset and values → drive → recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearsig.checks import closest_match_hint, within
+from gearsig.errors import InputError
+from gearsig.recording import Recording
+from sims.effects import EffectSetting, completed, effect
+from sims.forging._drive import (
+    MOST_FRICTION,
+    PARAMETERS,
+    SIDES,
+    Cycle,
+    ForgingDrive,
+    Schedule,
+    WeakTooth,
+    build_cycle,
+    build_drive,
+    build_rig,
+    gear_pair,
+    schedule,
+)
+from sims.machine import Operation, Profile
+from sims.mesh import GearMesh, RootCrack, mesh_stiffness
+from sims.presets import preset
+from sims.request import Model, truth_of
+from sims.simulator import Parameter, ParameterValue, ParameterValues, Values, complete_values
+
+if TYPE_CHECKING:
+    from sims.forging._respond import ForgingConvergence
+
+
+# --------------------
+# Effects of the catalogue that have a meaning for the drive, as changes of its parameters and of one tooth.
+# --------------------
+
+
+WITH_MEANING = ("root_crack", "tooth_wear", "sliding_friction", "backlash", "torque_ripple")
+"""What the drive can do. A wrong load inertia is `piece_mass_kg` or `wheel_inertia_kg_m2`."""
+
+
+def with_effects(values: Values, settings: Sequence[EffectSetting]) -> tuple[Values, WeakTooth | None]:
+    """Return the parameters with the effects in them, and the tooth that a crack makes weak.
+
+    - backlash: the play grows by the severity.
+    - tooth_wear: the drive flanks of one gear lose material by sliding, most at their ends and nothing at the pitch
+      point (`sims.mesh.wear_profile`); pairs touch the later the more they lost.
+    - sliding_friction: the coefficient grows by the severity; the bristles' deflection stays.
+    - torque_ripple: amplitude and order of the motor's ripple.
+    - root_crack: the tooth's pairs lose stiffness in the ratio of their mean stiffness with and without the crack, by
+      the potential energy of the tooth (`sims.mesh`); on the drive flank, where the load opens the crack.
+
+    Raises
+    ------
+    InputError
+        If an effect has no meaning here, is given twice, or its severity or options do not fit.
+    """
+    changed = dict(values)
+    weak: WeakTooth | None = None
+    _check_names(settings)
+    for setting in settings:
+        wanted, found = ParameterValues(changed), effect(setting.name)
+        s = found.severity
+        severity = within(setting.severity, f"{s.name} of {setting.name}", s.low, s.high, s.unit)
+        options = found.complete(setting.options)
+        if setting.name == "backlash":
+            changed["half_backlash_um"] = wanted.number("half_backlash_um") + 0.5 * severity
+        elif setting.name == "tooth_wear":
+            worn = f"sliding_wear_{options['gear']}_um"
+            changed[worn] = wanted.number(worn) + severity
+        elif setting.name == "sliding_friction":
+            now = wanted.number("friction_coefficient")
+            within(severity, f"{s.name} of {setting.name}, beside the {now:g} there are,", 0.0, MOST_FRICTION - now)
+            changed["friction_coefficient"] = now + severity
+        elif setting.name == "torque_ripple":
+            changed["torque_ripple"], changed["torque_ripple_order"] = severity / 100.0, float(options["order"])
+        elif severity > 0.0:
+            weak = _weak_tooth(wanted, severity, options)
+    return changed, weak
+
+
+def _check_names(settings: Sequence[EffectSetting]) -> None:
+    names = [setting.name for setting in settings]
+    for name in names:
+        if name not in WITH_MEANING:
+            raise InputError(
+                f"effect {name!r} has no meaning for the model forging",
+                allowed=", ".join(WITH_MEANING),
+                remedy=closest_match_hint(name, WITH_MEANING),
+            )
+        if names.count(name) > 1:
+            raise InputError(f"effect {name!r} is given {names.count(name)} times", allowed="once")
+
+
+def _weak_tooth(wanted: ParameterValues, depth_mm: float, options: Mapping[str, float | str]) -> WeakTooth:
+    gear = SIDES.index(str(options["gear"]))
+    pair = gear_pair(wanted)
+    n_teeth = (pair.driver, pair.driven)[gear].teeth
+    tooth = int(within(float(options["tooth"]), f"tooth of the {SIDES[gear]} gear", 1, n_teeth)) - 1
+    percent = float(options["width_percent"])
+    width = None if percent == 100.0 else percent / 100.0 * pair.face_width_mm
+    crack = RootCrack(depth_mm, float(options["angle_deg"]), tooth, width)
+    cracked = GearMesh(pair, cracks_1=(crack,) if gear == 0 else (), cracks_2=(crack,) if gear == 1 else ())
+    # Pair `tooth` alone, while it touches from its entry on: its column moves as the next pair enters.
+    cycles = tooth + np.linspace(0.05, 0.95, 40)
+    sound_n_per_m, weak_n_per_m = (
+        mesh_stiffness(mesh, cycles).pairs_n_per_m[:, 0] for mesh in (GearMesh(pair), cracked)
+    )
+    return WeakTooth(gear, tooth, 1.0 - float(np.mean(weak_n_per_m / sound_n_per_m)))
+
+
+NAME = "forging"
+SAMPLING_RATE_RANGE_HZ = (100.0, 200000.0)
+DURATION_RANGE_S = (0.05, 3600.0)
+MOST_SAMPLES = 12_000_000
+SPEED_RANGE_RPM = (0.0, 5000.0)
+TORQUE_RANGE_NM = (0.0, 1e6)
+
+
+@dataclass(frozen=True)
+class PreparedDrive:
+    """A drive with its cycle, ready to run.
+
+    Parameters
+    ----------
+    drive : ForgingDrive
+        With its effects.
+    cycle : Cycle
+    operation : Operation
+    preset : str
+    values, sound_values : mapping
+        Every parameter, with the effects and without.
+    effects : tuple of EffectSetting
+        With every option.
+    """
+
+    drive: ForgingDrive
+    cycle: Cycle
+    operation: Operation
+    preset: str
+    values: Values
+    sound_values: Values
+    effects: tuple[EffectSetting, ...] = ()
+
+    def courses(self, duration_s: float) -> Schedule:
+        """Torque, brake and press over a run."""
+        return schedule(self.cycle, self.operation.torque_nm, duration_s)
+
+    def truth(self) -> dict[str, Any]:
+        """What was put in, as plain values."""
+        return {
+            **truth_of(NAME, self.preset, self.sound_values, self.effects, self.operation),
+            "backlash_um": 2.0 * self.drive.contact.half_backlash_um,
+            "stiffness_n_per_m_lambda": self.drive.contact.stiffness_n_per_m_lambda,
+            "reduced_mass_kg": self.drive.reduced_mass_kg,
+        }
+
+
+@dataclass(frozen=True)
+class ForgingManipulator(Model):
+    """Pinion and wheel of a forging manipulator: start–stop, backlash, impact; see `sims.forging`."""
+
+    name: str = NAME
+    title: str = "forging manipulator's drive: start–stop, backlash, impact on both flanks, stick–slip"
+    parameters: tuple[Parameter, ...] = field(default=PARAMETERS, repr=False)
+    effects: tuple[str, ...] = field(default=WITH_MEANING, repr=False)
+
+    @property
+    def usual_sampling_rate_hz(self) -> float:
+        """A motion controller's, 1 ms."""
+        return 1000.0
+
+    def prepare(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        operation: Operation | None,
+        *,
+        preset_name: str = "",
+        settings: Sequence[EffectSetting] = (),
+    ) -> PreparedDrive:
+        """Build the drive and its cycle, with its effects."""
+        chosen = preset(NAME, preset_name)
+        sound = complete_values(PARAMETERS, chosen.parameters, parameters)
+        wanted_effects = (*chosen.effects, *settings)
+        values, weak = with_effects(sound, wanted_effects)
+        run = operation or chosen.operation
+        within(run.torque_nm.largest, "torque_nm", *TORQUE_RANGE_NM, "N m")
+        wanted = ParameterValues(values)
+        drive = build_drive(wanted, _constant(run.speed_rpm), weak)
+        complete = completed(wanted_effects)
+        return PreparedDrive(drive, build_cycle(wanted), run, chosen.name, values, sound, complete)
+
+    def simulate(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        effects: Sequence[EffectSetting],
+        operation: Operation | None,
+        rng: np.random.Generator,
+        *,
+        preset: str = "",
+        sampling_rate_hz: float = 1000.0,
+        duration_s: float = 6.0,
+    ) -> Recording:
+        """Make a recording with rig and truth, from rest on; see `sims.simulator.Simulator.simulate`.
+
+        The operation's torque is that of the open valve, its speed the pinion's that the flow allows (0: no limit).
+        Vibration is recorded from 5 kHz on.
+
+        Raises
+        ------
+        InputError
+            If a name does not exist, a value is out of its range, the values do not fit each other, or a stop is longer
+            than the record.
+        """
+        from sims.forging._measure import record, sensors
+
+        within(duration_s, "duration_s", *DURATION_RANGE_S, "s")
+        within(sampling_rate_hz, "sampling_rate_hz", *SAMPLING_RATE_RANGE_HZ, "Hz")
+        if sampling_rate_hz * duration_s > MOST_SAMPLES:
+            raise InputError(f"{sampling_rate_hz * duration_s:.3g} samples are wanted", allowed=f"up to {MOST_SAMPLES}")
+        ready = self.prepare(parameters, operation, preset_name=preset, settings=effects)
+        wanted = ParameterValues(ready.values)
+        rig = build_rig(
+            ready.drive,
+            ParameterValues(ready.sound_values),
+            ready.operation,
+            sensors(sampling_rate_hz),
+            name=self.rig_name(ready.preset),
+            sources=self.rig_sources(ready.preset),
+        )
+        ready.courses(duration_s)  # says so where a stop does not fit, before anything is run
+        return record(
+            ready.drive,
+            ready.courses(duration_s + 1.0),
+            wanted,
+            rig=rig,
+            rng=rng,
+            sampling_rate_hz=sampling_rate_hz,
+            duration_s=duration_s,
+            truth=ready.truth(),
+        )
+
+    def check_convergence(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        effects: Sequence[EffectSetting],
+        operation: Operation | None,
+        rng: np.random.Generator,
+        *,
+        preset: str = "",
+    ) -> ForgingConvergence:
+        """Tell how far shorter steps change the motion of this very drive, which nothing random enters."""
+        from sims.forging._respond import check_convergence
+
+        del rng
+        ready = self.prepare(parameters, operation, preset_name=preset, settings=effects)
+        return check_convergence(ready.drive, ready.cycle, ready.operation.torque_nm)
+
+
+def _constant(speed_rpm: Profile) -> float:
+    """Return the speed limit: one number, as a valve is set once."""
+    if len(speed_rpm.values) > 1 and float(speed_rpm.values.max() - speed_rpm.values.min()) > 0.0:
+        raise InputError("speed_rpm varies", allowed="one speed that the flow allows", remedy="vary --torque instead")
+    return within(float(speed_rpm.values[0]), "speed_rpm", *SPEED_RANGE_RPM, "rpm")

@@ -1,0 +1,64 @@
+"""What both models of a gear pair share: parameters, bearings, drive, measurement, and the twin of a rig."""
+
+from sims.gear_pair._bearing import BEARING_FIELDS, bearing_fields, bearing_loads_n, carried_part, foot
+from sims.gear_pair._build import build_machine, build_rig, gear_geometry
+from sims.gear_pair._drive import (
+    DRIVE_FIELDS,
+    DRIVE_SCALARS,
+    FRICTION_SCALARS,
+    draw_roughness,
+    drive_fields,
+    friction_fields,
+    governor_nm_s_per_rad,
+    total_inertia_kg_m2,
+)
+from sims.gear_pair._installed import Installed, completed
+from sims.gear_pair._measurement import COORDINATES, LEAST_MOTION_HZ, Measurement
+from sims.gear_pair._parameters import PARAMETERS
+from sims.gear_pair._simulator import PairModel, ReadyPair, SimulationRequest
+from sims.gear_pair._twin import (
+    BODY_KG,
+    BODY_SHAPES,
+    PLAUSIBLE,
+    Nominal,
+    PairGapSimulator,
+    PairTwin,
+    body_gain,
+    nominal_of,
+)
+
+__all__ = [
+    "BEARING_FIELDS",
+    "BODY_KG",
+    "BODY_SHAPES",
+    "COORDINATES",
+    "DRIVE_FIELDS",
+    "DRIVE_SCALARS",
+    "FRICTION_SCALARS",
+    "LEAST_MOTION_HZ",
+    "PARAMETERS",
+    "PLAUSIBLE",
+    "Installed",
+    "Measurement",
+    "Nominal",
+    "PairGapSimulator",
+    "PairModel",
+    "PairTwin",
+    "ReadyPair",
+    "SimulationRequest",
+    "bearing_fields",
+    "bearing_loads_n",
+    "body_gain",
+    "build_machine",
+    "build_rig",
+    "carried_part",
+    "completed",
+    "draw_roughness",
+    "drive_fields",
+    "foot",
+    "friction_fields",
+    "gear_geometry",
+    "governor_nm_s_per_rad",
+    "nominal_of",
+    "total_inertia_kg_m2",
+]

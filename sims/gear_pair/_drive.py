@@ -1,0 +1,138 @@
+"""Drive and inertias of a pair as plain numbers, which compiled code reads."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.errors import InputError
+from sims.machine import RECOVERY_S, Machine, Operation
+from sims.mesh import FlankRoughness, FractalSurface, TimeLockedRoughness, oil_terms, reduced_modulus_pa
+
+MOST_LINES = 8
+"""Torque ripples, or speed swings, at once."""
+DRIVE_SCALARS = ("governor", "governor_spring", "total_inertia", "ratio")
+DRIVE_FIELDS = [
+    ("n_ripples", np.int64),
+    ("ripples", np.float64, (MOST_LINES, 3)),
+    ("n_swings", np.int64),
+    ("swings", np.float64, (MOST_LINES, 3)),
+]
+"""Of a record, beside `DRIVE_SCALARS`."""
+
+
+def drive_fields(machine: Machine) -> dict[str, Any]:
+    """Values of `DRIVE_SCALARS` and `DRIVE_FIELDS`."""
+    drive, governor, total = machine.drive, governor_nm_s_per_rad(machine), total_inertia_kg_m2(machine)
+    swings = [(s.fraction, 2.0 * pi * s.frequency_hz, s.phase_rad) for s in drive.swings]
+    return {
+        "governor": governor,
+        "governor_spring": governor**2 / (4.0 * total),
+        "total_inertia": total,
+        "ratio": machine.ratio,
+        "n_ripples": len(drive.ripples),
+        "n_swings": len(drive.swings),
+        "ripples": _rows([(r.order, r.fraction, r.phase_rad) for r in drive.ripples], "torque ripples"),
+        "swings": _rows(swings, "speed swings"),
+    }
+
+
+def total_inertia_kg_m2(machine: Machine) -> float:
+    """Everything that turns, as the input shaft feels it."""
+    (input_shaft, output_shaft), (driver, driven) = machine.shafts, machine.wheels
+    far = driven.inertia_kg_m2 + output_shaft.rotor_inertia_kg_m2
+    return input_shaft.rotor_inertia_kg_m2 + driver.inertia_kg_m2 + far / machine.ratio**2
+
+
+def governor_nm_s_per_rad(machine: Machine) -> float:
+    """G of the drive; an ordinary one suits what it turns."""
+    given = machine.drive.governor_nm_s_per_rad
+    return 2.0 * total_inertia_kg_m2(machine) / RECOVERY_S if given is None else given
+
+
+def _rows(items: list[tuple[float, float, float]], what: str) -> FloatArray:
+    if len(items) > MOST_LINES:
+        raise InputError(f"{len(items)} {what}", allowed=f"at most {MOST_LINES}")
+    rows = np.zeros((MOST_LINES, 3))
+    rows[: len(items)] = np.array(items, dtype=np.float64).reshape(-1, 3)
+    return rows
+
+
+# --------------------
+# Friction between the teeth as plain numbers, which compiled code reads.
+# --------------------
+
+
+STICKING, STICKING_S = 0.1, 1e-5
+"""Friction coefficient, and time within which it must not turn a gear's sliding round: near standstill the smoothed
+sign is as stiff as a spring, and a fixed step would chatter."""
+SIGN_THRESHOLD = 0.01
+"""Sliding speed below which the sign of friction is smoothed, over the mesh's greatest sliding speed."""
+FRICTION_SCALARS = (
+    "start_radius",
+    "base_pitch",
+    "action_length",
+    "friction_factor",
+    "dry_friction",
+    "width",
+    "reduced_modulus",
+    "log10_oil",
+    "oil_constant",
+    "sign_threshold",
+)
+"""Of the record: what `sims.mesh.contact_friction_n` needs."""
+
+
+def friction_fields(machine: Machine, operation: Operation, force_n: float) -> dict[str, Any]:
+    """Values of `FRICTION_SCALARS`, and whether there is friction, at the set mesh force."""
+    mesh, pair = machine.mesh, machine.mesh.pair
+    log10_oil, oil_constant = oil_terms(machine.lubrication.viscosity_cp, machine.roughness.rms_um)
+    one, two = mesh.material_1, mesh.material_2
+    sliding = greatest_sliding_mps(machine, operation.speed_rpm.largest * pi / 30.0)
+    lightest = min(w.mass_kg for w in machine.wheels)
+    return {
+        "friction": machine.lubrication.friction,
+        "start_radius": pair.start_radius_mm * 1e-3,
+        "base_pitch": pair.base_pitch_mm * 1e-3,
+        "action_length": pair.action_length_mm * 1e-3,
+        "friction_factor": machine.lubrication.factor,
+        "dry_friction": machine.lubrication.dry_coefficient,
+        "width": mesh.face_width_m,
+        "reduced_modulus": reduced_modulus_pa(
+            one.youngs_modulus_pa, one.poisson_ratio, two.youngs_modulus_pa, two.poisson_ratio
+        ),
+        "log10_oil": log10_oil,
+        "oil_constant": oil_constant,
+        "sign_threshold": max(SIGN_THRESHOLD * sliding, STICKING * force_n * STICKING_S / lightest, 1e-6),
+    }
+
+
+def greatest_sliding_mps(machine: Machine, omega_rad_s: float) -> float:
+    """Sliding speed at the end of the path of contact where it is greatest."""
+    pair = machine.mesh.pair
+    cycles = np.array([0.0, pair.contact_ratio])
+    return float(np.max(np.abs(pair.sliding_speed_m_s(cycles, omega_rad_s * 30.0 / pi))))
+
+
+# --------------------
+# Roughness of a pair's flanks, drawn.
+# --------------------
+
+
+def draw_roughness(machine: Machine, rng: np.random.Generator) -> tuple[Machine, TimeLockedRoughness]:
+    """Give every tooth its profile, or the backlash its endless one; returns what the mesh and the kernel need.
+
+    Composite roughness S is shared evenly by the two flanks of a pair: each has S/√2.
+    """
+    rough, pair = machine.roughness, machine.mesh.pair
+    endless = FractalSurface.of_roughness(rough.rms_um if rough.locked_to == "time" else 0.0, rough.dimension)
+    profile = TimeLockedRoughness.draw(endless, rng)
+    if rough.locked_to == "flank" and rough.rms_um > 0.0:
+        surface = FractalSurface.of_roughness(rough.rms_um / np.sqrt(2.0), rough.dimension)
+        flanks = [FlankRoughness.draw(surface, gear.teeth, rng) for gear in (pair.driver, pair.driven)]
+        machine = replace(machine, mesh=replace(machine.mesh, roughness_1=flanks[0], roughness_2=flanks[1]))
+    return machine, profile

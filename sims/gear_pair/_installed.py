@@ -1,0 +1,307 @@
+"""What is fitted to a pair beyond its parameters: names of shafts, bearings, sensors, housing, tachometer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite, pi, sin
+from typing import Any
+
+from gearsig.checks import count, one_of, positive, within
+from gearsig.errors import InputError
+from gearsig.rig import Bearing, Rig, TachometerChannel, from_table, to_table
+
+N_BEARINGS = 4
+DIRECTIONS = ("vertical", "horizontal")
+MOST_SENSORS, MOST_MODES = 8, 32
+
+
+@dataclass(frozen=True)
+class SensorSeat:
+    """An accelerometer over one of the four bearings.
+
+    Parameters
+    ----------
+    channel : str
+    bearing : int
+        1 to 4: two of the driver's shaft, then two of the driven one's.
+    direction : str
+        "vertical" or "horizontal".
+    position : str
+        For the reader of the recording.
+    """
+
+    channel: str
+    bearing: int
+    direction: str = "vertical"
+    position: str = ""
+
+    def __post_init__(self) -> None:
+        within(count(self.bearing, "bearing of a sensor"), "bearing of a sensor", 1, N_BEARINGS)
+        one_of(self.direction, "direction of a sensor", DIRECTIONS)
+
+
+@dataclass(frozen=True)
+class HousingMode:
+    """A mode of the housing between the bearings and the sensors.
+
+    Parameters
+    ----------
+    frequency_hz, damping_ratio : float
+        Of the vertical mode; the horizontal one lies lower.
+    gain : float
+        Static gain where the shape is 1.
+    shape : tuple of four floats
+        At bearings 1 to 4.
+    """
+
+    frequency_hz: float
+    damping_ratio: float
+    gain: float
+    shape: tuple[float, float, float, float]
+
+    def __post_init__(self) -> None:
+        within(self.frequency_hz, "frequency_hz of a housing mode", 1.0, 1e5, "Hz")
+        within(self.damping_ratio, "damping_ratio of a housing mode", 1e-3, 1.0)
+        if len(self.shape) != N_BEARINGS or not all(isfinite(v) for v in (self.gain, *self.shape)):
+            raise InputError(
+                f"gain {self.gain}, shape {self.shape}", where="housing mode", allowed="finite, 4 bearings"
+            )
+
+
+@dataclass(frozen=True)
+class Pickup:
+    """The tachometer: its channel, and the side whose shaft carries its disc, 0 the driver."""
+
+    channel: str = "tacho"
+    side: int = 0
+    pulses_per_revolution: int = 1
+
+    def __post_init__(self) -> None:
+        within(self.side, "side of the tachometer", 0, 1)
+        within(count(self.pulses_per_revolution, "pulses_per_revolution"), "pulses_per_revolution", 1, 1024)
+
+
+@dataclass(frozen=True)
+class Installed:
+    """What is fitted to one machine.
+
+    Parameters
+    ----------
+    shafts : (str, str)
+        Names of the driver's and the driven shaft.
+    bearings : tuple of four Bearing
+        With geometry: the first two on the driver's shaft.
+    sensors : tuple of SensorSeat
+    modes : tuple of HousingMode
+    pickup : Pickup
+    """
+
+    shafts: tuple[str, str]
+    bearings: tuple[Bearing, Bearing, Bearing, Bearing]
+    sensors: tuple[SensorSeat, ...]
+    modes: tuple[HousingMode, ...] = ()
+    pickup: Pickup = Pickup()
+
+    def __post_init__(self) -> None:
+        if len(set(self.shafts)) != 2 or not all(self.shafts):
+            raise InputError(f"shafts {self.shafts}", allowed="two different names")
+        if len(self.bearings) != N_BEARINGS or len({b.name for b in self.bearings}) != N_BEARINGS:
+            raise InputError(f"bearings {', '.join(b.name for b in self.bearings)}", allowed="four different names")
+        if len(self.modes) > MOST_MODES or not 1 <= len(self.sensors) <= MOST_SENSORS:
+            raise InputError(
+                f"{len(self.sensors)} sensors and {len(self.modes)} housing modes",
+                allowed=f"1 to {MOST_SENSORS} sensors, at most {MOST_MODES} modes",
+            )
+        channels = [*(s.channel for s in self.sensors), self.pickup.channel]
+        if len(set(channels)) != len(channels) or not all(channels):
+            raise InputError(f"channels {', '.join(channels)}", allowed="names, each once")
+        for number, bearing in enumerate(self.bearings):
+            if bearing.shaft != self.shafts[number // 2]:
+                raise InputError(
+                    f"bearing {bearing.name!r} is on shaft {bearing.shaft!r}", allowed=f"{self.shafts[number // 2]!r}"
+                )
+            positive(bearing.n_rolling_elements or 0, f"n_rolling_elements of bearing {bearing.name!r}")
+
+
+# --------------------
+# What is fitted to a machine, as a table of a preset file and back; files are not trusted.
+# --------------------
+
+
+_LISTS = {"bearings": Bearing, "sensors": SensorSeat, "modes": HousingMode}
+_KEYS = ("shafts", "pickup", *_LISTS)
+_PLACE = "[installed]"
+
+
+def table_of(installed: Installed) -> dict[str, Any]:
+    """Return what is fitted as plain tables; `installed_of` reads them back."""
+    lists = {name: [to_table(item) for item in getattr(installed, name)] for name in _LISTS}
+    return {"shafts": list(installed.shafts), "pickup": to_table(installed.pickup), **lists}
+
+
+def installed_of(table: Mapping[str, Any]) -> Installed:
+    """Read what is fitted from plain tables.
+
+    Raises
+    ------
+    InputError
+        If a key is missing or not known, or a value does not fit.
+    """
+    if set(table) != set(_KEYS):
+        raise InputError(f"has the keys {', '.join(map(str, table))}", where=_PLACE, allowed=", ".join(_KEYS))
+    shafts = table["shafts"]
+    if not isinstance(shafts, list) or len(shafts) != 2 or not all(isinstance(name, str) for name in shafts):
+        raise InputError(f"shafts is {shafts!r}", where=_PLACE, allowed="two names")
+    lists = {name: _items(kind, table[name], f"[[installed.{name}]]") for name, kind in _LISTS.items()}
+    return Installed((shafts[0], shafts[1]), pickup=from_table(Pickup, table["pickup"], "[installed.pickup]"), **lists)
+
+
+def _items(kind: type, rows: object, where: str) -> tuple[Any, ...]:
+    if not isinstance(rows, list):
+        raise InputError("is not a list of tables", where=where)
+    return tuple(from_table(kind, row, f"{where} {i}") for i, row in enumerate(rows, 1))
+
+
+# --------------------
+# A rig's bearings and sensors at the places that the model has for them.
+# --------------------
+
+
+BALLS, BALL_MM, PITCH_MM = 9, 7.94, 39.04
+"""A usual bearing of a machine of size 1."""
+USUAL_SPLIT = 0.4
+"""BPFO over the number of elements, where only one order is known."""
+SEAT_ORDER = (1, 3, 2, 4)
+"""Bearings under the sensors whose place is not told."""
+SEATS_MOST_SENSORS = 4
+UNLISTED = "unlisted bearing"
+LEAST_PULSES = 4
+"""Per revolution, where the rig's speed is not told by a tachometer: well known speed, but no mark on a tooth."""
+
+
+def installed_of_rig(rig: Rig, size: float, modes: Sequence[HousingMode], used: Sequence[str] = ()) -> Installed:
+    """Return the rig's own shafts, bearings, sensors and tachometer; what it lacks is usual for the size.
+
+    Parameters
+    ----------
+    rig : Rig
+        With one gear pair.
+    size : float
+        See `sims.gear_pair.Nominal.size`.
+    modes : sequence of HousingMode
+    used : sequence of str
+        Bearings that must have a place: a model's shaft has only two.
+    """
+    pair = rig.pairs[0]
+    shafts = (pair.driver, pair.driven)
+    bearings: list[Bearing] = []
+    for side in range(2):
+        own = sorted(own_bearings(rig, shafts[side]), key=lambda b: b.name not in used)[:2]
+        bearings += [completed(b, size) for b in own]
+        bearings += [_spare(rig, shafts[side], 2 * side + n + 1, size) for n in range(len(own), 2)]
+    pickup = _pickup(rig, shafts)
+    return Installed(
+        shafts,
+        tuple(bearings),  # type: ignore[arg-type]  # four
+        _sensors(rig, bearings, pickup.channel),
+        tuple(modes),
+        pickup,
+    )
+
+
+def own_bearings(rig: Rig, shaft: str) -> list[Bearing]:
+    """Return the bearings of a shaft, in the rig's order."""
+    return [b for b in rig.bearings if b.shaft == shaft]
+
+
+def completed(bearing: Bearing, size: float) -> Bearing:
+    """Return a bearing with a geometry that gives its orders; where nothing is known, a usual one's.
+
+    n = BPFO + BPFI and d/D = (BPFI − BPFO)/n, with contact angle 0.
+    """
+    if bearing.n_rolling_elements is not None:
+        return bearing
+    outer, inner = bearing.bpfo_order, bearing.bpfi_order
+    n, share = BALLS, BALL_MM / PITCH_MM
+    if outer is not None and inner is not None:
+        n = max(round(outer + inner), 3)
+        share = (inner - outer) / n
+    elif outer is not None or inner is not None:
+        n = max(round((outer or 0.0) / USUAL_SPLIT or (inner or 0.0) / (1.0 - USUAL_SPLIT)), 3)
+        share = 1.0 - 2.0 * outer / n if outer is not None else 2.0 * (inner or 0.0) / n - 1.0
+    pitch = PITCH_MM * size
+    ball = min(max(share, 0.05), 0.9 * _closest(n)) * pitch
+    return replace(bearing, n_rolling_elements=n, rolling_element_diameter_mm=ball, pitch_diameter_mm=pitch)
+
+
+def _closest(n: int) -> float:
+    """Diameter at which n balls touch each other, over the pitch diameter."""
+    return sin(pi / n)
+
+
+def _spare(rig: Rig, shaft: str, number: int, size: float) -> Bearing:
+    """A sound bearing that the rig says nothing of."""
+    name = f"{UNLISTED} {number}"
+    while name in {b.name for b in rig.bearings}:
+        name += "'"
+    return Bearing(name, shaft, BALLS, BALL_MM * size, PITCH_MM * size)
+
+
+def _pickup(rig: Rig, shafts: tuple[str, str]) -> Pickup:
+    source = rig.speed
+    shaft = (source.shaft if source is not None else "") or rig.reference_shaft
+    side = shafts.index(shaft) if shaft in shafts else 0
+    if isinstance(source, TachometerChannel):
+        return Pickup(source.channel, side, min(source.pulses_per_revolution, 1024))
+    name = "tacho"
+    while name in {sensor.channel for sensor in rig.sensors}:
+        name += "'"
+    return Pickup(name, side, LEAST_PULSES)
+
+
+def _sensors(rig: Rig, bearings: Sequence[Bearing], tacho: str) -> tuple[SensorSeat, ...]:
+    """Return a seat for each of the rig's accelerometers: where its position says, else one bearing after another."""
+    told = [s for s in rig.sensors if s.quantity == "acceleration" and s.channel != tacho][:SEATS_MOST_SENSORS]
+    if not told:
+        told_names = {s.channel for s in rig.sensors} | {tacho}
+        names = [n for n in ("a1", "a2", "a3", "a4") if n not in told_names][:2]
+        return tuple(SensorSeat(name, number) for name, number in zip(names, SEAT_ORDER, strict=False))
+    taken: list[tuple[int, str]] = []
+    seats = []
+    for sensor in told:
+        direction = "horizontal" if "horizontal" in sensor.position.lower() else "vertical"
+        likely = [*_near(sensor.position.lower(), bearings), *SEAT_ORDER]
+        number = next((n for n in likely if (n, direction) not in taken), likely[0])
+        taken.append((number, direction))
+        seats.append(SensorSeat(sensor.channel, number, direction, sensor.position))
+    return tuple(seats)
+
+
+def _near(position: str, bearings: Sequence[Bearing]) -> list[int]:
+    """Numbers of the bearings that a sensor's position may mean: by a bearing's name, else by a shaft's."""
+    by_bearing = [n for n, b in enumerate(bearings, 1) if b.name.lower() in position]
+    by_shaft = [n for n, b in enumerate(bearings, 1) if b.shaft.lower() in position]
+    return by_bearing or by_shaft
+
+
+def further_seats(installed: Installed) -> tuple[SensorSeat, ...]:
+    """Return upright sensors over the bearings that have none."""
+    taken = {seat.bearing for seat in installed.sensors}
+    names = {seat.channel for seat in installed.sensors} | {installed.pickup.channel}
+    seats = []
+    for number, bearing in enumerate(installed.bearings, 1):
+        if number not in taken:
+            name = f"further {number}"
+            while name in names:
+                name += "'"
+            seats.append(SensorSeat(name, number, "vertical", f"{_bearing_words(bearing, number)}, vertical"))
+    return tuple(seats[: MOST_SENSORS - len(installed.sensors)])
+
+
+def _bearing_words(bearing: Bearing, number: int) -> str:
+    shaft = bearing.shaft if "shaft" in bearing.shaft.lower() else f"the {bearing.shaft} shaft"
+    if bearing.name.startswith(UNLISTED):
+        return f"the {'free' if number % 2 == 0 else 'drive'} end of {shaft}"
+    name = bearing.name if "bearing" in bearing.name.lower() else f"bearing {bearing.name}"
+    return f"{name} on {shaft}"

@@ -1,0 +1,165 @@
+"""From the motion of a pair to a recording: what the measurement chain needs of a model, and what it makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import ceil, floor
+from typing import Any, Protocol
+
+import numpy as np
+
+from gearsig.checks import FloatArray, positive
+from gearsig.recording import Recording
+from gearsig.rig import Rig
+from sims.gear_pair._drive import governor_nm_s_per_rad, total_inertia_kg_m2
+from sims.machine import Machine
+from sims.measure import MeasurementChain, Motion
+
+COORDINATES = (
+    "input rotor angle",
+    "driver angle",
+    "driven angle",
+    "output rotor angle",
+    "driver x",
+    "driver y",
+    "driven x",
+    "driven y",
+    *(f"bearing {i} {axis}" for i in (1, 2, 3, 4) for axis in ("x", "y")),
+)
+"""Places in rad and m; models give their velocities and accelerations, too."""
+ANGLES = COORDINATES[1:3]
+POSITIONS = COORDINATES[4:]
+"""Places whose acceleration a sensor can read, each with its direction."""
+POINTS_PER_CYCLE = 6
+"""Of the fastest resonance in path and sensor, in the motion handed to the measurement chain."""
+LEAST_MOTION_HZ = 80_000.0
+"""Rate of that motion at least: what the model still holds above half of it would fold back."""
+SETTLING = 6.0
+"""Time constants of the slowest start-up motion that are left out ahead of the recording."""
+
+
+class PairSignals(Protocol):
+    """What a model's run gives."""
+
+    @property
+    def interval_s(self) -> float:
+        """Between its points."""
+        ...
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Return a signal by its name."""
+        ...
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """How a machine is run to be measured, and the recording of it; time 0 of its courses is a sample.
+
+    Parameters
+    ----------
+    machine : Machine
+    chain : MeasurementChain
+        At the sampling rate of the recording.
+    duration_s, lead_in_s : float
+        Of the recording, and of what goes before it.
+    step_s : float
+        Of the integrator, a whole part of the sampling interval.
+    stride : int
+        Every how many steps a point is kept.
+    positions : tuple of str
+        Places that the channels' paths start from.
+    """
+
+    machine: Machine
+    chain: MeasurementChain
+    duration_s: float
+    lead_in_s: float
+    step_s: float
+    stride: int
+    positions: tuple[str, ...]
+
+    @classmethod
+    def of(cls, machine: Machine, *, sampling_rate_hz: float, duration_s: float, longest_step_s: float) -> Measurement:
+        """Plan a recording of `duration_s`; the step is `longest_step_s`, or less where the chain needs it.
+
+        Raises
+        ------
+        InputError
+            If rate, duration or step are not above 0.
+        """
+        positive(duration_s, "duration_s", "s")
+        rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+        chain = replace(machine.chain, sampling_rate_hz=rate)
+        wanted_hz = motion_rate_hz(chain)
+        per_sample = ceil(max(1.0 / positive(longest_step_s, "step_s", "s"), wanted_hz) / rate - 1e-9)
+        return cls(
+            machine,
+            chain,
+            duration_s,
+            ceil(lead_in_s(machine, chain) * rate) / rate,
+            1.0 / (rate * per_sample),
+            max(floor(rate * per_sample / wanted_hz + 1e-9), 1),
+            used_positions(chain),
+        )
+
+    @property
+    def motion_s(self) -> float:
+        """How long the model is to run."""
+        return self.chain.simulated_s(self.duration_s, self.lead_in_s) + 4.0 / self.chain.sampling_rate_hz
+
+    def signals(self, also: Sequence[str] = ()) -> tuple[str, ...]:
+        """Return the signals that the model is to give, with those that are wanted besides."""
+        return tuple(dict.fromkeys((*ANGLES, *(f"{name} acceleration" for name in self.positions), *also)))
+
+    def record(
+        self,
+        response: PairSignals,
+        *,
+        rng: np.random.Generator,
+        rig: Rig | None,
+        truth: Mapping[str, Any],
+        source: str,
+        reader: str,
+    ) -> Recording:
+        """Return the recording of a run that began at −`lead_in_s`; see `MeasurementChain.record`."""
+        motion = Motion(
+            response.interval_s,
+            self.positions,
+            np.column_stack([response[f"{name} acceleration"] for name in self.positions]),
+            dict(zip(self.machine.shaft_names, (response[name] for name in ANGLES), strict=True)),
+        )
+        return self.chain.record(
+            motion,
+            rng=rng,
+            rig=rig,
+            duration_s=self.duration_s,
+            lead_in_s=self.lead_in_s,
+            truth=truth,
+            source=source,
+            reader=reader,
+        )
+
+
+def lead_in_s(machine: Machine, chain: MeasurementChain) -> float:
+    """Time ahead of the recording: filters, the drive's governor, and the least damped start-up ringing settle."""
+    recovery = 2.0 * total_inertia_kg_m2(machine) / governor_nm_s_per_rad(machine)
+    return max(chain.lead_in_s, SETTLING * recovery, 0.1)
+
+
+def motion_rate_hz(chain: MeasurementChain) -> float:
+    """Points per second that the chain needs of the motion at least."""
+    modes = [mode.frequency_hz for channel in chain.channels for mode in channel.path.modes]
+    sensors = [channel.accelerometer.resonance_hz or 0.0 for channel in chain.channels]
+    return max(POINTS_PER_CYCLE * max([*modes, *sensors, 0.0]), LEAST_MOTION_HZ, 4.0 * chain.sampling_rate_hz)
+
+
+def used_positions(chain: MeasurementChain) -> tuple[str, ...]:
+    """Places that the channels' paths start from, in the model's order; unknown ones last, for the chain to refuse."""
+    used = {
+        name
+        for channel in chain.channels
+        for gains in (channel.path.direct, *(mode.gains for mode in channel.path.modes))
+        for name in gains
+    }
+    return tuple(name for name in POSITIONS if name in used) or POSITIONS[:1]

@@ -1,0 +1,176 @@
+"""What simulators of a gear pair have in common: preset and values → machine with effects → recording."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from gearsig.checks import within
+from gearsig.recording import Recording
+from gearsig.rig import Rig
+from sims.effects import EffectSetting, completed
+from sims.gear_pair._installed import Installed, installed_of
+from sims.machine import Machine, Operation
+from sims.presets import Preset, preset
+from sims.registry import DURATION_RANGE_S, check_run
+from sims.request import Model, truth_of
+from sims.simulator import Parameter, ParameterValue, Values, complete_values
+
+
+@dataclass(frozen=True)
+class SimulationRequest:
+    """What is asked of a model, complete.
+
+    Parameters
+    ----------
+    model, preset : str
+    operation : Operation
+    values : mapping
+        Every parameter; None where it follows from the others.
+    effects : tuple of EffectSetting
+        With every option.
+    installed : Installed or None
+    """
+
+    model: str
+    preset: str
+    operation: Operation
+    values: Values
+    effects: tuple[EffectSetting, ...]
+    installed: Installed | None = None
+
+    @classmethod
+    def of(
+        cls,
+        chosen: Preset,
+        known: tuple[Parameter, ...],
+        parameters: Mapping[str, ParameterValue],
+        settings: Sequence[EffectSetting],
+        operation: Operation | None,
+        sampling_rate_hz: float,
+    ) -> SimulationRequest:
+        """Complete a preset's values and effects by those given.
+
+        Raises
+        ------
+        InputError
+            If a name does not exist, or a value, speed or sampling rate is out of its range.
+        """
+        values = complete_values(known, chosen.parameters, parameters)
+        run = operation or chosen.operation
+        check_run(run, sampling_rate_hz)
+        effects = completed((*chosen.effects, *settings))
+        installed = installed_of(chosen.installed) if chosen.installed else None
+        return cls(chosen.model, chosen.name, run, values, effects, installed)
+
+
+@dataclass(frozen=True)
+class ReadyPair(ABC):
+    """A pair with its effects switched on, ready to run.
+
+    Parameters
+    ----------
+    asked : Asked
+    """
+
+    asked: SimulationRequest
+
+    @property
+    @abstractmethod
+    def machine(self) -> Machine:
+        """The machine, effects included."""
+
+    @property
+    def operation(self) -> Operation:
+        """Speed and torque."""
+        return self.asked.operation
+
+    @property
+    def preset(self) -> str:
+        """Name of the preset."""
+        return self.asked.preset
+
+    @property
+    def values(self) -> Values:
+        """Every parameter; None where it follows from the others."""
+        return self.asked.values
+
+    @property
+    def effects(self) -> tuple[EffectSetting, ...]:
+        """With every option."""
+        return self.asked.effects
+
+    def truth(self) -> dict[str, Any]:
+        """What was put in, as plain values."""
+        return truth_of(self.asked.model, self.preset, self.values, self.effects, self.operation)
+
+
+Ready = TypeVar("Ready", bound=ReadyPair)
+
+
+@dataclass(frozen=True)
+class PairModel(Model, ABC, Generic[Ready]):
+    """Base of the simulators of a gear pair."""
+
+    def prepare(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        settings: Sequence[EffectSetting],
+        operation: Operation | None,
+        rng: np.random.Generator,
+        *,
+        preset_name: str = "",
+        sampling_rate_hz: float = 20480.0,
+    ) -> Ready:
+        """Build the pair and switch its effects on; one number is drawn from `rng`, with and without effects."""
+        chosen = preset(self.name, preset_name)
+        return self._built(
+            SimulationRequest.of(chosen, self.parameters, parameters, settings, operation, sampling_rate_hz),
+            rng,
+            sampling_rate_hz,
+        )
+
+    def simulate(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        effects: Sequence[EffectSetting],
+        operation: Operation | None,
+        rng: np.random.Generator,
+        *,
+        preset: str = "",
+        sampling_rate_hz: float = 20480.0,
+        duration_s: float = 5.0,
+    ) -> Recording:
+        """Make a recording with rig and truth; see `sims.simulator.Simulator.simulate`.
+
+        Raises
+        ------
+        InputError
+            If a name does not exist, a value is out of its range, the values do not fit each other, or an effect has no
+            meaning here.
+        """
+        from sims.gear_pair._build import build_rig
+
+        within(duration_s, "duration_s", *DURATION_RANGE_S, "s")
+        ready = self.prepare(parameters, effects, operation, rng, preset_name=preset, sampling_rate_hz=sampling_rate_hz)
+        rig = build_rig(
+            ready.machine,
+            ready.operation,
+            name=self.rig_name(ready.preset),
+            sources=self.rig_sources(ready.preset),
+        )
+        return self._recorded(ready, rig, rng, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s)
+
+    @abstractmethod
+    def _built(self, asked: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> Ready:
+        """Build what is asked for."""
+
+    @abstractmethod
+    def _recorded(
+        self, ready: Ready, rig: Rig, rng: np.random.Generator, *, sampling_rate_hz: float, duration_s: float
+    ) -> Recording:
+        """Run and measure it."""

@@ -1,0 +1,362 @@
+"""A spur gear pair between two rotors: what the simulators of one share, and what effects change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import isfinite
+
+from gearsig.checks import count, not_negative, one_of, positive, within
+from gearsig.errors import InputError
+from gearsig.rig import Bearing
+from sims.measure import MeasurementChain
+from sims.mesh import GearMesh
+
+# --------------------
+# The parts of a geared drive as every simulator of one sees them, with what can be wrong with each.
+# --------------------
+
+
+MOST_DRY_FRICTION = 0.6
+"""Coefficient of clean dry steel on steel."""
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """The body of a gear.
+
+    Parameters
+    ----------
+    mass_kg, inertia_kg_m2 : float
+        About the centre of mass.
+    runout_um : float
+        Distance of the pitch circle's centre from the axis of rotation (half of the measured run-out).
+    runout_angle_deg : float
+        Where that centre lies, from the middle of tooth 0 in the gear's own direction of rotation.
+    unbalance_g_mm : float
+        Mass times distance of the centre of mass from the axis of rotation.
+    unbalance_angle_deg : float
+        Where the centre of mass lies, counted alike.
+    """
+
+    mass_kg: float
+    inertia_kg_m2: float
+    runout_um: float = 0.0
+    runout_angle_deg: float = 0.0
+    unbalance_g_mm: float = 0.0
+    unbalance_angle_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive(self.mass_kg, "mass_kg of a gear", "kg")
+        positive(self.inertia_kg_m2, "inertia_kg_m2 of a gear", "kg m^2")
+        not_negative(self.runout_um, "runout_um of a gear", "µm")
+        not_negative(self.unbalance_g_mm, "unbalance_g_mm of a gear", "g mm")
+        _finite(self.runout_angle_deg, "runout_angle_deg")
+        _finite(self.unbalance_angle_deg, "unbalance_angle_deg")
+
+    @property
+    def mass_offset_m(self) -> float:
+        """Distance of the centre of mass from the axis."""
+        return self.unbalance_g_mm * 1e-6 / self.mass_kg
+
+
+@dataclass(frozen=True)
+class ShaftLine:
+    """A shaft with the rotor (motor or load) at its end.
+
+    Parameters
+    ----------
+    name : str
+    bending_stiffness_n_per_m, bending_damping_n_s_per_m : float
+        Between the gear and the mean of its two bearings, alike in every direction.
+    torsional_stiffness_nm_per_rad, torsional_damping_nm_s_per_rad : float
+        Between gear and rotor.
+    rotor_inertia_kg_m2 : float
+    coupling_angle_deg : float
+        Angle between rotor axis and shaft axis in the coupling, 0 to 5.
+    coupling_bending_nm_per_rad : float
+        Bending stiffness of the coupling about the axis where it is stiff; about the other, a quarter turn away, it
+        has none, so that an angle bends the shaft twice a turn, however little torque it carries.
+    bearing_distance_m : float
+        Between the two bearings; it turns the coupling's bending moments into forces on them.
+    """
+
+    name: str
+    bending_stiffness_n_per_m: float
+    bending_damping_n_s_per_m: float
+    torsional_stiffness_nm_per_rad: float
+    torsional_damping_nm_s_per_rad: float
+    rotor_inertia_kg_m2: float
+    coupling_angle_deg: float = 0.0
+    bearing_distance_m: float = 0.1
+    coupling_bending_nm_per_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive(self.bending_stiffness_n_per_m, "bending_stiffness_n_per_m", "N/m")
+        not_negative(self.bending_damping_n_s_per_m, "bending_damping_n_s_per_m", "N s/m")
+        positive(self.torsional_stiffness_nm_per_rad, "torsional_stiffness_nm_per_rad", "N m/rad")
+        not_negative(self.torsional_damping_nm_s_per_rad, "torsional_damping_nm_s_per_rad", "N m s/rad")
+        positive(self.rotor_inertia_kg_m2, "rotor_inertia_kg_m2", "kg m^2")
+        within(self.coupling_angle_deg, "coupling_angle_deg", 0.0, 5.0, "°")
+        positive(self.bearing_distance_m, "bearing_distance_m", "m")
+        not_negative(self.coupling_bending_nm_per_rad, "coupling_bending_nm_per_rad", "N m/rad")
+
+
+@dataclass(frozen=True)
+class RaceDefect:
+    """A spall on a raceway of a rolling-element bearing: rolling elements sink into it and strike its far edge.
+
+    Parameters
+    ----------
+    race : str
+        "outer" (standing) or "inner" (turning).
+    length_mm : float
+        Along the raceway.
+    angle_deg : float
+        Outer: from the middle of the load zone. Inner: from tooth 0 at time 0.
+    spacing_jitter : float
+        Standard deviation of each element's place in the cage, in element spacings; 0 to 0.1.
+    slip : float
+        Part of the cage's turning that is lost by slip; 0 to 0.05.
+    """
+
+    race: str
+    length_mm: float
+    angle_deg: float = 0.0
+    spacing_jitter: float = 0.01
+    slip: float = 0.01
+
+    def __post_init__(self) -> None:
+        one_of(self.race, "race of the defect", ("outer", "inner"))
+        positive(self.length_mm, "length_mm of the race defect", "mm")
+        _finite(self.angle_deg, "angle_deg of the race defect")
+        within(self.spacing_jitter, "spacing_jitter of the race defect", 0.0, 0.1)
+        within(self.slip, "slip of the race defect", 0.0, 0.05)
+
+
+@dataclass(frozen=True)
+class BearingSupport:
+    """A bearing with its housing.
+
+    Parameters
+    ----------
+    bearing : gearsig.rig.Bearing
+        Name, shaft, and the geometry that its orders follow from.
+    mass_kg : float
+        Moving with the bearing.
+    stiffness_n_per_m, damping_n_s_per_m : float
+        To the ground, alike in x and y.
+    clearance_um : float
+        Radial distance that the shaft can move from the middle until the bearing carries.
+    defect : RaceDefect or None
+    """
+
+    bearing: Bearing
+    mass_kg: float
+    stiffness_n_per_m: float
+    damping_n_s_per_m: float
+    clearance_um: float = 0.0
+    defect: RaceDefect | None = None
+
+    def __post_init__(self) -> None:
+        positive(self.mass_kg, "mass_kg of a bearing", "kg")
+        positive(self.stiffness_n_per_m, "stiffness_n_per_m of a bearing", "N/m")
+        not_negative(self.damping_n_s_per_m, "damping_n_s_per_m of a bearing", "N s/m")
+        not_negative(self.clearance_um, "clearance_um of a bearing", "µm")
+        if (self.defect is not None or self.clearance_um > 0) and self.bearing.n_rolling_elements is None:
+            raise InputError(
+                f"bearing {self.bearing.name!r} has a defect or clearance, and its geometry is not given",
+                allowed="n_rolling_elements, rolling_element_diameter_mm and pitch_diameter_mm",
+                remedy="give the bearing's geometry",
+            )
+
+
+@dataclass(frozen=True)
+class Lubrication:
+    """Oil and friction of the flanks.
+
+    Parameters
+    ----------
+    friction : bool
+        False: none at all. (The regression does not give 0 for smooth flanks.)
+    viscosity_cp : float
+        Dynamic viscosity at the oil inlet.
+    factor : float
+        Multiplies the regression's coefficient: above 1 for starved or aged oil; 0 to 20.
+    dry_coefficient : float
+        Comes on top where the film does not part the flanks, the same at every sliding speed; 0 to 0.6.
+    """
+
+    friction: bool = True
+    viscosity_cp: float = 17.6
+    factor: float = 1.0
+    dry_coefficient: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive(self.viscosity_cp, "viscosity_cp", "cP")
+        within(self.factor, "factor of the friction coefficient", 0.0, 20.0)
+        within(self.dry_coefficient, "coefficient of dry friction", 0.0, MOST_DRY_FRICTION)
+
+
+@dataclass(frozen=True)
+class Roughness:
+    """Microscopic shape of the flanks.
+
+    Parameters
+    ----------
+    rms_um : float
+        Composite rms roughness of both flanks; it acts on friction and on the fractal profile.
+    locked_to : str
+        "time": one endless profile that runs at a fixed speed, as in the source paper; "flank": each tooth of both
+        gears has a profile of its own, which returns with it; "none": only friction knows the roughness.
+    dimension : float
+        Fractal dimension, 1.001 to 1.999.
+    """
+
+    rms_um: float = 0.0
+    locked_to: str = "flank"
+    dimension: float = 1.5
+
+    def __post_init__(self) -> None:
+        not_negative(self.rms_um, "rms_um of the roughness", "µm")
+        one_of(self.locked_to, "locked_to of the roughness", ("time", "flank", "none"))
+        within(self.dimension, "dimension of the roughness", 1.001, 1.999)
+
+
+@dataclass(frozen=True)
+class TorqueRipple:
+    """Drive torque × (1 + fraction · cos(order · θ + phase)), θ the angle of the input rotor."""
+
+    order: float
+    fraction: float
+    phase_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive(self.order, "order of the torque ripple")
+        within(self.fraction, "fraction of the torque ripple", 0.0, 1.0)
+        _finite(self.phase_rad, "phase_rad of the torque ripple")
+
+
+@dataclass(frozen=True)
+class SpeedSwing:
+    """Set speed × (1 + fraction · sin(2πft + phase)): a mains- or load-driven hunting of the drive."""
+
+    fraction: float
+    frequency_hz: float
+    phase_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        within(self.fraction, "fraction of the speed swing", 0.0, 0.5)
+        positive(self.frequency_hz, "frequency_hz of the speed swing", "Hz")
+        _finite(self.phase_rad, "phase_rad of the speed swing")
+
+
+RECOVERY_S = 0.06
+"""Time in which an ordinary drive makes up for a deviation of its speed."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What turns the input rotor.
+
+    T_i = T(t)·ripple + J ω̇_set + g (ω_set − θ̇_i) + g²/4J (θ_set − θ_i): the set torque, what the set acceleration
+    needs, and a governor that makes up for friction without a lasting error of the speed. J is everything that turns,
+    as felt at the input. The load takes T(t) z2/z1.
+
+    Parameters
+    ----------
+    governor_nm_s_per_rad : float or None
+        g, above 0; 2J/g is the time in which a deviation of the speed dies out. None: such that it is `RECOVERY_S`.
+    ripples : tuple of TorqueRipple
+    swings : tuple of SpeedSwing
+    """
+
+    governor_nm_s_per_rad: float | None = None
+    ripples: tuple[TorqueRipple, ...] = ()
+    swings: tuple[SpeedSwing, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.governor_nm_s_per_rad is not None:
+            positive(self.governor_nm_s_per_rad, "governor_nm_s_per_rad", "N m s/rad")
+        count(len(self.ripples), "number of torque ripples", minimum=0)
+
+
+def _finite(value: float, name: str) -> None:
+    if not isfinite(value):
+        raise InputError(f"{name} is {value}", allowed="a finite number")
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A spur gear pair, its shafts, bearings, drive and measurement chain. Index 0 is the driver, 1 the driven side.
+
+    Frame: y along the line of action, the way the driver's tooth pushes; x off it. The driver turns counter-clockwise,
+    the driven gear clockwise; angles count in the gears' own directions.
+
+    Parameters
+    ----------
+    mesh : GearMesh
+        Geometry, stiffness, tooth faults and flank deviations.
+    wheels : tuple of two Wheel
+    shafts : tuple of two ShaftLine
+    bearings : tuple of four BearingSupport
+        Two of the driver's shaft (the first on the coupling's side), then two of the driven one's.
+    mesh_damping_ratio : float
+        ζ of the pair on its mean mesh stiffness; the damping of each tooth pair is proportional to its stiffness.
+    half_backlash_um : float
+        b; the flanks have 2b of play along the line of action.
+    lubrication : Lubrication
+    roughness : Roughness
+    drive : Drive
+    chain : MeasurementChain
+    gravity_mps2 : float
+    line_of_action_deg : float
+        β, angle between the line of action and the vertical: upwards is x sin β + y cos β.
+
+    Notes
+    -----
+    Shafts are mirror-symmetric: either bearing takes half of the gear's force.
+    """
+
+    mesh: GearMesh
+    wheels: tuple[Wheel, Wheel]
+    shafts: tuple[ShaftLine, ShaftLine]
+    bearings: tuple[BearingSupport, BearingSupport, BearingSupport, BearingSupport]
+    chain: MeasurementChain
+    mesh_damping_ratio: float = 0.06
+    half_backlash_um: float = 20.0
+    lubrication: Lubrication = field(default_factory=Lubrication)
+    roughness: Roughness = field(default_factory=Roughness)
+    drive: Drive = field(default_factory=Drive)
+    gravity_mps2: float = 9.81
+    line_of_action_deg: float = 20.0
+
+    def __post_init__(self) -> None:
+        within(self.mesh_damping_ratio, "mesh_damping_ratio", 0.0, 1.0)
+        not_negative(self.half_backlash_um, "half_backlash_um", "µm")
+        not_negative(self.gravity_mps2, "gravity_mps2", "m/s^2")
+        within(self.line_of_action_deg, "line_of_action_deg", -180.0, 180.0, "°")
+        for name, wanted in (("wheels", 2), ("shafts", 2), ("bearings", 4)):
+            if len(getattr(self, name)) != wanted:
+                raise InputError(f"{len(getattr(self, name))} {name}", where="machine", allowed=str(wanted))
+
+    @property
+    def shaft_names(self) -> tuple[str, str]:
+        """Names of the driver's and the driven shaft."""
+        return self.shafts[0].name, self.shafts[1].name
+
+    @property
+    def ratio(self) -> float:
+        """Revolutions of the driver per revolution of the driven gear, z2/z1."""
+        return self.mesh.pair.driven.teeth / self.mesh.pair.driver.teeth
+
+
+def bearing_index(machine: Machine, name: str) -> int:
+    """Place of a bearing in `machine.bearings` by its name."""
+    from gearsig.checks import closest_match_hint
+
+    names = [support.bearing.name for support in machine.bearings]
+    if name not in names:
+        raise InputError(
+            f"there is no bearing {name!r}", allowed=", ".join(names), remedy=closest_match_hint(name, names)
+        )
+    return names.index(name)

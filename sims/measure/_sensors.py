@@ -1,0 +1,443 @@
+"""An accelerometer: bandwidth, noise, bias, range."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from gearsig.checks import FloatArray, closest_match_hint, not_negative, positive, within
+from gearsig.errors import InputError
+
+# --------------------
+# Linear systems on a solver's grid, exact for an input that runs straight from step to step.
+# --------------------
+
+
+Section = tuple[tuple[float, float, float], tuple[float, float, float]]
+"""b and a of a second-order filter."""
+
+HIGHEST_FRACTION = 0.2
+"""Highest natural frequency as a fraction of the grid's rate: five steps a cycle."""
+
+
+@lru_cache(maxsize=256)
+def discrete(numerator: tuple[float, ...], denominator: tuple[float, ...], step_s: float) -> Section:
+    """Ramp-invariant (first-order hold) equivalent of a transfer function in s, of second order at most.
+
+    Poles map exactly, and so does the response to any input that is straight between steps. A sine is not: its gain
+    is short by `hold_error`, its phase is right.
+
+    Source: G. F. Franklin, J. D. Powell, M. L. Workman, *Digital Control of Dynamic Systems*, 3rd ed., 1998, ch. 6.
+
+    Returns
+    -------
+    b, a : tuples of 3 floats
+        Numerator and denominator in z⁻¹, a[0] = 1.
+    """
+    from scipy.signal import cont2discrete
+
+    system = (np.array(numerator), np.array(denominator))
+    b, a, _ = cont2discrete(system, step_s, method="foh")
+    return _three(b), _three(a)
+
+
+def low_pass(frequency_hz: float, damping_ratio: float, step_s: float) -> Section:
+    """ω²/(s² + 2ζωs + ω²), discrete; refuses a frequency that the grid does not resolve."""
+    if frequency_hz * step_s > HIGHEST_FRACTION:
+        n_steps = 1 / (frequency_hz * step_s)
+        raise InputError(
+            f"a natural frequency of {frequency_hz:g} Hz has {n_steps:.2g} steps of {step_s:g} s a cycle",
+            allowed=f"at least {1 / HIGHEST_FRACTION:g} steps a cycle",
+            remedy="leave it out, or give the motion at a finer step",
+        )
+    w = 2 * np.pi * frequency_hz
+    return discrete((w * w,), (1.0, 2 * damping_ratio * w, w * w), step_s)
+
+
+def high_pass(frequency_hz: float, step_s: float) -> Section:
+    """s/(s + ω), discrete."""
+    return discrete((1.0, 0.0), (1.0, 2 * np.pi * frequency_hz), step_s)
+
+
+def apply_bank(sections: list[Section], gains: FloatArray, inputs: FloatArray, direct: FloatArray) -> FloatArray:
+    """Sum of filtered inputs, each filter from the steady state that belongs to the first values.
+
+    Parameters
+    ----------
+    sections : list
+        One per row of `gains`.
+    gains : array, (n_sections, n_inputs)
+        What of each input goes into each filter.
+    inputs : array, (n_steps, n_inputs)
+    direct : array, (n_inputs,)
+        What of each input goes past the filters.
+
+    Returns
+    -------
+    array, (n_steps,)
+    """
+    x = np.ascontiguousarray(inputs, dtype=np.float64)
+    out: FloatArray = x @ direct
+    if sections:
+        b = np.array([section[0] for section in sections])
+        a = np.array([section[1][1:] for section in sections])
+        filter_bank(x, np.asarray(gains, dtype=np.float64), b, a, out)
+    return out
+
+
+def apply(section: Section, signal: FloatArray) -> FloatArray:
+    """Filter one signal, (n_steps,)."""
+    return apply_bank([section], np.ones((1, 1)), signal[:, None], np.zeros(1))
+
+
+def hold_error(frequency_hz: ArrayLike, step_s: float) -> FloatArray:
+    """Relative loss of gain for a sine: 1 - sinc²(fΔ), about (πfΔ)²/3; 0.02 % at 2 kHz and 4 µs."""
+    loss: FloatArray = 1.0 - np.sinc(np.asarray(frequency_hz, dtype=np.float64) * step_s) ** 2
+    return loss
+
+
+def _three(values: FloatArray) -> tuple[float, float, float]:
+    padded = [*np.ravel(values).tolist(), 0.0, 0.0][:3]
+    return padded[0], padded[1], padded[2]
+
+
+@dataclass(frozen=True)
+class Accelerometer:
+    """value = clip(sensor's dynamics applied to the acceleration + noise + bias).
+
+    The dynamics are ω²/(s² + 2ζωs + ω²) of the mounted sensor and s/(s + ω_c) of its coupling.
+
+    Parameters
+    ----------
+    resonance_hz : float or None
+        Of the mounted sensor; None: flat. The response is within 5 % up to about a fifth of it.
+    damping_ratio : float
+        Of that resonance.
+    lower_limit_hz : float
+        -3 dB point of the coupling; 0: measures down to a standing acceleration.
+    range_mps2 : float or None
+        Values are held at ± this; None: no limit.
+    clip_percent : float
+        A range that is too small for the signal: values are held at the level that the reading exceeds this part of the
+        recording's time, 0 to 50 %. The level follows from each signal; `range_mps2` stays the same for all.
+    noise_mps2_per_sqrt_hz : float
+        One-sided density of white noise.
+    bias_mps2 : float
+        At the recording's start.
+    drift_mps2_per_s : float
+        Change of the bias with time, as from warming up.
+    wander_mps2_per_sqrt_s : float
+        Random walk of the bias: its standard deviation after 1 s.
+    """
+
+    resonance_hz: float | None = None
+    damping_ratio: float = 0.02
+    lower_limit_hz: float = 0.0
+    range_mps2: float | None = None
+    noise_mps2_per_sqrt_hz: float = 0.0
+    bias_mps2: float = 0.0
+    drift_mps2_per_s: float = 0.0
+    wander_mps2_per_sqrt_s: float = 0.0
+    clip_percent: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.resonance_hz is not None:
+            positive(self.resonance_hz, "resonance_hz of the accelerometer", "Hz")
+        within(self.damping_ratio, "damping_ratio of the accelerometer", 1e-4, 1.0)
+        not_negative(self.lower_limit_hz, "lower_limit_hz of the accelerometer", "Hz")
+        if self.range_mps2 is not None:
+            positive(self.range_mps2, "range_mps2 of the accelerometer", "m/s^2")
+        within(self.clip_percent, "clip_percent of the accelerometer", 0.0, 50.0, "%")
+        not_negative(self.noise_mps2_per_sqrt_hz, "noise_mps2_per_sqrt_hz of the accelerometer")
+        not_negative(self.wander_mps2_per_sqrt_s, "wander_mps2_per_sqrt_s of the accelerometer")
+        for name in ("bias_mps2", "drift_mps2_per_s"):
+            if not np.isfinite(getattr(self, name)):
+                raise InputError(f"{name} of the accelerometer is {getattr(self, name)}", allowed="a finite number")
+
+    @property
+    def settling_s(self) -> float:
+        """Time until a blow has rung down to 1e-4 in the mounted sensor; its coupling begins settled."""
+        if self.resonance_hz is None:
+            return 0.0
+        return float(np.log(1e4) / (self.damping_ratio * 2 * np.pi * self.resonance_hz))
+
+    def dynamics(self, acceleration_mps2: FloatArray, step_s: float) -> FloatArray:
+        """Apply the resonance and the coupling, (n_steps,)."""
+        x = acceleration_mps2
+        if self.resonance_hz is not None:
+            x = apply(low_pass(self.resonance_hz, self.damping_ratio, step_s), x)
+        if self.lower_limit_hz > 0:
+            # The coupling has long settled on the mean, not on a first value that may be the middle of a blow.
+            x = apply(high_pass(self.lower_limit_hz, step_s), np.concatenate(([np.mean(x)], x)))[1:]
+        return x
+
+    def read(self, acceleration_mps2: FloatArray, time_s: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Reading over time on a fine even grid, (n_steps,); noise, then wander, are drawn from `rng`.
+
+        The noise fills the band of the grid; the anti-alias filter that follows leaves its density in the band of the
+        recording.
+        """
+        step_s = float(time_s[1] - time_s[0])
+        reading = self.dynamics(acceleration_mps2, step_s) + self.bias_mps2 + self.drift_mps2_per_s * time_s
+        if self.noise_mps2_per_sqrt_hz > 0:
+            sigma = self.noise_mps2_per_sqrt_hz * np.sqrt(0.5 / step_s)
+            reading += sigma * rng.standard_normal(len(time_s))
+        if self.wander_mps2_per_sqrt_s > 0:
+            walk = np.cumsum(rng.standard_normal(len(time_s)))
+            # From 0 at the recording's start, so that bias_mps2 means what it says.
+            start = walk[np.searchsorted(time_s, 0.0)] if time_s[-1] >= 0 else walk[-1]
+            reading += self.wander_mps2_per_sqrt_s * np.sqrt(step_s) * (walk - start)
+        limit = self._limit_mps2(reading[time_s >= 0.0] if time_s[-1] >= 0.0 else reading)
+        return reading if limit is None else np.clip(reading, -limit, limit)
+
+    def _limit_mps2(self, reading: FloatArray) -> float | None:
+        """Where values are held; None for nowhere."""
+        if self.clip_percent == 0.0:
+            return self.range_mps2
+        level = float(np.quantile(np.abs(reading), 1.0 - self.clip_percent / 100.0))
+        return level if self.range_mps2 is None else min(level, self.range_mps2)
+
+
+@dataclass(frozen=True)
+class Converter:
+    """An analogue-to-digital converter: 2^bits equal steps over ± its range.
+
+    Parameters
+    ----------
+    range_mps2 : float
+    n_bits : int
+        8 to 32.
+    """
+
+    range_mps2: float
+    n_bits: int = 24
+
+    def __post_init__(self) -> None:
+        positive(self.range_mps2, "range_mps2 of the converter", "m/s^2")
+        within(self.n_bits, "n_bits of the converter", 8, 32)
+
+    @property
+    def step_mps2(self) -> float:
+        """Value of one step."""
+        return self.range_mps2 / 2.0 ** (self.n_bits - 1)
+
+    def convert(self, values_mps2: FloatArray) -> FloatArray:
+        """Round to steps and hold at the ends: -range … range - one step."""
+        half = 2.0 ** (self.n_bits - 1)
+        steps: FloatArray = np.clip(np.round(values_mps2 / self.step_mps2), -half, half - 1)
+        return steps * self.step_mps2
+
+
+# --------------------
+# Modal transfer path: from accelerations at bearings to the place where a sensor sits.
+# --------------------
+
+
+@dataclass(frozen=True)
+class PathMode:
+    """One mode of the housing as a sensor sees it.
+
+    Parameters
+    ----------
+    frequency_hz : float
+    damping_ratio : float
+        ζ, 1e-4 to 1.
+    gains : mapping
+        Position → static gain g: well below its frequency the mode adds g times that position's acceleration, at its
+        frequency g/(2ζ) times, a quarter of a period late.
+    """
+
+    frequency_hz: float
+    damping_ratio: float
+    gains: Mapping[str, float]
+
+    def __post_init__(self) -> None:
+        positive(self.frequency_hz, "frequency_hz of a path mode", "Hz")
+        within(self.damping_ratio, "damping_ratio of a path mode", 1e-4, 1.0)
+        object.__setattr__(self, "gains", _gains(self.gains))
+
+
+@dataclass(frozen=True)
+class ModalPath:
+    """a(s) = Σ_p (d_p + Σ_m g_mp ω_m²/(s² + 2ζ_m ω_m s + ω_m²)) a_p(s), over positions p and modes m.
+
+    Parameters
+    ----------
+    direct : mapping
+        Position → d, the part that arrives unfiltered. {"bearing 1": 1.0} alone is a sensor on that bearing.
+    modes : tuple of PathMode
+    """
+
+    direct: Mapping[str, float] = field(default_factory=dict)
+    modes: tuple[PathMode, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "direct", _gains(self.direct))
+        object.__setattr__(self, "modes", tuple(self.modes))
+        if not self.direct and not any(mode.gains for mode in self.modes):
+            raise InputError("the path leads from nowhere", remedy='give direct={"position": 1.0} or a mode with gains')
+
+    @property
+    def settling_s(self) -> float:
+        """Time until a start has rung down to 1e-4 in the slowest mode."""
+        return max((np.log(1e4) / (m.damping_ratio * 2 * np.pi * m.frequency_hz) for m in self.modes), default=0.0)
+
+    def apply(self, accelerations: FloatArray, positions: tuple[str, ...], step_s: float) -> FloatArray:
+        """Acceleration at the sensor, (n_steps, n_positions) → (n_steps,).
+
+        Exact for accelerations that run straight between steps; for a sine see `sims.measure.hold_error`. Modes
+        begin settled on the mean: a first value may be the middle of a blow, from which a slow mode would ring long.
+        """
+        settled = np.mean(accelerations, axis=0, keepdims=True)
+        return apply_bank(
+            [low_pass(mode.frequency_hz, mode.damping_ratio, step_s) for mode in self.modes],
+            np.array([_weights(mode.gains, positions) for mode in self.modes]).reshape(-1, len(positions)),
+            np.concatenate((settled, accelerations)),
+            _weights(self.direct, positions),
+        )[1:]
+
+    def response(self, frequency_hz: FloatArray, position: str) -> FloatArray:
+        """Complex frequency response from a position, analytic."""
+        f = np.asarray(frequency_hz, dtype=np.float64)
+        total = np.full(f.shape, self.direct.get(position, 0.0), dtype=complex)
+        for mode in self.modes:
+            r = f / mode.frequency_hz
+            total += mode.gains.get(position, 0.0) / (1 - r**2 + 2j * mode.damping_ratio * r)
+        result: FloatArray = total
+        return result
+
+
+def _weights(gains: Mapping[str, float], positions: tuple[str, ...]) -> FloatArray:
+    unknown = [name for name in gains if name not in positions]
+    if unknown:
+        raise InputError(
+            f"the path starts at {unknown[0]!r}, which the simulation does not give",
+            allowed=", ".join(positions),
+            remedy=closest_match_hint(unknown[0], positions),
+        )
+    return np.array([gains.get(name, 0.0) for name in positions])
+
+
+def _gains(gains: Mapping[str, float]) -> dict[str, float]:
+    for name, gain in gains.items():
+        if not np.isfinite(gain):
+            raise InputError(f"the gain from {name!r} is {gain}", allowed="a finite number")
+    return dict(gains)
+
+
+# --------------------
+# Compiled bank of second-order filters, side by side.
+# --------------------
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def filter_bank(inputs, gains, b, a, out):  # type: ignore[no-untyped-def]
+    """out[t] += Σ_m H_m applied to Σ_p gains[m, p] inputs[t, p].
+
+    Transposed direct form II, from the steady state of the first input. The filters of a bank do not wait for each
+    other, so that several run at the speed of one.
+
+    `inputs` (n_steps, n_inputs), `gains` (n_filters, n_inputs), `b` (n_filters, 3), `a` (n_filters, 2) without the
+    leading 1, `out` (n_steps,).
+    """
+    n_filters, n_inputs = gains.shape
+    z1, z2 = np.zeros(n_filters), np.zeros(n_filters)
+    for m in range(n_filters):
+        x = 0.0
+        for p in range(n_inputs):
+            x += gains[m, p] * inputs[0, p]
+        y = x * (b[m, 0] + b[m, 1] + b[m, 2]) / (1.0 + a[m, 0] + a[m, 1])
+        z1[m] = y - b[m, 0] * x
+        z2[m] = b[m, 2] * x - a[m, 1] * y
+    for t in range(inputs.shape[0]):
+        total = 0.0
+        for m in range(n_filters):
+            x = 0.0
+            for p in range(n_inputs):
+                x += gains[m, p] * inputs[t, p]
+            y = b[m, 0] * x + z1[m]
+            z1[m] = b[m, 1] * x - a[m, 0] * y + z2[m]
+            z2[m] = b[m, 2] * x - a[m, 1] * y
+            total += y
+        out[t] += total
+
+
+# --------------------
+# Noise of a measurement chain: Gaussian, white or coloured.
+# --------------------
+
+
+@dataclass(frozen=True)
+class ColouredNoise:
+    """Gaussian noise with a power density that goes as 1/f^slope.
+
+    Parameters
+    ----------
+    rms_mps2 : float
+        Standard deviation expected over the whole band.
+    slope : float
+        0: white, 1: pink, 2: red. Below 10 Hz the density stays level.
+    """
+
+    rms_mps2: float = 0.0
+    slope: float = 0.0
+
+    def __post_init__(self) -> None:
+        not_negative(self.rms_mps2, "rms_mps2 of the noise", "m/s^2")
+        within(self.slope, "slope of the noise", -2.0, 3.0)
+
+    def draw(self, n_samples: int, sampling_rate_hz: float, rng: np.random.Generator) -> FloatArray:
+        """Return noise of `n_samples` samples, (n_samples,)."""
+        from scipy import fft
+
+        white: FloatArray = rng.standard_normal(n_samples)
+        if self.slope == 0.0:
+            return self.rms_mps2 * white
+        frequency = fft.rfftfreq(n_samples, 1 / sampling_rate_hz)
+        shape = np.maximum(frequency, 10.0) ** (-self.slope / 2)
+        weight = np.full(len(shape), 2.0)
+        weight[0] = 1.0
+        if n_samples % 2 == 0:
+            weight[-1] = 1.0
+        # Scaled by the expected power of the filtered noise, so that rms_mps2 is a property of the model and not forced
+        # on each drawn sample.
+        scale = self.rms_mps2 / np.sqrt(np.sum(weight * shape**2) / n_samples)
+        coloured: FloatArray = scale * fft.irfft(fft.rfft(white) * shape, n_samples)
+        return coloured
+
+
+# --------------------
+# Mains hum: pick-up from the electric supply.
+# --------------------
+
+
+@dataclass(frozen=True)
+class MainsHum:
+    """Pick-up from the electric supply: a fixed frequency, whatever the shaft does.
+
+    Parameters
+    ----------
+    amplitudes_mps2 : tuple of float
+        Peak amplitude of harmonics 1, 2, … as the sensor reads them.
+    frequency_hz : float
+    phase_rad : float
+    """
+
+    amplitudes_mps2: tuple[float, ...] = ()
+    frequency_hz: float = 50.0
+    phase_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive(self.frequency_hz, "frequency_hz of the mains", "Hz")
+
+    def values(self, time_s: FloatArray) -> FloatArray:
+        """Σ_h A_h cos(h (2πft + φ)), (n_samples,)."""
+        total = np.zeros(np.shape(time_s))
+        for h, amplitude in enumerate(self.amplitudes_mps2, start=1):
+            total += amplitude * np.cos(h * (2 * np.pi * self.frequency_hz * np.asarray(time_s) + self.phase_rad))
+        return total

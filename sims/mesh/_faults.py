@@ -1,0 +1,403 @@
+"""A crack at the tooth root: where it runs, what it leaves of each section, how deep it may be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import cos, pi, radians, sin, sqrt
+
+import numpy as np
+
+from gearsig.checks import FloatArray, count, not_negative, one_of, positive, within
+from gearsig.errors import InputError
+from sims.mesh._geometry import GearGeometry, Material, fillet_outline, involute_outline, tip_point_mm
+from sims.mesh._pair import (
+    PairGeometry,
+    arc_length_mm,
+    contact_ends_mm,
+    contact_half_width_mm,
+    curvature_radius_mm,
+    flank_length_mm,
+    part_inside,
+    pitch_point_mm,
+    smooth_step,
+)
+
+LEAST_SECTION = 0.1
+"""Part of a section's thickness that a crack must leave; a tooth with less counts as broken."""
+
+
+@dataclass(frozen=True)
+class RootCrack:
+    """A straight crack from the middle of the loaded flank's fillet into the tooth root.
+
+    Parameters
+    ----------
+    depth_mm : float
+        Length of the crack in the cross-section, above 0. How deep it may be: see `deepest_crack_mm`.
+    angle_deg : float
+        ϑ between the crack and the tooth's centre line, 15 to 90; 90 runs straight across the tooth.
+    tooth : int
+        Which tooth of the gear, from 0.
+    width_mm : float or None
+        How far it reaches over the face width from one end; None: all through.
+    front : str
+        "straight": the same depth over `width_mm`. "parabolic": depth_mm · √(1 − w/width_mm) at w from the end face.
+
+    Notes
+    -----
+    It lies on the side that is in tension while the tooth drives. Loaded on the back flank it closes, and the tooth is
+    as stiff as a whole one.
+    """
+
+    depth_mm: float
+    angle_deg: float = 45.0
+    tooth: int = 0
+    width_mm: float | None = None
+    front: str = "straight"
+
+    def __post_init__(self) -> None:
+        positive(self.depth_mm, "depth_mm of the crack", "mm", remedy="leave out the crack for a sound tooth")
+        _angle_rad(self.angle_deg)
+        count(self.tooth, "tooth of the crack", minimum=0)
+        if self.width_mm is not None:
+            positive(self.width_mm, "width_mm of the crack", "mm")
+        one_of(self.front, "front of the crack", ("straight", "parabolic"))
+
+
+def crack_mouth_mm(gear: GearGeometry) -> tuple[float, float]:
+    """Middle of the fillet, x and y (half way in γ), where a crack starts."""
+    point = fillet_outline(gear, np.array([(pi / 2.0 + gear.pressure_angle_rad) / 2.0]))
+    return float(point.x_mm[0]), float(point.y_mm[0])
+
+
+def crack_tip_mm(gear: GearGeometry, depth_mm: float, angle_deg: float) -> tuple[float, float]:
+    """Tip of the crack, x and y: inwards along the centre line and across it."""
+    x, y = crack_mouth_mm(gear)
+    angle = _angle_rad(angle_deg)
+    return x - depth_mm * cos(angle), y - depth_mm * sin(angle)
+
+
+def crack_percent(gear: GearGeometry, depth_mm: float, angle_deg: float = 45.0) -> float:
+    """Depth across the tooth as a percentage of the root's thickness at the crack's mouth, 100 q sin ϑ/(2 y)."""
+    return 100.0 * depth_mm * sin(_angle_rad(angle_deg)) / (2.0 * crack_mouth_mm(gear)[1])
+
+
+def crack_depth_mm(gear: GearGeometry, percent: float, angle_deg: float = 45.0) -> float:
+    """Depth that takes `percent` of the root's thickness: the inverse of `crack_percent`."""
+    return percent / 100.0 * 2.0 * crack_mouth_mm(gear)[1] / sin(_angle_rad(angle_deg))
+
+
+def effective_flank_mm(
+    gear: GearGeometry, depth_mm: float, angle_deg: float, x_mm: FloatArray, y_mm: FloatArray
+) -> FloatArray:
+    """Where the loaded side of each section ends, behind a crack: y less the part that carries no load.
+
+    Two lines run to the tooth tip, one from the crack's mouth and one from its tip. What lies between them carries no
+    load; between the crack's tip and its mouth, what lies outside the second line. Without depth nothing is lost, so
+    that the stiffness falls steadily from the sound tooth's. (Cutting along the second line alone, as is common, takes
+    the bulge of the flank off a tooth whose crack has no depth yet.)
+
+    Parameters
+    ----------
+    gear : GearGeometry
+    depth_mm, angle_deg : float
+    x_mm, y_mm : arrays
+        Outline of the loaded side.
+    """
+    x_mouth, y_mouth = crack_mouth_mm(gear)
+    x_end, y_end = crack_tip_mm(gear, depth_mm, angle_deg)
+    x_tip, y_tip = tip_point_mm(gear)
+    behind = y_end + (y_tip - y_end) * (x_mm - x_end) / (x_tip - x_end)
+    before = y_mouth + (y_tip - y_mouth) * (x_mm - x_mouth) / (x_tip - x_mouth)
+    lost = np.where(x_mm >= x_mouth, np.maximum(before - behind, 0.0), np.maximum(y_mm - behind, 0.0))
+    result: FloatArray = np.where(x_mm >= x_end, y_mm - lost, y_mm)
+    return result
+
+
+@lru_cache(maxsize=256)
+def deepest_crack_mm(gear: GearGeometry, angle_deg: float = 45.0) -> float:
+    """Deepest crack that leaves a tenth of the root and of every section, and stays in the outer half of the rim."""
+    from scipy.optimize import brentq
+
+    def spare(depth: float) -> float:
+        return _least_section(gear, depth, angle_deg) - LEAST_SECTION
+
+    sine, cosine = sin(_angle_rad(angle_deg)), cos(_angle_rad(angle_deg))
+    across = (1.0 - LEAST_SECTION) * 2.0 * crack_mouth_mm(gear)[1] / sine
+    inwards = crack_mouth_mm(gear)[0] - (gear.bore_mm + gear.root_radius_mm) / 2.0
+    limit = min(across, inwards / cosine) if cosine > 1e-9 else across
+    return limit if spare(limit) >= 0.0 else float(brentq(spare, 1e-6 * gear.module_mm, limit, xtol=1e-9))
+
+
+def check_crack(gear: GearGeometry, crack: RootCrack) -> None:
+    """Refuse a crack that goes past the tooth, is wider than the gear, or sits on a tooth that is not there."""
+    deepest = deepest_crack_mm(gear, crack.angle_deg)
+    if crack.depth_mm > deepest:
+        raise InputError(
+            f"depth_mm of the crack is {crack.depth_mm:g} mm at {crack.angle_deg:g}°: it goes past the tooth",
+            allowed=f"above 0 to {deepest:.3g} mm ({crack_percent(gear, deepest, crack.angle_deg):.0f} % of the root)",
+            remedy="take a shallower crack, or a chipped tooth",
+        )
+    if crack.width_mm is not None:
+        within(crack.width_mm, "width_mm of the crack", 0.0, gear.face_width_mm, "mm")
+    within(crack.tooth, "tooth of the crack", 0, gear.teeth - 1)
+
+
+def _least_section(gear: GearGeometry, depth_mm: float, angle_deg: float) -> float:
+    """Smallest part of a section's thickness that is left, over the tooth."""
+    fillet = fillet_outline(gear, np.linspace(pi / 2.0, gear.pressure_angle_rad, 60))
+    flank = involute_outline(gear, np.linspace(gear.form_roll_rad, gear.tip_roll_rad, 60))
+    x, y = np.concatenate((fillet.x_mm, flank.x_mm)), np.concatenate((fillet.y_mm, flank.y_mm))
+    left = effective_flank_mm(gear, depth_mm, angle_deg, x, y)
+    return float(np.min((left + y) / (2.0 * y)))
+
+
+def _angle_rad(angle_deg: float) -> float:
+    return radians(within(angle_deg, "angle_deg of the crack", 15.0, 90.0, "°"))
+
+
+# --------------------
+# A spall: metal broken out of one flank, below the zone of contact.
+# --------------------
+
+
+LARGEST_PART = 0.9
+"""Greatest part of the face width that damage may take if it does not take all: what is left must carry the load."""
+
+
+@dataclass(frozen=True)
+class ToothSpall:
+    """A pit with a flat floor on the driving flank of one tooth.
+
+    Parameters
+    ----------
+    length_mm : float
+        Arc length along the profile, 0 to the length of the flank. 0: no spall.
+    width_mm : float
+        Across the face, 0 to 0.9 of the face width, or all of it. 0: no spall.
+    depth_um : float
+        0 or above. 0: no spall.
+    tooth : int
+        Which tooth of the gear, from 0.
+    centre : float or None
+        Where its middle lies on the path of contact, 0 at this flank's root end to 1 at its tip end. None: at the pitch
+        point.
+
+    Notes
+    -----
+    Over part of the face, the flank beside it carries: see `spall_share`. Over the whole face, the mate sinks in as far
+    as its curvature lets it: see `spall_separation_m`. Edges do not grow, and neither do they press into the mate.
+    """
+
+    length_mm: float
+    width_mm: float
+    depth_um: float = 100.0
+    tooth: int = 0
+    centre: float | None = None
+
+    def __post_init__(self) -> None:
+        not_negative(self.length_mm, "length_mm of the spall", "mm")
+        not_negative(self.width_mm, "width_mm of the spall", "mm")
+        not_negative(self.depth_um, "depth_um of the spall", "µm")
+        count(self.tooth, "tooth of the spall", minimum=0)
+        if self.centre is not None:
+            within(self.centre, "centre of the spall", 0.0, 1.0, remedy="0 is the root end of the contact, 1 the tip")
+
+
+def check_spall(pair: PairGeometry, side: int, spall: ToothSpall) -> None:
+    """Refuse a spall longer than its flank, wider than the face, or on a tooth that is not there."""
+    gear = pair.driver if side == 1 else pair.driven
+    longest = flank_length_mm(gear)
+    if spall.length_mm > longest:
+        raise InputError(
+            f"length_mm of the spall is {spall.length_mm:g} mm: it is longer than the flank",
+            allowed=f"0 to {longest:.3g} mm along the profile",
+        )
+    check_part_of_face(spall.width_mm, "width_mm of the spall", pair.face_width_mm)
+    within(spall.tooth, "tooth of the spall", 0, gear.teeth - 1)
+
+
+def check_part_of_face(width_mm: float, name: str, face_width_mm: float) -> None:
+    """Refuse a width beyond the loaded face, and one that leaves hardly a strip of it."""
+    # A part given in percent of the face comes back from its width with a rounding error.
+    if width_mm > face_width_mm * (1.0 + 1e-12) or LARGEST_PART + 1e-12 < width_mm / face_width_mm < 1.0 - 1e-12:
+        raise InputError(
+            f"{name} is {width_mm:g} mm on a loaded face of {face_width_mm:g} mm",
+            allowed=f"0 to {LARGEST_PART * face_width_mm:g} mm, or {face_width_mm:g} mm for all of it",
+            remedy="the strip that is left could not carry: give the whole face width"
+            if width_mm < face_width_mm
+            else "",
+        )
+
+
+def spans_face(width_mm: float, face_width_mm: float) -> bool:
+    """Whether damage takes the whole loaded face."""
+    return width_mm >= face_width_mm * (1.0 - 1e-12)
+
+
+def spall_share(
+    pair: PairGeometry,
+    side: int,
+    materials: tuple[Material, Material],
+    spall: ToothSpall,
+    roll_length_mm: FloatArray,
+) -> FloatArray:
+    """Part of the contact's width that a spall over part of the face takes away, λ; 0 if it spans the whole face.
+
+    λ = (w/b) min(1, 2 R h/a²) · (part of the zone of contact, 2a wide, that lies in the spall)
+
+    The compliance of the contact grows by 1/(1 − λ). a is taken at 1 GPa, as the load is not known here. a²/(2R) is the
+    Hertzian flattening: a mate that meets a pit less deep than it still presses on the floor.
+
+    Parameters
+    ----------
+    roll_length_mm : array
+        ρ of the gear that has the spall.
+
+    Returns
+    -------
+    array
+        0 to 0.9.
+    """
+    if spans_face(spall.width_mm, pair.face_width_mm):
+        return np.zeros(np.shape(roll_length_mm))
+    gear = pair.driver if side == 1 else pair.driven
+    half_width = contact_half_width_mm(pair, *materials)
+    flattening = half_width**2 / (2.0 * float(curvature_radius_mm(pair, pair.pitch_point_radius_mm)))
+    depth = min(1.0, spall.depth_um * 1e-3 / flattening)
+    low, high = _ends_mm(pair, side, spall)
+    inside = part_inside(arc_length_mm(gear, roll_length_mm), low, high, half_width)
+    result: FloatArray = spall.width_mm / pair.face_width_mm * depth * inside
+    return result
+
+
+def spall_separation_m(pair: PairGeometry, side: int, spall: ToothSpall, roll_length_mm: FloatArray) -> FloatArray:
+    """How far the mate sinks into a spall over the whole face, E = min(h, d²/(2R)); 0 if it is less wide.
+
+    At a distance d inside the edge of a pit, a mate of relative curvature 1/R rests on that edge, d²/(2R) below its
+    place on a whole flank, until it reaches the floor at h. A short pit is bridged.
+
+    Parameters
+    ----------
+    roll_length_mm : array
+        ρ of the gear that has the spall.
+    """
+    if not spans_face(spall.width_mm, pair.face_width_mm):
+        return np.zeros(np.shape(roll_length_mm))
+    gear = pair.driver if side == 1 else pair.driven
+    place = arc_length_mm(gear, roll_length_mm)
+    low, high = _ends_mm(pair, side, spall)
+    inside = np.maximum(np.minimum(place - low, high - place), 0.0)
+    # R is 0 at the base circle, where no contact can be; the floor bounds the sinking there.
+    sunk = inside**2 / np.maximum(2.0 * curvature_radius_mm(pair, roll_length_mm), 1e-12)
+    result: FloatArray = np.minimum(spall.depth_um * 1e-6, sunk * 1e-3)
+    return result
+
+
+def _ends_mm(pair: PairGeometry, side: int, spall: ToothSpall) -> tuple[float, float]:
+    """Arc lengths of its ends."""
+    low, high = contact_ends_mm(pair, side)
+    rho = pitch_point_mm(pair, side) if spall.centre is None else low + spall.centre * (high - low)
+    middle = float(arc_length_mm(pair.driver if side == 1 else pair.driven, rho))
+    return middle - spall.length_mm / 2.0, middle + spall.length_mm / 2.0
+
+
+# --------------------
+# A chipped tooth: a piece broken off its tip.
+# --------------------
+
+
+GAP_M = 0.3e-3
+"""Separation beyond the edge of a chip over the whole face: many times the deflection of a loaded pair."""
+EDGE_BASE_PITCHES = 0.05
+"""Over this length beyond a chip's edge contact is lost, as it is at the tip of a whole tooth."""
+
+
+@dataclass(frozen=True)
+class ToothChip:
+    """A piece broken off the tip of one tooth.
+
+    Parameters
+    ----------
+    height_mm : float
+        Radially from the tip down, 0 to the height of the flank. 0: no chip.
+    width_mm : float or None
+        Across the face from one end, 0 to 0.9 of the face width, or all of it. None: all of it.
+    tooth : int
+        Which tooth of the gear, from 0.
+
+    Notes
+    -----
+    Where contact lies beyond the chip's edge, the compliance of tooth and contact grows by 1/(1 − w/b) for a chip over
+    part of the face; over the whole face there is nothing to touch. The driving flank alone is described, and the mass
+    of the piece is not taken off the gear.
+    """
+
+    height_mm: float
+    width_mm: float | None = None
+    tooth: int = 0
+
+    def __post_init__(self) -> None:
+        not_negative(self.height_mm, "height_mm of the chip", "mm")
+        if self.width_mm is not None:
+            not_negative(self.width_mm, "width_mm of the chip", "mm")
+        count(self.tooth, "tooth of the chip", minimum=0)
+
+
+def highest_chip_mm(gear: GearGeometry) -> float:
+    """Radial height of the involute flank, from the end of the fillet to the tip."""
+    return gear.tip_radius_mm - gear.form_radius_mm
+
+
+def check_chip(pair: PairGeometry, side: int, chip: ToothChip) -> None:
+    """Refuse a chip higher than the flank, wider than the face, or on a tooth that is not there."""
+    gear = pair.driver if side == 1 else pair.driven
+    highest = highest_chip_mm(gear)
+    if chip.height_mm > highest:
+        raise InputError(
+            f"height_mm of the chip is {chip.height_mm:g} mm: it is higher than the flank",
+            allowed=f"0 to {highest:.3g} mm from the tip down",
+        )
+    if chip.width_mm is not None:
+        check_part_of_face(chip.width_mm, "width_mm of the chip", pair.face_width_mm)
+    within(chip.tooth, "tooth of the chip", 0, gear.teeth - 1)
+
+
+def chip_share(pair: PairGeometry, side: int, chip: ToothChip, roll_length_mm: FloatArray) -> FloatArray:
+    """Part of the width that a chip over part of the face takes away, 0 to 0.9; 0 if it spans the whole face.
+
+    Parameters
+    ----------
+    roll_length_mm : array
+        ρ of the gear that has the chip.
+    """
+    if _is_whole(pair, chip):
+        return np.zeros(np.shape(roll_length_mm))
+    part = (chip.width_mm or 0.0) / pair.face_width_mm
+    result: FloatArray = part * _beyond_edge(pair, side, chip, roll_length_mm)
+    return result
+
+
+def chip_separation_m(pair: PairGeometry, side: int, chip: ToothChip, roll_length_mm: FloatArray) -> FloatArray:
+    """Separation by a chip over the whole face, up to 0.3 mm within 0.05 base pitches of its edge; 0 if less wide."""
+    if not _is_whole(pair, chip):
+        return np.zeros(np.shape(roll_length_mm))
+    result: FloatArray = GAP_M * _beyond_edge(pair, side, chip, roll_length_mm)
+    return result
+
+
+def _is_whole(pair: PairGeometry, chip: ToothChip) -> bool:
+    return chip.width_mm is None or spans_face(chip.width_mm, pair.face_width_mm)
+
+
+def _beyond_edge(pair: PairGeometry, side: int, chip: ToothChip, roll_length_mm: FloatArray) -> FloatArray:
+    """0 below the chip's edge, 1 beyond it; less than 1 for a chip smaller than the edge's own length."""
+    gear = pair.driver if side == 1 else pair.driven
+    tip = gear.tip_roll_rad * gear.base_radius_mm
+    edge = sqrt((gear.tip_radius_mm - chip.height_mm) ** 2 - gear.base_radius_mm**2)
+    length = EDGE_BASE_PITCHES * pair.base_pitch_mm
+    # Contact on a whole tooth also goes on a little beyond the tip; without this it would jump with the first chip.
+    lost = min(1.0, (tip - edge) / length)
+    result: FloatArray = lost * smooth_step((np.asarray(roll_length_mm, dtype=np.float64) - edge) / length)
+    return result

@@ -1,0 +1,393 @@
+"""Friction of a lubricated tooth contact: the regression of Xu and Kahraman, and the pressure it needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp, log, pi, sqrt
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from gearsig.checks import FloatArray, positive
+from gearsig.errors import InputError
+from sims.mesh._mesh_stiffness import MeshTable, share_torque
+from sims.mesh._stiffness import GearMesh
+
+MOST_FRICTION = 0.3
+"""Cap of the coefficient."""
+COEFFICIENTS = (-8.916465, 1.03303, 1.036077, -0.354068, 2.812084, -0.100601, 0.752755, -0.390958, 0.620305)
+"""b1 … b9 of the regression."""
+
+# The roughness limit is the one that matters, as exp(S) sits in an exponent. The other limits are assumed: those of
+# contacts that such a regression is commonly used for, not a statement of its authors.
+_LIMITS = {
+    "roughness_um": (0.0, 0.6, "um"),
+    "slide_to_roll": (0.0, 2.0, ""),
+    "pressure_gpa": (0.2, 3.0, "GPa"),
+    "viscosity_cp": (1.0, 300.0, "cP"),
+    "entrainment_mps": (0.2, 30.0, "m/s"),
+    "radius_m": (0.002, 0.1, "m"),
+}
+
+
+@dataclass(frozen=True)
+class FrictionResult:
+    """Friction coefficient and what to know about it.
+
+    Parameters
+    ----------
+    coefficient : array
+        From 0 to `MOST_FRICTION`, in the common shape of what was given.
+    capped : array of bool
+        Where the regression gave more than the cap.
+    notes : tuple of str
+        One per quantity that leaves the regression's range, with value and limit; empty inside.
+    """
+
+    coefficient: FloatArray
+    capped: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+    notes: tuple[str, ...] = ()
+
+
+def friction_coefficient(
+    slide_to_roll: ArrayLike,
+    pressure_gpa: ArrayLike,
+    *,
+    viscosity_cp: float,
+    roughness_um: float,
+    entrainment_mps: ArrayLike,
+    radius_m: ArrayLike,
+) -> FrictionResult:
+    """Friction coefficient of a lubricated line contact between steel flanks.
+
+    μ = exp(f) P^b2 |SR|^b3 V^b6 ν^b7 R^b8 with
+    f = b1 + b4 |SR| P log₁₀ν + b5 exp(-|SR| P log₁₀ν) + b9 exp(S).
+
+    Parameters
+    ----------
+    slide_to_roll : array
+        SR, sliding speed over entrainment speed; its sign is ignored, and 0 gives 0.
+    pressure_gpa : array
+        Greatest Hertz pressure P, not below 0.
+    viscosity_cp : float
+        Dynamic viscosity ν of the oil at its inlet temperature, in cP = mPa·s, above 0.
+    roughness_um : float
+        Composite rms roughness S, √(Rq1² + Rq2²), not below 0. Smooth flanks (0) do not have μ = 0.
+    entrainment_mps : array
+        V, mean of the two surface speeds, above 0.
+    radius_m : array
+        R, ρ1 ρ2/(ρ1 + ρ2), above 0.
+
+    Returns
+    -------
+    FrictionResult
+        Outside the range (roughness above 0.6 µm above all) the coefficient is still given, with a note.
+
+    Raises
+    ------
+    InputError
+        On a value that has no meaning.
+
+    Notes
+    -----
+    The regression stands for one oil (a 75W-90) and full or mixed film. It does not know start and stop, where the
+    film is gone: there, use a friction law with a stick phase.
+
+    Source: H. Xu, *Development of a generalized mechanical efficiency prediction methodology for gear pairs*,
+    dissertation, The Ohio State University, 2005.
+    """
+    given = {
+        "slide_to_roll": np.abs(_checked(slide_to_roll, "slide_to_roll", signed=True)),
+        "pressure_gpa": _checked(pressure_gpa, "pressure_gpa"),
+        "viscosity_cp": np.asarray(positive(viscosity_cp, "viscosity_cp", "cP")),
+        "roughness_um": _checked(roughness_um, "roughness_um"),
+        "entrainment_mps": _checked(entrainment_mps, "entrainment_mps", above_zero=True),
+        "radius_m": _checked(radius_m, "radius_m", above_zero=True),
+    }
+    raw = _regression(
+        given["slide_to_roll"],
+        given["pressure_gpa"],
+        given["viscosity_cp"],
+        given["roughness_um"],
+        given["entrainment_mps"],
+        given["radius_m"],
+    )
+    return FrictionResult(np.minimum(raw, MOST_FRICTION), raw > MOST_FRICTION, _range_notes(given))
+
+
+def line_contact_pressure_gpa(
+    normal_force_n: ArrayLike, face_width_m: float, radius_m: ArrayLike, reduced_modulus_pa: float
+) -> FloatArray:
+    """Greatest Hertz pressure of a line contact, p = √(N E*/(π b R)), in GPa.
+
+    Parameters
+    ----------
+    normal_force_n : array
+        N; at or below 0 there is no contact and the pressure is 0.
+    face_width_m : float
+    radius_m : array
+        R, ρ1 ρ2/(ρ1 + ρ2).
+    reduced_modulus_pa : float
+        E*, see `reduced_modulus_pa`.
+
+    Source: K. L. Johnson, *Contact Mechanics*, 1985, ch. 4.
+    """
+    positive(face_width_m, "face_width_m", "m")
+    positive(reduced_modulus_pa, "reduced_modulus_pa", "Pa")
+    radius = _checked(radius_m, "radius_m", above_zero=True)
+    force = np.maximum(_checked(normal_force_n, "normal_force_n", signed=True), 0.0)
+    pressure: FloatArray = 1e-9 * np.sqrt(force * reduced_modulus_pa / (np.pi * face_width_m * radius))
+    return pressure
+
+
+def reduced_modulus_pa(modulus_1_pa: float, poisson_1: float, modulus_2_pa: float, poisson_2: float) -> float:
+    """Reduced modulus E* of two bodies: 1/E* = (1 - ν1²)/E1 + (1 - ν2²)/E2."""
+    positive(modulus_1_pa, "modulus_1_pa", "Pa")
+    positive(modulus_2_pa, "modulus_2_pa", "Pa")
+    return 1.0 / ((1 - poisson_1**2) / modulus_1_pa + (1 - poisson_2**2) / modulus_2_pa)
+
+
+def smooth_sign(sliding_mps: ArrayLike, threshold_mps: float) -> FloatArray:
+    """Sign of the sliding speed, smoothed: v/√(v² + v₀²).
+
+    At v = 10 v₀ it is 0.995. As it has the sign of v, a force -μN·sgn(v) never feeds energy in.
+    """
+    positive(threshold_mps, "threshold_mps", "m/s")
+    v = _checked(sliding_mps, "sliding_mps", signed=True)
+    result: FloatArray = v / np.hypot(v, threshold_mps)
+    return result
+
+
+def _regression(
+    SR: FloatArray, P: FloatArray, nu: FloatArray, S: FloatArray, V: FloatArray, R: FloatArray
+) -> FloatArray:
+    b1, b2, b3, b4, b5, b6, b7, b8, b9 = COEFFICIENTS
+    s = SR * P * np.log10(nu)
+    # Beyond an exponent of 700 a double overflows; the cap has long been reached.
+    f = np.minimum(b1 + b4 * s + b5 * np.exp(-s) + b9 * np.exp(np.minimum(S, 50.0)), 700.0)
+    mu: FloatArray = np.exp(f) * P**b2 * SR**b3 * V**b6 * nu**b7 * R**b8
+    return mu
+
+
+def _range_notes(given: dict[str, FloatArray]) -> tuple[str, ...]:
+    notes = []
+    for name, (low, high, unit) in _LIMITS.items():
+        least, most = float(np.min(given[name])), float(np.max(given[name]))
+        # No load and no sliding give exactly zero friction: that is no extrapolation.
+        if name == "pressure_gpa" and least == 0.0:
+            least = low
+        for value, outside in ((least, least < low), (most, most > high)):
+            if outside:
+                notes.append(
+                    f"{name} reaches {value:.4g} {unit}; the friction regression holds for {low:g} to {high:g} {unit}"
+                )
+    return tuple(notes)
+
+
+def _checked(value: ArrayLike, name: str, *, signed: bool = False, above_zero: bool = False) -> FloatArray:
+    array: FloatArray = np.asarray(value, dtype=np.float64)
+    wrong = ~np.isfinite(array)
+    if not signed:
+        wrong |= array <= 0.0 if above_zero else array < 0.0
+    if wrong.any():
+        allowed = "finite numbers" if signed else ("finite, > 0" if above_zero else "finite, >= 0")
+        raise InputError(f"{name} holds {float(array[wrong].flat[0]):g}", allowed=allowed)
+    return array
+
+
+# --------------------
+# Compiled friction of one line contact, for right-hand sides; `sims.mesh` states the formulas and units.
+# --------------------
+
+
+B1, B2, B3, B4, B5 = -8.916465, 1.03303, 1.036077, -0.354068, 2.812084
+B6, B7, B8, B9 = -0.100601, 0.752755, -0.390958, 0.620305
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def oil_terms(viscosity_cp, roughness_um):  # type: ignore[no-untyped-def]
+    """(log₁₀ν₀, b1 + b9·exp(S) + b7·ln ν₀): the terms that stay the same during a simulation."""
+    return log(viscosity_cp) / log(10.0), B1 + B9 * exp(roughness_um) + B7 * log(viscosity_cp)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def hertz_pressure_gpa(normal_force_n, width_m, radius_m, reduced_modulus_pa):  # type: ignore[no-untyped-def]
+    """Return p = √(N E*/(π b R)), in GPa; 0 without load."""
+    if normal_force_n <= 0.0:
+        return 0.0
+    return 1e-9 * sqrt(normal_force_n * reduced_modulus_pa / (3.141592653589793 * width_m * radius_m))
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def friction_coefficient_friction_kernel(slide_to_roll, pressure_gpa, entrainment_mps, radius_m, log10_oil, constant):  # type: ignore[no-untyped-def]
+    """μ of the regression, from 0 to MOST_FRICTION.
+
+    Powers are added as logarithms: two exponentials and four logarithms in all. No sliding and no load give 0; an
+    entrainment speed of zero with sliding gives the cap, as V^b6 grows without bound.
+    """
+    if slide_to_roll <= 0.0 or pressure_gpa <= 0.0:
+        return 0.0
+    if entrainment_mps <= 0.0:
+        return MOST_FRICTION
+    s = slide_to_roll * pressure_gpa * log10_oil
+    exponent = (
+        constant
+        + B4 * s
+        + B5 * exp(-s)
+        + B2 * log(pressure_gpa)
+        + B3 * log(slide_to_roll)
+        + B6 * log(entrainment_mps)
+        + B8 * log(radius_m)
+    )
+    # exp(-1.204) = 0.3: saves the exponential, and its overflow, where the cap holds.
+    return exp(exponent) if exponent < -1.2039728043259361 else MOST_FRICTION
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def smooth_sign_friction_kernel(sliding_mps, threshold_mps):  # type: ignore[no-untyped-def]
+    """v/√(v² + v₀²): odd, between -1 and 1, 0 at rest."""
+    return sliding_mps / sqrt(sliding_mps * sliding_mps + threshold_mps * threshold_mps)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def contact_friction_n(  # type: ignore[no-untyped-def]
+    normal_force_n,
+    surface_1_mps,
+    surface_2_mps,
+    vibration_mps,
+    radius_m,
+    width_m,
+    reduced_modulus_pa,
+    log10_oil,
+    constant,
+    threshold_mps,
+    film_factor=1.0,
+    dry_coefficient=0.0,
+):
+    """Friction of one tooth pair, μ N sgn(v_s), with v_s = u2 - u1 + vibration, u = ωρ; subtract it from body 1's x.
+
+    μ is `film_factor` times the regression's coefficient, plus `dry_coefficient` at every sliding speed.
+    Slide-to-roll ratio and entrainment use the rolling speeds u alone: the film takes no notice of the vibration
+    within its own length, and near the pitch point a vibrating sign would make the ratio chatter.
+    """
+    if normal_force_n <= 0.0:
+        return 0.0
+    entrainment = 0.5 * abs(surface_1_mps + surface_2_mps)
+    sliding = surface_2_mps - surface_1_mps
+    ratio = abs(sliding) / entrainment if entrainment > 0.0 else 0.0
+    pressure = hertz_pressure_gpa(normal_force_n, width_m, radius_m, reduced_modulus_pa)
+    mu = (
+        film_factor * friction_coefficient_friction_kernel(ratio, pressure, entrainment, radius_m, log10_oil, constant)
+        + dry_coefficient
+    )
+    return mu * normal_force_n * smooth_sign_friction_kernel(sliding + vibration_mps, threshold_mps)
+
+
+# --------------------
+# Friction of each tooth pair over the mesh at a steady load and speed.
+# --------------------
+
+
+LEAST_RADIUS = 1e-3
+"""In modules: radius of curvature below which a contact, on the base circle, is taken as this curved."""
+
+LEAST_PART = 0.2
+"""Part of the load from which a contact's range is told."""
+
+
+@dataclass(frozen=True)
+class MeshFriction:
+    """Friction over the mesh; column j is pair ⌊c + ramp/2⌋ − j, 0 where a pair does not touch.
+
+    Parameters
+    ----------
+    mesh_cycles : array, (n,)
+        c; pair k enters at c = k.
+    coefficient : array, (n, n_slots)
+        μ, not below 0.
+    friction_n : array, (n, n_slots)
+        μ N sgn(v_s): above 0 in approach, below 0 in recess. The driver receives −f across the line of action.
+    normal_n : array, (n, n_slots)
+        N.
+    sliding_mps : array, (n, n_slots)
+        v_s = ω2 ρ2 − ω1 ρ1.
+    notes : tuple of str
+        Where contacts that carry a fifth of the load or more leave the range of the friction regression.
+    """
+
+    mesh_cycles: FloatArray
+    coefficient: FloatArray
+    friction_n: FloatArray
+    normal_n: FloatArray
+    sliding_mps: FloatArray
+    notes: tuple[str, ...] = ()
+
+
+def friction_over_mesh(
+    mesh: GearMesh,
+    torque_nm: float,
+    speed_rpm: float,
+    viscosity_cp: float,
+    roughness_um: float,
+    mesh_cycles: FloatArray | None = None,
+    *,
+    table: MeshTable | None = None,
+) -> MeshFriction:
+    """Friction coefficient and force of each pair, with the load it carries in static equilibrium.
+
+    Parameters
+    ----------
+    mesh : GearMesh
+    torque_nm, speed_rpm : float
+        Of the driver, above 0.
+    viscosity_cp, roughness_um : float
+        As for `friction_coefficient`.
+    mesh_cycles : array or None
+        c; None: 200 points of one cycle.
+    table : MeshTable or None
+        Of this mesh, if it is at hand.
+
+    Notes
+    -----
+    Friction does not act back on the load sharing here. The pressure is that of smooth flanks of full width.
+    """
+    shared = share_torque(mesh, torque_nm, mesh_cycles, table=table)
+    u_1, u_2, radius_m = _speeds_and_radius(mesh, shared.mesh_cycles, positive(speed_rpm, "speed_rpm", "rpm"))
+    normal = shared.pair_forces_n
+    sliding, entrainment = u_2 - u_1, 0.5 * (u_1 + u_2)
+    pressure = line_contact_pressure_gpa(normal, mesh.face_width_m, radius_m, _reduced_modulus_pa(mesh))
+
+    def found(where: NDArray[np.bool_]) -> FrictionResult:
+        return friction_coefficient(
+            (sliding / entrainment)[where],
+            pressure[where],
+            viscosity_cp=viscosity_cp,
+            roughness_um=roughness_um,
+            entrainment_mps=entrainment[where],
+            radius_m=radius_m[where],
+        )
+
+    coefficient = found(np.ones(normal.shape, dtype=np.bool_)).coefficient.reshape(normal.shape)
+    # A pair that takes up its load passes every small pressure, of which there is nothing to say.
+    notes = found(normal >= LEAST_PART * normal.sum(axis=1, keepdims=True)).notes
+    friction = coefficient * normal * np.sign(sliding)
+    return MeshFriction(shared.mesh_cycles, coefficient, friction, normal, sliding, notes)
+
+
+def _reduced_modulus_pa(mesh: GearMesh) -> float:
+    one, two = mesh.material_1, mesh.material_2
+    return reduced_modulus_pa(one.youngs_modulus_pa, one.poisson_ratio, two.youngs_modulus_pa, two.poisson_ratio)
+
+
+def _speeds_and_radius(
+    mesh: GearMesh, mesh_cycles: FloatArray, speed_rpm: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Rolling speeds of both flanks in m/s and the radius of relative curvature in m, (n, n_slots)."""
+    pair, least = mesh.pair, LEAST_RADIUS * mesh.pair.driver.module_mm
+    newest = np.floor(mesh_cycles + mesh.ramp / 2.0)
+    progress = (mesh_cycles - newest)[:, None] + np.arange(mesh.n_slots)
+    rho_1, rho_2 = (np.maximum(rho, least) * 1e-3 for rho in pair.contact_radii_mm(progress))
+    omega_1 = speed_rpm * pi / 30.0
+    omega_2 = omega_1 * pair.driver.teeth / pair.driven.teeth
+    return omega_1 * rho_1, omega_2 * rho_2, rho_1 * rho_2 / (rho_1 + rho_2)

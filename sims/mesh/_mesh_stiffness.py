@@ -1,0 +1,526 @@
+"""Time-varying mesh stiffness, load sharing and static transmission error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray, count, frozen_array, positive
+from gearsig.errors import InputError
+from sims.mesh._deviation import flank_separation_m, pitch_separation_m, wear_profile
+from sims.mesh._faults import chip_separation_m, spall_separation_m
+from sims.mesh._pair import arc_length_mm, contact_ends_mm
+from sims.mesh._roughness import FlankRoughness
+from sims.mesh._stiffness import GearMesh
+
+# --------------------
+# Metal missing on the flanks of each tooth, over the path of contact.
+# --------------------
+
+
+def separation_rows(mesh: GearMesh, number: int, progress: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Rows of separation of one gear over ζ, in m, and the row of each tooth.
+
+    Row 0 is an ordinary tooth; each faulty tooth has a row of its own. With roughness, row i is tooth i.
+    """
+    side, rho = mesh.side(number), mesh.roll_length_mm(number, progress)
+    ordinary = _ordinary(mesh, number, progress)
+    n_teeth = side.gear.teeth
+    if side.roughness is None:
+        teeth = side.faulty_teeth
+        rows = np.tile(ordinary, (1 + len(teeth), 1))
+        surface = np.zeros(n_teeth, dtype=np.int64)
+        surface[list(teeth)] = np.arange(1, 1 + len(teeth))
+    else:
+        rows = ordinary - roughness_heights_m(mesh, number, side.roughness, rho)
+        surface = np.arange(n_teeth)
+    for tooth in side.faulty_teeth:
+        _, spall, chip = side.faults_of(tooth)
+        if spall is not None:
+            rows[surface[tooth]] += spall_separation_m(mesh.pair, number, spall, rho)
+        if chip is not None:
+            rows[surface[tooth]] += chip_separation_m(mesh.pair, number, chip, rho)
+    return rows, surface
+
+
+def roughness_heights_m(
+    mesh: GearMesh, number: int, roughness: FlankRoughness, roll_length_mm: FloatArray
+) -> FloatArray:
+    """Heights of all teeth of a gear, (z, n), above 0 into the gap.
+
+    The position on a flank is the arc length from the root end of its contact: a profile is fixed to the metal, over
+    which the contact moves slower than along the line of action, and faster towards the tip.
+    """
+    gear = mesh.side(number).gear
+    origin = arc_length_mm(gear, contact_ends_mm(mesh.pair, number)[0])
+    place_m = (arc_length_mm(gear, roll_length_mm) - origin) * 1e-3
+    return roughness.height_m(np.arange(gear.teeth)[:, None], place_m)
+
+
+def _ordinary(mesh: GearMesh, number: int, progress: FloatArray) -> FloatArray:
+    side, rho = mesh.side(number), mesh.pair.contact_radii_mm(progress)[number - 1]
+    worn = side.flank.wear_um * 1e-6 * wear_profile(mesh.pair, number, rho)
+    result: FloatArray = flank_separation_m(side.gear, side.flank, rho) + worn
+    return result
+
+
+# --------------------
+# The mesh as arrays over its progress, which compiled code reads while it integrates.
+# --------------------
+
+
+@dataclass(frozen=True)
+class MeshTable:
+    """Compliance and separation of a tooth pair over ζ, base pitches since its ideal entry.
+
+    A pair made of tooth i of the driver and tooth j of the driven gear has the compliance
+    compliance_1[variant_1[i]] + compliance_2[variant_2[j]] + that of the contact, and the separation
+    separation_1_m[surface_1[i]] + separation_2_m[surface_2[j]] + pitch_1_m[i] + pitch_2_m[j].
+
+    Parameters
+    ----------
+    start, step : float
+        ζ of the first column and between columns; one column lies beyond either end, for cubic interpolation. All
+        rows share the columns: n = `n_points` + 2.
+    compliance_1, compliance_2 : arrays, (n_variants, n)
+        Tooth and foundation of either gear, m/N. Row 0 is a sound tooth, each further row a faulty one.
+    variant_1, variant_2 : int arrays, (z,)
+        Row of `compliance_1`, `compliance_2` for each tooth.
+    separation_1_m, separation_2_m : arrays, (n_surfaces, n)
+        Metal missing on the flank of either gear along the line of action, below 0 where metal stands out. Row 0 is an
+        ordinary tooth of the gear: tip relief, profile deviation, wear. Further rows belong to teeth whose flank is
+        damaged. A gear with roughness of its own has a row for each tooth, row 0 being that of tooth 0.
+    surface_1, surface_2 : int arrays, (z,)
+        Row of `separation_1_m`, `separation_2_m` for each tooth.
+    pitch_1_m, pitch_2_m : arrays, (z,)
+        Cumulative pitch deviation of each tooth; not in the rows above.
+    contact_coefficient : float
+        m/N, or m/N^0.9 if `load_dependent`.
+    load_dependent : bool
+        Whether the approach grows with the 0.9th power of the force.
+    contact_ratio : float
+        ε.
+    ramp : float
+        Base pitches over which a pair takes up and gives up its stiffness, centred on ζ = 0 and ζ = ε.
+    n_slots : int
+        Most pairs that carry load at once.
+    """
+
+    start: float
+    step: float
+    compliance_1: FloatArray
+    compliance_2: FloatArray
+    variant_1: NDArray[np.int64]
+    variant_2: NDArray[np.int64]
+    separation_1_m: FloatArray
+    separation_2_m: FloatArray
+    surface_1: NDArray[np.int64]
+    surface_2: NDArray[np.int64]
+    pitch_1_m: FloatArray
+    pitch_2_m: FloatArray
+    contact_coefficient: float
+    load_dependent: bool
+    contact_ratio: float
+    ramp: float
+    n_slots: int
+
+
+def mesh_table(mesh: GearMesh, n_points: int = 512) -> MeshTable:
+    """Tabulate a mesh.
+
+    Parameters
+    ----------
+    mesh : GearMesh
+    n_points : int
+        Columns over the path of contact, ramps included. With 512 the interpolated compliance is right to 1e-9
+        and the height of roughness to 1e-4 of its rms. At the edges of spalls and chips and at the pitch point of worn
+        flanks the interpolation rounds over one or two columns.
+    """
+    n = count(n_points, "n_points", minimum=16)
+    low, high = -mesh.ramp / 2.0, mesh.pair.contact_ratio + mesh.ramp / 2.0
+    step = (high - low) / (n - 1)
+    progress = low + step * np.arange(-1, n + 1)
+    rows_1, variant_1 = _compliance_rows(mesh, 1, progress)
+    rows_2, variant_2 = _compliance_rows(mesh, 2, progress)
+    flanks_1, surface_1 = separation_rows(mesh, 1, progress)
+    flanks_2, surface_2 = separation_rows(mesh, 2, progress)
+    return MeshTable(
+        start=low - step,
+        step=step,
+        compliance_1=rows_1,
+        compliance_2=rows_2,
+        variant_1=variant_1,
+        variant_2=variant_2,
+        separation_1_m=flanks_1,
+        separation_2_m=flanks_2,
+        surface_1=surface_1,
+        surface_2=surface_2,
+        pitch_1_m=pitch_separation_m(mesh.pair.driver, mesh.flank_1),
+        pitch_2_m=pitch_separation_m(mesh.pair.driven, mesh.flank_2),
+        contact_coefficient=mesh.contact_coefficient,
+        load_dependent=mesh.contact_law == "load-dependent",
+        contact_ratio=mesh.pair.contact_ratio,
+        ramp=mesh.ramp,
+        n_slots=mesh.n_slots,
+    )
+
+
+def _compliance_rows(mesh: GearMesh, number: int, progress: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Row 0 for sound teeth, one row for each faulty one, and the row of each tooth."""
+    side = mesh.side(number)
+    rows = [mesh.gear_compliance(number, progress)]
+    variant = np.zeros(side.gear.teeth, dtype=np.int64)
+    for row, tooth in enumerate(side.faulty_teeth, start=1):
+        rows.append(mesh.gear_compliance(number, progress, side.faults_of(tooth)))
+        variant[tooth] = row
+    return np.array(rows), variant
+
+
+@dataclass(frozen=True)
+class MeshStiffness:
+    """Stiffness along the line of action over the mesh.
+
+    Parameters
+    ----------
+    mesh_cycles : array, (n,)
+        c; pair k enters at c = k.
+    total_n_per_m : array, (n,)
+        dF/dδ of all pairs together.
+    pairs_n_per_m : array, (n, n_slots)
+        Of each pair; column j is pair ⌊c + ramp/2⌋ − j, 0 where it does not touch.
+    """
+
+    mesh_cycles: FloatArray
+    total_n_per_m: FloatArray
+    pairs_n_per_m: FloatArray
+
+    @property
+    def mean_n_per_m(self) -> float:
+        """Mean over the given points."""
+        return float(np.mean(self.total_n_per_m))
+
+
+@dataclass(frozen=True)
+class LoadSharing:
+    """Static equilibrium over the mesh.
+
+    Parameters
+    ----------
+    mesh_cycles : array, (n,)
+    transmission_error_m : array, (n,)
+        δ = r_b1 θ1 − r_b2 θ2: how far the driver runs ahead along the line of action; 0 for unloaded ideal flanks.
+    pair_forces_n : array, (n, n_slots)
+        N_i ≥ 0, columns as in `MeshStiffness`.
+    stiffness_n_per_m : array, (n,)
+        dF/dδ at this load.
+    """
+
+    mesh_cycles: FloatArray
+    transmission_error_m: FloatArray
+    pair_forces_n: FloatArray
+    stiffness_n_per_m: FloatArray
+
+
+def one_mesh_cycle(n_points: int = 200) -> FloatArray:
+    """Middles of `n_points` equal parts of the first mesh cycle: their mean is the mean over the cycle."""
+    n = count(n_points, "n_points")
+    return (np.arange(n) + 0.5) / n
+
+
+def mesh_stiffness(
+    mesh: GearMesh,
+    mesh_cycles: FloatArray | None = None,
+    force_n: float | None = None,
+    *,
+    table: MeshTable | None = None,
+) -> MeshStiffness:
+    """Stiffness of the mesh along the line of action.
+
+    k = Σ k_i, 1/k_i = 1/k_h + Σ over both gears (1/k_b + 1/k_s + 1/k_a + 1/k_f)
+
+    Parameters
+    ----------
+    mesh : GearMesh
+    mesh_cycles : array or None
+        c; None: 200 points of one cycle.
+    force_n : float or None
+        Mesh force, above 0. None: every pair on the path of contact touches (separations do not count, so that a chip
+        or a spall over the whole face does not show), for the linear contact law only. Given: the tangent stiffness of
+        the pairs that carry at that force.
+    table : MeshTable or None
+        Of this mesh, if it is at hand: making one takes longer than reading it.
+
+    Returns
+    -------
+    MeshStiffness
+
+    Raises
+    ------
+    InputError
+        Without a force if the contact stiffens with the load.
+    """
+    cycles = one_mesh_cycle() if mesh_cycles is None else frozen_array(mesh_cycles, "mesh_cycles", ndim=1)
+    table = mesh_table(mesh) if table is None else table
+    compliance, separation, weight = pair_states(table, cycles)
+    if force_n is None:
+        if table.load_dependent:
+            raise InputError(
+                "the contact stiffens with the load, and no load is given",
+                where="force_n",
+                allowed="a force above 0 N",
+                remedy="give force_n or take contact_law='linear'",
+            )
+        pairs = weight / (compliance + table.contact_coefficient)
+        return MeshStiffness(cycles, pairs.sum(axis=1), pairs)
+    _, _, forces = _equilibrium(table, positive(force_n, "force_n", "N"), compliance, separation, weight)
+    pairs = _tangents(table, compliance, weight, forces)
+    return MeshStiffness(cycles, pairs.sum(axis=1), pairs)
+
+
+def share_torque(
+    mesh: GearMesh, torque_nm: float, mesh_cycles: FloatArray | None = None, *, table: MeshTable | None = None
+) -> LoadSharing:
+    """Which pair carries how much, and the static transmission error, at a torque on the driver.
+
+    Σ N_i(δ − E_i) = T1/r_b1, without friction.
+
+    Parameters
+    ----------
+    mesh : GearMesh
+    torque_nm : float
+        T1, above 0.
+    mesh_cycles : array or None
+        c; None: 200 points of one cycle. With faulty teeth, pitch deviations or roughness give a whole revolution or
+        more.
+    table : MeshTable or None
+        Of this mesh, if it is at hand.
+    """
+    cycles = one_mesh_cycle() if mesh_cycles is None else frozen_array(mesh_cycles, "mesh_cycles", ndim=1)
+    force = positive(torque_nm, "torque_nm", "N m") / (mesh.pair.driver.base_radius_mm * 1e-3)
+    table = mesh_table(mesh) if table is None else table
+    delta, slope, forces = _equilibrium(table, force, *pair_states(table, cycles))
+    return LoadSharing(cycles, delta, forces, slope)
+
+
+def back_stiffness_n_per_m(mesh: GearMesh) -> float:
+    """Mean stiffness of the mesh with the back flanks pressed, by the linear contact law, N/m.
+
+    A symmetric tooth is as stiff on either flank, and back flanks touch along the mirrored path: the mean over a mesh
+    cycle is that of sound drive flanks. A crack of the drive side closes and spalls are not touched. A piece broken off
+    a tip would be missing on both flanks; a constant for the whole gear leaves it out, as it does roughness and wear.
+    """
+    from dataclasses import replace
+
+    faults = {"cracks_1": (), "cracks_2": (), "spalls_1": (), "spalls_2": (), "chips_1": (), "chips_2": ()}
+    sound = replace(mesh, contact_law="linear", **faults)  # type: ignore[arg-type]  # all of them are tuples of faults
+    return mesh_stiffness(sound).mean_n_per_m
+
+
+def pair_states(table: MeshTable, mesh_cycles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Compliance without contact (m/N), separation (m) and engagement (0 to 1) of the pairs at each c, (n, n_slots)."""
+    shape = (len(mesh_cycles), table.n_slots)
+    compliance, separation, weight = np.empty(shape), np.empty(shape), np.empty(shape)
+    fill_pairs(
+        np.ascontiguousarray(mesh_cycles, dtype=np.float64),
+        table.start,
+        table.step,
+        table.compliance_1,
+        table.compliance_2,
+        table.variant_1,
+        table.variant_2,
+        table.separation_1_m,
+        table.separation_2_m,
+        table.surface_1,
+        table.surface_2,
+        table.pitch_1_m,
+        table.pitch_2_m,
+        table.contact_ratio,
+        table.ramp,
+        compliance,
+        separation,
+        weight,
+    )
+    return compliance, separation, weight
+
+
+def _equilibrium(
+    table: MeshTable, force: float, compliance: FloatArray, separation: FloatArray, weight: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+
+    delta, slope, forces = np.empty(len(weight)), np.empty(len(weight)), np.empty(weight.shape)
+    contact, law = table.contact_coefficient, table.load_dependent
+    share_loads(force, compliance, separation, weight, contact, law, delta, slope, forces)
+    return delta, slope, forces
+
+
+def _tangents(table: MeshTable, compliance: FloatArray, weight: FloatArray, forces: FloatArray) -> FloatArray:
+    """dN/dδ of each pair that carries a force."""
+    carrying = forces > 0.0
+    own = np.where(carrying, forces / np.where(weight > 0.0, weight, 1.0), 1.0)
+    contact = table.contact_coefficient * (0.9 * own**-0.1 if table.load_dependent else 1.0)
+    return np.where(carrying, weight / (compliance + contact), 0.0)
+
+
+# --------------------
+# Compiled: what each pair carries. Imported only where it is used, since it loads the compiler.
+# --------------------
+
+
+@njit(cache=True)
+def engagement(progress: float, contact_ratio: float, ramp: float) -> float:
+    """Part of its stiffness a pair has: 0 outside, 1 inside, with a quintic step of width `ramp` at either end."""
+    return float(engagement_and_slope(progress, 0.0, contact_ratio, ramp)[0])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def engagement_and_slope(progress: float, late: float, contact_ratio: float, ramp: float) -> tuple[float, float]:
+    """(w, ∂w/∂ζ) of `engagement`, for a pair that enters `late` base pitches late."""
+    if ramp <= 0.0:
+        return (1.0 if late <= progress <= contact_ratio else 0.0), 0.0
+    rise, rise_slope = _smooth((progress - late) / ramp + 0.5)
+    fall, fall_slope = _smooth((contact_ratio - progress) / ramp + 0.5)
+    return rise * fall, (rise_slope * fall - rise * fall_slope) / ramp
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _smooth(t: float) -> tuple[float, float]:
+    """6t⁵ − 15t⁴ + 10t³ between 0 and 1, with two continuous derivatives, and its slope."""
+    if t <= 0.0:
+        return 0.0, 0.0
+    if t >= 1.0:
+        return 1.0, 0.0
+    return t * t * t * (t * (6.0 * t - 15.0) + 10.0), 30.0 * t * t * (t - 1.0) * (t - 1.0)
+
+
+@njit(cache=True)
+def cubic(row: FloatArray, start: float, step: float, progress: float) -> float:
+    """Lagrange interpolation through the four nearest columns; beyond the ends the last cubic goes on."""
+    place = (progress - start) / step
+    i = min(max(int(place), 1), row.size - 3)
+    t = place - i
+    a, b, c, d = row[i - 1], row[i], row[i + 1], row[i + 2]
+    return float(
+        -a * t * (t - 1.0) * (t - 2.0) / 6.0
+        + b * (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0
+        - c * (t + 1.0) * t * (t - 2.0) / 2.0
+        + d * (t + 1.0) * t * (t - 1.0) / 6.0
+    )
+
+
+@njit(cache=True)
+def pair_force(
+    penetration: float, compliance: float, contact: float, load_dependent: bool, weight: float
+) -> tuple[float, float]:
+    """Force N ≥ 0 and its slope dN/dδ of one pair.
+
+    Linear: δ = N (c + c_h).  Load-dependent: δ = c N + B N^0.9. Both times the engagement weight.
+
+    With N = u¹⁰ the second is convex and rising in u; from above the root Newton's method comes down without a miss.
+    """
+    if penetration <= 0.0 or weight <= 0.0:
+        return 0.0, 0.0
+    if not load_dependent:
+        slope = weight / (compliance + contact)
+        return slope * penetration, slope
+    u = min((penetration / compliance) ** 0.1, (penetration / contact) ** (1.0 / 9.0))
+    for _ in range(50):
+        u8 = u**8
+        change = (u8 * u * (compliance * u + contact) - penetration) / (u8 * (10.0 * compliance * u + 9.0 * contact))
+        u -= change
+        if change <= 1e-14 * u:
+            break
+    return weight * u**10, weight / (compliance + 0.9 * contact / u)
+
+
+@njit(cache=True)
+def share_load(
+    force: float,
+    compliance: FloatArray,
+    separation: FloatArray,
+    weight: FloatArray,
+    contact: float,
+    load_dependent: bool,
+    pair_forces: FloatArray,
+) -> tuple[float, float]:
+    """Approach δ at which the pairs' forces N_i(δ − E_i) sum to `force`; return δ and dF/dδ, fill `pair_forces`.
+
+    The sum is convex in δ, and a pair that carried everything alone gives a δ that is too large: Newton comes down.
+    """
+    delta = 1e300
+    for i in range(compliance.size):
+        if weight[i] > 0.0:
+            n = force / weight[i]
+            own = compliance[i] * n + (contact * n**0.9 if load_dependent else contact * n)
+            delta = min(delta, separation[i] + own)
+    slope = 0.0
+    for _ in range(60):
+        total, slope = -force, 0.0
+        for i in range(compliance.size):
+            n, k = pair_force(delta - separation[i], compliance[i], contact, load_dependent, weight[i])
+            pair_forces[i] = n
+            total += n
+            slope += k
+        if abs(total) <= 1e-13 * force or slope <= 0.0:
+            break
+        delta -= total / slope
+    return delta, slope
+
+
+@njit(cache=True)
+def share_loads(
+    force: float,
+    compliance: FloatArray,
+    separation: FloatArray,
+    weight: FloatArray,
+    contact: float,
+    load_dependent: bool,
+    delta: FloatArray,
+    slope: FloatArray,
+    pair_forces: FloatArray,
+) -> None:
+    """`share_load` at each row; fills the last three."""
+    for row in range(delta.size):
+        delta[row], slope[row] = share_load(
+            force, compliance[row], separation[row], weight[row], contact, load_dependent, pair_forces[row]
+        )
+
+
+@njit(cache=True)
+def fill_pairs(
+    mesh_cycles: FloatArray,
+    start: float,
+    step: float,
+    rows_1: FloatArray,
+    rows_2: FloatArray,
+    variant_1: FloatArray,
+    variant_2: FloatArray,
+    separation_1: FloatArray,
+    separation_2: FloatArray,
+    surface_1: FloatArray,
+    surface_2: FloatArray,
+    pitch_1: FloatArray,
+    pitch_2: FloatArray,
+    contact_ratio: float,
+    ramp: float,
+    compliance: FloatArray,
+    separation: FloatArray,
+    weight: FloatArray,
+) -> None:
+    """Look up compliance, separation and weight of the pairs at each c; column j is pair ⌊c + ramp/2⌋ − j."""
+    for row in range(mesh_cycles.size):
+        newest = int((mesh_cycles[row] + ramp / 2.0) // 1.0)
+        for j in range(compliance.shape[1]):
+            k = newest - j
+            progress = mesh_cycles[row] - k
+            tooth_1, tooth_2 = k % variant_1.size, k % variant_2.size
+            compliance[row, j] = cubic(rows_1[variant_1[tooth_1]], start, step, progress) + cubic(
+                rows_2[variant_2[tooth_2]], start, step, progress
+            )
+            flanks = cubic(separation_1[surface_1[tooth_1]], start, step, progress) + cubic(
+                separation_2[surface_2[tooth_2]], start, step, progress
+            )
+            separation[row, j] = flanks + pitch_1[tooth_1] + pitch_2[tooth_2]
+            weight[row, j] = engagement(progress, contact_ratio, ramp)

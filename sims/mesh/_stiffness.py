@@ -1,0 +1,516 @@
+"""A pair of gears with all that decides how stiff its mesh is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import pairwise
+from math import floor, pi
+from typing import NamedTuple
+
+import numpy as np
+
+from gearsig.checks import FloatArray, one_of, within
+from gearsig.errors import InputError
+from sims.mesh._deviation import IDEAL_FLANK, FlankDeviation, check_deviation
+from sims.mesh._faults import (
+    RootCrack,
+    ToothChip,
+    ToothSpall,
+    check_chip,
+    check_crack,
+    check_spall,
+    chip_share,
+    crack_tip_mm,
+    effective_flank_mm,
+    spall_share,
+)
+from sims.mesh._geometry import (
+    STEEL,
+    GearGeometry,
+    Material,
+    fillet_outline,
+    involute_outline,
+    root_half_angle_rad,
+    root_point_mm,
+)
+from sims.mesh._pair import WORKING_PRESSURE_PA, PairGeometry, contact_half_width_mm
+from sims.mesh._roughness import FlankRoughness
+
+# --------------------
+# Compliance of one tooth as a cantilever: bending, shear and axial compression along its true outline.
+# --------------------
+
+
+SHEAR_FACTOR = 1.2
+"""Of a rectangular section."""
+
+N_NODES = 24
+"""Gauss points on each part of the outline; 96 change the compliance by less than 1e-13."""
+
+
+class ToothCompliance(NamedTuple):
+    """Deflection along the force for 1 N on 1 m of face width, by cause; m²/N."""
+
+    bending: FloatArray
+    shear: FloatArray
+    axial: FloatArray
+
+    @property
+    def total(self) -> FloatArray:
+        """Sum of the three."""
+        return self.bending + self.shear + self.axial
+
+
+class _Sections(NamedTuple):
+    """Sections between root and contact, one row per contact; metres, dx times the Gauss weight."""
+
+    x: FloatArray
+    front: FloatArray
+    back: FloatArray
+    dx: FloatArray
+
+
+def tooth_compliance(
+    gear: GearGeometry, material: Material, roll_rad: FloatArray, crack: tuple[float, float] | None = None
+) -> ToothCompliance:
+    """Deflection of a tooth loaded on its flank, relative to its root, from the strain energy of a beam.
+
+    1/k_b = ∫ M²/(E I) dx,  1/k_s = ∫ 1.2 cos²α_m/(G A) dx,  1/k_a = ∫ sin²α_m/(E A) dx
+
+    over the sections from the root circle to the contact, for unit force. About the tooth's centre line the moment is
+    exactly M = r_b − x cos α_m; behind a crack the section's centroid lies off it by y₀, which adds y₀ sin α_m.
+
+    Parameters
+    ----------
+    gear : GearGeometry
+    material : Material
+    roll_rad : array, (n,)
+        τ = tan α at the contact, from the form roll to the tip roll.
+    crack : (depth_mm, angle_deg) or None
+        The same over the whole width considered.
+
+    Returns
+    -------
+    ToothCompliance
+        Arrays (n,), m²/N; divide by the face width in m.
+
+    Source: X. Tian, *Dynamic simulation for system response of gearbox including localized gear faults*, University of
+    Alberta (2004), for the energies; the outline with its trochoid fillet and the moment about r_b are derived.
+    """
+    tau = np.atleast_1d(np.asarray(roll_rad, dtype=np.float64))
+    sections = _sections(gear, tau, crack)
+    load_angle = (tau - gear.base_half_angle_rad)[:, None]
+    sine, cosine = np.sin(load_angle), np.cos(load_angle)
+    height = sections.front + sections.back
+    moment = gear.base_radius_mm * 1e-3 - sections.x * cosine + sine * (sections.front - sections.back) / 2.0
+    bending = np.sum(12.0 * moment**2 / height**3 * sections.dx, axis=1)
+    length_over_height = np.sum(sections.dx / height, axis=1)
+    shear = 2.0 * SHEAR_FACTOR * (1.0 + material.poisson_ratio) * cosine[:, 0] ** 2 * length_over_height
+    axial = sine[:, 0] ** 2 * length_over_height
+    e = material.youngs_modulus_pa
+    return ToothCompliance(bending / e, shear / e, axial / e)
+
+
+def cracked_tooth_compliance(
+    gear: GearGeometry,
+    material: Material,
+    roll_rad: FloatArray,
+    crack: RootCrack,
+    face_width_m: float,
+    n_slices: int = 12,
+) -> FloatArray:
+    """Compliance of a tooth with a crack over all or part of its width, slices side by side: 1/k = 1/Σ k(w) dw.
+
+    Parameters
+    ----------
+    gear, material, roll_rad
+        As for `tooth_compliance`.
+    crack : RootCrack
+    face_width_m : float
+        Loaded width; a crack wider than it counts as all through.
+    n_slices : int
+        Gauss points over the cracked width of a parabolic front.
+
+    Returns
+    -------
+    array
+        m/N (not per width).
+
+    Source: Z. Chen, Y. Shao, Dynamic simulation of spur gear with tooth root crack propagating along tooth width and
+    crack depth, Engineering Failure Analysis 18 (2011), for the slices, which do not hold each other.
+    """
+    check_crack(gear, crack)
+    width = face_width_m if crack.width_mm is None else min(crack.width_mm * 1e-3, face_width_m)
+    part, weight = np.array([0.0]), np.array([1.0])
+    if crack.front == "parabolic":
+        part, weight = _gauss(n_slices)
+    stiffness = np.zeros(np.shape(np.atleast_1d(roll_rad)))
+    if width < face_width_m:
+        stiffness += (face_width_m - width) / tooth_compliance(gear, material, roll_rad).total
+    for p, w in zip(part, weight, strict=True):
+        depth = crack.depth_mm * float(np.sqrt(1.0 - p))
+        stiffness += width * w / tooth_compliance(gear, material, roll_rad, (depth, crack.angle_deg)).total
+    result: FloatArray = 1.0 / stiffness
+    return result
+
+
+def _sections(gear: GearGeometry, tau: FloatArray, crack: tuple[float, float] | None) -> _Sections:
+    node, weight = _gauss(N_NODES)
+    pieces = []
+    cuts = _fillet_cuts(gear, crack)
+    for low, high in pairwise(cuts):
+        fillet = fillet_outline(gear, np.broadcast_to(low + (high - low) * node, (len(tau), N_NODES)))
+        pieces.append((fillet.x_mm, fillet.y_mm, fillet.dx_mm * weight * (high - low)))
+    span = (tau - gear.form_roll_rad)[:, None]
+    flank = involute_outline(gear, gear.form_roll_rad + span * node)
+    pieces.append((flank.x_mm, flank.y_mm, flank.dx_mm * weight * span))
+    x, y, dx = (np.concatenate(part, axis=1) for part in zip(*pieces, strict=True))
+    front = y if crack is None else effective_flank_mm(gear, *crack, x, y)
+    return _Sections(x * 1e-3, front * 1e-3, y * 1e-3, dx * 1e-3)
+
+
+def _fillet_cuts(gear: GearGeometry, crack: tuple[float, float] | None) -> tuple[float, ...]:
+    """γ from the root circle to the involute, split where the sections change abruptly: at a crack's tip and mouth."""
+    root, form = pi / 2.0, gear.pressure_angle_rad
+    if crack is None:
+        return root, form
+    x_end, _ = crack_tip_mm(gear, *crack)
+    middle = (root + form) / 2.0
+    if x_end <= root_point_mm(gear)[0]:
+        return root, middle, form
+    from scipy.optimize import brentq
+
+    def off(gamma: float) -> float:
+        return float(fillet_outline(gear, np.array([gamma])).x_mm[0]) - x_end
+
+    at_end = middle if off(middle) <= 0.0 else float(brentq(off, middle, root, xtol=1e-14))
+    return (root, at_end, form) if at_end == middle else (root, at_end, middle, form)
+
+
+@lru_cache(maxsize=8)
+def _gauss(n: int) -> tuple[FloatArray, FloatArray]:
+    """Gauss–Legendre nodes and weights on 0 to 1."""
+    x, w = np.polynomial.legendre.leggauss(n)
+    return (x + 1.0) / 2.0, w / 2.0
+
+
+# --------------------
+# Compliance of the contact itself.
+# --------------------
+
+
+CONTACT_LAWS = ("linear", "load-dependent")
+
+
+def linear_contact_compliance(one: Material, two: Material, face_width_m: float) -> float:
+    """1/k_h of two cylinders by the common linear form, 4 (1 − ν²)/(π E b), in m/N.
+
+    It depends neither on load nor on curvature and is stiffer than a real contact at working load.
+
+    Source: D. C. H. Yang, J. Y. Lin, Hertzian damping, tooth friction and bending elasticity in gear impact dynamics,
+    Journal of Mechanisms, Transmissions, and Automation in Design 109 (1987).
+    """
+    flexibility = sum((1.0 - m.poisson_ratio**2) / m.youngs_modulus_pa for m in (one, two))
+    return 2.0 * flexibility / (pi * face_width_m)
+
+
+def load_dependent_contact_coefficient(one: Material, two: Material, face_width_m: float) -> float:
+    """B of the approach δ = B F^0.9 of a line contact, B = 1.275/(E^0.9 b^0.8), in m/N^0.9.
+
+    E is the harmonic mean of the two moduli.
+
+    Source: A. Palmgren, *Ball and Roller Bearing Engineering* (1959), for the exponents; 1.275 as used for steel gears.
+    """
+    e = 2.0 / (1.0 / one.youngs_modulus_pa + 1.0 / two.youngs_modulus_pa)
+    return float(1.275 / (e**0.9 * face_width_m**0.8))
+
+
+# --------------------
+# Compliance of the gear body below a tooth: fillet foundation.
+# --------------------
+
+
+_COEFFICIENTS = np.array(
+    [
+        [-5.574e-5, -1.9986e-3, -2.3015e-4, 4.7702e-3, 0.0271, 6.8045],
+        [60.111e-5, 28.100e-3, -83.431e-4, -9.9256e-3, 0.1624, 0.9086],
+        [-50.952e-5, 185.50e-3, 0.0538e-4, 53.300e-3, 0.2895, 0.9236],
+        [-6.2042e-5, 9.0889e-3, -4.0964e-4, 7.8297e-3, -0.1472, 0.6904],
+    ]
+)
+"""Rows L*, M*, P*, Q*; columns A to F."""
+
+RADIUS_RATIO_RANGE = (1.4, 7.0)
+ROOT_ANGLE_RANGE_RAD = (0.01, 0.12)
+
+
+def foundation_factors(radius_ratio: float, root_angle_rad: float) -> FloatArray:
+    """L*, M*, P*, Q* from X = A/θ² + B h² + C h/θ + D/θ + E h + F.
+
+    Parameters
+    ----------
+    radius_ratio : float
+        h, root radius over bore radius; the polynomial was fitted for 1.4 to 7.
+    root_angle_rad : float
+        θ, half the angle of the tooth on the root circle; fitted for 0.01 to 0.12 rad.
+
+    Source: P. Sainsot, P. Velex, O. Duverger, Contribution of gear body to tooth deflections – a new bidimensional
+    analytical formula, Journal of Mechanical Design 126 (2004).
+    """
+    h, theta = radius_ratio, root_angle_rad
+    terms = np.array([1.0 / theta**2, h**2, h / theta, 1.0 / theta, h, 1.0])
+    factors: FloatArray = _COEFFICIENTS @ terms
+    return factors
+
+
+def foundation_compliance(gear: GearGeometry, material: Material, load_angle_rad: FloatArray) -> FloatArray:
+    """Deflection of a tooth along its force by the body's compliance, for 1 N on 1 m of face width.
+
+    δ b E/F = cos²α_m [L* (u/S)² + M* u/S + P* (1 + Q* tan²α_m)]
+
+    u is the distance from the root circle to the crossing of force and tooth centre line, S the root thickness.
+
+    Parameters
+    ----------
+    gear : GearGeometry
+    material : Material
+    load_angle_rad : array
+        α_m, between the force and the normal of the tooth's centre line.
+
+    Returns
+    -------
+    array
+        m²/N; divide by the face width in m.
+
+    Notes
+    -----
+    Teeth of one gear share the body, so that neighbours in contact also move each other; that coupling is left out. It
+    makes the mesh in double contact appear stiffer than it is. A crack does not change the body's compliance here.
+    """
+    l_star, m_star, p_star, q_star = foundation_factors(gear.root_radius_mm / gear.bore_mm, root_half_angle_rad(gear))
+    cosine, tangent = np.cos(load_angle_rad), np.tan(load_angle_rad)
+    root_thickness = 2.0 * gear.root_radius_mm * root_half_angle_rad(gear)
+    ratio = (gear.base_radius_mm / cosine - gear.root_radius_mm) / root_thickness
+    shape = l_star * ratio**2 + m_star * ratio + p_star * (1.0 + q_star * tangent**2)
+    result: FloatArray = cosine**2 * shape / material.youngs_modulus_pa
+    return result
+
+
+def foundation_notes(gear: GearGeometry) -> tuple[str, ...]:
+    """Say where a gear lies outside the range for which the foundation's polynomial was fitted."""
+    ratio, angle = gear.root_radius_mm / gear.bore_mm, root_half_angle_rad(gear)
+    name = f"gear of {gear.teeth} teeth: foundation compliance is extrapolated,"
+    notes = []
+    if not RADIUS_RATIO_RANGE[0] <= ratio <= RADIUS_RATIO_RANGE[1]:
+        notes.append(f"{name} root over bore radius is {ratio:.3g} (fitted for 1.4 to 7)")
+    if not ROOT_ANGLE_RANGE_RAD[0] <= angle <= ROOT_ANGLE_RANGE_RAD[1]:
+        notes.append(f"{name} root half angle is {angle:.3g} rad (fitted for 0.01 to 0.12)")
+    return tuple(notes)
+
+
+class MeshSide(NamedTuple):
+    """One gear of a mesh, and what is its own."""
+
+    gear: GearGeometry
+    material: Material
+    flank: FlankDeviation
+    roughness: FlankRoughness | None
+    cracks: tuple[RootCrack, ...]
+    spalls: tuple[ToothSpall, ...]
+    chips: tuple[ToothChip, ...]
+
+    def faults_of(self, tooth: int) -> ToothFaults:
+        """What is wrong with one tooth."""
+        crack = next((fault for fault in self.cracks if fault.tooth == tooth), None)
+        spall = next((fault for fault in self.spalls if fault.tooth == tooth), None)
+        chip = next((fault for fault in self.chips if fault.tooth == tooth), None)
+        return ToothFaults(crack, spall, chip)
+
+    @property
+    def faulty_teeth(self) -> tuple[int, ...]:
+        """Teeth with a crack, a spall or a chip, in rising order."""
+        return tuple(sorted(_teeth(self.cracks) | _teeth(self.spalls) | _teeth(self.chips)))
+
+
+class ToothFaults(NamedTuple):
+    """Faults of one tooth; none by default."""
+
+    crack: RootCrack | None = None
+    spall: ToothSpall | None = None
+    chip: ToothChip | None = None
+
+
+SOUND = ToothFaults()
+"""A tooth without a fault."""
+
+
+@dataclass(frozen=True)
+class GearMesh:
+    """Geometry, material, contact law, faults and flanks of a pair; 1 is the driver, 2 the driven gear.
+
+    Parameters
+    ----------
+    pair : PairGeometry
+    material_1, material_2 : Material
+    contact_law : str
+        "linear": a constant contact stiffness. "load-dependent": approach by the 0.9th power of the force.
+    cracks_1, cracks_2 : tuple of RootCrack
+        At most one per tooth.
+    flank_1, flank_2 : FlankDeviation
+    ramp : float
+        In base pitches, 0 to 0.1: over this length, half before and half after the ideal point, a pair takes up and
+        gives up its stiffness. 0 switches at once, which costs an integrator its order.
+    roughness_1, roughness_2 : FlankRoughness or None
+        A profile of its own for each tooth, which returns with the tooth.
+    spalls_1, spalls_2 : tuple of ToothSpall
+        At most one per tooth.
+    chips_1, chips_2 : tuple of ToothChip
+        At most one per tooth.
+
+    Notes
+    -----
+    Every pair has its own compliance and separation; pairs act in parallel. Neglected: coupling of neighbouring teeth
+    through the body, misalignment along the face, heating. Only the driving flanks are described.
+    """
+
+    pair: PairGeometry
+    material_1: Material = STEEL
+    material_2: Material = STEEL
+    contact_law: str = "linear"
+    cracks_1: tuple[RootCrack, ...] = ()
+    cracks_2: tuple[RootCrack, ...] = ()
+    flank_1: FlankDeviation = IDEAL_FLANK
+    flank_2: FlankDeviation = IDEAL_FLANK
+    ramp: float = 0.05
+    roughness_1: FlankRoughness | None = None
+    roughness_2: FlankRoughness | None = None
+    spalls_1: tuple[ToothSpall, ...] = ()
+    spalls_2: tuple[ToothSpall, ...] = ()
+    chips_1: tuple[ToothChip, ...] = ()
+    chips_2: tuple[ToothChip, ...] = ()
+
+    def __post_init__(self) -> None:
+        one_of(self.contact_law, "contact_law", CONTACT_LAWS)
+        within(self.ramp, "ramp", 0.0, 0.1, "base pitches")
+        for number in (1, 2):
+            side = self.side(number)
+            check_deviation(side.gear, side.flank)
+            self._check_faults(number)
+            _check_roughness(side)
+        self._check_corner_contact()
+
+    @property
+    def face_width_m(self) -> float:
+        """Loaded width."""
+        return self.pair.face_width_mm * 1e-3
+
+    @property
+    def n_slots(self) -> int:
+        """Most pairs that carry load at once, ramps included."""
+        return floor(self.pair.contact_ratio + self.ramp) + 1
+
+    @cached_property
+    def contact_coefficient(self) -> float:
+        """Compliance of the contact in m/N (linear), or B in m/N^0.9 (load-dependent)."""
+        law = linear_contact_compliance if self.contact_law == "linear" else load_dependent_contact_coefficient
+        return law(self.material_1, self.material_2, self.face_width_m)
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """Where the mesh lies outside the range of its formulas; empty if nowhere."""
+        return foundation_notes(self.pair.driver) + foundation_notes(self.pair.driven)
+
+    @cached_property
+    def contact_compliance(self) -> float:
+        """Compliance of the contact in m/N at working pressure: the constant one, or the secant B N^-0.1 at 1 GPa."""
+        if self.contact_law == "linear":
+            return self.contact_coefficient
+        half_width_m = contact_half_width_mm(self.pair, self.material_1, self.material_2) * 1e-3
+        force = pi / 2.0 * half_width_m * WORKING_PRESSURE_PA * self.face_width_m
+        return float(self.contact_coefficient * force**-0.1)
+
+    def side(self, number: int) -> MeshSide:
+        """Return gear 1, the driver, or gear 2, the driven one, with what is its own."""
+        if number == 1:
+            one = (self.pair.driver, self.material_1, self.flank_1, self.roughness_1)
+            return MeshSide(*one, self.cracks_1, self.spalls_1, self.chips_1)
+        two = (self.pair.driven, self.material_2, self.flank_2, self.roughness_2)
+        return MeshSide(*two, self.cracks_2, self.spalls_2, self.chips_2)
+
+    def roll_length_mm(self, side: int, progress: FloatArray) -> FloatArray:
+        """ρ of gear 1 or 2 at ζ, not below 0: a ramp may begin below the base circle, where there is no flank."""
+        rho: FloatArray = self.pair.contact_radii_mm(np.atleast_1d(np.asarray(progress, dtype=np.float64)))[side - 1]
+        return np.maximum(rho, 0.0)
+
+    def gear_compliance(self, side: int, progress: FloatArray, faults: ToothFaults = SOUND) -> FloatArray:
+        """Tooth and foundation of one gear, and what a spall or chip adds to tooth and contact, in m/N.
+
+        c = c_tooth/(1 − λ_chip) + c_foundation + c_h [λ_spall/(1 − λ_spall) + λ_chip/(1 − λ_chip)]
+
+        with the part λ of the width that the fault takes away. The contact of sound flanks, c_h, is not in it.
+
+        Parameters
+        ----------
+        side : int
+            1 for the driver, 2 for the driven gear.
+        progress : array
+            ζ = c − k, base pitches since the pair's ideal entry, 0 to the contact ratio.
+        faults : ToothFaults
+            Of the tooth.
+        """
+        gear, material = self.side(side)[:2]
+        width, rho = self.face_width_m, self.roll_length_mm(side, progress)
+        roll = rho / gear.base_radius_mm
+        if faults.crack is None:
+            tooth = tooth_compliance(gear, material, roll).total / width
+        else:
+            tooth = cracked_tooth_compliance(gear, material, roll, faults.crack, width)
+        foundation = foundation_compliance(gear, material, roll - gear.base_half_angle_rad) / width
+        result: FloatArray = tooth + foundation + self._lost_width_compliance(side, rho, faults, tooth)
+        return result
+
+    def _lost_width_compliance(self, side: int, rho: FloatArray, faults: ToothFaults, tooth: FloatArray) -> FloatArray:
+        extra = np.zeros_like(rho)
+        if faults.spall is not None:
+            lost = spall_share(self.pair, side, (self.material_1, self.material_2), faults.spall, rho)
+            extra += self.contact_compliance * lost / (1.0 - lost)
+        if faults.chip is not None:
+            lost = chip_share(self.pair, side, faults.chip, rho)
+            extra += (tooth + self.contact_compliance) * lost / (1.0 - lost)
+        return extra
+
+    def _check_faults(self, number: int) -> None:
+        side = self.side(number)
+        for crack in side.cracks:
+            check_crack(side.gear, crack)
+        for spall in side.spalls:
+            check_spall(self.pair, number, spall)
+        for chip in side.chips:
+            check_chip(self.pair, number, chip)
+        for name, faults in (("crack", side.cracks), ("spall", side.spalls), ("chip", side.chips)):
+            if len(_teeth(faults)) < len(faults):
+                raise InputError(f"two {name}s on one tooth", allowed=f"one {name} per tooth", remedy="give the larger")
+
+    def _check_corner_contact(self) -> None:
+        """During the ramps the flank is carried on a little beyond the tip; it must not end in a point there."""
+        for gear in (self.pair.driver, self.pair.driven):
+            roll = gear.tip_roll_rad + 0.5 * self.ramp * self.pair.base_pitch_mm / gear.base_radius_mm
+            half_angle = gear.base_half_angle_rad - (roll - np.arctan(roll))
+            if half_angle <= 0.0:
+                raise InputError(
+                    f"ramp is {self.ramp:g} base pitches: the tooth of the gear of {gear.teeth} teeth ends before",
+                    allowed="a shorter ramp, or 0",
+                    remedy="shorten the ramp or lower the addendum",
+                )
+
+
+def _teeth(faults: tuple[RootCrack, ...] | tuple[ToothSpall, ...] | tuple[ToothChip, ...]) -> set[int]:
+    return {fault.tooth for fault in faults}
+
+
+def _check_roughness(side: MeshSide) -> None:
+    if side.roughness is not None and side.roughness.n_teeth != side.gear.teeth:
+        raise InputError(
+            f"the roughness has profiles of {side.roughness.n_teeth} teeth", allowed=f"one per tooth, {side.gear.teeth}"
+        )

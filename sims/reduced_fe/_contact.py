@@ -1,0 +1,638 @@
+"""The contact of two reduced gears as arrays over the progress of a tooth pair, which compiled code reads."""
+
+# mypy: allow-untyped-defs, allow-untyped-calls
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import ceil, floor
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray, within
+from gearsig.errors import InputError
+from sims.compiled import UNCOUNTED
+from sims.mesh import (
+    SOUND,
+    GearMesh,
+    PairGeometry,
+    load_dependent_contact_coefficient,
+    pitch_separation_m,
+    separation_rows,
+)
+from sims.reduced_fe._crack import crack_added_m_per_n
+from sims.reduced_fe._reduced_gear import ReducedGear
+
+# --------------------
+# Where a tooth pair touches over its progress, and how far apart it is before and after: corner contact.
+# --------------------
+
+
+def rolls_rad(pair: PairGeometry, progress: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Roll angles τ of driver and driven gear at ζ, held at the ends of the path of contact.
+
+    Before its ideal entry a pair touches at the driven gear's tip, after its ideal end at the driver's; where exactly
+    the corner then stands on the mate's flank is left out.
+    """
+    inside = np.clip(progress, 0.0, pair.contact_ratio)
+    rho_1, rho_2 = pair.contact_radii_mm(inside)
+    return rho_1 / pair.driver.base_radius_mm, rho_2 / pair.driven.base_radius_mm
+
+
+def corner_separation_m(pair: PairGeometry, progress: FloatArray) -> FloatArray:
+    """Distance between the unloaded flanks of a pair along the line of action; 0 on the path of contact, else above 0.
+
+    Before ζ = 0 the tip corner of the driven gear has not yet reached the line of action. The involute of the driver
+    that runs through the corner starts ahead of the driver's own flank, and r_b1 times that angle is what the driver
+    would have to yield by for the two to touch. Beyond ζ = ε the gears change places.
+
+    Parameters
+    ----------
+    pair : PairGeometry
+    progress : array, (n,)
+        ζ, base pitches since the ideal entry.
+
+    Returns
+    -------
+    array, (n,)
+        m.
+    """
+    rb1, rb2 = pair.driver.base_radius_mm, pair.driven.base_radius_mm
+    length, pitch = pair.action_length_mm, pair.base_pitch_mm
+    early = np.maximum(-progress, 0.0) * pitch
+    late = np.maximum(progress - pair.contact_ratio, 0.0) * pitch
+    entry = _corner_mm(rb1, rb2, length, pair.start_radius_mm, early)
+    leave = _corner_mm(rb2, rb1, length, length - pair.end_radius_mm, late)
+    result: FloatArray = 1e-3 * (entry + leave)
+    return result
+
+
+def _corner_mm(rb_flank: float, rb_tip: float, length: float, start: float, before: FloatArray) -> FloatArray:
+    """Separation of a tip corner that still has `before` to go along the line of action, mm.
+
+    Origin at the flank's base tangent point, y along the line of action; centres at (−rb_flank, 0), (rb_tip, length).
+    """
+    turn = before / rb_tip
+    x, y = -rb_tip, start - length
+    corner_x = rb_tip + x * np.cos(turn) - y * np.sin(turn)
+    corner_y = length + x * np.sin(turn) + y * np.cos(turn)
+    across, up = corner_x + rb_flank, corner_y
+    radius = np.hypot(across, up)
+    tangent = np.sqrt(np.maximum((radius / rb_flank) ** 2 - 1.0, 0.0))
+    base_angle = np.arctan2(up, across) + tangent - np.arctan(tangent)
+    own = (start - before) / rb_flank
+    result: FloatArray = np.where(before > 0.0, rb_flank * (base_angle - own), 0.0)
+    return result
+
+
+def over_height(roll: FloatArray, values: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Values at the heights of a grid (first axis) between them, by a cubic spline; held beyond the grid's ends."""
+    from scipy.interpolate import CubicSpline
+
+    spline = CubicSpline(roll, values, axis=0)
+    result: FloatArray = spline(np.clip(wanted, roll[0], roll[-1]))
+    return result
+
+
+# --------------------
+# What faulty teeth add to the compliance between the slices of a tooth pair.
+# --------------------
+
+
+def fault_compliance_rows(
+    gear: ReducedGear, mesh: GearMesh, side: int, progress: FloatArray
+) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Added compliance over ζ, (n_variants, n, n_slices, n_slices) in m/N, and the row of each tooth.
+
+    Row 0 belongs to sound teeth. A crack adds what finite elements of the cracked tooth yield more than those of the
+    sound one, see `sims.reduced_fe`. A spall or chip adds as in `sims.mesh.GearMesh`, alike in every
+    slice.
+
+    Notes
+    -----
+    A crack leaves the gear's modes as they are: one tooth in fifty hardly changes them.
+    """
+    own, n_slices = mesh.side(side), len(gear.grid.z_m)
+    variant = np.zeros(own.gear.teeth, dtype=np.int64)
+    rows = [np.zeros((len(progress), n_slices, n_slices))]
+    sound = mesh.gear_compliance(side, progress)
+    roll = rolls_rad(mesh.pair, progress)[side - 1]
+    for row, tooth in enumerate(own.faulty_teeth, start=1):
+        faults = own.faults_of(tooth)
+        lost = mesh.gear_compliance(side, progress, faults._replace(crack=SOUND.crack)) - sound
+        added = n_slices * lost[:, None, None] * np.eye(n_slices)
+        if faults.crack is not None:
+            added = added + over_height(gear.grid.roll_rad, crack_added_m_per_n(gear, faults.crack), roll)
+        rows.append(added)
+        variant[tooth] = row
+    return np.array(rows), variant
+
+
+POINTS_PER_PITCH = 64
+"""Columns per base pitch; a whole number, so that the columns of the next pair lie on those of this one."""
+MARGIN = 20 / POINTS_PER_PITCH
+"""Base pitches before the ideal entry and after the ideal end within which a loaded pair may touch by a corner."""
+LARGEST_LEAD_UM = 500.0
+FLANK = 0
+"""Of a `FlankGrid`: the flank that both gears drive with, each seen from its own side."""
+SIGNS = (-1, 1)
+"""The next tooth to touch lies at a smaller angle of the driver (ccw) and at a greater one of the driven gear (cw)."""
+
+ToothCompliance = Callable[[ReducedGear, list[int]], FloatArray]
+"""Compliance between the points of some teeth, as `ReducedGear.compliance_m_per_n`."""
+
+
+@dataclass(frozen=True)
+class ContactTable:
+    """Compliance, separation and local contact of tooth pairs and slices over ζ, base pitches since ideal entry.
+
+    Pair k touches at ζ = c − k, c = z1 θ1/2π; it is made of tooth k mod z1 and tooth k mod z2. Slices are counted from
+    the end face at −z.
+
+    Parameters
+    ----------
+    start, step : float
+        Least ζ, and distance of the columns (1/`POINTS_PER_PITCH`). One column lies beyond either end, for cubics.
+    contact_ratio : float
+    own : array, (n, n_slices, n_slices)
+        Compliance between the slices of a pair, both gears together, m/N.
+    cross : array, (n_offsets, n, n_slices, n_slices)
+        Between a pair at ζ (first slice) and the pair that entered o + 1 pitches earlier (second), m/N.
+    corner_m : array, (n,)
+        Separation of unloaded perfect flanks.
+    extra_1, extra_2 : arrays, (n_variants, n, n_slices, n_slices)
+        What faulty teeth add to the compliance between their slices; row 0, of sound teeth, is 0.
+    variant_1, variant_2 : int arrays, (z,)
+    separation_1_m, separation_2_m : arrays, (n_surfaces, n)
+        Metal missing on the flanks, see `sims.mesh.MeshTable`.
+    surface_1, surface_2 : int arrays, (z,)
+    pitch_1_m, pitch_2_m : arrays, (z,)
+    lead_m : array, (n_slices,)
+        Separation of each slice by misaligned axes, its least being 0.
+    hertz : array, (n_slices,)
+        B of a slice, h = B N^0.9, m/N^0.9.
+    """
+
+    start: float
+    step: float
+    contact_ratio: float
+    own: FloatArray
+    cross: FloatArray
+    corner_m: FloatArray
+    extra_1: FloatArray
+    extra_2: FloatArray
+    variant_1: NDArray[np.int64]
+    variant_2: NDArray[np.int64]
+    separation_1_m: FloatArray
+    separation_2_m: FloatArray
+    surface_1: NDArray[np.int64]
+    surface_2: NDArray[np.int64]
+    pitch_1_m: FloatArray
+    pitch_2_m: FloatArray
+    lead_m: FloatArray
+    hertz: FloatArray
+
+    @property
+    def progress(self) -> FloatArray:
+        """ζ of the columns."""
+        result: FloatArray = self.start + self.step * np.arange(-1, len(self.own) - 1)
+        return result
+
+    def column(self, progress: float) -> int:
+        """Column nearest to ζ."""
+        return round((progress - self.start) / self.step) + 1
+
+    @property
+    def n_slices(self) -> int:
+        """Slices of the face width."""
+        return int(self.own.shape[1])
+
+    @property
+    def n_slots(self) -> int:
+        """Most pairs that may touch at once, corners included."""
+        return floor((len(self.own) - 3) * self.step) + 1
+
+    @property
+    def arrays(self) -> tuple[FloatArray | NDArray[np.int64], ...]:
+        """In the order in which kernels take them; one of each kind for both gears, the driver's rows first."""
+        n1 = len(self.extra_1) - 1, len(self.separation_1_m)  # sound teeth of both gears share row 0
+        rows = np.zeros((4, max(len(self.variant_1), len(self.variant_2))), dtype=np.int64)
+        pitch = np.zeros((2, rows.shape[1]))
+        for i, values in enumerate(
+            (
+                self.variant_1,
+                np.where(self.variant_2 > 0, self.variant_2 + n1[0], 0),
+                self.surface_1,
+                self.surface_2 + n1[1],
+            )
+        ):
+            rows[i, : len(values)] = values
+        for i, places in enumerate((self.pitch_1_m, self.pitch_2_m)):
+            pitch[i, : len(places)] = places
+        extra = np.ascontiguousarray(np.concatenate((self.extra_1, self.extra_2[1:])))
+        separation = np.ascontiguousarray(np.vstack((self.separation_1_m, self.separation_2_m)))
+        return self.own, self.cross, self.corner_m, extra, separation, rows, pitch, self.lead_m, self.hertz
+
+
+def contact_table(
+    gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, compliance: ToothCompliance, *, lead_um: float = 0.0
+) -> ContactTable:
+    """Tabulate the contact of two reduced gears.
+
+    Parameters
+    ----------
+    gears : (ReducedGear, ReducedGear)
+        Driver and driven gear, with the same slices.
+    mesh : GearMesh
+        Geometry of the pair, its faults and deviations. The compliance of sound teeth is the gears'.
+    compliance : callable
+        Which part of each gear's compliance: all of it for statics, the rest beside the modes for dynamics.
+    lead_um : float
+        How much further apart the flanks are at one end of the face than at the other; above 0: open towards +z.
+
+    Raises
+    ------
+    InputError
+        If the gears are not those of the mesh, or their slices differ.
+    """
+    check_gears(gears, mesh)
+    within(lead_um, "lead_error_um", -LARGEST_LEAD_UM, LARGEST_LEAD_UM, "um")
+    n_before = round(MARGIN * POINTS_PER_PITCH)
+    n = n_before + ceil((mesh.pair.contact_ratio + MARGIN) * POINTS_PER_PITCH) + 3
+    step = 1.0 / POINTS_PER_PITCH
+    progress = -MARGIN + step * np.arange(-1, n - 1)
+    inside = np.clip(progress, 0.0, mesh.pair.contact_ratio)
+    own, cross = _compliances(gears, mesh, progress, compliance)
+    places = np.linspace(0.0, 1.0, len(gears[0].grid.z_m))
+    lead = 1e-6 * abs(lead_um) * (places if lead_um >= 0.0 else 1.0 - places)
+    faults = [fault_compliance_rows(gears[side - 1], mesh, side, inside) for side in (1, 2)]
+    flanks = [separation_rows(mesh, side, inside) for side in (1, 2)]
+    whole = load_dependent_contact_coefficient(mesh.material_1, mesh.material_2, mesh.face_width_m)
+    return ContactTable(
+        start=-MARGIN,
+        step=step,
+        contact_ratio=mesh.pair.contact_ratio,
+        own=own,
+        cross=cross,
+        corner_m=corner_separation_m(mesh.pair, progress),
+        extra_1=faults[0][0],
+        extra_2=faults[1][0],
+        variant_1=faults[0][1],
+        variant_2=faults[1][1],
+        separation_1_m=flanks[0][0],
+        separation_2_m=flanks[1][0],
+        surface_1=flanks[0][1],
+        surface_2=flanks[1][1],
+        pitch_1_m=pitch_separation_m(mesh.pair.driver, mesh.flank_1),
+        pitch_2_m=pitch_separation_m(mesh.pair.driven, mesh.flank_2),
+        lead_m=lead,
+        # An evenly loaded pair yields as the whole width does: h(N_s) = B (n N_s)^0.9.
+        hertz=np.full(len(lead), whole * len(lead) ** 0.9),
+    )
+
+
+def static_table(
+    gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, *, lead_um: float = 0.0, support: str = "hub_held"
+) -> ContactTable:
+    """Return the table for statics: all of the elastic compliance, held at the hubs whose motion is measured."""
+
+    def whole(gear: ReducedGear, teeth: list[int]) -> FloatArray:
+        return gear.compliance_m_per_n(teeth, support)  # type: ignore[arg-type]  # refused there if not one of its words
+
+    return contact_table(gears, mesh, whole, lead_um=lead_um)
+
+
+def check_gears(gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh) -> None:
+    """Refuse reduced gears that are not those of the mesh."""
+    for name, gear, wanted in zip(("driver", "driven"), gears, (mesh.pair.driver, mesh.pair.driven), strict=True):
+        own = gear.blank.geometry
+        if replace(own, bore_radius_mm=None) != replace(wanted, bore_radius_mm=None) or own.bore_mm != wanted.bore_mm:
+            raise InputError(f"the {name}'s reduced gear is of {own}", where="gears", allowed=f"{wanted}")
+    if len(gears[0].grid.z_m) != len(gears[1].grid.z_m) or not np.allclose(gears[0].grid.z_m, gears[1].grid.z_m):
+        raise InputError("the slices of the two reduced gears differ", remedy="reduce both with the same slices")
+
+
+def _compliances(
+    gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, progress: FloatArray, compliance: ToothCompliance
+) -> tuple[FloatArray, FloatArray]:
+    """Own and cross compliance of both gears together; see `ContactTable`."""
+    n, n_slices = len(progress), len(gears[0].grid.z_m)
+    n_offsets = floor((n - 1) / POINTS_PER_PITCH)
+    own = np.zeros((n, n_slices, n_slices))
+    cross = np.zeros((n_offsets, n, n_slices, n_slices))
+    here = rolls_rad(mesh.pair, progress)
+    for gear, sign, roll, side in zip(gears, SIGNS, here, (0, 1), strict=True):
+        block = _between(gear, [0], compliance)
+        own += _along_diagonal(gear.grid.roll_rad, block, roll)
+        for o in range(min(n_offsets, gear.n_offsets - 1)):
+            older = rolls_rad(mesh.pair, progress + o + 1.0)[side]
+            block = _between(gear, [0, -sign * (o + 1)], compliance)
+            cross[o] += _over_both(gear.grid.roll_rad, block, roll, older)
+    return own, cross
+
+
+def _between(gear: ReducedGear, teeth: list[int], compliance: ToothCompliance) -> FloatArray:
+    """Compliance between the driving flanks of the first and the last of the teeth, (heights, slices) twice."""
+    n, shape = gear.grid.n_points, gear.grid.shape
+    block = compliance(gear, teeth)[:n, -n:]
+    result: FloatArray = block.reshape(*shape, *shape)[FLANK, :, :, FLANK]
+    return result
+
+
+def _along_diagonal(roll: FloatArray, block: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Compliance between slices at one height, (n, n_slices, n_slices)."""
+    heights = np.arange(len(roll))
+    return over_height(roll, block[heights, :, heights, :], wanted)
+
+
+def _over_both(roll: FloatArray, block: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
+    """Compliance between slices at two heights, (n, n_slices, n_slices)."""
+    from scipy.interpolate import RectBivariateSpline
+
+    n_slices, order = block.shape[1], min(3, len(roll) - 1)
+    x, y = (np.clip(place, roll[0], roll[-1]) for place in (first, second))
+    found = np.empty((len(first), n_slices, n_slices))
+    for s in range(n_slices):
+        for t in range(n_slices):
+            found[:, s, t] = RectBivariateSpline(roll, roll, block[:, s, :, t], kx=order, ky=order).ev(x, y)
+    return found
+
+
+# --------------------
+# Slices that mirror each other carry alike where nothing tells the ends of the face apart: then one stands for two.
+# --------------------
+
+
+ALIKE = 1e-5
+"""Relative difference up to which the two halves of the face count as alike: that of the finite elements' solver."""
+
+
+def mirror_groups(n_slices: int) -> FloatArray:
+    """Which group each slice belongs to, from the middle plane's ends inwards, (n_slices, n_groups) of 0 and 1.
+
+    Examples
+    --------
+    >>> mirror_groups(3).tolist()
+    [[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]]
+    """
+    n_groups = (n_slices + 1) // 2
+    groups = np.zeros((n_slices, n_groups))
+    places = np.arange(n_slices)
+    groups[places, np.minimum(places, n_slices - 1 - places)] = 1.0
+    return groups
+
+
+def mirrors(table: ContactTable) -> bool:
+    """Whether both halves of the face are alike: compliance, faults, and no misalignment."""
+    if np.any(table.lead_m != 0.0) or table.n_slices < 2:
+        return False
+    return all(
+        bool(np.max(np.abs(c - c[..., ::-1, ::-1])) <= ALIKE * np.max(np.abs(table.own)))
+        for c in (table.own, table.cross, table.extra_1, table.extra_2)
+    )
+
+
+def folded(table: ContactTable) -> ContactTable:
+    """Return the table of groups of slices: the force of a group is the sum of its slices'.
+
+    N_s = F_g/|g| gives D_g = Σ_h mean_gh(R) F_h + B |g|^-0.9 F_g^0.9: nothing is lost.
+    """
+    groups = mirror_groups(table.n_slices)
+    size = groups.sum(axis=0)
+    mean = groups / size
+
+    def grouped(compliance: FloatArray) -> FloatArray:
+        return np.ascontiguousarray(np.einsum("sg,...st,th->...gh", mean, compliance, mean))
+
+    return replace(
+        table,
+        own=grouped(table.own),
+        cross=grouped(table.cross),
+        extra_1=grouped(table.extra_1),
+        extra_2=grouped(table.extra_2),
+        lead_m=np.zeros(len(size)),
+        hertz=table.hertz @ mean * size**-0.9,
+    )
+
+
+# --------------------
+# Compiled contact of several points on elastic bodies: which carry, and how much.
+#
+# Points i at the approach D_i carry N_i ≥ 0 with D = R N + h(N) where they touch; R is the compliance of the bodies and
+# h(N) = B N^0.9 the local approach by Hertz. Below the force `small` the latter is straight, h = B small^-0.1 N, so
+# that a contact that begins has a finite stiffness.
+# --------------------
+
+
+FAST = {"reassoc", "contract", "nsz"}
+"""Sums may be reordered for vector instructions; infinities and NaN keep their meaning."""
+MOST_ITERATIONS = 60
+
+
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
+def root(force, small, guess):
+    """max(N, small)^-0.1, by Newton's method from a guess near it."""
+    n = max(force, small)
+    w2 = guess * guess
+    w4 = w2 * w2
+    off = n * w4 * w4 * w2
+    if off < 0.7 or off > 1.4:
+        return n**-0.1
+    w = guess * (1.1 - 0.1 * off)
+    w2 = w * w
+    w4 = w2 * w2
+    return w * (1.1 - 0.1 * n * w4 * w4 * w2)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED)
+def factorised(a, n):
+    """Overwrite the lower triangle of a symmetric positive matrix by its Cholesky factor, with 1/diagonal on it."""
+    for i in range(n):
+        for j in range(i):
+            total = a[i, j]
+            for k in range(j):
+                total -= a[i, k] * a[j, k]
+            a[i, j] = total * a[j, j]
+        total = a[i, i]
+        for k in range(i):
+            total -= a[i, k] * a[i, k]
+        if not total > 0.0:
+            return False
+        a[i, i] = 1.0 / total**0.5
+    return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED)
+def back_substituted(a, n, x):
+    """Solve with the factor of `factorised`, in place."""
+    for i in range(n):
+        total = x[i]
+        for k in range(i):
+            total -= a[i, k] * x[k]
+        x[i] = total * a[i, i]
+    for i in range(n - 1, -1, -1):
+        total = x[i]
+        for k in range(i + 1, n):
+            total -= a[k, i] * x[k]
+        x[i] = total * a[i, i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED)
+def solve_contacts(r, n, approach, hertz, small, force, w, enough, order, a, x):
+    """Fill `force` (start values on entry) with N ≥ 0; return the number of iterations, or −1 where it fails.
+
+    r : (≥ n, ≥ n) compliance, symmetric.
+    approach : (≥ n,) D.
+    hertz : (n_s,) B of the slices; point i is of slice i mod n_s.
+    w : (≥ n,) N^-0.1, carried along.
+    enough : largest change of a force at which an iteration counts as the last. Newton's error falls with the square
+        of the change, as h is almost straight: a change of 5 % leaves 1e-4.
+    order, a, x : scratch; on return order[:m] are the points that touch and `a` the factor of R + h'(N) over them.
+    """
+    n_s = hertz.shape[0]
+    for iteration in range(1, MOST_ITERATIONS + 1):
+        m = 0
+        for i in range(n):
+            free = approach[i]
+            for j in range(n):
+                free -= r[i, j] * force[j]
+            if force[i] > 0.0 or free > 0.0:
+                w[i] = root(force[i], small, w[i])
+                order[m] = i
+                x[m] = free - hertz[i % n_s] * w[i] * force[i]
+                m += 1
+        for p in range(m):
+            i = order[p]
+            for s in range(p):
+                a[p, s] = r[i, order[s]]
+            a[p, p] = r[i, i] + (0.9 if force[i] > small else 1.0) * hertz[i % n_s] * w[i]
+        if not factorised(a, m):
+            return -1, m
+        back_substituted(a, m, x)
+        largest, let_go = 0.0, False
+        for p in range(m):
+            i = order[p]
+            change = x[p]
+            if force[i] + change < 0.0:
+                change, let_go = -force[i], let_go or force[i] > 0.0
+            force[i] += change
+            largest = max(largest, abs(change))
+        if largest <= enough and not let_go:
+            return iteration, m
+        if not largest < 1e30:
+            return -1, m
+    return -1, 0
+
+
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
+def hertz_energy(force, hertz, small):
+    """Energy of the local approach, ∫ N dh, in J."""
+    if force <= small:
+        return 0.5 * hertz * small**-0.1 * force * force
+    upper = hertz * 0.9 / 1.9 * (force**1.9 - small**1.9)
+    return 0.5 * hertz * small**1.9 + upper
+
+
+# --------------------
+# Compiled: which tooth pairs are near contact, how far apart their flanks are, how compliant their points.
+# --------------------
+
+
+MOST_CYCLES = 1e12
+"""Mesh cycles beyond which a run has burst; until then, single cycles are resolved to 1e-4."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
+def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reach, pairs, columns, parts, apart, slope):
+    """Find the pairs whose flanks are less than `reach` apart; return their number.
+
+    corner, separation, rows, pitch : see `ContactTable.arrays`.
+    teeth : (z1, z2), as floats: their remainder takes a fraction of that of whole numbers.
+    pairs : (n_slots,) filled with the pairs' numbers k, the newest first.
+    start, step : see `ContactTable`.
+    columns, parts : column i of the table and part t of a step beyond it.
+    apart, slope : separation in m, and its change per base pitch.
+    """
+    if not abs(cycles) < MOST_CYCLES:
+        return -1
+    n, last = 0, corner.shape[0] - 3
+    newest = np.floor(cycles - start)
+    for slot in range(pairs.shape[0]):
+        pair = newest - slot
+        place = (cycles - pair - start) / step
+        i = int(place) + 1  # one column lies ahead of the start
+        if i > last:
+            break
+        t = place - int(place)
+        one, two = int(pair - teeth[0] * np.floor(pair / teeth[0])), int(pair - teeth[1] * np.floor(pair / teeth[1]))
+        a, b = rows[2, one], rows[3, two]
+        e0 = corner[i - 1] + separation[a, i - 1] + separation[b, i - 1]
+        e1 = corner[i] + separation[a, i] + separation[b, i]
+        e2 = corner[i + 1] + separation[a, i + 1] + separation[b, i + 1]
+        e3 = corner[i + 2] + separation[a, i + 2] + separation[b, i + 2]
+        # The cubic with the slopes (e2 − e0)/2 and (e3 − e1)/2: continuous slopes, as the contact's damping needs.
+        c1, c2, c3 = 0.5 * (e2 - e0), e0 - 2.5 * e1 + 2.0 * e2 - 0.5 * e3, 1.5 * (e1 - e2) + 0.5 * (e3 - e0)
+        here = e1 + t * (c1 + t * (c2 + t * c3)) + pitch[0, one] + pitch[1, two]
+        if here < reach:
+            pairs[n], columns[n], parts[n] = pair, i, t
+            apart[n], slope[n] = here, (c1 + t * (2.0 * c2 + t * 3.0 * c3)) / step
+            n += 1
+    return n
+
+
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
+def fill_compliance(n, pairs, columns, parts, teeth, own, cross, extra, rows, r):
+    """Fill r[p·n_s + s, q·n_s + t] with the compliance between slices of the near pairs; both triangles."""
+    n_s = own.shape[1]
+    for p in range(n):
+        i, t = columns[p], parts[p]
+        pair = pairs[p]
+        one, two = int(pair - teeth[0] * np.floor(pair / teeth[0])), int(pair - teeth[1] * np.floor(pair / teeth[1]))
+        a, b = rows[0, one], rows[1, two]
+        at = p * n_s
+        for s in range(n_s):
+            for u in range(n_s):
+                r[at + s, at + u] = own[i, s, u] + t * (own[i + 1, s, u] - own[i, s, u])
+        for row in (a, b):
+            if row > 0:  # a faulty tooth
+                for s in range(n_s):
+                    for u in range(n_s):
+                        low, high = extra[row, i, s, u], extra[row, i + 1, s, u]
+                        r[at + s, at + u] += low + t * (high - low)
+        for q in range(p + 1, n):  # the older pairs
+            o = int(pair - pairs[q]) - 1
+            for s in range(n_s):
+                for u in range(n_s):
+                    value = 0.0
+                    if o < cross.shape[0]:
+                        value = cross[o, i, s, u] + t * (cross[o, i + 1, s, u] - cross[o, i, s, u])
+                    r[at + s, q * n_s + u] = value
+                    r[q * n_s + u, at + s] = value
+
+
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
+def compliance_slope_energy(n, pairs, columns, teeth, own, cross, extra, rows, step, force):
+    """½ Nᵀ (∂R/∂ζ) N of the near pairs, in J per base pitch."""
+    n_s, total = own.shape[1], 0.0
+    for p in range(n):
+        i, pair, at = columns[p], pairs[p], p * own.shape[1]
+        one, two = int(pair - teeth[0] * np.floor(pair / teeth[0])), int(pair - teeth[1] * np.floor(pair / teeth[1]))
+        a, b = rows[0, one], rows[1, two]
+        for s in range(n_s):
+            line = 0.0
+            for u in range(n_s):
+                line += (own[i + 1, s, u] - own[i, s, u]) * force[at + u]
+            for row in (a, b):
+                if row > 0:
+                    for u in range(n_s):
+                        line += (extra[row, i + 1, s, u] - extra[row, i, s, u]) * force[at + u]
+            for q in range(p + 1, n):
+                o = int(pair - pairs[q]) - 1
+                if o < cross.shape[0]:
+                    for u in range(n_s):
+                        line += 2.0 * (cross[o, i + 1, s, u] - cross[o, i, s, u]) * force[q * n_s + u]
+            total += 0.5 * line * force[at + s]
+    return total / step

@@ -1,0 +1,973 @@
+"""The flexible pair as plain numbers, which compiled code reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from math import cos, pi, radians, sin
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray, positive, within
+from gearsig.errors import InputError
+from sims.gear_pair import (
+    BEARING_FIELDS,
+    DRIVE_FIELDS,
+    DRIVE_SCALARS,
+    FRICTION_SCALARS,
+    bearing_fields,
+    bearing_loads_n,
+    drive_fields,
+    friction_fields,
+)
+from sims.machine import BearingSupport, Machine, Operation
+from sims.mesh import PairGeometry, one_mesh_cycle
+from sims.reduced_fe._contact import (
+    FLANK,
+    SIGNS,
+    ContactTable,
+    contact_table,
+    folded,
+    mirror_groups,
+    mirrors,
+    over_height,
+    rolls_rad,
+    static_table,
+)
+from sims.reduced_fe._maps import MeshMaps, contact_state, mesh_maps, teeth_of
+from sims.reduced_fe._reduced_gear import ReducedGear
+
+if TYPE_CHECKING:
+    from sims.reduced_fe._respond import FlexState
+
+
+# --------------------
+# Bearings with rolling elements as springs about their static load: softness across it, feet that move.
+#
+# A bearing with clearance c that its load presses to one side by δ = Q/k is as stiff as it is along the load, and only
+# k δ/(c + δ) across it, as the shaft may roll along the race. Rolling elements that pass move the spring's foot: over a
+# spall it sinks, with clearance it sways (see `sims.gear_pair`). Their load is that of the torque at this moment,
+# without the vibration; a load that lets the shaft lift is refused.
+# --------------------
+
+
+ROLLING_FIELDS: list[tuple[str, type, tuple[int, ...]]] = [
+    *BEARING_FIELDS,
+    ("bearing_yield", np.float64, (4, 2)),  # by the load of the nominal torque, m
+    ("bearing_play", np.float64, (4, 2)),  # clearance towards the load, m
+    ("bearing_spring", np.float64, (4, 2, 2)),
+]
+"""Of the kernel's record, one entry per bearing."""
+
+
+class Spring(NamedTuple):
+    """Stiffness in one direction."""
+
+    direction: FloatArray
+    n_per_m: float
+
+
+def bearing_springs(support: BearingSupport, load_n: FloatArray) -> tuple[Spring, Spring]:
+    """Return a bearing's springs: along x and y, or with clearance along its load and across it."""
+    k, clearance, load = support.stiffness_n_per_m, support.clearance_um * 1e-6, float(np.hypot(*load_n))
+    if clearance == 0.0:
+        return Spring(np.array([1.0, 0.0]), k), Spring(np.array([0.0, 1.0]), k)
+    along = load_n / load
+    yielded = load / k
+    return Spring(along, k), Spring(np.array([-along[1], along[0]]), k * yielded / (clearance + yielded))
+
+
+def rolling_fields(
+    machine: Machine, operation: Operation, force_n: float, loads_n: FloatArray, rng: np.random.Generator
+) -> dict[str, Any]:
+    """Values of `ROLLING_FIELDS` at the set mesh force; draws the elements' places.
+
+    Raises
+    ------
+    InputError
+        If a bearing with clearance is not loaded all the time.
+    """
+    _check_load(machine, operation)
+    springs = np.zeros((4, 2, 2))
+    given, play = np.zeros((4, 2)), np.zeros((4, 2))
+    for row, (support, load) in enumerate(zip(machine.bearings, loads_n, strict=True)):
+        for spring in bearing_springs(support, load):
+            springs[row] += spring.n_per_m * np.outer(spring.direction, spring.direction)
+        given[row] = load / support.stiffness_n_per_m
+        if support.clearance_um > 0.0:
+            play[row] = support.clearance_um * 1e-6 * load / np.hypot(*load)
+    own = {"bearing_yield": given, "bearing_play": play, "bearing_spring": springs}
+    return bearing_fields(machine, force_n, rng) | own
+
+
+def _check_load(machine: Machine, operation: Operation) -> None:
+    least = float(np.min(operation.torque_nm.values))
+    loose = next((b for b in machine.bearings if b.clearance_um > 0.0), None)
+    if loose is not None and least <= 0.0:
+        raise InputError(
+            f"torque_nm falls to {least:g} N m and {loose.bearing.name!r} has clearance: the shaft would lift in it",
+            where="clearance_um",
+            allowed="a torque above 0 all the time, or no clearance",
+            remedy="take the model 'cracked', whose bearings let the shaft lift",
+        )
+
+
+# --------------------
+# The elastic connection between a gear's body and its hub, where shaft, bearings and hub inertia hold it.
+# --------------------
+
+
+PLANE = (0, 1, 5)
+"""Of the hub's six motions those in the gear's plane: along x, along y, about z."""
+
+
+@dataclass(frozen=True)
+class HubSprings:
+    """What is left of the elastic motion between body, hub and flanks beside the kept modes, in the frame of the gear.
+
+    A force F on the hub and pushes N move the hub by H F + Sᵀ N against the body and its modes. With the hub's place
+    given instead, F = (u_hub − u_body − ψᵀq − SᵀN)/H: springs 1/H, by which the flanks move with S/H and are stiffer by
+    S Sᵀ/H. By symmetry H is diagonal, and alike along x and y.
+
+    Parameters
+    ----------
+    compliance : array, (3,)
+        H along x, along y (m/N) and about z (rad/(N m)).
+    flank : array, (3, n_points)
+        S: motion of the hub for a unit push at tooth 0.
+    """
+
+    compliance: FloatArray
+    flank: FloatArray
+
+    @classmethod
+    def of(cls, gear: ReducedGear, kept: NDArray[np.int64]) -> HubSprings:
+        """Return those of a gear beside the kept modes, of which none may move the hub along x or y."""
+        hub = gear.hub_modes[kept][:, PLANE]
+        soft = hub / gear.angular_frequencies_rad_s[kept, None] ** 2
+        own = np.diag(gear.hub_compliance)[list(PLANE)] - np.sum(soft * hub, axis=0)
+        for value in own:
+            positive(float(value), "compliance between hub and body", remedy="lower mode_limit_hz")
+        return cls(own, gear.hub_flank_compliance[list(PLANE)] - soft.T @ gear.flank_modes[kept])
+
+    def seen_from_the_line_of_action(
+        self, gear: ReducedGear, pair: PairGeometry, index: int, progress: FloatArray
+    ) -> FloatArray:
+        """S over ζ in the frame of the shafts, (n, n_slices, 3): along x, along the line of action, in its own sense.
+
+        The push points into the tooth: against y for the driver, along y for the driven gear.
+        """
+        tau = gear.grid.roll_rad
+        load = tau - gear.blank.geometry.base_half_angle_rad
+        up = float(SIGNS[index])
+        y = np.array([-np.sin(load), -np.cos(load)]) * up
+        x = np.array([y[1], -y[0]])
+        at = self.flank.reshape(3, *gear.grid.shape)[:, FLANK]
+        axes = [np.einsum("ch,chs->hs", axis, at[:2]) for axis in (x, y)]
+        turned = np.stack([*axes, -up * at[2]], axis=-1)
+        return over_height(tau, turned, rolls_rad(pair, progress)[index])
+
+
+def without_hub(
+    table: ContactTable, pair: PairGeometry, gears: tuple[ReducedGear, ReducedGear], hubs: tuple[HubSprings, HubSprings]
+) -> ContactTable:
+    """Return the table with the hubs' places given: less what flanks move by the springs of their hubs."""
+    own, cross = table.own.copy(), table.cross.copy()
+    for index, (gear, hub) in enumerate(zip(gears, hubs, strict=True)):
+        here = hub.seen_from_the_line_of_action(gear, pair, index, table.progress)
+        own -= np.einsum("nsc,ntc,c->nst", here, here, 1.0 / hub.compliance)
+        for o in range(len(cross)):
+            older = hub.seen_from_the_line_of_action(gear, pair, index, table.progress + o + 1.0)
+            cross[o] -= np.einsum("nsc,ntc,c->nst", here, older, 1.0 / hub.compliance)
+    return replace(table, own=own, cross=cross)
+
+
+# --------------------
+# One side of the pair as modes: rotor, shaft, bearings, hub, the gear's body, and its elastic modes.
+#
+# The elastic modes stay in the frame of the gear and the contact moves over them: no matrix is ever turned under a
+# state that stays. Modes of nodal diameter n ≥ 2 do not move the hub, so that they stand beside the shaft line's modes;
+# those of n = 0 twist it and are joined with them. Modes of n = 1 move the hub across the shaft, which turns against
+# them; they are left to the static compliance. What is not kept acts between hub and body as springs, see
+# `sims.reduced_fe`.
+# --------------------
+
+
+COORDINATES = (
+    "rotor angle",
+    "gear angle",
+    "gear x",
+    "gear y",
+    "first x",
+    "first y",
+    "second x",
+    "second y",
+    "hub x",
+    "hub y",
+    "hub angle",
+)
+"""Of a side: rad and m; "first" and "second" are its two bearings. Those of the gear are of its body as a whole,
+the hub's of its bore."""
+ROTOR, GEAR, X, Y, HUB_X, HUB = 0, 1, 2, 3, 8, 10
+INPUTS = (
+    "rotor torque",
+    "gear torque",
+    "gear x force",
+    "gear y force",
+    "first x force",
+    "first y force",
+    "second x force",
+    "second y force",
+    "even acceleration",
+)
+"""Generalised forces that act on a side besides the contact, those of bearings on the shaft in them; the last is minus
+one of the whole side turning."""
+LEAST_PART = 1e-3
+"""Static part of a mode at the flank, of the greatest one: modes below it are left to the residual compliance."""
+ABOUT_Z = 5
+LEAST_HUB = 1e-4
+"""Mass and inertia of a hub that has none of its own, of the body's: they let the bore move by itself."""
+INERTIA_TOLERANCE = 0.02
+"""Part by which a gear's total inertia may be below the finite-element body's before it is refused."""
+
+
+@dataclass(frozen=True)
+class RetainedModes:
+    """Elastic modes that take part in the dynamics.
+
+    Parameters
+    ----------
+    single : int array
+        Places of modes that stand alone (n = 0 or z/2).
+    pairs : int array, (n_pairs, 2)
+        Places of cosine and sine modes.
+    """
+
+    single: NDArray[np.int64]
+    pairs: NDArray[np.int64]
+
+    @property
+    def all(self) -> NDArray[np.int64]:
+        """Of every kept mode, ascending."""
+        return np.sort(np.concatenate((self.single, self.pairs.ravel())))
+
+
+@dataclass(frozen=True)
+class FlexibleSide:
+    """Modal model of one side.
+
+    Modes stand in the order: single ones that the contact moves, pairs (all cosine modes, then all sine modes), silent.
+
+    Parameters
+    ----------
+    omega_rad_s, damping_ratio : arrays, (n_modes,)
+    damping_rate : array, (n_modes,)
+        2ζω; of a rigid mode too.
+    shapes : array, (11, n_modes)
+        `COORDINATES` in each mode.
+    inputs : array, (9, n_modes)
+        Modal forces of unit `INPUTS`.
+    hub : array, (n_modes,)
+        r_b times the hub's rotation, m.
+    rows : array, (n, n_slices, n_single + 2 n_pairs)
+        ∂D/∂η over ζ, seen from the tooth in contact.
+    rigid : array, (n_modes,)
+        ∂D/∂η of the rigid gear alone.
+    diameters : array, (n_pairs,)
+        n of the pairs, with the sign of the side.
+    n_single, n_pairs : int
+    """
+
+    omega_rad_s: FloatArray
+    damping_rate: FloatArray
+    shapes: FloatArray
+    inputs: FloatArray
+    hub: FloatArray
+    rows: FloatArray
+    rigid: FloatArray
+    diameters: FloatArray
+    n_single: int
+    n_pairs: int
+
+    @property
+    def n_modes(self) -> int:
+        """Of the shaft line and the gear together."""
+        return len(self.omega_rad_s)
+
+    @property
+    def moving(self) -> NDArray[np.bool_]:
+        """Modes that are the side's own, (n_modes,): not those added so that both sides have as many."""
+        moves: NDArray[np.bool_] = np.any(self.shapes != 0.0, axis=0)
+        moves[: self.rows.shape[2]] |= np.any(self.rows != 0.0, axis=(0, 1))
+        return moves
+
+
+def kept_modes(gear: ReducedGear, limit_hz: float, groups: FloatArray) -> RetainedModes:
+    """Choose the elastic modes up to a frequency that matter at the driving flank; a pair is kept or left as a whole.
+
+    `groups`: see `sims.reduced_fe`; modes that bend the face's halves against each other move no group.
+    """
+    flank = gear.flank_modes.reshape(gear.n_modes, *gear.grid.shape)[:, FLANK] @ (groups / groups.sum(axis=0))
+    part = np.max(flank.reshape(gear.n_modes, -1) ** 2, axis=1) / gear.angular_frequencies_rad_s**2
+    paired = (gear.nodal_diameters > 0) & (2 * gear.nodal_diameters < gear.blank.n_teeth)
+    first = np.flatnonzero(paired)[::2]
+    part[first] = part[first + 1] = np.maximum(part[first], part[first + 1])
+    wanted = (gear.frequencies_hz <= limit_hz) & (part >= LEAST_PART * part.max()) & (gear.nodal_diameters != 1)
+    pairs = first[wanted[first]]
+    return RetainedModes(np.flatnonzero(wanted & ~paired), np.column_stack((pairs, pairs + 1)))
+
+
+def residual_compliance(gear: ReducedGear, teeth: list[int], kept: RetainedModes) -> FloatArray:
+    """Free compliance less that of the kept modes, C − Σ φφᵀ/ω²."""
+    modes = np.hstack([gear.modes_at(t)[kept.all] for t in teeth]) / gear.angular_frequencies_rad_s[kept.all, None]
+    rest: FloatArray = gear.compliance_m_per_n(teeth) - modes.T @ modes
+    return rest
+
+
+def build_side(
+    machine: Machine,
+    index: int,
+    gear: ReducedGear,
+    kept: RetainedModes,
+    table: ContactTable,
+    groups: FloatArray,
+    body_damping_ratio: float,
+    loads_n: FloatArray,
+) -> FlexibleSide:
+    """Return the modes of the driver's side (0) or the driven one (1); `loads_n` (4, 2) press the bearings.
+
+    Raises
+    ------
+    InputError
+        If the gear's total inertia or mass is below that of its finite elements.
+    """
+    base_m = (machine.mesh.pair.driver, machine.mesh.pair.driven)[index].base_radius_mm * 1e-3
+    twist = -SIGNS[index] * gear.hub_modes[kept.single, ABOUT_Z]
+    coupled = np.flatnonzero(np.abs(twist) > 0.0)
+    alone = np.setdiff1d(np.arange(len(kept.single)), coupled)
+    springs = HubSprings.of(gear, kept.all)
+    matrices = _matrices(
+        machine, index, gear, kept.single[coupled], twist[coupled], springs, body_damping_ratio, loads_n
+    )
+    mass, stiffness, damping = matrices
+    squares, shapes = _modes_of(stiffness, mass)
+    rate = np.einsum("ij,ik,kj->j", shapes, damping, shapes)
+    mean = groups / groups.sum(axis=0)
+    elastic = _elastic_rows(machine, index, gear, table, mean)
+    at_hub = springs.seen_from_the_line_of_action(gear, machine.mesh.pair, index, table.progress)
+    up = 1.0 if index == 0 else -1.0
+    rigid = up * (base_m * shapes[GEAR] + shapes[Y])
+    stretched = shapes[HUB_X : HUB + 1] - shapes[[X, Y, GEAR]]
+    stretched[2] -= twist[coupled] @ shapes[len(COORDINATES) :]
+    rows = rigid + elastic[:, :, kept.single[coupled]] @ shapes[len(COORDINATES) :]
+    rows = rows - np.einsum("nsc,sg,cj->ngj", at_hub, mean, stretched / springs.compliance[:, None])
+    silent = np.max(np.abs(rows), axis=(0, 1)) < 1e-9 * np.max(np.abs(rows))
+    line = [np.flatnonzero(~silent), np.flatnonzero(silent)]
+    others = np.concatenate((kept.single[alone], kept.pairs[:, 0], kept.pairs[:, 1]))
+    own = gear.angular_frequencies_rad_s[others]
+
+    def joined(train: FloatArray, rest: FloatArray) -> FloatArray:
+        """Modes that stand alone, pairs, silent ones; modes along the last axis."""
+        return np.concatenate((train[..., line[0]], rest, train[..., line[1]]), axis=-1)
+
+    zero = np.zeros(len(others))
+    turning = np.zeros(mass.shape[0])
+    turning[[ROTOR, GEAR, HUB]] = 1.0 if index == 0 else 1.0 / machine.ratio
+    forces = _input_places(len(shapes), -(mass @ turning)) @ shapes
+    return FlexibleSide(
+        omega_rad_s=joined(np.sqrt(squares), own),
+        damping_rate=joined(rate, 2.0 * body_damping_ratio * own),
+        shapes=joined(shapes[: len(COORDINATES)], np.zeros((len(COORDINATES), len(others)))),
+        inputs=joined(forces, np.zeros((len(INPUTS), len(others)))),
+        hub=joined(base_m * shapes[HUB], zero),
+        rows=np.ascontiguousarray(np.concatenate((rows[:, :, line[0]], elastic[:, :, others]), axis=2)),
+        rigid=joined(rigid, zero),
+        diameters=SIGNS[index] * gear.nodal_diameters[kept.pairs[:, 0]].astype(np.float64),
+        n_single=len(line[0]) + len(alone),
+        n_pairs=len(kept.pairs),
+    )
+
+
+def _elastic_rows(machine: Machine, index: int, gear: ReducedGear, table: ContactTable, mean: FloatArray) -> FloatArray:
+    """∂D/∂q of all elastic modes at tooth 0, (n, n_groups, n_modes): minus the push displacement."""
+    roll = rolls_rad(machine.mesh.pair, table.progress)[index]
+    flank = gear.flank_modes.reshape(gear.n_modes, *gear.grid.shape)[:, FLANK] @ mean
+    return -over_height(gear.grid.roll_rad, np.moveaxis(flank, 0, -1), roll)
+
+
+def hub_inertia(machine: Machine, index: int, gear: ReducedGear) -> tuple[float, float]:
+    """Mass (kg) and moment of inertia (kg m²) that hub and shaft add to the finite-element body."""
+    wheel = machine.wheels[index]
+    found = []
+    for what, unit, total, own in (
+        ("mass", "kg", wheel.mass_kg, gear.mass_kg),
+        ("inertia", "kg m^2", wheel.inertia_kg_m2, gear.polar_inertia_kg_m2),
+    ):
+        if total < own * (1.0 - INERTIA_TOLERANCE):
+            raise InputError(
+                f"{what} of the {('driver', 'driven gear')[index]} is {total:.4g} {unit}",
+                allowed=f"at least {own:.4g} {unit}, that of the toothed body alone",
+            )
+        found.append(max(total - own, 0.0))
+    return found[0], found[1]
+
+
+def _matrices(
+    machine: Machine,
+    index: int,
+    gear: ReducedGear,
+    modes: NDArray[np.int64],
+    twist: FloatArray,
+    springs: HubSprings,
+    body_damping_ratio: float,
+    loads_n: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """M, K and C over `COORDINATES` and the modes that twist the hub."""
+    n, n_own = len(COORDINATES) + len(modes), len(COORDINATES)
+    shaft, bearings = machine.shafts[index], machine.bearings[2 * index : 2 * index + 2]
+    hub_kg, hub_kg_m2 = hub_inertia(machine, index, gear)
+    mass = np.eye(n)
+    body = [gear.mass_kg, gear.mass_kg, gear.polar_inertia_kg_m2]
+    hub = np.maximum([hub_kg, hub_kg, hub_kg_m2], LEAST_HUB * np.array(body))
+    own = [shaft.rotor_inertia_kg_m2, body[2], *body[:2], *(b.mass_kg for b in bearings for _ in range(2)), *hub]
+    mass[range(n_own), range(n_own)] = own
+    stiffness, damping = np.zeros((n, n)), np.zeros((n, n))
+    omega = gear.angular_frequencies_rad_s[modes]
+    stiffness[range(n_own, n), range(n_own, n)] = omega**2
+    damping[range(n_own, n), range(n_own, n)] = 2.0 * body_damping_ratio * omega
+    twisted = np.zeros(n)
+    twisted[[ROTOR, HUB]] = 1.0, -1.0
+    lines: list[tuple[FloatArray, float, float]] = [
+        (twisted, shaft.torsional_stiffness_nm_per_rad, shaft.torsional_damping_nm_s_per_rad)
+    ]
+    for c, place in enumerate((X, Y, GEAR)):
+        inside = np.zeros(n)
+        inside[[HUB_X + c, place]] = 1.0, -1.0
+        if place == GEAR:
+            inside[n_own:] = -twist
+        own_k = float(1.0 / springs.compliance[c])
+        own_c = 2.0 * body_damping_ratio * float(np.sqrt(own_k / (1.0 / hub[c] + 1.0 / body[c])))
+        lines.append((inside, own_k, own_c))
+    for axis in range(2):
+        bent = np.zeros(n)
+        bent[[HUB_X + axis, 4 + axis, 6 + axis]] = 1.0, -0.5, -0.5
+        lines.append((bent, shaft.bending_stiffness_n_per_m, shaft.bending_damping_n_s_per_m))
+        for row, bearing in enumerate(bearings):
+            direction, spring = bearing_springs(bearing, loads_n[2 * index + row])[axis]
+            moved = np.zeros(n)
+            moved[4 + 2 * row : 6 + 2 * row] = direction
+            lines.append((moved, spring, bearing.damping_n_s_per_m))
+    for line, spring, damper in lines:
+        stiffness += spring * np.outer(line, line)
+        damping += damper * np.outer(line, line)
+    return mass, stiffness, damping
+
+
+def _modes_of(stiffness: FloatArray, mass: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Squared angular frequencies, rising, rigid ones exactly 0, and mass-normalised shapes."""
+    from scipy.linalg import eigh
+
+    squares, shapes = eigh(stiffness, mass)
+    squares = np.where(squares < (2.0 * pi * 0.1) ** 2, 0.0, squares)
+    return squares, shapes
+
+
+def _input_places(n: int, even: FloatArray) -> FloatArray:
+    """Generalised forces of unit `INPUTS`, (7, n)."""
+    places = np.zeros((len(INPUTS), n))
+    for row, coordinate in enumerate((ROTOR, GEAR, X, Y, 4, 5, 6, 7)):
+        places[row, coordinate] = 1.0
+    places[-1] = even
+    return places
+
+
+MODE_LIMIT_HZ = 20000.0
+"""Elastic modes up to here are kept; the others follow at once."""
+SMALL_PART = 1e-3
+"""Of the nominal force on a slice: below it the local contact is straight."""
+LEAST_FORCE_N = 50.0
+"""Mesh force for which stiffness and damping are taken where the torque is smaller."""
+
+_SCALARS = (
+    "start",
+    "column_step",
+    "small",
+    "nominal_force",
+    "cycles_per_rad",
+    "damping_time",
+    "backlash",
+    "back_stiffness",
+    "restitution",
+    "gravity_x",
+    "gravity_y",
+    *DRIVE_SCALARS,
+    "nominal_torque",
+    "contact_ratio",
+    *FRICTION_SCALARS,
+)
+_PER_SIDE = (
+    "teeth",
+    "mass",
+    "unbalance",
+    "mass_angle",
+    "runout",
+    "runout_angle",
+    "torsional_stiffness",
+    "torsional_damping",
+    "hooke",
+    "hooke_force",
+    "coupling_bending",
+)
+RECORD = np.dtype(
+    [(name, np.float64) for name in _SCALARS]
+    + [(name, np.float64, (2,)) for name in _PER_SIDE]
+    + [(name, np.bool_) for name in ("pushes", "rolls", "friction", "moving_force")]
+    + [("n_single", np.int64), ("n_pairs", np.int64)]
+    + DRIVE_FIELDS
+    + ROLLING_FIELDS,
+    align=True,
+)
+"""SI units; of a side in pairs (driver, driven)."""
+
+
+@dataclass(frozen=True)
+class FlexiblePair:
+    """A machine whose gears are reduced finite elements.
+
+    Parameters
+    ----------
+    machine : Machine
+        Masses and inertias of its wheels are those of gear, hub and shaft together; its contact law and the gears'
+        stiffness by potential energy are not used. `mesh_damping_ratio` is that of the torsional mode in all:
+        the contact has the damping that shafts, bearings and bodies leave wanting.
+    gears : (ReducedGear, ReducedGear)
+    body_damping_ratio : float
+        Of the elastic modes of the gears.
+    restitution : float or None
+        None: contact by its compliance alone. A number e: at first contact after a loss the closing speed of the gears
+        becomes −e times itself, on top of the compliance. That counts an impact twice; it is here for comparison with
+        models that do.
+    lead_error_um : float
+        Misalignment of the flanks over the face width.
+    mode_limit_hz : float
+    """
+
+    machine: Machine
+    gears: tuple[ReducedGear, ReducedGear]
+    body_damping_ratio: float = 0.08
+    restitution: float | None = None
+    lead_error_um: float = 0.0
+    mode_limit_hz: float = MODE_LIMIT_HZ
+
+    def __post_init__(self) -> None:
+        within(self.body_damping_ratio, "body_damping_ratio", 0.0, 1.0)
+        if self.restitution is not None:
+            within(self.restitution, "restitution", 0.0, 1.0)
+
+    def maps(self, torque_nm: FloatArray | None = None, mesh_cycles: FloatArray | None = None) -> MeshMaps:
+        """Return the static maps of this pair."""
+        return mesh_maps(self.gears, self.machine.mesh, torque_nm, mesh_cycles, lead_um=self.lead_error_um)
+
+
+@dataclass(frozen=True)
+class FlexiblePairConstants:
+    """What compiled code reads; see `sims.reduced_fe.march`.
+
+    Parameters
+    ----------
+    record : one `RECORD`
+    table : ContactTable
+        With the residual compliance.
+    sides : (Side, Side)
+        Padded to the same numbers of modes.
+    mean_stiffness_n_per_m : float
+        Tangent stiffness of the mesh at the nominal force, mean over a cycle.
+    base_radius_m : array, (2,)
+    """
+
+    record: Any
+    table: ContactTable
+    sides: tuple[FlexibleSide, FlexibleSide]
+    mean_stiffness_n_per_m: float
+    base_radius_m: FloatArray
+
+    @property
+    def omega_rad_s(self) -> FloatArray:
+        """Of all modes, (2, n_modes)."""
+        return np.array([s.omega_rad_s for s in self.sides])
+
+    def stacked(self, name: str) -> FloatArray:
+        """A field of both sides, driver first, contiguous."""
+        return np.ascontiguousarray(np.array([getattr(s, name) for s in self.sides]))
+
+    def turn(self) -> FloatArray:
+        """Cosine and sine of nψ for each tooth, (2, z, 2, n_pairs)."""
+        teeth = self.record["teeth"]
+        found = np.zeros((2, int(teeth.max()), 2, self.sides[0].n_pairs))
+        for index, side in enumerate(self.sides):
+            angle = 2.0 * pi / teeth[index] * np.outer(np.arange(int(teeth[index])), side.diameters)
+            found[index, : len(angle), 0], found[index, : len(angle), 1] = np.cos(angle), np.sin(angle)
+        return found
+
+
+def constants(
+    pair: FlexiblePair, operation: Operation, *, moving_force: bool = True, rng: np.random.Generator | None = None
+) -> FlexiblePairConstants:
+    """Turn a flexible pair into plain numbers.
+
+    Parameters
+    ----------
+    pair : FlexiblePair
+    operation : Operation
+        Its greatest torque sets the scale of forces and the damping of the contact.
+    moving_force : bool
+        Off: leave out the torque by which stiffness moving past under load acts on the driver, for comparison.
+    rng : numpy.random.Generator or None
+        Draws the places of rolling elements in bearings with a defect; None: always the same ones.
+    """
+    machine, mesh = pair.machine, pair.machine.mesh
+    base = np.array([mesh.pair.driver.base_radius_mm, mesh.pair.driven.base_radius_mm]) * 1e-3
+    force = max(operation.torque_nm.largest / base[0], LEAST_FORCE_N)
+    stiffness = mean_stiffness_n_per_m(pair, force)
+    table, kept, groups = _contact(pair)
+    loads = bearing_loads_n(machine, force)
+    make = partial(
+        build_side, machine, table=table, groups=groups, body_damping_ratio=pair.body_damping_ratio, loads_n=loads
+    )
+    sides = _padded([make(i, gear=pair.gears[i], kept=kept[i]) for i in (0, 1)])
+    beta = radians(machine.line_of_action_deg)
+    wheels, shafts = machine.wheels, machine.shafts
+    hooke = np.array([radians(s.coupling_angle_deg) for s in shafts])
+    nominal = force / table.n_slices
+    values: dict[str, Any] = {
+        "start": table.start,
+        "column_step": table.step,
+        "small": SMALL_PART * nominal,
+        "nominal_force": nominal,
+        "cycles_per_rad": mesh.pair.driver.teeth / (2.0 * pi),
+        "backlash": 2e-6 * machine.half_backlash_um,
+        "back_stiffness": stiffness,
+        "restitution": -1.0 if pair.restitution is None else pair.restitution,
+        "gravity_x": -machine.gravity_mps2 * sin(beta),
+        "gravity_y": -machine.gravity_mps2 * cos(beta),
+        "teeth": teeth_of(mesh),
+        "mass": [w.mass_kg for w in wheels],
+        "unbalance": [w.unbalance_g_mm * 1e-6 for w in wheels],
+        "mass_angle": np.radians([w.unbalance_angle_deg for w in wheels]),
+        "runout": [w.runout_um * 1e-6 for w in wheels],
+        "runout_angle": np.radians([w.runout_angle_deg for w in wheels]),
+        "torsional_stiffness": [s.torsional_stiffness_nm_per_rad for s in shafts],
+        "torsional_damping": [s.torsional_damping_nm_s_per_rad for s in shafts],
+        "hooke": hooke**2 / 4.0,
+        "hooke_force": hooke / np.array([2.0 * s.bearing_distance_m for s in shafts]),
+        "coupling_bending": [s.coupling_bending_nm_per_rad for s in shafts],
+        "pushes": machine.gravity_mps2 > 0.0 or bool(hooke.any()) or any(w.unbalance_g_mm > 0.0 for w in wheels),
+        "rolls": any(b.defect is not None or b.clearance_um > 0.0 for b in machine.bearings),
+        "moving_force": moving_force,
+        "nominal_torque": force * base[0],
+        "contact_ratio": mesh.pair.contact_ratio,
+        "n_single": sides[0].n_single,
+        "n_pairs": sides[0].n_pairs,
+    }
+    record = np.zeros((), RECORD)
+    values |= drive_fields(machine) | friction_fields(machine, operation, force)
+    values |= rolling_fields(machine, operation, force, loads, np.random.default_rng(0) if rng is None else rng)
+    for name, value in values.items():
+        record[name] = value
+    made = FlexiblePairConstants(record[()], table, sides, stiffness, base)
+    made.record["damping_time"] = torsional_mode(pair, operation, ready=made).damping_time_s(machine.mesh_damping_ratio)
+    return made
+
+
+def _contact(pair: FlexiblePair) -> tuple[ContactTable, list[RetainedModes], FloatArray]:
+    """Residual contact, the modes that are kept beside it, and which slices stand together."""
+    n_slices = len(pair.gears[0].grid.z_m)
+
+    def made(groups: FloatArray) -> tuple[ContactTable, list[RetainedModes]]:
+        kept = [kept_modes(gear, pair.mode_limit_hz, groups) for gear in pair.gears]
+
+        def rest(gear: ReducedGear, teeth: list[int]) -> FloatArray:
+            return residual_compliance(gear, teeth, kept[0] if gear is pair.gears[0] else kept[1])
+
+        table = contact_table(pair.gears, pair.machine.mesh, rest, lead_um=pair.lead_error_um)
+        hubs = HubSprings.of(pair.gears[0], kept[0].all), HubSprings.of(pair.gears[1], kept[1].all)
+        return without_hub(table, pair.machine.mesh.pair, pair.gears, hubs), kept
+
+    groups = mirror_groups(n_slices)
+    table, kept = made(groups)
+    if mirrors(table):
+        return folded(table), kept, groups
+    groups = np.eye(n_slices)
+    return *made(groups), groups
+
+
+def back_rows(machine: Machine, sides: tuple[FlexibleSide, FlexibleSide]) -> FloatArray:
+    """∂D/∂η of the flanks behind, (2, n_modes): along their own line of action, the bodies rigid."""
+    alpha = machine.mesh.pair.working_pressure_angle_rad
+    base = (machine.mesh.pair.driver.base_radius_mm * 1e-3, machine.mesh.pair.driven.base_radius_mm * 1e-3)
+    rows = []
+    for sign, radius, side in zip((1.0, -1.0), base, sides, strict=True):
+        gear, x, y = side.shapes[1:4]
+        rows.append(sign * (-radius * gear - cos(2.0 * alpha) * y + sin(2.0 * alpha) * x))
+    return np.array(rows)
+
+
+def mean_stiffness_n_per_m(pair: FlexiblePair, force_n: float) -> float:
+    """Tangent stiffness of the sound mesh at a force, mean over a mesh cycle."""
+    from dataclasses import replace
+
+    faults: dict[str, Any] = {f"{kind}_{i}": () for kind in ("cracks", "spalls", "chips") for i in (1, 2)}
+    sound = replace(pair.machine.mesh, **faults)
+    torque = np.array([force_n * sound.pair.driver.base_radius_mm * 1e-3])
+    table = static_table(pair.gears, sound)
+    return float(mesh_maps(pair.gears, sound, torque, table=table).tangent_stiffness_n_per_m.mean())
+
+
+def _padded(sides: list[FlexibleSide]) -> tuple[FlexibleSide, FlexibleSide]:
+    """Both sides with the same numbers of single, paired and silent modes; what is added never moves."""
+    single, pairs = (max(getattr(s, name) for s in sides) for name in ("n_single", "n_pairs"))
+    silent = max(s.n_modes - s.n_single - 2 * s.n_pairs for s in sides)
+    first, second = (_pad(s, single, pairs, silent) for s in sides)
+    return first, second
+
+
+def _pad(side: FlexibleSide, single: int, pairs: int, silent: int) -> FlexibleSide:
+    n = single + 2 * pairs + silent
+    places = [*range(side.n_single)]
+    for kind in range(2):
+        places += range(single + kind * pairs, single + kind * pairs + side.n_pairs)
+    n_silent = side.n_modes - side.n_single - 2 * side.n_pairs
+    n_rows = len(places)
+    places += range(single + 2 * pairs, single + 2 * pairs + n_silent)
+
+    def wider(values: FloatArray, size: int, fill: float = 0.0) -> FloatArray:
+        out = np.full((*values.shape[:-1], size), fill)
+        out[..., places[: values.shape[-1]]] = values
+        return out
+
+    assert side.rows.shape[-1] == n_rows  # noqa: S101 - by construction
+    return FlexibleSide(
+        wider(side.omega_rad_s, n, 1.0),
+        wider(side.damping_rate, n, 1.0),
+        wider(side.shapes, n),
+        wider(side.inputs, n),
+        wider(side.hub, n),
+        wider(side.rows, single + 2 * pairs),
+        wider(side.rigid, n),
+        np.concatenate((side.diameters, np.zeros(pairs - side.n_pairs))),
+        single,
+        pairs,
+    )
+
+
+# --------------------
+# Where a run starts: the static balance at the first torque, so that no blow has to die out.
+# --------------------
+
+
+DEEPEST_M = 1e-3
+"""Beyond any approach of flanks."""
+LEAST_HZ = 1.0
+"""Of modes that the balance bends; slower ones are rigid motion."""
+
+
+def start_state(pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, start_s: float) -> FlexState:
+    """Return the state in which the flanks carry the first torque, everything turning evenly, tooth 0 at its entry.
+
+    The modes take the deflection of the mean contact force; the driven side is turned back until the contact carries.
+    """
+    from sims.reduced_fe._respond import FlexState
+
+    torque = float(operation.torque_nm.at(start_s))
+    q = np.zeros((2, own.sides[0].n_modes))
+    force = torque / own.base_radius_m[0]
+    column = own.table.column(0.0)
+    for index, side in enumerate(own.sides):
+        drive = torque if index == 0 else -torque * float(own.record["ratio"])
+        load = side.inputs[0] * drive
+        load[: side.rows.shape[-1]] -= force * side.rows[column].mean(axis=0)
+        soft = side.omega_rad_s > 2.0 * np.pi * LEAST_HZ
+        q[index, soft] = load[soft] / side.omega_rad_s[soft] ** 2
+    shape = own.table.n_slots, own.table.n_slices
+    small = float(own.record["small"])
+    state = FlexState(
+        q,
+        np.zeros_like(q),
+        np.zeros_like(q),
+        np.zeros_like(q),
+        np.zeros(shape),
+        np.full(shape, small**-0.1),
+        np.full(own.table.n_slots, -1e9),
+        np.zeros(3),
+    )
+    return state if force <= 0.0 else _closed(pair, own, state, force)
+
+
+def _closed(pair: FlexiblePair, own: FlexiblePairConstants, state: FlexState, force: float) -> FlexState:
+    """Turn the driven side as a whole until the flanks carry `force` at ζ = 0."""
+    from dataclasses import replace
+
+    from scipy.optimize import brentq
+
+    from sims.reduced_fe._maps import force_map
+
+    table = own.table
+    rigid = own.sides[1]
+    free = np.flatnonzero(rigid.omega_rad_s == 0.0)
+    free = free[np.abs(rigid.hub[free]) > 0.0][0]
+    column = table.column(0.0)
+
+    def approach(q: FloatArray) -> float:
+        total = 0.0
+        for index, side in enumerate(own.sides):
+            n = side.rows.shape[-1]
+            total += float(side.rows[column].mean(axis=0) @ q[index, :n])
+        return total
+
+    def missing(depth: float) -> float:
+        return float(force_map(table, pair.machine.mesh, np.array([depth]), np.zeros(1)).force_n[0, 0]) - force
+
+    # Below 0: a tooth that stands ahead of its place carries before the others would touch.
+    depth = float(brentq(missing, -DEEPEST_M, DEEPEST_M, xtol=1e-12))
+    q = state.q.copy()
+    per_unit = float(rigid.rows[column].mean(axis=0)[free])
+    q[1, free] += (depth - approach(q)) / per_unit
+    return replace(state, q=q)
+
+
+# --------------------
+# The pair as a linear system about its loaded state: eigenfrequencies over the mesh angle.
+# --------------------
+
+
+DYNAMICS_LINEAR_LEAST_HZ = 200.0
+"""Modes below it are those of rotors on their couplings."""
+
+
+def eigenfrequencies_hz(
+    pair: FlexiblePair,
+    operation: Operation,
+    mesh_cycles: FloatArray | None = None,
+    *,
+    ready: FlexiblePairConstants | None = None,
+) -> FloatArray:
+    """Undamped eigenfrequencies of small motions about the loaded state at each mesh angle, (n_c, n), rising.
+
+    K = diag(ω²) + Σ rows S rowsᵀ with S = (R + h'(N))⁻¹ over the points that touch at the set torque.
+
+    Parameters
+    ----------
+    pair : FlexiblePair
+    operation : Operation
+        Its greatest torque loads the contact.
+    mesh_cycles : array or None
+        None: 50 points of a cycle.
+    ready : Constants or None
+        Where they are at hand.
+    """
+    own = constants(pair, operation) if ready is None else ready
+    cycles = one_mesh_cycle(50) if mesh_cycles is None else mesh_cycles
+    return np.array([np.sqrt(np.maximum(_squares(pair, own, operation, c)[0], 0.0)) / (2.0 * pi) for c in cycles])
+
+
+@dataclass(frozen=True)
+class TorsionalMode:
+    """The mode in which the flanks move most against each other, mean over a mesh cycle.
+
+    Parameters
+    ----------
+    frequency_hz : float
+    contact_part : float
+        Part of its energy that lies in the compliance of the contact.
+    other_damping_ratio : float
+        ζ by shafts, bearings and gear bodies alone.
+    """
+
+    frequency_hz: float
+    contact_part: float
+    other_damping_ratio: float
+
+    def damping_time_s(self, damping_ratio: float) -> float:
+        """Time τ of the contact's damping, with which the mode has a damping ratio in all; 0 if it has more without.
+
+        2ζω = 2ζ₀ω + τ ω² · contact part
+        """
+        omega = 2.0 * pi * self.frequency_hz
+        return max(2.0 * (damping_ratio - self.other_damping_ratio) / (omega * self.contact_part), 0.0)
+
+
+def torsional_mode(
+    pair: FlexiblePair, operation: Operation, *, ready: FlexiblePairConstants | None = None, n_points: int = 20
+) -> TorsionalMode:
+    """Return the torsional mode of the pair about its loaded state.
+
+    Parameters
+    ----------
+    pair : FlexiblePair
+    operation : Operation
+        Its greatest torque loads the contact.
+    ready : Constants or None
+        Where they are at hand.
+    n_points : int
+        Mesh angles in a cycle.
+    """
+    own = constants(pair, operation) if ready is None else ready
+    frequency, contact, other = _torsional(pair, own, operation, one_mesh_cycle(n_points)).mean(axis=0)
+    return TorsionalMode(float(frequency), float(contact), float(other))
+
+
+def torsional_curve_hz(pair: FlexiblePair, operation: Operation, mesh_cycles: FloatArray) -> FloatArray:
+    """Frequency of the torsional mode at each mesh angle, (n_c,)."""
+    return _torsional(pair, constants(pair, operation), operation, mesh_cycles)[:, 0]
+
+
+def _torsional(
+    pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, mesh_cycles: FloatArray
+) -> FloatArray:
+    """Frequency, contact part and damping ratio of others at each mesh angle, (n_c, 3)."""
+    rates = np.concatenate([side.damping_rate for side in own.sides])
+    found = []
+    for c in mesh_cycles:
+        squares, shapes, rows, stiff = _squares(pair, own, operation, c)
+        energy = np.einsum("ij,ik,kj->j", rows @ shapes, stiff, rows @ shapes)
+        part = energy / np.maximum(squares, (2.0 * pi * DYNAMICS_LINEAR_LEAST_HZ) ** 2)
+        mode = int(np.argmax(part))
+        omega = float(np.sqrt(squares[mode]))
+        found.append((omega / (2.0 * pi), part[mode], float(rates @ shapes[:, mode] ** 2) / (2.0 * omega)))
+    return np.array(found)
+
+
+def _squares(
+    pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, cycles: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Squared angular frequencies, shapes, and what `contact_rows` returns, at one mesh angle."""
+    rows, stiff = contact_rows(pair, own, operation, cycles)
+    k = np.diag(np.concatenate([side.omega_rad_s for side in own.sides]) ** 2) + rows.T @ stiff @ rows
+    squares, shapes = np.linalg.eigh(k)
+    return squares, shapes, rows, stiff
+
+
+def contact_rows(
+    pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, cycles: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return ∂D/∂η of the points that touch under the set torque, (n, n_modes), and their stiffness, (n, n)."""
+    force = max(operation.torque_nm.largest / own.base_radius_m[0], LEAST_FORCE_N)
+    at = contact_state(own.table, pair.machine.mesh, force, cycles)
+    one, two = own.sides
+    turn, n = own.turn(), one.n_modes
+    rows = np.zeros((len(at.force_n), 2 * n))
+    for point, (number, column, part) in enumerate(zip(at.pair, at.column, at.part, strict=True)):
+        for index, side in enumerate((one, two)):
+            tooth = int(number % own.record["teeth"][index])
+            s = point % own.table.n_slices
+            seen = (1.0 - part) * side.rows[column, s] + part * side.rows[column + 1, s]
+            cosine, sine = turn[index, tooth]
+            c, d = np.split(seen[side.n_single :], 2)
+            full = np.concatenate((seen[: side.n_single], cosine * c - sine * d, sine * c + cosine * d))
+            rows[point, index * n : index * n + len(full)] = full
+    touching = at.force_n > 0.0
+    rows = rows[touching]
+    stiff: FloatArray = np.linalg.inv(at.compliance[np.ix_(touching, touching)])
+    return rows, stiff

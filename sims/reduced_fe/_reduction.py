@@ -1,0 +1,743 @@
+"""Free-interface reduction by cyclic symmetry: elastic modes and static compliance at the flanks and the hub."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gearsig.checks import FloatArray, count, one_of
+from gearsig.errors import InputError
+from sims.reduced_fe._blank import (
+    GearBlank,
+    MeshSize,
+    check_memory,
+    check_reducible,
+    craig_bampton_bytes,
+    mesh_size_for,
+    one_thread,
+)
+from sims.reduced_fe._cyclic import (
+    ComplexArray,
+    CyclicGear,
+    CyclicModes,
+    Held,
+    cyclic_modes,
+    hub_sum,
+    lowest_with_static,
+)
+from sims.reduced_fe._elements import mesh_quality
+from sims.reduced_fe._mesh import IntArray, SectorMesh, sector_mesh
+from sims.reduced_fe._reduced_gear import (
+    FlankGrid,
+    ReducedGear,
+    Spread,
+    flank_grid,
+    flank_rows,
+    height_nodes,
+    plane_row,
+    point_and_push,
+    slice_weights,
+)
+
+AnyArray = np.ndarray[Any, Any]
+
+
+@dataclass(frozen=True)
+class ReductionPlan:
+    """What a gear is reduced to.
+
+    Parameters
+    ----------
+    size : MeshSize
+    n_modes : int
+        Elastic modes kept, at least; a pair is never cut.
+    n_heights, n_slices : int
+        Flank points of a tooth: heights over the involute, slices of the face width.
+    n_offsets : int
+        Compliance between teeth up to n_offsets − 1 apart.
+    spread : str
+        "section", "patch" or "node"; see `ReducedGear`.
+    """
+
+    size: MeshSize = field(default_factory=MeshSize)
+    n_modes: int = 40
+    n_heights: int = 9
+    n_slices: int = 5
+    n_offsets: int = 3
+    spread: Spread = "section"
+
+    def __post_init__(self) -> None:
+        count(self.n_modes, "n_modes")
+        count(self.n_heights, "n_heights", minimum=2)
+        count(self.n_slices, "n_slices")
+        count(self.n_offsets, "n_offsets")
+        one_of(self.spread, "spread", ("section", "patch", "node"))
+
+
+class StaticCompliance(NamedTuple):
+    """Static response at the points of a gear; see the fields of `ReducedGear`."""
+
+    flanks: FloatArray
+    hub_flank: FloatArray
+    hub: FloatArray
+
+
+def plan_for(blank: GearBlank, n_dof: int, **wanted: int | Spread) -> ReductionPlan:
+    """Return a plan with a mesh of about `n_dof` degrees of freedom."""
+    return ReductionPlan(mesh_size_for(blank, n_dof), **wanted)  # type: ignore[arg-type]  # checked by the plan
+
+
+def reduce_gear(blank: GearBlank, plan: ReductionPlan) -> ReducedGear:
+    """Mesh a gear and reduce it: its lowest elastic modes, and the exact static compliance at flanks and hub.
+
+    The modes are those of the whole free gear; all the others together act as if without mass, which the static
+    compliance accounts for: C − Σ φφᵀ/ω² (residual attachment modes). Frequencies of the reduced gear are therefore
+    those of the full model, and its static answer too.
+
+    Parameters
+    ----------
+    blank : GearBlank
+    plan : ReductionPlan
+
+    Raises
+    ------
+    InputError
+        If the mesh is too coarse for the fillet, or the memory does not suffice (estimated before starting).
+
+    Source: R. R. Craig, A. J. Kurdila, *Fundamentals of Structural Dynamics*, 2nd ed. (2006), ch. 17, for residual
+    attachment modes; D. L. Thomas, International Journal for Numerical Methods in Engineering 14 (1979), for cyclic
+    symmetry.
+    """
+    from sims.reduced_fe._blank import check_memory, sector_bytes
+    from sims.reduced_fe._store import gear_key
+
+    if plan.n_offsets > blank.n_teeth // 2:
+        raise InputError(f"n_offsets is {plan.n_offsets}", allowed=f"at most {blank.n_teeth // 2}, half of the teeth")
+    check_reducible(blank, plan.size)
+    check_memory(sector_bytes(blank, plan.size))
+    mesh = sector_mesh(blank, plan.size)
+    quality, gear = mesh_quality(mesh), CyclicGear(mesh)
+    grid = flank_grid(blank.geometry, plan.n_heights, plan.n_slices)
+    with one_thread():
+        rows = flank_rows(mesh, grid, plan.spread, gear.own_places, 3 * len(gear.own_nodes))
+        modes = cyclic_modes(gear, plan.n_modes, elastic=True)
+        free = static_compliance(gear, rows, grid, plan.n_offsets)
+        clamped = static_compliance(gear, rows, grid, plan.n_offsets, "bore")
+    frequencies, diameters, at_flanks, at_hub = _real_modes(gear, modes, rows)
+    return ReducedGear(
+        blank=blank,
+        key=gear_key(blank, plan),
+        n_dof=mesh.n_dof,
+        spread=plan.spread,
+        mass_kg=quality.mass_kg,
+        polar_inertia_kg_m2=quality.polar_inertia_kg_m2,
+        diametral_inertia_kg_m2=quality.diametral_inertia_kg_m2,
+        grid=grid,
+        frequencies_hz=frequencies,
+        nodal_diameters=diameters,
+        flank_modes=at_flanks,
+        hub_modes=at_hub,
+        free_compliance_m_per_n=free.flanks,
+        clamped_compliance_m_per_n=clamped.flanks,
+        hub_flank_compliance=free.hub_flank,
+        hub_compliance=free.hub,
+    )
+
+
+def static_compliance(
+    gear: CyclicGear, rows: FloatArray, grid: FlankGrid, n_offsets: int, held: Held = "free"
+) -> StaticCompliance:
+    """Compliance between flank points and hub, from one solution per nodal diameter.
+
+    A unit push at tooth 0 alone is the sum over all nodal diameters of 1/z of a push that travels round; with the
+    response H(n) of one sector, C_o = (1/z) Σ_n H(n) e^{2πino/z}.
+
+    Parameters
+    ----------
+    gear : CyclicGear
+    rows : array, (n_points, n_own_dof)
+        Of the flank points.
+    grid : FlankGrid
+    n_offsets : int
+    held : str
+        "free": the response of the free gear without its rigid motion; "bore": every node of the bore held.
+    """
+    z, points = gear.n_sectors, grid.n_points
+    flanks = np.zeros((n_offsets, points, points))
+    hub_flank, hub = np.zeros((6, points)), np.zeros((6, 6))
+    own = _solved_points(grid)
+    for n in gear.diameters:
+        weight = (1.0 if n == 0 or 2 * n == z else 2.0) / z
+        shares = hub_sum(n, z) @ gear.hub if n <= 1 else np.zeros((0, rows.shape[1]))
+        loads = np.hstack((rows[own].T, shares.conj().T))
+        moved = _response(gear, n, loads, held)
+        at_flanks = _mirrored((rows @ moved[:, : len(own)]).astype(np.complex128), grid, own)
+        for offset in range(n_offsets):
+            flanks[offset] += weight * np.real(at_flanks * np.exp(1j * gear.phase_rad(n) * offset))
+        if n <= 1:
+            hub += weight * np.real(shares @ moved[:, len(own) :])
+            hub_flank += weight * np.real(moved[:, len(own) :].conj().T @ rows.T)
+    return StaticCompliance(flanks, hub_flank, hub)
+
+
+def _response(gear: CyclicGear, n: int, loads: AnyArray, held: Held) -> AnyArray:
+    """Displacements for loads of one nodal diameter; of a free gear, what is left beside its rigid motion."""
+    solve = gear.solver(n, held)
+    rigid = gear.rigid(n)
+    if held == "bore" or gear.hub_stiffness is not None or not rigid.shape[1]:
+        return solve(loads)
+    inertia = gear.mass.at(gear.phase_rad(n)) @ rigid
+    balanced = loads - inertia @ (rigid.conj().T @ loads)
+    moved = solve(balanced)
+    elastic: AnyArray = moved - rigid @ (inertia.conj().T @ moved)
+    return elastic
+
+
+def _solved_points(grid: FlankGrid) -> IntArray:
+    """Points on flank 0 in one half of the face, with its middle: the others follow by mirrors."""
+    index = np.arange(grid.n_points).reshape(grid.shape)
+    return index[0, :, : (grid.shape[2] + 1) // 2].ravel()
+
+
+def _mirrored(part: ComplexArray, grid: FlankGrid, own: IntArray) -> ComplexArray:
+    """H of all points from its columns of some.
+
+    H is the same seen from the other end of the shaft, and a mirror at the middle of the tooth makes n to −n, which is
+    the complex conjugate.
+    """
+    index = np.arange(grid.n_points).reshape(grid.shape)
+    end, flank = index[:, :, ::-1].ravel(), index[::-1].ravel()
+    whole = np.zeros((grid.n_points, grid.n_points), dtype=np.complex128)
+    whole[:, own] = part
+    whole[:, end[own]] = part[end]
+    first = index[0].ravel()
+    whole[:, flank[first]] = whole[flank][:, first].conj()
+    return whole
+
+
+def _real_modes(
+    gear: CyclicGear, modes: CyclicModes, rows: FloatArray
+) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
+    """Cosine and sine modes at the flank points of tooth 0 and at the hub."""
+    frequencies, diameters, at_flanks, at_hub = [], [], [], []
+    for k, n in enumerate(modes.nodal_diameters):
+        flank = rows @ modes.shapes[:, k]
+        hub = hub_sum(int(n), gear.n_sectors) @ (gear.hub @ modes.shapes[:, k])
+        parts = (np.real, np.imag) if 0 < 2 * n < gear.n_sectors else (np.real,)
+        for part in parts:
+            frequencies.append(modes.frequencies_hz[k])
+            diameters.append(n)
+            at_flanks.append(part(flank))
+            at_hub.append(part(hub))
+    return np.array(frequencies), np.array(diameters), np.array(at_flanks), np.array(at_hub)
+
+
+# --------------------
+# Master degrees of freedom of a Craig–Bampton reduction: hub, contact patches, and auxiliary nodes.
+# --------------------
+
+
+N_HUB = 6
+
+
+class Masters(NamedTuple):
+    """Masters besides the six of the hub, which always come first.
+
+    Attributes
+    ----------
+    rows : array, (n_rows, n_own_dof)
+        Different rows over a sector's own degrees of freedom.
+    row_of : array of int, (n,)
+        Row of each master.
+    tooth_of : array of int, (n,)
+        Sector of each master.
+    """
+
+    rows: FloatArray
+    row_of: IntArray
+    tooth_of: IntArray
+
+    @property
+    def n_masters(self) -> int:
+        """With the hub's."""
+        return N_HUB + len(self.row_of)
+
+
+def contact_masters(gear: CyclicGear, teeth: Sequence[int] = (0, 1, 2, 3), n_slices: int = 5) -> Masters:
+    """Contact patches in the middle of the flanks of some teeth: per slice the motion along the push, the flank and z.
+
+    Parameters
+    ----------
+    gear : CyclicGear
+    teeth : sequence of int
+    n_slices : int
+        At most as many as there are layers of nodes along the face: more could not move independently.
+
+    Raises
+    ------
+    InputError
+        If there are more slices than layers.
+    """
+    n_layers = gear.mesh.tooth.shape[2]
+    if n_slices > n_layers:
+        raise InputError(
+            f"n_slices is {n_slices}",
+            allowed=f"at most {n_layers}, the layers of nodes along the face",
+            remedy="take fewer slices, or more cells along the face",
+        )
+    mesh, n_dof = gear.mesh, 3 * len(gear.own_nodes)
+    roll = float(np.mean(flank_grid(mesh.blank.geometry, 2, 1).roll_rad))
+    point, push = point_and_push(mesh.blank.geometry, roll, 1.0)
+    nodes = height_nodes(mesh, roll, "patch", 0)
+    along_flank = np.array([-push[1], push[0]])
+    axial = np.column_stack((np.zeros((len(nodes.weights), 2)), nodes.weights))
+    planes = (plane_row(mesh, nodes, point, push), plane_row(mesh, nodes, point, along_flank), axial)
+    dof = 3 * gear.own_places[nodes.nodes][..., None] + np.arange(3)
+    rows = np.zeros((n_slices, 3, n_dof))
+    for k, z in enumerate(flank_grid(mesh.blank.geometry, 2, n_slices).z_m):
+        weights = slice_weights(mesh, float(z), n_slices, "patch")
+        for component, plane in enumerate(planes):
+            np.add.at(rows[k, component], dof, plane[:, None, :] * weights[None, :, None])
+    n = 3 * n_slices
+    row_of, tooth_of = np.tile(np.arange(n), len(teeth)), np.repeat(np.asarray(teeth, dtype=np.int64), n)
+    return Masters(rows.reshape(n, n_dof), row_of, tooth_of)
+
+
+def with_auxiliary(gear: CyclicGear, masters: Masters, modes: CyclicModes, n_nodes: int) -> Masters:
+    """Add the nodes of the whole gear that tell its modes apart best, three degrees of freedom each.
+
+    One after the other, the node that most increases det(Q), Q = Σ over masters of aᵀa, a a master's motion in the
+    modes (each scaled to its largest motion).
+
+    Source: D. C. Kammer, Sensor placement for on-orbit modal identification and correlation of large space structures,
+    Journal of Guidance, Control, and Dynamics 14 (1991), for the determinant as the criterion.
+    """
+    if not n_nodes:
+        return masters
+    at_nodes = _real_motion(gear, modes)  # (sector, node, 3, mode)
+    scale = np.abs(at_nodes).max(axis=(0, 1, 2))
+    at_nodes = at_nodes / scale
+    at_masters = motion_at(masters, gear, modes)[N_HUB:] / scale
+    information = at_masters.T @ at_masters + 1e-6 * np.eye(len(scale))
+    flat = at_nodes.reshape(-1, 3, len(scale))
+    chosen: list[int] = []
+    for _ in range(n_nodes):
+        small = np.eye(3) + flat @ np.linalg.inv(information) @ flat.transpose(0, 2, 1)
+        gain = np.linalg.det(small)
+        gain[chosen] = 0.0
+        best = int(np.argmax(gain))
+        chosen.append(best)
+        information += flat[best].T @ flat[best]
+    return _with_nodes(masters, np.array(chosen), len(gear.own_nodes))
+
+
+def phased_rows(masters: Masters, gear: CyclicGear, n: int) -> tuple[ComplexArray, ComplexArray]:
+    """Rows of nodal diameter n and how masters follow from them.
+
+    Returns
+    -------
+    rows : array, (n_rows + 6, n_own_dof)
+        Hub first.
+    turn : array, (n_masters, n_rows + 6)
+        Master = turn · rows · U; a force on it acts as the conjugate transpose, divided by z.
+    """
+    z, n_rows = gear.n_sectors, len(masters.rows)
+    hub = hub_sum(n, z) @ gear.hub if n <= 1 else np.zeros((N_HUB, masters.rows.shape[1]))
+    turn = np.zeros((masters.n_masters, N_HUB + n_rows), dtype=np.complex128)
+    turn[:N_HUB, :N_HUB] = np.eye(N_HUB)
+    place = np.arange(N_HUB, masters.n_masters)
+    turn[place, N_HUB + masters.row_of] = np.exp(1j * gear.phase_rad(n) * masters.tooth_of)
+    return np.vstack((hub, masters.rows)).astype(np.complex128), turn
+
+
+def _with_nodes(masters: Masters, chosen: IntArray, n_own: int) -> Masters:
+    sectors, nodes = np.divmod(chosen, n_own)
+    rows = np.zeros((3 * len(chosen), 3 * n_own))
+    for k, node in enumerate(nodes):
+        rows[3 * k + np.arange(3), 3 * node + np.arange(3)] = 1.0
+    return Masters(
+        np.vstack((masters.rows, rows)),
+        np.concatenate((masters.row_of, len(masters.rows) + np.arange(len(rows)))),
+        np.concatenate((masters.tooth_of, np.repeat(sectors, 3))),
+    )
+
+
+def _real_motion(gear: CyclicGear, modes: CyclicModes) -> FloatArray:
+    """Motion of all nodes in the real modes (sector, node, component, mode)."""
+    columns = []
+    for k, n in enumerate(modes.nodal_diameters):
+        waves = np.exp(1j * gear.phase_rad(int(n)) * np.arange(gear.n_sectors))[:, None] * modes.shapes[:, k]
+        columns += [waves.real, waves.imag][: int(modes.multiplicity(gear.n_sectors)[k])]
+    motion = np.stack(columns, axis=-1)
+    return motion.reshape(gear.n_sectors, -1, 3, motion.shape[-1])
+
+
+def motion_at(masters: Masters, gear: CyclicGear, modes: CyclicModes) -> FloatArray:
+    """Motion of the masters in the real modes, (n_masters, n_modes)."""
+    columns = []
+    for k, n in enumerate(modes.nodal_diameters):
+        rows, turn = phased_rows(masters, gear, int(n))
+        moved = turn @ (rows @ modes.shapes[:, k])
+        columns += [moved.real, moved.imag][: int(modes.multiplicity(gear.n_sectors)[k])]
+    return np.column_stack(columns)
+
+
+# --------------------
+# How well a reduced gear keeps the modes of the full model.
+# --------------------
+
+
+SAME_HZ = 1e-3
+"""Relative: modes of the full model this close are one subspace; within it errors of this size turn the vectors."""
+
+
+@dataclass(frozen=True)
+class ReductionAccuracy:
+    """Elastic modes of the full and of the reduced model, side by side.
+
+    Parameters
+    ----------
+    full_hz, reduced_hz : array, (n,)
+    subspace_mac : array, (n,)
+        Least squared cosine, weighted by mass, between the subspace of equal frequencies (to 0.1 %) that a full mode
+        belongs to and the reduced modes of that frequency: 1 where the reduced model holds it.
+    rigid_hz : array, (6,)
+        Of the reduced model; 0 if nothing holds the gear.
+    """
+
+    full_hz: FloatArray
+    reduced_hz: FloatArray
+    subspace_mac: FloatArray
+    rigid_hz: FloatArray
+
+    @property
+    def errors(self) -> FloatArray:
+        """Relative errors of the frequencies."""
+        relative: FloatArray = self.reduced_hz / self.full_hz - 1.0
+        return relative
+
+    @property
+    def worst_error(self) -> float:
+        """Largest of them without sign."""
+        return float(np.abs(self.errors).max())
+
+    @property
+    def least_mac(self) -> float:
+        """Of all modes compared."""
+        return float(self.subspace_mac.min())
+
+    def table(self) -> str:
+        """Return the comparison as text, a line for each mode."""
+        head = f"{'full Hz':>12} {'reduced Hz':>12} {'error %':>10} {'subspace MAC':>14}"
+        rows = zip(self.full_hz, self.reduced_hz, 100.0 * self.errors, self.subspace_mac, strict=True)
+        return "\n".join([head, *(f"{f:12.3f} {r:12.3f} {e:10.5f} {m:14.9f}" for f, r, e, m in rows)])
+
+
+def matched(
+    full_hz: FloatArray, reduced_hz: FloatArray, products: FloatArray, *, rigid_hz: FloatArray
+) -> ReductionAccuracy:
+    """Compare modes place by place.
+
+    Parameters
+    ----------
+    full_hz : array, (n,)
+        Ascending.
+    reduced_hz : array, (m,)
+        Elastic ones, ascending, m ≥ n.
+    products : array, (n, m)
+        Mass products of full and reduced modes, both mass-normalised.
+    rigid_hz : array
+
+    Source: R. J. Allemang, The modal assurance criterion – twenty years of use and abuse, Sound and Vibration (2003),
+    for the criterion; for subspaces, the squared cosines of their principal angles.
+    """
+    n = len(full_hz)
+    mac = np.empty(n)
+    start = 0
+    while start < n:
+        end = start + 1
+        while end < n and full_hz[end] <= full_hz[start] * (1.0 + SAME_HZ):
+            end += 1
+        near = np.abs(reduced_hz / np.mean(full_hz[start:end]) - 1.0) < SAME_HZ
+        near[start:end] = True
+        cosines = np.linalg.svd(products[start:end, near], compute_uv=False)
+        mac[start:end] = cosines[-1] ** 2
+        start = end
+    return ReductionAccuracy(full_hz, reduced_hz[:n], mac, rigid_hz)
+
+
+# --------------------
+# Craig–Bampton reduction of a whole gear with selected masters, by cyclic symmetry.
+# --------------------
+
+
+N_COMPARED = 20
+"""Elastic modes in the table of errors."""
+
+
+@dataclass(frozen=True)
+class CraigBamptonPlan:
+    """What is kept.
+
+    Parameters
+    ----------
+    n_dof : int
+        Of the reduced gear: masters and fixed-interface modes.
+    n_teeth, n_slices : int
+        Contact patches, three degrees of freedom each; four teeth and five slices make 60, with the hub 66 masters.
+    n_auxiliary : int
+        Auxiliary nodes, three degrees of freedom each.
+    n_shapes : int
+        Shapes of each nodal diameter, from which the fixed-interface modes are built; z times as many in all.
+    """
+
+    n_dof: int = 229
+    n_teeth: int = 4
+    n_slices: int = 5
+    n_auxiliary: int = 4
+    n_shapes: int = 12
+
+    def __post_init__(self) -> None:
+        count(self.n_teeth, "n_teeth")
+        count(self.n_slices, "n_slices")
+        count(self.n_auxiliary, "n_auxiliary", minimum=0)
+        count(self.n_shapes, "n_shapes", minimum=2)
+        count(self.n_dof, "n_dof", minimum=self.n_masters + 1, remedy="keep more, or take fewer masters")
+
+    @property
+    def n_masters(self) -> int:
+        """Hub, contact patches, auxiliary nodes."""
+        return N_HUB + 3 * (self.n_teeth * self.n_slices + self.n_auxiliary)
+
+
+@dataclass(frozen=True)
+class CraigBamptonGear:
+    """A gear reduced to master degrees of freedom and fixed-interface modes; free, without damping.
+
+    Parameters
+    ----------
+    stiffness, mass : array, (n_dof, n_dof)
+        Masters first (six of the hub: m, rad; then contact patches, auxiliary nodes: m), then modal coordinates.
+    masters : Masters
+    fixed_frequencies_hz : array
+        Of the fixed-interface modes.
+    accuracy : ReductionAccuracy
+        Against the full model.
+    """
+
+    stiffness: FloatArray = field(repr=False)
+    mass: FloatArray = field(repr=False)
+    masters: Masters = field(repr=False)
+    fixed_frequencies_hz: FloatArray
+    accuracy: ReductionAccuracy
+
+
+class _Space(NamedTuple):
+    """What the whole gear, sprung at its hub, tells of its modes φ and of static answers s_b to forces on the masters.
+
+    Attributes
+    ----------
+    squares : array, (p,)
+        ω² of the real modes.
+    at_masters : array, (m, p)
+        Bφ.
+    compliance : array, (m, m)
+        B K⁻¹ Bᵀ.
+    inertia : array, (m, m)
+        B K⁻¹ M K⁻¹ Bᵀ, the mass matrix of the static answers.
+    with_modes, with_static : arrays, (r, p) and (r, m)
+        Mass products of the full model's reference modes with φ and with the static answers.
+    """
+
+    squares: FloatArray
+    at_masters: FloatArray
+    compliance: FloatArray
+    inertia: FloatArray
+    with_modes: FloatArray
+    with_static: FloatArray
+
+
+class _Targets(NamedTuple):
+    """Elastic modes of the free gear that the reduction has to keep: frequencies, and motion of the masters (m, r)."""
+
+    frequencies_hz: FloatArray
+    at_masters: FloatArray
+
+    @property
+    def squares(self) -> FloatArray:
+        """ω², (r,)."""
+        squares: FloatArray = (2.0 * np.pi * self.frequencies_hz) ** 2
+        return squares
+
+
+def craig_bampton(
+    mesh: SectorMesh, plan: CraigBamptonPlan | None = None, n_compared: int = N_COMPARED
+) -> CraigBamptonGear:
+    """Reduce a gear to masters and fixed-interface modes, and compare its first elastic modes with the full model.
+
+    u = Ψ u_m + Y η;  Ψ: static answers to unit motions of the masters, Y: modes with the masters held.
+
+    Everything follows from solutions of one sector. Ψ is exact. The fixed-interface modes are those of the full model
+    within the space of its lowest z·n_shapes modes (hub on springs, which are taken off afterwards) and Ψ. Those are
+    kept that the first elastic modes of the gear need most, not those of lowest frequency: tooth by tooth there are
+    many of these that do not take part.
+
+    Parameters
+    ----------
+    mesh : SectorMesh
+    plan : CraigBamptonPlan or None
+        None: 229 degrees of freedom.
+    n_compared : int
+        Elastic modes compared.
+
+    Raises
+    ------
+    InputError
+        If there are more slices than layers of nodes, or the memory does not suffice.
+
+    Source: R. R. Craig, M. C. C. Bampton, Coupling of substructures for dynamic analyses, AIAA Journal 6 (1968).
+    """
+    used = CraigBamptonPlan() if plan is None else plan
+    check_memory(craig_bampton_bytes(mesh.blank, mesh.size, n_compared))
+    with one_thread():
+        free = CyclicGear(mesh)
+        reference = cyclic_modes(free, n_compared, elastic=True)
+        teeth = tuple(range(used.n_teeth))
+        contact = contact_masters(free, teeth, used.n_slices)
+        masters = with_auxiliary(free, contact, reference, used.n_auxiliary)
+        springs = _hub_springs(mesh)
+        space = _space(CyclicGear(mesh, springs), masters, reference, used.n_shapes)
+        targets = _Targets(
+            np.repeat(reference.frequencies_hz, reference.multiplicity(free.n_sectors)),
+            motion_at(masters, free, reference),
+        )
+        return _reduced(space, masters, springs, targets, used.n_dof)
+
+
+def _hub_springs(mesh: SectorMesh) -> FloatArray:
+    """Springs about as stiff as the body: they only make the matrices definite."""
+    b = mesh.blank
+    stiffness = 0.1 * b.material.youngs_modulus_pa * b.geometry.face_width_mm * 1e-3
+    turning = stiffness * (b.geometry.bore_mm * 1e-3) ** 2
+    return np.array([stiffness] * 3 + [turning] * 3)
+
+
+def _space(gear: CyclicGear, masters: Masters, reference: CyclicModes, n_shapes: int) -> _Space:
+    z, m = gear.n_sectors, masters.n_masters
+    squares: list[FloatArray] = []
+    at_masters: list[FloatArray] = []
+    products: list[tuple[int, FloatArray]] = []
+    compliance, inertia = np.zeros((m, m)), np.zeros((m, m))
+    with_static = np.zeros((int(reference.multiplicity(z).sum()), m))
+    for n in gear.diameters:
+        weight = (1.0 if n == 0 or 2 * n == z else 2.0) / z
+        rows, turn = phased_rows(masters, gear, n)
+        frequencies, shapes, static = lowest_with_static(gear, n, n_shapes, rows.conj().T)
+        mass = gear.mass.at(gear.phase_rad(n))
+        moved = np.asarray(mass @ static)
+        compliance += weight * np.real(turn @ (rows @ static) @ turn.conj().T)
+        inertia += weight * np.real(turn @ (static.conj().T @ moved) @ turn.conj().T)
+        pair = 0 < 2 * n < z
+        squares.append(np.repeat((2.0 * np.pi * frequencies) ** 2, 2 if pair else 1))
+        at_masters.append(_real_columns(turn @ (rows @ shapes), pair))
+        for place, shape in _references(reference, n, z):
+            _add_products(with_static, place, shape, moved @ turn.conj().T, pair)
+            products.append((place, _mode_products(shape, np.asarray(mass @ shapes), z, pair)))
+    widths = np.cumsum([0, *(len(s) for s in squares)])
+    with_modes = np.zeros((len(with_static), widths[-1]))
+    for place, block in products:
+        n = int(_diameter_of(reference, place, z))
+        with_modes[place : place + len(block), widths[n] : widths[n + 1]] = block
+    return _Space(np.concatenate(squares), np.hstack(at_masters), compliance, inertia, with_modes, with_static)
+
+
+def _reduced(space: _Space, masters: Masters, springs: FloatArray, targets: _Targets, n_dof: int) -> CraigBamptonGear:
+    """Matrices in (u_m, η); y = φ − Ψ Bφ are motions with the masters held."""
+    from scipy.linalg import eigh
+
+    c = space.at_masters
+    held = np.linalg.inv(space.compliance)
+    held = (held + held.T) / 2.0
+    static_mass = held @ space.inertia @ held
+    mode_static = (c.T / space.squares[:, None]) @ held
+    inner_k = np.diag(space.squares) - c.T @ held @ c
+    crossed = mode_static @ c
+    inner_m = np.eye(len(space.squares)) - crossed - crossed.T + c.T @ static_mass @ c
+    values, turn = _definite_modes(inner_k, inner_m)
+    coupled = turn.T @ (mode_static - c.T @ static_mass)
+    kept = _needed(values, coupled, targets, n_dof - masters.n_masters)
+    values, turn, coupled = values[kept], turn[:, kept], coupled[kept]
+    m = masters.n_masters
+    stiffness, mass = np.zeros((m + len(values),) * 2), np.eye(m + len(values))
+    stiffness[:m, :m] = held
+    stiffness[range(N_HUB), range(N_HUB)] -= springs
+    stiffness[range(m, m + len(values)), range(m, m + len(values))] = values
+    mass[:m, :m], mass[m:, :m], mass[:m, m:] = static_mass, coupled, coupled.T
+    squares, vectors = eigh(stiffness, mass)
+    on_masters = space.with_static @ held
+    products = np.hstack((on_masters, (space.with_modes - on_masters @ c) @ turn)) @ vectors
+    frequencies = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi)
+    accuracy = matched(targets.frequencies_hz, frequencies[N_HUB:], products[:, N_HUB:], rigid_hz=frequencies[:N_HUB])
+    return CraigBamptonGear(stiffness, mass, masters, np.sqrt(values) / (2.0 * np.pi), accuracy)
+
+
+def _needed(squares: FloatArray, coupled: FloatArray, targets: _Targets, n_modes: int) -> IntArray:
+    """Places of the fixed-interface modes without which a target would be missed most, ascending.
+
+    Without mode i, coupled to the masters by c_i, the square of target j's frequency is off by about
+    ω_j⁴ (c_iᵀ x_j)²/|λ_i − ω_j²|, x_j the masters' motion in it.
+    """
+    away = np.abs(squares[:, None] - targets.squares)
+    missed = (coupled @ targets.at_masters) ** 2 * targets.squares / away
+    return np.sort(np.argsort(-missed.max(axis=1), kind="stable")[:n_modes])
+
+
+def _definite_modes(stiffness: FloatArray, mass: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """All modes in the part of the space where the mass is well above rounding."""
+    from scipy.linalg import eigh
+
+    weights, axes = eigh(mass)
+    kept = weights > 1e-9 * weights[-1]
+    white = axes[:, kept] / np.sqrt(weights[kept])
+    values, turn = eigh(white.T @ stiffness @ white)
+    return values, white @ turn
+
+
+def _real_columns(columns: ComplexArray, pair: bool) -> FloatArray:
+    """Cosine and sine modes side by side."""
+    if not pair:
+        return columns.real
+    return np.stack((columns.real, columns.imag), axis=-1).reshape(len(columns), -1)
+
+
+def _references(modes: CyclicModes, n: int, z: int) -> list[tuple[int, ComplexArray]]:
+    """Place among the real reference modes, and shape, of those of nodal diameter n."""
+    starts = np.concatenate(([0], np.cumsum(modes.multiplicity(z))))
+    return [(int(starts[k]), modes.shapes[:, k]) for k in np.flatnonzero(modes.nodal_diameters == n)]
+
+
+def _diameter_of(modes: CyclicModes, place: int, z: int) -> int:
+    starts = np.cumsum(modes.multiplicity(z))
+    return int(modes.nodal_diameters[int(np.searchsorted(starts, place, side="right"))])
+
+
+def _add_products(into: FloatArray, place: int, shape: ComplexArray, moved: ComplexArray, pair: bool) -> None:
+    """Mass products with static answers, whose n-th wave is U/z: Re(VᴴMU) and −Im(VᴴMU)."""
+    product = shape.conj() @ moved
+    into[place] = product.real
+    if pair:
+        into[place + 1] = -product.imag
+
+
+def _mode_products(shape: ComplexArray, moved: ComplexArray, z: int, pair: bool) -> FloatArray:
+    """Mass products of a reference mode (both of a pair) with the real modes of the same nodal diameter."""
+    product = z * (shape.conj() @ moved)
+    if not pair:
+        return product.real[None]
+    block = np.empty((2, 2 * len(product)))
+    block[0, ::2], block[0, 1::2] = product.real / 2.0, product.imag / 2.0
+    block[1, ::2], block[1, 1::2] = -product.imag / 2.0, product.real / 2.0
+    return block

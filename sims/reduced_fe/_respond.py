@@ -1,0 +1,540 @@
+"""Run a flexible pair and return what it does: transmission error, forces, displacements, accelerations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray, closest_match_hint, count, positive
+from gearsig.errors import InputError, RefusalError
+from sims.gear_pair import COORDINATES
+from sims.machine import Operation, Profile
+from sims.mesh import one_mesh_cycle
+from sims.reduced_fe._integrate import Method, step_coefficients
+from sims.reduced_fe._pair import (
+    FlexiblePair,
+    FlexiblePairConstants,
+    back_rows,
+    constants,
+    contact_rows,
+    hub_inertia,
+    start_state,
+)
+
+# --------------------
+# Whether a step can be followed: errors must not grow from step to step.
+#
+# A contact that is stiff or strongly damped against the light parts behind it answers a step by more than it was taken
+# with. What comes of it is bounded by the loss of contact and looks like impacts.
+# --------------------
+
+
+MOST_GROWTH = 1e-4
+"""Of errors in a step. Without any damping steps of 5 µs have 4e-7; those that cannot be followed 1e-2 and more."""
+N_POINTS = 5
+MOST_HALVINGS = 3
+USUAL_HUB = 2.0
+"""Inertia of a hub over its toothed body's."""
+
+
+def followed_step_s(pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, longest_s: float) -> float:
+    """Return the step, or its half, quarter or eighth, that the contact can be followed with in one pass.
+
+    Where none can, the longest: `check_step` then says why.
+    """
+    for halvings in range(MOST_HALVINGS + 1):
+        step = longest_s * 0.5**halvings
+        coefficients = np.array([step_coefficients(s.omega_rad_s, s.damping_rate, step) for s in own.sides])
+        if growth(pair, own, operation, coefficients) <= MOST_GROWTH:
+            return step
+    return longest_s
+
+
+def growth(pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, coefficients: FloatArray) -> float:
+    """Return by how much errors of the loaded, linear pair grow in a step of one pass, at the worst of some angles.
+
+    The spectral radius, less 1, of the map of (q, v, f, f of the step before) that `integrate_kernel.march` makes, with
+    the contact as springs S and dampers τS between ∂D/∂η·q.
+
+    Parameters
+    ----------
+    pair : FlexiblePair
+    own : Constants
+    operation : Operation
+    coefficients : array, (2, 8, n_modes)
+        See `step_coefficients`.
+    """
+    qq, qv, vq, vv, q0, q1, v0, v1 = (np.diag(np.concatenate(c)) for c in np.moveaxis(coefficients, 1, 0))
+    nothing, same = np.zeros_like(qq), np.eye(len(qq))
+    extrapolated = np.hstack((nothing, nothing, 2.0 * same, -same))
+    free_q, free_v = np.hstack((qq, qv, q0, nothing)), np.hstack((vq, vv, v0, nothing))
+    seen = free_q + q1 @ extrapolated + float(own.record["damping_time"]) * (free_v + v1 @ extrapolated)
+    found = 0.0
+    for cycles in one_mesh_cycle(N_POINTS):
+        rows, stiff = contact_rows(pair, own, operation, cycles)
+        force = -rows.T @ stiff @ rows @ seen
+        step = np.vstack(
+            (free_q + q1 @ force, free_v + v1 @ force, force, np.hstack((nothing, nothing, same, nothing)))
+        )
+        found = max(found, float(np.abs(np.linalg.eigvals(step)).max()))
+    return found - 1.0
+
+
+def check_step(
+    pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, coefficients: FloatArray, method: Method
+) -> None:
+    """Refuse a step in which errors grow, or, of the method that repeats its passes, one whose passes do not settle.
+
+    Raises
+    ------
+    InputError
+        Where hubs are too heavy for their teeth, the damping ratio is too great, or the step too long.
+    """
+    if method == "exponential" and growth(pair, own, operation, coefficients) <= MOST_GROWTH:
+        return
+    if method == "newmark" and _pass_gain(pair, own, operation, coefficients) <= 1.0:
+        return
+    hubs = [hub_inertia(pair.machine, i, gear)[1] / gear.polar_inertia_kg_m2 for i, gear in enumerate(pair.gears)]
+    worst = int(np.argmax(hubs))
+    raise InputError(
+        f"the contact is stiffer or damped more than its gears can follow: hubs turn with {hubs[0]:.2g} and "
+        f"{hubs[1]:.2g} times the inertia of the toothed bodies, damping ratio {pair.machine.mesh_damping_ratio:g}",
+        where=f"hub_inertia_{('driver', 'driven')[worst]}_kg_m2" if hubs[worst] > USUAL_HUB else "mesh_damping_ratio",
+        allowed="6 times at a damping ratio of 0.08, or 0.2 with lighter hubs, or so",
+        remedy="give hubs that suit the gears, lower mesh_damping_ratio, or give a shorter step",
+    )
+
+
+def _pass_gain(pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, coefficients: FloatArray) -> float:
+    """Change of a contact force over that of the force that a pass was made with: below 1 passes settle."""
+    moved = np.concatenate(coefficients[:, 5] + float(own.record["damping_time"]) * coefficients[:, 7])
+    gain = 0.0
+    for cycles in one_mesh_cycle(N_POINTS):
+        rows, stiff = contact_rows(pair, own, operation, cycles)
+        gain = max(gain, float(np.abs(np.linalg.eigvals(stiff @ (rows * moved) @ rows.T)).max(initial=0.0)))
+    return gain
+
+
+STEP_S = 5e-6
+"""Step where none is given; see `sims.reduced_fe` for what it costs in accuracy."""
+MOST_STEPS = 400_000_000
+"""Half an hour of computing or so; more is taken for a mistake."""
+STEPS_PER_CALL = 100_000
+"""Compiled code cannot be interrupted: it comes back for a look every quarter of a second or so."""
+MOVING = COORDINATES
+"""Places in rad and m, each also with " velocity" and " acceleration". Those of gears are of their hubs."""
+EXTRAS = ("mesh_force_n", "back_force_n", "mesh_cycles", "approach_m", "contact_torque_nm", "friction_n")
+"""Sum of the contact forces, the force behind, c, the greatest approach of flanks, torque of moving stiffness, friction
+along x on the driven gear."""
+TRANSMISSION_ERROR = "transmission_error_m"
+"""r_b1 θ1 − r_b2 θ2 of the hubs."""
+KINDS = ("", " velocity", " acceleration")
+
+
+@dataclass(frozen=True)
+class FlexState:
+    """Where a flexible pair is: what a later run needs to go on from there; see `integrate_kernel.march`."""
+
+    q: FloatArray
+    v: FloatArray
+    f: FloatArray
+    f_before: FloatArray
+    force: FloatArray
+    root: FloatArray
+    pair: FloatArray
+    rest: FloatArray
+
+    @property
+    def arrays(self) -> tuple[FloatArray, ...]:
+        """Copies, which the kernel overwrites."""
+        fields = (self.q, self.v, self.f, self.f_before, self.force, self.root, self.pair, self.rest)
+        return tuple(np.array(a) for a in fields)
+
+
+@dataclass(frozen=True)
+class FlexResponse:
+    """Signals of a run on an even grid of time.
+
+    Parameters
+    ----------
+    start_s, interval_s : float
+    signals : mapping
+        Name → (n,), in m, rad, s, N.
+    step_s : float
+        Of the integrator.
+    energy_j : array
+        (n,), or empty where it was not asked for.
+    last : FlexState
+    """
+
+    start_s: float
+    interval_s: float
+    signals: Mapping[str, FloatArray]
+    step_s: float
+    energy_j: FloatArray
+    last: FlexState
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Times of the points."""
+        return self.start_s + self.interval_s * np.arange(len(next(iter(self.signals.values()))))
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Return a signal by its name."""
+        return self.signals[name]
+
+
+def respond(
+    pair: FlexiblePair,
+    operation: Operation,
+    *,
+    duration_s: float,
+    signals: Sequence[str] = (TRANSMISSION_ERROR, "mesh_force_n"),
+    start_s: float = 0.0,
+    step_s: float = STEP_S,
+    stride: int = 1,
+    method: Method = "exponential",
+    with_energy: bool = False,
+    first: FlexState | None = None,
+    ready: FlexiblePairConstants | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> FlexResponse:
+    """Integrate from the static balance on, or from where another run ended.
+
+    Parameters
+    ----------
+    pair : FlexiblePair
+    operation : Operation
+        Set speed and torque; time 0 of their courses is time 0 here.
+    duration_s : float
+    signals : sequence of str
+        Of `signal_names`.
+    start_s : float
+        First time; below 0 for a lead-in.
+    step_s : float
+    stride : int
+        Every how many steps a point is kept.
+    method : str
+        "exponential": fast, each step taken once. "newmark": the reference; average acceleration, each step repeated
+        until forces stay to 1e-11.
+    with_energy : bool
+        Meaningful without set speed, damping, governor and weight.
+    first : FlexState or None
+        `FlexResponse.last` of another run; None: the static balance at `start_s`.
+    ready : Constants or None
+        Of this pair and operation, where they are at hand.
+    on_progress : callable or None
+        Called now and then with the part that is done, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        On an unknown signal, a run of more than `MOST_STEPS` steps, or a contact damped more than its gears can follow.
+    RefusalError
+        If the solution grows beyond all bounds.
+    """
+    from sims.reduced_fe._integrate import march, room
+
+    step, every = positive(step_s, "step_s", "s"), count(stride, "stride")
+    n_steps = ceil(positive(duration_s, "duration_s", "s") / step - 1e-9)
+    if n_steps > MOST_STEPS:
+        raise InputError(
+            f"{n_steps:.3g} steps of {step:.3g} s", where="duration_s", allowed=f"at most {MOST_STEPS:.0e} steps"
+        )
+    own = constants(pair, operation) if ready is None else ready
+    lines = _lines(own, signals)
+    coefficients = np.array([step_coefficients(s.omega_rad_s, s.damping_rate, step, method) for s in own.sides])
+    check_step(pair, own, operation, coefficients, method)
+    state = (start_state(pair, own, operation, start_s) if first is None else first).arrays
+    fixed = (
+        own.record,
+        own.table.arrays,
+        own.stacked("rows"),
+        own.turn(),
+        coefficients,
+        np.array([[s.omega_rad_s**2, s.damping_rate] for s in own.sides]),
+        own.stacked("inputs"),
+        own.stacked("rigid"),
+        back_rows(pair.machine, own.sides),
+    )
+    courses = course_points(operation.speed_rpm, pi / 30.0), course_points(operation.torque_nm, 1.0)
+    scratch = room(state[4].shape, state[0].shape[1], fixed[2].shape[3])
+    rows = np.empty((-(-n_steps // every), len(signals)))
+    energies = np.empty(len(rows) if with_energy else 0)
+    per_call = every * max(STEPS_PER_CALL // every, 1)
+    for begun in range(0, n_steps, per_call):
+        n = min(per_call, n_steps - begun)
+        part = slice(begun // every, begun // every + -(-n // every))
+        energy = energies[part] if with_energy else energies
+        time = start_s + begun * step
+        found = rows[part]
+        filled = march(
+            *fixed, state, *courses, time, step, n, every, method == "newmark", lines, found, energy, scratch
+        )
+        if filled < len(found) or not np.isfinite(found).all():
+            raise RefusalError(
+                f"the solution grows beyond all bounds after {(begun + filled * every) * step:.3g} s",
+                remedy="lower mesh_damping_ratio, look for inertias that do not go together, or give a shorter step",
+            )
+        if on_progress is not None:
+            on_progress((begun + n) / n_steps)
+    return FlexResponse(
+        start_s, step * every, dict(zip(signals, rows.T, strict=True)), step, energies, FlexState(*state)
+    )
+
+
+def signal_names(ready: FlexiblePairConstants) -> tuple[str, ...]:
+    """Return all signals a run can give."""
+    moving = [f"{name}{kind}" for kind in KINDS for name in (*MOVING, TRANSMISSION_ERROR)]
+    return (*moving, *EXTRAS, *slot_names(ready))
+
+
+def slot_names(ready: FlexiblePairConstants) -> tuple[str, ...]:
+    """Forces of the pairs that may touch, the newest first, then of their slices."""
+    slots, slices = range(ready.table.n_slots), range(ready.table.n_slices)
+    return (
+        *(f"pair {j} force_n" for j in slots),
+        *(f"pair {j} slice {s} force_n" for j in slots for s in slices),
+    )
+
+
+def course_points(course: Profile, factor: float) -> FloatArray:
+    """Times and values as kernels take them, (2, n)."""
+    return np.ascontiguousarray(np.vstack((course.times_s, factor * np.asarray(course.values))), dtype=np.float64)
+
+
+def _lines(own: FlexiblePairConstants, signals: Sequence[str]) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+    """Kind, factors and factor of the set angle of each signal."""
+    shape = (len(signals), 2, own.sides[0].n_modes)
+    kinds, factors, along = np.zeros(len(signals), dtype=np.int64), np.zeros(shape), np.zeros(len(signals))
+    extras = (*EXTRAS, *slot_names(own))
+    for line, name in enumerate(signals):
+        if name in extras:
+            kinds[line] = 3 + extras.index(name)
+            continue
+        kind = next((i for i in (2, 1) if name.endswith(KINDS[i])), 0)
+        place = name.removesuffix(KINDS[kind]) if kind else name
+        if place not in (*MOVING, TRANSMISSION_ERROR):
+            known = signal_names(own)
+            raise InputError(f"there is no signal {name!r}", remedy=closest_match_hint(name, known))
+        kinds[line] = kind
+        along[line] = _place(own, place, factors[line])
+    return kinds, factors, along
+
+
+def _place(own: FlexiblePairConstants, name: str, factors: FloatArray) -> float:
+    """Fill the modal factors of a place; return that of the set angle."""
+    one, two = own.sides
+    if name == TRANSMISSION_ERROR:
+        factors[0], factors[1] = one.hub, -two.hub
+        return 0.0
+    number = MOVING.index(name)
+    if number < 4:
+        side = number // 2
+        rotor = number in (0, 3)
+        factors[side] = own.sides[side].shapes[0] if rotor else own.sides[side].hub / own.base_radius_m[side]
+        return 1.0 if side == 0 else 1.0 / float(own.record["ratio"])
+    if number < 8:
+        factors[(number - 4) // 2] = own.sides[(number - 4) // 2].shapes[8 + number % 2]
+    else:
+        factors[(number - 8) // 4] = own.sides[(number - 8) // 4].shapes[4 + (number - 8) % 4]
+    return 0.0
+
+
+# --------------------
+# Slow sweeps over speed, up and down: rms of the dynamic transmission error, contact loss, jumps.
+# --------------------
+
+
+STRIDE = 10
+"""Steps per kept point."""
+
+
+@dataclass(frozen=True)
+class SpeedSweep:
+    """What a sweep gives in equal parts of its time.
+
+    Parameters
+    ----------
+    speed_rpm : array, (n,)
+        Mean of each part, in the order of time.
+    mesh_hz : array, (n,)
+    rms_m : array, (n,)
+        Of the dynamic transmission error without its mean in the part.
+    least_force_n : array, (n,)
+        Least mesh force.
+    lost_part : array, (n,)
+        Part of the time without contact on the driving flanks.
+    n_steps : int
+    step_s : float
+    """
+
+    speed_rpm: FloatArray
+    mesh_hz: FloatArray
+    rms_m: FloatArray
+    least_force_n: FloatArray
+    lost_part: FloatArray
+    n_steps: int
+    step_s: float
+
+    def peak_hz(self, low_hz: float, high_hz: float) -> float:
+        """Mesh frequency of the greatest rms value between two others."""
+        inside = (self.mesh_hz >= low_hz) & (self.mesh_hz <= high_hz)
+        if not np.any(inside):
+            raise InputError(f"no part of the sweep lies in {low_hz:g} to {high_hz:g} Hz", where="peak_hz")
+        return float(self.mesh_hz[inside][np.argmax(self.rms_m[inside])])
+
+    def jump_hz(self, low_hz: float, high_hz: float, ratio: float = 1.4) -> float | None:
+        """Mesh frequency of the greatest jump of rms, over the part it happens in; None where none exceeds `ratio`."""
+        inside = np.flatnonzero((self.mesh_hz >= low_hz) & (self.mesh_hz <= high_hz))
+        level = np.log(self.rms_m[inside])
+        change = np.abs(level[2:] - level[:-2])
+        place = int(np.argmax(change))
+        return float(self.mesh_hz[inside[place + 1]]) if change[place] >= np.log(ratio) else None
+
+
+def speed_sweep(
+    pair: FlexiblePair,
+    torque_nm: float,
+    first_rpm: float,
+    last_rpm: float,
+    duration_s: float,
+    *,
+    n_parts: int = 200,
+    step_s: float = STEP_S,
+    method: Method = "exponential",
+    on_progress: Callable[[float], None] | None = None,
+) -> SpeedSweep:
+    """Run a pair through a range of speeds at constant torque.
+
+    Parameters
+    ----------
+    pair : FlexiblePair
+    torque_nm : float
+        On the driver. The drive also gives what the rotors need to speed up.
+    first_rpm, last_rpm : float
+        Of the driver; up or down.
+    duration_s : float
+        Jumps move with the rate of a quick sweep: 100 to 400 rpm/s is slow for a pair of a few kHz.
+    n_parts : int
+    step_s : float
+    method : str
+    on_progress : callable or None
+    """
+    positive(duration_s, "duration_s", "s")
+    operation = Operation(Profile.of([0.0, duration_s], [first_rpm, last_rpm]), Profile.constant(torque_nm))
+    run = respond(
+        pair,
+        operation,
+        duration_s=duration_s,
+        signals=(TRANSMISSION_ERROR, "mesh_force_n"),
+        step_s=step_s,
+        stride=STRIDE,
+        method=method,
+        ready=constants(pair, operation),
+        on_progress=on_progress,
+    )
+    n = len(run[TRANSMISSION_ERROR]) // count(n_parts, "n_parts")
+    error, force = (run[name][: n * n_parts].reshape(n_parts, n) for name in (TRANSMISSION_ERROR, "mesh_force_n"))
+    speed = np.asarray(operation.speed_rpm.at((np.arange(n_parts) + 0.5) * n * run.interval_s))
+    return SpeedSweep(
+        speed,
+        speed / 60.0 * pair.machine.mesh.pair.driver.teeth,
+        error.std(axis=1),
+        force.min(axis=1),
+        (force <= 0.0).mean(axis=1),
+        round(duration_s / step_s),
+        step_s,
+    )
+
+
+# --------------------
+# How far the integrator's step changes the result: the fast way against the reference at a quarter of the step.
+# --------------------
+
+
+CHECK_S = 0.05
+"""Time over which runs are compared."""
+FINER = 4
+SIGNALS = (TRANSMISSION_ERROR, "mesh_force_n", "driver angle acceleration")
+ALLOWED = 0.01
+"""Part by which rms values may differ."""
+
+
+@dataclass(frozen=True)
+class FlexConvergence:
+    """Rms values of signals, without their means, at a step and by the reference.
+
+    Parameters
+    ----------
+    step_s, fine_step_s : float
+    rms, fine_rms : arrays, (n_signals,)
+        Of `SIGNALS`, in their units.
+    largest : array, (n_signals,)
+        Greatest difference at any time over the reference's rms.
+    """
+
+    step_s: float
+    fine_step_s: float
+    rms: FloatArray
+    fine_rms: FloatArray
+    largest: FloatArray
+
+    @property
+    def rms_error(self) -> FloatArray:
+        """Relative difference of the rms values."""
+        result: FloatArray = np.abs(self.rms / self.fine_rms - 1.0)
+        return result
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether no rms value is off by more than `ALLOWED`."""
+        return bool(self.rms_error.max() <= ALLOWED)
+
+    @property
+    def text(self) -> str:
+        """For people."""
+        head = f"step {self.step_s * 1e6:.3g} µs against Newmark's method at {self.fine_step_s * 1e6:.3g} µs:"
+        rows = [
+            f"  {name}: rms off by {100.0 * off:.2g} %, single values by up to {100.0 * most:.2g} % of it"
+            for name, off, most in zip(SIGNALS, self.rms_error, self.largest, strict=True)
+        ]
+        return "\n".join([head, *rows, "The step is short enough." if self.is_enough else "Take a shorter step_us."])
+
+
+def check_convergence(
+    pair: FlexiblePair, operation: Operation, step_s: float, time_s: float = CHECK_S
+) -> FlexConvergence:
+    """Run a pair both ways from the same static balance on and compare.
+
+    Where teeth lose contact and the motion is chaotic, single values part after a while at any step; rms values do not.
+
+    Parameters
+    ----------
+    pair : FlexiblePair
+    operation : Operation
+    step_s : float
+        Longest of the fast way, see `followed_step_s`; the reference takes a quarter of it.
+    time_s : float
+    """
+    own = constants(pair, operation)
+    step = followed_step_s(pair, own, operation, positive(step_s, "step_s", "s"))
+    fast = respond(pair, operation, duration_s=time_s, signals=SIGNALS, step_s=step, ready=own)
+    fine = respond(
+        pair,
+        operation,
+        duration_s=time_s,
+        signals=SIGNALS,
+        step_s=step / FINER,
+        stride=FINER,
+        method="newmark",
+        ready=own,
+    )
+    n = min(len(fast[SIGNALS[0]]), len(fine[SIGNALS[0]]))
+    rms, fine_rms = (np.array([np.std(r[name][:n]) for name in SIGNALS]) for r in (fast, fine))
+    largest = np.array([np.max(np.abs(fast[name][:n] - fine[name][:n])) for name in SIGNALS]) / fine_rms
+    return FlexConvergence(step, step / FINER, rms, fine_rms, largest)

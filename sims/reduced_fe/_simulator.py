@@ -1,0 +1,521 @@
+"""The pair of reduced finite-element gears as a simulator: preset and values → machine → effects → recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearsig.checks import positive
+from gearsig.errors import InputError
+from gearsig.gap import OperatingCondition
+from gearsig.recording import Recording
+from gearsig.rig import Rig
+from sims.effects import EffectSetting, effects, with_effects
+from sims.gear_pair import (
+    PARAMETERS as SHARED,
+)
+from sims.gear_pair import (
+    Installed,
+    Measurement,
+    PairGapSimulator,
+    PairModel,
+    PairTwin,
+    ReadyPair,
+    SimulationRequest,
+    build_machine,
+    draw_roughness,
+    gear_geometry,
+)
+from sims.machine import Machine, Operation
+from sims.measure import plain
+from sims.mesh import Material, PairGeometry
+from sims.presets import Preset
+from sims.reduced_fe._blank import GearBlank
+from sims.reduced_fe._contact import MARGIN, corner_separation_m
+from sims.reduced_fe._pair import FlexiblePair, FlexiblePairConstants, constants, eigenfrequencies_hz, torsional_mode
+from sims.reduced_fe._reduced_gear import ReducedGear
+from sims.reduced_fe._reduction import plan_for
+from sims.reduced_fe._respond import STEP_S, FlexResponse, FlexState, followed_step_s, respond
+from sims.reduced_fe._store import READY, cached_gear, ready_gear
+from sims.registry import check_load
+from sims.simulator import Parameter, ParameterValue, ParameterValues, Values
+
+if TYPE_CHECKING:
+    from sims.reduced_fe._respond import FlexConvergence
+
+
+# --------------------
+# The parameters of the flexible pair: those it shares with the 16-DOF pair, and those of its gear bodies.
+# --------------------
+
+
+MEANINGLESS: dict[str, ParameterValue | None] = {
+    "contact_law": "linear",
+    "mesh_ramp": 0.05,
+    "mass_driver_kg": None,
+    "mass_driven_kg": None,
+    "inertia_driver_kg_m2": None,
+    "inertia_driven_kg_m2": None,
+}
+"""Parameters of the 16-DOF pair that this model lacks, and the values with which its machine is built all the same."""
+
+_CHANGED = {
+    "mesh_damping_ratio": {
+        "meaning": "damping ratio of the torsional mode, rotors standing still; the contact gives what others do not",
+        "default": 0.08,
+    },
+    "friction": {"default": "off"},
+    "roughness_locked_to": {"choices": ("flank", "none")},
+    "bending_stiffness_n_per_m": {"default": 1.5e10},
+    "bearing_stiffness_n_per_m": {"default": 1.5e10},
+}
+
+
+def _number(name: str, unit: str, meaning: str, low: float, high: float, default: float | None) -> Parameter:
+    return Parameter(name, unit, meaning, low, high, default)
+
+
+def _bodies() -> tuple[Parameter, ...]:
+    found: list[Parameter] = []
+    for side, whose in (("driver", "the driver"), ("driven", "the driven gear")):
+        found += [
+            _number(f"web_thickness_{side}_mm", "mm", f"web of {whose}; none: a full disc", 0.1, 500, None),
+            _number(f"rim_thickness_{side}_mm", "mm", f"rim of {whose}; none: 3 modules", 0.1, 500, None),
+            _number(f"hub_thickness_{side}_mm", "mm", f"hub of {whose}; none: 3 modules", 0.1, 500, None),
+            _number(
+                f"hub_inertia_{side}_kg_m2", "kg m^2", f"what hub and shaft add to the inertia of {whose}", 0, 1e5, 0.0
+            ),
+            _number(f"hub_mass_{side}_kg", "kg", f"what hub and shaft add to the mass of {whose}", 0, 1e5, 0.0),
+        ]
+    return tuple(found)
+
+
+_DYNAMICS = (
+    _number("body_damping_ratio", "", "damping ratio of the elastic modes of the gears", 0, 0.5, 0.08),
+    _number("mode_limit_hz", "Hz", "elastic modes up to here move; those above follow at once", 500, 1e5, 20000.0),
+    _number(
+        "restitution",
+        "",
+        "of the gears' impact at first contact after a loss, on top of the compliance, which counts it twice; none: "
+        "the compliance alone",
+        0,
+        1,
+        None,
+    ),
+    _number("lead_error_um", "um", "misalignment of the flanks over the face width", -500, 500, 0.0),
+    _number(
+        "step_us",
+        "us",
+        "longest step of the integrator; shortened to what the contact needs and to a part of the sampling interval",
+        0.1,
+        20,
+        5.0,
+    ),
+    Parameter(
+        "mesh_dof",
+        "",
+        "degrees of freedom of each gear's finite elements, where no ready-made gear fits; kept on disk once reduced",
+        5000,
+        1e6,
+        277200,
+        whole=True,
+    ),
+)
+
+PARAMETERS: tuple[Parameter, ...] = (
+    *(replace(p, **_CHANGED.get(p.name, {})) for p in SHARED if p.name not in MEANINGLESS),  # type: ignore[arg-type]  # fields by name
+    *_bodies(),
+    *_DYNAMICS,
+)
+"""All of them."""
+OWN = frozenset(p.name for p in (*_bodies(), *_DYNAMICS))
+"""Those that the 16-DOF pair does not have."""
+
+NAME = "reduced-fe"
+
+
+@dataclass(frozen=True)
+class PreparedPair(ReadyPair):
+    """A flexible pair with its effects switched on, ready to run.
+
+    Parameters
+    ----------
+    asked : Asked
+    pair : FlexiblePair
+    """
+
+    pair: FlexiblePair
+
+    @property
+    def machine(self) -> Machine:
+        """The machine, effects included."""
+        return self.pair.machine
+
+    @property
+    def step_s(self) -> float:
+        """Longest step of the integrator."""
+        return 1e-6 * float(self.values["step_us"] or 0.0)
+
+
+@dataclass(frozen=True)
+class ReducedPair(PairModel[PreparedPair]):
+    """Spur pair of reduced finite-element gears between two rotors; see `sims.reduced_fe`.
+
+    Does not represent: gyroscopic and centrifugal terms, tilting of the gears, oil churning, heating, teeth bent by
+    friction, a shaft that lifts in its bearings or vibrates within their clearance, a change of the gears' modes by a
+    crack, contact off the line of action at corners.
+    """
+
+    name: str = NAME
+    title: str = "spur pair of finite-element gears, reduced: elastic bodies, contact of slices, contact loss"
+    parameters: tuple[Parameter, ...] = field(default=PARAMETERS, repr=False)
+    effects: tuple[str, ...] = field(default_factory=lambda: tuple(effects()), repr=False)
+    meaningless: tuple[str, ...] = (
+        "surface_roughness with locked_to=time: flanks are shapes here, which return with their teeth.",
+    )
+
+    def _built(self, asked: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> PreparedPair:
+        return _prepared(asked, rng, sampling_rate_hz)
+
+    def _recorded(
+        self, ready: PreparedPair, rig: Rig, rng: np.random.Generator, *, sampling_rate_hz: float, duration_s: float
+    ) -> Recording:
+
+        recording, _ = simulate_pair(
+            ready.pair,
+            ready.operation,
+            rng=rng,
+            sampling_rate_hz=sampling_rate_hz,
+            duration_s=duration_s,
+            rig=rig,
+            truth=ready.truth(),
+            step_s=ready.step_s,
+        )
+        return recording
+
+    def check_convergence(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        effects: Sequence[EffectSetting],
+        operation: Operation | None,
+        rng: np.random.Generator,
+        *,
+        preset: str = "",
+    ) -> FlexConvergence:
+        """Tell how far a smaller step of the integrator changes the result of this very pair."""
+        from sims.reduced_fe._respond import check_convergence
+
+        ready = self.prepare(parameters, effects, operation, rng, preset_name=preset)
+        return check_convergence(ready.pair, ready.operation, ready.step_s)
+
+
+def prepare_preset(
+    chosen: Preset,
+    parameters: Mapping[str, ParameterValue],
+    settings: Sequence[EffectSetting],
+    operation: Operation | None,
+    rng: np.random.Generator,
+    *,
+    sampling_rate_hz: float = 20480.0,
+) -> PreparedPair:
+    """Build a preset's pair and switch on its effects and `settings`; one number is drawn from `rng`."""
+    return _prepared(
+        SimulationRequest.of(chosen, PARAMETERS, parameters, settings, operation, sampling_rate_hz),
+        rng,
+        sampling_rate_hz,
+    )
+
+
+def _prepared(asked: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> PreparedPair:
+
+    gears = reduced_gears(asked.values)
+    sound = sound_machine(asked.values, gears, sampling_rate_hz=sampling_rate_hz, installed=asked.installed)
+    check_load(sound, asked.operation)
+    machine = with_effects(sound, asked.effects, rng)
+    if machine.roughness.locked_to == "time" and machine.roughness.rms_um > 0.0:
+        raise InputError(
+            "a roughness that is locked to time has no meaning here: flanks are shapes that return with their teeth",
+            where="locked_to of surface_roughness",
+            allowed="'flank'",
+        )
+    return PreparedPair(asked, flexible_pair(asked.values, machine, gears))
+
+
+# --------------------
+# From a flexible pair to a recording: run the model, then measure it.
+# --------------------
+
+
+LARGEST_DEPTH = 0.5
+"""Of what corners are apart at the table's ends: the most the static approach may take, to leave room to vibrate."""
+
+
+def simulate_pair(
+    pair: FlexiblePair,
+    operation: Operation,
+    *,
+    rng: np.random.Generator,
+    sampling_rate_hz: float,
+    duration_s: float,
+    rig: Rig | None = None,
+    truth: Mapping[str, Any] | None = None,
+    step_s: float = STEP_S,
+    also: Sequence[str] = (),
+    first: FlexState | None = None,
+    noise_rng: np.random.Generator | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> tuple[Recording, FlexResponse]:
+    """Simulate a flexible pair and measure it; return the recording and the motion behind it.
+
+    Parameters
+    ----------
+    pair : FlexiblePair
+    operation : Operation
+        Its time 0 is the recording's start.
+    rng : numpy.random.Generator
+        One stream for the machine (roughness), one for the measurement chain.
+    sampling_rate_hz, duration_s : float
+    rig : Rig or None
+        Goes with the recording.
+    truth : mapping or None
+        What was asked for; "machine", "gears" and "solver" are added.
+    step_s : float
+        Longest step; it is shortened to what the contact can be followed with, and to a whole part of the sampling
+        interval.
+    also : sequence of str
+        Signals of `sims.reduced_fe.signal_names` wanted besides those that are measured.
+    first : FlexState or None
+        Where the lead-in starts; None: at the static balance.
+    noise_rng : numpy.random.Generator or None
+        For the chain, instead of the stream made of `rng`.
+    on_progress : callable or None
+        Called now and then with the part of the motion that is done, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        If the teeth yield further under the load than their corners are apart.
+    """
+    machine_rng, chain_rng = rng.spawn(2)
+    machine, _ = draw_roughness(pair.machine, machine_rng)
+    pair = replace(pair, machine=machine)
+    check_depth(pair, operation)
+    own = constants(pair, operation, rng=machine_rng)
+    step = followed_step_s(pair, own, operation, positive(step_s, "step_s", "s"))
+    measured = Measurement.of(machine, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s, longest_step_s=step)
+    response = respond(
+        pair,
+        operation,
+        duration_s=measured.motion_s,
+        signals=measured.signals(also),
+        start_s=-measured.lead_in_s,
+        step_s=measured.step_s,
+        stride=measured.stride,
+        first=first,
+        ready=own,
+        on_progress=on_progress,
+    )
+    recording = measured.record(
+        response,
+        rng=chain_rng if noise_rng is None else noise_rng,
+        rig=rig,
+        truth={**(truth or {}), **_known(pair, operation, own, response)},
+        source="simulation: pair of reduced finite-element gears",
+        reader="sims.reduced_fe",
+    )
+    return replace(recording, warnings=(*recording.warnings, *model_notes(pair, operation, own))), response
+
+
+def model_notes(pair: FlexiblePair, operation: Operation, own: FlexiblePairConstants) -> tuple[str, ...]:
+    """Where the model is used near its limits."""
+    notes = []
+    mesh_hz = operation.speed_rpm.largest / 60.0 * pair.machine.mesh.pair.driver.teeth
+    if mesh_hz > 0.25 * pair.mode_limit_hz:
+        notes.append(
+            f"the mesh frequency reaches {mesh_hz:.0f} Hz: its fourth harmonic lies above {pair.mode_limit_hz:.0f} Hz, "
+            "up to where the gears' elastic modes move"
+        )
+    if pair.machine.mesh_damping_ratio > 0.0 and float(own.record["damping_time"]) == 0.0:
+        notes.append("shafts, bearings and gear bodies damp the torsional mode more than mesh_damping_ratio asks for")
+    return tuple(notes)
+
+
+def _known(
+    pair: FlexiblePair, operation: Operation, own: FlexiblePairConstants, response: FlexResponse
+) -> dict[str, Any]:
+    """What is worth knowing of the machine and the run."""
+    mode = torsional_mode(pair, operation, ready=own)
+    frequencies = eigenfrequencies_hz(pair, operation, np.array([0.5]), ready=own)[0]
+    return {
+        "machine": plain(replace(pair.machine, chain=None)),  # type: ignore[arg-type]  # it stands under "measurement"
+        "gears": [
+            {"key": gear.key, "degrees_of_freedom": gear.n_dof, "frequencies_hz": gear.frequencies_hz.tolist()}
+            for gear in pair.gears
+        ],
+        "solver": {
+            "step_s": response.step_s,
+            "torsional_hz": mode.frequency_hz,
+            "mesh_stiffness_n_per_m": own.mean_stiffness_n_per_m,
+            "eigenfrequencies_hz": frequencies.tolist(),
+        },
+    }
+
+
+def check_depth(pair: FlexiblePair, operation: Operation) -> None:
+    """Refuse a torque under which the teeth yield further than half of what their corners are apart."""
+    torque = operation.torque_nm.largest
+    if torque <= 0.0:
+        return
+    deepest = float(pair.maps(np.array([torque])).transmission_error_m.max())
+    geometry = pair.machine.mesh.pair
+    ends = np.array([-MARGIN, geometry.contact_ratio + MARGIN])
+    apart = LARGEST_DEPTH * float(corner_separation_m(geometry, ends).min())
+    if deepest > apart:
+        raise InputError(
+            f"the teeth yield by {1e6 * deepest:.0f} µm under {torque:g} N m",
+            where="torque_nm",
+            allowed=f"up to {1e6 * apart:.0f} µm: beyond, corners touch further out than the model follows them",
+            remedy="lower the torque or widen the face",
+        )
+
+
+# --------------------
+# From parameter values to a flexible pair.
+# --------------------
+
+
+SIDES = ("driver", "driven")
+Gears = tuple[ReducedGear, ReducedGear]
+
+
+def reduced_gears(values: Values) -> Gears:
+    """Return both gears: ready-made where they fit, else from the cache, else reduced now, which takes a minute.
+
+    Raises
+    ------
+    InputError
+        If a gear cannot be made or meshed, or memory does not suffice.
+    """
+    wanted = ParameterValues(values)
+    n_dof = wanted.whole("mesh_dof")
+    return _gear(_blank(wanted, 0), n_dof), _gear(_blank(wanted, 1), n_dof)
+
+
+def sound_machine(
+    values: Values, gears: Gears, *, sampling_rate_hz: float = 20480.0, installed: Installed | None = None
+) -> Machine:
+    """Return the machine without effects: that of the 16-DOF pair, with masses and inertias of gears and hubs."""
+    wanted = ParameterValues(values)
+    shared: Values = {name: value for name, value in values.items() if name not in OWN}
+    shared.update(MEANINGLESS)
+    for side, gear in zip(SIDES, gears, strict=True):
+        shared[f"mass_{side}_kg"] = gear.mass_kg + wanted.number(f"hub_mass_{side}_kg")
+        hub = wanted.number(f"hub_inertia_{side}_kg_m2")
+        shared[f"inertia_{side}_kg_m2"] = gear.polar_inertia_kg_m2 + hub
+    return build_machine(shared, sampling_rate_hz=sampling_rate_hz, installed=installed)
+
+
+def flexible_pair(values: Values, machine: Machine, gears: Gears) -> FlexiblePair:
+    """Return the pair of a machine, effects included."""
+    wanted = ParameterValues(values)
+    return FlexiblePair(
+        machine,
+        gears,
+        body_damping_ratio=wanted.number("body_damping_ratio"),
+        restitution=wanted.optional("restitution"),
+        lead_error_um=wanted.number("lead_error_um"),
+        mode_limit_hz=wanted.number("mode_limit_hz"),
+    )
+
+
+def _blank(wanted: ParameterValues, side: int) -> GearBlank:
+    name = SIDES[side]
+    material = Material(
+        wanted.number("youngs_modulus_gpa"), wanted.number("poisson_ratio"), wanted.number("density_kg_m3")
+    )
+    return GearBlank(
+        gear_geometry(wanted, side),
+        wanted.optional(f"web_thickness_{name}_mm"),
+        wanted.optional(f"rim_thickness_{name}_mm"),
+        wanted.optional(f"hub_thickness_{name}_mm"),
+        material,
+    )
+
+
+@lru_cache(maxsize=8)
+def _gear(blank: GearBlank, n_dof: int) -> ReducedGear:
+    for name, ready in READY.items():
+        if ready == blank:
+            return ready_gear(name)
+    return cached_gear(blank, plan_for(blank, n_dof))
+
+
+# --------------------
+# The pair of finite-element gears set to a rig, for the gap diagnosis: see `gearsig.gap`.
+# --------------------
+
+
+MESH_DOF, MESH_DOF_PER_TOOTH = 40_000, 900
+"""Of a twin's gears: their compliance is within a few per cent of that of finer meshes, less than a rig file knows."""
+TWIN_STEP_S = 8.2e-6
+"""Longer than that of a single simulation: six steps for a sample at 20480 Hz. Up to 10 kHz lines of acceleration miss
+0.2 dB (median; 95 % of them less than 0.8 dB), those of the transmission error 0.01 dB: far less than one specimen's
+housing differs from another's."""
+
+
+def twin_parameters(values: Mapping[str, ParameterValue], teeth: tuple[int, int]) -> dict[str, ParameterValue]:
+    """Return those parameters of the 16-DOF pair that this model has, with the mesh of a twin's gears."""
+    known = {p.name for p in PARAMETERS}
+    own = {name: value for name, value in values.items() if name in known}
+    return own | {"mesh_dof": float(max(MESH_DOF, MESH_DOF_PER_TOOTH * max(teeth)))}
+
+
+@dataclass(frozen=True)
+class ReducedTwin(PairTwin):
+    """A rig's twin with finite-element gears, full discs; see `sims.gear_pair.PairTwin`."""
+
+    @property
+    def model(self) -> str:
+        """Name of the model whose preset the twin is."""
+        return NAME
+
+    def _simulated(
+        self,
+        own: Preset,
+        point: OperatingCondition,
+        seed: int,
+        *,
+        sampling_rate_hz: float,
+        duration_s: float,
+        noise_rng: np.random.Generator | None,
+    ) -> Recording:
+
+        rng = np.random.default_rng(seed)
+        ready = prepare_preset(own, {}, (), None, rng, sampling_rate_hz=sampling_rate_hz)
+        recording, _ = simulate_pair(
+            ready.pair,
+            ready.operation,
+            rng=rng,
+            sampling_rate_hz=sampling_rate_hz,
+            duration_s=duration_s,
+            rig=self._rig_at(point),
+            truth=ready.truth(),
+            step_s=TWIN_STEP_S,
+            noise_rng=noise_rng,
+        )
+        return recording
+
+    def _own_parameters(self, values: dict[str, ParameterValue]) -> dict[str, ParameterValue]:
+        return twin_parameters(values, self.nominal.teeth)
+
+    def _geometry(self, own: Preset) -> PairGeometry:
+        return prepare_preset(own, {}, (), None, np.random.default_rng(0)).pair.machine.mesh.pair
+
+
+def reduced_gap_simulator() -> PairGapSimulator:
+    """Return the model "reduced-fe" as the gap diagnosis takes it; its twin's gears are reduced, and kept on disk."""
+    return PairGapSimulator(NAME, ReducedTwin)

@@ -1,0 +1,347 @@
+"""What the way a contact force is spread over nodes does to natural frequencies: the check of RBE3 patches."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from gearsig.checks import FloatArray, count, positive, within
+from gearsig.errors import InputError
+from sims.machine import Operation
+from sims.reduced_fe._blank import MeshSize, mesh_size_for, one_thread
+from sims.reduced_fe._cyclic import ComplexArray, CyclicGear, CyclicModes, Held, cyclic_modes
+from sims.reduced_fe._elements import cell_gradients_at_nodes, lame_pa
+from sims.reduced_fe._mesh import IntArray, SectorMesh, sector_mesh
+from sims.reduced_fe._pair import FlexiblePair, torsional_curve_hz
+from sims.reduced_fe._reduced_gear import FlankGrid, Spread, flank_rows
+from sims.reduced_fe._reduction import ReductionPlan, reduce_gear
+
+SPREADS: tuple[Spread, ...] = ("node", "patch", "section")
+SIZE = MeshSize(n_across=3, n_gap=1, n_up=6, n_rim=2, n_body=2, n_along=1)
+"""A coarse mesh shows best what nodes do: some six rows of cells up the flank."""
+N_HEIGHTS = 41
+"""Some three points between two rows of nodes."""
+DEGREE = 4
+"""Of the polynomial in the mesh angle that is taken as smooth."""
+
+
+@dataclass(frozen=True)
+class SpreadingCheck:
+    """The torsional mode over the mesh angle, by how contact forces reach the nodes.
+
+    Parameters
+    ----------
+    mesh_cycles : array, (n_c,)
+    frequency_hz : mapping of "node", "patch", "section" to arrays, (n_c,)
+    ripple : mapping
+        Part by which a tooth's compliance departs from a smooth curve over the height of its flank, rms.
+    """
+
+    mesh_cycles: FloatArray
+    frequency_hz: dict[Spread, FloatArray]
+    ripple: dict[Spread, float]
+
+
+def spreading_check(pair: FlexiblePair, operation: Operation, mesh_cycles: FloatArray) -> SpreadingCheck:
+    """Reduce the pair's gears anew, coarsely, once per way of spreading, and follow the torsional mode.
+
+    Parameters
+    ----------
+    pair : FlexiblePair
+    operation : Operation
+        Its greatest torque loads the contact.
+    mesh_cycles : array
+
+    Notes
+    -----
+    "node": force and motion of one line of nodes across the face, interpolated between lines: the local indentation
+    depends on where between nodes the contact is. "patch": RBE3 over the flank's nodes around the point. "section": the
+    whole cross-section at that height, what the simulations use; its frequencies are higher, as Hertz alone is the
+    indentation there, while nodes and patches add one of their own.
+    """
+    frequency: dict[Spread, FloatArray] = {}
+    ripple: dict[Spread, float] = {}
+    first, second = (gear.blank for gear in pair.gears)
+    for spread in SPREADS:
+        plan = ReductionPlan(SIZE, n_heights=N_HEIGHTS, n_slices=1, spread=spread)
+        one = reduce_gear(first, plan)
+        gears = (one, one if second == first else reduce_gear(second, plan))
+        own = replace(pair, gears=gears, lead_error_um=0.0)
+        frequency[spread] = torsional_curve_hz(own, operation, mesh_cycles)
+        inner = slice(2, N_HEIGHTS - 2)  # the ends of the involute have neighbours on one side only
+        compliance = np.log(np.diag(one.clamped_compliance_m_per_n[0])[:N_HEIGHTS][inner])
+        roll = one.grid.roll_rad[inner]
+        smooth = np.polyval(np.polyfit(roll, compliance, DEGREE), roll)
+        ripple[spread] = float(np.std(compliance - smooth))
+    return SpreadingCheck(mesh_cycles, frequency, ripple)
+
+
+# --------------------
+# One tooth pushed by a static force: displacement and von Mises stress of the gear.
+# --------------------
+
+
+@dataclass(frozen=True)
+class ToothLoad:
+    """A gear, its bore held, with a force on one flank of tooth 0.
+
+    Parameters
+    ----------
+    mesh : SectorMesh
+        Of every sector.
+    force_n : float
+    roll_rad : float
+        Where on the flank.
+    displacement_m : array, (n_teeth, n_nodes, 3)
+        x, y, z in the axes of each sector (x through its tooth's middle).
+    push_m : float
+        Motion of the flank point along the force.
+    """
+
+    mesh: SectorMesh
+    force_n: float
+    roll_rad: float
+    displacement_m: FloatArray = field(repr=False)
+    push_m: float
+
+    def von_mises_pa(self, tooth: int = 0) -> FloatArray:
+        """Von Mises stress at the nodes of a sector, (n_nodes,): mean over the cells that meet there."""
+        return von_mises_pa(self.mesh, self.displacement_m[tooth])
+
+
+def load_tooth(
+    mesh: SectorMesh, force_n: float, roll_rad: float | None = None, *, flank: int = 0, spread: Spread = "patch"
+) -> ToothLoad:
+    """Push a tooth along its flank's normal, evenly over the face width, with every node of the bore held.
+
+    Parameters
+    ----------
+    mesh : SectorMesh
+    force_n : float
+        Above 0.
+    roll_rad : float or None
+        Roll angle of the point; None: the middle of the flank by roll.
+    flank : int
+        0 or 1.
+    spread : str
+        What the force acts on; see `ReducedGear`. A "patch" shows the stress near the contact only roughly: the strip
+        is wider than a Hertzian contact.
+    """
+    g = mesh.blank.geometry
+    force = positive(force_n, "force_n", "N")
+    roll = (g.form_roll_rad + g.tip_roll_rad) / 2.0 if roll_rad is None else roll_rad
+    within(roll, "roll_rad", g.form_roll_rad, g.tip_roll_rad, "rad", remedy="take a point of the involute")
+    within(flank, "flank", 0, 1)
+    gear = CyclicGear(mesh)
+    grid = FlankGrid(np.array([roll]), np.array([0.0]))
+    row = flank_rows(mesh, grid, spread, gear.own_places, 3 * len(gear.own_nodes))[int(flank)]
+    with one_thread():
+        own = _static_field(gear, force * row)
+    return ToothLoad(mesh, force, float(roll), gear.sector_fields(own), float(own[0] @ row))
+
+
+def von_mises_pa(mesh: SectorMesh, displacement_m: FloatArray) -> FloatArray:
+    """Von Mises stress at the nodes, √(3/2 s:s), s the deviator of λ tr(ε) 1 + 2μ ε.
+
+    Parameters
+    ----------
+    mesh : SectorMesh
+    displacement_m : array, (n_nodes, 3)
+        Cartesian.
+
+    Returns
+    -------
+    array, (n_nodes,)
+        Pa. Stresses are taken at the nodes of each cell and averaged there; those of eight-node cells leave out what
+        their incompatible modes add.
+    """
+    _, mu = lame_pa(mesh.blank.material)
+    nodes = mesh.cells.reshape(len(mesh.cells), -1)
+    gradient = np.einsum("cqia,caj->cqij", cell_gradients_at_nodes(mesh.points_m, mesh.cells), displacement_m[nodes])
+    strain = (gradient + gradient.transpose(0, 1, 3, 2)) / 2.0
+    deviator = strain - np.trace(strain, axis1=2, axis2=3)[..., None, None] * np.eye(3) / 3.0
+    total, shared = np.zeros((mesh.n_nodes, 3, 3)), np.zeros(mesh.n_nodes)
+    np.add.at(total, nodes, deviator)
+    np.add.at(shared, nodes, 1.0)
+    mean = 2.0 * mu * total / shared[:, None, None]
+    stress: FloatArray = np.sqrt(1.5 * np.sum(mean**2, axis=(1, 2)))
+    return stress
+
+
+def _static_field(gear: CyclicGear, load: FloatArray) -> FloatArray:
+    """Displacement (n_sectors, n_own_dof) for a load on sector 0, the bore held."""
+    z = gear.n_sectors
+    waves: ComplexArray = np.zeros((z // 2 + 1, len(load)), dtype=np.complex128)
+    for n in gear.diameters:
+        waves[n] = gear.solver(n, "bore")(load)
+    moved: FloatArray = np.fft.irfft(waves, n=z, axis=0)
+    return moved
+
+
+# --------------------
+# How far a mesh is from a finer one: natural frequencies and the compliance of a tooth.
+# --------------------
+
+
+FINER_DOF = 150_000
+"""Of the mesh that coarser ones are compared with; its own first frequency is 0.2 % above that of a million."""
+
+
+class DiscretisationError(NamedTuple):
+    """A mesh against a finer one.
+
+    Attributes
+    ----------
+    finer_dof : int
+    frequency : array, (n,)
+        Relative error of each frequency, of modes with the same nodal diameters in the same order.
+    compliance : float
+        Relative error of the tooth's compliance under the same force.
+    """
+
+    finer_dof: int
+    frequency: FloatArray
+    compliance: float
+
+
+def discretisation_error(
+    gear: CyclicGear, modes: CyclicModes, load: ToothLoad, held: Held = "free", *, elastic: bool = True
+) -> DiscretisationError:
+    """Solve modes and load again on a mesh of `FINER_DOF`.
+
+    Parameters
+    ----------
+    gear : CyclicGear
+        Coarser than that.
+    modes : CyclicModes
+        Of it, as `cyclic_modes` found them with `held` and `elastic`.
+    load : ToothLoad
+    held : str
+    elastic : bool
+    """
+    blank = gear.mesh.blank
+    mesh = sector_mesh(blank, mesh_size_for(blank, FINER_DOF))
+    wanted = int(modes.multiplicity(gear.n_sectors).sum())
+    with one_thread():
+        finer = cyclic_modes(CyclicGear(mesh, gear.hub_stiffness), wanted + 8, held, elastic=elastic)
+    own, theirs = _by_diameter(modes), _by_diameter(finer)
+    ratio = [own[name] / theirs[name] - 1.0 for name in own if name in theirs]
+    again = load_tooth(mesh, load.force_n, load.roll_rad)
+    return DiscretisationError(mesh.n_dof, np.array(ratio), load.push_m / again.push_m - 1.0)
+
+
+def _by_diameter(modes: CyclicModes) -> dict[tuple[int, int], float]:
+    """Frequencies by nodal diameters and rank among those with as many; rigid motions left out."""
+    seen: Counter[int] = Counter()
+    found = {}
+    for hertz, n in zip(modes.frequencies_hz, modes.nodal_diameters, strict=True):
+        seen[int(n)] += 1
+        if hertz > 1.0:
+            found[int(n), seen[int(n)]] = float(hertz)
+    return found
+
+
+# --------------------
+# Meshes, modes and stresses for other finite-element programs, through meshio.
+# --------------------
+
+
+SUFFIXES = (".vtu", ".vtk")
+"""Formats that hold 27-node cells."""
+
+_CORNERS = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [0, 0, 2], [2, 0, 2], [2, 2, 2], [0, 2, 2]])
+_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+_FACES = np.array([[0, 1, 1], [2, 1, 1], [1, 0, 1], [1, 2, 1], [1, 1, 0], [1, 1, 2]])
+
+
+def write_vtk(
+    path: str | Path, mesh: SectorMesh, values: Mapping[str, FloatArray] | None = None, *, n_sectors: int | None = None
+) -> Path:
+    """Write sectors of a gear, with values at their nodes, as hexahedra of 27 nodes (VTK type 29) or eight (12).
+
+    Parameters
+    ----------
+    path : path
+        Ends in .vtu or .vtk.
+    mesh : SectorMesh
+    values : mapping or None
+        Name → array of (n_sectors, n_nodes) or (n_sectors, n_nodes, 3), e.g. displacement in m, stress in Pa; vectors
+        in the axes of each sector, turned here.
+    n_sectors : int or None
+        From sector 0 counter-clockwise; None: the whole gear. Nodes that two sectors share are written once.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        If the name has another ending, an array has another shape, or the file cannot be written.
+    """
+    import meshio
+
+    target = Path(path)
+    if target.suffix not in SUFFIXES:
+        raise InputError(f"extension {target.suffix or '(none)'!r}", where=target.name, allowed=" ".join(SUFFIXES))
+    n = mesh.blank.n_teeth if n_sectors is None else count(n_sectors, "n_sectors")
+    if n > mesh.blank.n_teeth:
+        raise InputError(f"n_sectors is {n}", allowed=f"at most {mesh.blank.n_teeth}")
+    number = _shared_numbers(mesh, n)
+    turns = _turns(mesh, n)
+    points = _merged(np.einsum("kij,aj->kai", turns, mesh.points_m), number)
+    kind, order = ("hexahedron27", _vtk_order()) if mesh.size.order == 2 else ("hexahedron", _CORNERS // 2 @ [4, 2, 1])
+    cells = number[:, mesh.cells.reshape(len(mesh.cells), -1)[:, order]].reshape(-1, len(order))
+    point_data = {name: _merged(_turned(name, v, turns, mesh), number) for name, v in (values or {}).items()}
+    try:
+        meshio.Mesh(points, [(kind, cells)], point_data=point_data).write(target)
+    except OSError as error:
+        raise InputError(f"cannot be written ({error.strerror})", where=str(target)) from None
+    return target
+
+
+def _vtk_order() -> IntArray:
+    """Places in `SectorMesh.cells`, raveled, of VTK's nodes: corners, edges, faces, middle."""
+    edges = np.array([(_CORNERS[a] + _CORNERS[b]) // 2 for a, b in _EDGES])
+    order: IntArray = np.vstack((_CORNERS, edges, _FACES, [[1, 1, 1]])) @ np.array([9, 3, 1])
+    return order
+
+
+def _shared_numbers(mesh: SectorMesh, n_sectors: int) -> IntArray:
+    """Number of each sector's nodes, (n_sectors, n_nodes): the high side is the low side of the next sector."""
+    own = np.setdiff1d(np.arange(mesh.n_nodes), mesh.high_side)
+    number = np.empty((n_sectors + 1, mesh.n_nodes), dtype=np.int64)
+    number[:, own] = np.arange(len(own)) + len(own) * np.arange(n_sectors + 1)[:, None]
+    last = 0 if n_sectors == mesh.blank.n_teeth else n_sectors
+    number[:-1, mesh.high_side] = number[[*range(1, n_sectors), last]][:, mesh.low_side]
+    shared = number[:-1]
+    _, packed = np.unique(shared, return_inverse=True)
+    return packed.reshape(shared.shape)
+
+
+def _turns(mesh: SectorMesh, n_sectors: int) -> FloatArray:
+    angle = mesh.blank.pitch_angle_rad * np.arange(n_sectors)
+    c, s, zero, one = np.cos(angle), np.sin(angle), 0.0 * angle, 0.0 * angle + 1.0
+    rows = ((c, -s, zero), (s, c, zero), (zero, zero, one))
+    return np.array([[list(column) for column in row] for row in rows]).transpose(2, 0, 1)
+
+
+def _turned(name: str, values: FloatArray, turns: FloatArray, mesh: SectorMesh) -> FloatArray:
+    array = np.asarray(values, dtype=np.float64)[: len(turns)]
+    if array.shape[:2] != (len(turns), mesh.n_nodes) or array.shape[2:] not in ((), (3,)):
+        raise InputError(
+            f"{name} has shape {np.shape(values)}",
+            allowed=f"({len(turns)}, {mesh.n_nodes}) or ({len(turns)}, {mesh.n_nodes}, 3)",
+        )
+    return np.einsum("kij,kaj->kai", turns, array) if array.ndim == 3 else array
+
+
+def _merged(values: FloatArray, number: IntArray) -> FloatArray:
+    merged = np.empty((int(number.max()) + 1, *values.shape[2:]))
+    merged[number.ravel()] = values.reshape(-1, *values.shape[2:])
+    return merged
