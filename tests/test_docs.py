@@ -1,0 +1,101 @@
+"""What README and docs show: their Python runs, their commands and options exist, their links lead somewhere."""
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+import typer.main
+
+from app.cli.main import app
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+RUN = [
+    page
+    for page in PAGES
+    if "```python" in page.read_text(encoding="utf-8") and page.name not in ("gap.md", "engines.md")
+] + [ROOT / "docs" / "tutorials" / "gap.md"]
+BLOCK = re.compile(
+    r"^(?:<!-- (?P<mark>[a-z]+) -->\n)?```(?P<language>\w*)\n(?P<code>.*?)^```$", re.DOTALL | re.MULTILINE
+)
+
+
+def blocks(page: Path, language: str) -> Iterator[tuple[str, str]]:
+    """Yield mark and code of a page's blocks of one language."""
+    for block in BLOCK.finditer(page.read_text(encoding="utf-8")):
+        if block["language"] == language:
+            yield block["mark"] or "", block["code"]
+
+
+def name_of(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+@pytest.mark.parametrize("page", RUN, ids=name_of)
+def test_python_of_the_pages_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "sample_data").symlink_to(ROOT / "sample_data")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    for mark, code in blocks(page, "python"):
+        if mark != "slow":
+            exec(compile(code, name_of(page), "exec"), names)  # noqa: S102 - our own pages
+    assert names
+
+
+@pytest.mark.slow
+def test_slow_python_of_the_gap_tutorial_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "sample_data").symlink_to(ROOT / "sample_data")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    for _, code in blocks(ROOT / "docs" / "tutorials" / "gap.md", "python"):
+        exec(compile(code, "gap.md", "exec"), names)  # noqa: S102 - our own page
+    assert names["report"].causes[0].name in {"root_crack", "tooth_spall", "chipped_tooth"}  # type: ignore[attr-defined]
+
+
+def commands() -> Iterator[tuple[str, list[str]]]:
+    """Yield page and words of every line that calls gearsig."""
+    for page in PAGES:
+        for _, code in blocks(page, "sh"):
+            for line in code.replace("\\\n", " ").splitlines():
+                for part in line.split("&&"):
+                    words = shlex.split(part, comments=True)
+                    if words and words[0] in ("gearsig", ".venv/bin/gearsig"):
+                        yield name_of(page), words[1:]
+
+
+@pytest.mark.parametrize(
+    ("page", "words"), list(commands()), ids=lambda value: value if isinstance(value, str) else " ".join(value)
+)
+def test_commands_of_the_pages_exist(page: str, words: list[str]) -> None:
+    command: click.Command = typer.main.get_command(app)
+    while isinstance(command, click.Group):
+        assert words[0] in command.commands, (page, words)
+        command, words = command.commands[words[0]], words[1:]
+    known = {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)}
+    assert {word for word in words if re.match(r"--?[a-z]", word)} <= known | {"--help"}, page
+
+
+def test_links_lead_somewhere() -> None:
+    lost = []
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        for target in re.findall(r"\]\(([^)#:]*)(?:#[^)]*)?\)", text):
+            if target and not (page.parent / target).exists():
+                lost.append((name_of(page), target))
+    assert not lost
+
+
+def test_the_glossary_is_short() -> None:
+    rows = [
+        line
+        for line in (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8").splitlines()
+        if line.startswith("| ")
+    ]
+    assert len(rows) - 1 <= 80
+
+
+def test_the_readme_is_a_readme() -> None:
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
