@@ -143,6 +143,7 @@ def test_the_same_cases_have_the_same_gears_conditions_and_effects():
     assert ours["conditions"] == [{key: c[key] for key in kept} for c in theirs["conditions"]]
 
 
+@pytest.mark.slow
 def test_a_stopped_run_leaves_answers_and_goes_on(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(run, "state_of_code", lambda: "the same")  # others may be at work on it
     wanted = BenchmarkRequest(SHORT, ("rules", "majority"))

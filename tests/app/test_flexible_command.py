@@ -9,6 +9,8 @@ from typer.testing import CliRunner
 from app.cli.main import app
 from gearsig.errors import InputError
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):

@@ -24,6 +24,7 @@ def drawn(n: int, truth: GapCalibration, seed: int = 3) -> list[WeighedCase]:
     return cases
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sharpness", "weight"), [(0.6, 2.0), (1.3, 0.5)])
 def test_the_drawn_calibration_is_found(sharpness: float, weight: float) -> None:
     truth = GapCalibration(sharpness, weight, 0.2, 0.7, -0.5, 0.5, 0.65, sharper=0.4, none_slope=-1.0)

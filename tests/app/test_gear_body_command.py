@@ -21,6 +21,7 @@ def _run(*arguments):
     return CliRunner().invoke(app, ["gear-body", *arguments])
 
 
+@pytest.mark.slow
 def test_mesh_modes_stress_and_reductions_are_written(tmp_path, monkeypatch):
     monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path / "kept"))
     found = _run("-o", str(tmp_path / "out"), *SMALL, "--vtk", "--reduce", "--modes", "8")
@@ -41,6 +42,7 @@ def test_mesh_modes_stress_and_reductions_are_written(tmp_path, monkeypatch):
     assert any(name.startswith("mode_1_") for name in points)
 
 
+@pytest.mark.slow
 def test_a_gear_of_another_version_is_named_until_it_is_cleared_away(tmp_path, monkeypatch):
     monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path / "kept"))
     arguments = ("-o", str(tmp_path / "out"), *SMALL, "--dof", "5000", "--modes", "4", "--reduce")

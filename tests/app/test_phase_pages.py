@@ -41,6 +41,7 @@ def test_the_path_is_shown_in_space_with_its_own_dimension():
     assert len(page.get("plotly_chart")) == 1
 
 
+@pytest.mark.slow
 def test_a_run_up_is_warned_of():
     assert "at a steady speed" in shown_text(opened_at("Phase plane", "run_up"))
     assert "at a steady speed" not in shown_text(opened_at("Phase plane"))
@@ -70,6 +71,7 @@ def button(page, label):
     return next(b for b in page.button if b.label == label)
 
 
+@pytest.mark.slow
 def test_a_bifurcation_is_drawn_on_demand():
     page = at_bifurcation()
     assert not page.get("image")

@@ -113,6 +113,7 @@ def test_a_missing_population_says_how_to_make_it(tmp_path: Path) -> None:
         load_population(tmp_path / "none.npz")
 
 
+@pytest.mark.slow
 def test_the_forest_is_fitted_once() -> None:
     assert load_recogniser(with_reference=False) is load_recogniser(with_reference=False)
 

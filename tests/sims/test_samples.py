@@ -39,6 +39,7 @@ def read(folder, file):
     return read_recording(folder / file, rig=read_rig(folder / f"{file.split('.')[0]}.toml"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", FILES)
 def test_made_again_the_samples_are_the_same(file, made_again):
     old, new = read(FOLDER, file), read(made_again, file)

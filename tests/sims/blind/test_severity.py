@@ -9,6 +9,8 @@ from gearsig.recording import Recording
 from sims.blind import CATALOGUE, OUTSIDE_CATALOGUE, draw_case, record_case
 from tests.sims.blind.order_domain import distance_db
 
+pytestmark = pytest.mark.slow
+
 SEED = {"backlash": 6}
 """Backlash shows where the brake's pull turns the torque round: not on every rig."""
 LEAST_DB = {"unbalance": 0.5, "mains_hum": 0.5, "clipping": 0.5, "speed_fluctuation": 0.5, "eccentricity": 0.5}

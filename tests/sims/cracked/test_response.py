@@ -193,6 +193,7 @@ def rough_runs() -> dict[float, Response]:
     return found
 
 
+@pytest.mark.slow
 def test_fractal_lines_show_and_grow_with_roughness(rough_runs: dict[float, Response]) -> None:
     """The twelve published lines, 10 times over what the smooth pair has there, each higher with more roughness."""
     # 451 Hz lies beside the mesh frequency: its line is compared among rough pairs only.
@@ -209,6 +210,7 @@ def test_backlash_has_the_roughness_it_is_given(rough_runs: dict[float, Response
     assert FractalSurface.of_roughness(0.84).rms_m == pytest.approx(0.84e-6)
 
 
+@pytest.mark.slow
 def test_sidebands_round_the_mesh_frequency_grow_with_roughness(rough_runs: dict[float, Response]) -> None:
     """Friction multiplies roughness into the mesh: f_m ± the lowest fractal lines, which a smooth pair has not."""
     offsets = FRACTAL_LINES_HZ[:4]

@@ -104,6 +104,7 @@ def test_the_whole_gear_with_one_cracked_sector_agrees() -> None:
     np.testing.assert_allclose(ring, whole, rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_between_solved_depths_and_widths_the_table_is_that_of_the_crack() -> None:
     """A ready-made gear's shipped table against solutions of its own, between depths: within 2 %."""
     gear = ready_gear("z50_m3")

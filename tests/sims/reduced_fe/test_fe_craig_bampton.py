@@ -46,6 +46,7 @@ def whole_rows(gear: CyclicGear, masters: Masters) -> FloatArray:
     return rows.reshape(masters.n_masters, -1)
 
 
+@pytest.mark.slow
 def test_masters_carry_the_static_stiffness_and_mass_of_the_whole_gear() -> None:
     """Guyan's matrices: static answers to unit motions of the masters, from K and M of all sectors."""
     gear, reduced = small_cyclic(), small()

@@ -124,6 +124,7 @@ def test_rows_give_rigid_motions_exactly() -> None:
         np.testing.assert_allclose(rows @ tilt.ravel(), expected[4], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_patches_remove_the_ripple_of_single_nodes() -> None:
     """Stiffness over the flank's height: a single line of nodes follows the mesh, a patch or section hardly does."""
     mesh = sector_mesh(PAPER, MeshSize(3, 1, 6, 2, 2, 1))
