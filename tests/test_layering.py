@@ -24,6 +24,7 @@ CHAIN = (
     "phase",
     "indicators",
     "motion",
+    "prepared",
     "severity",
     "diagnosis",
     "comparison",

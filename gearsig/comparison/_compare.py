@@ -52,6 +52,7 @@ from gearsig.comparison._types import (
 from gearsig.comparison._verdict import findings_of, remarks, verdict_of
 from gearsig.errors import RefusalError
 from gearsig.orders import SynchronousAverage, order_spectrum
+from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 from gearsig.spectra import Spectrum
@@ -255,8 +256,8 @@ ALIGN = ("auto", "marks", "correlation")
 
 
 def compare_recordings(
-    simulated: Recording,
-    recorded: Recording,
+    simulated: Recording | PreparedRecording,
+    recorded: Recording | PreparedRecording,
     rig: Rig | None = None,
     *,
     channels: Sequence[tuple[str, str]] = (),
@@ -269,7 +270,7 @@ def compare_recordings(
 
     Parameters
     ----------
-    simulated, recorded : Recording
+    simulated, recorded : Recording or PreparedRecording
         With at least 8 revolutions of the reference shaft each. Two recordings, or two simulations, will do as well.
     rig : Rig or None
         The machine; default: the recording's own, else the simulation's.
@@ -302,29 +303,18 @@ def compare_recordings(
     W. Heylen, S. Lammens, "FRAC: a consistent way of comparing frequency response functions", 1996.
     """
     one_of(align_by, "align_by", ALIGN)
+    sides = prepare(simulated), prepare(recorded)
+    simulated, recorded = (side.recording for side in sides)
     pairs = pair_channels(simulated, recorded, channels)
     check_live(simulated, [p.simulated for p in pairs], "simulation")
     check_live(recorded, [p.recorded for p in pairs], "recording")
     machine = common_machine(simulated, recorded, rig)
     ratios = _ratios(machine.recorded)
+    simulated_rig = replace(machine.simulated, speed=usable_speed(machine.simulated, simulated))
     own = make_side(
-        simulated,
-        np.stack([simulated.values(p.simulated) * p.factor for p in pairs]),
-        [p.simulated for p in pairs],
-        replace(machine.simulated, speed=usable_speed(machine.simulated, simulated)),
-        machine.names,
-        ratios,
-        "simulation",
+        sides[0].with_rig(simulated_rig), {p.simulated: p.factor for p in pairs}, machine.names, ratios, "simulation"
     )
-    other = make_side(
-        recorded,
-        np.stack([recorded.values(p.recorded) for p in pairs]),
-        [p.recorded for p in pairs],
-        machine.recorded,
-        {},
-        ratios,
-        "recording",
-    )
+    other = make_side(sides[1].with_rig(machine.recorded), {p.recorded: 1.0 for p in pairs}, {}, ratios, "recording")
     lines = _lines(own, other, ratios)
     alignments = tuple(_align(shaft, own, other, lines, machine.recorded, align_by) for shaft in lines)
     turned = {a.shaft: (lines[a.shaft][0].turned(a.shift_deg / 360.0), lines[a.shaft][1]) for a in alignments}

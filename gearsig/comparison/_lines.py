@@ -19,7 +19,7 @@ from gearsig.comparison._types import (
     decibel,
     power_levels,
 )
-from gearsig.diagnosis import line_excess
+from gearsig.prepared import line_excess
 from gearsig.rig import OrderLine, Rig, order_lines
 from gearsig.spectra import Spectrum, noise_floor, power_density
 

@@ -11,10 +11,11 @@ from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import first_whole_sample
+from gearsig.prepared import PreparedRecording
 from gearsig.recording import SI_FACTORS, Channel, Recording, find_problems
 from gearsig.rig import ConstantSpeed, PulseTimes, Rig, SpeedSource
 
-LEAST_REVOLUTIONS = 8
+MIN_REVOLUTIONS = 8
 """Of a shaft: four in each half. Fewer leave other shafts' orders in its average, and say nothing of scatter."""
 
 
@@ -27,7 +28,7 @@ class ComparedSide:
     recording : Recording
         Of the compared channels only, in the common unit.
     angle : ShaftAngle
-        Of the reference shaft.
+        Of the shaft that the result counts orders of.
     signals : mapping
         Shaft (as in the recording's rig) → its signals of the first and of the second half.
     marked : frozenset of str
@@ -41,26 +42,22 @@ class ComparedSide:
 
 
 def make_side(
-    recording: Recording,
-    values: FloatArray,
-    channels: Sequence[str],
-    rig: Rig,
+    prepared: PreparedRecording,
+    channels: Mapping[str, float],
     names: Mapping[str, str],
     ratios: Mapping[str, float],
     which: str,
 ) -> ComparedSide:
-    """Find the speed of a record and sample its channels over each shaft's angle.
+    """Sample a record's channels over each shaft's angle, and cut them into halves.
 
     Parameters
     ----------
-    recording : Recording
-    values : array, (n_channels, n_samples)
-        Of `channels`, in the unit of the comparison.
-    channels : sequence of str
-    rig : Rig
-        Of this side.
+    prepared : PreparedRecording
+        With the rig of this side.
+    channels : mapping
+        Name → factor that turns its values into the unit of the comparison.
     names : mapping
-        Shaft as the result calls it → as this rig calls it.
+        Shaft as the result calls it → as this side's rig calls it.
     ratios : mapping
         Shaft as the result calls it → its revolutions per revolution of the first one.
     which : str
@@ -71,31 +68,59 @@ def make_side(
     RefusalError
         If the speed cannot be known, or the reference shaft makes too few turns.
     """
-    from gearsig.angle import resample_to_angle
-    from gearsig.severity import has_mark
-
+    recording, rig = prepared.recording, prepared.rig
     reference = next(iter(ratios))
-    angle = _angle(recording, rig, names.get(reference, reference), which)
-    rows = [recording.index(name) for name in channels]
-    own = replace(recording, samples=values, channels=tuple(recording.channels[i] for i in rows))
+    reference_ratio = _reference_ratio(prepared, names.get(reference, reference), which)
     signals: dict[str, tuple[AngleSignal, AngleSignal]] = {}
     for shaft, ratio in ratios.items():
-        turned = replace(angle, shaft=shaft) if ratio == 1.0 else angle.of_shaft(shaft, ratio)
-        if turned.n_revolutions < LEAST_REVOLUTIONS:
+        place = (names.get(shaft, shaft), ratio * reference_ratio)
+        n_revolutions = prepared.angle_of(place[0], ratio=place[1], followed=True).n_revolutions
+        if n_revolutions < MIN_REVOLUTIONS:
             if shaft != reference:
                 continue
             raise RefusalError(
-                f"the {which} holds {turned.n_revolutions:.3g} revolutions of shaft {shaft or 'of reference'}, "
-                f"{LEAST_REVOLUTIONS} are needed",
+                f"the {which} holds {n_revolutions:.3g} revolutions of shaft {shaft or 'of reference'}, "
+                f"{MIN_REVOLUTIONS} are needed",
                 remedy="make it longer",
             )
-        halved = halves(resample_to_angle(own, turned, channels=list(channels)))
+        halved = halves(
+            _scaled(prepared.over_angle(place[0], tuple(channels), ratio=place[1], followed=True), channels)
+        )
         if halved is not None:
             signals[shaft] = halved
     if reference not in signals:
         raise RefusalError(f"the {which} holds too few whole revolutions", remedy="make it longer")
-    marked = {shaft for shaft in signals if rig.shafts and has_mark(recording, rig, names.get(shaft, shaft))}
-    return ComparedSide(own, angle, signals, frozenset(marked))
+    rows = [recording.index(name) for name in channels]
+    factors = np.array(list(channels.values()))[:, None]
+    return ComparedSide(
+        replace(
+            recording, samples=recording.samples[rows] * factors, channels=tuple(recording.channels[i] for i in rows)
+        ),
+        prepared.angle_of(names.get(reference, reference), ratio=reference_ratio, followed=True),
+        signals,
+        frozenset(shaft for shaft in signals if rig.shafts and prepared.has_mark(names.get(shaft, shaft))),
+    )
+
+
+def _reference_ratio(prepared: PreparedRecording, shaft: str, which: str) -> float:
+    """Return revolutions of the shaft that the result counts orders of, per revolution of this side's reference."""
+    try:
+        angle = prepared.followed_angle
+    except RefusalError as refusal:
+        raise RefusalError(f"the speed of the {which} is not known: {refusal.reason}", remedy=refusal.remedy) from None
+    ratio = prepared.rig.ratio(shaft, to=angle.shaft) if shaft and angle.shaft else 1.0
+    if ratio is None:
+        raise RefusalError(
+            f"the speed of shaft {shaft!r} does not follow from the teeth of the {which}'s rig",
+            remedy="complete the tooth counts",
+        )
+    return ratio
+
+
+def _scaled(signal: AngleSignal, channels: Mapping[str, float]) -> AngleSignal:
+    if all(factor == 1.0 for factor in channels.values()):
+        return signal
+    return replace(signal, samples=signal.samples * np.array(list(channels.values()))[:, None])
 
 
 def halves(signal: AngleSignal) -> tuple[AngleSignal, AngleSignal] | None:
@@ -103,7 +128,7 @@ def halves(signal: AngleSignal) -> tuple[AngleSignal, AngleSignal] | None:
     per_rev = signal.samples_per_revolution
     start, revolution = first_whole_sample(signal)
     n_rev = (signal.samples.shape[1] - start) // per_rev // 2
-    if n_rev < LEAST_REVOLUTIONS // 2:
+    if n_rev < MIN_REVOLUTIONS // 2:
         return None
     middle, end = start + n_rev * per_rev, start + 2 * n_rev * per_rev
     first = replace(signal, samples=signal.samples[:, start:middle], start_revolution=float(revolution))
@@ -117,23 +142,6 @@ def time_halves(recording: Recording, row: int) -> tuple[FloatArray, FloatArray]
     values = np.asarray(recording.samples[row], dtype=np.float64)
     values = values - values.mean()
     return values[:n], values[n : 2 * n]
-
-
-def _angle(recording: Recording, rig: Rig, shaft: str, which: str) -> ShaftAngle:
-    """Return the angle of a shaft of this side's rig, found and checked as `analyze` does."""
-    from gearsig.diagnosis import CannotTell, determine_angle, exact_angle
-
-    found = determine_angle(recording, rig)
-    if isinstance(found, CannotTell):
-        raise RefusalError(f"the speed of the {which} is not known: {found.reason}", remedy=found.remedy)
-    angle = exact_angle(recording, rig, found).between(0.0, recording.duration_s)
-    ratio = rig.ratio(shaft, to=angle.shaft) if shaft and angle.shaft else 1.0
-    if ratio is None:
-        raise RefusalError(
-            f"the speed of shaft {shaft!r} does not follow from the teeth of the {which}'s rig",
-            remedy="complete the tooth counts",
-        )
-    return angle if ratio == 1.0 else angle.of_shaft(shaft, ratio)
 
 
 # --------------------

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gearsig.comparison._sides import LEAST_REVOLUTIONS, ComparedSide
+from gearsig.comparison._sides import MIN_REVOLUTIONS, ComparedSide
 from gearsig.comparison._types import Alignment, ChannelComparison, LineLevel
 
 WITHIN_DB = 3.0
@@ -200,7 +200,7 @@ def remarks(
     left_out = [shaft for shaft in ratios if shaft not in {a.shaft for a in alignments}]
     if left_out:
         texts.append(
-            f"Shaft {', '.join(left_out)} makes fewer than {LEAST_REVOLUTIONS} revolutions in one of the records: its "
+            f"Shaft {', '.join(left_out)} makes fewer than {MIN_REVOLUTIONS} revolutions in one of the records: its "
             "average and its lines are left out."
         )
     told = {s.shaft for channel in channels for s in channel.shafts if s.best_correlation >= LEAST_REPEATED}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -25,7 +25,7 @@ from gearsig.diagnosis._signals import (
     own_bands,
 )
 from gearsig.diagnosis._single_lines import detect_lines
-from gearsig.diagnosis._speed import determine_angle, speed_finding
+from gearsig.diagnosis._speed import speed_finding
 from gearsig.diagnosis._start_stop import start_stop_analysis
 from gearsig.diagnosis._tooth import detect_tooth_damage
 from gearsig.diagnosis._types import Analysis, AnalysisSettings, CannotTell, Finding, Kind
@@ -33,6 +33,7 @@ from gearsig.diagnosis._verdict import detect_data_problems, ranked, verdict_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.indicators import Indicator
 from gearsig.orders import SynchronousAverage
+from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 
@@ -128,11 +129,11 @@ LARGEST_VALUE = 1e60
 
 
 def analyze(
-    recording: Recording,
+    recording: Recording | PreparedRecording,
     rig: Rig | None = None,
     settings: AnalysisSettings | None = None,
     *,
-    reference: Recording | None = None,
+    reference: Recording | PreparedRecording | None = None,
     torque_nm: float | None = None,
     on_stage: Callable[[str], object] | None = None,
 ) -> Analysis:
@@ -140,13 +141,13 @@ def analyze(
 
     Parameters
     ----------
-    recording : Recording
+    recording : Recording or PreparedRecording
         Its rig, if any, tells what the machine is.
     rig : Rig or None
         Used where the recording carries none.
     settings : AnalysisSettings or None
-    reference : Recording or None
-        Of the same machine when it was sound, same sensors, speed and load: cracks of a millimetre show against it,
+    reference : Recording, PreparedRecording or None
+        Of the same machine when it was healthy, same sensors, speed and load: cracks of a millimetre show against it,
         and indicators are compared with it.
     torque_nm : float or None
         For the depth of a crack, instead of the operating point's: of the shaft that this names, else of the
@@ -168,35 +169,38 @@ def analyze(
     """
     settings = settings or AnalysisSettings()
     tell = on_stage or (lambda _: None)
-    if recording.rig is None and rig is not None:
-        recording = recording.with_rig(rig)
-    known = recording.rig or Rig()
+    prepared = prepare(recording, rig)
+    recording, known = prepared.recording, prepared.rig
     _check_size(recording)
+    before = None
     if reference is not None:
-        _check_reference(recording, reference)
+        before = prepare(reference, recording.rig)
+        _check_reference(recording, before.recording)
     tell("finding the speed")
     findings, dead = detect_data_problems(recording)
     names = [name for name in recording.vibration_names() if name not in dead]
-    unsteady = start_stop_analysis(recording, known, findings, asdict(settings), reference)
+    unsteady = start_stop_analysis(
+        recording, known, findings, asdict(settings), before.recording if before is not None else None
+    )
     if unsteady is not None:
         return unsteady
     _check_vibration(recording)
-    angle = _angle_of(recording, known)
+    angle = _angle_of(prepared)
     findings.append(speed_finding(angle))
     if not names:
         findings.append(Finding("all-channels-dead", Kind.CANNOT_TELL, "Every vibration channel is dead."))
         order = ranked(findings)
         return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings))
     usable = angle if not isinstance(angle, CannotTell) else None
-    material = _material(recording.select(names), known, usable, settings, tell, has_reference=reference is not None)
+    material = _material(prepared, names, usable, settings, tell, has_reference=reference is not None)
     tell("gears, bearings and shafts")
     findings += _detect(material)
     then = None
-    if reference is not None:
+    if before is not None:
         tell("the reference")
-        then = analyze(reference, known if recording.rig is not None else None, settings)
+        then = analyze(before, settings=settings)
         findings = beside_reference(findings, then)
-    crack = crack_depth(recording, known, reference, torque_nm, dead)
+    crack = crack_depth(prepared, known, before, torque_nm, dead)
     order = ranked(with_crack(findings, crack, known))
     return Analysis(
         recording=recording,
@@ -213,8 +217,8 @@ def analyze(
 
 
 def _material(
-    recording: Recording,
-    rig: Rig,
+    prepared: PreparedRecording,
+    names: Sequence[str],
     angle: ShaftAngle | None,
     settings: AnalysisSettings,
     tell: Callable[[str], object],
@@ -223,19 +227,18 @@ def _material(
 ) -> ExaminedSignals:
     """Compute everything that is looked at."""
     tell("averages and spectra")
-    signals = replace(compute_signals(recording, rig, angle, settings), has_reference=has_reference)
+    signals = replace(compute_signals(prepared, names, angle, settings), has_reference=has_reference)
     tell("envelopes")
     envelopes, own = list(band_envelopes(signals)), own_bands(signals)
     tell("levels over speed")
     return ExaminedSignals(signals, envelopes, own, order_levels(signals))
 
 
-def _angle_of(recording: Recording, rig: Rig) -> ShaftAngle | CannotTell:
+def _angle_of(prepared: PreparedRecording) -> ShaftAngle | CannotTell:
     """Return the angle within the record's own time; pulses may go on before and after it, but do not count."""
-    source = recording.provenance.source
+    source = prepared.recording.provenance.source
     try:
-        angle = determine_angle(recording, rig)
-        return angle if isinstance(angle, CannotTell) else angle.between(0.0, recording.duration_s)
+        return prepared.shaft_angle
     except RefusalError as refusal:
         return CannotTell("What is the speed of the shafts?", refusal.reason, refusal.remedy)
     except InputError as error:  # it names the channel; which file it is in is known here

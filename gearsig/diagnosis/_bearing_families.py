@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from gearsig.diagnosis._lines import Comb, LineExcess, best_comb, comb_at
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
+from gearsig.prepared import Comb, LineExcess, best_comb, comb_at
 from gearsig.rig import Bearing
 
 # --------------------

@@ -17,6 +17,7 @@ from gearsig.diagnosis._types import (
 )
 from gearsig.diagnosis._verdict import DEPTH_UNKNOWN
 from gearsig.errors import RefusalError
+from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording
 from gearsig.rig import GearPair, Rig
 from gearsig.severity import CRACKED, CrackEstimate, NoCrackSeen
@@ -57,9 +58,9 @@ Answer = CrackEstimate | NoCrackSeen | CannotTell
 
 
 def crack_depth(
-    recording: Recording,
+    recording: Recording | PreparedRecording,
     rig: Rig,
-    reference: Recording | None,
+    reference: Recording | PreparedRecording | None,
     torque_nm: float | None,
     dead: Collection[str] = (),
 ) -> Answer | None:
@@ -69,10 +70,10 @@ def crack_depth(
 
     Parameters
     ----------
-    recording : Recording
+    recording : Recording or PreparedRecording
     rig : Rig
-    reference : Recording or None
-        Of the same gears when they were sound. Without it only a crack is an answer: that none is seen says little,
+    reference : Recording, PreparedRecording or None
+        Of the same gears when they were healthy. Without it only a crack is an answer: that none is seen says little,
         and that it cannot be told says nothing.
     torque_nm : float or None
         Of the operating point's shaft, instead of its own.
@@ -88,9 +89,10 @@ def crack_depth(
 
     if rig.bearings and not rig.pairs:
         return None
-    alive = [c.name for c in recording.channels if c.quantity == "acceleration" and c.name not in dead]
+    prepared = prepare(recording, rig)
+    alive = [c.name for c in prepared.recording.channels if c.quantity == "acceleration" and c.name not in dead]
     try:
-        answer = estimate_crack(recording, rig, reference=reference, torque_nm=torque_nm, channels=alive)
+        answer = estimate_crack(prepared, reference=reference, torque_nm=torque_nm, channels=alive)
     except RefusalError as refusal:
         if reference is None:
             return None

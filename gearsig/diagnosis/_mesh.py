@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearsig.diagnosis._lines import LineExcess
 from gearsig.diagnosis._signals import AnalysisSignals
 from gearsig.diagnosis._speed import N_HARMONICS, ConfirmingLine, clearest_line
 from gearsig.diagnosis._types import Finding, Kind, Strength, Where
+from gearsig.prepared import LineExcess
 from gearsig.rig import GearPair
 
 MOST_TEETH_WRONG = 3

@@ -7,12 +7,12 @@ from math import log10
 
 import numpy as np
 
-from gearsig.diagnosis._lines import INNER_LINES, RUN_UP_FOOT_ORDERS, Comb, LineExcess, best_comb, level_beside
 from gearsig.diagnosis._mesh import teeth_are_contradicted
 from gearsig.diagnosis._signals import AnalysisSignals
 from gearsig.diagnosis._speed import mesh_is_confirmed
 from gearsig.diagnosis._types import WITH_ASSUMED_DATA, Finding, Kind, Strength, Where, from_p_value, p_text
 from gearsig.indicators import lobe_lines
+from gearsig.prepared import INNER_LINES, RUN_UP_FOOT_ORDERS, Comb, LineExcess, best_comb, level_beside
 from gearsig.rig import GearPair
 from gearsig.spectra import Spectrum
 

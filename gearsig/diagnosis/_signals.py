@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray
-from gearsig.diagnosis._lines import Comb, LineExcess, best_comb, line_excess
 from gearsig.diagnosis._types import AnalysisSettings, ChannelAnalysis, Finding, Kind, OrderLevel
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import OrderMap, SeparatedAverage, SynchronousAverage, highest_line, separate, whole_revolutions
+from gearsig.prepared import Comb, LineExcess, PreparedRecording, best_comb, envelope_bands, floor_of
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 from gearsig.spectra import BandCandidate, Kurtogram, Spectrum
@@ -112,69 +111,44 @@ class AnalysisSignals:
 
 
 def compute_signals(
-    recording: Recording, rig: Rig, angle: ShaftAngle | None, settings: AnalysisSettings
+    prepared: PreparedRecording, names: Sequence[str], angle: ShaftAngle | None, settings: AnalysisSettings
 ) -> AnalysisSignals:
-    """Compute what the detectors need, as far as the speed and the rig allow."""
-    from gearsig.spectra import channel_spectrum
-
-    names = recording.channel_names
-    spectra = {name: channel_spectrum(recording, name) for name in names}
+    """Compute what the detectors need of the named channels, as far as the speed and the rig allow."""
+    spectra = {name: prepared.spectrum(name) for name in names}
     excess: dict[str, LineExcess] = {}
     shafts: tuple[ShaftSignals, ...] = ()
     maps: dict[str, OrderMap] = {}
     if angle is not None and angle.n_revolutions >= settings.minimum_revolutions:
         try:
-            signal = _resampled(recording, angle)
-            excess = {name: _order_excess(signal, name) for name in names}
-            shafts = _shaft_signals(recording, rig, angle, signal, settings)
+            prepared.over_angle(channels=names)  # all channels at once
+            excess = {name: prepared.order_lines(name) for name in names}
+            shafts = _shaft_signals(prepared, names, angle, settings)
         except RefusalError:  # too few samples per revolution or too short: the detectors say that nothing is known
             excess, shafts = {}, ()
-    result = AnalysisSignals(recording, rig, angle, settings, spectra, excess, shafts, maps)
+    recording = prepared.recording.select(names)
+    result = AnalysisSignals(recording, prepared.rig, angle, settings, spectra, excess, shafts, maps)
     if excess and result.speed_varies:
-        from gearsig.orders import order_map
-
-        maps.update({name: order_map(signal, name) for name in names})
+        maps.update({name: prepared.order_map(name) for name in names})
     return result
 
 
-def floor_of(spectrum: Spectrum) -> LineExcess:
-    """Return an amplitude spectrum's lines against its local noise floor."""
-    from gearsig.spectra import noise_floor
-
-    return line_excess(spectrum, noise_floor(spectrum).values)
-
-
-def _order_excess(signal: AngleSignal, name: str) -> LineExcess:
-    from gearsig.orders import order_spectrum
-
-    return floor_of(order_spectrum(signal, name))
-
-
-def _resampled(recording: Recording, angle: ShaftAngle) -> AngleSignal:
-    from gearsig.angle import resample_to_angle
-
-    return resample_to_angle(recording, angle)
-
-
 def _shaft_signals(
-    recording: Recording, rig: Rig, angle: ShaftAngle, signal: AngleSignal, settings: AnalysisSettings
+    prepared: PreparedRecording, names: Sequence[str], angle: ShaftAngle, settings: AnalysisSettings
 ) -> tuple[ShaftSignals, ...]:
     """Average each shaft's revolutions, wherever its order is known and it turns often enough."""
-    found = []
-    for shaft in rig.shaft_names or (angle.shaft,):
-        ratio = rig.ratio(shaft) if rig.shaft_names else 1.0
-        if ratio is None or angle.n_revolutions * ratio < settings.minimum_revolutions:
-            continue
-        own = angle if ratio == 1.0 else angle.of_shaft(shaft, ratio)
-        found.append(_one_shaft(shaft, rig, own, signal if ratio == 1.0 else _resampled(recording, own)))
-    return tuple(found)
+    rig = prepared.rig
+    ratios = {shaft: rig.ratio(shaft) for shaft in rig.shaft_names} or {angle.shaft: 1.0}
+    return tuple(
+        _one_shaft(prepared, shaft, names)
+        for shaft, ratio in ratios.items()
+        if ratio is not None and angle.n_revolutions * ratio >= settings.minimum_revolutions
+    )
 
 
-def _one_shaft(shaft: str, rig: Rig, angle: ShaftAngle, signal: AngleSignal) -> ShaftSignals:
-    from gearsig.orders import synchronous_average
-
-    averages = {name: synchronous_average(signal, name) for name in signal.channel_names}
-    gears = [pair.teeth(shaft) for pair in rig.pairs if shaft in (pair.driver, pair.driven)]
+def _one_shaft(prepared: PreparedRecording, shaft: str, names: Sequence[str]) -> ShaftSignals:
+    signal = prepared.over_angle(shaft, names)
+    averages = {name: prepared.average(shaft, name) for name in names}
+    gears = [pair.teeth(shaft) for pair in prepared.rig.pairs if shaft in (pair.driver, pair.driven)]
     teeth = tuple(z for z in gears if z is not None)
     separated, halves = {}, {}
     for name, average in averages.items():
@@ -185,7 +159,7 @@ def _one_shaft(shaft: str, rig: Rig, angle: ShaftAngle, signal: AngleSignal) -> 
             except (RefusalError, InputError):
                 continue  # nothing is left beside the mesh lines: there is no residual to look at
             halves[name] = np.stack([separate(h, visible).difference.values for h in _halves(signal, average)])
-    return ShaftSignals(shaft, teeth, angle, averages, separated, halves, signal)
+    return ShaftSignals(shaft, teeth, prepared.angle_of(shaft), averages, separated, halves, signal)
 
 
 def _halves(signal: AngleSignal, average: SynchronousAverage) -> tuple[SynchronousAverage, SynchronousAverage]:
@@ -201,13 +175,6 @@ def _halves(signal: AngleSignal, average: SynchronousAverage) -> tuple[Synchrono
 # --------------------
 # Envelope spectra of several bands, where impacts of bearings show.
 # --------------------
-
-
-DIVISIONS = (1, 2, 6)
-"""The spectrum is taken whole, in halves and in sixths: wide bands gather weak impacts, narrow ones leave out gears."""
-
-LOWEST_BAND_HZ = 300.0
-"""Below it shaft and first mesh harmonics rule; impacts of a bearing ring at structural resonances above."""
 
 
 @dataclass(frozen=True)
@@ -230,21 +197,9 @@ class BandEnvelope:
     mean: float
 
 
-def bands(sampling_rate_hz: float) -> tuple[tuple[float, float], ...]:
-    """Return bands of equal relative width, coarse and fine, that cover the spectrum up to 0.45 of the sampling rate.
-
-    Several bands are searched instead of one chosen by its kurtosis: the kurtosis of a gearbox is as often that of the
-    gears, and the family of lines itself says which band carries it.
-    """
-    top = 0.45 * sampling_rate_hz
-    low = min(LOWEST_BAND_HZ, top / 4)
-    edges = [[low * (top / low) ** (i / n) for i in range(n + 1)] for n in DIVISIONS]
-    return tuple(band for division in edges for band in pairwise(division))
-
-
 def band_envelopes(signals: AnalysisSignals) -> Iterator[BandEnvelope]:
     """Yield the envelope spectra of all channels and bands."""
-    for band in bands(signals.recording.sampling_rate_hz):
+    for band in envelope_bands(signals.recording.sampling_rate_hz):
         yield from envelopes_in(signals, signals.recording, band)
 
 

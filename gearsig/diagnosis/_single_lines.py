@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearsig.diagnosis._lines import RUN_UP_FOOT_ORDERS, LineExcess, levels_beside, over_floor_db
-from gearsig.diagnosis._signals import AnalysisSignals, floor_of
-from gearsig.diagnosis._speed import MAINS_HZ
+from gearsig.diagnosis._signals import AnalysisSignals
 from gearsig.diagnosis._types import Finding, Kind, Strength, Where
+from gearsig.prepared import MAINS_HZ, RUN_UP_FOOT_ORDERS, LineExcess, floor_of, levels_beside, over_floor_db
 
 CLEAR_DB = 15.0
 """Power over mean floor that noise exceeds in one line of 10¹³: also over a million lines, a chance of 10⁻⁷."""

@@ -16,7 +16,7 @@ from gearsig.diagnosis._signals import AnalysisSignals, ShaftSignals
 from gearsig.diagnosis._speed import mesh_is_confirmed
 from gearsig.diagnosis._types import WITH_ASSUMED_DATA, Finding, Kind, Strength, Where, from_p_value, p_text
 from gearsig.orders import whole_revolutions
-from gearsig.severity import has_mark
+from gearsig.prepared import has_mark
 
 # --------------------
 # Whether the energy of a periodic signal is gathered at one angle, more than its spectrum alone would make it.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +17,6 @@ from gearsig.diagnosis import (
     Kind,
     Outcome,
     analyze,
-    determine_angle,
     in_reference,
 )
 from gearsig.diagnosis import (
@@ -40,6 +40,7 @@ from gearsig.gap._types import (
     group_probabilities,
 )
 from gearsig.gap._words import band_words, hertz
+from gearsig.prepared import refined_angle
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 from gearsig.severity import LARGEST_SPEED_DIFFERENCE
@@ -635,8 +636,10 @@ def _nearest(speed_rpm: float, references: Sequence[Recording], rigs: Sequence[R
     pairs = list(zip(references, rigs, strict=True))
     if len(pairs) < 2:
         return pairs[0] if pairs else None
-    speeds = [determine_angle(carrying(one, rig), rig) for one, rig in pairs]
-    known = [(abs(a.mean_speed_rpm - speed_rpm), i) for i, a in enumerate(speeds) if not isinstance(a, CannotTell)]
+    known = []
+    for i, (recording, rig) in enumerate(pairs):
+        with suppress(RefusalError):  # a reference without a speed is no help
+            known.append((abs(refined_angle(carrying(recording, rig), rig).mean_speed_rpm - speed_rpm), i))
     return pairs[min(known)[1]] if known else None
 
 

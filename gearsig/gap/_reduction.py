@@ -13,9 +13,9 @@ from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.orders import first_whole_sample
+from gearsig.prepared import has_mark
 from gearsig.recording import Recording
 from gearsig.rig import GearPair, Rig
-from gearsig.severity import has_mark
 
 # --------------------
 # The gear pair under study, with every order counted on its driver's shaft.
@@ -507,12 +507,10 @@ def _check_mesh(signal: AngleSignal, frame: GearFrame, recording: Recording, spe
 
 
 def _angle_of(recording: Recording, rig: Rig) -> ShaftAngle:
-    from gearsig.diagnosis import CannotTell, determine_angle, exact_angle
+    from gearsig.prepared import phase_followed_angle, refined_angle
 
-    found = determine_angle(recording, rig)
-    if isinstance(found, CannotTell):
-        raise RefusalError(found.reason, remedy=found.remedy)
-    return exact_angle(recording, rig, found).between(0.0, recording.duration_s)
+    angle = phase_followed_angle(recording, rig, refined_angle(recording, rig))
+    return angle.between(0.0, recording.duration_s)
 
 
 def _of_shaft(angle: ShaftAngle, rig: Rig, shaft: str) -> ShaftAngle:

@@ -10,6 +10,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, positive, within
 from gearsig.errors import InputError, RefusalError
+from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording
 from gearsig.rig import GearPair, Rig
 from gearsig.severity._features import (
@@ -85,12 +86,12 @@ class GearEvidence:
     agreement: float | None = None
 
 
-def pair_lines(recording: Recording, rig: Rig, pair: GearPair, channels: Sequence[str]) -> tuple[ShaftLines, ...]:
+def pair_lines(
+    recording: Recording | PreparedRecording, rig: Rig | None, pair: GearPair, channels: Sequence[str]
+) -> tuple[ShaftLines, ...]:
     """Return the lines of both shafts, the driver's first."""
-    from gearsig.angle import find_shaft_angle
-
-    angle = find_shaft_angle(recording, rig).between(0.0, recording.duration_s)
-    return tuple(shaft_lines(recording, rig, pair, shaft, angle, channels) for shaft in (pair.driver, pair.driven))
+    prepared = prepare(recording, rig)
+    return tuple(shaft_lines(prepared, pair, shaft, channels) for shaft in (pair.driver, pair.driven))
 
 
 def gear_evidence(
@@ -430,10 +431,10 @@ CLEARLY_LARGER = log(1.3)
 
 
 def estimate_crack(
-    recording: Recording,
+    recording: Recording | PreparedRecording,
     rig: Rig | None = None,
     *,
-    reference: Recording | None = None,
+    reference: Recording | PreparedRecording | None = None,
     torque_nm: float | None = None,
     tip_relief_um: float | None = None,
     channels: Sequence[str] = (),
@@ -447,11 +448,11 @@ def estimate_crack(
 
     Parameters
     ----------
-    recording : Recording
+    recording : Recording or PreparedRecording
         Acceleration at steady speed; 13 revolutions of either shaft at least, better a hundred.
     rig : Rig or None
         Where the recording carries none. Teeth, module, face width and torque must be known.
-    reference : Recording or None
+    reference : Recording, PreparedRecording or None
         Of the same gears, sensors, speed and load before there was a crack. Without it, what teeth differ by from
         birth hides all but deep cracks.
     torque_nm : float or None
@@ -499,23 +500,21 @@ def estimate_crack(
     time domain average of the meshing vibration", 1987. J. Lei, M. G'Sell, A. Rinaldo, R. J. Tibshirani,
     L. Wasserman, "Distribution-free predictive inference for regression", 2018 (locally weighted conformal intervals).
     """
-    if recording.rig is None and rig is not None:
-        recording = recording.with_rig(rig)
-    known = recording.rig or Rig()
-    facts = pair_facts(known, torque_nm)
+    prepared = prepare(recording, rig)
+    facts = pair_facts(prepared.rig, torque_nm)
     used = calibration or load_calibration()
     _check_relief(tip_relief_um, used.reach)
-    names = acceleration_channels(recording, tuple(channels))
-    check_alive(recording, names)
-    now = pair_lines(recording, known, facts.pair, names)
+    names = acceleration_channels(prepared.recording, tuple(channels))
+    check_alive(prepared.recording, names)
+    now = pair_lines(prepared, None, facts.pair, names)
     used.check_reach(reach_of(facts, now[0].order_hz * facts.driver_teeth))
     sound = None
     if reference is not None:
-        described = reference if reference.rig is not None else reference.with_rig(known)
-        acceleration_channels(described, names)
-        check_alive(described, names, "of the reference ")
-        check_same_rig(known, described.rig or known)
-        sound = pair_lines(described, described.rig or known, facts.pair, names)
+        before = prepare(reference, prepared.rig)
+        acceleration_channels(before.recording, names)
+        check_alive(before.recording, names, "of the reference ")
+        check_same_rig(prepared.rig, before.rig)
+        sound = pair_lines(before, None, facts.pair, names)
         check_same_level(now, sound)
     found = gear_evidence(now, sound, facts.module_mm, facts.load_mpa, tip_relief_um)
     way = ALONE if reference is None else WITH_REFERENCE

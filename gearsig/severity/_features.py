@@ -9,18 +9,17 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.angle import ShaftAngle
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.recording import Recording
-from gearsig.rig import GearPair, PulseTimes, Rig, TachometerChannel
+from gearsig.prepared import PreparedRecording
+from gearsig.rig import GearPair
 
 # --------------------
 # Synchronous averages of the two shafts of a gear pair, as spectra over the order of each shaft.
 # --------------------
 
 
-LEAST_REVOLUTIONS = 13
+MIN_REVOLUTIONS = 13
 """Of either shaft: fewer leave the other shaft's orders in its average, and the calibration has no fewer."""
 
 
@@ -55,9 +54,7 @@ class ShaftLines:
     has_mark: bool = False
 
 
-def shaft_lines(
-    recording: Recording, rig: Rig, pair: GearPair, shaft: str, angle: ShaftAngle, channels: Sequence[str]
-) -> ShaftLines:
+def shaft_lines(prepared: PreparedRecording, pair: GearPair, shaft: str, channels: Sequence[str]) -> ShaftLines:
     """Return the lines of the shaft's average for each channel.
 
     Raises
@@ -65,35 +62,30 @@ def shaft_lines(
     RefusalError
         If there are too few revolutions.
     """
-    from gearsig.angle import resample_to_angle
-    from gearsig.orders import synchronous_average
-
-    ratio = rig.ratio(shaft)
-    own, other = pair.teeth(shaft), pair.teeth(pair.driven if shaft == pair.driver else pair.driver)
-    if ratio is None or own is None or other is None:
+    ratio = prepared.rig.ratio(shaft)
+    teeth, other_teeth = pair.teeth(shaft), pair.teeth(pair.driven if shaft == pair.driver else pair.driver)
+    if ratio is None or teeth is None or other_teeth is None:
         raise RefusalError("the teeth of both gears are not known", remedy="state them in the rig file")
-    turned = angle if ratio == 1.0 else angle.of_shaft(shaft, ratio)
-    if turned.n_revolutions < LEAST_REVOLUTIONS:
+    angle = prepared.angle_of(shaft)
+    if angle.n_revolutions < MIN_REVOLUTIONS:
         raise RefusalError(
-            f"the record holds {turned.n_revolutions:.3g} revolutions of shaft {shaft!r}, "
-            f"{LEAST_REVOLUTIONS} are needed",
+            f"the record holds {angle.n_revolutions:.3g} revolutions of shaft {shaft!r}, {MIN_REVOLUTIONS} are needed",
             remedy="record longer",
         )
-    signal = resample_to_angle(recording, turned, channels=list(channels))
-    averages = [synchronous_average(signal, name) for name in channels]
+    prepared.over_angle(shaft, channels)  # all channels at once
+    averages = [prepared.average(shaft, name) for name in channels]
     n = len(averages[0].values)
     highest = min(int(averages[0].highest_order), (n - 1) // 2)
-    lines = np.stack([2.0 * np.fft.rfft(a.values)[: highest + 1] / n for a in averages])
     return ShaftLines(
         shaft,
-        own,
-        other,
-        lines,
+        teeth,
+        other_teeth,
+        np.stack([2.0 * np.fft.rfft(average.values)[: highest + 1] / n for average in averages]),
         averages[0].n_revolutions,
         highest,
-        turned.mean_speed_rpm / 60.0,
+        angle.mean_speed_rpm / 60.0,
         tuple(channels),
-        has_mark(recording, rig, shaft),
+        prepared.has_mark(shaft),
     )
 
 
@@ -101,14 +93,6 @@ def orders_from_mesh(orders: NDArray[np.intp], teeth: int) -> NDArray[np.intp]:
     """Return how many orders of a shaft lie between each order and the nearest mesh harmonic."""
     distance: NDArray[np.intp] = np.abs((orders + teeth // 2) % teeth - teeth // 2)
     return distance
-
-
-def has_mark(recording: Recording, rig: Rig, shaft: str) -> bool:
-    """Say whether angle 0 of a shaft is a mark on that very shaft: one pulse per revolution."""
-    source = recording.speed_source
-    if not isinstance(source, PulseTimes | TachometerChannel) or source.pulses_per_revolution != 1:
-        return False
-    return (source.shaft or rig.reference_shaft) == shaft
 
 
 # --------------------

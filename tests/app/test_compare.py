@@ -12,7 +12,7 @@ from app.cli.compare import DATA, PAGE, TABLE, read_pair
 from app.cli.main import main
 from gearsig.errors import InputError
 from gearsig.recording import Channel, Recording
-from tests.compare.machines import LINES, TEETH, gear_record
+from tests.comparison.machines import LINES, TEETH, gear_record
 
 RIG = f'[[pair]]\nname = "p"\ndriver = "in"\ndriven = "out"\ndriver_teeth = {TEETH[0]}\ndriven_teeth = {TEETH[1]}\n'
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearsig.diagnosis import best_comb, comb_at, floor_of, line_excess, score_needed, tail_probability
+from gearsig.prepared import best_comb, comb_at, floor_of, line_excess, score_needed, tail_probability
 from gearsig.spectra import amplitude_spectrum
 
 RATE_HZ = 1000.0
@@ -97,7 +97,7 @@ def test_ranges_beyond_the_axis_are_cut_to_it() -> None:
 def test_pieces_of_a_search_make_the_same_family_as_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     excess = excess_of(family(23.37, 0.06, np.random.default_rng(9)))
     whole = best_comb(excess, 10.0, 60.0)
-    monkeypatch.setattr("gearsig.diagnosis._lines.CHUNK", 1000)
+    monkeypatch.setattr("gearsig.prepared._lines.CHUNK", 1000)
     assert best_comb(excess, 10.0, 60.0) == whole
 
 

@@ -10,20 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.angle import AngleSignal, ShaftAngle
-from gearsig.diagnosis import (
-    Analysis,
-    Finding,
-    Kind,
-    LineExcess,
-    Outcome,
-    analyze,
-    floor_of,
-    level_beside,
-    levels_beside,
-    modulation_of,
-)
+from gearsig.diagnosis import Analysis, Finding, Kind, Outcome, analyze, modulation_of
 from gearsig.diagnosis import Modulation as Found
 from gearsig.orders import order_spectrum
+from gearsig.prepared import LineExcess, floor_of, level_beside, levels_beside
 from gearsig.recording import Recording
 from gearsig.rig import GearPair, Rig, Shaft, TachometerChannel
 from sims.measure import ColouredNoise, Tachometer

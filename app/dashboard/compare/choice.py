@@ -130,15 +130,16 @@ def speed_of(recorded: Recording) -> float:
     InputError
         If it is not known.
     """
-    from gearsig.angle import ShaftAngle
-    from gearsig.diagnosis import determine_angle
+    from gearsig.errors import RefusalError
+    from gearsig.prepared import refined_angle
 
     rig = recorded.rig or Rig()
-    angle = determine_angle(recorded, rig)
-    if not isinstance(angle, ShaftAngle):
+    try:
+        angle = refined_angle(recorded, rig)
+    except RefusalError as refusal:
         raise InputError(
-            f"the speed of the recording is not known: {angle.reason}", remedy=f"type a speed, or {angle.remedy}"
-        )
+            f"the speed of the recording is not known: {refusal.reason}", remedy=f"type a speed, or {refusal.remedy}"
+        ) from None
     driver = rig.pairs[0].driver if rig.pairs else ""
     return angle.mean_speed_rpm * ((rig.ratio(driver, to=angle.shaft) or 1.0) if driver else 1.0)
 

@@ -11,7 +11,7 @@ from gearsig.comparison import Comparison, LineLevel, compare_recordings, missin
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Channel, Recording
 from gearsig.rig import GearPair, PulseTimes, Rig, Shaft
-from tests.compare.machines import LINES, RIG, TEETH, gear_record
+from tests.comparison.machines import LINES, RIG, TEETH, gear_record
 
 
 def line(comparison: Comparison, order: float) -> LineLevel:

@@ -121,6 +121,13 @@ def line_excess(spectrum: Spectrum, floor: FloatArray) -> LineExcess:
     return LineExcess(spectrum, np.asarray(floor), widened, np.zeros(len(widened), dtype=np.bool_))
 
 
+def floor_of(spectrum: Spectrum) -> LineExcess:
+    """Return an amplitude spectrum's lines against its local noise floor."""
+    from gearsig.spectra import noise_floor
+
+    return line_excess(spectrum, noise_floor(spectrum).values)
+
+
 def best_comb(
     excess: LineExcess,
     low: float,

@@ -1,0 +1,50 @@
+"""One prepared record per recording: angle, resampled channels, averages and lines, each computed once, on demand.
+
+>>> from gearsig.prepared import PreparedRecording
+>>> from gearsig import analyze, estimate_crack, read_recording  # doctest: +SKIP
+>>> now, healthy = (PreparedRecording(read_recording(name)) for name in ("now.h5", "healthy.h5"))  # doctest: +SKIP
+>>> analyze(now, reference=healthy), estimate_crack(now, reference=healthy)  # doctest: +SKIP
+"""
+
+from gearsig.prepared._angle import MAINS_HZ, envelope_bands, phase_followed_angle, refined_angle
+from gearsig.prepared._lines import (
+    INNER_LINES,
+    LOG_RATIO_LIMIT,
+    RUN_UP_FOOT_ORDERS,
+    Comb,
+    LineExcess,
+    best_comb,
+    comb_at,
+    floor_of,
+    level_beside,
+    levels_beside,
+    line_excess,
+    over_floor_db,
+    score_needed,
+    tail_probability,
+)
+from gearsig.prepared._recording import PreparedRecording, has_mark, prepare
+
+__all__ = [
+    "INNER_LINES",
+    "LOG_RATIO_LIMIT",
+    "MAINS_HZ",
+    "RUN_UP_FOOT_ORDERS",
+    "Comb",
+    "LineExcess",
+    "PreparedRecording",
+    "best_comb",
+    "comb_at",
+    "envelope_bands",
+    "floor_of",
+    "has_mark",
+    "level_beside",
+    "levels_beside",
+    "line_excess",
+    "over_floor_db",
+    "phase_followed_angle",
+    "prepare",
+    "refined_angle",
+    "score_needed",
+    "tail_probability",
+]

@@ -1,0 +1,202 @@
+"""The angle of the reference shaft, refined by what the vibration itself shows of the speed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from gearsig.angle import ShaftAngle
+from gearsig.errors import InputError, RefusalError
+from gearsig.prepared._lines import best_comb, floor_of
+from gearsig.recording import Recording
+from gearsig.rig import ConstantSpeed, Rig, SpeedChannel
+
+STATED_SPEED_TOLERANCE = 0.03
+"""How far the true speed may be from a stated one: the slip of an induction motor from no load to full load."""
+
+LARGEST_DRIFT_REV = 0.01
+"""Drift of the angle over the record that averages bear: a third of a tooth's pitch of thirty teeth."""
+
+STEADY = 0.01
+"""Relative range of a speed channel below which the mesh lines are sought at one speed."""
+
+N_SHAFT_HARMONICS = 8
+N_PHASE_HARMONICS = 3
+"""Of the mesh, whose phase an angle may follow."""
+
+MAINS_HZ = (50.0, 60.0)
+"""Supplies put their own harmonics, and those of motors, within the slip of a motor's speed."""
+
+MAINS_TOLERANCE = 0.002
+"""How far a supply's frequency wanders."""
+
+
+def refined_angle(recording: Recording, rig: Rig) -> ShaftAngle:
+    """Return the angle of the reference shaft, a stated speed refined where the signal shows the true one near it.
+
+    Synchronous averages need the speed to a small part of a revolution over the whole record, and nameplates are not
+    as good as that.
+
+    Parameters
+    ----------
+    recording : Recording
+    rig : Rig
+        Its speed source is used where the recording has none.
+
+    Raises
+    ------
+    RefusalError
+        If the speed cannot be known, the machine is at rest, or it turns faster than half the sampling rate.
+    InputError
+        If the speed source is malformed, or names a channel or shaft that is not there.
+    """
+    from gearsig.angle import find_shaft_angle
+
+    angle = find_shaft_angle(recording, rig)
+    hertz, limit_hz = angle.mean_speed_rpm / 60, recording.sampling_rate_hz / 2
+    if hertz >= limit_hz:
+        raise RefusalError(
+            f"{angle.mean_speed_rpm:.4g} rpm are {hertz:.4g} Hz, above half the sampling rate ({limit_hz:.4g} Hz)",
+            remedy="check the speed's unit and the sampling rate",
+        )
+    if isinstance(recording.speed_source, ConstantSpeed):
+        return _refined(recording, rig, angle)
+    if isinstance(recording.speed_source, SpeedChannel):
+        return _rescaled(recording, rig, angle)
+    return angle
+
+
+def phase_followed_angle(recording: Recording, rig: Rig, estimated: ShaftAngle) -> ShaftAngle:
+    """Let an angle that was estimated from the vibration follow the phase of the mesh harmonics.
+
+    The estimate may hold the speed constant where it wanders by some 10⁻⁴. Over hundreds of revolutions that is half
+    a tooth, and takes decibels from the averages' mesh harmonics.
+
+    Parameters
+    ----------
+    recording : Recording
+    rig : Rig
+    estimated : ShaftAngle
+        Of the reference shaft; one that was not estimated from the vibration is returned as it is.
+    """
+    from gearsig.angle import refine_by_phase
+
+    if estimated.method != "tachless":
+        return estimated
+    meshes = [order for pair in rig.pairs if (order := rig.mesh_order(pair, estimated.shaft)) is not None]
+    orders = tuple(k * order for order in meshes for k in range(1, N_PHASE_HARMONICS + 1))
+    followed = refine_by_phase(recording, recording.vibration_names(), estimated, orders)
+    return replace(
+        estimated,
+        time_s=followed.time_s,
+        revolutions=followed.revolutions,
+        speed_rev_per_s=followed.speed_rev_per_s,
+        notes=(*estimated.notes, "the course of the angle follows the phase of the mesh harmonics"),
+    )
+
+
+def _refined(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle:
+    """Return the speed that mesh lines or shaft harmonics show near the stated one, else the stated one."""
+    found = _from_meshes(recording, rig, stated) if rig.pairs else _from_shaft_harmonics(recording, stated)
+    if found is None:
+        return replace(
+            stated, quality=0.5, notes=(*stated.notes, "The stated speed could not be confirmed from the signal.")
+        )
+    difference = 100 * (found.mean_speed_rpm / stated.mean_speed_rpm - 1)
+    lines_say = f"the signal's own lines say {found.mean_speed_rpm:.6g} rpm ({difference:+.2f} %)"
+    note = f"Stated {stated.mean_speed_rpm:.6g} rpm; {lines_say}."
+    return replace(found, shaft=stated.shaft, notes=(*found.notes, note))
+
+
+def _rescaled(recording: Recording, rig: Rig, measured: ShaftAngle) -> ShaftAngle:
+    """Return a steady speed channel's angle at the scale the mesh lines show, if they show another.
+
+    Speed channels are right to a part in a hundred or a thousand, which is revolutions in a long record.
+    """
+    low, high = measured.speed_range_rpm
+    if not rig.pairs or high - low > STEADY * measured.mean_speed_rpm:
+        return measured
+    found = _from_meshes(recording, rig, measured)
+    if found is None:
+        return measured
+    difference = found.mean_speed_rpm / measured.mean_speed_rpm - 1
+    if abs(difference) * measured.n_revolutions < LARGEST_DRIFT_REV:
+        return measured
+    lines_say = f"the signal's own lines say {found.mean_speed_rpm:.6g} rpm ({100 * difference:+.2f} %)"
+    note = f"The speed channel says {measured.mean_speed_rpm:.6g} rpm; {lines_say}."
+    return replace(found, shaft=measured.shaft, notes=(*found.notes, note))
+
+
+def _from_meshes(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle | None:
+    from gearsig.angle import estimate_shaft_angle
+
+    speed = stated.mean_speed_rpm
+    limits = (speed * (1 - STATED_SPEED_TOLERANCE), speed * (1 + STATED_SPEED_TOLERANCE))
+    try:
+        return estimate_shaft_angle(recording, rig, speed_range_rpm=limits)
+    except RefusalError:
+        return None
+
+
+def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngle | None:
+    """Find the shaft's harmonics in the envelopes, where a bearing's modulation shows them better than the spectrum.
+
+    Multiples of the mains are left out: a hum's would be taken for the shaft of any motor of little slip.
+    """
+    from gearsig.spectra import channel_spectrum, envelope_recording
+
+    hertz = stated.mean_speed_rpm / 60
+    low, high = hertz * (1 - STATED_SPEED_TOLERANCE), hertz * (1 + STATED_SPEED_TOLERANCE)
+    combs = []
+    for band in envelope_bands(recording.sampling_rate_hz):
+        try:
+            envelopes = envelope_recording(recording, band, kind="magnitude")
+        except InputError:
+            continue
+        for name in envelopes.channel_names:
+            spectrum = channel_spectrum(envelopes, name)
+            excess = floor_of(spectrum)
+            for mains_hz in MAINS_HZ:
+                excess = excess.without_multiples(mains_hz, skirt=MAINS_TOLERANCE)
+            comb = best_comb(excess, low, high, offsets=np.arange(1, N_SHAFT_HARMONICS + 1))
+            if comb is not None:
+                combs.append((comb.p_value, comb.fundamental, spectrum.resolution))
+    if not combs:
+        return None
+    p_value, found, resolution = min(combs)
+    p_value = min(1.0, p_value * len(combs))
+    if p_value > 1e-3:
+        return None
+    return replace(
+        stated,
+        revolutions=stated.revolutions * (found / hertz),
+        speed_rev_per_s=stated.speed_rev_per_s * (found / hertz),
+        relative_speed_uncertainty=resolution / (3 * N_SHAFT_HARMONICS) / found,
+        quality=min(0.95, 1 - p_value),
+    )
+
+
+# --------------------
+# Bands whose envelopes are searched.
+# --------------------
+
+
+DIVISIONS = (1, 2, 6)
+"""The spectrum is taken whole, in halves and in sixths: wide bands gather weak impacts, narrow ones leave out gears."""
+
+LOWEST_BAND_HZ = 300.0
+"""Below it shaft and first mesh harmonics rule; impacts of a bearing ring at structural resonances above."""
+
+
+def envelope_bands(sampling_rate_hz: float) -> tuple[tuple[float, float], ...]:
+    """Return bands of equal relative width, coarse and fine, that cover the spectrum up to 0.45 of the sampling rate.
+
+    Several bands are searched instead of one chosen by its kurtosis: the kurtosis of a gearbox is as often that of the
+    gears, and the family of lines itself says which band carries it.
+    """
+    top = 0.45 * sampling_rate_hz
+    low = min(LOWEST_BAND_HZ, top / 4)
+    edges = [[low * (top / low) ** (i / n) for i in range(n + 1)] for n in DIVISIONS]
+    return tuple(band for division in edges for band in pairwise(division))

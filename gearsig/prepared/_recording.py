@@ -1,0 +1,299 @@
+"""One recording with all that several methods compute of it, each once and on demand."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from gearsig.angle import AngleSignal, ShaftAngle
+from gearsig.checks import positive
+from gearsig.errors import GearsigError, RefusalError
+from gearsig.orders import OrderMap, SynchronousAverage
+from gearsig.prepared._angle import phase_followed_angle, refined_angle
+from gearsig.prepared._lines import LineExcess, floor_of
+from gearsig.recording import Recording
+from gearsig.rig import PulseTimes, Rig, TachometerChannel
+from gearsig.spectra import Spectrum
+
+T = TypeVar("T")
+
+MEMORY_LIMIT_MB = 1024.0
+"""What a prepared recording keeps at most: ten minutes of four channels at 25.6 kHz over two shafts are 980 MB."""
+
+
+class PreparedRecording:
+    """A recording whose shaft angle, resampled channels, averages and spectra are computed once and then kept.
+
+    `analyze`, `estimate_crack` and `compare` take one in place of a recording, so that calls on the same recording
+    share what they have in common.
+
+    Parameters
+    ----------
+    recording : Recording
+        Never changed.
+    rig : Rig or None
+        Used where the recording carries none; its sensors' quantities, units and scales are applied.
+    memory_limit_mb : float
+        In MB (10⁶ bytes), for all that is kept beside the recording. What was used longest ago is forgotten first, and
+        computed again when it is asked for; the latest result is always kept.
+
+    Notes
+    -----
+    Results are shared: their arrays are read-only. A refusal is kept as well, and raised again. Not for several
+    threads at a time.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from gearsig.recording import Channel, Recording
+    >>> from gearsig.rig import ConstantSpeed
+    >>> time_s = np.arange(20000) / 1000.0
+    >>> sine = np.sin(2 * np.pi * 10.0 * time_s)[None, :]
+    >>> record = Recording(sine, 1000.0, (Channel("a1", "acceleration", "m/s^2"),), ConstantSpeed(300.0))
+    >>> prepared = PreparedRecording(record)
+    >>> prepared.over_angle().n_revolutions > 90
+    True
+    >>> prepared.average("", "a1") is prepared.average("", "a1")
+    True
+    """
+
+    def __init__(
+        self, recording: Recording, rig: Rig | None = None, *, memory_limit_mb: float = MEMORY_LIMIT_MB
+    ) -> None:
+        positive(memory_limit_mb, "memory_limit_mb", "MB")
+        self.recording = recording.with_rig(rig) if recording.rig is None and rig is not None else recording
+        self.memory_limit_mb = memory_limit_mb
+        self._kept: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
+
+    def __repr__(self) -> str:
+        source = self.recording.provenance.source or "made in memory"
+        return f"PreparedRecording({source}, {len(self._kept)} results, {self.kept_bytes / 1e6:.1f} MB)"
+
+    @property
+    def rig(self) -> Rig:
+        """The recording's rig; an empty one if it has none."""
+        return self.recording.rig or Rig()
+
+    @property
+    def kept_bytes(self) -> int:
+        """Size of all arrays that are kept, in bytes."""
+        return sum(n_bytes for _, n_bytes in self._kept.values())
+
+    def keep(self, key: Hashable, compute: Callable[[], T]) -> T:
+        """Return what `compute` returned, or raise what it raised, when this key was first asked for.
+
+        Parameters
+        ----------
+        key : hashable
+            Names the result and every setting it depends on; beginning with the name of the method's room.
+        compute : callable
+            Without arguments. An `InputError` or `RefusalError` of it is kept as well.
+        """
+        if key in self._kept:
+            self._kept.move_to_end(key)
+        else:
+            try:
+                result: Any = compute()
+            except GearsigError as error:
+                result = error
+            self._kept[key] = result, _size_bytes(result)
+            while self.kept_bytes > 1e6 * self.memory_limit_mb and len(self._kept) > 1:
+                self._kept.popitem(last=False)
+        kept: Any = self._kept[key][0]
+        if isinstance(kept, GearsigError):
+            raise kept.with_traceback(None)
+        return kept  # type: ignore[no-any-return]  # of the type that `compute` returns
+
+    # Angles: small, and asked for by everything.
+
+    @property
+    def shaft_angle(self) -> ShaftAngle:
+        """Angle of the reference shaft within the record's own time, a stated speed refined by the vibration.
+
+        Raises
+        ------
+        RefusalError
+            If the speed cannot be known.
+        InputError
+            If the speed source is malformed.
+        """
+        return self.keep(
+            "angle", lambda: refined_angle(self.recording, self.rig).between(0.0, self.recording.duration_s)
+        )
+
+    @property
+    def followed_angle(self) -> ShaftAngle:
+        """`shaft_angle`; where it was estimated from the vibration, its phase follows the mesh harmonics.
+
+        Averages of two records compare only with it; `analyze` does without.
+        """
+        return self.keep("followed angle", lambda: phase_followed_angle(self.recording, self.rig, self.shaft_angle))
+
+    def ratio(self, shaft: str) -> float:
+        """Return revolutions of a shaft per revolution of the reference shaft.
+
+        Raises
+        ------
+        RefusalError
+            If the teeth on the way to it are not known.
+        """
+        ratio = self.rig.ratio(shaft) if shaft and self.rig.shafts else 1.0
+        if ratio is None:
+            raise RefusalError(
+                f"the speed of shaft {shaft!r} does not follow from the teeth", remedy="complete the rig"
+            )
+        return ratio
+
+    def angle_of(self, shaft: str = "", *, followed: bool = False, ratio: float | None = None) -> ShaftAngle:
+        """Return the angle of a shaft.
+
+        Parameters
+        ----------
+        shaft : str
+            Default: the reference shaft.
+        followed : bool
+            Whether to start from `followed_angle`.
+        ratio : float or None
+            Revolutions per revolution of the reference shaft, where the rig does not tell it.
+        """
+        angle = self.followed_angle if followed else self.shaft_angle
+        turns = self.ratio(shaft) if ratio is None else ratio
+        return angle if turns == 1.0 else angle.of_shaft(shaft, turns)
+
+    def has_mark(self, shaft: str) -> bool:
+        """Whether angle 0 of a shaft is a mark on that very shaft: one pulse per revolution."""
+        return has_mark(self.recording, self.rig, shaft)
+
+    # Channels over angle, and what is made of them.
+
+    def over_angle(
+        self,
+        shaft: str = "",
+        channels: Sequence[str] | None = None,
+        *,
+        followed: bool = False,
+        ratio: float | None = None,
+    ) -> AngleSignal:
+        """Return channels at equal steps of a shaft's angle, see `gearsig.angle.resample_to_angle`.
+
+        Parameters
+        ----------
+        shaft : str
+            Default: the reference shaft.
+        channels : sequence of str or None
+            Default: all vibration channels. A part of channels that were asked for together before is taken from them.
+        followed, ratio
+            See `angle_of`.
+
+        Returns
+        -------
+        AngleSignal
+            In the channels' units, with the whole bandwidth on most revolutions.
+        """
+        from gearsig.angle import resample_to_angle
+
+        names = tuple(channels) if channels is not None else self.recording.vibration_names()
+        turns = self.ratio(shaft) if ratio is None else ratio
+        angle = self.angle_of(shaft, followed=followed, ratio=turns)
+        # A shaft that turns with the reference shaft shares its signal, and the followed angle that of the other one
+        # where there is nothing to follow.
+        place = ("over angle", angle.shaft, turns, self._is_followed(followed))
+        together = (key[-1] for key in self._kept if isinstance(key, tuple) and key[:-1] == place)
+        held = next((others for others in together if set(names) <= set(others)), names)
+        signal = self.keep((*place, held), lambda: resample_to_angle(self.recording, angle, channels=held))
+        return signal if held == names else _rows(signal, names)
+
+    def _is_followed(self, followed: bool) -> bool:
+        return followed and self.followed_angle is not self.shaft_angle
+
+    def average(self, shaft: str, channel: str, *, followed: bool = False) -> SynchronousAverage:
+        """Return the synchronous average of a channel over a shaft's whole revolutions, with its standard error."""
+        from gearsig.orders import synchronous_average
+
+        return self.keep(
+            ("average", shaft, channel, self._is_followed(followed)),
+            lambda: synchronous_average(self.over_angle(shaft, [channel], followed=followed), channel),
+        )
+
+    def spectrum(self, channel: str) -> Spectrum:
+        """Return the amplitude spectrum (peak) over frequency."""
+        from gearsig.spectra import channel_spectrum
+
+        return self.keep(("spectrum", channel), lambda: channel_spectrum(self.recording, channel))
+
+    def power_density(self, channel: str) -> Spectrum:
+        """Return Welch's power spectral density over frequency."""
+        from gearsig.spectra import channel_density
+
+        return self.keep(("density", channel), lambda: channel_density(self.recording, channel))
+
+    def order_lines(self, channel: str) -> LineExcess:
+        """Return the amplitude spectrum (peak) over order of the reference shaft, with its noise floor."""
+        from gearsig.orders import order_spectrum
+
+        return self.keep(
+            ("order lines", channel), lambda: floor_of(order_spectrum(self.over_angle("", [channel]), channel))
+        )
+
+    def order_map(self, channel: str) -> OrderMap:
+        """Return amplitudes over order of the reference shaft, along the record."""
+        from gearsig.orders import order_map
+
+        return self.keep(("order map", channel), lambda: order_map(self.over_angle("", [channel]), channel))
+
+    def with_rig(self, rig: Rig) -> PreparedRecording:
+        """Return the same with another rig, whose sensors are not applied; this very object where it is its own rig."""
+        if rig is self.recording.rig or (not isinstance(rig.speed, PulseTimes) and rig == self.recording.rig):
+            return self
+        return PreparedRecording(replace(self.recording, rig=rig), memory_limit_mb=self.memory_limit_mb)
+
+
+def prepare(recording: Recording | PreparedRecording, rig: Rig | None = None) -> PreparedRecording:
+    """Return a recording prepared; one that is prepared already, as it is, unless it lacks the rig.
+
+    Parameters
+    ----------
+    recording : Recording or PreparedRecording
+    rig : Rig or None
+        Used where the recording carries none.
+    """
+    if not isinstance(recording, PreparedRecording):
+        return PreparedRecording(recording, rig)
+    if recording.recording.rig is None and rig is not None:
+        return PreparedRecording(recording.recording, rig, memory_limit_mb=recording.memory_limit_mb)
+    return recording
+
+
+def has_mark(recording: Recording, rig: Rig, shaft: str) -> bool:
+    """Whether angle 0 of a shaft is a mark on that very shaft: one pulse per revolution."""
+    source = recording.speed_source
+    if not isinstance(source, PulseTimes | TachometerChannel) or source.pulses_per_revolution != 1:
+        return False
+    return (source.shaft or rig.reference_shaft) == shaft
+
+
+def _rows(signal: AngleSignal, names: Sequence[str]) -> AngleSignal:
+    """Return some of a signal's channels, without a copy where they follow each other."""
+    rows = [signal.channel_names.index(name) for name in names]
+    neighbours = rows == list(range(rows[0], rows[0] + len(rows)))
+    return replace(
+        signal,
+        samples=signal.samples[rows[0] : rows[0] + len(rows)] if neighbours else signal.samples[rows],
+        channel_names=tuple(names),
+        units=tuple(signal.units[i] for i in rows),
+    )
+
+
+def _size_bytes(result: object) -> int:
+    """Return the size of all arrays in a result."""
+    if isinstance(result, np.ndarray):
+        return int(result.nbytes)
+    if is_dataclass(result):
+        return sum(_size_bytes(getattr(result, field.name)) for field in fields(result))
+    if isinstance(result, Mapping):
+        return sum(map(_size_bytes, result.values()))
+    return sum(map(_size_bytes, result)) if isinstance(result, tuple | list) else 0
