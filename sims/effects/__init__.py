@@ -1,30 +1,98 @@
-"""Effects that can be switched on: one file each; see `sims.effects`."""
+"""Effects that can be switched on: one file each.
 
-from sims.effects._catalogue import VARIABLE, add_effect, completed, effect, effects, is_own, own_files, with_effects
-from sims.effects._effect import GROUPS, Effect, EffectSetting, Option, OptionValue, Severity
-from sims.effects._shared import GEARS, element_spacing_mm, vector_sum, with_bearing
+An effect's module holds all of it in its ``EFFECT``: physics for a pair of gears, range and plausible severities, where
+it shows, and what it means for a start–stop drive. A module that is put beside these, or a file of one's own
+(`add_effect`), is an effect without further ado; the names below are what such a file is written with.
+"""
+
+from sims.effects._catalogue import (
+    VARIABLE,
+    add_effect,
+    as_gap_effect,
+    completed,
+    effect,
+    effects,
+    is_own,
+    own_files,
+    with_effects,
+)
+from sims.effects._effect import (
+    GEAR_OPTION,
+    GROUPS,
+    SHOWS_IN,
+    TOOTH_OPTION,
+    DriveEffect,
+    DriveParameters,
+    Effect,
+    EffectSetting,
+    MachineFacts,
+    Option,
+    Options,
+    OptionValue,
+    PlausibleRange,
+    Severity,
+)
+from sims.effects._shared import (
+    ANGLE_OPTION,
+    BEARING_OPTION,
+    GEARS,
+    any_bearing,
+    any_gear,
+    any_tooth,
+    each_bearing,
+    either_gear,
+    first_teeth,
+    gear_geometry,
+    gear_index,
+    tooth_number,
+    vector_sum,
+    with_bearing,
+    with_each_channel,
+    with_mesh_field,
+    with_tooth_fault,
+)
 from sims.effects.pitch_error import cumulative_pitch
-from sims.effects.unbalance import LARGEST_OFFSET
 
 __all__ = [
+    "ANGLE_OPTION",
+    "BEARING_OPTION",
     "GEARS",
+    "GEAR_OPTION",
     "GROUPS",
-    "LARGEST_OFFSET",
+    "SHOWS_IN",
+    "TOOTH_OPTION",
     "VARIABLE",
+    "DriveEffect",
+    "DriveParameters",
     "Effect",
     "EffectSetting",
+    "MachineFacts",
     "Option",
     "OptionValue",
+    "Options",
+    "PlausibleRange",
     "Severity",
     "add_effect",
+    "any_bearing",
+    "any_gear",
+    "any_tooth",
+    "as_gap_effect",
     "completed",
     "cumulative_pitch",
+    "each_bearing",
     "effect",
     "effects",
-    "element_spacing_mm",
+    "either_gear",
+    "first_teeth",
+    "gear_geometry",
+    "gear_index",
     "is_own",
     "own_files",
+    "tooth_number",
     "vector_sum",
     "with_bearing",
+    "with_each_channel",
     "with_effects",
+    "with_mesh_field",
+    "with_tooth_fault",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache, partial
 from importlib import import_module
@@ -16,7 +16,8 @@ import numpy as np
 
 from gearsig.checks import closest_match_hint
 from gearsig.errors import GearsigError, InputError
-from sims.effects._effect import GROUPS, Effect, EffectSetting, OptionValue
+from gearsig.gap import GapEffect
+from sims.effects._effect import GROUPS, Effect, EffectSetting, Options
 from sims.machine import Machine
 
 # --------------------
@@ -71,7 +72,7 @@ def _changed(
     own: Effect,
     machine: Machine,
     severity: float,
-    options: Mapping[str, OptionValue],
+    options: Options,
     rng: np.random.Generator,
 ) -> Machine:
     """Return what somebody's own effect makes of a machine.
@@ -169,6 +170,20 @@ def effect(name: str) -> Effect:
     return found[name]
 
 
+def as_gap_effect(shown: Effect) -> GapEffect:
+    """Return an effect as the gap diagnosis sees it."""
+    return GapEffect(
+        shown.name,
+        shown.group,
+        shown.title,
+        shown.severity.name,
+        shown.severity.unit,
+        shown.signature,
+        shown.shows_in,
+        shown.group == "measurement chain",
+    )
+
+
 def completed(settings: Iterable[EffectSetting]) -> tuple[EffectSetting, ...]:
     """Return settings with every option, defaults included.
 
@@ -193,8 +208,3 @@ def with_effects(machine: Machine, settings: Iterable[EffectSetting], rng: np.ra
         stream = np.random.default_rng([seed, crc32(setting.name.encode()), same_before])
         machine = effect(setting.name).apply(machine, setting.severity, setting.options, stream)
     return machine
-
-
-def replaced_item(items: tuple, index: int, **changes: object) -> tuple:  # type: ignore[type-arg]  # any dataclasses
-    """Return a tuple of dataclasses with fields of one of them changed."""
-    return tuple(replace(item, **changes) if i == index else item for i, item in enumerate(items))

@@ -1,19 +1,27 @@
-"""What an effect is: a change to a machine or to its measurement chain, with one severity in physical units."""
+"""What an effect is: a change to a machine or to its measurement chain, with one severity in physical units.
+
+An effect's file holds all of it: physics, range and plausible severities, where it shows, and what it means for the
+models that are no pair of gears between bearings.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
 from gearsig.checks import closest_match_hint, one_of, within
 from gearsig.errors import InputError
-from sims.machine import Machine
+from gearsig.rig import Bearing
+from sims.machine import Machine, Nominal, WeakTooth
+from sims.mesh import GearGeometry, PairGeometry
 
 GROUPS = ("tooth-local", "flank", "shaft", "drive and load", "bearing", "measurement chain")
 
 OptionValue = float | str
+Options = Mapping[str, OptionValue]
 
 
 @dataclass(frozen=True)
@@ -98,7 +106,102 @@ SHOWS_IN = (
 )
 """Kinds of places that an effect may say it shows in."""
 
-Change = Callable[[Machine, float, Mapping[str, OptionValue], np.random.Generator], Machine]
+Change = Callable[[Machine, float, Options, np.random.Generator], Machine]
+
+# --------------------
+# How strong it may plausibly be on a machine: one source for what a diagnosis tries and for what is drawn.
+# --------------------
+
+
+@dataclass(frozen=True)
+class MachineFacts:
+    """What plausible severities scale with on a machine.
+
+    Parameters
+    ----------
+    nominal : Nominal
+    gears : (GearGeometry, GearGeometry)
+    bearings : tuple of Bearing
+        That the rig names, with geometry.
+    vibration_mps2 : float
+        Rms of the healthy machine at its nominal point.
+    """
+
+    nominal: Nominal
+    gears: tuple[GearGeometry, GearGeometry]
+    bearings: tuple[Bearing, ...]
+    vibration_mps2: float
+
+    def diameter_mm(self, side: int) -> float:
+        """Pitch diameter of the driver (0) or the driven gear (1)."""
+        return self.nominal.pitch_diameters_mm[side]
+
+    def bearing(self, options: Options) -> Bearing:
+        """Bearing that the options choose."""
+        return next(b for b in self.bearings if b.name == options["bearing"])
+
+
+Scale = Callable[[MachineFacts, Options], float]
+
+
+@dataclass(frozen=True)
+class PlausibleRange:
+    """From what is barely noticeable on most machines to strong damage that still runs.
+
+    Parameters
+    ----------
+    low, high : float
+        Severity over `scale`.
+    why : str
+    scale : callable
+        Something of the machine, in the severity's unit, where that unit does not scale with the machine by itself.
+    choices : callable
+        Option sets worth a try; nothing where the machine lacks what the effect needs.
+    drawn : callable
+        Random options.
+    largest : callable
+        Largest severity that the machine allows.
+    n_severities : int
+        Worth a try, at even ratios.
+    """
+
+    low: float
+    high: float
+    why: str
+    scale: Scale = lambda _machine, _options: 1.0
+    choices: Callable[[MachineFacts], Sequence[Options]] = lambda _machine: ({},)
+    drawn: Callable[[MachineFacts, np.random.Generator], Options] = lambda _machine, _rng: {}
+    largest: Scale = lambda _machine, _options: float("inf")
+    n_severities: int = 3
+
+
+# --------------------
+# What it means for a start–stop drive.
+# --------------------
+
+
+class DriveParameters(Protocol):
+    """Complete parameters of a start–stop drive as effects read them; see `sims.forging`."""
+
+    def number(self, name: str) -> float:
+        """Value of a parameter."""
+        ...
+
+    def highest(self, name: str) -> float:
+        """Largest value that the parameter may have."""
+        ...
+
+    def gear_pair(self) -> PairGeometry:
+        """Teeth of both gears."""
+        ...
+
+
+@dataclass(frozen=True)
+class DriveEffect:
+    """What an effect makes of a start–stop drive: other values of parameters, and perhaps a weak tooth."""
+
+    values: Mapping[str, float] = field(default_factory=dict)
+    weak_tooth: WeakTooth | None = None
 
 
 @dataclass(frozen=True)
@@ -124,6 +227,11 @@ class Effect:
         (machine, severity, options, rng) → machine, for a severity above 0. Its change vanishes with the severity, and
         what it draws does not depend on it, so that one seed at rising severities shows one fault that grows.
     options : tuple of Option
+    plausible : PlausibleRange or None
+        None: a third to three times the typical severity, on each gear, shaft or bearing that it may be on, at the
+        first tooth, other options as by default.
+    on_drive : callable or None
+        (parameters, severity, options) → change of a start–stop drive; None: it has no meaning there.
     """
 
     name: str
@@ -135,6 +243,8 @@ class Effect:
     shows_in: tuple[str, ...]
     change: Change
     options: tuple[Option, ...] = ()
+    plausible: PlausibleRange | None = None
+    on_drive: Callable[[DriveParameters, float, Options], DriveEffect] | None = None
 
     def __post_init__(self) -> None:
         one_of(self.group, f"group of {self.name}", GROUPS)
@@ -145,7 +255,7 @@ class Effect:
         self,
         machine: Machine,
         severity: float,
-        options: Mapping[str, OptionValue],
+        options: Options,
         rng: np.random.Generator,
     ) -> Machine:
         """Return the machine with the effect, after checking severity and options; at severity 0, the machine itself.
@@ -155,12 +265,28 @@ class Effect:
         InputError
             If the severity or an option is outside its range, or the machine allows less.
         """
-        s = self.severity
-        within(severity, f"{s.name} of {self.name}", s.low, s.high, s.unit)
+        self.check_severity(severity)
         complete = self.complete(options)
         return machine if severity == 0 else self.change(machine, float(severity), complete, rng)
 
-    def complete(self, options: Mapping[str, OptionValue]) -> dict[str, OptionValue]:
+    def check_severity(self, severity: float) -> float:
+        """Return the severity if it is in its range."""
+        s = self.severity
+        return within(severity, f"{s.name} of {self.name}", s.low, s.high, s.unit)
+
+    @property
+    def plausible_range(self) -> PlausibleRange:
+        """`plausible`, or about its typical severity where the effect states none."""
+        return self.plausible or _about_typical(self)
+
+    def plausible_severities(self, machine: MachineFacts, options: Options) -> tuple[float, float]:
+        """Smallest and largest severity with these options; the range keeps its width where the machine cuts it off."""
+        plausible = self.plausible_range
+        scale = plausible.scale(machine, options)
+        top = min(plausible.high * scale, plausible.largest(machine, options), self.severity.high)
+        return top * plausible.low / plausible.high, top
+
+    def complete(self, options: Options) -> dict[str, OptionValue]:
         """Return the options, checked, with defaults for those not given; those left to be drawn are not in it."""
         names = [option.name for option in self.options]
         for name in options:
@@ -174,10 +300,32 @@ class Effect:
         return {o.name: o.check(value, self.name) for o, value in given.items() if value is not None}
 
 
+def _about_typical(effect: Effect) -> PlausibleRange:
+    """A third to three times the typical severity, with the option sets that `Effect` tells."""
+
+    def choices(machine: MachineFacts) -> Sequence[Options]:
+        sets: list[Options] = [{}]
+        for option in effect.options:
+            words = [b.name for b in machine.bearings] if option.name == "bearing" else option.choices
+            if words:
+                sets = [{**options, option.name: word} for options in sets for word in words]
+            elif option.name == "tooth":
+                sets = [{**options, "tooth": 1.0} for options in sets]
+        return sets
+
+    def drawn(machine: MachineFacts, rng: np.random.Generator) -> Options:
+        sets = choices(machine)
+        return sets[int(rng.integers(len(sets)))]
+
+    severity = effect.severity
+    low, high = max(severity.low, severity.typical / 3.0), min(severity.high, 3.0 * severity.typical)
+    return PlausibleRange(low, high, "about its typical severity", choices=choices, drawn=drawn)
+
+
 @dataclass(frozen=True)
 class EffectSetting:
     """An effect that is switched on."""
 
     name: str
     severity: float
-    options: Mapping[str, OptionValue] = field(default_factory=dict)
+    options: Options = field(default_factory=dict)

@@ -1,21 +1,31 @@
-"""What the effects on a bearing share: which one, and a defect on one of its races."""
+"""What effects share: how a machine's parts are chosen and changed, and option sets worth a try on it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from math import atan2, cos, degrees, pi, radians
+from math import atan2, degrees, radians
 from typing import Any
 
 import numpy as np
 
 from gearsig.checks import within
 from gearsig.errors import InputError
-from sims.effects._catalogue import replaced_item
-from sims.effects._effect import Option, OptionValue
-from sims.machine import BearingSupport, Machine, RaceDefect, bearing_index
+from sims.effects._effect import MachineFacts, Option, Options, OptionValue, Scale
+from sims.machine import RACE_EDGE_MM, BearingSupport, Machine, RaceDefect, bearing_index
 from sims.measure import MeasuredChannel
 from sims.mesh import GearGeometry, RootCrack, ToothChip, ToothSpall
+
+
+def replaced_item(items: tuple, index: int, **changes: object) -> tuple:  # type: ignore[type-arg]  # any dataclasses
+    """Return a tuple of dataclasses with fields of one of them changed."""
+    return tuple(replace(item, **changes) if i == index else item for i, item in enumerate(items))
+
+
+# --------------------
+# Bearings: which one, and a defect on one of its races.
+# --------------------
+
 
 BEARING_OPTION = Option("bearing", "", "name of the bearing; empty: the first of the driver's shaft")
 RACE_OPTIONS = (
@@ -26,7 +36,7 @@ RACE_OPTIONS = (
 )
 
 
-def chosen_bearing(machine: Machine, options: Mapping[str, OptionValue]) -> int:
+def chosen_bearing(machine: Machine, options: Options) -> int:
     """Place of the chosen bearing in the machine."""
     name = str(options["bearing"])
     return bearing_index(machine, name) if name else 0
@@ -38,7 +48,7 @@ def with_bearing(machine: Machine, index: int, **changes: object) -> Machine:
     return replace(machine, bearings=bearings)
 
 
-def with_race_defect(machine: Machine, race: str, length_mm: float, options: Mapping[str, OptionValue]) -> Machine:
+def with_race_defect(machine: Machine, race: str, length_mm: float, options: Options) -> Machine:
     """Return the machine with a defect on a race, which must be free of one and longer than the defect."""
     index = chosen_bearing(machine, options)
     support = machine.bearings[index]
@@ -50,7 +60,7 @@ def with_race_defect(machine: Machine, race: str, length_mm: float, options: Map
             allowed="one defect per bearing",
             remedy="choose another one with the option bearing",
         )
-    spacing = element_spacing_mm(support, race)
+    spacing = support.element_spacing_mm(race)
     if spacing is not None:
         within(length_mm, f"length_mm of a defect on the {race} race of {name!r}", 0.0, spacing, "mm")
     defect = RaceDefect(
@@ -63,17 +73,34 @@ def with_race_defect(machine: Machine, race: str, length_mm: float, options: Map
     return with_bearing(machine, index, defect=defect)
 
 
-def element_spacing_mm(support: BearingSupport, race: str) -> float | None:
-    """Distance between rolling elements along a race, π (D ± d cos α)/n; a longer defect would hold two at once.
+def each_bearing(machine: MachineFacts) -> Sequence[Options]:
+    """Every bearing of the machine, for `PlausibleRange.choices`."""
+    return [{"bearing": b.name} for b in machine.bearings]
 
-    None if the bearing's geometry is not known.
-    """
-    b = support.bearing
-    if b.n_rolling_elements is None or b.pitch_diameter_mm is None or b.rolling_element_diameter_mm is None:
-        return None
-    across = b.rolling_element_diameter_mm * cos(radians(b.contact_angle_deg))
-    diameter = b.pitch_diameter_mm + across if race == "outer" else b.pitch_diameter_mm - across
-    return pi * diameter / b.n_rolling_elements
+
+def any_bearing(machine: MachineFacts, rng: np.random.Generator) -> Options:
+    """A random bearing, for `PlausibleRange.drawn`."""
+    return {"bearing": str(rng.choice([b.name for b in machine.bearings]))}
+
+
+def any_race(machine: MachineFacts, rng: np.random.Generator) -> Options:
+    """A random bearing, whose cage slips a little."""
+    return {**any_bearing(machine, rng), "slip_percent": float(rng.uniform(0.0, 1.5))}
+
+
+def rolling_element_mm(machine: MachineFacts, options: Options) -> float:
+    """Diameter of the chosen bearing's rolling elements."""
+    return machine.bearing(options).rolling_element_diameter_mm or 1.0
+
+
+def longest_defect_mm(race: str) -> Scale:
+    """The longest defect that does not hold two elements at once, at 1 % jitter, less a fifth."""
+
+    def longest(machine: MachineFacts, options: Options) -> float:
+        spacing = BearingSupport(machine.bearing(options), 1.0, 1.0, 0.0).element_spacing_mm(race) or 1.0
+        return 0.8 * (spacing * (1.0 - 6.0 * 0.01) - 2.0 * RACE_EDGE_MM)
+
+    return longest
 
 
 # --------------------
@@ -95,7 +122,7 @@ def with_each_channel(machine: Machine, change: Callable[[MeasuredChannel], Meas
 GEARS = ("driver", "driven")
 
 
-def gear_index(options: Mapping[str, OptionValue], option: str = "gear") -> int:
+def gear_index(options: Options, option: str = "gear") -> int:
     """0 for the driver, 1 for the driven side."""
     return GEARS.index(str(options[option]))
 
@@ -105,20 +132,20 @@ def gear_geometry(machine: Machine, index: int) -> GearGeometry:
     return (machine.mesh.pair.driver, machine.mesh.pair.driven)[index]
 
 
-def tooth_number(machine: Machine, options: Mapping[str, OptionValue]) -> int:
+def tooth_number(machine: Machine, options: Options) -> int:
     """Return the chosen tooth, checked against the number of teeth; people count from 1, the model from 0."""
     index = gear_index(options)
     teeth = gear_geometry(machine, index).teeth
     return int(within(float(options["tooth"]), f"tooth of the {GEARS[index]} gear", 1, teeth)) - 1
 
 
-def part_of_width_mm(machine: Machine, options: Mapping[str, OptionValue]) -> float | None:
+def part_of_width_mm(machine: Machine, options: Options) -> float | None:
     """Return the width that `width_percent` stands for, None for the whole face."""
     percent = float(options["width_percent"])
     return None if percent == 100.0 else percent / 100.0 * gear_geometry(machine, gear_index(options)).face_width_mm
 
 
-def loaded_width_mm(machine: Machine, options: Mapping[str, OptionValue]) -> float:
+def loaded_width_mm(machine: Machine, options: Options) -> float:
     """Return the width that `width_percent` stands for of the face on which the teeth touch."""
     return float(options["width_percent"]) / 100.0 * machine.mesh.pair.face_width_mm
 
@@ -147,6 +174,37 @@ def with_tooth_fault(machine: Machine, faults: str, index: int, fault: RootCrack
     return with_mesh_field(machine, faults, index, (*present, fault))
 
 
+def either_gear(_machine: MachineFacts) -> Sequence[Options]:
+    """Both gears, for `PlausibleRange.choices`."""
+    return [{"gear": gear} for gear in GEARS]
+
+
+def any_gear(_machine: MachineFacts, rng: np.random.Generator) -> Options:
+    """A random gear, for `PlausibleRange.drawn`."""
+    return {"gear": str(rng.choice(GEARS))}
+
+
+def first_teeth(_machine: MachineFacts, **further: OptionValue) -> Sequence[Options]:
+    """The first tooth of both gears, with further options."""
+    return [{"gear": gear, "tooth": 1.0, **further} for gear in GEARS]
+
+
+def any_tooth(machine: MachineFacts, rng: np.random.Generator) -> Options:
+    """A random tooth of a random gear."""
+    options = any_gear(machine, rng)
+    return {**options, "tooth": float(rng.integers(machine.nominal.teeth[gear_index(options)]) + 1)}
+
+
+def module_mm(machine: MachineFacts, _options: Options) -> float:
+    """Module of the gears, for `PlausibleRange.scale`."""
+    return machine.nominal.module_mm
+
+
+def tolerance_of(tolerance_um: Callable[[float, float], float]) -> Scale:
+    """A tolerance of class 5 of ISO 1328 of the chosen gear, as a function of module and diameter in mm."""
+    return lambda machine, options: tolerance_um(machine.nominal.module_mm, machine.diameter_mm(gear_index(options)))
+
+
 # --------------------
 # Sum of two vectors that turn with a shaft: run-outs, unbalances.
 # --------------------
@@ -158,7 +216,7 @@ ANGLE_OPTION = Option(
 """Drawn where it is not given."""
 
 
-def angle_or_drawn_deg(options: Mapping[str, OptionValue], rng: np.random.Generator) -> float:
+def angle_or_drawn_deg(options: Options, rng: np.random.Generator) -> float:
     """Return `angle_deg`, or one drawn evenly from the circle."""
     drawn = float(rng.uniform(0.0, 360.0))
     return float(options.get("angle_deg", drawn))

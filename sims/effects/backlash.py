@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from sims.effects._effect import Effect, OptionValue, Severity
+from sims.effects._effect import DriveEffect, DriveParameters, Effect, Options, PlausibleRange, Severity
+from sims.effects._shared import module_mm
 from sims.machine import Machine
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with wider play; half of it lies on either side."""
     del options, rng
     return replace(machine, half_backlash_um=machine.half_backlash_um + severity / 2.0)
+
+
+def on_drive(drive: DriveParameters, severity: float, options: Options) -> DriveEffect:
+    """Widen the play by the severity."""
+    del options
+    return DriveEffect({"half_backlash_um": drive.number("half_backlash_um") + 0.5 * severity})
 
 
 EFFECT = Effect(
@@ -30,4 +36,6 @@ EFFECT = Effect(
     "it cannot be seen, and no method will.",
     shows_in=("low_load", "broadband", "mesh_harmonics"),
     change=change,
+    plausible=PlausibleRange(25.0, 300.0, "um per mm of module; new gears have some 20 to 50", module_mm),
+    on_drive=on_drive,
 )

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from sims.effects._effect import Effect, OptionValue, Severity
-from sims.effects._shared import BEARING_OPTION, chosen_bearing, with_bearing
+from sims.effects._effect import Effect, Options, PlausibleRange, Severity
+from sims.effects._shared import BEARING_OPTION, any_bearing, chosen_bearing, each_bearing, module_mm, with_bearing
 from sims.machine import Machine
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with clearance added to one bearing."""
     del rng
     index = chosen_bearing(machine, options)
@@ -33,4 +31,12 @@ EFFECT = Effect(
     shows_in=("shaft_orders", "envelope_orders", "resonances", "low_load"),
     change=change,
     options=(BEARING_OPTION,),
+    plausible=PlausibleRange(
+        3.0,
+        40.0,
+        "um per mm of module: clearance classes C3 to C5 of a bearing of the machine's size, to a worn-out one",
+        module_mm,
+        each_bearing,
+        any_bearing,
+    ),
 )

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from sims.effects._effect import Effect, OptionValue, Severity
-from sims.effects._shared import RACE_OPTIONS, with_race_defect
+from sims.effects._effect import Effect, Options, PlausibleRange, Severity
+from sims.effects._shared import (
+    RACE_OPTIONS,
+    any_race,
+    each_bearing,
+    longest_defect_mm,
+    rolling_element_mm,
+    with_race_defect,
+)
 from sims.machine import Machine
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with the defect; the angle counts from tooth 1 at time 0."""
     del rng  # the places of the rolling elements are drawn by the simulator
     return with_race_defect(machine, "inner", severity, options)
@@ -30,4 +35,7 @@ EFFECT = Effect(
     shows_in=("envelope_orders", "resonances", "broadband"),
     change=change,
     options=RACE_OPTIONS,
+    plausible=PlausibleRange(
+        0.01, 0.15, "as on the outer race", rolling_element_mm, each_bearing, any_race, longest_defect_mm("inner")
+    ),
 )

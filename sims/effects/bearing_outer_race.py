@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from sims.effects._effect import Effect, OptionValue, Severity
-from sims.effects._shared import RACE_OPTIONS, with_race_defect
+from sims.effects._effect import Effect, Options, PlausibleRange, Severity
+from sims.effects._shared import (
+    RACE_OPTIONS,
+    any_race,
+    each_bearing,
+    longest_defect_mm,
+    rolling_element_mm,
+    with_race_defect,
+)
 from sims.machine import Machine
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with the defect; the angle counts from the middle of the load zone."""
     del rng  # the places of the rolling elements are drawn by the simulator
     return with_race_defect(machine, "outer", severity, options)
@@ -31,4 +36,13 @@ EFFECT = Effect(
     shows_in=("envelope_orders", "resonances", "broadband"),
     change=change,
     options=RACE_OPTIONS,
+    plausible=PlausibleRange(
+        0.01,
+        0.15,
+        "of the rolling element's diameter; beyond half a millimetre or so the knocks grow no more",
+        rolling_element_mm,
+        each_bearing,
+        any_race,
+        longest_defect_mm("outer"),
+    ),
 )

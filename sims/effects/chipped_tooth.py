@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from sims.effects._effect import GEAR_OPTION, TOOTH_OPTION, Effect, Option, OptionValue, Severity
-from sims.effects._shared import gear_index, loaded_width_mm, tooth_number, with_tooth_fault
+from sims.effects._effect import GEAR_OPTION, TOOTH_OPTION, Effect, Option, Options, PlausibleRange, Severity
+from sims.effects._shared import (
+    any_tooth,
+    first_teeth,
+    gear_index,
+    loaded_width_mm,
+    module_mm,
+    tooth_number,
+    with_tooth_fault,
+)
 from sims.machine import Machine
 from sims.mesh import ToothChip
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with the chip."""
     del rng
     chip = ToothChip(severity, loaded_width_mm(machine, options), tooth_number(machine, options))
@@ -36,5 +42,16 @@ EFFECT = Effect(
         GEAR_OPTION,
         TOOTH_OPTION,
         Option("width_percent", 50.0, "part of the loaded face, up to 90, or 100", "%", 1.0, 100.0),
+    ),
+    plausible=PlausibleRange(
+        0.2,
+        0.9,
+        "of the module: a broken corner to half of the tooth's height; smaller chips lie in double contact",
+        module_mm,
+        lambda machine: first_teeth(machine, width_percent=85.0),
+        lambda machine, rng: {
+            **any_tooth(machine, rng),
+            "width_percent": float(rng.choice((30.0, 60.0, 85.0, 100.0))),
+        },
     ),
 )

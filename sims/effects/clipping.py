@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from sims.effects._effect import Effect, OptionValue, Severity
+from sims.effects._effect import Effect, Options, PlausibleRange, Severity
 from sims.effects._shared import with_each_channel
 from sims.machine import Machine
 from sims.measure import MeasuredChannel
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with sensors that clip."""
     del options, rng
 
@@ -40,4 +39,5 @@ EFFECT = Effect(
     "lines appear as far as the filter lets them; impulses lose most, so that a local fault looks smaller.",
     shows_in=("amplitude_tail", "mesh_harmonics", "broadband"),
     change=change,
+    plausible=PlausibleRange(0.3, 12.0, "percent of the time: rare peaks to a grossly wrong range"),
 )

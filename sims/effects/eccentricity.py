@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from sims.effects._catalogue import replaced_item
-from sims.effects._effect import GEAR_OPTION, Effect, OptionValue, Severity
-from sims.effects._shared import ANGLE_OPTION, angle_or_drawn_deg, gear_index, vector_sum
-from sims.machine import Machine
+from sims.effects._effect import GEAR_OPTION, Effect, Options, PlausibleRange, Severity
+from sims.effects._shared import (
+    ANGLE_OPTION,
+    angle_or_drawn_deg,
+    any_gear,
+    either_gear,
+    gear_index,
+    replaced_item,
+    tolerance_of,
+    vector_sum,
+)
+from sims.machine import Machine, runout_tolerance_um
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with run-out, and the unbalance that goes with it."""
     index, angle = gear_index(options), angle_or_drawn_deg(options, rng)
     wheel = machine.wheels[index]
@@ -48,4 +55,12 @@ EFFECT = Effect(
     shows_in=("shaft_orders", "mesh_sidebands"),
     change=change,
     options=(GEAR_OPTION, ANGLE_OPTION),
+    plausible=PlausibleRange(
+        1.0,
+        8.0,
+        "half of the run-out over F_r of class 5: gears of class 7 to 13, or a bent shaft",
+        tolerance_of(runout_tolerance_um),
+        either_gear,
+        any_gear,
+    ),
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from itertools import zip_longest
 from math import pi
@@ -10,13 +9,13 @@ from math import pi
 import numpy as np
 
 from gearsig.errors import InputError
-from sims.effects._effect import Effect, Option, OptionValue, Severity
+from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
 from sims.effects._shared import with_each_channel
 from sims.machine import Machine
 from sims.measure import MainsHum, MeasuredChannel
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with hum in every channel, in phase with the hum there is."""
     second = severity * float(options["harmonics_percent"]) / 100.0
     added = MainsHum((severity, second, second), float(options["frequency_hz"]), float(rng.uniform(0.0, 2.0 * pi)))
@@ -55,5 +54,16 @@ EFFECT = Effect(
     options=(
         Option("frequency_hz", 50.0, "of the supply", "Hz", 10.0, 400.0),
         Option("harmonics_percent", 25.0, "second and third harmonic over the first", "%", 0.0, 200.0),
+    ),
+    plausible=PlausibleRange(
+        0.03,
+        1.0,
+        "of the healthy machine's vibration",
+        lambda machine, _options: machine.vibration_mps2,
+        lambda _machine: [{"frequency_hz": 50.0}],
+        lambda _machine, rng: {
+            "frequency_hz": float(rng.choice((50.0, 60.0))),
+            "harmonics_percent": float(rng.uniform(0.0, 80.0)),
+        },
     ),
 )

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from gearsig.checks import FloatArray
-from sims.effects._effect import GEAR_OPTION, Effect, OptionValue, Severity
-from sims.effects._shared import gear_geometry, gear_index, mesh_field, with_mesh_field
-from sims.machine import Machine
+from sims.effects._effect import GEAR_OPTION, Effect, Options, PlausibleRange, Severity
+from sims.effects._shared import (
+    any_gear,
+    either_gear,
+    gear_geometry,
+    gear_index,
+    mesh_field,
+    tolerance_of,
+    with_mesh_field,
+)
+from sims.machine import Machine, pitch_tolerance_um
 from sims.mesh import FlankDeviation
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with pitch errors added to those it has."""
     index = gear_index(options)
     flank: FlankDeviation = mesh_field(machine, "flank", index)
@@ -53,4 +60,12 @@ EFFECT = Effect(
     shows_in=("shaft_orders", "mesh_sidebands"),
     change=change,
     options=(GEAR_OPTION,),
+    plausible=PlausibleRange(
+        0.4,
+        3.0,
+        "standard deviation over the pitch tolerance of class 5, which is a limit: of classes 5 to 11",
+        tolerance_of(pitch_tolerance_um),
+        either_gear,
+        any_gear,
+    ),
 )

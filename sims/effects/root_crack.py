@@ -2,22 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from sims.effects._effect import GEAR_OPTION, TOOTH_OPTION, Effect, Option, OptionValue, Severity
-from sims.effects._shared import gear_index, part_of_width_mm, tooth_number, with_tooth_fault
-from sims.machine import Machine
-from sims.mesh import RootCrack
+from gearsig.checks import within
+from sims.effects._effect import (
+    GEAR_OPTION,
+    TOOTH_OPTION,
+    DriveEffect,
+    DriveParameters,
+    Effect,
+    MachineFacts,
+    Option,
+    Options,
+    PlausibleRange,
+    Severity,
+)
+from sims.effects._shared import (
+    GEARS,
+    any_tooth,
+    first_teeth,
+    gear_index,
+    part_of_width_mm,
+    tooth_number,
+    with_tooth_fault,
+)
+from sims.machine import Machine, WeakTooth
+from sims.mesh import GearMesh, RootCrack, deepest_crack_mm, mesh_stiffness
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with the crack."""
     del rng  # nothing is drawn
     tooth, width_mm = tooth_number(machine, options), part_of_width_mm(machine, options)
     crack = RootCrack(severity, float(options["angle_deg"]), tooth, width_mm)
     return with_tooth_fault(machine, "cracks", gear_index(options), crack)
+
+
+def on_drive(drive: DriveParameters, severity: float, options: Options) -> DriveEffect:
+    """Weaken a tooth: its pairs lose stiffness in the ratio of their mean stiffness with and without the crack.
+
+    On the drive flank, where the load opens the crack; by the potential energy of the tooth (`sims.mesh`).
+    """
+    if severity == 0.0:
+        return DriveEffect()
+    gear, pair = gear_index(options), drive.gear_pair()
+    n_teeth = (pair.driver, pair.driven)[gear].teeth
+    tooth = int(within(float(options["tooth"]), f"tooth of the {GEARS[gear]} gear", 1, n_teeth)) - 1
+    percent = float(options["width_percent"])
+    width = None if percent == 100.0 else percent / 100.0 * pair.face_width_mm
+    crack = RootCrack(severity, float(options["angle_deg"]), tooth, width)
+    cracked = GearMesh(pair, cracks_1=(crack,) if gear == 0 else (), cracks_2=(crack,) if gear == 1 else ())
+    # Pair `tooth` alone, while it touches from its entry on: its column moves as the next pair enters.
+    cycles = tooth + np.linspace(0.05, 0.95, 40)
+    healthy_n_per_m, weak_n_per_m = (
+        mesh_stiffness(mesh, cycles).pairs_n_per_m[:, 0] for mesh in (GearMesh(pair), cracked)
+    )
+    return DriveEffect(weak_tooth=WeakTooth(gear, tooth, 1.0 - float(np.mean(weak_n_per_m / healthy_n_per_m))))
+
+
+def _deepest_mm(machine: MachineFacts, options: Options) -> float:
+    return deepest_crack_mm(machine.gears[gear_index(options)], float(options.get("angle_deg", 45.0)))
 
 
 EFFECT = Effect(
@@ -39,4 +83,14 @@ EFFECT = Effect(
         Option("angle_deg", 45.0, "between the crack and the tooth's centre line", "deg", 15.0, 90.0),
         Option("width_percent", 100.0, "part of the face width it reaches over, from one end", "%", 1.0, 100.0),
     ),
+    plausible=PlausibleRange(
+        0.2,
+        0.85,
+        "of the deepest crack that the tooth bears; below a fifth the stiffness hardly changes",
+        _deepest_mm,
+        first_teeth,
+        lambda machine, rng: {**any_tooth(machine, rng), "angle_deg": float(rng.uniform(35.0, 75.0))},
+        lambda machine, options: 0.95 * _deepest_mm(machine, options),
+    ),
+    on_drive=on_drive,
 )

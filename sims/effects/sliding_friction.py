@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from gearsig.checks import within
-from sims.effects._effect import Effect, OptionValue, Severity
-from sims.machine import MOST_DRY_FRICTION, Machine
+from sims.effects._effect import DriveEffect, DriveParameters, Effect, Options, PlausibleRange, Severity
+from sims.machine import MAX_DRY_FRICTION, Machine
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with friction added."""
     del options, rng
     oil = machine.lubrication
     dry = oil.dry_coefficient if oil.friction else 0.0
-    within(severity, f"added_coefficient, beside the {dry:g} there are,", 0.0, MOST_DRY_FRICTION - dry)
+    within(severity, f"added_coefficient, beside the {dry:g} there are,", 0.0, MAX_DRY_FRICTION - dry)
     # A machine without friction has factor 0 of the regression, whatever its field says.
     factor = oil.factor if oil.friction else 0.0
     return replace(machine, lubrication=replace(oil, friction=True, factor=factor, dry_coefficient=dry + severity))
+
+
+def on_drive(drive: DriveParameters, severity: float, options: Options) -> DriveEffect:
+    """Raise the flanks' coefficient; the bristles' deflection stays."""
+    del options
+    now, highest = (of("friction_coefficient") for of in (drive.number, drive.highest))
+    within(severity, f"added_coefficient of sliding_friction, beside the {now:g} there are,", 0.0, highest - now)
+    return DriveEffect({"friction_coefficient": now + severity})
 
 
 EFFECT = Effect(
@@ -31,7 +38,7 @@ EFFECT = Effect(
         "added_coefficient",
         "",
         0.0,
-        MOST_DRY_FRICTION,
+        MAX_DRY_FRICTION,
         0.1,
         "friction coefficient that comes on top of the film's; well lubricated flanks have 0.03 to 0.05 in all",
     ),
@@ -44,4 +51,6 @@ EFFECT = Effect(
     "the load.",
     shows_in=("mesh_harmonics",),
     change=change,
+    plausible=PlausibleRange(0.03, 0.4, "mixed film with worn-out oil to dry, rough steel"),
+    on_drive=on_drive,
 )

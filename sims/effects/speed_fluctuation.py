@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from math import pi
 
 import numpy as np
 
-from sims.effects._effect import Effect, Option, OptionValue, Severity
-from sims.machine import Machine, SpeedSwing
+from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
+from sims.machine import Machine, SpeedSwing, log_uniform
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with one more swing of the set speed."""
     swing = SpeedSwing(severity / 100.0, float(options["frequency_hz"]), float(rng.uniform(0.0, 2.0 * pi)))
     return replace(machine, drive=replace(machine.drive, swings=(*machine.drive.swings, swing)))
@@ -30,4 +29,11 @@ EFFECT = Effect(
     shows_in=("speed", "mesh_sidebands"),
     change=change,
     options=(Option("frequency_hz", 1.0, "of the swing", "Hz", 0.01, 50.0),),
+    plausible=PlausibleRange(
+        0.2,
+        5.0,
+        "percent: a controlled drive holds 0.1, a hunting one swings by several",
+        choices=lambda _machine: [{"frequency_hz": 1.0}],
+        drawn=lambda _machine, rng: {"frequency_hz": log_uniform(rng, 0.3, 8.0)},
+    ),
 )

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from math import hypot
 
 import numpy as np
 
 from gearsig.errors import InputError
-from sims.effects._effect import Effect, Option, OptionValue, Severity
+from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
 from sims.machine import Machine, Roughness
 
 _AS_IT_IS = "as it is"
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with rougher flanks."""
     del rng  # the profile is drawn by the simulator
     locked_to = _locked_to(machine.roughness, str(options["locked_to"]))
@@ -59,5 +58,8 @@ EFFECT = Effect(
             "what the profile returns with; 'none': only friction knows the roughness",
             choices=(_AS_IT_IS, "time", "flank", "none"),
         ),
+    ),
+    plausible=PlausibleRange(
+        0.3, 2.5, "um: ground flanks have 0.4, hobbed or run-out ones 1 to 3; it does not grow with the gear"
     ),
 )

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from sims.effects._effect import GEAR_OPTION, TOOTH_OPTION, Effect, Option, OptionValue, Severity
-from sims.effects._shared import gear_index, tooth_number, with_tooth_fault
-from sims.machine import Machine
+from sims.effects._effect import GEAR_OPTION, TOOTH_OPTION, Effect, Option, Options, PlausibleRange, Severity
+from sims.effects._shared import any_tooth, first_teeth, gear_index, tooth_number, with_tooth_fault
+from sims.machine import Machine, log_uniform
 from sims.mesh import ToothSpall
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with the spall, about the pitch point."""
     del rng
     width_mm = severity / 100.0 * machine.mesh.pair.face_width_mm
@@ -41,5 +39,15 @@ EFFECT = Effect(
         TOOTH_OPTION,
         Option("length_mm", 1.5, "along the profile, its middle at the pitch point", "mm", 0.05, 20.0),
         Option("depth_um", 100.0, "depth of the spall", "um", 1.0, 2000.0),
+    ),
+    plausible=PlausibleRange(
+        15.0,
+        85.0,
+        "percent of the face; a pit of a tenth is lost in ordinary flanks, 90 is the model's limit",
+        choices=lambda machine: first_teeth(machine, length_mm=0.45 * machine.nominal.module_mm),
+        drawn=lambda machine, rng: {
+            **any_tooth(machine, rng),
+            "length_mm": machine.nominal.module_mm * log_uniform(rng, 0.2, 1.0),
+        },
     ),
 )

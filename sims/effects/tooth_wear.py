@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from sims.effects._effect import GEAR_OPTION, Effect, OptionValue, Severity
-from sims.effects._shared import gear_index, mesh_field, with_mesh_field
-from sims.machine import Machine
+from sims.effects._effect import GEAR_OPTION, DriveEffect, DriveParameters, Effect, Options, PlausibleRange, Severity
+from sims.effects._shared import any_gear, either_gear, gear_index, mesh_field, tolerance_of, with_mesh_field
+from sims.machine import Machine, profile_tolerance_um
 from sims.mesh import FlankDeviation
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with wear added on every tooth of one gear."""
     del rng
     index = gear_index(options)
     flank: FlankDeviation = mesh_field(machine, "flank", index)
     return with_mesh_field(machine, "flank", index, replace(flank, wear_um=flank.wear_um + severity))
+
+
+def on_drive(drive: DriveParameters, severity: float, options: Options) -> DriveEffect:
+    """Wear one gear's drive flanks, most at their ends and nothing at the pitch point: pairs touch later."""
+    name = f"sliding_wear_{options['gear']}_um"
+    return DriveEffect({name: drive.number(name) + severity})
 
 
 EFFECT = Effect(
@@ -35,4 +40,13 @@ EFFECT = Effect(
     shows_in=("mesh_harmonics",),
     change=change,
     options=(GEAR_OPTION,),
+    plausible=PlausibleRange(
+        1.0,
+        10.0,
+        "of the profile tolerance of class 5 of ISO 1328: to that of class 11 or 12",
+        tolerance_of(profile_tolerance_um),
+        either_gear,
+        any_gear,
+    ),
+    on_drive=on_drive,
 )

@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from math import pi
 
 import numpy as np
 
-from sims.effects._effect import Effect, Option, OptionValue, Severity
+from sims.effects._effect import DriveEffect, DriveParameters, Effect, Option, Options, PlausibleRange, Severity
 from sims.machine import Machine, TorqueRipple
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with one more ripple."""
     ripple = TorqueRipple(float(options["order"]), severity / 100.0, float(rng.uniform(0.0, 2.0 * pi)))
     return replace(machine, drive=replace(machine.drive, ripples=(*machine.drive.ripples, ripple)))
+
+
+def on_drive(drive: DriveParameters, severity: float, options: Options) -> DriveEffect:
+    """Set amplitude and order of the motor's ripple."""
+    del drive
+    return DriveEffect({"torque_ripple": severity / 100.0, "torque_ripple_order": float(options["order"])})
+
+
+def _any_order(rng: np.random.Generator) -> float:
+    """Whole orders of motors and pumps twice as often as any order of something geared or belted to the drive."""
+    if rng.uniform() < 2.0 / 3.0:
+        return float(rng.choice((1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)))
+    return float(rng.uniform(1.5, 16.0))
 
 
 EFFECT = Effect(
@@ -39,4 +51,12 @@ EFFECT = Effect(
             high=200.0,
         ),
     ),
+    plausible=PlausibleRange(
+        2.0,
+        30.0,
+        "percent: inverters give 1 to 5, piston engines and pumps tens",
+        choices=lambda _machine: [{"order": order} for order in (1.0, 2.0, 3.0, 4.0, 6.0)],
+        drawn=lambda _machine, rng: {"order": _any_order(rng)},
+    ),
+    on_drive=on_drive,
 )

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from sims.effects._effect import Effect, Option, OptionValue, Severity
+from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
 from sims.effects._shared import with_each_channel
-from sims.machine import Machine
+from sims.machine import Machine, log_uniform
 from sims.measure import MeasuredChannel, ModalPath, PathMode
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with the mode in the path of every channel."""
     del rng
     frequency_hz, damping_ratio = float(options["frequency_hz"]), float(options["damping_ratio"])
@@ -55,5 +54,15 @@ EFFECT = Effect(
     options=(
         Option("frequency_hz", 3000.0, "of the mode", "Hz", 10.0, 100e3),
         Option("damping_ratio", 0.03, "of the mode", low=1e-3, high=0.5),
+    ),
+    plausible=PlausibleRange(
+        2.0,
+        20.0,
+        "amplification: a well damped to a sharp resonance",
+        choices=lambda _machine: [{"frequency_hz": frequency_hz} for frequency_hz in (1200.0, 3500.0)],
+        drawn=lambda _machine, rng: {
+            "frequency_hz": log_uniform(rng, 400.0, 7000.0),
+            "damping_ratio": log_uniform(rng, 0.01, 0.08),
+        },
     ),
 )

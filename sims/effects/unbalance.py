@@ -2,30 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from gearsig.checks import within
-from sims.effects._catalogue import replaced_item
-from sims.effects._effect import GEAR_OPTION, Effect, OptionValue, Severity
-from sims.effects._shared import ANGLE_OPTION, GEARS, angle_or_drawn_deg, gear_geometry, gear_index, vector_sum
-from sims.machine import Machine
+from sims.effects._effect import GEAR_OPTION, Effect, MachineFacts, Options, PlausibleRange, Severity
+from sims.effects._shared import (
+    ANGLE_OPTION,
+    GEARS,
+    angle_or_drawn_deg,
+    any_gear,
+    either_gear,
+    gear_geometry,
+    gear_index,
+    replaced_item,
+    vector_sum,
+)
+from sims.machine import Machine, usual_mass_kg
 
-LARGEST_OFFSET = 0.1
+_LARGEST_OFFSET = 0.1
 """Of the centre of mass, in pitch radii; a gear further out of balance has lost a piece."""
 
 
-def change(machine: Machine, severity: float, options: Mapping[str, OptionValue], rng: np.random.Generator) -> Machine:
+def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with the unbalance added."""
     index, angle = gear_index(options), angle_or_drawn_deg(options, rng)
     wheel = machine.wheels[index]
     length, direction = vector_sum(wheel.unbalance_g_mm, wheel.unbalance_angle_deg, severity, angle)
-    largest = LARGEST_OFFSET * gear_geometry(machine, index).pitch_radius_mm * wheel.mass_kg * 1e3
+    largest = _LARGEST_OFFSET * gear_geometry(machine, index).pitch_radius_mm * wheel.mass_kg * 1e3
     within(length, f"unbalance_g_mm of the {GEARS[index]} gear", 0.0, largest, "g mm")
     wheels = replaced_item(machine.wheels, index, unbalance_g_mm=length, unbalance_angle_deg=direction)
     return replace(machine, wheels=wheels)
+
+
+def _mesh_force_g_mm(machine: MachineFacts, options: Options) -> float:
+    """Unbalance whose force at the nominal speed is the static mesh force."""
+    omega = machine.nominal.speed_rpm * np.pi / 30.0
+    if gear_index(options) == 1:
+        omega *= machine.nominal.teeth[0] / machine.nominal.teeth[1]
+    return float(machine.nominal.mesh_force_n / omega**2 * 1e6)
+
+
+def _largest_g_mm(machine: MachineFacts, options: Options) -> float:
+    side = gear_index(options)
+    radius = 0.5 * machine.diameter_mm(side)
+    return 0.8 * _LARGEST_OFFSET * radius * usual_mass_kg(machine.nominal, side) * 1e3
 
 
 EFFECT = Effect(
@@ -44,4 +66,13 @@ EFFECT = Effect(
     shows_in=("shaft_orders",),
     change=change,
     options=(GEAR_OPTION, ANGLE_OPTION),
+    plausible=PlausibleRange(
+        0.01,
+        0.15,
+        "its force at the nominal speed over the static mesh force; less is lost beside the mesh",
+        _mesh_force_g_mm,
+        either_gear,
+        any_gear,
+        _largest_g_mm,
+    ),
 )

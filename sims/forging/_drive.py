@@ -23,7 +23,7 @@ from gearsig.rig import (
     hertz_stiffness_n_per_m1p5,
     standard_path,
 )
-from sims.machine import Operation, Profile
+from sims.machine import Operation, Profile, WeakTooth
 from sims.mesh import GearGeometry, PairGeometry, wear_profile
 from sims.simulator import Parameter, ParameterValues
 
@@ -127,30 +127,6 @@ class GrippedLoad:
 
     def __post_init__(self) -> None:
         not_negative(self.unbalance_nm, "unbalance_nm", "N m")
-
-
-@dataclass(frozen=True)
-class WeakTooth:
-    """A tooth that yields more than the others on its drive flank.
-
-    Parameters
-    ----------
-    gear : int
-        0: pinion, 1: wheel.
-    tooth : int
-        From 0 at the angles' zero.
-    loss : float
-        Part of a pair's stiffness that is gone, 0 to below 1.
-    """
-
-    gear: int
-    tooth: int
-    loss: float
-
-    def __post_init__(self) -> None:
-        within(self.gear, "gear of the weak tooth", 0, 1)
-        not_negative(self.tooth, "tooth of the weak tooth")
-        within(self.loss, "loss of the weak tooth", 0.0, 0.99)
 
 
 @dataclass(frozen=True)
@@ -367,8 +343,6 @@ def _product(first: Profile, second: Profile) -> Profile:
 STIFFNESSES = ("formula", "table")
 """Two that one source gives for one pair of gears: by its formula, and as its table prints it, a tenth of that."""
 SAMPLINGS = ("instants", "filtered")
-MOST_FRICTION = 0.5
-"""Coefficient of the flanks."""
 
 
 def _number(
@@ -427,7 +401,7 @@ _CONTACT = (
     _number(
         "sliding_wear_driven_um", "um", "worn off the wheel's drive flanks by sliding, where it is most", 0, 1000, 0.0
     ),
-    _number("friction_coefficient", "", "sliding friction of the flanks", 0, MOST_FRICTION, 0.05),
+    _number("friction_coefficient", "", "sliding friction of the flanks", 0, 0.5, 0.05),
     _number("flank_static_ratio", "", "static over sliding friction of the flanks", *STATIC_RATIO_RANGE, 1.2),
     _number("flank_stribeck_mps", "m/s", "sliding speed at which static friction has gone", 1e-4, 1, 0.005),
     _number("flank_presliding_um", "um", "deflection of the flanks' bristles at which they slide", 0.5, 1000, 10.0),

@@ -19,12 +19,9 @@ from sims.gear_pair._simulator import PairModel, ReadyPair, SimulationRequest
 from sims.gear_pair._twin import (
     BODY_KG,
     BODY_SHAPES,
-    PLAUSIBLE,
-    Nominal,
     PairGapSimulator,
     PairTwin,
     body_gain,
-    nominal_of,
 )
 
 __all__ = [
@@ -37,10 +34,8 @@ __all__ = [
     "FRICTION_SCALARS",
     "LEAST_MOTION_HZ",
     "PARAMETERS",
-    "PLAUSIBLE",
     "Installed",
     "Measurement",
-    "Nominal",
     "PairGapSimulator",
     "PairModel",
     "PairTwin",
@@ -59,6 +54,5 @@ __all__ = [
     "friction_fields",
     "gear_geometry",
     "governor_nm_s_per_rad",
-    "nominal_of",
     "total_inertia_kg_m2",
 ]

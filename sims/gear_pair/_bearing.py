@@ -23,10 +23,8 @@ from numba import njit
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
-from sims.machine import BearingSupport, Machine
+from sims.machine import RACE_EDGE_MM, BearingSupport, Machine
 
-EDGES_MM = 0.3
-"""Beyond either edge of a spall, where an element begins to feel it."""
 N_HARMONICS = 4
 """Of the motion at the rolling elements' passing."""
 LEFT_OVER = 1e-7
@@ -108,9 +106,9 @@ def _defect(support: BearingSupport) -> tuple[int, float, float, float]:
     n = bearing.n_rolling_elements or 1
     outer = defect.race == "outer"
     spacing = pi * (pitch + ball if outer else pitch - ball) / n
-    taken = (defect.length_mm + 2.0 * EDGES_MM) / spacing + 6.0 * defect.spacing_jitter
+    taken = (defect.length_mm + 2.0 * RACE_EDGE_MM) / spacing + 6.0 * defect.spacing_jitter
     if taken > 1.0:
-        longest = spacing * (1.0 - 6.0 * defect.spacing_jitter) - 2.0 * EDGES_MM
+        longest = spacing * (1.0 - 6.0 * defect.spacing_jitter) - 2.0 * RACE_EDGE_MM
         raise InputError(
             f"length_mm of the defect in {bearing.name!r} is {defect.length_mm:g} mm: it holds two elements at once",
             allowed=f"at most {longest:.3g} mm with this scatter of the elements",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sims.machine import MOST_DRY_FRICTION
+from sims.machine import MAX_DRY_FRICTION
 from sims.simulator import Parameter
 
 _SWITCH = ("on", "off")
@@ -68,7 +68,7 @@ _MESH = (
         "",
         "coefficient that is added at every sliding speed: starved flanks",
         0,
-        MOST_DRY_FRICTION,
+        MAX_DRY_FRICTION,
         0.0,
     ),
     _number("viscosity_cp", "cP", "dynamic viscosity of the oil at the inlet", 0.1, 1e4, 17.6),

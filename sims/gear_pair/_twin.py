@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
@@ -16,12 +16,11 @@ from gearsig.checks import count
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap import Added, GapEffect, OperatingCondition
 from gearsig.recording import Recording
-from gearsig.rig import Bearing, OperatingPoint, Rig, rig_to_dict
-from sims.effects import GEARS, LARGEST_OFFSET, Effect, EffectSetting, OptionValue, effect, effects, element_spacing_mm
-from sims.gear_pair._bearing import EDGES_MM
+from gearsig.rig import OperatingPoint, Rig, rig_to_dict
+from sims.effects import GEARS, EffectSetting, MachineFacts, as_gap_effect, effect, effects
 from sims.gear_pair._installed import HousingMode, SensorSeat, completed, further_seats, installed_of_rig, table_of
-from sims.machine import BearingSupport
-from sims.mesh import GearGeometry, PairGeometry, deepest_crack_mm
+from sims.machine import Nominal, log_uniform, nominal_of, pitch_tolerance_um, runout_tolerance_um, usual_mass_kg
+from sims.mesh import PairGeometry
 from sims.presets import Preset, preset_text
 from sims.registry import sources_digest
 from sims.simulator import ParameterValue
@@ -33,15 +32,6 @@ from sims.simulator import ParameterValue
 # --------------------
 
 
-USUAL_LOAD_N_PER_MM2 = 50.0
-"""Force per face width and module of a pair whose torque is not known; rated gears carry 20 to 120."""
-LARGEST_LOAD_N_PER_MM2 = 500.0
-"""Bends a tooth's root, with a form factor of 3, by 1500 N/mm²: more than hardened steel stands."""
-USUAL_WIDTH_MODULES = 10.0
-USUAL_MESH_HZ = 540.0
-"""Mesh frequency of a pair whose speed is not known."""
-STIFFNESS_N_PER_MM_UM = 14.0
-"""Usual stiffness of a pair of steel gears per face width."""
 RELIEF_SHARE, RELIEF_LENGTH_MODULES = 0.8, 1.1
 """Tip relief over the deflection under the nominal load; its length along the line of action."""
 PITCH_RMS_SHARE, RUNOUT_SHARE = 0.1, 0.3
@@ -55,98 +45,6 @@ UNBALANCE_UM = 30.0
 COUPLING_BENDING_SHARE = 0.01
 """A coupling's bending stiffness over the torsional one of shaft and coupling: catalogues have 0.002 (steel discs) to
 0.05 (elastomer)."""
-
-
-@dataclass(frozen=True)
-class Nominal:
-    """What a rig says of its pair, completed by what is usual.
-
-    Parameters
-    ----------
-    teeth : (int, int)
-    module_mm, face_width_mm, pressure_angle_deg : float
-    speed_rpm, torque_nm : float
-        Of the driver.
-    assumed : tuple of str
-        What the rig does not say.
-    """
-
-    teeth: tuple[int, int]
-    module_mm: float
-    face_width_mm: float
-    pressure_angle_deg: float
-    speed_rpm: float
-    torque_nm: float
-    assumed: tuple[str, ...] = ()
-
-    @property
-    def size(self) -> float:
-        """Of the machine, 1 for module 2."""
-        return self.module_mm / 2.0
-
-    @property
-    def pitch_diameters_mm(self) -> tuple[float, float]:
-        """Of driver and driven gear."""
-        return self.module_mm * self.teeth[0], self.module_mm * self.teeth[1]
-
-    @property
-    def mesh_force_n(self) -> float:
-        """Static force between the teeth, tangential."""
-        return 2e3 * self.torque_nm / self.pitch_diameters_mm[0]
-
-    @property
-    def deflection_um(self) -> float:
-        """Of the teeth under the nominal load."""
-        return self.mesh_force_n / self.face_width_mm / STIFFNESS_N_PER_MM_UM
-
-    @property
-    def mesh_hz(self) -> float:
-        """Tooth passings per second."""
-        return self.speed_rpm / 60.0 * self.teeth[0]
-
-
-def nominal_of(rig: Rig) -> Nominal:
-    """Return what a rig says of its only pair.
-
-    Raises
-    ------
-    RefusalError
-        If there is no pair or more than one, or if teeth or module are not known.
-    """
-    if len(rig.pairs) != 1:
-        have = "no gear pair" if not rig.pairs else f"{len(rig.pairs)} gear pairs"
-        raise RefusalError(f"the rig has {have}; the model has one", remedy="describe one pair in the rig file")
-    pair = rig.pairs[0]
-    missing = [name for name in ("driver_teeth", "driven_teeth", "module_mm") if getattr(pair, name) is None]
-    if missing or not (pair.driver_teeth and pair.driven_teeth and pair.module_mm):
-        raise RefusalError(
-            f"{', '.join(missing)} of pair {pair.name!r} must be known for a model of it",
-            remedy="complete the rig file",
-        )
-    teeth, module = (pair.driver_teeth, pair.driven_teeth), pair.module_mm
-    width = pair.face_width_mm or USUAL_WIDTH_MODULES * module
-    torque, speed = rig.nominal_torque_nm(pair.driver), rig.nominal_speed_rpm(pair.driver)
-    largest_nm = LARGEST_LOAD_N_PER_MM2 * width * module * 0.5e-3 * module * teeth[0]
-    if torque and abs(torque) > largest_nm:
-        raise RefusalError(
-            f"{torque:g} N·m on shaft {pair.driver!r} would break teeth of module {module:g} mm, {width:g} mm wide",
-            remedy=f"state the torque in N·m; up to {largest_nm:.3g} can be",
-        )
-    told = {
-        "face_width_mm": pair.face_width_mm,
-        "pressure_angle_deg": pair.pressure_angle_deg,
-        "speed_rpm": speed,
-        "torque_nm": torque,
-    }
-    return Nominal(
-        teeth,
-        module,
-        width,
-        pair.pressure_angle_deg or 20.0,
-        speed or 60.0 * USUAL_MESH_HZ / teeth[0],
-        torque or USUAL_LOAD_N_PER_MM2 * width * module * 0.5e-3 * module * teeth[0],
-        tuple(name for name, value in told.items() if not value),
-    )
 
 
 def usual_parameters(nominal: Nominal) -> dict[str, ParameterValue]:
@@ -239,36 +137,6 @@ def body_gain(bearing_stiffness_n_per_m: float, mass_kg: float, mounts_hz: float
     return bearing_stiffness_n_per_m / (mass_kg * (2.0 * pi * mounts_hz) ** 2)
 
 
-def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """Draw with even chance per decade."""
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
-def pitch_tolerance_um(module_mm: float, diameter_mm: float) -> float:
-    """Single pitch deviation f_pt of class 5, 0.3 (m + 0.4 √d) + 4; each class more is √2 times as much.
-
-    ISO 1328-1:1995, *Cylindrical gears: ISO system of accuracy*.
-    """
-    return 0.3 * (module_mm + 0.4 * sqrt(diameter_mm)) + 4.0
-
-
-def runout_tolerance_um(module_mm: float, diameter_mm: float) -> float:
-    """Radial run-out F_r of class 5, 0.8 (0.3 m + 1.25 √d + 7), of which half is the eccentricity; same source."""
-    return 0.8 * (0.3 * module_mm + 1.25 * sqrt(diameter_mm) + 7.0)
-
-
-def profile_tolerance_um(module_mm: float, diameter_mm: float) -> float:
-    """Total profile deviation F_α of class 5, 3.2 √m + 0.22 √d + 0.7; same source."""
-    return 3.2 * sqrt(module_mm) + 0.22 * sqrt(diameter_mm) + 0.7
-
-
-def usual_mass_kg(nominal: Nominal, side: int) -> float:
-    """Of a steel disc of the pitch circle's size, with the bore that the model takes where none is given."""
-    radius = 0.5 * nominal.pitch_diameters_mm[side]
-    bore = 0.35 * (radius - 1.25 * nominal.module_mm)
-    return 7850e-9 * pi * (radius**2 - bore**2) * nominal.face_width_mm
-
-
 def _shift(teeth: int, pressure_angle_deg: float) -> float:
     """Least profile shift without undercut, in modules: (z_min − z)/z_min, z_min = 2/sin²α of the rack."""
     least = 2.0 / sin(radians(pressure_angle_deg)) ** 2
@@ -292,331 +160,6 @@ def as_plain(values: dict[str, Any]) -> dict[str, Any]:
 
 def _rounded(value: float) -> float:
     return float(f"{value:.6g}")
-
-
-# --------------------
-# How strong each effect may plausibly be on a machine: one source for what a diagnosis tries and for what is drawn.
-#
-# Lower ends are barely noticeable on most machines, upper ends are strong damage that still runs. Where a unit does not
-# scale with the machine by itself, the range is a share of something that does.
-# --------------------
-
-
-Options = dict[str, OptionValue]
-PLAUSIBLE_GEARS = ("driver", "driven")
-RIPPLE_ORDERS = (1.0, 2.0, 3.0, 4.0, 6.0)
-PATH_HZ = (1200.0, 3500.0)
-_JITTER = 0.01
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """A machine as the ranges need it.
-
-    Parameters
-    ----------
-    nominal : Nominal
-    gears : (GearGeometry, GearGeometry)
-    bearings : tuple of Bearing
-        That the rig names, with geometry.
-    vibration_mps2 : float
-        Rms of the sound machine at its nominal point.
-    """
-
-    nominal: Nominal
-    gears: tuple[GearGeometry, GearGeometry]
-    bearings: tuple[Bearing, ...]
-    vibration_mps2: float
-
-    def diameter_mm(self, options: Mapping[str, OptionValue]) -> float:
-        """Pitch diameter of the gear that the options choose."""
-        return self.nominal.pitch_diameters_mm[_side(options)]
-
-    def bearing(self, options: Mapping[str, OptionValue]) -> Bearing:
-        """Bearing that the options choose."""
-        return next(b for b in self.bearings if b.name == options["bearing"])
-
-
-Scale = Callable[[Surroundings, Options], float]
-Drawn = Callable[[Surroundings, np.random.Generator], Options]
-
-
-@dataclass(frozen=True)
-class Plausible:
-    """One effect's range.
-
-    Parameters
-    ----------
-    low, high : float
-        Severity over `scale`.
-    why : str
-    scale : callable
-        In the severity's unit.
-    choices : callable
-        Option sets worth a try; nothing where the machine lacks what the effect needs.
-    drawn : callable
-        Random options.
-    most : callable
-        Greatest severity that the machine allows.
-    n : int
-        How many severities are worth a try, at even ratios.
-    """
-
-    low: float
-    high: float
-    why: str
-    scale: Scale = lambda _m, _o: 1.0
-    choices: Callable[[Surroundings], Sequence[Options]] = lambda _m: ({},)
-    drawn: Drawn = lambda _m, _rng: {}
-    most: Scale = lambda _m, _o: float("inf")
-    n: int = 3
-
-    def reach(self, name: str, machine: Surroundings, options: Options) -> tuple[float, float]:
-        """Least and greatest severity with these options; the range keeps its width where the machine cuts it off."""
-        scale = self.scale(machine, options)
-        top = min(self.high * scale, self.most(machine, options), effect(name).severity.high)
-        return top * self.low / self.high, top
-
-
-def _side(options: Mapping[str, OptionValue]) -> int:
-    return PLAUSIBLE_GEARS.index(str(options["gear"]))
-
-
-def _either_gear(_machine: Surroundings) -> Sequence[Options]:
-    return [{"gear": gear} for gear in PLAUSIBLE_GEARS]
-
-
-def _one_tooth(_machine: Surroundings) -> Sequence[Options]:
-    return [{"gear": gear, "tooth": 1.0} for gear in PLAUSIBLE_GEARS]
-
-
-def _any_gear(_machine: Surroundings, rng: np.random.Generator) -> Options:
-    return {"gear": str(rng.choice(PLAUSIBLE_GEARS))}
-
-
-def _any_tooth(machine: Surroundings, rng: np.random.Generator) -> Options:
-    options = _any_gear(machine, rng)
-    return {**options, "tooth": float(rng.integers(machine.nominal.teeth[_side(options)]) + 1)}
-
-
-def _each_bearing(machine: Surroundings) -> Sequence[Options]:
-    return [{"bearing": b.name} for b in machine.bearings]
-
-
-def _any_bearing(machine: Surroundings, rng: np.random.Generator) -> Options:
-    return {"bearing": str(rng.choice([b.name for b in machine.bearings]))}
-
-
-def _any_race(machine: Surroundings, rng: np.random.Generator) -> Options:
-    return {**_any_bearing(machine, rng), "slip_percent": float(rng.uniform(0.0, 1.5))}
-
-
-def _ball_mm(machine: Surroundings, options: Options) -> float:
-    return machine.bearing(options).rolling_element_diameter_mm or 1.0
-
-
-def _longest_mm(race: str) -> Scale:
-    """The longest defect that does not hold two elements at once, less a fifth."""
-
-    def longest(machine: Surroundings, options: Options) -> float:
-        spacing = element_spacing_mm(BearingSupport(machine.bearing(options), 1.0, 1.0, 0.0), race) or 1.0
-        return 0.8 * (spacing * (1.0 - 6.0 * _JITTER) - 2.0 * EDGES_MM)
-
-    return longest
-
-
-def _deepest_mm(machine: Surroundings, options: Options) -> float:
-    return deepest_crack_mm(machine.gears[_side(options)], float(options.get("angle_deg", 45.0)))
-
-
-def _module_mm(machine: Surroundings, _options: Options) -> float:
-    return machine.nominal.module_mm
-
-
-def _force_share_g_mm(machine: Surroundings, options: Options) -> float:
-    """Unbalance whose force at the nominal speed is the static mesh force."""
-    omega = machine.nominal.speed_rpm * np.pi / 30.0
-    if _side(options) == 1:
-        omega *= machine.nominal.teeth[0] / machine.nominal.teeth[1]
-    return float(machine.nominal.mesh_force_n / omega**2 * 1e6)
-
-
-def _most_g_mm(machine: Surroundings, options: Options) -> float:
-    radius = 0.5 * machine.diameter_mm(options)
-    return 0.8 * LARGEST_OFFSET * radius * usual_mass_kg(machine.nominal, _side(options)) * 1e3
-
-
-def _iso(tolerance: Callable[[float, float], float]) -> Scale:
-    return lambda machine, options: tolerance(machine.nominal.module_mm, machine.diameter_mm(options))
-
-
-PLAUSIBLE: dict[str, Plausible] = {
-    "root_crack": Plausible(
-        0.2,
-        0.85,
-        "of the deepest crack that the tooth bears; below a fifth the stiffness hardly changes",
-        _deepest_mm,
-        _one_tooth,
-        lambda m, rng: {**_any_tooth(m, rng), "angle_deg": float(rng.uniform(35.0, 75.0))},
-        lambda m, o: 0.95 * _deepest_mm(m, o),
-    ),
-    "tooth_spall": Plausible(
-        15.0,
-        85.0,
-        "percent of the face; a pit of a tenth is lost in ordinary flanks, 90 is the model's limit",
-        lambda _m, _o: 1.0,
-        lambda m: [{**o, "length_mm": 0.45 * m.nominal.module_mm} for o in _one_tooth(m)],
-        lambda m, rng: {**_any_tooth(m, rng), "length_mm": m.nominal.module_mm * log_uniform(rng, 0.2, 1.0)},
-    ),
-    "chipped_tooth": Plausible(
-        0.2,
-        0.9,
-        "of the module: a broken corner to half of the tooth's height; smaller chips lie in double contact",
-        _module_mm,
-        lambda m: [{**o, "width_percent": 85.0} for o in _one_tooth(m)],
-        lambda m, rng: {**_any_tooth(m, rng), "width_percent": float(rng.choice((30.0, 60.0, 85.0, 100.0)))},
-    ),
-    "tooth_wear": Plausible(
-        1.0,
-        10.0,
-        "of the profile tolerance of class 5 of ISO 1328: to that of class 11 or 12",
-        _iso(profile_tolerance_um),
-        _either_gear,
-        _any_gear,
-    ),
-    "pitch_error": Plausible(
-        0.4,
-        3.0,
-        "standard deviation over the pitch tolerance of class 5, which is a limit: of classes 5 to 11",
-        _iso(pitch_tolerance_um),
-        _either_gear,
-        _any_gear,
-    ),
-    "surface_roughness": Plausible(
-        0.3, 2.5, "um: ground flanks have 0.4, hobbed or run-out ones 1 to 3; it does not grow with the gear"
-    ),
-    "sliding_friction": Plausible(0.03, 0.4, "mixed film with worn-out oil to dry, rough steel"),
-    "eccentricity": Plausible(
-        1.0,
-        8.0,
-        "half of the run-out over F_r of class 5: gears of class 7 to 13, or a bent shaft",
-        _iso(runout_tolerance_um),
-        _either_gear,
-        _any_gear,
-    ),
-    "unbalance": Plausible(
-        0.01,
-        0.15,
-        "its force at the nominal speed over the static mesh force; less is lost beside the mesh",
-        _force_share_g_mm,
-        _either_gear,
-        _any_gear,
-        _most_g_mm,
-    ),
-    "misalignment": Plausible(
-        0.4,
-        4.0,
-        "degrees: elastic couplings bear 1, universal joints more; the model goes to 5",
-        choices=lambda _m: [{"shaft": side} for side in PLAUSIBLE_GEARS],
-        drawn=lambda _m, rng: {"shaft": str(rng.choice(PLAUSIBLE_GEARS))},
-    ),
-    "torque_ripple": Plausible(
-        2.0,
-        30.0,
-        "percent: inverters give 1 to 5, piston engines and pumps tens",
-        choices=lambda _m: [{"order": order} for order in RIPPLE_ORDERS],
-        drawn=lambda _m, rng: {"order": _any_order(rng)},
-    ),
-    "speed_fluctuation": Plausible(
-        0.2,
-        5.0,
-        "percent: a controlled drive holds 0.1, a hunting one swings by several",
-        choices=lambda _m: [{"frequency_hz": 1.0}],
-        drawn=lambda _m, rng: {"frequency_hz": log_uniform(rng, 0.3, 8.0)},
-    ),
-    "backlash": Plausible(25.0, 300.0, "um per mm of module; new gears have some 20 to 50", _module_mm),
-    "bearing_outer_race": Plausible(
-        0.01,
-        0.15,
-        "of the rolling element's diameter; beyond half a millimetre or so the knocks grow no more",
-        _ball_mm,
-        _each_bearing,
-        _any_race,
-        _longest_mm("outer"),
-    ),
-    "bearing_inner_race": Plausible(
-        0.01, 0.15, "as on the outer race", _ball_mm, _each_bearing, _any_race, _longest_mm("inner")
-    ),
-    "bearing_clearance": Plausible(
-        3.0,
-        40.0,
-        "um per mm of module: clearance classes C3 to C5 of a bearing of the machine's size, to a worn-out one",
-        _module_mm,
-        _each_bearing,
-        _any_bearing,
-    ),
-    "transfer_path": Plausible(
-        2.0,
-        20.0,
-        "amplification: a well damped to a sharp resonance",
-        choices=lambda _m: [{"frequency_hz": f} for f in PATH_HZ],
-        drawn=lambda _m, rng: {
-            "frequency_hz": log_uniform(rng, 400.0, 7000.0),
-            "damping_ratio": log_uniform(rng, 0.01, 0.08),
-        },
-    ),
-    "mains_hum": Plausible(
-        0.03,
-        1.0,
-        "of the sound machine's vibration",
-        lambda m, _o: m.vibration_mps2,
-        lambda _m: [{"frequency_hz": 50.0}],
-        lambda _m, rng: {
-            "frequency_hz": float(rng.choice((50.0, 60.0))),
-            "harmonics_percent": float(rng.uniform(0.0, 80.0)),
-        },
-    ),
-    "clipping": Plausible(0.3, 12.0, "percent of the time: rare peaks to a grossly wrong range"),
-}
-"""By the effect's name."""
-
-
-def _any_order(rng: np.random.Generator) -> float:
-    """Whole orders of motors and pumps twice as often as any order of something geared or belted to the drive."""
-    if rng.uniform() < 2.0 / 3.0:
-        return float(rng.choice((1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)))
-    return float(rng.uniform(1.5, 16.0))
-
-
-def plausible_of(own: Effect) -> Plausible:
-    """Return the range of an effect that is not listed: a third to three times its typical severity.
-
-    It is tried on each gear, shaft or bearing that it may be on, at the first tooth, with its other options as they
-    are by default.
-    """
-    severity = own.severity
-
-    def choices(machine: Surroundings) -> Sequence[Options]:
-        found: list[Options] = [{}]
-        for option in own.options:
-            words = [b.name for b in machine.bearings] if option.name == "bearing" else option.choices
-            if words:
-                found = [{**options, option.name: word} for options in found for word in words]
-            elif option.name == "tooth":
-                found = [{**options, "tooth": 1.0} for options in found]
-        return found
-
-    def drawn(machine: Surroundings, rng: np.random.Generator) -> Options:
-        every = choices(machine)
-        return dict(every[int(rng.integers(len(every)))])
-
-    return Plausible(
-        max(severity.low, severity.typical / 3.0),
-        min(severity.high, 3.0 * severity.typical),
-        "about its typical severity",
-        choices=choices,
-        drawn=drawn,
-    )
 
 
 LONGEST_LEAD_REV = 8.0
@@ -712,10 +255,14 @@ class PairTwin:
 
     def candidates(self, name: str) -> Sequence[Added]:
         """Return settings of an effect worth a try, from barely noticeable to strong, for each option that matters."""
-        found = []
-        for options, (low, high) in self._reaches(name):
-            found += [Added(name, float(f"{s:.4g}"), options) for s in np.geomspace(low, high, _plausible(name).n)]
-        return found
+        chosen, machine = effect(name), self._facts
+        candidates = []
+        for options in chosen.plausible_range.choices(machine):
+            severities = np.geomspace(
+                *chosen.plausible_severities(machine, options), chosen.plausible_range.n_severities
+            )
+            candidates += [Added(name, float(f"{severity:.4g}"), options) for severity in severities]
+        return candidates
 
     def with_further_sensors(self) -> tuple[Self, Mapping[str, str]]:
         """Return the machine with an upright sensor over each bearing that has none, and those channels' places."""
@@ -737,11 +284,11 @@ class PairTwin:
         RefusalError
             If the rig lacks what the effect needs: a bearing.
         """
-        plausible, machine = _plausible(name), self._surroundings
+        plausible, machine = effect(name).plausible_range, self._facts
         if not plausible.choices(machine):
             raise RefusalError(f"the rig has nothing that {name} could be in", remedy="describe its bearings")
         options = plausible.drawn(machine, rng)
-        low, high = plausible.reach(name, machine, options)
+        low, high = effect(name).plausible_severities(machine, options)
         return Added(name, log_uniform(rng, low * (high / low) ** above, high), options)
 
     def preset(
@@ -795,17 +342,13 @@ class PairTwin:
         return self._geometry(self.preset(self.point))
 
     @cached_property
-    def _surroundings(self) -> Surroundings:
+    def _facts(self) -> MachineFacts:
         pair = self.pair_geometry()
         shafts = (self.rig.pairs[0].driver, self.rig.pairs[0].driven)
-        own = tuple(completed(b, self.nominal.size) for b in self.rig.bearings if b.shaft in shafts)
-        sound = self.run(self.point, seed=0, duration_s=VIBRATION_S, sampling_rate_hz=20480.0)
-        rms = np.mean([np.std(sound.values(name)) for name in sound.vibration_names()])
-        return Surroundings(self.nominal, (pair.driver, pair.driven), own, float(rms))
-
-    def _reaches(self, name: str) -> list[tuple[Options, tuple[float, float]]]:
-        plausible, machine = _plausible(name), self._surroundings
-        return [(o, plausible.reach(name, machine, o)) for o in plausible.choices(machine)]
+        bearings = tuple(completed(b, self.nominal.size) for b in self.rig.bearings if b.shaft in shafts)
+        healthy = self.run(self.point, seed=0, duration_s=VIBRATION_S, sampling_rate_hz=20480.0)
+        rms = np.mean([np.std(healthy.values(name)) for name in healthy.vibration_names()])
+        return MachineFacts(self.nominal, (pair.driver, pair.driven), bearings, float(rms))
 
     def _simulated(
         self,
@@ -850,7 +393,7 @@ class PairGapSimulator:
 
     def gap_effects(self) -> Mapping[str, GapEffect]:
         """Return all effects of the catalogue: each has a meaning for a gear pair."""
-        return gap_effects_of(effects())
+        return {name: as_gap_effect(e) for name, e in effects().items()}
 
     def twin_of(self, rig: Rig) -> PairTwin:
         """Return a twin of the rig, whose machine has been built to see that it can be.
@@ -866,24 +409,3 @@ class PairGapSimulator:
         except InputError as error:
             raise RefusalError(f"the model {self.name!r} cannot be set to this rig: {error}") from None
         return twin
-
-
-def gap_effects_of(names: Iterable[str]) -> dict[str, GapEffect]:
-    """Return effects of the catalogue as the gap diagnosis sees them."""
-    return {
-        e.name: GapEffect(
-            e.name,
-            e.group,
-            e.title,
-            e.severity.name,
-            e.severity.unit,
-            e.signature,
-            e.shows_in,
-            e.group == "measurement chain",
-        )
-        for e in map(effect, names)
-    }
-
-
-def _plausible(name: str) -> Plausible:
-    return PLAUSIBLE.get(effect(name).name) or plausible_of(effect(name))

@@ -1,7 +1,8 @@
 """What a geared drive is made of, for the simulators and the effects; see `sims.machine`."""
 
 from sims.machine._machine import (
-    MOST_DRY_FRICTION,
+    MAX_DRY_FRICTION,
+    RACE_EDGE_MM,
     RECOVERY_S,
     BearingSupport,
     Drive,
@@ -12,18 +13,30 @@ from sims.machine._machine import (
     ShaftLine,
     SpeedSwing,
     TorqueRipple,
+    WeakTooth,
     Wheel,
     bearing_index,
+)
+from sims.machine._nominal import (
+    Nominal,
+    log_uniform,
+    nominal_of,
+    pitch_tolerance_um,
+    profile_tolerance_um,
+    runout_tolerance_um,
+    usual_mass_kg,
 )
 from sims.machine._operation import Operation, Profile, course_value, set_speed
 
 __all__ = [
-    "MOST_DRY_FRICTION",
+    "MAX_DRY_FRICTION",
+    "RACE_EDGE_MM",
     "RECOVERY_S",
     "BearingSupport",
     "Drive",
     "Lubrication",
     "Machine",
+    "Nominal",
     "Operation",
     "Profile",
     "RaceDefect",
@@ -31,8 +44,15 @@ __all__ = [
     "ShaftLine",
     "SpeedSwing",
     "TorqueRipple",
+    "WeakTooth",
     "Wheel",
     "bearing_index",
     "course_value",
+    "log_uniform",
+    "nominal_of",
+    "pitch_tolerance_um",
+    "profile_tolerance_um",
+    "runout_tolerance_um",
     "set_speed",
+    "usual_mass_kg",
 ]

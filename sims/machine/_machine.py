@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import isfinite
+from math import cos, isfinite, pi, radians
 
 from gearsig.checks import count, not_negative, one_of, positive, within
 from gearsig.errors import InputError
@@ -16,8 +16,10 @@ from sims.mesh import GearMesh
 # --------------------
 
 
-MOST_DRY_FRICTION = 0.6
+MAX_DRY_FRICTION = 0.6
 """Coefficient of clean dry steel on steel."""
+RACE_EDGE_MM = 0.3
+"""Beyond either edge of a spall on a race, where a rolling element begins to feel it."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,30 @@ class ShaftLine:
 
 
 @dataclass(frozen=True)
+class WeakTooth:
+    """A tooth that yields more than the others on its drive flank.
+
+    Parameters
+    ----------
+    gear : int
+        0: pinion, 1: wheel.
+    tooth : int
+        From 0 at the angles' zero.
+    loss : float
+        Part of a pair's stiffness that is gone, 0 to below 1.
+    """
+
+    gear: int
+    tooth: int
+    loss: float
+
+    def __post_init__(self) -> None:
+        within(self.gear, "gear of the weak tooth", 0, 1)
+        not_negative(self.tooth, "tooth of the weak tooth")
+        within(self.loss, "loss of the weak tooth", 0.0, 0.99)
+
+
+@dataclass(frozen=True)
 class RaceDefect:
     """A spall on a raceway of a rolling-element bearing: rolling elements sink into it and strike its far edge.
 
@@ -169,6 +195,18 @@ class BearingSupport:
                 remedy="give the bearing's geometry",
             )
 
+    def element_spacing_mm(self, race: str) -> float | None:
+        """Distance between rolling elements along a race, π (D ± d cos α)/n; a longer defect would hold two at once.
+
+        None if the bearing's geometry is not known.
+        """
+        b = self.bearing
+        if b.n_rolling_elements is None or b.pitch_diameter_mm is None or b.rolling_element_diameter_mm is None:
+            return None
+        across = b.rolling_element_diameter_mm * cos(radians(b.contact_angle_deg))
+        diameter = b.pitch_diameter_mm + across if race == "outer" else b.pitch_diameter_mm - across
+        return pi * diameter / b.n_rolling_elements
+
 
 @dataclass(frozen=True)
 class Lubrication:
@@ -194,7 +232,7 @@ class Lubrication:
     def __post_init__(self) -> None:
         positive(self.viscosity_cp, "viscosity_cp", "cP")
         within(self.factor, "factor of the friction coefficient", 0.0, 20.0)
-        within(self.dry_coefficient, "coefficient of dry friction", 0.0, MOST_DRY_FRICTION)
+        within(self.dry_coefficient, "coefficient of dry friction", 0.0, MAX_DRY_FRICTION)
 
 
 @dataclass(frozen=True)

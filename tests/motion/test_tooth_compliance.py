@@ -11,7 +11,8 @@ from gearsig.motion import measure_motion, tooth_compliance
 from gearsig.recording import Recording
 from sims import simulate
 from sims.effects import EffectSetting
-from sims.forging import ForgingManipulator, WeakTooth, build_rig, record, sensors
+from sims.forging import ForgingManipulator, build_rig, record, sensors
+from sims.machine import WeakTooth
 from sims.simulator import ParameterValues
 from tests.motion.recordings import start_stop, without
 

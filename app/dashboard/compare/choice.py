@@ -100,7 +100,7 @@ def run_simulation(run: SimulationToCompare, recorded: Recording) -> Recording:
 
 def _twin(run: SimulationToCompare, rig: Rig | None, speed_rpm: float, sampling_rate_hz: float) -> Recording:
     from gearsig.gap import OperatingCondition
-    from sims.gear_pair import nominal_of
+    from sims.machine import nominal_of
     from sims.registry import gap_simulator
 
     if rig is None:

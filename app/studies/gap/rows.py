@@ -47,7 +47,7 @@ from gearsig.recording import Recording
 from sims.blind import CATALOGUE, draw_case, record_case
 from sims.cracked import STEP_ANGLE_RAD, CrackedTwin
 from sims.effects import EffectSetting, effects
-from sims.gear_pair import nominal_of
+from sims.machine import nominal_of
 
 # --------------------
 # One recording of the population, reduced and compared, and how all of them are written.

@@ -8,7 +8,7 @@ import pytest
 
 from gearsig.errors import InputError
 from gearsig.rig import Bearing
-from sims.effects import effect, element_spacing_mm, with_bearing
+from sims.effects import effect, with_bearing
 from sims.machine import Machine
 from tests.sims.machines import spur_pair_machine
 
@@ -43,8 +43,8 @@ def test_a_bearing_that_is_not_there() -> None:
 
 def test_spacing_of_the_elements_on_either_race() -> None:
     support = spur_pair_machine().bearings[0]
-    assert element_spacing_mm(support, "outer") == pytest.approx(pi * 46.98 / 9)
-    assert element_spacing_mm(support, "inner") == pytest.approx(pi * 31.10 / 9)
+    assert support.element_spacing_mm("outer") == pytest.approx(pi * 46.98 / 9)
+    assert support.element_spacing_mm("inner") == pytest.approx(pi * 31.10 / 9)
 
 
 def test_a_defect_is_no_longer_than_the_spacing() -> None:

@@ -24,9 +24,7 @@ RIG = Rig(
 )
 FILE = """
 from dataclasses import replace
-from sims.effects import Effect, Severity
-from sims.effects.chain_channels import with_each_channel
-from sims.effects.effect import GEAR_OPTION, TOOTH_OPTION
+from sims.effects import GEAR_OPTION, TOOTH_OPTION, Effect, Severity, with_each_channel
 
 def change(machine, severity, options, rng):
     def louder(channel):

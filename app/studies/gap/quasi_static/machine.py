@@ -14,8 +14,8 @@ from app.studies.gap.signatures import PathChange, draw_side, partly, sign
 from gearsig.checks import FloatArray
 from gearsig.rig import Bearing, Rig
 from sims.cracked import CrackedPair
-from sims.gear_pair import Nominal, build_rig, nominal_of
-from sims.machine import Operation
+from sims.gear_pair import build_rig
+from sims.machine import Nominal, Operation, nominal_of
 
 # --------------------
 # What lies between forces and sensors: modes of the machine, shared by all channels, and each channel's own part.
