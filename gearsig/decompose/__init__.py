@@ -2,7 +2,7 @@
 
 from gearsig.decompose._long_signals import joined, long_modes, modes_by_block
 from gearsig.decompose._suggestion import ModeSuggestion, ModeTrial, noise_width, suggest_modes
-from gearsig.decompose._types import ModeAxis, Modes, StartName, VmdSettings
+from gearsig.decompose._types import ModeAxis, Modes, StartName, VmdEngine, VmdSettings
 from gearsig.decompose._vmd import (
     angle_modes,
     channel_envelope_modes,
@@ -33,6 +33,7 @@ __all__ = [
     "ModeTrial",
     "Modes",
     "StartName",
+    "VmdEngine",
     "VmdSettings",
     "angle_modes",
     "apply",

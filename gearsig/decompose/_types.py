@@ -14,6 +14,7 @@ from gearsig.errors import InputError
 StartName = Literal["uniform", "zero", "random", "peaks"]
 STARTS = get_args(StartName)
 ModeAxis = Literal["frequency", "order"]
+VmdEngine = Literal["gearsig", "vmdpy"]
 
 REFERENCE_ITERATIONS = 499
 """The limit built into the reference programs, whose count of 500 includes the start."""
@@ -45,11 +46,14 @@ class VmdSettings:
         energy, which gives the same modes in any unit.
     max_iterations : int
         At least 2.
+    engine : str
+        "gearsig", or "vmdpy": the reference program in Python, much slower and with 16 kB of memory per sample and
+        mode; it starts "uniform" or "zero" and always iterates up to 499 times.
 
     Raises
     ------
     InputError
-        On a value out of range.
+        On a value out of range, or one that the engine cannot take.
     """
 
     n_modes: int
@@ -59,6 +63,7 @@ class VmdSettings:
     start: StartName | tuple[float, ...] = "uniform"
     tolerance: float | None = None
     max_iterations: int = REFERENCE_ITERATIONS
+    engine: VmdEngine = "gearsig"
 
     def __post_init__(self) -> None:
         count(self.n_modes, "n_modes")
@@ -67,12 +72,27 @@ class VmdSettings:
         count(self.max_iterations, "max_iterations", minimum=2)
         if self.tolerance is not None:
             not_negative(self.tolerance, "tolerance")
+        one_of(self.engine, "engine", get_args(VmdEngine))
+        if self.engine == "vmdpy":
+            self._check_vmdpy()
         if isinstance(self.start, str):
             one_of(self.start, "start", STARTS)
             return
         object.__setattr__(self, "start", tuple(float(f) for f in self.start))
         if len(self.start) != self.n_modes:
             raise InputError(f"start has {len(self.start)} frequencies", allowed=f"{self.n_modes}, one per mode")
+
+    def _check_vmdpy(self) -> None:
+        """Raise on what vmdpy cannot be told; its random start would draw from numpy's global state."""
+        remedy = 'choose engine="gearsig"'
+        if self.start not in ("uniform", "zero"):
+            raise InputError(f"start is {self.start!r} with the engine vmdpy", allowed="uniform, zero", remedy=remedy)
+        if self.max_iterations != REFERENCE_ITERATIONS:
+            raise InputError(
+                f"max_iterations is {self.max_iterations} with the engine vmdpy",
+                allowed=f"{REFERENCE_ITERATIONS}, which is built into it",
+                remedy=remedy,
+            )
 
 
 @dataclass(frozen=True)
@@ -97,7 +117,7 @@ class Modes:
     converged : bool
         Whether the tolerance was reached within the iterations allowed.
     last_change : float
-        Change of the modes' energy in the last iteration over the signal's energy.
+        Change of the modes' energy in the last iteration over the signal's energy; nan where the engine keeps it.
     centre_history : array, (n_iterations, n_modes)
         Centres before each iteration; the last row holds `centres`.
     settings : VmdSettings

@@ -10,6 +10,7 @@ from numba import njit
 from gearsig.angle import AngleSignal
 from gearsig.checks import FloatArray, positive
 from gearsig.decompose._types import ModeAxis, Modes, VmdSettings, check_supported, mode_notes
+from gearsig.engines import engine_module
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.spectra import Envelope, EnvelopeKind, Spectrum, amplitude_spectrum, band_envelope, checked_signal
@@ -171,7 +172,7 @@ def variational_modes(
     check_supported(x, settings.n_modes)
     solution = _solve(x.astype(np.float64), fs, settings, rng)
     centres, bandwidths = fs * solution.history[-1], fs * _bandwidths(solution)
-    waveforms = _waveforms(solution.lines)
+    waveforms = solution.waveforms()
     residual = np.asarray(x - waveforms.sum(axis=0))
     return Modes(
         waveforms=waveforms,
@@ -201,30 +202,87 @@ class _Solution:
     relative_change: float
     converged: bool
 
+    def waveforms(self) -> FloatArray:
+        """Transform each mode back; even lengths get the reference programs' line at half the sampling rate."""
+        from scipy.fft import idct
+
+        n = self.lines.shape[1]
+        # The line's phase there is (-1)^m cos(π/2n) after the mirrored part is cut off; odd lengths have none.
+        alternating = self.lines[:, -1:] * (np.cos(0.5 * np.pi / n) / (2 * n) if n % 2 == 0 else 0.0)
+        # In place is quicker, but the result then holds on to the solver's memory, which only matters for long signals.
+        u: FloatArray = idct(self.lines, type=2, axis=1, overwrite_x=self.lines.nbytes < _MUCH_MEMORY, workers=1)
+        u[:, ::2] -= alternating
+        u[:, 1::2] += alternating
+        return u
+
+
+@dataclass(frozen=True)
+class _VmdpySolution(_Solution):
+    """The same from vmdpy, which returns waveforms; `lines` is their cosine transform."""
+
+    u: FloatArray
+
+    def waveforms(self) -> FloatArray:
+        """Return the modes as vmdpy computed them."""
+        return self.u
+
 
 def _solve(x: FloatArray, fs: float, settings: VmdSettings, rng: np.random.Generator | None) -> _Solution:
-    from scipy.fft import dct
-
     # A power of two leaves every digit as it is, and keeps squares of very small or large values in range.
     scale = 2.0 ** np.floor(np.log2(np.abs(x).max()))
-    spectrum = dct(x / scale, type=2, workers=1)
     energy = float(np.square(x / scale).sum())  # no scalar product: threads of BLAS cost more than they save here
-    start = first_centres(settings, fs, spectrum, rng)
     threshold = _threshold(settings.tolerance, energy, scale)
-    history = np.empty((settings.max_iterations + 1, settings.n_modes))
-    grid, space = _grid(len(x)), working_space(settings.n_modes, len(x))
-    told = (settings.penalty, settings.dual_step, settings.zero_mode)
-    lines, n_done, change = iterate(spectrum, grid, space, start, *told, threshold, len(history) - 1, history)
-    if n_done < 2:
+    if settings.engine == "vmdpy":
+        solution = _solve_with_vmdpy(x / scale, scale, settings, threshold)
+    else:
+        solution = _solve_here(x / scale, scale, fs, settings, rng, threshold, energy)
+    if len(solution.history) < 2:
         raise InputError(
             f"tolerance is {settings.tolerance:g}, more than the modes' energy changes in the first iteration",
             allowed=f"well below the signal's energy, which is {energy * scale * scale:.3g}",
             remedy="leave tolerance out: it is then taken relative to the signal's energy",
         )
-    if not np.isfinite(history[: n_done + 1]).all():
+    if not np.isfinite(solution.history).all():
         raise RefusalError("a mode stayed empty: it has no centre frequency", remedy="ask for fewer modes")
+    return solution
+
+
+def _solve_here(
+    x: FloatArray,
+    scale: float,
+    fs: float,
+    settings: VmdSettings,
+    rng: np.random.Generator | None,
+    threshold: float,
+    energy: float,
+) -> _Solution:
+    from scipy.fft import dct
+
+    spectrum = dct(x, type=2, workers=1)
+    start = first_centres(settings, fs, spectrum, rng)
+    history = np.empty((settings.max_iterations + 1, settings.n_modes))
+    grid, space = _grid(len(x)), working_space(settings.n_modes, len(x))
+    constants = (settings.penalty, settings.dual_step, settings.zero_mode)
+    lines, n_done, change = iterate(spectrum, grid, space, start, *constants, threshold, len(history) - 1, history)
     lines *= scale
+    if not np.isfinite(history[n_done]).all():  # the centres after the last iteration, which no row returned shows
+        history[0] = np.nan
     return _Solution(lines, history[:n_done], change / energy, bool(change <= threshold))
+
+
+def _solve_with_vmdpy(x: FloatArray, scale: float, settings: VmdSettings, threshold: float) -> _Solution:
+    """Let vmdpy 0.2 do it; it drops the last sample of an odd length, so the signal is mirrored by one sample first."""
+    from scipy.fft import dct
+
+    even = np.append(x, x[-1]) if len(x) % 2 else x
+    tolerance = threshold + np.spacing(1.0)  # its sum of changes starts there
+    init = {"zero": 0, "uniform": 1}[str(settings.start)]
+    with engine_module("vmdpy") as vmdpy, np.errstate(all="ignore"):
+        u, _, history = vmdpy.VMD(
+            even, settings.penalty, settings.dual_step, settings.n_modes, settings.zero_mode, init, tolerance
+        )
+        u = np.asarray(u)[:, : len(x)] * scale
+    return _VmdpySolution(dct(u, type=2, axis=1), history, float("nan"), len(history) < settings.max_iterations, u)
 
 
 def _grid(n: int) -> FloatArray:
@@ -240,20 +298,6 @@ def _threshold(tolerance: float | None, energy: float, scale: float) -> float:
     if tolerance is None:
         return RELATIVE_TOLERANCE * energy
     return float((tolerance - np.spacing(1.0)) / scale / scale)
-
-
-def _waveforms(lines: FloatArray) -> FloatArray:
-    """Transform each mode back; even lengths get the reference programs' line at half the sampling rate."""
-    from scipy.fft import idct
-
-    n = lines.shape[1]
-    # The line's phase there is (-1)^m cos(π/2n) after the mirrored part is cut off; odd lengths have none.
-    alternating = lines[:, -1:] * (np.cos(0.5 * np.pi / n) / (2 * n) if n % 2 == 0 else 0.0)
-    # In place is quicker, but the result then holds on to the solver's memory, which only matters for long signals.
-    u: FloatArray = idct(lines, type=2, axis=1, overwrite_x=lines.nbytes < _MUCH_MEMORY, workers=1)
-    u[:, ::2] -= alternating
-    u[:, 1::2] += alternating
-    return u
 
 
 def _bandwidths(solution: _Solution) -> FloatArray:

@@ -12,6 +12,7 @@ from gearsig.timefreq._packets import (
 )
 from gearsig.timefreq._ridges import NOT_HIDDEN, best_path, meetings, ridges, untangled
 from gearsig.timefreq._squeezed import squeeze_lines, squeezed_cwt, squeezed_cwt_map, squeezed_stft, squeezed_stft_map
+from gearsig.timefreq._ssqueezepy import SqueezeEngine
 from gearsig.timefreq._stft import stft, stft_map
 from gearsig.timefreq._types import Axis, Reduction, Ridge, TimeFrequencyMap, at_label, axis_label
 from gearsig.timefreq._uniform import UniformSignal, uniform
@@ -34,6 +35,7 @@ __all__ = [
     "Morse",
     "Reduction",
     "Ridge",
+    "SqueezeEngine",
     "TimeFrequencyMap",
     "UniformSignal",
     "WaveletPackets",

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, one_of
 from gearsig.timefreq._cwt import edge_of, largest_power_of_two_in, n_reach
+from gearsig.timefreq._ssqueezepy import SqueezeEngine, cwt_by_ssqueezepy, is_ssqueezepy, stft_by_ssqueezepy
 from gearsig.timefreq._stft import FramePlan, prepared, spectra
 from gearsig.timefreq._types import Coefficients, ComplexArray, Reduction, Spacing, TimeFrequencyMap
 from gearsig.timefreq._uniform import (
@@ -109,6 +110,7 @@ def squeezed_cwt(
     n_per_octave: int = 32,
     step: int = 1,
     edges: Edges = "reflect",
+    engine: SqueezeEngine = "gearsig",
 ) -> Coefficients:
     """Return the wavelet coefficients moved to their momentary frequency, at every `step`-th sample.
 
@@ -121,6 +123,9 @@ def squeezed_cwt(
         As in `cwt`.
     n_per_octave : int
         Lines, and wavelets, per octave.
+    engine : str
+        "gearsig", or "ssqueezepy" for comparison: single precision, the whole matrix at once in memory, each
+        frequency on the line that is nearest on the logarithm.
 
     Returns
     -------
@@ -140,9 +145,12 @@ def squeezed_cwt(
     Source: I. Daubechies, J. Lu, H.-T. Wu, *Synchrosqueezed wavelet transforms: an empirical mode decomposition-like
     tool*, Applied and Computational Harmonic Analysis 30 (2011).
     """
-    x, plan, form = _prepared(signal, channel, wavelet, lowest, highest, n_per_octave, edges)
+    x, plan, form = _prepared(signal, channel, wavelet, lowest, highest, n_per_octave, edges, engine)
     T = room_for(len(plan.lines), x, step)
-    _fill(T, x, plan, wavelet, step, edges)
+    if is_ssqueezepy(engine):
+        T[:] = cwt_by_ssqueezepy(x, plan.lines, plan.analysed, LEAST_SHARE, wavelet, edges)[:, ::step]
+    else:
+        _fill(T, x, plan, wavelet, step, edges)
     return form.coefficients(T, x, step, np.ones(len(plan.lines)))
 
 
@@ -158,12 +166,13 @@ def squeezed_cwt_map(
     reduction: Reduction = "mean",
     scaling: str = "amplitude peak",
     edges: Edges = "reflect",
+    engine: SqueezeEngine = "gearsig",
 ) -> TimeFrequencyMap:
     """Return levels of the synchrosqueezed wavelet transform in stretches, never holding the whole matrix.
 
     Parameters
     ----------
-    signal, channel, wavelet, lowest, highest, n_per_octave, edges
+    signal, channel, wavelet, lowest, highest, n_per_octave, edges, engine
         As in `squeezed_cwt`.
     n_columns, reduction, scaling
         As in `cwt_map`.
@@ -178,9 +187,13 @@ def squeezed_cwt_map(
     InputError, RefusalError
         As in `squeezed_cwt`.
     """
-    x, plan, form = _prepared(signal, channel, wavelet, lowest, highest, n_per_octave, edges)
+    x, plan, form = _prepared(signal, channel, wavelet, lowest, highest, n_per_octave, edges, engine)
     columns = plan_columns(x, n_columns)
     powers = ColumnPowers(columns, len(plan.lines), reduction)
+    if is_ssqueezepy(engine):
+        T = cwt_by_ssqueezepy(x, plan.lines, plan.analysed, LEAST_SHARE, wavelet, edges)
+        powers.add(np.arange(len(plan.lines)), 0, 1, T)
+        return powers.finished(x, form, scaling)
     octave = np.floor(np.log2(plan.lines[-1] / plan.lines) + 1e-9)
     for o in np.unique(octave):
         part = np.flatnonzero(octave == o)
@@ -197,12 +210,14 @@ def _prepared(
     highest: float | None,
     n_per_octave: int,
     edges: Edges,
+    engine: SqueezeEngine,
 ) -> tuple[UniformSignal, SqueezingWavelets, Form]:
     """Check what both functions are given, and lay lines and wavelets."""
     x = uniform(signal, channel)
     plan = analysis(x, wavelet, lowest, highest, n_per_octave)
     one_of(edges, "edges", EDGES)
-    lines, method = plan.lines, f"synchrosqueezed CWT, {wavelet.name}"
+    by = " by ssqueezepy" if is_ssqueezepy(engine) else ""
+    lines, method = plan.lines, f"synchrosqueezed CWT{by}, {wavelet.name}"
     form = Form(lines, "logarithmic", method, edge_of(lines, wavelet), n_reach(lines, wavelet), squeezed=True)
     return x, plan, form
 
@@ -279,6 +294,7 @@ def squeezed_stft(
     highest: float | None = None,
     step: int = 1,
     edges: Edges = "reflect",
+    engine: SqueezeEngine = "gearsig",
 ) -> Coefficients:
     """Return the short-time spectra moved to their momentary frequency, at every `step`-th sample.
 
@@ -289,6 +305,8 @@ def squeezed_stft(
     ----------
     signal, channel, window, window_length, zero_padding, lowest, highest, step, edges
         As in `stft`.
+    engine : str
+        As in `squeezed_cwt`.
 
     Returns
     -------
@@ -307,11 +325,12 @@ def squeezed_stft(
     Source: G. Thakur, H.-T. Wu, *Synchrosqueezing-based recovery of instantaneous frequency from nonuniform samples*,
     SIAM Journal on Mathematical Analysis 43 (2011).
     """
+    by = " by ssqueezepy" if is_ssqueezepy(engine) else ""
     x, plan, form = prepared(
-        signal, channel, window, window_length, zero_padding, lowest, highest, edges, squeezed=True
+        signal, channel, window, window_length, zero_padding, lowest, highest, edges, squeezed_by=by
     )
     T = room_for(plan.n_lines, x, step)
-    for frame, part in _squeezed(x, plan, step, edges):
+    for frame, part in _squeezed(x, plan, step, edges, engine):
         T[:, frame : frame + part.shape[1]] = part
     return form.coefficients(T, x, step, np.ones(plan.n_lines))
 
@@ -329,13 +348,14 @@ def squeezed_stft_map(
     reduction: Reduction = "mean",
     scaling: str = "amplitude peak",
     edges: Edges = "reflect",
+    engine: SqueezeEngine = "gearsig",
 ) -> TimeFrequencyMap:
     """Return levels of the synchrosqueezed short-time Fourier transform, never holding the whole matrix.
 
     Parameters
     ----------
-    signal, channel, window, window_length, zero_padding, lowest, highest, edges
-        As in `stft`.
+    signal, channel, window, window_length, zero_padding, lowest, highest, edges, engine
+        As in `squeezed_stft`.
     n_columns, reduction, scaling
         As in `cwt_map`.
 
@@ -348,20 +368,26 @@ def squeezed_stft_map(
     InputError, RefusalError
         As in `stft`.
     """
+    by = " by ssqueezepy" if is_ssqueezepy(engine) else ""
     x, plan, form = prepared(
-        signal, channel, window, window_length, zero_padding, lowest, highest, edges, squeezed=True
+        signal, channel, window, window_length, zero_padding, lowest, highest, edges, squeezed_by=by
     )
     columns = plan_columns(x, n_columns)
     powers = ColumnPowers(columns, plan.n_lines, reduction)
     step = max(1, min(columns.n_per_column, plan.n_window // 16))
     everything = np.arange(plan.n_lines)
-    for frame, part in _squeezed(x, plan, step, edges):
+    for frame, part in _squeezed(x, plan, step, edges, engine):
         powers.add(everything, frame * step, step, part)
     return powers.finished(x, form, scaling)
 
 
-def _squeezed(x: UniformSignal, plan: FramePlan, step: int, edges: Edges) -> Iterator[tuple[int, ComplexArray]]:
-    """Yield (first frame, T) in batches."""
+def _squeezed(
+    x: UniformSignal, plan: FramePlan, step: int, edges: Edges, engine: SqueezeEngine
+) -> Iterator[tuple[int, ComplexArray]]:
+    """Yield (first frame, T) in batches; ssqueezepy knows one batch only."""
+    if is_ssqueezepy(engine):
+        yield 0, stft_by_ssqueezepy(x, plan, step, LEAST_SHARE, edges)
+        return
     lines = plan.lines(x.rate)
     table = squeeze_lines(lines, x.rate, "linear")
     omega = 2 * np.pi / x.rate * lines

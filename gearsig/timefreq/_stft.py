@@ -291,12 +291,13 @@ def prepared(
     highest: float | None,
     edges: Edges,
     *,
-    squeezed: bool = False,
+    squeezed_by: str | None = None,
 ) -> tuple[UniformSignal, FramePlan, Form]:
     """Check what all transforms by frames are given, and plan the frames."""
     x = uniform(signal, channel)
     plan = plan_frames(x, window, window_length, zero_padding, lowest, highest)
     one_of(edges, "edges", EDGES)
-    method = f"{'synchrosqueezed ' if squeezed else ''}STFT, {plan.name}"
+    squeezed = squeezed_by is not None
+    method = f"{'synchrosqueezed ' if squeezed else ''}STFT{squeezed_by or ''}, {plan.name}"
     edge = np.full(plan.n_lines, plan.n_window / 2 / x.rate)
     return x, plan, Form(plan.lines(x.rate), "linear", method, edge, plan.n_reach, squeezed)

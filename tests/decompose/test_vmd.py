@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -248,3 +251,46 @@ def test_random_starts_need_a_generator():
 def test_a_tolerance_above_the_signals_energy_is_no_tolerance():
     with pytest.raises(InputError, match="leave tolerance out"):
         variational_modes(1e-6 * _signal(100), 1.0, VmdSettings(2, tolerance=1e-5))
+
+
+def _by_both_engines(n: int):
+    x = 1e-3 * _signal(n)
+    return x, *(variational_modes(x, 500.0, VmdSettings(3, engine=engine)) for engine in ("gearsig", "vmdpy"))
+
+
+def test_the_engine_vmdpy_gives_the_same_modes():
+    x, ours, theirs = _by_both_engines(1500)
+    assert np.abs(theirs.waveforms - ours.waveforms).max() < 1e-12 * np.abs(x).max()
+    assert theirs.centre_history == pytest.approx(ours.centre_history, rel=1e-12)
+    # Its line at half the sampling rate is the only thing by which its waveforms' spectra differ from the solution.
+    assert theirs.bandwidths == pytest.approx(ours.bandwidths, rel=1e-4)
+    assert theirs.waveforms.sum(axis=0) + theirs.residual == pytest.approx(x, abs=1e-15)
+    assert theirs.converged
+
+
+def test_the_engine_vmdpy_keeps_the_last_sample_of_an_odd_length():
+    x, ours, theirs = _by_both_engines(1501)
+    # One mirrored sample more is another end to the signal: the modes differ there, and little elsewhere.
+    assert np.abs(theirs.waveforms - ours.waveforms)[:, :-100].max() < 1e-3 * np.abs(x).max()
+    assert theirs.centres == pytest.approx(ours.centres, rel=2e-3)
+    assert theirs.waveforms.sum(axis=0) + theirs.residual == pytest.approx(x, abs=1e-15)
+
+
+@pytest.mark.parametrize("wrong", [{"start": "peaks"}, {"start": "random"}, {"max_iterations": 50}])
+def test_what_vmdpy_cannot_be_told_is_refused(wrong):
+    with pytest.raises(InputError, match=r"vmdpy.*gearsig"):
+        VmdSettings(2, engine="vmdpy", **wrong)
+
+
+def test_an_engine_that_is_missing_or_fails_says_so(monkeypatch):
+    monkeypatch.setitem(sys.modules, "vmdpy", None)
+    with pytest.raises(InputError, match="pip install vmdpy"):
+        variational_modes(_signal(64), 1.0, VmdSettings(2, engine="vmdpy"))
+
+    def out_of_memory(*_):
+        raise MemoryError("too much")
+
+    monkeypatch.setitem(sys.modules, "vmdpy", SimpleNamespace(VMD=out_of_memory))
+    with pytest.raises(InputError, match="MemoryError: too much"):
+        variational_modes(_signal(64), 1.0, VmdSettings(2, engine="vmdpy"))
+    assert variational_modes(_signal(64), 1.0, VmdSettings(2)).n_modes == 2

@@ -1,7 +1,8 @@
 """Synchrosqueezed transforms against closed forms and ssqueezepy."""
 
-import os
+import sys
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 import pytest
@@ -76,22 +77,61 @@ def test_whole_signal_comes_back_from_the_sum():
         assert np.sqrt(np.mean((inverse(found).real - x[::step]) ** 2)) < 2e-4
 
 
-def test_same_energy_per_line_as_ssqueezepy():
-    os.environ["SSQ_PARALLEL"] = "0"  # its parallel kernels may abort the process under threads
-    ssqueezepy = pytest.importorskip("ssqueezepy")
-    t = np.arange(8192)
-    x = np.cos(2 * np.pi * (0.02 * t + 4e-6 * t**2)) + 0.5 * np.cos(2 * np.pi * 0.21 * t + 30 * np.cos(t / 900))
-    n_per_octave = 16
-    ours = squeezed_cwt(UniformSignal(x, 1.0), wavelet=Morse(60.0), lowest=0.01, highest=0.4, n_per_octave=n_per_octave)
-    lines = ours.positions
-    wavelet = ssqueezepy.Wavelet(("gmw", {"beta": 60, "gamma": 3}))
-    scales = (20 ** (1 / 3) / (2 * np.pi * lines))[::-1].copy()
-    theirs = np.asarray(ssqueezepy.ssq_cwt(x, wavelet, scales=scales, ssq_freqs=lines.copy())[0])
-    theirs = theirs[::-1] if np.abs(theirs[0]).sum() > np.abs(theirs[-1]).sum() else theirs
-    power, reference = (np.sum(np.abs(v[:, 500:-500]) ** 2, axis=1) for v in (ours.values, theirs))
-    power, reference = power / power.sum(), reference / reference.sum()
-    best = min(np.abs(power - r).sum() for r in (reference, reference[::-1]))
-    assert best < 0.05
+def _tone_and_chirp() -> tuple[UniformSignal, np.ndarray]:
+    t = np.arange(8000) / 2000.0
+    x = 0.8 * np.cos(2 * np.pi * (100 * t + 20 * t**2) + 0.3) + 1.5 * np.cos(2 * np.pi * 500 * t)
+    return UniformSignal(x, 2000.0), 100 + 40 * t
+
+
+@pytest.mark.parametrize(
+    "transform",
+    [
+        partial(squeezed_cwt, wavelet=Morse(60.0), lowest=40, highest=900),
+        partial(squeezed_cwt, wavelet=Morlet(12.0), lowest=40, highest=900, step=3),
+        partial(squeezed_stft, window_length=0.1),
+        partial(squeezed_stft, window="hann", window_length=0.1, lowest=50, highest=800, step=3),
+    ],
+    ids=["cwt morse", "cwt morlet", "stft gaussian", "stft hann"],
+)
+def test_both_engines_give_the_same_amplitude_phase_and_ridge(transform):
+    signal, chirp_hz = _tone_and_chirp()
+    ours, theirs = (transform(signal, engine=engine) for engine in ("gearsig", "ssqueezepy"))
+    assert np.array_equal(theirs.positions, ours.positions)
+    assert np.array_equal(theirs.at, ours.at)
+    assert "ssqueezepy" in theirs.method
+    middle = slice(len(ours.at) // 8, -len(ours.at) // 8)
+    # A frequency that lies on a border may fall to either side, so lines are compared by how few differ.
+    assert np.mean(np.abs(theirs.values - ours.values)[:, middle] > 0.01) < 3e-4
+    assert inverse(theirs)[middle] == pytest.approx(inverse(ours)[middle], abs=2e-4)
+    step = round(ours.at[1] * 2000)
+    assert inverse(theirs).real[middle] == pytest.approx(signal.values[::step][middle], abs=2e-4)
+    low = ours.positions < 350
+    ridge_hz = theirs.positions[low][np.argmax(np.abs(theirs.values[low]), axis=0)]
+    spacing_hz = np.gradient(ours.positions)[low].max()
+    assert np.abs(ridge_hz - chirp_hz[::step])[middle].max() < 1.01 * spacing_hz
+
+
+@pytest.mark.parametrize(
+    "transform",
+    [partial(squeezed_cwt_map, lowest=40, highest=900), partial(squeezed_stft_map, window_length=0.1)],
+    ids=["cwt", "stft"],
+)
+def test_both_engines_give_the_same_map(transform):
+    signal, _ = _tone_and_chirp()
+    ours, theirs = (transform(signal, engine=engine, n_columns=200).values for engine in ("gearsig", "ssqueezepy"))
+    assert np.square(theirs).sum() == pytest.approx(np.square(ours).sum(), rel=2e-3)
+    assert np.corrcoef(theirs.ravel(), ours.ravel())[0, 1] > 0.9995
+
+
+def test_an_engine_that_is_missing_unknown_or_too_large_is_refused(monkeypatch):
+    signal, _ = _tone_and_chirp()
+    with pytest.raises(InputError, match="ssqueezepy"):
+        squeezed_cwt(signal, engine="ssqueeze")
+    with pytest.raises(InputError, match=r"GB.*gearsig"):
+        squeezed_cwt_map(UniformSignal(np.tile(signal.values, 250), 2000.0), engine="ssqueezepy")
+    monkeypatch.setitem(sys.modules, "ssqueezepy", None)
+    with pytest.raises(InputError, match="pip install ssqueezepy"):
+        squeezed_stft(signal, engine="ssqueezepy")
 
 
 def test_map_is_the_mean_of_the_matrix(crossing):
