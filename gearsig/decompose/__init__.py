@@ -1,12 +1,9 @@
 """Signals taken apart: variational modes, wavelet denoising."""
 
-from gearsig.decompose._long_signals import joined, long_modes, modes_by_block
+from gearsig.decompose._long_signals import joined, long_modes, modes_by_block, vmd
 from gearsig.decompose._suggestion import ModeSuggestion, ModeTrial, noise_width, suggest_modes
 from gearsig.decompose._types import ModeAxis, Modes, StartName, VmdEngine, VmdSettings
 from gearsig.decompose._vmd import (
-    angle_modes,
-    channel_envelope_modes,
-    channel_modes,
     envelope_modes,
     mode_spectra,
     peak_centres,
@@ -35,11 +32,8 @@ __all__ = [
     "StartName",
     "VmdEngine",
     "VmdSettings",
-    "angle_modes",
     "apply",
     "bayes",
-    "channel_envelope_modes",
-    "channel_modes",
     "deepest_level",
     "denoise",
     "denoise_channel",
@@ -55,4 +49,5 @@ __all__ = [
     "sure",
     "universal",
     "variational_modes",
+    "vmd",
 ]

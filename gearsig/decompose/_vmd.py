@@ -7,13 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
-from gearsig.angle import AngleSignal
 from gearsig.checks import FloatArray, positive
 from gearsig.decompose._types import ModeAxis, Modes, VmdSettings, check_supported, mode_notes
 from gearsig.engines import engine_module
 from gearsig.errors import InputError, RefusalError
-from gearsig.recording import Recording
-from gearsig.spectra import Envelope, EnvelopeKind, Spectrum, amplitude_spectrum, band_envelope, checked_signal
+from gearsig.spectra import Envelope, Spectrum, amplitude_spectrum, checked_signal
 
 # --------------------
 # Where the modes' centre frequencies start.
@@ -432,74 +430,22 @@ def _rows(blocks, n, space):  # type: ignore[no-untyped-def]
 
 
 # --------------------
-# Modes of a recording's channel, of a signal over angle, of a band's envelope.
+# Modes of an envelope.
 # --------------------
-
-
-def channel_modes(
-    recording: Recording, channel: str, settings: VmdSettings, *, rng: np.random.Generator | None = None
-) -> Modes:
-    """Return the modes of one channel over frequency; see `variational_modes`."""
-    return variational_modes(
-        recording.values(channel),
-        recording.sampling_rate_hz,
-        settings,
-        rng=rng,
-        unit=recording.channels[recording.index(channel)].unit,
-        source=channel,
-    )
-
-
-def angle_modes(
-    signal: AngleSignal, channel: str, settings: VmdSettings, *, rng: np.random.Generator | None = None
-) -> Modes:
-    """Return the modes of one channel over the shaft's angle: centres and bandwidths are orders.
-
-    At variable speed an order stays one narrow mode, where over time it would be smeared.
-    """
-    return variational_modes(
-        signal.values(channel),
-        float(signal.samples_per_revolution),
-        settings,
-        rng=rng,
-        axis="order",
-        unit=signal.units[signal.channel_names.index(channel)],
-        source=f"{channel} over angle",
-        shaft=signal.shaft_angle.shaft,
-    )
 
 
 def envelope_modes(envelope: Envelope, settings: VmdSettings, *, rng: np.random.Generator | None = None) -> Modes:
     """Return the modes of an envelope, its mean taken out first and kept as `offset`.
 
     Centres are modulation frequencies, the sampling rate is the envelope's own. Without its mean the envelope shows
-    the modulation alone; the mean would be a mode of its own that outweighs the others.
+    the modulation alone; the mean would be a mode of its own that outweighs the others. Take the magnitude, whose modes
+    are the amplitude modulation's own lines; a squared envelope adds their sums and differences.
     """
     mean = float(envelope.values.mean(dtype=np.float64))
     modes = variational_modes(
         envelope.values - mean, envelope.sampling_rate_hz, settings, rng=rng, unit=envelope.unit, source=envelope.source
     )
     return replace(modes, offset=mean)
-
-
-def channel_envelope_modes(
-    recording: Recording,
-    channel: str,
-    band_hz: tuple[float, float],
-    settings: VmdSettings,
-    *,
-    kind: EnvelopeKind = "magnitude",
-    rng: np.random.Generator | None = None,
-) -> Modes:
-    """Return the modes of the envelope of one channel's band; see `envelope_modes` and `band_envelope`.
-
-    The magnitude is in the channel's unit, and its modes are the amplitude modulation's own lines; the squared envelope
-    adds their sums and differences.
-    """
-    unit = recording.channels[recording.index(channel)].unit
-    values = recording.values(channel)
-    envelope = band_envelope(values, recording.sampling_rate_hz, band_hz, kind=kind, unit=unit, source=channel)
-    return envelope_modes(envelope, settings, rng=rng)
 
 
 # --------------------

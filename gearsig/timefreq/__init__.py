@@ -15,7 +15,7 @@ from gearsig.timefreq._squeezed import squeeze_lines, squeezed_cwt, squeezed_cwt
 from gearsig.timefreq._ssqueezepy import SqueezeEngine
 from gearsig.timefreq._stft import stft, stft_map
 from gearsig.timefreq._types import Axis, Reduction, Ridge, TimeFrequencyMap, at_label, axis_label
-from gearsig.timefreq._uniform import UniformSignal, uniform
+from gearsig.timefreq._uniform import Source, UniformSignal, uniform
 from gearsig.timefreq._wavelets import (
     Morlet,
     Morse,
@@ -35,6 +35,7 @@ __all__ = [
     "Morse",
     "Reduction",
     "Ridge",
+    "Source",
     "SqueezeEngine",
     "TimeFrequencyMap",
     "UniformSignal",

@@ -19,27 +19,27 @@ TONES = np.stack([np.cos(0.2 * SAMPLES), 0.5 * np.cos(1.3 * SAMPLES + 0.4)])
 def test_stretches_cover_the_signal_once_and_sum_to_it(n, n_per_block, overlap):
     x = TONES.sum(axis=0)[:n]
     exact = VmdSettings(2, penalty=20.0, dual_step=0.5, tolerance=0.0)
-    stretches = list(modes_by_block(x, 1.0, exact, n_per_block=n_per_block, overlap=overlap))
-    ends = [s.start + s.waveforms.shape[1] for s in stretches]
-    assert [s.start for s in stretches] == [0, *ends[:-1]]
+    segments = list(modes_by_block(x, 1.0, exact, n_per_block=n_per_block, overlap=overlap))
+    ends = [s.start + s.waveforms.shape[1] for s in segments]
+    assert [s.start for s in segments] == [0, *ends[:-1]]
     assert ends[-1] == n
     # The line at half the sampling rate is all that an exact block leaves; a sample doubled or left out would jump.
-    assert np.abs(joined(stretches).sum(axis=0) - x).max() < 1e-2
-    assert all(0 < s.n_fade <= s.waveforms.shape[1] for s in stretches[1:])
+    assert np.abs(joined(segments).sum(axis=0) - x).max() < 1e-2
+    assert all(0 < s.n_fade <= s.waveforms.shape[1] for s in segments[1:])
 
 
 def test_a_short_signal_is_one_block():
-    (stretch,) = modes_by_block(TONES.sum(axis=0), 1.0, VmdSettings(2))
+    (segment,) = modes_by_block(TONES.sum(axis=0), 1.0, VmdSettings(2))
     whole = variational_modes(TONES.sum(axis=0), 1.0, VmdSettings(2))
-    assert np.array_equal(stretch.waveforms, whole.waveforms)
-    assert (stretch.n_fade, stretch.start) == (0, 0)
+    assert np.array_equal(segment.waveforms, whole.waveforms)
+    assert (segment.n_fade, segment.start) == (0, 0)
 
 
 def test_steady_tones_go_on_over_the_seams():
-    stretches = list(modes_by_block(TONES.sum(axis=0), 1.0, VmdSettings(2), n_per_block=3000))
-    assert len(stretches) > 5
-    assert max(s.seam_mismatch.max() for s in stretches) < 0.1
-    error = joined(stretches)[:, 200:-200] - TONES[:, 200:-200]
+    segments = list(modes_by_block(TONES.sum(axis=0), 1.0, VmdSettings(2), n_per_block=3000))
+    assert len(segments) > 5
+    assert max(s.seam_mismatch.max() for s in segments) < 0.1
+    error = joined(segments)[:, 200:-200] - TONES[:, 200:-200]
     assert np.sqrt(np.mean(error**2)) < 0.02
 
 
@@ -53,15 +53,15 @@ def test_a_frequency_that_wanders_is_followed():
 
 def test_a_component_that_ends_shows_at_its_seam():
     second = np.where(SAMPLES < 10_000, np.cos(1.3 * SAMPLES), np.cos(2.2 * SAMPLES))
-    stretches = list(modes_by_block(TONES[0] + second, 1.0, VmdSettings(2), n_per_block=3000))
-    mismatch = np.array([s.seam_mismatch for s in stretches])
+    segments = list(modes_by_block(TONES[0] + second, 1.0, VmdSettings(2), n_per_block=3000))
+    mismatch = np.array([s.seam_mismatch for s in segments])
     assert mismatch[:, 0].max() < 0.2
     assert mismatch[:, 1].max() > 0.3
 
 
 def test_the_mode_at_zero_stays_first():
-    stretches = modes_by_block(TONES[1] + 2.0, 1.0, VmdSettings(2, zero_mode=True), n_per_block=3000)
-    assert all(s.centres[0] == 0.0 for s in stretches)
+    segments = modes_by_block(TONES[1] + 2.0, 1.0, VmdSettings(2, zero_mode=True), n_per_block=3000)
+    assert all(s.centres[0] == 0.0 for s in segments)
 
 
 def test_a_block_without_signal_has_no_modes():
@@ -77,5 +77,5 @@ def test_blocks_that_do_not_do(wrong):
 
 
 def test_nothing_to_join():
-    with pytest.raises(InputError, match="stretches"):
+    with pytest.raises(InputError, match="segments"):
         joined([])

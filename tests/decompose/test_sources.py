@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearsig.angle import AngleSignal, ShaftAngle
-from gearsig.decompose import VmdSettings, angle_modes, channel_envelope_modes, channel_modes, envelope_modes
+from gearsig.decompose import VmdSettings, envelope_modes, vmd
 from gearsig.errors import InputError
 from gearsig.recording import Channel, Recording, read_recording
 from gearsig.spectra import band_envelope
@@ -27,7 +27,7 @@ def _recording(*rows: np.ndarray) -> Recording:
 
 def test_a_channels_modes_carry_its_name_and_unit():
     x = np.cos(2 * np.pi * 200 * TIME) + 0.5 * np.cos(2 * np.pi * 2000 * TIME)
-    modes = channel_modes(_recording(MODULATED, x), "a2", VmdSettings(2))
+    modes = vmd(_recording(MODULATED, x), 2, "a2")
     assert modes.centre_frequencies_hz == pytest.approx([200.0, 2000.0], abs=1.0)
     assert (modes.source, modes.unit, modes.sampling_rate) == ("a2", "g", FS)
     assert modes.rms == pytest.approx([0.707, 0.354], abs=0.01)
@@ -40,7 +40,7 @@ def test_over_angle_the_centres_are_orders():
     x = np.cos(2 * np.pi * 23 * revolutions) + 0.5 * np.cos(2 * np.pi * 4 * revolutions)
     angle = ShaftAngle("input", np.array([0.0, 10.0]), np.array([0.0, 80.0]), np.array([4.0, 12.0]), "constant")
     signal = AngleSignal(x[None, :], 256, angle, 0.0, ("a1",), ("m/s^2",), 100.0)
-    modes = angle_modes(signal, "a1", VmdSettings(2, start=(4.0, 23.0)))
+    modes = vmd(signal, VmdSettings(2, start=(4.0, 23.0)))
     assert modes.centres == pytest.approx([4.0, 23.0], abs=0.05)
     assert (modes.axis, modes.shaft, modes.unit) == ("order", "input", "m/s^2")
     assert "order" in modes.describe()
@@ -49,7 +49,8 @@ def test_over_angle_the_centres_are_orders():
 
 
 def test_modes_of_the_envelope_are_its_modulations():
-    modes = channel_envelope_modes(_recording(MODULATED), "a1", (2700, 3300), VmdSettings(2, start="peaks"))
+    envelope = band_envelope(MODULATED, FS, (2700, 3300), kind="magnitude", unit="g", source="a1")
+    modes = envelope_modes(envelope, VmdSettings(2, start="peaks"))
     assert modes.centre_frequencies_hz == pytest.approx([20.0, 90.0], abs=0.5)
     assert modes.rms * np.sqrt(2) == pytest.approx([1.0, 0.6], abs=0.02)
     assert modes.offset == pytest.approx(2.0, abs=1e-6)
@@ -69,5 +70,6 @@ def test_the_outer_race_shows_in_a_mode_of_the_measured_envelope():
     recording = read_recording(path)
     name = recording.vibration_names()[0]
     settings = VmdSettings(4, penalty=20_000.0, start="peaks")
-    modes = channel_envelope_modes(recording, name, (2000, 2600), settings, kind="magnitude")
+    envelope = band_envelope(recording.values(name), recording.sampling_rate_hz, (2000, 2600), kind="magnitude")
+    modes = envelope_modes(envelope, settings)
     assert np.abs(modes.centres - 81.125).min() < 4.0

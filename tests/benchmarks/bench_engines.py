@@ -1,0 +1,101 @@
+"""gearsig's own transforms beside vmdpy and ssqueezepy as engines. Run: python tests/benchmarks/bench_engines.py.
+
+Prints a Markdown table: largest difference over the signal's largest value, processor time (best of interleaved
+rounds, compiled before), and by how much the process grew at its peak, each engine in a process of its own (Linux).
+"""
+
+# ruff: noqa: E402 - the number of threads must be set before numpy is loaded
+
+import os
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ[_name] = "1"
+
+import subprocess
+import sys
+import time
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from gearsig.decompose import VmdSettings, vmd
+from gearsig.timefreq import Morse, UniformSignal, inverse, squeezed_cwt, squeezed_cwt_map, squeezed_stft
+
+RATE_HZ = 10_000.0
+N_ROUNDS = 3
+
+
+def _signal(n: int) -> UniformSignal:
+    """Return two tones, a chirp and noise."""
+    t = np.arange(n) / RATE_HZ
+    tones = np.cos(2 * np.pi * 200 * t) + 0.5 * np.cos(2 * np.pi * 1000 * t)
+    chirp = 0.7 * np.cos(2 * np.pi * (2500 * t + 250 * t**2 / t[-1]))
+    return UniformSignal(tones + chirp + 0.1 * np.random.default_rng(0).normal(size=n), RATE_HZ, unit="m/s^2")
+
+
+def _waveforms(signal, engine):
+    return vmd(signal, VmdSettings(3, tolerance=1e-4), engine=engine).waveforms
+
+
+def _back(transform, signal, engine):
+    return inverse(transform(signal, engine=engine))
+
+
+CWT = partial(squeezed_cwt, wavelet=Morse(60.0), lowest=50, highest=4500)
+STFT = partial(squeezed_stft, window_length=0.0512, step=4)
+CASES = {
+    "VMD, 3 modes, 2¹³ samples": (2**13, _waveforms, "vmdpy"),
+    "VMD, 3 modes, 2¹⁵ samples": (2**15, _waveforms, "vmdpy"),
+    "squeezed CWT, 208 lines, 2¹⁶ samples; sum over the lines": (2**16, partial(_back, CWT), "ssqueezepy"),
+    "its map, 1000 columns": (
+        2**16,
+        lambda x, engine: squeezed_cwt_map(x, wavelet=Morse(60.0), lowest=50, highest=4500, engine=engine).values,
+        "ssqueezepy",
+    ),
+    "squeezed STFT, 513 lines, 2¹⁶ samples, each 4th; sum": (2**16, partial(_back, STFT), "ssqueezepy"),
+}
+
+
+def _peak_mb() -> float:
+    """Return the process's own largest resident size; getrusage would hand down the parent's."""
+    return int(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0]) / 1e3
+
+
+def _growth_mb(name: str, engine: str) -> float:
+    command = [sys.executable, __file__, "--memory", name, engine]
+    return float(subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()[-1])
+
+
+def _grow(name: str, engine: str) -> None:
+    n, run, _ = CASES[name]
+    run(_signal(512 if "VMD" in name else 4096), engine)  # compiles and loads
+    before = _peak_mb()
+    run(_signal(n), engine)
+    print(_peak_mb() - before)
+
+
+def main() -> None:
+    """Print the table."""
+    print(f"| case | engine | difference | time ratio | peak, MB | gearsig's peak, MB |\n|{'---|' * 6}")
+    for name, (n, run, other) in CASES.items():
+        signal, best, results = _signal(n), dict.fromkeys(("gearsig", other), np.inf), {}
+        for _ in range(N_ROUNDS):
+            for engine in best:
+                start = time.process_time()
+                results[engine] = run(signal, engine)
+                best[engine] = min(best[engine], time.process_time() - start)
+        inside = slice(results[other].shape[-1] // 10, -results[other].shape[-1] // 10)
+        apart = np.abs(results[other] - results["gearsig"])
+        apart = apart if "map" in name else apart[..., inside]
+        difference = float(np.sqrt(np.mean(apart**2))) if "map" in name else float(apart.max())
+        difference /= float(np.abs(signal.values).max())
+        ratio, peaks = best[other] / best["gearsig"], [_growth_mb(name, e) for e in (other, "gearsig")]
+        print(f"| {name} | {other} | {difference:.1e} | {ratio:.1f} | {peaks[0]:.0f} | {peaks[1]:.0f} |", flush=True)
+
+
+if __name__ == "__main__":
+    if "--memory" in sys.argv:
+        _grow(*sys.argv[-2:])
+    else:
+        main()
