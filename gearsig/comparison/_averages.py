@@ -13,6 +13,7 @@ from gearsig.checks import FloatArray
 from gearsig.comparison._types import Agreement, Alignment, LevelPair, Repeated, power_levels
 from gearsig.errors import InputError
 from gearsig.orders import whole_revolutions
+from gearsig.prepared import shift_scores, turned_lines
 
 ComplexArray = NDArray[np.complex128]
 
@@ -46,8 +47,7 @@ class HalvedLines:
 
     def turned(self, shift_rev: float) -> HalvedLines:
         """Return the lines of the average turned forward by `shift_rev`."""
-        phase = np.exp(-2j * np.pi * np.arange(self.first.shape[1]) * shift_rev)
-        return replace(self, first=self.first * phase, second=self.second * phase)
+        return replace(self, first=turned_lines(self.first, shift_rev), second=turned_lines(self.second, shift_rev))
 
     def up_to(self, highest: int) -> HalvedLines:
         """Return the lines up to an order."""
@@ -142,7 +142,7 @@ def align(
     spread = np.hypot(_apart(shifts[0], shifts[1]), _apart(shifts[2], shifts[3])) / 2.0
     certain = None if n_teeth is None else _is_certain(x, y, best, shifts, n_teeth)
     if by_marks:
-        gain = float(_score(cross, np.array([best]))[0] - _score(cross, np.zeros(1))[0])
+        gain = float(shift_scores(cross, np.array([best]))[0] - shift_scores(cross, np.zeros(1))[0])
         return Alignment(shaft, "marks", 0.0, 0.0, certain, 360.0 * best, gain)
     return Alignment(shaft, "correlation", 360.0 * best, 360.0 * float(spread), certain)
 
@@ -157,11 +157,6 @@ def _cross(x: ComplexArray, y: ComplexArray) -> ComplexArray:
     return mean
 
 
-def _score(cross: ComplexArray, shifts: FloatArray) -> FloatArray:
-    scores: FloatArray = np.real(np.exp(2j * np.pi * np.outer(shifts, np.arange(len(cross)))) @ cross)
-    return scores
-
-
 def _best_shift(cross: ComplexArray) -> float:
     """Return the shift with the highest score, -0.5 to 0.5 revolutions."""
     from scipy.fft import ifft, next_fast_len
@@ -172,7 +167,7 @@ def _best_shift(cross: ComplexArray) -> float:
     n = next_fast_len(PER_CYCLE * len(cross))
     start = int(np.argmax(np.real(ifft(cross, n)))) / n
     found = minimize_scalar(
-        lambda s: -float(_score(cross, np.array([s]))[0]),
+        lambda s: -float(shift_scores(cross, np.array([s]))[0]),
         bounds=(start - 1.0 / n, start + 1.0 / n),
         method="bounded",
         options={"xatol": 1e-9},
@@ -193,7 +188,7 @@ def _is_certain(x: ComplexArray, y: ComplexArray, best: float, shifts: list[floa
     if max(_apart(best, shift) for shift in shifts) >= 0.5 / n_teeth:
         return False
     telling = np.arange(x.shape[1]) % n_teeth != 0
-    alike = _score(_cross(np.where(telling, x, 0.0), np.where(telling, y, 0.0)), np.array([best]))[0]
+    alike = shift_scores(_cross(np.where(telling, x, 0.0), np.where(telling, y, 0.0)), np.array([best]))[0]
     return bool(alike > LEAST_ALIKE)
 
 

@@ -16,7 +16,7 @@ from gearsig.diagnosis._signals import AnalysisSignals, ShaftSignals
 from gearsig.diagnosis._speed import mesh_is_confirmed
 from gearsig.diagnosis._types import WITH_ASSUMED_DATA, Finding, Kind, Strength, Where, from_p_value, p_text
 from gearsig.orders import whole_revolutions
-from gearsig.prepared import has_mark
+from gearsig.prepared import has_mark, sliding_mean, strongest_window
 
 # --------------------
 # Whether the energy of a periodic signal is gathered at one angle, more than its spectrum alone would make it.
@@ -101,14 +101,11 @@ def localise(
     scale = np.sqrt(np.mean(signals**2, axis=1, keepdims=True))
     used = scale[:, 0] > 0
     x = signals[used] / scale[used]
-    kernel = np.conj(np.fft.rfft(np.r_[np.ones(width) / width, np.zeros(n - width)]))
-    energies = _window_energy(x**2, kernel, n)
-    joint = energies.sum(axis=0)
-    start = int(np.argmax(joint))
-    ratio = float(joint[start] / np.median(joint))
+    energies = sliding_mean(x**2, width)
+    start, ratio = strongest_window(energies.sum(axis=0))
     drawn = np.empty(0)
     for surrogates in _surrogates(x, n_surrogates, rng):
-        drawn = np.append(drawn, _ratios(surrogates, kernel, n))
+        drawn = np.append(drawn, _ratios(surrogates, width))
         if np.sum(drawn >= ratio) >= _ENOUGH_HIGHER:
             break
     inside = (start + np.arange(width)) % n
@@ -169,12 +166,6 @@ def _onset(x: FloatArray, start: int, width: int) -> float:
     return float(((start - short + rise + short / 2) / n) % 1.0)
 
 
-def _window_energy(square: FloatArray, kernel: np.ndarray, n: int) -> FloatArray:
-    """Return the mean square in the window that starts at each angle, by circular correlation."""
-    energy: FloatArray = np.fft.irfft(np.fft.rfft(square, axis=-1) * kernel, n, axis=-1)
-    return energy
-
-
 def _surrogates(x: FloatArray, n_surrogates: int, rng: np.random.Generator) -> Iterator[FloatArray]:
     """Yield surrogates of all channels, (n, n_channels, n_angles), in bounded portions."""
     n = x.shape[1]
@@ -188,8 +179,8 @@ def _surrogates(x: FloatArray, n_surrogates: int, rng: np.random.Generator) -> I
         done += m
 
 
-def _ratios(surrogates: FloatArray, kernel: np.ndarray, n: int) -> FloatArray:
-    joint = _window_energy(surrogates**2, kernel, n).sum(axis=1)
+def _ratios(surrogates: FloatArray, width: int) -> FloatArray:
+    joint = sliding_mean(np.sum(surrogates**2, axis=1), width)
     ratios: FloatArray = joint.max(axis=1) / np.median(joint, axis=1)
     return ratios
 
@@ -315,8 +306,7 @@ def _peaks(differences: FloatArray, width: int) -> tuple[float, ...]:
     n = differences.shape[1]
     scale = np.mean(differences**2, axis=1, keepdims=True)
     square = np.sum(differences**2 / np.where(scale > 0, scale, 1.0), axis=0)
-    total = np.concatenate([[0.0], np.cumsum(np.concatenate([square, square[:width]]))])
-    energy = total[width : width + n] - total[:n]
+    energy = sliding_mean(square, width)
     floor = float(np.median(energy))
     limit = floor + PEAK_SHARE * (float(energy.max()) - floor)
     found: list[int] = []

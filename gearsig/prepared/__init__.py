@@ -24,6 +24,7 @@ from gearsig.prepared._lines import (
     tail_probability,
 )
 from gearsig.prepared._recording import PreparedRecording, has_mark, prepare
+from gearsig.prepared._revolution import shift_scores, sliding_mean, strongest_window, turned_lines
 
 __all__ = [
     "INNER_LINES",
@@ -46,5 +47,9 @@ __all__ = [
     "prepare",
     "refined_angle",
     "score_needed",
+    "shift_scores",
+    "sliding_mean",
+    "strongest_window",
     "tail_probability",
+    "turned_lines",
 ]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.prepared import PreparedRecording
+from gearsig.prepared import PreparedRecording, shift_scores, sliding_mean, strongest_window, turned_lines
 from gearsig.rig import GearPair
 
 # --------------------
@@ -148,28 +148,30 @@ def find_event(shaft: ShaftLines) -> ToothEvent:
     Each band's mean square envelope is divided by its median over the revolution before bands and channels are added:
     what a resonance or a gain multiplies, it multiplies at all teeth.
     """
-    envelopes = band_envelopes(shaft)
-    n = envelopes.shape[-1]
-    width = round(WINDOW_PITCHES * n / shaft.teeth)
-    energy = sliding_mean(envelopes, width)
-    median = np.median(energy, axis=-1, keepdims=True)
-    relative = np.divide(energy, median, out=np.ones_like(energy), where=median > 0).mean(axis=(0, 1))
-    start = int(np.argmax(relative))
+    energy, median, width = _window_energies(shaft)
+    relative = np.divide(energy, median[..., None], out=np.ones_like(energy), where=median[..., None] > 0)
+    start, prominence = strongest_window(relative.mean(axis=(0, 1)))
     return ToothEvent(
-        centre_rev=float((start + width / 2) / n % 1.0),
-        prominence=float(relative[start] / np.median(relative)),
+        centre_rev=float((start + width / 2) / energy.shape[-1] % 1.0),
+        prominence=prominence,
         window=energy[:, :, start],
-        background=median[:, :, 0],
+        background=median,
     )
 
 
 def event_windows(shaft: ShaftLines, event: ToothEvent) -> tuple[FloatArray, FloatArray]:
     """Return each band's mean square envelope in the event's window and the median one, (n_bands + 1, n_channels)."""
+    energy, median, width = _window_energies(shaft)
+    n = energy.shape[-1]
+    return energy[:, :, round(event.centre_rev * n - width / 2) % n], median
+
+
+def _window_energies(shaft: ShaftLines) -> tuple[FloatArray, FloatArray, int]:
+    """Return the mean square envelope in the window from each angle on, its median, and the window's width."""
     envelopes = band_envelopes(shaft)
-    n = envelopes.shape[-1]
-    width = round(WINDOW_PITCHES * n / shaft.teeth)
+    width = round(WINDOW_PITCHES * envelopes.shape[-1] / shaft.teeth)
     energy = sliding_mean(envelopes, width)
-    return energy[:, :, round(event.centre_rev * n - width / 2) % n], np.median(energy, axis=-1)
+    return energy, np.median(energy, axis=-1), width
 
 
 def band_envelopes(shaft: ShaftLines) -> FloatArray:
@@ -199,11 +201,9 @@ def without_regular_lines(shaft: ShaftLines) -> np.ndarray:
     return lines
 
 
-def sliding_mean(values: FloatArray, width: int) -> FloatArray:
-    """Return the mean over the window that starts at each sample of a periodic signal."""
-    doubled = np.concatenate([np.zeros((*values.shape[:-1], 1)), values, values[..., :width]], axis=-1).cumsum(axis=-1)
-    mean: FloatArray = (doubled[..., width:-1] - doubled[..., : values.shape[-1]]) / width
-    return mean
+# --------------------
+# The numbers that the depth is read from.
+# --------------------
 
 
 FEATURES = (
@@ -429,14 +429,13 @@ def difference_lines(now: ShaftLines, sound: ShaftLines, *, whole_teeth: bool) -
     """
     check_same_speed(now, sound)
     highest = min(now.highest_order, sound.highest_order)
-    orders = np.arange(highest + 1)
     x, r = now.lines[:, : highest + 1], sound.lines[:, : highest + 1]
     cross = _weighted_cross(x, r, now.teeth)
     shifts = _shifts(now, sound, whole_teeth)
-    scores = np.real(np.exp(2j * np.pi * np.outer(shifts, orders)) @ cross)
+    scores = shift_scores(cross, shifts)
     best = int(np.argmax(scores))
     agreement = float(scores[best] / np.abs(cross).sum()) if np.any(cross) else 0.0
-    turned = r * np.exp(-2j * np.pi * orders * shifts[best])
+    turned = turned_lines(r, float(shifts[best]))
     return replace(now, lines=x - _matched(turned, x, now.teeth), highest_order=highest), agreement
 
 
