@@ -6,86 +6,92 @@ The main job in three lines:
 >>> result = gearsig.analyze(gearsig.read_recording("gearbox.csv", rig=gearsig.read_rig("rig.toml")))  # doctest: +SKIP
 >>> print(gearsig.analysis_text(result))  # doctest: +SKIP
 
-Everything else is imported from its room, e.g. `from gearsig.orders import synchronous_average`.
+Single methods take a recording and a channel's name, or a plain array and its sampling rate:
+
+>>> recording = gearsig.read_recording("gearbox.csv")  # doctest: +SKIP
+>>> gearsig.order_spectrum(recording, "a1"), gearsig.envelope_spectrum(recording, "a1")  # doctest: +SKIP
+>>> import numpy as np
+>>> tone = np.sin(2 * np.pi * 50.0 * np.arange(1000) / 1000.0)
+>>> round(float(gearsig.amplitude_spectrum(tone, 1000.0).values[50]), 9)
+1.0
+
+Everything else is imported from its room, e.g. `from gearsig.orders import separate_shafts`.
 """
 
 from __future__ import annotations
 
+import ast
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+# The one table of names: type checkers follow it (`x as x` exports x), and `__getattr__` below reads it, so that a room
+# is loaded when a name of it is first used and `import gearsig` stays light.
 if TYPE_CHECKING:
-    from gearsig.diagnosis import AnalysisSettings, analyze
-    from gearsig.errors import GearsigError, InputError, RefusalError
-    from gearsig.recording import Channel, Recording, read_recording, write_recording
-    from gearsig.report import analysis_text
-    from gearsig.rig import (
-        Bearing,
-        ConstantSpeed,
-        EncoderChannel,
-        GearPair,
-        OperatingPoint,
-        PulseTimes,
-        Rig,
-        Sensor,
-        Shaft,
-        SpeedChannel,
-        TachometerChannel,
-        read_rig,
-    )
+    from gearsig.angle import AngleSignal as AngleSignal
+    from gearsig.angle import ShaftAngle as ShaftAngle
+    from gearsig.angle import find_shaft_angle as find_shaft_angle
+    from gearsig.angle import resample_to_angle as resample_to_angle
+    from gearsig.comparison import compare_recordings as compare_recordings
+    from gearsig.diagnosis import AnalysisSettings as AnalysisSettings
+    from gearsig.diagnosis import analyze as analyze
+    from gearsig.errors import GearsigError as GearsigError
+    from gearsig.errors import InputError as InputError
+    from gearsig.errors import RefusalError as RefusalError
+    from gearsig.gap import diagnose_gap as diagnose_gap
+    from gearsig.indicators import gear_indicators as gear_indicators
+    from gearsig.indicators import time_indicators as time_indicators
+    from gearsig.orders import order_map as order_map
+    from gearsig.orders import order_spectrum as order_spectrum
+    from gearsig.orders import synchronous_average as synchronous_average
+    from gearsig.orders import track_orders as track_orders
+    from gearsig.orders import track_vold_kalman as track_vold_kalman
+    from gearsig.prepared import PreparedRecording as PreparedRecording
+    from gearsig.recording import Channel as Channel
+    from gearsig.recording import Recording as Recording
+    from gearsig.recording import read_recording as read_recording
+    from gearsig.recording import write_recording as write_recording
+    from gearsig.report import analysis_text as analysis_text
+    from gearsig.rig import Bearing as Bearing
+    from gearsig.rig import ConstantSpeed as ConstantSpeed
+    from gearsig.rig import EncoderChannel as EncoderChannel
+    from gearsig.rig import GearPair as GearPair
+    from gearsig.rig import OperatingPoint as OperatingPoint
+    from gearsig.rig import PulseTimes as PulseTimes
+    from gearsig.rig import Rig as Rig
+    from gearsig.rig import Sensor as Sensor
+    from gearsig.rig import Shaft as Shaft
+    from gearsig.rig import SpeedChannel as SpeedChannel
+    from gearsig.rig import TachometerChannel as TachometerChannel
+    from gearsig.rig import read_rig as read_rig
+    from gearsig.severity import estimate_crack as estimate_crack
+    from gearsig.spectra import Spectrum as Spectrum
+    from gearsig.spectra import amplitude_spectrum as amplitude_spectrum
+    from gearsig.spectra import cepstrum as cepstrum
+    from gearsig.spectra import envelope_spectrum as envelope_spectrum
+    from gearsig.spectra import kurtogram as kurtogram
+    from gearsig.spectra import power_density as power_density
+    from gearsig.spectra import spectral_coherence as spectral_coherence
 
 __version__ = "0.1.0"
 
-_HOMES = {
-    "AnalysisSettings": "gearsig.diagnosis",
-    "analyze": "gearsig.diagnosis",
-    "analysis_text": "gearsig.report",
-    "GearsigError": "gearsig.errors",
-    "InputError": "gearsig.errors",
-    "RefusalError": "gearsig.errors",
-    "read_recording": "gearsig.recording",
-    "write_recording": "gearsig.recording",
-    "Channel": "gearsig.recording",
-    "Recording": "gearsig.recording",
-    "read_rig": "gearsig.rig",
-    **dict.fromkeys(
-        ("ConstantSpeed", "EncoderChannel", "PulseTimes", "SpeedChannel", "TachometerChannel"), "gearsig.rig"
-    ),
-    **dict.fromkeys(("Bearing", "GearPair", "OperatingPoint", "Rig", "Sensor", "Shaft"), "gearsig.rig"),
-}
 
-__all__ = [
-    "AnalysisSettings",
-    "Bearing",
-    "Channel",
-    "ConstantSpeed",
-    "EncoderChannel",
-    "GearPair",
-    "GearsigError",
-    "InputError",
-    "OperatingPoint",
-    "PulseTimes",
-    "Recording",
-    "RefusalError",
-    "Rig",
-    "Sensor",
-    "Shaft",
-    "SpeedChannel",
-    "TachometerChannel",
-    "analysis_text",
-    "analyze",
-    "read_recording",
-    "read_rig",
-    "write_recording",
-]
+def _rooms() -> dict[str, str]:
+    """Return the room of each public name, as the table above says."""
+    table = next(node for node in ast.parse(Path(__file__).read_text("utf-8")).body if isinstance(node, ast.If))
+    return {name.name: str(node.module) for node in table.body for name in node.names}  # type: ignore[attr-defined]
+
+
+_ROOMS = _rooms()
+
+__all__ = sorted(_ROOMS)  # noqa: PLE0605 - a list of names
 
 
 def __getattr__(name: str) -> Any:
-    """Load a public name from its room when it is first used, so that `import gearsig` stays light."""
-    if name not in _HOMES:
+    if name not in _ROOMS:
         raise AttributeError(f"module 'gearsig' has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    return getattr(import_module(_ROOMS[name]), name)
 
 
 def __dir__() -> list[str]:
-    return sorted([*__all__, "__version__"])
+    return sorted([*_ROOMS, "__version__"])

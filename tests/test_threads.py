@@ -12,7 +12,7 @@ from gearsig.orders import order_map, track_vold_kalman
 from gearsig.phase import phase_plane
 from gearsig.plot import kurtogram_figure, time_frequency_figure
 from gearsig.recording import Channel, Recording
-from gearsig.spectra import channel_coherence, channel_kurtogram, kurtogram_envelope, order_coherence
+from gearsig.spectra import kurtogram, kurtogram_envelope, order_coherence, spectral_coherence
 from gearsig.timefreq import (
     component,
     cwt,
@@ -64,7 +64,7 @@ METHODS = {
     "cwt over angle": lambda r, a: cwt_map(resample_to_angle(r, a), n_columns=200).values,
     "wavelet packets": lambda r, _: packet_inverse(wavelet_packets(r, level=4), [2, 3]),
     "kurtogram": lambda r, _: kurtogram_envelope(r, "a", preparation="tones removed").spectrum.values,
-    "coherence": lambda r, _: channel_coherence(r, "a", highest_alpha_hz=100, n_bands=16).coherence_squared,
+    "coherence": lambda r, _: spectral_coherence(r, "a", highest_alpha_hz=100, n_bands=16).coherence_squared,
     "order coherence": lambda r, a: order_coherence(r, "a", a, highest_order=4, n_bands=16).coherence_squared,
     "modes": lambda r, _: variational_modes(r.values("a"), FS, VmdSettings(3)).waveforms,
     "suggested modes": lambda r, _: np.array(
@@ -75,7 +75,7 @@ METHODS = {
     "order map": lambda r, a: order_map(resample_to_angle(r, a), "a").values,
     "phase plane": lambda r, _: phase_plane(r, "a", low_cut_hz=50.0).points,
     "map figure": lambda r, _: of_figure(time_frequency_figure(stft_map(r, n_columns=50, highest=1000))),
-    "kurtogram figure": lambda r, _: of_figure(kurtogram_figure(channel_kurtogram(r, "a", n_levels=3))),
+    "kurtogram figure": lambda r, _: of_figure(kurtogram_figure(kurtogram(r, "a", n_levels=3))),
 }
 
 

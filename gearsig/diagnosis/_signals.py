@@ -11,7 +11,7 @@ from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray
 from gearsig.diagnosis._types import AnalysisSettings, ChannelAnalysis, Finding, Kind, OrderLevel
 from gearsig.errors import InputError, RefusalError
-from gearsig.orders import OrderMap, SeparatedAverage, SynchronousAverage, highest_line, separate, whole_revolutions
+from gearsig.orders import OrderMap, SeparatedAverage, SynchronousAverage, separate, whole_revolutions
 from gearsig.prepared import Comb, LineExcess, PreparedRecording, best_comb, envelope_bands, floor_of
 from gearsig.recording import Recording
 from gearsig.rig import Rig
@@ -152,7 +152,7 @@ def _one_shaft(prepared: PreparedRecording, shaft: str, names: Sequence[str]) ->
     teeth = tuple(z for z in gears if z is not None)
     separated, halves = {}, {}
     for name, average in averages.items():
-        visible = tuple(z for z in teeth if z <= highest_line(average))
+        visible = tuple(z for z in teeth if z <= average.highest_line)
         if visible and np.any(average.values):
             try:
                 separated[name] = separate(average, visible)
@@ -210,7 +210,7 @@ def envelopes_in(signals: AnalysisSignals, recording: Recording, band: tuple[flo
     """
     from gearsig.angle import resample_to_angle
     from gearsig.orders import order_spectrum
-    from gearsig.spectra import channel_spectrum, envelope_recording
+    from gearsig.spectra import amplitude_spectrum, envelope_recording
 
     try:
         envelopes = envelope_recording(recording, band, kind="magnitude")
@@ -228,7 +228,7 @@ def envelopes_in(signals: AnalysisSignals, recording: Recording, band: tuple[flo
         except (InputError, RefusalError):
             return  # the band is narrower than the modulations sought
     for name in envelopes.channel_names:
-        spectrum = channel_spectrum(envelopes, name) if over_angle is None else order_spectrum(over_angle, name)
+        spectrum = amplitude_spectrum(envelopes, name) if over_angle is None else order_spectrum(over_angle, name)
         yield BandEnvelope(name, band, floor_of(spectrum), float(envelopes.values(name).mean()))
 
 
@@ -360,7 +360,7 @@ class ExaminedSignals:
 
 def channel_analysis(material: ExaminedSignals, name: str, findings: Sequence[Finding]) -> ChannelAnalysis:
     """Return the signals and spectra of one channel."""
-    from gearsig.spectra import channel_density
+    from gearsig.spectra import power_density
 
     signals = material.signals
     envelope = _shown_envelope(material, name, findings)
@@ -368,7 +368,7 @@ def channel_analysis(material: ExaminedSignals, name: str, findings: Sequence[Fi
     return ChannelAnalysis(
         channel=name,
         spectrum=signals.spectra[name],
-        power_density=channel_density(signals.recording, name),
+        power_density=power_density(signals.recording, name),
         envelope_spectrum=envelope.excess.spectrum if envelope else None,
         envelope_band_hz=envelope.band_hz if envelope else None,
         order_spectrum=signals.order_excess[name].spectrum if name in signals.order_excess else None,

@@ -1,16 +1,19 @@
 """Spectra and averages over shaft angle: orders, maps, tracked orders, synchronous averages."""
 
 from gearsig.orders._average import (
+    SeparatedShafts,
+    average_lines,
     first_whole_sample,
     mean_and_error,
+    separate_shafts,
     synchronous_average,
     times_of_revolutions,
     whole_revolutions,
 )
-from gearsig.orders._separate import SeparatedAverage, band_passed_mesh, highest_line, mesh_modulation, separate
+from gearsig.orders._separate import SeparatedAverage, band_passed_mesh, mesh_modulation, separate
 from gearsig.orders._spectrum import frequency_map, order_map, order_spectrum
 from gearsig.orders._track import amplitude_at_speeds, track_order_bands, track_orders
-from gearsig.orders._types import OrderMap, SynchronousAverage, TrackedOrder
+from gearsig.orders._types import AverageLines, OrderMap, SynchronousAverage, TrackedOrder
 from gearsig.orders.vold_kalman._banded import eliminate, rotate, solve_band
 from gearsig.orders.vold_kalman._filter import separate_frequencies, track_vold_kalman
 from gearsig.orders.vold_kalman._joint import (
@@ -40,16 +43,19 @@ from gearsig.orders.vold_kalman._tracks import (
 )
 
 __all__ = [
+    "AverageLines",
     "FrequencyTrack",
     "Generation",
     "OrderMap",
     "OrderSeparation",
     "SeparatedAverage",
     "SeparatedOrder",
+    "SeparatedShafts",
     "SynchronousAverage",
     "TrackedOrder",
     "accuracy_of",
     "amplitude_at_speeds",
+    "average_lines",
     "band_passed_mesh",
     "bandwidth_of_weight",
     "closeness",
@@ -62,7 +68,6 @@ __all__ = [
     "expected_error",
     "first_whole_sample",
     "frequency_map",
-    "highest_line",
     "mean_and_error",
     "mesh_modulation",
     "order_map",
@@ -72,6 +77,7 @@ __all__ = [
     "samples_per_cell",
     "separate",
     "separate_frequencies",
+    "separate_shafts",
     "settling_time",
     "solve_band",
     "solve_by_splines",

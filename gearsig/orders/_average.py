@@ -1,19 +1,21 @@
-"""Time-synchronous average of a shaft: one mean revolution, with its standard error."""
+"""Time-synchronous averages: mean revolution, standard error, lines; of several shafts at once."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
-from gearsig.angle import AngleSignal, ShaftAngle
-from gearsig.checks import FloatArray, count
-from gearsig.errors import RefusalError
-from gearsig.orders._types import SynchronousAverage
-
-# --------------------
-# Whole revolutions of an angle signal.
-# --------------------
+from gearsig.angle import AngleSignal, ShaftAngle, find_shaft_angle, resample_to_angle, times_at
+from gearsig.checks import FloatArray, count, one_of, positive
+from gearsig.errors import InputError, RefusalError
+from gearsig.orders._types import AverageLines, LineScaling, SynchronousAverage, lines_of_revolution
+from gearsig.recording import Channel, Recording
+from gearsig.rig import Rig
+from gearsig.spectra import checked_signal
 
 
 def first_whole_sample(signal: AngleSignal) -> tuple[int, int]:
@@ -56,8 +58,6 @@ def unit_of(signal: AngleSignal, channel: str) -> str:
 
 def times_of_revolutions(angle: ShaftAngle, first: float, step: float, n: int) -> FloatArray:
     """Return the times at which the shaft passes `first`, `first` + `step`, … revolutions: n times."""
-    from gearsig.angle import times_at
-
     out = np.empty(n)
     interval = int(np.searchsorted(angle.revolutions, first, side="right")) - 1
     times_at(
@@ -86,22 +86,62 @@ def block_times(
     return middle, 60.0 * length / (end - begin)
 
 
-DEFAULT_JACKKNIFE_BLOCKS = 32
+def over_angle(
+    signal: AngleSignal | Recording | FloatArray, channel: str | float, shaft: str, shaft_angle: ShaftAngle | None
+) -> tuple[AngleSignal, str]:
+    """Return (a channel over a shaft's angle, its name) of what `synchronous_average` and `order_spectrum` accept."""
+    if isinstance(signal, AngleSignal):
+        if shaft not in ("", signal.shaft_angle.shaft) or shaft_angle is not None:
+            raise InputError(
+                f"the signal lies over the angle of shaft {signal.shaft_angle.shaft!r}",
+                where="shaft",
+                allowed="no other",
+            )
+        return signal, str(channel)
+    if not isinstance(signal, Recording):
+        if shaft_angle is None:
+            raise InputError("an array has no shaft angle", where="shaft_angle", remedy="give one, or a recording")
+        if isinstance(channel, str):
+            raise InputError(f"an array has no channel {channel!r}", allowed="its sampling rate in Hz")
+        rate = positive(channel, "sampling_rate_hz", "Hz")
+        signal = Recording(checked_signal(signal)[None], rate, (Channel("signal"),))
+        channel = "signal"
+    angle = find_shaft_angle(signal) if shaft_angle is None else shaft_angle
+    if shaft not in ("", angle.shaft):
+        angle = angle.of_shaft(shaft, _ratio(signal.rig, shaft, angle.shaft))
+    return resample_to_angle(signal, angle, channels=[str(channel)]), str(channel)
+
+
+def _ratio(rig: Rig | None, shaft: str, reference: str) -> float:
+    ratio = None if rig is None else rig.ratio(shaft, to=reference)
+    if ratio is None:
+        raise RefusalError(f"the speed of shaft {shaft!r} does not follow from the teeth", remedy="complete the rig")
+    return ratio
 
 
 def synchronous_average(
-    signal: AngleSignal, channel: str, *, n_jackknife_blocks: int = DEFAULT_JACKKNIFE_BLOCKS
+    signal: AngleSignal | Recording | FloatArray,
+    channel: str | float,
+    *,
+    shaft: str = "",
+    shaft_angle: ShaftAngle | None = None,
+    n_jackknife_blocks: int = 32,
 ) -> SynchronousAverage:
-    """Return the mean over whole revolutions of the shaft that the signal was resampled on.
+    """Return the mean over whole revolutions of a shaft, with its standard error.
 
     a(θ) = 1/N Σ_r x(θ + r). Over N revolutions, the shaft's whole orders stay, noise falls as 1/√N, and order o is
     multiplied by |sin(πNo)/(N sin πo)|: other shafts' orders fall as 1/N, but are only gone where N·o is whole.
 
     Parameters
     ----------
-    signal : AngleSignal
-        Resampled on the angle of the shaft in question.
-    channel : str
+    signal : AngleSignal, Recording or array, (n_samples,)
+        An AngleSignal is averaged over the shaft that it was resampled on.
+    channel : str or float
+        The channel's name; of an array its sampling rate in Hz.
+    shaft : str
+        Of a recording: the shaft to average over; default: that of the angle.
+    shaft_angle : ShaftAngle or None
+        Of a recording or an array; default: what `gearsig.angle.find_shaft_angle` finds in the recording.
     n_jackknife_blocks : int
         At least 2. Revolutions are grouped in so many blocks (or as many as there are revolutions) before their
         scatter is taken, so that a correlation between neighbouring revolutions does not make the error too small.
@@ -109,14 +149,15 @@ def synchronous_average(
     Returns
     -------
     SynchronousAverage
-        From shaft angle 0, with the standard error of the mean at each angle.
+        From shaft angle 0, in the channel's unit, with the standard error of the mean at each angle; its `lines` are
+        the complex amplitudes of the shaft's orders.
 
     Raises
     ------
     RefusalError
-        With fewer than two whole revolutions.
+        With fewer than two whole revolutions, or where the speed is not known.
     InputError
-        On an unknown channel.
+        On an unknown channel or shaft.
 
     References
     ----------
@@ -125,6 +166,7 @@ def synchronous_average(
     M. H. Quenouille, "Notes on bias in estimation", 1956 (jackknife).
     """
     count(n_jackknife_blocks, "n_jackknife_blocks", minimum=2)
+    signal, channel = over_angle(signal, channel, shaft, shaft_angle)
     revolutions = whole_revolutions(signal, channel, at_least=2)
     mean, standard_error = mean_and_error(revolutions, n_jackknife_blocks)
     return SynchronousAverage(
@@ -146,12 +188,182 @@ def mean_and_error(revolutions: FloatArray, n_blocks: int) -> tuple[FloatArray, 
     SE² = (B - 1)/B Σ_b (m_(b) - mean of m_(b))².
     """
     n = len(revolutions)
-    b = min(n, n_blocks)
-    edges = np.linspace(0, n, b + 1).round().astype(np.intp)
+    blocks = _blocks(n, min(n, n_blocks))
     # Row blocks are summed one by one: no copy of the whole signal in double precision is made.
-    sums = np.stack([revolutions[i:j].sum(axis=0, dtype=np.float64) for i, j in pairwise(edges)])
+    sums = np.stack([revolutions[block].sum(axis=0, dtype=np.float64) for block in blocks])
     total = sums.sum(axis=0)
-    without = (total - sums) / (n - np.diff(edges))[:, None]
-    standard_error: FloatArray = np.sqrt((b - 1.0) * without.var(axis=0))
+    without = (total - sums) / np.array([n - (block.stop - block.start) for block in blocks])[:, None]
+    standard_error: FloatArray = np.sqrt((len(blocks) - 1.0) * without.var(axis=0))
     mean: FloatArray = total / n
     return mean, standard_error
+
+
+def _blocks(n_revolutions: int, n_blocks: int) -> list[slice]:
+    """Return consecutive blocks of revolutions of nearly equal length."""
+    edges = np.linspace(0, n_revolutions, n_blocks + 1).round().astype(int)
+    return [slice(int(i), int(j)) for i, j in pairwise(edges)]
+
+
+def average_lines(
+    signal: AngleSignal,
+    channels: Sequence[str] | None = None,
+    *,
+    n_parts: int = 1,
+    weighting: Literal["equal", "hann"] = "equal",
+    scaling: LineScaling = "amplitude peak",
+) -> AverageLines:
+    """Return the complex lines of a shaft's synchronous averages, of several channels and parts of the record at once.
+
+    a(θ) = Σ_r w_r x(θ + r)/Σ w_r over the revolutions of each part, then its Fourier transform at whole orders.
+
+    Parameters
+    ----------
+    signal : AngleSignal
+        Over the angle of the shaft in question; see `separate_shafts` for shafts whose orders lie close.
+    channels : sequence of str or None
+        Default: all of the signal.
+    n_parts : int
+        Consecutive parts with (nearly) equally many whole revolutions: 2 for halves, more for a jackknife.
+    weighting : str
+        "equal", or "hann" for w_r = sin²(π(r + 1/2)/N): another shaft's order that lies d orders from a whole one then
+        leaks as 1/(N d)³ of it instead of 1/(N d), and noise grows by 1.8 dB.
+    scaling : str
+        See `SynchronousAverage.lines`.
+
+    Returns
+    -------
+    AverageLines
+        Up to the signal's highest order.
+
+    Raises
+    ------
+    RefusalError
+        With fewer whole revolutions than parts.
+    InputError
+        On an unknown channel, weighting or scaling.
+    """
+    count(n_parts, "n_parts")
+    one_of(weighting, "weighting", ("equal", "hann"))
+    one_of(scaling, "scaling", ("amplitude peak", "amplitude rms"))
+    names = tuple(channels) if channels is not None else signal.channel_names
+    per_rev = signal.samples_per_revolution
+    highest = min(int(signal.highest_order + 1e-9), (per_rev - 1) // 2)
+    rows = []
+    for name in names:
+        revolutions = whole_revolutions(signal, name, at_least=n_parts)
+        blocks = _blocks(len(revolutions), n_parts)
+        means = np.stack([_weighted_mean(revolutions[block], weighting) for block in blocks])
+        rows.append(lines_of_revolution(means, scaling)[:, : highest + 1])
+    return AverageLines(
+        parts=np.stack(rows, axis=1),
+        n_revolutions=np.array([float(block.stop - block.start) for block in blocks]),
+        shaft=signal.shaft_angle.shaft,
+        channels=names,
+        units=tuple(unit_of(signal, name) for name in names),
+        scaling=scaling,
+    )
+
+
+def _weighted_mean(revolutions: FloatArray, weighting: str) -> FloatArray:
+    n = len(revolutions)
+    if weighting == "equal":
+        return np.asarray(revolutions.mean(axis=0, dtype=np.float64))
+    weights = np.sin(np.pi * (np.arange(n) + 0.5) / n) ** 2
+    return np.asarray((weights / weights.sum()) @ revolutions)
+
+
+# Several shafts at once: what one repeats does not leak into the other's average.
+
+
+@dataclass(frozen=True)
+class SeparatedShafts:
+    """What each of several meshing shafts repeats.
+
+    Parameters
+    ----------
+    signals : tuple of AngleSignal
+        Over the angle of each shaft, without what the others repeat besides the mesh: what `synchronous_average` and
+        `average_lines` take.
+    residual : AngleSignal
+        Over the first shaft's angle, what none repeats.
+    """
+
+    signals: tuple[AngleSignal, ...]
+    residual: AngleSignal
+
+
+def separate_shafts(signals: Sequence[AngleSignal], teeth: Sequence[int], *, n_passes: int = 3) -> SeparatedShafts:
+    """Separate the periodic parts of several meshing shafts from each other, and from the residual.
+
+    Alternating projections (Gauss–Seidel on the normal equations of x(θ) = a1(θ) + a2(θ z1/z2) + … + residual): from
+    each shaft's signal, the averages of the others are subtracted in turn before it is averaged.
+
+    Parameters
+    ----------
+    signals : sequence of AngleSignal
+        The same record and channels over the angle of each shaft; all count from the same instant.
+    teeth : sequence of int
+        Of the gear on each shaft; all have one mesh frequency, as a pair or a train of idlers. Mesh harmonics stay in
+        all signals; other orders that shafts have in common go to the first of them.
+    n_passes : int
+        Orders of two shafts lie close, and few revolutions tell them apart badly: each pass leaves of the leak its
+        square.
+
+    Returns
+    -------
+    SeparatedShafts
+
+    Raises
+    ------
+    InputError
+        If the numbers of signals and teeth differ or the channels do.
+    RefusalError
+        If a signal has no whole revolution.
+    """
+    count(n_passes, "n_passes")
+    if len(signals) != len(teeth) or len({signal.channel_names for signal in signals}) != 1:
+        raise InputError("signals and teeth do not belong together", allowed="one gear per signal, the same channels")
+    separated = [np.array(signal.samples, dtype=np.float64) for signal in signals]
+    residual = separated[0].copy()
+    for row, name in enumerate(signals[0].channel_names):
+        means: list[FloatArray | None] = [None] * len(signals)
+        for _ in range(n_passes):
+            for k, signal in enumerate(signals):
+                separated[k][row] = signal.samples[row]
+                for j, mean in enumerate(means):
+                    if j != k and mean is not None:
+                        separated[k][row] -= _at(_without_mesh(mean, teeth[j]), _places(signal) * teeth[k] / teeth[j])
+                means[k] = whole_revolutions(_with_samples(signal, separated[k]), name).mean(axis=0)
+        for j, mean in enumerate(means):
+            assert mean is not None  # noqa: S101 - there is at least one pass
+            periodic = mean if j == 0 else _without_mesh(mean, teeth[j])
+            residual[row] -= _at(periodic, _places(signals[0]) * teeth[0] / teeth[j])
+    own = tuple(_with_samples(signal, samples) for signal, samples in zip(signals, separated, strict=True))
+    return SeparatedShafts(own, _with_samples(signals[0], residual))
+
+
+def _with_samples(signal: AngleSignal, samples: FloatArray) -> AngleSignal:
+    return replace(signal, samples=samples)
+
+
+def _without_mesh(revolution: FloatArray, teeth: int) -> FloatArray:
+    lines = np.fft.rfft(revolution)
+    lines[::teeth] = 0.0
+    return np.asarray(np.fft.irfft(lines, len(revolution)))
+
+
+def _places(signal: AngleSignal) -> FloatArray:
+    """Return the shaft's angle at each sample, in revolutions."""
+    n = signal.samples_per_revolution
+    places: FloatArray = (np.arange(signal.samples.shape[1]) + round(signal.start_revolution * n)) / n
+    return places
+
+
+def _at(revolution: FloatArray, place_rev: FloatArray) -> FloatArray:
+    """Return a periodic waveform at any angles, by cubic splines through finer points."""
+    from scipy.ndimage import map_coordinates
+
+    n = 2 * len(revolution)  # cubic splines through twice the points are good to 10⁻³ at the highest order
+    fine = np.fft.irfft(np.fft.rfft(revolution), n) * 2
+    values: FloatArray = map_coordinates(fine, [place_rev * n % n], order=3, mode="grid-wrap")
+    return values

@@ -83,7 +83,7 @@ def separate(
     _check_kind(average)
     gears = checked_teeth(average, teeth)
     count(n_sidebands, "n_sidebands", minimum=0)
-    highest = highest_line(average)
+    highest = average.highest_line
     # Beyond the highest order the filter's flank still lets strong mesh harmonics through: they go as well.
     last = (len(average.values) - 1) // 2
     mesh = [k * z for z in gears for k in range(1, (n_harmonics or last) + 1) if k * z <= last]
@@ -137,7 +137,7 @@ def band_passed_mesh(
     lines[:low] = 0
     lines[high + 1 :] = 0
     values = np.fft.irfft(lines, len(average.values))
-    return _part(average, values, "band-passed mesh", (high - low + 1) / (highest_line(average) + 1))
+    return _part(average, values, "band-passed mesh", (high - low + 1) / (average.highest_line + 1))
 
 
 def mesh_band(average: SynchronousAverage, teeth: int, harmonic: int, half_width_orders: int | None) -> tuple[int, int]:
@@ -147,9 +147,9 @@ def mesh_band(average: SynchronousAverage, teeth: int, harmonic: int, half_width
     half = (z - 1) // 2 if half_width_orders is None else count(half_width_orders, "half_width_orders")
     if half >= z:
         raise InputError(f"half_width_orders is {half}", allowed=f"1 to {z - 1}", remedy="leave the next harmonic out")
-    if centre + half > highest_line(average):
+    if centre + half > average.highest_line:
         raise RefusalError(
-            f"the band {centre} ± {half} orders reaches above the average's highest order {highest_line(average)}",
+            f"the band {centre} ± {half} orders reaches above the average's highest order {average.highest_line}",
             remedy="take a lower harmonic, a narrower band or a higher sampling rate",
         )
     return centre - half, centre + half
@@ -162,17 +162,12 @@ def checked_teeth(average: SynchronousAverage, teeth: int | Iterable[int]) -> tu
         raise InputError("no teeth are given", remedy="give the teeth of each gear on the shaft")
     for z in numbers:
         count(z, "teeth", minimum=3)
-        if z > highest_line(average):
+        if z > average.highest_line:
             raise RefusalError(
-                f"mesh order {z} lies above the average's highest order {highest_line(average)}",
+                f"mesh order {z} lies above the average's highest order {average.highest_line}",
                 remedy="a higher sampling rate or a lower speed would show the mesh",
             )
     return tuple(int(z) for z in numbers)
-
-
-def highest_line(average: SynchronousAverage) -> int:
-    """Return the highest whole order that the average holds, below half its samples."""
-    return min(int(average.highest_order + 1e-9), (len(average.values) - 1) // 2)
 
 
 def _check_kind(average: SynchronousAverage) -> None:

@@ -9,8 +9,9 @@ import numpy as np
 from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray, count, one_of, positive
 from gearsig.errors import InputError, RefusalError
-from gearsig.orders._average import block_times, first_whole_sample, unit_of, whole_revolutions
+from gearsig.orders._average import block_times, first_whole_sample, over_angle, unit_of, whole_revolutions
 from gearsig.orders._types import OrderMap
+from gearsig.recording import Recording
 from gearsig.spectra import (
     BlockPlan,
     Scaling,
@@ -27,9 +28,11 @@ ORDER_SCALINGS = ("amplitude peak", "amplitude rms", "power", "power density")
 
 
 def order_spectrum(
-    signal: AngleSignal,
-    channel: str,
+    signal: AngleSignal | Recording | FloatArray,
+    channel: str | float,
     *,
+    shaft: str = "",
+    shaft_angle: ShaftAngle | None = None,
     window: str = "hann",
     scaling: Scaling = "amplitude peak",
     revolutions_per_block: int | None = None,
@@ -42,9 +45,12 @@ def order_spectrum(
 
     Parameters
     ----------
-    signal : AngleSignal
+    signal : AngleSignal, Recording or array, (n_samples,)
         Partial revolutions at either end are left out.
-    channel : str
+    channel : str or float
+        The channel's name; of an array its sampling rate in Hz.
+    shaft, shaft_angle
+        Of a recording or an array, as in `synchronous_average`.
     window : str
         See `make_window`. "hann" for spectra that hold other shafts' orders as well; "rectangular" has the finest
         resolution, but whatever is not a whole number of cycles per block leaks.
@@ -81,6 +87,7 @@ def order_spectrum(
     2.0
     """
     one_of(scaling, "scaling", ORDER_SCALINGS)
+    signal, channel = over_angle(signal, channel, shaft, shaft_angle)
     revolutions = whole_revolutions(signal, channel)
     n_rev, per_rev = revolutions.shape
     if revolutions_per_block is not None:

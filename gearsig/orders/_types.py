@@ -5,9 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError
-from gearsig.spectra import Scaling
+from gearsig.spectra import ComplexArray, Scaling
+
+LineScaling = Literal["amplitude peak", "amplitude rms"]
 
 
 @dataclass(frozen=True)
@@ -114,3 +118,71 @@ class SynchronousAverage:
             object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
         if len(self.values) != len(self.standard_error):
             raise InputError(f"{len(self.values)} values, {len(self.standard_error)} standard errors")
+
+    @property
+    def highest_line(self) -> int:
+        """Highest whole order that is truly in the average."""
+        return min(int(self.highest_order + 1e-9), (len(self.values) - 1) // 2)
+
+    def lines(self, scaling: LineScaling = "amplitude peak") -> ComplexArray:
+        """Return the complex amplitudes of the shaft's whole orders, (highest_line + 1,).
+
+        With "amplitude peak", A_o = 2/N Σ_m a[m] exp(-2πi o m/N), and the mean A_0 = 1/N Σ_m a[m]; with "amplitude rms"
+        all but the mean are divided by √2. The phase is that of the cosine at shaft angle 0.
+        """
+        return lines_of_revolution(self.values, scaling)[: self.highest_line + 1]
+
+
+@dataclass(frozen=True)
+class AverageLines:
+    """Complex lines of a shaft's synchronous averages: of several channels at once, in consecutive parts of a record.
+
+    Parameters
+    ----------
+    parts : complex array, (n_parts, n_channels, n_orders)
+        parts[i, c, o] is the amplitude of the shaft's order o in channel c, averaged over part i.
+    n_revolutions : array, (n_parts,)
+        Revolutions in each part.
+    shaft : str
+    channels, units : tuples of str
+    scaling : str
+        See `SynchronousAverage.lines`.
+    """
+
+    parts: ComplexArray
+    n_revolutions: FloatArray
+    shaft: str
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    scaling: LineScaling
+
+    def __post_init__(self) -> None:
+        for name in ("parts", "n_revolutions"):
+            array = np.array(getattr(self, name))
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        if self.parts.shape[:2] != (len(self.n_revolutions), len(self.channels)):
+            raise InputError(
+                f"parts of shape {self.parts.shape} for {len(self.n_revolutions)} parts, {len(self.channels)} channels"
+            )
+
+    @property
+    def highest_order(self) -> int:
+        """The last line's order."""
+        return int(self.parts.shape[2]) - 1
+
+    @property
+    def whole(self) -> ComplexArray:
+        """Lines of the whole record, (n_channels, n_orders): the parts' mean, by their revolutions."""
+        mean: ComplexArray = np.tensordot(self.n_revolutions / self.n_revolutions.sum(), self.parts, axes=1)
+        return mean
+
+
+def lines_of_revolution(revolution: FloatArray, scaling: LineScaling) -> ComplexArray:
+    """Return lines 0 … (N - 1)//2 of periodic waveforms of N samples along the last axis."""
+    n = revolution.shape[-1]
+    lines: ComplexArray = np.fft.rfft(revolution)[..., : (n - 1) // 2 + 1] * (2.0 / n)
+    lines[..., 0] *= 0.5
+    if scaling == "amplitude rms":
+        lines[..., 1:] /= np.sqrt(2.0)
+    return lines

@@ -145,7 +145,7 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
 
     Multiples of the mains are left out: a hum's would be taken for the shaft of any motor of little slip.
     """
-    from gearsig.spectra import channel_spectrum, envelope_recording
+    from gearsig.spectra import amplitude_spectrum, envelope_recording
 
     hertz = stated.mean_speed_rpm / 60
     low, high = hertz * (1 - STATED_SPEED_TOLERANCE), hertz * (1 + STATED_SPEED_TOLERANCE)
@@ -156,7 +156,7 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
         except InputError:
             continue
         for name in envelopes.channel_names:
-            spectrum = channel_spectrum(envelopes, name)
+            spectrum = amplitude_spectrum(envelopes, name)
             excess = floor_of(spectrum)
             for mains_hz in MAINS_HZ:
                 excess = excess.without_multiples(mains_hz, skirt=MAINS_TOLERANCE)

@@ -221,15 +221,15 @@ class PreparedRecording:
 
     def spectrum(self, channel: str) -> Spectrum:
         """Return the amplitude spectrum (peak) over frequency."""
-        from gearsig.spectra import channel_spectrum
+        from gearsig.spectra import amplitude_spectrum
 
-        return self.keep(("spectrum", channel), lambda: channel_spectrum(self.recording, channel))
+        return self.keep(("spectrum", channel), lambda: amplitude_spectrum(self.recording, channel))
 
     def power_density(self, channel: str) -> Spectrum:
         """Return Welch's power spectral density over frequency."""
-        from gearsig.spectra import channel_density
+        from gearsig.spectra import power_density
 
-        return self.keep(("density", channel), lambda: channel_density(self.recording, channel))
+        return self.keep(("density", channel), lambda: power_density(self.recording, channel))
 
     def order_lines(self, channel: str) -> LineExcess:
         """Return the amplitude spectrum (peak) over order of the reference shaft, with its noise floor."""

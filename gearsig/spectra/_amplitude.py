@@ -13,8 +13,8 @@ from gearsig.recording import Recording
 from gearsig.spectra._types import (
     Scaling,
     Spectrum,
-    checked_signal,
     mean_power,
+    named_signal,
     plan_blocks,
     scaled,
     scaled_unit,
@@ -25,8 +25,8 @@ AMPLITUDE_SCALINGS = ("amplitude peak", "amplitude rms", "power")
 
 
 def amplitude_spectrum(
-    values: FloatArray,
-    sampling_rate_hz: float,
+    signal: FloatArray | Recording,
+    channel_or_rate_hz: str | float,
     *,
     unit: str = "",
     source: str = "",
@@ -41,11 +41,12 @@ def amplitude_spectrum(
 
     Parameters
     ----------
-    values : array, (n_samples,)
+    signal : Recording or array, (n_samples,)
         The mean is not removed: it stands at line 0.
-    sampling_rate_hz : float
+    channel_or_rate_hz : str or float
+        The channel of a recording; of an array its sampling rate in Hz.
     unit, source : str
-        Of the signal.
+        Of the signal; default: the channel's.
     window : str
         See `make_window`.
     scaling : str
@@ -78,8 +79,7 @@ def amplitude_spectrum(
     >>> round(float(spectrum.values[50]), 9)
     3.0
     """
-    x = checked_signal(values)
-    fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    x, fs, unit, source = named_signal(signal, channel_or_rate_hz, unit, source)
     one_of(scaling, "scaling", AMPLITUDE_SCALINGS)
     plan = plan_blocks(len(x), n_per_block, overlap, window)
     resolution = fs / plan.n_per_block
@@ -99,29 +99,6 @@ def amplitude_spectrum(
     )
 
 
-def channel_spectrum(
-    recording: Recording,
-    channel: str,
-    *,
-    window: str = "hann",
-    scaling: Scaling = "amplitude peak",
-    n_per_block: int | None = None,
-    overlap: float = 0.5,
-) -> Spectrum:
-    """Return `amplitude_spectrum` of one channel of a recording, with its unit and name."""
-    row = recording.channels[recording.index(channel)]
-    return amplitude_spectrum(
-        recording.values(channel),
-        recording.sampling_rate_hz,
-        unit=row.unit,
-        source=row.name,
-        window=window,
-        scaling=scaling,
-        n_per_block=n_per_block,
-        overlap=overlap,
-    )
-
-
 # --------------------
 # Power spectral density over frequency by Welch's method.
 # --------------------
@@ -131,8 +108,8 @@ DEFAULT_BLOCK = 8192
 
 
 def power_density(
-    values: FloatArray,
-    sampling_rate_hz: float,
+    signal: FloatArray | Recording,
+    channel_or_rate_hz: str | float,
     *,
     unit: str = "",
     source: str = "",
@@ -146,11 +123,12 @@ def power_density(
 
     Parameters
     ----------
-    values : array, (n_samples,)
+    signal : Recording or array, (n_samples,)
         The mean is not removed.
-    sampling_rate_hz : float
+    channel_or_rate_hz : str or float
+        The channel of a recording; of an array its sampling rate in Hz.
     unit, source : str
-        Of the signal.
+        Of the signal; default: the channel's.
     window : str
         See `make_window`.
     n_per_block : int or None
@@ -176,8 +154,7 @@ def power_density(
     ----------
     P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", 1967.
     """
-    x = checked_signal(values)
-    fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    x, fs, unit, source = named_signal(signal, channel_or_rate_hz, unit, source)
     n = n_per_block if n_per_block is not None else min(DEFAULT_BLOCK, max(2, len(x) // 8))
     plan = plan_blocks(len(x), n, overlap, window)
     resolution = fs / plan.n_per_block
@@ -194,27 +171,6 @@ def power_density(
         window=plan.window.name,
         n_averages=plan.n_averages,
         source=source,
-    )
-
-
-def channel_density(
-    recording: Recording,
-    channel: str,
-    *,
-    window: str = "hann",
-    n_per_block: int | None = None,
-    overlap: float = 0.5,
-) -> Spectrum:
-    """Return `power_density` of one channel of a recording, with its unit and name."""
-    row = recording.channels[recording.index(channel)]
-    return power_density(
-        recording.values(channel),
-        recording.sampling_rate_hz,
-        unit=row.unit,
-        source=row.name,
-        window=window,
-        n_per_block=n_per_block,
-        overlap=overlap,
     )
 
 

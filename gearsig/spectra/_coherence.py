@@ -13,7 +13,14 @@ from gearsig.checks import FloatArray, count, frozen_array, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.spectra._envelope import Preparation, prepared_signal
-from gearsig.spectra._types import ComplexArray, Spectrum, checked_signal, make_window, scaled_unit
+from gearsig.spectra._types import (
+    ComplexArray,
+    Spectrum,
+    checked_signal,
+    make_window,
+    named_signal,
+    scaled_unit,
+)
 
 # --------------------
 # Carrier bands: where they lie, how they weigh the spectrum's lines, and how many cells there may be.
@@ -231,11 +238,12 @@ def enhanced_envelope(
 
 
 def spectral_coherence(
-    values: FloatArray,
-    sampling_rate_hz: float,
+    signal: FloatArray | Recording,
+    channel_or_rate_hz: str | float,
     *,
     highest_alpha_hz: float,
     n_bands: int = 64,
+    preparation: Preparation = "none",
     unit: str = "",
     source: str = "",
 ) -> SpectralCoherence:
@@ -247,14 +255,18 @@ def spectral_coherence(
 
     Parameters
     ----------
-    values : array, (n_samples,)
-    sampling_rate_hz : float
+    signal : Recording or array, (n_samples,)
+    channel_or_rate_hz : str or float
+        The channel of a recording; of an array its sampling rate in Hz.
     highest_alpha_hz : float
         The highest cyclic frequency: a few times the fastest modulation sought.
     n_bands : int
         Carrier bands from 0 to half the sampling rate. Fewer bands average more and find weaker modulation; more show
         better where its carrier is. Bands below half of `highest_alpha_hz` are left out.
+    preparation : str
+        "none", "tones removed" (gears) or "whitened", see `prepared_signal`.
     unit, source : str
+        Of the signal; default: the channel's.
 
     Returns
     -------
@@ -280,8 +292,10 @@ def spectral_coherence(
     analysis in practice", 2007. J. Antoni, G. Xin and N. Hamzaoui, "Fast computation of the spectral correlation",
     2017, reach nearly the same average by short-time transforms.
     """
-    x = checked_signal(values, minimum=64)
-    fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    x, fs, unit, source = named_signal(signal, channel_or_rate_hz, unit, source, minimum=64)
+    if preparation != "none":
+        x, source = prepared_signal(x, fs, preparation), f"{source or 'signal'}, {preparation}"
+        unit = "" if preparation == "whitened" else unit
     n_alphas = _n_alphas(positive(highest_alpha_hz, "highest_alpha_hz", "Hz"), fs, len(x))
     window = make_window("hann", len(x)).values
     energy = float(np.dot(window, window))
@@ -302,29 +316,6 @@ def spectral_coherence(
         alpha_resolution=fs / len(x),
         unit=scaled_unit(unit, "power density"),
         source=source or "signal",
-    )
-
-
-def channel_coherence(
-    recording: Recording,
-    channel: str,
-    *,
-    highest_alpha_hz: float,
-    n_bands: int = 64,
-    preparation: Preparation = "none",
-) -> SpectralCoherence:
-    """Return the spectral coherence of a recording's channel, see `spectral_coherence`.
-
-    Of the signal as it is, with its steady "tones removed" (gears), or "whitened"; see `prepared_signal`.
-    """
-    unit = recording.channels[recording.index(channel)].unit if preparation != "whitened" else ""
-    return spectral_coherence(
-        prepared_signal(recording.values(channel), recording.sampling_rate_hz, preparation),
-        recording.sampling_rate_hz,
-        highest_alpha_hz=highest_alpha_hz,
-        n_bands=n_bands,
-        unit=unit,
-        source=channel if preparation == "none" else f"{channel}, {preparation}",
     )
 
 

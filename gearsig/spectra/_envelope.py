@@ -12,7 +12,7 @@ from gearsig.checks import FloatArray, frozen_array, not_negative, one_of, posit
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Channel, Recording
 from gearsig.spectra._amplitude import amplitude_spectrum, noise_floor
-from gearsig.spectra._types import ComplexArray, Scaling, Spectrum, checked_signal, squared_unit
+from gearsig.spectra._types import ComplexArray, Scaling, Spectrum, checked_signal, named_signal, squared_unit
 
 EnvelopeKind = Literal["magnitude", "squared"]
 
@@ -43,8 +43,8 @@ class Envelope:
 
 
 def band_envelope(
-    values: FloatArray,
-    sampling_rate_hz: float,
+    signal: FloatArray | Recording,
+    channel_or_rate_hz: str | float,
     band_hz: tuple[float, float],
     *,
     kind: EnvelopeKind = "squared",
@@ -60,8 +60,9 @@ def band_envelope(
 
     Parameters
     ----------
-    values : array, (n_samples,)
-    sampling_rate_hz : float
+    signal : Recording or array, (n_samples,)
+    channel_or_rate_hz : str or float
+        The channel of a recording; of an array its sampling rate in Hz.
     band_hz : (float, float)
         Lower and upper limit, 0 ≤ lower < upper ≤ half the sampling rate.
     kind : str
@@ -88,8 +89,7 @@ def band_envelope(
     ----------
     R. B. Randall and J. Antoni, "Rolling element bearing diagnostics – a tutorial", 2011.
     """
-    x = checked_signal(values, minimum=8)
-    fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    x, fs, unit, source = named_signal(signal, channel_or_rate_hz, unit, source, minimum=8)
     one_of(kind, "kind", ("magnitude", "squared"))
     within(edge_fraction, "edge_fraction", 0.0, 0.5)
     first, last = _band_lines(band_hz, fs, len(x))
@@ -106,8 +106,11 @@ def band_envelope(
 
 
 def envelope_spectrum(
-    envelope: Envelope,
+    signal: Envelope | Recording | FloatArray,
+    channel_or_rate_hz: str | float = "",
     *,
+    band_hz: tuple[float, float] | None = None,
+    kind: EnvelopeKind = "squared",
     window: str = "hann",
     scaling: Scaling = "amplitude peak",
     highest_hz: float | None = None,
@@ -116,7 +119,14 @@ def envelope_spectrum(
 
     Parameters
     ----------
-    envelope : Envelope
+    signal : Envelope, Recording or array, (n_samples,)
+    channel_or_rate_hz : str or float
+        The channel of a recording; of an array its sampling rate in Hz.
+    band_hz : (float, float) or None
+        Of a recording or an array: the band whose envelope is taken; None takes the most impulsive one of the signal's
+        kurtogram, at least three times as wide as `highest_hz`.
+    kind : str
+        Of that envelope, see `band_envelope`.
     window, scaling : str
         As in `amplitude_spectrum`.
     highest_hz : float or None
@@ -127,9 +137,22 @@ def envelope_spectrum(
     Spectrum
         Over modulation frequency.
     """
-    x = envelope.values - envelope.values.mean()
+    if isinstance(signal, Envelope):
+        envelope = signal
+    else:
+        x, fs, unit, source = named_signal(signal, channel_or_rate_hz, "", "")
+        if band_hz is None:
+            from gearsig.spectra._kurtogram import kurtogram  # it takes this module's envelopes
+
+            band_hz = kurtogram(x, fs).best_band(narrowest_hz=3.0 * (highest_hz or 0.0)).band_hz
+        envelope = band_envelope(x, fs, band_hz, kind=kind, unit=unit, source=source)
     spectrum = amplitude_spectrum(
-        x, envelope.sampling_rate_hz, unit=envelope.unit, source=envelope.source, window=window, scaling=scaling
+        envelope.values - envelope.values.mean(),
+        envelope.sampling_rate_hz,
+        unit=envelope.unit,
+        source=envelope.source,
+        window=window,
+        scaling=scaling,
     )
     if highest_hz is None:
         return spectrum

@@ -20,7 +20,7 @@ from gearsig.spectra._envelope import (
     envelope_spectrum,
     prepared_signal,
 )
-from gearsig.spectra._types import Spectrum, checked_signal
+from gearsig.spectra._types import Spectrum, named_signal
 
 # --------------------
 # What Gaussian noise alone does to the spectral kurtosis of a kurtogram's bands.
@@ -349,8 +349,8 @@ class ChosenBand:
 
 
 def kurtogram(
-    values: FloatArray,
-    sampling_rate_hz: float,
+    signal: FloatArray | Recording,
+    channel_or_rate_hz: str | float,
     *,
     n_levels: int | None = None,
     preparation: Preparation = "none",
@@ -363,14 +363,16 @@ def kurtogram(
 
     Parameters
     ----------
-    values : array, (n_samples,)
-    sampling_rate_hz : float
+    signal : Recording or array, (n_samples,)
+    channel_or_rate_hz : str or float
+        The channel of a recording; of an array its sampling rate in Hz.
     n_levels : int or None
         L, the number of halvings. None is 7 (128 and 192 bands), or what the length allows: envelopes have at
         least 512 samples.
     preparation : str
         "none", "tones removed" or "whitened", see `prepared_signal`.
     source : str
+        Default: the channel.
 
     Returns
     -------
@@ -404,8 +406,7 @@ def kurtogram(
     >>> low <= 3000 <= high
     True
     """
-    x = checked_signal(values, minimum=64)
-    fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    x, fs, _, source = named_signal(signal, channel_or_rate_hz, "", source, minimum=64)
     n_levels = _checked_levels(len(x), n_levels)
     x = prepared_signal(x, fs, preparation)
     low, high, mean = float(x.min()), float(x.max()), float(np.mean(x, dtype=np.float64))
@@ -428,16 +429,8 @@ def best_band(
     highest_hz: float | None = None,
 ) -> BandCandidate:
     """Return the most impulsive band of a channel, by its kurtogram; see `kurtogram` and `Kurtogram.best_band`."""
-    found = channel_kurtogram(recording, channel, n_levels=n_levels, preparation=preparation)
+    found = kurtogram(recording, channel, n_levels=n_levels, preparation=preparation)
     return found.best_band(narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
-
-
-def channel_kurtogram(
-    recording: Recording, channel: str, *, n_levels: int | None = None, preparation: Preparation = "none"
-) -> Kurtogram:
-    """Return the kurtogram of a recording's channel, see `kurtogram`."""
-    x = recording.values(channel)
-    return kurtogram(x, recording.sampling_rate_hz, n_levels=n_levels, preparation=preparation, source=channel)
 
 
 def kurtogram_envelope(

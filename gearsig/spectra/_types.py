@@ -10,8 +10,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, closest_match_hint, count, frozen_array, not_negative, within
+from gearsig.checks import FloatArray, closest_match_hint, count, frozen_array, not_negative, positive, within
 from gearsig.errors import InputError
+from gearsig.recording import Recording
 
 Scaling = Literal["amplitude peak", "amplitude rms", "power", "power density", "dimensionless"]
 Axis = Literal["frequency", "order", "quefrency"]
@@ -239,6 +240,28 @@ def checked_signal(values: FloatArray, *, minimum: int = 2) -> FloatArray:
     if len(x) < minimum:
         raise InputError(f"values has {len(x)} sample(s)", allowed=f"at least {minimum}", remedy="record longer")
     return x
+
+
+def named_signal(
+    signal: FloatArray | Recording, channel_or_rate_hz: str | float, unit: str, source: str, *, minimum: int = 2
+) -> tuple[FloatArray, float, str, str]:
+    """Return (values, sampling rate in Hz, unit, source) of a recording's channel, or of an array with its rate."""
+    if isinstance(signal, Recording):
+        if not isinstance(channel_or_rate_hz, str):
+            raise InputError(
+                f"channel of a recording is {channel_or_rate_hz!r}", allowed=", ".join(signal.channel_names)
+            )
+        row = signal.channels[signal.index(channel_or_rate_hz)]
+        return (
+            checked_signal(signal.values(row.name), minimum=minimum),
+            signal.sampling_rate_hz,
+            unit or row.unit,
+            source or row.name,
+        )
+    if isinstance(channel_or_rate_hz, str):
+        raise InputError(f"an array has no channel {channel_or_rate_hz!r}", allowed="its sampling rate in Hz")
+    rate = positive(channel_or_rate_hz, "sampling_rate_hz", "Hz")
+    return checked_signal(signal, minimum=minimum), rate, unit, source
 
 
 def plan_blocks(n_samples: int, n_per_block: int | None, overlap: float, window: str) -> BlockPlan:

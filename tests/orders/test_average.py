@@ -5,15 +5,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gearsig.angle import AngleSignal, ShaftAngle, find_shaft_angle
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import (
     SynchronousAverage,
+    average_lines,
     band_passed_mesh,
     mean_and_error,
     mesh_modulation,
+    order_spectrum,
     separate,
+    separate_shafts,
     synchronous_average,
 )
+from gearsig.recording import Channel, Recording
+from gearsig.rig import ConstantSpeed
 
 PER_REV = 256
 ANGLE = np.arange(PER_REV) / PER_REV
@@ -153,3 +159,58 @@ def test_modulation_of_what_is_not_there_is_refused():
         mesh_modulation(_average(_gear(ANGLE)), 23, harmonic=6)
     with pytest.raises(InputError, match="half_width_orders"):
         mesh_modulation(_average(_gear(ANGLE)), 23, half_width_orders=23)
+
+
+def test_lines_of_parts_and_of_the_whole(angle_signal):
+    rng = np.random.default_rng(1)
+    signal = angle_signal(lambda r: 0.7 + _gear(r) + rng.normal(size=len(r)), 41, start=0.3)
+    lines = average_lines(signal, n_parts=2)
+    average = synchronous_average(signal, "a")
+    assert lines.parts.shape == (2, 1, 128)
+    assert list(lines.n_revolutions) == [20, 20]
+    assert lines.whole[0] == pytest.approx(average.lines(), abs=1e-12)
+    assert average.lines()[0].real == pytest.approx(average.values.mean())
+    assert average.lines()[23] == pytest.approx(np.exp(0.4j), abs=0.2)
+    rms = average_lines(signal, ["a"], scaling="amplitude rms")
+    assert rms.whole[0, 1:] == pytest.approx(average.lines()[1:] / np.sqrt(2))
+
+
+def test_hann_weights_keep_other_shafts_orders_out(angle_signal):
+    signal = angle_signal(lambda r: np.cos(2 * np.pi * 7.27 * r), 40)
+    equal, hann = (abs(average_lines(signal, weighting=w).whole[0, 7]) for w in ("equal", "hann"))
+    assert hann < 0.05 * equal
+
+
+def test_shafts_with_close_orders_are_told_apart():
+    teeth, n_angles = (25, 41), 256
+    signals = []
+    for own in (1.0, teeth[0] / teeth[1]):
+        n = int(40 * own) * n_angles
+        driver = np.arange(n) / n_angles / own
+        # 8 turns of the driver are nearly 13 of the driven gear; both share the mesh.
+        waves = [np.cos(2 * np.pi * o * driver) for o in (8, 13 * teeth[0] / teeth[1], teeth[0])]
+        angle = ShaftAngle(f"{own:g}", np.array([0.0, 1.0]), np.array([0.0, 40 * own]), np.full(2, 40 * own), "given")
+        signals.append(AngleSignal(sum(waves)[None], n_angles, angle, 0.0, ("v",), ("g",), 100.0))
+    found = separate_shafts(signals, teeth)
+    for signal, order, z in zip(found.signals, (8, 13), teeth, strict=True):
+        lines = np.abs(average_lines(signal).whole[0])
+        assert lines[[order, z]] == pytest.approx(1.0, abs=0.02)
+        assert np.delete(lines, [order, z]).max() < 0.02
+    assert np.abs(found.residual.samples).max() < 0.1
+
+
+def test_average_and_spectrum_of_a_recording_and_of_an_array():
+    rate, speed = 5000.0, 7.0
+    x = _gear(speed * np.arange(50000) / rate)
+    recording = Recording(x[None], rate, (Channel("a1", "acceleration", "g"),), ConstantSpeed(60 * speed, shaft="in"))
+    average = synchronous_average(recording, "a1")
+    assert (average.unit, average.channel) == ("g", "a1")
+    assert abs(average.lines()[23]) == pytest.approx(1.0, abs=1e-5)
+    of_array = synchronous_average(x, rate, shaft_angle=find_shaft_angle(recording))
+    assert of_array.values == pytest.approx(average.values, abs=1e-12)
+    spectrum = order_spectrum(recording, "a1")
+    assert spectrum.values[spectrum.index_of(46.0)] == pytest.approx(0.3, abs=1e-4)
+    with pytest.raises(InputError):
+        synchronous_average(x, rate)
+    with pytest.raises(RefusalError):
+        synchronous_average(recording, "a1", shaft="out")

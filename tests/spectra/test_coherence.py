@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Channel, Recording, read_recording
-from gearsig.spectra import channel_coherence, enhanced_envelope, spectral_coherence
+from gearsig.spectra import enhanced_envelope, spectral_coherence
 
 FS = 10_000.0
 DATA = Path(__file__).parents[3] / "shared" / "data" / "bearing_races"
@@ -140,7 +140,7 @@ def test_bad_input_names_the_remedy():
     with pytest.raises(InputError, match="probability"):
         c.level(0.0)
     recording = Recording(x[None, :], FS, (Channel("a", "acceleration", "m/s^2"),))
-    assert channel_coherence(recording, "a", highest_alpha_hz=100.0, n_bands=8).unit == "(m/s^2)^2/Hz"
+    assert spectral_coherence(recording, "a", highest_alpha_hz=100.0, n_bands=8).unit == "(m/s^2)^2/Hz"
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the measured recordings are not here")
@@ -149,7 +149,7 @@ def test_bad_input_names_the_remedy():
     [("InnerRaceFault_vload_3.mat", 118.875, 81.125), ("OuterRaceFault_vload_4.mat", 81.125, 118.875)],
 )
 def test_bearing_race_is_the_strongest_line_of_the_enhanced_envelope(file, race_hz, other_hz):
-    e = enhanced_envelope(channel_coherence(read_recording(DATA / file), "gs", highest_alpha_hz=600.0))
+    e = enhanced_envelope(spectral_coherence(read_recording(DATA / file), "gs", highest_alpha_hz=600.0))
     assert e.spectrum.positions[np.argmax(e.spectrum.values)] == pytest.approx(race_hz, rel=0.02)
     race, other = (e.spectrum.largest_near(hz, 0.02 * hz)[1] for hz in (race_hz, other_hz))
     assert race > 20 * max(other, e.level)
@@ -161,8 +161,8 @@ def test_tones_are_coherent_with_each_other_until_removed():
     tones = sum(np.cos(2 * np.pi * f * t) for f in (1000.0, 1100.0))
     x = 0.5 * np.random.default_rng(6).normal(size=n) + tones
     recording = Recording(x[None, :], FS, (Channel("a", "acceleration", "m/s^2"),))
-    raw = channel_coherence(recording, "a", highest_alpha_hz=150.0, n_bands=32)
-    cleaned = channel_coherence(recording, "a", highest_alpha_hz=150.0, n_bands=32, preparation="tones removed")
+    raw = spectral_coherence(recording, "a", highest_alpha_hz=150.0, n_bands=32)
+    cleaned = spectral_coherence(recording, "a", highest_alpha_hz=150.0, n_bands=32, preparation="tones removed")
     at = int(np.argmin(np.abs(raw.alpha - 100.0)))
     assert raw.coherence_squared[at].max() > 0.5
     assert cleaned.coherence_squared[at].max() < cleaned.level(1e-4)

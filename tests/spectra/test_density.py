@@ -5,7 +5,7 @@ import pytest
 from scipy import signal as scipy_signal
 
 from gearsig.recording import Channel, Recording
-from gearsig.spectra import channel_density, power_density
+from gearsig.spectra import power_density
 
 
 @pytest.mark.parametrize("n_per_block", [256, 255])
@@ -36,4 +36,4 @@ def test_integral_is_the_mean_square():
 
 def test_channel_density_writes_its_unit():
     recording = Recording(np.ones((1, 100)), 8.0, (Channel("p", "sound_pressure", "Pa"),))
-    assert channel_density(recording, "p").unit == "Pa^2/Hz"
+    assert power_density(recording, "p").unit == "Pa^2/Hz"

@@ -11,7 +11,6 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Channel, Recording, read_recording
 from gearsig.spectra import (
     best_band,
-    channel_kurtogram,
     kurtogram,
     kurtogram_envelope,
     noise_floor,
@@ -190,7 +189,7 @@ def test_bad_input_names_the_remedy():
     with pytest.raises(RefusalError, match="no band"):
         kurtogram(x, FS).best_band(narrowest_hz=FS)
     with pytest.raises(InputError, match="no channel"):
-        channel_kurtogram(recording_of(x), "b")
+        kurtogram(recording_of(x), "b")
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the measured recordings are not here")

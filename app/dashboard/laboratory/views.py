@@ -193,10 +193,10 @@ ENVELOPE_SHAFTS = 12.0
 
 def show_amplitude(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
     """Show the amplitude spectra of a channel."""
-    from gearsig.spectra import channel_spectrum
+    from gearsig.spectra import amplitude_spectrum
 
     runs = _runs(healthy, faulty)
-    spectra = [channel_spectrum(run.recording, channel) for run in runs]
+    spectra = [amplitude_spectrum(run.recording, channel) for run in runs]
     cursors = spectrum_cursors(runs[-1])
     mesh = max((c.position for c in cursors if c.kind == "mesh"), default=0.0)
     _show_spectrum_view(spectra, cursors, "spectrum", logarithmic=True, first_end=1.04 * mesh)

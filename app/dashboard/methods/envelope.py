@@ -318,9 +318,9 @@ def coherence_of(key: str, settings: CoherenceSettings, _stretch: SignalSegment)
         from gearsig.spectra import order_coherence
 
         return order_coherence(recording, name, _stretch.angle, highest_order=highest, n_bands=n_bands)
-    from gearsig.spectra import channel_coherence
+    from gearsig.spectra import spectral_coherence
 
-    return channel_coherence(
+    return spectral_coherence(
         recording, name, highest_alpha_hz=highest, n_bands=n_bands, preparation=settings.preparation
     )
 
