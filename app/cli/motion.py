@@ -74,16 +74,16 @@ def start_stop(
 def tooth_levels(recording: Recording, examined: StartStop) -> tuple[AngleProfile | None, str, str, Spectrum | None]:
     """Return of the first acceleration, else of the torque: level tooth by tooth, channel, unit, orders forwards."""
     from gearsig.errors import RefusalError
-    from gearsig.motion import angle_profile, stretch_order_spectrum
+    from gearsig.motion import angle_profile, segment_order_spectrum
 
     fitting = [c for q in ("acceleration", "torque") for c in recording.channels if c.quantity == q]
     if not fitting:
         return None, "", "", None
     channel, motion = fitting[0], examined.motion
     values, angle = recording.values(channel.name), motion.driver_angle_rad
-    found = angle_profile(values, angle, examined.course, motion.path.teeth[0])
+    found = angle_profile(values, angle, examined.segments, motion.path.teeth[0])
     try:
-        orders = stretch_order_spectrum(values, angle, examined.course, unit=channel.unit, source=channel.name)
+        orders = segment_order_spectrum(values, angle, examined.segments, unit=channel.unit, source=channel.name)
     except RefusalError:  # no stretch holds a revolution
         return found, channel.name, channel.unit, None
     return found, channel.name, channel.unit, orders

@@ -228,12 +228,12 @@ def refuse_start_stop(recordings: Sequence[Recording], rigs: Sequence[Rig], name
 
 def is_start_stop_recording(recording: Recording, rig: Rig) -> bool:
     """Whether a recording holds the motion of both gears of a machine that starts and stops."""
-    from gearsig.motion import course_of_angle, is_start_stop, measure_motion
+    from gearsig.motion import is_start_stop, measure_motion, motion_segments
 
     if rig.contact is None:
         return False
     try:
         motion = measure_motion(recording, rig)
-        return is_start_stop(course_of_angle(motion.driver_angle_rad, motion.sampling_rate_hz))
+        return is_start_stop(motion_segments(motion.driver_angle_rad, motion.sampling_rate_hz))
     except GearsigError:
         return False

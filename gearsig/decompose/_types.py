@@ -47,8 +47,8 @@ class VmdSettings:
     max_iterations : int
         At least 2.
     engine : str
-        "gearsig", or "vmdpy": the reference program in Python, much slower and with 16 kB of memory per sample and
-        mode; it starts "uniform" or "zero" and always iterates up to 499 times.
+        "gearsig", or "vmdpy": the reference program in Python, much slower and with up to 16 kB of memory per sample
+        and mode; it starts "uniform" or "zero" and always iterates up to 499 times.
 
     Raises
     ------

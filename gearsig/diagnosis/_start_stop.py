@@ -18,11 +18,11 @@ from gearsig.motion import (
     StartStop,
     YieldingTeeth,
     check_wrap,
-    course_of_angle,
     examine_start_stop,
     find_bursts,
     is_start_stop,
     measure_motion,
+    motion_segments,
     refuse_standing,
 )
 from gearsig.recording import Recording
@@ -183,7 +183,7 @@ def weak_teeth_findings(examined: StartStop, rig: Rig) -> list[Finding]:
 
 def _teeth_alike(found: YieldingTeeth, contact: ToothContact) -> Finding:
     """Say that no tooth stands out, and from which loss of stiffness on one would."""
-    least = 100.0 * found.least_loss(contact.exponent)
+    least = 100.0 * found.min_loss(contact.exponent)
     seen = int(np.count_nonzero(np.isfinite(found.extra_um)))
     return Finding(
         "teeth-alike",
@@ -345,7 +345,7 @@ def course_of(recording: Recording, rig: Rig) -> tuple[MotionSegments, FloatArra
         revolutions = values / source.units_per_revolution
         angle = 2.0 * np.pi * (np.unwrap(revolutions, period=1.0) if source.wraps else revolutions)
     try:
-        return course_of_angle(angle, rate), angle
+        return motion_segments(angle, rate), angle
     except InputError:  # too short for a speed
         return None
 

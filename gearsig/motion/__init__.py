@@ -47,13 +47,13 @@ from gearsig.motion._segments import (
     MotionSegments,
     angle_profile,
     find_bursts,
-    find_course,
     find_phases,
     is_start_stop,
+    motion_segments,
+    segment_order_spectrum,
     shaft_speed_rad_s,
-    stretch_order_spectrum,
 )
-from gearsig.motion._start_stop import StartStop, course_of_angle, examine_start_stop
+from gearsig.motion._start_stop import StartStop, examine_start_stop
 from gearsig.motion._types import ForceEstimate, PairMotion, check_turns, refuse_standing
 
 __all__ = [
@@ -86,14 +86,12 @@ __all__ = [
     "check_angle",
     "check_turns",
     "check_wrap",
-    "course_of_angle",
     "dependence",
     "depth",
     "estimate_backlash",
     "estimate_forces",
     "examine_start_stop",
     "find_bursts",
-    "find_course",
     "find_impacts",
     "find_phases",
     "find_roles",
@@ -105,13 +103,14 @@ __all__ = [
     "latched_damping",
     "local_polynomial",
     "measure_motion",
+    "motion_segments",
     "noise_study",
     "pair_force",
     "reduced_mass_kg",
     "refuse_standing",
     "robust_fit",
+    "segment_order_spectrum",
     "shaft_speed_rad_s",
-    "stretch_order_spectrum",
     "tooth_compliance",
     "torque_twist",
 ]

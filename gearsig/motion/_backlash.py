@@ -14,12 +14,12 @@ from gearsig.motion._types import PairMotion
 
 LOADED = 0.1
 """Part of the ordinary load from which on a sample tells where a flank is."""
-LEAST_SAMPLES = 12
+MIN_SAMPLES = 12
 """On either flank."""
 FAR = 4.0
 """Standard deviations from the fit beyond which a sample is left out: the middle of a blow, a slipped count."""
 MOST_ROUNDS = 20
-LEAST_PART = 0.5
+MIN_PART = 0.5
 """Of the rig's play: without torque, less is the deflection of one flank and not the way to the other."""
 
 
@@ -145,7 +145,7 @@ def _lost_motion(motion: PairMotion) -> BacklashEstimate:
     _check_sides(len(drive), len(back))
     scatter = 1.4826 * float(np.median(np.abs(drive - np.median(drive))))
     drawn = 2e-6 * motion.contact.half_backlash_um
-    if high - low < max(6.0 * scatter, LEAST_PART * drawn):
+    if high - low < max(6.0 * scatter, MIN_PART * drawn):
         raise RefusalError(
             f"the flanks move by {1e6 * (high - low):.3g} µm against each other, the play drawn is {1e6 * drawn:.3g} "
             f"µm and the noise {1e6 * scatter:.2g} µm: only one flank was loaded, or it cannot be told",
@@ -165,7 +165,7 @@ def _lost_motion(motion: PairMotion) -> BacklashEstimate:
 
 
 def _check_sides(n_drive: int, n_back: int) -> None:
-    if min(n_drive, n_back) < LEAST_SAMPLES:
+    if min(n_drive, n_back) < MIN_SAMPLES:
         raise RefusalError(
             f"{n_drive} samples load the drive flank and {n_back} the back flank: the play between them does not show",
             remedy="record a reversal, or a stop with a brake: both flanks must carry",
@@ -195,10 +195,10 @@ class TorqueTwist:
         Width of the loop at a light load, between both signs of the torque: the play as the driver's shaft feels it;
         nan where the torque has one sign.
     loss_per_cycle_j : float
-        ∮ τ dδ per stretch of motion: what contact and friction of the teeth take; nan where the motion neither stops
+        ∮ τ dδ per segment of motion: what contact and friction of the teeth take; nan where the motion neither stops
         nor reverses, as no loop closes then.
     work_per_cycle_j : float
-        ∫ τ dθ1 per stretch of motion: what goes through the shaft; nan likewise.
+        ∫ τ dθ1 per segment of motion: what goes through the shaft; nan likewise.
     n_cycles : int
     """
 
@@ -210,7 +210,7 @@ class TorqueTwist:
     n_cycles: int
 
 
-def torque_twist(motion: PairMotion, course: MotionSegments, datum_m: float) -> TorqueTwist:
+def torque_twist(motion: PairMotion, segments: MotionSegments, datum_m: float) -> TorqueTwist:
     """Return the loop of a start–stop motion.
 
     Raises
@@ -223,7 +223,7 @@ def torque_twist(motion: PairMotion, course: MotionSegments, datum_m: float) -> 
     r1 = motion.path.base_radii_m[0]
     twist = (motion.compression_m - datum_m) / r1
     torque = motion.torque_nm
-    n_cycles = len(course.moving) if course.stops_s or course.n_reversals else 0
+    n_cycles = len(segments.moving) if segments.stops_s or segments.n_reversals else 0
     share = 1.0 / (n_cycles * motion.sampling_rate_hz) if n_cycles else float("nan")
     return TorqueTwist(
         twist,

@@ -82,7 +82,7 @@ def friction_share(motion: PairMotion, g: FloatArray, gear: int = 0) -> FloatArr
 
 LOADED = 0.2
 """Part of the load of one sample in twenty from which on a sample counts as loaded: no single blow decides."""
-LEAST_SAMPLES = 20
+MIN_SAMPLES = 20
 AGREEMENT = 0.35
 """How far the width between both flanks may be from the rig's backlash, as a part of it, for a datum without torque."""
 
@@ -126,7 +126,7 @@ def _from_torque(motion: PairMotion) -> Datum:
     force = motion.tooth_force_from_torque_n
     assert force is not None  # noqa: S101  the caller has looked
     loaded = np.abs(force) > LOADED * np.quantile(np.abs(force), 0.95)
-    if np.count_nonzero(loaded) < LEAST_SAMPLES or not np.any(force):
+    if np.count_nonzero(loaded) < MIN_SAMPLES or not np.any(force):
         raise RefusalError(
             f"{np.count_nonzero(loaded)} samples carry a load: the zero of the compression cannot be found",
             remedy="record while the machine drives, or tell the zero to gearsig force by --datum",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
-from gearsig.motion._backlash import LEAST_SAMPLES, dependence, estimate_backlash
+from gearsig.motion._backlash import MIN_SAMPLES, dependence, estimate_backlash
 from gearsig.motion._force import find_datum, friction_share
 from gearsig.motion._impacts import meeting_speeds
 from gearsig.motion._types import PairMotion
@@ -83,7 +83,7 @@ def robust_fit(
     wanted: NDArray[np.bool_],
     names: tuple[str, ...],
     *,
-    least_scatter: float = 0.0,
+    min_scatter: float = 0.0,
     with_jackknife: bool = True,
 ) -> RobustFit:
     """Minimise the squares of the wanted residuals; leave out what is far off, and again.
@@ -96,7 +96,7 @@ def robust_fit(
         Where to begin, and the parameters' sizes.
     wanted : array of bool, (n_samples,)
     names : tuple of str
-    least_scatter : float
+    min_scatter : float
         What the equation itself leaves out: a sample nearer than five times that is never left out.
     with_jackknife : bool
         Whether the covariance is widened by it; it costs eight further solutions.
@@ -113,7 +113,7 @@ def robust_fit(
         x, jacobian = _solve(residuals, x, scale, keep)
         left = residuals(x * scale)
         scatter = 1.4826 * float(np.median(np.abs(left[keep])))
-        again = wanted & (np.abs(left) <= FAR * max(scatter, least_scatter))
+        again = wanted & (np.abs(left) <= FAR * max(scatter, min_scatter))
         if np.array_equal(again, keep):
             break
         keep = again
@@ -196,7 +196,7 @@ PITCH_POINT, SLOW = 0.1, 0.15
 known: bristles bend."""
 LOADED = 0.1
 """Part of the ordinary load from which on a sample is taken."""
-LEAST_SCATTER_M = 2e-8
+MIN_SCATTER_M = 2e-8
 """What the equation leaves out: bristles that bend, a damping that is latched a little early."""
 LONG_CONTACT, MOST_LONG = 40, 8
 """Samples from which on a contact whose speed of meeting is not known gets a damping of its own, and how many do."""
@@ -265,7 +265,7 @@ class ContactEquation:
             scale[rows],
             self.wanted,
             tuple(names[i] for i in rows),
-            least_scatter=LEAST_SCATTER_M,
+            min_scatter=MIN_SCATTER_M,
             with_jackknife=with_jackknife,
         )
 
@@ -283,9 +283,9 @@ def contact_equation(motion: PairMotion) -> ContactEquation:
     assert torque is not None  # noqa: S101
     side = np.sign(force)
     wanted = (np.abs(force) > LOADED * float(np.quantile(np.abs(force), 0.95))) & _clear(motion, side)
-    if np.sum(wanted) < 10 * LEAST_SAMPLES:
+    if np.sum(wanted) < 10 * MIN_SAMPLES:
         raise RefusalError(f"{np.sum(wanted)} samples carry a load", remedy="record while the machine drives")
-    both = min(np.sum(wanted & (side > 0)), np.sum(wanted & (side < 0))) >= LEAST_SAMPLES
+    both = min(np.sum(wanted & (side > 0)), np.sum(wanted & (side < 0))) >= MIN_SAMPLES
     start = _start(motion, both_flanks=bool(both))
     speed = meeting_speeds(motion, float(start[0]), float(start[1]))
     group, n_groups = _groups(speed, wanted, side)
@@ -413,7 +413,7 @@ TOLD = 0.5
 NORMAL_95 = 1.96
 TURNING = 0.1
 """Part of the ordinary speed of the driven gear from which on its friction slides."""
-LEAST_SCATTER = 1e-3
+MIN_SCATTER = 1e-3
 """Part of the ordinary acceleration that the load's equation leaves out."""
 ONE_FLANK = "only one flank was loaded: play and zero of the angles cannot be told apart; record a stop with a brake"
 ONE_ZERO = "only one flank was loaded: it is told from the zero of the angles by little; record a stop with a brake"
@@ -500,7 +500,7 @@ def _fit_load(motion: PairMotion, inertia_kg_m2: float) -> RobustFit:
     force = (torque - inertia_kg_m2 * motion.driver_acceleration_rad_s2) / r1
     drive = r2 * force * friction_share(motion, force, 1) / friction_share(motion, force, 0)
     turning = np.abs(w) > TURNING * float(np.quantile(np.abs(w), 0.95))
-    if np.sum(turning) < 10 * LEAST_SAMPLES:
+    if np.sum(turning) < 10 * MIN_SAMPLES:
         raise RefusalError("the driven gear hardly turns", remedy="record a start or a stop")
 
     def residuals(values: FloatArray) -> FloatArray:
@@ -516,7 +516,7 @@ def _fit_load(motion: PairMotion, inertia_kg_m2: float) -> RobustFit:
         np.array([1.0 / guess, ordinary, ordinary]),
         turning,
         ("inverse inertia", "load_friction_nm", "load_viscous_nm_s_per_rad"),
-        least_scatter=LEAST_SCATTER * ordinary / guess,
+        min_scatter=MIN_SCATTER * ordinary / guess,
     )
 
 
@@ -611,10 +611,10 @@ def _why(fit: RobustFit, own: str) -> str:
 CERTAIN = 5.0
 """Standard deviations by which a tooth must stand out of the others."""
 N_PLACES = 12
-"""Parts of the stretch in which a pair carries alone: teeth are compared at equal places of their contact."""
-LEAST_PART = 0.02
+"""Parts of the segment in which a pair carries alone: teeth are compared at equal places of their contact."""
+MIN_PART = 0.02
 """Of the mean deflection: teeth differ by that anyway."""
-TOOTH_COMPLIANCE_LEAST_SAMPLES = 4
+TOOTH_COMPLIANCE_MIN_SAMPLES = 4
 """Of a tooth."""
 
 
@@ -645,10 +645,10 @@ class YieldingTeeth:
         """Part of the stiffness of a pair that such an extra deflection stands for: 1 − (1 + x/g)^−λ."""
         return self._loss(float(self.extra_um[tooth - 1]), exponent)
 
-    def least_loss(self, exponent: float) -> float:
+    def min_loss(self, exponent: float) -> float:
         """Part of its stiffness that an ordinary tooth must have lost to stand out."""
         ordinary = float(np.nanmedian(self.uncertainty_um))
-        return self._loss(max(CERTAIN * ordinary, LEAST_PART * self.deflection_um), exponent)
+        return self._loss(max(CERTAIN * ordinary, MIN_PART * self.deflection_um), exponent)
 
     def _loss(self, extra_um: float, exponent: float) -> float:
         return float(1.0 - (1.0 + extra_um / self.deflection_um) ** -exponent)
@@ -679,14 +679,14 @@ def tooth_compliance(motion: PairMotion) -> YieldingTeeth:
     tooth = (motion.path.tooth(motion.driver_angle_rad) - 1.0).astype(np.int64)
     n_teeth = motion.path.teeth[0]
     counts = np.bincount(tooth[single], minlength=n_teeth)
-    n_seen = int(np.sum(counts >= TOOTH_COMPLIANCE_LEAST_SAMPLES))
+    n_seen = int(np.sum(counts >= TOOTH_COMPLIANCE_MIN_SAMPLES))
     if n_seen < n_teeth // 2:
         raise RefusalError(
-            f"{n_seen} of {n_teeth} teeth of the driver carried alone for {TOOTH_COMPLIANCE_LEAST_SAMPLES} samples",
+            f"{n_seen} of {n_teeth} teeth of the driver carried alone for {TOOTH_COMPLIANCE_MIN_SAMPLES} samples",
             remedy="record more revolutions, under load",
         )
     middle, spread = np.full(n_teeth, np.nan), np.full(n_teeth, np.nan)
-    for j in np.flatnonzero(counts >= TOOTH_COMPLIANCE_LEAST_SAMPLES):
+    for j in np.flatnonzero(counts >= TOOTH_COMPLIANCE_MIN_SAMPLES):
         own = left[single & (tooth == j)]
         middle[j] = np.median(own)
         spread[j] = 1.4826 * np.median(np.abs(own - middle[j]))
@@ -734,8 +734,6 @@ def _deflection(equation: ContactEquation, log_stiffness: float, single: NDArray
 
 
 def _weak(extra: FloatArray, uncertainty: FloatArray, deflection: float) -> tuple[int, ...]:
-    stands_out = np.nan_to_num(extra) > np.fmax(
-        CERTAIN * np.nan_to_num(uncertainty, nan=np.inf), LEAST_PART * deflection
-    )
+    stands_out = np.nan_to_num(extra) > np.fmax(CERTAIN * np.nan_to_num(uncertainty, nan=np.inf), MIN_PART * deflection)
     order = np.argsort(-np.nan_to_num(extra, nan=-np.inf))
     return tuple(int(j) + 1 for j in order if stands_out[j])

@@ -92,7 +92,7 @@ def fit_flight(
 
 NOISE_DEPTH = 4.0
 """Depth that counts as touching, in standard deviations of the compression's noise."""
-LEAST_FLIGHT_SAMPLES = 2
+MIN_FLIGHT_SAMPLES = 2
 """In the play ahead of a contact: fewer, and the speed of impact is that of a contact that never ended."""
 LONGEST_BOUNCE = 6.0
 """In times of a free elastic impact: a longer contact is carried, not bounced off."""
@@ -141,7 +141,7 @@ class Impact:
 
 
 def find_impacts(
-    motion: PairMotion, datum_m: float, *, half_backlash_m: float | None = None, least_speed_mps: float | None = None
+    motion: PairMotion, datum_m: float, *, half_backlash_m: float | None = None, min_speed_mps: float | None = None
 ) -> tuple[Impact, ...]:
     """Find the moments at which the flanks met after a flight through the play.
 
@@ -152,7 +152,7 @@ def find_impacts(
         Compression in the middle of the play, from `estimate_backlash` or `find_datum`.
     half_backlash_m : float or None
         None: the rig's. A measured one finds flanks that are worn.
-    least_speed_mps : float or None
+    min_speed_mps : float or None
         Slower approaches are left out. None: five standard deviations of the compression rate's scatter.
 
     Raises
@@ -183,12 +183,12 @@ def find_impacts(
             remedy="encoders of more counts; where the motion is slow, --bandwidth of gearsig start-stop",
         )
     g = depth(q, a)
-    slowest = 5.0 * scatter_of(rate) if least_speed_mps is None else least_speed_mps
+    slowest = 5.0 * scatter_of(rate) if min_speed_mps is None else min_speed_mps
     flights = _Flights(motion, q, a, (noise, scatter_of(rate)))
     runs = _runs(np.where(np.abs(g) > 0.0, np.sign(g), 0.0).astype(np.int64), g, NOISE_DEPTH * noise)
     found = []
     for before, this, after in zip(runs[:-1], runs[1:], [*runs[2:], None][: len(runs) - 1], strict=True):
-        if this[0] == 0 or before[0] != 0 or before[2] - before[1] < LEAST_FLIGHT_SAMPLES:
+        if this[0] == 0 or before[0] != 0 or before[2] - before[1] < MIN_FLIGHT_SAMPLES:
             continue
         impact = _impact(motion, flights, g, before, this, after)
         if impact.speed_mps > slowest:
@@ -209,7 +209,7 @@ def meeting_speeds(motion: PairMotion, datum_m: float, half_backlash_m: float) -
     runs = _runs(np.sign(g).astype(np.int64), g, NOISE_DEPTH * scatter[0])
     for before, this in pairwise(runs):
         if this[0] != 0:
-            long_enough = before[0] == 0 and before[2] - before[1] >= LEAST_FLIGHT_SAMPLES
+            long_enough = before[0] == 0 and before[2] - before[1] >= MIN_FLIGHT_SAMPLES
             speed = flights.meets(before, this[0])[1] if long_enough else np.nan
             speeds[this[1] : this[2]] = np.maximum(speed, motion.contact.impact_speed_floor_mps)
     return speeds
@@ -236,13 +236,13 @@ Run = tuple[int, int, int]
 """Flank or 0, first sample, sample after the last."""
 
 
-def _runs(side: np.ndarray, g: FloatArray, least_depth_m: float) -> list[Run]:
-    """Stretches on one flank or in the play; a touch no deeper than the noise counts as flight."""
+def _runs(side: np.ndarray, g: FloatArray, min_depth_m: float) -> list[Run]:
+    """Segments on one flank or in the play; a touch no deeper than the noise counts as flight."""
     runs: list[Run] = []
     edges = np.flatnonzero(np.diff(side)) + 1
     for first, last in zip(np.concatenate([[0], edges]), np.concatenate([edges, [len(side)]]), strict=True):
         flank = int(side[first])
-        if flank and float(np.max(np.abs(g[first:last]))) < least_depth_m:
+        if flank and float(np.max(np.abs(g[first:last]))) < min_depth_m:
             flank = 0
         if runs and runs[-1][0] == flank:
             runs[-1] = (flank, runs[-1][1], int(last))
@@ -289,7 +289,7 @@ def _impact(motion: PairMotion, flights: _Flights, g: FloatArray, before: Run, t
     mass = reduced_mass_kg(motion)
     angle = float(np.interp(time, [(first - 1) * step, first * step], motion.driver_angle_rad[first - 1 : first + 1]))
     restitution, note = float("nan"), ""
-    bounced = after is not None and after[0] == 0 and after[2] - after[1] >= LEAST_FLIGHT_SAMPLES
+    bounced = after is not None and after[0] == 0 and after[2] - after[1] >= MIN_FLIGHT_SAMPLES
     if bounced and speed > 0.0 and (last - first - 1) * step < LONGEST_BOUNCE * _bounce_s(motion, speed, mass):
         assert after is not None  # noqa: S101  bounced says so
         restitution = max(flights.leaves(after, flank), 0.0) / speed

@@ -139,7 +139,7 @@ MOST_OF_ONE = 0.5
 """Of the sum of squares that a single window may have."""
 ALLOWED = {1: 0.03, 2: 0.06}
 """Parts by which scales of speeds and of accelerations may differ."""
-LEAST_RATE_HZ = {1: 0.0, 2: 4000.0}
+MIN_RATE_HZ = {1: 0.0, 2: 4000.0}
 """Sampling rates from which on they are compared: slower, an acceleration that rings is folded down, alike in each
 start, so that its sum is off and its scatter does not say so."""
 CERTAIN = 5.0
@@ -208,7 +208,7 @@ def check_scale(
         If the scale is off by more than 3 % (speeds) or 6 % (accelerations, from 4 kHz on), and by five of its standard
         errors.
     """
-    if sampling_rate_hz < LEAST_RATE_HZ[order]:
+    if sampling_rate_hz < MIN_RATE_HZ[order]:
         return
     scale, error = channel_scale(angle_rad, rate, sampling_rate_hz, order)
     if not abs(scale - 1.0) > max(ALLOWED[order], CERTAIN * error):
@@ -226,7 +226,7 @@ def check_scale(
 # --------------------
 
 
-LEAST_JUMP_RAD = 2e-3 * pi
+MIN_JUMP_RAD = 2e-3 * pi
 """A thousandth of a revolution: no gear with its load gets there and stays within one sample."""
 SCATTER = 50.0
 """Of the ordinary change of the angle's increments: an impact reaches a tenth of that."""
@@ -255,7 +255,7 @@ def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where
     steps, beyond = _steps(angle_rad)
     moving = np.abs(steps[steps != 0.0])
     quantum = float(moving.min()) if len(moving) else 0.0
-    limit = max(LEAST_JUMP_RAD, SCATTER * 1.4826 * float(np.median(beyond)), QUANTA * quantum)
+    limit = max(MIN_JUMP_RAD, SCATTER * 1.4826 * float(np.median(beyond)), QUANTA * quantum)
     found = np.flatnonzero(beyond > limit)
     if len(found):
         i = int(found[0])
@@ -405,7 +405,7 @@ def local_polynomial(sampling_rate_hz: float, bandwidth_hz: float | None = None)
 
 
 RATIO_TOLERANCE = 0.02
-LEAST_TURN_RAD = 0.2
+MIN_TURN_RAD = 0.2
 """Turn of the driver below which the ratio of both angles says nothing."""
 MOST_PLAY_TEETH = 0.5
 """Of a tooth pitch: both angles may differ by the backlash."""
@@ -560,10 +560,7 @@ def _check_ratio(driver_rad: FloatArray, driven_rad: FloatArray, path: PathOfCon
     first, last = int(np.argmin(driver_rad)), int(np.argmax(driver_rad))
     turned, follows = driver_rad[last] - driver_rad[first], driven_rad[last] - driven_rad[first]
     expected = turned * z1 / z2
-    if (
-        turned < LEAST_TURN_RAD
-        or abs(follows - expected) < RATIO_TOLERANCE * expected + MOST_PLAY_TEETH * 2.0 * pi / z2
-    ):
+    if turned < MIN_TURN_RAD or abs(follows - expected) < RATIO_TOLERANCE * expected + MOST_PLAY_TEETH * 2.0 * pi / z2:
         return
     against = abs(follows + expected) < RATIO_TOLERANCE * expected + MOST_PLAY_TEETH * 2.0 * pi / z2
     raise InputError(

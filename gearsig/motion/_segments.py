@@ -1,4 +1,4 @@
-"""How one shaft moves: stretches forwards, backwards and at rest; starts, stops, reversals."""
+"""How one shaft moves: segments forwards, backwards and at rest; starts, stops, reversals; signals over its angle."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ STANDING_SCATTER = 5.0
 """Or below so many standard deviations of the speed's own scatter."""
 SHORTEST_S = 0.03
 """A shorter rest is the turning point of a swing, a shorter motion a tremor."""
-LEAST_TURN = 0.02
-"""Of the longest stretch's angle: a standing machine that is knocked has not been started."""
+MIN_TURN = 0.02
+"""Of the longest segment's angle: a standing machine that is knocked has not been started."""
 AT_ONCE, FIRST_S = 0.15, 0.01
-"""Of the top speed of the first stretch: slower on average in its first hundredth of a second, it begins from rest."""
+"""Of the top speed of the first segment: slower on average in its first hundredth of a second, it begins from rest."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +58,11 @@ class MotionSegment:
 
 @dataclass(frozen=True)
 class MotionSegments:
-    """The stretches of a recording, and what they add up to.
+    """The segments of a recording, and what they add up to.
 
     Parameters
     ----------
-    stretches : tuple of Stretch
+    segments : tuple of Segment
         One after the other, without gaps.
     threshold_rad_s : float
         Speed below which the shaft is taken to stand.
@@ -70,19 +70,19 @@ class MotionSegments:
         Whether the shaft stands at the first sample and moves from it on: a start without a rest ahead of it.
     """
 
-    stretches: tuple[MotionSegment, ...]
+    segments: tuple[MotionSegment, ...]
     threshold_rad_s: float
     starts_at_once: bool = False
 
     @property
     def moving(self) -> tuple[MotionSegment, ...]:
-        """Stretches in which the shaft turns."""
-        return tuple(s for s in self.stretches if s.direction)
+        """Segments in which the shaft turns."""
+        return tuple(s for s in self.segments if s.direction)
 
     @property
     def starts_s(self) -> tuple[float, ...]:
         """Times at which motion begins after a rest in the record, or from rest at its first sample."""
-        at_once = (self.stretches[0].start_s,) if self.starts_at_once else ()
+        at_once = (self.segments[0].start_s,) if self.starts_at_once else ()
         return (*at_once, *(b.start_s for a, b in self._pairs() if not a.direction and b.direction))
 
     @property
@@ -95,8 +95,8 @@ class MotionSegments:
         """Starts and stops in words; a record that begins or ends in motion holds one less of them."""
         said = f"{_counted(len(self.starts_s), 'start')} and {_counted(len(self.stops_s), 'stop')}"
         moves = {
-            "begins": self.stretches[0].direction and not self.starts_at_once,
-            "ends": self.stretches[-1].direction,
+            "begins": self.segments[0].direction and not self.starts_at_once,
+            "ends": self.segments[-1].direction,
         }
         ends = [name for name, is_moving in moves.items() if is_moving]
         return f"{said} in a record that {' and '.join(ends)} in motion" if ends else said
@@ -109,28 +109,38 @@ class MotionSegments:
     @property
     def standing_part(self) -> float:
         """Part of the time at rest."""
-        total = sum(s.duration_s for s in self.stretches)
-        return sum(s.duration_s for s in self.stretches if not s.direction) / total
+        total = sum(s.duration_s for s in self.segments)
+        return sum(s.duration_s for s in self.segments if not s.direction) / total
 
     @property
     def backwards_rad(self) -> float:
         """Angle turned against the direction in which most is turned."""
-        turned = [sum(abs(s.turned_rad) for s in self.stretches if s.direction == d) for d in (1, -1)]
+        turned = [sum(abs(s.turned_rad) for s in self.segments if s.direction == d) for d in (1, -1)]
         return float(min(turned))
 
     def _pairs(self) -> list[tuple[MotionSegment, MotionSegment]]:
-        return list(pairwise(self.stretches))
+        return list(pairwise(self.segments))
 
 
 def _counted(n: int, name: str) -> str:
     return f"{n} {name}" if n == 1 else f"{n} {name}s"
 
 
-def find_course(angle_rad: FloatArray, speed_rad_s: FloatArray, sampling_rate_hz: float) -> MotionSegments:
-    """Cut a motion into stretches forwards, backwards and at rest.
+def motion_segments(
+    angle_rad: FloatArray, sampling_rate_hz: float, speed_rad_s: FloatArray | None = None
+) -> MotionSegments:
+    """Cut a shaft's motion into segments forwards, backwards and at rest.
 
     At rest is a speed below 2 % of its 95 % quantile, or within five standard deviations of its scatter from sample to
     sample, for at least 30 ms.
+
+    Parameters
+    ----------
+    angle_rad : array, (n,)
+        Running on.
+    sampling_rate_hz : float
+    speed_rad_s : array, (n,), or None
+        None: derived from the angle within 50 Hz, see `shaft_speed_rad_s`.
 
     Raises
     ------
@@ -138,6 +148,8 @@ def find_course(angle_rad: FloatArray, speed_rad_s: FloatArray, sampling_rate_hz
         If the lengths differ, or there are fewer than 8 samples.
     """
     positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    if speed_rad_s is None:
+        speed_rad_s = shaft_speed_rad_s(angle_rad, sampling_rate_hz)
     if len(angle_rad) != len(speed_rad_s) or len(speed_rad_s) < 8:
         raise InputError(f"{len(angle_rad)} angles for {len(speed_rad_s)} speeds", allowed="as many, at least 8")
     scatter = 1.4826 * float(np.median(np.abs(np.diff(speed_rad_s, 2)))) / np.sqrt(6.0)
@@ -145,26 +157,26 @@ def find_course(angle_rad: FloatArray, speed_rad_s: FloatArray, sampling_rate_hz
     directions = np.where(np.abs(speed_rad_s) < threshold, 0, np.sign(speed_rad_s)).astype(np.int64)
     shortest = max(2, round(SHORTEST_S * sampling_rate_hz))
     _absorb(directions, shortest)
-    stretches = _cut(directions, angle_rad, speed_rad_s, sampling_rate_hz)
-    least = LEAST_TURN * max(abs(s.turned_rad) for s in stretches)
-    for stretch in stretches:
-        if abs(stretch.turned_rad) < least:
-            directions[stretch.first : stretch.last] = 0
+    segments = _cut(directions, angle_rad, speed_rad_s, sampling_rate_hz)
+    min_turned_rad = MIN_TURN * max(abs(s.turned_rad) for s in segments)
+    for segment in segments:
+        if abs(segment.turned_rad) < min_turned_rad:
+            directions[segment.first : segment.last] = 0
     final = _cut(directions, angle_rad, speed_rad_s, sampling_rate_hz)
     return MotionSegments(final, threshold, _starts_at_once(final[0], angle_rad, sampling_rate_hz))
 
 
-def is_start_stop(course: MotionSegments, *, least_standing: float = 0.05, least_back_rad: float = 0.1) -> bool:
+def is_start_stop(segments: MotionSegments, *, min_standing: float = 0.05, min_back_rad: float = 0.1) -> bool:
     """Say whether a motion starts and stops, or reverses: no speed to count orders by.
 
     A run-up from rest does not: what follows can be counted in revolutions.
     """
-    rests = bool(course.starts_s) and bool(course.stops_s) and course.standing_part >= least_standing
-    return rests or course.backwards_rad >= least_back_rad
+    rests = bool(segments.starts_s) and bool(segments.stops_s) and segments.standing_part >= min_standing
+    return rests or segments.backwards_rad >= min_back_rad
 
 
 def _starts_at_once(first: MotionSegment, angle_rad: FloatArray, rate_hz: float) -> bool:
-    """Say whether the first stretch moves, and began to with the record."""
+    """Say whether the first segment moves, and began to with the record."""
     n = min(max(2, round(FIRST_S * rate_hz)), first.last - 1)
     speed = abs(float(angle_rad[n] - angle_rad[0])) * rate_hz / n
     return bool(first.direction) and speed < AT_ONCE * first.top_speed_rad_s
@@ -189,11 +201,11 @@ def _cut(
     edges = np.flatnonzero(np.diff(directions)) + 1
     bounds = np.concatenate([[0], edges, [len(directions)]])
     return tuple(
-        _stretch(int(directions[a]), int(a), int(b), angle_rad, speed_rad_s, rate_hz) for a, b in pairwise(bounds)
+        _segment(int(directions[a]), int(a), int(b), angle_rad, speed_rad_s, rate_hz) for a, b in pairwise(bounds)
     )
 
 
-def _stretch(
+def _segment(
     direction: int, first: int, last: int, angle_rad: FloatArray, speed_rad_s: FloatArray, rate_hz: float
 ) -> MotionSegment:
     end = min(last, len(angle_rad) - 1)
@@ -208,7 +220,7 @@ def _stretch(
 
 
 RUNNING_PART = 0.9
-"""Of a stretch's highest speed: from when it is first reached until it is last seen, the machine runs."""
+"""Of a segment's highest speed: from when it is first reached until it is last seen, the machine runs."""
 RUN_UP, RUNNING, RUN_DOWN, AT_REST = "run-up", "running", "run-down", "at rest"
 SPEED_BANDWIDTH_HZ = 50.0
 """In which a shaft starts and stops; what is faster is ringing."""
@@ -229,35 +241,35 @@ def shaft_speed_rad_s(angle_rad: FloatArray, sampling_rate_hz: float) -> FloatAr
     return smoother.apply(angle_rad, 1)
 
 
-def find_phases(course: MotionSegments, speed_rad_s: FloatArray, sampling_rate_hz: float) -> tuple[Phase, ...]:
-    """Cut every stretch in motion where it first reaches, and where it last has, 90 % of its highest speed.
+def find_phases(segments: MotionSegments, speed_rad_s: FloatArray, sampling_rate_hz: float) -> tuple[Phase, ...]:
+    """Cut every segment in motion where it first reaches, and where it last has, 90 % of its highest speed.
 
     Parameters
     ----------
-    course : Course
+    segments : MotionSegments
     speed_rad_s : array, (n,)
-        The smoothed one that the course was found from: ringing would pass for running.
+        The smoothed one that the segments was found from: ringing would pass for running.
     sampling_rate_hz : float
 
     Returns
     -------
     tuple of Phase
-        One after the other from the record's begin to its end; a phase of no length is left out. A stretch that is
+        One after the other from the record's begin to its end; a phase of no length is left out. A segment that is
         cut by the record's end has no run-down, one that is cut by its begin no run-up.
     """
     phases: list[Phase] = []
-    for stretch in course.stretches:
-        if stretch.direction:
-            phases += _of_motion(stretch, np.abs(speed_rad_s[stretch.first : stretch.last]), sampling_rate_hz)
+    for segment in segments.segments:
+        if segment.direction:
+            phases += _of_motion(segment, np.abs(speed_rad_s[segment.first : segment.last]), sampling_rate_hz)
         else:
-            phases.append(Phase(AT_REST, stretch.start_s, stretch.end_s))
+            phases.append(Phase(AT_REST, segment.start_s, segment.end_s))
     return tuple(phases)
 
 
-def _of_motion(stretch: MotionSegment, speed_rad_s: FloatArray, rate_hz: float) -> list[Phase]:
+def _of_motion(segment: MotionSegment, speed_rad_s: FloatArray, rate_hz: float) -> list[Phase]:
     fast = np.flatnonzero(speed_rad_s >= RUNNING_PART * float(speed_rad_s.max()))
-    up, down = stretch.start_s + fast[0] / rate_hz, stretch.start_s + (fast[-1] + 1) / rate_hz
-    edges = [(RUN_UP, stretch.start_s, up), (RUNNING, up, down), (RUN_DOWN, down, stretch.end_s)]
+    up, down = segment.start_s + fast[0] / rate_hz, segment.start_s + (fast[-1] + 1) / rate_hz
+    edges = [(RUN_UP, segment.start_s, up), (RUNNING, up, down), (RUN_DOWN, down, segment.end_s)]
     return [Phase(name, float(a), float(b)) for name, a, b in edges if b - a > 0.5 / rate_hz]
 
 
@@ -285,10 +297,10 @@ class AngleProfile:
     passes_backwards: NDArray[np.int64]
 
 
-def angle_profile(values: FloatArray, angle_rad: FloatArray, course: MotionSegments, n_teeth: int) -> AngleProfile:
+def angle_profile(values: FloatArray, angle_rad: FloatArray, segments: MotionSegments, n_teeth: int) -> AngleProfile:
     """Return the root mean square over angle of a signal within each tooth pitch.
 
-    Every stretch of one direction is followed by its own angle, so that a stop in the middle of a tooth or a turn back
+    Every segment of one direction is followed by its own angle, so that a stop in the middle of a tooth or a turn back
     needs no speed; samples weigh by the angle they cover, so that a slow passage counts no more than a fast one.
     Samples at rest have no angle and are left out.
 
@@ -297,7 +309,7 @@ def angle_profile(values: FloatArray, angle_rad: FloatArray, course: MotionSegme
     values : array, (n,)
     angle_rad : array, (n,)
         Of the shaft, running on.
-    course : Course
+    segments : MotionSegments
     n_teeth : int
 
     Raises
@@ -310,13 +322,13 @@ def angle_profile(values: FloatArray, angle_rad: FloatArray, course: MotionSegme
         raise InputError(f"{len(values)} values for {len(angle_rad)} angles", allowed="equal lengths")
     sums, weights = np.zeros((2, n_teeth)), np.zeros((2, n_teeth))
     passes = np.zeros((2, n_teeth), dtype=np.int64)
-    for stretch in course.moving:
-        row = 0 if stretch.direction > 0 else 1
-        x = angle_rad[stretch.first : stretch.last] * n_teeth / (2.0 * np.pi)
+    for segment in segments.moving:
+        row = 0 if segment.direction > 0 else 1
+        x = angle_rad[segment.first : segment.last] * n_teeth / (2.0 * np.pi)
         covered = np.abs(np.gradient(x)) if len(x) > 1 else np.zeros(len(x))
         pitch = np.floor(x).astype(np.int64)
         tooth = pitch % n_teeth
-        np.add.at(sums[row], tooth, covered * values[stretch.first : stretch.last] ** 2)
+        np.add.at(sums[row], tooth, covered * values[segment.first : segment.last] ** 2)
         np.add.at(weights[row], tooth, covered)
         np.add.at(passes[row], np.unique(pitch) % n_teeth, 1)
     with np.errstate(invalid="ignore"):
@@ -325,20 +337,20 @@ def angle_profile(values: FloatArray, angle_rad: FloatArray, course: MotionSegme
 
 
 # --------------------
-# Order spectra of a motion that stops and turns back: stretch by stretch, over angle alone.
+# Order spectra of a motion that stops and turns back: segment by segment, over angle alone.
 # --------------------
 
 
 HIGHEST_PART = 0.25
 """Highest order over samples per revolution: the mean over a step of angle has lost a tenth there, which is made up."""
-LEAST_SAMPLES = 16
+MIN_SAMPLES = 16
 """Per revolution."""
 
 
-def stretch_order_spectrum(
+def segment_order_spectrum(
     values: FloatArray,
     angle_rad: FloatArray,
-    course: MotionSegments,
+    segments: MotionSegments,
     *,
     direction: str = "forwards",
     revolutions_per_block: float = 1.0,
@@ -346,22 +358,22 @@ def stretch_order_spectrum(
     source: str = "",
     shaft: str = "",
 ) -> Spectrum:
-    """Return the order spectrum of all stretches of one direction, however fast, slow or short they are.
+    """Return the order spectrum of all segments of one direction, however fast, slow or short they are.
 
-    Each stretch is cut into equal steps of angle; a step holds the signal's mean over it, ∫x dθ/Δθ, so that slow
+    Each segment is cut into equal steps of angle; a step holds the signal's mean over it, ∫x dθ/Δθ, so that slow
     passages are averaged and do not fold back, and the passage to and from standstill needs no speed. Blocks of
-    whole steps are windowed (Hann), and their power is averaged over all stretches.
+    whole steps are windowed (Hann), and their power is averaged over all segments.
 
     Parameters
     ----------
     values : array, (n,)
     angle_rad : array, (n,)
         Of the shaft, running on.
-    course : Course
+    segments : MotionSegments
     direction : str
         "forwards" or "backwards"; backwards orders count up as well.
     revolutions_per_block : float
-        Stretches that are shorter are left out. The lines lie 1/this apart.
+        Segments that are shorter are left out. The lines lie 1/this apart.
     unit, source, shaft : str
 
     Returns
@@ -372,46 +384,46 @@ def stretch_order_spectrum(
     Raises
     ------
     RefusalError
-        If no stretch of that direction is long enough.
+        If no segment of that direction is long enough.
 
     Notes
     -----
-    Phases differ from stretch to stretch and are not kept. A resonance that rings on in time smears here.
+    Phases differ from segment to segment and are not kept. A resonance that rings on in time smears here.
     """
     one_of(direction, "direction", ("forwards", "backwards"))
     positive(revolutions_per_block, "revolutions_per_block")
     if len(values) != len(angle_rad):
         raise InputError(f"{len(values)} values for {len(angle_rad)} angles", allowed="equal lengths")
     sign = 1 if direction == "forwards" else -1
-    chosen = [s for s in course.moving if s.direction == sign]
+    chosen = [s for s in segments.moving if s.direction == sign]
     turns = [abs(s.turned_rad) / (2.0 * np.pi) for s in chosen]
     long = [s for s, n in zip(chosen, turns, strict=True) if n >= revolutions_per_block]
     if not long:
         longest = max(turns, default=0.0)
         raise RefusalError(
-            f"no stretch {direction} holds {revolutions_per_block:g} revolutions (the longest {longest:.3g})",
+            f"no segment {direction} holds {revolutions_per_block:g} revolutions (the longest {longest:.3g})",
             remedy="give fewer revolutions per block: the lines then lie further apart",
         )
     per_revolution = _samples_per_revolution(angle_rad, long)
     n_block = floor(revolutions_per_block * per_revolution)
     spectra = []
-    for stretch in long:
-        steps = steps_of_angle(values, sign * angle_rad, stretch, per_revolution)
+    for segment in long:
+        steps = steps_of_angle(values, sign * angle_rad, segment, per_revolution)
         if len(steps) >= n_block:
             spectra.append(
                 amplitude_spectrum(steps, float(per_revolution), unit=unit, scaling="power", n_per_block=n_block)
             )
     if not spectra:
-        raise RefusalError(f"no stretch {direction} holds a whole block", remedy="give fewer revolutions per block")
-    return _mean(spectra, per_revolution, unit, f"{source}, {len(spectra)} stretch(es) {direction}", shaft)
+        raise RefusalError(f"no segment {direction} holds a whole block", remedy="give fewer revolutions per block")
+    return _mean(spectra, per_revolution, unit, f"{source}, {len(spectra)} segment(es) {direction}", shaft)
 
 
 def steps_of_angle(
-    values: FloatArray, angle_rad: FloatArray, stretch: MotionSegment, per_revolution: int
+    values: FloatArray, angle_rad: FloatArray, segment: MotionSegment, per_revolution: int
 ) -> FloatArray:
-    """Mean of a signal over equal steps of a rising angle within a stretch, (n_steps,)."""
-    rising = np.maximum.accumulate(angle_rad[stretch.first : stretch.last]) / (2.0 * np.pi)
-    x = np.asarray(values[stretch.first : stretch.last], dtype=np.float64)
+    """Mean of a signal over equal steps of a rising angle within a segment, (n_steps,)."""
+    rising = np.maximum.accumulate(angle_rad[segment.first : segment.last]) / (2.0 * np.pi)
+    x = np.asarray(values[segment.first : segment.last], dtype=np.float64)
     integral = np.concatenate([[0.0], np.cumsum(0.5 * (x[1:] + x[:-1]) * np.diff(rising))])
     first, last = np.ceil(rising[0] * per_revolution), np.floor(rising[-1] * per_revolution)
     edges = np.arange(first, last + 1) / per_revolution
@@ -419,11 +431,11 @@ def steps_of_angle(
     return steps
 
 
-def _samples_per_revolution(angle_rad: FloatArray, stretches: list[MotionSegment]) -> int:
+def _samples_per_revolution(angle_rad: FloatArray, segments: list[MotionSegment]) -> int:
     """As many as the fastest passage has samples, no more."""
-    step = max(float(np.quantile(np.abs(np.diff(angle_rad[s.first : s.last])), 0.99)) for s in stretches)
+    step = max(float(np.quantile(np.abs(np.diff(angle_rad[s.first : s.last])), 0.99)) for s in segments)
     found = floor(2.0 * np.pi / step)
-    if found < LEAST_SAMPLES:
+    if found < MIN_SAMPLES:
         raise RefusalError(
             f"the shaft turns by {step:.3g} rad between samples: {found} samples a revolution",
             remedy="record at a higher rate",
@@ -432,7 +444,7 @@ def _samples_per_revolution(angle_rad: FloatArray, stretches: list[MotionSegment
 
 
 def _mean(spectra: list[Spectrum], per_revolution: int, unit: str, source: str, shaft: str) -> Spectrum:
-    """Mean power of the stretches, as amplitude over order, what the steps' means lost made up."""
+    """Mean power of the segments, as amplitude over order, what the steps' means lost made up."""
     weights = np.array([s.n_averages for s in spectra], dtype=np.float64)
     power = np.average([s.values for s in spectra], axis=0, weights=weights)
     first = spectra[0]
@@ -467,7 +479,7 @@ FACTOR = 8.0
 """Over the quiet level: white noise does not reach it in an hour."""
 RISE = 2.0
 """Over the level just before: a blow begins at once, ringing does not."""
-LEAST_PART = 0.35
+MIN_PART = 0.35
 """Of the hardest blow: below it teeth that merely take up their load are counted as well."""
 
 
@@ -507,9 +519,9 @@ def find_bursts(values: FloatArray, sampling_rate_hz: float) -> tuple[Burst, ...
     for i in map(int, np.flatnonzero(rises)):
         if i < next_free:
             continue
-        stretch = np.abs(centred[i + n : i + n + dead])
-        begin = i + n + int(np.argmax(stretch > 0.25 * stretch.max()))
-        found.append(Burst(begin / sampling_rate_hz, float(stretch.max())))
+        segment = np.abs(centred[i + n : i + n + dead])
+        begin = i + n + int(np.argmax(segment > 0.25 * segment.max()))
+        found.append(Burst(begin / sampling_rate_hz, float(segment.max())))
         next_free = i + dead
     hardest = max((burst.peak for burst in found), default=0.0)
-    return tuple(burst for burst in found if burst.peak >= LEAST_PART * hardest)
+    return tuple(burst for burst in found if burst.peak >= MIN_PART * hardest)

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.indicators import Indicator
 from gearsig.motion._backlash import BacklashEstimate, TorqueTwist, estimate_backlash, torque_twist
 from gearsig.motion._force import find_datum
 from gearsig.motion._identify import YieldingTeeth, tooth_compliance
 from gearsig.motion._impacts import Impact, find_impacts
-from gearsig.motion._segments import MotionSegments, find_course, shaft_speed_rad_s
+from gearsig.motion._segments import MotionSegments, motion_segments
 from gearsig.motion._types import PairMotion, check_turns
 from gearsig.phase import PhasePortrait
 
@@ -28,7 +27,7 @@ class StartStop:
     Parameters
     ----------
     motion : PairMotion
-    course : Course
+    segments : MotionSegments
         Of the driver.
     backlash : BacklashEstimate or None
     impacts : tuple of Impact
@@ -45,7 +44,7 @@ class StartStop:
     """
 
     motion: PairMotion
-    course: MotionSegments
+    segments: MotionSegments
     backlash: BacklashEstimate | None
     impacts: tuple[Impact, ...]
     loop: TorqueTwist | None
@@ -57,7 +56,7 @@ class StartStop:
 
 
 def examine_start_stop(motion: PairMotion) -> StartStop:
-    """Find stretches, backlash, impacts, the loop of torque over twist and the phase plane of a pair's motion.
+    """Find segments, backlash, impacts, the loop of torque over twist and the phase plane of a pair's motion.
 
     What the record does not allow is left out and said in `refusals`.
 
@@ -67,7 +66,7 @@ def examine_start_stop(motion: PairMotion) -> StartStop:
         If the machine stands all the time: its stop is longer than the record.
     """
     check_turns(motion)
-    course = course_of_angle(motion.driver_angle_rad, motion.sampling_rate_hz)
+    segments = motion_segments(motion.driver_angle_rad, motion.sampling_rate_hz)
     refusals: list[str] = []
     backlash: BacklashEstimate | None = None
     try:
@@ -86,17 +85,17 @@ def examine_start_stop(motion: PairMotion) -> StartStop:
         except RefusalError as refusal:
             refusals.append(f"impacts: {refusal}")
         if motion.torque_nm is not None:
-            loop = torque_twist(motion, course, datum)
+            loop = torque_twist(motion, segments, datum)
     teeth: YieldingTeeth | None = None
     if motion.torque_nm is not None:
         try:
             teeth = tooth_compliance(motion)
         except RefusalError as refusal:
             refusals.append(f"stiffness of single teeth: {refusal}")
-    indicators = start_stop_indicators(motion, course, backlash, impacts, loop)
+    indicators = start_stop_indicators(motion, segments, backlash, impacts, loop)
     return StartStop(
         motion,
-        course,
+        segments,
         backlash,
         impacts,
         loop,
@@ -106,11 +105,6 @@ def examine_start_stop(motion: PairMotion) -> StartStop:
         tuple(refusals),
         _notes(impacts, motion.sampling_rate_hz),
     )
-
-
-def course_of_angle(angle_rad: FloatArray, sampling_rate_hz: float) -> MotionSegments:
-    """Return the stretches of a shaft's angle, its speed derived within 50 Hz."""
-    return find_course(angle_rad, shaft_speed_rad_s(angle_rad, sampling_rate_hz), sampling_rate_hz)
 
 
 def phase_plane_of_teeth(motion: PairMotion, datum_m: float) -> PhasePortrait:
@@ -123,7 +117,7 @@ def phase_plane_of_teeth(motion: PairMotion, datum_m: float) -> PhasePortrait:
 
 def start_stop_indicators(
     motion: PairMotion,
-    course: MotionSegments,
+    segments: MotionSegments,
     backlash: BacklashEstimate | None,
     impacts: tuple[Impact, ...],
     loop: TorqueTwist | None,
@@ -133,14 +127,15 @@ def start_stop_indicators(
     Starts, stops, rests, reversals; run-down; backlash; impacts: number, hardest, energy lost per cycle, restitution;
     loss and work per cycle, lost motion.
     """
-    n_cycles = max(1, len(course.moving))
+    n_cycles = max(1, len(segments.moving))
+    top_rpm = max((s.top_speed_rad_s for s in segments.moving), default=0.0) * 30.0 / np.pi
     rows: list[tuple[str, float, str, str]] = [
-        ("starts", float(len(course.starts_s)), "", "motion"),
-        ("stops", float(len(course.stops_s)), "", "motion"),
-        ("reversals", float(course.n_reversals), "", "motion"),
-        ("standing part", course.standing_part, "", "motion"),
-        ("highest speed", max((s.top_speed_rad_s for s in course.moving), default=0.0) * 30.0 / np.pi, "rpm", "motion"),
-        ("run-down", run_down_rad_s2(motion, course), "rad/s^2", "motion"),
+        ("starts", float(len(segments.starts_s)), "", "motion"),
+        ("stops", float(len(segments.stops_s)), "", "motion"),
+        ("reversals", float(segments.n_reversals), "", "motion"),
+        ("standing part", segments.standing_part, "", "motion"),
+        ("highest speed", top_rpm, "rpm", "motion"),
+        ("run-down", run_down_rad_s2(motion, segments), "rad/s^2", "motion"),
     ]
     if backlash is not None:
         rows.append(("backlash", backlash.backlash_um, "um", "compression"))
@@ -166,11 +161,11 @@ def start_stop_indicators(
     )
 
 
-def run_down_rad_s2(motion: PairMotion, course: MotionSegments) -> float:
+def run_down_rad_s2(motion: PairMotion, segments: MotionSegments) -> float:
     """Median over stops of the driver's mean deceleration from 80 to 20 % of its top speed; nan for none."""
     found = []
-    for stretch in course.moving:
-        speed = np.abs(motion.driver_speed_rad_s[stretch.first : stretch.last])
+    for segment in segments.moving:
+        speed = np.abs(motion.driver_speed_rad_s[segment.first : segment.last])
         top = int(np.argmax(speed))
         falling = speed[top:]
         high, low = np.flatnonzero(falling < 0.8 * speed[top]), np.flatnonzero(falling < 0.2 * speed[top])

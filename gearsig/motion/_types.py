@@ -173,13 +173,13 @@ class ForceEstimate:
 # --------------------
 
 
-LEAST_PITCHES = 0.25
+MIN_PITCHES = 0.25
 """Of the driver's teeth: a machine that turns by less than that beyond its play stands, though a blow may rattle it."""
 
 
 def stands(driver_angle_rad: FloatArray, path: PathOfContact, contact: ToothContact) -> bool:
     """Say whether the driver turns by less than its play and a quarter of a tooth pitch."""
-    return float(np.ptp(driver_angle_rad)) < _play_rad(path, contact) + 2.0 * pi / path.teeth[0] * LEAST_PITCHES
+    return float(np.ptp(driver_angle_rad)) < _play_rad(path, contact) + 2.0 * pi / path.teeth[0] * MIN_PITCHES
 
 
 def check_turns(motion: PairMotion) -> None:

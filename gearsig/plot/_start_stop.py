@@ -70,7 +70,7 @@ def start_stop_figure(examined: StartStop, *, title: str = "") -> Figure:
 def _draw_speed(figure: Figure, axes: Axes, examined: StartStop) -> None:
     motion = examined.motion
     axes.plot(*thin(motion.time_s, motion.driver_speed_rad_s * 30.0 / np.pi), color=style.MEASURED, linewidth=0.9)
-    for stretch in examined.course.stretches:
+    for stretch in examined.segments.segments:
         if not stretch.direction:
             series.shade(axes, (stretch.start_s, stretch.end_s))
     axes.set_xlim(0.0, float(motion.time_s[-1]))
@@ -179,7 +179,7 @@ def _shade_phases(figure: Figure, all_axes: list[Axes], examined: StartStop) -> 
 
     motion = examined.motion
     speed = shaft_speed_rad_s(motion.driver_angle_rad, motion.sampling_rate_hz)
-    phases = find_phases(examined.course, speed, motion.sampling_rate_hz)
+    phases = find_phases(examined.segments, speed, motion.sampling_rate_hz)
     for phase in phases:
         for axes in all_axes:
             series.shade(axes, (phase.start_s, phase.end_s), COLOURS[phase.name], ALPHA)

@@ -254,15 +254,15 @@ MOST_ROWS = 12
 
 def start_stop_text(examined: StartStop) -> str:
     """Return stretches, backlash, the hardest impacts and the indicators, in plain text."""
-    lines = [f"{examined.motion.source or 'recording'}: {examined.course.summary}", ""]
+    lines = [f"{examined.motion.source or 'recording'}: {examined.segments.summary}", ""]
     lines += ["stretch           from s     to s   turned rev   top rpm"]
-    for s in examined.course.stretches[:MOST_ROWS]:
+    for s in examined.segments.segments[:MOST_ROWS]:
         name = {1: "forwards", -1: "backwards", 0: "at rest"}[s.direction]
         lines.append(
             f"{name:<14} {s.start_s:>9.3f} {s.end_s:>8.3f} {s.turned_rad / (2 * np.pi):>12.4f} "
             f"{s.top_speed_rad_s * 30 / np.pi:>9.2f}"
         )
-    lines += _more(len(examined.course.stretches))
+    lines += _more(len(examined.segments.segments))
     if examined.backlash is not None:
         b = examined.backlash
         lines += [
@@ -311,7 +311,7 @@ def start_stop_json(
         "stretches": [
             {"direction": s.direction, "start_s": rounded(s.start_s), "end_s": rounded(s.end_s),
              "turned_rad": rounded(s.turned_rad), "top_speed_rpm": rounded(s.top_speed_rad_s * 30 / np.pi)}
-            for s in examined.course.stretches
+            for s in examined.segments.segments
         ],
         "backlash": backlash,
         "impacts": [{k: _number(v) for k, v in asdict(impact).items()} for impact in examined.impacts],

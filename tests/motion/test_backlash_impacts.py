@@ -82,9 +82,9 @@ def test_dependence_of_white_and_of_smooth_noise() -> None:
     assert dependence(np.ones(10)) == 1.0
 
 
-@pytest.mark.parametrize(("rate_hz", "least_found"), [(1000.0, 0.7), (4000.0, 1.0), (10_000.0, 1.0)])
+@pytest.mark.parametrize(("rate_hz", "min_found"), [(1000.0, 0.7), (4000.0, 1.0), (10_000.0, 1.0)])
 @pytest.mark.parametrize("preset", PRESETS)
-def test_impacts_are_found_with_time_tooth_and_energy(preset: str, rate_hz: float, least_found: float) -> None:
+def test_impacts_are_found_with_time_tooth_and_energy(preset: str, rate_hz: float, min_found: float) -> None:
     recording = start_stop(preset, rate_hz)
     found, true = impacts(recording), contacts(recording)
     hard = true[true[:, 2] > 0.02]
@@ -94,7 +94,7 @@ def test_impacts_are_found_with_time_tooth_and_energy(preset: str, rate_hz: floa
         for impact in found
         if abs(impact.time_s - row[0]) < 5e-4 and impact.flank == row[1]
     ]
-    assert len(pairs) >= least_found * len(hard)
+    assert len(pairs) >= min_found * len(hard)
     assert all(min(abs(true[:, 0] - impact.time_s)) < 1e-3 for impact in found)
     mass = reduced_mass_kg(measure_motion(recording))
     assert recording.truth is not None

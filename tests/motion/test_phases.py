@@ -9,9 +9,9 @@ from gearsig.motion import (
     RUN_UP,
     RUNNING,
     examine_start_stop,
-    find_course,
     find_phases,
     measure_motion,
+    motion_segments,
     shaft_speed_rad_s,
 )
 from tests.motion.recordings import start_stop
@@ -31,7 +31,7 @@ def trapezoid(*corners: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
 def test_phases_of_a_trapezoid(sign: float) -> None:
     corners = [(0.0, 0.0), (1.0, 0.0), (2.0, 10.0), (3.0, 10.0), (3.5, 0.0), (5.0, 0.0)]
     angle, speed = trapezoid(*((t, sign * w) for t, w in corners))
-    phases = find_phases(find_course(angle, speed, RATE), speed, RATE)
+    phases = find_phases(motion_segments(angle, RATE, speed), speed, RATE)
     assert [p.name for p in phases] == [AT_REST, RUN_UP, RUNNING, RUN_DOWN, AT_REST]
     # 2 % of the speed is motion, 90 % is running
     assert [p.start_s for p in phases] == pytest.approx([0.0, 1.02, 1.9, 3.05, 3.49], abs=3e-3)
@@ -40,7 +40,7 @@ def test_phases_of_a_trapezoid(sign: float) -> None:
 
 def test_a_record_that_is_cut_has_no_run_up_or_run_down() -> None:
     angle, speed = trapezoid((0.0, 10.0), (1.0, 10.0), (1.5, 0.0), (3.0, 0.0), (3.5, 10.0), (4.0, 10.0))
-    phases = find_phases(find_course(angle, speed, RATE), speed, RATE)
+    phases = find_phases(motion_segments(angle, RATE, speed), speed, RATE)
     assert [p.name for p in phases] == [RUNNING, RUN_DOWN, AT_REST, RUN_UP, RUNNING]
 
 
@@ -48,15 +48,15 @@ def test_phases_of_the_drive_follow_valve_and_brake() -> None:
     """95 N m from 0 to 1 s and from 3 to 4 s, then the brake."""
     motion = measure_motion(start_stop())
     speed = shaft_speed_rad_s(motion.driver_angle_rad, motion.sampling_rate_hz)
-    phases = find_phases(examine_start_stop(motion).course, speed, motion.sampling_rate_hz)
+    phases = find_phases(examine_start_stop(motion).segments, speed, motion.sampling_rate_hz)
     assert [p.name for p in phases] == [RUN_UP, RUNNING, RUN_DOWN, AT_REST] * 2
     assert [p.end_s for p in phases if p.name == RUNNING] == pytest.approx([1.03, 4.03], abs=0.02)
 
 
 def test_starts_and_stops_in_words() -> None:
     angle, speed = trapezoid((0.0, 0.0), (0.5, 0.0), (0.6, 9.0), (1.5, 9.0), (1.6, 0.0), (2.0, 0.0))
-    assert find_course(angle, speed, RATE).summary == "1 start and 1 stop"
+    assert motion_segments(angle, RATE, speed).summary == "1 start and 1 stop"
     cut = slice(700, 1400)
-    assert find_course(angle[cut], speed[cut], RATE).summary == (
+    assert motion_segments(angle[cut], RATE, speed[cut]).summary == (
         "0 starts and 0 stops in a record that begins and ends in motion"
     )

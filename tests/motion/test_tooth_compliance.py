@@ -32,11 +32,11 @@ def cracked(
 
 
 @pytest.mark.parametrize("part", [0.4, 2.0])
-def test_the_least_loss_parts_what_shows_from_what_does_not(part: float) -> None:
+def test_the_min_loss_parts_what_shows_from_what_does_not(part: float) -> None:
     """A tooth that has lost two fifths of it is not named, one that has lost twice as much is."""
     sound = tooth_compliance(measure_motion(cracked(0.0, "manipulator_formula", "start-stop")))
     prepared = ForgingManipulator().prepare({}, None, preset_name="manipulator_formula")
-    drive = replace(prepared.drive, weak_tooth=WeakTooth(0, 6, part * sound.least_loss(1.5)))
+    drive = replace(prepared.drive, weak_tooth=WeakTooth(0, 6, part * sound.min_loss(1.5)))
     wanted = ParameterValues(prepared.values)
     recording = record(
         drive,

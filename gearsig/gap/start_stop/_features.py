@@ -14,11 +14,11 @@ from gearsig.motion import (
     Impact,
     MotionSegments,
     PairMotion,
-    course_of_angle,
     find_impacts,
     friction_share,
     is_start_stop,
     local_polynomial,
+    motion_segments,
 )
 
 # --------------------
@@ -76,7 +76,7 @@ def cut_cycles(motion: PairMotion) -> CycledMotion:
         If it does not start and stop, or hardly ever: nothing would be left to check a fit on.
     """
     thinned = thin(motion)
-    course = course_of_angle(thinned.driver_angle_rad, thinned.sampling_rate_hz)
+    course = motion_segments(thinned.driver_angle_rad, thinned.sampling_rate_hz)
     where = thinned.source or "the recording"
     if not is_start_stop(course) and course.standing_part < LEAST_STANDING:
         raise RefusalError(

@@ -1,4 +1,4 @@
-"""Stretches of a shaft's motion, signals over an angle that stops and turns back, loops of torque over twist."""
+"""Segments of a shaft's motion, signals over an angle that stops and turns back, loops of torque over twist."""
 
 import numpy as np
 import pytest
@@ -8,11 +8,10 @@ from hypothesis import strategies as st
 from gearsig.errors import InputError, RefusalError
 from gearsig.motion import (
     angle_profile,
-    course_of_angle,
     examine_start_stop,
-    find_course,
     is_start_stop,
     measure_motion,
+    motion_segments,
     torque_twist,
 )
 from tests.motion.recordings import continuous, start_stop, without
@@ -26,49 +25,52 @@ def moved(*pieces: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
     return np.cumsum(speed) / RATE, speed
 
 
-def test_stretches_of_a_known_motion() -> None:
-    course = find_course(*moved((0.5, 0.0), (1.0, 10.0), (0.4, 0.0), (1.0, -10.0), (0.5, 10.0)), RATE)
-    assert [s.direction for s in course.stretches] == [0, 1, 0, -1, 1]
-    assert course.starts_s == pytest.approx((0.5, 1.9))
-    assert course.stops_s == pytest.approx((1.5,))
-    assert course.n_reversals == 2
-    assert course.standing_part == pytest.approx(0.9 / 3.4)
-    assert course.backwards_rad == pytest.approx(10.0, abs=0.03)
-    assert is_start_stop(course)
+def test_segments_of_a_known_motion() -> None:
+    angle, speed = moved((0.5, 0.0), (1.0, 10.0), (0.4, 0.0), (1.0, -10.0), (0.5, 10.0))
+    segments = motion_segments(angle, RATE, speed)
+    assert [s.direction for s in segments.segments] == [0, 1, 0, -1, 1]
+    assert segments.starts_s == pytest.approx((0.5, 1.9))
+    assert segments.stops_s == pytest.approx((1.5,))
+    assert segments.n_reversals == 2
+    assert segments.standing_part == pytest.approx(0.9 / 3.4)
+    assert segments.backwards_rad == pytest.approx(10.0, abs=0.03)
+    assert is_start_stop(segments)
 
 
 def test_a_run_up_from_rest_is_no_start_stop_motion() -> None:
-    course = find_course(*moved((0.5, 0.0), *((0.05, w) for w in np.linspace(0.5, 20.0, 40))), RATE)
-    assert len(course.starts_s) == 1
-    assert not is_start_stop(course)
+    angle, speed = moved((0.5, 0.0), *((0.05, w) for w in np.linspace(0.5, 20.0, 40)))
+    segments = motion_segments(angle, RATE, speed)
+    assert len(segments.starts_s) == 1
+    assert not is_start_stop(segments)
 
 
 def test_a_knock_on_a_standing_machine_is_no_start() -> None:
-    course = find_course(*moved((1.0, 10.0), (0.5, 0.0), (0.05, 2.0), (0.5, 0.0)), RATE)
-    assert [s.direction for s in course.stretches] == [1, 0]
+    angle, speed = moved((1.0, 10.0), (0.5, 0.0), (0.05, 2.0), (0.5, 0.0))
+    segments = motion_segments(angle, RATE, speed)
+    assert [s.direction for s in segments.segments] == [1, 0]
 
 
 @given(st.floats(0.0, 0.3), st.integers(0, 1000))
 def test_noise_makes_no_starts(sigma: float, seed: int) -> None:
     angle, speed = moved((0.5, 0.0), (1.0, 10.0), (0.5, 0.0))
     noisy = speed + sigma * np.random.default_rng(seed).standard_normal(len(speed))
-    course = find_course(angle, noisy, RATE)
-    assert [s.direction for s in course.stretches] == [0, 1, 0]
+    segments = motion_segments(angle, RATE, noisy)
+    assert [s.direction for s in segments.segments] == [0, 1, 0]
 
 
 def test_starts_and_stops_of_the_simulated_drive() -> None:
     recording = start_stop()
-    course = course_of_angle(recording.values("pinion angle"), RATE)
-    assert [s.direction for s in course.stretches] == [1, 0, 1, 0]
-    assert course.starts_s == pytest.approx((0.0, 3.0), abs=0.03)
-    assert course.stops_s == pytest.approx((1.14, 4.14), abs=0.03)
-    assert is_start_stop(course)
-    assert not is_start_stop(course_of_angle(continuous().values("pinion angle"), RATE))
+    segments = motion_segments(recording.values("pinion angle"), RATE)
+    assert [s.direction for s in segments.segments] == [1, 0, 1, 0]
+    assert segments.starts_s == pytest.approx((0.0, 3.0), abs=0.03)
+    assert segments.stops_s == pytest.approx((1.14, 4.14), abs=0.03)
+    assert is_start_stop(segments)
+    assert not is_start_stop(motion_segments(continuous().values("pinion angle"), RATE))
 
 
 def test_lengths_that_do_not_fit() -> None:
     with pytest.raises(InputError, match="as many"):
-        find_course(np.zeros(10), np.zeros(9), RATE)
+        motion_segments(np.zeros(10), RATE, np.zeros(9))
 
 
 def test_level_per_tooth_forwards_and_backwards_through_zero_speed() -> None:
@@ -76,12 +78,12 @@ def test_level_per_tooth_forwards_and_backwards_through_zero_speed() -> None:
     angle, _ = moved((1.0, 7.0), (0.3, 0.0), (0.6, -7.0), (0.3, 0.0), (1.2, 3.0))
     n_teeth = 12
     tooth = np.floor(angle * n_teeth / (2.0 * np.pi)).astype(int) % n_teeth
-    course = course_of_angle(angle, RATE)
+    segments = motion_segments(angle, RATE)
     sense = np.zeros(len(angle))
-    for s in course.moving:
+    for s in segments.moving:
         sense[s.first : s.last] = s.direction
     values = (1.0 + tooth) * np.where(sense < 0.0, 10.0, 1.0)
-    profile = angle_profile(values, angle, course, n_teeth)
+    profile = angle_profile(values, angle, segments, n_teeth)
     passed = profile.passes_forwards > 0
     assert profile.rms_forwards[passed] == pytest.approx(1.0 + np.flatnonzero(passed), rel=1e-9)
     back = profile.passes_backwards > 0
@@ -95,7 +97,7 @@ def test_slow_and_fast_passages_weigh_by_angle() -> None:
     t = np.arange(0.0, 1.0, 1e-4)
     angle = 2.0 * np.pi * (t + 0.1 * np.sin(2.0 * np.pi * t) / np.pi)
     values = np.sqrt(np.mod(angle * 4.0 / (2.0 * np.pi), 1.0))
-    profile = angle_profile(values, angle, find_course(angle, np.gradient(angle, 1e-4), 1e4), 4)
+    profile = angle_profile(values, angle, motion_segments(angle, 1e4, np.gradient(angle, 1e-4)), 4)
     assert profile.rms_forwards == pytest.approx(np.sqrt(0.5), abs=2e-3)
 
 
@@ -103,8 +105,8 @@ def test_work_and_loss_of_the_loop_are_those_of_the_model() -> None:
     """∮ τ dδ is what leaves through the teeth: contact damping and their friction, all else being a state."""
     recording = start_stop(quiet=True, rate_hz=20_000.0)
     motion = measure_motion(recording)
-    course = course_of_angle(motion.driver_angle_rad, 20_000.0)
-    loop = torque_twist(motion, course, 0.0)
+    segments = motion_segments(motion.driver_angle_rad, 20_000.0)
+    loop = torque_twist(motion, segments, 0.0)
     assert loop.n_cycles == 2
     from sims.forging import ForgingManipulator, respond
 
@@ -114,7 +116,7 @@ def test_work_and_loss_of_the_loop_are_those_of_the_model() -> None:
     assert loop.work_per_cycle_j == pytest.approx(work / 2.0, rel=1e-3)
     assert loop.loss_per_cycle_j == pytest.approx(run["lost in contact"][-1] / 2.0, rel=0.5)
     with pytest.raises(RefusalError, match="torque"):
-        torque_twist(measure_motion(without(recording, "torque")), course, 0.0)
+        torque_twist(measure_motion(without(recording, "torque")), segments, 0.0)
 
 
 def test_everything_at_once_and_what_is_refused() -> None:
