@@ -23,7 +23,6 @@ from app.cli.options import (
     torque_of,
 )
 from app.cli.quantities import quantity
-from app.samples import samples
 from gearsig.errors import InputError
 
 
@@ -126,8 +125,8 @@ def demo(
     ),
 ) -> None:
     """Diagnose the sample recordings, write their report, and say where to look."""
-    from app.cli.options import open_recording, open_rig
     from app.cli.report import make_report
+    from app.samples import samples
     from gearsig.diagnosis import analyze
     from gearsig.report import analysis_text
 

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, TypeVar
 
 import typer
 
-from gearsig.checks import one_of
+from app.cli.console import progress_bar, stopped, typed_command
 from gearsig.errors import InputError
 
-if TYPE_CHECKING:
-    from rich.progress import Progress
-
-    from app.benchmark.run import BenchmarkRequest, Done
-
-
-EXIT_INTERRUPTED = 130
+Result = TypeVar("Result")
 
 benchmark_app = typer.Typer(no_args_is_help=True, help="Measure how good a diagnosis is.")
 
@@ -74,11 +68,7 @@ def gap(
 
     Example: gearsig benchmark gap --cases 200 --same-simulator -o benchmark
     """
-    from app.benchmark.cases import Plan
-    from app.benchmark.diagnosers import BASELINES, GAP
-    from app.benchmark.run import BenchmarkRequest
-    from app.benchmark.scoring.results import TABLE, write_results
-    from app.benchmark.scoring.scores import judge
+    from gearsig.checks import one_of
 
     wished = "both" if reference is None else "with" if reference else "without"
     if one_of(model, "model", ("cracked", "forging")) == "forging":
@@ -90,10 +80,20 @@ def gap(
         )
         _run_drives(cases, seed, role, wished, output, processes)
         return
+    from app.benchmark.cases import Plan
+    from app.benchmark.diagnosers import BASELINES, GAP
+    from app.benchmark.run import BenchmarkRequest, run_benchmark
+    from app.benchmark.scoring.results import TABLE, write_results
+    from app.benchmark.scoring.scores import judge
+
     names = tuple(dict.fromkeys([*(diagnosers or [GAP]), *BASELINES]))
-    wanted = BenchmarkRequest(Plan(cases, seed, role, wished, same_simulator, longest, least_level), names)
-    done = _run(wanted, output, processes)
-    page = write_results(judge(wanted, done), done, output, " ".join(["gearsig", *sys.argv[1:]]))
+    request = BenchmarkRequest(Plan(cases, seed, role, wished, same_simulator, longest, least_level), names)
+    done = _run(
+        lambda show: run_benchmark(request, output, n_processes=processes, on_progress=show),
+        len(request.plan.cases()),
+        output,
+    )
+    page = write_results(judge(request, done), done, output, typed_command())
     typer.echo((output / TABLE).read_text(encoding="utf-8"))
     typer.echo(f"{page} (report), {TABLE}, scores.json, cases.csv, labels/.")
 
@@ -109,39 +109,18 @@ def _run_drives(cases: int, seed: int, role: str, reference: str, output: Path, 
     from app.benchmark.start_stop import DrivePlan, run_drive_benchmark, write_scores
 
     plan = DrivePlan(cases, seed, role, reference)
-    with _progress() as progress:
-        task = progress.add_task("diagnosing", total=cases)
-        done = run_drive_benchmark(
-            plan, output, n_processes=processes, on_progress=lambda n: progress.update(task, completed=n)
-        )
-    table = write_scores(done, output, " ".join(["gearsig", *sys.argv[1:]]))
+    done = _run(lambda show: run_drive_benchmark(plan, output, n_processes=processes, on_progress=show), cases, output)
+    table = write_scores(done, output, typed_command())
     typer.echo(table.read_text(encoding="utf-8"))
     typer.echo(f"{table}, scores.json, cases.csv.")
 
 
-def _progress() -> Progress:
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+def _run(run: Callable[[Callable[[int], None]], Result], n_cases: int, output: Path) -> Result:
+    """Run a benchmark with a progress bar; the answers so far stay after Ctrl-C."""
+    from app.benchmark.run import n_answered
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    console = Console(stderr=True)
-    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
-
-
-def _run(wanted: BenchmarkRequest, output: Path, processes: int) -> list[Done]:
-    from app.benchmark.run import n_answered, run_benchmark
-
-    n_cases = len(wanted.plan.cases())
     try:
-        with _progress() as progress:
-            task = progress.add_task("diagnosing", total=n_cases)
-            return run_benchmark(
-                wanted, output, n_processes=processes, on_progress=lambda n: progress.update(task, completed=n)
-            )
+        with progress_bar("diagnosing", n_cases) as show:
+            return run(show)
     except KeyboardInterrupt:
-        n = n_answered(output)
-        typer.echo(
-            f"gearsig: stopped; {n} of {n_cases} cases are answered in {output}; the same command goes on from there",
-            err=True,
-        )
-        raise typer.Exit(EXIT_INTERRUPTED) from None
+        raise stopped(f"{n_answered(output)} of {n_cases} cases are answered in {output}") from None

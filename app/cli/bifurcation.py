@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.cli.console import progress_bar, stopped
 from app.cli.options import (
     EffectOption,
     PresetOption,
     RateOption,
     SeedOption,
     SetOption,
+    SimulatedSpeedOption,
+    SimulatedTorqueOption,
     SimulationChoices,
-    SpeedOption_simulation_options,
-    TorqueOption_simulation_options,
     read_request,
 )
 
@@ -23,8 +24,7 @@ if TYPE_CHECKING:
     from app.bifurcation import BifurcationRequest, Found
 
 
-EXIT_INTERRUPTED = 130
-MOST_REASONS = 5
+MAX_REASONS = 5
 
 
 def bifurcation(
@@ -44,8 +44,8 @@ def bifurcation(
     preset: PresetOption = "",
     settings: SetOption = None,
     effects: EffectOption = None,
-    speed: SpeedOption_simulation_options = None,
-    torque: TorqueOption_simulation_options = None,
+    speed: SimulatedSpeedOption = None,
+    torque: SimulatedTorqueOption = None,
     section: Annotated[
         str,
         typer.Option("--section", metavar="CYCLE", help="A point once per mesh cycle (mesh) or revolution (shaft)."),
@@ -116,28 +116,16 @@ def wanted_of(
 
 
 def _run(wanted: BifurcationRequest, output: Path, jobs: int | None) -> Found:
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
     from app.bifurcation import complete, n_complete, run_folder
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    console = Console(stderr=True)
     try:
-        with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-            task = progress.add_task("simulating", total=wanted.n_values)
-            return run_folder(
-                wanted, output, n_processes=jobs, on_progress=lambda n: progress.update(task, completed=n)
-            )
+        with progress_bar("simulating", wanted.n_values) as show:
+            return run_folder(wanted, output, n_processes=jobs, on_progress=show)
     except KeyboardInterrupt:
         n = n_complete(wanted, output)
         if n:
             _tell(wanted, complete(wanted, output), output)
-        typer.echo(
-            f"gearsig: stopped; {n} of {wanted.n_values} values are in {output}; the same command goes on from there",
-            err=True,
-        )
-        raise typer.Exit(EXIT_INTERRUPTED) from None
+        raise stopped(f"{n} of {wanted.n_values} values are in {output}") from None
 
 
 def _tell(wanted: BifurcationRequest, found: Found, output: Path) -> None:
@@ -153,10 +141,10 @@ def _tell(wanted: BifurcationRequest, found: Found, output: Path) -> None:
 
     paths = write_results(wanted, found, output)
     reasons = [(name, one) for name, kept in found.items() for one in kept if one.reason]
-    for name, one in reasons[:MOST_REASONS]:
+    for name, one in reasons[:MAX_REASONS]:
         typer.echo(f"{NAMES[name]}, {one.value:g}: {one.reason}", err=True)
-    if len(reasons) > MOST_REASONS:
-        typer.echo(f"… and {len(reasons) - MOST_REASONS} more: see {paths[2].name}", err=True)
+    if len(reasons) > MAX_REASONS:
+        typer.echo(f"… and {len(reasons) - MAX_REASONS} more: see {paths[2].name}", err=True)
     unit = parameter_words(wanted.branch)[1]
     for name, kept in found.items():
         values = measured_of(kept)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.cli.console import typed_command
 from app.cli.options import (
     PulsesOption,
     RigOption,
@@ -19,7 +18,6 @@ from app.cli.options import (
     open_rig,
     stated_speed,
 )
-from gearsig.checks import one_of
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
@@ -81,6 +79,7 @@ def compare(
     """
     from rich.console import Console
 
+    from gearsig.checks import one_of
     from gearsig.comparison import ALIGN, compare_recordings
     from gearsig.report import check_writable, comparison_text
 
@@ -96,7 +95,7 @@ def compare(
         result = compare_recordings(simulated, recorded, channels=pairs, align_by=align)
         if output is not None:
             status.update("drawing")
-            write_comparison(result, output, "gearsig " + shlex.join(sys.argv[1:]))
+            write_comparison(result, output, typed_command())
     typer.echo(comparison_text(result))
     if output is not None:
         typer.echo(f"\nOpen {output / PAGE} in a browser.")

@@ -8,8 +8,6 @@ from typing import Annotated, Any
 
 import typer
 
-from app.dashboard.theme import THEME_OPTIONS
-
 MAIN_PAGE = Path(__file__).parents[1] / "dashboard" / "main.py"
 
 OPTIONS = (
@@ -22,7 +20,6 @@ OPTIONS = (
     "browser.gatherUsageStats=false",
     "client.toolbarMode=minimal",
     "client.showErrorLinks=false",
-    *THEME_OPTIONS,
 )
 """Flags win over the configuration files of the user and of the folder the command is started in."""
 
@@ -35,12 +32,14 @@ def dashboard(
     from streamlit.runtime.pages_manager import PagesManager
     from streamlit.web import cli as streamlit_cli
 
+    from app.dashboard.theme import THEME_OPTIONS
+
     # main.py lists the pages. Streamlit would take a folder called "pages" for a list of its own until main.py has run
     # once, and show that instead to who opens a page by its address first.
     PagesManager.uses_pages_directory = False
     _without_advertisement()
     own = (f"server.port={port}", f"server.headless={str(not browser).lower()}")
-    sys.argv = ["streamlit", "run", str(MAIN_PAGE), *(f"--{option}" for option in (*OPTIONS, *own))]
+    sys.argv = ["streamlit", "run", str(MAIN_PAGE), *(f"--{option}" for option in (*OPTIONS, *THEME_OPTIONS, *own))]
     sys.exit(streamlit_cli.main())
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.cli.console import progress_bar
 from app.cli.options import (
     EffectOption,
     FreshOption,
@@ -17,8 +18,11 @@ from app.cli.options import (
     read_request,
 )
 from app.cli.quantities import quantity
-from gearsig.checks import FloatArray, one_of, positive
 from gearsig.errors import InputError
+
+if TYPE_CHECKING:
+    from gearsig.checks import FloatArray
+
 
 MODEL = "reduced-fe"
 
@@ -46,8 +50,6 @@ def flexible(
     Example: gearsig flexible --preset light_damping_50_50 -o study
     """
     import numpy as np
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     from app.flexible import RANGE, flexible_study, write_study
     from sims.presets import preset as preset_named
@@ -62,9 +64,7 @@ def flexible(
         request.parameters, request.effects, None, np.random.default_rng(seed), preset_name=request.preset
     )
     chosen = preset_named(MODEL, request.preset)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("preparing", total=1.0)
+    with progress_bar("preparing") as show:
         study = flexible_study(
             ready.pair,
             float(ready.operation.torque_nm.values[0]),
@@ -74,7 +74,7 @@ def flexible(
             last_rpm=last,
             step_s=ready.step_s,
             check_spreading=spreading,
-            on_progress=lambda what, done: progress.update(task, description=what, completed=done),
+            on_progress=lambda stage, done: show(done, stage),
         )
         paths = write_study(study, output, chosen.name)
     typer.echo(f"{output}: {', '.join(path.name for path in paths)}")
@@ -139,11 +139,8 @@ def gear_body(
 
     Example: gearsig gear-body --teeth 50 --module 3mm --web 12mm --reduce -o gear
     """
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    from app.cli.options import clear_other_versions
     from app.gear_body import lines, study_gear, write_gear_body
+    from gearsig.checks import one_of
     from sims.mesh import GearGeometry
     from sims.reduced_fe import NAME, GearBlank
 
@@ -164,9 +161,7 @@ def gear_body(
     springs = _springs(held, {"radial": radial, "axial": axial, "tilt": tilt, "twist": twist})
     if fresh:
         clear_other_versions(NAME)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("mesh", total=1.0)
+    with progress_bar("mesh") as show:
         study = study_gear(
             blank,
             dof,
@@ -175,7 +170,7 @@ def gear_body(
             springs=springs,
             force_n=quantity(force, "N", "--force"),
             reduce=reduce,
-            on_progress=lambda what, done: progress.update(task, description=what, completed=done),
+            on_progress=lambda stage, done: show(done, stage),
         )
         paths = write_gear_body(study, output, vtk=vtk)
     typer.echo("\n".join(lines(study)))
@@ -185,6 +180,8 @@ def gear_body(
 def _springs(held: str, given: dict[str, str]) -> FloatArray | None:
     """Stiffness in the six directions of the hub; None where it is not on springs."""
     import numpy as np
+
+    from gearsig.checks import positive
 
     if held != "springs":
         for name, text in given.items():

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.cli.console import progress_bar, typed_command
 from app.cli.options import SamplingRateOption, clear_other_versions
-from app.gap.run import GapRequest
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
+    from app.gap.run import GapRequest
     from gearsig.gap import GapReport
 
 
@@ -82,13 +83,14 @@ def gap(
     if output is None:
         raise InputError("no folder for the results is given", remedy="give -o DIR")
     from app.gap.job import check_folder, write_results
+    from app.gap.run import GapRequest
 
     asked = GapRequest(tuple(recordings or ()), tuple(reference or ()), rig, _torques(torque), fs)
     check_folder(output)
     if fresh and model == "reduced-fe":
         clear_other_versions(model)
     report = _diagnosed(asked, model, cache, fresh=fresh)
-    written = write_results(report, output, command="gearsig " + shlex.join(sys.argv[1:]))
+    written = write_results(report, output, command=typed_command())
     _tell(report, written)
 
 
@@ -101,23 +103,16 @@ def _torques(texts: list[str] | None) -> tuple[float, ...]:
 
 def _diagnosed(asked: GapRequest, model: str, cache: Path | None, *, fresh: bool) -> GapReport:
     """Diagnose with a progress bar, which is shown on a terminal only."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
-
     from app.gap.run import run_gap
     from gearsig.cache import cache_folder
 
-    stage = TextColumn("{task.description}", markup=False)  # names of files are no markup
-    columns = (stage, BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("reading", total=1.0)
+    with progress_bar("reading") as show:
         return run_gap(
             asked,
             model,
             cache=cache or cache_folder("gap"),
             fresh=fresh,
-            on_stage=lambda what, done: progress.update(task, description=what, completed=done),
+            on_stage=lambda stage, done: show(done, stage),
         )
 
 

@@ -13,6 +13,7 @@ from app.cli.analyze import analyze, crack, demo
 from app.cli.benchmark import benchmark_app
 from app.cli.bifurcation import bifurcation
 from app.cli.compare import compare
+from app.cli.console import EXIT_INPUT_ERROR, EXIT_INTERRUPTED
 from app.cli.dashboard import dashboard
 from app.cli.flexible import flexible, gear_body
 from app.cli.gap import gap
@@ -24,13 +25,9 @@ from app.cli.sweep import sweep
 from gearsig import __version__
 from gearsig.errors import InputError, RefusalError
 
-EXIT_INPUT_ERROR = 2
-EXIT_INTERRUPTED = 130
-
 app = typer.Typer(
     name="gearsig",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
     help="""Signal processing and diagnostics for gear vibration.
@@ -55,7 +52,6 @@ app.command()(gap)
 app.add_typer(benchmark_app, name="benchmark")
 app.command()(demo)
 app.command()(dashboard)
-
 
 USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
 """Base of all errors of Typer's parser, which it does not export; since version 0.20 it is no longer Click's."""

@@ -44,7 +44,7 @@ ReferenceOption = Annotated[
     typer.Option(
         "--reference",
         metavar="FILE",
-        help="Recording of the same machine when it was sound: same sensors, speed and load.",
+        help="Recording of the same machine when it was healthy: same sensors, speed and load.",
     ),
 ]
 TorqueOption = Annotated[
@@ -103,7 +103,7 @@ def open_recording(
 def open_reference(
     path: Path | None, rig: Rig | None, sampling_rate_hz: float | None, speed_rpm: float | None
 ) -> Recording | None:
-    """Read the recording of the sound machine, if one is given; pulse times belong to the other recording."""
+    """Read the recording of the healthy machine, if one is given; pulse times belong to the other recording."""
     if path is None:
         return None
     from gearsig.diagnosis import rig_of_reference
@@ -113,7 +113,6 @@ def open_reference(
 
 def torque_of(text: str | None) -> float | None:
     """Return the torque that the option states, in N m."""
-    from app.cli.quantities import quantity
     from gearsig.checks import positive
 
     return positive(quantity(text, "N m", "--torque"), "--torque", "N m") if text else None
@@ -144,7 +143,7 @@ EffectOption = Annotated[
         help="Switch an effect on, e.g. root_crack=2mm or root_crack=2mm,gear=driven,tooth=5; repeatable.",
     ),
 ]
-SpeedOption_simulation_options = Annotated[
+SimulatedSpeedOption = Annotated[
     str | None,
     typer.Option(
         "--speed",
@@ -152,7 +151,7 @@ SpeedOption_simulation_options = Annotated[
         help="500rpm, 300..1500rpm (over the duration), or a CSV file with time_s,speed_rpm. Default: the preset's.",
     ),
 ]
-TorqueOption_simulation_options = Annotated[
+SimulatedTorqueOption = Annotated[
     str | None,
     typer.Option("--torque", metavar="TORQUE", help="110Nm, 20..110Nm, or a CSV file with time_s,torque_nm."),
 ]
@@ -200,7 +199,7 @@ def read_request(
     seed: int,
 ) -> SimulationChoices:
     """Return what the options ask for; names and units are checked here, ranges by the simulator."""
-    from app.cli.quantities import course
+    from app.cli.quantities import read_profile
     from sims.presets import is_file
     from sims.presets import preset as preset_named
     from sims.registry import simulator, simulators, usual_sampling_rate_hz
@@ -214,8 +213,8 @@ def read_request(
         preset if is_file(preset) else preset_named(model, preset).name,
         dict(read_parameter(chosen, text) for text in settings or ()),
         tuple(read_effect(text) for text in effects or ()),
-        None if speed is None else course(speed, "speed_rpm", "rpm", duration_s),
-        None if torque is None else course(torque, "torque_nm", "N m", duration_s),
+        None if speed is None else read_profile(speed, "speed_rpm", "rpm", duration_s),
+        None if torque is None else read_profile(torque, "torque_nm", "N m", duration_s),
         duration_s,
         quantity(fs, "Hz", "--fs") if fs else usual_sampling_rate_hz(chosen),
         seed,

@@ -6,11 +6,14 @@ import csv
 import re
 from math import isfinite, pi
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
 from gearsig.errors import InputError
-from sims.machine import Profile
+
+if TYPE_CHECKING:
+    from sims.machine import Profile
 
 _RADIAN_RPM = 30.0 / pi
 
@@ -116,11 +119,11 @@ def _spelt(unit: str) -> str:
 # --------------------
 
 
-MOST_BYTES = 50_000_000
+MAX_PROFILE_BYTES = 50_000_000
 
 
-def course(text: str, name: str, unit: str, duration_s: float) -> Profile:
-    """Return a course from "500rpm", "300..1500rpm" (in a straight line over the duration) or a CSV file.
+def read_profile(text: str, name: str, unit: str, duration_s: float) -> Profile:
+    """Return a profile from "500rpm", "300..1500rpm" (in a straight line over the duration) or a CSV file.
 
     Parameters
     ----------
@@ -130,28 +133,33 @@ def course(text: str, name: str, unit: str, duration_s: float) -> Profile:
     unit : str
     duration_s : float
     """
+    from sims.machine import Profile
+
     if text.strip().lower().endswith(".csv"):
-        found = read_course(Path(text.strip()), name)
-        for held in _held(found, duration_s):
-            typer.echo(f"Note: {Path(text.strip()).name}: {held}", err=True)
-        return found
+        path = Path(text.strip())
+        profile = read_profile_file(path, name)
+        for held in _held(profile, duration_s):
+            typer.echo(f"Note: {path.name}: {held}", err=True)
+        return profile
     if ".." in text:
         return Profile.of([0.0, duration_s], span(text, unit, name))
     return Profile.constant(quantity(text, unit, name))
 
 
-def _held(found: Profile, duration_s: float) -> list[str]:
+def _held(profile: Profile, duration_s: float) -> list[str]:
     """Return what is said of a profile that does not span the recording."""
-    first_s, last_s = float(found.times_s[0]), float(found.times_s[-1])
+    first_s, last_s = float(profile.times_s[0]), float(profile.times_s[-1])
     begins = f"begins at {first_s:g} s; its first value is held from 0 s"
     ends = f"ends at {last_s:g} s of {duration_s:g} s; its last value is held"
     return [begins] * (first_s > 0.0) + [ends] * (last_s < duration_s)
 
 
-def read_course(path: Path, name: str) -> Profile:
-    """Read a course from a CSV file with the columns time_s and `name`."""
+def read_profile_file(path: Path, name: str) -> Profile:
+    """Read a profile from a CSV file with the columns time_s and `name`."""
+    from sims.machine import Profile
+
     try:
-        if path.stat().st_size > MOST_BYTES:
+        if path.stat().st_size > MAX_PROFILE_BYTES:
             raise InputError("is too long for a profile", where=path.name, allowed="up to 50 MB")
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = [(n, row) for n, row in enumerate(csv.reader(file), 1) if any(cell.strip() for cell in row)]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.cli.console import EXIT_INPUT_ERROR, EXIT_INTERRUPTED, EXIT_SOME_FAILED, progress_bar, typed_command
 from app.cli.options import (
     PulsesOption,
     ReferenceOption,
@@ -25,11 +24,6 @@ from gearsig.errors import InputError
 
 if TYPE_CHECKING:
     from gearsig.rig import SpeedSource
-
-
-EXIT_SOME_FAILED = 1
-EXIT_NONE_READ = 2
-EXIT_INTERRUPTED = 130
 
 
 def report(
@@ -56,12 +50,11 @@ def report(
             f"--tach-times belong to one recording, and there are {len(files)}", remedy="make a report for each"
         )
     speed = stated_speed(speed_rpm, tach_times, pulses_per_revolution)
-    command = "gearsig " + shlex.join(sys.argv[1:])
     failed = make_report(
-        files, output, rig, fs, speed, jobs, command=command, reference=reference, torque_nm=torque_of(torque)
+        files, output, rig, fs, speed, jobs, command=typed_command(), reference=reference, torque_nm=torque_of(torque)
     )
     if failed:
-        raise typer.Exit(EXIT_NONE_READ if failed == len(files) else EXIT_SOME_FAILED)
+        raise typer.Exit(EXIT_INPUT_ERROR if failed == len(files) else EXIT_SOME_FAILED)
 
 
 def make_report(
@@ -76,23 +69,17 @@ def make_report(
     torque_nm: float | None = None,
 ) -> int:
     """Write the pages with a progress bar; return how many files failed."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
     from gearsig.batch import report_many
 
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     before, n_done = output.exists(), 0
 
     def advance(*_: object) -> None:
         nonlocal n_done
         n_done += 1
-        progress.advance(task)
+        show(n_done)
 
     try:
-        with Progress(*columns, console=console, transient=True) as progress:
-            task = progress.add_task("analysing", total=len(files))
+        with progress_bar("analysing", len(files)) as show:
             result = report_many(
                 files,
                 output,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.cli.console import EXIT_INPUT_ERROR, EXIT_SOME_FAILED, progress_bar, stopped
 from app.cli.options import (
     DurationOption,
     EffectOption,
@@ -15,13 +16,13 @@ from app.cli.options import (
     RateOption,
     SeedOption,
     SetOption,
+    SimulatedSpeedOption,
+    SimulatedTorqueOption,
     SimulationChoices,
-    SpeedOption_simulation_options,
-    TorqueOption_simulation_options,
     read_effect_options,
     read_request,
 )
-from app.cli.quantities import quantity, span
+from app.cli.quantities import quantity, span, split_quantity
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,10 +30,7 @@ if TYPE_CHECKING:
     from sims.sweep import Axis, Sweep, SweepResult
 
 
-EXIT_SOME_FAILED = 1
-EXIT_NONE_MADE = 2
-EXIT_INTERRUPTED = 130
-MOST_REASONS = 5
+MAX_REASONS = 5
 """Failures that are printed; the index holds them all."""
 
 
@@ -51,8 +49,8 @@ def sweep(
     preset: PresetOption = "",
     settings: SetOption = None,
     effects: EffectOption = None,
-    speed: SpeedOption_simulation_options = None,
-    torque: TorqueOption_simulation_options = None,
+    speed: SimulatedSpeedOption = None,
+    torque: SimulatedTorqueOption = None,
     duration: DurationOption = "5s",
     fs: RateOption = "",
     seed: SeedOption = 0,
@@ -76,15 +74,15 @@ def sweep(
     request = read_request(model, preset, settings, effects, speed, torque, duration, fs, seed)
     wanted = sweep_of(request, vary, common_seed, f".{extension.lstrip('.')}")
     result = _run(wanted, output, jobs)
-    for failure in result.failures[:MOST_REASONS]:
+    for failure in result.failures[:MAX_REASONS]:
         typer.echo(f"point {failure.point.index}: {failure.reason}", err=True)
-    if len(result.failures) > MOST_REASONS:
-        typer.echo(f"… and {len(result.failures) - MOST_REASONS} more points: see the index", err=True)
+    if len(result.failures) > MAX_REASONS:
+        typer.echo(f"… and {len(result.failures) - MAX_REASONS} more points: see the index", err=True)
     n_made = len(result.outcomes) - len(result.failures)
     found = f"; {result.n_found} were there already" if result.n_found else ""
     typer.echo(f"{result.n_points} points, {n_made} simulated{found}. They are listed in {result.index_path}.")
     if result.failures:
-        raise typer.Exit(EXIT_SOME_FAILED if n_made + result.n_found else EXIT_NONE_MADE)
+        raise typer.Exit(EXIT_SOME_FAILED if n_made + result.n_found else EXIT_INPUT_ERROR)
 
 
 def sweep_of(request: SimulationChoices, vary: Sequence[str], common_seed: bool, extension: str) -> Sweep:
@@ -149,8 +147,6 @@ def read_axis(model: Simulator, text: str) -> Axis:
 
 def read_values(items: Sequence[str], unit: str, name: str) -> tuple[float, ...]:
     """Return the values of ["0..4mm:5"] or ["0", "1", "2mm"]; the last one's unit holds for those without."""
-    from app.cli.quantities import split_quantity
-
     if len(items) == 1 and ".." in items[0]:
         reach, sign, number = items[0].rpartition(":")
         if not sign or not number.strip().isdigit() or int(number) < 2:
@@ -165,26 +161,10 @@ def read_values(items: Sequence[str], unit: str, name: str) -> tuple[float, ...]
 
 
 def _run(wanted: Sweep, output: Path, jobs: int | None) -> SweepResult:
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
     from sims.sweep import n_complete, run_sweep
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    console = Console(stderr=True)
     try:
-        with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-            task = progress.add_task("simulating", total=wanted.n_points)
-            return run_sweep(
-                wanted,
-                output,
-                n_processes=jobs,
-                on_progress=lambda n_done, _n, _outcome: progress.update(task, completed=n_done),
-            )
+        with progress_bar("simulating", wanted.n_points) as show:
+            return run_sweep(wanted, output, n_processes=jobs, on_progress=lambda n_done, _n, _outcome: show(n_done))
     except KeyboardInterrupt:
-        n = n_complete(wanted, output)
-        typer.echo(
-            f"gearsig: stopped; {n} of {wanted.n_points} points are in {output}; the same command goes on from there",
-            err=True,
-        )
-        raise typer.Exit(EXIT_INTERRUPTED) from None
+        raise stopped(f"{n_complete(wanted, output)} of {wanted.n_points} points are in {output}") from None

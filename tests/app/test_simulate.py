@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli.quantities import course
+from app.cli.quantities import read_profile
 from gearsig.errors import InputError
 from gearsig.recording import read_recording
 from gearsig.rig import read_rig
@@ -118,7 +118,7 @@ def test_bad_profiles(tmp_path: Path, text: str, named: str) -> None:
     path = tmp_path / "p.csv"
     path.write_text(text)
     with pytest.raises(InputError) as caught:
-        course(str(path), "speed_rpm", "rpm", 1.0)
+        read_profile(str(path), "speed_rpm", "rpm", 1.0)
     assert named in str(caught.value)
     assert "p.csv" in str(caught.value)
 
@@ -132,7 +132,7 @@ def test_a_profile_that_does_not_span_the_recording_is_held_and_said(
 ) -> None:
     path = tmp_path / "p.csv"
     path.write_text("time_s,speed_rpm\n0.5,300\n1.5,600\n")
-    assert course(str(path), "speed_rpm", "rpm", duration_s).at(3.0) == 600.0
+    assert read_profile(str(path), "speed_rpm", "rpm", duration_s).at(3.0) == 600.0
     notes = capsys.readouterr().err.splitlines()
     assert len(notes) == len(said)
     assert all(f"p.csv: {text}" in note for text, note in zip(said, notes, strict=True))
