@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from app.benchmark.diagnosers import SHARES
 from gearsig.checks import count, one_of, within
 from gearsig.errors import RefusalError
 from gearsig.gap import Added, OperatingCondition
@@ -29,14 +30,6 @@ from sims.blind import (
 from sims.cracked import cracked_gap_simulator
 from sims.effects import effect
 from sims.gear_pair import PairTwin
-
-# --------------------
-# Shares of the kinds of case; apart from the plan, since a diagnoser may know them: they are public.
-# --------------------
-
-
-SHARES = {"single": 0.60, "none": 0.15, "unknown": 0.15, "pair": 0.10}
-"""Of all cases; "single" is shared evenly by the catalogue's effects, "unknown" by those outside it."""
 
 
 def counts_of(shares: Mapping[str, float], n_cases: int) -> dict[str, int]:

@@ -11,12 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.benchmark.cases import SHARES
 from gearsig.errors import InputError
 from gearsig.gap import (
     INDEPENDENT,
     NONE,
-    RULES,
     SIDES,
     UNKNOWN,
     Added,
@@ -32,6 +30,7 @@ from gearsig.gap import (
     sides_of,
     without_machines_of,
 )
+from gearsig.gap import RULES as TEXTBOOK_RULES
 from gearsig.recording import Recording, read_recording
 from gearsig.rig import Rig, read_rig
 from sims.effects import effects
@@ -61,12 +60,12 @@ class VisibleCase:
     reference_rigs: tuple[Rig, ...]
 
     @cached_property
-    def gathered(self) -> tuple[ReducedRecording, ...]:
+    def reduced(self) -> tuple[ReducedRecording, ...]:
         """The recordings, reduced."""
         return tuple(reduce_recording(r, rig) for r, rig in zip(self.recordings, self.rigs, strict=True))
 
     @cached_property
-    def gathered_references(self) -> tuple[ReducedRecording, ...]:
+    def reduced_references(self) -> tuple[ReducedRecording, ...]:
         """The references, reduced."""
         return tuple(reduce_recording(r, rig) for r, rig in zip(self.references, self.reference_rigs, strict=True))
 
@@ -88,23 +87,14 @@ def read_seen(folder: Path) -> VisibleCase:
 
 Diagnoser = Callable[[VisibleCase], GapReport]
 
-GAP, FOREST, MAJORITY, DIAGNOSERS_RULES = "gap", "forest", "majority", "rules"
+GAP, FOREST, MAJORITY, RULES = "gap", "forest", "majority", "rules"
 GAP_UNSEEN, FOREST_UNSEEN = "gap-unseen", "forest-unseen"
 """The same without what was learned from the independent rig's development gears."""
 START_STOP = "start-stop"
 """Of machines that start and stop, by the model forging."""
-BASELINES = (MAJORITY, DIAGNOSERS_RULES)
+BASELINES = (MAJORITY, RULES)
 MAIN = "__main__"
 """A module that is another one in every process: the diagnosing process finds nothing of the caller's there."""
-_HOMES = {
-    GAP: "app.benchmark.diagnosers:diagnose",
-    FOREST: "app.benchmark.diagnosers:diagnose",
-    MAJORITY: "app.benchmark.diagnosers:diagnose",
-    DIAGNOSERS_RULES: "app.benchmark.diagnosers:diagnose",
-    GAP_UNSEEN: "app.benchmark.diagnosers:diagnose",
-    FOREST_UNSEEN: "app.benchmark.diagnosers:recognise",
-    START_STOP: "app.benchmark.diagnosers:diagnose_drive",
-}
 
 
 def diagnoser(name: str) -> Diagnoser:
@@ -115,20 +105,22 @@ def diagnoser(name: str) -> Diagnoser:
     InputError
         If there is none.
     """
-    module, sign, function = _HOMES.get(name, name).partition(":")
+    if name in DIAGNOSERS:
+        return DIAGNOSERS[name]
+    module, sign, function = name.partition(":")
     is_shared = sign and module != MAIN
     try:
-        found = getattr(import_module(module), function) if is_shared else None
+        shared = getattr(import_module(module), function) if is_shared else None
     except (ImportError, AttributeError):
-        found = None
-    if not callable(found):
-        raise InputError(f"there is no diagnoser {name!r}", allowed=f"{', '.join(_HOMES)} or MODULE:FUNCTION")
-    return found  # type: ignore[no-any-return]  # what a user's function returns shows when it is called
+        shared = None
+    if not callable(shared):
+        raise InputError(f"there is no diagnoser {name!r}", allowed=f"{', '.join(DIAGNOSERS)} or MODULE:FUNCTION")
+    return shared  # type: ignore[no-any-return]  # what a user's function returns shows when it is called
 
 
 def folders_of(name: str) -> tuple[Path, ...]:
     """Return the folders that a diagnoser's module is imported from; none where there is no file of it."""
-    top = _HOMES.get(name, name).partition(":")[0].partition(".")[0]
+    top = (__name__ if name in DIAGNOSERS else name.partition(":")[0]).partition(".")[0]
     spec = None if top == MAIN else find_spec(top)
     if spec is None:
         return ()
@@ -254,6 +246,13 @@ def diagnose_forest(seen: VisibleCase) -> GapReport:
 # --------------------
 
 
+SHARES = {"single": 0.60, "none": 0.15, "unknown": 0.15, "pair": 0.10}
+"""Of all cases; "single" is shared evenly by the catalogue's effects, "unknown" by those outside it.
+
+They are public, and stand here since the diagnosing process imports nothing that makes cases.
+"""
+
+
 def diagnose_majority(seen: VisibleCase) -> GapReport:  # noqa: ARG001 - that is the point of it
     """Return the shares; the likeliest is "none"."""
     of_each = (SHARES["single"] + SHARES["pair"]) / len(effects())
@@ -273,7 +272,7 @@ def diagnose_unseen(seen: VisibleCase) -> GapReport:
         return diagnose(seen)
 
 
-def recognise(seen: VisibleCase) -> GapReport:
+def diagnose_forest_unseen(seen: VisibleCase) -> GapReport:
     """Return what the forests say of a case without what was learned from those gears."""
     with without_machines_of(INDEPENDENT):
         return diagnose_forest(seen)
@@ -288,7 +287,7 @@ def recognise(seen: VisibleCase) -> GapReport:
 # --------------------
 
 
-LEAST_STRENGTH = 2.0
+MIN_STRENGTH = 2.0
 """In spreads: the strength at which "none" stands."""
 
 USUAL: dict[str, tuple[float, float, float]] = {
@@ -340,27 +339,40 @@ USUAL: dict[str, tuple[float, float, float]] = {
 
 def diagnose_rules(seen: VisibleCase) -> GapReport:
     """Return the rules' strengths as probabilities, by exponentials; conditions count alike."""
-    found: dict[str, tuple[float, str]] = {NONE: (LEAST_STRENGTH, "")}
+    strongest: dict[str, tuple[float, str]] = {NONE: (MIN_STRENGTH, "")}
     each = list(_deviations(seen))
-    for rule in RULES:
+    for rule in TEXTBOOK_RULES:
         for side in sides_of(rule):
             strength = float(np.mean([rule_strength(rule, side, deviations) for deviations in each]))
-            if strength > found.get(rule.cause, (-np.inf, ""))[0]:
-                found[rule.cause] = strength, side
-    weights = {cause: float(np.exp(strength)) for cause, (strength, _) in found.items()}
+            if strength > strongest.get(rule.cause, (-np.inf, ""))[0]:
+                strongest[rule.cause] = strength, side
+    weights = {cause: float(np.exp(strength)) for cause, (strength, _) in strongest.items()}
     total = sum(weights.values())
-    options = {cause: {"gear": side} for cause, (_, side) in found.items() if side}
+    options = {cause: {"gear": side} for cause, (_, side) in strongest.items() if side}
     return bare_report("rules", {cause: weight / total for cause, weight in weights.items()}, options)
 
 
 def _deviations(seen: VisibleCase) -> Iterator[dict[str, float]]:
     """Yield, for each condition, how far every feature of the table is from usual, in spreads."""
-    for i, gathered in enumerate(seen.gathered):
-        values = dict(zip(*once(gathered), strict=True))
-        before = dict(zip(*once(seen.gathered_references[i]), strict=True)) if seen.gathered_references else None
-        found = {}
+    for i, recording in enumerate(seen.reduced):
+        values = dict(zip(*once(recording), strict=True))
+        before = dict(zip(*once(seen.reduced_references[i]), strict=True)) if seen.reduced_references else None
+        deviations = {}
         for name, (usual, spread, change) in USUAL.items():
             for side in SIDES:
-                own = name.format(side=side)
-                found[own] = (values[own] - usual) / spread if before is None else (values[own] - before[own]) / change
-        yield found
+                feature = name.format(side=side)
+                value = values[feature]
+                deviations[feature] = (value - usual) / spread if before is None else (value - before[feature]) / change
+        yield deviations
+
+
+DIAGNOSERS: dict[str, Diagnoser] = {
+    GAP: diagnose,
+    FOREST: diagnose_forest,
+    MAJORITY: diagnose_majority,
+    RULES: diagnose_rules,
+    GAP_UNSEEN: diagnose_unseen,
+    FOREST_UNSEEN: diagnose_forest_unseen,
+    START_STOP: diagnose_drive,
+}
+"""Those that `gearsig benchmark gap` knows by name."""

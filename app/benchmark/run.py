@@ -130,7 +130,7 @@ def diagnosed(folder: Path, names: Sequence[str], running: Running | None = None
     """
     runs = running or Running()
     process = runs.start(
-        [sys.executable, "-m", "app.benchmark.diagnose_one", *names],
+        [sys.executable, "-P", "-m", "app.benchmark.diagnose_one", *names],
         cwd=folder,
         env=environment(folder, names),
         stdout=subprocess.DEVNULL,

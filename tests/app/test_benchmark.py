@@ -13,12 +13,9 @@ import h5py
 import pytest
 
 from app.benchmark import diagnosers, run
-from app.benchmark import diagnosers as forest
-from app.benchmark import diagnosers as unseen
-from app.benchmark import run as blind_run
 from app.benchmark.answer import Answer, AnsweredCause, AnsweredPlace, AnsweredShrinkage, from_text, to_text
 from app.benchmark.cases import BLIND, SAME, Plan, PlannedCase, make_case
-from app.benchmark.diagnosers import USUAL, diagnoser, read_seen
+from app.benchmark.diagnosers import DIAGNOSERS, USUAL, diagnoser, read_seen
 from app.benchmark.run import ANSWERS_FOLDER, BenchmarkRequest, diagnosed, environment, run_benchmark, state_of_code
 from app.cli.main import main
 from gearsig.cache import FOLDERS
@@ -107,7 +104,7 @@ def test_the_diagnosing_process_finds_no_label(folders):
     assert found["recordings"] == ["condition_1.h5"]
     assert found["truths"] == [None, None]
     assert not [m for m in found["modules"] if m.startswith("sims.blind")]
-    making = {f"app.benchmark.{name}" for name in ("plan", "make", "run", "blind_run")}
+    making = {f"app.benchmark.{name}" for name in ("cases", "run", "start_stop")}
     assert making.isdisjoint(found["modules"])
     # The checkout and the interpreter may lie anywhere: their places are not the case's.
     own = {
@@ -279,7 +276,7 @@ def test_the_state_of_the_code_hangs_on_the_code_and_not_on_where_it_lies(tmp_pa
         for folder, text in (("gearsig/gap", "1"), ("gearsig/report", place)):
             (root / folder).mkdir(parents=True)
             (root / folder / "a.py").write_text(text, encoding="utf-8")
-        monkeypatch.setattr(blind_run, "_ROOT", root)
+        monkeypatch.setattr(run, "_ROOT", root)
         states.append(state_of_code())
     assert states[0] == states[1]
     (root / "gearsig/gap/a.py").write_text("2", encoding="utf-8")
@@ -320,7 +317,13 @@ def is_running(pid):
 
 
 def test_the_unseen_know_nothing_of_the_rig_that_makes_the_cases(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (diagnosers, forest):
-        monkeypatch.setattr(module, "diagnose", lambda _: set(load_population().simulators))
-    for ask in (unseen.diagnose_unseen, unseen.recognise):
-        assert ask(None) == set(load_population().simulators) - {INDEPENDENT}  # type: ignore[arg-type]  # not looked at
+    for name in ("diagnose", "diagnose_forest"):
+        monkeypatch.setattr(diagnosers, name, lambda _: set(load_population().simulators))
+    for name in ("gap-unseen", "forest-unseen"):
+        answer = diagnoser(name)(None)  # type: ignore[arg-type]  # not looked at
+        assert answer == set(load_population().simulators) - {INDEPENDENT}
+
+
+def test_each_name_is_a_diagnoser_of_its_own() -> None:
+    assert len(set(DIAGNOSERS.values())) == len(DIAGNOSERS)
+    assert all(diagnoser(name) is function for name, function in DIAGNOSERS.items())

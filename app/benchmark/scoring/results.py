@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from app.benchmark.answer import Answer
-from app.benchmark.cases import BLIND, SAME, SHARES
-from app.benchmark.diagnosers import BASELINES
+from app.benchmark.cases import BLIND, SAME
+from app.benchmark.diagnosers import BASELINES, SHARES
 from app.benchmark.run import Done, state_of_code
 from app.benchmark.scoring.judged import STRONG, Row
 from app.benchmark.scoring.scores import (
