@@ -13,11 +13,9 @@ from app.cli.main import app
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-RUN = [
-    page
-    for page in PAGES
-    if "```python" in page.read_text(encoding="utf-8") and page.name not in ("gap.md", "engines.md")
-] + [ROOT / "docs" / "tutorials" / "gap.md"]
+RUN = [page for page in PAGES if "```python" in page.read_text(encoding="utf-8") and page.name != "gap.md"] + [
+    ROOT / "docs" / "tutorials" / "gap.md"
+]
 BLOCK = re.compile(
     r"^(?:<!-- (?P<mark>[a-z]+) -->\n)?```(?P<language>\w*)\n(?P<code>.*?)^```$", re.DOTALL | re.MULTILINE
 )
