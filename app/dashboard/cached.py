@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import streamlit as st
 
-from app.dashboard.state import AnalysisRequest
+from app.dashboard.state import AnalysisRequest, Content
 from app.dashboard.theme import one_line
 
 if TYPE_CHECKING:
@@ -25,9 +26,6 @@ if TYPE_CHECKING:
 # --------------------
 
 
-LONGEST_STEM, LONGEST_ENDING, N_ENDINGS = 60, 15, 2
-
-
 def safe_file_name(name: str) -> str:
     r"""Return a name that stays inside its folder: the last part of a path, plain letters, digits, ".", "-", "_".
 
@@ -37,8 +35,8 @@ def safe_file_name(name: str) -> str:
     ('run-1.csv', 'a.MAT', 'recording')
     """
     stem, *endings = re.split(r"[/\\]", name)[-1].split(".")
-    kept = [plain for ending in endings[-N_ENDINGS:] if (plain := _plain(ending)[:LONGEST_ENDING])]
-    return ".".join([_plain(stem)[:LONGEST_STEM] or "recording", *kept])
+    kept = [plain for ending in endings[-2:] if (plain := _plain(ending)[:15])]
+    return ".".join([_plain(stem)[:60] or "recording", *kept])
 
 
 def _plain(text: str) -> str:
@@ -57,14 +55,14 @@ def read_rig_text(text: str, name: str = "rig.toml") -> Rig | None:
         return read_rig(path)
 
 
-def read_recording_bytes(
-    content: bytes | memoryview, name: str, *, rig: Rig | None, sampling_rate_hz: float | None, speed_rpm: float | None
+def read_content(
+    content: bytes | Content, name: str, *, rig: Rig | None, sampling_rate_hz: float | None, speed_rpm: float | None
 ) -> Recording:
-    """Read a recording from the bytes of a file called `name`.
+    """Read a recording from a file of this machine, e.g. a sample, or from the bytes of a file called `name`.
 
     Parameters
     ----------
-    content : bytes-like
+    content : Path or bytes-like
     name : str
         As the browser gave it; never trusted as a path.
     rig : Rig or None
@@ -76,31 +74,40 @@ def read_recording_bytes(
     InputError
         As `gearsig.recording.read_recording`.
     """
-    with TemporaryDirectory(prefix="gearsig-") as folder:
-        path = Path(folder) / safe_file_name(name)
-        path.write_bytes(content)
-        recording = read_recording_file(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed_rpm=speed_rpm)
-    return replace(recording, provenance=replace(recording.provenance, source=one_line(name)))
-
-
-def read_recording_file(
-    path: Path, *, rig: Rig | None, sampling_rate_hz: float | None, speed_rpm: float | None
-) -> Recording:
-    """Read a recording from a file of this machine, e.g. a sample."""
     from gearsig.recording import read_recording
     from gearsig.rig import ConstantSpeed
 
     speed = None if speed_rpm is None else ConstantSpeed(speed_rpm)
-    return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+    if isinstance(content, Path):
+        return read_recording(content, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+    with TemporaryDirectory(prefix="gearsig-") as folder:
+        path = Path(folder) / safe_file_name(name)
+        path.write_bytes(content)
+        recording = read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+    return replace(recording, provenance=replace(recording.provenance, source=one_line(name)))
 
 
-Content = Path | memoryview
+def _read(request: AnalysisRequest, name: str, content: Content, rig: Rig | None) -> Recording:
+    rate_hz, speed_rpm = request.sampling_rate_hz, request.speed_rpm
+    return read_content(content, name, rig=rig, sampling_rate_hz=rate_hz, speed_rpm=speed_rpm)
 
-N_ANALYSES, N_LARGE_ANALYSES = 6, 2
-"""Each holds its recording and several spectra: a few times the size of the file."""
-LARGE_BYTES = 50_000_000
-N_PAGES = 4
-N_HASHES = N_QUALITIES = 64
+
+def recorded(request: AnalysisRequest, content: Content, rig: Rig | None = None) -> Recording:
+    """Return a recording as requested; `rig` is for files without a rig file of their own.
+
+    Raises
+    ------
+    InputError
+        If the rig or the recording cannot be read.
+    """
+    return _recorded(request, repr(rig), content, rig)
+
+
+@st.cache_resource(max_entries=6, show_spinner="Reading …")
+def _recorded(request: AnalysisRequest, rig_text: str, _content: Content, _rig: Rig | None) -> Recording:
+    del rig_text  # it stands for the rig
+    own_rig = read_rig_text(request.rig_text, request.rig_name)
+    return _read(request, request.name, _content, own_rig if own_rig is not None else _rig)
 
 
 def analysis_of(request: AnalysisRequest, content: Content, reference: Content | None = None) -> Analysis:
@@ -112,19 +119,20 @@ def analysis_of(request: AnalysisRequest, content: Content, reference: Content |
         If the rig, the recording or the reference cannot be read, or not be analysed.
     """
     size = _size(content) + (0 if reference is None else _size(reference))
-    return (_large if size > LARGE_BYTES else _small)(request, content, reference)
+    return (_large if size > 50_000_000 else _small)(request, content, reference)
 
 
+# Each holds its recording and several spectra, a few times the size of the file: of large ones fewer are kept.
 def _size(content: Content) -> int:
     return content.stat().st_size if isinstance(content, Path) else content.nbytes
 
 
-@st.cache_resource(max_entries=N_ANALYSES, show_spinner=False)
+@st.cache_resource(max_entries=6, show_spinner=False)
 def _small(request: AnalysisRequest, _content: Content, _reference: Content | None) -> Analysis:
     return read_and_analyze(request, _content, _reference)
 
 
-@st.cache_resource(max_entries=N_LARGE_ANALYSES, show_spinner=False)
+@st.cache_resource(max_entries=2, show_spinner=False)
 def _large(request: AnalysisRequest, _content: Content, _reference: Content | None) -> Analysis:
     return read_and_analyze(request, _content, _reference)
 
@@ -139,14 +147,7 @@ def read_and_analyze(request: AnalysisRequest, content: Content, reference: Cont
     return analyze(recording, reference=then, torque_nm=request.torque_nm)
 
 
-def _read(request: AnalysisRequest, name: str, content: Content, rig: Rig | None) -> Recording:
-    rate, speed = request.sampling_rate_hz, request.speed_rpm
-    if isinstance(content, Path):
-        return read_recording_file(content, rig=rig, sampling_rate_hz=rate, speed_rpm=speed)
-    return read_recording_bytes(content, name, rig=rig, sampling_rate_hz=rate, speed_rpm=speed)
-
-
-@st.cache_data(max_entries=N_PAGES, show_spinner=False)
+@st.cache_data(max_entries=4, show_spinner=False)
 def report_page(request: AnalysisRequest, _analysis: Analysis) -> bytes:
     """Return the self-contained report as HTML."""
     from gearsig.report import page_html
@@ -154,7 +155,7 @@ def report_page(request: AnalysisRequest, _analysis: Analysis) -> bytes:
     return page_html(_analysis, command=command_of(request)).encode("utf-8")
 
 
-@st.cache_data(max_entries=N_QUALITIES, show_spinner=False)
+@st.cache_data(max_entries=64, show_spinner=False)
 def channel_problems(key: str, _recording: Recording) -> tuple[ChannelProblem, ...]:
     """Return what is wrong with the channels; `key` stands for the recording."""
     from gearsig.recording import find_problems
@@ -163,7 +164,7 @@ def channel_problems(key: str, _recording: Recording) -> tuple[ChannelProblem, .
     return find_problems(_recording)
 
 
-@st.cache_data(max_entries=N_HASHES, show_spinner=False)
+@st.cache_data(max_entries=64, show_spinner=False)
 def sha256_of_upload(file_id: str, _content: memoryview) -> str:
     """Hash an upload once; `file_id` is Streamlit's own, new for every upload."""
     del file_id  # it is the key of the cache
@@ -172,17 +173,14 @@ def sha256_of_upload(file_id: str, _content: memoryview) -> str:
 
 def command_of(request: AnalysisRequest) -> str:
     """Return the command that gives the same diagnosis outside the dashboard."""
-    import shlex
-
-    words = ["gearsig", "analyze", request.name]
-    if request.rig_text.strip():
-        words += ["--rig", request.rig_name]
-    if request.sampling_rate_hz is not None:
-        words += ["--fs", f"{request.sampling_rate_hz:.15g}"]
-    if request.speed_rpm is not None:
-        words += ["--speed-rpm", f"{request.speed_rpm:.15g}"]
-    if request.reference_name:
-        words += ["--reference", request.reference_name]
-    if request.torque_nm is not None:
-        words += ["--torque", f"{request.torque_nm:.15g}Nm"]
+    words = ["gearsig", "analyze", request.name, *stated_options(request)]
+    words += ["--reference", request.reference_name] if request.reference_name else []
+    words += ["--torque", f"{request.torque_nm:.15g}Nm"] if request.torque_nm is not None else []
     return shlex.join(words)
+
+
+def stated_options(request: AnalysisRequest) -> list[str]:
+    """Return the options of the command line for the rig file, and for what the recording does not state."""
+    words = ["--rig", request.rig_name] if request.rig_text.strip() else []
+    words += ["--fs", f"{request.sampling_rate_hz:.15g}"] if request.sampling_rate_hz is not None else []
+    return words + (["--speed-rpm", f"{request.speed_rpm:.15g}"] if request.speed_rpm is not None else [])

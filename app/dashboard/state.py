@@ -9,12 +9,14 @@ import streamlit as st
 
 from gearsig.diagnosis import Analysis
 
-ORIGIN, SAMPLE, RECORDING_FILE, RIG_FILE = "origin", "sample", "recording file", "rig file"
+ORIGIN, SAMPLE, RECORDING_FILE, RIG_FILE = "origin", "sample", "recording file", "recording file rig"
 TAB, CHANNEL = "tab", "channel"
 ANALYSIS_PAGE = Path(__file__).parent / "pages" / "analysis.py"
 OF_LABORATORY = "Laboratory"
 """Origin of a recording that the laboratory made."""
-_CHOSEN, _SIMULATED, _UPLOAD, _REFERENCE, _FILES = "chosen", "simulated", "upload", "kept reference", "kept files"
+_CHOSEN, _SIMULATED, _FILES = "chosen", "simulated", "kept files"
+Content = Path | memoryview
+"""Of a file: on this machine, or in memory."""
 
 
 @dataclass(frozen=True)
@@ -53,19 +55,30 @@ class Chosen:
     """A request, and where its bytes are: files of this machine (samples), or in memory (uploads)."""
 
     request: AnalysisRequest
-    content: Path | memoryview
-    reference: Path | memoryview | None = None
+    content: Content
+    reference: Content | None = None
 
 
 @dataclass(frozen=True)
-class Upload:
-    """Files that the user gave: bytes of the recording, text of the rig file."""
+class ChosenFile:
+    """A recording that the user chose, a sample or a file of their own, with the text of its rig file; or a rig file.
+
+    Parameters
+    ----------
+    name, sha256 : str
+    content : Path or memoryview
+    rig_name, rig_text : str
+    """
 
     name: str
     sha256: str
-    content: memoryview
+    content: Content
     rig_name: str = "rig.toml"
     rig_text: str = ""
+
+    def request(self, *, sampling_rate_hz: float | None = None, speed_rpm: float | None = None) -> AnalysisRequest:
+        """Return the request to read it, with what the file does not state."""
+        return AnalysisRequest(self.name, self.sha256, self.rig_name, self.rig_text, sampling_rate_hz, speed_rpm)
 
 
 def remember(chosen: Chosen | None) -> None:
@@ -75,8 +88,8 @@ def remember(chosen: Chosen | None) -> None:
 
 def chosen() -> Chosen | None:
     """Return what was chosen last in this session, on whatever page."""
-    found: Chosen | None = st.session_state.get(_CHOSEN)
-    return found
+    result: Chosen | None = st.session_state.get(_CHOSEN)
+    return result
 
 
 def open_simulated(made: Chosen) -> None:
@@ -87,8 +100,8 @@ def open_simulated(made: Chosen) -> None:
 
 def simulated() -> Chosen | None:
     """Return the recording that the laboratory made last in this session."""
-    found: Chosen | None = st.session_state.get(_SIMULATED)
-    return found
+    result: Chosen | None = st.session_state.get(_SIMULATED)
+    return result
 
 
 def carry_over(key: str, default: object = None) -> None:
@@ -100,37 +113,15 @@ def carry_over(key: str, default: object = None) -> None:
         st.session_state[key] = st.session_state.get(key, default)
 
 
-def keep_upload(upload: Upload | None) -> None:
-    """Keep an upload while another page is shown: Streamlit forgets what its uploader held."""
-    st.session_state[_UPLOAD] = upload
-
-
-def kept_upload() -> Upload | None:
-    """Return the upload that was open when this session last saw the analysis page."""
-    found: Upload | None = st.session_state.get(_UPLOAD)
-    return found
-
-
-def keep_files(kind: str, files: tuple[Upload, ...]) -> None:
-    """Keep several uploads of one kind while another page is shown."""
+def keep_files(kind: str, files: tuple[ChosenFile, ...]) -> None:
+    """Keep uploads of one kind while another page is shown: Streamlit forgets what its uploaders held."""
     st.session_state[source_key(_FILES, kind)] = files
 
 
-def kept_files(kind: str) -> tuple[Upload, ...]:
+def kept_files(kind: str) -> tuple[ChosenFile, ...]:
     """Return the uploads of one kind that this session keeps."""
-    found: tuple[Upload, ...] = st.session_state.get(source_key(_FILES, kind), ())
-    return found
-
-
-def keep_reference(source: str, upload: Upload | None) -> None:
-    """Keep the reference of one recording while another page is shown."""
-    st.session_state[source_key(_REFERENCE, source)] = upload
-
-
-def kept_reference(source: str) -> Upload | None:
-    """Return the reference that was given last to that recording."""
-    found: Upload | None = st.session_state.get(source_key(_REFERENCE, source))
-    return found
+    files: tuple[ChosenFile, ...] = st.session_state.get(source_key(_FILES, kind), ())
+    return files
 
 
 def source_key(name: str, source: str) -> str:

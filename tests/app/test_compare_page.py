@@ -6,7 +6,7 @@ from streamlit.testing.v1 import AppTest
 
 import app.dashboard
 from app.dashboard import state
-from app.dashboard.compare.choice import MACHINE, ORIGIN, TWIN, SimulatedFile, SimulationToCompare, command_of, teeth_of
+from app.dashboard.compare import MACHINE, ORIGIN, TWIN, SimulatedFile, SimulationToCompare, command_of, teeth_of
 from app.dashboard.state import AnalysisRequest
 from app.samples import samples
 from gearsig.rig import GearPair, Rig, Shaft

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from app.dashboard.cached import command_of, read_and_analyze, read_recording_bytes, read_rig_text, safe_file_name
+from app.dashboard.cached import command_of, read_and_analyze, read_content, read_rig_text, safe_file_name
 from app.dashboard.state import AnalysisRequest
 from app.dashboard.theme import as_plot_text, as_typed, one_line
 from app.dashboard.widgets.charts import picture_bytes
@@ -34,7 +34,7 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("name", ["run.csv", "../../run.csv", "/etc/run.csv", r"C:\data\run.csv", ".. /a b/√.csv"])
 def test_bytes_are_read_whatever_the_name_and_nothing_is_left(name: str, temporary: Path) -> None:
-    recording = read_recording_bytes(CSV, name, rig=None, sampling_rate_hz=None, speed_rpm=None)
+    recording = read_content(CSV, name, rig=None, sampling_rate_hz=None, speed_rpm=None)
     assert recording.n_samples == 2000
     assert recording.sampling_rate_hz == pytest.approx(1000)
     assert recording.provenance.source == name
@@ -43,7 +43,7 @@ def test_bytes_are_read_whatever_the_name_and_nothing_is_left(name: str, tempora
 
 def test_broken_bytes_leave_nothing_either(temporary: Path) -> None:
     with pytest.raises(InputError):
-        read_recording_bytes(b"\x80\x04pickle", "run.mat", rig=None, sampling_rate_hz=None, speed_rpm=None)
+        read_content(b"\x80\x04pickle", "run.mat", rig=None, sampling_rate_hz=None, speed_rpm=None)
     with pytest.raises(InputError, match="TOML"):
         read_rig_text("[[shaft", "../rig.toml")
     assert not list(temporary.iterdir())

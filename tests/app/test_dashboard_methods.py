@@ -10,7 +10,7 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
-from app.dashboard.methods.menu import METHODS
+from app.dashboard.methods import METHODS
 from tests.app.test_dashboard import SAMPLES, opened, shown_text, upload
 
 TAB = "More methods"
@@ -87,7 +87,7 @@ def test_every_transform_draws_its_map() -> None:
 
 def test_a_stretch_of_a_recording_is_what_is_analysed() -> None:
     page = opened_at("Time–frequency")
-    next(s for s in page.slider if s.label.startswith("Stretch")).set_value((1.0, 2.0)).run()
+    next(s for s in page.slider if s.label.startswith("Segment")).set_value((1.0, 2.0)).run()
     assert not page.error
     assert "Analysed: 1 to 2 s of 5 s, 12800 samples" in shown_text(page)
 
@@ -122,7 +122,7 @@ def test_orders_have_the_amplitudes_that_were_put_in() -> None:
         middle = curves(page)[name]
         middle = middle[len(middle) // 4 : -len(middle) // 4]
         np.testing.assert_allclose(middle, amplitude, rtol=0.03)
-    assert np.abs(curves(page)["what is left without all chosen orders"]).max() < 0.5
+    assert np.abs(curves(page)["residual without all chosen orders"]).max() < 0.5
     choose(page, "Levels over", "Speed")
     assert not page.error
 
@@ -212,7 +212,7 @@ def test_the_lowest_frequency_is_half_the_slowest_shaft_or_what_the_stretch_allo
     page = opened_machine("Phase plane")
     low = next(n for n in page.number_input if n.label.startswith("Lowest"))
     assert low.placeholder.startswith("5, half")
-    next(s for s in page.slider if s.label.startswith("Stretch")).set_value((0.0, 1.0)).run()
+    next(s for s in page.slider if s.label.startswith("Segment")).set_value((0.0, 1.0)).run()
     low = next(n for n in page.number_input if n.label.startswith("Lowest"))
     assert low.placeholder.startswith("14.7, as low as")
     assert not page.error

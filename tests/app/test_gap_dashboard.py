@@ -11,7 +11,7 @@ from streamlit.testing.v1 import AppTest
 import app.dashboard
 from app.dashboard.gap.choice import Choice, common_rig, files_of, own_rig
 from app.dashboard.gap.view import _FINISHED, _JOB, Finished
-from app.dashboard.state import Upload
+from app.dashboard.state import ChosenFile
 from app.gap.run import read_inputs
 from app.samples import sample_folder
 from gearsig.errors import InputError
@@ -27,8 +27,12 @@ REPORTS = all_reports()
 EVIL = "<script>*a*</script> :rocket: [x](http://y)"
 
 
-def upload(name: str, content: bytes = b"", text: str = "") -> Upload:
-    return Upload(name, sha256(content).hexdigest(), memoryview(content), name, text)
+def upload(name: str, content: bytes = b"", text: str = "") -> ChosenFile:
+    return ChosenFile(name, sha256(content).hexdigest(), memoryview(content), name, text)
+
+
+def sample(path: Path) -> ChosenFile:
+    return ChosenFile(path.name, sha256(path.read_bytes()).hexdigest(), path)
 
 
 def opened() -> AppTest:
@@ -84,7 +88,7 @@ def test_uploads_become_files_with_their_own_rigs(tmp_path) -> None:
 
 
 def test_two_rig_files_for_all_are_refused() -> None:
-    choice = Choice((CRACKED,), rigs=(upload("one.toml", text=RIG), upload("two.toml", text=RIG)))
+    choice = Choice((sample(CRACKED),), rigs=(upload("one.toml", text=RIG), upload("two.toml", text=RIG)))
     with pytest.raises(InputError, match=r"one\.toml, two\.toml"):
         common_rig(choice)
 
@@ -114,15 +118,15 @@ def test_the_only_rig_file_is_for_all_though_it_is_named_as_the_reference() -> N
 
 
 def test_another_choice_has_another_key() -> None:
-    one = Choice((CRACKED,), (HEALTHY,))
+    one = Choice((sample(CRACKED),), (sample(HEALTHY),))
     others = (
-        Choice((CRACKED,)),
-        Choice((HEALTHY,)),
-        Choice((CRACKED,), (HEALTHY,), torque_nm=3.0),
-        Choice((CRACKED,), (HEALTHY,), (upload("r.toml", text=RIG),)),
+        Choice((sample(CRACKED),)),
+        Choice((sample(HEALTHY),)),
+        Choice((sample(CRACKED),), (sample(HEALTHY),), torque_nm=3.0),
+        Choice((sample(CRACKED),), (sample(HEALTHY),), (upload("r.toml", text=RIG),)),
     )
     assert len({one.key, *(other.key for other in others)}) == 5
-    assert one.key == Choice((CRACKED,), (HEALTHY,)).key
+    assert one.key == Choice((sample(CRACKED),), (sample(HEALTHY),)).key
 
 
 def test_a_run_from_the_button_to_the_answer(stub) -> None:

@@ -14,8 +14,8 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
-from app.dashboard.methods.menu import METHODS
-from app.dashboard.methods.signals import OVER_TIME, Waveforms, recording_of, table_csv, waveforms_file
+from app.dashboard.methods import METHODS
+from app.dashboard.methods.frame import OVER_TIME, Waveforms, recording_of, table_csv, waveforms_file
 from gearsig.recording import read_recording
 from tests.app.test_dashboard import SAMPLES, opened, shown_text, upload
 from tests.app.test_dashboard_methods import TAB, choose, curves, opened_at, opened_machine
@@ -91,13 +91,14 @@ def test_waveforms_open_with_five_mesh_cycles() -> None:
 
 
 def test_modes_are_numbered_by_rising_centre() -> None:
-    from app.dashboard.methods.modes import ModeSignal, modes_of
+    from app.dashboard.methods.modes import modes_of
     from gearsig.decompose import VmdSettings
+    from gearsig.timefreq import UniformSignal
 
     t = np.arange(8000) / 1000.0
     x = np.cos(2 * np.pi * 300 * t) + 0.5 * np.cos(2 * np.pi * 60 * t)
-    signal = ModeSignal(x, 1000.0, "frequency", "g", "a", "two tones")
-    modes = modes_of("two tones", VmdSettings(2, 2000.0, start="peaks"), signal)
+    signal = UniformSignal(x, 1000.0, unit="g", source="a")
+    modes = modes_of(signal, VmdSettings(2, 2000.0, start="peaks"))
     assert modes.by_centre() == (0, 1)
     assert modes.centres == pytest.approx([60.0, 300.0], abs=2.0)
     assert modes.rms == pytest.approx([0.5 / np.sqrt(2), 1 / np.sqrt(2)], rel=0.05)
@@ -153,7 +154,7 @@ def test_component_and_rest_make_the_signal() -> None:
     page = opened_machine("Ridges")
     labelled(page, "slider", "Ridges").set_value(1).run()
     shown = curves(page)
-    together = shown["component 1"] + shown["what is left without all of them"]
+    together = shown["component 1"] + shown["residual without all of them"]
     np.testing.assert_allclose(together, shown["signal"], atol=1e-6)
 
 
@@ -173,7 +174,7 @@ def test_the_depth_of_a_crack_against_the_sound_sample() -> None:
 def test_the_reference_may_be_an_own_file() -> None:
     page = choose(opened_at("Crack severity", "root_crack_3mm"), "Reference", "Own file")
     sound = SAMPLES["root_crack_0mm"].recording
-    uploader = next(w for w in page.file_uploader if w.label == "Recording of the sound gears")
+    uploader = next(w for w in page.file_uploader if w.label == "Recording of the healthy gears")
     uploader.upload(sound.name, sound.read_bytes())
     page.run()
     assert "tooth 21" in page.error[0].value
@@ -241,7 +242,7 @@ def test_a_stretch_that_is_too_short_is_at_most_one_message(stretch_s: tuple[flo
     page = opened_at("Time–frequency")
     for method in METHODS:
         choose(page, "Method", method)
-        sliders = [s for s in page.slider if s.label.startswith("Stretch")]
+        sliders = [s for s in page.slider if s.label.startswith("Segment")]
         if sliders:
             sliders[0].set_value(stretch_s).run()
         assert not page.exception, method

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.dashboard.methods.menu import METHODS
+from app.dashboard.methods import METHODS
 from gearsig.decompose import denoise_channel
 from gearsig.recording import read_recording
 from tests.app.test_dashboard import SAMPLES

@@ -10,9 +10,9 @@ from typing import Any
 import streamlit as st
 
 from app.dashboard.gap.choice import Choice, files_of
-from app.dashboard.methods.signals import show_notes
 from app.dashboard.theme import as_typed, is_dark
 from app.dashboard.widgets.charts import download, picture_bytes
+from app.dashboard.widgets.messages import show_warnings
 from app.dashboard.widgets.verdict import Colour
 from app.gap.job import JSON, PAGE, TWIN, Job, private_folder
 from gearsig.cache import cache_folder
@@ -205,7 +205,7 @@ def _show_verdict(report: GapReport) -> None:
     advice = condition_advice(report)
     if advice:
         st.caption(as_typed(advice))
-    show_notes(report.notices, quiet=True)
+    show_warnings(report.notices, quiet=True)
 
 
 def _show_downloads(finished: Finished) -> None:

@@ -16,7 +16,7 @@ from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.laboratory.setup import MODEL, WIDEST, Setup, shown_unit
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import show_picture
-from app.dashboard.widgets.verdict import show_error
+from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError, InputError
 from sims.cracked import DECAYS, RAMP_S, SECTIONS, Branch, slowest_decay_s
 from sims.effects import effect

@@ -48,7 +48,7 @@ MOTION = {
     "transmission error": ("transmission_error_m", 1e6, "transmission error (µm)"),
     "mesh force": ("mesh_force_n", 1e-3, "mesh force (kN)"),
 }
-STRETCHES = {"1 revolution": 1.0, "3 revolutions": 3.0, "all": float("inf")}
+SEGMENTS = {"1 revolution": 1.0, "3 revolutions": 3.0, "all": float("inf")}
 
 
 def show_time(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
@@ -58,12 +58,12 @@ def show_time(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     name = left.selectbox("Signal", names, format_func=_shown, key="signal of the laboratory", persist_state="session")
     shown = right.segmented_control(
         "Shown, of the input shaft",
-        list(STRETCHES),
+        list(SEGMENTS),
         default="3 revolutions",
         key="stretch of the laboratory",
         persist_state="session",
     )
-    end = _end_s(healthy, STRETCHES[shown or "3 revolutions"])
+    end = _end_s(healthy, SEGMENTS[shown or "3 revolutions"])
     own, unit = signal_of(healthy, name, end)
     if faulty is None:
         show_lines([ChartLine(*thin(*own, N_POINTS), "healthy")], Axes("time (s)", unit, (0.0, end)), "time of healthy")
@@ -296,7 +296,7 @@ POINTS_PER_CYCLE = 250
 def show_mesh(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     """Show stiffness and dynamic force of both machines over the same mesh cycles."""
     runs = [healthy] if faulty is None else [healthy, faulty]
-    shown, marks = _stretch(runs[-1])
+    shown, marks = _segment(runs[-1])
     cycles = np.linspace(*shown, round((shown[1] - shown[0]) * POINTS_PER_CYCLE) + 1)
     x = "mesh cycles (tooth k of the driver enters at k − 1)"
     st.markdown("**Mesh stiffness** of the tooth pairs in contact")
@@ -325,7 +325,7 @@ def stiffness(run: LaboratoryRun, cycles: FloatArray) -> FloatArray:
     return mesh_stiffness(mesh, cycles, force_n).total_n_per_m
 
 
-def _stretch(run: LaboratoryRun) -> tuple[tuple[float, float], list[Cursor]]:
+def _segment(run: LaboratoryRun) -> tuple[tuple[float, float], list[Cursor]]:
     """Return the mesh cycles about the first faulty tooth that passes in the run; without one, the run's first."""
     teeth, cycles = faulty_teeth(run.setup), run.mesh_cycles
     pair = run.machine.mesh.pair

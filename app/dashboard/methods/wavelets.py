@@ -1,4 +1,4 @@
-"""Noise taken out by wavelet thresholds, with what was taken out beside it."""
+"""Wavelets: a signal without its noise, and its energy and parts by wavelet packets."""
 
 from __future__ import annotations
 
@@ -8,340 +8,249 @@ from typing import TYPE_CHECKING
 import numpy as np
 import streamlit as st
 
-from app.dashboard import state
-from app.dashboard.methods.signals import (
-    SignalSegment,
-    Waveforms,
-    choose_one,
-    choose_over_angle,
-    choose_stretch,
-    choose_window,
-    length_shown,
-    offer_downloads,
-    show_waveforms,
-    signal_of,
-    waveforms_of,
-    waveforms_over,
-)
+from app.dashboard.methods.frame import MethodPage, SignalSegment, cached, show_table, signal_of, waveforms_of
 from app.dashboard.theme import as_typed, palette
 from app.dashboard.widgets.charts import CONFIG, show_picture
-from gearsig.diagnosis import Analysis, ChannelAnalysis
+from gearsig.decompose import Denoised, DenoiseSettings, denoise_channel
 from gearsig.errors import InputError
 from gearsig.formatting import readable
-from gearsig.plot import unit_text
+from gearsig.plot import time_frequency_figure, unit_text
+from gearsig.timefreq import (
+    TimeFrequencyMap,
+    UniformSignal,
+    WaveletPackets,
+    natural_order,
+    node_path,
+    packet_inverse,
+    wavelet_packet_map,
+    wavelet_packets,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from gearsig.decompose import Denoised, DenoiseSettings
-    from gearsig.timefreq import TimeFrequencyMap, UniformSignal, WaveletPackets
+N_FIRST, N_MAX = 200_000, 4_000_000
 
+# --------------------
+# Denoising.
+# --------------------
 
-N_FIRST, N_MOST = 200_000, 4_000_000
-N_KEPT = 2
-"""Answers are several times as long as the stretch."""
 WAVELETS = ("sym8", "sym4", "db4", "db8", "coif3", "haar")
 LEVELS = ("automatic", *(str(n) for n in range(1, 15)))
 THRESHOLDS = {
-    "universal": "next to no noise is left",
-    "sure": "least estimated risk of each level",
+    "universal": "next to no noise remains",
+    "sure": "minimum estimated risk of each level",
     "bayes": "keeps most",
 }
 
 
-def show_denoising(analysis: Analysis, channel: ChannelAnalysis) -> None:
+def show_denoising(page: MethodPage) -> None:
     """Show one channel without its noise."""
-    settings = _choose_settings(analysis)
+    settings = _choose_denoising(page)
     left, right = st.columns(2)
     with left:
-        stretch = choose_stretch(analysis, channel, "denoising", n_first=N_FIRST, n_most=N_MOST)
-    with st.spinner("Removing the noise …", show_time=True):
-        found = denoised(stretch.key, settings, stretch)
-    waveforms = denoised_waveforms(stretch, found)
+        segment = page.segment(n_first=N_FIRST, n_max=N_MAX)
+    denoised = denoise(segment, settings)
+    columns = {"signal": segment.values, "without noise": denoised.values, "removed": denoised.removed}
+    step = f"{settings.threshold} {settings.rule} thresholds, {settings.wavelet}"
+    waveforms = waveforms_of(segment, signal_of(segment), columns, step)
     with right:
-        shown = length_shown(analysis, stretch, over_angle=False)
-        limits = choose_window(analysis, waveforms, "denoising", shown=shown)
-    looks = {"signal": -1, "without noise": 0}
-    show_waveforms(analysis, waveforms, limits, looks, "denoising", last=False)
-    show_waveforms(analysis, waveforms, limits, {"removed": 1}, "denoising removed", label="removed", height_px=180)
-    unit = unit_text(stretch.unit)
+        limits = page.window(waveforms, shown=page.first_length(segment, over_angle=False))
+    page.draw(waveforms, limits, {"signal": -1, "without noise": 0}, last=False)
+    page.draw(waveforms, limits, {"removed": 1}, label="removed", height_px=180)
+    unit = unit_text(segment.unit)
     st.markdown(
-        f"Removed: **{100.0 * found.removed_share:.3g} %** of the energy. Estimated noise on the finest level: "
-        f"**{readable(found.noise_rms)} {unit}** rms."
+        f"Removed: **{100.0 * denoised.removed_share:.3g} %** of the energy. Estimated noise on the finest level: "
+        f"**{readable(denoised.noise_rms)} {unit}** rms."
     )
     st.caption(
         "Look at what was removed: a rhythm in it is signal that should not have gone. Steady tones are better "
-        "gathered by a spectrum or a synchronous average."
+        "extracted by a spectrum or a synchronous average."
     )
-    _show_levels(found, unit)
-    offer_downloads(analysis, "denoising", waveforms)
+    with st.expander(f"Levels of the wavelet transform ({len(denoised.levels)})"):
+        show_table(
+            {
+                "level": [level.level for level in denoised.levels],
+                "from (Hz)": [level.band_hz[0] for level in denoised.levels],
+                "to (Hz)": [level.band_hz[1] for level in denoised.levels],
+                f"noise ({unit or 1})": [level.noise for level in denoised.levels],
+                f"threshold ({unit or 1})": [level.threshold for level in denoised.levels],
+                "kept (%)": [100.0 * level.kept_share for level in denoised.levels],
+            }
+        )
+    page.offer(waveforms)
 
 
-def denoised_waveforms(stretch: SignalSegment, found: Denoised) -> Waveforms:
-    """Return the signal, what is left of it, and what was removed."""
-    told = found.settings
-    columns = {
-        "signal": stretch.recording.values(stretch.channel),
-        "without noise": found.values,
-        "removed": found.removed,
-    }
-    return waveforms_of(stretch, columns, f"{told.threshold} {told.rule} thresholds, {told.wavelet}")
-
-
-def _choose_settings(analysis: Analysis) -> DenoiseSettings:
-    from gearsig.decompose import DenoiseSettings
-
+def _choose_denoising(page: MethodPage) -> DenoiseSettings:
     one, two, three = st.columns(3)
     four, five, six = st.columns(3)
     about = "; ".join(f"{name}: {text}" for name, text in THRESHOLDS.items())
-    with one:
-        threshold = choose_one("Threshold", list(THRESHOLDS), _key("threshold", analysis), about=about)
-    with two:
-        about = "What is above the threshold is shrunk by it (soft), kept as it is (hard), or in between (garrote)."
-        rule = choose_one("Rule", ("soft", "hard", "garrote"), _key("rule", analysis), about=about)
-    wavelet = four.selectbox("Wavelet", WAVELETS, key=_key("wavelet", analysis), persist_state="session")
-    with three:
-        about = "White: one size of noise for all levels, from the finest. Coloured: each level has its own."
-        noise = choose_one("Noise", ("White", "Coloured"), _key("noise", analysis), about=about)
+    threshold = page.choose(one, "Threshold", list(THRESHOLDS), about=about)
+    about = "What is above the threshold is shrunk by it (soft), kept as it is (hard), or in between (garrote)."
+    rule = page.choose(two, "Rule", ("soft", "hard", "garrote"), about=about)
+    about = "White: one size of noise for all levels, from the finest. Coloured: each level has its own."
+    noise = page.choose(three, "Noise", ("White", "Coloured"), about=about)
+    wavelet = page.ask(four.selectbox, "Wavelet", WAVELETS)
     about = "Cycle spinning: the mean over shifts of the signal against the wavelet's grid. 1 is none."
-    n_shifts = five.slider("Shifts", 1, 16, 8, key=_key("shifts", analysis), help=about, persist_state="session")
+    n_shifts = page.ask(five.slider, "Shifts", 1, 16, 8, about=about)
     about = "How often the signal is halved in frequency; what lies below the coarsest level is kept as it is."
-    key = _key("levels", analysis)
-    levels = six.select_slider("Levels", LEVELS, key=key, help=about, persist_state="session")
+    levels = page.ask(six.select_slider, "Levels", LEVELS, about=about)
     return DenoiseSettings(
         threshold,  # type: ignore[arg-type] # checked there
         rule,  # type: ignore[arg-type] # checked there
-        wavelet=str(wavelet),
+        wavelet=wavelet,
         n_levels=None if levels == LEVELS[0] else int(levels),
         noise="finest level" if noise == "White" else "each level",
-        n_shifts=int(n_shifts),
+        n_shifts=n_shifts,
     )
 
 
-@st.cache_resource(max_entries=N_KEPT, show_spinner=False)
-def denoised(key: str, settings: DenoiseSettings, _stretch: SignalSegment) -> Denoised:
-    """Return the signal without noise; `key` stands for the stretch. It is frozen, so that sessions may share it."""
-    from gearsig.decompose import denoise_channel
-
-    del key
-    return denoise_channel(_stretch.recording, _stretch.channel, settings)
-
-
-def _show_levels(found: Denoised, unit: str) -> None:
-    with st.expander(f"Levels of the wavelet transform ({len(found.levels)})"):
-        columns = {
-            "level": [v.level for v in found.levels],
-            "from (Hz)": [v.band_hz[0] for v in found.levels],
-            "to (Hz)": [v.band_hz[1] for v in found.levels],
-            f"noise ({unit or 1})": [v.noise for v in found.levels],
-            f"threshold ({unit or 1})": [v.threshold for v in found.levels],
-            "kept (%)": [100.0 * v.kept_share for v in found.levels],
-        }
-        number = st.column_config.NumberColumn(format="%.4g")
-        st.dataframe(columns, hide_index=True, width="stretch", column_config=dict.fromkeys(list(columns)[1:], number))
-
-
-def _key(name: str, analysis: Analysis) -> str:
-    return state.view_key(f"denoising {name}", analysis)
-
-
-# --------------------
-# Energy of each wavelet packet node as bars, in a chosen order of the nodes.
-# --------------------
-
-
-ORDERINGS = ("frequency", "filter tree", "energy")
-HEIGHT_PX = 260
-
-
-def node_order(found: WaveletPackets, ordering: str) -> list[int]:
-    """Return the bands in one of `ORDERINGS`."""
-    from gearsig.timefreq import natural_order
-
-    if ordering == "filter tree":
-        return [int(band) for band in natural_order(found.n_bands)]
-    if ordering == "energy":
-        return [int(band) for band in np.argsort(-found.energies, kind="stable")]
-    return list(range(found.n_bands))
-
-
-def show_energies(analysis: Analysis, found: WaveletPackets, ordering: str) -> None:
-    """Show each node's share of the energy as a bar."""
-    from plotly.graph_objects import Figure
-
-    from gearsig.timefreq import node_path
-
-    bands = node_order(found, ordering)
-    shares = 100.0 * found.energies / (float(found.energies.sum()) or 1.0)
-    unit = "Hz" if found.axis == "frequency" else "orders"
-    names = [node_path(band, found.level) for band in bands]
-    words = [f"{low:.5g} to {high:.5g} {unit}" for low, high in map(found.limits_of, bands)]
-    figure = Figure()
-    figure.add_bar(
-        x=names,
-        y=shares[bands],
-        customdata=words,
-        marker={"color": palette().measured},
-        hovertemplate="%{x}, %{customdata}: %{y:.3g} %<extra></extra>",
-    )
-    by_frequency = ordering == "frequency"
-    ticks = _ticks(found, bands) if by_frequency else {}
-    figure.update_layout(
-        height=HEIGHT_PX,
-        margin={"l": 8, "r": 8, "t": 8, "b": 8},
-        showlegend=False,
-        bargap=0.15,
-        xaxis={"type": "category", "title": f"node, lower border in {unit}" if by_frequency else "node", **ticks},
-        yaxis={"title": "share of the energy (%)"},
-    )
-    key = state.view_key(f"packet energies {ordering}", analysis)
-    st.plotly_chart(figure, width="stretch", key=key, config=CONFIG, alt="Share of the energy in each node")
-    rms = f"{np.sqrt(found.energies.sum() / found.n_samples):.4g} {unit_text(found.unit)}".strip()
-    st.caption(
-        as_typed(
-            f"{found.n_bands} nodes, each {found.band_width:.5g} {unit} wide. Together they hold the stretch's energy, "
-            f"rms {rms}; its mean is in the first. A path names the filters: a low-pass, d high-pass."
-        )
-    )
-
-
-def _ticks(found: WaveletPackets, bands: list[int]) -> dict[str, object]:
-    """Label some bars by their lower border: paths alone do not say where they lie."""
-    from gearsig.timefreq import node_path
-
-    step = max(1, len(bands) // 16)
-    shown = bands[::step]
-    return {
-        "tickmode": "array",
-        "tickvals": [node_path(band, found.level) for band in shown],
-        "ticktext": [f"{found.limits_of(band)[0]:.4g}" for band in shown],
-    }
+@cached(2, "Removing the noise …")
+def denoise(segment: SignalSegment, settings: DenoiseSettings) -> Denoised:
+    """Return the signal without noise."""
+    return denoise_channel(segment.recording, segment.channel, settings)
 
 
 # --------------------
 # Wavelet packets: energy of each node, and the signal that some nodes make.
 # --------------------
 
-
-VIEW = "wavelet packets"
-PACKETS_WAVELETS = ("sym12", "sym8", "db4", "db10", "db20", "coif3", "dmey", "haar")
-DEEPEST = 8
-HEIGHT_IN = 3.8
+PACKET_WAVELETS = ("sym12", "sym8", "db4", "db10", "db20", "coif3", "dmey", "haar")
+ORDERINGS = ("frequency", "filter tree", "energy")
 
 
-def show_packets(analysis: Analysis, channel: ChannelAnalysis) -> None:
+def show_packets(page: MethodPage) -> None:
     """Show energies of the nodes of one channel, their levels over time, and the waveform of chosen ones."""
-    wavelet, level, ordering, over_angle = _choose_settings_packets(analysis)
-    stretch = choose_stretch(analysis, channel, VIEW, n_first=N_FIRST, n_most=N_MOST)
-    signal = signal_of(stretch, over_angle=over_angle)
-    with st.spinner("Splitting the signal …", show_time=True):
-        found = packets_of(f"{stretch.key} {over_angle}", wavelet, level, signal)
-        levels = packet_map(f"{stretch.key} {over_angle}", wavelet, level, signal)
-    show_energies(analysis, found, ordering)
-    from gearsig.plot import time_frequency_figure
-
-    words = f"Levels of the wavelet packets of {stretch.channel}: {levels.axis_label} over {levels.at_label}"
-    show_picture(time_frequency_figure(levels, height_in=HEIGHT_IN), words)
-    nodes = _choose_nodes(analysis, found, ordering)
-    _show_nodes(analysis, stretch, signal, found, nodes)
-
-
-def _choose_settings_packets(analysis: Analysis) -> tuple[str, int, str, bool]:
     one, two, three, four = st.columns((2, 3, 4, 3))
     about = "Long wavelets separate bands better; nearly symmetric ones (sym, dmey) show an event when it was."
-    wavelet = one.selectbox(
-        "Wavelet", PACKETS_WAVELETS, key=_key_packets("wavelet", analysis), help=about, persist_state="session"
-    )
+    wavelet = page.ask(one.selectbox, "Wavelet", PACKET_WAVELETS, about=about)
     about = "The signal is split so often into halves: 2 to the power of it nodes of equal width."
-    level = two.slider("Level", 1, DEEPEST, 4, key=_key_packets("level", analysis), help=about, persist_state="session")
-    with three:
-        about = "Upwards in frequency; as the filter tree branches, low-pass (a) before high-pass (d); or by energy."
-        ordering = choose_one("Order of the nodes", ORDERINGS, _key_packets("ordering", analysis), about=about)
-    with four:
-        over_angle = choose_over_angle(analysis, VIEW)
-    return str(wavelet), int(level), ordering, over_angle
+    level = page.ask(two.slider, "Level", 1, 8, 4, about=about)
+    about = "Upwards in frequency; as the filter tree branches, low-pass (a) before high-pass (d); or by energy."
+    ordering = page.choose(three, "Order of the nodes", ORDERINGS, about=about)
+    over_angle = page.choose_over_angle(four)
+    segment = page.segment(n_first=N_FIRST, n_max=N_MAX)
+    signal = signal_of(segment, over_angle=over_angle)
+    packets = packets_of(signal, wavelet, level)
+    levels = packet_map(signal, wavelet, level)
+    _show_energies(page, packets, ordering)
+    text = f"Levels of the wavelet packets of {segment.channel}: {levels.axis_label} over {levels.at_label}"
+    show_picture(time_frequency_figure(levels, height_in=3.8), text)
+    _show_nodes(page, segment, signal, packets, _choose_nodes(page, packets, ordering))
 
 
-@st.cache_resource(max_entries=N_KEPT, show_spinner=False)
-def packets_of(key: str, wavelet: str, level: int, _signal: UniformSignal) -> WaveletPackets:
-    """Return the packets; `key` stands for the signal. They are frozen, so that sessions may share them."""
-    from gearsig.timefreq import wavelet_packets
-
-    del key
-    return wavelet_packets(_signal, wavelet=wavelet, level=level)
+@cached(2, "Splitting the signal …")
+def packets_of(signal: UniformSignal, wavelet: str, level: int) -> WaveletPackets:
+    """Return the packets."""
+    return wavelet_packets(signal, wavelet=wavelet, level=level)
 
 
-@st.cache_resource(max_entries=N_KEPT, show_spinner=False)
-def packet_map(key: str, wavelet: str, level: int, _signal: UniformSignal) -> TimeFrequencyMap:
-    """Return the levels over time or angle; `key` stands for the signal."""
-    from gearsig.timefreq import wavelet_packet_map
-
-    del key
-    return wavelet_packet_map(_signal, wavelet=wavelet, level=level)
+@cached(2, "Splitting the signal …")
+def packet_map(signal: UniformSignal, wavelet: str, level: int) -> TimeFrequencyMap:
+    """Return the levels over time or angle."""
+    return wavelet_packet_map(signal, wavelet=wavelet, level=level)
 
 
-def _choose_nodes(analysis: Analysis, found: WaveletPackets, ordering: str) -> list[int]:
+def _unit(packets: WaveletPackets) -> str:
+    return "Hz" if packets.axis == "frequency" else "orders"
+
+
+def _node_order(packets: WaveletPackets, ordering: str) -> list[int]:
+    """Return the bands in one of `ORDERINGS`."""
+    if ordering == "filter tree":
+        return [int(band) for band in natural_order(packets.n_bands)]
+    if ordering == "energy":
+        return [int(band) for band in np.argsort(-packets.energies, kind="stable")]
+    return list(range(packets.n_bands))
+
+
+def _show_energies(page: MethodPage, packets: WaveletPackets, ordering: str) -> None:
+    """Show each node's share of the energy as a bar."""
+    from plotly.graph_objects import Figure
+
+    bands, unit = _node_order(packets, ordering), _unit(packets)
+    shares = 100.0 * packets.energies / (float(packets.energies.sum()) or 1.0)
+    figure = Figure()
+    figure.add_bar(
+        x=[node_path(band, packets.level) for band in bands],
+        y=shares[bands],
+        customdata=[f"{low:.5g} to {high:.5g} {unit}" for low, high in map(packets.limits_of, bands)],
+        marker={"color": palette().measured},
+        hovertemplate="%{x}, %{customdata}: %{y:.3g} %<extra></extra>",
+    )
+    ticks, title = {}, "node"
+    if ordering == "frequency":  # paths alone do not say where the bars lie
+        title = f"node, lower border in {unit}"
+        labelled = bands[:: max(1, len(bands) // 16)]
+        ticks = {
+            "tickmode": "array",
+            "tickvals": [node_path(band, packets.level) for band in labelled],
+            "ticktext": [f"{packets.limits_of(band)[0]:.4g}" for band in labelled],
+        }
+    figure.update_layout(
+        height=260,
+        margin={"l": 8, "r": 8, "t": 8, "b": 8},
+        showlegend=False,
+        bargap=0.15,
+        xaxis={"type": "category", "title": title, **ticks},
+        yaxis={"title": "share of the energy (%)"},
+    )
+    key = page.key(f"energies {ordering}")
+    st.plotly_chart(figure, width="stretch", key=key, config=CONFIG, alt="Share of the energy in each node")
+    rms = f"{np.sqrt(packets.energies.sum() / packets.n_samples):.4g} {unit_text(packets.unit)}".strip()
+    st.caption(
+        as_typed(
+            f"{packets.n_bands} nodes, each {packets.band_width:.5g} {unit} wide. Together they hold the segment's "
+            f"energy, rms {rms}; its mean is in the first. A path names the filters: a low-pass, d high-pass."
+        )
+    )
+
+
+def _choose_nodes(page: MethodPage, packets: WaveletPackets, ordering: str) -> list[int]:
     """Return the bands whose waveform is shown, the strongest at first."""
-    strongest = int(np.argmax(found.energies))
-    names = {band: node_name(found, band) for band in node_order(found, ordering)}
-    chosen = st.multiselect(
+    strongest = int(np.argmax(packets.energies))
+    names = {}
+    for band in _node_order(packets, ordering):
+        low, high = packets.limits_of(band)
+        names[band] = f"{node_path(band, packets.level)}: {low:.5g} to {high:.5g} {_unit(packets)}"
+    chosen = page.ask(
+        st.multiselect,
         "Waveform of the nodes",
         list(names),
         default=[strongest],
         format_func=names.__getitem__,
-        key=_key_packets(f"nodes {found.n_bands} {found.axis} {strongest} {ordering}", analysis),
-        persist_state="session",
-        help="Several nodes are added up; all of them together make the signal.",
+        key=f"nodes {packets.n_bands} {packets.axis} {strongest} {ordering}",
+        about="Several nodes are added up; all of them together make the signal.",
     )
     if not chosen:
         raise InputError("no node is chosen", where="Waveform of the nodes", remedy="choose one from the list")
-    return sorted(int(band) for band in chosen)
-
-
-def node_name(found: WaveletPackets, band: int) -> str:
-    """Return path and band of a node."""
-    from gearsig.timefreq import node_path
-
-    low, high = found.limits_of(band)
-    unit = "Hz" if found.axis == "frequency" else "orders"
-    return f"{node_path(band, found.level)}: {low:.5g} to {high:.5g} {unit}"
+    return sorted(chosen)
 
 
 def _show_nodes(
-    analysis: Analysis, stretch: SignalSegment, signal: UniformSignal, found: WaveletPackets, nodes: list[int]
+    page: MethodPage, segment: SignalSegment, signal: UniformSignal, packets: WaveletPackets, nodes: list[int]
 ) -> None:
-    from gearsig.timefreq import node_path, packet_inverse
-
-    paths = " + ".join(node_path(band, found.level) for band in nodes)
+    paths = " + ".join(node_path(band, packets.level) for band in nodes)
     name = f"node{'s' if len(nodes) > 1 else ''} {paths}"
-    values = packet_inverse(found, nodes)
-    columns = {"signal": signal.values, name: values, "what is left": signal.values - values}
-    waveforms = waveforms_over(signal, stretch, columns, f"wavelet packets, {found.wavelet}, {name}")
-    shown = length_shown(analysis, stretch, over_angle=signal.axis == "order")
-    limits = choose_window(analysis, waveforms, VIEW, shown=shown)
-    show_waveforms(analysis, waveforms, limits, {"signal": -1, name: 0}, VIEW)
+    values = packet_inverse(packets, nodes)
+    columns = {"signal": signal.values, name: values, "residual": signal.values - values}
+    waveforms = waveforms_of(segment, signal, columns, f"wavelet packets, {packets.wavelet}, {name}")
+    limits = page.window(waveforms, shown=page.first_length(segment, over_angle=signal.axis == "order"))
+    page.draw(waveforms, limits, {"signal": -1, name: 0})
     st.caption(
-        "Near the ends, within the wavelet's length, nodes mix both ends of the stretch: it is taken as periodic."
+        "Near the ends, within the wavelet's length, nodes mix both ends of the segment: it is taken as periodic."
     )
-    tables = {"Energy per node": lambda: energy_columns(found)}
-    offer_downloads(analysis, VIEW, waveforms, tables=tables)
+    page.offer(waveforms, {"Energy per node": lambda: _energy_columns(packets)})
 
 
-def energy_columns(found: WaveletPackets) -> Mapping[str, ArrayLike]:
+def _energy_columns(packets: WaveletPackets) -> Mapping[str, ArrayLike]:
     """Return path, borders, energy and share of each node, upwards in frequency."""
-    from gearsig.timefreq import node_path
-
-    bands = range(found.n_bands)
-    unit = "Hz" if found.axis == "frequency" else "orders"
-    energies = found.energies
+    bands, unit = range(packets.n_bands), _unit(packets)
+    energies = packets.energies
     return {
-        "node": [node_path(band, found.level) for band in bands],
-        f"from ({unit})": [found.limits_of(band)[0] for band in bands],
-        f"to ({unit})": [found.limits_of(band)[1] for band in bands],
-        "mean square": energies / found.n_samples,
+        "node": [node_path(band, packets.level) for band in bands],
+        f"from ({unit})": [packets.limits_of(band)[0] for band in bands],
+        f"to ({unit})": [packets.limits_of(band)[1] for band in bands],
+        "mean square": energies / packets.n_samples,
         "share of the energy (%)": 100.0 * energies / (float(energies.sum()) or 1.0),
     }
-
-
-def _key_packets(name: str, analysis: Analysis) -> str:
-    return state.view_key(f"{VIEW} {name}", analysis)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import streamlit as st
 
-from app.dashboard.compare.choice import (
+from app.dashboard.cached import recorded
+from app.dashboard.compare import (
     Both,
     choose_alignment,
     choose_pairs,
@@ -12,13 +13,13 @@ from app.dashboard.compare.choice import (
     command_of,
     compared,
     page_of,
-    recorded_of,
+    show_comparison,
+    show_downloads,
     simulated_of,
 )
-from app.dashboard.compare.view import show_comparison, show_downloads
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.chooser import choose_recording
-from app.dashboard.widgets.verdict import show_error
+from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError
 
 WELCOME = """
@@ -39,16 +40,16 @@ def show() -> None:
         return
     what, content = simulation
     with st.spinner("Reading the recording …", show_time=True):
-        recorded = recorded_of(chosen.request, chosen.content)
+        recording = recorded(chosen.request, chosen.content)
     with st.spinner("Reading or simulating; a first simulation takes half a minute …", show_time=True):
-        simulated = simulated_of(what, chosen.request, content, recorded)
+        simulated = simulated_of(what, chosen.request, content, recording)
     st.caption(as_typed(f"{simulated.provenance.source or 'simulation of this page'} beside {chosen.request.name}"))
-    pairs = choose_pairs(simulated, recorded)
+    pairs = choose_pairs(simulated, recording)
     with st.spinner("Comparing …", show_time=True):
-        found = compared(chosen.request, what, pairs, align_by, Both(recorded, simulated))
+        comparison = compared(chosen.request, what, pairs, align_by, Both(recording, simulated))
     command = command_of(chosen.request, what, pairs, align_by)
-    show_downloads(found, lambda: page_of(chosen.request, what, pairs, align_by, command, found), command)
-    show_comparison(found)
+    show_downloads(comparison, lambda: page_of(chosen.request, what, pairs, align_by, command, comparison), command)
+    show_comparison(comparison)
 
 
 try:

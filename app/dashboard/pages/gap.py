@@ -7,7 +7,7 @@ import streamlit as st
 from app.dashboard.gap.choice import choose
 from app.dashboard.gap.view import show_finished, show_running
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.verdict import show_error
+from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError
 
 WELCOME = """

@@ -9,7 +9,7 @@ from app.dashboard.laboratory.setup import SETUP_MODEL as DRIVE
 from app.dashboard.laboratory.setup import Setup, choose_preset, choose_setup
 from app.dashboard.laboratory.views import show_expectation, show_legend, show_numbers, show_title, show_views
 from app.dashboard.start_stop.page import show_drive
-from app.dashboard.widgets.verdict import show_error
+from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError
 from sims.presets import Preset
 

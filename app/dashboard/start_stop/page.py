@@ -15,7 +15,7 @@ from app.dashboard.laboratory.setup import DriveSetup, choose_number, effect_tex
 from app.dashboard.laboratory.views import change, shown
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import show_picture
-from app.dashboard.widgets.verdict import show_error
+from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError
 from gearsig.rig import DAMPING_LAWS
 from sims.effects import EffectSetting, effect

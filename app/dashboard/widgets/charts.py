@@ -236,7 +236,7 @@ def picture_bytes(figure: PictureFigure, *, dark: bool) -> bytes:
 
 
 # --------------------
-# A stretch of an axis, chosen with two handles.
+# A segment of an axis, chosen with two handles.
 # --------------------
 
 
@@ -252,7 +252,7 @@ def choose_range(
     shown: tuple[float, float] | None = None,
     name: str = "",
 ) -> tuple[float, float]:
-    """Return the chosen stretch between `start` and `end`; never an empty one.
+    """Return the chosen segment between `start` and `end`; never an empty one.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Choose a recording: a sample, or a file of one's own with its rig."""
+"""Choose recordings: samples, or files of one's own with their rigs."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,57 +11,22 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.cached import sha256_of_upload
-from app.dashboard.state import AnalysisRequest, Chosen, Upload
+from app.dashboard.state import Chosen, ChosenFile
 from app.dashboard.theme import as_typed
 from app.samples import SampleRecording, samples
 from gearsig.errors import InputError
+from gearsig.recording import FORMAT_OF_EXTENSION, sha256_of
 
 if TYPE_CHECKING:
     from streamlit.runtime.uploaded_file_manager import UploadedFile
 
+ENDINGS = (*FORMAT_OF_EXTENSION, ".gz")
+KINDS = "CSV (also .gz), MAT, WAV, HDF5, Parquet, TDMS or UFF58."
+SIMULATED = "Simulated, not measured: what is in them is known."
 
 # --------------------
-# What the recording is compared with: the same machine when it was sound, and the torque that depths rest on.
+# One file or several.
 # --------------------
-
-
-NOTHING, OWN = "None", "Own file"
-
-
-@dataclass(frozen=True)
-class ReferenceAndTorque:
-    """A reference, without a name where there is none, and a torque that the rig does not state."""
-
-    name: str = ""
-    sha256: str = ""
-    content: Path | memoryview | None = None
-    torque_nm: float | None = None
-
-
-def choose_comparison(name: str, source: str) -> ReferenceAndTorque:
-    """Let the user give a reference and the torque; `source` stands for the recording called `name`."""
-    with st.expander("Reference (sound machine)", icon=":material/compare:"):
-        offered = {sample_name(s): s for s in samples() if s.recording.name != name}
-        of = st.selectbox(
-            "Compared with",
-            [NOTHING, OWN, *offered],
-            key=state.source_key("reference", source),
-            persist_state="session",
-            help="The same machine when it was sound: same sensors, speed and load. Cracks of a millimetre show "
-            "against it, and every indicator is compared. It is read with the rig and the numbers stated above.",
-        )
-        name, digest, content = _own(source) if of == OWN else _sample(offered.get(of))
-        torque = st.number_input(
-            "Torque (N·m)",
-            min_value=0.0,
-            value=None,
-            placeholder="from the rig",
-            key=state.source_key("torque", source),
-            persist_state="session",
-            help="For the depth of a crack, instead of the rig's: of the shaft that its operating point names, else of "
-            "the reference shaft.",
-        )
-    return ReferenceAndTorque(name, digest, content, torque or None)
 
 
 def sample_name(sample: SampleRecording) -> str:
@@ -69,34 +34,125 @@ def sample_name(sample: SampleRecording) -> str:
     return sample.rig.stem.replace("_", " ").capitalize()
 
 
-def _sample(sample: SampleRecording | None) -> tuple[str, str, Path | None]:
-    from gearsig.recording import sha256_of
+def sample_file(sample: SampleRecording) -> ChosenFile:
+    """Return a sample with its rig."""
+    path, rig = sample.recording, sample.rig
+    return ChosenFile(path.name, sha256_of(path), path, rig.name, rig.read_text("utf-8"))
 
-    return ("", "", None) if sample is None else (sample.recording.name, sha256_of(sample.recording), sample.recording)
+
+def choose_sample(label: str, key: str, *, first: str = "", without: str = "") -> ChosenFile:
+    """Let the user choose a sample.
+
+    Parameters
+    ----------
+    label, key : str
+        Of the widget.
+    first : str
+        Stem of the sample that is chosen at first.
+    without : str
+        Name of a recording that is not offered.
+    """
+    offered = [sample for sample in samples() if sample.recording.name != without]
+    index = next((i for i, sample in enumerate(offered) if sample.rig.stem == first), 0)
+    state.carry_over(key, offered[index])
+    sample: SampleRecording = st.selectbox(label, offered, format_func=sample_name, key=key, persist_state="session")
+    return sample_file(sample)
 
 
-def _own(source: str) -> tuple[str, str, memoryview | None]:
-    from gearsig.recording import FORMAT_OF_EXTENSION
+def choose_files(
+    label: str, key: str, *, about: str = KINDS, of_rigs: bool = False, several: bool = True
+) -> tuple[ChosenFile, ...]:
+    """Let the user give files; those from before another page was shown stay open until they are closed.
 
-    file = st.file_uploader(
-        "Recording of the sound machine",
-        type=[*FORMAT_OF_EXTENSION, ".gz"],
-        key=state.source_key("reference file", source),
-        on_change=state.keep_reference,
-        args=(source, None),
+    Parameters
+    ----------
+    label, key : str
+        Of the uploader.
+    about : str
+    of_rigs : bool
+        Rig files instead of recordings.
+    several : bool
+
+    Raises
+    ------
+    InputError
+        If a rig file is no text.
+    """
+    given = st.file_uploader(
+        label,
+        type=["toml"] if of_rigs else list(ENDINGS),
+        accept_multiple_files=several,
+        key=key,
+        help=about,
+        on_change=state.keep_files,
+        args=(key, ()),
     )
-    kept = state.kept_reference(source)
-    if file is not None:
-        content = file.getbuffer()
-        kept = Upload(file.name, sha256_of_upload(file.file_id, content), content)
-        state.keep_reference(source, kept)
-    elif kept is not None:
-        st.caption(f"Still open: {as_typed(kept.name)}")
-    return ("", "", None) if kept is None else (kept.name, kept.sha256, kept.content)
+    files = given if isinstance(given, list) else [] if given is None else [given]
+    if files:
+        state.keep_files(key, tuple(_chosen_file(file, is_rig=of_rigs) for file in files))
+        return state.kept_files(key)
+    kept = state.kept_files(key)
+    if kept:
+        st.caption(f"Still open: {as_typed(', '.join(file.name for file in kept))}")
+        st.button("Close", on_click=state.keep_files, args=(key, ()), key=f"close {key}")
+    return kept
 
+
+def choose_file(label: str, key: str, *, about: str = KINDS, rig: str = "", about_rig: str = "") -> ChosenFile | None:
+    """Let the user give one recording, and its rig file where `rig` is the label of its uploader.
+
+    Raises
+    ------
+    InputError
+        If the rig file is no text.
+    """
+    files = choose_files(label, key, about=about, several=False)
+    if rig:
+        given = st.file_uploader(rig, type=["toml"], key=f"{key} rig", max_upload_size=1, help=about_rig)
+        if files and given is not None:
+            files = (replace(files[0], rig_name=given.name, rig_text=_text_of(given)),)
+            state.keep_files(key, files)
+    return files[0] if files else None
+
+
+def _chosen_file(file: UploadedFile, *, is_rig: bool) -> ChosenFile:
+    content = file.getbuffer()
+    digest = sha256_of_upload(file.file_id, content)
+    return (
+        ChosenFile(file.name, digest, content, file.name, _text_of(file))
+        if is_rig
+        else ChosenFile(file.name, digest, content)
+    )
+
+
+def _text_of(file: UploadedFile) -> str:
+    try:
+        return file.getvalue().decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError("is not text in UTF-8", where=file.name, remedy="save the rig file as UTF-8") from None
+
+
+def choose_number(
+    label: str, key: str, placeholder: str, *, about: str = "", minimum: float | None = None
+) -> float | None:
+    """Return a number that files may not state, None where the field is empty."""
+    return st.number_input(
+        label,
+        min_value=minimum,
+        value=None,
+        placeholder=placeholder,
+        key=key,
+        persist_state="session",
+        help=about or None,
+    )
+
+
+# --------------------
+# The recording of the analysis page, with its rig, its reference, and what its file does not state.
+# --------------------
 
 EXAMPLE_RIG = Path(__file__).parents[2] / "cli" / "example_rig.toml"
-ORIGINS = ("Sample", "Own file")
+SAMPLE, FILE, NO_REFERENCE = "Sample", "Own file", "None"
 
 
 def choose_recording(*, with_reference: bool = True) -> Chosen | None:
@@ -105,7 +161,7 @@ def choose_recording(*, with_reference: bool = True) -> Chosen | None:
     Parameters
     ----------
     with_reference : bool
-        Whether to ask for a recording of the sound machine as well.
+        Whether to ask for a recording of the healthy machine as well.
 
     Raises
     ------
@@ -115,114 +171,80 @@ def choose_recording(*, with_reference: bool = True) -> Chosen | None:
     with st.sidebar:
         made = state.simulated()
         state.carry_over(state.ORIGIN)
-        origins = ORIGINS if made is None else (*ORIGINS, state.OF_LABORATORY)
+        origins = (SAMPLE, FILE) if made is None else (SAMPLE, FILE, state.OF_LABORATORY)
         origin = st.radio("Recording", origins, horizontal=True, key=state.ORIGIN, persist_state="session")
         if origin == state.OF_LABORATORY and made is not None:
-            return _choose_simulated(made, with_reference)
-        return _choose_sample(with_reference) if origin == ORIGINS[0] else _choose_file(with_reference)
+            file: ChosenFile | None = simulated_file(made)
+        elif origin == SAMPLE:
+            file = choose_sample("Sample", state.SAMPLE, first="damaged_tooth")
+            st.caption(SIMULATED)
+        else:
+            file = choose_file(
+                "Recording file",
+                state.RECORDING_FILE,
+                about=f"{KINDS} It stays on this machine.",
+                rig="Rig file (TOML), if you have one",
+                about_rig="What is known of the machine: shafts, teeth, bearings, sensors, speed source. Teeth add "
+                "mesh orders and sidebands, bearings their orders.",
+            )
+        return None if file is None else _described(file, with_reference)
 
 
-def _choose_simulated(made: Chosen, with_reference: bool) -> Chosen:
-    st.caption(f"{as_typed(made.request.name)}, from the fault laboratory.")
+def simulated_file(made: Chosen) -> ChosenFile:
+    """Show which recording the laboratory made, and return it."""
     request = made.request
-    return _described(request.name, request.sha256, request.rig_name, request.rig_text, made.content, with_reference)
+    st.caption(f"{as_typed(request.name)}, from the fault laboratory.")
+    return ChosenFile(request.name, request.sha256, made.content, request.rig_name, request.rig_text)
 
 
-def _choose_sample(with_reference: bool) -> Chosen:
-    from gearsig.recording import sha256_of
-
-    found = samples()
-    first = next((sample for sample in found if sample.rig.stem == "damaged_tooth"), found[0])
-    state.carry_over(state.SAMPLE, first)
-    sample: SampleRecording = st.selectbox(
-        "Sample", found, format_func=sample_name, key=state.SAMPLE, persist_state="session"
-    )
-    st.caption("Simulated, not measured: what is in it is known.")
-    name, digest = sample.recording.name, sha256_of(sample.recording)
-    return _described(name, digest, sample.rig.name, sample.rig.read_text("utf-8"), sample.recording, with_reference)
-
-
-def _choose_file(with_reference: bool) -> Chosen | None:
-    from gearsig.recording import FORMAT_OF_EXTENSION
-
-    endings = [*FORMAT_OF_EXTENSION, ".gz"]
-    kinds = "CSV (also .gz), MAT, WAV, HDF5, Parquet, TDMS or UFF58. It stays on this machine."
-    file = st.file_uploader(
-        "Recording file", type=endings, key=state.RECORDING_FILE, help=kinds, on_change=state.keep_upload, args=(None,)
-    )
-    rig_file = st.file_uploader(
-        "Rig file (TOML), if you have one",
-        type=["toml"],
-        key=state.RIG_FILE,
-        max_upload_size=1,
-        help="What is known of the machine: shafts, teeth, bearings, sensors, speed source. Teeth add mesh orders and "
-        "sidebands, bearings their orders.",
-    )
-    upload = _from_before()
-    if file is not None:
-        content = file.getbuffer()
-        upload = Upload(file.name, sha256_of_upload(file.file_id, content), content)
-    if upload is None:
-        return None
-    if rig_file is not None:
-        upload = replace(upload, rig_name=rig_file.name, rig_text=text_of_upload(rig_file))
-    state.keep_upload(upload)
-    return _described(upload.name, upload.sha256, upload.rig_name, upload.rig_text, upload.content, with_reference)
-
-
-def _from_before() -> Upload | None:
-    """Return the upload that was open before the user looked at another page; it can be closed."""
-    kept = state.kept_upload()
-    if kept is None or st.session_state.get(state.RECORDING_FILE) is not None:
-        return None
-    st.caption(f"Still open: {as_typed(kept.name)}")
-    st.button("Close it", on_click=state.keep_upload, args=(None,), key="close the upload")
-    return kept
-
-
-def text_of_upload(file: UploadedFile) -> str:
-    """Return the text of an uploaded file.
-
-    Raises
-    ------
-    InputError
-        If it is not in UTF-8.
-    """
-    try:
-        return file.getvalue().decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError("is not text in UTF-8", where=file.name, remedy="save the rig file as UTF-8") from None
-
-
-def _described(
-    name: str, digest: str, rig_name: str, rig_text: str, content: Path | memoryview, with_reference: bool
-) -> Chosen:
+def _described(file: ChosenFile, with_reference: bool) -> Chosen:
     """Let the user change the rig, state what the file does not, and give a reference."""
-    source = f"{digest} {sha256(rig_text.encode()).hexdigest()}"
+    source = f"{file.sha256} {sha256(file.rig_text.encode()).hexdigest()}"
     with st.expander("Rig", icon=":material/account_tree:"):
-        rig_text = _edit_rig(rig_name, rig_text, source)
-    for number in ("rate", "speed"):
-        state.carry_over(state.source_key(number, source))
+        rig_text = _edit_rig(file.rig_name, file.rig_text, source)
+    rate_key, speed_key = (state.source_key(name, source) for name in ("rate", "speed"))
+    for key in (rate_key, speed_key):
+        state.carry_over(key)
     with st.expander("Not in the file?", icon=":material/tune:"):
-        rate = st.number_input(
-            "Sampling rate (Hz)",
-            value=None,
-            placeholder="from the file or the rig",
-            key=state.source_key("rate", source),
+        placeholder = "from the file or the rig"
+        rate = choose_number("Sampling rate (Hz)", rate_key, placeholder, about="Overrides what the file states.")
+        about = "Of the reference shaft, if it held still and is known well. It is refined where the signal shows it."
+        speed = choose_number("Constant speed (rpm)", speed_key, placeholder, about=about)
+    request = replace(file, rig_text=rig_text).request(sampling_rate_hz=rate, speed_rpm=speed)
+    if not with_reference:
+        return Chosen(request, file.content)
+    reference, torque_nm = _choose_comparison(file)
+    if reference is None:
+        return Chosen(replace(request, torque_nm=torque_nm), file.content)
+    request = replace(request, reference_name=reference.name, reference_sha256=reference.sha256, torque_nm=torque_nm)
+    return Chosen(request, file.content, reference.content)
+
+
+def _choose_comparison(file: ChosenFile) -> tuple[ChosenFile | None, float | None]:
+    """Return the same machine when it was healthy, and the torque in N·m that depths rest on."""
+    source = file.sha256
+    with st.expander("Reference (healthy machine)", icon=":material/compare:"):
+        offered = {sample_name(s): s for s in samples() if s.recording.name != file.name}
+        name = st.selectbox(
+            "Compared with",
+            [NO_REFERENCE, FILE, *offered],
+            key=state.source_key("reference", source),
             persist_state="session",
-            help="Overrides what the file states.",
+            help="The same machine when it was healthy: same sensors, speed and load. Cracks of a millimetre show "
+            "against it, and every indicator is compared. It is read with the rig and the numbers stated above.",
         )
-        speed = st.number_input(
-            "Constant speed (rpm)",
-            value=None,
-            placeholder="from the file or the rig",
-            key=state.source_key("speed", source),
-            persist_state="session",
-            help="Of the reference shaft, if it held still and is known well. It is refined where the signal shows it.",
+        reference = sample_file(offered[name]) if name in offered else None
+        if name == FILE:
+            reference = choose_file("Recording of the healthy machine", state.source_key("reference file", source))
+        torque = choose_number(
+            "Torque (N·m)",
+            state.source_key("torque", source),
+            "from the rig",
+            about="For the depth of a crack, instead of the rig's: of the shaft that its operating point names, else "
+            "of the reference shaft.",
+            minimum=0.0,
         )
-    then = choose_comparison(name, digest) if with_reference else ReferenceAndTorque()
-    request = AnalysisRequest(name, digest, rig_name, rig_text, rate, speed, then.name, then.sha256, then.torque_nm)
-    return Chosen(request, content, then.content)
+    return reference, torque or None
 
 
 def _edit_rig(name: str, text: str, source: str) -> str:

@@ -1,4 +1,4 @@
-"""A spectrum with cursors, thinned to the stretch that is shown."""
+"""A spectrum with cursors, thinned to the segment that is shown."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ N_COLUMNS = 1600
 N_OFFSET_LINES = 3
 """Lines over which a window spreads a constant."""
 OFFSET_SHARE = 0.005
-FOUND_SHARE = 0.01
+SLIP_SHARE = 0.01
 """Bearings slip by a percent or so: a finding that near to a cursor is the cursor's."""
 KIND_NAMES = {
     "mesh": "mesh",
@@ -46,7 +46,7 @@ def show_spectrum(
     scale: str = "Logarithmic",
     quantity: str = "",
 ) -> tuple[float, float]:
-    """Show a spectrum and what can be changed about its view; return the stretch that is shown.
+    """Show a spectrum and what can be changed about its view; return the segment that is shown.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def show_spectrum(
     marked : sequence of float
         Positions that findings name.
     shown : (float, float) or None
-        Stretch shown at first.
+        Segment shown at first.
     scale : str
         Chosen at first, one of `SCALES`.
     quantity : str
@@ -91,7 +91,7 @@ def show_spectrum(
 
 def _first_if_found(cursor: Cursor, marked: Sequence[float]) -> Cursor:
     """Give the cursor of a finding the first right to its label."""
-    found = any(abs(cursor.position - position) <= FOUND_SHARE * position for position in marked)
+    found = any(abs(cursor.position - position) <= SLIP_SHARE * position for position in marked)
     return replace(cursor, number=0) if found else cursor
 
 

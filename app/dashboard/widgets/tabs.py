@@ -7,7 +7,7 @@ from collections.abc import Callable
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.methods.menu import show_methods
+from app.dashboard.methods import show_methods
 from app.dashboard.state import AnalysisRequest
 from app.dashboard.widgets import views
 from app.dashboard.widgets.spectrum import show_average

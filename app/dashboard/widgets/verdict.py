@@ -9,7 +9,6 @@ import streamlit as st
 
 from app.dashboard.theme import as_typed
 from gearsig.diagnosis import Analysis, Finding, Kind, Outcome
-from gearsig.errors import GearsigError, InputError
 from gearsig.report import FindingCard, finding_card, reference_text
 
 Colour = Literal["red", "orange", "violet", "gray", "blue", "green"]
@@ -166,45 +165,3 @@ Files stay on this machine. They are read in a private folder that is removed at
 def show_welcome() -> None:
     """Say how a recording is opened."""
     st.markdown(TEXT)
-
-
-# --------------------
-# An error as one clear message: what is wrong, where, what is allowed, what to do.
-# --------------------
-
-
-_PLACES = {
-    "--fs": "the sampling rate under 'Not in the file?'",
-    "--speed-rpm": "the speed under 'Not in the file?'",
-    "low_cut_hz": "the lowest frequency",
-    "high_cut_hz": "the highest frequency",
-    "n_modes": "K",
-    "n_levels": "the number of levels",
-    "highest_modulation_hz": "the highest modulation",
-    "highest_alpha_hz": "the highest cyclic frequency",
-    "highest_order": "the highest cyclic order",
-    "window_length": "the window",
-    "half_width": "the band around the ridge",
-    "set lowest to": "set the lowest line shown to",
-}
-"""What the page calls the options of the command line and of functions that messages name."""
-
-
-def show_error(error: GearsigError) -> None:
-    """Show an error of the input; texts in it may come from the file."""
-    if not isinstance(error, InputError):
-        st.error(as_typed(_in_words_of_the_page(str(error))), icon=":material/help:")
-        return
-    what = as_typed(_in_words_of_the_page(error.what))
-    lines = [f"**{as_typed(_PLACES.get(error.where, error.where))}**: {what}" if error.where else what]
-    if error.allowed:
-        lines.append(f"Allowed: {as_typed(error.allowed)}")
-    if error.remedy:
-        lines.append(f"What to do: {as_typed(_in_words_of_the_page(error.remedy))}")
-    st.error("\n\n".join(lines), icon=":material/error:")
-
-
-def _in_words_of_the_page(text: str) -> str:
-    for option, place in _PLACES.items():
-        text = text.replace(option, place)
-    return text

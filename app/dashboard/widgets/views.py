@@ -1,4 +1,4 @@
-"""The views of one channel: which spectrum, which cursors, which stretch."""
+"""The views of one channel: which spectrum, which cursors, which segment."""
 
 from __future__ import annotations
 
@@ -180,7 +180,7 @@ def show_channels(analysis: Analysis) -> None:
     window = choose_range("Time shown (s)", analysis, recording.duration_s, name="time")
     for name in names:
         channel = recording.channels[recording.index(name)]
-        time, values = stretch(recording, name, window)
+        time, values = segment(recording, name, window)
         st.markdown(f"**{as_typed(name)}** {as_typed(channel.position)}")
         label = with_unit(
             channel.quantity.replace("_", " ") if channel.quantity != "unknown" else "value", channel.unit
@@ -193,7 +193,7 @@ def show_channels(analysis: Analysis) -> None:
         )
 
 
-def stretch(recording: Recording, name: str, window_s: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+def segment(recording: Recording, name: str, window_s: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
     """Return times and samples inside a window, at least two samples."""
     rate, n = recording.sampling_rate_hz, recording.n_samples
     start = min(max(int(window_s[0] * rate), 0), max(n - 2, 0))

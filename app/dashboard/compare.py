@@ -1,0 +1,392 @@
+"""A simulation beside a recording: choice, comparison, and what the page shows of it."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import streamlit as st
+
+from app.dashboard import state
+from app.dashboard.cached import recorded, stated_options
+from app.dashboard.laboratory.setup import MODEL, shown_name
+from app.dashboard.state import AnalysisRequest, ChosenFile, Content
+from app.dashboard.theme import as_typed
+from app.dashboard.widgets.charts import download, show_picture
+from app.dashboard.widgets.chooser import FILE, SAMPLE, choose_file, choose_number, choose_sample, simulated_file
+from app.dashboard.widgets.messages import show_warnings
+from gearsig.comparison import (
+    ALIGN,
+    ChannelComparison,
+    Comparison,
+    LineLevel,
+    compare_recordings,
+    for_simulation,
+    missing_words,
+)
+from gearsig.errors import InputError, RefusalError
+from gearsig.gap import OperatingCondition
+from gearsig.plot import unit_text
+from gearsig.prepared import refined_angle
+from gearsig.recording import Recording
+from gearsig.report import FIGURES, alignment_texts, channel_rows, comparison_page, comparison_to_json, orders_csv
+from gearsig.rig import Rig
+from sims.machine import nominal_of
+from sims.presets import presets
+from sims.registry import gap_simulator
+
+TWIN = "Set to the rig"
+"""Instead of a preset: the rig's own geometry, the rest usual for its size."""
+
+
+@dataclass(frozen=True)
+class SimulationToCompare:
+    """A simulation that is run for the comparison.
+
+    Parameters
+    ----------
+    machine : str
+        Name of a preset, or `TWIN`.
+    speed_rpm, torque_nm : float or None
+        Of the driver; None: the recording's speed, the rig's or the preset's torque.
+    duration_s : float
+    seed : int
+    """
+
+    machine: str
+    speed_rpm: float | None = None
+    torque_nm: float | None = None
+    duration_s: float = 5.0
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class SimulatedFile:
+    """A simulation from a file: what is known of it."""
+
+    request: AnalysisRequest
+
+
+Simulation = SimulationToCompare | SimulatedFile
+
+
+def run_simulation(run: SimulationToCompare, recorded: Recording) -> Recording:
+    """Simulate the recording's machine at its speed and sampling rate.
+
+    Raises
+    ------
+    GearsigError
+        If the speed is not known, the machine allows less, or the rig does not say enough for a twin.
+    """
+    speed = run.speed_rpm if run.speed_rpm is not None else speed_of(recorded)
+    rate = min(max(recorded.sampling_rate_hz, 4096.0), 102400.0)
+    if run.machine == TWIN:
+        return _twin(run, recorded.rig, speed, rate)
+    import sims
+
+    return sims.simulate(
+        MODEL,
+        preset=run.machine,
+        parameters=teeth_of(recorded.rig),
+        speed_rpm=speed,
+        torque_nm=run.torque_nm,
+        duration_s=run.duration_s,
+        sampling_rate_hz=rate,
+        seed=run.seed,
+    )
+
+
+def _twin(run: SimulationToCompare, rig: Rig | None, speed_rpm: float, sampling_rate_hz: float) -> Recording:
+    if rig is None:
+        raise InputError(
+            "no rig is described that the simulator could be set to", remedy="give a rig file, or choose a preset"
+        )
+    torque = run.torque_nm if run.torque_nm is not None else nominal_of(rig).torque_nm
+    twin = gap_simulator(MODEL).twin_of(rig)
+    point = OperatingCondition(speed_rpm, torque)
+    return twin.run(point, seed=run.seed, duration_s=run.duration_s, sampling_rate_hz=sampling_rate_hz)
+
+
+def teeth_of(rig: Rig | None) -> dict[str, float]:
+    """Return the parameters that give a preset the rig's teeth: orders are compared, so they must be the same."""
+    if rig is None or len(rig.pairs) != 1:
+        return {}
+    pair = rig.pairs[0]
+    known = {"teeth_driver": pair.driver_teeth, "teeth_driven": pair.driven_teeth}
+    return {name: float(teeth) for name, teeth in known.items() if teeth is not None}
+
+
+def speed_of(recorded: Recording) -> float:
+    """Return the mean speed of the driver in the recording.
+
+    Raises
+    ------
+    InputError
+        If it is not known.
+    """
+    rig = recorded.rig or Rig()
+    try:
+        angle = refined_angle(recorded, rig)
+    except RefusalError as refusal:
+        raise InputError(
+            f"the speed of the recording is not known: {refusal.reason}", remedy=f"type a speed, or {refusal.remedy}"
+        ) from None
+    driver = rig.pairs[0].driver if rig.pairs else ""
+    return angle.mean_speed_rpm * ((rig.ratio(driver, to=angle.shaft) or 1.0) if driver else 1.0)
+
+
+# --------------------
+# Simulating and comparing, done once for equal choices and shared between sessions.
+# --------------------
+
+
+Pairs = tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Both:
+    """A recording and its simulation."""
+
+    recorded: Recording
+    simulated: Recording
+
+
+def simulated_of(
+    simulation: Simulation, request: AnalysisRequest, content: Content | None, recording: Recording
+) -> Recording:
+    """Return the simulation for a recording, which `request` stands for.
+
+    A file without a rig of its own takes the gears of the recording's rig.
+    """
+    if isinstance(simulation, SimulationToCompare):
+        return _simulated(simulation, request, recording)
+    assert content is not None  # noqa: S101 - a file has content, said to the type checker
+    rig = recording.rig
+    return recorded(simulation.request, content, None if rig is None else for_simulation(rig))
+
+
+@st.cache_resource(max_entries=3, show_spinner=False)
+def _simulated(simulation: SimulationToCompare, request: AnalysisRequest, _recording: Recording) -> Recording:
+    del request  # it stands for the recording
+    return run_simulation(simulation, _recording)
+
+
+@st.cache_resource(max_entries=4, show_spinner=False)
+def compared(request: AnalysisRequest, simulation: Simulation, pairs: Pairs, align_by: str, _both: Both) -> Comparison:
+    """Return the comparison; it is frozen, so that sessions may share it."""
+    del request, simulation  # they stand for the records
+    return compare_recordings(_both.simulated, _both.recorded, channels=pairs, align_by=align_by)
+
+
+@st.cache_data(max_entries=4, show_spinner=False)
+def page_of(
+    request: AnalysisRequest, simulation: Simulation, pairs: Pairs, align_by: str, command: str, _comparison: Comparison
+) -> bytes:
+    """Return the self-contained page of a comparison."""
+    del request, simulation, pairs, align_by
+    return comparison_page(_comparison, command=command).encode("utf-8")
+
+
+def command_of(request: AnalysisRequest, simulation: Simulation, pairs: Pairs, align_by: str) -> str:
+    """Return the command that gives the same comparison outside the dashboard; empty for a simulation of this page."""
+    if not isinstance(simulation, SimulatedFile):
+        return ""
+    words = ["gearsig", "compare", simulation.request.name, request.name, *stated_options(request)]
+    if simulation.request.rig_text.strip():
+        words += ["--sim-rig", simulation.request.rig_name]
+    words += [word for simulated, measured in pairs for word in ("--channel", f"{simulated}={measured}")]
+    return shlex.join([*words, *(["--align", align_by] if align_by != "auto" else []), "-o", "comparison"])
+
+
+# --------------------
+# Choose the simulation in the sidebar, and the channels on the page.
+# --------------------
+
+
+NOW = "Simulate now"
+ORIGIN, MACHINE = "simulation origin", "simulation machine"
+
+
+def choose_simulation() -> tuple[Simulation, Content | None] | None:
+    """Return what the recording is compared with, None while there is nothing.
+
+    Raises
+    ------
+    InputError
+        If a rig file is no text.
+    """
+    with st.sidebar:
+        st.divider()
+        made = state.simulated()
+        origins = (NOW, SAMPLE, FILE) if made is None else (NOW, SAMPLE, FILE, state.OF_LABORATORY)
+        origin = st.radio("Simulation", origins, horizontal=True, key=ORIGIN, persist_state="session")
+        if origin == NOW:
+            return _choose_run(), None
+        if origin == state.OF_LABORATORY and made is not None:
+            file: ChosenFile | None = simulated_file(made)
+        elif origin == SAMPLE:
+            file = choose_sample("Simulated sample", "simulation sample", first="healthy")
+        else:
+            file = choose_file(
+                "Simulated signals",
+                "simulation file",
+                rig="Its rig file (TOML), if it has one",
+                about_rig="Without one it is read as the file states, with the gears of the recording's rig.",
+            )
+        return None if file is None else (SimulatedFile(file.request()), file.content)
+
+
+def choose_alignment() -> str:
+    """Return how the averages are aligned."""
+    with st.sidebar:
+        chosen = st.selectbox(
+            "Align by",
+            ALIGN,
+            key="comparison alignment",
+            persist_state="session",
+            help="Marks: angle 0 is the same tooth in both. Correlation: the simulation is turned to where the "
+            "averages fit best. Auto: marks for shafts that have one in both.",
+        )
+    return str(chosen)
+
+
+def choose_pairs(simulated: Recording, recorded: Recording) -> Pairs:
+    """Return the channels that are compared: those of equal names, or two that the user names."""
+    ours, measured = simulated.vibration_names(), recorded.vibration_names()
+    common = [name for name in measured if name in ours]
+    if common and len(measured) == len(common):
+        return tuple((name, name) for name in common)
+    if not ours or not measured:
+        return ()  # the comparison says what is missing
+    source = f"{recorded.provenance.sha256} {' '.join(ours)}"
+    left, right = st.columns(2)
+    chosen = left.selectbox(
+        "Channel of the recording",
+        measured,
+        index=measured.index(common[0]) if common else 0,
+        key=state.source_key("recorded channel", source),
+    )
+    mate = right.selectbox(
+        "Channel of the simulation",
+        ours,
+        index=ours.index(chosen) if chosen in ours else 0,
+        key=state.source_key(f"simulated channel for {chosen}", source),
+    )
+    return ((str(mate), str(chosen)),)
+
+
+def _choose_run() -> SimulationToCompare:
+    known = presets(MODEL)
+
+    def title(name: str) -> str:
+        return name if name == TWIN else f"Preset {shown_name(name)}"
+
+    machine = st.selectbox(
+        "Machine",
+        [TWIN, *known],
+        format_func=title,
+        key=MACHINE,
+        persist_state="session",
+        help="Set to the rig: its teeth, module and face width, all else usual for its size. A preset keeps its own "
+        "geometry but takes the rig's teeth.",
+    )
+    if machine != TWIN:
+        st.caption(known[machine].title)
+    speed = choose_number("Speed of the driver (rpm)", "simulation speed", "the recording's", minimum=1.0)
+    torque = choose_number("Torque on the driver (N·m)", "simulation torque", "the rig's or the preset's", minimum=0.0)
+    length = st.segmented_control(
+        "Length (s)", (2.0, 5.0, 10.0), default=5.0, key="simulation length", persist_state="session"
+    )
+    seed = st.number_input("Seed", min_value=0, value=0, key="simulation seed", persist_state="session")
+    return SimulationToCompare(str(machine), speed, torque, float(length or 5.0), int(seed))
+
+
+# --------------------
+# Verdict, downloads, figures, tables.
+# --------------------
+
+
+LINES = "Lines"
+
+
+def show_comparison(comparison: Comparison) -> None:
+    """Show verdict, findings, and one channel's agreement, figures and lines."""
+    st.markdown(f"**{as_typed(comparison.verdict)}**")
+    if comparison.findings:
+        st.markdown("\n".join(f"- {as_typed(text)}" for text in comparison.findings))
+    show_warnings(comparison.notes)
+    st.caption(as_typed(f"{_facts(comparison)} Aligned: {'; '.join(alignment_texts(comparison))}."))
+    channel = _choose_channel(comparison.channels)
+    rows = channel_rows(channel)
+    st.dataframe(
+        {"agreement": [name for name, _ in rows], "": [text for _, text in rows]},
+        hide_index=True,
+        width="stretch",
+        column_config={"": st.column_config.TextColumn(width="large")},
+    )
+    tabs = st.tabs((*FIGURES, LINES), key="comparison tab", on_change="rerun")
+    for name, tab in zip((*FIGURES, LINES), tabs, strict=True):
+        if not tab.open:
+            continue
+        with tab:
+            if name == LINES:
+                _show_lines(channel)
+                continue
+            for drawn in FIGURES[name](comparison, channel):
+                show_picture(drawn.figure, drawn.alternative)
+                st.caption(as_typed(drawn.caption))
+
+
+def show_downloads(comparison: Comparison, page: Any, command: str) -> None:
+    """Offer the page, the data and the lines; `page` makes the page's bytes when it is asked for."""
+    with st.container(horizontal=True):
+        download("Page (HTML)", page, "compare.html", "text/html", primary=True)
+        download("JSON", lambda: comparison_to_json(comparison).encode(), "compare.json", "application/json")
+        download("Lines (CSV)", lambda: orders_csv(comparison).encode(), "orders.csv", "text/csv")
+    if command:
+        with st.expander("The same from the command line", icon=":material/terminal:"):
+            st.code(command, language="bash", wrap_lines=True)
+
+
+def _facts(comparison: Comparison) -> str:
+    sides = ("Recording", comparison.recorded), ("Simulation", comparison.simulated)
+    return " ".join(
+        f"{name}: {side.duration_s:.4g} s, {side.mean_speed_rpm:.6g} rpm, {side.n_revolutions:.4g} revolutions."
+        for name, side in sides
+    )
+
+
+def _choose_channel(channels: Sequence[ChannelComparison]) -> ChannelComparison:
+    if len(channels) == 1:
+        return channels[0]
+    names = [channel.name for channel in channels]
+    chosen = st.segmented_control(
+        "Channel", names, default=names[0], key="comparison channel", label_visibility="collapsed"
+    )
+    return channels[names.index(chosen)] if chosen in names else channels[0]
+
+
+def _show_lines(channel: ChannelComparison) -> None:
+    unit = f" re 1 {unit_text(channel.unit)}" if channel.unit else ""
+    shown = [line for line in (*channel.lines, *channel.other_lines) if line.is_seen]
+    st.dataframe(
+        {
+            "line": [line.label for line in shown],
+            "order": [line.order for line in shown],
+            f"recorded (dB{unit})": [round(line.level.recorded_db, 1) for line in shown],
+            f"simulated (dB{unit})": [round(line.level.simulated_db, 1) for line in shown],
+            "difference (dB)": [round(line.level.difference_db, 1) for line in shown],
+            "±": [round(2 * line.level.repeatability_db, 1) for line in shown],
+            "remark": [_remark(line) for line in shown],
+        },
+        hide_index=True,
+        width="stretch",
+        column_config={"order": st.column_config.NumberColumn(format="%.6g")},
+    )
+    st.caption("Levels are rms. ± is twice the standard error that follows from the halves of both records.")
+
+
+def _remark(line: LineLevel) -> str:
+    return missing_words(line) or ("" if line.level.is_beyond else "within the scatter")

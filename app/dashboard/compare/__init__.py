@@ -1,1 +1,0 @@
-"""The page *Simulation against recording*: what it computes, and its parts."""

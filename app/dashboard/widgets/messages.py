@@ -1,0 +1,57 @@
+"""Messages on a page: an error with what is allowed and what to do; warnings of an answer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import streamlit as st
+
+from app.dashboard.theme import as_typed
+from gearsig.errors import GearsigError, InputError
+
+_PLACES = {
+    "--fs": "the sampling rate under 'Not in the file?'",
+    "--speed-rpm": "the speed under 'Not in the file?'",
+    "low_cut_hz": "the lowest frequency",
+    "high_cut_hz": "the highest frequency",
+    "n_modes": "K",
+    "n_levels": "the number of levels",
+    "highest_modulation_hz": "the highest modulation",
+    "highest_alpha_hz": "the highest cyclic frequency",
+    "highest_order": "the highest cyclic order",
+    "window_length": "the window",
+    "half_width": "the band around the ridge",
+    "set lowest to": "set the lowest line shown to",
+}
+"""What the page calls the options of the command line and of functions that messages name."""
+
+
+def show_error(error: GearsigError) -> None:
+    """Show an error of the input; texts in it may come from the file."""
+    if not isinstance(error, InputError):
+        st.error(as_typed(_in_words_of_the_page(str(error))), icon=":material/help:")
+        return
+    what = as_typed(_in_words_of_the_page(error.what))
+    lines = [f"**{as_typed(_PLACES.get(error.where, error.where))}**: {what}" if error.where else what]
+    if error.allowed:
+        lines.append(f"Allowed: {as_typed(error.allowed)}")
+    if error.remedy:
+        lines.append(f"What to do: {as_typed(_in_words_of_the_page(error.remedy))}")
+    st.error("\n\n".join(lines), icon=":material/error:")
+
+
+def _in_words_of_the_page(text: str) -> str:
+    for option, place in _PLACES.items():
+        text = text.replace(option, place)
+    return text
+
+
+def show_warnings(warnings: Sequence[str], *, quiet: bool = False) -> None:
+    """Show what an answer says about itself, as one warning or quietly as small print; names in it come from files."""
+    if not warnings:
+        return
+    text = as_typed(warnings[0]) if len(warnings) == 1 else "\n".join(f"- {as_typed(text)}" for text in warnings)
+    if quiet:
+        st.caption(text)
+    else:
+        st.warning(text, icon=":material/warning:")
