@@ -173,6 +173,15 @@ def test_modes_that_share_their_lines_are_warned_of() -> None:
     assert any("share the same lines" in w.value for w in page.warning)
 
 
+@pytest.mark.parametrize(("method", "engine"), [("Modes", "vmdpy"), ("Ridges", "ssqueezepy")])
+def test_other_engines_answer_for_short_segments(method: str, engine: str) -> None:
+    pytest.importorskip(engine)
+    page = choose(opened_machine(method), "Engine", engine)
+    assert not page.exception
+    assert not page.error, shown_text(page)
+    assert len(page.get("image")) == 1
+
+
 def test_modes_of_envelopes_and_over_angle() -> None:
     page = opened_at("Modes")
     for kind in ("Envelope", "Over angle"):

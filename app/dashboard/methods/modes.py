@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, cast, get_args
 
 import streamlit as st
 
@@ -12,7 +12,7 @@ from app.dashboard.methods.frame import MethodPage, SignalSegment, cached, conte
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import choose_range, show_picture
 from app.dashboard.widgets.messages import show_warnings
-from gearsig.decompose import Modes, ModeSuggestion, ModeTrial, StartName, VmdSettings, long_modes, suggest_modes
+from gearsig.decompose import Modes, ModeSuggestion, ModeTrial, StartName, VmdEngine, VmdSettings, suggest_modes, vmd
 from gearsig.plot import modes_figure
 from gearsig.spectra import band_envelope
 from gearsig.timefreq import UniformSignal
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 N_PER_BLOCK = 2**18
 """Longer segments are taken block by block."""
+MAX_OF_VMDPY = 2**13
+"""Samples: it keeps all iterations, 16 kB per sample and mode."""
 PENALTIES = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000, 200_000)
 """A logarithmic scale that holds whatever is suggested."""
 SUGGESTED = ("K", "penalty", "start")
@@ -31,11 +33,13 @@ SUGGESTED = ("K", "penalty", "start")
 def show_modes(page: MethodPage) -> None:
     """Show the modes of one channel."""
     left, right = st.columns(2)
+    about = "vmdpy: the reference program, for comparison; slow, and short segments only."
+    engine = page.choose(left, "Engine", get_args(VmdEngine), about=about)
     with right:
-        segment = page.segment(n_first=2**16, n_max=2**21)
+        segment = page.segment(n_first=2**16, n_max=2**21 if engine == "gearsig" else MAX_OF_VMDPY)
     with left:
         signal, offset = _choose_signal(page, segment)
-    settings = _choose_settings(page)
+    settings = _choose_settings(page, cast("VmdEngine", engine))
     _show_suggestion(page, signal)
     modes = replace(modes_of(signal, settings), offset=offset)
     show_warnings(modes.notes)
@@ -78,7 +82,7 @@ def _choose_signal(page: MethodPage, segment: SignalSegment) -> tuple[UniformSig
     return signal, mean
 
 
-def _choose_settings(page: MethodPage) -> VmdSettings:
+def _choose_settings(page: MethodPage, engine: VmdEngine) -> VmdSettings:
     one, two, three, four, five = st.columns((2.6, 4, 4.8, 3, 3.2))
     # a suggestion sets the values of both
     for name, value in (("K", 4), ("penalty", 2000)):
@@ -90,7 +94,10 @@ def _choose_settings(page: MethodPage) -> VmdSettings:
     start = page.choose(three, "Start", ("uniform", "peaks", "zero"), key="start", about=about)
     about = "Keep the first mode's centre at zero, so that it takes mean and drift."
     zero_mode = page.ask(five.toggle, "Mode at zero", about=about)
-    max_iterations = page.ask(four.select_slider, "Iterations", (499, 1000, 2000, 5000))
+    # vmdpy iterates up to 499 times
+    iterations = (499, 1000, 2000, 5000)
+    disabled = engine == "vmdpy"
+    max_iterations = page.ask(four.select_slider, "Iterations", iterations, disabled=disabled)
     with st.expander("More settings"):
         about = "Above 0 the modes must sum to the signal, noise included; 0 leaves noise in the residual."
         column = st.columns(3)[0]
@@ -103,23 +110,15 @@ def _choose_settings(page: MethodPage) -> VmdSettings:
         dual_step=float(dual_step),
         zero_mode=zero_mode,
         start=cast("StartName", start),
-        max_iterations=max_iterations,
+        max_iterations=499 if disabled else max_iterations,
+        engine=engine,
     )
 
 
 @cached(2, "Finding the modes …")
 def modes_of(signal: UniformSignal, settings: VmdSettings) -> Modes:
     """Return the modes by rising centre: the first one shown is number 1."""
-    modes = long_modes(
-        signal.values,
-        signal.rate,
-        settings,
-        axis=signal.axis,
-        unit=signal.unit,
-        source=signal.source,
-        shaft=signal.shaft,
-        n_per_block=N_PER_BLOCK,
-    )
+    modes = vmd(signal, settings)
     order = list(modes.by_centre())
     return replace(
         modes,

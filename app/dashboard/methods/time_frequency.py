@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import streamlit as st
@@ -27,6 +27,7 @@ from gearsig.timefreq import (
     Morse,
     Reduction,
     Ridge,
+    SqueezeEngine,
     TimeFrequencyMap,
     UniformSignal,
     at_label,
@@ -62,6 +63,7 @@ class Transform:
     about: str
     n_max: int
     of_wavelets: bool = False
+    squeezed: bool = False
 
 
 TRANSFORMS = {
@@ -76,10 +78,12 @@ TRANSFORMS = {
         10_000_000,
         of_wavelets=True,
     ),
-    "Squeezed Fourier": Transform(squeezed_stft_map, SQUEEZED_TEXT, 4_000_000),
-    "Squeezed wavelet": Transform(squeezed_cwt_map, SQUEEZED_TEXT, 2_000_000, of_wavelets=True),
+    "Squeezed Fourier": Transform(squeezed_stft_map, SQUEEZED_TEXT, 4_000_000, squeezed=True),
+    "Squeezed wavelet": Transform(squeezed_cwt_map, SQUEEZED_TEXT, 2_000_000, of_wavelets=True, squeezed=True),
 }
 REDUCTIONS: dict[str, Reduction] = {"Mean": "mean", "Largest": "max"}
+MAX_OF_SSQUEEZEPY = 100_000
+"""Samples: it holds the whole matrix of lines and samples several times."""
 OCTAVES_SHOWN = 8.0
 """Of wavelet maps at first; lower lines are mostly the ends' doing."""
 
@@ -92,6 +96,7 @@ class MapSettings:
     limits: tuple[float, float]
     reduction: Reduction
     length: float
+    engine: str = "gearsig"
 
     def wavelet(self) -> Morse:
         """Return the wavelet, of usual length where the transform has none."""
@@ -135,9 +140,14 @@ def choose_map(
     transform = TRANSFORMS[name]
     over_angle = page.choose_over_angle(right)
     st.caption(transform.about)
+    engine, limit = "gearsig", min(transform.n_max, n_max or transform.n_max)
+    if transform.squeezed:
+        about = "ssqueezepy: another program, for comparison; single precision, and short segments only."
+        engine = page.choose(st, "Engine", get_args(SqueezeEngine), about=about)
+        limit = limit if engine == "gearsig" else MAX_OF_SSQUEEZEPY
     left, right = st.columns(2)
     with left:
-        segment = page.segment(n_first=200_000, n_max=min(transform.n_max, n_max or transform.n_max))
+        segment = page.segment(n_first=200_000, n_max=limit)
     signal = signal_of(segment, over_angle=over_angle)
     limits = _choose_limits(page, right, signal, of_wavelets=transform.of_wavelets)
     one, two, three = st.columns((2, 2, 1))
@@ -149,7 +159,7 @@ def choose_map(
     span_db = page.ask(two.slider, "Colours span (dB)", 20, 120, 60, step=5)
     about = "A column holds many samples: their mean power, or the largest one, which keeps the height of impacts."
     reduction = REDUCTIONS[page.choose(three, "Each column", list(REDUCTIONS), about=about)]
-    return MapChoice(segment, signal, MapSettings(name, limits, reduction, length), float(span_db))
+    return MapChoice(segment, signal, MapSettings(name, limits, reduction, length, engine), float(span_db))
 
 
 def _choose_limits(page: MethodPage, place: Any, signal: UniformSignal, *, of_wavelets: bool) -> tuple[float, float]:
@@ -200,15 +210,14 @@ def level_map(signal: UniformSignal, settings: MapSettings) -> TimeFrequencyMap:
     GearsigError
         See the transforms.
     """
-    transform = TRANSFORMS[settings.transform]
-    low, high = settings.limits
-    if not transform.of_wavelets:
-        return transform.map_of(
-            signal, window_length=settings.length, lowest=low or None, highest=high, reduction=settings.reduction
-        )
-    wavelet = settings.wavelet()
-    low = max(low, lowest_possible(signal, wavelet))
-    return transform.map_of(signal, wavelet=wavelet, lowest=low, highest=high, reduction=settings.reduction)
+    transform, (low, high) = TRANSFORMS[settings.transform], settings.limits
+    more: dict[str, Any] = {"engine": settings.engine} if transform.squeezed else {}
+    if transform.of_wavelets:
+        more["wavelet"] = settings.wavelet()
+        low = max(low, lowest_possible(signal, settings.wavelet()))
+    else:
+        more["window_length"] = settings.length
+    return transform.map_of(signal, lowest=low or None, highest=high, reduction=settings.reduction, **more)
 
 
 def show_time_frequency(page: MethodPage) -> None:
