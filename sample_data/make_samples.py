@@ -18,7 +18,7 @@ from sample_files import Made, Writer, wav_writer, write_csv_gz, write_hdf5, wri
 
 from gearsig.recording import Recording
 from gearsig.rig import OperatingPoint, Rig, Sensor, TachometerChannel, write_rig
-from sims.cracked import CrackedPair, simulate_machine
+from sims.cracked import CrackedPair, simulate_with_motion
 from sims.effects import EffectSetting
 from sims.gear_pair import build_rig, draw_roughness
 from sims.machine import Machine, Operation, Profile
@@ -132,7 +132,7 @@ def dynamic(
     rig = replace(rig, operating_point=OperatingPoint("input", nominal_rpm, torque_nm=operation.torque_nm.largest))
     rig = replace(rig, sensors=tuple(s for s in rig.sensors if s.channel in CHANNELS))
     machine = same_flanks(ready.machine)
-    recording = simulate_machine(
+    recording, _ = simulate_with_motion(
         machine, operation, rng=rng, sampling_rate_hz=RATE_HZ, duration_s=duration_s, rig=rig, truth=ready.truth()
     )
     step_mps2 = machine.chain.channels[0].converter.step_mps2 if machine.chain.channels[0].converter else 0.0

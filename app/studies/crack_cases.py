@@ -31,7 +31,7 @@ from gearsig.severity import (
     CRACKED as CRACK_KIND,
 )
 from sims.cracked import NAME as CRACKED
-from sims.cracked import CrackedPair, PreparedCrackedPair, default_step_s, simulate_machine
+from sims.cracked import CrackedPair, PreparedCrackedPair, default_step_s, simulate_with_motion
 from sims.effects import EffectSetting, with_effects
 from sims.gear_pair import build_rig, draw_roughness
 from sims.machine import Machine, Operation
@@ -320,7 +320,7 @@ def simulate_rig(
         recording, _ = simulate_pair(replace(ready.pair, machine=machine), operation, step_s=TWIN_STEP_S, **asked)
     else:
         step_s = None if step_angle_rad is None else default_step_s(machine, operation, step_angle_rad)
-        recording = simulate_machine(machine, operation, step_s=step_s, **asked)
+        recording, _ = simulate_with_motion(machine, operation, step_s=step_s, **asked)
     return _cut(recording, round(lead_s * SAMPLING_RATE_HZ)) if run else recording
 
 

@@ -24,8 +24,6 @@ from sims.cracked._simulator import (
     CrackedTwin,
     PreparedCrackedPair,
     cracked_gap_simulator,
-    prepare_preset,
-    simulate_machine,
     simulate_with_motion,
 )
 
@@ -60,9 +58,7 @@ __all__ = [
     "place_of_entry",
     "potential_energy",
     "prepare",
-    "prepare_preset",
     "respond",
-    "simulate_machine",
     "simulate_with_motion",
     "slowest_decay_s",
 ]

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import ceil, cos, floor, pi, radians, sin, sqrt
+from math import cos, floor, pi, radians, sin, sqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, closest_match_hint, count, positive
-from gearsig.errors import InputError, RefusalError
+from gearsig.checks import FloatArray, closest_match_hint
+from gearsig.errors import InputError
 from sims.cracked._kernels import MOST_LATE
 from sims.gear_pair import (
     BEARING_FIELDS,
@@ -19,15 +19,18 @@ from sims.gear_pair import (
     DRIVE_FIELDS,
     DRIVE_SCALARS,
     FRICTION_SCALARS,
+    PairResponse,
+    RunPlan,
     bearing_fields,
     bearing_loads_n,
     draw_roughness,
     drive_fields,
     friction_fields,
     governor_nm_s_per_rad,
+    profile_points,
     total_inertia_kg_m2,
 )
-from sims.machine import Machine, Operation, Profile
+from sims.machine import Machine, Operation
 from sims.mesh import MeshTable, TimeLockedRoughness, back_stiffness_n_per_m, mesh_stiffness, mesh_table, share_torque
 
 # --------------------
@@ -400,10 +403,6 @@ def default_step_s(machine: Machine, operation: Operation, step_angle_rad: float
     return step
 
 
-MOST_STEPS = 400_000_000
-"""Ten minutes of computing or so; more is taken for a mistake."""
-
-
 STEPS_PER_CALL = 200_000
 """Compiled code cannot be interrupted: it comes back for a look every quarter of a second or so."""
 
@@ -425,39 +424,8 @@ class PairState:
     set_angle_rad: float
 
 
-@dataclass(frozen=True)
-class Response:
-    """Signals of a run on an even grid of time.
-
-    Parameters
-    ----------
-    start_s, interval_s : float
-    signals : mapping
-        Name (see `sims.cracked.SIGNALS`) → (n,), in m, rad, s, N.
-    step_s : float
-        Of the integrator.
-    energy_j : array
-        Potential, kinetic and gravitational energy, (n,), or empty where it was not asked for.
-    last : State or None
-        At the end of the last step: one step after the last point where every step is kept.
-    """
-
-    start_s: float
-    interval_s: float
-    signals: Mapping[str, FloatArray]
-    step_s: float
-    energy_j: FloatArray
-    last: PairState | None = None
-
-    @property
-    def time_s(self) -> FloatArray:
-        """Times of the points."""
-        n = len(next(iter(self.signals.values())))
-        return self.start_s + self.interval_s * np.arange(n)
-
-    def __getitem__(self, name: str) -> FloatArray:
-        """Return a signal by its name."""
-        return self.signals[name]
+Response = PairResponse[PairState]
+"""Of a run: signals of `SIGNALS`, and where it ended."""
 
 
 @dataclass(frozen=True)
@@ -481,8 +449,8 @@ def prepare(machine: Machine, operation: Operation, rng: np.random.Generator, st
         constants(machine, operation, bearing_rng),
         q,
         v,
-        _points(operation.speed_rpm, pi / 30.0),
-        _points(operation.torque_nm, 1.0),
+        profile_points(operation.speed_rpm, pi / 30.0),
+        profile_points(operation.torque_nm, 1.0),
         roughness,
     )
 
@@ -528,7 +496,7 @@ def respond(
     Raises
     ------
     InputError
-        On an unknown signal, or a run of more than `MOST_STEPS` steps.
+        On an unknown signal, or a run of too many steps.
     RefusalError
         If the solution grows beyond all bounds: the step is too long.
 
@@ -539,53 +507,42 @@ def respond(
     """
     from sims.cracked._kernels import integrate
 
-    positive(duration_s, "duration_s", "s")
-    step = default_step_s(machine, operation) if step_s is None else positive(step_s, "step_s", "s")
-    n_steps = ceil(duration_s / step - 1e-9)
-    if n_steps > MOST_STEPS:
-        raise InputError(
-            f"{n_steps:.3g} steps of {step:.3g} s",
-            where="duration_s",
-            allowed=f"at most {MOST_STEPS:.0e} steps",
-            remedy="simulate a shorter time, or in parts",
-        )
-    every = count(stride, "stride")
+    step = default_step_s(machine, operation) if step_s is None else step_s
+    plan = RunPlan(start_s, duration_s, step, stride, STEPS_PER_CALL)
     ready = prepare(machine, operation, rng, start_s)
     q, v, set_angle = _first_state(ready, first)
-    rows = np.empty((-(-n_steps // every), len(signals)))
-    energies = np.empty(len(rows) if with_energy else 0)
     select = np.array([_place(name) for name in signals], dtype=np.int64)
     phasors = ready.roughness.phasors(step / 2.0)
-    per_call = every * max(STEPS_PER_CALL // every, 1)
-    for begun in range(0, n_steps, per_call):
-        n = min(per_call, n_steps - begun)
-        part = slice(begun // every, begun // every + -(-n // every))
-        filled = integrate(
-            *ready.constants.arguments,
-            q,
-            v,
-            set_angle,
-            start_s + begun * step,
-            step,
-            n,
-            every,
-            ready.speed,
-            ready.torque,
-            phasors,
-            select,
-            rows[part],
-            energies[part] if with_energy else energies,
-        )
-        if filled < len(rows[part]) or not np.isfinite(rows[part][-1]).all():
-            raise RefusalError(
-                f"the solution grows beyond all bounds after {(begun + filled * every) * step:.3g} s "
-                f"at a step of {step:.3g} s",
-                remedy="look for stiffness, damping and inertia that do not go together, or give a shorter step_s",
+
+    def march(time_s: float, n_steps: int, rows: FloatArray, energies: FloatArray) -> int:
+        return int(
+            integrate(
+                *ready.constants.arguments,
+                q,
+                v,
+                set_angle,
+                time_s,
+                step,
+                n_steps,
+                stride,
+                ready.speed,
+                ready.torque,
+                phasors,
+                select,
+                rows,
+                energies,
             )
-        if on_progress is not None:
-            on_progress((begun + n) / n_steps)
+        )
+
+    kept, energies = plan.run(
+        march,
+        signals,
+        with_energy=with_energy,
+        remedy="look for stiffness, damping and inertia that do not go together, or give a shorter step_s",
+        on_progress=on_progress,
+    )
     last = PairState(q, v, float(set_angle[0]))
-    return Response(start_s, step * every, dict(zip(signals, rows.T, strict=True)), step, energies, last)
+    return Response(start_s, step * stride, kept, step, energies, last)
 
 
 def _first_state(ready: PreparedRun, given: PairState | None) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -597,10 +554,6 @@ def _first_state(ready: PreparedRun, given: PairState | None) -> tuple[FloatArra
             f"a state of {given.q.size} coordinates", where="first", allowed=f"{ready.q.size}: another run's last"
         )
     return given.q.copy(), given.v.copy(), np.array([given.set_angle_rad])
-
-
-def _points(course: Profile, factor: float) -> FloatArray:
-    return np.ascontiguousarray(np.vstack((course.times_s, factor * np.asarray(course.values))), dtype=np.float64)
 
 
 def _place(name: str) -> int:

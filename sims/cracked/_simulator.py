@@ -8,15 +8,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearsig.gap import OperatingCondition
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 from sims.cracked._respond import PairState, Response, default_step_s, eigenfrequencies_hz, respond
 from sims.effects import EffectSetting, effects, with_effects
-from sims.gear_pair import PARAMETERS, Measurement, PairGapSimulator, PairModel, PairTwin, ReadyPair, SimulationRequest
+from sims.gear_pair import (
+    PARAMETERS,
+    Measurement,
+    PairGapSimulator,
+    PairModel,
+    PairTwin,
+    ReadyPair,
+    SimulationRequest,
+    build_machine,
+)
 from sims.machine import Machine, Operation
 from sims.measure import plain
-from sims.mesh import PairGeometry, friction_over_mesh
+from sims.mesh import friction_over_mesh
 from sims.presets import Preset
 from sims.registry import check_load
 from sims.simulator import Parameter, ParameterValue
@@ -59,19 +67,23 @@ class CrackedPair(PairModel[PreparedCrackedPair]):
     def _built(
         self, asked: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float
     ) -> PreparedCrackedPair:
-        return _prepared(asked, rng, sampling_rate_hz)
+        healthy = build_machine(asked.values, sampling_rate_hz=sampling_rate_hz, installed=asked.installed)
+        check_load(healthy, asked.operation)
+        return PreparedCrackedPair(asked, with_effects(healthy, asked.effects, rng))
 
-    def _recorded(
+    def record(
         self,
         ready: PreparedCrackedPair,
-        rig: Rig,
         rng: np.random.Generator,
         *,
+        rig: Rig,
         sampling_rate_hz: float,
         duration_s: float,
+        step_s: float | None = None,
+        noise_rng: np.random.Generator | None = None,
     ) -> Recording:
-
-        return simulate_machine(
+        """Run a prepared pair and measure it; see `simulate_with_motion`."""
+        recording, _ = simulate_with_motion(
             ready.machine,
             ready.operation,
             rng=rng,
@@ -79,7 +91,10 @@ class CrackedPair(PairModel[PreparedCrackedPair]):
             duration_s=duration_s,
             rig=rig,
             truth=ready.truth(),
+            step_s=step_s,
+            noise_rng=noise_rng,
         )
+        return recording
 
     def check_convergence(
         self,
@@ -97,63 +112,9 @@ class CrackedPair(PairModel[PreparedCrackedPair]):
         return check_convergence(ready.machine, ready.operation, rng)
 
 
-def prepare_preset(
-    chosen: Preset,
-    parameters: Mapping[str, ParameterValue],
-    settings: Sequence[EffectSetting],
-    operation: Operation | None,
-    rng: np.random.Generator,
-    *,
-    sampling_rate_hz: float = 20480.0,
-) -> PreparedCrackedPair:
-    """Build a preset's machine and switch on its effects and `settings`; one number is drawn from `rng`."""
-    return _prepared(
-        SimulationRequest.of(chosen, PARAMETERS, parameters, settings, operation, sampling_rate_hz),
-        rng,
-        sampling_rate_hz,
-    )
-
-
-def _prepared(asked: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> PreparedCrackedPair:
-    from sims.gear_pair import build_machine
-
-    sound = build_machine(asked.values, sampling_rate_hz=sampling_rate_hz, installed=asked.installed)
-    check_load(sound, asked.operation)
-    return PreparedCrackedPair(asked, with_effects(sound, asked.effects, rng))
-
-
 # --------------------
 # From a machine to a recording: run the model, then measure it.
 # --------------------
-
-
-def simulate_machine(
-    machine: Machine,
-    operation: Operation,
-    *,
-    rng: np.random.Generator,
-    sampling_rate_hz: float,
-    duration_s: float,
-    rig: Rig | None = None,
-    truth: Mapping[str, Any] | None = None,
-    step_s: float | None = None,
-    noise_rng: np.random.Generator | None = None,
-    on_progress: Callable[[float], None] | None = None,
-) -> Recording:
-    """Simulate the sixteen coordinates and measure them; see `simulate_with_motion`."""
-    recording, _ = simulate_with_motion(
-        machine,
-        operation,
-        rng=rng,
-        sampling_rate_hz=sampling_rate_hz,
-        duration_s=duration_s,
-        rig=rig,
-        truth=truth,
-        step_s=step_s,
-        noise_rng=noise_rng,
-        on_progress=on_progress,
-    )
-    return recording
 
 
 def simulate_with_motion(
@@ -272,48 +233,17 @@ class CrackedTwin(PairTwin):
     """A rig's twin with 16 degrees of freedom; see `sims.gear_pair.PairTwin`."""
 
     @property
-    def model(self) -> str:
-        """Name of the model whose preset the twin is."""
-        return NAME
-
-    def _simulated(
-        self,
-        own: Preset,
-        point: OperatingCondition,
-        seed: int,
-        *,
-        sampling_rate_hz: float,
-        duration_s: float,
-        noise_rng: np.random.Generator | None,
-    ) -> Recording:
-        """Run a specimen and measure it."""
-        rng = np.random.default_rng(seed)
-        ready = prepare_preset(own, {}, (), None, rng, sampling_rate_hz=sampling_rate_hz)
-        return simulate_machine(
-            ready.machine,
-            ready.operation,
-            rng=rng,
-            sampling_rate_hz=sampling_rate_hz,
-            duration_s=duration_s,
-            rig=self._rig_at(point),
-            truth=ready.truth(),
-            step_s=self._step_s(own),
-            noise_rng=noise_rng,
-        )
-
-    def _geometry(self, own: Preset) -> PairGeometry:
-        """Return the geometry of a specimen's pair."""
-        return prepare_preset(own, {}, (), None, np.random.default_rng(0)).machine.mesh.pair
+    def pair_model(self) -> CrackedPair:
+        """The model that runs the twin."""
+        return CrackedPair()
 
     def _step_s(self, own: Preset) -> float:
-        """Step of the integrator: that of the sound machine, so that effects leave the drawn noise as it is.
+        """Step of the integrator: that of the healthy machine, so that effects leave the drawn noise as it is.
 
         It is longer than that of a single simulation; the accelerations miss 2 to 4 parts in a thousand.
         """
-        from sims.cracked._respond import default_step_s
-
-        sound = prepare_preset(replace(own, effects=()), {}, (), None, np.random.default_rng(0))
-        return default_step_s(sound.machine, sound.operation, STEP_ANGLE_RAD)
+        healthy = self._prepared(replace(own, effects=()), np.random.default_rng(0))
+        return default_step_s(healthy.machine, healthy.operation, STEP_ANGLE_RAD)
 
 
 def cracked_gap_simulator() -> PairGapSimulator:

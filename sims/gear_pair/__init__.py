@@ -15,6 +15,7 @@ from sims.gear_pair._drive import (
 from sims.gear_pair._installed import Installed, completed
 from sims.gear_pair._measurement import COORDINATES, LEAST_MOTION_HZ, Measurement
 from sims.gear_pair._parameters import PARAMETERS
+from sims.gear_pair._run import PairResponse, RunPlan, profile_points
 from sims.gear_pair._simulator import PairModel, ReadyPair, SimulationRequest
 from sims.gear_pair._twin import (
     BODY_KG,
@@ -38,8 +39,10 @@ __all__ = [
     "Measurement",
     "PairGapSimulator",
     "PairModel",
+    "PairResponse",
     "PairTwin",
     "ReadyPair",
+    "RunPlan",
     "SimulationRequest",
     "bearing_fields",
     "bearing_loads_n",
@@ -54,5 +57,6 @@ __all__ = [
     "friction_fields",
     "gear_geometry",
     "governor_nm_s_per_rad",
+    "profile_points",
     "total_inertia_kg_m2",
 ]

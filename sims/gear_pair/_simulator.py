@@ -128,6 +128,19 @@ class PairModel(Model, ABC, Generic[Ready]):
     ) -> Ready:
         """Build the pair and switch its effects on; one number is drawn from `rng`, with and without effects."""
         chosen = preset(self.name, preset_name)
+        return self.prepare_preset(chosen, parameters, settings, operation, rng, sampling_rate_hz=sampling_rate_hz)
+
+    def prepare_preset(
+        self,
+        chosen: Preset,
+        parameters: Mapping[str, ParameterValue],
+        settings: Sequence[EffectSetting],
+        operation: Operation | None,
+        rng: np.random.Generator,
+        *,
+        sampling_rate_hz: float = 20480.0,
+    ) -> Ready:
+        """Build a preset's pair and switch on its effects and `settings`; one number is drawn from `rng`."""
         return self._built(
             SimulationRequest.of(chosen, self.parameters, parameters, settings, operation, sampling_rate_hz),
             rng,
@@ -163,14 +176,36 @@ class PairModel(Model, ABC, Generic[Ready]):
             name=self.rig_name(ready.preset),
             sources=self.rig_sources(ready.preset),
         )
-        return self._recorded(ready, rig, rng, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s)
+        return self.record(ready, rng, rig=rig, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s)
 
     @abstractmethod
     def _built(self, asked: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> Ready:
         """Build what is asked for."""
 
     @abstractmethod
-    def _recorded(
-        self, ready: Ready, rig: Rig, rng: np.random.Generator, *, sampling_rate_hz: float, duration_s: float
+    def record(
+        self,
+        ready: Ready,
+        rng: np.random.Generator,
+        *,
+        rig: Rig,
+        sampling_rate_hz: float,
+        duration_s: float,
+        step_s: float | None = None,
+        noise_rng: np.random.Generator | None = None,
     ) -> Recording:
-        """Run and measure it."""
+        """Run a prepared pair and measure it.
+
+        Parameters
+        ----------
+        ready : ReadyPair
+        rng : numpy.random.Generator
+            For the machine and, unless `noise_rng` is given, for the chain.
+        rig : Rig
+            Goes with the recording.
+        sampling_rate_hz, duration_s : float
+        step_s : float or None
+            Longest step of the integrator; None: the model's.
+        noise_rng : numpy.random.Generator or None
+            For the chain: the same machine with other noise.
+        """

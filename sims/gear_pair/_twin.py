@@ -19,6 +19,7 @@ from gearsig.recording import Recording
 from gearsig.rig import OperatingPoint, Rig, rig_to_dict
 from sims.effects import GEARS, EffectSetting, MachineFacts, as_gap_effect, effect, effects
 from sims.gear_pair._installed import HousingMode, SensorSeat, completed, further_seats, installed_of_rig, table_of
+from sims.gear_pair._simulator import PairModel, ReadyPair
 from sims.machine import Nominal, log_uniform, nominal_of, pitch_tolerance_um, runout_tolerance_um, usual_mass_kg
 from sims.mesh import PairGeometry
 from sims.presets import Preset, preset_text
@@ -204,9 +205,14 @@ class PairTwin:
         return f"{self.model} {sources_digest()} {sha256(told.encode()).hexdigest()[:16]}"
 
     @property
+    def pair_model(self) -> PairModel[Any]:
+        """The model that runs the twin."""
+        raise NotImplementedError
+
+    @property
     def model(self) -> str:
         """Name of the model whose preset the twin is."""
-        raise NotImplementedError
+        return self.pair_model.name
 
     @property
     def point(self) -> OperatingCondition:
@@ -234,12 +240,14 @@ class PairTwin:
         skipped = 0
         if noise:
             skipped = round(run_rng.uniform(0.0, LONGEST_LEAD_REV) * 60.0 / point.speed_rpm * sampling_rate_hz)
-        recording = self._simulated(
-            own,
-            point,
-            seed,
+        machine_rng = np.random.default_rng(seed)
+        recording = self.pair_model.record(
+            self._prepared(own, machine_rng, sampling_rate_hz),
+            machine_rng,
+            rig=self._rig_at(point),
             sampling_rate_hz=sampling_rate_hz,
             duration_s=duration_s + skipped / sampling_rate_hz,
+            step_s=self._step_s(own),
             noise_rng=run_rng if noise else None,
         )
         recording = replace(recording, truth={**(recording.truth or {}), "seed": seed, "noise": noise})
@@ -339,7 +347,7 @@ class PairTwin:
         InputError
             If the model cannot have such gears.
         """
-        return self._geometry(self.preset(self.point))
+        return self._prepared(self.preset(self.point), np.random.default_rng(0)).machine.mesh.pair
 
     @cached_property
     def _facts(self) -> MachineFacts:
@@ -350,21 +358,12 @@ class PairTwin:
         rms = np.mean([np.std(healthy.values(name)) for name in healthy.vibration_names()])
         return MachineFacts(self.nominal, (pair.driver, pair.driven), bearings, float(rms))
 
-    def _simulated(
-        self,
-        own: Preset,
-        point: OperatingCondition,
-        seed: int,
-        *,
-        sampling_rate_hz: float,
-        duration_s: float,
-        noise_rng: np.random.Generator | None,
-    ) -> Recording:
-        """Run a specimen and measure it."""
-        raise NotImplementedError
+    def _prepared(self, own: Preset, rng: np.random.Generator, sampling_rate_hz: float = 20480.0) -> ReadyPair:
+        ready: ReadyPair = self.pair_model.prepare_preset(own, {}, (), None, rng, sampling_rate_hz=sampling_rate_hz)
+        return ready
 
-    def _geometry(self, own: Preset) -> PairGeometry:
-        """Return the geometry of a specimen's pair."""
+    def _step_s(self, own: Preset) -> float:
+        """Longest step of the integrator."""
         raise NotImplementedError
 
     def _own_parameters(self, values: dict[str, ParameterValue]) -> dict[str, ParameterValue]:

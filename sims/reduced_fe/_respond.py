@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import ceil, pi
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, closest_match_hint, count, positive
-from gearsig.errors import InputError, RefusalError
-from sims.gear_pair import COORDINATES
+from gearsig.errors import InputError
+from sims.gear_pair import COORDINATES, PairResponse, RunPlan, profile_points
 from sims.machine import Operation, Profile
 from sims.mesh import one_mesh_cycle
 from sims.reduced_fe._integrate import Method, step_coefficients
@@ -121,8 +121,6 @@ def _pass_gain(pair: FlexiblePair, own: FlexiblePairConstants, operation: Operat
 
 STEP_S = 5e-6
 """Step where none is given; see `sims.reduced_fe` for what it costs in accuracy."""
-MOST_STEPS = 400_000_000
-"""Half an hour of computing or so; more is taken for a mistake."""
 STEPS_PER_CALL = 100_000
 """Compiled code cannot be interrupted: it comes back for a look every quarter of a second or so."""
 MOVING = COORDINATES
@@ -155,37 +153,8 @@ class FlexState:
         return tuple(np.array(a) for a in fields)
 
 
-@dataclass(frozen=True)
-class FlexResponse:
-    """Signals of a run on an even grid of time.
-
-    Parameters
-    ----------
-    start_s, interval_s : float
-    signals : mapping
-        Name → (n,), in m, rad, s, N.
-    step_s : float
-        Of the integrator.
-    energy_j : array
-        (n,), or empty where it was not asked for.
-    last : FlexState
-    """
-
-    start_s: float
-    interval_s: float
-    signals: Mapping[str, FloatArray]
-    step_s: float
-    energy_j: FloatArray
-    last: FlexState
-
-    @property
-    def time_s(self) -> FloatArray:
-        """Times of the points."""
-        return self.start_s + self.interval_s * np.arange(len(next(iter(self.signals.values()))))
-
-    def __getitem__(self, name: str) -> FloatArray:
-        """Return a signal by its name."""
-        return self.signals[name]
+FlexResponse = PairResponse[FlexState]
+"""Of a run: signals of `signal_names`, and where it ended."""
 
 
 def respond(
@@ -233,18 +202,14 @@ def respond(
     Raises
     ------
     InputError
-        On an unknown signal, a run of more than `MOST_STEPS` steps, or a contact damped more than its gears can follow.
+        On an unknown signal, a run of too many steps, or a contact damped more than its gears can follow.
     RefusalError
         If the solution grows beyond all bounds.
     """
     from sims.reduced_fe._integrate import march, room
 
-    step, every = positive(step_s, "step_s", "s"), count(stride, "stride")
-    n_steps = ceil(positive(duration_s, "duration_s", "s") / step - 1e-9)
-    if n_steps > MOST_STEPS:
-        raise InputError(
-            f"{n_steps:.3g} steps of {step:.3g} s", where="duration_s", allowed=f"at most {MOST_STEPS:.0e} steps"
-        )
+    step = positive(step_s, "step_s", "s")
+    plan = RunPlan(start_s, duration_s, step, stride, STEPS_PER_CALL)
     own = constants(pair, operation) if ready is None else ready
     lines = _lines(own, signals)
     coefficients = np.array([step_coefficients(s.omega_rad_s, s.damping_rate, step, method) for s in own.sides])
@@ -261,30 +226,23 @@ def respond(
         own.stacked("rigid"),
         back_rows(pair.machine, own.sides),
     )
-    courses = course_points(operation.speed_rpm, pi / 30.0), course_points(operation.torque_nm, 1.0)
+    courses = profile_points(operation.speed_rpm, pi / 30.0), profile_points(operation.torque_nm, 1.0)
     scratch = room(state[4].shape, state[0].shape[1], fixed[2].shape[3])
-    rows = np.empty((-(-n_steps // every), len(signals)))
-    energies = np.empty(len(rows) if with_energy else 0)
-    per_call = every * max(STEPS_PER_CALL // every, 1)
-    for begun in range(0, n_steps, per_call):
-        n = min(per_call, n_steps - begun)
-        part = slice(begun // every, begun // every + -(-n // every))
-        energy = energies[part] if with_energy else energies
-        time = start_s + begun * step
-        found = rows[part]
-        filled = march(
-            *fixed, state, *courses, time, step, n, every, method == "newmark", lines, found, energy, scratch
+
+    def part(time_s: float, n_steps: int, rows: FloatArray, energies: FloatArray) -> int:
+        is_newmark = method == "newmark"
+        return int(
+            march(*fixed, state, *courses, time_s, step, n_steps, stride, is_newmark, lines, rows, energies, scratch)
         )
-        if filled < len(found) or not np.isfinite(found).all():
-            raise RefusalError(
-                f"the solution grows beyond all bounds after {(begun + filled * every) * step:.3g} s",
-                remedy="lower mesh_damping_ratio, look for inertias that do not go together, or give a shorter step",
-            )
-        if on_progress is not None:
-            on_progress((begun + n) / n_steps)
-    return FlexResponse(
-        start_s, step * every, dict(zip(signals, rows.T, strict=True)), step, energies, FlexState(*state)
+
+    kept, energies = plan.run(
+        part,
+        signals,
+        with_energy=with_energy,
+        remedy="lower mesh_damping_ratio, look for inertias that do not go together, or give a shorter step",
+        on_progress=on_progress,
     )
+    return FlexResponse(start_s, step * stride, kept, step, energies, FlexState(*state))
 
 
 def signal_names(ready: FlexiblePairConstants) -> tuple[str, ...]:
@@ -300,11 +258,6 @@ def slot_names(ready: FlexiblePairConstants) -> tuple[str, ...]:
         *(f"pair {j} force_n" for j in slots),
         *(f"pair {j} slice {s} force_n" for j in slots for s in slices),
     )
-
-
-def course_points(course: Profile, factor: float) -> FloatArray:
-    """Times and values as kernels take them, (2, n)."""
-    return np.ascontiguousarray(np.vstack((course.times_s, factor * np.asarray(course.values))), dtype=np.float64)
 
 
 def _lines(own: FlexiblePairConstants, signals: Sequence[str]) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:

@@ -11,7 +11,6 @@ import numpy as np
 
 from gearsig.checks import positive
 from gearsig.errors import InputError
-from gearsig.gap import OperatingCondition
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 from sims.effects import EffectSetting, effects, with_effects
@@ -32,7 +31,7 @@ from sims.gear_pair import (
 )
 from sims.machine import Machine, Operation
 from sims.measure import plain
-from sims.mesh import Material, PairGeometry
+from sims.mesh import Material
 from sims.presets import Preset
 from sims.reduced_fe._blank import GearBlank
 from sims.reduced_fe._contact import MARGIN, corner_separation_m
@@ -179,12 +178,30 @@ class ReducedPair(PairModel[PreparedPair]):
     )
 
     def _built(self, asked: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> PreparedPair:
-        return _prepared(asked, rng, sampling_rate_hz)
+        gears = reduced_gears(asked.values)
+        healthy = healthy_machine(asked.values, gears, sampling_rate_hz=sampling_rate_hz, installed=asked.installed)
+        check_load(healthy, asked.operation)
+        machine = with_effects(healthy, asked.effects, rng)
+        if machine.roughness.locked_to == "time" and machine.roughness.rms_um > 0.0:
+            raise InputError(
+                "a roughness locked to time has no meaning here: flanks are shapes that return with their teeth",
+                where="locked_to of surface_roughness",
+                allowed="'flank'",
+            )
+        return PreparedPair(asked, flexible_pair(asked.values, machine, gears))
 
-    def _recorded(
-        self, ready: PreparedPair, rig: Rig, rng: np.random.Generator, *, sampling_rate_hz: float, duration_s: float
+    def record(
+        self,
+        ready: PreparedPair,
+        rng: np.random.Generator,
+        *,
+        rig: Rig,
+        sampling_rate_hz: float,
+        duration_s: float,
+        step_s: float | None = None,
+        noise_rng: np.random.Generator | None = None,
     ) -> Recording:
-
+        """Run a prepared pair and measure it; see `simulate_pair`."""
         recording, _ = simulate_pair(
             ready.pair,
             ready.operation,
@@ -193,7 +210,8 @@ class ReducedPair(PairModel[PreparedPair]):
             duration_s=duration_s,
             rig=rig,
             truth=ready.truth(),
-            step_s=ready.step_s,
+            step_s=ready.step_s if step_s is None else step_s,
+            noise_rng=noise_rng,
         )
         return recording
 
@@ -211,38 +229,6 @@ class ReducedPair(PairModel[PreparedPair]):
 
         ready = self.prepare(parameters, effects, operation, rng, preset_name=preset)
         return check_convergence(ready.pair, ready.operation, ready.step_s)
-
-
-def prepare_preset(
-    chosen: Preset,
-    parameters: Mapping[str, ParameterValue],
-    settings: Sequence[EffectSetting],
-    operation: Operation | None,
-    rng: np.random.Generator,
-    *,
-    sampling_rate_hz: float = 20480.0,
-) -> PreparedPair:
-    """Build a preset's pair and switch on its effects and `settings`; one number is drawn from `rng`."""
-    return _prepared(
-        SimulationRequest.of(chosen, PARAMETERS, parameters, settings, operation, sampling_rate_hz),
-        rng,
-        sampling_rate_hz,
-    )
-
-
-def _prepared(asked: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> PreparedPair:
-
-    gears = reduced_gears(asked.values)
-    sound = sound_machine(asked.values, gears, sampling_rate_hz=sampling_rate_hz, installed=asked.installed)
-    check_load(sound, asked.operation)
-    machine = with_effects(sound, asked.effects, rng)
-    if machine.roughness.locked_to == "time" and machine.roughness.rms_um > 0.0:
-        raise InputError(
-            "a roughness that is locked to time has no meaning here: flanks are shapes that return with their teeth",
-            where="locked_to of surface_roughness",
-            allowed="'flank'",
-        )
-    return PreparedPair(asked, flexible_pair(asked.values, machine, gears))
 
 
 # --------------------
@@ -405,7 +391,7 @@ def reduced_gears(values: Values) -> Gears:
     return _gear(_blank(wanted, 0), n_dof), _gear(_blank(wanted, 1), n_dof)
 
 
-def sound_machine(
+def healthy_machine(
     values: Values, gears: Gears, *, sampling_rate_hz: float = 20480.0, installed: Installed | None = None
 ) -> Machine:
     """Return the machine without effects: that of the 16-DOF pair, with masses and inertias of gears and hubs."""
@@ -479,41 +465,16 @@ class ReducedTwin(PairTwin):
     """A rig's twin with finite-element gears, full discs; see `sims.gear_pair.PairTwin`."""
 
     @property
-    def model(self) -> str:
-        """Name of the model whose preset the twin is."""
-        return NAME
-
-    def _simulated(
-        self,
-        own: Preset,
-        point: OperatingCondition,
-        seed: int,
-        *,
-        sampling_rate_hz: float,
-        duration_s: float,
-        noise_rng: np.random.Generator | None,
-    ) -> Recording:
-
-        rng = np.random.default_rng(seed)
-        ready = prepare_preset(own, {}, (), None, rng, sampling_rate_hz=sampling_rate_hz)
-        recording, _ = simulate_pair(
-            ready.pair,
-            ready.operation,
-            rng=rng,
-            sampling_rate_hz=sampling_rate_hz,
-            duration_s=duration_s,
-            rig=self._rig_at(point),
-            truth=ready.truth(),
-            step_s=TWIN_STEP_S,
-            noise_rng=noise_rng,
-        )
-        return recording
+    def pair_model(self) -> ReducedPair:
+        """The model that runs the twin."""
+        return ReducedPair()
 
     def _own_parameters(self, values: dict[str, ParameterValue]) -> dict[str, ParameterValue]:
         return twin_parameters(values, self.nominal.teeth)
 
-    def _geometry(self, own: Preset) -> PairGeometry:
-        return prepare_preset(own, {}, (), None, np.random.default_rng(0)).pair.machine.mesh.pair
+    def _step_s(self, own: Preset) -> float:
+        del own
+        return TWIN_STEP_S
 
 
 def reduced_gap_simulator() -> PairGapSimulator:

@@ -14,7 +14,7 @@ from gearsig.gap import Added, OperatingCondition, Twin, reduce_recording
 from gearsig.recording import Recording
 from gearsig.rig import Bearing, EncoderChannel, GearPair, OperatingPoint, Rig, Sensor, Shaft, TachometerChannel
 from sims import simulate
-from sims.cracked import CrackedTwin, prepare_preset
+from sims.cracked import CrackedPair, CrackedTwin
 from sims.effects import effect, effects
 from sims.gear_pair import BODY_KG, completed
 from sims.machine import nominal_of
@@ -97,7 +97,7 @@ def test_ordinary_gears_can_be_made(teeth: tuple[int, int], angle_deg: float) ->
 
 
 def machine_of(made: CrackedTwin, *added: Added):  # type: ignore[no-untyped-def]  # of the machine's room
-    return prepare_preset(made.preset(POINT, added), {}, (), None, np.random.default_rng(0)).machine
+    return CrackedPair().prepare_preset(made.preset(POINT, added), {}, (), None, np.random.default_rng(0)).machine
 
 
 def test_recordings_have_the_rigs_channels_and_can_be_gathered_with_it() -> None:

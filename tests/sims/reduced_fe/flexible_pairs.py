@@ -8,12 +8,12 @@ import numpy as np
 
 from sims.mesh import GearMesh, PairGeometry
 from sims.presets import preset
-from sims.reduced_fe import NAME, FlexiblePair, prepare_preset, ready_gear
+from sims.reduced_fe import NAME, FlexiblePair, ReducedPair, ready_gear
 from tests.sims.reduced_fe.synthetic import synthetic_gear
 
 
 def pair_of(preset_name="flexible_50_50", **parameters) -> FlexiblePair:
-    return prepare_preset(preset(NAME, preset_name), parameters, (), None, np.random.default_rng(0)).pair
+    return ReducedPair().prepare_preset(preset(NAME, preset_name), parameters, (), None, np.random.default_rng(0)).pair
 
 
 def synthetic_pair(**parameters) -> FlexiblePair:

@@ -1,0 +1,133 @@
+"""A run of a gear pair: its signals on an even grid of time, integrated in parts that can be interrupted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from gearsig.checks import FloatArray, count, positive
+from gearsig.errors import InputError, RefusalError
+from sims.machine import Profile
+
+State = TypeVar("State")
+March = Callable[[float, int, FloatArray, FloatArray], int]
+"""(time_s, n_steps, rows, energies) → rows that were filled, fewer than there are where the solution bursts."""
+
+
+@dataclass(frozen=True)
+class PairResponse(Generic[State]):
+    """Signals of a run on an even grid of time.
+
+    Parameters
+    ----------
+    start_s, interval_s : float
+    signals : mapping
+        Name → (n,), in m, rad, s, N.
+    step_s : float
+        Of the integrator.
+    energy_j : array
+        Potential, kinetic and gravitational energy, (n,), or empty where it was not asked for.
+    last : state of the model or None
+        At the end of the last step: one step after the last point where every step is kept.
+    """
+
+    start_s: float
+    interval_s: float
+    signals: Mapping[str, FloatArray]
+    step_s: float
+    energy_j: FloatArray
+    last: State | None = None
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Times of the points."""
+        return self.start_s + self.interval_s * np.arange(len(next(iter(self.signals.values()))))
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Return a signal by its name."""
+        return self.signals[name]
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """Steps of a run, and which of them are kept.
+
+    Parameters
+    ----------
+    start_s, duration_s, step_s : float
+    stride : int
+        Every how many steps a point is kept.
+    steps_per_call : int
+        After these many compiled code comes back for a look whether it is to stop.
+    max_steps : int
+        Ten minutes to half an hour of computing or so; more is taken for a mistake.
+    """
+
+    start_s: float
+    duration_s: float
+    step_s: float
+    stride: int
+    steps_per_call: int
+    max_steps: int = 400_000_000
+
+    def __post_init__(self) -> None:
+        positive(self.duration_s, "duration_s", "s")
+        positive(self.step_s, "step_s", "s")
+        count(self.stride, "stride")
+        if self.n_steps > self.max_steps:
+            raise InputError(
+                f"{self.n_steps:.3g} steps of {self.step_s:.3g} s",
+                where="duration_s",
+                allowed=f"at most {self.max_steps:.0e} steps",
+                remedy="simulate a shorter time, or in parts",
+            )
+
+    @property
+    def n_steps(self) -> int:
+        """Steps that reach the end."""
+        return ceil(self.duration_s / self.step_s - 1e-9)
+
+    def run(
+        self,
+        march: March,
+        signals: Sequence[str],
+        *,
+        with_energy: bool,
+        remedy: str,
+        on_progress: Callable[[float], None] | None,
+    ) -> tuple[dict[str, FloatArray], FloatArray]:
+        """Return the signals by name, and the energies where they are asked for.
+
+        Raises
+        ------
+        RefusalError
+            If the solution grows beyond all bounds.
+        """
+        every, n_steps = self.stride, self.n_steps
+        rows = np.empty((-(-n_steps // every), len(signals)))
+        energies = np.empty(len(rows) if with_energy else 0)
+        per_call = every * max(self.steps_per_call // every, 1)
+        for begun in range(0, n_steps, per_call):
+            n = min(per_call, n_steps - begun)
+            part = slice(begun // every, begun // every + -(-n // every))
+            filled = march(
+                self.start_s + begun * self.step_s, n, rows[part], energies[part] if with_energy else energies
+            )
+            if filled < len(rows[part]) or not np.isfinite(rows[part]).all():
+                raise RefusalError(
+                    f"the solution grows beyond all bounds after {(begun + filled * every) * self.step_s:.3g} s "
+                    f"at a step of {self.step_s:.3g} s",
+                    remedy=remedy,
+                )
+            if on_progress is not None:
+                on_progress((begun + n) / n_steps)
+        return dict(zip(signals, rows.T, strict=True)), energies
+
+
+def profile_points(profile: Profile, factor: float) -> FloatArray:
+    """Times and values as kernels take them, (2, n)."""
+    return np.ascontiguousarray(np.vstack((profile.times_s, factor * np.asarray(profile.values))), dtype=np.float64)
