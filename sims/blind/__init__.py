@@ -48,8 +48,8 @@ pair            z1, z2, module_mm
 
 "Pinion" is the gear on the input shaft, "wheel" that on the output shaft, whichever is larger.
 
-Names: `CATALOGUE` (19), `MECHANICAL` (16 of them), `OUTSIDE` (10). For the benchmark's own cases: `Condition`,
-`SHAFTS`; `labels` and `write_seen` are the two halves of `write_case`.
+Names: `CATALOGUE` (19), `MECHANICAL` (16 of them), `OUTSIDE_CATALOGUE` (10). For the benchmark's own cases:
+`RunCondition`, `SHAFTS`; `labels` and `write_seen` are the two halves of `write_case`.
 """
 
 from sims.blind._cases import BlindCase, CaseRecordings, Fault, draw_case, labels, record_case, write_case, write_seen

@@ -15,7 +15,7 @@ from sims.forging._drive import (
 )
 from sims.forging._kernels import bristle, position, reach, weight, younger_pair
 from sims.forging._measure import record, sensors
-from sims.forging._respond import DriveResponse, FirstState, drive_numbers, respond
+from sims.forging._respond import DriveResponse, FirstState, check_convergence, drive_numbers, respond
 from sims.forging._simulator import NAME, WITH_MEANING, ForgingManipulator, PreparedDrive, with_effects
 
 __all__ = [
@@ -36,6 +36,7 @@ __all__ = [
     "bristle",
     "build_drive",
     "build_rig",
+    "check_convergence",
     "drive_numbers",
     "position",
     "reach",

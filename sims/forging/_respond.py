@@ -326,7 +326,9 @@ class ForgingConvergence:
         return "\n".join([*lines, "converged" if self.converged else "NOT converged: flanks may rattle chaotically"])
 
 
-def check_convergence(drive: ForgingDrive, cycle: Cycle, torque_nm: Profile) -> ForgingConvergence:
+def check_convergence(
+    drive: ForgingDrive, cycle: Cycle, torque_nm: Profile, *, tolerance: float = TOLERANCE
+) -> ForgingConvergence:
     """Run one cycle twice.
 
     The impact is the first one backwards after the torque has gone, in continuous rotation the first of all. What
@@ -340,7 +342,7 @@ def check_convergence(drive: ForgingDrive, cycle: Cycle, torque_nm: Profile) -> 
     runs_on = cycle.mode == CONTINUOUS
     lasts_s = CONTINUOUS_S if runs_on else cycle.on_s + cycle.off_s
     courses = schedule(cycle, torque_nm, lasts_s)
-    ours, exact = (respond(drive, courses, duration_s=lasts_s, tolerance=t) for t in (TOLERANCE, EXACT * TOLERANCE))
+    ours, exact = (respond(drive, courses, duration_s=lasts_s, tolerance=t) for t in (tolerance, EXACT * tolerance))
     flank, after_s = (0.0, 0.0) if runs_on else (-1.0, cycle.on_s)
     (time_s, speed), (exact_s, exact_speed) = (_first(run, flank, after_s) for run in (ours, exact))
     rms = [float(np.sqrt(np.mean(run["interaction force"] ** 2))) for run in (ours, exact)]

@@ -1,6 +1,5 @@
 """Shared gear physics: involute geometry and mesh stiffness of spur pairs."""
 
-from sims.mesh._backlash import FlankContact, dead_zone_m
 from sims.mesh._deviation import FlankDeviation, pitch_separation_m, wear_profile
 from sims.mesh._faults import (
     RootCrack,
@@ -79,7 +78,6 @@ __all__ = [
     "MOST_FRICTION",
     "SOUND",
     "STEEL",
-    "FlankContact",
     "FlankDeviation",
     "FlankRoughness",
     "FractalSurface",
@@ -110,7 +108,6 @@ __all__ = [
     "cracked_tooth_compliance",
     "cubic",
     "curvature_radius_mm",
-    "dead_zone_m",
     "deepest_crack_mm",
     "disc_inertia_kg_m2",
     "disc_mass_kg",

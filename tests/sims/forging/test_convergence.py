@@ -3,8 +3,7 @@
 import pytest
 
 from gearsig.errors import RefusalError
-from sims.forging import Cycle
-from sims.forging import _respond as convergence
+from sims.forging import Cycle, check_convergence
 from sims.machine import Profile
 from tests.app.test_cli import run
 from tests.sims.forging.drives import drive
@@ -14,23 +13,22 @@ from tests.sims.forging.drives import drive
 @pytest.mark.parametrize("stiffness", ["formula", "table"])
 def test_the_tolerance_in_use_is_enough(mode: str, stiffness: str) -> None:
     made = drive(contact_stiffness=stiffness)
-    found = convergence.check_convergence(made, Cycle(mode, brake_nm=60.0), Profile.constant(95.0))
+    found = check_convergence(made, Cycle(mode, brake_nm=60.0), Profile.constant(95.0))
     assert found.converged
     assert abs(found.time_s - found.exact_time_s) < 2e-6
     assert found.energy_error < 1e-3
     assert found.n_exact_steps > 2 * found.n_steps
 
 
-def test_a_coarse_tolerance_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(convergence, "TOLERANCE", 1e-3)
-    found = convergence.check_convergence(drive(), Cycle(brake_nm=60.0), Profile.constant(95.0))
+def test_a_coarse_tolerance_is_told() -> None:
+    found = check_convergence(drive(), Cycle(brake_nm=60.0), Profile.constant(95.0), tolerance=1e-3)
     assert not found.converged
     assert "NOT converged" in found.text
 
 
 def test_without_torque_there_is_nothing_to_compare() -> None:
     with pytest.raises(RefusalError, match="never meet"):
-        convergence.check_convergence(drive(), Cycle(), Profile.constant(0.0))
+        check_convergence(drive(), Cycle(), Profile.constant(0.0))
 
 
 def test_the_command(capsys: pytest.CaptureFixture[str]) -> None:
