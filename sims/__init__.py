@@ -40,7 +40,7 @@ def simulate(
         Name → value; what is not given is the preset's.
     effects : mapping, sequence of EffectSetting or None
         Name → severity in the effect's unit, or settings with options (which gear, which tooth).
-    speed_rpm, torque_nm : number, sequence of (time in s, value), Course or None
+    speed_rpm, torque_nm : number, sequence of (time in s, value), Profile or None
         Of the input shaft; between points in straight lines. None: the preset's.
     duration_s, sampling_rate_hz : float
     seed : int

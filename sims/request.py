@@ -71,12 +71,8 @@ def truth_of(
             {"name": s.name, "severity": s.severity, "unit": effect(s.name).severity.unit, "options": dict(s.options)}
             for s in settings
         ],
-        "operation": {"speed_rpm": _plain(operation.speed_rpm), "torque_nm": _plain(operation.torque_nm)},
+        "operation": {"speed_rpm": operation.speed_rpm.as_dict(), "torque_nm": operation.torque_nm.as_dict()},
     }
-
-
-def _plain(course: Profile) -> dict[str, list[float]]:
-    return {"times_s": course.times_s.tolist(), "values": course.values.tolist()}
 
 
 # --------------------

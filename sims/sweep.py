@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from gearsig.recording import Recording
 
 
-MOST_POINTS = 1_000_000
+MAX_POINTS = 1_000_000
 OPERATION_AXES = ("speed_rpm", "torque_nm")
 """Names of axes that are neither a parameter nor an effect."""
 
@@ -88,7 +88,7 @@ class Sweep:
     axes : tuple of Axis
     parameters, effects : mapping and tuple of EffectSetting
         The same at every point.
-    speed_rpm, torque_nm : Course or None
+    speed_rpm, torque_nm : Profile or None
         Where no axis varies them; None: the preset's.
     duration_s, sampling_rate_hz : float
     seed : int
@@ -122,8 +122,8 @@ class Sweep:
         names = [axis.name for axis in self.axes]
         if not names or len(set(names)) < len(names):
             raise InputError(f"axes are {', '.join(names) or 'none'}", allowed="at least one, none twice")
-        if self.n_points > MOST_POINTS:
-            raise InputError(f"the grid has {self.n_points} points", allowed=f"up to {MOST_POINTS}")
+        if self.n_points > MAX_POINTS:
+            raise InputError(f"the grid has {self.n_points} points", allowed=f"up to {MAX_POINTS}")
         self._check_axes()
 
     @property
@@ -161,8 +161,8 @@ class Sweep:
             "axes": [{"name": a.name, "values": list(a.values), "options": dict(a.options)} for a in self.axes],
             "parameters": dict(self.parameters),
             "effects": [{"name": s.name, "severity": s.severity, "options": dict(s.options)} for s in self.effects],
-            "speed_rpm": _plain(self.speed_rpm),
-            "torque_nm": _plain(self.torque_nm),
+            "speed_rpm": self.speed_rpm and self.speed_rpm.as_dict(),
+            "torque_nm": self.torque_nm and self.torque_nm.as_dict(),
             "duration_s": self.duration_s,
             "sampling_rate_hz": self.sampling_rate_hz,
             "seed": self.seed,
@@ -213,10 +213,6 @@ class Sweep:
             else:
                 for value in axis.values:
                     checked_value(parameter(model.parameters, axis.name), value)
-
-
-def _plain(course: Profile | None) -> dict[str, list[float]] | None:
-    return None if course is None else {"times_s": course.times_s.tolist(), "values": course.values.tolist()}
 
 
 # --------------------

@@ -58,7 +58,7 @@ N_NUMBERS = 33
 
 GAP, STIFFNESS, SLIP, RHO, CARRIED = range(5)
 """Columns of the pairs in reach."""
-MOST_PAIRS = 6
+MAX_PAIRS = 6
 Tables = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -94,7 +94,7 @@ def pairs_in_reach(
     `shift` is a separation of all teeth by run-out: gear 2 lags by it, and with gear 2's tips the path's start A; its
     end E belongs to gear 1. `opening` is a growth of the centre distance, which moves both ends.
 
-    Pair j stands at r_b1 θ1 / p_b − j on the path; a pair whose compliance is 1 + w times the sound one has 1/(1 + w)
+    Pair j stands at r_b1 θ1 / p_b − j on the path; a pair whose compliance is 1 + w times the healthy one has 1/(1 + w)
     of its stiffness.
     """
     gap_0, pair_k, slip, gap_1, gap_2, weak_1, weak_2 = tables
@@ -377,7 +377,7 @@ def march(
     n, n_seen = shapes.shape[0], seen.shape[0]
     out = np.empty((n_out, N_OUT))
     f, f_new, q_new, p_new, push = np.zeros(n), np.zeros(n), q.copy(), p.copy(), np.zeros(n)
-    u, v, held, pairs = np.zeros(n_seen), np.zeros(n_seen), np.zeros(4), np.zeros((MOST_PAIRS, 5))
+    u, v, held, pairs = np.zeros(n_seen), np.zeros(n_seen), np.zeros(4), np.zeros((MAX_PAIRS, 5))
     pointers = np.zeros(all_trains[0].shape[0], dtype=np.int64)
     gamma, gamma_v = (seen[0] ** 2 * steps[5]).sum(), (seen[0] ** 2 * steps[7]).sum()
     force, behind = 0.0, 0.0

@@ -211,10 +211,10 @@ def _mounted_paths(rig: BlindRig, condition: RunCondition) -> list[list[SensorRe
 def _speed_course(rig: BlindRig, condition: RunCondition, omega_1: float, rng: np.random.Generator) -> Matrix:
     """Reference speed and its rate of change, (n, 2), every GRID_S: a slow wander."""
     t = np.arange(0, condition.duration_s + WARM_UP_S + 1, GRID_S)
-    course, later = np.ones_like(t), rng.uniform(0, 20)
+    profile, later = np.ones_like(t), rng.uniform(0, 20)
     for frequency_hz, share, phase in rig.wander:
-        course += share * np.sin(2 * pi * frequency_hz * (t + later) + phase)
-    return np.column_stack([omega_1 * course, np.gradient(omega_1 * course, GRID_S)])
+        profile += share * np.sin(2 * pi * frequency_hz * (t + later) + phase)
+    return np.column_stack([omega_1 * profile, np.gradient(omega_1 * profile, GRID_S)])
 
 
 def with_course(scene: Scene, factor: Callable[[FloatArray], FloatArray]) -> None:

@@ -1,4 +1,4 @@
-"""One blind case: a machine by its drawing, something wrong or nothing, recordings now and when it was sound."""
+"""One blind case: a machine by its drawing, something wrong or nothing, recordings now and when it was healthy."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def _slips(machine: BlindDrive, found: FloatArray, rng: np.random.Generator) -> 
 
 KINDS = ("none", "single", "unknown")
 DAILY = {"load_level": 0.05, "mu": 0.05, "torque": 0.02, "motor_level": 0.1, "brake": 0.05}
-"""What a sound machine changes by from one day to another, relative."""
+"""What a healthy machine changes by from one day to another, relative."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ class DriveCase:
         0 (barely noticeable) to 1 (strong), and in the effect's unit.
     place : mapping
         Tooth (from 1) or order, where it has one.
-    machine, sound : Machine
+    machine, healthy : Machine
         Now; and as the reference knew it.
     chain : Chain
     duration_s : float
@@ -175,7 +175,7 @@ class DriveCase:
     severity: float
     place: dict[str, float]
     machine: BlindDrive
-    sound: BlindDrive
+    healthy: BlindDrive
     chain: Chain
     duration_s: float
     with_reference: bool
@@ -184,7 +184,7 @@ class DriveCase:
 
 @dataclass(frozen=True)
 class MadeCase:
-    """Recordings: now, and of the sound machine where there is one."""
+    """Recordings: now, and of the healthy machine where there is one."""
 
     recording: Recording
     reference: Recording | None
@@ -210,9 +210,9 @@ def draw_case(
     """
     one_of(kind, "kind", KINDS)
     drawing = draw_drawing(rng, role)
-    sound = build(rng, drawing)
+    healthy = build(rng, drawing)
     chain = draw_chain(rng)
-    now = _another_day(sound, rng)
+    now = _another_day(healthy, rng)
     severity = 0.0
     place: dict[str, float] = {}
     if effect:
@@ -222,14 +222,14 @@ def draw_case(
     n_cycles = int(rng.integers(5, 8))
     duration = n_cycles * (drawing.on_s + drawing.off_s)
     return DriveCase(
-        kind, effect, level, severity, place, now, sound, chain, duration, with_reference, int(rng.integers(2**31))
+        kind, effect, level, severity, place, now, healthy, chain, duration, with_reference, int(rng.integers(2**31))
     )
 
 
 def record_case(case: DriveCase) -> MadeCase:
     """Record a case."""
     rng, other = np.random.default_rng(case.seed).spawn(2)
-    reference = run(case.sound, case.chain, case.duration_s, other) if case.with_reference else None
+    reference = run(case.healthy, case.chain, case.duration_s, other) if case.with_reference else None
     return MadeCase(run(case.machine, case.chain, case.duration_s, rng), reference)
 
 

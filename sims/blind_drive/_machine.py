@@ -293,7 +293,7 @@ class DriveChange:
     apply : callable
         Machine, severity, generator → numbers that change, place.
     needs_reference : bool
-        Whether no drawing states the sound value.
+        Whether no drawing states the healthy value.
     """
 
     low: float

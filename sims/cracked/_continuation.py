@@ -12,7 +12,7 @@ from gearsig.errors import InputError
 from gearsig.recording import Recording
 from sims.cracked._respond import SIGNALS, PairState, Response, default_step_s, respond, slowest_decay_s
 from sims.cracked._simulator import NAME, CrackedPair, PreparedCrackedPair, simulate_with_motion
-from sims.gear_pair import COORDINATES, LEAST_MOTION_HZ
+from sims.gear_pair import COORDINATES, MIN_MOTION_HZ
 from sims.machine import Machine, Operation, Profile
 from sims.request import operation_of
 from sims.sweep import Sweep
@@ -24,7 +24,7 @@ DECAYS = 8.0
 RAMP_S = 0.1
 """Time over which speed and torque go from one value to the next: no blow throws the motion off its branch."""
 SPARE_CYCLES = 2
-LEAST_PER_CYCLE = 16
+MIN_PER_CYCLE = 16
 """Points that are kept per cycle, so that the section can be interpolated."""
 _ANGLE = ("driver angle", "driver angle velocity")
 
@@ -107,8 +107,8 @@ class Branch:
             raise InputError(f"model {self.sweep.model} cannot go on from a state", allowed=NAME)
         if len(self.sweep.axes) != 1:
             raise InputError(f"{len(self.sweep.axes)} things are varied", allowed="one", remedy="give --vary once")
-        for course, name in ((self.sweep.speed_rpm, "speed_rpm"), (self.sweep.torque_nm, "torque_nm")):
-            if course is not None and np.ptp(course.values) > 0.0:
+        for profile, name in ((self.sweep.speed_rpm, "speed_rpm"), (self.sweep.torque_nm, "torque_nm")):
+            if profile is not None and np.ptp(profile.values) > 0.0:
                 raise InputError(f"{name} changes with time", allowed="constant: the motion must become steady")
 
     @property
@@ -192,7 +192,7 @@ class Branch:
             signals=self._wanted(),
             start_s=-settle_s,
             step_s=step,
-            stride=max(int(min(1.0 / LEAST_MOTION_HZ, cycle_s / LEAST_PER_CYCLE) / step), 1),
+            stride=max(int(min(1.0 / MIN_MOTION_HZ, cycle_s / MIN_PER_CYCLE) / step), 1),
             first=first,
         )
 

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from sims.gear_pair import carried_part, foot
-from sims.machine import course_value, set_speed
+from sims.machine import profile_value, set_speed
 from sims.mesh import advance, contact_friction_n, cubic, engagement_and_slope, height_now, pair_force
 
 # --------------------
@@ -31,9 +31,9 @@ from sims.mesh import advance, contact_friction_n, cubic, engagement_and_slope, 
 # --------------------
 
 
-MOST_CYCLES = 1e12
+MAX_CYCLES = 1e12
 """Mesh cycles beyond which a run has burst; until then, single cycles are resolved to 1e-4."""
-MOST_LATE = 0.12
+MAX_LATE = 0.12
 """Base pitches by which an entry may be late or early; the places of gears that move further count as that far."""
 
 
@@ -41,7 +41,7 @@ MOST_LATE = 0.12
 def late_entry(k, dx, dy):
     """Base pitches by which pairs enter late, from the driver's centre less the driven gear's."""
     late = -(k.late_x * dx + k.late_y * dy)
-    return min(max(late, -MOST_LATE), MOST_LATE)
+    return min(max(late, -MAX_LATE), MAX_LATE)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -54,9 +54,9 @@ def contact_forces(  # noqa: PLR0915  one pass over the pairs: no part of it sta
     `slip_x`: ẋ1 − ẋ2. `rough`, `rough_rate`: Δb and its rate.
     """
     normal, along_cycles, friction, moment_1, moment_2 = 0.0, 0.0, 0.0, 0.0, 0.0
-    if not abs(cycles) < MOST_CYCLES:  # a solution that bursts, or NaN, must not be taken for a tooth's number
+    if not abs(cycles) < MAX_CYCLES:  # a solution that bursts, or NaN, must not be taken for a tooth's number
         return np.nan, np.nan, np.nan, np.nan, np.nan
-    newest = np.floor(cycles + 0.5 * k.ramp + MOST_LATE)
+    newest = np.floor(cycles + 0.5 * k.ramp + MAX_LATE)
     z1, z2 = float(k.teeth[0]), float(k.teeth[1])
     columns = curves.shape[1]
     for slot in range(k.n_slots):
@@ -142,7 +142,7 @@ def energy_of_pair(depth, compliance, force, load_dependent):
 def stored_energy(k, curves, rows, pitch, delta, late, cycles, rough):
     """ΣU of the driving flanks, in J; for checks."""
     total = 0.0
-    newest = int(np.floor(cycles + 0.5 * k.ramp + MOST_LATE))
+    newest = int(np.floor(cycles + 0.5 * k.ramp + MAX_LATE))
     for slot in range(k.n_slots):
         pair = newest - slot
         progress = cycles - pair
@@ -369,7 +369,7 @@ def integrate(  # noqa: PLR0915  four stages written out
 
     k, curves, rows, pitch : see `sims.cracked`.
     q, v, set_angle : (16,), (16,), (1,); left at the last step's state, for the next call to go on from.
-    speed, torque : (2, n) times and values of the set courses, in rad/s and N m.
+    speed, torque : (2, n) times and values of the set profiles, in rad/s and N m.
     rough : phasors of a roughness locked to time at `start`, stepped by half of `step`, left at the end; see
         `TimeLockedRoughness`.
     select : places of the wanted signals in `sims.cracked.SIGNALS`.
@@ -394,7 +394,7 @@ def integrate(  # noqa: PLR0915  four stages written out
         # The set angle by Simpson's rule, and by the parabola through the same three speeds half way.
         angle_h = angle + step / 24.0 * (5.0 * w0 + 8.0 * wh - w1)
         angle_1 = angle + step / 6.0 * (w0 + 4.0 * wh + w1)
-        m0, mh, m1 = course_value(torque, t), course_value(torque, t + 0.5 * step), course_value(torque, t + step)
+        m0, mh, m1 = profile_value(torque, t), profile_value(torque, t + 0.5 * step), profile_value(torque, t + step)
         advance(re, im, half_cos, half_sin)
         hh, rh = height_now(re, im, omega)
         advance(re, im, half_cos, half_sin)
@@ -462,7 +462,7 @@ def derivative(k, curves, rows, pitch, t, state, speed, torque, first_angle, rou
         pitch,
         state[:16],
         state[16:],
-        course_value(torque, t),
+        profile_value(torque, t),
         angle,
         w,
         d,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, closest_match_hint
 from gearsig.errors import InputError
-from sims.cracked._kernels import MOST_LATE
+from sims.cracked._kernels import MAX_LATE
 from sims.gear_pair import (
     BEARING_FIELDS,
     COORDINATES,
@@ -172,7 +172,7 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
         "load_dependent": table.load_dependent,
         "contact_ratio": table.contact_ratio,
         "ramp": table.ramp,
-        "n_slots": floor(table.contact_ratio + table.ramp + 2.0 * MOST_LATE) + 1,
+        "n_slots": floor(table.contact_ratio + table.ramp + 2.0 * MAX_LATE) + 1,
         "teeth": (pair.driver.teeth, pair.driven.teeth),
         "base_radius": base_radius,
         "cycles_per_rad": pair.driver.teeth / (2.0 * pi),
@@ -223,13 +223,13 @@ def mesh_mass_kg(machine: Machine) -> float:
 
 
 def mean_stiffness_n_per_m(machine: Machine, force_n: float) -> float:
-    """Mean mesh stiffness over a cycle of sound teeth, at the set force where contact stiffens with the load."""
+    """Mean mesh stiffness over a cycle of healthy teeth, at the set force where contact stiffens with the load."""
     from dataclasses import replace
 
-    sound = replace(machine.mesh, cracks_1=(), cracks_2=(), spalls_1=(), spalls_2=(), chips_1=(), chips_2=())
-    if sound.contact_law == "linear":
-        return mesh_stiffness(sound).mean_n_per_m
-    return mesh_stiffness(sound, force_n=max(force_n, 1.0)).mean_n_per_m
+    healthy = replace(machine.mesh, cracks_1=(), cracks_2=(), spalls_1=(), spalls_2=(), chips_1=(), chips_2=())
+    if healthy.contact_law == "linear":
+        return mesh_stiffness(healthy).mean_n_per_m
+    return mesh_stiffness(healthy, force_n=max(force_n, 1.0)).mean_n_per_m
 
 
 def _stacked(table: MeshTable) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
@@ -430,7 +430,7 @@ Response = PairResponse[PairState]
 
 @dataclass(frozen=True)
 class PreparedRun:
-    """A run that is ready to start: numbers, first state, set courses, roughness."""
+    """A run that is ready to start: numbers, first state, set profiles, roughness."""
 
     constants: PairConstants
     q: FloatArray
@@ -475,7 +475,7 @@ def respond(
     ----------
     machine : Machine
     operation : Operation
-        Set speed and torque; time 0 of their courses is time 0 here.
+        Set speed and torque; time 0 of their profiles is time 0 here.
     duration_s : float
     rng : numpy.random.Generator
         Draws the roughness, then the rolling elements' places.

@@ -30,7 +30,7 @@ from sims.simulator import Parameter, ParameterValues
 STATIC_RATIO_RANGE = (1.0, 10.0)
 SPEED_BAND_RANGE = (0.01, 1.0)
 MESH_RAMP_RANGE = (0.005, 0.1)
-LEAST_CONTACT_RATIO = 1.1
+MIN_CONTACT_RATIO = 1.1
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ class ForgingDrive:
         for depth in self.wear_um:
             not_negative(depth, "wear_um", "um")
         highest = 1.9 - self.mesh_ramp
-        within(self.path.contact_ratio, "contact_ratio", LEAST_CONTACT_RATIO, highest, remedy="one to two pairs touch")
+        within(self.path.contact_ratio, "contact_ratio", MIN_CONTACT_RATIO, highest, remedy="one to two pairs touch")
         if self.contact.driven_inertia_kg_m2 is None or self.pinion_side_inertia_kg_m2 <= 0.0:
             raise InputError("an inertia is missing", where="forging drive", allowed="above 0 kg m^2 on either side")
 
@@ -268,8 +268,8 @@ class Schedule:
     brake_nm: Profile
     press_nm: Profile
 
-    def stretches(self, duration_s: float) -> FloatArray:
-        """Times between which all courses are straight, from 0 to `duration_s`."""
+    def segments(self, duration_s: float) -> FloatArray:
+        """Times between which all profiles are straight, from 0 to `duration_s`."""
         knots = np.concatenate([c.times_s for c in (self.torque_nm, self.brake_nm, self.press_nm)])
         inside = knots[(knots > 0.0) & (knots < duration_s)]
         return np.unique(np.round(np.concatenate([[0.0], inside, [duration_s]]), 12))
@@ -277,14 +277,14 @@ class Schedule:
     def straight(self, start_s: float, end_s: float) -> FloatArray:
         """Start time, then value and slope of torque, brake and press over one stretch."""
         values = [start_s]
-        for course in (self.torque_nm, self.brake_nm, self.press_nm):
-            first, last = (float(course.at(time)) for time in (start_s, end_s))
+        for profile in (self.torque_nm, self.brake_nm, self.press_nm):
+            first, last = (float(profile.at(time)) for time in (start_s, end_s))
             values += [first, (last - first) / (end_s - start_s)]
         return np.array(values)
 
 
 def schedule(cycle: Cycle, torque_nm: Profile, duration_s: float) -> Schedule:
-    """Return the courses of a run from rest; a stop must fit into the record.
+    """Return the profiles of a run from rest; a stop must fit into the record.
 
     Raises
     ------
@@ -373,7 +373,7 @@ _GEARS = (
     _number("module_mm", "mm", "module of both gears", 0.3, 50, 5.0),
     _number("pressure_angle_deg", "deg", "pressure angle", 14, 30, 20.0),
     _number("face_width_mm", "mm", "face width; for the rig file only", 1, 1000, 80.0),
-    _number("contact_ratio", "", "mean pairs in contact; none: of standard teeth", LEAST_CONTACT_RATIO, 1.85, None),
+    _number("contact_ratio", "", "mean pairs in contact; none: of standard teeth", MIN_CONTACT_RATIO, 1.85, None),
     _number("mesh_ramp", "", "base pitches over which a pair takes up its load", *MESH_RAMP_RANGE, 0.05),
     _number("mesh_phase", "", "pinion's angle, in tooth pitches, at which a pair enters", 0, 1, 0.0),
 )

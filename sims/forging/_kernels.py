@@ -1,4 +1,4 @@
-"""Compiled: runs the drive through one stretch of straight courses, and finds every contact gained or lost."""
+"""Compiled: runs the drive through one stretch of straight profiles, and finds every contact gained or lost."""
 
 # mypy: allow-untyped-defs, allow-untyped-calls
 
@@ -56,7 +56,7 @@ def position(k, angle, flank, younger):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def soundness(k, number, flank):
+def stiffness_share(k, number, flank):
     """Part of its stiffness that a pair has: less than 1 for a weak tooth on its drive flank."""
     if flank > 0 and k.weak_loss > 0.0 and number - floor(number / k.weak_teeth) * k.weak_teeth == k.weak_tooth:
         return 1.0 - k.weak_loss
@@ -118,7 +118,7 @@ def stored_energy(k, angle, q, flank, younger):
     for i in range(2):
         depth = flank * q - k.half_backlash - worn_off(k, p + i, flank)[0]
         if depth > 0.0:
-            n = weight(k, p + i)[0] * soundness(k, younger - i, flank)
+            n = weight(k, p + i)[0] * stiffness_share(k, younger - i, flank)
             total += n * k.stiffness * depth ** (k.exponent + 1.0) / (k.exponent + 1.0)
     return total
 
@@ -178,8 +178,8 @@ def rates(k, y, flank, younger, damping, torque, brake, press, dy, out):
             w, dw = weight(k, p + i)
             if depth <= 0.0 or w <= 0.0:
                 continue
-            sound = soundness(k, younger - i, flank)
-            w, dw = w * sound, dw * sound
+            share = stiffness_share(k, younger - i, flank)
+            w, dw = w * share, dw * share
             closing = flank * q_rate - over * slope * w1
             elastic, pressed = one_pair(k, depth, closing, damping)
             pairs += w
@@ -240,11 +240,11 @@ DENSE = np.asarray(RK45.P)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def step(k, y, t, h, mode, course, stages, end, out):
+def step(k, y, t, h, mode, profile, stages, end, out):
     """Step from y (first stage already in `stages[0]`) to `end`; `out` is that of the step's end.
 
     mode : flank, younger pair, damping.
-    course : time 0 and values of torque, brake, press with their slopes.
+    profile : time 0 and values of torque, brake, press with their slopes.
     """
     n = y.shape[0]
     for s in range(1, N_STAGES):
@@ -253,16 +253,16 @@ def step(k, y, t, h, mode, course, stages, end, out):
             for j in range(s):
                 total += STAGES[s, j] * stages[j, i]
             end[i] = y[i] + h * total
-        evaluate(k, end, t + NODES[s] * h, mode, course, stages[s], out)
+        evaluate(k, end, t + NODES[s] * h, mode, profile, stages[s], out)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def evaluate(k, y, t, mode, course, dy, out):
+def evaluate(k, y, t, mode, profile, dy, out):
     """Fill the rates at time t."""
-    since = t - course[0]
+    since = t - profile[0]
     rates(
         k, y, mode[0], mode[1], mode[2],
-        course[1] + course[2] * since, course[3] + course[4] * since, course[5] + course[6] * since, dy, out,
+        profile[1] + profile[2] * since, profile[3] + profile[4] * since, profile[5] + profile[6] * since, dy, out,
     )  # fmt: skip
 
 
@@ -292,19 +292,19 @@ N_OUT = 13
 N_SIGNALS = 17
 LONGEST_STEP_S = 1e-3
 SHORTEST_STEP_S = 1e-12
-MOST_TURN = 0.03
+MAX_TURN = 0.03
 """Base pitches in one step: pairs then change hands within single contact."""
 ROOT_M = 1e-16
 DONE, TOO_MANY_CONTACTS, STUCK = 0, 1, 2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def integrate(k, y, mode, t, t_end, first_step, course, absolute, relative, interval, select, counts, found, contacts):
+def integrate(k, y, mode, t, t_end, first_step, profile, absolute, relative, interval, select, counts, found, contacts):
     """Run from t to `t_end`; fill rows of `found` at multiples of `interval` and rows of `contacts`.
 
     y : states, left at the end's.
     mode : flank (−1, 0, 1), younger pair, damping of the contact; left at the end's.
-    course : start time, then value and slope of torque, brake and press.
+    profile : start time, then value and slope of torque, brake and press.
     select : places of the wanted signals in `sims.forging.SIGNALS`.
     counts : rows filled so far in `found` and in `contacts` (an unfinished contact is the last row), steps taken,
         steps refused; continued.
@@ -314,13 +314,13 @@ def integrate(k, y, mode, t, t_end, first_step, course, absolute, relative, inte
     stages, end = np.empty((N_STAGES, n)), np.empty(n)
     out, spare = np.empty(N_OUT), np.empty((2, n))
     h = first_step
-    evaluate(k, y, t, mode, course, stages[0], out)
+    evaluate(k, y, t, mode, profile, stages[0], out)
     while t < t_end - 1e-15 * max(1.0, t_end):
         turn = abs(y[1]) * k.cycles_per_rad
-        h = min(h, LONGEST_STEP_S, MOST_TURN / turn if turn > 0.0 else LONGEST_STEP_S)
+        h = min(h, LONGEST_STEP_S, MAX_TURN / turn if turn > 0.0 else LONGEST_STEP_S)
         free = h
         h = min(h, t_end - t)
-        step(k, y, t, h, mode, course, stages, end, out)
+        step(k, y, t, h, mode, profile, stages, end, out)
         error = error_norm(y, end, h, stages, absolute, relative)
         if not error <= 1.0:
             counts[3] += 1
@@ -332,9 +332,9 @@ def integrate(k, y, mode, t, t_end, first_step, course, absolute, relative, inte
         next_flank = _flank_after(k, y, end, h, stages, mode[0])
         changes = next_flank != mode[0]
         if changes:
-            h = _to_event(k, y, t, h, mode, course, stages, end, out, next_flank)
+            h = _to_event(k, y, t, h, mode, profile, stages, end, out, next_flank)
         if counts[0] < found.shape[0] and counts[0] * interval <= t + h:
-            _fill_rows(k, y, t, h, mode, course, stages, interval, select, counts, found, spare)
+            _fill_rows(k, y, t, h, mode, profile, stages, interval, select, counts, found, spare)
         t += h
         y[:] = end
         if mode[0] != 0.0:
@@ -342,11 +342,11 @@ def integrate(k, y, mode, t, t_end, first_step, course, absolute, relative, inte
         if changes:
             if not _change_contact(k, y, t, next_flank, mode, counts, contacts):
                 return h, TOO_MANY_CONTACTS
-            evaluate(k, y, t, mode, course, stages[0], out)
+            evaluate(k, y, t, mode, profile, stages[0], out)
             h = min(free, 1e-5)
             continue
         if mode[0] != 0.0 and _hand_over(k, y, mode):
-            evaluate(k, y, t, mode, course, stages[0], out)
+            evaluate(k, y, t, mode, profile, stages[0], out)
         else:
             stages[0] = stages[N_STAGES - 1]
         grown = h * min(5.0, 0.9 * max(error, 1e-10) ** -0.2)
@@ -355,7 +355,7 @@ def integrate(k, y, mode, t, t_end, first_step, course, absolute, relative, inte
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _fill_rows(k, y, t, h, mode, course, stages, interval, select, counts, found, spare):
+def _fill_rows(k, y, t, h, mode, profile, stages, interval, select, counts, found, spare):
     """Fill the rows of `found` whose times lie within a step."""
     extra, row = np.empty(N_OUT), np.empty(N_SIGNALS)
     at = spare[0]
@@ -363,7 +363,7 @@ def _fill_rows(k, y, t, h, mode, course, stages, interval, select, counts, found
         x = (counts[0] * interval - t) / h
         for i in range(y.shape[0]):
             at[i] = within_step(y, h, stages, x, i)
-        evaluate(k, at, t + x * h, mode, course, spare[1], extra)
+        evaluate(k, at, t + x * h, mode, profile, spare[1], extra)
         row[:N_OUT] = extra
         row[N_OUT] = energy(k, at, mode[0], mode[1])
         row[N_OUT + 1 : N_SIGNALS] = at[8:11]
@@ -438,7 +438,7 @@ def _flank_after(k, y, end, h, stages, flank):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _to_event(k, y, t, h, mode, course, stages, end, out, next_flank):
+def _to_event(k, y, t, h, mode, profile, stages, end, out, next_flank):
     """Shorten the step to the moment at which the flanks meet or part; return its length.
 
     First on the interpolant by bisection, then with true steps by Newton's rule.
@@ -458,7 +458,7 @@ def _to_event(k, y, t, h, mode, course, stages, end, out, next_flank):
     found = high * h
     for _ in range(4):
         found = min(max(found, 1e-15), h)
-        step(k, y, t, found, mode, course, stages, end, out)
+        step(k, y, t, found, mode, profile, stages, end, out)
         edge, over = reach(k, end[0], flank)
         left = flank * end[2] - edge
         speed = flank * end[3] - over * end[1]

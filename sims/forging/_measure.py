@@ -31,46 +31,44 @@ from sims.simulator import ParameterValues
 # --------------------
 
 
-FILTERED_FINE_POINTS = 8
+SLOW_FINE_POINTS = 8
 """Points of the motion per sample: what the teeth do above seven times the sampling rate is below a millinewton."""
-MOST_VALUES = 40_000_000
+MAX_VALUES = 40_000_000
 """Of the fine motion at a time: a third of a gigabyte."""
 
 
 def filtered_signals(
-    drive: ForgingDrive, courses: Schedule, names: Sequence[str], *, sampling_rate_hz: float, n_samples: int
+    drive: ForgingDrive, profiles: Schedule, names: Sequence[str], *, sampling_rate_hz: float, n_samples: int
 ) -> dict[str, FloatArray]:
     """Return signals of the drive, low-pass filtered and sampled, each (n_samples,).
 
     The filter has no delay: a sine up to 0.4 of the sampling rate keeps amplitude and phase, one above half of it is
-    down by 90 dB. Ahead of the run everything stands as it does at its begin. The courses must last 30 samples longer.
+    down by 90 dB. Ahead of the run everything stands as it does at its begin. The profiles must last 30 samples longer.
 
     Parameters
     ----------
     drive : ForgingDrive
-    courses : Schedule
+    profiles : Schedule
     names : sequence of str
         Of `sims.forging.SIGNALS`.
     sampling_rate_hz : float
     n_samples : int
     """
     chain = AntiAlias()
-    step_s = 1.0 / (FILTERED_FINE_POINTS * sampling_rate_hz)
+    step_s = 1.0 / (SLOW_FINE_POINTS * sampling_rate_hz)
     reach = ceil(chain.reach_s(sampling_rate_hz) * sampling_rate_hz) + 1
     lasts_s = (n_samples + reach) / sampling_rate_hz
-    together = max(1, MOST_VALUES // ((n_samples + 2 * reach) * FILTERED_FINE_POINTS))
+    together = max(1, MAX_VALUES // ((n_samples + 2 * reach) * SLOW_FINE_POINTS))
     found: dict[str, FloatArray] = {}
     for first in range(0, len(names), together):
         chosen = names[first : first + together]
-        run = respond(drive, courses, duration_s=lasts_s, interval_s=step_s, signals=chosen)
-        fine = np.pad(
-            np.stack([run[name] for name in chosen]), ((0, 0), (reach * FILTERED_FINE_POINTS, 0)), mode="edge"
-        )
+        run = respond(drive, profiles, duration_s=lasts_s, interval_s=step_s, signals=chosen)
+        fine = np.pad(np.stack([run[name] for name in chosen]), ((0, 0), (reach * SLOW_FINE_POINTS, 0)), mode="edge")
         found |= zip(chosen, chain.sample(fine, step_s, sampling_rate_hz, reach, n_samples), strict=True)
     return found
 
 
-LEAST_VIBRATION_HZ = 5000.0
+MIN_VIBRATION_HZ = 5000.0
 """Sampling rate from which on vibration is recorded: flanks in contact ring at some 400 Hz, housings above."""
 FINE_POINTS = 4
 """Points of the motion per sample of the accelerometer."""
@@ -97,13 +95,13 @@ VIBRATION = Channel("vibration", "acceleration", "m/s^2", "pinion bearing, along
 
 def sensors(sampling_rate_hz: float) -> tuple[Sensor, ...]:
     """Return the sensors of a recording at that rate, for its rig file."""
-    wanted = (*CHANNELS, VIBRATION) if sampling_rate_hz >= LEAST_VIBRATION_HZ else CHANNELS
+    wanted = (*CHANNELS, VIBRATION) if sampling_rate_hz >= MIN_VIBRATION_HZ else CHANNELS
     return tuple(Sensor(c.name, c.quantity, c.unit, c.position) for c in wanted)
 
 
 def record(
     drive: ForgingDrive,
-    courses: Schedule,
+    profiles: Schedule,
     wanted: ParameterValues,
     *,
     rig: Rig,
@@ -120,18 +118,18 @@ def record(
     hold lines from above half the sampling rate.
     """
     motion_rng, vibration_rng = rng.spawn(2)
-    motion = respond(drive, courses, duration_s=duration_s, interval_s=1.0 / sampling_rate_hz)
+    motion = respond(drive, profiles, duration_s=duration_s, interval_s=1.0 / sampling_rate_hz)
     is_filtered = wanted.word("slow_channels") == FILTERED
-    folds = not is_filtered and wanted.word("mode") == CONTINUOUS and sampling_rate_hz < LEAST_VIBRATION_HZ
+    folds = not is_filtered and wanted.word("mode") == CONTINUOUS and sampling_rate_hz < MIN_VIBRATION_HZ
     true = {c.name: motion[c.name] for c in CHANNELS}
     if is_filtered:
         slow = [c.name for c in CHANNELS if c.quantity != "angle"]
         n = len(true[slow[0]])
-        true |= filtered_signals(drive, courses, slow, sampling_rate_hz=sampling_rate_hz, n_samples=n)
+        true |= filtered_signals(drive, profiles, slow, sampling_rate_hz=sampling_rate_hz, n_samples=n)
     rows = list(_readings(true, wanted, motion_rng))
     channels = list(CHANNELS)
-    if sampling_rate_hz >= LEAST_VIBRATION_HZ:
-        rows.append(_vibration(drive, courses, wanted, vibration_rng, sampling_rate_hz, len(rows[0])))
+    if sampling_rate_hz >= MIN_VIBRATION_HZ:
+        rows.append(_vibration(drive, profiles, wanted, vibration_rng, sampling_rate_hz, len(rows[0])))
         channels.append(VIBRATION)
     return Recording(
         np.vstack(rows),
@@ -178,7 +176,7 @@ def _readings(true: Mapping[str, FloatArray], wanted: ParameterValues, rng: np.r
 
 def _vibration(
     drive: ForgingDrive,
-    courses: Schedule,
+    profiles: Schedule,
     wanted: ParameterValues,
     rng: np.random.Generator,
     rate_hz: float,
@@ -189,7 +187,7 @@ def _vibration(
     chain = MeasurementChain(rate_hz, (_channel(wanted),), AntiAlias())
     lead = ceil(chain.lead_in_s * rate_hz) * FINE_POINTS
     lasts_s = n_samples / rate_hz + chain.anti_alias.reach_s(rate_hz) + 4.0 / rate_hz
-    force = respond(drive, courses, duration_s=lasts_s, interval_s=fine_s, signals=("interaction force",))
+    force = respond(drive, profiles, duration_s=lasts_s, interval_s=fine_s, signals=("interaction force",))
     shaken = _housing(np.concatenate([np.zeros(lead), force["interaction force"]]), wanted, fine_s)
     motion = Motion(fine_s, (PLACE,), shaken[:, None])
     measured = chain.record(motion, rng=rng, duration_s=n_samples / rate_hz, lead_in_s=lead * fine_s)

@@ -102,7 +102,7 @@ ABSOLUTE = np.array([1e-8, 1e-6, 1e-10, 1e-7, 1e-4, 1e-4, 1e-4, 1e-4])
 """At `TOLERANCE`, in rad, rad/s, m, m/s, and bristles in their sliding friction; a loaded flank yields 2e-5 m."""
 CONTACTS_PER_SECOND = 2000
 """More than any rattle makes; beyond, the run is stopped."""
-MOST_POINTS = 60_000_000
+MAX_POINTS = 60_000_000
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class DriveResponse:
 
 def respond(
     drive: ForgingDrive,
-    courses: Schedule,
+    profiles: Schedule,
     *,
     duration_s: float,
     interval_s: float = 1e-3,
@@ -167,12 +167,12 @@ def respond(
     """Integrate the drive from rest, or from a given state.
 
     Dormand–Prince 5(4) with error control; a step ends where flanks meet or part, so that the speed at which they meet
-    is latched exactly, and where a course bends.
+    is latched exactly, and where a profile bends.
 
     Parameters
     ----------
     drive : ForgingDrive
-    courses : Schedule
+    profiles : Schedule
     duration_s, interval_s : float
         The grid is 0, interval, … below the duration.
     first : FirstState or None
@@ -191,8 +191,8 @@ def respond(
     positive(interval_s, "interval_s", "s")
     within(tolerance, "tolerance", 1e-12, 1e-3)
     run = _DriveRun.begin(drive, first or FirstState(), signals, duration_s, interval_s)
-    for begin, end in pairwise(courses.stretches(duration_s)):
-        run.advance(begin, end, courses.straight(begin, end), tolerance)
+    for begin, end in pairwise(profiles.segments(duration_s)):
+        run.advance(begin, end, profiles.straight(begin, end), tolerance)
     return run.response(signals)
 
 
@@ -218,8 +218,8 @@ class _DriveRun:
         from sims.forging._kernels import open_contact, reach
 
         n = ceil(duration_s / interval_s - 1e-9)
-        if n > MOST_POINTS:
-            raise InputError(f"{n} points are wanted", allowed=f"up to {MOST_POINTS}", remedy="shorten the run")
+        if n > MAX_POINTS:
+            raise InputError(f"{n} points are wanted", allowed=f"up to {MAX_POINTS}", remedy="shorten the run")
         select = np.array([SIGNALS.index(one_of(name, "signals", SIGNALS)) for name in signals], dtype=np.int64)
         contacts = np.zeros((1000 + int(CONTACTS_PER_SECOND * duration_s), len(CONTACT_COLUMNS)))
         y, mode, counts = np.zeros(N_STATES), np.zeros(3), np.zeros(4, dtype=np.int64)
@@ -231,13 +231,13 @@ class _DriveRun:
             counts[1] = 1
         return cls(k, y, mode, counts, select, np.full((n, len(select)), np.nan), contacts, interval_s)
 
-    def advance(self, begin_s: float, end_s: float, course: FloatArray, tolerance: float) -> None:
-        """Integrate over one stretch of straight courses."""
+    def advance(self, begin_s: float, end_s: float, profile: FloatArray, tolerance: float) -> None:
+        """Integrate over one stretch of straight profiles."""
         from sims.forging._kernels import DONE, integrate
 
         absolute = ABSOLUTE * (tolerance / TOLERANCE)
         self.step_s, status = integrate(
-            self.k, self.y, self.mode, begin_s, end_s, min(self.step_s, 1e-5), course, absolute, tolerance,
+            self.k, self.y, self.mode, begin_s, end_s, min(self.step_s, 1e-5), profile, absolute, tolerance,
             self.interval_s, self.select, self.counts, self.found, self.contacts,
         )  # fmt: skip
         if status != DONE or not np.isfinite(self.y).all():
@@ -341,8 +341,8 @@ def check_convergence(
     """
     runs_on = cycle.mode == CONTINUOUS
     lasts_s = CONTINUOUS_S if runs_on else cycle.on_s + cycle.off_s
-    courses = schedule(cycle, torque_nm, lasts_s)
-    ours, exact = (respond(drive, courses, duration_s=lasts_s, tolerance=t) for t in (tolerance, EXACT * tolerance))
+    profiles = schedule(cycle, torque_nm, lasts_s)
+    ours, exact = (respond(drive, profiles, duration_s=lasts_s, tolerance=t) for t in (tolerance, EXACT * tolerance))
     flank, after_s = (0.0, 0.0) if runs_on else (-1.0, cycle.on_s)
     (time_s, speed), (exact_s, exact_speed) = (_first(run, flank, after_s) for run in (ours, exact))
     rms = [float(np.sqrt(np.mean(run["interaction force"] ** 2))) for run in (ours, exact)]

@@ -78,7 +78,7 @@ def with_effects(values: Values, settings: Sequence[EffectSetting]) -> tuple[Val
 NAME = "forging"
 SAMPLING_RATE_RANGE_HZ = (100.0, 200000.0)
 DURATION_RANGE_S = (0.05, 3600.0)
-MOST_SAMPLES = 12_000_000
+MAX_SAMPLES = 12_000_000
 SPEED_RANGE_RPM = (0.0, 5000.0)
 TORQUE_RANGE_NM = (0.0, 1e6)
 
@@ -94,7 +94,7 @@ class PreparedDrive:
     cycle : Cycle
     operation : Operation
     preset : str
-    values, sound_values : mapping
+    values, healthy_values : mapping
         Every parameter, with the effects and without.
     effects : tuple of EffectSetting
         With every option.
@@ -105,17 +105,17 @@ class PreparedDrive:
     operation: Operation
     preset: str
     values: Values
-    sound_values: Values
+    healthy_values: Values
     effects: tuple[EffectSetting, ...] = ()
 
-    def courses(self, duration_s: float) -> Schedule:
+    def profiles(self, duration_s: float) -> Schedule:
         """Torque, brake and press over a run."""
         return schedule(self.cycle, self.operation.torque_nm, duration_s)
 
     def truth(self) -> dict[str, Any]:
         """What was put in, as plain values."""
         return {
-            **truth_of(NAME, self.preset, self.sound_values, self.effects, self.operation),
+            **truth_of(NAME, self.preset, self.healthy_values, self.effects, self.operation),
             "backlash_um": 2.0 * self.drive.contact.half_backlash_um,
             "stiffness_n_per_m_lambda": self.drive.contact.stiffness_n_per_m_lambda,
             "reduced_mass_kg": self.drive.reduced_mass_kg,
@@ -146,15 +146,15 @@ class ForgingManipulator(Model):
     ) -> PreparedDrive:
         """Build the drive and its cycle, with its effects."""
         chosen = preset(NAME, preset_name)
-        sound = complete_values(PARAMETERS, chosen.parameters, parameters)
+        healthy = complete_values(PARAMETERS, chosen.parameters, parameters)
         wanted_effects = (*chosen.effects, *settings)
-        values, weak = with_effects(sound, wanted_effects)
+        values, weak = with_effects(healthy, wanted_effects)
         run = operation or chosen.operation
         within(run.torque_nm.largest, "torque_nm", *TORQUE_RANGE_NM, "N m")
         wanted = ParameterValues(values)
         drive = build_drive(wanted, _constant(run.speed_rpm), weak)
         complete = completed(wanted_effects)
-        return PreparedDrive(drive, build_cycle(wanted), run, chosen.name, values, sound, complete)
+        return PreparedDrive(drive, build_cycle(wanted), run, chosen.name, values, healthy, complete)
 
     def simulate(
         self,
@@ -182,22 +182,22 @@ class ForgingManipulator(Model):
 
         within(duration_s, "duration_s", *DURATION_RANGE_S, "s")
         within(sampling_rate_hz, "sampling_rate_hz", *SAMPLING_RATE_RANGE_HZ, "Hz")
-        if sampling_rate_hz * duration_s > MOST_SAMPLES:
-            raise InputError(f"{sampling_rate_hz * duration_s:.3g} samples are wanted", allowed=f"up to {MOST_SAMPLES}")
+        if sampling_rate_hz * duration_s > MAX_SAMPLES:
+            raise InputError(f"{sampling_rate_hz * duration_s:.3g} samples are wanted", allowed=f"up to {MAX_SAMPLES}")
         ready = self.prepare(parameters, operation, preset_name=preset, settings=effects)
         wanted = ParameterValues(ready.values)
         rig = build_rig(
             ready.drive,
-            ParameterValues(ready.sound_values),
+            ParameterValues(ready.healthy_values),
             ready.operation,
             sensors(sampling_rate_hz),
             name=self.rig_name(ready.preset),
             sources=self.rig_sources(ready.preset),
         )
-        ready.courses(duration_s)  # says so where a stop does not fit, before anything is run
+        ready.profiles(duration_s)  # says so where a stop does not fit, before anything is run
         return record(
             ready.drive,
-            ready.courses(duration_s + 1.0),
+            ready.profiles(duration_s + 1.0),
             wanted,
             rig=rig,
             rng=rng,

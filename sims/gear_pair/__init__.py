@@ -13,7 +13,7 @@ from sims.gear_pair._drive import (
     total_inertia_kg_m2,
 )
 from sims.gear_pair._installed import Installed, completed
-from sims.gear_pair._measurement import COORDINATES, LEAST_MOTION_HZ, Measurement
+from sims.gear_pair._measurement import COORDINATES, MIN_MOTION_HZ, Measurement
 from sims.gear_pair._parameters import PARAMETERS
 from sims.gear_pair._run import PairResponse, RunPlan, profile_points
 from sims.gear_pair._simulator import PairModel, ReadyPair, SimulationRequest
@@ -33,7 +33,7 @@ __all__ = [
     "DRIVE_FIELDS",
     "DRIVE_SCALARS",
     "FRICTION_SCALARS",
-    "LEAST_MOTION_HZ",
+    "MIN_MOTION_HZ",
     "PARAMETERS",
     "Installed",
     "Measurement",

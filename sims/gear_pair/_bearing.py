@@ -184,7 +184,7 @@ def _balanced(
 # --------------------
 
 
-LEAST_LOAD = 1e-12
+MIN_LOAD = 1e-12
 EDGE_M = 5e-5
 """Length over which an edge is rounded: a contact is some 0.2 mm wide."""
 FAR = 12.0
@@ -237,7 +237,7 @@ def carried_part(k, row, x, y):
     if clearance <= 0.0:
         return 1.0
     r = sqrt(x * x + y * y)
-    if r <= LEAST_LOAD:
+    if r <= MIN_LOAD:
         return 0.0
     # A soft edge of a tenth of the clearance: roughness and oil carry a little before the metal does.
     width = 0.1 * clearance

@@ -410,5 +410,5 @@ def _speed_source(chain: MeasurementChain, shaft: str) -> SpeedSource | None:
     return None  # a counter's pulse times belong to the recording
 
 
-def _constant(course: Profile) -> float | None:
-    return float(course.values[0]) if np.ptp(course.values) == 0.0 else None
+def _constant(profile: Profile) -> float | None:
+    return float(profile.values[0]) if np.ptp(profile.values) == 0.0 else None

@@ -13,14 +13,14 @@ from gearsig.errors import InputError
 from sims.machine import RECOVERY_S, Machine, Operation
 from sims.mesh import FlankRoughness, FractalSurface, TimeLockedRoughness, oil_terms, reduced_modulus_pa
 
-MOST_LINES = 8
+MAX_LINES = 8
 """Torque ripples, or speed swings, at once."""
 DRIVE_SCALARS = ("governor", "governor_spring", "total_inertia", "ratio")
 DRIVE_FIELDS = [
     ("n_ripples", np.int64),
-    ("ripples", np.float64, (MOST_LINES, 3)),
+    ("ripples", np.float64, (MAX_LINES, 3)),
     ("n_swings", np.int64),
-    ("swings", np.float64, (MOST_LINES, 3)),
+    ("swings", np.float64, (MAX_LINES, 3)),
 ]
 """Of a record, beside `DRIVE_SCALARS`."""
 
@@ -55,9 +55,9 @@ def governor_nm_s_per_rad(machine: Machine) -> float:
 
 
 def _rows(items: list[tuple[float, float, float]], what: str) -> FloatArray:
-    if len(items) > MOST_LINES:
-        raise InputError(f"{len(items)} {what}", allowed=f"at most {MOST_LINES}")
-    rows = np.zeros((MOST_LINES, 3))
+    if len(items) > MAX_LINES:
+        raise InputError(f"{len(items)} {what}", allowed=f"at most {MAX_LINES}")
+    rows = np.zeros((MAX_LINES, 3))
     rows[: len(items)] = np.array(items, dtype=np.float64).reshape(-1, 3)
     return rows
 

@@ -13,7 +13,7 @@ from gearsig.rig import Bearing, Rig, TachometerChannel, from_table, to_table
 
 N_BEARINGS = 4
 DIRECTIONS = ("vertical", "horizontal")
-MOST_SENSORS, MOST_MODES = 8, 32
+MAX_SENSORS, MAX_MODES = 8, 32
 
 
 @dataclass(frozen=True)
@@ -108,10 +108,10 @@ class Installed:
             raise InputError(f"shafts {self.shafts}", allowed="two different names")
         if len(self.bearings) != N_BEARINGS or len({b.name for b in self.bearings}) != N_BEARINGS:
             raise InputError(f"bearings {', '.join(b.name for b in self.bearings)}", allowed="four different names")
-        if len(self.modes) > MOST_MODES or not 1 <= len(self.sensors) <= MOST_SENSORS:
+        if len(self.modes) > MAX_MODES or not 1 <= len(self.sensors) <= MAX_SENSORS:
             raise InputError(
                 f"{len(self.sensors)} sensors and {len(self.modes)} housing modes",
-                allowed=f"1 to {MOST_SENSORS} sensors, at most {MOST_MODES} modes",
+                allowed=f"1 to {MAX_SENSORS} sensors, at most {MAX_MODES} modes",
             )
         channels = [*(s.channel for s in self.sensors), self.pickup.channel]
         if len(set(channels)) != len(channels) or not all(channels):
@@ -174,9 +174,9 @@ USUAL_SPLIT = 0.4
 """BPFO over the number of elements, where only one order is known."""
 SEAT_ORDER = (1, 3, 2, 4)
 """Bearings under the sensors whose place is not told."""
-SEATS_MOST_SENSORS = 4
+MAX_RIG_SENSORS = 4
 UNLISTED = "unlisted bearing"
-LEAST_PULSES = 4
+MIN_PULSES = 4
 """Per revolution, where the rig's speed is not told by a tachometer: well known speed, but no mark on a tooth."""
 
 
@@ -241,7 +241,7 @@ def _closest(n: int) -> float:
 
 
 def _spare(rig: Rig, shaft: str, number: int, size: float) -> Bearing:
-    """A sound bearing that the rig says nothing of."""
+    """A healthy bearing that the rig says nothing of."""
     name = f"{UNLISTED} {number}"
     while name in {b.name for b in rig.bearings}:
         name += "'"
@@ -257,12 +257,12 @@ def _pickup(rig: Rig, shafts: tuple[str, str]) -> Pickup:
     name = "tacho"
     while name in {sensor.channel for sensor in rig.sensors}:
         name += "'"
-    return Pickup(name, side, LEAST_PULSES)
+    return Pickup(name, side, MIN_PULSES)
 
 
 def _sensors(rig: Rig, bearings: Sequence[Bearing], tacho: str) -> tuple[SensorSeat, ...]:
     """Return a seat for each of the rig's accelerometers: where its position says, else one bearing after another."""
-    told = [s for s in rig.sensors if s.quantity == "acceleration" and s.channel != tacho][:SEATS_MOST_SENSORS]
+    told = [s for s in rig.sensors if s.quantity == "acceleration" and s.channel != tacho][:MAX_RIG_SENSORS]
     if not told:
         told_names = {s.channel for s in rig.sensors} | {tacho}
         names = [n for n in ("a1", "a2", "a3", "a4") if n not in told_names][:2]
@@ -296,7 +296,7 @@ def further_seats(installed: Installed) -> tuple[SensorSeat, ...]:
             while name in names:
                 name += "'"
             seats.append(SensorSeat(name, number, "vertical", f"{_bearing_words(bearing, number)}, vertical"))
-    return tuple(seats[: MOST_SENSORS - len(installed.sensors)])
+    return tuple(seats[: MAX_SENSORS - len(installed.sensors)])
 
 
 def _bearing_words(bearing: Bearing, number: int) -> str:

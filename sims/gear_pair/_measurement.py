@@ -33,7 +33,7 @@ POSITIONS = COORDINATES[4:]
 """Places whose acceleration a sensor can read, each with its direction."""
 POINTS_PER_CYCLE = 6
 """Of the fastest resonance in path and sensor, in the motion handed to the measurement chain."""
-LEAST_MOTION_HZ = 80_000.0
+MIN_MOTION_HZ = 80_000.0
 """Rate of that motion at least: what the model still holds above half of it would fold back."""
 SETTLING = 6.0
 """Time constants of the slowest start-up motion that are left out ahead of the recording."""
@@ -54,7 +54,7 @@ class PairSignals(Protocol):
 
 @dataclass(frozen=True)
 class Measurement:
-    """How a machine is run to be measured, and the recording of it; time 0 of its courses is a sample.
+    """How a machine is run to be measured, and the recording of it; time 0 of its profiles is a sample.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def motion_rate_hz(chain: MeasurementChain) -> float:
     """Points per second that the chain needs of the motion at least."""
     modes = [mode.frequency_hz for channel in chain.channels for mode in channel.path.modes]
     sensors = [channel.accelerometer.resonance_hz or 0.0 for channel in chain.channels]
-    return max(POINTS_PER_CYCLE * max([*modes, *sensors, 0.0]), LEAST_MOTION_HZ, 4.0 * chain.sampling_rate_hz)
+    return max(POINTS_PER_CYCLE * max([*modes, *sensors, 0.0]), MIN_MOTION_HZ, 4.0 * chain.sampling_rate_hz)
 
 
 def used_positions(chain: MeasurementChain) -> tuple[str, ...]:

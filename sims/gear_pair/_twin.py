@@ -173,7 +173,7 @@ _UNEVEN = (
 )
 _NOISES = ("noise_mps2", "sensor_noise_mps2_per_sqrt_hz")
 VIBRATION_S = 0.5
-"""Length of the run that tells how strongly the sound machine vibrates."""
+"""Length of the run that tells how strongly the healthy machine vibrates."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from sims.machine._nominal import (
     runout_tolerance_um,
     usual_mass_kg,
 )
-from sims.machine._operation import Operation, Profile, course_value, set_speed
+from sims.machine._operation import Operation, Profile, profile_value, set_speed
 
 __all__ = [
     "MAX_DRY_FRICTION",
@@ -47,11 +47,11 @@ __all__ = [
     "WeakTooth",
     "Wheel",
     "bearing_index",
-    "course_value",
     "log_uniform",
     "nominal_of",
     "pitch_tolerance_um",
     "profile_tolerance_um",
+    "profile_value",
     "runout_tolerance_um",
     "set_speed",
     "usual_mass_kg",

@@ -27,7 +27,7 @@ class Profile:
 
     Examples
     --------
-    >>> run_up = Course.of([0.0, 10.0], [300.0, 1500.0])
+    >>> run_up = Profile.of([0.0, 10.0], [300.0, 1500.0])
     >>> float(run_up.at(2.5))
     600.0
     """
@@ -36,15 +36,19 @@ class Profile:
     values: FloatArray
 
     def __post_init__(self) -> None:
-        times = frozen_array(self.times_s, "times_s of a course", ndim=1)
-        values = frozen_array(self.values, "values of a course", ndim=1)
+        times = frozen_array(self.times_s, "times_s of a profile", ndim=1)
+        values = frozen_array(self.values, "values of a profile", ndim=1)
         if len(times) != len(values) or len(times) == 0 or np.any(np.diff(times) <= 0):
             raise InputError(
-                f"{len(times)} times for {len(values)} values of a course, or times that do not rise",
+                f"{len(times)} times for {len(values)} values of a profile, or times that do not rise",
                 allowed="one value per time, times rising",
             )
         object.__setattr__(self, "times_s", times)
         object.__setattr__(self, "values", values)
+
+    def as_dict(self) -> dict[str, list[float]]:
+        """Times and values as plain numbers."""
+        return {"times_s": self.times_s.tolist(), "values": self.values.tolist()}
 
     @classmethod
     def constant(cls, value: float) -> Profile:
@@ -53,7 +57,7 @@ class Profile:
 
     @classmethod
     def of(cls, times_s: object, values: object) -> Profile:
-        """Return a course through points given as any sequences."""
+        """Return a profile through points given as any sequences."""
         return cls(np.asarray(times_s, dtype=np.float64), np.asarray(values, dtype=np.float64))
 
     @property
@@ -73,9 +77,9 @@ class Operation:
 
     Parameters
     ----------
-    speed_rpm : Course
+    speed_rpm : Profile
         Not below 0.
-    torque_nm : Course
+    torque_nm : Profile
         Not below 0; the load on the output is this times the ratio. 0 lets the teeth rattle.
     """
 
@@ -83,9 +87,9 @@ class Operation:
     torque_nm: Profile
 
     def __post_init__(self) -> None:
-        for name, course, unit in (("speed_rpm", self.speed_rpm, "rpm"), ("torque_nm", self.torque_nm, "N m")):
-            if np.min(course.values) < 0.0:
-                raise InputError(f"{name} falls to {np.min(course.values):g} {unit}", allowed=f"at least 0 {unit}")
+        for name, profile, unit in (("speed_rpm", self.speed_rpm, "rpm"), ("torque_nm", self.torque_nm, "N m")):
+            if np.min(profile.values) < 0.0:
+                raise InputError(f"{name} falls to {np.min(profile.values):g} {unit}", allowed=f"at least 0 {unit}")
 
     @classmethod
     def steady(cls, speed_rpm: float, torque_nm: float) -> Operation:
@@ -99,7 +103,7 @@ class Operation:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
-def course(points, t):
+def profile(points, t):
     """Value and slope at t: straight between points, held outside; (2, n) times and values."""
     n = points.shape[1]
     if t <= points[0, 0]:
@@ -118,15 +122,15 @@ def course(points, t):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
-def course_value(points, t):
+def profile_value(points, t):
     """Value at t."""
-    return course(points, t)[0]
+    return profile(points, t)[0]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def set_speed(k, speed, t):
     """Set speed in rad/s and its slope, swings included."""
-    value, slope = course(speed, t)
+    value, slope = profile(speed, t)
     factor, rate = 1.0, 0.0
     for i in range(k.n_swings):
         amplitude, omega, phase = k.swings[i, 0], k.swings[i, 1], k.swings[i, 2]

@@ -18,7 +18,7 @@ from sims.mesh._faults import (
 )
 from sims.mesh._friction import (
     COEFFICIENTS,
-    MOST_FRICTION,
+    MAX_FRICTION,
     MeshFriction,
     contact_friction_n,
     friction_coefficient,
@@ -26,7 +26,6 @@ from sims.mesh._friction import (
     line_contact_pressure_gpa,
     oil_terms,
     reduced_modulus_pa,
-    smooth_sign,
 )
 from sims.mesh._geometry import (
     STEEL,
@@ -75,7 +74,7 @@ from sims.mesh._stiffness import (
 
 __all__ = [
     "COEFFICIENTS",
-    "MOST_FRICTION",
+    "MAX_FRICTION",
     "SOUND",
     "STEEL",
     "FlankDeviation",
@@ -141,7 +140,6 @@ __all__ = [
     "root_half_angle_rad",
     "separation_rows",
     "share_torque",
-    "smooth_sign",
     "spans_face",
     "tooth_compliance",
     "tooth_outline_mm",

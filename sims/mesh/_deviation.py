@@ -30,7 +30,7 @@ class FlankDeviation:
     pitch_um : tuple of float
         Cumulative pitch deviation of each tooth, as many as the gear has teeth. Empty: none.
     wear_um : float
-        Greatest depth of wear by sliding, 0 for none; see `sims.mesh` for its course over the flank.
+        Greatest depth of wear by sliding, 0 for none; see `sims.mesh` for its shape over the flank.
     """
 
     tip_relief_um: float = 0.0
@@ -98,7 +98,7 @@ def pitch_separation_m(gear: GearGeometry, deviation: FlankDeviation) -> FloatAr
 # --------------------
 
 
-LEAST_RADIUS = 0.1
+MIN_RADIUS = 0.1
 """In modules: below this radius of curvature specific sliding no longer grows, as the zone of contact is wider."""
 
 
@@ -136,6 +136,6 @@ def wear_profile(pair: PairGeometry, side: int, roll_length_mm: FloatArray) -> F
 
 def _specific_sliding(pair: PairGeometry, side: int, roll_length_mm: FloatArray) -> FloatArray:
     own, mate = (pair.driver, pair.driven) if side == 1 else (pair.driven, pair.driver)
-    rho = np.maximum(np.asarray(roll_length_mm, dtype=np.float64), LEAST_RADIUS * own.module_mm)
+    rho = np.maximum(np.asarray(roll_length_mm, dtype=np.float64), MIN_RADIUS * own.module_mm)
     result: FloatArray = np.abs(1.0 - own.teeth / mate.teeth * (pair.action_length_mm - rho) / rho)
     return result

@@ -23,7 +23,7 @@ from sims.mesh._pair import (
     smooth_step,
 )
 
-LEAST_SECTION = 0.1
+MIN_SECTION = 0.1
 """Part of a section's thickness that a crack must leave; a tooth with less counts as broken."""
 
 
@@ -57,7 +57,7 @@ class RootCrack:
     front: str = "straight"
 
     def __post_init__(self) -> None:
-        positive(self.depth_mm, "depth_mm of the crack", "mm", remedy="leave out the crack for a sound tooth")
+        positive(self.depth_mm, "depth_mm of the crack", "mm", remedy="leave out the crack for a healthy tooth")
         _angle_rad(self.angle_deg)
         count(self.tooth, "tooth of the crack", minimum=0)
         if self.width_mm is not None:
@@ -95,8 +95,8 @@ def effective_flank_mm(
 
     Two lines run to the tooth tip, one from the crack's mouth and one from its tip. What lies between them carries no
     load; between the crack's tip and its mouth, what lies outside the second line. Without depth nothing is lost, so
-    that the stiffness falls steadily from the sound tooth's. (Cutting along the second line alone, as is common, takes
-    the bulge of the flank off a tooth whose crack has no depth yet.)
+    that the stiffness falls steadily from the healthy tooth's. (Cutting along the second line alone, as is common,
+    takes the bulge of the flank off a tooth whose crack has no depth yet.)
 
     Parameters
     ----------
@@ -121,10 +121,10 @@ def deepest_crack_mm(gear: GearGeometry, angle_deg: float = 45.0) -> float:
     from scipy.optimize import brentq
 
     def spare(depth: float) -> float:
-        return _least_section(gear, depth, angle_deg) - LEAST_SECTION
+        return _least_section(gear, depth, angle_deg) - MIN_SECTION
 
     sine, cosine = sin(_angle_rad(angle_deg)), cos(_angle_rad(angle_deg))
-    across = (1.0 - LEAST_SECTION) * 2.0 * crack_mouth_mm(gear)[1] / sine
+    across = (1.0 - MIN_SECTION) * 2.0 * crack_mouth_mm(gear)[1] / sine
     inwards = crack_mouth_mm(gear)[0] - (gear.bore_mm + gear.root_radius_mm) / 2.0
     limit = min(across, inwards / cosine) if cosine > 1e-9 else across
     return limit if spare(limit) >= 0.0 else float(brentq(spare, 1e-6 * gear.module_mm, limit, xtol=1e-9))

@@ -14,7 +14,7 @@ from gearsig.errors import InputError
 from sims.mesh._mesh_stiffness import MeshTable, share_torque
 from sims.mesh._stiffness import GearMesh
 
-MOST_FRICTION = 0.3
+MAX_FRICTION = 0.3
 """Cap of the coefficient."""
 COEFFICIENTS = (-8.916465, 1.03303, 1.036077, -0.354068, 2.812084, -0.100601, 0.752755, -0.390958, 0.620305)
 """b1 … b9 of the regression."""
@@ -38,7 +38,7 @@ class FrictionResult:
     Parameters
     ----------
     coefficient : array
-        From 0 to `MOST_FRICTION`, in the common shape of what was given.
+        From 0 to `MAX_FRICTION`, in the common shape of what was given.
     capped : array of bool
         Where the regression gave more than the cap.
     notes : tuple of str
@@ -113,7 +113,7 @@ def friction_coefficient(
         given["entrainment_mps"],
         given["radius_m"],
     )
-    return FrictionResult(np.minimum(raw, MOST_FRICTION), raw > MOST_FRICTION, _range_notes(given))
+    return FrictionResult(np.minimum(raw, MAX_FRICTION), raw > MAX_FRICTION, _range_notes(given))
 
 
 def line_contact_pressure_gpa(
@@ -146,17 +146,6 @@ def reduced_modulus_pa(modulus_1_pa: float, poisson_1: float, modulus_2_pa: floa
     positive(modulus_1_pa, "modulus_1_pa", "Pa")
     positive(modulus_2_pa, "modulus_2_pa", "Pa")
     return 1.0 / ((1 - poisson_1**2) / modulus_1_pa + (1 - poisson_2**2) / modulus_2_pa)
-
-
-def smooth_sign(sliding_mps: ArrayLike, threshold_mps: float) -> FloatArray:
-    """Sign of the sliding speed, smoothed: v/√(v² + v₀²).
-
-    At v = 10 v₀ it is 0.995. As it has the sign of v, a force -μN·sgn(v) never feeds energy in.
-    """
-    positive(threshold_mps, "threshold_mps", "m/s")
-    v = _checked(sliding_mps, "sliding_mps", signed=True)
-    result: FloatArray = v / np.hypot(v, threshold_mps)
-    return result
 
 
 def _regression(
@@ -220,8 +209,8 @@ def hertz_pressure_gpa(normal_force_n, width_m, radius_m, reduced_modulus_pa):  
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def friction_coefficient_friction_kernel(slide_to_roll, pressure_gpa, entrainment_mps, radius_m, log10_oil, constant):  # type: ignore[no-untyped-def]
-    """μ of the regression, from 0 to MOST_FRICTION.
+def film_coefficient(slide_to_roll, pressure_gpa, entrainment_mps, radius_m, log10_oil, constant):  # type: ignore[no-untyped-def]
+    """μ of the regression, from 0 to MAX_FRICTION.
 
     Powers are added as logarithms: two exponentials and four logarithms in all. No sliding and no load give 0; an
     entrainment speed of zero with sliding gives the cap, as V^b6 grows without bound.
@@ -229,7 +218,7 @@ def friction_coefficient_friction_kernel(slide_to_roll, pressure_gpa, entrainmen
     if slide_to_roll <= 0.0 or pressure_gpa <= 0.0:
         return 0.0
     if entrainment_mps <= 0.0:
-        return MOST_FRICTION
+        return MAX_FRICTION
     s = slide_to_roll * pressure_gpa * log10_oil
     exponent = (
         constant
@@ -241,11 +230,11 @@ def friction_coefficient_friction_kernel(slide_to_roll, pressure_gpa, entrainmen
         + B8 * log(radius_m)
     )
     # exp(-1.204) = 0.3: saves the exponential, and its overflow, where the cap holds.
-    return exp(exponent) if exponent < -1.2039728043259361 else MOST_FRICTION
+    return exp(exponent) if exponent < -1.2039728043259361 else MAX_FRICTION
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def smooth_sign_friction_kernel(sliding_mps, threshold_mps):  # type: ignore[no-untyped-def]
+def smooth_sign(sliding_mps, threshold_mps):  # type: ignore[no-untyped-def]
     """v/√(v² + v₀²): odd, between -1 and 1, 0 at rest."""
     return sliding_mps / sqrt(sliding_mps * sliding_mps + threshold_mps * threshold_mps)
 
@@ -277,11 +266,8 @@ def contact_friction_n(  # type: ignore[no-untyped-def]
     sliding = surface_2_mps - surface_1_mps
     ratio = abs(sliding) / entrainment if entrainment > 0.0 else 0.0
     pressure = hertz_pressure_gpa(normal_force_n, width_m, radius_m, reduced_modulus_pa)
-    mu = (
-        film_factor * friction_coefficient_friction_kernel(ratio, pressure, entrainment, radius_m, log10_oil, constant)
-        + dry_coefficient
-    )
-    return mu * normal_force_n * smooth_sign_friction_kernel(sliding + vibration_mps, threshold_mps)
+    mu = film_factor * film_coefficient(ratio, pressure, entrainment, radius_m, log10_oil, constant) + dry_coefficient
+    return mu * normal_force_n * smooth_sign(sliding + vibration_mps, threshold_mps)
 
 
 # --------------------
@@ -289,10 +275,10 @@ def contact_friction_n(  # type: ignore[no-untyped-def]
 # --------------------
 
 
-LEAST_RADIUS = 1e-3
+MIN_RADIUS = 1e-3
 """In modules: radius of curvature below which a contact, on the base circle, is taken as this curved."""
 
-LEAST_PART = 0.2
+MIN_PART = 0.2
 """Part of the load from which a contact's range is told."""
 
 
@@ -370,7 +356,7 @@ def friction_over_mesh(
 
     coefficient = found(np.ones(normal.shape, dtype=np.bool_)).coefficient.reshape(normal.shape)
     # A pair that takes up its load passes every small pressure, of which there is nothing to say.
-    notes = found(normal >= LEAST_PART * normal.sum(axis=1, keepdims=True)).notes
+    notes = found(normal >= MIN_PART * normal.sum(axis=1, keepdims=True)).notes
     friction = coefficient * normal * np.sign(sliding)
     return MeshFriction(shared.mesh_cycles, coefficient, friction, normal, sliding, notes)
 
@@ -384,7 +370,7 @@ def _speeds_and_radius(
     mesh: GearMesh, mesh_cycles: FloatArray, speed_rpm: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Rolling speeds of both flanks in m/s and the radius of relative curvature in m, (n, n_slots)."""
-    pair, least = mesh.pair, LEAST_RADIUS * mesh.pair.driver.module_mm
+    pair, least = mesh.pair, MIN_RADIUS * mesh.pair.driver.module_mm
     newest = np.floor(mesh_cycles + mesh.ramp / 2.0)
     progress = (mesh_cycles - newest)[:, None] + np.arange(mesh.n_slots)
     rho_1, rho_2 = (np.maximum(rho, least) * 1e-3 for rho in pair.contact_radii_mm(progress))

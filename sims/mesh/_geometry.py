@@ -64,7 +64,7 @@ def inverse_involute(value_rad: float) -> float:
     return float(angle)
 
 
-LEAST_TIP_THICKNESS = 0.05
+MIN_TIP_THICKNESS = 0.05
 """In modules; below it a tooth counts as pointed."""
 
 
@@ -241,12 +241,12 @@ class GearGeometry:
                 allowed=f"a profile shift of at least {least:.3g}",
                 remedy="shift the profile outwards or take more teeth",
             )
-        if self.tip_radius_mm <= self.form_radius_mm or self.tip_thickness_mm < LEAST_TIP_THICKNESS * self.module_mm:
+        if self.tip_radius_mm <= self.form_radius_mm or self.tip_thickness_mm < MIN_TIP_THICKNESS * self.module_mm:
             raise InputError(
                 f"the tooth is pointed: {self.tip_thickness_mm:.3g} mm thick at its tip"
                 if self.tip_radius_mm > self.form_radius_mm
                 else "the tooth has no involute: its tip lies below the fillet's end",
-                allowed=f"a tip at least {LEAST_TIP_THICKNESS:g} modules thick",
+                allowed=f"a tip at least {MIN_TIP_THICKNESS:g} modules thick",
                 remedy="lower the addendum or the profile shift",
             )
 

@@ -86,7 +86,7 @@ class MeshTable:
         ζ of the first column and between columns; one column lies beyond either end, for cubic interpolation. All
         rows share the columns: n = `n_points` + 2.
     compliance_1, compliance_2 : arrays, (n_variants, n)
-        Tooth and foundation of either gear, m/N. Row 0 is a sound tooth, each further row a faulty one.
+        Tooth and foundation of either gear, m/N. Row 0 is a healthy tooth, each further row a faulty one.
     variant_1, variant_2 : int arrays, (z,)
         Row of `compliance_1`, `compliance_2` for each tooth.
     separation_1_m, separation_2_m : arrays, (n_surfaces, n)
@@ -169,7 +169,7 @@ def mesh_table(mesh: GearMesh, n_points: int = 512) -> MeshTable:
 
 
 def _compliance_rows(mesh: GearMesh, number: int, progress: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Row 0 for sound teeth, one row for each faulty one, and the row of each tooth."""
+    """Row 0 for healthy teeth, one row for each faulty one, and the row of each tooth."""
     side = mesh.side(number)
     rows = [mesh.gear_compliance(number, progress)]
     variant = np.zeros(side.gear.teeth, dtype=np.int64)
@@ -309,14 +309,15 @@ def back_stiffness_n_per_m(mesh: GearMesh) -> float:
     """Mean stiffness of the mesh with the back flanks pressed, by the linear contact law, N/m.
 
     A symmetric tooth is as stiff on either flank, and back flanks touch along the mirrored path: the mean over a mesh
-    cycle is that of sound drive flanks. A crack of the drive side closes and spalls are not touched. A piece broken off
-    a tip would be missing on both flanks; a constant for the whole gear leaves it out, as it does roughness and wear.
+    cycle is that of healthy drive flanks. A crack of the drive side closes and spalls are not touched. A piece broken
+    off a tip would be missing on both flanks; a constant for the whole gear leaves it out, as it does roughness and
+    wear.
     """
     from dataclasses import replace
 
     faults = {"cracks_1": (), "cracks_2": (), "spalls_1": (), "spalls_2": (), "chips_1": (), "chips_2": ()}
-    sound = replace(mesh, contact_law="linear", **faults)  # type: ignore[arg-type]  # all of them are tuples of faults
-    return mesh_stiffness(sound).mean_n_per_m
+    healthy = replace(mesh, contact_law="linear", **faults)  # type: ignore[arg-type]  # all of them are tuples of faults
+    return mesh_stiffness(healthy).mean_n_per_m
 
 
 def pair_states(table: MeshTable, mesh_cycles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

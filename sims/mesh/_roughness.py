@@ -199,37 +199,11 @@ class FlankRoughness:
             Arc length along the flank, from the root end of the contact, in the shape of `tooth` or one that goes with
             it.
         """
-        return self._sum(self.surface.amplitudes_m, 0.0, tooth, position_m)
-
-    def slope(self, tooth: NDArray[np.integer] | int, position_m: ArrayLike) -> FloatArray:
-        """dz/ds, for the rate of a contact that travels: ż = (dz/ds) ṡ."""
-        k = 2 * np.pi * self.surface.cycles_per_metre
-        return self._sum(self.surface.amplitudes_m * k, np.pi / 2, tooth, position_m)
-
-    def table(self, length_m: float, n_points: int = 257) -> tuple[FloatArray, FloatArray, float]:
-        """What `roughness_kernel.height_on_flank` works on.
-
-        The error is about (kΔ)⁴/384 of a line's amplitude, k = 2πγⁿ and Δ the step.
-
-        Returns
-        -------
-        heights_m, slopes : arrays, (n_teeth, n_points)
-        step_m : float
-        """
-        positive(length_m, "length_m of the flank", "m")
-        count(n_points, "n_points of the flank", minimum=2)
-        position = np.linspace(0.0, length_m, n_points)
-        teeth = np.arange(self.n_teeth)[:, None]
-        return self.height_m(teeth, position), self.slope(teeth, position), length_m / (n_points - 1)
-
-    def _sum(
-        self, amplitudes: FloatArray, lead_rad: float, tooth: NDArray[np.integer] | int, position_m: ArrayLike
-    ) -> FloatArray:
         s = np.asarray(position_m, dtype=np.float64)
         row = np.mod(tooth, self.n_teeth)
         total = np.zeros(np.broadcast_shapes(np.shape(row), s.shape))
         for n, cycles in enumerate(self.surface.cycles_per_metre):
-            total += amplitudes[n] * np.cos(2 * np.pi * cycles * s + self.phases_rad[row, n] + lead_rad)
+            total += self.surface.amplitudes_m[n] * np.cos(2 * np.pi * cycles * s + self.phases_rad[row, n])
         return total
 
 
@@ -272,26 +246,3 @@ def advance(real, imaginary, step_cos, step_sin):  # type: ignore[no-untyped-def
         re = real[n] * step_cos[n] - imaginary[n] * step_sin[n]
         imaginary[n] = real[n] * step_sin[n] + imaginary[n] * step_cos[n]
         real[n] = re
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def height_on_flank(heights_m, slopes, step_m, tooth, position_m):  # type: ignore[no-untyped-def]
-    """(z, dz/ds) of a tooth at a position on its flank, by cubic Hermite interpolation.
-
-    `heights_m` and `slopes` are (n_teeth, n_points). The tooth number counts on through revolutions, also backwards.
-    Past the table's ends the height stays that of the end.
-    """
-    row = tooth % heights_m.shape[0]
-    last = heights_m.shape[1] - 1
-    x = position_m / step_m
-    if x <= 0.0:
-        return heights_m[row, 0], 0.0
-    if x >= last:
-        return heights_m[row, last], 0.0
-    i = int(x)
-    u = x - i
-    z0, z1 = heights_m[row, i], heights_m[row, i + 1]
-    d0, d1 = slopes[row, i] * step_m, slopes[row, i + 1] * step_m
-    c2 = 3.0 * (z1 - z0) - 2.0 * d0 - d1
-    c3 = d0 + d1 - 2.0 * (z1 - z0)
-    return z0 + u * (d0 + u * (c2 + u * c3)), (d0 + u * (2.0 * c2 + 3.0 * u * c3)) / step_m

@@ -448,7 +448,7 @@ class GearMesh:
 
         c = c_tooth/(1 − λ_chip) + c_foundation + c_h [λ_spall/(1 − λ_spall) + λ_chip/(1 − λ_chip)]
 
-        with the part λ of the width that the fault takes away. The contact of sound flanks, c_h, is not in it.
+        with the part λ of the width that the fault takes away. The contact of healthy flanks, c_h, is not in it.
 
         Parameters
         ----------

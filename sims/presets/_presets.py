@@ -21,7 +21,7 @@ _ABOUT = ("model", "title", "sources", "assumed", "does_not_represent")
 _OPERATION = ("speed_rpm", "torque_nm")
 _OPTIONAL = ("effects", "installed")
 _EFFECT = ("name", "severity", "options")
-MOST_BYTES = 1_000_000
+MAX_BYTES = 1_000_000
 """A preset is a page or two; anything larger is something else."""
 
 
@@ -133,7 +133,7 @@ def _of_model(found: Preset, model: str) -> Preset:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        if path.stat().st_size > MOST_BYTES:
+        if path.stat().st_size > MAX_BYTES:
             raise InputError(f"{path.stat().st_size} bytes", where=path.name, allowed="a preset of up to 1 MB")
         return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except OSError as error:

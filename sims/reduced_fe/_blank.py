@@ -17,7 +17,7 @@ from gearsig.errors import InputError
 from gearsig.recording import free_memory_bytes
 from sims.mesh import STEEL, GearGeometry, Material, Outline, fillet_outline, involute_outline, root_half_angle_rad
 
-LEAST_RIM = 1.0
+MIN_RIM = 1.0
 """Least thickness of rim and hub in modules: thinner ones crack through the rim, which this model does not follow."""
 
 
@@ -106,7 +106,7 @@ class GearBlank:
 
     def _check_bore(self) -> None:
         g = self.geometry
-        largest = g.root_radius_mm - LEAST_RIM * g.module_mm
+        largest = g.root_radius_mm - MIN_RIM * g.module_mm
         if g.bore_mm > largest:
             raise InputError(
                 f"bore_radius_mm is {g.bore_mm:g} mm: it leaves {g.root_radius_mm - g.bore_mm:.3g} mm below the teeth",
@@ -130,7 +130,7 @@ class GearBlank:
                 remedy="take a thinner web, or leave it out for a full disc",
             )
         space = g.root_radius_mm - g.bore_mm
-        least = LEAST_RIM * g.module_mm
+        least = MIN_RIM * g.module_mm
         for name in ("rim_thickness_mm", "hub_thickness_mm"):
             if getattr(self, name) is not None:
                 within(getattr(self, name), name, least, space, "mm")
@@ -287,7 +287,7 @@ def _joined(pieces: tuple[tuple[Curve, float, float], ...]) -> tuple[Curve, floa
 # --------------------
 
 
-LEAST_DOF, MOST_DOF = 5_000, 1_100_000
+MIN_DOF, MAX_DOF = 5_000, 1_100_000
 """Range in which a size is chosen; explicit numbers of cells may leave it."""
 
 
@@ -344,10 +344,10 @@ COARSE = tuple(
 )
 """Meshes of first order, from the coarsest on: 54 to some 1 000 degrees of freedom per tooth."""
 
-MOST_OUTLINE_ERROR = 0.01
+MAX_OUTLINE_ERROR = 0.01
 """In modules: how far the cells' edges may lie off the true outline."""
 
-MOST_STRAIGHT_ERROR = 0.04
+MAX_STRAIGHT_ERROR = 0.04
 """The same of a mesh of first order that is to be reduced: with more, a tooth's compliance is a fifth off."""
 
 
@@ -359,7 +359,7 @@ def check_fillet(blank: GearBlank, size: MeshSize) -> None:
     if size.order == 1:
         return
     error = outline_error_mm(blank.geometry, size.n_gap, size.n_up)
-    most = MOST_OUTLINE_ERROR * blank.geometry.module_mm
+    most = MAX_OUTLINE_ERROR * blank.geometry.module_mm
     if error > most:
         raise InputError(
             f"the mesh is too coarse for the fillet: its edges lie up to {error:.3g} mm off it",
@@ -374,7 +374,7 @@ def check_reducible(blank: GearBlank, size: MeshSize) -> None:
 
     Its modes may be looked at all the same: they hardly depend on the fillet.
     """
-    most = MOST_STRAIGHT_ERROR * blank.geometry.module_mm
+    most = MAX_STRAIGHT_ERROR * blank.geometry.module_mm
 
     def error_mm(wanted: MeshSize) -> float:
         return outline_error_mm(blank.geometry, wanted.n_gap, wanted.n_up, wanted.order)
@@ -435,9 +435,9 @@ def mesh_size_for(blank: GearBlank, n_dof: int) -> MeshSize:
     InputError
         If even the coarsest has more.
     """
-    wanted = count(n_dof, "n_dof", minimum=LEAST_DOF)
-    if wanted > MOST_DOF:
-        raise InputError(f"n_dof is {wanted}", allowed=f"{LEAST_DOF} to {MOST_DOF}", remedy="take fewer")
+    wanted = count(n_dof, "n_dof", minimum=MIN_DOF)
+    if wanted > MAX_DOF:
+        raise InputError(f"n_dof is {wanted}", allowed=f"{MIN_DOF} to {MAX_DOF}", remedy="take fewer")
     sizes = [_size(blank, blank.geometry.module_mm * 2.5 * 0.97**k) for k in range(110)]
     sizes += [replace(size, n_up=size.n_up - 1) for size in sizes if size.n_up > _least_cells(blank)[1]]
     best = min(sizes, key=lambda size: abs(n_dof_of(blank, size) - wanted))
@@ -455,7 +455,7 @@ def mesh_size_for(blank: GearBlank, n_dof: int) -> MeshSize:
 @lru_cache(maxsize=16)
 def _least_cells(blank: GearBlank) -> tuple[int, int]:
     """Fewest cells in the gap, and rows of the tooth, that follow the fillet."""
-    g, most = blank.geometry, MOST_OUTLINE_ERROR * blank.geometry.module_mm
+    g, most = blank.geometry, MAX_OUTLINE_ERROR * blank.geometry.module_mm
     gap = next((n for n in range(1, 4) if outline_error_mm(g, n, 12) <= most), 4)
     return gap, next((n for n in range(1, 12) if outline_error_mm(g, 4, n) <= most), 12)
 
@@ -483,7 +483,7 @@ def _size(blank: GearBlank, cell_mm: float) -> MeshSize:
 BASE_BYTES = 250e6
 """Interpreter and libraries."""
 
-MOST_PART = 0.9
+MAX_PART = 0.9
 """Of the free memory that may be taken."""
 
 
@@ -504,14 +504,6 @@ def craig_bampton_bytes(blank: GearBlank, size: MeshSize, n_compared: int) -> fl
     return sector_bytes(blank, size) + 13.0 * 8.0 * n_compared * n_dof_of(blank, size)
 
 
-def full_bytes(n_dof: int) -> float:
-    """Peak of a direct solution of the whole gear: matrices and factors, which fill about as n^1.25.
-
-    Measured: 0.35 GB at 31 500 and 0.85 GB at 72 000 degrees of freedom.
-    """
-    return float(BASE_BYTES + 12.0 * (150.0 * n_dof + 38.0 * n_dof**1.25))
-
-
 def check_memory(needed_bytes: float, free_bytes: float | None = None) -> None:
     """Refuse a computation that will not fit.
 
@@ -527,10 +519,10 @@ def check_memory(needed_bytes: float, free_bytes: float | None = None) -> None:
         With both numbers.
     """
     free = free_memory_bytes() if free_bytes is None else free_bytes
-    if free is not None and needed_bytes > MOST_PART * free:
+    if free is not None and needed_bytes > MAX_PART * free:
         raise InputError(
             f"about {needed_bytes / 1e9:.2g} GB of memory are needed, {free / 1e9:.2g} GB are free",
-            allowed=f"at most {MOST_PART:.0%} of the free memory",
+            allowed=f"at most {MAX_PART:.0%} of the free memory",
             remedy="take a coarser mesh, or close other programs",
         )
 

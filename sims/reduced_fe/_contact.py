@@ -107,8 +107,8 @@ def fault_compliance_rows(
 ) -> tuple[FloatArray, NDArray[np.int64]]:
     """Added compliance over ζ, (n_variants, n, n_slices, n_slices) in m/N, and the row of each tooth.
 
-    Row 0 belongs to sound teeth. A crack adds what finite elements of the cracked tooth yield more than those of the
-    sound one, see `sims.reduced_fe`. A spall or chip adds as in `sims.mesh.GearMesh`, alike in every
+    Row 0 belongs to healthy teeth. A crack adds what finite elements of the cracked tooth yield more than those of the
+    healthy one, see `sims.reduced_fe`. A spall or chip adds as in `sims.mesh.GearMesh`, alike in every
     slice.
 
     Notes
@@ -118,11 +118,11 @@ def fault_compliance_rows(
     own, n_slices = mesh.side(side), len(gear.grid.z_m)
     variant = np.zeros(own.gear.teeth, dtype=np.int64)
     rows = [np.zeros((len(progress), n_slices, n_slices))]
-    sound = mesh.gear_compliance(side, progress)
+    healthy = mesh.gear_compliance(side, progress)
     roll = rolls_rad(mesh.pair, progress)[side - 1]
     for row, tooth in enumerate(own.faulty_teeth, start=1):
         faults = own.faults_of(tooth)
-        lost = mesh.gear_compliance(side, progress, faults._replace(crack=SOUND.crack)) - sound
+        lost = mesh.gear_compliance(side, progress, faults._replace(crack=SOUND.crack)) - healthy
         added = n_slices * lost[:, None, None] * np.eye(n_slices)
         if faults.crack is not None:
             added = added + over_height(gear.grid.roll_rad, crack_added_m_per_n(gear, faults.crack), roll)
@@ -164,7 +164,7 @@ class ContactTable:
     corner_m : array, (n,)
         Separation of unloaded perfect flanks.
     extra_1, extra_2 : arrays, (n_variants, n, n_slices, n_slices)
-        What faulty teeth add to the compliance between their slices; row 0, of sound teeth, is 0.
+        What faulty teeth add to the compliance between their slices; row 0, of healthy teeth, is 0.
     variant_1, variant_2 : int arrays, (z,)
     separation_1_m, separation_2_m : arrays, (n_surfaces, n)
         Metal missing on the flanks, see `sims.mesh.MeshTable`.
@@ -218,7 +218,7 @@ class ContactTable:
     @property
     def arrays(self) -> tuple[FloatArray | NDArray[np.int64], ...]:
         """In the order in which kernels take them; one of each kind for both gears, the driver's rows first."""
-        n1 = len(self.extra_1) - 1, len(self.separation_1_m)  # sound teeth of both gears share row 0
+        n1 = len(self.extra_1) - 1, len(self.separation_1_m)  # healthy teeth of both gears share row 0
         rows = np.zeros((4, max(len(self.variant_1), len(self.variant_2))), dtype=np.int64)
         pitch = np.zeros((2, rows.shape[1]))
         for i, values in enumerate(
@@ -247,7 +247,7 @@ def contact_table(
     gears : (ReducedGear, ReducedGear)
         Driver and driven gear, with the same slices.
     mesh : GearMesh
-        Geometry of the pair, its faults and deviations. The compliance of sound teeth is the gears'.
+        Geometry of the pair, its faults and deviations. The compliance of healthy teeth is the gears'.
     compliance : callable
         Which part of each gear's compliance: all of it for statics, the rest beside the modes for dynamics.
     lead_um : float
@@ -429,7 +429,7 @@ def folded(table: ContactTable) -> ContactTable:
 
 FAST = {"reassoc", "contract", "nsz"}
 """Sums may be reordered for vector instructions; infinities and NaN keep their meaning."""
-MOST_ITERATIONS = 60
+MAX_ITERATIONS = 60
 
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
@@ -493,7 +493,7 @@ def solve_contacts(r, n, approach, hertz, small, force, w, enough, order, a, x):
     order, a, x : scratch; on return order[:m] are the points that touch and `a` the factor of R + h'(N) over them.
     """
     n_s = hertz.shape[0]
-    for iteration in range(1, MOST_ITERATIONS + 1):
+    for iteration in range(1, MAX_ITERATIONS + 1):
         m = 0
         for i in range(n):
             free = approach[i]
@@ -541,7 +541,7 @@ def hertz_energy(force, hertz, small):
 # --------------------
 
 
-MOST_CYCLES = 1e12
+MAX_CYCLES = 1e12
 """Mesh cycles beyond which a run has burst; until then, single cycles are resolved to 1e-4."""
 
 
@@ -556,7 +556,7 @@ def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reac
     columns, parts : column i of the table and part t of a step beyond it.
     apart, slope : separation in m, and its change per base pitch.
     """
-    if not abs(cycles) < MOST_CYCLES:
+    if not abs(cycles) < MAX_CYCLES:
         return -1
     n, last = 0, corner.shape[0] - 3
     newest = np.floor(cycles - start)

@@ -1,4 +1,4 @@
-"""A cracked tooth: nodes doubled along the crack in one sector, the other sectors sound."""
+"""A cracked tooth: nodes doubled along the crack in one sector, the other sectors healthy."""
 
 from __future__ import annotations
 
@@ -64,10 +64,10 @@ class OpenCrack(NamedTuple):
         return (whole + whole.T) / 2.0
 
 
-def crack_compliance_m_per_n(
+def open_crack(
     blank: GearBlank, crack: RootCrack, grid: FlankGrid, spread: Spread = "section", size: MeshSize = CRACK_SIZE
-) -> FloatArray:
-    """What a root crack adds to the compliance between the flank points of its tooth, (n_points, n_points), m/N.
+) -> OpenCrack:
+    """Solve the gear with the crack open, once for all widths.
 
     The difference of two static solutions of the whole gear, bore held, on the same mesh: with the nodes on the crack
     doubled, and without. For a gear that is not held at its bore it is nearly the same: a crack acts on its tooth.
@@ -76,15 +76,10 @@ def crack_compliance_m_per_n(
     ----------
     blank : GearBlank
     crack : RootCrack
-        From the middle of the fillet of flank 0. Its width is rounded to whole cells.
+        From the middle of the fillet of flank 0, through the whole width.
     grid : FlankGrid
     spread : str
     size : MeshSize
-
-    Returns
-    -------
-    array, (n_points, n_points)
-        Rows and columns of flank 1 are zero: pushed from the back, the crack is closed.
 
     Raises
     ------
@@ -97,23 +92,10 @@ def crack_compliance_m_per_n(
     add 2 to 5 % more. Near the tooth's tip this agrees with the potential energy of sections behind a limiting line to
     5 %; halfway up the flank that method finds only half as much.
     """
-    if crack.front != "straight":
-        raise InputError("front of the crack is 'parabolic'", allowed="straight", remedy="give the mean depth")
-    opened = open_crack(blank, replace(crack, width_mm=None), grid, spread, size)
-    added = np.zeros((grid.n_points, grid.n_points))
-    half = grid.n_points // 2
-    added[:half, :half] = opened.added_m_per_n(front_layer(blank, crack.width_mm, size))
-    return added
-
-
-def open_crack(
-    blank: GearBlank, crack: RootCrack, grid: FlankGrid, spread: Spread = "section", size: MeshSize = CRACK_SIZE
-) -> OpenCrack:
-    """Solve the gear with the crack open, once for all widths; see `crack_compliance_m_per_n`."""
-    sound, cracked = crack_meshes(blank, crack, size)
-    n_new = cracked.n_nodes - sound.n_nodes
-    old = sound.tooth[0, sound.tooth.shape[1] - n_new // sound.tooth.shape[2] :].ravel()
-    opening = sparse.csr_array(sparse.eye_array(3 * cracked.n_nodes, format="csr")[3 * sound.n_nodes :])
+    healthy, cracked = crack_meshes(blank, crack, size)
+    n_new = cracked.n_nodes - healthy.n_nodes
+    old = healthy.tooth[0, healthy.tooth.shape[1] - n_new // healthy.tooth.shape[2] :].ravel()
+    opening = sparse.csr_array(sparse.eye_array(3 * cracked.n_nodes, format="csr")[3 * healthy.n_nodes :])
     opening = opening - sparse.csr_array(
         (
             np.ones(3 * n_new),
@@ -126,15 +108,8 @@ def open_crack(
         rows = flank_rows(cracked, grid, spread, np.arange(cracked.n_nodes), 3 * cracked.n_nodes)
         flank, gap = rows[: grid.n_points // 2, kept], opening[:, kept].toarray()
         moved = factorised(stiffness)(gap.T)
-    layer = np.repeat(np.tile(np.arange(sound.tooth.shape[2]), n_new // sound.tooth.shape[2]), 3)
-    return OpenCrack(flank @ moved, gap @ moved, layer, sound.tooth.shape[2] - 1)
-
-
-def front_layer(blank: GearBlank, width_mm: float | None, size: MeshSize = CRACK_SIZE) -> int | None:
-    """Layer of nodes between cells where the crack's front lies, from the end at z < 0; None: through the width."""
-    if width_mm is None:
-        return None
-    return 2 * (int(np.argmin(np.abs(front_widths_mm(blank, size) - width_mm))) + 1)
+    layer = np.repeat(np.tile(np.arange(healthy.tooth.shape[2]), n_new // healthy.tooth.shape[2]), 3)
+    return OpenCrack(flank @ moved, gap @ moved, layer, healthy.tooth.shape[2] - 1)
 
 
 def crack_meshes(blank: GearBlank, crack: RootCrack, size: MeshSize = CRACK_SIZE) -> tuple[SectorMesh, SectorMesh]:
@@ -145,14 +120,14 @@ def crack_meshes(blank: GearBlank, crack: RootCrack, size: MeshSize = CRACK_SIZE
     n_cells = min(max(1, round(part * size.n_across)), size.n_across - 1)
     line = CrackLine(crack_tip_mm(g, crack.depth_mm, crack.angle_deg), n_cells)
     try:
-        sound = sector_mesh(blank, size, line)
+        healthy = sector_mesh(blank, size, line)
     except InputError as error:
         raise InputError(
             f"the mesh cannot follow a crack of {crack.depth_mm:g} mm at {crack.angle_deg:g}° ({error.what})",
             allowed="angles from about 35°",
             remedy="take a larger angle or a shallower crack",
         ) from error
-    return sound, _opened(sound, n_cells)
+    return healthy, _opened(healthy, n_cells)
 
 
 def tooth_compliance_with(mesh: SectorMesh, chain: FloatArray, grid: FlankGrid, spread: Spread) -> FloatArray:
@@ -256,7 +231,7 @@ COARSE_SIZE, COARSE_DOF = MeshSize(n_across=6, n_gap=1, n_up=6, n_rim=2, n_body=
 `CRACK_SIZE`."""
 READY_ANGLE_DEG = 45.0
 READY_FILE = FOLDER / "cracks.npz"
-MOST_BYTES = 100_000_000
+MAX_BYTES = 100_000_000
 """Of a kept crack's arrays; a usual one has less than one."""
 
 
@@ -438,7 +413,7 @@ def _kept(path: Path, solve: Callable[[], FloatArray], grid: tuple[int, int, int
 
 def _read(path: Path) -> tuple[str, FloatArray | None]:
     """Code that made a file, and what it keeps; None if it is not there or damaged."""
-    data = read_arrays(path, MOST_BYTES)
+    data = read_arrays(path, MAX_BYTES)
     return (str(data["code"]), data["added"]) if data is not None and {"code", "added"} <= set(data) else ("", None)
 
 

@@ -28,7 +28,7 @@ from numba import njit
 from gearsig.checks import FloatArray, one_of, positive
 from sims.compiled import UNCOUNTED
 from sims.gear_pair import foot
-from sims.machine import course_value, set_speed
+from sims.machine import profile_value, set_speed
 from sims.mesh import contact_friction_n
 from sims.reduced_fe._contact import (
     FAST,
@@ -225,7 +225,7 @@ REACH_MPS = 4.0
 FAST_PART = 0.05
 """Change of a contact force, over the nominal one, after which the fast way takes no second iteration."""
 PRECISE_PART = 1e-11
-MOST_PASSES = 50
+MAX_PASSES = 50
 N_EXTRAS = 6
 
 
@@ -261,7 +261,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
     state : (q, v, f, f_before: (2, n_modes); force, root: (n_slots, n_slices); pair: (n_slots,); rest: (3,)), left at
         the last step. rest: set angle, whether the flanks touched, whether
         the state has forces already.
-    speed, torque : (2, n) courses in rad/s and N m.
+    speed, torque : (2, n) profiles in rad/s and N m.
     time : of the first step.
     precise : repeat each step until it stays.
     lines : (kinds (n,), factors (n, 2, n_modes), set factors (n,)): wanted signals; kind 0, 1, 2: displacement,
@@ -281,7 +281,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
     q1, v1, f1, base, free_q, free_v = modes
     n_out, angle, margin, reach = 0, rest[0], REACH_MPS * step, START_REACH
     enough = (PRECISE_PART if precise else FAST_PART) * k.nominal_force
-    passes = MOST_PASSES if precise else 1
+    passes = MAX_PASSES if precise else 1
     w1, rate1 = set_speed(k, speed, time)
     for number in range(n_steps + 1):
         t = time + number * step
@@ -290,7 +290,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
             wh = set_speed(k, speed, t - 0.5 * step)[0]
             w1, rate1 = set_speed(k, speed, t)
             angle += step / 6.0 * (w0 + 4.0 * wh + w1)
-        load = course_value(torque, t)
+        load = profile_value(torque, t)
         _predict(number, coefficients, q, v, f, f_before, free_q, free_v, f1)
         outer_forces(k, inputs, q, v, angle, w1, rate1, load, base)
         cycles, total, back, along_torque, rubbing, n = 0.0, 0.0, 0.0, 0.0, 0.0, 0

@@ -224,10 +224,10 @@ INPUTS = (
 )
 """Generalised forces that act on a side besides the contact, those of bearings on the shaft in them; the last is minus
 one of the whole side turning."""
-LEAST_PART = 1e-3
+MIN_PART = 1e-3
 """Static part of a mode at the flank, of the greatest one: modes below it are left to the residual compliance."""
 ABOUT_Z = 5
-LEAST_HUB = 1e-4
+MIN_HUB = 1e-4
 """Mass and inertia of a hub that has none of its own, of the body's: they let the bore move by itself."""
 INERTIA_TOLERANCE = 0.02
 """Part by which a gear's total inertia may be below the finite-element body's before it is refused."""
@@ -314,7 +314,7 @@ def kept_modes(gear: ReducedGear, limit_hz: float, groups: FloatArray) -> Retain
     paired = (gear.nodal_diameters > 0) & (2 * gear.nodal_diameters < gear.blank.n_teeth)
     first = np.flatnonzero(paired)[::2]
     part[first] = part[first + 1] = np.maximum(part[first], part[first + 1])
-    wanted = (gear.frequencies_hz <= limit_hz) & (part >= LEAST_PART * part.max()) & (gear.nodal_diameters != 1)
+    wanted = (gear.frequencies_hz <= limit_hz) & (part >= MIN_PART * part.max()) & (gear.nodal_diameters != 1)
     pairs = first[wanted[first]]
     return RetainedModes(np.flatnonzero(wanted & ~paired), np.column_stack((pairs, pairs + 1)))
 
@@ -430,7 +430,7 @@ def _matrices(
     hub_kg, hub_kg_m2 = hub_inertia(machine, index, gear)
     mass = np.eye(n)
     body = [gear.mass_kg, gear.mass_kg, gear.polar_inertia_kg_m2]
-    hub = np.maximum([hub_kg, hub_kg, hub_kg_m2], LEAST_HUB * np.array(body))
+    hub = np.maximum([hub_kg, hub_kg, hub_kg_m2], MIN_HUB * np.array(body))
     own = [shaft.rotor_inertia_kg_m2, body[2], *body[:2], *(b.mass_kg for b in bearings for _ in range(2)), *hub]
     mass[range(n_own), range(n_own)] = own
     stiffness, damping = np.zeros((n, n)), np.zeros((n, n))
@@ -487,7 +487,7 @@ MODE_LIMIT_HZ = 20000.0
 """Elastic modes up to here are kept; the others follow at once."""
 SMALL_PART = 1e-3
 """Of the nominal force on a slice: below it the local contact is straight."""
-LEAST_FORCE_N = 50.0
+MIN_FORCE_N = 50.0
 """Mesh force for which stiffness and damping are taken where the torque is smaller."""
 
 _SCALARS = (
@@ -629,7 +629,7 @@ def constants(
     """
     machine, mesh = pair.machine, pair.machine.mesh
     base = np.array([mesh.pair.driver.base_radius_mm, mesh.pair.driven.base_radius_mm]) * 1e-3
-    force = max(operation.torque_nm.largest / base[0], LEAST_FORCE_N)
+    force = max(operation.torque_nm.largest / base[0], MIN_FORCE_N)
     stiffness = mean_stiffness_n_per_m(pair, force)
     table, kept, groups = _contact(pair)
     loads = bearing_loads_n(machine, force)
@@ -715,14 +715,14 @@ def back_rows(machine: Machine, sides: tuple[FlexibleSide, FlexibleSide]) -> Flo
 
 
 def mean_stiffness_n_per_m(pair: FlexiblePair, force_n: float) -> float:
-    """Tangent stiffness of the sound mesh at a force, mean over a mesh cycle."""
+    """Tangent stiffness of the healthy mesh at a force, mean over a mesh cycle."""
     from dataclasses import replace
 
     faults: dict[str, Any] = {f"{kind}_{i}": () for kind in ("cracks", "spalls", "chips") for i in (1, 2)}
-    sound = replace(pair.machine.mesh, **faults)
-    torque = np.array([force_n * sound.pair.driver.base_radius_mm * 1e-3])
-    table = static_table(pair.gears, sound)
-    return float(mesh_maps(pair.gears, sound, torque, table=table).tangent_stiffness_n_per_m.mean())
+    healthy = replace(pair.machine.mesh, **faults)
+    torque = np.array([force_n * healthy.pair.driver.base_radius_mm * 1e-3])
+    table = static_table(pair.gears, healthy)
+    return float(mesh_maps(pair.gears, healthy, torque, table=table).tangent_stiffness_n_per_m.mean())
 
 
 def _padded(sides: list[FlexibleSide]) -> tuple[FlexibleSide, FlexibleSide]:
@@ -769,7 +769,7 @@ def _pad(side: FlexibleSide, single: int, pairs: int, silent: int) -> FlexibleSi
 
 DEEPEST_M = 1e-3
 """Beyond any approach of flanks."""
-LEAST_HZ = 1.0
+MIN_HZ = 1.0
 """Of modes that the balance bends; slower ones are rigid motion."""
 
 
@@ -788,7 +788,7 @@ def start_state(pair: FlexiblePair, own: FlexiblePairConstants, operation: Opera
         drive = torque if index == 0 else -torque * float(own.record["ratio"])
         load = side.inputs[0] * drive
         load[: side.rows.shape[-1]] -= force * side.rows[column].mean(axis=0)
-        soft = side.omega_rad_s > 2.0 * np.pi * LEAST_HZ
+        soft = side.omega_rad_s > 2.0 * np.pi * MIN_HZ
         q[index, soft] = load[soft] / side.omega_rad_s[soft] ** 2
     shape = own.table.n_slots, own.table.n_slices
     small = float(own.record["small"])
@@ -842,7 +842,7 @@ def _closed(pair: FlexiblePair, own: FlexiblePairConstants, state: FlexState, fo
 # --------------------
 
 
-DYNAMICS_LINEAR_LEAST_HZ = 200.0
+MIN_TORSIONAL_HZ = 200.0
 """Modes below it are those of rotors on their couplings."""
 
 
@@ -932,7 +932,7 @@ def _torsional(
     for c in mesh_cycles:
         squares, shapes, rows, stiff = _squares(pair, own, operation, c)
         energy = np.einsum("ij,ik,kj->j", rows @ shapes, stiff, rows @ shapes)
-        part = energy / np.maximum(squares, (2.0 * pi * DYNAMICS_LINEAR_LEAST_HZ) ** 2)
+        part = energy / np.maximum(squares, (2.0 * pi * MIN_TORSIONAL_HZ) ** 2)
         mode = int(np.argmax(part))
         omega = float(np.sqrt(squares[mode]))
         found.append((omega / (2.0 * pi), part[mode], float(rates @ shapes[:, mode] ** 2) / (2.0 * omega)))
@@ -953,7 +953,7 @@ def contact_rows(
     pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, cycles: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return ∂D/∂η of the points that touch under the set torque, (n, n_modes), and their stiffness, (n, n)."""
-    force = max(operation.torque_nm.largest / own.base_radius_m[0], LEAST_FORCE_N)
+    force = max(operation.torque_nm.largest / own.base_radius_m[0], MIN_FORCE_N)
     at = contact_state(own.table, pair.machine.mesh, force, cycles)
     one, two = own.sides
     turn, n = own.turn(), one.n_modes

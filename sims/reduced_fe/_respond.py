@@ -33,10 +33,10 @@ from sims.reduced_fe._pair import (
 # --------------------
 
 
-MOST_GROWTH = 1e-4
+MAX_GROWTH = 1e-4
 """Of errors in a step. Without any damping steps of 5 µs have 4e-7; those that cannot be followed 1e-2 and more."""
 N_POINTS = 5
-MOST_HALVINGS = 3
+MAX_HALVINGS = 3
 USUAL_HUB = 2.0
 """Inertia of a hub over its toothed body's."""
 
@@ -46,10 +46,10 @@ def followed_step_s(pair: FlexiblePair, own: FlexiblePairConstants, operation: O
 
     Where none can, the longest: `check_step` then says why.
     """
-    for halvings in range(MOST_HALVINGS + 1):
+    for halvings in range(MAX_HALVINGS + 1):
         step = longest_s * 0.5**halvings
         coefficients = np.array([step_coefficients(s.omega_rad_s, s.damping_rate, step) for s in own.sides])
-        if growth(pair, own, operation, coefficients) <= MOST_GROWTH:
+        if growth(pair, own, operation, coefficients) <= MAX_GROWTH:
             return step
     return longest_s
 
@@ -94,7 +94,7 @@ def check_step(
     InputError
         Where hubs are too heavy for their teeth, the damping ratio is too great, or the step too long.
     """
-    if method == "exponential" and growth(pair, own, operation, coefficients) <= MOST_GROWTH:
+    if method == "exponential" and growth(pair, own, operation, coefficients) <= MAX_GROWTH:
         return
     if method == "newmark" and _pass_gain(pair, own, operation, coefficients) <= 1.0:
         return
@@ -178,7 +178,7 @@ def respond(
     ----------
     pair : FlexiblePair
     operation : Operation
-        Set speed and torque; time 0 of their courses is time 0 here.
+        Set speed and torque; time 0 of their profiles is time 0 here.
     duration_s : float
     signals : sequence of str
         Of `signal_names`.
@@ -226,13 +226,13 @@ def respond(
         own.stacked("rigid"),
         back_rows(pair.machine, own.sides),
     )
-    courses = profile_points(operation.speed_rpm, pi / 30.0), profile_points(operation.torque_nm, 1.0)
+    profiles = profile_points(operation.speed_rpm, pi / 30.0), profile_points(operation.torque_nm, 1.0)
     scratch = room(state[4].shape, state[0].shape[1], fixed[2].shape[3])
 
     def part(time_s: float, n_steps: int, rows: FloatArray, energies: FloatArray) -> int:
         is_newmark = method == "newmark"
         return int(
-            march(*fixed, state, *courses, time_s, step, n_steps, stride, is_newmark, lines, rows, energies, scratch)
+            march(*fixed, state, *profiles, time_s, step, n_steps, stride, is_newmark, lines, rows, energies, scratch)
         )
 
     kept, energies = plan.run(

@@ -73,7 +73,7 @@ _ARRAYS = (
     "hub_flank_compliance",
     "hub_compliance",
 )
-MOST_BYTES = 200_000_000
+MAX_BYTES = 200_000_000
 """Of a file's arrays; a usual one has half a million."""
 
 
@@ -103,9 +103,9 @@ def read_gear(path: str | Path) -> ReducedGear:
     source = Path(path)
     if not source.exists():
         raise InputError("no such file", where=str(source))
-    data = read_arrays(source, MOST_BYTES)
+    data = read_arrays(source, MAX_BYTES)
     if data is None:
-        raise _no_gear(source, f"no archive of at most {MOST_BYTES:.0e} bytes")
+        raise _no_gear(source, f"no archive of at most {MAX_BYTES:.0e} bytes")
     try:
         about = json.loads(str(data["about"]))
         _check_format(about, source)

@@ -16,13 +16,13 @@ from sims.reduced_fe import (
     SectorMesh,
     craig_bampton,
     cyclic_modes,
-    full_modes,
     mesh_size_for,
     one_thread,
     plan_for,
     reduce_gear,
     sector_mesh,
 )
+from tests.sims.reduced_fe.fe_gears import full_modes
 
 GEAR = READY["z50_m3"]
 WANTED = 277_200

@@ -111,7 +111,7 @@ def test_work_and_loss_of_the_loop_are_those_of_the_model() -> None:
     from sims.forging import ForgingManipulator, respond
 
     ready = ForgingManipulator().prepare({}, None)
-    run = respond(ready.drive, ready.courses(6.0), duration_s=6.0, interval_s=1e-4)
+    run = respond(ready.drive, ready.profiles(6.0), duration_s=6.0, interval_s=1e-4)
     work = np.trapezoid(run["torque"] * run["pinion speed"], dx=1e-4)
     assert loop.work_per_cycle_j == pytest.approx(work / 2.0, rel=1e-3)
     assert loop.loss_per_cycle_j == pytest.approx(run["lost in contact"][-1] / 2.0, rel=0.5)

@@ -40,7 +40,7 @@ def test_the_min_loss_parts_what_shows_from_what_does_not(part: float) -> None:
     wanted = ParameterValues(prepared.values)
     recording = record(
         drive,
-        prepared.courses(13.0),
+        prepared.profiles(13.0),
         wanted,
         rig=build_rig(drive, wanted, prepared.operation, sensors(1000.0)),
         rng=np.random.default_rng(0),

@@ -158,12 +158,12 @@ def rig_of(ready: PreparedCrackedPair) -> Rig:
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_the_rig_file_reads_back_and_tells_no_damage(name: str, tmp_path: Path) -> None:
-    sound, hurt = rig_of(prepared(name)), rig_of(prepared(name, crack_depth_mm=1.0))
-    write_rig(sound, tmp_path / "rig.toml")
-    assert read_rig(tmp_path / "rig.toml") == sound == hurt
-    assert sound.speed is not None
-    assert {s.channel for s in sound.sensors} == {"a1", "a2", "tacho"}
-    assert {b.shaft for b in sound.bearings[:2]} == {"input"}
+    healthy, hurt = rig_of(prepared(name)), rig_of(prepared(name, crack_depth_mm=1.0))
+    write_rig(healthy, tmp_path / "rig.toml")
+    assert read_rig(tmp_path / "rig.toml") == healthy == hurt
+    assert healthy.speed is not None
+    assert {s.channel for s in healthy.sensors} == {"a1", "a2", "tacho"}
+    assert {b.shaft for b in healthy.bearings[:2]} == {"input"}
 
 
 def test_a_varying_speed_is_left_out_of_the_rig() -> None:
@@ -239,9 +239,9 @@ def test_effects_change_the_machine_and_stand_in_the_truth() -> None:
     rng, other = np.random.default_rng(3), np.random.default_rng(3)
     settings = [EffectSetting("root_crack", 1.0, {"tooth": 4.0})]
     ready = CrackedPair().prepare({}, settings, None, rng, preset_name="published_55_75")
-    sound = CrackedPair().prepare({}, [], None, other, preset_name="published_55_75")
+    healthy = CrackedPair().prepare({}, [], None, other, preset_name="published_55_75")
     assert ready.machine.mesh.cracks_1[0].tooth == 3  # the model counts from 0
-    assert sound.machine.mesh.cracks_1 == ()
+    assert healthy.machine.mesh.cracks_1 == ()
     assert rng.random() == other.random()  # healthy and faulty runs go on with the same random numbers
     (entry,) = ready.truth()["effects"]
     assert (entry["name"], entry["severity"], entry["unit"]) == ("root_crack", 1.0, "mm")
@@ -260,7 +260,7 @@ def test_every_effect_has_a_meaning_here(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_a_sound_machine_does_not_overdrive_its_sensors(name: str) -> None:
+def test_a_healthy_machine_does_not_overdrive_its_sensors(name: str) -> None:
     recording = simulate("cracked", preset=name, duration_s=0.2)
     range_mps2 = machine(name).chain.channels[0].accelerometer.range_mps2
     assert range_mps2 is not None

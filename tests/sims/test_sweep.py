@@ -81,7 +81,7 @@ def test_a_point_puts_its_values_in_place(monkeypatch: pytest.MonkeyPatch) -> No
         ("root_crack", 1.0, {"gear": "driven"}),
     ]
     assert seen["speed_rpm"] is ramp
-    assert seen["torque_nm"].values.tolist() == [20.0]  # type: ignore[attr-defined]  # a Course
+    assert seen["torque_nm"].values.tolist() == [20.0]  # type: ignore[attr-defined]  # a Profile
 
 
 def test_every_point_stands_in_the_folder_with_rig_and_truth(quick: list[SweepPoint], tmp_path: Path) -> None:
@@ -192,9 +192,9 @@ def test_processes_give_what_one_process_gives(tmp_path: Path) -> None:
         common_seed=True,
     )
     run_sweep(sweep, tmp_path / "two", n_processes=2)
-    sound, cracked = (read_recording(tmp_path / "two" / f"point_{i}.h5") for i in (0, 1))
+    healthy, cracked = (read_recording(tmp_path / "two" / f"point_{i}.h5") for i in (0, 1))
     alone = sweep.simulate(sweep.points()[1])
     assert np.array_equal(alone.samples, cracked.samples)
-    assert not np.array_equal(sound.samples, cracked.samples)
+    assert not np.array_equal(healthy.samples, cracked.samples)
     assert cracked.truth is not None
     assert cracked.truth["effects"][0]["severity"] == 1.0

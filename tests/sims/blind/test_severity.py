@@ -13,7 +13,7 @@ pytestmark = pytest.mark.slow
 
 SEED = {"backlash": 6}
 """Backlash shows where the brake's pull turns the torque round: not on every rig."""
-LEAST_DB = {"unbalance": 0.5, "mains_hum": 0.5, "clipping": 0.5, "speed_fluctuation": 0.5, "eccentricity": 0.5}
+MIN_DB = {"unbalance": 0.5, "mains_hum": 0.5, "clipping": 0.5, "speed_fluctuation": 0.5, "eccentricity": 0.5}
 """Some touch only a few lines of the whole spectrum."""
 
 
@@ -29,4 +29,4 @@ def twins(name: str, level: float) -> tuple[Recording, Recording]:
 def test_the_change_grows_with_the_level(name: str) -> None:
     weak, strong = (distance_db(*twins(name, level)) for level in (0.15, 1.0))
     assert strong > weak
-    assert strong > LEAST_DB.get(name, 1.0)
+    assert strong > MIN_DB.get(name, 1.0)

@@ -46,8 +46,8 @@ def test_gears_are_in_one_role_only():
 @pytest.mark.parametrize("name", CATALOGUE | OUTSIDE)
 def test_one_compiled_kernel_runs_them_all(name: str):
     """Two processes that compile two kernels at once can keep one under the other's name."""
-    sound = machine()
-    assert changed(sound, name, 1.0, np.random.default_rng(1))[0].record().dtype == sound.record().dtype
+    healthy = machine()
+    assert changed(healthy, name, 1.0, np.random.default_rng(1))[0].record().dtype == healthy.record().dtype
 
 
 def test_torque_less_friction_accelerates_the_inertias():
@@ -74,20 +74,20 @@ def test_half_the_step_changes_the_motion_little():
 
 def test_flanks_lie_a_play_apart():
     """Between driving and braking, the compression changes by the play and what both flanks yield."""
-    sound, wide = machine(), changed(machine(), "backlash", 200.0, np.random.default_rng(1))[0]
+    healthy, wide = machine(), changed(machine(), "backlash", 200.0, np.random.default_rng(1))[0]
     spans = []
-    for made in (sound, wide):
+    for made in (healthy, wide):
         q = 1e6 * measure_motion(recorded(made)).compression_m
         spans.append(np.quantile(q, 0.9) - np.quantile(q, 0.02))
     assert spans[1] - spans[0] == pytest.approx(200.0, rel=0.1)
-    assert spans[0] > 2e6 * sound.numbers["half_play"]
+    assert spans[0] > 2e6 * healthy.numbers["half_play"]
 
 
 @pytest.mark.parametrize("name", [*CATALOGUE, *OUTSIDE])
 def test_everything_that_can_be_wrong_shows(name):
-    sound = machine()
-    made, _ = changed(sound, name, (CATALOGUE | OUTSIDE)[name].high, np.random.default_rng(2))
-    ours, theirs = recorded(made).samples, recorded(sound).samples
+    healthy = machine()
+    made, _ = changed(healthy, name, (CATALOGUE | OUTSIDE)[name].high, np.random.default_rng(2))
+    ours, theirs = recorded(made).samples, recorded(healthy).samples
     assert np.max(np.abs(ours[:3] - theirs[:3]) / np.std(theirs[:3], axis=1)[:, None]) > 1e-4
 
 

@@ -125,10 +125,10 @@ def test_an_effect_may_be_varied_and_a_channel_looked_at():
     one = branch(
         "root_crack", (0.0, 2.0), signal="a1", section="shaft", n_cycles=4, effects=(EffectSetting("unbalance", 50.0),)
     )
-    sound, cracked = one.run(0.0), one.run(2.0)
-    assert sound.recording.channel_names[0] == "a1"
+    healthy, cracked = one.run(0.0), one.run(2.0)
+    assert healthy.recording.channel_names[0] == "a1"
     assert cracked.recording.truth is not None
-    assert not np.allclose(sound.recording.values("a1"), cracked.recording.values("a1"))
+    assert not np.allclose(healthy.recording.values("a1"), cracked.recording.values("a1"))
 
 
 @pytest.mark.parametrize(

@@ -126,10 +126,12 @@ def test_the_same_as_an_adaptive_integrator() -> None:
 
 def change_per_cycle(machine: Machine, depth_mm: float, name: str) -> NDArray[np.float64]:
     """Greatest change that a crack in the driver's tooth 0 makes, in each of the 55 mesh cycles of a revolution."""
-    sound, faulty = (by_angle(run(m, (name, "driver angle"), 0.5), name) for m in (machine, cracked(machine, depth_mm)))
-    n = min(len(sound), len(faulty)) // 5500 * 5500
-    change = (faulty[:n] - sound[:n]).reshape(-1, 55, 100)
-    return np.abs(change - np.median(change)).max(axis=(0, 2)) / np.ptp(sound)
+    healthy, faulty = (
+        by_angle(run(m, (name, "driver angle"), 0.5), name) for m in (machine, cracked(machine, depth_mm))
+    )
+    n = min(len(healthy), len(faulty)) // 5500 * 5500
+    change = (faulty[:n] - healthy[:n]).reshape(-1, 55, 100)
+    return np.abs(change - np.median(change)).max(axis=(0, 2)) / np.ptp(healthy)
 
 
 def test_crack_strikes_once_per_revolution_and_harder_with_depth() -> None:
@@ -144,8 +146,8 @@ def test_crack_strikes_once_per_revolution_and_harder_with_depth() -> None:
 
 
 def test_reach_of_the_crack_grows_with_its_depth() -> None:
-    """Mesh cycles in which more than 1 % of the sound transmission error's swing changes: about 3, later 7 (published:
-    3, later 9). It rests on the torsional damping, which is not published: 0.4 N m s/rad here."""
+    """Mesh cycles in which more than 1 % of the healthy transmission error's swing changes: about 3, later 7
+    (published: 3, later 9). It rests on the torsional damping, which is not published: 0.4 N m s/rad here."""
     base = spur_pair_machine()
     machine = replace(base, shafts=tuple(replace(s, torsional_damping_nm_s_per_rad=0.4) for s in base.shafts))
     reach = [int((change_per_cycle(machine, q, "transmission_error_m") > 0.01).sum()) for q in (1.0, 2.0, 3.0, 4.0)]
@@ -159,10 +161,10 @@ def test_crack_of_one_tooth_leaves_the_other_gear_alone() -> None:
     machine = spur_pair_machine()
     faulty = replace(machine, mesh=replace(machine.mesh, cracks_2=(RootCrack(3.0),)))
     signals = ("driver y acceleration", "driver angle")
-    sound, struck = (by_angle(run(m, signals, 0.8), signals[0]) for m in (machine, faulty))
-    n = min(len(sound), len(struck)) // 7500 * 7500
+    healthy, struck = (by_angle(run(m, signals, 0.8), signals[0]) for m in (machine, faulty))
+    n = min(len(healthy), len(struck)) // 7500 * 7500
     first = int(np.ceil(55 * run(machine, ("driver angle",), 0.01)["driver angle"][0] / (2 * np.pi) / 55)) * 55
-    change = np.roll((struck[:n] - sound[:n]).reshape(-1, 75, 100), first, axis=1)
+    change = np.roll((struck[:n] - healthy[:n]).reshape(-1, 75, 100), first, axis=1)
     peaks = np.abs(change).max(axis=(0, 2))
     assert set(np.argsort(peaks)[-2:]) == {0, 1}
 

@@ -1,7 +1,7 @@
-"""Each effect shows where theory says it does, and the sound machine does not show it there.
+"""Each effect shows where theory says it does, and the healthy machine does not show it there.
 
-Without noise the sound machine is periodic in the mesh: its other lines are the integrator's rounding. So "shows" means
-orders of magnitude, and amplitudes are compared with closed forms where there are any.
+Without noise the healthy machine is periodic in the mesh: its other lines are the integrator's rounding. So "shows"
+means orders of magnitude, and amplitudes are compared with closed forms where there are any.
 """
 
 from dataclasses import replace
@@ -30,7 +30,7 @@ BPFO, BPFI = (9 / 2 * (1 - 7.94 / 39.04), 9 / 2 * (1 + 7.94 / 39.04))
 TOOTH_LOCAL = [("root_crack", 3.0), ("tooth_spall", 60.0), ("chipped_tooth", 1.5)]
 TOOTH = 20  # from 0, as rows of teeth are; effects count from 1
 FLOOR = 1e-5
-"""m/s², above the sound machine's lines off the mesh harmonics."""
+"""m/s², above the healthy machine's lines off the mesh harmonics."""
 
 
 @lru_cache(maxsize=8)  # a run keeps some 16 MB
@@ -42,11 +42,11 @@ def kurtosis(x: FloatArray) -> float:
     return float(np.mean((x - x.mean()) ** 4) / x.var() ** 2)
 
 
-def test_the_sound_machine_has_mesh_harmonics_and_nothing_else() -> None:
-    sound = healthy()
-    assert sound.lines(ACCELERATION, [Z, 2 * Z, 3 * Z]).min() > 1.0
+def test_the_healthy_machine_has_mesh_harmonics_and_nothing_else() -> None:
+    baseline = healthy()
+    assert baseline.lines(ACCELERATION, [Z, 2 * Z, 3 * Z]).min() > 1.0
     others = [1, 2, 6, OUTPUT_ORDER, 2 * OUTPUT_ORDER, BPFO, BPFI, Z - 1, Z + 1, Z - OUTPUT_ORDER, 2.4]
-    assert sound.lines(ACCELERATION, others).max() < FLOOR
+    assert baseline.lines(ACCELERATION, others).max() < FLOOR
 
 
 @pytest.mark.parametrize(("name", "severity"), TOOTH_LOCAL)
@@ -126,9 +126,9 @@ def test_time_locked_roughness_shows_at_its_fixed_frequencies() -> None:
 @pytest.mark.parametrize("added", [0.05, 0.2])
 def test_friction_shows_across_the_line_of_action_in_proportion(added: float) -> None:
     """Coulomb's force changes by twice its size at the pitch point: harmonics that the film's hardly has."""
-    ill, half, sound = faulty("sliding_friction", added), faulty("sliding_friction", added / 2.0), healthy()
+    ill, half, baseline = faulty("sliding_friction", added), faulty("sliding_friction", added / 2.0), healthy()
     orders = [Z, 2 * Z, 3 * Z]
-    across = [run.lines("driver x", orders) for run in (ill, half, sound)]
+    across = [run.lines("driver x", orders) for run in (ill, half, baseline)]
     assert across[0][1:].min() > 3.0 * across[2][1:].max()
     assert across[0][1:] == pytest.approx(2.0 * across[1][1:], rel=0.25)
     assert ill.lines(ACCELERATION, [1, Z - 1, Z + 1]).max() < FLOOR
@@ -169,10 +169,10 @@ def test_misalignment_bends_the_shaft_at_its_second_order(angle_deg: float) -> N
 
 def test_a_stiff_coupling_bends_the_shaft_beyond_what_torque_does() -> None:
     """β K/(2 L) at order 2 as well, a quarter of a period from the torque's: the two add as squares."""
-    sound, bends = spur_pair_machine(), 200.0
-    stiff = replace(sound.shafts[0], coupling_bending_nm_per_rad=bends)
+    healthy, bends = spur_pair_machine(), 200.0
+    stiff = replace(healthy.shafts[0], coupling_bending_nm_per_rad=bends)
     setting = EffectSetting("misalignment", 1.0, {})
-    machine = with_effects(replace(sound, shafts=(stiff, sound.shafts[1])), [setting], np.random.default_rng(0))
+    machine = with_effects(replace(healthy, shafts=(stiff, healthy.shafts[1])), [setting], np.random.default_rng(0))
     force = radians(1.0) * np.hypot(TORQUE_NM, bends) / (2 * 0.1)
     found = run_machine(machine, SPEED_RPM, TORQUE_NM).line(ACCELERATION, 2.0)
     assert found == pytest.approx((2 * OMEGA) ** 2 * force / 2e8, rel=0.05)
@@ -217,7 +217,7 @@ def test_backlash_shows_only_where_teeth_separate() -> None:
 
 
 def envelope_lines(ill: Run, orders: FloatArray) -> FloatArray:
-    """Lines of the squared envelope of what the defect adds to the sound machine."""
+    """Lines of the squared envelope of what the defect adds to the healthy machine."""
     n = min(len(ill.revolutions), len(healthy().revolutions))
     added = ill.signals[ACCELERATION][:n] - np.interp(
         ill.revolutions[:n], healthy().revolutions, healthy().signals[ACCELERATION]
@@ -309,9 +309,9 @@ def test_hum_stands_at_its_frequency_whatever_the_speed() -> None:
 
 
 def test_clipping_cuts_the_tail_of_the_amplitudes() -> None:
-    sound, clipped = (recorded(*s).samples[0] for s in ((), (EffectSetting("clipping", 10.0),)))
-    level = np.quantile(np.abs(sound), 0.9)
-    beyond = [np.mean(np.abs(x) > 1.1 * level) for x in (sound, clipped)]
+    healthy, clipped = (recorded(*s).samples[0] for s in ((), (EffectSetting("clipping", 10.0),)))
+    level = np.quantile(np.abs(healthy), 0.9)
+    beyond = [np.mean(np.abs(x) > 1.1 * level) for x in (healthy, clipped)]
     assert 0.03 < beyond[0] < 0.1
     assert beyond[1] < beyond[0] / 4  # what is left is the anti-alias filter's overshoot
-    assert kurtosis(clipped) < kurtosis(sound)
+    assert kurtosis(clipped) < kurtosis(healthy)

@@ -174,7 +174,7 @@ def test_the_same_seed_is_the_same_machine_and_another_noise_another_run() -> No
 
 
 @cache
-def sound_run() -> Recording:
+def healthy_run() -> Recording:
     return run(noise=2, duration_s=0.1)
 
 
@@ -183,7 +183,7 @@ def test_an_effect_that_vanishes_leaves_nothing(name: str) -> None:
     """Common random numbers: what is not the effect is the same to rounding."""
     (first, *_) = twin().candidates(name)
     tiny = replace(first, severity=1e-9 * first.severity)
-    assert difference(sound_run(), run((tiny,), noise=2, duration_s=0.1)) < 1e-5
+    assert difference(healthy_run(), run((tiny,), noise=2, duration_s=0.1)) < 1e-5
 
 
 @pytest.mark.parametrize("name", list(effects()))

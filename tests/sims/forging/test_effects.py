@@ -53,16 +53,16 @@ def test_a_cracked_tooth_yields_more_while_it_carries_and_only_then() -> None:
     assert weak is not None
     assert (weak.gear, weak.tooth) == (0, 6)
     assert 0.02 < weak.loss < 0.5
-    sound, cracked = (respond(m.drive, driven_by(95.0), duration_s=3.0) for m in (made(), made(CRACK)))
+    healthy, cracked = (respond(m.drive, driven_by(95.0), duration_s=3.0) for m in (made(), made(CRACK)))
     mean = {}
-    for name, run in (("sound", sound), ("cracked", cracked)):
+    for name, run in (("healthy", healthy), ("cracked", cracked)):
         x = run["pinion angle"] * 20.0 / (2.0 * np.pi)
         steady = (run.time_s > 1.2) & (x % 1.0 > 0.75) & (x % 1.0 < 0.95)  # tooth ⌊x⌋ alone
         tooth = np.floor(x[steady]).astype(int) % 20
         depth = run["compression"][steady] - 150e-6
         stiffness = run["interaction force"][steady] / np.maximum(depth, 1e-9) ** 1.5
         mean[name] = np.array([np.median(stiffness[tooth == j]) for j in range(20)])
-    ratio = mean["cracked"] / mean["sound"]
+    ratio = mean["cracked"] / mean["healthy"]
     assert ratio[6] == pytest.approx(1.0 - weak.loss, abs=2e-3)
     assert np.delete(ratio, 6) == pytest.approx(np.ones(19), abs=2e-3)
 

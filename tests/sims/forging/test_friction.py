@@ -94,10 +94,10 @@ def test_friction_work_of_each_flank_is_that_of_the_loss_factor(flank: float, di
     path = made.path
     torque = 50.0 * flank
     load = -torque * path.base_radii_m[1] / path.base_radii_m[0]
-    courses = Schedule(Profile.constant(torque), NOTHING, Profile.constant(load))
+    profiles = Schedule(Profile.constant(torque), NOTHING, Profile.constant(load))
     start = FirstState(0.0, 40.0 * direction, 2e-5 * flank, 0.0)
     span = 2.0 * np.pi / 40.0  # some revolution of the pinion
-    run = respond(made, courses, duration_s=0.2 + 1.5 * span, interval_s=span / 20_000, first=start)
+    run = respond(made, profiles, duration_s=0.2 + 1.5 * span, interval_s=span / 20_000, first=start)
     angle, lost = np.abs(run["pinion angle"]), run["lost in friction"]
     first = np.searchsorted(run.time_s, 0.2)
     last = np.searchsorted(angle, angle[first] + 2.0 * np.pi)

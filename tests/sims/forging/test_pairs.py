@@ -43,13 +43,13 @@ def test_two_pairs_carry_for_the_part_epsilon_minus_one(direction: float) -> Non
     made = free_bodies({"restitution": 0.5, "half_backlash_um": 5.0, "impact_speed_floor_mps": 1e-3})
     r1, r2 = made.path.base_radii_m
     torque = 50.0
-    courses = type(AT_REST)(
+    profiles = type(AT_REST)(
         AT_REST.torque_nm.constant(torque), AT_REST.brake_nm, AT_REST.press_nm.constant(-torque * r2 / r1)
     )
     start = FirstState(0.0, direction * 40.0, 2e-5, 0.0)
     # 40 pitches after the start has died out
     span = 40.0 * 2.0 * np.pi / 20.0 / 40.0
-    run = respond(made, courses, duration_s=0.2 + span, interval_s=span / 40_000, first=start)
+    run = respond(made, profiles, duration_s=0.2 + span, interval_s=span / 40_000, first=start)
     turning = run["pinion speed"][run.time_s >= 0.2]
     assert np.all(turning * direction > 30.0)
     angle = run["pinion angle"][run.time_s >= 0.2]

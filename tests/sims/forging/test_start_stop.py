@@ -16,8 +16,8 @@ CYCLE = Cycle(brake_nm=60.0, press_nm=1500.0)
 def run(
     duration_s: float = 3.0, cycle: Cycle = CYCLE, interval_s: float = 1e-3, tolerance: float = 1e-6
 ) -> DriveResponse:
-    courses = schedule(cycle, Profile.constant(95.0), duration_s)
-    return respond(drive(), courses, duration_s=duration_s, interval_s=interval_s, tolerance=tolerance)
+    profiles = schedule(cycle, Profile.constant(95.0), duration_s)
+    return respond(drive(), profiles, duration_s=duration_s, interval_s=interval_s, tolerance=tolerance)
 
 
 def back_impact(found: DriveResponse, after_s: float) -> np.ndarray:
@@ -81,10 +81,10 @@ def test_it_stands_while_it_is_stopped_and_the_press_rattles_it() -> None:
 def test_breakaway_torque_is_that_of_static_friction(torque_nm: float) -> None:
     """Slowly rising torque: all sticks (bristles bend a little) until static friction of both shafts is overcome."""
     made = drive(0.0, friction_coefficient=0.0, load_friction_nm=4.0 * torque_nm, press_nm=0.0, half_backlash_um=1.0)
-    courses = driven_by(0.0)
+    profiles = driven_by(0.0)
     slope = 0.2 * torque_nm  # N m per s
-    courses = replace(courses, torque_nm=Profile.of([0.0, 8.0], [0.0, 8.0 * slope]))
-    found = respond(made, courses, duration_s=8.0)
+    profiles = replace(profiles, torque_nm=Profile.of([0.0, 8.0], [0.0, 8.0 * slope]))
+    found = respond(made, profiles, duration_s=8.0)
     expected = 1.3 * (4.0 * torque_nm / 5.0 + 5.0)
     slips = found.time_s[np.argmax(found["wheel speed"] > 0.03)]
     assert slips * slope == pytest.approx(expected, rel=0.03)

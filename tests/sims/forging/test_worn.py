@@ -63,8 +63,8 @@ def test_energy_is_conserved_over_worn_flanks_without_losses() -> None:
 
 def test_energy_stays_balanced_at_work() -> None:
     made = worn()
-    courses = schedule(Cycle(brake_nm=60.0, press_nm=1500.0), Profile.constant(95.0), 3.0)
-    found = respond(made, courses, duration_s=3.0)
+    profiles = schedule(Cycle(brake_nm=60.0, press_nm=1500.0), Profile.constant(95.0), 3.0)
+    found = respond(made, profiles, duration_s=3.0)
     balance = found["energy"] - found["work put in"] + found["lost in contact"] + found["lost in friction"]
     assert largest(balance) < 2e-4
     assert np.all(np.diff(found["lost in contact"]) >= -1e-9)

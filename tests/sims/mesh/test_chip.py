@@ -28,7 +28,7 @@ def test_nothing_carries_beyond_the_edge_of_a_chip_over_the_face(height_mm: floa
     """The neighbours carry; where there is none, the pair runs into the gap instead of holding at its place."""
     mesh = replace(MESH, chips_1=(ToothChip(height_mm, tooth=9),))
     cycles = 9 + np.linspace(-0.5, 2.5, 1501)
-    sound, chipped = (share_torque(m, torque_nm, cycles) for m in (MESH, mesh))
+    healthy, chipped = (share_torque(m, torque_nm, cycles) for m in (MESH, mesh))
     lost = touched_radius_mm(cycles - 9 - EDGE) > PAIR.driver.tip_radius_mm - height_mm
     column = np.floor(cycles + MESH.ramp / 2).astype(int) - 9
     here = (column >= 0) & (column < MESH.n_slots)
@@ -36,7 +36,7 @@ def test_nothing_carries_beyond_the_edge_of_a_chip_over_the_face(height_mm: floa
     double = (cycles > 10.05) & (cycles < 9 + PAIR.contact_ratio - 0.05)
     assert forces[lost & double].max() == 0.0
     alone = lost & (cycles > 9.85) & (cycles < 9.95)
-    jump = chipped.transmission_error_m - sound.transmission_error_m
+    jump = chipped.transmission_error_m - healthy.transmission_error_m
     if alone.any():
         assert jump[alone].min() > 0.2e-3
     whole = touched_radius_mm(cycles - 9 + COLUMNS) <= PAIR.driver.tip_radius_mm - height_mm
@@ -85,13 +85,13 @@ def test_load_stays_balanced(height_mm: float, torque_nm: float) -> None:
 @pytest.mark.parametrize("width_mm", [None, 8.0])
 def test_small_chips_change_little_and_none_changes_nothing(width_mm: float | None) -> None:
     beyond = np.linspace(0.0, PAIR.contact_ratio + 0.025, 400)
-    sound, none, small = (
+    healthy, none, small = (
         mesh_table(replace(MESH, chips_1=chips))
         for chips in ((), (ToothChip(0.0, width_mm),), (ToothChip(1e-4, width_mm),))
     )
     assert np.all(own_separation(none, beyond) == 0.0)
-    assert np.all(own_compliance(none, beyond) == own_compliance(sound, beyond))
-    change = own_compliance(small, beyond) / own_compliance(sound, beyond) - 1
+    assert np.all(own_compliance(none, beyond) == own_compliance(healthy, beyond))
+    change = own_compliance(small, beyond) / own_compliance(healthy, beyond) - 1
     assert np.abs(change).max() < 1e-3
     assert own_separation(small, beyond).max() < 1e-6
     assert np.abs(change).max() + own_separation(small, beyond).max() > 0.0

@@ -77,8 +77,8 @@ def test_friction_follows_the_load_of_a_chipped_tooth() -> None:
             friction_over_mesh(MESH, 110.0, speed, *OIL)
 
 
-def test_back_flanks_are_sound_whatever_ails_the_drive_flanks() -> None:
-    """Mean of the sound mesh by the linear law: 3.79e8 N/m of the trial program."""
+def test_back_flanks_are_healthy_whatever_ails_the_drive_flanks() -> None:
+    """Mean of the healthy mesh by the linear law: 3.79e8 N/m of the trial program."""
     assert back_stiffness_n_per_m(MESH) == pytest.approx(mesh_stiffness(MESH).mean_n_per_m, rel=1e-12)
     assert back_stiffness_n_per_m(MESH) == pytest.approx(3.79e8, rel=0.015)
     ailing = replace(

@@ -111,23 +111,6 @@ def test_gear_that_turns_shows_only_orders_of_its_shaft():
     assert spectrum[np.arange(len(spectrum)) % 4 != 0].max() < 1e-9 * spectrum.max()
 
 
-@settings(deadline=None)  # kernels compile in the first example
-@given(st.integers(-50, 50), st.floats(0.0, 6e-3), st.integers(0, 50))
-def test_table_on_the_flank_agrees_with_the_sum(tooth, position, seed):
-    flank = FlankRoughness.draw(FractalSurface.of_roughness(1.4), 13, np.random.default_rng(seed))
-    height, slope = kernel.height_on_flank(*flank.table(6e-3), tooth, position)
-    assert height == pytest.approx(float(flank.height_m(tooth, position)), abs=1e-5 * flank.surface.rms_m)
-    if 0.0 < position < 6e-3:
-        assert slope == pytest.approx(float(flank.slope(tooth, position)), abs=1e-6)
-
-
-def test_past_its_ends_the_table_stays_level():
-    flank = FlankRoughness.draw(FractalSurface.of_roughness(1.4), 3, np.random.default_rng(0))
-    table = flank.table(6e-3)
-    assert kernel.height_on_flank(*table, 1, -1e-3) == (pytest.approx(float(flank.height_m(1, 0.0))), 0.0)
-    assert kernel.height_on_flank(*table, 1, 7e-3) == (pytest.approx(float(flank.height_m(1, 6e-3))), 0.0)
-
-
 def test_same_seed_same_phases_and_wrong_numbers_are_refused():
     surface = FractalSurface.of_roughness(0.45)
     a, b = (TimeLockedRoughness.draw(surface, np.random.default_rng(9)) for _ in range(2))

@@ -56,9 +56,9 @@ def test_arc_length_is_that_of_the_outline() -> None:
 @pytest.mark.parametrize("width_mm", [2.0, 10.0, 18.0])
 def test_contact_over_a_spall_is_softer_by_the_width_that_is_lost(width_mm: float) -> None:
     """c_h grows to c_h/(1 − w/b) in the middle of a spall that is longer than the zone of contact."""
-    sound, damaged = (mesh_table(m) for m in (MESH, spalled(length_mm=1.0, width_mm=width_mm)))
+    healthy, damaged = (mesh_table(m) for m in (MESH, spalled(length_mm=1.0, width_mm=width_mm)))
     contact = 4 * (1 - 0.3**2) / (np.pi * 206e9 * 0.02)
-    extra = own_compliance(damaged, AT_PITCH) - own_compliance(sound, AT_PITCH)
+    extra = own_compliance(damaged, AT_PITCH) - own_compliance(healthy, AT_PITCH)
     assert extra == pytest.approx(contact * (1 / (1 - width_mm / 20.0) - 1), rel=1e-6)
 
 
@@ -99,14 +99,14 @@ def test_spall_of_the_driven_gear_comes_with_its_tooth_and_counts_from_its_own_r
     """The driven gear's flank is touched from tip to root: its root end is where the pair leaves."""
     at_root = replace(MESH, spalls_2=(ToothSpall(0.6, 10.0, tooth=3, centre=0.0),))
     at_tip = replace(MESH, spalls_2=(ToothSpall(0.6, 10.0, tooth=3, centre=1.0),))
-    sound = own_compliance(mesh_table(MESH), own_stretch(MESH))
+    healthy = own_compliance(mesh_table(MESH), own_stretch(MESH))
     late, early = (
-        own_stretch(MESH)[own_compliance(mesh_table(m), own_stretch(MESH), pair=78) > sound * 1.001]
+        own_stretch(MESH)[own_compliance(mesh_table(m), own_stretch(MESH), pair=78) > healthy * 1.001]
         for m in (at_root, at_tip)
     )
     assert late.min() > 0.6 * PAIR.contact_ratio
     assert early.max() < 0.4 * PAIR.contact_ratio
-    assert own_compliance(mesh_table(at_root), own_stretch(MESH), pair=4) == pytest.approx(sound, rel=1e-12)
+    assert own_compliance(mesh_table(at_root), own_stretch(MESH), pair=4) == pytest.approx(healthy, rel=1e-12)
 
 
 def test_shallow_spall_over_the_face_adds_its_depth_to_the_error() -> None:
@@ -155,9 +155,9 @@ def test_crack_and_spall_on_one_tooth_add() -> None:
     crack, spall = RootCrack(2.0, tooth=5), ToothSpall(1.0, 10.0, tooth=5)
     meshes = (MESH, replace(MESH, cracks_1=(crack,)), replace(MESH, spalls_1=(spall,)))
     both = replace(MESH, cracks_1=(crack,), spalls_1=(spall, ToothSpall(1.0, 5.0, tooth=6)))
-    sound, cracked, pitted = (own_compliance(mesh_table(m), SINGLE, pair=5) for m in meshes)
+    healthy, cracked, pitted = (own_compliance(mesh_table(m), SINGLE, pair=5) for m in meshes)
     found = own_compliance(mesh_table(both), SINGLE, pair=5)
-    assert found - sound == pytest.approx((cracked - sound) + (pitted - sound), rel=1e-9)
+    assert found - healthy == pytest.approx((cracked - healthy) + (pitted - healthy), rel=1e-9)
     assert mesh_table(both).compliance_1.shape[0] == 3
 
 

@@ -116,8 +116,10 @@ def test_contact_laws() -> None:
 
 def test_a_crack_of_no_depth_takes_nothing() -> None:
     for angle in (20.0, 45.0, 90.0):
-        sound = tooth_compliance(PINION, STEEL_200, rolls(PINION)).total
-        assert tooth_compliance(PINION, STEEL_200, rolls(PINION), (1e-9, angle)).total == pytest.approx(sound, rel=1e-8)
+        healthy = tooth_compliance(PINION, STEEL_200, rolls(PINION)).total
+        assert tooth_compliance(PINION, STEEL_200, rolls(PINION), (1e-9, angle)).total == pytest.approx(
+            healthy, rel=1e-8
+        )
 
 
 @given(st.floats(15.0, 90.0), st.floats(0.02, 0.95), st.floats(1.02, 1.05))
@@ -143,17 +145,17 @@ def test_section_behind_a_crack() -> None:
 
 def test_crack_over_part_of_the_width() -> None:
     width = 0.02
-    sound = width / tooth_compliance(PINION, STEEL_200, rolls(PINION)).total
+    healthy = width / tooth_compliance(PINION, STEEL_200, rolls(PINION)).total
 
     def stiffness(**changes: object) -> np.ndarray:
         crack = RootCrack(2.0, **changes)  # type: ignore[arg-type]  # keyword values of several types
         return 1 / cracked_tooth_compliance(PINION, STEEL_200, rolls(PINION), crack, width)
 
     through = stiffness()
-    assert stiffness(width_mm=5.0) == pytest.approx(0.75 * sound + 0.25 * through, rel=1e-12)
+    assert stiffness(width_mm=5.0) == pytest.approx(0.75 * healthy + 0.25 * through, rel=1e-12)
     assert stiffness(width_mm=20.0) == pytest.approx(through, rel=1e-12)
     parabolic = stiffness(front="parabolic")
-    assert np.all((through < parabolic) & (parabolic < sound))
+    assert np.all((through < parabolic) & (parabolic < healthy))
     # Slices against a fine sum over the width.
     w = (np.arange(2000) + 0.5) / 2000
     fine = np.mean(

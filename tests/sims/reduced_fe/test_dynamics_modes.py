@@ -157,7 +157,7 @@ def test_damping_that_light_bodies_behind_heavy_hubs_cannot_follow_is_refused(me
 
 
 def test_a_step_is_shortened_to_what_the_contact_can_be_followed_with(pair, ready):
-    """Steps that a sound pair is not followed with: its forces are many times those of shorter ones."""
+    """Steps that a healthy pair is not followed with: its forces are many times those of shorter ones."""
     assert followed_step_s(pair, ready, OPERATION, 5e-6) == 5e-6
     step = followed_step_s(pair, ready, OPERATION, 40e-6)
     assert step < 40e-6

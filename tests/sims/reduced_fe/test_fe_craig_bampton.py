@@ -18,12 +18,11 @@ from sims.reduced_fe import (
     CyclicGear,
     Masters,
     craig_bampton,
-    full_matrices,
     matched,
     mesh_size_for,
     sector_mesh,
 )
-from tests.sims.reduced_fe.fe_gears import PAPER, small_cyclic
+from tests.sims.reduced_fe.fe_gears import PAPER, full_matrices, small_cyclic
 
 PLAN = CraigBamptonPlan(n_dof=120, n_teeth=2, n_slices=3, n_auxiliary=2, n_shapes=20)
 

@@ -13,15 +13,13 @@ from sims.reduced_fe import (
     CyclicModes,
     GearBlank,
     cyclic_modes,
-    full_matrices,
-    full_modes,
     mesh_quality,
     mesh_size_for,
     mode_field,
     modes_of_diameter,
     sector_mesh,
 )
-from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL, small_cyclic
+from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL, full_matrices, full_modes, small_cyclic
 
 
 def repeated(modes: CyclicModes, n_sectors: int) -> FloatArray:

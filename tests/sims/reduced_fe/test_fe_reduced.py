@@ -22,7 +22,6 @@ from sims.reduced_fe import (
     flank_grid,
     flank_rows,
     forget_gears_of_other_versions,
-    full_matrices,
     gear_name,
     hub_rows,
     line_weights,
@@ -35,7 +34,7 @@ from sims.reduced_fe import (
     write_gear,
 )
 from sims.reduced_fe import _store as gear_file
-from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL, small_cyclic, small_reduced
+from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL, full_matrices, small_cyclic, small_reduced
 
 ARRAYS = ("frequencies_hz", "flank_modes", "free_compliance_m_per_n", "clamped_compliance_m_per_n", "hub_compliance")
 

@@ -14,7 +14,6 @@ from sims.reduced_fe import (
     MeshSize,
     cyclic_modes,
     face_view,
-    full_matrices,
     load_tooth,
     mesh_quality,
     mode_field,
@@ -22,7 +21,7 @@ from sims.reduced_fe import (
     von_mises_pa,
     write_vtk,
 )
-from tests.sims.reduced_fe.fe_gears import COARSE, SMALL, small_cyclic, small_reduced
+from tests.sims.reduced_fe.fe_gears import COARSE, SMALL, full_matrices, small_cyclic, small_reduced
 
 
 def test_uniaxial_tension_has_its_own_stress() -> None:

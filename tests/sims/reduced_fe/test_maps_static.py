@@ -99,19 +99,19 @@ def test_a_crack_softens_its_tooth_alone():
     def error(mesh):
         return mesh_maps(GEARS, mesh, torque, cycles).transmission_error_m[:, 0]
 
-    sound, found = error(MESH), error(cracked)
-    assert found[0] > 1.02 * sound[0]
+    healthy, found = error(MESH), error(cracked)
+    assert found[0] > 1.02 * healthy[0]
     assert found[3] == pytest.approx(found[0])  # the same tooth a revolution later
-    assert found[1:3] == pytest.approx(sound[1:3], rel=1e-9)
+    assert found[1:3] == pytest.approx(healthy[1:3], rel=1e-9)
     assert error(replace(MESH, cracks_1=(RootCrack(3.5, 45.0, 7),)))[0] > found[0]
 
 
-def test_a_crack_over_part_of_the_width_moves_the_load_to_the_sound_slices():
+def test_a_crack_over_part_of_the_width_moves_the_load_to_the_healthy_slices():
     half = replace(MESH, cracks_1=(RootCrack(3.0, 45.0, 0, 8.0),))
     force = mesh_maps(GEARS, half, np.array([170.0]), np.array([0.85])).force_n[0, 0, 1]
-    sound = mesh_maps(GEARS, MESH, np.array([170.0]), np.array([0.85])).force_n[0, 0, 1]
-    assert np.all(force[:2] < sound[:2])
-    assert np.all(force[2:] > sound[2:])
+    healthy = mesh_maps(GEARS, MESH, np.array([170.0]), np.array([0.85])).force_n[0, 0, 1]
+    assert np.all(force[:2] < healthy[:2])
+    assert np.all(force[2:] > healthy[2:])
 
 
 def test_misaligned_flanks_carry_at_one_end():

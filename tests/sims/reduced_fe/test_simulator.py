@@ -14,7 +14,7 @@ SHORT = {"duration_s": 0.25, "seed": 1}
 
 
 @pytest.fixture(scope="module")
-def sound():
+def healthy():
     return sims.simulate(MODEL, **SHORT)
 
 
@@ -22,13 +22,13 @@ def rms(recording, name="a1"):
     return float(np.std(recording.values(name)))
 
 
-def test_recording_has_the_channels_units_rig_and_truth_of_the_other_simulator(sound):
+def test_recording_has_the_channels_units_rig_and_truth_of_the_other_simulator(healthy):
     other = sims.simulate("cracked", preset="symmetric_50_50", duration_s=0.05)
-    assert sound.channel_names == other.channel_names
-    assert [c.unit for c in sound.channels] == [c.unit for c in other.channels]
-    assert sound.rig is not None
-    assert sound.rig.pairs[0].driver_teeth == 50
-    truth = sound.truth
+    assert healthy.channel_names == other.channel_names
+    assert [c.unit for c in healthy.channels] == [c.unit for c in other.channels]
+    assert healthy.rig is not None
+    assert healthy.rig.pairs[0].driver_teeth == 50
+    truth = healthy.truth
     assert truth["model"] == MODEL
     assert truth["parameters"]["hub_inertia_driver_kg_m2"] == 0.0043
     assert 2600.0 < truth["solver"]["torsional_hz"] < 2750.0
@@ -36,33 +36,33 @@ def test_recording_has_the_channels_units_rig_and_truth_of_the_other_simulator(s
     assert truth["measurement"]["n_revolutions"]["input"] == pytest.approx(2000.0 / 60.0 * 0.25, rel=1e-3)
 
 
-def test_mesh_harmonics_stand_out_of_the_spectrum(sound):
-    values = sound.values("a1") * np.hanning(sound.n_samples)
+def test_mesh_harmonics_stand_out_of_the_spectrum(healthy):
+    values = healthy.values("a1") * np.hanning(healthy.n_samples)
     lines = np.abs(np.fft.rfft(values))
-    hz = np.fft.rfftfreq(sound.n_samples, 1.0 / sound.sampling_rate_hz)
+    hz = np.fft.rfftfreq(healthy.n_samples, 1.0 / healthy.sampling_rate_hz)
     mesh = 2000.0 / 60.0 * 50.0
     for harmonic in range(1, 5):
         near = np.abs(hz - harmonic * mesh) < 12.0
         assert lines[near].max() > 20.0 * np.median(lines)
 
 
-def test_the_same_seed_gives_the_same_recording(sound):
+def test_the_same_seed_gives_the_same_recording(healthy):
     again = sims.simulate(MODEL, **SHORT)
-    np.testing.assert_array_equal(sound.samples, again.samples)
+    np.testing.assert_array_equal(healthy.samples, again.samples)
 
 
 @pytest.mark.parametrize("name", effects())
-def test_every_effect_changes_the_recording_or_says_why_not(sound, name):
+def test_every_effect_changes_the_recording_or_says_why_not(healthy, name):
     wanted = effect(name)
     found = sims.simulate(MODEL, effects={name: wanted.severity.typical}, **SHORT)
     assert found.truth["effects"][0]["name"] == name
-    change = float(np.std(found.values("a1") - sound.values("a1")))
+    change = float(np.std(found.values("a1") - healthy.values("a1")))
     if name == "backlash":  # at full load the play is never crossed
         assert change == 0.0
     else:
-        assert change > 1e-5 * rms(sound)
+        assert change > 1e-5 * rms(healthy)
     nothing = sims.simulate(MODEL, effects={name: 0.0}, **SHORT)
-    np.testing.assert_array_equal(nothing.samples, sound.samples)
+    np.testing.assert_array_equal(nothing.samples, healthy.samples)
 
 
 def test_a_crack_shows_once_per_revolution_and_grows():
@@ -78,10 +78,10 @@ def test_a_crack_shows_once_per_revolution_and_grows():
         )
         return found.values("a1")
 
-    sound, small, deep = burst(0.0), burst(2.0), burst(3.5)
-    assert np.std(deep - sound) > 1.6 * np.std(small - sound)
+    healthy, small, deep = burst(0.0), burst(2.0), burst(3.5)
+    assert np.std(deep - healthy) > 1.6 * np.std(small - healthy)
     per_revolution = 1280  # 40960 Hz at 1920 rpm
-    power = (deep - sound)[: 18 * per_revolution].reshape(18, per_revolution) ** 2
+    power = (deep - healthy)[: 18 * per_revolution].reshape(18, per_revolution) ** 2
     profile = power.mean(axis=0)
     window = np.convolve(np.tile(profile, 2), np.ones(per_revolution // 10), "valid")[:per_revolution]
     assert window.max() > 0.6 * profile.sum()  # within a tenth of the revolution

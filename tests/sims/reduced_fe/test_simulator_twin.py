@@ -53,11 +53,11 @@ def test_the_twin_is_the_rig_with_this_model(twin):
 
 
 def test_an_effect_alone_makes_the_difference(twin):
-    sound, cracked, other = run(twin), run(twin, (CRACK,)), run(twin, seed=1)
-    np.testing.assert_array_equal(sound.samples, run(twin).samples)
-    change = np.std(cracked.samples[0] - sound.samples[0])
-    assert 1e-3 * np.std(sound.samples[0]) < change < np.std(other.samples[0] - sound.samples[0])
-    assert not np.array_equal(run(twin, noise=1).samples[0], sound.samples[0])
+    healthy, cracked, other = run(twin), run(twin, (CRACK,)), run(twin, seed=1)
+    np.testing.assert_array_equal(healthy.samples, run(twin).samples)
+    change = np.std(cracked.samples[0] - healthy.samples[0])
+    assert 1e-3 * np.std(healthy.samples[0]) < change < np.std(other.samples[0] - healthy.samples[0])
+    assert not np.array_equal(run(twin, noise=1).samples[0], healthy.samples[0])
 
 
 def test_a_small_spall_in_a_bearing_knocks_as_in_the_other_model(twin):
