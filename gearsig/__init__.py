@@ -32,8 +32,12 @@ if TYPE_CHECKING:
     from gearsig.angle import ShaftAngle as ShaftAngle
     from gearsig.angle import find_shaft_angle as find_shaft_angle
     from gearsig.angle import resample_to_angle as resample_to_angle
-    from gearsig.comparison import compare_recordings as compare_recordings
+    from gearsig.comparison import Comparison as Comparison
+    from gearsig.comparison import compare as compare
+    from gearsig.diagnosis import Analysis as Analysis
     from gearsig.diagnosis import AnalysisSettings as AnalysisSettings
+    from gearsig.diagnosis import CannotTell as CannotTell
+    from gearsig.diagnosis import Finding as Finding
     from gearsig.diagnosis import analyze as analyze
     from gearsig.errors import GearsigError as GearsigError
     from gearsig.errors import InputError as InputError
@@ -64,6 +68,8 @@ if TYPE_CHECKING:
     from gearsig.rig import SpeedChannel as SpeedChannel
     from gearsig.rig import TachometerChannel as TachometerChannel
     from gearsig.rig import read_rig as read_rig
+    from gearsig.severity import CrackEstimate as CrackEstimate
+    from gearsig.severity import NoCrackSeen as NoCrackSeen
     from gearsig.severity import estimate_crack as estimate_crack
     from gearsig.spectra import Spectrum as Spectrum
     from gearsig.spectra import amplitude_spectrum as amplitude_spectrum

@@ -80,7 +80,8 @@ def compare(
     from rich.console import Console
 
     from gearsig.checks import one_of
-    from gearsig.comparison import ALIGN, compare_recordings
+    from gearsig.comparison import ALIGN
+    from gearsig.comparison import compare as compare_records
     from gearsig.report import check_writable, comparison_text
 
     one_of(align, "--align", ALIGN)
@@ -92,7 +93,7 @@ def compare(
         simulated = open_simulation(simulation, simulation_rig, machine, simulation_fs, simulation_speed_rpm)
         pairs = [read_pair(text, simulated, recorded) for text in channel or ()]
         status.update("comparing")
-        result = compare_recordings(simulated, recorded, channels=pairs, align_by=align)
+        result = compare_records(simulated, recorded, channels=pairs, align_by=align)
         if output is not None:
             status.update("drawing")
             write_comparison(result, output, typed_command())

@@ -22,7 +22,7 @@ from gearsig.comparison import (
     ChannelComparison,
     Comparison,
     LineLevel,
-    compare_recordings,
+    compare,
     for_simulation,
     missing_words,
 )
@@ -177,7 +177,7 @@ def _simulated(simulation: SimulationToCompare, request: AnalysisRequest, _recor
 def compared(request: AnalysisRequest, simulation: Simulation, pairs: Pairs, align_by: str, _both: Both) -> Comparison:
     """Return the comparison; it is frozen, so that sessions may share it."""
     del request, simulation  # they stand for the records
-    return compare_recordings(_both.simulated, _both.recorded, channels=pairs, align_by=align_by)
+    return compare(_both.simulated, _both.recorded, channels=pairs, align_by=align_by)
 
 
 @st.cache_data(max_entries=4, show_spinner=False)

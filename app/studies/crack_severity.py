@@ -40,7 +40,7 @@ from gearsig.severity import (
     FEATURES,
     FILE,
     KINDS,
-    LEAST_SPREAD,
+    MIN_SPREAD,
     RELIEF,
     RELIEF_KNOWN,
     RISING,
@@ -124,7 +124,7 @@ def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
         quantiles=_conformal(_errors_of_others(z[taught], y[taught], knots, rest)),
         detection=detection,
         threshold=threshold,
-        sound_scores=sound_scores,
+        healthy_scores=sound_scores,
         precision=precision,
         largest_distance=float(np.quantile(distances, 1.0 - OUTSIDE)),
         lowest=cases.features[taught].min(axis=0),
@@ -156,7 +156,7 @@ def _errors_of_others(z: FloatArray, y: FloatArray, knots: FloatArray, rest: lis
     for k in range(_FOLDS):
         out = fold == k
         depth, spread = _depth_and_spread(z[~out], y[~out], knots, rest)
-        sigma = np.maximum(spread[0] + z[out] @ spread[1:], LEAST_SPREAD)
+        sigma = np.maximum(spread[0] + z[out] @ spread[1:], MIN_SPREAD)
         scaled[out] = (y[out] - _predicted(depth, z[out], knots)) / sigma
     return scaled
 

@@ -1,7 +1,7 @@
 """A simulation beside a recording: aligned in angle, compared by order, band and angle. Names no cause."""
 
 from gearsig.comparison._averages import HalvedLines, frac, tooth_powers, waveform
-from gearsig.comparison._compare import ALIGN, compare_recordings
+from gearsig.comparison._compare import ALIGN, compare
 from gearsig.comparison._lines import band_powers, order_band_limits, third_octave_limits, third_octaves
 from gearsig.comparison._sides import for_simulation
 from gearsig.comparison._types import (
@@ -17,12 +17,12 @@ from gearsig.comparison._types import (
     ShaftComparison,
     power_levels,
 )
-from gearsig.comparison._verdict import LEAST_REPEATED, STEADY, mesh_lines, missing_words
+from gearsig.comparison._verdict import MIN_REPEATED, STEADY, mesh_lines, missing_words
 
 __all__ = [
     "ALIGN",
     "BEYOND",
-    "LEAST_REPEATED",
+    "MIN_REPEATED",
     "STEADY",
     "Agreement",
     "BandLevel",
@@ -35,7 +35,7 @@ __all__ = [
     "Repeated",
     "ShaftComparison",
     "band_powers",
-    "compare_recordings",
+    "compare",
     "for_simulation",
     "frac",
     "mesh_lines",

@@ -110,7 +110,7 @@ def waveform(lines: ComplexArray, n_angles: int) -> FloatArray:
 PER_CYCLE = 16
 """Shifts tried per cycle of the highest order, before the best one is refined."""
 
-LEAST_ALIKE = 0.5
+MIN_ALIKE = 0.5
 """Correlation of what tells teeth apart; patterns of different gears reach 0.3 to 0.4 at the best of all teeth."""
 
 
@@ -166,13 +166,13 @@ def _best_shift(cross: ComplexArray) -> float:
         return 0.0
     n = next_fast_len(PER_CYCLE * len(cross))
     start = int(np.argmax(np.real(ifft(cross, n)))) / n
-    found = minimize_scalar(
+    refined = minimize_scalar(
         lambda s: -float(shift_scores(cross, np.array([s]))[0]),
         bounds=(start - 1.0 / n, start + 1.0 / n),
         method="bounded",
         options={"xatol": 1e-9},
     )
-    return float((found.x + 0.5) % 1.0 - 0.5)
+    return float((refined.x + 0.5) % 1.0 - 0.5)
 
 
 def _apart(a: float, b: float) -> float:
@@ -189,7 +189,7 @@ def _is_certain(x: ComplexArray, y: ComplexArray, best: float, shifts: list[floa
         return False
     telling = np.arange(x.shape[1]) % n_teeth != 0
     alike = shift_scores(_cross(np.where(telling, x, 0.0), np.where(telling, y, 0.0)), np.array([best]))[0]
-    return bool(alike > LEAST_ALIKE)
+    return bool(alike > MIN_ALIKE)
 
 
 # --------------------
@@ -286,11 +286,11 @@ def tooth_levels(
     simulated: HalvedLines, recorded: HalvedLines, channel: int, n_teeth: int, n_angles: int
 ) -> tuple[LevelPair, ...]:
     """Return the level of the averages in each tooth pitch, from shaft angle 0 on."""
-    own, other = (
+    simulated_powers, recorded_powers = (
         np.stack([tooth_powers(waveform(half[channel], n_angles), n_teeth) for half in (lines.first, lines.second)])
         for lines in (simulated, recorded)
     )
-    return power_levels(own, other, smooth=n_teeth)
+    return power_levels(simulated_powers, recorded_powers, smooth=n_teeth)
 
 
 def tooth_powers(values: FloatArray, n_teeth: int) -> FloatArray:

@@ -49,7 +49,7 @@ from gearsig.comparison._types import (
     ShaftComparison,
     power_levels,
 )
-from gearsig.comparison._verdict import findings_of, remarks, verdict_of
+from gearsig.comparison._verdict import findings_of, notes_of, verdict_of
 from gearsig.errors import RefusalError
 from gearsig.orders import SynchronousAverage, order_spectrum
 from gearsig.prepared import PreparedRecording, prepare
@@ -104,7 +104,7 @@ class ChannelContext:
 
 def halved_spectra(halves: tuple[AngleSignal, AngleSignal], material: ChannelContext) -> HalvedSpectra:
     """Return the order spectra of both halves, by channel, up to the order that both records hold."""
-    found = {}
+    spectra_of = {}
     for name in halves[0].channel_names:
         spectra = [
             order_spectrum(half, name, scaling="power", revolutions_per_block=material.revolutions_per_block)
@@ -112,15 +112,15 @@ def halved_spectra(halves: tuple[AngleSignal, AngleSignal], material: ChannelCon
         ]
         n = int(material.highest_order * material.revolutions_per_block) + 1
         first, second = (replace(s, values=s.values[:n], positions=s.positions[:n]) for s in spectra)
-        found[name] = (first, second)
-    return found
+        spectra_of[name] = (first, second)
+    return spectra_of
 
 
 def compare_channel(
     i: int,
     pair: ChannelPair,
-    own: ComparedSide,
-    other: ComparedSide,
+    simulated_side: ComparedSide,
+    recorded_side: ComparedSide,
     spectra: Sequence[HalvedSpectra],
     material: ChannelContext,
 ) -> ChannelComparison:
@@ -152,10 +152,10 @@ def compare_channel(
         ),
         order_bands=order_bands(limits, densities[0], densities[1], averages[material.reference], i),
         third_octaves=third_octaves(
-            time_halves(own.recording, i),
-            own.recording.sampling_rate_hz,
-            time_halves(other.recording, i),
-            other.recording.sampling_rate_hz,
+            time_halves(simulated_side.recording, i),
+            simulated_side.recording.sampling_rate_hz,
+            time_halves(recorded_side.recording, i),
+            recorded_side.recording.sampling_rate_hz,
         ),
         shafts=tuple(_shaft(shaft, i, pair, material) for shaft in averages),
         overall=power_levels(totals[0], totals[1])[0],
@@ -179,21 +179,21 @@ def _amplitudes(halves: tuple[Spectrum, Spectrum], name: str, unit: str) -> Spec
 
 
 def _shaft(shaft: str, i: int, pair: ChannelPair, material: ChannelContext) -> ShaftComparison:
-    own, other = material.lines[shaft]
-    every = slice(1, own.first.shape[1])
+    simulated, recorded = material.lines[shaft]
+    every = slice(1, simulated.first.shape[1])
     teeth = teeth_on(material.rig, shaft)
-    n_angles = _n_angles(own.first.shape[1])
-    resolved = teeth is not None and own.first.shape[1] > teeth
+    n_angles = _n_angles(simulated.first.shape[1])
+    resolved = teeth is not None and simulated.first.shape[1] > teeth
     return ShaftComparison(
         shaft=shaft,
         n_teeth=teeth,
-        simulated=_average(own, i, n_angles, shaft, pair.simulated, pair.unit),
-        recorded=_average(other, i, n_angles, shaft, pair.recorded, pair.unit),
-        correlation=repeated(correlation, own, other, i, every),
-        simulated_reliability=reliability(own, i),
-        recorded_reliability=reliability(other, i),
-        agreement=agreement(own, other, i, every),
-        tooth_levels=tooth_levels(own, other, i, teeth, n_angles) if teeth is not None and resolved else (),
+        simulated=_average(simulated, i, n_angles, shaft, pair.simulated, pair.unit),
+        recorded=_average(recorded, i, n_angles, shaft, pair.recorded, pair.unit),
+        correlation=repeated(correlation, simulated, recorded, i, every),
+        simulated_reliability=reliability(simulated, i),
+        recorded_reliability=reliability(recorded, i),
+        agreement=agreement(simulated, recorded, i, every),
+        tooth_levels=tooth_levels(simulated, recorded, i, teeth, n_angles) if teeth is not None and resolved else (),
     )
 
 
@@ -249,13 +249,13 @@ def _locked(side: int, i: int, totals: FloatArray, material: ChannelContext) -> 
     return Repeated(float(np.clip(powers[0] / mean, 0.0, 1.0)), float(abs(shares[0] - shares[1])) / 2.0)
 
 
-MOST_REVOLUTIONS_PER_BLOCK = 64
+MAX_REVOLUTIONS_PER_BLOCK = 64
 """Of the order spectra: lines 1/64 of an order apart tell slow shafts and bearings from the shaft's own orders."""
 
 ALIGN = ("auto", "marks", "correlation")
 
 
-def compare_recordings(
+def compare(
     simulated: Recording | PreparedRecording,
     recorded: Recording | PreparedRecording,
     rig: Rig | None = None,
@@ -311,12 +311,16 @@ def compare_recordings(
     machine = common_machine(simulated, recorded, rig)
     ratios = _ratios(machine.recorded)
     simulated_rig = replace(machine.simulated, speed=usable_speed(machine.simulated, simulated))
-    own = make_side(
+    simulated_side = make_side(
         sides[0].with_rig(simulated_rig), {p.simulated: p.factor for p in pairs}, machine.names, ratios, "simulation"
     )
-    other = make_side(sides[1].with_rig(machine.recorded), {p.recorded: 1.0 for p in pairs}, {}, ratios, "recording")
-    lines = _lines(own, other, ratios)
-    alignments = tuple(_align(shaft, own, other, lines, machine.recorded, align_by) for shaft in lines)
+    recorded_side = make_side(
+        sides[1].with_rig(machine.recorded), {p.recorded: 1.0 for p in pairs}, {}, ratios, "recording"
+    )
+    lines = _lines(simulated_side, recorded_side, ratios)
+    alignments = tuple(
+        _align(shaft, simulated_side, recorded_side, lines, machine.recorded, align_by) for shaft in lines
+    )
     turned = {a.shaft: (lines[a.shaft][0].turned(a.shift_deg / 360.0), lines[a.shaft][1]) for a in alignments}
     reference = next(iter(ratios))
     material = ChannelContext(
@@ -324,23 +328,25 @@ def compare_recordings(
         reference,
         {shaft: ratios[shaft] for shaft in turned},
         turned,
-        _block(own, other, reference),
-        min(float(side.signals[reference][0].highest_order) for side in (own, other)),
+        _block(simulated_side, recorded_side, reference),
+        min(float(side.signals[reference][0].highest_order) for side in (simulated_side, recorded_side)),
     )
-    spectra = tuple(halved_spectra(side.signals[reference], material) for side in (own, other))
-    found = tuple(compare_channel(i, p, own, other, spectra, material) for i, p in enumerate(pairs))
+    spectra = tuple(halved_spectra(side.signals[reference], material) for side in (simulated_side, recorded_side))
+    compared = tuple(
+        compare_channel(i, p, simulated_side, recorded_side, spectra, material) for i, p in enumerate(pairs)
+    )
     return Comparison(
-        simulated=_facts(simulated, own),
-        recorded=_facts(recorded, other),
+        simulated=_facts(simulated, simulated_side),
+        recorded=_facts(recorded, recorded_side),
         machine=machine.recorded.name,
         reference_shaft=reference,
         mesh_orders=tuple(m for p in machine.recorded.pairs if (m := machine.recorded.mesh_order(p)) is not None),
         highest_order=material.highest_order,
         alignments=alignments,
-        channels=found,
-        notes=(*machine.notes, *remarks(own, other, alignments, found, ratios)),
-        verdict=verdict_of(found),
-        findings=findings_of(found),
+        channels=compared,
+        notes=(*machine.notes, *notes_of(simulated_side, recorded_side, alignments, compared, ratios)),
+        verdict=verdict_of(compared),
+        findings=findings_of(compared),
     )
 
 
@@ -352,34 +358,34 @@ def _ratios(rig: Rig) -> dict[str, float]:
 
 
 def _lines(
-    own: ComparedSide, other: ComparedSide, ratios: Mapping[str, float]
+    simulated_side: ComparedSide, recorded_side: ComparedSide, ratios: Mapping[str, float]
 ) -> dict[str, tuple[HalvedLines, HalvedLines]]:
     """Return the averages' lines of each shaft that both records know, up to the same order."""
-    found = {}
+    lines_of = {}
     for shaft in ratios:
-        if shaft in own.signals and shaft in other.signals:
-            pair = tuple(halved_lines(side.signals[shaft]) for side in (own, other))
+        if shaft in simulated_side.signals and shaft in recorded_side.signals:
+            pair = tuple(halved_lines(side.signals[shaft]) for side in (simulated_side, recorded_side))
             highest = min(lines.first.shape[1] for lines in pair) - 1
             if highest >= 1:
-                found[shaft] = (pair[0].up_to(highest), pair[1].up_to(highest))
-    if next(iter(ratios)) not in found:
+                lines_of[shaft] = (pair[0].up_to(highest), pair[1].up_to(highest))
+    if next(iter(ratios)) not in lines_of:
         raise RefusalError(
             "not even the first order of the reference shaft is within both sampling rates",
             remedy="check speed and sampling rates",
         )
-    return found
+    return lines_of
 
 
 def _align(
     shaft: str,
-    own: ComparedSide,
-    other: ComparedSide,
+    simulated_side: ComparedSide,
+    recorded_side: ComparedSide,
     lines: Mapping[str, tuple[HalvedLines, HalvedLines]],
     rig: Rig,
     align_by: str,
 ) -> Alignment:
-    marked = shaft in own.marked and shaft in other.marked
-    if align_by == "marks" and not any(s in own.marked and s in other.marked for s in lines):
+    marked = shaft in simulated_side.marked and shaft in recorded_side.marked
+    if align_by == "marks" and not any(s in simulated_side.marked and s in recorded_side.marked for s in lines):
         raise RefusalError(
             "no shaft has a mark (one tachometer pulse per revolution) in both records", remedy="align by correlation"
         )
@@ -387,14 +393,14 @@ def _align(
     return align(shaft, *lines[shaft], teeth_on(rig, shaft), by_marks=by_marks)
 
 
-def _block(own: ComparedSide, other: ComparedSide, reference: str) -> int:
+def _block(simulated_side: ComparedSide, recorded_side: ComparedSide, reference: str) -> int:
     """Revolutions per block of the order spectra: as many as the shortest half holds, at most 64."""
     shortest = min(
         half.samples.shape[1] // half.samples_per_revolution
-        for side in (own, other)
+        for side in (simulated_side, recorded_side)
         for half in side.signals[reference]
     )
-    return int(min(shortest, MOST_REVOLUTIONS_PER_BLOCK))
+    return int(min(shortest, MAX_REVOLUTIONS_PER_BLOCK))
 
 
 def _facts(recording: Recording, side: ComparedSide) -> RecordFacts:

@@ -23,7 +23,7 @@ from gearsig.prepared import line_excess
 from gearsig.rig import OrderLine, Rig, order_lines
 from gearsig.spectra import Spectrum, noise_floor, power_density
 
-MOST_MESH_HARMONICS, N_SHAFT_ORDERS, N_SIDEBANDS = 10, 4, 3
+MAX_MESH_HARMONICS, N_SHAFT_ORDERS, N_SIDEBANDS = 10, 4, 3
 N_WITHOUT_GEARS = 12
 """Shaft orders where no gears are known."""
 N_OTHER = 5
@@ -38,19 +38,19 @@ def line_levels(
     rig: Rig, reference: str, simulated: Mapping[str, HalvedLines], recorded: Mapping[str, HalvedLines], channel: int
 ) -> tuple[LineLevel, ...]:
     """Return mesh harmonics, sidebands and shaft orders of one channel, by rising order; each order once."""
-    found: dict[float, LineLevel] = {}
+    levels: dict[float, LineLevel] = {}
     for line in sorted(expected_lines(rig, reference), key=lambda expected: _PRIORITY[expected.kind]):
         shaft = _shaft_of(line, rig, simulated)
         ratio = rig.ratio(shaft, to=reference) if rig.shafts else 1.0
         if shaft not in simulated or ratio is None:
             continue
         n = round(line.order / ratio)
-        if abs(n * ratio - line.order) > 1e-6 * line.order or round(line.order, 6) in found:
+        if abs(n * ratio - line.order) > 1e-6 * line.order or round(line.order, 6) in levels:
             continue
         if 1 <= n < simulated[shaft].first.shape[1]:
             kind: LineKind = line.kind  # type: ignore[assignment]  # `expected_lines` has no others
-            found[round(line.order, 6)] = _level(line.label, kind, line.order, shaft, n, simulated, recorded, channel)
-    return tuple(found[order] for order in sorted(found))
+            levels[round(line.order, 6)] = _level(line.label, kind, line.order, shaft, n, simulated, recorded, channel)
+    return tuple(levels[order] for order in sorted(levels))
 
 
 def expected_lines(rig: Rig, reference: str) -> tuple[OrderLine, ...]:
@@ -61,7 +61,7 @@ def expected_lines(rig: Rig, reference: str) -> tuple[OrderLine, ...]:
     lines = order_lines(
         rig,
         reference,
-        n_mesh_harmonics=MOST_MESH_HARMONICS,
+        n_mesh_harmonics=MAX_MESH_HARMONICS,
         n_shaft_harmonics=N_SHAFT_ORDERS if rig.pairs else N_WITHOUT_GEARS,
         n_sidebands=N_SIDEBANDS,
     )
@@ -91,9 +91,9 @@ def _level(
     channel: int,
 ) -> LineLevel:
     values = [_read(lines[shaft], channel, n) for lines in (simulated, recorded)]
-    (own, own_error, own_seen), (other, other_error, other_seen) = values
-    level = LevelPair(own, other, float(np.hypot(own_error, other_error)))
-    return LineLevel(label, kind, order, shaft, level, own_seen, other_seen)
+    (simulated_db, simulated_error, simulated_seen), (recorded_db, recorded_error, recorded_seen) = values
+    level = LevelPair(simulated_db, recorded_db, float(np.hypot(simulated_error, recorded_error)))
+    return LineLevel(label, kind, order, shaft, level, simulated_seen, recorded_seen)
 
 
 def _read(lines: HalvedLines, channel: int, n: int) -> tuple[float, float, bool]:
@@ -125,17 +125,19 @@ def other_lines(
     highest : float
         Order up to which they are looked for.
     """
-    found: dict[int, None] = {}
+    places: dict[int, None] = {}
     for spectra in (recorded, simulated):
-        found |= dict.fromkeys(_strongest(spectra, ratios, mesh_orders, highest))
+        places |= dict.fromkeys(_strongest(spectra, ratios, mesh_orders, highest))
     step = recorded[0].resolution
     levels: list[tuple[int, LineLevel]] = []
-    for line in sorted(found):
-        if any(abs(line - other) <= 3 for other, _ in levels):
+    for line in sorted(places):
+        if any(abs(line - near) <= 3 for near, _ in levels):
             continue
         label = other_label(line * step, mesh_orders)
         levels.append((line, _other_level(label, line * step, line, simulated, recorded)))
-    kept = sorted((level for _, level in levels), key=lambda one: -max(one.level.recorded_db, one.level.simulated_db))
+    kept = sorted(
+        (level for _, level in levels), key=lambda level: -max(level.level.recorded_db, level.level.simulated_db)
+    )
     return tuple(kept[: 2 * N_OTHER])
 
 
@@ -212,7 +214,7 @@ HIGHEST_SHARE = 0.45
 """Of the sampling rate: above it, anti-aliasing filters have taken over."""
 LONGEST_BLOCK_S = 4.0
 LINES_PER_BAND = 4
-MOST_ORDER_BANDS = 10
+MAX_ORDER_BANDS = 10
 _NOMINAL = (1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0)
 
 
@@ -279,13 +281,13 @@ def band_powers(density: Spectrum, limits: Sequence[tuple[float, float]]) -> Flo
 def order_band_limits(mesh_order: float | None, name: str, highest: float) -> tuple[tuple[str, float, float], ...]:
     """Return (label, low, high): bands of one mesh order around its harmonics; ten equal bands without a mesh."""
     if mesh_order is not None and 1.5 * mesh_order <= highest:
-        n = min(int(highest / mesh_order - 0.5), MOST_ORDER_BANDS)
+        n = min(int(highest / mesh_order - 0.5), MAX_ORDER_BANDS)
         around = [(f"around {k}× mesh {name}".rstrip(), (k - 0.5) * mesh_order) for k in range(1, n + 1)]
         return (
             ("below the mesh", 0.5, 0.5 * mesh_order),
             *((label, low, low + mesh_order) for label, low in around),
         )
-    edges = np.linspace(0.5, highest, MOST_ORDER_BANDS + 1)
+    edges = np.linspace(0.5, highest, MAX_ORDER_BANDS + 1)
     return tuple((f"orders {a:.4g} to {b:.4g}", float(a), float(b)) for a, b in pairwise(edges))
 
 
@@ -308,13 +310,15 @@ def order_bands(
     channel : int
     """
     edges = [(low, high) for _, low, high in limits]
-    own, other = (np.stack([band_powers(half, edges) for half in halves]) for halves in (simulated, recorded))
-    found = []
-    for (label, low, high), level in zip(limits, power_levels(own, other), strict=True):
+    simulated_powers, recorded_powers = (
+        np.stack([band_powers(half, edges) for half in halves]) for halves in (simulated, recorded)
+    )
+    bands = []
+    for (label, low, high), level in zip(limits, power_levels(simulated_powers, recorded_powers), strict=True):
         inside = slice(max(1, ceil(low)), min(ceil(high), lines[0].first.shape[1]))
         alike = agreement(*lines, channel, inside) if inside.stop > inside.start + 1 else None
-        found.append(BandLevel(label, low, high, "order", level, alike))
-    return tuple(found)
+        bands.append(BandLevel(label, low, high, "order", level, alike))
+    return tuple(bands)
 
 
 def _hertz(nominal: float) -> str:

@@ -191,58 +191,59 @@ def pair_channels(
 
 
 def _by_name(simulated: Recording, recorded: Recording) -> list[tuple[str, str]]:
-    own, other = simulated.vibration_names(), recorded.vibration_names()
-    for side, names in (("simulation", own), ("recording", other)):
+    simulated_names, recorded_names = simulated.vibration_names(), recorded.vibration_names()
+    for side, names in (("simulation", simulated_names), ("recording", recorded_names)):
         if not names:
             raise InputError(
                 f"the {side} has no vibration channel",
                 allowed="a channel of acceleration, velocity, displacement, sound pressure, force or torque",
                 remedy="state the quantity in the rig file's [[sensor]] tables",
             )
-    common = [(name, name) for name in other if name in own]
+    common = [(name, name) for name in recorded_names if name in simulated_names]
     if common:
         return common
-    if len(own) == len(other) == 1:
-        return [(own[0], other[0])]
+    if len(simulated_names) == len(recorded_names) == 1:
+        return [(simulated_names[0], recorded_names[0])]
     raise InputError(
-        f"no channel names agree: the simulation has {', '.join(own)}; the recording has {', '.join(other)}",
-        remedy=f'say which belong together, e.g. --channel "{own[0]}={other[0]}"',
+        f"no channel names agree: the simulation has {', '.join(simulated_names)}; the recording has "
+        f"{', '.join(recorded_names)}",
+        remedy=f'say which belong together, e.g. --channel "{simulated_names[0]}={recorded_names[0]}"',
     )
 
 
-def _pair(own: Channel, other: Channel) -> ChannelPair:
-    names = f"channels {own.name!r} of the simulation and {other.name!r} of the recording"
-    for channel in (own, other):
+def _pair(simulated: Channel, recorded: Channel) -> ChannelPair:
+    names = f"channels {simulated.name!r} of the simulation and {recorded.name!r} of the recording"
+    for channel in (simulated, recorded):
         if not channel.is_vibration:
             raise InputError(
                 f"channel {channel.name!r} is a {channel.quantity.replace('_', ' ')}", allowed="a vibration channel"
             )
-    if "unknown" not in (own.quantity, other.quantity) and own.quantity != other.quantity:
+    if "unknown" not in (simulated.quantity, recorded.quantity) and simulated.quantity != recorded.quantity:
         raise InputError(
-            f"{names} measure different things: {own.quantity.replace('_', ' ')} and "
-            f"{other.quantity.replace('_', ' ')}",
+            f"{names} measure different things: {simulated.quantity.replace('_', ' ')} and "
+            f"{recorded.quantity.replace('_', ' ')}",
             allowed="the same quantity",
             remedy="compare other channels with --channel, or integrate one of them first",
         )
-    quantity = other.quantity if other.quantity != "unknown" else own.quantity
-    known = bool(own.unit and other.unit)
-    factor = _factor(own.unit, other.unit, quantity) if known else 1.0
+    quantity = recorded.quantity if recorded.quantity != "unknown" else simulated.quantity
+    known = bool(simulated.unit and recorded.unit)
+    factor = _factor(simulated.unit, recorded.unit, quantity) if known else 1.0
     if factor is None:
         raise InputError(
-            f"{names} are in {own.unit} and {other.unit}",
+            f"{names} are in {simulated.unit} and {recorded.unit}",
             allowed="the same unit, or two of one quantity",
             remedy="state unit and scale in the rig file's [[sensor]] tables",
         )
-    return ChannelPair(own.name, other.name, quantity, other.unit if known else "", factor, known)
+    return ChannelPair(simulated.name, recorded.name, quantity, recorded.unit if known else "", factor, known)
 
 
-def _factor(own: str, other: str, quantity: str) -> float | None:
-    if own == other:
+def _factor(unit: str, target_unit: str, quantity: str) -> float | None:
+    if unit == target_unit:
         return 1.0
     for name in (quantity,) if quantity != "unknown" else tuple(SI_FACTORS):
         units = SI_FACTORS.get(name, {})
-        if own in units and other in units:
-            return units[own] / units[other]
+        if unit in units and target_unit in units:
+            return units[unit] / units[target_unit]
     return None
 
 
@@ -297,18 +298,24 @@ def common_machine(simulated: Recording, recorded: Recording, rig: Rig | None) -
         If the teeth differ, or the shafts of two rigs cannot be told to be the same.
     """
     notes: list[str] = []
-    own = simulated.rig if simulated.rig is not None and simulated.rig.shafts else None
-    other = rig if rig is not None else recorded.rig
-    if other is None or not other.shafts:
-        if own is not None:
+    simulated_rig = simulated.rig if simulated.rig is not None and simulated.rig.shafts else None
+    recorded_rig = rig if rig is not None else recorded.rig
+    if recorded_rig is None or not recorded_rig.shafts:
+        if simulated_rig is not None:
             notes.append("The recording has no rig: its gears are taken to be the simulation's.")
-        other = gears_only(own, recorded.speed_source) if own is not None else (other or Rig())
-    if own is None:
-        own = for_simulation(other, simulated.speed_source)
-    if isinstance(own.speed, ConstantSpeed) and own.speed == other.speed and simulated.speed is None:
-        rpm = f"{own.speed.speed_rpm:g} rpm"
+        recorded_rig = (
+            gears_only(simulated_rig, recorded.speed_source) if simulated_rig is not None else (recorded_rig or Rig())
+        )
+    if simulated_rig is None:
+        simulated_rig = for_simulation(recorded_rig, simulated.speed_source)
+    if (
+        isinstance(simulated_rig.speed, ConstantSpeed)
+        and simulated_rig.speed == recorded_rig.speed
+        and simulated.speed is None
+    ):
+        rpm = f"{simulated_rig.speed.speed_rpm:g} rpm"
         notes.append(f"The simulation has no tachometer: it is taken to run at {rpm}, as the rig file says.")
-    return ComparedRigs(own, other, _shaft_names(own, other), tuple(notes))
+    return ComparedRigs(simulated_rig, recorded_rig, _shaft_names(simulated_rig, recorded_rig), tuple(notes))
 
 
 def gears_only(rig: Rig, speed: SpeedSource | None = None) -> Rig:
@@ -340,24 +347,25 @@ def teeth_on(rig: Rig, shaft: str) -> int | None:
     return next((teeth for teeth in gears if teeth is not None), None)
 
 
-def _shaft_names(own: Rig, other: Rig) -> dict[str, str]:
-    if not own.pairs or not other.pairs:
-        if set(own.shaft_names) == set(other.shaft_names):
-            return {name: name for name in other.shaft_names}
-        if len(own.shafts) == len(other.shafts) == 1:
-            return {other.shafts[0].name: own.shafts[0].name}
-    if len(own.pairs) != len(other.pairs) or not own.pairs:
+def _shaft_names(simulated: Rig, recorded: Rig) -> dict[str, str]:
+    if not simulated.pairs or not recorded.pairs:
+        if set(simulated.shaft_names) == set(recorded.shaft_names):
+            return {name: name for name in recorded.shaft_names}
+        if len(simulated.shafts) == len(recorded.shafts) == 1:
+            return {recorded.shafts[0].name: simulated.shafts[0].name}
+    if len(simulated.pairs) != len(recorded.pairs) or not simulated.pairs:
         raise InputError(
-            f"the simulation's rig has {_gears(own)}, the recording's {_gears(other)}",
+            f"the simulation's rig has {_gears(simulated)}, the recording's {_gears(recorded)}",
             allowed="the same machine on both sides",
             remedy="give the simulation the recording's rig file",
         )
     names: dict[str, str] = {}
-    for mine, theirs in zip(own.pairs, other.pairs, strict=True):
+    for mine, theirs in zip(simulated.pairs, recorded.pairs, strict=True):
         for a, b in ((mine.driver_teeth, theirs.driver_teeth), (mine.driven_teeth, theirs.driven_teeth)):
             if a is not None and b is not None and a != b:
                 raise InputError(
-                    f"the simulation is of other gears: {_gears(own)}, the recording's rig has {_gears(other)}",
+                    f"the simulation is of other gears: {_gears(simulated)}, the recording's rig has "
+                    f"{_gears(recorded)}",
                     allowed="the same teeth, pair by pair",
                     remedy="simulate with the recording's teeth (--set teeth_driver=…), or correct the rig file",
                 )

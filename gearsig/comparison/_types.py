@@ -359,9 +359,11 @@ def power_levels(simulated: FloatArray, recorded: FloatArray, *, smooth: int = 5
         strongest = float(power.max(initial=0.0))
         a, b = decibel(power[0], strongest), decibel(power[1], strongest)
         both.append((decibel(power.mean(axis=0), strongest), _smoothed(np.abs(a - b) / 2.0, smooth)))
-    (own, own_error), (other, other_error) = both
-    errors = np.hypot(own_error, other_error)
-    return tuple(LevelPair(float(s), float(r), float(e)) for s, r, e in zip(own, other, errors, strict=True))
+    (simulated_db, simulated_error), (recorded_db, recorded_error) = both
+    errors = np.hypot(simulated_error, recorded_error)
+    return tuple(
+        LevelPair(float(s), float(r), float(e)) for s, r, e in zip(simulated_db, recorded_db, errors, strict=True)
+    )
 
 
 def _smoothed(errors: FloatArray, n: int) -> FloatArray:

@@ -22,7 +22,7 @@ LACKING_DB = 6.0
 """And if the other record's noise would let a line half as large be seen."""
 
 
-LEAST_REPEATED = 0.3
+MIN_REPEATED = 0.3
 """Correlation that two averages could reach, below which they say nothing of each other: their halves differ."""
 
 
@@ -64,9 +64,9 @@ def _head(channel: ChannelComparison, channels: Sequence[ChannelComparison]) -> 
 def mesh_lines(channel: ChannelComparison) -> tuple[LineLevel, ...]:
     """Return the mesh harmonics that the recording shows; the shaft orders where it shows none."""
     for kind in ("mesh", "shaft"):
-        found = tuple(line for line in channel.lines if line.kind == kind and line.recorded_is_seen)
-        if found:
-            return found
+        lines = tuple(line for line in channel.lines if line.kind == kind and line.recorded_is_seen)
+        if lines:
+            return lines
     return ()
 
 
@@ -75,11 +75,11 @@ def _levels_text(channel: ChannelComparison) -> str:
     if not lines:
         return "No line of the recording stands above its own noise: only the floors can be compared."
     where = "mesh harmonics" if lines[0].kind == "mesh" else "shaft orders"
-    told = [line for line in lines if line.simulated_is_seen or not _is_hidden(line)]
-    hidden = len(lines) - len(told)
-    if not told:
+    comparable = [line for line in lines if line.simulated_is_seen or not _is_hidden(line)]
+    hidden = len(lines) - len(comparable)
+    if not comparable:
         return f"The simulation's own scatter hides all {where} of the recording: they cannot be compared."
-    text = _lines_text(told, where, levels_compare=channel.levels_compare)
+    text = _lines_text(comparable, where, levels_compare=channel.levels_compare)
     return f"{text} {hidden} more are hidden by the simulation's own scatter." if hidden else text
 
 
@@ -115,21 +115,21 @@ def _worst(line: LineLevel, gain: float) -> str:
 def _missing_texts(channel: ChannelComparison) -> list[str]:
     """Name the strongest lines that only one of the two shows."""
     texts = []
-    for seen, other, words in (
+    for seen, lacking, words in (
         ("recorded_is_seen", "simulated_is_seen", "The simulation lacks"),
         ("simulated_is_seen", "recorded_is_seen", "Only the simulation has"),
     ):
-        found = [
+        missing = [
             line
             for line in (*channel.lines, *channel.other_lines)
-            if getattr(line, seen) and not getattr(line, other) and not _is_hidden(line)
+            if getattr(line, seen) and not getattr(line, lacking) and not _is_hidden(line)
         ]
         side = "recorded_db" if seen.startswith("recorded") else "simulated_db"
         strongest = max(getattr(line.level, side) for line in (*channel.lines, *channel.other_lines))
-        found = [line for line in found if getattr(line.level, side) > strongest - WORTH_NAMING_DB]
-        found.sort(key=lambda line: -float(getattr(line.level, side)))
-        if found:
-            texts.append(f"{words} {', '.join(line.label for line in found[:3])}{_more(len(found) - 3)}.")
+        missing = [line for line in missing if getattr(line.level, side) > strongest - WORTH_NAMING_DB]
+        missing.sort(key=lambda line: -float(getattr(line.level, side)))
+        if missing:
+            texts.append(f"{words} {', '.join(line.label for line in missing[:3])}{_more(len(missing) - 3)}.")
     return texts
 
 
@@ -141,7 +141,7 @@ def _shape_texts(channel: ChannelComparison) -> list[str]:
     parts, loose = [], []
     for shaft in channel.shafts:
         name = f" of {shaft.shaft}" if shaft.shaft else ""
-        if shaft.best_correlation < LEAST_REPEATED:
+        if shaft.best_correlation < MIN_REPEATED:
             loose.append(name)
         else:
             parts.append(f"{_number(shaft.correlation.value)}{name} ({_number(shaft.best_correlation)} is possible)")
@@ -188,23 +188,23 @@ WORTH_SAYING = 0.1
 """Correlation that a turned mark would gain."""
 
 
-def remarks(
-    own: ComparedSide,
-    other: ComparedSide,
+def notes_of(
+    simulated_side: ComparedSide,
+    recorded_side: ComparedSide,
     alignments: Sequence[Alignment],
     channels: Sequence[ChannelComparison],
     ratios: Mapping[str, float],
 ) -> tuple[str, ...]:
     """Return remarks on speeds, shafts left out, alignment and units."""
-    texts = _speed_texts(own, other)
+    texts = _speed_texts(simulated_side, recorded_side)
     left_out = [shaft for shaft in ratios if shaft not in {a.shaft for a in alignments}]
     if left_out:
         texts.append(
             f"Shaft {', '.join(left_out)} makes fewer than {MIN_REVOLUTIONS} revolutions in one of the records: its "
             "average and its lines are left out."
         )
-    told = {s.shaft for channel in channels for s in channel.shafts if s.best_correlation >= LEAST_REPEATED}
-    texts += _alignment_texts([one for one in alignments if one.shaft in told])
+    comparable = {s.shaft for channel in channels for s in channel.shafts if s.best_correlation >= MIN_REPEATED}
+    texts += _alignment_texts([alignment for alignment in alignments if alignment.shaft in comparable])
     unknown = [channel.name for channel in channels if not channel.levels_compare]
     if unknown:
         texts.append(
@@ -214,17 +214,22 @@ def remarks(
     return tuple(texts)
 
 
-def _speed_texts(own: ComparedSide, other: ComparedSide) -> list[str]:
+def _speed_texts(simulated_side: ComparedSide, recorded_side: ComparedSide) -> list[str]:
     """Return one text on both speeds: a run-up has no speed of its own that could be compared with another."""
-    if not (_is_steady(own) and _is_steady(other)):
-        unsteady = [name for side, name in ((own, "simulation"), (other, "recording")) if not _is_steady(side)]
+    if not (_is_steady(simulated_side) and _is_steady(recorded_side)):
+        unsteady = [
+            name
+            for side, name in ((simulated_side, "simulation"), (recorded_side, "recording"))
+            if not _is_steady(side)
+        ]
         text = (
-            f"{_speed_words(own, 'The simulation')}, {_speed_words(other, 'the recording')}: levels of the "
+            f"{_speed_words(simulated_side, 'The simulation')}, {_speed_words(recorded_side, 'the recording')}: levels "
+            "of the "
             f"{' and of the '.join(unsteady)} are means over all speeds. At each of them orders meet other resonances, "
             "and an average need not repeat: parts at one speed compare better."
         )
         return [text]
-    simulated, recorded = own.angle.mean_speed_rpm, other.angle.mean_speed_rpm
+    simulated, recorded = simulated_side.angle.mean_speed_rpm, recorded_side.angle.mean_speed_rpm
     off = simulated / recorded - 1.0
     if abs(off) > OTHER_SPEED:
         text = (
@@ -255,15 +260,17 @@ def _speed_words(side: ComparedSide, name: str) -> str:
 
 def _alignment_texts(alignments: Sequence[Alignment]) -> list[str]:
     texts = []
-    for one in alignments:
-        if one.method == "marks" and one.gain > WORTH_SAYING:
-            turned = f"{one.best_shift_deg:+.4g}°".replace("-", "−")
+    for alignment in alignments:
+        if alignment.method == "marks" and alignment.gain > WORTH_SAYING:
+            turned = f"{alignment.best_shift_deg:+.4g}°".replace("-", "−")
             texts.append(
-                f"The averages{_of([one])} are aligned by their marks; with the simulation turned by {turned} they "
-                f"would correlate better by {one.gain:.2f}. A simulation's mark need not sit where the rig's does: "
-                "align by correlation then."
+                f"The averages{_of([alignment])} are aligned by their marks; with the simulation turned by {turned} "
+                f"they would correlate better by {alignment.gain:.2f}. A simulation's mark need not sit where the "
+                "rig's does: align by correlation then."
             )
-    loose = [one for one in alignments if one.method != "marks" and one.tooth_is_certain is False]
+    loose = [
+        alignment for alignment in alignments if alignment.method != "marks" and alignment.tooth_is_certain is False
+    ]
     if loose:
         texts.append(
             f"No tooth{_of(loose)} stands out enough to tell which is which: the simulation's average is aligned to a "

@@ -22,7 +22,7 @@ from gearsig.diagnosis._signals import (
     band_envelopes,
     channel_analysis,
     compute_signals,
-    own_bands,
+    kurtogram_bands,
 )
 from gearsig.diagnosis._single_lines import detect_lines
 from gearsig.diagnosis._speed import speed_finding
@@ -110,10 +110,10 @@ def _of_bearings(signals: AnalysisSignals, name: str, envelopes: list[BandEnvelo
     """Take the band whose envelope has the clearest lines; a quiet one would only state its floor."""
     from gearsig.indicators import bearing_indicators
 
-    own = [e for e in envelopes if e.channel == name]
-    if not own:
+    of_channel = [e for e in envelopes if e.channel == name]
+    if not of_channel:
         return
-    envelope = max(own, key=lambda e: float(e.excess.scores().sum()))
+    envelope = max(of_channel, key=lambda e: float(e.excess.scores().sum()))
     band = f"{envelope.band_hz[0]:.0f} to {envelope.band_hz[1]:.0f} Hz"
     for bearing in signals.rig.bearings:
         ratio = signals.rig.ratio(bearing.shaft)
@@ -168,19 +168,23 @@ def analyze(
         is the recording itself.
     """
     settings = settings or AnalysisSettings()
-    tell = on_stage or (lambda _: None)
+    announce = on_stage or (lambda _: None)
     prepared = prepare(recording, rig)
     recording, known = prepared.recording, prepared.rig
     _check_size(recording)
-    before = None
+    prepared_reference = None
     if reference is not None:
-        before = prepare(reference, recording.rig)
-        _check_reference(recording, before.recording)
-    tell("finding the speed")
+        prepared_reference = prepare(reference, recording.rig)
+        _check_reference(recording, prepared_reference.recording)
+    announce("finding the speed")
     findings, dead = detect_data_problems(recording)
     names = [name for name in recording.vibration_names() if name not in dead]
     unsteady = start_stop_analysis(
-        recording, known, findings, asdict(settings), before.recording if before is not None else None
+        recording,
+        known,
+        findings,
+        asdict(settings),
+        prepared_reference.recording if prepared_reference is not None else None,
     )
     if unsteady is not None:
         return unsteady
@@ -192,15 +196,15 @@ def analyze(
         order = ranked(findings)
         return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings))
     usable = angle if not isinstance(angle, CannotTell) else None
-    material = _material(prepared, names, usable, settings, tell, has_reference=reference is not None)
-    tell("gears, bearings and shafts")
+    material = _material(prepared, names, usable, settings, announce, has_reference=reference is not None)
+    announce("gears, bearings and shafts")
     findings += _detect(material)
-    then = None
-    if before is not None:
-        tell("the reference")
-        then = analyze(before, settings=settings)
-        findings = beside_reference(findings, then)
-    crack = crack_depth(prepared, known, before, torque_nm, dead)
+    reference_analysis = None
+    if prepared_reference is not None:
+        announce("the reference")
+        reference_analysis = analyze(prepared_reference, settings=settings)
+        findings = beside_reference(findings, reference_analysis)
+    crack = crack_depth(prepared, known, prepared_reference, torque_nm, dead)
     order = ranked(with_crack(findings, crack, known))
     return Analysis(
         recording=recording,
@@ -212,7 +216,7 @@ def analyze(
         verdict=verdict_of(order, has_reference=reference is not None),
         settings=asdict(settings),
         crack=crack,
-        reference=then,
+        reference=reference_analysis,
     )
 
 
@@ -221,17 +225,17 @@ def _material(
     names: Sequence[str],
     angle: ShaftAngle | None,
     settings: AnalysisSettings,
-    tell: Callable[[str], object],
+    announce: Callable[[str], object],
     *,
     has_reference: bool,
 ) -> ExaminedSignals:
     """Compute everything that is looked at."""
-    tell("averages and spectra")
+    announce("averages and spectra")
     signals = replace(compute_signals(prepared, names, angle, settings), has_reference=has_reference)
-    tell("envelopes")
-    envelopes, own = list(band_envelopes(signals)), own_bands(signals)
-    tell("levels over speed")
-    return ExaminedSignals(signals, envelopes, own, order_levels(signals))
+    announce("envelopes")
+    envelopes, chosen = list(band_envelopes(signals)), kurtogram_bands(signals)
+    announce("levels over speed")
+    return ExaminedSignals(signals, envelopes, chosen, order_levels(signals))
 
 
 def _angle_of(prepared: PreparedRecording) -> ShaftAngle | CannotTell:
@@ -253,7 +257,7 @@ def _detect(material: ExaminedSignals) -> list[Finding]:
         *_nothing_to_examine(signals.rig),
         *detect_mesh(signals),
         *detect_tooth_damage(signals),
-        *detect_bearings(signals, material.envelopes, material.own_bands),
+        *detect_bearings(signals, material.envelopes, material.kurtogram_bands),
         *detect_sidebands(signals),
         *detect_lines(signals),
         *detect_resonances(material.order_levels),
@@ -299,7 +303,7 @@ def _check_vibration(recording: Recording) -> None:
 def _check_reference(recording: Recording, reference: Recording) -> None:
     where = reference.provenance.source or "reference"
     if np.array_equal(recording.samples, reference.samples):
-        remedy = "give one that was taken when the machine was sound"
+        remedy = "give one that was taken when the machine was healthy"
         raise InputError("the reference is the recording itself", where=where, remedy=remedy)
     missing = [name for name in recording.vibration_names() if name not in reference.channel_names]
     if missing:

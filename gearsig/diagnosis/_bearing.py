@@ -21,7 +21,7 @@ from gearsig.diagnosis._bearing_families import (
     speed_is_only_stated,
     without_synchronous,
 )
-from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope, OwnBand, witness_text
+from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope, KurtogramBand, witness_text
 from gearsig.diagnosis._speed import speed_is_confirmed
 from gearsig.diagnosis._types import WITH_ASSUMED_DATA, Finding, Kind, Strength, Where, from_p_value, p_text
 from gearsig.prepared import LOG_RATIO_LIMIT, score_needed
@@ -36,7 +36,7 @@ CLEAR_MODULATION = 0.05
 """Depth of the strongest line of the envelope from which a race is called damaged, not only worth watching."""
 
 N_HARMONICS = 6
-FEWEST_FREE = 3
+MIN_FREE = 3
 """Harmonics that must lie beside those of the shafts for a family to be seen."""
 
 
@@ -80,7 +80,7 @@ def _depth_in(envelope: BandEnvelope, order: float, slip: float, probability: fl
     places = places[places <= excess.spectrum.positions[-1]]
     index = np.array([excess.spectrum.index_of(place) for place in places], dtype=np.int64)
     free = index[~excess.masked[index]] if len(index) else index
-    if len(free) < FEWEST_FREE or envelope.mean <= 0:
+    if len(free) < MIN_FREE or envelope.mean <= 0:
         return inf
     needed = score_needed(excess, N_HARMONICS, order * (1 - slip), order * (1 + slip), probability) / len(free)
     if needed > LOG_RATIO_LIMIT:
@@ -118,8 +118,8 @@ def none_found(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], fami
         if signals.has_reference
         else "An earlier recording of the same machine: then smaller changes show."
     )
-    sound = replace(_no_damage(envelopes, examined, depths, where), surer=surer)
-    return [sound, *_not_examined(signals, depths, where)]
+    no_damage = replace(_no_damage(envelopes, examined, depths, where), surer=surer)
+    return [no_damage, *_not_examined(signals, depths, where)]
 
 
 def _smallest_depths(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> dict[tuple[str, str], float]:
@@ -134,13 +134,13 @@ def _smallest_depths(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]
 
 def _examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], float]) -> list[str]:
     """Return the bearings whose races, or what is known of them, would have shown a damage."""
-    found = []
+    examined = []
     for bearing in signals.rig.bearings:
-        own = {name: depth for (owner, name), depth in depths.items() if owner == bearing.name}
-        decisive = [depth for name, depth in own.items() if name in RACES] or list(own.values())
+        depths_of_parts = {name: depth for (owner, name), depth in depths.items() if owner == bearing.name}
+        decisive = [depth for name, depth in depths_of_parts.items() if name in RACES] or list(depths_of_parts.values())
         if decisive and max(decisive) <= CLEAR_MODULATION:
-            found.append(bearing.name)
-    return found
+            examined.append(bearing.name)
+    return examined
 
 
 def _no_damage(
@@ -197,7 +197,7 @@ def _undecided(why: str, surer: str, where: Where) -> Finding:
     )
 
 
-MOST_PARTS = 2
+MAX_PARTS = 2
 """Parts that may be damaged at once; families at more orders than that have another cause more likely."""
 
 WITH_STATED_SPEED = 0.85
@@ -216,20 +216,20 @@ WORTH_A_SUSPICION = 0.3
 
 
 def detect_bearings(
-    signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], own_bands: Sequence[OwnBand] = ()
+    signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], kurtogram_bands: Sequence[KurtogramBand] = ()
 ) -> list[Finding]:
     """Name the race where the rig gives the bearing; else report families that nothing known explains.
 
     The bands that the kurtograms choose are searched like the others, and say what they show of a race found.
     """
-    searched = [*envelopes, *(own.envelope for own in own_bands)]
+    searched = [*envelopes, *(own.envelope for own in kurtogram_bands)]
     cleaned = [replace(e, excess=without_synchronous(signals, e.excess)) for e in searched]
     if signals.angle is None:
         return _over_frequency(signals, cleaned)
     if signals.angle.n_revolutions < signals.settings.minimum_revolutions:
         return [_too_short(signals)] if signals.rig.bearings else []
     families = find_families(signals, cleaned)
-    findings = [_with_witness(_named_finding(signals, c, len(families.named)), own_bands) for c in families.named]
+    findings = [_with_witness(_named_finding(signals, c, len(families.named)), kurtogram_bands) for c in families.named]
     findings += [
         _unnamed_finding(signals, c) if c.bearing is None else _named_finding(signals, c, 1) for c in families.trains
     ]
@@ -240,11 +240,11 @@ def detect_bearings(
     return findings
 
 
-def _with_witness(finding: Finding, own_bands: Sequence[OwnBand]) -> Finding:
+def _with_witness(finding: Finding, kurtogram_bands: Sequence[KurtogramBand]) -> Finding:
     where = finding.where
     if where.order is None or where.band_hz is None:
         return finding
-    text = witness_text(own_bands, where.channels[0], where.band_hz, where.order)
+    text = witness_text(kurtogram_bands, where.channels[0], where.band_hz, where.order)
     return replace(finding, evidence=(*finding.evidence, *text))
 
 
@@ -307,7 +307,7 @@ def _named_evidence(signals: AnalysisSignals, candidate: Candidate, n_parts: int
         evidence.append("Belts and other machines at the same rate look the same: lines at the cage's order alone.")
     if _is_among_hunting_lines(signals, candidate):
         evidence.append("A multiple of a hunting-tooth order is there too: teeth that differ from each other do it.")
-    if n_parts > MOST_PARTS:
+    if n_parts > MAX_PARTS:
         evidence.append(f"{n_parts} parts show at once, which a single other source of impacts explains as well.")
     return tuple(evidence)
 
@@ -327,7 +327,7 @@ def _confidence(signals: AnalysisSignals, candidate: Candidate, n_parts: int) ->
 
 def _is_shared(candidate: Candidate, n_parts: int) -> bool:
     """Whether other causes explain the lines as well: at a cage's order, or at the orders of several parts."""
-    return candidate.name == "FTF" or n_parts > MOST_PARTS
+    return candidate.name == "FTF" or n_parts > MAX_PARTS
 
 
 def _is_among_hunting_lines(signals: AnalysisSignals, candidate: Candidate) -> bool:

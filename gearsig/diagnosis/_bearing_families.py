@@ -25,7 +25,7 @@ LARGEST_DIVISOR = 30
 LARGEST_NUMERATOR = 3
 """A family may sit on every third line of a train of which it then has two multiples in three."""
 
-FEWEST_LINES_APART = 6
+MIN_LINES_APART = 6
 """Trains with lines closer than that are not told from noise."""
 
 SEEN = float(np.log(4.0))
@@ -34,7 +34,7 @@ SEEN = float(np.log(4.0))
 SHARE_SEEN = 0.5
 """Share of a train's further lines that must be seen; sidebands of a race's family make few of them."""
 
-FEWEST_FURTHER = 3
+MIN_FURTHER = 3
 N_SIDEBANDS = 3
 COST = 0.4
 """What a line costs, between noise (0) and the family's own mean (1): a train that adds noise lines loses."""
@@ -68,13 +68,13 @@ def slower_train(excess: LineExcess, comb: Comb, shafts: tuple[float, ...] = ())
     if not comb.positions:
         return None
     reach = max(comb.positions) + excess.spectrum.resolution
-    own = _unmasked(excess, comb.fundamental, reach)
+    family = _unmasked(excess, comb.fundamental, reach)
     noise = float(np.median(excess.log_ratio[~excess.masked]))
-    cost = noise + COST * (float(own.mean()) - noise) if len(own) else 0.0
-    best, best_score = None, float(np.sum(own - cost))
+    cost = noise + COST * (float(family.mean()) - noise) if len(family) else 0.0
+    best, best_score = None, float(np.sum(family - cost))
     for fraction in _fractions():
         fundamental = comb.fundamental * fraction
-        if fundamental < FEWEST_LINES_APART * excess.spectrum.resolution:
+        if fundamental < MIN_LINES_APART * excess.spectrum.resolution:
             continue
         score = float(np.sum(_unmasked(excess, fundamental, reach) - cost))
         if score > best_score and _is_seen_between(excess, fundamental, comb.fundamental, reach, shafts):
@@ -122,7 +122,7 @@ def _is_seen_between(
     explained = np.any([_is_of_family(excess, places, family, sideband) for sideband in sidebands], axis=0)
     index = _lines_of(excess, places[~explained])
     further = excess.log_ratio[index[~excess.masked[index]]]
-    return len(further) >= FEWEST_FURTHER and float(np.mean(further >= SEEN)) >= SHARE_SEEN
+    return len(further) >= MIN_FURTHER and float(np.mean(further >= SEEN)) >= SHARE_SEEN
 
 
 def _is_of_family(excess: LineExcess, places: FloatArray, family: float, sideband: float) -> NDArray[np.bool_]:
@@ -174,7 +174,7 @@ SAME_ORDER = 1e-3
 MINIMUM_LINES = 3
 """Lines of a family over 6 dB that must be there: two may coincide by chance with the harmonics of something else."""
 
-MOST_TRAINS = 3
+MAX_TRAINS = 3
 """Trains of impacts looked for, each hidden before the next search."""
 
 
@@ -229,7 +229,7 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
     the search begins anew, so that a damaged part beside it is found.
     """
     trains: list[Candidate] = []
-    for _ in range(MOST_TRAINS):
+    for _ in range(MAX_TRAINS):
         named = _significant(signals, envelopes)
         train = next((t for c in named if (t := _train_of(signals, c)) is not None), None)
         if train is None:
@@ -307,16 +307,16 @@ def _significant(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> lis
     """Return the significant bearing parts, surest first; one that shares its lines with a surer one is left out."""
     slip = slip_of(signals)
     expected = expected_parts(signals)
-    found = []
+    candidates = []
     for bearing, name, order in expected:
         best = clearest_family(envelopes, order * (1 - slip), order * (1 + slip))
         if best is not None and _is_within(best.comb, best.envelope, order, slip):
             p_value = min(1.0, best.p_value * len(expected))
             if p_value <= signals.settings.false_alarm_probability:
-                found.append(replace(best, p_value=p_value, bearing=bearing, name=name, expected=order))
-    found.sort(key=lambda c: -_weight(signals, c.name, c.comb.fundamental / c.expected - 1))
+                candidates.append(replace(best, p_value=p_value, bearing=bearing, name=name, expected=order))
+    candidates.sort(key=lambda c: -_weight(signals, c.name, c.comb.fundamental / c.expected - 1))
     kept: list[Candidate] = []
-    for candidate in found:
+    for candidate in candidates:
         if not any(_shares_lines(candidate.comb, other.comb) for other in kept):
             kept.append(_with_rivals(signals, candidate))
     return sorted(kept, key=lambda c: c.p_value)

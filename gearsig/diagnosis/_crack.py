@@ -26,8 +26,8 @@ SAME_PLACE_PITCHES = 1.5
 """The largest event and the crack's estimate each are good to about one tooth."""
 
 CLEAR = 0.7
-"""Confidence from which a crack seen by itself is called a fault. With the calibration's fifty or so sound machines no
-p-value is below 2 %: what is clearer than all of them must be enough."""
+"""Confidence from which a crack seen by itself is called a fault. With the calibration's fifty or so healthy machines
+no p-value is below 2 %: what is clearer than all of them must be enough."""
 
 PRIOR_WITH_REFERENCE = 0.5
 PRIOR_ALONE = 0.1
@@ -41,7 +41,7 @@ LIMIT_WITH_REFERENCE = 0.98
 SETTLED_PERCENT = 50.0
 """If a crack through half of the root would have shown against the reference, the teeth count as examined."""
 
-DOUBTS = ("tooth-damage-undecided", "tooth-not-examined")
+SETTLED_BY_REFERENCE = ("tooth-damage-undecided", "tooth-not-examined")
 """Codes of findings about teeth that a comparison with the reference settles: it looks at both gears of the pair."""
 
 BESIDE_ANOTHER_FAULT = 0.5
@@ -110,36 +110,36 @@ def with_crack(findings: Sequence[Finding], answer: Answer | None, rig: Rig) -> 
         return [*_unsettled(findings, answer, rig), _none_seen(answer, rig)]
     same = next((f for f in findings if _is_same_tooth(f, answer, rig)), None)
     if same is not None:
-        return [_merged(same, answer, rig) if f is same else f for f in findings if not _is_doubt(f, answer, rig)]
-    own = _beside_others(_seen(answer, rig), findings)
-    if not answer.with_reference and own.confidence < CLEAR:
+        return [_merged(same, answer, rig) if f is same else f for f in findings if not _is_superseded(f, answer, rig)]
+    crack_finding = _beside_others(_seen(answer, rig), findings)
+    if not answer.with_reference and crack_finding.confidence < CLEAR:
         return list(findings)
-    return [*(f for f in findings if not _is_doubt(f, answer, rig)), own]
+    return [*(f for f in findings if not _is_superseded(f, answer, rig)), crack_finding]
 
 
-def _beside_others(own: Finding, findings: Sequence[Finding]) -> Finding:
+def _beside_others(crack_finding: Finding, findings: Sequence[Finding]) -> Finding:
     """Return the finding of a crack, less sure where a fault of a bearing explains a small change as well."""
     if not any(f.kind is Kind.FAULT and f.where.bearing for f in findings):
-        return own
-    confidence = BESIDE_ANOTHER_FAULT * own.confidence
+        return crack_finding
+    confidence = BESIDE_ANOTHER_FAULT * crack_finding.confidence
     kind = Kind.SUSPICION if confidence >= WORTH_A_SUSPICION else Kind.NOTICE
     text = "Knocks of the damaged bearing may have made the change as well."
-    return replace(own, kind=kind, confidence=confidence, evidence=(*own.evidence, text))
+    return replace(crack_finding, kind=kind, confidence=confidence, evidence=(*crack_finding.evidence, text))
 
 
-def _merged(found: Finding, crack: CrackEstimate, rig: Rig) -> Finding:
+def _merged(tooth_finding: Finding, crack: CrackEstimate, rig: Rig) -> Finding:
     """Return the finding of a damaged tooth with the depth that its crack would have."""
-    own = _seen(crack, rig)
+    crack_finding = _seen(crack, rig)
     place = f"tooth {crack.tooth}" if crack.tooth is not None else f"{crack.angle_deg:.0f}°"
     return replace(
-        found,
-        kind=min(found.kind, own.kind, key=list(Kind).index),
+        tooth_finding,
+        kind=min(tooth_finding.kind, crack_finding.kind, key=list(Kind).index),
         title=f"Local tooth damage at {place} of {crack.gear}{_mate(crack)}{_what(crack)}.",
-        where=replace(own.where, channels=found.where.channels),
-        confidence=max(found.confidence, own.confidence),
-        confidence_basis=f"{found.confidence_basis}; {_INTERVAL}",
-        evidence=tuple(dict.fromkeys((*found.evidence, *own.evidence))),
-        surer=found.surer if not crack.with_reference else own.surer,
+        where=replace(crack_finding.where, channels=tooth_finding.where.channels),
+        confidence=max(tooth_finding.confidence, crack_finding.confidence),
+        confidence_basis=f"{tooth_finding.confidence_basis}; {_INTERVAL}",
+        evidence=tuple(dict.fromkeys((*tooth_finding.evidence, *crack_finding.evidence))),
+        surer=tooth_finding.surer if not crack.with_reference else crack_finding.surer,
     )
 
 
@@ -156,10 +156,10 @@ def _seen(crack: CrackEstimate, rig: Rig) -> Finding:
         crack.text,
         Where(shaft=crack.shaft, gear=crack.gear, angle_deg=crack.angle_deg, tooth=tooth),
         confidence=confidence,
-        confidence_basis="chance of as clear a change on sound gears "
+        confidence_basis="chance of as clear a change on healthy gears "
         f"{p_text(crack.p_value)}, by simulation; {_INTERVAL}",
         evidence=(_share_text(crack), *_kind_text(crack), *crack.reasons),
-        surer="Look at the tooth." if crack.with_reference else "A recording of the same gears when they were sound.",
+        surer="Look at the tooth." if crack.with_reference else "A recording of the same gears when they were healthy.",
     )
 
 
@@ -188,10 +188,10 @@ def _cannot_tell(answer: CannotTell) -> Finding:
 def _unsettled(findings: Sequence[Finding], answer: NoCrackSeen, rig: Rig) -> list[Finding]:
     """Return the findings without the doubt about teeth that the comparison with the reference settles."""
     settled = answer.with_reference and answer.below_percent <= SETTLED_PERCENT and not rig.assumed
-    return [f for f in findings if not (settled and f.code in DOUBTS)]
+    return [f for f in findings if not (settled and f.code in SETTLED_BY_REFERENCE)]
 
 
-def _is_doubt(finding: Finding, crack: CrackEstimate, rig: Rig) -> bool:
+def _is_superseded(finding: Finding, crack: CrackEstimate, rig: Rig) -> bool:
     """Whether a finding says that nothing shows at teeth one of which has a crack."""
     if finding.code == "tooth-damage-undecided":
         return crack.with_reference

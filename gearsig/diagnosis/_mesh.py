@@ -12,7 +12,7 @@ from gearsig.diagnosis._types import Finding, Kind, Strength, Where
 from gearsig.prepared import LineExcess
 from gearsig.rig import GearPair
 
-MOST_TEETH_WRONG = 3
+MAX_TEETH_WRONG = 3
 CONTRADICTED_DB = 10.0
 """By so much the true mesh lines exceed the stated ones: more than sidebands exceed their carriers in several harmonics
 at once, always on the same side."""
@@ -45,7 +45,7 @@ def teeth_are_contradicted(signals: AnalysisSignals, pair: GearPair) -> float | 
     mesh = signals.rig.mesh_order(pair)
     if mesh is None or not signals.order_excess:
         return None
-    shifts = [d for d in range(-MOST_TEETH_WRONG, MOST_TEETH_WRONG + 1) if d]
+    shifts = [d for d in range(-MAX_TEETH_WRONG, MAX_TEETH_WRONG + 1) if d]
     best: tuple[float, float] | None = None
     for step in _reckoned_from(signals, pair):
         for order in (mesh + d * step for d in shifts):

@@ -20,10 +20,10 @@ STRONG_DB = -10.0
 """Sidebands over carrier, in power: an amplitude modulation of 45 %, or a third together with some phase modulation."""
 
 NOTABLE_DB = -16.0
-"""An amplitude modulation of 22 %: worth a look, common on sound machines."""
+"""An amplitude modulation of 22 %: worth a look, common on healthy machines."""
 
 N_CARRIERS = 3
-MOST_TIMES = 8
+MAX_TIMES = 8
 """Modulations per revolution that are looked for: planets, jaws of couplings, bolts."""
 
 CLEAR_DB = 12.0
@@ -80,7 +80,7 @@ def mesh_modulation(signals: AnalysisSignals, pair: GearPair, shaft: str) -> dic
     mesh, order = signals.rig.mesh_order(pair), signals.rig.ratio(shaft)
     if mesh is None or order is None:
         return {}
-    found = {}
+    by_channel = {}
     for name, excess in signals.order_excess.items():
         narrowest = sideband_distance(excess.spectrum, RUN_UP_FOOT_ORDERS if signals.speed_varies else 0.0)
         if order < narrowest:
@@ -89,8 +89,8 @@ def mesh_modulation(signals: AnalysisSignals, pair: GearPair, shaft: str) -> dic
         multiples = _multiples_of_its_own(signals, shaft, APART_LINES * excess.spectrum.resolution)
         modulation = modulation_of(excess, mesh, order, foreign, multiples)
         if modulation is not None:
-            found[name] = modulation
-    return found
+            by_channel[name] = modulation
+    return by_channel
 
 
 def sideband_distance(spectrum: Spectrum, foot: float = 0.0) -> float:
@@ -133,7 +133,7 @@ def modulation_of(
 
 
 def _summed(cells: Cells, order: float, carriers: float, floor: float) -> Modulation | None:
-    power = {k: sum(sum(cell) for (_, own), cell in cells.items() if own == k) for k in range(1, MOST_TIMES + 1)}
+    power = {k: sum(sum(cell) for (_, own), cell in cells.items() if own == k) for k in range(1, MAX_TIMES + 1)}
     total = sum(power.values())
     # What a pair needs in order to count: below it, "not modulated" and "hidden" are the same.
     hidden_db = 10 * log10(max(2 * 10 ** (CLEAR_DB / 10) * floor / (carriers + total), 1e-30))
@@ -150,7 +150,7 @@ def _summed(cells: Cells, order: float, carriers: float, floor: float) -> Modula
 def _times_per_revolution(power: dict[int, float]) -> int:
     """Return the largest k whose multiples hold nearly all of the sidebands' power."""
     total = sum(power.values())
-    for k in range(MOST_TIMES, 1, -1):
+    for k in range(MAX_TIMES, 1, -1):
         if total > 0 and sum(p for own, p in power.items() if own % k == 0) >= SHARE_OF_PERIOD * total:
             return k
     return 1
@@ -220,12 +220,12 @@ def _foreign_orders(signals: AnalysisSignals, shaft: str, mesh: float) -> tuple[
 
 def _multiples_of_its_own(signals: AnalysisSignals, shaft: str, near: float) -> tuple[int, ...]:
     """Return the k for which k·shaft is no smaller multiple of another shaft: that would be the simpler cause."""
-    own = signals.rig.ratio(shaft) or 0.0
+    ratio = signals.rig.ratio(shaft) or 0.0
     others = [order for name, order in signals.known_shaft_orders.items() if name != shaft]
     return tuple(
         k
-        for k in range(1, MOST_TIMES + 1)
-        if not any(abs(k * own - j * other) <= near for other in others for j in range(1, k))
+        for k in range(1, MAX_TIMES + 1)
+        if not any(abs(k * ratio - j * other) <= near for other in others for j in range(1, k))
     )
 
 
@@ -236,7 +236,7 @@ def _multiples_of_its_own(signals: AnalysisSignals, shaft: str, near: float) -> 
 
 TIMES = {1: "once", 2: "twice"}
 
-FEWEST_LINES = 3
+MIN_LINES = 3
 """Of a family whose shaft is not known."""
 
 LINE_OVER_SURROUNDINGS_DB = 6.0
@@ -293,7 +293,7 @@ def _modulated(
             10 ** (median / 20),
             "sideband/carrier",
             10 ** (NOTABLE_DB / 20),
-            "common on sound machines",
+            "common on healthy machines",
             median - NOTABLE_DB,
         ),
         confidence=0.5 if suspect else 0.95 * (WITH_ASSUMED_DATA if signals.rig.assumed else 1.0),
@@ -370,7 +370,7 @@ def _is_family(excess: LineExcess, comb: Comb, mesh: float) -> bool:
         if level is None or amplitude >= level * 10 ** (LINE_OVER_SURROUNDINGS_DB / 20):
             h = max(1, round(position / mesh))
             places.append((h, round((position - h * mesh) / comb.fundamental)))
-    return len(places) >= FEWEST_LINES and any((h, -k) in places for h, k in places)
+    return len(places) >= MIN_LINES and any((h, -k) in places for h, k in places)
 
 
 def _is_known(signals: AnalysisSignals, comb: Comb) -> bool:

@@ -1,4 +1,4 @@
-"""A recording beside that of the sound machine: indicators and findings, then and now."""
+"""A recording beside that of the healthy machine: indicators and findings, then and now."""
 
 from __future__ import annotations
 
@@ -62,17 +62,17 @@ def rig_of_reference(path: str | Path, rig: Rig | None) -> Rig | None:
     from gearsig.rig import read_rig, rig_file_beside
 
     beside = rig_file_beside(path)
-    own = read_rig(beside) if beside is not None else None
-    if own is None or rig is None or not own.pairs:
+    rig_beside = read_rig(beside) if beside is not None else None
+    if rig_beside is None or rig is None or not rig_beside.pairs:
         return rig
-    teeth, others = (", ".join(f"{p.driver_teeth}/{p.driven_teeth}" for p in r.pairs) for r in (rig, own))
+    teeth, others = (", ".join(f"{p.driver_teeth}/{p.driven_teeth}" for p in r.pairs) for r in (rig, rig_beside))
     if teeth != others:
         raise InputError(
             f"the reference is of another machine: its rig file says teeth {others}, the recording's {teeth}",
             where=Path(path).name,
-            remedy="give a recording of the same machine when it was sound",
+            remedy="give a recording of the same machine when it was healthy",
         )
-    point, then = rig.operating_point, own.operating_point
+    point, then = rig.operating_point, rig_beside.operating_point
     return replace(rig, operating_point=replace(point, torque_nm=then.torque_nm)) if then.shaft == point.shaft else rig
 
 

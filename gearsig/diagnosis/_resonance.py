@@ -28,7 +28,7 @@ LARGEST_P_VALUE = 0.1
 PRIOR = 0.8
 """Every structure has resonances: who looks at one frequency in a run-up finds one more often than not."""
 
-MOST_RESONANCES = 3
+MAX_RESONANCES = 3
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def detect_resonances(levels: Mapping[str, Sequence[OrderLevel]]) -> list[Findin
             kept.append(cluster)
     significant = [c for c in kept if c.p_value * len(levels) <= LARGEST_P_VALUE]
     found = [replace(c, p_value=c.p_value * len(levels)) for c in significant]
-    return [_finding(cluster, clusters) for cluster in found[:MOST_RESONANCES]]
+    return [_finding(cluster, clusters) for cluster in found[:MAX_RESONANCES]]
 
 
 def _clusters(channel: str, levels: Sequence[OrderLevel]) -> list[_Cluster]:
@@ -155,16 +155,16 @@ def _finding(cluster: _Cluster, every: Sequence[_Cluster]) -> Finding:
 # --------------------
 
 
-LEAST_SPEED_RATIO = 1.2
+MIN_SPEED_RATIO = 1.2
 """Highest over lowest speed from which levels over speed say something."""
 
 N_MESH_HARMONICS = 4
-MOST_PAIRS = 2
-MOST_ORDERS = 6
+MAX_PAIRS = 2
+MAX_ORDERS = 6
 BELOW_MESH = 0.5
 """Of the lowest mesh order: other orders above it are of teeth that differ, or sidebands."""
 
-MOST_MULTIPLES = 48
+MAX_MULTIPLES = 48
 """Of half a shaft order: those above are seldom a shaft's own."""
 
 CLEAR_DB = 15.0
@@ -183,8 +183,8 @@ SHARE_OF_DISTANCE = 0.5
 """Of the distance to the nearest order: two poles then leave a hundredth of its amplitude."""
 
 N_SPEEDS = 160
-FEWEST_SPEEDS = 20
-LEAST_SHARE_OF_RANGE = 0.4
+MIN_SPEEDS = 20
+MIN_SHARE_OF_RANGE = 0.4
 """Of the speed range that an order must lie below half the sampling rate."""
 
 
@@ -202,7 +202,7 @@ def runs_up(signals: AnalysisSignals) -> bool:
     if signals.angle is None or not signals.order_excess:
         return False
     low, high = signals.angle.speed_range_rpm
-    return high >= LEAST_SPEED_RATIO * max(low, 0.0) > 0 or (low <= 0 < high)
+    return high >= MIN_SPEED_RATIO * max(low, 0.0) > 0 or (low <= 0 < high)
 
 
 def order_levels(signals: AnalysisSignals) -> dict[str, tuple[OrderLevel, ...]]:
@@ -219,23 +219,23 @@ def order_levels(signals: AnalysisSignals) -> dict[str, tuple[OrderLevel, ...]]:
 def _levels(signals: AnalysisSignals, channel: str) -> Iterator[OrderLevel]:
     from gearsig.orders import track_vold_kalman
 
-    for wanted in _wanted(signals, channel):
+    for request in _orders_to_track(signals, channel):
         try:
             separated = track_vold_kalman(
                 signals.recording,
                 channel,
-                [wanted.order],
-                bandwidth_orders=wanted.bandwidth,
+                [request.order],
+                bandwidth_orders=request.bandwidth,
                 n_poles=N_POLES,
                 shaft_angle=signals.angle,
             )
         except (InputError, RefusalError):
             continue  # above half the sampling rate all the time, or the record is too short for the band
         speed, amplitude = _over_speed(separated.orders[0])
-        if len(speed) >= FEWEST_SPEEDS:
+        if len(speed) >= MIN_SPEEDS:
             unit = separated.orders[0].unit
             yield OrderLevel(
-                wanted.name, wanted.order, speed, amplitude, unit, wanted.bandwidth, wanted.pair, wanted.harmonic
+                request.name, request.order, speed, amplitude, unit, request.bandwidth, request.pair, request.harmonic
             )
 
 
@@ -254,20 +254,20 @@ def _over_speed(order: SeparatedOrder) -> tuple[FloatArray, FloatArray]:
     return middles[there], np.sqrt(power[there] / n[there])
 
 
-def _wanted(signals: AnalysisSignals, channel: str) -> list[_OrderRequest]:
+def _orders_to_track(signals: AnalysisSignals, channel: str) -> list[_OrderRequest]:
     """Return the orders to follow, mesh harmonics first, each with its bandwidth."""
     assert signals.angle is not None  # noqa: S101 - `runs_up` has seen to it; narrows the type
     low, high = (max(rpm, 0.0) / 60.0 for rpm in signals.angle.speed_range_rpm)
-    highest = 0.5 * signals.recording.sampling_rate_hz / (low + LEAST_SHARE_OF_RANGE * (high - low))
+    highest = 0.5 * signals.recording.sampling_rate_hz / (low + MIN_SHARE_OF_RANGE * (high - low))
     meshes = [
         (f"{h}× mesh of {pair.name}", h * mesh, pair.name, h)
-        for pair in signals.rig.pairs[:MOST_PAIRS]
+        for pair in signals.rig.pairs[:MAX_PAIRS]
         if (mesh := signals.rig.mesh_order(pair)) is not None and mesh_is_confirmed(signals, pair)
         for h in range(1, N_MESH_HARMONICS + 1)
         if h * mesh < highest
     ]
     below = min(highest, min((BELOW_MESH * order for _, order, _, _ in meshes), default=highest))
-    others = _strongest(signals, signals.order_excess[channel], below)[: max(0, MOST_ORDERS - len(meshes))]
+    others = _strongest(signals, signals.order_excess[channel], below)[: max(0, MAX_ORDERS - len(meshes))]
     shafts = signals.known_shaft_orders.values()
     sidebands = [order + side * shaft for _, order, _, _ in meshes for shaft in shafts for side in (-1, 1)]
     every = [*(order for _, order, _, _ in meshes), *others, *sidebands]
@@ -292,7 +292,7 @@ def _strongest(signals: AnalysisSignals, excess: LineExcess, highest: float) -> 
     lines: dict[float, float] = {}
     strongest = float(spectrum.values.max())
     for shaft in signals.known_shaft_orders.values():
-        n_orders = min(MOST_MULTIPLES, int(min(highest, spectrum.positions[-1]) / (shaft / 2)))
+        n_orders = min(MAX_MULTIPLES, int(min(highest, spectrum.positions[-1]) / (shaft / 2)))
         for order in np.arange(1, n_orders + 1) * shaft / 2:
             found, amplitude = spectrum.largest_near(order, max(WITHIN_ORDERS, 1.5 * spectrum.resolution))
             around = spectrum.largest_near(order, max(AROUND_ORDERS, 6 * spectrum.resolution))[1]

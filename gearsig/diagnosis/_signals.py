@@ -72,7 +72,7 @@ class AnalysisSignals:
     order_maps : mapping
         Channel → map along speed, where the speed varies.
     has_reference : bool
-        Whether a recording of the sound machine was given: then none is asked for.
+        Whether a recording of the healthy machine was given: then none is asked for.
     """
 
     recording: Recording
@@ -246,14 +246,14 @@ SAME_FAMILY = 3e-3
 SHOWS = 0.01
 """p-value of a family at a given order in this one band, from which on it bears the other bands out."""
 
-FEWEST_LINES = 3
+MIN_LINES = 3
 
 ROUNDING = 1e-9
 """Of the signal: what is left without its tones and lies below is no vibration."""
 
 
 @dataclass(frozen=True)
-class OwnBand:
+class KurtogramBand:
     """A channel's kurtogram, the band it chooses, and the envelope there.
 
     Parameters
@@ -278,7 +278,7 @@ class OwnBand:
         )
 
 
-def own_bands(signals: AnalysisSignals) -> tuple[OwnBand, ...]:
+def kurtogram_bands(signals: AnalysisSignals) -> tuple[KurtogramBand, ...]:
     """Return each channel's own band; none where no bearing's speed is known or no band is wide enough."""
     races = [
         ratio * order
@@ -290,31 +290,33 @@ def own_bands(signals: AnalysisSignals) -> tuple[OwnBand, ...]:
     if signals.angle is None or not races:
         return ()
     narrowest_hz = N_HARMONICS * max(races) * signals.frequency_per_order_hz
-    found = (_own_band(signals, name, narrowest_hz) for name in signals.recording.channel_names)
-    return tuple(own for own in found if own is not None)
+    bands = (_kurtogram_band(signals, name, narrowest_hz) for name in signals.recording.channel_names)
+    return tuple(band for band in bands if band is not None)
 
 
-def witness(own: OwnBand, order: float) -> Comb | None:
+def witness(band: KurtogramBand, order: float) -> Comb | None:
     """Return the family at an order found elsewhere, if the own band shows it too."""
-    comb = best_comb(own.envelope.excess, order * (1 - SAME_FAMILY), order * (1 + SAME_FAMILY))
-    return comb if comb is not None and comb.p_value <= SHOWS and len(comb.positions) >= FEWEST_LINES else None
+    comb = best_comb(band.envelope.excess, order * (1 - SAME_FAMILY), order * (1 + SAME_FAMILY))
+    return comb if comb is not None and comb.p_value <= SHOWS and len(comb.positions) >= MIN_LINES else None
 
 
-def witness_text(bands: Sequence[OwnBand], channel: str, band_hz: tuple[float, float], order: float) -> tuple[str, ...]:
+def witness_text(
+    bands: Sequence[KurtogramBand], channel: str, band_hz: tuple[float, float], order: float
+) -> tuple[str, ...]:
     """Say what a channel's own band shows of a family found at `order` in the band `band_hz`."""
-    own = next((b for b in bands if b.envelope.channel == channel), None)
-    if own is None:
+    band = next((b for b in bands if b.envelope.channel == channel), None)
+    if band is None:
         return ()
-    comb = witness(own, order)
+    comb = witness(band, order)
     if comb is None:
-        return (f"{own.text}, does not show it.",)
+        return (f"{band.text}, does not show it.",)
     largest = f"{max(comb.ratios_db):.0f} dB over its floor"
-    if own.envelope.band_hz == band_hz:
-        return (f"{own.text}, shows it clearest of all bands, {largest}.",)
-    return (f"{own.text}, shows the same family, {largest}.",)
+    if band.envelope.band_hz == band_hz:
+        return (f"{band.text}, shows it clearest of all bands, {largest}.",)
+    return (f"{band.text}, shows the same family, {largest}.",)
 
 
-def _own_band(signals: AnalysisSignals, channel: str, narrowest_hz: float) -> OwnBand | None:
+def _kurtogram_band(signals: AnalysisSignals, channel: str, narrowest_hz: float) -> KurtogramBand | None:
     from gearsig.spectra import kurtogram, prepared_signal
 
     fs = signals.recording.sampling_rate_hz
@@ -329,7 +331,7 @@ def _own_band(signals: AnalysisSignals, channel: str, narrowest_hz: float) -> Ow
         return None
     without_tones = replace(signals.recording.select([channel]), samples=x[None, :])
     envelope = next(envelopes_in(signals, without_tones, band.band_hz), None)
-    return None if envelope is None else OwnBand(grid, band, envelope)
+    return None if envelope is None else KurtogramBand(grid, band, envelope)
 
 
 # --------------------
@@ -343,10 +345,10 @@ class ExaminedSignals:
 
     Parameters
     ----------
-    signals : Signals
+    signals : AnalysisSignals
     envelopes : list of BandEnvelope
         Of fixed bands.
-    own_bands : tuple of OwnBand
+    kurtogram_bands : tuple of KurtogramBand
         Bands that the kurtograms choose, at most one per channel.
     order_levels : mapping
         Channel → levels over speed, where the speed runs through a range.
@@ -354,7 +356,7 @@ class ExaminedSignals:
 
     signals: AnalysisSignals
     envelopes: list[BandEnvelope]
-    own_bands: tuple[OwnBand, ...]
+    kurtogram_bands: tuple[KurtogramBand, ...]
     order_levels: Mapping[str, tuple[OrderLevel, ...]]
 
 
@@ -364,7 +366,7 @@ def channel_analysis(material: ExaminedSignals, name: str, findings: Sequence[Fi
 
     signals = material.signals
     envelope = _shown_envelope(material, name, findings)
-    own = _telling_own_band(material, name, findings)
+    shown_band = _shown_kurtogram_band(material, name, findings)
     return ChannelAnalysis(
         channel=name,
         spectrum=signals.spectra[name],
@@ -374,8 +376,8 @@ def channel_analysis(material: ExaminedSignals, name: str, findings: Sequence[Fi
         order_spectrum=signals.order_excess[name].spectrum if name in signals.order_excess else None,
         order_map=signals.order_maps.get(name),
         averages=_averages(signals, name),
-        kurtogram=own.kurtogram if own else None,
-        kurtogram_band=own.band if own else None,
+        kurtogram=shown_band.kurtogram if shown_band else None,
+        kurtogram_band=shown_band.band if shown_band else None,
         order_levels=material.order_levels.get(name, ()),
     )
 
@@ -393,22 +395,22 @@ def _averages(signals: AnalysisSignals, name: str) -> dict[tuple[str, str], Sync
 
 def _shown_envelope(material: ExaminedSignals, name: str, findings: Sequence[Finding]) -> BandEnvelope | None:
     """Return the envelope in which the surest family of impacts was found, else the one whose lines stand out most."""
-    every = [*material.envelopes, *(own.envelope for own in material.own_bands)]
-    own = [e for e in every if e.channel == name]
-    if not own:
+    envelopes = [*material.envelopes, *(candidates.envelope for candidates in material.kurtogram_bands)]
+    candidates = [e for e in envelopes if e.channel == name]
+    if not candidates:
         return None
     for finding in findings:
-        for envelope in own:
+        for envelope in candidates:
             if finding.where.band_hz == envelope.band_hz and name in finding.where.channels:
                 return envelope
-    return max(own, key=lambda e: float(e.excess.scores().sum()))
+    return max(candidates, key=lambda e: float(e.excess.scores().sum()))
 
 
-def _telling_own_band(material: ExaminedSignals, name: str, findings: Sequence[Finding]) -> OwnBand | None:
+def _shown_kurtogram_band(material: ExaminedSignals, name: str, findings: Sequence[Finding]) -> KurtogramBand | None:
     """Return the channel's own band where it shows a damage that is claimed of a bearing, on this channel."""
-    own = next((band for band in material.own_bands if band.envelope.channel == name), None)
+    band = next((band for band in material.kurtogram_bands if band.envelope.channel == name), None)
     places = [f.where for f in findings if f.where.bearing and f.kind in (Kind.FAULT, Kind.SUSPICION)]
-    if own is None:
+    if band is None:
         return None
     orders = [where.order for where in places if name in where.channels and where.order is not None]
-    return own if any(witness(own, order) for order in orders) else None
+    return band if any(witness(band, order) for order in orders) else None

@@ -46,7 +46,7 @@ CERTAIN = 4.0
 
 
 def not_of_rest(problems: list[Finding], recording: Recording) -> list[Finding]:
-    """Leave out what a machine at rest does to sound sensors: teeth in their play carry nothing, again and again."""
+    """Leave out what a machine at rest does to good sensors: teeth in their play carry nothing, again and again."""
     forces = {c.name for c in recording.channels if c.quantity in ("force", "torque")}
     return [p for p in problems if p.code != "channel-stuck" or not set(p.where.channels) <= forces]
 
@@ -113,21 +113,21 @@ def not_examined(error: RefusalError | InputError) -> Finding:
 
 def backlash_findings(examined: StartStop, rig: Rig, then: Analysis | None) -> list[Finding]:
     """Give the backlash beside the reference's, else beside the rig file's."""
-    found = examined.backlash
-    if found is None or rig.contact is None:
+    backlash = examined.backlash
+    if backlash is None or rig.contact is None:
         return []
-    drawn, deviation, whose, least = 2.0 * rig.contact.half_backlash_um, found.uncertainty_um, "rig", GROWN
+    drawn, deviation, whose, least = 2.0 * rig.contact.half_backlash_um, backlash.uncertainty_um, "rig", GROWN
     before = None if then is None or then.motion is None else then.motion.backlash
-    if before is not None and before.method == found.method:
+    if before is not None and before.method == backlash.method:
         drawn, deviation = before.backlash_um, float(np.hypot(before.uncertainty_um, deviation))
         whose, least = "reference", GROWN_SINCE
-    is_pure = found.method.startswith("both flanks")
-    grown = is_pure and found.backlash_um > max(least * drawn, drawn + CERTAIN * deviation)
+    is_pure = backlash.method.startswith("both flanks")
+    grown = is_pure and backlash.backlash_um > max(least * drawn, drawn + CERTAIN * deviation)
     what = "The backlash" if is_pure else "The lost motion, deflection included,"
-    title = f"{what} is {found.backlash_um:.4g} ± {found.uncertainty_um:.2g} µm along the line of action"
+    title = f"{what} is {backlash.backlash_um:.4g} ± {backlash.uncertainty_um:.2g} µm along the line of action"
     title += f", where the {whose} {'says' if whose == 'rig' else 'has'} {drawn:.4g} µm." if drawn else "."
     floor = "backlash of the rig file" if whose == "rig" else "backlash of the reference"
-    strength = Strength(found.backlash_um, "µm", drawn, floor, against="") if drawn else None
+    strength = Strength(backlash.backlash_um, "µm", drawn, floor, against="") if drawn else None
     pair = rig.contact.pair or rig.pairs[0].name
     return [
         Finding(
@@ -139,9 +139,9 @@ def backlash_findings(examined: StartStop, rig: Rig, then: Analysis | None) -> l
             confidence=0.9 if grown else 1.0,
             confidence_basis=BASIS[whose] if grown else "",
             evidence=(
-                found.method,
-                f"{found.n_drive} samples on the drive flank and {found.n_back} on the back flank",
-                f"scatter {found.scatter_um:.3g} µm",
+                backlash.method,
+                f"{backlash.n_drive} samples on the drive flank and {backlash.n_back} on the back flank",
+                f"scatter {backlash.scatter_um:.3g} µm",
             ),
             surer="A recording of the same machine when it was new." if grown and whose == "rig" else "",
         )
@@ -267,25 +267,25 @@ def start_stop_analysis(
     RefusalError
         If a machine whose contact the rig describes only stands.
     """
-    found = course_of(recording, rig)
-    if found is not None:
-        _check_standing(found[1], recording, rig)
-    if found is None or not is_start_stop(found[0]):
+    motion_and_angle = course_of(recording, rig)
+    if motion_and_angle is not None:
+        _check_standing(motion_and_angle[1], recording, rig)
+    if motion_and_angle is None or not is_start_stop(motion_and_angle[0]):
         return None
-    course, angle_rad = found
+    course, angle_rad = motion_and_angle
     source = recording.speed_source or rig.speed
     if isinstance(source, EncoderChannel):  # what seems to turn back may be an encoder that wraps
         check_wrap(angle_rad, recording.sampling_rate_hz, source.channel, recording.provenance.source)
     findings = [*not_of_rest(problems, recording), motion_finding(course)]
-    then = None if reference is None else _of_reference(reference, rig, settings)
-    if reference is not None and then is None:
+    reference_analysis = None if reference is None else _of_reference(reference, rig, settings)
+    if reference is not None and reference_analysis is None:
         findings.append(reference_runs_on())
-    examined, told = _of_teeth(recording, rig, then)
-    findings += told
+    examined, teeth_findings = _of_teeth(recording, rig, reference_analysis)
+    findings += teeth_findings
     findings.append(left_out(course, examined))
     bursts = _bursts(recording, problems)
     findings += [burst_finding(name, blows, angle_rad, recording, rig) for name, blows in bursts.items() if blows]
-    order = ranked(findings if then is None else beside_reference(findings, then))
+    order = ranked(findings if reference_analysis is None else beside_reference(findings, reference_analysis))
     return Analysis(
         recording,
         recording.rig,
@@ -293,9 +293,9 @@ def start_stop_analysis(
         (),
         _indicators(course, examined, bursts),
         order,
-        verdict_of(order, has_reference=then is not None),
+        verdict_of(order, has_reference=reference_analysis is not None),
         dict(settings),
-        reference=then,
+        reference=reference_analysis,
         motion=examined,
     )
 
@@ -333,7 +333,7 @@ def _of_reference(reference: Recording, rig: Rig, settings: Settings) -> Analysi
 
 
 def course_of(recording: Recording, rig: Rig) -> tuple[MotionSegments, FloatArray] | None:
-    """Return the stretches of the motion and the angle in rad, from an encoder or a speed channel; None without one."""
+    """Return the segments of the motion and the angle in rad, from an encoder or a speed channel; None without one."""
     source = recording.speed_source or rig.speed
     rate = recording.sampling_rate_hz
     if not isinstance(source, (EncoderChannel, SpeedChannel)) or source.channel not in recording.channel_names:
@@ -354,13 +354,13 @@ def _bursts(recording: Recording, problems: list[Finding]) -> dict[str, tuple[Bu
     """Return the blows of every acceleration that is sampled fast enough and not dead."""
     dead = {name for finding in problems if finding.code == "channel-dead" for name in finding.where.channels}
     names = [c.name for c in recording.channels if c.quantity == "acceleration" and c.name not in dead]
-    found = {}
+    bursts = {}
     for name in names:
         try:
-            found[name] = find_bursts(np.asarray(recording.values(name), dtype=np.float64), recording.sampling_rate_hz)
+            bursts[name] = find_bursts(np.asarray(recording.values(name), dtype=np.float64), recording.sampling_rate_hz)
         except InputError:  # too slow or too short for blows
             continue
-    return found
+    return bursts
 
 
 def _indicators(

@@ -309,14 +309,14 @@ def _peaks(differences: FloatArray, width: int) -> tuple[float, ...]:
     energy = sliding_mean(square, width)
     floor = float(np.median(energy))
     limit = floor + PEAK_SHARE * (float(energy.max()) - floor)
-    found: list[int] = []
+    starts: list[int] = []
     for start in np.argsort(-energy):
-        if energy[start] < limit or len(found) > 24:
+        if energy[start] < limit or len(starts) > 24:
             break
         # A knock rings on: what follows within two windows is the same event.
-        if all(min((start - f) % n, (f - start) % n) > 2 * width for f in found):
-            found.append(int(start))
-    return tuple(f / n for f in found)
+        if all(min((start - other_start) % n, (other_start - start) % n) > 2 * width for other_start in starts):
+            starts.append(int(start))
+    return tuple(other_start / n for other_start in starts)
 
 
 def _energy_by_revolution(shaft: ShaftSignals, names: list[str], inside: FloatArray, lowest_order: int) -> FloatArray:
@@ -342,11 +342,11 @@ def _periods(signals: AnalysisSignals, shaft: ShaftSignals) -> set[int]:
 
     Two for a machine that works every second revolution, and for pulses that are counted wrongly.
     """
-    own = signals.rig.ratio(shaft.shaft) or 1.0
+    ratio = signals.rig.ratio(shaft.shaft) or 1.0
     periods = {2}
     for order in signals.known_shaft_orders.values():
-        fraction = Fraction(own / order).limit_denominator(LARGEST_PERIOD * 4)
-        if abs(float(fraction) - own / order) < 1e-9 and fraction.numerator <= LARGEST_PERIOD:
+        fraction = Fraction(ratio / order).limit_denominator(LARGEST_PERIOD * 4)
+        if abs(float(fraction) - ratio / order) < 1e-9 and fraction.numerator <= LARGEST_PERIOD:
             periods.add(fraction.numerator)
     return periods - {1}
 
@@ -404,9 +404,9 @@ def single_shock(shaft: ShaftSignals, event: LocalEvent) -> Finding:
 
 def event_in_some_revolutions(signals: AnalysisSignals, shaft: ShaftSignals, event: LocalEvent) -> Finding:
     """Report an event that only every second, third, … revolution has."""
-    own = signals.rig.ratio(shaft.shaft) or 1.0
+    ratio = signals.rig.ratio(shaft.shaft) or 1.0
     share = 100 * event.share_of_revolutions
-    slower = [n for n, order in signals.known_shaft_orders.items() if order < own * (1 - 1e-9)]
+    slower = [n for n, order in signals.known_shaft_orders.items() if order < ratio * (1 - 1e-9)]
     return Finding(
         "event-in-some-revolutions",
         Kind.CANNOT_TELL,
@@ -467,7 +467,7 @@ CAUSE = 0.9
 NEAR_MARK_DEG = 6.0
 
 ASK_FOR_REFERENCE = (
-    "A recording of the same gears when they were sound, given with --reference: what teeth are made with cancels."
+    "A recording of the same gears when they were healthy, given with --reference: what teeth are made with cancels."
 )
 MORE_SURER = "More revolutions, a sensor nearer to the gears, a higher load; certain data of the machine."
 
@@ -484,16 +484,16 @@ def detect_tooth_damage(signals: AnalysisSignals) -> list[Finding]:
     able = [s for s in signals.shafts if s.separated and _why_blind(signals, s) == ""]
     tested = [(s, largest_event(s, signals)) for s in able]
     examined = [_Examined(s, event, min(1.0, event.place.p_value * len(tested))) for s, event in tested]
-    found = [(e, _finding(signals, e)) for e in _one_per_pair_of_twins(signals, examined)]
-    findings = [f for _, f in found if f is not None]
+    judged = [(e, _finding(signals, e)) for e in _one_per_pair_of_twins(signals, examined)]
+    findings = [f for _, f in judged if f is not None]
     codes = {f.code for f in findings}
     shocks = [f for f in findings if f.code == "single-shock"]
     findings = [f for f in findings if f not in shocks[1:]]  # every shaft's average shows the same one
     if "tooth-local-damage" in codes:  # events of other shafts are its images
         findings = [f for f in findings if f.code in ("tooth-local-damage", "single-shock")]
     elif "event-in-some-revolutions" not in codes:  # with it, even the speed is in doubt
-        findings += _nothing_found(signals, [e for e, f in found if f is None])
-        covered = [e for e, f in found if f is not None]
+        findings += _nothing_found(signals, [e for e, f in judged if f is None])
+        covered = [e for e, f in judged if f is not None]
         reason, given = "other local events would cover damage", signals.has_reference
         findings += [_undecided(covered, reason, has_reference=given)] if covered else []
     return findings + _not_examined(signals, {s.shaft for s in able})

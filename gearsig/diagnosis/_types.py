@@ -227,7 +227,7 @@ class Analysis:
     crack : CrackEstimate, NoCrackSeen, CannotTell or None
         Depth of a root crack; None where nobody asked and none is clear.
     reference : Analysis or None
-        Of the recording of the sound machine that was given to compare with.
+        Of the recording of the healthy machine that was given to compare with.
     motion : StartStop or None
         Of a machine that starts and stops, where its teeth could be examined.
     """

@@ -93,7 +93,7 @@ def phase_followed_angle(recording: Recording, rig: Rig, estimated: ShaftAngle) 
         time_s=followed.time_s,
         revolutions=followed.revolutions,
         speed_rev_per_s=followed.speed_rev_per_s,
-        notes=(*estimated.notes, "the course of the angle follows the phase of the mesh harmonics"),
+        notes=(*estimated.notes, "the angle follows the phase of the mesh harmonics"),
     )
 
 

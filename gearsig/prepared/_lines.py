@@ -347,7 +347,7 @@ INNER_LINES = 3
 """Nearer lines belong to the line itself: two by the Hann window, one because it may lie between two."""
 
 OUTER_LINES = 12
-FEWEST_LINES = 6
+MIN_LINES = 6
 """Of fewer lines the median says too little."""
 
 RUN_UP_FOOT_ORDERS = 0.1
@@ -372,7 +372,7 @@ def level_beside(spectrum: Spectrum, position: float, outer_lines: float = OUTER
     below = spectrum.values[max(i - reach, 0) : max(i - INNER_LINES + 1, 0)]
     above = spectrum.values[min(i + INNER_LINES, n) : min(i + reach + 1, n)]
     beside = np.concatenate([below, above])
-    if len(beside) < FEWEST_LINES:
+    if len(beside) < MIN_LINES:
         return None
     return float(np.sqrt(np.sort(beside**2)[len(beside) // 2] / log(2)))
 

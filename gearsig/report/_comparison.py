@@ -12,7 +12,7 @@ from textwrap import fill
 
 from gearsig import __version__
 from gearsig.comparison import (
-    LEAST_REPEATED,
+    MIN_REPEATED,
     STEADY,
     BandLevel,
     ChannelComparison,
@@ -242,7 +242,7 @@ def _channel_table(channel: ChannelComparison) -> list[str]:
     rows += [_level_row(line.label, line.level, line) for line in mesh_lines(channel)[:MOST_LINES]]
     for shaft in channel.shafts:
         best = shaft.best_correlation
-        possible = f"at most {best:.3f}" if best >= LEAST_REPEATED else "its halves do not repeat"
+        possible = f"at most {best:.3f}" if best >= MIN_REPEATED else "its halves do not repeat"
         frac = shaft.agreement
         rows.append(
             f"average of {shaft.shaft or 'the shaft'}: correlation {shaft.correlation.value:.3f} "
@@ -363,7 +363,7 @@ def channel_rows(channel: ChannelComparison) -> Rows:
 
 def _possible(shaft: ShaftComparison) -> str:
     """Return the correlation that two such averages of one motion reach, or that it means nothing."""
-    if shaft.best_correlation < LEAST_REPEATED:
+    if shaft.best_correlation < MIN_REPEATED:
         return "says nothing, as one record's halves do not repeat"
     return f"two such averages reach {shaft.best_correlation:.3f}"
 

@@ -1,4 +1,4 @@
-"""How deep a crack in a tooth root is, from one recording and, far better, a reference of the sound gears."""
+"""How deep a crack in a tooth root is, from one recording and, far better, a reference of the healthy gears."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gearsig.recording import Recording
 from gearsig.rig import GearPair, Rig
 from gearsig.severity._features import (
     FEATURES,
-    MOST_RELIEF_SHARE,
+    MAX_RELIEF_SHARE,
     STIFFNESS_N_PER_MM_UM,
     Conditions,
     ShaftLines,
@@ -50,7 +50,7 @@ from gearsig.severity._model import (
 # --------------------
 
 
-LEAST_HARMONICS = 4
+MIN_HARMONICS = 4
 """Mesh harmonics below the highest order: with fewer, one resonance decides."""
 
 SMALLEST_DIFFERENCE = 1e-9
@@ -68,9 +68,9 @@ class GearEvidence:
     features : array
         See `gearsig.severity.FEATURES`.
     searched : ShaftLines
-        What the event was found in: the average, or its difference from the sound gear's.
-    sound : ShaftLines
-        The sound gear's average, or the average itself where there is no reference.
+        What the event was found in: the average, or its difference from the healthy gear's.
+    healthy : ShaftLines
+        The healthy gear's average, or the average itself where there is no reference.
     shape : array
         See `gearsig.severity.SHAPE`.
     agreement : float or None
@@ -81,7 +81,7 @@ class GearEvidence:
     event: ToothEvent
     features: FloatArray
     searched: ShaftLines
-    sound: ShaftLines
+    healthy: ShaftLines
     shape: FloatArray
     agreement: float | None = None
 
@@ -96,41 +96,41 @@ def pair_lines(
 
 def gear_evidence(
     now: Sequence[ShaftLines],
-    sound: Sequence[ShaftLines] | None,
+    healthy: Sequence[ShaftLines] | None,
     module_mm: float,
     load_mpa: float,
     tip_relief_um: float | None = None,
 ) -> tuple[GearEvidence, ...]:
-    """Return the most conspicuous tooth of either gear, in what differs from the sound gear where there is one.
+    """Return the most conspicuous tooth of either gear, in what differs from the healthy gear where there is one.
 
     Mesh energies that the event is compared with are the geometric mean of both recordings'.
     """
     return tuple(
-        _one_gear(now, sound, i, Conditions(module_mm, load_mpa, shaft.order_hz * shaft.teeth, tip_relief_um))
+        _one_gear(now, healthy, i, Conditions(module_mm, load_mpa, shaft.order_hz * shaft.teeth, tip_relief_um))
         for i, shaft in enumerate(now)
     )
 
 
 def _one_gear(
-    now: Sequence[ShaftLines], sound: Sequence[ShaftLines] | None, i: int, conditions: Conditions
+    now: Sequence[ShaftLines], healthy: Sequence[ShaftLines] | None, i: int, conditions: Conditions
 ) -> GearEvidence:
     shaft = now[i]
     _check_harmonics(shaft)
-    if sound is None:
+    if healthy is None:
         event = find_event(shaft)
         mesh = mesh_energies(shaft, n_bands(shaft))
         shape = event_shape(shaft, event)
         return GearEvidence(shaft, event, feature_vector(shaft, shaft, mesh, event, conditions), shaft, shaft, shape)
-    marked = any(a.has_mark and b.has_mark for a, b in zip(now, sound, strict=True))
-    _check_harmonics(sound[i], "the reference's")
-    difference, agreement = difference_lines(shaft, sound[i], whole_teeth=marked)
+    marked = any(a.has_mark and b.has_mark for a, b in zip(now, healthy, strict=True))
+    _check_harmonics(healthy[i], "the reference's")
+    difference, agreement = difference_lines(shaft, healthy[i], whole_teeth=marked)
     _check_differs(difference, shaft)
     n = n_bands(difference)
-    mesh = np.sqrt(mesh_energies(shaft, n) * mesh_energies(sound[i], n))
+    mesh = np.sqrt(mesh_energies(shaft, n) * mesh_energies(healthy[i], n))
     event = find_event(difference)
-    features = feature_vector(difference, sound[i], mesh, event, conditions)
+    features = feature_vector(difference, healthy[i], mesh, event, conditions)
     shape = event_shape(difference, event)
-    return GearEvidence(shaft, event, features, difference, sound[i], shape, agreement)
+    return GearEvidence(shaft, event, features, difference, healthy[i], shape, agreement)
 
 
 def _check_differs(difference: ShaftLines, shaft: ShaftLines) -> None:
@@ -143,13 +143,13 @@ def _check_differs(difference: ShaftLines, shaft: ShaftLines) -> None:
 
 
 def _check_harmonics(shaft: ShaftLines, whose: str = "the recording's") -> None:
-    if n_bands(shaft) < LEAST_HARMONICS:
+    if n_bands(shaft) < MIN_HARMONICS:
         raise RefusalError(
             f"{n_bands(shaft)} mesh harmonics of the {shaft.teeth} teeth lie in {whose} band, "
-            f"{LEAST_HARMONICS} are needed",
+            f"{MIN_HARMONICS} are needed",
             remedy="a higher sampling rate or a lower speed",
         )
-    if not np.all(mesh_energies(shaft, LEAST_HARMONICS) > 0):
+    if not np.all(mesh_energies(shaft, MIN_HARMONICS) > 0):
         raise RefusalError("a channel holds no mesh vibration at all", remedy="leave the dead channel out")
 
 
@@ -238,18 +238,20 @@ def pair_facts(rig: Rig, torque_nm: float | None) -> PairFacts:
     return PairFacts(pair, pair.driver_teeth, pair.driven_teeth, pair.module_mm, pair.face_width_mm, load_mpa)
 
 
-def acceleration_channels(recording: Recording, wanted: tuple[str, ...]) -> tuple[str, ...]:
+def acceleration_channels(recording: Recording, chosen: tuple[str, ...]) -> tuple[str, ...]:
     """Return the wanted channels, or all accelerations; other quantities weigh frequencies differently."""
-    found = tuple(channel.name for channel in recording.channels if channel.quantity == "acceleration")
-    unknown = [name for name in wanted if name not in found]
+    accelerations = tuple(channel.name for channel in recording.channels if channel.quantity == "acceleration")
+    unknown = [name for name in chosen if name not in accelerations]
     if unknown:
-        raise InputError(f"{unknown[0]!r} is no acceleration channel", where="channels", allowed=", ".join(found))
-    if not found:
+        raise InputError(
+            f"{unknown[0]!r} is no acceleration channel", where="channels", allowed=", ".join(accelerations)
+        )
+    if not accelerations:
         raise RefusalError(
             "there is no acceleration channel, and the calibration has no others",
             remedy="name the channel's quantity with a [[sensor]] in the rig file",
         )
-    return wanted or found
+    return chosen or accelerations
 
 
 def check_alive(recording: Recording, names: tuple[str, ...], whose: str = "") -> None:
@@ -271,44 +273,44 @@ LARGEST_TORQUE_CHANGE = 0.10
 """Relative, as in the calibration."""
 
 LARGEST_LEVEL_CHANGE_DB = 2.5
-"""Of the middling mesh harmonic. On 100 simulated machines it is 1.4 dB at most, with the deepest cracks; another
+"""Of the median mesh harmonic. On 100 simulated machines it is 1.4 dB at most, with the deepest cracks; another
 torque within its limit adds 0.8 dB."""
 
 _REMEDY = "take a reference of the same gears, with the same sensors and gains, at the same speed and load"
 
 
-def check_same_rig(now: Rig, sound: Rig) -> None:
+def check_same_rig(now: Rig, healthy: Rig) -> None:
     """Refuse a reference whose own rig has other teeth or another torque.
 
     Raises
     ------
     RefusalError
     """
-    teeth, others = ([(p.driver_teeth, p.driven_teeth) for p in rig.pairs] for rig in (now, sound))
-    if others and teeth != others:
+    teeth, reference_teeth = ([(p.driver_teeth, p.driven_teeth) for p in rig.pairs] for rig in (now, healthy))
+    if reference_teeth and teeth != reference_teeth:
         raise RefusalError(
-            f"the reference is of another machine: its teeth are {_teeth_text(others)}, "
+            f"the reference is of another machine: its teeth are {_teeth_text(reference_teeth)}, "
             f"the recording's {_teeth_text(teeth)}",
             remedy=_REMEDY,
         )
-    torque, other = now.operating_point.torque_nm, sound.operating_point.torque_nm
-    same_shaft = now.operating_point.shaft == sound.operating_point.shaft
-    if torque and other and same_shaft and abs(abs(torque / other) - 1.0) > LARGEST_TORQUE_CHANGE:
+    torque, reference_torque = now.operating_point.torque_nm, healthy.operating_point.torque_nm
+    same_shaft = now.operating_point.shaft == healthy.operating_point.shaft
+    if torque and reference_torque and same_shaft and abs(abs(torque / reference_torque) - 1.0) > LARGEST_TORQUE_CHANGE:
         raise RefusalError(
-            f"the reference was taken at {other:g} N m, the recording at {torque:g} N m",
+            f"the reference was taken at {reference_torque:g} N m, the recording at {torque:g} N m",
             remedy=f"take it within {100 * LARGEST_TORQUE_CHANGE:.0f} % of the same torque",
         )
 
 
-def check_same_level(now: Sequence[ShaftLines], sound: Sequence[ShaftLines]) -> None:
+def check_same_level(now: Sequence[ShaftLines], healthy: Sequence[ShaftLines]) -> None:
     """Refuse a reference at another speed, or whose mesh harmonics are much stronger or weaker.
 
     Raises
     ------
     RefusalError
     """
-    check_same_speed(now[0], sound[0])
-    for name, change_db in zip(now[0].channels, mesh_change_db(now[0], sound[0]), strict=True):
+    check_same_speed(now[0], healthy[0])
+    for name, change_db in zip(now[0].channels, mesh_change_db(now[0], healthy[0]), strict=True):
         if abs(change_db) > LARGEST_LEVEL_CHANGE_DB:
             side = "above" if change_db > 0 else "below"
             raise RefusalError(
@@ -318,10 +320,10 @@ def check_same_level(now: Sequence[ShaftLines], sound: Sequence[ShaftLines]) -> 
             )
 
 
-def mesh_change_db(now: ShaftLines, sound: ShaftLines) -> FloatArray:
-    """Return for each channel by how much the middling mesh harmonic has risen since the reference, in dB."""
-    n = min(n_bands(now), n_bands(sound))
-    energies = (np.maximum(mesh_energies(shaft, n), np.finfo(float).tiny) for shaft in (now, sound))
+def mesh_change_db(now: ShaftLines, healthy: ShaftLines) -> FloatArray:
+    """Return for each channel by how much the median mesh harmonic has risen since the reference, in dB."""
+    n = min(n_bands(now), n_bands(healthy))
+    energies = (np.maximum(mesh_energies(shaft, n), np.finfo(float).tiny) for shaft in (now, healthy))
     ratios: FloatArray = np.median(np.subtract(*(10.0 * np.log10(e) for e in energies)), axis=0)
     return ratios
 
@@ -442,9 +444,10 @@ def estimate_crack(
 ) -> CrackEstimate | NoCrackSeen:
     """Estimate the depth of a crack in a tooth root of a spur gear pair.
 
-    The synchronous average of either shaft (with a reference: its difference from that of the sound gears) is searched
-    for the tooth that stands out most. Ratios of its energy to that of the mesh harmonics in the same bands go into a
-    model of ln(depth) that never falls with them, fitted to simulated machines; its interval is a conformal one.
+    The synchronous average of either shaft (with a reference: its difference from that of the healthy gears) is
+    searched for the tooth that stands out most. Ratios of its energy to that of the mesh harmonics in the same bands go
+    into a model of ln(depth) that never falls with them, fitted to simulated machines; its interval is a conformal
+    one.
 
     Parameters
     ----------
@@ -484,7 +487,7 @@ def estimate_crack(
     On 200 simulated gearboxes with other teeth and modules than the calibration's
     (`tests/benchmarks/severity_cases.py`, seed 9157; depths 0.5 to 4 mm): with a reference, the median error is 0.36 mm
     (90 %: 0.30 to 0.43 mm; 0.32 mm where the tip relief is known to 20 %), and the 90 % interval held the depth in 83
-    of 90 cases. Seen were 5 of 20 cracks below 1 mm and 85 of 121 above, most others refused; 1 of 59 sound gearboxes
+    of 90 cases. Seen were 5 of 20 cracks below 1 mm and 85 of 121 above, most others refused; 1 of 59 healthy gearboxes
     got a crack. Without a reference 33 of 141 were seen, with a median error of 0.52 mm. Where teeth differ much from
     each other, a load 8 % off the reference's can look like a crack of 2 mm.
 
@@ -508,24 +511,24 @@ def estimate_crack(
     check_alive(prepared.recording, names)
     now = pair_lines(prepared, None, facts.pair, names)
     used.check_reach(reach_of(facts, now[0].order_hz * facts.driver_teeth))
-    sound = None
+    healthy = None
     if reference is not None:
         before = prepare(reference, prepared.rig)
         acceleration_channels(before.recording, names)
         check_alive(before.recording, names, "of the reference ")
         check_same_rig(prepared.rig, before.rig)
-        sound = pair_lines(before, None, facts.pair, names)
-        check_same_level(now, sound)
-    found = gear_evidence(now, sound, facts.module_mm, facts.load_mpa, tip_relief_um)
+        healthy = pair_lines(before, None, facts.pair, names)
+        check_same_level(now, healthy)
+    evidence = gear_evidence(now, healthy, facts.module_mm, facts.load_mpa, tip_relief_um)
     way = ALONE if reference is None else WITH_REFERENCE
-    return judge(found, used.models[way + ("" if tip_relief_um is None else RELIEF_KNOWN)], used, facts)
+    return judge(evidence, used.models[way + ("" if tip_relief_um is None else RELIEF_KNOWN)], used, facts)
 
 
 def _check_relief(tip_relief_um: float | None, reach: Mapping[str, tuple[float, float]]) -> None:
     """Refuse a tip relief beyond any in the calibration, as a wrong unit makes."""
     if tip_relief_um is None:
         return
-    most_um = round(MOST_RELIEF_SHARE * reach["load_mpa"][1] * reach["module_mm"][1] / STIFFNESS_N_PER_MM_UM)
+    most_um = round(MAX_RELIEF_SHARE * reach["load_mpa"][1] * reach["module_mm"][1] / STIFFNESS_N_PER_MM_UM)
     within(tip_relief_um, "tip_relief_um", 0.0, most_um, "µm", remedy="give what is ground off at the tips, in µm")
 
 
@@ -541,25 +544,25 @@ def reach_of(facts: PairFacts, mesh_hz: float) -> dict[str, float]:
 
 
 def judge(
-    found: Sequence[GearEvidence], model: DepthModel, calibration: Calibration, facts: PairFacts
+    gears: Sequence[GearEvidence], model: DepthModel, calibration: Calibration, facts: PairFacts
 ) -> CrackEstimate | NoCrackSeen:
     """Decide whether the clearest event is a crack, and how deep it is or may be."""
-    scores = [model.score(evidence.features) for evidence in found]
-    best = max(range(len(found)), key=lambda i: scores[i])
+    scores = [model.score(evidence.features) for evidence in gears]
+    best = max(range(len(gears)), key=lambda i: scores[i])
     clear = scores[best] >= model.threshold
-    if clear and _strange_reference(found):  # then its pattern is in the difference: ask for as much as without it
+    if clear and _strange_reference(gears):  # then its pattern is in the difference: ask for as much as without it
         alone = calibration.models[ALONE]
-        clear = alone.score(found[best].features) >= alone.threshold
-    return _seen(found, best, model, calibration, facts) if clear else _none_seen(found, best, model, facts)
+        clear = alone.score(gears[best].features) >= alone.threshold
+    return _seen(gears, best, model, calibration, facts) if clear else _none_seen(gears, best, model, facts)
 
 
-def _strange_reference(found: Sequence[GearEvidence]) -> bool:
-    return any(e.agreement is not None and e.agreement < SMALLEST_AGREEMENT for e in found)
+def _strange_reference(gears: Sequence[GearEvidence]) -> bool:
+    return any(e.agreement is not None and e.agreement < SMALLEST_AGREEMENT for e in gears)
 
 
-def _none_seen(found: Sequence[GearEvidence], best: int, model: DepthModel, facts: PairFacts) -> NoCrackSeen:
-    if _strange_reference(found):
-        weakest = min(found, key=lambda e: e.agreement if e.agreement is not None else 1.0)
+def _none_seen(gears: Sequence[GearEvidence], best: int, model: DepthModel, facts: PairFacts) -> NoCrackSeen:
+    if _strange_reference(gears):
+        weakest = min(gears, key=lambda e: e.agreement if e.agreement is not None else 1.0)
         raise RefusalError(
             f"the teeth's own pattern on shaft {weakest.shaft.shaft!r} agrees with that of the reference by "
             f"{weakest.agreement:.2f} only",
@@ -567,34 +570,34 @@ def _none_seen(found: Sequence[GearEvidence], best: int, model: DepthModel, fact
             "hardly differ have no pattern to agree by: then a longer recording may help",
         )
     limits = []
-    for evidence in found:
+    for evidence in gears:
         percent = exp(model.log_interval(model.at_threshold(evidence.features))[1])
         limits.append((percent / percent_per_mm(evidence.shaft.teeth, facts.module_mm), percent))
     below_mm, below_percent = max(limits)
     if below_percent > LARGEST_BOUND_PERCENT:
-        alone = found[best].agreement is None
+        alone = gears[best].agreement is None
         raise RefusalError(
             f"no crack stands out, but one of up to {below_mm:.1f} mm ({below_percent:.0f} % of the root) might hide "
             "among the teeth's own differences",
-            remedy="give a reference of the same gears when they were sound"
+            remedy="give a reference of the same gears when they were healthy"
             if alone
             else "record longer, at higher load",
         )
-    features = found[best].features
+    features = gears[best].features
     return NoCrackSeen(
         below_mm,
         below_percent,
         model.p_value(model.score(features)),
-        found[best].agreement is not None,
+        gears[best].agreement is not None,
         dict(zip(FEATURES, features.tolist(), strict=True)),
-        (_reference_text(found[best]),),
+        (_reference_text(gears[best]),),
     )
 
 
 def _seen(
-    found: Sequence[GearEvidence], best: int, model: DepthModel, calibration: Calibration, facts: PairFacts
+    gears: Sequence[GearEvidence], best: int, model: DepthModel, calibration: Calibration, facts: PairFacts
 ) -> CrackEstimate:
-    evidence = found[best]
+    evidence = gears[best]
     if evidence.agreement is not None:
         _check_direction(evidence)
     unlike = model.unlike(evidence.features)
@@ -612,7 +615,7 @@ def _seen(
     interval = min(bounds[0], percent), max(min(bounds[1], 100.0), percent)
     per_mm = percent_per_mm(evidence.shaft.teeth, facts.module_mm)
     place = (evidence.event.centre_rev - calibration.lag_pitches / evidence.shaft.teeth) % 1.0
-    others = [e.event.prominence for e in found if e is not evidence]
+    others = [e.event.prominence for e in gears if e is not evidence]
     if evidence.shaft.has_mark:
         reasons.append("Teeth count from 1 at the mark, as they engage; the place is good to about one tooth.")
     else:
@@ -636,7 +639,7 @@ def _seen(
         reasons=tuple(reasons),
         kind_probabilities=kinds,
         reach_cycles=reach_cycles(evidence.searched, evidence.event),
-        squeezed_rise_db=squeezed_rise_db(evidence.searched, evidence.sound, evidence.event),
+        squeezed_rise_db=squeezed_rise_db(evidence.searched, evidence.healthy, evidence.event),
     )
 
 
@@ -646,13 +649,13 @@ def _check_direction(evidence: GearEvidence) -> None:
         raise RefusalError(
             f"what stands out at one tooth of shaft {evidence.shaft.shaft!r} seems to be in the reference, not in the "
             "recording",
-            remedy="swap both if they were exchanged, or take a reference of sound gears",
+            remedy="swap both if they were exchanged, or take a reference of healthy gears",
         )
 
 
 def _reference_text(evidence: GearEvidence) -> str:
     if evidence.agreement is None:
-        return "Without a reference of the sound gears, what every tooth differs by hides all but deep cracks."
+        return "Without a reference of the healthy gears, what every tooth differs by hides all but deep cracks."
     if evidence.agreement < SMALLEST_AGREEMENT:
         return (
             f"Be careful with the reference: the teeth's own pattern agrees by {evidence.agreement:.2f} only. It may "

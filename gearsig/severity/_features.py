@@ -100,7 +100,7 @@ def orders_from_mesh(orders: NDArray[np.intp], teeth: int) -> NDArray[np.intp]:
 # --------------------
 
 
-MOST_BANDS = 10
+MAX_BANDS = 10
 """One band about each mesh harmonic. A band's ratio to its mesh line scatters by some 8 dB, for the line is one number
 that hangs on tip relief and resonances: many bands average it out."""
 
@@ -139,7 +139,7 @@ class ToothEvent:
 
 def n_bands(shaft: ShaftLines) -> int:
     """Return how many mesh harmonics have a whole band below the highest order, 10 at most."""
-    return min(MOST_BANDS, int((shaft.highest_order - shaft.teeth // 2) / shaft.teeth))
+    return min(MAX_BANDS, int((shaft.highest_order - shaft.teeth // 2) / shaft.teeth))
 
 
 def find_event(shaft: ShaftLines) -> ToothEvent:
@@ -235,7 +235,7 @@ from birth must not decide on a depth."""
 RELIEF = ("relief_share", "relief_share_squared")
 """Of the models that know the tip relief only; 0 where it is not known."""
 
-MOST_RELIEF_SHARE = 2.0
+MAX_RELIEF_SHARE = 2.0
 """Beyond, the tips never touch: more relief changes nothing."""
 
 STIFFNESS_N_PER_MM_UM = 14.0
@@ -244,7 +244,7 @@ STIFFNESS_N_PER_MM_UM = 14.0
 GATE_PITCHES = 4.0
 _SUB_BANDS = 4
 """Per mesh harmonic."""
-_LEAST_SHARE = 0.1
+_MIN_SHARE = 0.1
 """What is left of an energy at least when the background's is taken off: a logarithm follows."""
 _N_OTHER_GATES = 6
 _MESH_WEIGHT = 0.25
@@ -273,11 +273,11 @@ class Conditions:
     def relief_share(self) -> float:
         """Tip relief over what the teeth yield under the load, at most 2; 0 where the relief is not known."""
         yield_um = self.load_mpa * self.module_mm / STIFFNESS_N_PER_MM_UM
-        return min((self.tip_relief_um or 0.0) / yield_um, MOST_RELIEF_SHARE)
+        return min((self.tip_relief_um or 0.0) / yield_um, MAX_RELIEF_SHARE)
 
 
 def feature_vector(
-    shaft: ShaftLines, sound: ShaftLines, mesh: FloatArray, event: ToothEvent, conditions: Conditions
+    shaft: ShaftLines, healthy: ShaftLines, mesh: FloatArray, event: ToothEvent, conditions: Conditions
 ) -> FloatArray:
     """Return the features in the order of `FEATURES`.
 
@@ -286,8 +286,8 @@ def feature_vector(
     - line_excess: ln of the spectrum of the event by itself (gated, four pitches) over mesh energies interpolated
       between harmonics; mean over quarter bands. A resonance counts in few of them.
     - prominence: ln of the event's energy over that at the other teeth.
-    - pattern_excess: ln of the event's energy over that by which all teeth differ (on the sound gear, where there is a
-      reference); mean over bands and channels. What resonances multiply cancels entirely.
+    - pattern_excess: ln of the event's energy over that by which all teeth differ (on the healthy gear, where there is
+      a reference); mean over bands and channels. What resonances multiply cancels entirely.
     - event_slope, mesh_slope: change of the logarithms per mesh harmonic; event_spread, mesh_spread: their standard
       deviations over the bands.
     - relief_share: tip relief over the teeth's deflection, see `Conditions`; it decides how strong the mesh is that the
@@ -297,8 +297,8 @@ def feature_vector(
     Parameters
     ----------
     shaft : ShaftLines
-        Whose event it is: the average itself, or its difference from a sound gear's.
-    sound : ShaftLines
+        Whose event it is: the average itself, or its difference from a healthy gear's.
+    healthy : ShaftLines
         The reference's average, or the average itself.
     mesh : array, (n_harmonics, n_channels)
         Energies of the mesh lines.
@@ -315,7 +315,7 @@ def feature_vector(
             float(np.sum(weights * excess) / np.sum(weights)),
             float(np.mean(event_levels - between)),
             np.log(event.prominence),
-            float(np.mean(np.log(_event_energy(event) / _pattern_energies(sound, len(mesh))))),
+            float(np.mean(np.log(_event_energy(event) / _pattern_energies(healthy, len(mesh))))),
             np.polyfit(positions, event_levels.mean(axis=1), 1)[0],
             np.polyfit(harmonics, mesh_levels.mean(axis=1), 1)[0],
             event_levels.std(axis=0).mean(),
@@ -348,9 +348,9 @@ def _event_energy(event: ToothEvent) -> FloatArray:
     return energy
 
 
-def _pattern_energies(sound: ShaftLines, n_harmonics: int) -> FloatArray:
+def _pattern_energies(healthy: ShaftLines, n_harmonics: int) -> FloatArray:
     """Return the mean square envelope over all teeth of each band, (n_harmonics, n_channels)."""
-    z, lines = sound.teeth, without_regular_lines(sound)
+    z, lines = healthy.teeth, without_regular_lines(healthy)
     bands = [lines[:, k * z - z // 2 : k * z + z // 2 + 1] for k in range(1, n_harmonics + 1)]
     return np.array([np.sum(np.abs(band) ** 2, axis=1) for band in bands])
 
@@ -384,12 +384,12 @@ def _energy_spectrum(signal: FloatArray) -> FloatArray:
 
 
 def _less_background(energy: FloatArray, background: FloatArray) -> FloatArray:
-    left: FloatArray = np.maximum(energy - background, _LEAST_SHARE * energy)
+    left: FloatArray = np.maximum(energy - background, _MIN_SHARE * energy)
     return left
 
 
 # --------------------
-# The difference between a shaft's average and that of the sound gear: what every tooth is born with cancels.
+# The difference between a shaft's average and that of the healthy gear: what every tooth is born with cancels.
 # --------------------
 
 
@@ -403,14 +403,14 @@ _FINE_STEPS_PER_TOOTH = 16
 _SHAFT_ORDERS = 4
 
 
-def difference_lines(now: ShaftLines, sound: ShaftLines, *, whole_teeth: bool) -> tuple[ShaftLines, float]:
-    """Return the lines of `now` less those of the sound gear, turned so that the same teeth meet.
+def difference_lines(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool) -> tuple[ShaftLines, float]:
+    """Return the lines of `now` less those of the healthy gear, turned so that the same teeth meet.
 
     d[n] = x[n] − r[n] e^{−2πi n s}, with the shift s that gives the largest Σ w[n] Re(x[n] r*[n] e^{2πi n s}).
 
     Parameters
     ----------
-    now, sound : ShaftLines
+    now, healthy : ShaftLines
         Of the same shaft and channels.
     whole_teeth : bool
         Whether the shift can only be a whole number of teeth: the mate's mark fixes the phase of the mesh. Without a
@@ -427,11 +427,11 @@ def difference_lines(now: ShaftLines, sound: ShaftLines, *, whole_teeth: bool) -
     RefusalError
         If the speeds differ too much.
     """
-    check_same_speed(now, sound)
-    highest = min(now.highest_order, sound.highest_order)
-    x, r = now.lines[:, : highest + 1], sound.lines[:, : highest + 1]
+    check_same_speed(now, healthy)
+    highest = min(now.highest_order, healthy.highest_order)
+    x, r = now.lines[:, : highest + 1], healthy.lines[:, : highest + 1]
     cross = _weighted_cross(x, r, now.teeth)
-    shifts = _shifts(now, sound, whole_teeth)
+    shifts = _shifts(now, healthy, whole_teeth)
     scores = shift_scores(cross, shifts)
     best = int(np.argmax(scores))
     agreement = float(scores[best] / np.abs(cross).sum()) if np.any(cross) else 0.0
@@ -439,11 +439,11 @@ def difference_lines(now: ShaftLines, sound: ShaftLines, *, whole_teeth: bool) -
     return replace(now, lines=x - _matched(turned, x, now.teeth), highest_order=highest), agreement
 
 
-def check_same_speed(now: ShaftLines, sound: ShaftLines) -> None:
+def check_same_speed(now: ShaftLines, healthy: ShaftLines) -> None:
     """Refuse a reference at another speed."""
-    change = abs(now.order_hz / sound.order_hz - 1.0)
+    change = abs(now.order_hz / healthy.order_hz - 1.0)
     if change > LARGEST_SPEED_DIFFERENCE:
-        rpm = tuple(60.0 * shaft.order_hz for shaft in (sound, now))
+        rpm = tuple(60.0 * shaft.order_hz for shaft in (healthy, now))
         raise RefusalError(
             f"the reference was taken at a speed {100 * change:.1f} % off: shaft {now.shaft!r} turns at {rpm[0]:.5g} "
             f"rpm there, at {rpm[1]:.5g} rpm in the recording",
@@ -477,8 +477,8 @@ def telling_teeth_apart(orders: np.ndarray, teeth: int) -> np.ndarray:
     return used
 
 
-def _shifts(now: ShaftLines, sound: ShaftLines, whole_teeth: bool) -> FloatArray:
-    if now.has_mark and sound.has_mark:
+def _shifts(now: ShaftLines, healthy: ShaftLines, whole_teeth: bool) -> FloatArray:
+    if now.has_mark and healthy.has_mark:
         return np.zeros(1)
     n = now.teeth * (1 if whole_teeth else _FINE_STEPS_PER_TOOTH)
     return np.arange(n) / n
@@ -502,12 +502,12 @@ SHAPE = ("lead", "tail", "duration", "kurtosis", "peak", "window_slope")
 """Order of the entries of `event_shape`."""
 
 REACH_LEVEL = 4.0
-"""Energy over that at the middling tooth down to which an event lasts: sound teeth reach it now and then."""
+"""Energy over that at the median tooth down to which an event lasts: healthy teeth reach it now and then."""
 
 _SHAPE_STEPS_PER_TOOTH = 64
 _NEAR_PITCHES = 2.5
-_MOST_HARMONICS = 8
-_LEAST = 1e-12
+_MAX_HARMONICS = 8
+_TINY = 1e-12
 
 
 def event_shape(searched: ShaftLines, event: ToothEvent) -> FloatArray:
@@ -524,21 +524,21 @@ def event_shape(searched: ShaftLines, event: ToothEvent) -> FloatArray:
     Parameters
     ----------
     searched : ShaftLines
-        The average, or its difference from the sound gear's.
+        The average, or its difference from the healthy gear's.
     event : ToothEvent
     """
-    levels = np.log(np.maximum(event.window, _LEAST * event.window.max())).mean(axis=1)
+    levels = np.log(np.maximum(event.window, _TINY * event.window.max())).mean(axis=1)
     slope = float(np.polyfit(np.arange(len(levels)), levels, 1)[0])
     return np.array([*_around(searched, event), *_durations(searched, event), slope])
 
 
 def reach_cycles(searched: ShaftLines, event: ToothEvent) -> float:
-    """Return for how many mesh cycles after its middle the event has four times the energy of a middling other tooth.
+    """Return for how many mesh cycles after its middle the event has four times the energy of a median other tooth.
 
     Parameters
     ----------
     searched : ShaftLines
-        The average, or its difference from the sound gear's.
+        The average, or its difference from the healthy gear's.
     event : ToothEvent
     """
     energy = _relative_energy(searched, event)
@@ -549,7 +549,7 @@ def reach_cycles(searched: ShaftLines, event: ToothEvent) -> float:
 
 
 def _relative_energy(searched: ShaftLines, event: ToothEvent) -> FloatArray:
-    """Return the energy in windows of one pitch over the middling one, the event in the middle."""
+    """Return the energy in windows of one pitch over the median one, the event in the middle."""
     envelopes = band_envelopes(searched)
     median = np.median(envelopes, axis=-1, keepdims=True)
     relative = np.divide(envelopes, median, out=np.ones_like(envelopes), where=median > 0).mean(axis=(0, 1))
@@ -570,17 +570,17 @@ def _around(searched: ShaftLines, event: ToothEvent) -> tuple[float, float]:
 
 def _durations(searched: ShaftLines, event: ToothEvent) -> tuple[float, float, float]:
     """Return the logarithms of width, kurtosis and peak of the energy near the event."""
-    z, highest = searched.teeth, min(n_bands(searched), _MOST_HARMONICS) + 0.5
+    z, highest = searched.teeth, min(n_bands(searched), _MAX_HARMONICS) + 0.5
     energy = band_signal(searched, 0.5, highest, event.centre_rev) ** 2
     level = np.median(sliding_mean(energy, _SHAPE_STEPS_PER_TOOTH), axis=1)
     relative = np.divide(energy, level[:, None], out=np.zeros_like(energy), where=level[:, None] > 0).mean(axis=0)
     pitches = (np.arange(len(relative)) - len(relative) // 2) / _SHAPE_STEPS_PER_TOOTH
     near = np.abs(pitches) < min(_NEAR_PITCHES, z / 4)
-    density = np.maximum(relative[near] - np.median(relative[~near]), 0.0) + _LEAST
+    density = np.maximum(relative[near] - np.median(relative[~near]), 0.0) + _TINY
     density /= density.sum()
     off = pitches[near] - density @ pitches[near]
-    variance = max(float(density @ off**2), _LEAST)
-    kurtosis = max(float(density @ off**4) / variance**2, _LEAST)
+    variance = max(float(density @ off**2), _TINY)
+    kurtosis = max(float(density @ off**4) / variance**2, _TINY)
     return 0.5 * float(np.log(variance)), float(np.log(kurtosis)), float(np.log(density.max() * _SHAPE_STEPS_PER_TOOTH))
 
 
@@ -613,8 +613,8 @@ SQUEEZED_WINDOW_PITCHES = 2.0
 _STEP = 4
 
 
-def squeezed_rise_db(searched: ShaftLines, sound: ShaftLines, event: ToothEvent) -> float:
-    """Return 10 log₁₀ of the squeezed energy near the tooth over that of a middling sound tooth, mean over channels.
+def squeezed_rise_db(searched: ShaftLines, healthy: ShaftLines, event: ToothEvent) -> float:
+    """Return 10 log₁₀ of the squeezed energy near the tooth over that of a median healthy tooth, mean over channels.
 
     E = Σ |T(o, θ)|² over orders o above 3.5 mesh harmonics and the two pitches about the event. It grows with a crack's
     depth on one machine. Between machines it says no more of the depth than the energies that `features` holds: the
@@ -623,22 +623,22 @@ def squeezed_rise_db(searched: ShaftLines, sound: ShaftLines, event: ToothEvent)
     Parameters
     ----------
     searched : ShaftLines
-        The average, or its difference from the sound gear's.
-    sound : ShaftLines
-        The sound gear's average, or the average itself: whose middling tooth is compared with.
+        The average, or its difference from the healthy gear's.
+    healthy : ShaftLines
+        The healthy gear's average, or the average itself: whose median tooth is compared with.
     event : ToothEvent
     """
-    highest = min(n_bands(searched), n_bands(sound)) + 0.5
+    highest = min(n_bands(searched), n_bands(healthy)) + 0.5
     near = [windows[len(windows) // 2] for windows in _windows(searched, highest, event)]
-    middling = [np.median(windows) for windows in _windows(sound, highest, event)]
-    return 10.0 * float(np.mean(np.log10(np.divide(near, middling))))
+    usual = [np.median(windows) for windows in _windows(healthy, highest, event)]
+    return 10.0 * float(np.mean(np.log10(np.divide(near, usual))))
 
 
 def _windows(shaft: ShaftLines, highest: float, event: ToothEvent) -> list[FloatArray]:
     """Return the mean energy in the window about each angle, the event in the middle, one array per channel."""
     from gearsig.timefreq import UniformSignal, squeezed_cwt
 
-    found = []
+    energies = []
     for values in band_signal(shaft, LOWEST_HARMONIC, highest, event.centre_rev):
         largest = float(np.abs(values).max())
         signal = UniformSignal(values / largest, len(values), "order", highest=highest * shaft.teeth)
@@ -646,5 +646,5 @@ def _windows(shaft: ShaftLines, highest: float, event: ToothEvent) -> list[Float
         plane = squeezed_cwt(signal, lowest=lowest, highest=highest * shaft.teeth, step=_STEP).values
         energy = largest**2 * np.sum(np.abs(plane).astype(np.float64) ** 2, axis=0)
         width = round(SQUEEZED_WINDOW_PITCHES * len(energy) / shaft.teeth)
-        found.append(np.roll(sliding_mean(energy, width), width // 2))
-    return found
+        energies.append(np.roll(sliding_mean(energy, width), width // 2))
+    return energies

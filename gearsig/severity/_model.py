@@ -18,7 +18,7 @@ from gearsig.severity._features import FEATURES, RELIEF, RISING, SHAPE, SHAPED
 RANGE_MARGIN = 0.05
 """Of a feature's range in the calibration, by which it may lie beyond."""
 
-LEAST_SPREAD = 0.1
+MIN_SPREAD = 0.1
 """Of ln percent: no machine is known better than to ten percent."""
 
 
@@ -61,8 +61,8 @@ class DepthModel:
         Weights of the detection score.
     threshold : float
         Score from which a crack counts as seen.
-    sound_scores : array, (n_sound,)
-        Scores of sound gear pairs, rising: the higher one of either gear.
+    healthy_scores : array, (n_healthy,)
+        Scores of healthy gear pairs, rising: the higher one of either gear.
     precision : array, (n_features, n_features)
         Inverse covariance of the features (f_i − m_i)/s_i; 0 for those that the depth is not read from.
     largest_distance : float
@@ -83,7 +83,7 @@ class DepthModel:
     quantiles: tuple[float, float]
     detection: FloatArray
     threshold: float
-    sound_scores: FloatArray
+    healthy_scores: FloatArray
     precision: FloatArray
     largest_distance: float
     lowest: FloatArray
@@ -98,7 +98,7 @@ class DepthModel:
             if len(array) != length:
                 raise InputError(f"{name} of the model has {len(array)} entries", allowed=str(length))
             object.__setattr__(self, name, array)
-        object.__setattr__(self, "sound_scores", frozen_array(self.sound_scores, "sound_scores", ndim=1))
+        object.__setattr__(self, "healthy_scores", frozen_array(self.healthy_scores, "healthy_scores", ndim=1))
         for name in ("precision", "knots", "slopes"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=2))
         if self.knots.shape != (len(SHAPED), 2) or self.slopes.shape != (len(SHAPED), 3):
@@ -130,7 +130,7 @@ class DepthModel:
             quantiles=two("quantiles"),
             detection=array("detection"),
             threshold=float(values["threshold"]),
-            sound_scores=array("sound_scores"),
+            healthy_scores=array("sound_scores"),
             precision=array("precision"),
             largest_distance=float(values["largest_distance"]),
             lowest=array("lowest"),
@@ -160,16 +160,16 @@ class DepthModel:
     def spread_of(self, features: FloatArray) -> float:
         """Return σ of ln percent."""
         spread = float(self.spread[0] + self.standardised(features) @ self.spread[1:])
-        return max(spread, LEAST_SPREAD)
+        return max(spread, MIN_SPREAD)
 
     def score(self, features: FloatArray) -> float:
         """Return the detection score."""
         return float(self.standardised(features) @ self.detection)
 
     def p_value(self, score: float) -> float:
-        """Return (1 + number of sound pairs with as high a score)/(1 + number of sound pairs)."""
-        higher = len(self.sound_scores) - int(np.searchsorted(self.sound_scores, score, side="left"))
-        return (1.0 + higher) / (1.0 + len(self.sound_scores))
+        """Return (1 + number of healthy pairs with as high a score)/(1 + number of healthy pairs)."""
+        higher = len(self.healthy_scores) - int(np.searchsorted(self.healthy_scores, score, side="left"))
+        return (1.0 + higher) / (1.0 + len(self.healthy_scores))
 
     def distance(self, features: FloatArray) -> float:
         """Return the Mahalanobis distance from the calibration's cracks."""
@@ -379,9 +379,9 @@ class CrackEstimate:
     interval_mm, interval_percent : tuples of two floats
         Holds the depth in `COVERAGE` of the cases, among machines like the calibration's.
     p_value : float
-        Chance of as clear an event on a sound gear pair, among the calibration's sound ones.
+        Chance of as clear an event on a healthy gear pair, among the calibration's healthy ones.
     with_reference : bool
-        Whether a recording of the sound gears was compared with.
+        Whether a recording of the healthy gears was compared with.
     features : mapping
         Name → value of what the estimate rests on; see `gearsig.severity`.
     reasons : tuple of str
@@ -389,10 +389,10 @@ class CrackEstimate:
     kind_probabilities : mapping
         "cracked", "chipped", "spalled" → probability, if cracks are as frequent as chips and spalls together.
     reach_cycles : float
-        For how many mesh cycles after its middle the event has four times a middling other tooth's energy. It hangs on
+        For how many mesh cycles after its middle the event has four times a median other tooth's energy. It hangs on
         damping and resonances as much as on the depth; the estimate does not rest on it.
     squeezed_rise_db : float
-        Synchrosqueezed energy at high orders near the tooth over that of a middling sound tooth; see
+        Synchrosqueezed energy at high orders near the tooth over that of a median healthy tooth; see
         `gearsig.severity`. The estimate does not rest on it.
     """
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from gearsig.comparison import compare_recordings
+from gearsig.comparison import compare
 from gearsig.recording import read_recording
 from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft
 
@@ -19,7 +19,7 @@ RIG = Rig(
 
 def test_two_sensors_of_one_gear_pair_without_tachometer() -> None:
     one, other = (read_recording(DATA / f"3027_217_Data_Chan{n}.mat", rig=RIG) for n in (12, 14))
-    found = compare_recordings(one, other)
+    found = compare(one, other)
     channel = found.channels[0]
     assert found.recorded.mean_speed_rpm == pytest.approx(1999.76, abs=0.05)
     mesh = [line for line in channel.lines if line.kind == "mesh"]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearsig.comparison import Comparison, LineLevel, compare_recordings, missing_words
+from gearsig.comparison import Comparison, LineLevel, compare, missing_words
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Channel, Recording
 from gearsig.rig import GearPair, PulseTimes, Rig, Shaft
@@ -21,7 +21,7 @@ def line(comparison: Comparison, order: float) -> LineLevel:
 
 def test_a_record_against_itself_agrees_in_everything() -> None:
     record = gear_record()
-    found = compare_recordings(record, record)
+    found = compare(record, record)
     channel = found.channels[0]
     assert all(x.level.difference_db == 0 for x in (*channel.lines, *channel.other_lines))
     assert all(band.level.difference_db == 0 for band in (*channel.order_bands, *channel.third_octaves))
@@ -35,7 +35,7 @@ def test_a_record_against_itself_agrees_in_everything() -> None:
 
 
 def test_levels_are_rms_of_the_lines() -> None:
-    found = compare_recordings(gear_record(), gear_record(seed=1))
+    found = compare(gear_record(), gear_record(seed=1))
     for order, amplitude in LINES.items():
         level = line(found, order).level if order in (1, 2, 22, 23, 24, 46, 47, 69) else None
         assert level is not None
@@ -51,7 +51,7 @@ def test_levels_are_rms_of_the_lines() -> None:
 def test_a_gain_is_found_at_every_line_and_band_and_changes_no_shape(gain_db: float) -> None:
     record = gear_record(noise=0.02)
     louder = replace(record, samples=record.samples * 10 ** (gain_db / 20))
-    channel = compare_recordings(louder, record).channels[0]
+    channel = compare(louder, record).channels[0]
     for item in (*channel.lines, *channel.order_bands, *channel.third_octaves):
         assert item.level.difference_db == pytest.approx(gain_db, abs=1e-6)
     assert channel.overall.difference_db == pytest.approx(gain_db, abs=1e-9)
@@ -61,7 +61,7 @@ def test_a_gain_is_found_at_every_line_and_band_and_changes_no_shape(gain_db: fl
 @pytest.mark.parametrize("shift_deg", [-170.0, -37.3, 0.0, 11.2, 90.0, 180.0])
 def test_a_shift_is_found_by_correlation(shift_deg: float) -> None:
     simulated = gear_record(with_pulses=False, seed=1)
-    found = compare_recordings(simulated, gear_record(shift_rev=shift_deg / 360.0), align_by="correlation")
+    found = compare(simulated, gear_record(shift_rev=shift_deg / 360.0), align_by="correlation")
     first = found.alignments[0]
     assert first.method == "correlation"
     off = (first.shift_deg - shift_deg + 180.0) % 360.0 - 180.0
@@ -72,12 +72,12 @@ def test_a_shift_is_found_by_correlation(shift_deg: float) -> None:
 
 def test_marks_are_trusted_and_a_better_shift_is_told() -> None:
     simulated, recorded = gear_record(seed=1), gear_record(shift_rev=0.1)
-    found = compare_recordings(simulated, recorded)
+    found = compare(simulated, recorded)
     assert (found.alignments[0].method, found.alignments[0].shift_deg) == ("marks", 0.0)
     assert found.alignments[0].best_shift_deg == pytest.approx(36.0, abs=0.1)
     assert found.channels[0].shafts[0].correlation.value < 0.5
     assert any("+36" in note for note in found.notes)
-    turned = compare_recordings(simulated, recorded, align_by="correlation")
+    turned = compare(simulated, recorded, align_by="correlation")
     assert turned.channels[0].shafts[0].correlation.value > 0.99
     # Levels know no angle.
     for a, b in zip(found.channels[0].lines, turned.channels[0].lines, strict=True):
@@ -86,7 +86,7 @@ def test_marks_are_trusted_and_a_better_shift_is_told() -> None:
 
 def test_teeth_that_are_all_alike_are_aligned_to_whole_teeth_only() -> None:
     mesh = {23: 2.0, 46: 1.0}
-    found = compare_recordings(
+    found = compare(
         gear_record(lines=mesh, with_pulses=False, seed=1), gear_record(lines=mesh, shift_rev=0.01, with_pulses=False)
     )
     assert found.alignments[0].tooth_is_certain is False
@@ -97,7 +97,7 @@ def test_teeth_that_are_all_alike_are_aligned_to_whole_teeth_only() -> None:
 
 def test_noise_alone_shows_no_line_and_no_agreement() -> None:
     simulated, recorded = (gear_record(lines={}, noise=1.0, seed=seed) for seed in (1, 2))
-    found = compare_recordings(simulated, recorded)
+    found = compare(simulated, recorded)
     channel = found.channels[0]
     assert "No line of the recording stands above its own noise" in found.verdict
     assert not any(x.is_seen for x in channel.lines if x.kind == "mesh")
@@ -114,13 +114,13 @@ def test_noise_alone_shows_no_line_and_no_agreement() -> None:
 
 def test_other_rate_length_and_speed_change_nothing_by_order() -> None:
     simulated = gear_record(rate_hz=12000.0, duration_s=4.0, speed_rpm=1620.0, seed=1)
-    found = compare_recordings(simulated, gear_record())
+    found = compare(simulated, gear_record())
     assert found.simulated.mean_speed_rpm == pytest.approx(1620.0)
     for order in LINES:
         assert line(found, order).level.difference_db == pytest.approx(0.0, abs=0.3)
     assert found.channels[0].shafts[0].correlation.value > 0.99
     assert any("8.0 % faster" in note for note in found.notes)
-    fast = compare_recordings(gear_record(speed_rpm=1800.0, seed=1), gear_record())
+    fast = compare(gear_record(speed_rpm=1800.0, seed=1), gear_record())
     assert any("+20 %" in note for note in fast.notes)
     assert line(fast, 23).level.difference_db == pytest.approx(0.0, abs=0.1)
 
@@ -130,7 +130,7 @@ def test_another_shafts_lines_do_not_leak_into_an_average() -> None:
     out = {31: 2.0, 30: 0.5, 32: 0.5, 1: 1.0}
     simulated = gear_record(lines={}, out_lines=out, noise=1e-4, duration_s=5.3)
     recorded = gear_record(lines={}, out_lines=out, noise=1e-4, seed=1)
-    found = compare_recordings(simulated, recorded)
+    found = compare(simulated, recorded)
     assert line(found, 23).level.difference_db == pytest.approx(0.0, abs=0.02)  # the mesh is both shafts'
     assert line(found, 30 * 23 / 31).level.difference_db == pytest.approx(0.0, abs=0.02)
     driver = [x for x in found.channels[0].lines if x.shaft == "in" and x.kind != "mesh"]
@@ -139,7 +139,7 @@ def test_another_shafts_lines_do_not_leak_into_an_average() -> None:
 
 def test_a_line_that_belongs_to_nothing_is_named_and_missed() -> None:
     recorded = gear_record(other_lines={5.5: 0.5, 17.5: 0.4})
-    found = compare_recordings(gear_record(seed=1), recorded)
+    found = compare(gear_record(seed=1), recorded)
     missing = line(found, 5.5)
     assert (missing.kind, missing.recorded_is_seen, missing.simulated_is_seen) == ("other", True, False)
     assert missing.level.recorded_db == pytest.approx(20 * np.log10(0.5 / np.sqrt(2)), abs=0.1)
@@ -151,7 +151,7 @@ def test_a_line_that_belongs_to_nothing_is_named_and_missed() -> None:
 
 def test_energy_that_turns_with_the_shafts() -> None:
     noise = 1.0
-    found = compare_recordings(gear_record(noise=0.0), gear_record(noise=noise, duration_s=20.0))
+    found = compare(gear_record(noise=0.0), gear_record(noise=noise, duration_s=20.0))
     locked = sum(a**2 / 2 for a in LINES.values())
     reach = found.highest_order * 25.0 / 4000.0
     share = found.channels[0].locked
@@ -164,7 +164,7 @@ def test_one_stronger_tooth_is_found_tooth_by_tooth() -> None:
     theta = 25.0 * record.time_s()
     burst = ((theta % 1.0) * 23).astype(int) == 6
     marked = replace(record, samples=record.samples * np.where(burst, 2.0, 1.0))
-    teeth = compare_recordings(record, marked).channels[0].shafts[0].tooth_levels
+    teeth = compare(record, marked).channels[0].shafts[0].tooth_levels
     differences = [tooth.difference_db for tooth in teeth]
     assert len(teeth) == 23
     assert int(np.argmin(differences)) == 6
@@ -175,11 +175,11 @@ def test_units_are_converted_and_unknown_ones_told() -> None:
     in_g = Channel("a1", "acceleration", "g")
     simulated = gear_record(seed=1)
     recorded = gear_record(gain=1 / 9.80665, noise=0.05 / 9.80665, channel=in_g)
-    found = compare_recordings(simulated, recorded)
+    found = compare(simulated, recorded)
     assert found.channels[0].unit == "g"
     assert line(found, 23).level.difference_db == pytest.approx(0.0, abs=0.1)
     bare = gear_record(gain=20.0, noise=1.0, channel=Channel("a1"))
-    found = compare_recordings(simulated, bare)
+    found = compare(simulated, bare)
     assert not found.channels[0].levels_compare
     assert found.channels[0].unit == ""
     assert "after a common gain of +26.0 dB" in found.verdict
@@ -187,7 +187,7 @@ def test_units_are_converted_and_unknown_ones_told() -> None:
 
 
 def test_without_a_rig_the_shafts_orders_are_compared() -> None:
-    found = compare_recordings(gear_record(rig=None, seed=1), gear_record(rig=None))
+    found = compare(gear_record(rig=None, seed=1), gear_record(rig=None))
     assert [x.order for x in found.channels[0].lines] == list(range(1, 13))
     assert found.mesh_orders == ()
     assert line(found, 1).level.difference_db == pytest.approx(0.0, abs=0.3)
@@ -195,7 +195,7 @@ def test_without_a_rig_the_shafts_orders_are_compared() -> None:
 
 def test_a_side_without_rig_takes_the_others_gears() -> None:
     for simulated, recorded in ((None, RIG), (RIG, None)):
-        found = compare_recordings(gear_record(rig=simulated, seed=1), gear_record(rig=recorded))
+        found = compare(gear_record(rig=simulated, seed=1), gear_record(rig=recorded))
         assert found.mesh_orders == (23.0,)
         assert line(found, 23).level.difference_db == pytest.approx(0.0, abs=0.1)
 
@@ -205,7 +205,7 @@ def test_shafts_of_other_names_are_matched_by_their_gears() -> None:
     simulated = gear_record(seed=1)
     assert simulated.speed is not None
     simulated = replace(simulated, rig=own, speed=replace(simulated.speed, shaft="driver"))
-    found = compare_recordings(simulated, gear_record())
+    found = compare(simulated, gear_record())
     assert [a.shaft for a in found.alignments] == ["in", "out"]
     assert found.alignments[0].method == "marks"
     assert line(found, 23).level.difference_db == pytest.approx(0.0, abs=0.1)
@@ -219,7 +219,7 @@ def test_a_wandering_speed_without_tachometer_keeps_its_mesh_harmonics() -> None
     x = sum(a * np.cos(2 * np.pi * n * theta + 0.7 * n**2) for n, a in LINES.items())
     x = x + 0.05 * rng.standard_normal(len(time))
     recorded = replace(gear_record(), samples=x[None, :], speed=None)
-    found = compare_recordings(gear_record(seed=1), recorded)
+    found = compare(gear_record(seed=1), recorded)
     for order in (23, 46, 69):
         assert line(found, order).level.difference_db == pytest.approx(0.0, abs=0.2)
 
@@ -227,24 +227,24 @@ def test_a_wandering_speed_without_tachometer_keeps_its_mesh_harmonics() -> None
 def test_what_cannot_be_compared_is_refused() -> None:
     record = gear_record()
     with pytest.raises(InputError, match="measure different things: velocity and acceleration"):
-        compare_recordings(gear_record(channel=Channel("a1", "velocity", "m/s")), record)
+        compare(gear_record(channel=Channel("a1", "velocity", "m/s")), record)
     with pytest.raises(InputError, match=r"in V and m/s\^2"):
-        compare_recordings(gear_record(channel=Channel("a1", "acceleration", "V")), record)
+        compare(gear_record(channel=Channel("a1", "acceleration", "V")), record)
     other = Rig(shafts=RIG.shafts, pairs=(GearPair("p", "in", "out", 25, 31),))
     with pytest.raises(InputError, match="simulation is of other gears: 25/31"):
-        compare_recordings(gear_record(rig=other), record)
+        compare(gear_record(rig=other), record)
     with pytest.raises(RefusalError, match="simulation holds 6"):
-        compare_recordings(gear_record(duration_s=0.25), record)
+        compare(gear_record(duration_s=0.25), record)
     bare = replace(gear_record(rig=None), speed=None)
     with pytest.raises(RefusalError, match="speed of the recording is not known"):
-        compare_recordings(gear_record(rig=None), bare)
+        compare(gear_record(rig=None), bare)
     silent = replace(record, samples=record.samples * np.array([[float(not c.is_vibration)] for c in record.channels]))
     with pytest.raises(RefusalError, match="channel a1 of the recording is dead"):
-        compare_recordings(record, silent)
+        compare(record, silent)
     with pytest.raises(RefusalError, match="no shaft has a mark"):
-        compare_recordings(gear_record(with_pulses=False), record, align_by="marks")
+        compare(gear_record(with_pulses=False), record, align_by="marks")
     with pytest.raises(InputError, match="align_by is 'mark'"):
-        compare_recordings(record, record, align_by="mark")
+        compare(record, record, align_by="mark")
 
 
 def test_channels_that_do_not_pair_are_listed_on_both_sides() -> None:
@@ -255,11 +255,11 @@ def test_channels_that_do_not_pair_are_listed_on_both_sides() -> None:
         channels=(Channel("b1", "acceleration", "m/s^2"), Channel("b2", "acceleration", "m/s^2")),
     )
     with pytest.raises(InputError, match=r"the simulation has a1; the recording has b1, b2.*--channel \"a1=b1\""):
-        compare_recordings(one, two)
-    found = compare_recordings(one, two, channels=[("a1", "b2")])
+        compare(one, two)
+    found = compare(one, two, channels=[("a1", "b2")])
     assert [(c.simulated_name, c.recorded_name) for c in found.channels] == [("a1", "b2")]
     with pytest.raises(InputError, match="no channel 'a9'"):
-        compare_recordings(one, two, channels=[("a9", "b2")])
+        compare(one, two, channels=[("a9", "b2")])
 
 
 def run_up(seed: int = 0) -> Recording:
@@ -274,7 +274,7 @@ def run_up(seed: int = 0) -> Recording:
 
 
 def test_a_run_up_has_no_speed_of_its_own_and_its_scatter_is_no_missing_line() -> None:
-    found = compare_recordings(run_up(), gear_record())
+    found = compare(run_up(), gear_record())
     (speeds,) = [note for note in found.notes if "rpm" in note]
     assert "The simulation runs between" in speeds
     assert "the recording turns at 1500 rpm" in speeds
@@ -292,6 +292,6 @@ def test_a_run_up_has_no_speed_of_its_own_and_its_scatter_is_no_missing_line() -
 
 
 def test_steady_records_at_other_speeds_turn_at_them() -> None:
-    found = compare_recordings(gear_record(speed_rpm=1800.0, seed=1), gear_record())
+    found = compare(gear_record(speed_rpm=1800.0, seed=1), gear_record())
     (speeds,) = [note for note in found.notes if "rpm" in note]
     assert "turns at 1800 rpm, the recording at 1500 rpm (+20 %)" in speeds

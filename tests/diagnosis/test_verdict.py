@@ -61,10 +61,10 @@ def test_what_kind_of_reference_would_do_comes_before_other_wishes() -> None:
 
 
 def test_a_reference_that_was_given_is_not_asked_for() -> None:
-    sound = (Finding("no-tooth-local-damage", Kind.INFORMATION, "Teeth look alike."),)
-    assert "against an earlier recording" in verdict_of(sound)
-    assert "since the reference" in verdict_of(sound, has_reference=True)
-    assert "earlier recording" not in verdict_of(sound, has_reference=True)
+    healthy = (Finding("no-tooth-local-damage", Kind.INFORMATION, "Teeth look alike."),)
+    assert "against an earlier recording" in verdict_of(healthy)
+    assert "since the reference" in verdict_of(healthy, has_reference=True)
+    assert "earlier recording" not in verdict_of(healthy, has_reference=True)
 
 
 def test_confidence_falls_with_the_p_value_and_is_bounded() -> None:

@@ -13,6 +13,6 @@ def record() -> Record:
 
 
 @pytest.fixture(scope="session")
-def sound() -> Recording:
+def healthy() -> Recording:
     """Return the gearbox before it cracked, at a slightly other speed."""
     return record_gearbox(0.0, speed_rpm=1.004 * SPEED_RPM)

@@ -25,8 +25,8 @@ def with_pair(recording: Recording, **changes: object) -> Recording:
     return replace(recording, rig=replace(recording.rig, pairs=(pair,)))
 
 
-def test_estimates_rise_with_the_depth(record: Record, sound: Recording) -> None:
-    found = [crack(estimate_crack(record(depth), reference=sound)) for depth in DEPTHS_MM]
+def test_estimates_rise_with_the_depth(record: Record, healthy: Recording) -> None:
+    found = [crack(estimate_crack(record(depth), reference=healthy)) for depth in DEPTHS_MM]
     depths = [f.depth_mm for f in found]
     assert depths == sorted(depths)
     assert len(set(depths)) == len(depths)
@@ -37,97 +37,97 @@ def test_estimates_rise_with_the_depth(record: Record, sound: Recording) -> None
         assert answer.depth_percent / answer.depth_mm == pytest.approx(found[0].depth_percent / found[0].depth_mm)
 
 
-def test_neither_estimate_nor_bound_falls_from_half_a_millimetre_on(record: Record, sound: Recording) -> None:
-    answers = [estimate_crack(record(depth), reference=sound) for depth in (0.5, 1.0, 3.0, 4.0)]
+def test_neither_estimate_nor_bound_falls_from_half_a_millimetre_on(record: Record, healthy: Recording) -> None:
+    answers = [estimate_crack(record(depth), reference=healthy) for depth in (0.5, 1.0, 3.0, 4.0)]
     sizes = [(a.depth_mm, a.interval_mm[1]) if isinstance(a, CrackEstimate) else (0.0, 0.0) for a in answers]
     assert [size for size, _ in sizes] == sorted(size for size, _ in sizes)
     assert [bound for _, bound in sizes] == sorted(bound for _, bound in sizes)
     assert sum(isinstance(answer, CrackEstimate) for answer in answers) >= 3
 
 
-def test_knowing_the_tip_relief_changes_depth_not_place(record: Record, sound: Recording) -> None:
+def test_knowing_the_tip_relief_changes_depth_not_place(record: Record, healthy: Recording) -> None:
     unknown, known = (
-        crack(estimate_crack(record(2.0), reference=sound, tip_relief_um=relief)) for relief in (None, 12.0)
+        crack(estimate_crack(record(2.0), reference=healthy, tip_relief_um=relief)) for relief in (None, 12.0)
     )
     assert known.tooth == unknown.tooth
     assert known.features["relief_share"] > 0 == unknown.features["relief_share"]
     assert known.depth_mm != unknown.depth_mm
     with pytest.raises(InputError, match="tip_relief_um"):
-        estimate_crack(record(2.0), reference=sound, tip_relief_um=-1.0)
+        estimate_crack(record(2.0), reference=healthy, tip_relief_um=-1.0)
 
 
-def test_gear_and_tooth_are_named(record: Record, sound: Recording) -> None:
-    answer = crack(estimate_crack(record(2.0), reference=sound))
+def test_gear_and_tooth_are_named(record: Record, healthy: Recording) -> None:
+    answer = crack(estimate_crack(record(2.0), reference=healthy))
     assert (answer.gear, answer.tooth, answer.gear_is_certain) == ("stage 1/input", 12, True)
     assert int(answer.angle_deg / 360 * 29) == 11
     assert "tooth 12 of stage 1/input" in answer.text
     assert answer.p_value < 0.05
 
 
-def test_driven_gear_has_an_angle_but_no_tooth(record: Record, sound: Recording) -> None:
-    answer = crack(estimate_crack(record(2.5, gear="driven"), reference=sound))
+def test_driven_gear_has_an_angle_but_no_tooth(record: Record, healthy: Recording) -> None:
+    answer = crack(estimate_crack(record(2.5, gear="driven"), reference=healthy))
     assert (answer.shaft, answer.tooth) == ("output", None)
     assert any("no mark on this shaft" in reason for reason in answer.reasons)
 
 
-def test_sound_gears_are_bounded(record: Record, sound: Recording) -> None:
-    answer = estimate_crack(record(0.0), reference=sound)
+def test_sound_gears_are_bounded(record: Record, healthy: Recording) -> None:
+    answer = estimate_crack(record(0.0), reference=healthy)
     assert isinstance(answer, NoCrackSeen)
     assert 0 < answer.below_mm < 3
     assert "No crack seen: below" in answer.text
 
 
-def test_float32_and_another_length_say_the_same(record: Record, sound: Recording) -> None:
+def test_float32_and_another_length_say_the_same(record: Record, healthy: Recording) -> None:
     whole = record(2.0)
-    expected = crack(estimate_crack(whole, reference=sound))
+    expected = crack(estimate_crack(whole, reference=healthy))
     single = replace(whole, samples=whole.samples.astype(np.float32))
     shorter = replace(whole, samples=whole.samples[:, :-1])
     for other in (single, shorter):
-        answer = crack(estimate_crack(other, reference=sound))
+        answer = crack(estimate_crack(other, reference=healthy))
         assert answer.depth_mm == pytest.approx(expected.depth_mm, rel=1e-3)
         assert answer.tooth == expected.tooth
 
 
-def test_gain_does_not_matter(record: Record, sound: Recording) -> None:
+def test_gain_does_not_matter(record: Record, healthy: Recording) -> None:
     def louder(recording: Recording) -> Recording:
         samples = np.array(recording.samples)
         samples[:2] *= 7.0
         return replace(recording, samples=samples)
 
-    expected = crack(estimate_crack(record(2.0), reference=sound))
-    answer = crack(estimate_crack(louder(record(2.0)), reference=louder(sound)))
+    expected = crack(estimate_crack(record(2.0), reference=healthy))
+    answer = crack(estimate_crack(louder(record(2.0)), reference=louder(healthy)))
     assert answer.depth_mm == pytest.approx(expected.depth_mm, rel=1e-6)
 
 
 @pytest.mark.parametrize("gain", [0.5, 2.0, 1 / 9.81])
 def test_a_reference_with_another_gain_is_refused_and_makes_no_crack(
-    record: Record, sound: Recording, gain: float
+    record: Record, healthy: Recording, gain: float
 ) -> None:
-    samples = np.array(sound.samples)
+    samples = np.array(healthy.samples)
     samples[1] *= gain
     side = "above" if gain < 1 else "below"
-    with pytest.raises(RefusalError, match=f"dB {side} that of the reference in channel '{sound.channel_names[1]}'"):
-        estimate_crack(record(0.0), reference=replace(sound, samples=samples))
+    with pytest.raises(RefusalError, match=f"dB {side} that of the reference in channel '{healthy.channel_names[1]}'"):
+        estimate_crack(record(0.0), reference=replace(healthy, samples=samples))
 
 
-def test_a_deep_crack_in_the_reference_is_refused(record: Record, sound: Recording) -> None:
+def test_a_deep_crack_in_the_reference_is_refused(record: Record, healthy: Recording) -> None:
     with pytest.raises(RefusalError, match="in the reference, not in the recording"):
-        estimate_crack(sound, reference=record(4.0))
+        estimate_crack(healthy, reference=record(4.0))
 
 
-def test_a_small_crack_in_the_reference_makes_none(record: Record, sound: Recording) -> None:
+def test_a_small_crack_in_the_reference_makes_none(record: Record, healthy: Recording) -> None:
     with pytest.raises(RefusalError, match="no crack stands out"):
-        estimate_crack(sound, reference=record(1.0))
+        estimate_crack(healthy, reference=record(1.0))
 
 
-def test_a_reference_of_another_machine_or_load_is_named_first(record: Record, sound: Recording) -> None:
-    assert sound.rig is not None
+def test_a_reference_of_another_machine_or_load_is_named_first(record: Record, healthy: Recording) -> None:
+    assert healthy.rig is not None
     with pytest.raises(RefusalError, match=r"another machine: its teeth are 20/47.*29/47"):
-        estimate_crack(record(2.0), reference=with_pair(sound, driver_teeth=20))
-    point = sound.rig.operating_point
+        estimate_crack(record(2.0), reference=with_pair(healthy, driver_teeth=20))
+    point = healthy.rig.operating_point
     other = replace(point, torque_nm=1.2 * (point.torque_nm or 0.0))
     with pytest.raises(RefusalError, match="N m, the recording at"):
-        estimate_crack(record(2.0), reference=replace(sound, rig=replace(sound.rig, operating_point=other)))
+        estimate_crack(record(2.0), reference=replace(healthy, rig=replace(healthy.rig, operating_point=other)))
 
 
 @pytest.mark.parametrize(
@@ -145,14 +145,14 @@ def test_rigs_beyond_the_calibration_are_refused(record: Record, changes: dict[s
         estimate_crack(with_pair(record(2.0), **changes))
 
 
-def test_a_missing_torque_is_asked_for_and_may_be_given(record: Record, sound: Recording) -> None:
+def test_a_missing_torque_is_asked_for_and_may_be_given(record: Record, healthy: Recording) -> None:
     recording = record(2.0)
     assert recording.rig is not None
     bare = replace(recording, rig=replace(recording.rig, operating_point=OperatingPoint("input", SPEED_RPM)))
     with pytest.raises(RefusalError, match="torque_nm"):
         estimate_crack(bare)
     torque = recording.rig.operating_point.torque_nm
-    assert estimate_crack(bare, reference=sound, torque_nm=torque) == estimate_crack(recording, reference=sound)
+    assert estimate_crack(bare, reference=healthy, torque_nm=torque) == estimate_crack(recording, reference=healthy)
 
 
 def test_short_slow_and_other_recordings_are_refused(record: Record) -> None:

@@ -21,13 +21,13 @@ def model(name: str) -> DepthModel:
 def test_the_file_is_whole(name: str) -> None:
     m = model(name)
     assert m.quantiles[0] < 0 < m.quantiles[1]
-    assert np.all(np.diff(m.sound_scores) >= 0)
+    assert np.all(np.diff(m.healthy_scores) >= 0)
     assert np.all(np.linalg.eigvalsh(m.precision) > -1e-9)
     assert np.all(m.lowest < m.highest)
     assert 0 < m.percent_range[0] < m.percent_range[1] < 100
-    # The threshold leaves the stated part of the sound pairs above it.
-    above = np.mean(m.sound_scores > m.threshold)
-    assert above == pytest.approx(load_calibration().provenance["false_alarms"], abs=1.0 / len(m.sound_scores))
+    # The threshold leaves the stated part of the healthy pairs above it.
+    above = np.mean(m.healthy_scores > m.threshold)
+    assert above == pytest.approx(load_calibration().provenance["false_alarms"], abs=1.0 / len(m.healthy_scores))
 
 
 def test_the_file_says_where_it_comes_from() -> None:
@@ -58,10 +58,10 @@ def test_the_least_visible_crack_is_just_visible(name: str) -> None:
 @MODELS
 def test_p_values_count_sound_pairs(name: str) -> None:
     m = model(name)
-    n = len(m.sound_scores)
+    n = len(m.healthy_scores)
     assert m.p_value(np.inf) == pytest.approx(1 / (n + 1))
     assert m.p_value(-np.inf) == 1.0
-    assert m.p_value(float(m.sound_scores[-1])) == pytest.approx(2 / (n + 1))
+    assert m.p_value(float(m.healthy_scores[-1])) == pytest.approx(2 / (n + 1))
 
 
 def test_what_is_unlike_the_calibration_is_named() -> None:
