@@ -14,8 +14,19 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
+from gearsig.orders.vold_kalman._banded import eliminate, rotate, solve_band
 from gearsig.orders.vold_kalman._grouping import Group
-from gearsig.orders.vold_kalman._tracks import HALF_POWER, Generation, cosine_and_sine, envelope_weight, waveform_weight
+from gearsig.orders.vold_kalman._single import envelope_alone, waveform_alone
+from gearsig.orders.vold_kalman._tracks import (
+    HALF_POWER,
+    Generation,
+    cosine_and_sine,
+    envelope_weight,
+    waveform_weight,
+    write_envelope,
+    write_modulated,
+    write_phasors,
+)
 
 # --------------------
 # Adding up the cells' parts of the coarse normal equations.
@@ -23,6 +34,8 @@ from gearsig.orders.vold_kalman._tracks import HALF_POWER, Generation, cosine_an
 
 
 Array = NDArray[Any]
+ComplexArray = NDArray[np.complex128]
+BoolArray = NDArray[np.bool_]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -58,16 +71,13 @@ def add_projections(right: Array, k: int, first: int, projected: Array) -> None:
 # --------------------
 
 
-ComplexArray = NDArray[np.complex128]
-BoolArray = NDArray[np.bool_]
-
 DEGREE = 5
 """Of the spline: 2p - 1 for p = 3, as the error's order 2p asks; with p = 2 it is more than needed."""
 PIECES = DEGREE + 1
 CELL_ANGLE = {2: 0.0234, 3: 0.0993}
 """d·ω_h for two and three poles where truncation 2.4 (dω_h/π)^2p and rounding ~10 ε/(dω_h)^2p are equal."""
-LARGEST_CELL = 2**16
-LARGEST_INT64_CELL = 2600
+MAX_CELL = 2**16
+MAX_INT64_CELL = 2600
 """Up to here 66 d⁵, the largest value of 5! d⁵ φ, fits 64 bits; that the sums before it wrap around does no harm."""
 CHUNK_SAMPLES = 2**15
 
@@ -79,7 +89,7 @@ def samples_per_cell(lowest_bandwidth: float, highest_bandwidth: float, p: int) 
     """
     if p not in CELL_ANGLE:
         return 0
-    return min(LARGEST_CELL, int(CELL_ANGLE[p] / (np.pi * np.sqrt(lowest_bandwidth * highest_bandwidth))))
+    return min(MAX_CELL, int(CELL_ANGLE[p] / (np.pi * np.sqrt(lowest_bandwidth * highest_bandwidth))))
 
 
 def expected_error(lowest_bandwidth: float, highest_bandwidth: float, d: int, p: int) -> float:
@@ -125,7 +135,7 @@ def solve_by_splines(
     _add_structure(matrix, unknown_weights, differences, len(y), p)
     # A last knot at the last sample leaves a spline that vanishes on all samples.
     n_splines = -(-(len(y) - 1) // d) + DEGREE
-    coefficients = _solved(matrix[:, :n_splines], right[:n_splines])
+    coefficients = _solve_spline_system(matrix[:, :n_splines], right[:n_splines])
     envelope = np.asarray(coefficients.view(np.complex128) if mirror else 2.0 * coefficients, dtype=np.complex128)
     return _sampled(envelope, basis, len(y), len(right))
 
@@ -137,7 +147,7 @@ def sampled_basis(d: int, p: int) -> tuple[FloatArray, FloatArray]:
     of a cell reach into the spline that begins with the next cell (column 6). Integers throughout: the difference of
     rounded values would have few digits left.
     """
-    kind: Any = np.int64 if d < LARGEST_INT64_CELL else np.object_
+    kind: Any = np.int64 if d < MAX_INT64_CELL else np.object_
     grid: NDArray[Any] = np.arange((PIECES + 2) * d).astype(kind)
     powers = grid * grid * grid * grid * grid
     spline: NDArray[Any] = np.zeros((PIECES + 2) * d, dtype=kind)  # one empty cell before, one after
@@ -177,77 +187,69 @@ def _data_terms(
         np.float64 if mirror or n_orders == 1 else np.complex128,
     )
     right = np.zeros((n_cells + PIECES, n_unknowns), np.float64 if mirror else np.complex128)
-    add = _add_real_terms if mirror else _add_complex_terms
     per_chunk = max(1, CHUNK_SAMPLES // d)
     for first in range(0, n_cells, per_chunk):
         last = min(first + per_chunk, n_cells)
         samples = slice(first * d, min(last * d, n))
-        values, phasors = _padded_chunk(y, cycles, active, samples, (last - first, d))
+        values, regressors = _padded_chunk(y, cycles, active, samples, (last - first, d), mirror=mirror)
         # Where cos² + sin² is 1 throughout, its products are the same in every cell.
         whole = np.tile(products.sum(axis=0), (last - first, 1)) if active is None and last * d <= n else None
-        add(matrix, right, first, values, phasors, basis, pairs, products, whole)
+        _add_data_terms(matrix, right, first, values, regressors, basis, pairs, products, whole)
     return matrix, right
 
 
-def _add_complex_terms(
+def _add_data_terms(
     matrix: NDArray[Any],
     right: NDArray[Any],
     first: int,
     values: FloatArray,
-    phasors: list[tuple[FloatArray, FloatArray]],
+    regressors: list[NDArray[Any]],
     basis: FloatArray,
     pairs: NDArray[np.int64],
     products: FloatArray,
     whole: FloatArray | None,
 ) -> None:
-    """Add a chunk's part for the complex unknowns: e_k* y on the right, e_k* e_m in the matrix."""
-    for k, (c_k, s_k) in enumerate(phasors):
-        add_projections(right, k, first, (values * c_k) @ basis - 1j * ((values * s_k) @ basis))
-        own = whole if whole is not None else (c_k * c_k + s_k * s_k) @ products
-        add_products(matrix, k, k, first, pairs, own)
-        for m, (c_m, s_m) in enumerate(phasors[:k]):
-            coupling = (c_k * c_m + s_k * s_m) @ products + 1j * ((c_k * s_m - s_k * c_m) @ products)
-            add_products(matrix, k, m, first, pairs, coupling)
+    """Add a chunk's part: e_k* y on the right, e_k* e_m in the matrix, e a phasor, or cos and -sin of each in turn."""
+    square: FloatArray = np.zeros(0)
+    for k, e_k in enumerate(regressors):
+        add_projections(right, k, first, _summed(values * e_k.conj(), basis))
+        for m, e_m in enumerate(regressors[:k]):
+            add_products(matrix, k, m, first, pairs, _summed(e_k.conj() * e_m, products))
+        if whole is not None and np.iscomplexobj(e_k):
+            square = whole
+        elif whole is not None and k % 2:
+            square = whole - square
+        else:
+            square = _summed(e_k.real**2 + e_k.imag**2 if np.iscomplexobj(e_k) else e_k * e_k, products)
+        add_products(matrix, k, k, first, pairs, square)
 
 
-def _add_real_terms(
-    matrix: NDArray[Any],
-    right: NDArray[Any],
-    first: int,
-    values: FloatArray,
-    phasors: list[tuple[FloatArray, FloatArray]],
-    basis: FloatArray,
-    pairs: NDArray[np.int64],
-    products: FloatArray,
-    whole: FloatArray | None,
-) -> None:
-    """Add a chunk's part for the real unknowns: Re(a e^{iΘ}) = u cos Θ - v sin Θ."""
-    regressors = [part for c, s in phasors for part in (c, -s)]
-    own: FloatArray = np.zeros(0)
-    for k, of_k in enumerate(regressors):
-        add_projections(right, k, first, (values * of_k) @ basis)
-        for m, of_m in enumerate(regressors[:k]):
-            add_products(matrix, k, m, first, pairs, (of_k * of_m) @ products)
-        own = whole - own if whole is not None and k % 2 else (of_k * of_k) @ products
-        add_products(matrix, k, k, first, pairs, own)
+def _summed(samples: NDArray[Any], columns: FloatArray) -> NDArray[Any]:
+    """Return each cell's sums over its samples, weighted by real columns: not a complex product with zeros in it."""
+    if np.iscomplexobj(samples):
+        return np.asarray(samples.real @ columns + 1j * (samples.imag @ columns))
+    return np.asarray(samples @ columns)
 
 
 def _padded_chunk(
-    y: FloatArray, cycles: FloatArray, active: BoolArray | None, samples: slice, shape: tuple[int, int]
-) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return the signal and each order's (cosine, sine) as (cell, sample in it); zero past the end, where inactive."""
+    y: FloatArray, cycles: FloatArray, active: BoolArray | None, samples: slice, shape: tuple[int, int], *, mirror: bool
+) -> tuple[FloatArray, list[NDArray[Any]]]:
+    """Return the signal and the regressors as (cell, sample in it); zero past the end, where inactive.
+
+    Phasors, or with mirror images Re(a e^{iΘ}) = u cos Θ - v sin Θ: cosine and minus sine of each order in turn.
+    """
     length = samples.stop - samples.start
     values: FloatArray = np.zeros(shape)
     values.reshape(-1)[:length] = y[samples]
-    phasors: list[tuple[FloatArray, FloatArray]] = []
+    regressors: list[NDArray[Any]] = []
     for k in range(len(cycles)):
         cosine, sine = np.zeros(shape), np.zeros(shape)
         cosine_and_sine(cycles[k, samples], cosine.reshape(-1)[:length], sine.reshape(-1)[:length])
         if active is not None:
             for part in (cosine, sine):
                 part.reshape(-1)[:length] *= active[k, samples]
-        phasors.append((cosine, sine))
-    return values, phasors
+        regressors.extend((cosine, -sine) if mirror else (cosine + 1j * sine,))
+    return values, regressors
 
 
 def _add_structure(matrix: NDArray[Any], weights: FloatArray, differences: FloatArray, n: int, p: int) -> None:
@@ -270,7 +272,7 @@ def _add_structure(matrix: NDArray[Any], weights: FloatArray, differences: Float
             add_products(matrix, k, k, first, pairs, grams)
 
 
-def _solved(matrix: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
+def _solve_spline_system(matrix: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
     """Solve the Hermitian banded system by Cholesky's method; unknowns ordered by spline, then by order.
 
     A real matrix takes real and imaginary part of the right-hand side as two.
@@ -318,7 +320,7 @@ def _sampled(coefficients: ComplexArray, basis: FloatArray, n: int, n_splines: i
 # --------------------
 
 
-POINTS_PER_STRETCH = 16
+POINTS_PER_SEGMENT = 16
 GROWTH = 1.5
 
 
@@ -326,8 +328,8 @@ def closeness(cycles: FloatArray, active: NDArray[np.bool_] | None, bandwidths: 
     """Return the factor by which rounding errors grow, 1 where no two orders stay within a bandwidth.
 
     Two orders at a distance g below the bandwidth B can exchange what they hold at the price of (g/B)^2p, which divides
-    the smallest eigenvalue of the normal equations. Within a stretch W the price is that of the distance's rms or of
-    going up and down again in W, p/W, whichever is higher (factor from trials); the cheapest stretch counts. Orders
+    the smallest eigenvalue of the normal equations. Within a segment W the price is that of the distance's rms or of
+    going up and down again in W, p/W, whichever is higher (factor from trials); the cheapest segment counts. Orders
     that cross swiftly are close for too short a time to exchange much.
 
     Parameters
@@ -352,10 +354,10 @@ def closeness(cycles: FloatArray, active: NDArray[np.bool_] | None, bandwidths: 
 
 def _smallest_distance(difference: FloatArray, width: float, p: int) -> float:
     """Return the smallest of max(p/W, rms slope of the phase difference over W samples), W from 1/width on."""
-    smallest, stretch = np.inf, 1.0 / width
+    smallest, segment = np.inf, 1.0 / width
     while len(difference) > 1:
-        n = min(int(stretch) + 1, len(difference) - 1)
-        step = max(1, n // POINTS_PER_STRETCH)
+        n = min(int(segment) + 1, len(difference) - 1)
+        step = max(1, n // POINTS_PER_SEGMENT)
         slopes = np.diff(difference[::step]) / step
         m = min(len(slopes), max(1, round(n / step)))
         total = np.concatenate([[0.0], np.cumsum(slopes**2)])
@@ -363,22 +365,22 @@ def _smallest_distance(difference: FloatArray, width: float, p: int) -> float:
         smallest = min(smallest, max(p / n, rms))
         if n >= len(difference) - 1 or rms > smallest:
             break
-        stretch *= GROWTH
+        segment *= GROWTH
     return float(smallest)
 
 
-Way = Literal["splines", "elimination", "rotations"]
+Solver = Literal["splines", "elimination", "rotations"]
 
-STRONGEST_ELIMINATED = 1.5e5
+MAX_ELIMINATED_STRENGTH = 1.5e5
 """r·|D| up to which the normal equations are solved: their rounding error is below 5e-7 there."""
-SMALLEST_CELL = 3
+MIN_CELL = 3
 """Samples. Below, the band is so wide that the coarse grid saves nothing, and elimination loses no digits."""
 
-CHEAP_CELL, MOST_TOGETHER = 16, 8
+CHEAP_CELL, MAX_TOGETHER = 16, 8
 """Samples per cell from which, and orders up to which, the coarse grid is faster than several solutions (trials)."""
 ACCURATE = 1e-7
 ENOUGH = 5e-7
-"""Expected error up to which the fastest way is taken."""
+"""Expected error up to which the fastest solver is taken."""
 
 
 def solve_envelopes(
@@ -430,15 +432,12 @@ def solve_envelopes(
     # A row of the structural equation holds p + 1 samples; its weight is that of the middle one.
     weights = envelope_weight(_of_rows(bandwidths, n, p), p)
     if len(cycles) == 1:
-        from gearsig.orders.vold_kalman._single import envelope_alone
-
         return envelope_alone(y, cycles[0], None if active is None else active[0], weights[0], p, mirror=mirror)[None]
-    way, _ = chosen_way(bandwidths, p, closeness(cycles, active, bandwidths, p))
-    if way == "splines":
+    solver, _ = chosen_solver(bandwidths, p, closeness(cycles, active, bandwidths, p))
+    if solver == "splines":
         return solve_by_splines(y, cycles, active, weights, p, cell_of(bandwidths, p), mirror=mirror)
     weights = np.broadcast_to(weights, (len(cycles), n - p))
-    solve = _solved_with_mirror_images if mirror else _solved_as_in_textbooks
-    return solve(y, cycles, active, weights, p, way)
+    return _solve_envelopes_by_samples(y, cycles, active, weights, p, solver, mirror=mirror)
 
 
 def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None, bandwidths: FloatArray) -> FloatArray:
@@ -462,8 +461,6 @@ def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None,
     """
     width = _of_rows(bandwidths, len(y), 2)
     if len(cycles) == 1:
-        from gearsig.orders.vold_kalman._single import waveform_alone
-
         return waveform_alone(y, cycles[0], None if active is None else active[0], width[0])[None]
     frequency = (cycles[:, 2:] - cycles[:, :-2]) / 2.0
     # Outside the active part the order may stand still: any finite weight does there.
@@ -473,41 +470,38 @@ def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None,
     data = np.ones(cycles.shape) if active is None else active.astype(np.float64)
     weights = waveform_weight(width, inside)
     # |D|, the largest gain of the stencil, is 2^p for differences and for the first generation at most that.
-    way = _sample_by_sample(4.0 * float(weights.max()), closeness(cycles, active, bandwidths, 2))[0]
-    return solve_sample_by_sample(data, y.astype(np.float64), weights, stencils, way)
+    solver = _sample_by_sample(4.0 * float(weights.max()), closeness(cycles, active, bandwidths, 2))[0]
+    return _solve_by_samples(data, y.astype(np.float64), weights, stencils, solver)
 
 
-def solve_sample_by_sample(
-    data: NDArray[Any], observed: NDArray[Any], weights: FloatArray, stencils: FloatArray, way: Way
+def _solve_by_samples(
+    data: NDArray[Any], observed: NDArray[Any], weights: FloatArray, stencils: FloatArray, solver: Solver
 ) -> NDArray[Any]:
-    """Solve a banded least-squares problem by elimination or rotations."""
-    from gearsig.orders.vold_kalman._banded import eliminate, rotate, solve_band
-
-    return solve_band(data, observed, weights, stencils, forward=eliminate if way == "elimination" else rotate)
+    return solve_band(data, observed, weights, stencils, forward=eliminate if solver == "elimination" else rotate)
 
 
 def cell_of(bandwidths: FloatArray, p: int) -> int:
     """Return the samples per cell of the coarse grid; 0 where the problem is solved sample by sample."""
     d = samples_per_cell(float(bandwidths.min()), float(bandwidths.max()), p)
-    return d if d >= SMALLEST_CELL else 0
+    return d if d >= MIN_CELL else 0
 
 
-def chosen_way(bandwidths: FloatArray, p: int, close: float) -> tuple[Way, float]:
+def chosen_solver(bandwidths: FloatArray, p: int, close: float) -> tuple[Solver, float]:
     """Return how several orders of the second generation are solved for, and the expected error.
 
     Relative to the largest component of the signal; `close` is the factor of `closeness`.
     """
     d = cell_of(bandwidths, p)
-    ways = [_sample_by_sample(2.0**p * float(envelope_weight(bandwidths.min()[None], p)[0]), close)]
+    solvers = [_sample_by_sample(2.0**p * float(envelope_weight(bandwidths.min()[None], p)[0]), close)]
     if d:
-        ways.insert(0, ("splines", close * expected_error(float(bandwidths.min()), float(bandwidths.max()), d, p)))
-    return next((way for way in ways if way[1] <= ENOUGH), min(ways, key=lambda way: way[1]))
+        solvers.insert(0, ("splines", close * expected_error(float(bandwidths.min()), float(bandwidths.max()), d, p)))
+    return next((option for option in solvers if option[1] <= ENOUGH), min(solvers, key=lambda option: option[1]))
 
 
-def _sample_by_sample(strength: float, close: float) -> tuple[Way, float]:
+def _sample_by_sample(strength: float, close: float) -> tuple[Solver, float]:
     """Return elimination or rotations and their error for r·|D|, the former's growing with its square (trials)."""
     elimination, rotations = 2e-17 * strength**2 * close, 1e-15 * strength * close**0.5
-    if strength <= STRONGEST_ELIMINATED and elimination <= max(ENOUGH, rotations):
+    if strength <= MAX_ELIMINATED_STRENGTH and elimination <= max(ENOUGH, rotations):
         return "elimination", elimination
     return "rotations", rotations
 
@@ -516,12 +510,12 @@ def accuracy_of(cycles: FloatArray, active: BoolArray | None, bandwidths: FloatA
     """Return the expected error of `solve_envelopes`, relative to the largest component of the signal."""
     if len(bandwidths) == 1:
         return error_alone(bandwidths)
-    return chosen_way(bandwidths, p, closeness(cycles, active, bandwidths, p))[1]
+    return chosen_solver(bandwidths, p, closeness(cycles, active, bandwidths, p))[1]
 
 
 def cheap_together(cycles: FloatArray, active: BoolArray | None, bandwidths: FloatArray, p: int) -> bool:
     """Return whether one solution of the second generation for all orders takes less time than several for groups."""
-    few = 1 < len(bandwidths) <= MOST_TOGETHER
+    few = 1 < len(bandwidths) <= MAX_TOGETHER
     return few and cell_of(bandwidths, p) >= CHEAP_CELL and accuracy_of(cycles, active, bandwidths, p) <= ACCURATE
 
 
@@ -547,48 +541,33 @@ def envelopes_of_waveforms(x: FloatArray, cycles: FloatArray) -> ComplexArray:
     For constant a the neighbours are x(n±1) = x cos α± ∓ q sin α±, α the phase step; both give the quadrature q by
     least squares, and a = (x + iq) e^{-2πi c}.
     """
-    from gearsig.orders.vold_kalman._tracks import write_envelope
-
     a = np.empty(x.shape, np.complex128)
     for waveform, angle, envelope in zip(x, cycles, a, strict=True):
         write_envelope(np.ascontiguousarray(waveform), np.ascontiguousarray(angle), envelope)
     return a
 
 
-def phasors_of(cycles: FloatArray) -> ComplexArray:
-    """Return e^{2πi c}, (n_orders, n)."""
-    from gearsig.orders.vold_kalman._tracks import write_phasors
-
-    phasors = np.empty(cycles.shape, np.complex128)
-    for row, angle in zip(phasors, cycles, strict=True):
+def _solve_envelopes_by_samples(
+    y: FloatArray,
+    cycles: FloatArray,
+    active: BoolArray | None,
+    weights: FloatArray,
+    p: int,
+    solver: Solver,
+    *,
+    mirror: bool,
+) -> ComplexArray:
+    """Solve for the complex x, or with mirror images for the real coefficients of cos and -sin, as by splines."""
+    data: NDArray[Any] = np.empty(cycles.shape, np.complex128)
+    for row, angle in zip(data, cycles, strict=True):
         write_phasors(np.ascontiguousarray(angle), row)
-    return phasors
-
-
-def _solved_with_mirror_images(
-    y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, p: int, way: Way
-) -> ComplexArray:
-    """Sample by sample, for the real coefficients u, v of cos and -sin: u + iv = 2x, with weight r/√2 each."""
-    data = np.empty((2 * len(cycles), len(y)))
-    for k in range(len(cycles)):
-        phasor = phasors_of(cycles[k : k + 1])[0]
-        data[2 * k], data[2 * k + 1] = phasor.real, -phasor.imag
-    if active is not None:
-        data *= np.repeat(active, 2, axis=0)
-    weights = np.repeat(weights, 2, axis=0) / 2**0.5
-    x = solve_sample_by_sample(data, y.astype(np.float64), weights, _differences(weights, p), way)
-    return np.asarray(x[::2] + 1j * x[1::2], dtype=np.complex128)
-
-
-def _solved_as_in_textbooks(
-    y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, p: int, way: Way
-) -> ComplexArray:
-    """Sample by sample, for the complex x."""
-    data: NDArray[Any] = phasors_of(cycles)
     if active is not None:
         data *= active
-    x = solve_sample_by_sample(data, y.astype(np.complex128), weights, _differences(weights, p), way)
-    return np.asarray(2.0 * x, dtype=np.complex128)
+    if mirror:
+        data = np.stack([data.real, -data.imag], axis=1).reshape(-1, len(y))
+        weights = np.repeat(weights, 2, axis=0) / 2**0.5
+    x = _solve_by_samples(data, y.astype(data.dtype), weights, _differences(weights, p), solver)
+    return np.asarray(x[::2] + 1j * x[1::2] if mirror else 2.0 * x, dtype=np.complex128)
 
 
 def _differences(weights: FloatArray, p: int) -> FloatArray:
@@ -606,14 +585,11 @@ def _of_rows(bandwidths: FloatArray, n: int, p: int) -> FloatArray:
 
 
 # --------------------
-# Groups of orders solved for in turn, each on what the others leave of the signal.
+# Groups of orders solved for in turn, each on the signal less the others' waveforms.
 # --------------------
 
 
 Rows = Group | slice
-MOST_SWEEPS = 20
-VOLD_KALMAN_SWEEPS_ENOUGH = 2e-7
-"""Change of any waveform by a further sweep, as a share of the signal's largest value, that is not worth it."""
 
 
 @dataclass(frozen=True)
@@ -631,7 +607,7 @@ class Problem:
 def solve_groups(
     y: FloatArray, problem: Problem, groups: Sequence[Group], *, share: bool
 ) -> tuple[ComplexArray, FloatArray, float]:
-    """Return envelopes (nan where not valid), waveforms (0 there), and the error that is left relative to the signal.
+    """Return envelopes (nan where not valid), waveforms (0 there), and the remaining error relative to the signal.
 
     Without `share`, each group sees the whole signal, and takes what leaks through its bands of the others: near the
     ends, that is some percent even of far ones. With it, each sees the signal less the others' waveforms, in several
@@ -644,25 +620,25 @@ def solve_groups(
     rows = [_rows(group) for group in groups]
     if len(groups) == 1 or not share:
         for g in rows:
-            solutions[g], waveforms[g] = _solved_vold_kalman_sweeps(y, problem, g)
+            solutions[g], waveforms[g] = _solve_group(y, problem, g)
         return _envelopes(solutions, problem), waveforms, 0.0
     rest = y.astype(np.float64)
     largest = float(np.abs(rest).max()) or 1.0
-    before, left = 1.0, 1.0
-    for _ in range(MOST_SWEEPS):
+    before, error = 1.0, 1.0
+    for _ in range(20):
         change = 0.0
         for g in rows:
             rest += waveforms[g].sum(axis=0)
-            solutions[g], new = _solved_vold_kalman_sweeps(rest, problem, g)
+            solutions[g], new = _solve_group(rest, problem, g)
             change = max(change, float(np.abs(new - waveforms[g]).max()) / largest)
             waveforms[g] = new
             rest -= new.sum(axis=0)
         # Each sweep changes the waveforms by the same fraction of what the last one did.
-        left = change * min(1.0, change / before)
+        error = change * min(1.0, change / before)
         before = change
-        if left < VOLD_KALMAN_SWEEPS_ENOUGH:
+        if error < 2e-7:  # of the signal's largest value: not worth a further sweep
             break
-    return _envelopes(solutions, problem), waveforms, left
+    return _envelopes(solutions, problem), waveforms, error
 
 
 def _rows(group: Group) -> Rows:
@@ -670,7 +646,7 @@ def _rows(group: Group) -> Rows:
     return slice(int(group[0]), int(group[-1]) + 1) if np.all(np.diff(group) == 1) else group
 
 
-def _solved_vold_kalman_sweeps(y: FloatArray, problem: Problem, g: Rows) -> tuple[NDArray[Any], FloatArray]:
+def _solve_group(y: FloatArray, problem: Problem, g: Rows) -> tuple[NDArray[Any], FloatArray]:
     """Return the solution of one group (envelopes, or waveforms of the first generation), and its waveforms.
 
     Where an order is not valid, the solution goes on all the same, and the waveform is 0.
@@ -680,8 +656,6 @@ def _solved_vold_kalman_sweeps(y: FloatArray, problem: Problem, g: Rows) -> tupl
     if problem.generation == "first":
         continued = solve_waveforms(y, cycles, active, widths)
         return continued, continued if active is None else np.where(valid, continued, 0.0)
-    from gearsig.orders.vold_kalman._tracks import write_modulated
-
     envelopes = solve_envelopes(y, cycles, active, widths, problem.p, mirror=problem.mirror)
     waveforms = np.empty(cycles.shape)
     for envelope, angle, out in zip(envelopes, cycles, waveforms, strict=True):
