@@ -76,10 +76,10 @@ class Measured:
 
 def measured(run: SteadyRun, branch: Branch, *, phase_cycles: float = 0.0, with_kind: bool = False) -> Measured:
     """Take the Poincaré points of a steady run and, for some seconds more, the kind of motion."""
-    from gearsig.phase import kind_of_motion, locked_section, section_period
+    from gearsig.phase import kind_of_motion, poincare_section, section_period
 
     portrait, lock = portrait_of(run, branch), lock_of(run, branch)
-    section = locked_section(portrait, lock, phase_cycles=phase_cycles)
+    section = poincare_section(portrait, lock, phase_cycles=phase_cycles)
     kind = kind_of_motion(portrait, lock, noise_free=_is_noise_free(run, branch)) if with_kind else None
     return Measured(
         run.value,

@@ -34,6 +34,9 @@ if TYPE_CHECKING:
     from gearsig.angle import resample_to_angle as resample_to_angle
     from gearsig.comparison import Comparison as Comparison
     from gearsig.comparison import compare as compare
+    from gearsig.decompose import denoise as denoise
+    from gearsig.decompose import suggest_modes as suggest_modes
+    from gearsig.decompose import vmd as vmd
     from gearsig.diagnosis import Analysis as Analysis
     from gearsig.diagnosis import AnalysisSettings as AnalysisSettings
     from gearsig.diagnosis import CannotTell as CannotTell
@@ -45,11 +48,20 @@ if TYPE_CHECKING:
     from gearsig.gap import diagnose_gap as diagnose_gap
     from gearsig.indicators import gear_indicators as gear_indicators
     from gearsig.indicators import time_indicators as time_indicators
+    from gearsig.motion import estimate_forces as estimate_forces
+    from gearsig.motion import examine_start_stop as examine_start_stop
+    from gearsig.motion import measure_motion as measure_motion
     from gearsig.orders import order_map as order_map
     from gearsig.orders import order_spectrum as order_spectrum
     from gearsig.orders import synchronous_average as synchronous_average
     from gearsig.orders import track_orders as track_orders
     from gearsig.orders import track_vold_kalman as track_vold_kalman
+    from gearsig.phase import delay_embedding as delay_embedding
+    from gearsig.phase import kind_of_motion as kind_of_motion
+    from gearsig.phase import largest_lyapunov_exponent as largest_lyapunov_exponent
+    from gearsig.phase import phase_plane as phase_plane
+    from gearsig.phase import poincare_section as poincare_section
+    from gearsig.phase import recurrence_plot as recurrence_plot
     from gearsig.prepared import PreparedRecording as PreparedRecording
     from gearsig.recording import Channel as Channel
     from gearsig.recording import Recording as Recording
@@ -78,6 +90,11 @@ if TYPE_CHECKING:
     from gearsig.spectra import kurtogram as kurtogram
     from gearsig.spectra import power_density as power_density
     from gearsig.spectra import spectral_coherence as spectral_coherence
+    from gearsig.timefreq import cwt as cwt
+    from gearsig.timefreq import ridges as ridges
+    from gearsig.timefreq import squeezed_cwt as squeezed_cwt
+    from gearsig.timefreq import squeezed_stft as squeezed_stft
+    from gearsig.timefreq import stft as stft
 
 __version__ = "0.1.0"
 

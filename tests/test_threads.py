@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gearsig.angle import ShaftAngle, resample_to_angle
-from gearsig.decompose import VmdSettings, denoise_channel, suggest_modes, variational_modes
+from gearsig.decompose import VmdSettings, denoise, suggest_modes, variational_modes
 from gearsig.orders import order_map, track_vold_kalman
 from gearsig.phase import phase_plane
 from gearsig.plot import kurtogram_figure, time_frequency_figure
@@ -70,7 +70,7 @@ METHODS = {
     "suggested modes": lambda r, _: np.array(
         suggest_modes(r.values("a"), FS, most_modes=2, penalties=(2000.0,), longest=2048).chosen.centres
     ),
-    "denoising": lambda r, _: denoise_channel(r, "a").values,
+    "denoising": lambda r, _: denoise(r, "a").values,
     "orders": lambda r, a: track_vold_kalman(r, "a", (29.0, 30.0), bandwidth_hz=5, shaft_angle=a).residual,
     "order map": lambda r, a: order_map(resample_to_angle(r, a), "a").values,
     "phase plane": lambda r, _: phase_plane(r, "a", low_cut_hz=50.0).points,

@@ -24,8 +24,8 @@ _LARGE_MISMATCH = 0.5
 
 def vmd(
     signal: Source,
+    channel: str | float | None,
     settings: VmdSettings | int,
-    channel: str | None = None,
     *,
     engine: VmdEngine | None = None,
     rng: np.random.Generator | None = None,
@@ -34,13 +34,13 @@ def vmd(
 
     Parameters
     ----------
-    signal : Recording, AngleSignal or UniformSignal
+    signal : Recording, AngleSignal, UniformSignal or array, (n_samples,)
         Over angle, centres and bandwidths are orders: at variable speed an order stays one narrow mode, where over time
-        it would be smeared. Plain samples: `UniformSignal(values, sampling_rate_hz)`.
+        it would be smeared.
+    channel : str, float or None
+        None: the only channel there is. Of an array its sampling rate in Hz.
     settings : VmdSettings or int
         An int is the number of modes, with everything else as usual; `suggest_modes` finds it.
-    channel : str or None
-        None: the only channel there is.
     engine : str or None
         "gearsig" or "vmdpy", in place of that of the settings.
     rng : numpy.random.Generator or None
@@ -58,10 +58,9 @@ def vmd(
 
     Examples
     --------
-    >>> from gearsig.timefreq import UniformSignal
     >>> t = np.arange(2000) / 1000.0
     >>> x = np.cos(2 * np.pi * 50 * t) + 0.5 * np.cos(2 * np.pi * 200 * t)
-    >>> vmd(UniformSignal(x, 1000.0), 2, engine="vmdpy").centre_frequencies_hz.round(1)
+    >>> vmd(x, 1000.0, 2, engine="vmdpy").centre_frequencies_hz.round(1)
     array([ 50., 200.])
     """
     x = uniform(signal, channel)

@@ -10,7 +10,7 @@ import numpy as np
 from gearsig.checks import FloatArray, count, frozen_array, one_of, positive
 from gearsig.errors import InputError
 from gearsig.recording import Recording
-from gearsig.spectra import checked_signal
+from gearsig.spectra import named_signal
 
 # --------------------
 # Thresholds of wavelet coefficients, and the rules that apply them.
@@ -232,8 +232,8 @@ FILTER_LENGTHS_LEFT = 8
 
 
 def denoise(
-    values: FloatArray,
-    sampling_rate_hz: float,
+    signal: FloatArray | Recording,
+    channel_or_rate_hz: str | float,
     settings: DenoiseSettings | None = None,
     *,
     unit: str = "",
@@ -247,12 +247,14 @@ def denoise(
 
     Parameters
     ----------
-    values : array, (n_samples,)
+    signal : Recording or array, (n_samples,)
         Finite, not constant, at least as long as the wavelet's filter. Any length.
-    sampling_rate_hz : float
+    channel_or_rate_hz : str or float
+        The channel of a recording; of an array its sampling rate in Hz.
     settings : DenoiseSettings or None
         None: universal threshold, soft, "sym8", eight shifts.
     unit, source : str
+        Of the signal; default: the channel's.
 
     Returns
     -------
@@ -276,8 +278,8 @@ def denoise(
     D. L. Donoho, "De-noising by soft-thresholding", 1995.
     R. R. Coifman and D. L. Donoho, "Translation-invariant de-noising", 1995.
     """
-    x = checked_signal(values, minimum=8).astype(np.float64)
-    fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    values, fs, unit, source = named_signal(signal, channel_or_rate_hz, unit, source, minimum=8)
+    x = values.astype(np.float64)
     settings = _with_levels(settings or DenoiseSettings(), x)
     n_levels, n_shifts = settings.n_levels or 1, settings.n_shifts
     found = np.zeros((n_levels, 3))  # noise, threshold, kept share
@@ -294,17 +296,6 @@ def denoise(
         for j in range(1, n_levels + 1)
     )
     return Denoised(clean, x - clean, fs, levels, levels[0].noise, settings, unit, source)
-
-
-def denoise_channel(recording: Recording, channel: str, settings: DenoiseSettings | None = None) -> Denoised:
-    """Take the noise out of one channel of a recording; see `denoise`."""
-    return denoise(
-        recording.values(channel),
-        recording.sampling_rate_hz,
-        settings,
-        unit=recording.channels[recording.index(channel)].unit,
-        source=channel,
-    )
 
 
 def deepest_level(n_samples: int, wavelet: str) -> int:

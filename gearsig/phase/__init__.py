@@ -13,7 +13,6 @@ from gearsig.phase._embedding import (
     average_mutual_information,
     delay_embedding,
     delay_vectors,
-    embed_channel,
     embedding_dimension,
 )
 from gearsig.phase._kind import (
@@ -34,14 +33,13 @@ from gearsig.phase._measures import (
     RecurrencePlot,
 )
 from gearsig.phase._neighbours import nearest_apart, spaced
-from gearsig.phase._plane import LEAST_PERIODS, SETTLING_PERIODS, MotionQuantity, phase_plane, phase_plane_of
+from gearsig.phase._plane import LEAST_PERIODS, SETTLING_PERIODS, MotionQuantity, phase_plane
 from gearsig.phase._recurrence import recurrence_measures, recurrence_plot
 from gearsig.phase._section import (
     CycleLock,
     constant_period_lock,
     find_lock,
-    geometric_section,
-    locked_section,
+    poincare_section,
     section_period,
 )
 from gearsig.phase._types import BifurcationDiagram, PhasePortrait, PoincareSection
@@ -70,17 +68,14 @@ __all__ = [
     "constant_period_lock",
     "delay_embedding",
     "delay_vectors",
-    "embed_channel",
     "embedding_dimension",
     "find_lock",
-    "geometric_section",
     "kind_of_motion",
     "largest_lyapunov_exponent",
-    "locked_section",
     "mean_square_displacement",
     "nearest_apart",
     "phase_plane",
-    "phase_plane_of",
+    "poincare_section",
     "recurrence_measures",
     "recurrence_plot",
     "section_period",

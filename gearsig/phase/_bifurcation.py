@@ -10,7 +10,7 @@ import numpy as np
 from gearsig.checks import FloatArray, count, frozen_array, not_negative, one_of
 from gearsig.errors import InputError
 from gearsig.phase._plane import phase_plane
-from gearsig.phase._section import CycleLock, constant_period_lock, find_lock, locked_section, section_period
+from gearsig.phase._section import CycleLock, constant_period_lock, find_lock, poincare_section, section_period
 from gearsig.phase._types import BifurcationDiagram, PhasePortrait, PoincareSection
 from gearsig.recording import Recording
 
@@ -102,14 +102,14 @@ def bifurcation_of_recordings(
     parameter, unit, axis, most_points, tolerance
         As in `bifurcation_diagram`.
     pair, shaft, phase_cycles
-        What the sections are locked to; see `find_lock`, `locked_section`.
+        What the sections are locked to; see `find_lock`, `poincare_section`.
     """
 
     def sections() -> Iterable[tuple[float, PoincareSection]]:
         for value, recording in recordings:
             portrait = phase_plane(recording, channel, low_cut_hz=low_cut_hz)
             lock = find_lock(recording, pair=pair, shaft=shaft)
-            yield value, locked_section(portrait, lock, phase_cycles=phase_cycles)
+            yield value, poincare_section(portrait, lock, phase_cycles=phase_cycles)
 
     return bifurcation_diagram(
         sections(), parameter=parameter, unit=unit, axis=axis, most_points=most_points, tolerance=tolerance
@@ -162,7 +162,7 @@ def bifurcation_of_runs(
             portrait = _steady(series, sampling_rate_hz, transient_s, axis_names, units)
             end_s = portrait.end_s + 1.0 / sampling_rate_hz
             lock = period if isinstance(period, CycleLock) else constant_period_lock(period, end_s)
-            yield value, locked_section(portrait, lock)
+            yield value, poincare_section(portrait, lock)
 
     return bifurcation_diagram(
         sections(), parameter=parameter, unit=unit, axis=axis, most_points=most_points, tolerance=tolerance

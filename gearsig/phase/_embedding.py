@@ -13,11 +13,12 @@ from gearsig.phase._measures import EmbeddingDimension, MutualInformation, check
 from gearsig.phase._neighbours import nearest_apart, spaced
 from gearsig.phase._types import PhasePortrait
 from gearsig.recording import Recording
+from gearsig.spectra import named_signal
 
 
 def delay_embedding(
-    values: FloatArray,
-    sampling_rate_hz: float,
+    signal: FloatArray | Recording,
+    channel_or_rate_hz: str | float,
     *,
     delay_samples: int | None = None,
     dimension: int | None = None,
@@ -28,13 +29,15 @@ def delay_embedding(
 
     Parameters
     ----------
-    values : array, (n_samples,)
-    sampling_rate_hz : float
+    signal : Recording or array, (n_samples,)
+    channel_or_rate_hz : str or float
+        The channel of a recording; of an array its sampling rate in Hz.
     delay_samples : int or None
         None: the first minimum of the average mutual information.
     dimension : int or None
         1 to 20; None: from false nearest neighbours.
     unit, source : str
+        Of the signal; default: the channel's.
 
     Returns
     -------
@@ -50,7 +53,7 @@ def delay_embedding(
 
     Source: F. Takens, *Detecting strange attractors in turbulence*, Lecture Notes in Mathematics 898 (1981).
     """
-    rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    values, rate, unit, source = named_signal(signal, channel_or_rate_hz, unit, source, minimum=1)
     x = checked_series(values, minimum=16)
     tau = chosen_delay(x, rate) if delay_samples is None else count(delay_samples, "delay_samples")
     d = _chosen_dimension(x, rate, tau) if dimension is None else _checked_dimension(dimension)
@@ -62,21 +65,6 @@ def delay_embedding(
         kind="delay embedding",
         source=source,
         delay_samples=tau,
-    )
-
-
-def embed_channel(
-    recording: Recording, channel: str, *, delay_samples: int | None = None, dimension: int | None = None
-) -> PhasePortrait:
-    """Return the delay embedding of a recording's channel; see `delay_embedding`."""
-    unit = recording.channels[recording.index(channel)].unit
-    return delay_embedding(
-        recording.values(channel),
-        recording.sampling_rate_hz,
-        delay_samples=delay_samples,
-        dimension=dimension,
-        unit=unit,
-        source=channel,
     )
 
 

@@ -20,7 +20,7 @@ from gearsig.phase._measures import (
     checked_series,
     mean_period_samples,
 )
-from gearsig.phase._section import CycleLock, locked_section, section_period
+from gearsig.phase._section import CycleLock, poincare_section, section_period
 from gearsig.phase._types import PhasePortrait, PoincareSection
 
 # --------------------
@@ -248,7 +248,7 @@ def kind_of_motion(
     Raises
     ------
     RefusalError
-        If there is no section (see `locked_section`). Measures that cannot answer are named in the evidence.
+        If there is no section (see `poincare_section`). Measures that cannot answer are named in the evidence.
 
     Notes
     -----
@@ -257,7 +257,7 @@ def kind_of_motion(
     "stochastic" says that the motion does not unfold. Clean chaos recorded over fewer than about a hundred cycles may
     not unfold either: record longer, or state `noise_free` where it is a model's, which makes it "undecided".
     """
-    section = locked_section(portrait, lock)
+    section = poincare_section(portrait, lock)
     period = section_period(section, tolerance=tolerance)
     if period:
         seen = (

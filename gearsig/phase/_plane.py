@@ -12,6 +12,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.phase._measures import checked_series
 from gearsig.phase._types import PhasePortrait
 from gearsig.recording import Recording
+from gearsig.spectra import named_signal
 
 # --------------------
 # Integration and differentiation of a signal inside a frequency band.
@@ -127,14 +128,16 @@ LEAST_PERIODS = 4.0
 
 
 def phase_plane(
-    recording: Recording,
-    channel: str,
+    signal: FloatArray | Recording,
+    channel_or_rate_hz: str | float,
     *,
     low_cut_hz: float | None = None,
     high_cut_hz: float | None = None,
     quantity: MotionQuantity | None = None,
+    unit: str = "",
+    source: str = "",
 ) -> PhasePortrait:
-    """Return displacement and velocity of a channel that measures acceleration, velocity or displacement.
+    """Return displacement and velocity of a signal that measures acceleration, velocity or displacement.
 
     Acceleration is integrated twice and once, velocity once and not at all; displacement (and transmission error) is
     differentiated. All within the band from `low_cut_hz` to `high_cut_hz`, in the frequency domain, with no phase
@@ -142,15 +145,18 @@ def phase_plane(
 
     Parameters
     ----------
-    recording : Recording
-    channel : str
+    signal : Recording or array, (n_samples,)
+    channel_or_rate_hz : str or float
+        The channel of a recording; of an array its sampling rate in Hz.
     low_cut_hz : float or None
         Lowest frequency kept in full; a quarter of it and less is gone. Needed for acceleration and velocity:
         integration magnifies whatever is slow. None for a displacement keeps everything slow, the mean included.
     high_cut_hz : float or None
         Highest frequency kept in full; None: 0.4 of the sampling rate.
     quantity : str or None
-        What the channel measures where the recording does not know.
+        What the signal measures; needed for an array, and where the recording does not know.
+    unit, source : str
+        Of the signal; default: the channel's.
 
     Returns
     -------
@@ -174,33 +180,12 @@ def phase_plane(
     Source: L. Meirovitch, *Elements of Vibration Analysis* (1986), for the phase plane; integration: the property of
     the Fourier transform.
     """
-    of_channel = recording.channels[recording.index(channel)]
-    known = quantity if quantity is not None else of_channel.quantity
-    values = recording.values(channel)
-    return phase_plane_of(
-        values,
-        recording.sampling_rate_hz,
-        quantity=known,
-        low_cut_hz=low_cut_hz,
-        high_cut_hz=high_cut_hz,
-        unit=of_channel.unit,
-        source=channel,
-    )
-
-
-def phase_plane_of(
-    values: FloatArray,
-    sampling_rate_hz: float,
-    *,
-    quantity: str,
-    low_cut_hz: float | None = None,
-    high_cut_hz: float | None = None,
-    unit: str = "",
-    source: str = "",
-) -> PhasePortrait:
-    """Return displacement and velocity of a plain signal; see `phase_plane`."""
-    rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
-    n_times = _integrations(quantity, source)
+    if isinstance(signal, Recording) and quantity is None:
+        measured: str = signal.channels[signal.index(str(channel_or_rate_hz))].quantity
+    else:
+        measured = quantity or "an unknown quantity"
+    values, rate, unit, source = named_signal(signal, channel_or_rate_hz, unit, source, minimum=1)
+    n_times = _integrations(measured, source)
     x = checked_series(values, minimum=16)
     low, high = _band(low_cut_hz, high_cut_hz, rate, n_times)
     n_lost = n_unsettled(rate, low)

@@ -121,33 +121,58 @@ def _cycles(rig: Rig | None, pair: str, shaft: str) -> tuple[float, str]:
     return order, name
 
 
-def locked_section(portrait: PhasePortrait, lock: CycleLock, *, phase_cycles: float = 0.0) -> PoincareSection:
-    """Return the points of the path once per cycle of a mesh or a shaft.
+def poincare_section(
+    portrait: PhasePortrait,
+    lock: CycleLock | None = None,
+    *,
+    phase_cycles: float = 0.0,
+    normal: FloatArray | None = None,
+    offset: float = 0.0,
+    direction: int = 1,
+) -> PoincareSection:
+    """Return the points of a path once per cycle of a mesh or a shaft, or where it crosses the plane n·x = offset.
 
-    Values between the samples are interpolated band-limited (error below 5e-6 of full scale up to 0.4 of the sampling
-    rate), at times from the exact inverse of the shaft angle: speed may vary.
+    With a lock, values between the samples are interpolated band-limited (error below 5e-6 of full scale up to 0.4 of
+    the sampling rate), at times from the exact inverse of the shaft angle: speed may vary. Without, the crossing is the
+    root of the cubic through the four samples around it.
 
     Parameters
     ----------
     portrait : PhasePortrait
         A periodic motion with the lock's period gives one point, one with twice the period two; a quasi-periodic one a
         closed curve.
-    lock : CycleLock
-        See `find_lock`.
+    lock : CycleLock or None
+        See `find_lock`; None: the plane.
     phase_cycles : float
-        Where in the cycle the path is looked at.
+        Where in the lock's cycle the path is looked at.
+    normal : array, (n_axes,), or None
+        Of the plane; None: the last axis; in a phase plane, velocity zero upwards: the lowest displacements.
+    offset : float
+        In the unit of n·x.
+    direction : int
+        1: from below the plane to above, -1: from above to below, 0: both.
 
     Raises
     ------
+    InputError
+        On a normal of another length or of zero, or one beside a lock.
     RefusalError
-        If no whole cycle lies in the portrait, or its samples are too coarse for the cycle.
+        If no whole cycle lies in the portrait, its samples are too coarse for the cycle, or it never crosses the plane.
 
     Notes
     -----
-    Not for discontinuous states: an interpolated jump overshoots.
+    A lock is not for discontinuous states: an interpolated jump overshoots.
 
     Source: F. C. Moon, *Chaotic Vibrations* (1987), ch. 2 (Poincaré maps of forced motion).
     """
+    if lock is None:
+        return _geometric_section(portrait, normal, offset, direction)
+    if normal is not None:
+        raise InputError("a lock and a plane are given", where="lock, normal", remedy="give one of them")
+    return _locked_section(portrait, lock, phase_cycles)
+
+
+def _locked_section(portrait: PhasePortrait, lock: CycleLock, phase_cycles: float) -> PoincareSection:
     from gearsig.angle import REACH
 
     rate = portrait.sampling_rate_hz
@@ -170,30 +195,9 @@ def locked_section(portrait: PhasePortrait, lock: CycleLock, *, phase_cycles: fl
     return _section(portrait, points, times, "locked", lock.name)
 
 
-def geometric_section(
-    portrait: PhasePortrait, *, normal: FloatArray | None = None, offset: float = 0.0, direction: int = 1
+def _geometric_section(
+    portrait: PhasePortrait, normal: FloatArray | None, offset: float, direction: int
 ) -> PoincareSection:
-    """Return the points where the path crosses the plane n·x = offset, upwards, downwards or both.
-
-    The crossing is the root of the cubic through the four samples around it.
-
-    Parameters
-    ----------
-    portrait : PhasePortrait
-    normal : array, (n_axes,)
-        Default: the last axis; in a phase plane, velocity zero upwards: the lowest displacements.
-    offset : float
-        In the unit of n·x.
-    direction : int
-        1: from below to above, -1: from above to below, 0: both.
-
-    Raises
-    ------
-    InputError
-        On a normal of another length or of zero.
-    RefusalError
-        If the path never crosses the plane.
-    """
     if direction not in (-1, 0, 1):
         raise InputError(f"direction is {direction!r}", allowed="-1, 0, 1")
     n = np.eye(portrait.n_axes)[-1] if normal is None else frozen_array(normal, "normal", ndim=1)

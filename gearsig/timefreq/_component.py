@@ -58,7 +58,7 @@ class Component:
 def component(
     signal: Source,
     ridge: Ridge,
-    channel: str | None = None,
+    channel: str | float | None = None,
     *,
     half_width: float | None = None,
     squeezed: bool = True,

@@ -32,7 +32,7 @@ from gearsig.timefreq._wavelets import (
 
 def cwt(
     signal: Source,
-    channel: str | None = None,
+    channel: str | float | None = None,
     *,
     wavelet: Wavelet = DEFAULT,
     positions: FloatArray | None = None,
@@ -48,9 +48,10 @@ def cwt(
 
     Parameters
     ----------
-    signal : Recording, AngleSignal or UniformSignal
+    signal : Recording, AngleSignal, UniformSignal or array, (n_samples,)
         Over time, lines are frequencies; over angle, orders.
-    channel : str or None
+    channel : str, float or None
+        None: the only channel there is. Of an array its sampling rate in Hz.
     wavelet : Morse or Morlet
     positions : array or None
         Lines in Hz or orders; None: `lowest` to `highest` at `n_per_octave` per octave.
@@ -92,7 +93,7 @@ def cwt(
 
 def cwt_map(
     signal: Source,
-    channel: str | None = None,
+    channel: str | float | None = None,
     *,
     wavelet: Wavelet = DEFAULT,
     positions: FloatArray | None = None,
@@ -138,7 +139,7 @@ def cwt_map(
 
 def _prepared(
     signal: Source,
-    channel: str | None,
+    channel: str | float | None,
     wavelet: Wavelet,
     positions: FloatArray | None,
     lowest: float | None,

@@ -115,15 +115,16 @@ def natural_order(n_bands: int) -> NDArray[np.int64]:
 
 
 def wavelet_packets(
-    signal: Source, channel: str | None = None, *, wavelet: str = "sym12", level: int = 6
+    signal: Source, channel: str | float | None = None, *, wavelet: str = "sym12", level: int = 6
 ) -> WaveletPackets:
     """Return the wavelet packet coefficients of 2^level bands of equal width.
 
     Parameters
     ----------
-    signal : Recording, AngleSignal or UniformSignal
+    signal : Recording, AngleSignal, UniformSignal or array, (n_samples,)
         Over time, bands are of frequencies; over angle, of orders.
-    channel : str or None
+    channel : str, float or None
+        As in `cwt`.
     wavelet : str
         An orthogonal wavelet of PyWavelets. Long ones separate bands better. Nearly symmetric ones
         (sym12, dmey) show an event when it was; db10 scatters it over bands by several coefficients.
@@ -202,7 +203,7 @@ def packet_inverse(packets: WaveletPackets, bands: list[int] | None = None) -> F
 
 def wavelet_packet_map(
     signal: Source,
-    channel: str | None = None,
+    channel: str | float | None = None,
     *,
     wavelet: str = "sym12",
     level: int = 6,

@@ -102,7 +102,7 @@ class SqueezingWavelets:
 
 def squeezed_cwt(
     signal: Source,
-    channel: str | None = None,
+    channel: str | float | None = None,
     *,
     wavelet: Wavelet = DEFAULT,
     lowest: float | None = None,
@@ -156,7 +156,7 @@ def squeezed_cwt(
 
 def squeezed_cwt_map(
     signal: Source,
-    channel: str | None = None,
+    channel: str | float | None = None,
     *,
     wavelet: Wavelet = DEFAULT,
     lowest: float | None = None,
@@ -204,7 +204,7 @@ def squeezed_cwt_map(
 
 def _prepared(
     signal: Source,
-    channel: str | None,
+    channel: str | float | None,
     wavelet: Wavelet,
     lowest: float | None,
     highest: float | None,
@@ -285,7 +285,7 @@ def _step(width: float, largest: int) -> int:
 
 def squeezed_stft(
     signal: Source,
-    channel: str | None = None,
+    channel: str | float | None = None,
     *,
     window: str = "gaussian",
     window_length: float | None = None,
@@ -337,7 +337,7 @@ def squeezed_stft(
 
 def squeezed_stft_map(
     signal: Source,
-    channel: str | None = None,
+    channel: str | float | None = None,
     *,
     window: str = "gaussian",
     window_length: float | None = None,

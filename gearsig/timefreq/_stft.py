@@ -181,7 +181,7 @@ def _window(name: str, n: int) -> tuple[FloatArray, FloatArray]:
 
 def stft(
     signal: Source,
-    channel: str | None = None,
+    channel: str | float | None = None,
     *,
     window: str = "hann",
     window_length: float | None = None,
@@ -197,9 +197,10 @@ def stft(
 
     Parameters
     ----------
-    signal : Recording, AngleSignal or UniformSignal
+    signal : Recording, AngleSignal, UniformSignal or array, (n_samples,)
         Over time, lines are frequencies; over angle, orders.
-    channel : str or None
+    channel : str, float or None
+        None: the only channel there is. Of an array its sampling rate in Hz.
     window : str
         "hann" or "gaussian".
     window_length : float or None
@@ -240,7 +241,7 @@ def stft(
 
 def stft_map(
     signal: Source,
-    channel: str | None = None,
+    channel: str | float | None = None,
     *,
     window: str = "hann",
     window_length: float | None = None,
@@ -283,7 +284,7 @@ def stft_map(
 
 def prepared(
     signal: Source,
-    channel: str | None,
+    channel: str | float | None,
     window: str,
     window_length: float | None,
     zero_padding: int,

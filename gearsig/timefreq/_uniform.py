@@ -96,35 +96,37 @@ class UniformSignal:
         return self.start + np.arange(0, self.n_samples, step) / self.rate
 
 
-Source = Recording | AngleSignal | UniformSignal
+Source = Recording | AngleSignal | UniformSignal | FloatArray
 
 
-def uniform(signal: Source, channel: str | None = None) -> UniformSignal:
-    """Return one channel of a recording (over time) or of an angle signal (over revolutions).
+def uniform(signal: Source, channel: str | float | None = None) -> UniformSignal:
+    """Return a channel of a recording (over time) or of an angle signal (over revolutions), or an array with its rate.
 
     Parameters
     ----------
-    signal : Recording, AngleSignal or UniformSignal
+    signal : Recording, AngleSignal, UniformSignal or array, (n_samples,)
         An angle signal makes every transform one over orders and revolutions.
-    channel : str or None
-        None: the only channel there is.
+    channel : str, float or None
+        Name of a channel; None: the only one there is. Of an array its sampling rate in Hz.
 
     Raises
     ------
     InputError
-        If the channel is not there, or none is named and there are several.
+        If the channel is not there, or none is named and there are several; if an array comes without its rate.
     """
     if isinstance(signal, UniformSignal):
         return signal
     if not isinstance(signal, (Recording, AngleSignal)):
-        raise InputError(
-            f"signal is a {type(signal).__name__}",
-            allowed="a Recording, an AngleSignal, or UniformSignal(values, sampling_rate_hz)",
-        )
+        if channel is None or isinstance(channel, str):
+            raise InputError(
+                f"signal is a {type(signal).__name__}, and its sampling rate is {channel!r}",
+                allowed="a Recording or AngleSignal and its channel, a UniformSignal, or an array and its rate in Hz",
+            )
+        return UniformSignal(signal, positive(channel, "sampling_rate_hz", "Hz"))
     names = signal.channel_names
     if channel is None and len(names) != 1:
         raise InputError("no channel is named", where="channel", allowed=", ".join(names))
-    name = names[0] if channel is None else channel
+    name = names[0] if channel is None else str(channel)
     values = signal.values(name)
     if isinstance(signal, Recording):
         unit = signal.channels[signal.index(name)].unit

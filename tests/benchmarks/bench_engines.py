@@ -35,7 +35,7 @@ def _signal(n: int) -> UniformSignal:
 
 
 def _waveforms(signal, engine):
-    return vmd(signal, VmdSettings(3, tolerance=1e-4), engine=engine).waveforms
+    return vmd(signal, None, VmdSettings(3, tolerance=1e-4), engine=engine).waveforms
 
 
 def _back(transform, signal, engine):

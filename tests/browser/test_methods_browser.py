@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.dashboard.methods import METHODS
-from gearsig.decompose import denoise_channel
+from gearsig.decompose import denoise
 from gearsig.recording import read_recording
 from tests.app.test_dashboard import SAMPLES
 from tests.browser.conftest import CHROMIUM, settle
@@ -70,7 +70,7 @@ def test_the_denoised_signal_can_be_taken_along_whole(page: playwright.Page) -> 
     path = Path(download.value.path())
     found = read_recording(path.rename(path.with_suffix(".csv")))
     sample = read_recording(SAMPLES["damaged_tooth"].recording, sampling_rate_hz=found.sampling_rate_hz)
-    whole = denoise_channel(sample, sample.channel_names[0])
+    whole = denoise(sample, sample.channel_names[0])
     np.testing.assert_allclose(found.values("without noise"), whole.values, atol=1e-12)
 
 

@@ -27,7 +27,7 @@ def _recording(*rows: np.ndarray) -> Recording:
 
 def test_a_channels_modes_carry_its_name_and_unit():
     x = np.cos(2 * np.pi * 200 * TIME) + 0.5 * np.cos(2 * np.pi * 2000 * TIME)
-    modes = vmd(_recording(MODULATED, x), 2, "a2")
+    modes = vmd(_recording(MODULATED, x), "a2", 2)
     assert modes.centre_frequencies_hz == pytest.approx([200.0, 2000.0], abs=1.0)
     assert (modes.source, modes.unit, modes.sampling_rate) == ("a2", "g", FS)
     assert modes.rms == pytest.approx([0.707, 0.354], abs=0.01)
@@ -40,7 +40,7 @@ def test_over_angle_the_centres_are_orders():
     x = np.cos(2 * np.pi * 23 * revolutions) + 0.5 * np.cos(2 * np.pi * 4 * revolutions)
     angle = ShaftAngle("input", np.array([0.0, 10.0]), np.array([0.0, 80.0]), np.array([4.0, 12.0]), "constant")
     signal = AngleSignal(x[None, :], 256, angle, 0.0, ("a1",), ("m/s^2",), 100.0)
-    modes = vmd(signal, VmdSettings(2, start=(4.0, 23.0)))
+    modes = vmd(signal, "a1", VmdSettings(2, start=(4.0, 23.0)))
     assert modes.centres == pytest.approx([4.0, 23.0], abs=0.05)
     assert (modes.axis, modes.shaft, modes.unit) == ("order", "input", "m/s^2")
     assert "order" in modes.describe()

@@ -14,7 +14,6 @@ from gearsig.decompose import (
     bayes,
     deepest_level,
     denoise,
-    denoise_channel,
     noise_level,
     sure,
     universal,
@@ -185,7 +184,7 @@ def test_a_channel_carries_its_name_and_unit():
     recording = Recording(
         np.stack([_noise(), _impacts() + 0.2 * _noise()]), 100.0, (Channel("a"), Channel("b", unit="g"))
     )
-    result = denoise_channel(recording, "b")
+    result = denoise(recording, "b")
     assert (result.source, result.unit, result.sampling_rate_hz) == ("b", "g", 100.0)
     text = result.describe()
     assert text.splitlines()[0].startswith("b: universal thresholds, soft, sym8")

@@ -13,8 +13,8 @@ from gearsig.phase import (
     embedding_dimension,
     find_lock,
     largest_lyapunov_exponent,
-    locked_section,
-    phase_plane_of,
+    phase_plane,
+    poincare_section,
     recurrence_measures,
     recurrence_plot,
     translation_walk,
@@ -29,7 +29,7 @@ SERIES_TOOLS = {
     "embedding as told": lambda x: delay_embedding(x, 1000.0, delay_samples=5, dimension=3),
     "0–1 test": zero_one_test,
     "walk": lambda x: translation_walk(x, 1.0),
-    "phase plane": lambda x: phase_plane_of(x, 1000.0, quantity="acceleration", low_cut_hz=10.0),
+    "phase plane": lambda x: phase_plane(x, 1000.0, quantity="acceleration", low_cut_hz=10.0),
 }
 PATH_TOOLS = {
     "exponent": largest_lyapunov_exponent,
@@ -92,9 +92,9 @@ def test_a_section_without_a_period_is_refused():
 def test_a_period_longer_than_the_path_or_faster_than_its_samples_is_refused():
     path = portrait(np.random.default_rng(0).normal(size=(3000, 2)))
     with pytest.raises(RefusalError, match=r"no whole cycle.*record longer"):
-        locked_section(path, constant_period_lock(10.0, 30.0))
+        poincare_section(path, constant_period_lock(10.0, 30.0))
     with pytest.raises(RefusalError, match=r"faster than two samples per cycle.*slower shaft or sample faster"):
-        locked_section(path, constant_period_lock(0.0015, 3.0))
+        poincare_section(path, constant_period_lock(0.0015, 3.0))
 
 
 def test_a_bifurcation_of_runs_that_are_too_short_is_refused():

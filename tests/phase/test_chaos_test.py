@@ -7,8 +7,8 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.phase import (
     PhasePortrait,
     constant_period_lock,
-    locked_section,
     mean_square_displacement,
+    poincare_section,
     translation_walk,
     zero_one_test,
     zero_one_test_of_section,
@@ -56,7 +56,7 @@ def test_transition_of_the_logistic_map_follows_its_exponent():
 def test_sections_of_a_forced_oscillator(force, verdict):
     states = duffing(force, 1500)
     path = PhasePortrait(states, 64 / DUFFING_PERIOD_S, ("x", "v"), ("m", "m/s"), "states", "duffing")
-    section = locked_section(path, constant_period_lock(DUFFING_PERIOD_S, path.end_s))
+    section = poincare_section(path, constant_period_lock(DUFFING_PERIOD_S, path.end_s))
     assert zero_one_test_of_section(section).verdict == verdict
 
 

@@ -9,7 +9,6 @@ from gearsig.phase import (
     average_mutual_information,
     delay_embedding,
     delay_vectors,
-    embed_channel,
     embedding_dimension,
     nearest_apart,
 )
@@ -108,7 +107,7 @@ def test_embedding_is_a_view_of_delayed_values():
 
 def test_a_channel_is_embedded_with_its_unit():
     recording = Recording(lorenz(N, 0.02)[:, 0][None, :], 50.0, (Channel("a1", "acceleration", "g"),))
-    portrait = embed_channel(recording, "a1")
+    portrait = delay_embedding(recording, "a1")
     assert (portrait.n_axes, portrait.units, portrait.source) == (3, ("g",) * 3, "a1")
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from gearsig.errors import RefusalError
-from gearsig.phase import PhasePortrait, constant_period_lock, embedding_dimension, kind_of_motion, phase_plane_of
+from gearsig.phase import PhasePortrait, constant_period_lock, embedding_dimension, kind_of_motion, phase_plane
 from tests.phase.systems import DUFFING_PERIOD_S, duffing, quasi_periodic
 
 RATE = 64 / DUFFING_PERIOD_S
@@ -40,13 +40,13 @@ def test_from_measured_acceleration_alone():
     x, v = path.points.T
     t = np.arange(len(x)) / RATE
     acceleration = 0.5 * np.cos(1.2 * t) - 0.3 * v + x - x**3
-    plane = phase_plane_of(acceleration, RATE, quantity="acceleration", low_cut_hz=0.02, unit="m/s^2")
+    plane = phase_plane(acceleration, RATE, quantity="acceleration", low_cut_hz=0.02, unit="m/s^2")
     assert kind_of_motion(plane, lock).kind == "chaotic"
 
 
 def test_two_frequencies_are_quasi_periodic():
     x = quasi_periodic(30_000)
-    plane = phase_plane_of(x, 1000.0, quantity="displacement")
+    plane = phase_plane(x, 1000.0, quantity="displacement")
     found = kind_of_motion(plane, constant_period_lock(50.3 / 1000.0, 30.0))
     assert found.kind == "quasi-periodic"
     assert found.chaos_test.k < 0.1
@@ -98,5 +98,5 @@ def test_a_model_without_noise_needs_no_exponent_to_be_regular(monkeypatch):
     chaos = _duffing(0.5)
     assert kind_of_motion(*chaos).kind == "undecided"
     assert kind_of_motion(*chaos, noise_free=True).kind == "undecided"
-    plane = phase_plane_of(quasi_periodic(30_000), 1000.0, quantity="displacement")
+    plane = phase_plane(quasi_periodic(30_000), 1000.0, quantity="displacement")
     assert kind_of_motion(plane, constant_period_lock(50.3 / 1000.0, 30.0), noise_free=True).kind == "quasi-periodic"

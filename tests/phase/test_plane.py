@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase import phase_plane, phase_plane_of
+from gearsig.phase import phase_plane
 from gearsig.recording import Channel, Recording
 
 RATE = 2000.0
@@ -35,7 +35,7 @@ def test_acceleration_becomes_displacement_and_velocity(n, f1, f2, phase, offset
     lines = ((1e-3, f1, phase), (5e-4, f2, 1.0))
     acceleration = _motion(np.arange(n) / RATE, *lines)[2]
     scale = np.abs(acceleration).max()
-    plane = phase_plane_of(acceleration + offset * scale, RATE, quantity="acceleration", unit="m/s^2", low_cut_hz=10.0)
+    plane = phase_plane(acceleration + offset * scale, RATE, quantity="acceleration", unit="m/s^2", low_cut_hz=10.0)
     time = plane.start_s + np.arange(plane.n_points) / RATE
     displacement, velocity, _ = _motion(time, *lines)
     assert plane.units == ("m", "m/s")
@@ -50,7 +50,7 @@ def test_acceleration_becomes_displacement_and_velocity(n, f1, f2, phase, offset
 def test_displacement_is_differentiated_and_keeps_mean_and_trend(n):
     time = np.arange(n) / RATE
     w = 2 * np.pi * 31.0
-    plane = phase_plane_of(3.0 + 0.2 * time + np.sin(w * time), RATE, quantity="displacement", unit="in")
+    plane = phase_plane(3.0 + 0.2 * time + np.sin(w * time), RATE, quantity="displacement", unit="in")
     inside = plane.start_s + np.arange(plane.n_points) / RATE
     np.testing.assert_allclose(plane.points[:, 0], 3.0 + 0.2 * inside + np.sin(w * inside), atol=1e-9)
     np.testing.assert_allclose(plane.points[:, 1], 0.2 + w * np.cos(w * inside), atol=1e-9 * w)
@@ -60,22 +60,22 @@ def test_displacement_is_differentiated_and_keeps_mean_and_trend(n):
 def test_velocity_in_mm_per_s_and_acceleration_in_g_agree():
     time = np.arange(8000) / RATE
     displacement, velocity, acceleration = _motion(time, (1e-4, 60.0, 0.3))
-    one = phase_plane_of(1e3 * velocity, RATE, quantity="velocity", unit="mm/s", low_cut_hz=20.0)
-    two = phase_plane_of(acceleration / 9.80665, RATE, quantity="acceleration", unit="g", low_cut_hz=20.0)
+    one = phase_plane(1e3 * velocity, RATE, quantity="velocity", unit="mm/s", low_cut_hz=20.0)
+    two = phase_plane(acceleration / 9.80665, RATE, quantity="acceleration", unit="g", low_cut_hz=20.0)
     np.testing.assert_allclose(one.points / [1.0, 377.0], two.points / [1.0, 377.0], atol=1e-8)
     np.testing.assert_allclose(one.points[:, 0], displacement[500:-500], atol=1e-8)
 
 
 def test_what_is_slower_than_the_low_cut_is_gone():
     time = np.arange(20000) / RATE
-    slow = phase_plane_of(np.cos(2 * np.pi * 2.0 * time), RATE, quantity="acceleration", low_cut_hz=10.0)
+    slow = phase_plane(np.cos(2 * np.pi * 2.0 * time), RATE, quantity="acceleration", low_cut_hz=10.0)
     assert np.abs(slow.points[:, 0]).max() < 1e-3 / (2 * np.pi * 2.0) ** 2
 
 
 def test_float32_gives_the_same_to_its_rounding():
     x = np.random.default_rng(0).normal(size=5001)
-    one = phase_plane_of(x.astype(np.float32), RATE, quantity="acceleration", low_cut_hz=20.0)
-    two = phase_plane_of(x, RATE, quantity="acceleration", low_cut_hz=20.0)
+    one = phase_plane(x.astype(np.float32), RATE, quantity="acceleration", low_cut_hz=20.0)
+    two = phase_plane(x, RATE, quantity="acceleration", low_cut_hz=20.0)
     np.testing.assert_allclose(one.points, two.points, atol=1e-5 * np.abs(two.points).max())
 
 
@@ -106,4 +106,4 @@ def test_a_recording_knows_what_its_channel_measures():
 def test_bad_input_says_what_to_do(changes, error, words):
     settings_ = {"values": np.random.default_rng(0).normal(size=4000), "low_cut_hz": 50.0} | changes
     with pytest.raises(error, match=words):
-        phase_plane_of(settings_.pop("values"), RATE, quantity="acceleration", **settings_)
+        phase_plane(settings_.pop("values"), RATE, quantity="acceleration", **settings_)

@@ -19,10 +19,8 @@ from gearsig.phase import (
     coexistence_ranges,
     constant_period_lock,
     find_lock,
-    geometric_section,
-    locked_section,
     phase_plane,
-    phase_plane_of,
+    poincare_section,
     section_period,
     values_apart,
 )
@@ -42,7 +40,7 @@ def _states(points, rate, start_s=0.0):
 
 def _duffing_section(force, n_periods=200):
     path = _states(duffing(force, n_periods, PER_PERIOD), DUFFING_RATE)
-    return locked_section(path, constant_period_lock(DUFFING_PERIOD_S, path.end_s, "forcing period"))
+    return poincare_section(path, constant_period_lock(DUFFING_PERIOD_S, path.end_s, "forcing period"))
 
 
 # Forces of the textbook cascade of this oscillator: periods 1, 2, 4, 5, and chaos.
@@ -69,8 +67,8 @@ def test_two_frequencies_give_an_ellipse_from_acceleration_alone():
     t = np.arange(40_001) / rate
     w1, w2 = 2 * np.pi * f1, 2 * np.pi * f2
     acceleration = -(w1**2) * np.cos(w1 * t) - 0.5 * w2**2 * np.cos(w2 * t)
-    plane = phase_plane_of(acceleration, rate, quantity="acceleration", low_cut_hz=15.0)
-    section = locked_section(plane, constant_period_lock(1.0 / f1, t[-1]))
+    plane = phase_plane(acceleration, rate, quantity="acceleration", low_cut_hz=15.0)
+    section = poincare_section(plane, constant_period_lock(1.0 / f1, t[-1]))
     radius = np.hypot((section.points[:, 0] - 1.0) / 0.5, section.points[:, 1] / (0.5 * w2))
     np.testing.assert_allclose(radius, 1.0, atol=1e-3)
     assert section_period(section) == 0
@@ -92,11 +90,11 @@ def test_a_mesh_cycle_stays_one_point_while_the_speed_changes():
     recording, angle = _run_up()
     lock = find_lock(recording, pair="stage", angle=angle)
     assert (lock.cycles_per_revolution, lock.name) == (20.0, "mesh of stage")
-    section = locked_section(phase_plane(recording, "d"), lock, phase_cycles=0.0)
+    section = poincare_section(phase_plane(recording, "d"), lock, phase_cycles=0.0)
     np.testing.assert_allclose(section.points[:, 0], 1.0 + 0.3 * np.cos(1.0), atol=2e-5)
     cycles = 20 * angle.revolutions_at(section.times_s)
     np.testing.assert_allclose(cycles, np.round(cycles), atol=1e-7)
-    quarter = locked_section(phase_plane(recording, "d"), lock, phase_cycles=0.25)
+    quarter = poincare_section(phase_plane(recording, "d"), lock, phase_cycles=0.25)
     np.testing.assert_allclose(quarter.points[:, 0], 0.3 * np.cos(np.pi + 1.0), atol=2e-5)
 
 
@@ -127,13 +125,13 @@ def test_no_section_without_a_period():
 def test_section_refuses_cycles_it_cannot_resolve_or_hold():
     path = _states(np.random.default_rng(0).normal(size=(2000, 2)), 1000.0)
     with pytest.raises(RefusalError, match="faster than two samples"):
-        locked_section(path, constant_period_lock(1e-3, 2.0))
+        poincare_section(path, constant_period_lock(1e-3, 2.0))
     with pytest.raises(RefusalError, match="no whole cycle"):
-        locked_section(path, CycleLock(constant_period_lock(1.0, 2.0).angle, 0.1, "slow"), phase_cycles=0.5)
+        poincare_section(path, CycleLock(constant_period_lock(1.0, 2.0).angle, 0.1, "slow"), phase_cycles=0.5)
     with pytest.raises(RefusalError, match="angle is known from"):
-        locked_section(_states(path.points, 1000.0, 10.0), constant_period_lock(0.1, 2.0))
+        poincare_section(_states(path.points, 1000.0, 10.0), constant_period_lock(0.1, 2.0))
     with pytest.raises(InputError, match="the portrait has 20 points"):
-        locked_section(_states(path.points[:20], 1000.0), constant_period_lock(0.01, 2.0))
+        poincare_section(_states(path.points[:20], 1000.0), constant_period_lock(0.01, 2.0))
 
 
 @pytest.mark.parametrize("direction", [1, -1, 0])
@@ -142,7 +140,7 @@ def test_geometric_section_of_a_circle_is_of_fourth_order(direction):
     for rate in (50.0, 100.0):
         t = 2 * np.pi * 1.0137 * np.arange(int(40 * rate)) / rate  # crossings anywhere between the samples
         circle = _states(np.column_stack([np.cos(t), np.sin(t)]), rate)
-        section = geometric_section(circle, normal=np.array([0.0, 1.0]), offset=0.5, direction=direction)
+        section = poincare_section(circle, normal=np.array([0.0, 1.0]), offset=0.5, direction=direction)
         assert section.n_points == pytest.approx(81 if direction == 0 else 40.5, abs=1)
         np.testing.assert_allclose(section.points[:, 1], 0.5, atol=1e-12)
         errors.append(np.abs(np.abs(section.points[:, 0]) - np.sqrt(0.75)).max())
@@ -155,11 +153,11 @@ def test_geometric_section_says_where_the_path_lies():
     t = np.linspace(0, 10, 500)
     circle = _states(np.column_stack([np.cos(t), np.sin(t)]), 50.0)
     with pytest.raises(RefusalError, match=r"runs from -1 to 1"):
-        geometric_section(circle, offset=2.0)
+        poincare_section(circle, offset=2.0)
     with pytest.raises(InputError, match="2 numbers"):
-        geometric_section(circle, normal=np.zeros(2))
+        poincare_section(circle, normal=np.zeros(2))
     with pytest.raises(InputError, match="direction"):
-        geometric_section(circle, direction=2)
+        poincare_section(circle, direction=2)
 
 
 def _map_section(x):
@@ -293,7 +291,7 @@ def test_a_motion_that_nearly_closes_is_not_called_periodic():
     t = np.arange(30_000) / 1000.0
     w = 2 * np.pi * 20.0
     x = np.sin(w * t) + 0.6 * np.sin(np.sqrt(2.0) / 1.1 * w * t)
-    plane = phase_plane_of(x, 1000.0, quantity="displacement")
-    assert section_period(locked_section(plane, constant_period_lock(0.05, 30.0))) == 0
-    closed = phase_plane_of(np.sin(w * t) + 0.6 * np.sin(9 / 7 * w * t), 1000.0, quantity="displacement")
-    assert section_period(locked_section(closed, constant_period_lock(0.05, 30.0))) == 7
+    plane = phase_plane(x, 1000.0, quantity="displacement")
+    assert section_period(poincare_section(plane, constant_period_lock(0.05, 30.0))) == 0
+    closed = phase_plane(np.sin(w * t) + 0.6 * np.sin(9 / 7 * w * t), 1000.0, quantity="displacement")
+    assert section_period(poincare_section(closed, constant_period_lock(0.05, 30.0))) == 7

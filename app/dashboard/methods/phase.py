@@ -29,9 +29,8 @@ from gearsig.phase import (
     find_lock,
     kind_of_motion,
     largest_lyapunov_exponent,
-    locked_section,
     phase_plane,
-    phase_plane_of,
+    poincare_section,
     recurrence_measures,
     recurrence_plot,
     translation_walk,
@@ -83,7 +82,7 @@ def _section(path: PhasePortrait, lock: CycleLock | None, phase_cycles: float) -
     if lock is None:
         return None
     try:
-        return locked_section(path, lock, phase_cycles=phase_cycles)
+        return poincare_section(path, lock, phase_cycles=phase_cycles)
     except RefusalError as error:
         st.info(as_typed(error), icon=":material/help:")
         return None
@@ -358,7 +357,7 @@ def signal_in_band(segment: SignalSegment, low_cut_hz: float | None, high_cut_hz
                 f"channel {channel!r} has values that are not numbers here", remedy="choose a segment without gaps"
             )
         return PhasePortrait(points, rate_hz, (channel,), (unit,), "states", channel)
-    plane = phase_plane_of(
+    plane = phase_plane(
         segment.values, rate_hz, quantity="displacement", low_cut_hz=low_cut_hz, high_cut_hz=high_cut_hz, source=channel
     )
     points = np.ascontiguousarray(plane.points[:, :1])
@@ -495,7 +494,7 @@ def _show_chaos_test(page: MethodPage, segment: SignalSegment, path: PhasePortra
             lock = _choose_lock(page, st, segment)
         if lock is None:
             return
-        section = locked_section(path, lock)
+        section = poincare_section(path, lock)
         values = np.ascontiguousarray(section.points[:, 0])
         test = zero_one_test_of_section(section, damping=damping)
     else:

@@ -11,7 +11,7 @@ import streamlit as st
 from app.dashboard.methods.frame import MethodPage, SignalSegment, cached, show_table, signal_of, waveforms_of
 from app.dashboard.theme import as_typed, palette
 from app.dashboard.widgets.charts import CONFIG, show_picture
-from gearsig.decompose import Denoised, DenoiseSettings, denoise_channel
+from gearsig.decompose import Denoised, DenoiseSettings, denoise
 from gearsig.errors import InputError
 from gearsig.formatting import readable
 from gearsig.plot import time_frequency_figure, unit_text
@@ -108,7 +108,7 @@ def _choose_denoising(page: MethodPage) -> DenoiseSettings:
 @cached(2, "Removing the noise …")
 def denoise(segment: SignalSegment, settings: DenoiseSettings) -> Denoised:
     """Return the signal without noise."""
-    return denoise_channel(segment.recording, segment.channel, settings)
+    return denoise(segment.recording, segment.channel, settings)
 
 
 # --------------------
