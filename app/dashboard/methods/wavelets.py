@@ -50,7 +50,7 @@ def show_denoising(page: MethodPage) -> None:
     left, right = st.columns(2)
     with left:
         segment = page.segment(n_first=N_FIRST, n_max=N_MAX)
-    denoised = denoise(segment, settings)
+    denoised = denoised_segment(segment, settings)
     columns = {"signal": segment.values, "without noise": denoised.values, "removed": denoised.removed}
     step = f"{settings.threshold} {settings.rule} thresholds, {settings.wavelet}"
     waveforms = waveforms_of(segment, signal_of(segment), columns, step)
@@ -106,7 +106,7 @@ def _choose_denoising(page: MethodPage) -> DenoiseSettings:
 
 
 @cached(2, "Removing the noise …")
-def denoise(segment: SignalSegment, settings: DenoiseSettings) -> Denoised:
+def denoised_segment(segment: SignalSegment, settings: DenoiseSettings) -> Denoised:
     """Return the signal without noise."""
     return denoise(segment.recording, segment.channel, settings)
 
