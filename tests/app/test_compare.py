@@ -77,7 +77,7 @@ def test_nothing_is_written_where_the_page_fails(
     def fail(*_: object, **__: object) -> str:
         raise InputError("no page today")
 
-    monkeypatch.setattr("gearsig.report._comparison.comparison_page", fail)
+    monkeypatch.setattr("gearsig.report.comparison_page", fail)
     arguments = (files / "model.csv", files / "measured.csv", "--rig", files / "gear.toml", "-o", tmp_path / "out")
     code, out, err = run(capsys, "compare", *arguments)
     assert (code, out) == (2, "")
