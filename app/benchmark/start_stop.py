@@ -5,8 +5,8 @@ from __future__ import annotations
 import csv
 import json
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
 from functools import partial
 from io import StringIO
 from math import isfinite, nan
@@ -16,22 +16,16 @@ from typing import Any
 import numpy as np
 
 from app.benchmark.answer import Answer, AnsweredShrinkage
-from app.benchmark.cases import counts_of
+from app.benchmark.cases import BLIND, REFERENCES, counts_of
 from app.benchmark.diagnosers import START_STOP
-from app.benchmark.run import ANSWERS_FOLDER, DEFINITION, BlindRun, state_of_code
-from app.benchmark.scoring.scores import Score, brier, calibration_error, median_of, share
-from app.gap_start_stop.diagnose import compared_of, predictions_of
-from app.gap_start_stop.predict import DriveEvidence, seen_of
+from app.benchmark.run import BlindRun, state_of_code
+from app.benchmark.scoring.judged import Located, Row
+from app.benchmark.scoring.scores import Measure, Score, brier_of, calibration_error, counted, median_of, shrink_of
 from gearsig import __version__
 from gearsig.checks import count, one_of
-from gearsig.gap import NONE, UNKNOWN, GapOutcome
+from gearsig.gap import NAMING, NONE, UNKNOWN, GapOutcome
 from sims.blind_drive import CATALOGUE, OUTSIDE, ROLES, draw_case, label_of, record_case
 from sims.sweep import written
-
-# --------------------
-# What the diagnosis sees of blind start–stop cases, collected for its floors and its calibration.
-# --------------------
-
 
 SHARES = {"none": 0.3, "single": 0.55, "unknown": 0.15}
 
@@ -39,33 +33,12 @@ SHARES = {"none": 0.3, "single": 0.55, "unknown": 0.15}
 def planned(n_cases: int, seed: int) -> list[tuple[str, str, float]]:
     """Return kind, effect and level of each case: effects in turn, levels drawn."""
     rng = np.random.default_rng([seed, 0])
-    found: list[tuple[str, str, float]] = []
+    cases: list[tuple[str, str, float]] = []
     effects = {"none": ("",), "single": tuple(CATALOGUE), "unknown": tuple(OUTSIDE)}
     for kind, n in counts_of(SHARES, n_cases).items():
         names = effects[kind]
-        found += [(kind, names[i % len(names)], float(rng.random())) for i in range(n)]
-    return [found[i] for i in rng.permutation(len(found))]
-
-
-def collect(
-    role: str, seed: int, number: int, plan: tuple[str, str, float]
-) -> list[tuple[dict[str, Any], DriveEvidence]]:
-    """Make a case and return what is seen of it with its reference and without."""
-    kind, effect, level = plan
-    rng = np.random.default_rng([seed, 1, number])
-    case = draw_case(rng, role, kind=kind, effect=effect, level=level, with_reference=True)
-    made, label = record_case(case), label_of(case)
-    found = []
-    for reference in (made.reference, None):
-        if reference is None and effect and (CATALOGUE | OUTSIDE)[effect].needs_reference:
-            continue
-        compared = compared_of(made.recording, reference, "case")
-        seen = seen_of(compared, predictions_of(compared).causes)
-        found.append(({**label, "with_reference": reference is not None}, seen))
-    return found
-
-
-REFERENCES = ("both", "with", "without")
+        cases += [(kind, names[i % len(names)], float(rng.random())) for i in range(n)]
+    return [cases[i] for i in rng.permutation(len(cases))]
 
 
 @dataclass(frozen=True)
@@ -148,136 +121,173 @@ def run_drive_benchmark(
 
 
 # --------------------
-# Scores of blind start–stop cases: how often right, what is said of sound and of unknown ones, how far gaps shrink.
+# Scores of blind start–stop cases: how often right, what is said of healthy and of unknown ones, how far gaps shrink.
 # --------------------
 
 
 TABLE, SCORES, CASES = "table.md", "scores.json", "cases.csv"
-FILES = (TABLE, SCORES, CASES, DEFINITION, ANSWERS_FOLDER)
-NAMING = (GapOutcome.EFFECT.value, GapOutcome.CANNOT_SEPARATE.value)
-STRONG = 0.5
+STRONG_LEVEL = 0.5
 """Level from which on an effect is in the upper half of its span."""
+N_BINS = 5
 SEED = 0
 """Of the draws with replacement that a median's interval comes from."""
 
-Cases = Sequence[DriveDone]
 
-
-def truth_of(done: DriveDone) -> str:
-    """Return the cause that is right."""
-    return str(done.label["effect"]) if done.label["kind"] == "single" else str(done.label["kind"])
-
-
-def ranked(done: DriveDone) -> list[str]:
-    """Return the causes by probability."""
-    return [c.name for c in done.answer.ranked]
-
-
-def mechanical(done: DriveDone) -> list[str]:
-    """Return the effects by probability."""
-    return [name for name in ranked(done) if name not in (NONE, UNKNOWN)]
-
-
-def names_effect(done: DriveDone) -> bool:
-    """Whether the answer names an effect."""
-    return done.answer.outcome in NAMING
-
-
-def named_effects(done: DriveDone) -> list[str]:
-    """Return what the answer names: one effect, or all those that it cannot tell apart."""
-    if done.answer.outcome == GapOutcome.CANNOT_SEPARATE.value:
-        return list(done.answer.inseparable)
-    return mechanical(done)[:1] if names_effect(done) else []
-
-
-def figures(cases: Cases) -> dict[str, Score]:
-    """Return the figures of some cases, each with its 90 % interval and its number of cases."""
-    single = [c for c in cases if c.label["kind"] == "single"]
-    strong = [c for c in single if c.label["level"] >= STRONG]
-    placed = [c for c in single if c.label["place"] and mechanical(c)[:1] == [truth_of(c)]]
-    found = {
-        "likeliest effect right": _share(single, lambda c: mechanical(c)[:1] == [truth_of(c)]),
-        "among the first two": _share(single, lambda c: truth_of(c) in mechanical(c)[:2]),
-        "likeliest effect right, upper half of the span": _share(strong, lambda c: mechanical(c)[:1] == [truth_of(c)]),
-        "named, and right": _share(single, lambda c: truth_of(c) in named_effects(c)),
-        "named, and wrong": _share(single, lambda c: names_effect(c) and truth_of(c) not in named_effects(c)),
-        "tooth or order right, of effects found": _share(placed, _is_placed),
-        "effect named on a sound machine": _share([c for c in cases if c.label["kind"] == "none"], names_effect),
-        "effect named on an unknown": _share([c for c in cases if c.label["kind"] == "unknown"], names_effect),
-        "unknown recognised": _share(
-            [c for c in cases if c.label["kind"] == "unknown"],
-            lambda c: c.answer.outcome == GapOutcome.UNKNOWN.value,
-        ),
-    }
-    shrinks = [s for c in single if (s := _shrink(c, truth_of(c))) is not None]
-    found["held-out shrink by the true effect, median"] = _middle([s.shrink for s in shrinks])
-    found["by the same effect elsewhere (placebo), median"] = _middle([s.placebo for s in shrinks if s.n_placebos])
-    wrong = [s.shrink for c in single for n in mechanical(c) if n != truth_of(c) and (s := _shrink(c, n)) is not None]
-    found["by wrong effects, median"] = _middle(wrong)
-    answered = [c for c in cases if c.answer.causes]
-    sure = [max(k.probability for k in c.answer.causes) for c in answered]
-    right = [ranked(c)[0] == truth_of(c) for c in answered]
-    error = calibration_error(sure, right, 5) if answered else nan
-    found["calibration error"] = Score(error, nan, nan, len(answered))
-    scores = [brier({k.name: k.probability for k in c.answer.causes}, truth_of(c)) for c in answered]
-    found["Brier score, mean"] = Score(sum(scores) / len(scores) if scores else nan, nan, nan, len(scores))
-    found["processor time of a diagnosis in s, median"] = _middle([c.answer.cpu_seconds for c in cases])
-    found["longest time of a diagnosis in s"] = Score(
-        max((c.answer.seconds for c in cases), default=nan), nan, nan, len(cases)
+def drive_row(done: DriveDone) -> Row:
+    """Return a case with its answer as the scores count it; tooth or order are placed right if the setting says so."""
+    label, answer = done.label, done.answer
+    effects = (str(label["effect"]),) if label["effect"] else ()
+    truths = effects if label["kind"] == "single" else (str(label["kind"]),)
+    cause = answer.cause(truths[0])
+    placed = {name: cause is not None and cause.options.get(name) == at for name, at in label["place"].items()}
+    return Row(
+        number=done.number,
+        source=BLIND,
+        kind=label["kind"],
+        effects=effects,
+        truths=truths,
+        level=label["level"],
+        strength=nan,
+        has_reference=bool(label["with_reference"]),
+        n_conditions=1,
+        answer=answer,
+        located=Located(**placed),
     )
-    found["no answer"] = _share(cases, lambda c: not c.answer.causes)
-    return found
 
 
-def write_scores(cases: Cases, folder: Path, command: str) -> Path:
+def effects_ranked(row: Row) -> list[str]:
+    """Return the effects by probability."""
+    return [name for name in row.ranked if name not in (NONE, UNKNOWN)]
+
+
+def effects_named(row: Row) -> list[str]:
+    """Return what the answer names: one effect, or all those that it cannot tell apart."""
+    if row.answer.outcome == GapOutcome.CANNOT_SEPARATE.value:
+        return list(row.answer.inseparable)
+    return effects_ranked(row)[:1] if _names_effect(row) else []
+
+
+def _names_effect(row: Row) -> bool:
+    return row.answer.outcome in {outcome.value for outcome in NAMING}
+
+
+def _is_right(row: Row) -> bool:
+    return effects_ranked(row)[:1] == list(row.truths)
+
+
+def _is(kind: str) -> Callable[[Row], bool]:
+    return lambda row: row.kind == kind
+
+
+def _is_single(row: Row) -> bool:
+    return row.kind == "single"
+
+
+def _is_placed(row: Row) -> bool:
+    return bool(row.located.tooth or row.located.order)
+
+
+def _shrinkages(rows: Sequence[Row]) -> list[AnsweredShrinkage]:
+    """Return the shrinkages by the true effects."""
+    causes = [row.answer.cause(row.truths[0]) for row in rows if _is_single(row)]
+    return [cause.shrinkage for cause in causes if cause is not None and cause.shrinkage is not None]
+
+
+def _wrong_shrinks(rows: Sequence[Row]) -> list[float]:
+    return [shrink_of(row, name) for row in rows if _is_single(row) for name in effects_ranked(row)
+            if name not in row.truths]  # fmt: skip
+
+
+def _medians(values: Callable[[Sequence[Row]], list[float]]) -> Measure:
+    return lambda rows, rng: median_of(values(rows), rng)
+
+
+def _is_answered(row: Row) -> bool:
+    return bool(row.ranked)
+
+
+def _plain(statistic: Callable[[Sequence[Row]], float], of: Callable[[Row], bool] = _is_answered) -> Measure:
+    """Return a statistic of the answered cases without an interval."""
+
+    def measure(rows: Sequence[Row], rng: np.random.Generator) -> Score:  # noqa: ARG001 - all measures have one form
+        chosen = [row for row in rows if of(row)]
+        return Score(statistic(chosen) if chosen else nan, nan, nan, len(chosen))
+
+    return measure
+
+
+MEASURES: dict[str, Measure] = {
+    "likeliest effect right": counted(_is_single, _is_right),
+    "among the first two": counted(_is_single, lambda r: r.truths[0] in effects_ranked(r)[:2]),
+    "likeliest effect right, upper half of the span": counted(
+        lambda r: _is_single(r) and r.level >= STRONG_LEVEL, _is_right
+    ),
+    "named, and right": counted(_is_single, lambda r: r.truths[0] in effects_named(r)),
+    "named, and wrong": counted(_is_single, lambda r: _names_effect(r) and r.truths[0] not in effects_named(r)),
+    "tooth or order right, of effects found": counted(
+        lambda r: _is_single(r) and r.located != Located() and _is_right(r), _is_placed
+    ),
+    "effect named on a sound machine": counted(_is("none"), _names_effect),
+    "effect named on an unknown": counted(_is("unknown"), _names_effect),
+    "unknown recognised": counted(_is("unknown"), lambda r: r.answer.outcome == GapOutcome.UNKNOWN.value),
+    "held-out shrink by the true effect, median": _medians(lambda rows: [s.shrink for s in _shrinkages(rows)]),
+    "by the same effect elsewhere (placebo), median": _medians(
+        lambda rows: [s.placebo for s in _shrinkages(rows) if s.n_placebos]
+    ),
+    "by wrong effects, median": _medians(_wrong_shrinks),
+    "calibration error": _plain(
+        lambda rows: calibration_error([r.confidence for r in rows], [r.first in r.truths for r in rows], N_BINS)
+    ),
+    "Brier score, mean": _plain(lambda rows: float(np.mean([brier_of(r) for r in rows]))),
+    "processor time of a diagnosis in s, median": _medians(lambda rows: [r.answer.cpu_seconds for r in rows]),
+    "longest time of a diagnosis in s": _plain(lambda rows: max(r.answer.seconds for r in rows), lambda _: True),
+    "no answer": counted(lambda _: True, lambda r: not _is_answered(r)),
+}
+"""Figures by their names in table and scores.json."""
+
+
+def figures(rows: Sequence[Row]) -> dict[str, Score]:
+    """Return the figures of some cases, each with its 90 % interval and its number of cases."""
+    return {name: measure(rows, np.random.default_rng(SEED)) for name, measure in MEASURES.items()}
+
+
+def write_scores(cases: Sequence[DriveDone], folder: Path, command: str) -> Path:
     """Write table, scores and cases beside the answers, each whole or not at all."""
-    with_, without = ([c for c in cases if bool(c.label["with_reference"]) is wanted] for wanted in (True, False))
-    parts = {"all": figures(cases), "with reference": figures(with_), "without": figures(without)}
-    rows = [f"| {name} | {' | '.join(_cell(parts[part][name]) for part in parts)} |" for name in parts["all"]]
-    head = f"| blind start–stop cases | {' | '.join(parts)} |\n|---|{'---|' * len(parts)}\n"
-    text = head + "\n".join(rows) + "\n\n" + _effect_table(cases) + f"\n`{command}`\n"
-    plain = {
-        part: {name: {"value": s.value, "low": s.low, "high": s.high, "n": s.n} for name, s in found.items()}
-        for part, found in parts.items()
+    rows = [drive_row(done) for done in cases]
+    parts = {
+        "all": figures(rows),
+        "with reference": figures([row for row in rows if row.has_reference]),
+        "without": figures([row for row in rows if not row.has_reference]),
     }
-    written(folder / CASES, _cases_csv(cases))
-    written(folder / SCORES, json.dumps(_finite(plain), indent=1) + "\n")
-    return written(folder / TABLE, text)
+    lines = [
+        f"| blind start–stop cases | {' | '.join(parts)} |",
+        f"|---|{'---|' * len(parts)}",
+        *(f"| {name} | {' | '.join(_cell(scores[name]) for scores in parts.values())} |" for name in MEASURES),
+        "",
+        *_effect_lines(rows),
+        "",
+        f"`{command}`",
+    ]
+    plain = {
+        part: {name: {key: _finite(value) for key, value in asdict(score).items()} for name, score in scores.items()}
+        for part, scores in parts.items()
+    }
+    written(folder / CASES, _cases_csv(cases, rows))
+    written(folder / SCORES, json.dumps(plain, indent=1) + "\n")
+    return written(folder / TABLE, "\n".join(lines) + "\n")
 
 
-def _effect_table(cases: Cases) -> str:
-    """Return, for each effect, how often the likeliest effect was right and what it was taken for."""
-    lines = ["| effect | right | in the upper half of its span | most often taken for |", "|---|---|---|---|"]
+def _effect_lines(rows: Sequence[Row]) -> Iterator[str]:
+    """Yield, for each effect, how often the likeliest effect was right and what it was taken for."""
+    yield "| effect | right | in the upper half of its span | most often taken for |"
+    yield "|---|---|---|---|"
     for name in CATALOGUE:
-        own = [c for c in cases if c.label["effect"] == name]
-        strong = [c for c in own if c.label["level"] >= STRONG]
-        wrong = Counter(ranked(c)[0] for c in own if c.answer.causes and ranked(c)[0] != name).most_common(1)
-        cells = [_right(own, name), _right(strong, name), f"{wrong[0][0]} ({wrong[0][1]})" if wrong else ""]
-        lines.append(f"| {name} | {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
-
-
-def _right(cases: Cases, name: str) -> str:
-    return f"{sum(mechanical(c)[:1] == [name] for c in cases)} of {len(cases)}"
-
-
-def _share(cases: Cases, wanted: Callable[[DriveDone], bool]) -> Score:
-    return share(sum(wanted(c) for c in cases), len(cases))
-
-
-def _middle(values: Sequence[float]) -> Score:
-    return median_of(values, np.random.default_rng(SEED))
-
-
-def _shrink(done: DriveDone, name: str) -> AnsweredShrinkage | None:
-    cause = done.answer.cause(name)
-    return None if cause is None else cause.shrinkage
-
-
-def _is_placed(done: DriveDone) -> bool:
-    cause = done.answer.cause(truth_of(done))
-    place = done.label["place"]
-    return cause is not None and all(cause.options.get(key) == value for key, value in place.items())
+        cases = [row for row in rows if row.effects == (name,)]
+        strong = [row for row in cases if row.level >= STRONG_LEVEL]
+        wrong = Counter(row.first for row in cases if row.ranked and row.first != name).most_common(1)
+        taken_for = f"{wrong[0][0]} ({wrong[0][1]})" if wrong else ""
+        shares = (f"{sum(map(_is_right, some))} of {len(some)}" for some in (cases, strong))
+        yield f"| {name} | {' | '.join(shares)} | {taken_for} |"
 
 
 def _cell(score: Score) -> str:
@@ -287,33 +297,19 @@ def _cell(score: Score) -> str:
     return f"{score.value:.2f}{interval}, n {score.n}"
 
 
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(one) for key, one in value.items()}
-    return None if isinstance(value, float) and not isfinite(value) else value
+def _finite(value: float) -> float | None:
+    return value if isfinite(value) else None
 
 
-def _cases_csv(cases: Cases) -> str:
+def _cases_csv(cases: Sequence[DriveDone], rows: Sequence[Row]) -> str:
     """Return one line per case."""
     text = StringIO()
-    rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(["case", "kind", "effect", "level", "severity", "unit", "with_reference", "n_channels",
-                   "encoder_counts", "outcome", "first", "probability", "second", "seconds", "error"])  # fmt: skip
-    for c in cases:
-        names, label = ranked(c), c.label
-        first = names[0] if names else ""
-        rows.writerow(
-            [
-                c.number,
-                *(label[k] for k in ("kind", "effect", "level", "severity", "unit", "with_reference")),
-                label["n_channels"],
-                label["encoder_counts"],
-                c.answer.outcome,
-                first,
-                f"{c.answer.probability(first):.3f}",
-                names[1] if len(names) > 1 else "",
-                f"{c.answer.seconds:.1f}",
-                c.answer.error,
-            ]
-        )
+    table = csv.writer(text, lineterminator="\n")
+    stated = ("kind", "effect", "level", "severity", "unit", "with_reference", "n_channels", "encoder_counts")
+    table.writerow(["case", *stated, "outcome", "first", "probability", "second", "seconds", "error"])
+    for done, row in zip(cases, rows, strict=True):
+        answer = done.answer
+        said = (row.first, f"{answer.probability(row.first):.3f}", row.ranked[1] if len(row.ranked) > 1 else "")
+        label = (done.label[name] for name in stated)
+        table.writerow([done.number, *label, answer.outcome, *said, f"{answer.seconds:.1f}", answer.error])
     return text.getvalue()

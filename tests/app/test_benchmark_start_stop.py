@@ -10,14 +10,15 @@ from app.benchmark.answer import Answer, AnsweredCause, AnsweredShrinkage
 from app.benchmark.start_stop import (
     DriveDone,
     DrivePlan,
+    drive_row,
+    effects_named,
     figures,
     make_drive_case,
-    named_effects,
     planned,
     write_scores,
 )
-from app.benchmark.start_stop_calibrate import numbers_of
 from app.cli.main import main
+from app.studies.gap.start_stop import numbers_of
 from gearsig.recording import read_recording
 from gearsig.rig import read_rig
 from sims.blind_drive import CATALOGUE
@@ -80,7 +81,7 @@ CASES = [
 
 
 def test_figures_count_what_they_say():
-    found = {name: score.value for name, score in figures(CASES).items()}
+    found = {name: score.value for name, score in figures([drive_row(case) for case in CASES]).items()}
     assert found["likeliest effect right"] == 0.5
     assert found["among the first two"] == 1.0
     assert found["named, and right"] == 0.5
@@ -96,9 +97,9 @@ def test_all_effects_that_cannot_be_separated_are_named():
     said = {"backlash": 0.4, "tooth_wear": 0.3, "root_crack": 0.25, "none": 0.05}
     three = ("backlash", "tooth_wear", "root_crack")
     case = done(0, "single", "root_crack", said, "cannot separate", inseparable=three)
-    assert named_effects(case) == list(three)
-    assert figures([case])["named, and right"].value == 1.0
-    assert figures([case])["named, and wrong"].value == 0.0
+    assert effects_named(drive_row(case)) == list(three)
+    assert figures([drive_row(case)])["named, and right"].value == 1.0
+    assert figures([drive_row(case)])["named, and wrong"].value == 0.0
 
 
 def test_placebos_count_where_there_are_any():
@@ -107,13 +108,13 @@ def test_placebos_count_where_there_are_any():
         ("single", "backlash", {"backlash": 1.0}, "effect"),
     )
     cases = [done(0, *crack, placebo=0.0), done(1, *crack, placebo=0.3), done(2, *play, placebo=0.0)]
-    found = figures(cases)["by the same effect elsewhere (placebo), median"]
+    found = figures([drive_row(case) for case in cases])["by the same effect elsewhere (placebo), median"]
     assert (found.value, found.n) == (pytest.approx(0.15), 2)
 
 
 def test_the_interval_of_a_median_is_its_own_and_not_that_of_its_values():
     cases = [done(i, "single", "root_crack", {"root_crack": 1.0}, "effect", shrink=0.01 * i) for i in range(1, 102)]
-    found = figures(cases)["held-out shrink by the true effect, median"]
+    found = figures([drive_row(case) for case in cases])["held-out shrink by the true effect, median"]
     assert found.value == pytest.approx(0.51)
     assert 0.35 < found.low < 0.51 < found.high < 0.67
 

@@ -195,7 +195,7 @@ class Figure:
     is_least: bool = True
 
 
-def _counted(of: Callable[[Row], bool], hit: Callable[[Row], bool]) -> Measure:
+def counted(of: Callable[[Row], bool], hit: Callable[[Row], bool]) -> Measure:
     """Return the measure that counts hits among the rows it applies to."""
 
     def measure(rows: Rows, rng: np.random.Generator) -> Score:  # noqa: ARG001 - all measures have one form
@@ -233,7 +233,7 @@ def _of_place(part: str) -> Measure:
         found: bool | None = getattr(row.located, part)
         return found
 
-    return _counted(lambda r: r.is_mechanical and at(r) is not None, lambda r: bool(at(r)))
+    return counted(lambda r: r.is_mechanical and at(r) is not None, lambda r: bool(at(r)))
 
 
 def is_one_answer(row: Row) -> bool:
@@ -259,7 +259,8 @@ def ece(rows: Rows) -> float:
     return calibration_error([r.confidence for r in rows], [r.first in r.truths for r in rows])
 
 
-def _brier(row: Row) -> float:
+def brier_of(row: Row) -> float:
+    """Return the Brier score of a case with one right answer; nan for the others."""
     if not is_one_answer(row):
         return float("nan")
     return brier({c.name: c.probability for c in row.answer.causes}, row.truths[0])
@@ -303,30 +304,30 @@ FIGURES: tuple[Figure, ...] = (
     Figure(
         "top_1",
         "likeliest cause right (16 mechanical effects)",
-        _counted(lambda r: r.is_mechanical, lambda r: r.first in r.truths),
+        counted(lambda r: r.is_mechanical, lambda r: r.first in r.truths),
         targets=(0.80, 0.90),
     ),
     Figure(
         "top_2",
         "among the two likeliest",
-        _counted(lambda r: r.is_mechanical, lambda r: r.truths[0] in r.ranked[:2]),
+        counted(lambda r: r.is_mechanical, lambda r: r.truths[0] in r.ranked[:2]),
         targets=(0.92, 0.97),
     ),
     Figure(
         "group",
         "right group",
-        _counted(lambda r: r.is_mechanical, lambda r: group_of(r.first) == group_of(r.truths[0])),
+        counted(lambda r: r.is_mechanical, lambda r: group_of(r.first) == group_of(r.truths[0])),
         targets=(0.90, 0.96),
     ),
     Figure(
         "top_1_of_16",
         "likeliest right if only the 16 could be",
-        _counted(lambda r: r.is_mechanical, lambda r: r.first_mechanical in r.truths),
+        counted(lambda r: r.is_mechanical, lambda r: r.first_mechanical in r.truths),
     ),
     Figure(
         "named",
         "mechanical effect there: one is named",
-        _counted(lambda r: r.is_mechanical, lambda r: bool(r.named)),
+        counted(lambda r: r.is_mechanical, lambda r: bool(r.named)),
     ),
     Figure(
         "macro_f1", "macro-F1 of the 16 (no pairs)", _resampled(lambda r: r.kind != "pair", macro_f1), is_share=False
@@ -334,41 +335,41 @@ FIGURES: tuple[Figure, ...] = (
     Figure(
         "named_on_none",
         "healthy: an effect is named",
-        _counted(lambda r: r.kind == "none", lambda r: bool(r.named)),
+        counted(lambda r: r.kind == "none", lambda r: bool(r.named)),
         targets=(0.05, 0.05),
         is_least=False,
     ),
     Figure(
         "named_on_unknown",
         "unknown: an effect is named all the same",
-        _counted(lambda r: r.kind == "unknown", lambda r: bool(r.named)),
+        counted(lambda r: r.kind == "unknown", lambda r: bool(r.named)),
         targets=(0.20, 0.15),
         is_least=False,
     ),
     Figure(
         "unknown_recognised",
         "unknown: recognised",
-        _counted(lambda r: r.kind == "unknown", lambda r: r.answer.outcome == GapOutcome.UNKNOWN.value),
+        counted(lambda r: r.kind == "unknown", lambda r: r.answer.outcome == GapOutcome.UNKNOWN.value),
     ),
     Figure(
         "named_on_chain",
         "measurement chain only: a mechanical effect is named",
-        _counted(lambda r: r.is_nuisance, lambda r: bool(r.named)),
+        counted(lambda r: r.is_nuisance, lambda r: bool(r.named)),
     ),
     Figure(
         "chain_right",
         "measurement chain only: likeliest cause right",
-        _counted(lambda r: r.is_nuisance, lambda r: r.first in r.truths),
+        counted(lambda r: r.is_nuisance, lambda r: r.first in r.truths),
     ),
     Figure(
         "pair_top_1",
         "two effects: likeliest is one of them",
-        _counted(lambda r: r.kind == "pair", lambda r: r.first in r.truths),
+        counted(lambda r: r.kind == "pair", lambda r: r.first in r.truths),
     ),
     Figure(
         "pair_top_2",
         "two effects: both are the two likeliest",
-        _counted(lambda r: r.kind == "pair", lambda r: set(r.ranked[:2]) == set(r.truths)),
+        counted(lambda r: r.kind == "pair", lambda r: set(r.ranked[:2]) == set(r.truths)),
     ),
     Figure(
         "ece",
@@ -378,7 +379,7 @@ FIGURES: tuple[Figure, ...] = (
         targets=(0.06, 0.06),
         is_least=False,
     ),
-    Figure("brier", "Brier score (0 to 2)", _mean(_brier), is_share=False),
+    Figure("brier", "Brier score (0 to 2)", _mean(brier_of), is_share=False),
     Figure("tooth", "right tooth, within one", _of_place("tooth")),
     Figure("shaft", "right shaft", _of_place("shaft")),
     Figure("bearing", "right bearing", _of_place("bearing")),
@@ -408,7 +409,7 @@ FIGURES: tuple[Figure, ...] = (
         is_least=False,
     ),
     Figure("slope", "observed over predicted change, median", _median(_slope), is_share=False),
-    Figure("answered", "answered at all", _counted(lambda _: True, lambda r: bool(r.answer.outcome))),
+    Figure("answered", "answered at all", counted(lambda _: True, lambda r: bool(r.answer.outcome))),
 )
 
 

@@ -1,6 +1,6 @@
 """Fits floors and probabilities of the start–stop diagnosis to blind cases kept for that.
 
-``python -m app.benchmark.start_stop_calibrate --cases 100 --seed 71`` makes cases of the role calibration, whose gears
+`python -m app.studies.gap.start_stop --cases 100 --seed 71` makes cases of the role calibration, whose gears
 no case of the evaluation has, and writes `gearsig/gap/start_stop/floors.json`. 3 s of processor time a case. The
 file's provenance says which cases it was made of: `--numbers` makes some of those planned only.
 """
@@ -15,10 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from app.benchmark.start_stop import collect, planned
-from app.gap_start_stop.predict import HALF, DriveAttribution, DriveEvidence, weigh
+from app.benchmark.start_stop import planned
+from app.gap_start_stop.diagnose import compared_of, predictions_of
+from app.gap_start_stop.predict import HALF, DriveAttribution, DriveEvidence, seen_of, weigh
 from gearsig.checks import FloatArray
 from gearsig.gap import FLOORS_FILE, NONE, UNKNOWN, DriveFloor, GapCalibration
+from sims.blind_drive import CATALOGUE, OUTSIDE, draw_case, label_of, record_case
 
 ROLE = "calibration"
 NEUTRAL_SHRINK = 0.3
@@ -27,10 +29,26 @@ RIDGE = 0.005
 START = (0.6, 1.0, 0.0, 0.0)
 """Sharpness, weight of the shrink, bias of none and of unknown."""
 FALSE_ALARMS = 0.05
-LEAST_NAMED, MOST_NAMED, APART = 0.6, 0.95, 0.7
-LEAST_SHARE = 1e-6
+MIN_NAMED, MAX_NAMED, APART = 0.6, 0.95, 0.7
+MIN_SHARE = 1e-6
 
 Row = tuple[Mapping[str, Any], DriveEvidence]
+
+
+def collect(role: str, seed: int, number: int, plan: tuple[str, str, float]) -> list[Row]:
+    """Make a case and return what is seen of it with its reference and without."""
+    kind, effect, level = plan
+    rng = np.random.default_rng([seed, 1, number])
+    case = draw_case(rng, role, kind=kind, effect=effect, level=level, with_reference=True)
+    made, label = record_case(case), label_of(case)
+    rows: list[Row] = []
+    for reference in (made.reference, None):
+        if reference is None and effect and (CATALOGUE | OUTSIDE)[effect].needs_reference:
+            continue
+        compared = compared_of(made.recording, reference, "case")
+        seen = seen_of(compared, predictions_of(compared).causes)
+        rows.append(({**label, "with_reference": reference is not None}, seen))
+    return rows
 
 
 def truth_of(label: Mapping[str, Any]) -> str:
@@ -40,9 +58,11 @@ def truth_of(label: Mapping[str, Any]) -> str:
 
 def fit_part(rows: Sequence[Row]) -> dict[str, Any]:
     """Return floors and calibration of all cases with a reference, or of all without, as plain values."""
-    sound = [seen for label, seen in rows if label["kind"] == "none"]
-    whole = DriveFloor.of_sound(np.array([seen.whole for seen in sound]), np.array([seen.scatter for seen in sound]))
-    halves = [(fold.fitted_to, HALF * seen.scatter) for seen in sound for fold in seen.folds]
+    healthy = [seen for label, seen in rows if label["kind"] == "none"]
+    whole = DriveFloor.of_sound(
+        np.array([seen.whole for seen in healthy]), np.array([seen.scatter for seen in healthy])
+    )
+    halves = [(fold.fitted_to, HALF * seen.scatter) for seen in healthy for fold in seen.folds]
     half = DriveFloor.of_sound(np.array([change for change, _ in halves]), np.array([error for _, error in halves]))
     weighed = [(truth_of(label), weigh([seen], (whole, half))) for label, seen in rows]
     calibration = fit_calibration(weighed)
@@ -59,18 +79,18 @@ def fit_calibration(weighed: Sequence[tuple[str, DriveAttribution]]) -> GapCalib
 
     def loss(values: FloatArray) -> float:
         calibration = _calibration(values)
-        logs = [np.log(max(_probabilities(calibration, w).get(t, 0.0), LEAST_SHARE)) for t, w in weighed]
+        logs = [np.log(max(_probabilities(calibration, w).get(t, 0.0), MIN_SHARE)) for t, w in weighed]
         return float(-np.mean(logs) + RIDGE * np.sum((values - np.array(START)) ** 2))
 
     found = minimize(loss, np.array(START), method="Nelder-Mead", options={"maxiter": 400, "xatol": 1e-3})
     calibration = _calibration(found.x)
-    sound = [_probabilities(calibration, w) for t, w in weighed if t == NONE]
-    named = sorted(1.0 - p[NONE] - p[UNKNOWN] for p in sound)
-    limit = float(np.quantile(named, 1.0 - FALSE_ALARMS, method="higher")) if named else LEAST_NAMED
-    return _calibration(found.x, float(np.clip(limit, LEAST_NAMED, MOST_NAMED)))
+    healthy = [_probabilities(calibration, w) for t, w in weighed if t == NONE]
+    named = sorted(1.0 - p[NONE] - p[UNKNOWN] for p in healthy)
+    limit = float(np.quantile(named, 1.0 - FALSE_ALARMS, method="higher")) if named else MIN_NAMED
+    return _calibration(found.x, float(np.clip(limit, MIN_NAMED, MAX_NAMED)))
 
 
-def _calibration(values: FloatArray, named_from: float = LEAST_NAMED) -> GapCalibration:
+def _calibration(values: FloatArray, named_from: float = MIN_NAMED) -> GapCalibration:
     sharpness, weight, none, unknown = (float(v) for v in values)
     return GapCalibration(max(sharpness, 0.05), weight, NEUTRAL_SHRINK, none, unknown, named_from, APART)
 
