@@ -12,7 +12,7 @@ import numpy as np
 
 from gearsig.checks import closest_match_hint, within
 from gearsig.errors import InputError
-from gearsig.gap import GapSimulator
+from gearsig.gap import DriveSimulator, GapSimulator
 from sims.effects import EffectSetting
 from sims.machine import Machine, Operation
 from sims.simulator import ParameterValue, Simulator
@@ -40,16 +40,17 @@ def simulator(name: str) -> Simulator:
 
 
 @cache
-def gap_simulators() -> dict[str, GapSimulator]:
+def gap_simulators() -> dict[str, GapSimulator | DriveSimulator]:
     """Return every simulator that takes part in the gap diagnosis, by its name."""
     from sims.cracked import cracked_gap_simulator
+    from sims.forging import forging_gap_simulator
     from sims.reduced_fe import reduced_gap_simulator
 
-    found: tuple[GapSimulator, ...] = (cracked_gap_simulator(), reduced_gap_simulator())
+    found = (cracked_gap_simulator(), reduced_gap_simulator(), forging_gap_simulator())
     return {simulator.name: simulator for simulator in found}
 
 
-def gap_simulator(name: str) -> GapSimulator:
+def gap_simulator(name: str) -> GapSimulator | DriveSimulator:
     """Return the simulator called `name` as the gap diagnosis takes it."""
     found = gap_simulators()
     if name not in found:

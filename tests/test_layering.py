@@ -75,7 +75,8 @@ def test_the_library_knows_no_simulator_and_no_app() -> None:
 
 def test_simulators_use_only_rig_recording_and_the_protocol_of_the_gap_diagnosis() -> None:
     basic = ("gearsig.checks", "gearsig.errors", "gearsig.cache", "gearsig.processes", "gearsig.formatting")
-    protocol = {"Added", "Drive", "GapEffect", "GapSimulator", "OperatingCondition", "Twin", "severities"}
+    drive = {"DriveFacts", "DriveSimulator", "DriveTwin"}
+    protocol = {"Added", "GapEffect", "GapSimulator", "OperatingCondition", "Twin"} | drive
     allowed = ("gearsig.rig", "gearsig.recording", *basic, *(f"gearsig.gap.{name}" for name in protocol))
 
     def wrong(name: str, modules: set[str]) -> set[str]:

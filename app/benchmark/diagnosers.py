@@ -146,10 +146,12 @@ def diagnose(seen: VisibleCase) -> GapReport:
 
 def diagnose_drive(seen: VisibleCase) -> GapReport:
     """Diagnose a case of starts and stops with the product itself."""
-    from app.gap_start_stop.diagnose import diagnose_start_stop
+    from gearsig.gap import diagnose_gap
+    from sims.registry import gap_simulator
 
-    return diagnose_start_stop(
+    return diagnose_gap(
         seen.recordings,
+        gap_simulator("forging"),
         rigs=seen.rigs,
         references=seen.references,
         reference_rigs=seen.reference_rigs,
@@ -227,9 +229,9 @@ def _cause(name: str, probability: float, options: Mapping[str, str]) -> GapCaus
 def diagnose_forest(seen: VisibleCase) -> GapReport:
     """Return the calibrated probabilities of the forests, what may be said of them, and the shaft that shows it."""
     from gearsig.gap import attribute, conditions_of, told_options
-    from sims.registry import gap_simulator
+    from sims.cracked import cracked_gap_simulator
 
-    simulator = gap_simulator("cracked")
+    simulator = cracked_gap_simulator()
     twin = simulator.twin_of(seen.rigs[0])
     conditions, _ = conditions_of(
         seen.recordings, seen.rigs, seen.references, seen.reference_rigs, twin, seen.names, lambda *_: None

@@ -166,7 +166,7 @@ def environment(folder: Path, names: Sequence[str]) -> dict[str, str]:
 def state_of_code() -> str:
     """Return a hash of everything that makes or answers a case: answers of other code are no answers of this one."""
     found = hashlib.sha256()
-    for room in ("gearsig", "sims", "app/gap", "app/benchmark"):
+    for room in ("gearsig", "sims", "app/benchmark"):
         for path in sorted((_ROOT / room).rglob("*")):
             own = path.relative_to(_ROOT)
             if path.suffix in (".py", ".json", ".toml", ".npz") and not _SHOWS_ONLY & set(own.parts):

@@ -15,8 +15,7 @@ from app.cli.options import SamplingRateOption, clear_other_versions
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
-    from app.gap.run import GapRequest
-    from gearsig.gap import GapReport
+    from gearsig.gap import GapReport, GapRequest
 
 
 TABLE_WIDTH = 110
@@ -82,8 +81,8 @@ def gap(
         return
     if output is None:
         raise InputError("no folder for the results is given", remedy="give -o DIR")
-    from app.gap.job import check_folder, write_results
-    from app.gap.run import GapRequest
+    from app.gap_job import check_folder, write_results
+    from gearsig.gap import GapRequest
 
     asked = GapRequest(tuple(recordings or ()), tuple(reference or ()), rig, _torques(torque), fs)
     check_folder(output)
@@ -103,7 +102,7 @@ def _torques(texts: list[str] | None) -> tuple[float, ...]:
 
 def _diagnosed(asked: GapRequest, model: str, cache: Path | None, *, fresh: bool) -> GapReport:
     """Diagnose with a progress bar, which is shown on a terminal only."""
-    from app.gap.run import run_gap
+    from app.gap_job import run_gap
     from gearsig.cache import cache_folder
 
     with progress_bar("reading") as show:
@@ -146,12 +145,12 @@ def _print_effects(model: str) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from app.gap.run import gap_effects_of
     from gearsig.gap import severity_unit
     from sims.effects import is_own
+    from sims.registry import gap_simulator
 
     table = Table("group", "effect", "severity", "shows in", box=SIMPLE_HEAD, pad_edge=False)
-    found = gap_effects_of(model)
+    found = gap_simulator(model).gap_effects()
     last = ""
     for effect in found.values():
         where = ", ".join(kind.replace("_", " ") for kind in effect.shows_in)

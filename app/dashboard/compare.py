@@ -33,9 +33,9 @@ from gearsig.prepared import refined_angle
 from gearsig.recording import Recording
 from gearsig.report import FIGURES, alignment_texts, channel_rows, comparison_page, comparison_to_json, orders_csv
 from gearsig.rig import Rig
+from sims.cracked import cracked_gap_simulator
 from sims.machine import nominal_of
 from sims.presets import presets
-from sims.registry import gap_simulator
 
 TWIN = "Set to the rig"
 """Instead of a preset: the rig's own geometry, the rest usual for its size."""
@@ -104,7 +104,7 @@ def _twin(run: SimulationToCompare, rig: Rig | None, speed_rpm: float, sampling_
             "no rig is described that the simulator could be set to", remedy="give a rig file, or choose a preset"
         )
     torque = run.torque_nm if run.torque_nm is not None else nominal_of(rig).torque_nm
-    twin = gap_simulator(MODEL).twin_of(rig)
+    twin = cracked_gap_simulator().twin_of(rig)
     point = OperatingCondition(speed_rpm, torque)
     return twin.run(point, seed=run.seed, duration_s=run.duration_s, sampling_rate_hz=sampling_rate_hz)
 

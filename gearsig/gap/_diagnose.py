@@ -20,12 +20,11 @@ from gearsig.gap._gearless import beside_standing, diagnose_gearless, standing_p
 from gearsig.gap._next_recording import next_recordings
 from gearsig.gap._places import gap_places, ranked_places
 from gearsig.gap._posterior import is_calibrated
-from gearsig.gap._simulator import Added, GapEffect, GapSimulator, Twin
+from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, GapSimulator, Twin
 from gearsig.gap._trials import TriedEffect, at_its_tooth, cause_place, n_compared, steps_of
 from gearsig.gap._types import (
     NAMING,
     NONE,
-    UNKNOWN,
     GapCause,
     GapOutcome,
     GapPlace,
@@ -33,8 +32,9 @@ from gearsig.gap._types import (
     NextRecording,
     group_probabilities,
 )
-from gearsig.gap._verdict import rivals
+from gearsig.gap._verdict import in_order, likeliest_two, rivals
 from gearsig.gap._words import fitted_words
+from gearsig.gap.start_stop._diagnose import diagnose_start_stop, refuse_start_stop
 from gearsig.recording import Recording, metres_per_second_squared
 from gearsig.rig import Bearing, GearPair, Rig
 
@@ -126,7 +126,7 @@ NOT_NEARER = (
 
 def diagnose_gap(
     recordings: Sequence[Recording],
-    simulator: GapSimulator,
+    simulator: GapSimulator | DriveSimulator,
     *,
     rigs: Sequence[Rig] = (),
     references: Sequence[Recording] = (),
@@ -147,7 +147,8 @@ def diagnose_gap(
     ----------
     recordings : sequence of Recording
         Of one rig; several operating conditions tell more.
-    simulator : GapSimulator
+    simulator : GapSimulator or DriveSimulator
+        Of running that goes on, or of starts and stops: what is compared is told in `gearsig.gap.start_stop`.
     rigs : sequence of Rig
         One per recording, with its operating point; empty: those that the recordings carry.
     references : sequence of Recording
@@ -182,6 +183,13 @@ def diagnose_gap(
     called = tuple(reference_names) or _numbered("reference", references)
     _check_distinct([*recordings, *references], [*(names or _numbered("recording", recordings)), *called])
     own_rigs, other_rigs = _rigs(recordings, rigs), _rigs(references, reference_rigs)
+    if isinstance(simulator, DriveSimulator):
+        allowed = {name: effect for name, effect in known.items() if not effects or name in effects}
+        shown = tuple(names) or _numbered("recording", recordings)
+        return diagnose_start_stop(
+            recordings, own_rigs, references, other_rigs, simulator, allowed, shown, called, tell
+        )
+    refuse_start_stop(recordings, own_rigs, names or _numbered("recording", recordings), simulator.name)
     if is_gearless(own_rigs[0]):
         allowed = {name: effect for name, effect in known.items() if not effects or name in effects}
         return diagnose_gearless(recordings, own_rigs, references, other_rigs, names, called, allowed, tell)
@@ -209,7 +217,7 @@ def diagnose_gap(
     doubts = (*unseen, *(text for condition in conditions for text in doubts_of(condition)), *faults)
     places = ranked_places(_places(clearest), [standing_place(one, own_rigs[k]) for one in standing])
     causes = tuple(_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items())
-    causes = _in_order(causes, outcome)
+    causes = in_order(causes, outcome)
     fitted = causes[0].fitted if outcome in NAMING else None
     if outcome in NAMING and causes[0].severity is not None:
         notices.append(OF_THE_TWIN)
@@ -217,7 +225,7 @@ def diagnose_gap(
         notices.append(NOT_NEARER.format(title=causes[0].title))
     after = None if fitted is None else simulated(twin, clearest.facts, clearest.now, (fitted,))
     tell("looking for what would tell more", 0.88)
-    pair = _likeliest_two(causes)
+    pair = likeliest_two(causes)
     size = clearest.size
     reference = clearest.reference
     return GapReport(
@@ -376,24 +384,6 @@ def _cause(
         shrinkage=one.shrinkage,
         evidence=evidence_of(one.fit, seen, frame),
     )
-
-
-def _in_order(causes: tuple[GapCause, ...], outcome: GapOutcome) -> tuple[GapCause, ...]:
-    """Put first what the outcome says; the rest by probability."""
-    if outcome is GapOutcome.NO_GAP:
-        first = next(c for c in causes if c.name == NONE)
-    elif outcome is GapOutcome.UNKNOWN:
-        first = next(c for c in causes if c.name == UNKNOWN)
-    elif outcome is GapOutcome.UNDECIDED:
-        return causes
-    else:
-        first = next(c for c in causes if c.name not in (NONE, UNKNOWN))
-    return (first, *(c for c in causes if c is not first))
-
-
-def _likeliest_two(causes: Sequence[GapCause]) -> tuple[str, str] | None:
-    names = [c.name for c in causes if c.name not in (NONE, UNKNOWN)]
-    return (names[0], names[1]) if len(names) > 1 else None
 
 
 def _preset(twin: Twin, condition: Condition, cause: GapCause, fitted: Added) -> str:

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
+from gearsig.checks import FloatArray
 from gearsig.recording import Recording
-from gearsig.rig import Rig
+from gearsig.rig import PathOfContact, Rig, ToothContact
 
 
 @dataclass(frozen=True)
@@ -136,4 +137,96 @@ class GapSimulator(Protocol):
         RefusalError
             If the rig's data do not suffice, with what is missing.
         """
+        ...
+
+
+# --------------------
+# The same of machines that start and stop, whose equations of motion are compared and not their vibration.
+# --------------------
+
+
+@dataclass(frozen=True)
+class DriveFacts:
+    """How a start–stop machine is built and driven: its rig's contact, and what its recording shows.
+
+    Parameters
+    ----------
+    path : PathOfContact
+    contact : ToothContact
+        Of the rig; half the play, driven inertia and flank friction from a healthy recording where it shows them.
+    module_mm : float
+    motor_torque_nm, brake_torque_nm : float
+        With the valve open; in a stop.
+    load_friction_nm : float
+        On the driven shaft.
+    top_speed_rad_s : float
+        Of the driver.
+    on_s, off_s : float
+        Of a cycle.
+    """
+
+    path: PathOfContact
+    contact: ToothContact
+    module_mm: float
+    motor_torque_nm: float
+    brake_torque_nm: float
+    load_friction_nm: float
+    top_speed_rad_s: float
+    on_s: float
+    off_s: float
+
+
+class DriveTwin(Protocol):
+    """A simulated drive that is set to one rig and driven as a recording shows it; its runs have no sensor noise."""
+
+    @property
+    def point(self) -> OperatingCondition:
+        """Torque of the open valve, and the driver's speed that the flow allows."""
+        ...
+
+    def run(self, added: Sequence[Added] = ()) -> Recording:
+        """Return a recording of some cycles, always with the same seed."""
+        ...
+
+    def at_torque(self, factor: float) -> DriveTwin:
+        """Return the drive with another torque of the motor, and so another top speed."""
+        ...
+
+    def worn_curve_um(self, deflection_um: float, depth_um: float, n_places: int) -> FloatArray:
+        """Return how much further the driver turns at each place of the mesh cycle with worn teeth, (n_places,).
+
+        Parameters
+        ----------
+        deflection_um : float
+            Of one pair under the ordinary load.
+        depth_um : float
+            Where the wear is greatest.
+        n_places : int
+        """
+        ...
+
+    def crack_stiffness_loss(self, crack: Added) -> float:
+        """Return which part of its stiffness a cracked tooth loses."""
+        ...
+
+    def preset_toml(self, added: Added, notes: Sequence[str]) -> str:
+        """Return the drive with an effect as a preset file that `gearsig simulate` runs."""
+        ...
+
+
+@runtime_checkable
+class DriveSimulator(Protocol):
+    """A simulator that takes part in the gap diagnosis of machines that start and stop."""
+
+    @property
+    def name(self) -> str:
+        """As on the command line."""
+        ...
+
+    def gap_effects(self) -> Mapping[str, GapEffect]:
+        """Return the effects that have a meaning for this model."""
+        ...
+
+    def drive_twin_of(self, facts: DriveFacts) -> DriveTwin:
+        """Return a twin of the drive."""
         ...

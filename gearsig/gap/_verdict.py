@@ -73,6 +73,22 @@ def _which_unknown(report: GapReport) -> str:
     return f"Which: unknown; {best.title} comes nearest ({100 * best.probability:.0f} %), too little to be named."
 
 
+def in_order(causes: Sequence[GapCause], outcome: GapOutcome) -> tuple[GapCause, ...]:
+    """Put first what the outcome says; the rest by probability."""
+    ranked = sorted(causes, key=lambda cause: -cause.probability)
+    if outcome is GapOutcome.UNDECIDED:
+        return tuple(ranked)
+    name = {GapOutcome.NO_GAP: NONE, GapOutcome.UNKNOWN: UNKNOWN}.get(outcome)
+    first = next(c for c in ranked if (c.name == name if name else c.name not in (NONE, UNKNOWN)))
+    return (first, *(c for c in ranked if c is not first))
+
+
+def likeliest_two(causes: Sequence[GapCause]) -> tuple[str, str] | None:
+    """Return the names of the first two effects, None where there are fewer."""
+    names = [c.name for c in causes if c.name not in (NONE, UNKNOWN)]
+    return (names[0], names[1]) if len(names) > 1 else None
+
+
 def rivals(causes: Sequence[GapCause]) -> tuple[str, ...]:
     """Return the effects that cannot be told apart: the two likeliest, and more until they are `TOGETHER`."""
     effects = sorted((c for c in causes if c.name not in (NONE, UNKNOWN)), key=lambda cause: -cause.probability)

@@ -249,7 +249,7 @@ def test_a_diagnoser_that_is_not_there_is_named():
     with pytest.raises(InputError, match="no diagnoser 'nothing'"):
         diagnoser("nothing")
     with pytest.raises(InputError, match=r"app\.gap:nothing"):
-        diagnoser("app.gap:nothing")
+        diagnoser("app.gap_job:nothing")
 
     with pytest.raises(InputError, match="no diagnoser '__main__:main'"):
         diagnoser("__main__:main")  # of this process, not of the one that would call it

@@ -11,12 +11,11 @@ from typing import Any
 import pytest
 
 from app.cli.main import main
-from app.gap.job import check_folder, write_results
-from app.gap.run import GapRequest, read_inputs
+from app.gap_job import check_folder, write_results
 from app.samples import sample_folder
 from gearsig.cache import cache_folder
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap import GapReport
+from gearsig.gap import GapReport, GapRequest, read_gap_inputs
 from gearsig.rig import Bearing, OperatingPoint, read_rig, write_rig
 from tests.gap.example_report import TWIN, cannot_separate_report, effect_report, no_gap_report
 
@@ -167,7 +166,7 @@ def test_a_rig_file_beside_a_recording_overrides_speed_and_torque(tmp_path) -> N
     slow = copied(tmp_path, "slow", operating_point=OperatingPoint("input", 300.0, 5.0, 40.0))
     half = copied(tmp_path, "half", operating_point=OperatingPoint("input", 250.0))
     bare = copied(tmp_path, "bare")
-    inputs = read_inputs(GapRequest((slow, half, bare), rig=RIG))
+    inputs = read_gap_inputs(GapRequest((slow, half, bare), rig=RIG))
     points = [(rig.operating_point.speed_rpm, rig.operating_point.torque_nm) for rig in inputs.rigs]
     assert points == [(300.0, 40.0), (250.0, 110.0), (500.0, 110.0)]
     assert all(rig.pairs == inputs.rigs[0].pairs for rig in inputs.rigs)
@@ -175,18 +174,18 @@ def test_a_rig_file_beside_a_recording_overrides_speed_and_torque(tmp_path) -> N
 
 
 def test_without_a_rig_those_beside_are_taken(tmp_path) -> None:
-    inputs = read_inputs(GapRequest((CRACKED,), (HEALTHY,)))
+    inputs = read_gap_inputs(GapRequest((CRACKED,), (HEALTHY,)))
     assert inputs.rigs[0].name == read_rig(RIG).name
     assert len(inputs.reference_rigs) == 1
     with pytest.raises(InputError, match="--rig"):
-        read_inputs(GapRequest((copied(tmp_path, "bare"),)))
+        read_gap_inputs(GapRequest((copied(tmp_path, "bare"),)))
 
 
 def test_torques_are_one_for_all_or_one_for_each(tmp_path) -> None:
     one, two = copied(tmp_path, "one"), copied(tmp_path, "two")
 
     def torques(*stated: float) -> list[float | None]:
-        inputs = read_inputs(GapRequest((one, two), (HEALTHY,), RIG, stated))
+        inputs = read_gap_inputs(GapRequest((one, two), (HEALTHY,), RIG, stated))
         return [rig.operating_point.torque_nm for rig in (*inputs.rigs, *inputs.reference_rigs)]
 
     assert torques() == [110.0, 110.0, 110.0]
@@ -217,28 +216,28 @@ def test_recordings_of_different_rigs_are_refused(tmp_path, changes, what) -> No
         GapRequest((CRACKED,), (other,)),
     ):
         with pytest.raises(InputError) as refused:
-            read_inputs(asked)
+            read_gap_inputs(asked)
         assert what in str(refused.value)
         assert "other.h5" in str(refused.value)
 
 
 def test_what_a_rig_file_does_not_say_is_no_difference(tmp_path) -> None:
     own = copied(tmp_path, "own", bearings=(), **rig_with(module_mm=None, face_width_mm=None))
-    assert read_inputs(GapRequest((own,), rig=RIG)).rigs[0].bearings
+    assert read_gap_inputs(GapRequest((own,), rig=RIG)).rigs[0].bearings
 
 
 def test_files_given_twice_are_refused() -> None:
     with pytest.raises(InputError, match="twice"):
-        read_inputs(GapRequest((CRACKED, CRACKED)))
+        read_gap_inputs(GapRequest((CRACKED, CRACKED)))
     with pytest.raises(InputError, match="its own healthy reference"):
-        read_inputs(GapRequest((CRACKED,), (CRACKED,)))
+        read_gap_inputs(GapRequest((CRACKED,), (CRACKED,)))
 
 
 def test_names_of_equal_files_in_different_folders_stay_apart(tmp_path) -> None:
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
     paths = tuple(copied(tmp_path / name, "run") for name in ("a", "b"))
-    assert read_inputs(GapRequest(paths, rig=RIG)).names == ("a/run.h5", "b/run.h5")
+    assert read_gap_inputs(GapRequest(paths, rig=RIG)).names == ("a/run.h5", "b/run.h5")
 
 
 @pytest.mark.parametrize(
@@ -316,5 +315,5 @@ def test_a_rig_that_does_not_know_all_teeth_is_no_other_machine(tmp_path) -> Non
     rig = read_rig(RIG)
     partly = replace(rig, pairs=(replace(rig.pairs[0], driven_teeth=None),))
     write_rig(partly, tmp_path / "common.toml")
-    (read,) = read_inputs(GapRequest((path,), rig=tmp_path / "common.toml")).rigs
+    (read,) = read_gap_inputs(GapRequest((path,), rig=tmp_path / "common.toml")).rigs
     assert read.pairs[0].driven_teeth is None

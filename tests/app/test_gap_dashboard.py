@@ -12,9 +12,9 @@ import app.dashboard
 from app.dashboard.gap.choice import Choice, common_rig, files_of, own_rig
 from app.dashboard.gap.view import _FINISHED, _JOB, Finished
 from app.dashboard.state import ChosenFile
-from app.gap.run import read_inputs
 from app.samples import sample_folder
 from gearsig.errors import InputError
+from gearsig.gap import read_gap_inputs
 from gearsig.report import gap_figures, gap_to_json
 from tests.gap.example_report import all_reports, effect_report
 from tests.gap.stub_diagnosis import OUTCOME, SECONDS, environment
@@ -80,7 +80,7 @@ def test_uploads_become_files_with_their_own_rigs(tmp_path) -> None:
     asked = files_of(choice, tmp_path)
     assert all(tmp_path in path.parents for path in (*asked.recordings, *asked.references))
     assert asked.names == ("../a run.h5", "b.h5")
-    inputs = read_inputs(asked)
+    inputs = read_gap_inputs(asked)
     torques = [rig.operating_point.torque_nm for rig in (*inputs.rigs, *inputs.reference_rigs)]
     assert torques == [110.0, 55.0, 55.0]
     assert "--rig gearbox.toml" in choice.command
@@ -101,7 +101,7 @@ def test_names_that_differ_after_a_dot_have_their_own_rigs(tmp_path) -> None:
         rigs=(upload("run.10Nm.toml", text=RIG), upload("run.5Nm.toml", text=own)),
     )
     assert common_rig(choice) is None
-    assert [rig.operating_point.torque_nm for rig in read_inputs(files_of(choice, tmp_path)).rigs] == [55.0, 110.0]
+    assert [rig.operating_point.torque_nm for rig in read_gap_inputs(files_of(choice, tmp_path)).rigs] == [55.0, 110.0]
     assert own_rig(upload("run.5Nm.csv.gz"), choice.rigs) is choice.rigs[1]
 
 

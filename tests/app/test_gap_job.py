@@ -6,11 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from app.gap.job import Job, JobFailedError, private_folder
-from app.gap.run import GapRequest
-from app.gap.worker import error_from_dict, error_to_dict
+from app.gap_job import Job, JobFailedError, error_from_dict, error_to_dict, private_folder
 from app.samples import sample_folder
 from gearsig.errors import GearsigError, InputError, RefusalError
+from gearsig.gap import GapRequest
 from tests.gap.example_report import effect_report
 from tests.gap.stub_diagnosis import CHILD, OUTCOME, SECONDS, environment
 

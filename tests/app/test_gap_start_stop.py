@@ -9,20 +9,18 @@ import numpy as np
 import pytest
 
 from app.cli.main import main
-from app.gap.run import checked_model, gap_effects_of, gap_models
-from app.gap_start_stop import diagnose
-from app.gap_start_stop.diagnose import compared_of, diagnose_start_stop
-from app.gap_start_stop.predict import TRIED
-from app.gap_start_stop.report import report_of
-from app.gap_start_stop.twin import worn_curve_um
 from app.samples import sample_folder
 from gearsig.errors import InputError
-from gearsig.gap import NONE, GapOutcome
+from gearsig.gap import NONE, Added, GapOutcome, diagnose_gap
+from gearsig.gap.start_stop import TRIED, compared_of, drive_report, weighed_drive
 from gearsig.recording import write_recording
 from gearsig.report import gap_schema, read_gap_json
 from gearsig.rig import write_rig
 from sims import simulate
-from sims.effects import EffectSetting
+from sims.forging import forging_gap_simulator, worn_curve_um
+from sims.registry import gap_simulator, gap_simulators
+
+SIMULATOR = forging_gap_simulator()
 
 
 def run(arguments: list[str]) -> int:
@@ -61,13 +59,7 @@ def folder(tmp_path_factory) -> Path:
 
 def diagnosed(recording, reference=None):
     references = [] if reference is None else [reference]
-    return diagnose_start_stop(
-        [recording],
-        rigs=[recording.rig],
-        references=references,
-        reference_rigs=[one.rig for one in references],
-        names=["now"],
-    )
+    return diagnose_gap([recording], SIMULATOR, references=references, names=["now"])
 
 
 def test_more_play_is_named_measured_and_simulated_again(folder, tmp_path, capsys):
@@ -93,26 +85,28 @@ def test_more_play_is_named_measured_and_simulated_again(folder, tmp_path, capsy
 @pytest.fixture(scope="module")
 def wider():
     """All that the report of a drive with more play is made of."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(diagnose, "report_of", lambda found: found)
-        return diagnosed(made(2, {"backlash": 120.0}), made(1))
+    now, healthy = made(2, {"backlash": 120.0}), made(1)
+    effects = SIMULATOR.gap_effects()
+    return weighed_drive(
+        [now], [now.rig], [healthy], [healthy.rig], SIMULATOR, effects, ["now"], ["reference 1"], lambda *_: None
+    )
 
 
 def test_what_is_left_is_told_on_cycles_that_the_severity_was_not_fitted_to(wider):
-    before, after = report_of(wider).steps
+    before, after = drive_report(wider).steps
     assert (before.label, after.label) == ("before", "more backlash")
     assert after.left.value < 0.3 * before.left.value
     # Where the half that is fitted to shows twice as much, twice as much is taken off the other half.
     seen = wider.seen[0]
     double = replace(seen, folds=tuple(replace(fold, fitted_to=2.0 * fold.fitted_to) for fold in seen.folds))
-    same, too_much = report_of(replace(wider, seen=(double,))).steps
+    same, too_much = drive_report(replace(wider, seen=(double,))).steps
     assert same == before
     assert too_much.left.value == pytest.approx(before.left.value, rel=0.3)
 
 
 @pytest.mark.parametrize("outcome", [GapOutcome.NO_GAP, GapOutcome.UNKNOWN, GapOutcome.UNDECIDED])
 def test_where_no_effect_is_named_none_is_added(wider, outcome):
-    report = report_of(replace(wider, outcome=outcome))
+    report = drive_report(replace(wider, outcome=outcome))
     assert report.steps == ()
     assert report.verdict[2] == "How far: no effect was added."
 
@@ -155,10 +149,7 @@ def test_without_torque_the_play_can_still_be_told():
 def test_a_second_recording_without_torque_is_told_about():
     """Causes are weighed on all recordings, so that what one of them cannot tell is weighed on none."""
     recordings = [made(7, {"backlash": 150.0}), without_torque(made(8, {"backlash": 150.0}))]
-    rigs = [one.rig for one in recordings]
-    sound = made(9)
-    names = ["first", "second"]
-    report = diagnose_start_stop(recordings, rigs=rigs, references=[sound], reference_rigs=[sound.rig], names=names)
+    report = diagnose_gap(recordings, SIMULATOR, references=[made(9)], names=["first", "second"])
     assert {c.name for c in report.causes if c.severity is not None} == WITHOUT_TORQUE
     told = next(text for text in report.notices if text.startswith("Not weighed, as no torque was recorded in second:"))
     assert "crack in a tooth root" in told
@@ -183,27 +174,27 @@ def test_a_recording_for_another_model_is_one_clear_line(folder, tmp_path, capsy
 
 
 def test_models_and_their_effects_are_known():
-    assert gap_models() == ("cracked", "reduced-fe", "forging")
-    assert set(gap_effects_of("forging")) == set(TRIED)
+    assert tuple(gap_simulators()) == ("cracked", "reduced-fe", "forging")
+    assert set(SIMULATOR.gap_effects()) == set(TRIED)
     with pytest.raises(InputError, match="cracked"):
-        checked_model("craked")
+        gap_simulator("craked")
 
 
 def test_worn_flanks_touch_later_where_they_slide_most():
-    compared = compared_of(made(9), None, "now")
-    curve = worn_curve_um(compared.twin.parameters, 20.0, 60.0)
+    compared = compared_of(made(9), None, SIMULATOR)
+    curve = worn_curve_um(compared.drive.twin.parameters, 20.0, 60.0, 20)
     assert np.all(curve >= -1e-6)
     assert np.max(curve) < 60.0
     assert np.ptp(curve) > 5.0
-    assert worn_curve_um(compared.twin.parameters, 20.0, 0.0) == pytest.approx(np.zeros(len(curve)), abs=1e-6)
+    assert worn_curve_um(compared.drive.twin.parameters, 20.0, 0.0, 20) == pytest.approx(np.zeros(len(curve)), abs=1e-6)
 
 
 @pytest.mark.parametrize("depth_um", [30.0, 60.0, 120.0])
 def test_a_worn_drive_runs_as_its_teeth_at_rest_say(depth_um):
     """The course of the compression from the balance of forces of two worn pairs, against the drive in motion."""
-    twin = compared_of(made(9), None, "now").twin
-    worn = twin.tell(twin.parameters, (EffectSetting("tooth_wear", depth_um, {"gear": "driver"}),)).contact
-    sound, expected = twin.sound.contact, worn_curve_um(twin.parameters, twin.sound.contact.deflection_um, depth_um)
+    drive = compared_of(made(9), None, SIMULATOR).drive
+    worn = drive.features(Added("tooth_wear", depth_um, {"gear": "driver"})).contact
+    sound, expected = drive.healthy.contact, drive.worn_curve_um(depth_um)
     known = np.isfinite(worn.curve_um) & np.isfinite(sound.curve_um)
     found = (worn.curve_um - sound.curve_um)[known]
     assert found - found.mean() == pytest.approx(expected[known] - expected[known].mean(), abs=1.5)

@@ -11,9 +11,9 @@ import streamlit as st
 from app.dashboard.cached import safe_file_name
 from app.dashboard.state import ChosenFile
 from app.dashboard.widgets.chooser import SIMULATED, choose_files, choose_number, sample_file, sample_name
-from app.gap.run import GapRequest, gap_models
 from app.samples import samples
 from gearsig.errors import InputError
+from gearsig.gap import GapRequest
 from gearsig.rig import recording_stem
 
 
@@ -149,10 +149,12 @@ ChosenFiles = tuple[tuple[ChosenFile, ...], tuple[ChosenFile, ...], tuple[Chosen
 
 def choose() -> Choice:
     """Return what the user chose; there may be no recording in it yet."""
+    from sims.registry import gap_simulators
+
     with st.sidebar:
         origin = st.radio("Recordings", (SAMPLES, FILES), horizontal=True, key="gap origin", persist_state="session")
         recordings, references, rigs = _choose_samples() if origin == SAMPLES else _choose_files()
-        model = st.selectbox("Simulator", gap_models(), key="gap simulator", persist_state="session")
+        model = st.selectbox("Simulator", tuple(gap_simulators()), key="gap simulator", persist_state="session")
         with st.expander("Not in the files?", icon=":material/tune:"):
             about = "Of the input shaft, for all recordings."
             torque = choose_number("Torque (N·m)", "gap torque", "from the rig", about=about, minimum=0.0)

@@ -14,7 +14,7 @@ from app.dashboard.theme import as_typed, is_dark
 from app.dashboard.widgets.charts import download, picture_bytes
 from app.dashboard.widgets.messages import show_warnings
 from app.dashboard.widgets.verdict import Colour
-from app.gap.job import JSON, PAGE, TWIN, Job, private_folder
+from app.gap_job import JSON, PAGE, TWIN, Job, private_folder
 from gearsig.cache import cache_folder
 from gearsig.errors import GearsigError
 from gearsig.gap import GapOutcome, GapReport

@@ -205,7 +205,7 @@ def run_drive(setup: DriveSetup) -> DriveRun:
 
 def _curve_um(motion: PairMotion) -> FloatArray | None:
     from gearsig.errors import RefusalError
-    from gearsig.gap import PreparedCycles, cut_cycles
+    from gearsig.gap.start_stop import PreparedCycles, cut_cycles
 
     try:
         cycles = PreparedCycles(cut_cycles(motion))

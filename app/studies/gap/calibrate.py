@@ -174,7 +174,7 @@ def weigh_case(index: int, most_tried: int) -> list[dict[str, Any]]:
     """
     from gearsig.gap import attribute, compare, conditions_of
     from sims.blind import CATALOGUE, draw_case, record_case
-    from sims.registry import gap_simulator
+    from sims.cracked import cracked_gap_simulator
 
     rng = np.random.default_rng([SEED, index])
     place, names = index % ROUND, list(CATALOGUE)
@@ -186,7 +186,7 @@ def weigh_case(index: int, most_tried: int) -> list[dict[str, Any]]:
     truths = [wanted["effect"]] if wanted else [NONE if kind == "none" else UNKNOWN]
     recorded = record_case(case)
     rigs = [_rig(r) for r in recorded.conditions]
-    simulator = gap_simulator("cracked")
+    simulator = cracked_gap_simulator()
     rows = []
     for references in (recorded.references, ()):
         try:

@@ -16,11 +16,21 @@ from typing import Any
 import numpy as np
 
 from app.benchmark.start_stop import planned
-from app.gap_start_stop.diagnose import compared_of, predictions_of
-from app.gap_start_stop.predict import HALF, DriveAttribution, DriveEvidence, seen_of, weigh
 from gearsig.checks import FloatArray
-from gearsig.gap import FLOORS_FILE, NONE, UNKNOWN, DriveFloor, GapCalibration
+from gearsig.gap import NONE, UNKNOWN, GapCalibration
+from gearsig.gap.start_stop import (
+    FLOORS_FILE,
+    HALF,
+    DriveAttribution,
+    DriveEvidence,
+    DriveFloor,
+    attribute_drive,
+    compared_of,
+    evidence_of_drive,
+    predictions_of,
+)
 from sims.blind_drive import CATALOGUE, OUTSIDE, draw_case, label_of, record_case
+from sims.forging import forging_gap_simulator
 
 ROLE = "calibration"
 NEUTRAL_SHRINK = 0.3
@@ -41,12 +51,12 @@ def collect(role: str, seed: int, number: int, plan: tuple[str, str, float]) -> 
     rng = np.random.default_rng([seed, 1, number])
     case = draw_case(rng, role, kind=kind, effect=effect, level=level, with_reference=True)
     made, label = record_case(case), label_of(case)
-    rows: list[Row] = []
+    simulator, rows = forging_gap_simulator(), list[Row]()
     for reference in (made.reference, None):
         if reference is None and effect and (CATALOGUE | OUTSIDE)[effect].needs_reference:
             continue
-        compared = compared_of(made.recording, reference, "case")
-        seen = seen_of(compared, predictions_of(compared).causes)
+        compared = compared_of(made.recording, reference, simulator)
+        seen = evidence_of_drive(compared, predictions_of(compared, simulator.gap_effects()).causes)
         rows.append(({**label, "with_reference": reference is not None}, seen))
     return rows
 
@@ -64,7 +74,7 @@ def fit_part(rows: Sequence[Row]) -> dict[str, Any]:
     )
     halves = [(fold.fitted_to, HALF * seen.scatter) for seen in healthy for fold in seen.folds]
     half = DriveFloor.of_sound(np.array([change for change, _ in halves]), np.array([error for _, error in halves]))
-    weighed = [(truth_of(label), weigh([seen], (whole, half))) for label, seen in rows]
+    weighed = [(truth_of(label), attribute_drive([seen], (whole, half))) for label, seen in rows]
     calibration = fit_calibration(weighed)
     return {
         "whole": whole.to_dict(),

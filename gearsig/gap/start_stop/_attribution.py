@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from gearsig.gap._posterior import GapCalibration
-from gearsig.gap._types import NONE, UNKNOWN, Interval
+from gearsig.gap._posterior import GapCalibration, score_of
+from gearsig.gap._types import NONE, UNKNOWN, Interval, Shrinkage
 from gearsig.gap.start_stop._features import NAMES
 
 # --------------------
@@ -314,6 +314,160 @@ def shrink(
     before, after = float(np.sqrt(np.mean(z**2))), float(np.sqrt(np.mean((z - p) ** 2)))
     slope = float(np.sum(z * p) / np.sum(p * p)) if np.any(p) else float("nan")
     return before, after, max(1.0 - (after / before) ** 2, WORST) if before > 0.0 else 0.0, slope
+
+
+# --------------------
+# Causes against each other: evidence on all cycles, and shrink on those that a severity was not fitted to.
+# --------------------
+
+
+HALF = float(np.sqrt(2.0))
+"""By which half of the cycles scatter more."""
+HELD_OUT = "starts and stops that it was not fitted to"
+PLACED = ("root_crack", "torque_ripple")
+"""Causes that sit somewhere: a placebo is the same cause elsewhere."""
+N_PLACEBOS = 4
+NORMAL_90 = 1.645
+
+
+@dataclass(frozen=True)
+class CycleFold:
+    """One half of the cycles to fit to, and the other to check on.
+
+    Parameters
+    ----------
+    fitted_to : array
+        Change of one half, where it is largest.
+    held_out : array
+        Change of the other half, at the same tooth and order.
+    without : array, (n_blocks, n)
+        The same without each of its cycles.
+    elsewhere : mapping
+        Placed cause → changes of the other half at other places, (k, n).
+    """
+
+    fitted_to: FloatArray
+    held_out: FloatArray
+    without: FloatArray
+    elsewhere: Mapping[str, FloatArray]
+
+
+@dataclass(frozen=True)
+class DriveEvidence:
+    """All that weighing needs of one recording.
+
+    Parameters
+    ----------
+    whole : array
+        Change of all cycles.
+    folds : tuple of CycleFold
+    predicted : mapping
+        Cause → what the simulator predicts.
+    with_reference : bool
+    scatter : array
+        Standard errors of `whole`.
+    """
+
+    whole: FloatArray
+    folds: tuple[CycleFold, ...]
+    predicted: Mapping[str, Predicted]
+    with_reference: bool
+    scatter: FloatArray
+
+    def floors(self, whole: DriveFloor, half: DriveFloor) -> tuple[DriveFloor, DriveFloor]:
+        """Return the floors of this recording, of its whole and of its halves: wider where its cycles scatter."""
+        return whole.widened(self.scatter), half.widened(HALF * self.scatter)
+
+
+@dataclass(frozen=True)
+class DriveAttribution:
+    """What came of it.
+
+    Parameters
+    ----------
+    fits : mapping
+        Cause → severity and evidence, on all cycles.
+    shares : mapping
+        Cause, none, unknown → share of the evidence.
+    shrinkages : mapping
+        Cause → held-out check.
+    """
+
+    fits: Mapping[str, FittedDriveCause]
+    shares: Mapping[str, float]
+    shrinkages: Mapping[str, Shrinkage]
+
+    @property
+    def scores(self) -> dict[str, float]:
+        """Held-out shrink beyond that of placebos."""
+        return {name: score_of(s.shrink.value, s.placebo) for name, s in self.shrinkages.items()}
+
+
+def attribute_drive(every: Sequence[DriveEvidence], floors: tuple[DriveFloor, DriveFloor]) -> DriveAttribution:
+    """Weigh the causes on one or several recordings of one machine.
+
+    Several recordings share a machine and its tolerances: their evidence is averaged, not added.
+
+    Parameters
+    ----------
+    every : sequence of DriveEvidence
+    floors : (DriveFloor, DriveFloor)
+        Of other drives' whole recordings and halves.
+    """
+    own = [seen.floors(*floors) for seen in every]
+    names = [name for name in every[0].predicted if all(name in seen.predicted for seen in every)]
+    pairs = [(seen, whole) for seen, (whole, _) in zip(every, own, strict=True)]
+    fits = {name: [fit(seen.predicted[name], seen.whole, whole) for seen, whole in pairs] for name in names}
+    logs = [evidences(seen.whole, whole, [fits[n][i] for n in names]) for i, (seen, whole) in enumerate(pairs)]
+    mean = {name: float(np.mean([log[name] for log in logs])) for name in logs[0]}
+    folds = [(seen, fold, half) for seen, (_, half) in zip(every, own, strict=True) for fold in seen.folds]
+    found = {name: _shrinkage(name, folds) for name in names}
+    best = {name: max(fits[name], key=lambda one: one.log_evidence) for name in names}
+    return DriveAttribution(best, shares(mean), found)
+
+
+def _shrinkage(name: str, folds: Sequence[tuple[DriveEvidence, CycleFold, DriveFloor]]) -> Shrinkage:
+    """Fit to one half, check on the other, and the other way round; the mean of both."""
+    values, placebos, spread = [], [], []
+    for seen, fold, floor in folds:
+        fitted = fit(seen.predicted[name], fold.fitted_to, floor)
+        own = own_features(fitted.predicted, fold.held_out, floor)
+        values.append(shrink(fold.held_out, fitted.predicted, floor, own))
+        spread.append([shrink(row, fitted.predicted, floor, own) for row in fold.without])
+        placebos.append(_placebo(name, fold, floor, own, fitted.predicted))
+    before, after, taken, slope = (_mean([v[i] for v in values]) for i in range(4))
+    half = [NORMAL_90 * _error(spread, i) for i in range(3)]
+    return Shrinkage(
+        Interval(before, max(0.0, before - half[0]), before + half[0]),
+        Interval(after, max(0.0, after - half[1]), after + half[1]),
+        Interval(taken, taken - half[2], min(1.0, taken + half[2])),
+        slope,
+        float(np.mean(placebos)),
+        HELD_OUT,
+        N_PLACEBOS if name in PLACED else 0,
+    )
+
+
+def _mean(values: Sequence[float]) -> float:
+    known = [value for value in values if np.isfinite(value)]
+    return float(np.mean(known)) if known else float("nan")
+
+
+def _placebo(name: str, fold: CycleFold, floor: DriveFloor, own: NDArray[np.intp], predicted: FloatArray) -> float:
+    """Return the largest shrink of the same cause elsewhere; 0 where it sits nowhere."""
+    if name not in PLACED:
+        return 0.0
+    return max(float(shrink(row, predicted, floor, own)[2]) for row in fold.elsewhere[name])
+
+
+def _error(spread: Sequence[Sequence[tuple[float, ...]]], i: int) -> float:
+    """Return the standard error of the mean over the folds, by the jackknife within each."""
+    variances = []
+    for rows in spread:
+        values = np.array([row[i] for row in rows])
+        n = len(values)
+        variances.append((n - 1.0) * float(np.var(values)) if n > 1 else 0.25)
+    return float(np.sqrt(np.sum(variances)) / len(spread))
 
 
 # --------------------

@@ -685,8 +685,18 @@ class PreparedCycles:
         """Numbers of all cycles."""
         return tuple(range(self.cycles.n_cycles))
 
+    @cached_property
+    def _told(self) -> dict[tuple[int, ...], Told]:
+        """By cycles: halves and blocks are asked for again and again."""
+        return {}
+
     def tell(self, wanted: tuple[int, ...]) -> Told:
         """Return what some cycles tell."""
+        if wanted not in self._told:
+            self._told[wanted] = self._computed(wanted)
+        return self._told[wanted]
+
+    def _computed(self, wanted: tuple[int, ...]) -> Told:
         rows = self.cycles.samples_of(wanted)
         return Told(
             contact_part(self.flanks, rows),

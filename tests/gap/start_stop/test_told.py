@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import RefusalError
-from gearsig.gap import (
+from gearsig.gap.start_stop import (
     NAMES,
     PHASES,
     LocatedDriveChange,

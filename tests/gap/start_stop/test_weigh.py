@@ -7,13 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.gap import (
+from gearsig.gap import NONE, UNKNOWN, GapCalibration
+from gearsig.gap.start_stop import (
     FLOOR,
     NAMES,
-    NONE,
-    UNKNOWN,
     DriveFloor,
-    GapCalibration,
     Predicted,
     evidences,
     fit,

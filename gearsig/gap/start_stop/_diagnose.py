@@ -1,28 +1,42 @@
-"""The gap between start–stop recordings and the simulated drive: where, which cause, how far it shrinks, what next.
+"""The gap between start–stop recordings and a simulated drive: where, which cause, how far it shrinks, what next.
 
 Orders and sidebands mean nothing where the speed crosses zero. What a start–stop machine tells is in its equations:
 play and deflection of the flanks, tooth by tooth and over the mesh cycle, under a torque that is measured; inertia and
 friction of the load from torque against acceleration; ripple of the torque over the pinion's angle; impacts. They hold
 whatever the valve and the brake do, so that a simulated drive need not repeat the very motion.
 
-1. `gearsig.gap` fits those equations to the cycles of a recording, to a sound recording's, or to a
-   run of `sims.forging` by the rig's drawing (its valve, brake and load friction read off the recording: nuisances).
+1. Those equations are fitted to the cycles of a recording, to a healthy recording's, or to a run of the simulated drive
+   by the rig's drawing (its valve, brake and load friction read off the recording: nuisances).
 2. Each cause is run in the simulated drive at some severities; between them runs a straight line. What it changes is
-   compared with what changed, over the floor: what sound drives of another make differ by (`floors.json`).
+   compared with what changed, over the floor: what healthy drives of another make differ by (`floors.json`).
 3. Severity and evidence come from all cycles; the shrink from every second cycle checked on the others and the other
    way round, against the same cause at wrong teeth and orders. Both go into probabilities calibrated on blind cases.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
-from app.gap_start_stop.predict import TRIED, DriveComparison, Predictions, drive_effects, predict, seen_of, weigh
-from app.gap_start_stop.report import Diagnosis, report_of
-from app.gap_start_stop.twin import drive_twin
-from gearsig.errors import GearsigError, InputError, RefusalError
-from gearsig.gap import GapReport, PreparedCycles, cut_cycles, is_drive_calibrated, load_drive_calibration, load_floor
-from gearsig.motion import check_turns, find_roles, measure_motion
+from gearsig.errors import GearsigError, RefusalError
+from gearsig.gap._simulator import DriveSimulator, GapEffect
+from gearsig.gap._types import GapReport
+from gearsig.gap.start_stop._attribution import (
+    attribute_drive,
+    is_drive_calibrated,
+    load_drive_calibration,
+    load_floor,
+)
+from gearsig.gap.start_stop._comparison import (
+    TRIED,
+    DriveComparison,
+    Predictions,
+    evidence_of_drive,
+    predict,
+    simulated_drive,
+)
+from gearsig.gap.start_stop._features import PreparedCycles, cut_cycles
+from gearsig.gap.start_stop._report import DriveDiagnosis, drive_report
+from gearsig.motion import check_turns, find_roles, is_start_stop, measure_motion, motion_segments
 from gearsig.recording import Recording
 from gearsig.rig import Rig, contact_pair
 
@@ -38,75 +52,85 @@ FEW = 4
 
 def diagnose_start_stop(
     recordings: Sequence[Recording],
-    *,
     rigs: Sequence[Rig],
-    references: Sequence[Recording] = (),
-    reference_rigs: Sequence[Rig] = (),
-    names: Sequence[str] = (),
-    reference_names: Sequence[str] = (),
-    on_stage: Stage | None = None,
+    references: Sequence[Recording],
+    reference_rigs: Sequence[Rig],
+    simulator: DriveSimulator,
+    effects: Mapping[str, GapEffect],
+    names: Sequence[str],
+    reference_names: Sequence[str],
+    tell: Stage,
 ) -> GapReport:
-    """Diagnose the gap between start–stop recordings of one machine and the simulated forging drive.
+    """Diagnose the gap between start–stop recordings of one machine and its simulated drive; see `diagnose_gap`.
 
     Parameters
     ----------
-    recordings : sequence of Recording
-        With the angles (or speeds) of pinion and wheel, better with the torque between motor and pinion.
-    rigs : sequence of Rig
-        One per recording, with a [contact] table.
-    references : sequence of Recording
-        Of the same machine when it was sound; each recording is compared with the one at the nearest torque.
-    reference_rigs : sequence of Rig
+    recordings, references : sequence of Recording
+        With the angles (or speeds) of pinion and wheel, better with the torque between motor and pinion. Each is
+        compared with the reference at the nearest torque.
+    rigs, reference_rigs : sequence of Rig
+        With a [contact] table.
+    simulator : DriveSimulator
+    effects : mapping
+        Those that may be named.
     names, reference_names : sequence of str
-    on_stage : callable or None
-        Is told what is being done, and which share of the whole is complete.
+    tell : callable
 
     Raises
     ------
-    InputError
-        If there is no recording, or no rig for one.
     RefusalError
         If a recording holds no start and stop, or no motion of both gears, or the rig no contact.
     """
-    tell = on_stage or (lambda _what, _done: None)
-    if not recordings or len(rigs) != len(recordings) or len(reference_rigs) != len(references):
-        raise InputError(f"{len(rigs)} rigs for {len(recordings)} recordings", allowed="one each, at least one")
-    called = tuple(names) or tuple(f"recording {i + 1}" for i in range(len(recordings)))
+    return drive_report(
+        weighed_drive(recordings, rigs, references, reference_rigs, simulator, effects, names, reference_names, tell)
+    )
+
+
+def weighed_drive(
+    recordings: Sequence[Recording],
+    rigs: Sequence[Rig],
+    references: Sequence[Recording],
+    reference_rigs: Sequence[Rig],
+    simulator: DriveSimulator,
+    effects: Mapping[str, GapEffect],
+    names: Sequence[str],
+    reference_names: Sequence[str],
+    tell: Stage,
+) -> DriveDiagnosis:
+    """Return all that the report is made of, see `diagnose_start_stop`."""
     tell("reading the motion", 0.02)
-    sound = [examined(*one) for one in zip(references, reference_rigs, strict=True)]
+    healthy = [examined(*each) for each in zip(references, reference_rigs, strict=True)]
     compared = tuple(
-        _compared(name, examined(recording, rig), sound)
-        for name, recording, rig in zip(called, recordings, rigs, strict=True)
+        _compared(name, examined(recording, rig), healthy, simulator)
+        for name, recording, rig in zip(names, recordings, rigs, strict=True)
     )
     predictions = []
-    for i, one in enumerate(compared):
+    for i, each in enumerate(compared):
         begun, part = 0.1 + 0.7 * i / len(compared), 0.7 / len(compared)
 
         def simulating(name: str, done: float, begun: float = begun, part: float = part) -> None:
             tell(f"simulating {name.replace('_', ' ')}", begun + part * done)
 
-        predictions.append(predictions_of(one, simulating))
+        predictions.append(predictions_of(each, effects, simulating))
     tell("weighing", 0.85)
-    seen = tuple(seen_of(one, found.causes) for one, found in zip(compared, predictions, strict=True))
+    seen = tuple(evidence_of_drive(a, b.causes) for a, b in zip(compared, predictions, strict=True))
     with_reference = bool(references)
     whole, half = (load_floor(with_reference=with_reference, part=part) for part in ("whole", "half"))
-    weighed = weigh(seen, (whole, half))
+    weighed = attribute_drive(seen, (whole, half))
     calibration = load_drive_calibration(with_reference=with_reference)
     probabilities = calibration.probabilities(weighed.shares, weighed.scores)
-    return report_of(
-        Diagnosis(
-            rigs[0].name,
-            compared,
-            seen,
-            tuple(predictions),
-            weighed,
-            probabilities,
-            calibration.outcome(probabilities),
-            (tuple(reference_names) or tuple(f"reference {i + 1}" for i in range(len(references))))
-            if references
-            else (),
-            tuple(_notices(compared)),
-        )
+    return DriveDiagnosis(
+        rigs[0].name,
+        simulator.name,
+        effects,
+        compared,
+        seen,
+        tuple(predictions),
+        weighed,
+        probabilities,
+        calibration.outcome(probabilities),
+        tuple(reference_names),
+        tuple(_notices(compared, effects)),
     )
 
 
@@ -133,17 +157,20 @@ def examined(recording: Recording, rig: Rig | None = None) -> PreparedCycles:
     return PreparedCycles(cut_cycles(motion))
 
 
-def compared_of(recording: Recording, reference: Recording | None, name: str) -> DriveComparison:
-    """Set a recording beside its sound reference, or beside the drive simulated by its rig."""
-    return _compared(name, examined(recording), [] if reference is None else [examined(reference)])
+def compared_of(
+    recording: Recording, reference: Recording | None, simulator: DriveSimulator, name: str = "recording"
+) -> DriveComparison:
+    """Set a recording beside its healthy reference, or beside the drive simulated by its rig."""
+    return _compared(name, examined(recording), [] if reference is None else [examined(reference)], simulator)
 
 
-def _compared(name: str, now: PreparedCycles, sound: Sequence[PreparedCycles]) -> DriveComparison:
+def _compared(
+    name: str, now: PreparedCycles, healthy: Sequence[PreparedCycles], simulator: DriveSimulator
+) -> DriveComparison:
     told = now.tell(now.every)
-    if not sound:
-        return DriveComparison(name, now, None, drive_twin(now.cycles, told, None))
-    nearest = min(sound, key=lambda one: _apart(one, now))
-    return DriveComparison(name, now, nearest, drive_twin(now.cycles, told, nearest.tell(nearest.every)))
+    nearest = min(healthy, key=lambda each: _apart(each, now), default=None)
+    known = None if nearest is None else nearest.tell(nearest.every)
+    return DriveComparison(name, now, nearest, simulated_drive(simulator, now.cycles, told, known))
 
 
 def _apart(one: PreparedCycles, other: PreparedCycles) -> float:
@@ -155,49 +182,53 @@ def _apart(one: PreparedCycles, other: PreparedCycles) -> float:
     return float(abs(abs(first).max() - abs(second).max()))
 
 
-def predictions_of(compared: DriveComparison, tell: Callable[[str, float], object] = lambda *_: None) -> Predictions:
+def predictions_of(
+    compared: DriveComparison, effects: Mapping[str, GapEffect], tell: Stage = lambda *_: None
+) -> Predictions:
     """Simulate every cause that the recording can tell."""
     order = int(compared.now.orders[compared.spot.order])
     return predict(
-        compared.twin,
+        compared.drive,
         compared.spot,
         order,
-        tellable(compared),
+        {name: effects[name] for name in tellable(compared, effects)},
         tell,
         with_reference=compared.reference is not None,
     )
 
 
-def tellable(compared: DriveComparison) -> tuple[str, ...]:
+def tellable(compared: DriveComparison, effects: Mapping[str, GapEffect]) -> tuple[str, ...]:
     """Causes that the channels and the reference there are can tell."""
     has_torque = compared.now.cycles.motion.torque_nm is not None
     return tuple(
         name
         for name, tried in TRIED.items()
-        if (has_torque or tried.needs != "torque") and (compared.reference is not None or not tried.needs_reference)
+        if name in effects
+        and (has_torque or tried.needs != "torque")
+        and (compared.reference is not None or not tried.needs_reference)
     )
 
 
-def _notices(compared: Sequence[DriveComparison]) -> list[str]:
+def _notices(compared: Sequence[DriveComparison], effects: Mapping[str, GapEffect]) -> list[str]:
     """Say what could not be told, and what was taken for granted."""
     found = [] if is_drive_calibrated() else [UNCALIBRATED]
-    known, effects = set.intersection(*(set(tellable(one)) for one in compared)), drive_effects()
-    missing = [effects[name].title for name in TRIED if name not in known]
+    known = set.intersection(*(set(tellable(each, effects)) for each in compared))
+    missing = [effects[name].title for name in TRIED if name in effects and name not in known]
     if missing:
-        lacking = [one.name for one in compared if one.now.cycles.motion.torque_nm is None]
+        lacking = [each.name for each in compared if each.now.cycles.motion.torque_nm is None]
         why = "only a healthy reference tells what is ordinary"
         if lacking:
             why = f"no torque was recorded in {', '.join(lacking)}"
         found.append(f"Not weighed, as {why}: {', '.join(missing)}. Such a cause ends in none or unknown.")
     if compared[0].reference is not None:
         found.append(LIKE_CYCLES)
-    for one in compared:
-        if one.now.cycles.n_cycles < FEW:
+    for each in compared:
+        if each.now.cycles.n_cycles < FEW:
             found.append(
-                f"{one.name} has {one.now.cycles.n_cycles} starts: how far the gap shrinks rests on few cycles."
+                f"{each.name} has {each.now.cycles.n_cycles} starts: how far the gap shrinks rests on few cycles."
             )
-        if not one.told.contact.play_um > 0.0:
-            found.append(f"{one.name} loads one flank only: its play cannot be told; record a stop with the brake.")
+        if not each.told.contact.play_um > 0.0:
+            found.append(f"{each.name} loads one flank only: its play cannot be told; record a stop with the brake.")
     return found
 
 
@@ -228,8 +259,6 @@ def refuse_start_stop(recordings: Sequence[Recording], rigs: Sequence[Rig], name
 
 def is_start_stop_recording(recording: Recording, rig: Rig) -> bool:
     """Whether a recording holds the motion of both gears of a machine that starts and stops."""
-    from gearsig.motion import is_start_stop, measure_motion, motion_segments
-
     if rig.contact is None:
         return False
     try:

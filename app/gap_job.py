@@ -1,23 +1,83 @@
-"""A gap diagnosis that runs beside the page which asked for it, and can be stopped."""
+"""A gap diagnosis from files to a folder of results, here or in a process of its own that can be stopped.
+
+A page starts `python -P -m app.gap_job FOLDER`. The folder holds request.json; progress.json, and in the end results or
+error.json, come beside it. The process ends when its standard input does: nothing goes on for a parent that is gone.
+"""
 
 from __future__ import annotations
 
 import json
+import os
 import secrets
 import shutil
+import signal
 import subprocess
 import sys
+import sysconfig
 import weakref
+from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from tempfile import mkdtemp
+from threading import Thread
+from time import monotonic
+from typing import Any
 
-from app.gap.run import GapRequest
-from app.gap.worker import ERROR, PROGRESS, RESULTS, error_from_dict, write_request
 from app.stopping import stop
-from gearsig.errors import GearsigError, InputError
-from gearsig.gap import GapReport
-from gearsig.report import check_writable
+from gearsig.errors import GearsigError, InputError, RefusalError
+from gearsig.gap import GapReport, GapRequest, read_gap_inputs
+from gearsig.report import check_writable, read_gap_json, write_gap_json, write_gap_page, write_text
+
+Stage = Callable[[str, float], None]
+READING = 0.03
+"""Share of the progress that is reading."""
+
+
+def run_gap(
+    asked: GapRequest,
+    model: str,
+    *,
+    cache: Path | None,
+    fresh: bool = False,
+    on_stage: Stage = lambda *_: None,
+) -> GapReport:
+    """Read the files and diagnose the gap.
+
+    Parameters
+    ----------
+    asked : GapRequest
+    model : str
+        Name of the simulator.
+    cache : Path or None
+        Folder that keeps what is prepared once per rig; None: nothing is kept, nor taken from before.
+    fresh : bool
+        Prepare anew what the folder holds already, and keep that.
+    on_stage : callable
+        Is told what is being done, and which share of the whole is complete.
+
+    Raises
+    ------
+    InputError, RefusalError
+    """
+    from gearsig.gap import diagnose_gap
+    from sims.registry import gap_simulator
+
+    simulator = gap_simulator(model)
+    inputs = read_gap_inputs(asked, lambda name: on_stage(f"reading {name}", 0.0))
+    return diagnose_gap(
+        inputs.recordings,
+        simulator,
+        rigs=inputs.rigs,
+        references=inputs.references,
+        reference_rigs=inputs.reference_rigs,
+        names=inputs.names,
+        reference_names=inputs.reference_names,
+        cache=cache,
+        fresh=fresh,
+        on_stage=lambda stage, done: on_stage(stage, READING + (1 - READING) * done),
+    )
+
 
 # --------------------
 # What a gap diagnosis leaves in a folder: gap.json, gap.html and, where an effect is named, twin.toml; all or none.
@@ -53,8 +113,6 @@ def write_results(report: GapReport, folder: Path, *, command: str = "") -> tupl
     tuple of Path
         Page, JSON, and the twin's preset where there is one.
     """
-    from gearsig.report import write_gap_json, write_gap_page
-
     target = folder.absolute()
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -95,7 +153,15 @@ def _is_ours(path: Path) -> bool:
     return isinstance(found, dict) and found.get("schema") == "gearsig.gap"
 
 
-LOG = "log.txt"
+# --------------------
+# The process beside a page: what it is asked, what it says, what it leaves.
+# --------------------
+
+
+REQUEST, PROGRESS, ERROR, RESULTS, LOG = "request.json", "progress.json", "error.json", "results", "log.txt"
+EXIT_REFUSED = 2
+EVERY_S = 0.2
+"""Progress is written no oftener."""
 
 
 class JobFailedError(GearsigError):
@@ -110,7 +176,7 @@ class Job:
     folder : Path
         From `private_folder`; holds the uploads, too. The job owns it.
     asked, model, cache, command
-        See `app.gap.run.run_gap` and the page's command.
+        See `run_gap` and the page's command.
     """
 
     def __init__(self, folder: Path, asked: GapRequest, model: str, *, cache: Path | None, command: str = "") -> None:
@@ -118,7 +184,8 @@ class Job:
         write_request(folder, asked, model, cache, command)
         log = (folder / LOG).open("w", encoding="utf-8")
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "app.gap.worker", str(folder)],
+            [sys.executable, "-P", "-m", "app.gap_job", str(folder)],  # -P: a user's own app.py there is not ours
+            env=_environment(),
             stdin=subprocess.PIPE,
             stdout=log,
             stderr=log,
@@ -154,8 +221,6 @@ class Job:
         GearsigError
             Why there is none.
         """
-        from gearsig.report import read_gap_json
-
         if (self.folder / ERROR).exists():
             raise error_from_dict(json.loads((self.folder / ERROR).read_text(encoding="utf-8")))
         if not (self.folder / RESULTS / JSON).exists():
@@ -181,6 +246,15 @@ def private_folder() -> Path:
     return Path(mkdtemp(prefix="gearsig-gap-"))
 
 
+def _environment() -> dict[str, str]:
+    """Return the environment in which a process finds this very `app`, installed or not."""
+    root = str(Path(__file__).parents[1])
+    if root == sysconfig.get_path("purelib"):
+        return dict(os.environ)
+    folders = (root, os.environ.get("PYTHONPATH", ""))
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, folders))}
+
+
 def _end(process: subprocess.Popen[bytes], folder: Path) -> None:
     _stop(process)
     shutil.rmtree(folder, ignore_errors=True)
@@ -191,3 +265,83 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
     if process.stdin is not None:
         with suppress(OSError):
             process.stdin.close()
+
+
+def write_request(folder: Path, asked: GapRequest, model: str, cache: Path | None, command: str) -> None:
+    """Write what the process is to do."""
+    found = {"asked": asdict(asked), "model": model, "cache": cache, "command": command}
+    write_text(folder / REQUEST, json.dumps(found, default=str))
+
+
+def error_to_dict(error: GearsigError) -> dict[str, str]:
+    """Return an error as texts."""
+    if isinstance(error, InputError):
+        return {"what": error.what, "where": error.where, "allowed": error.allowed, "remedy": error.remedy}
+    if isinstance(error, RefusalError):
+        return {"reason": error.reason, "remedy": error.remedy}
+    return {"reason": str(error), "remedy": ""}
+
+
+def error_from_dict(found: dict[str, str]) -> GearsigError:
+    """Return the error that `error_to_dict` made the texts of."""
+    if "what" in found:
+        return InputError(found["what"], where=found["where"], allowed=found["allowed"], remedy=found["remedy"])
+    return RefusalError(found["reason"], remedy=found["remedy"])
+
+
+def _request(folder: Path) -> tuple[GapRequest, str, Path | None, str]:
+    found: dict[str, Any] = json.loads((folder / REQUEST).read_text(encoding="utf-8"))
+    given = found["asked"]
+    asked = GapRequest(
+        tuple(map(Path, given["recordings"])),
+        tuple(map(Path, given["references"])),
+        Path(given["rig"]) if given["rig"] else None,
+        tuple(given["torques_nm"]),
+        given["sampling_rate_hz"],
+        tuple(given["names"]),
+        tuple(given["reference_names"]),
+    )
+    return asked, found["model"], Path(found["cache"]) if found["cache"] else None, found["command"]
+
+
+class _Progress:
+    """Writes the stage and the share that is complete, now and then."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._stage, self._at = path, "", 0.0
+
+    def __call__(self, stage: str, done: float) -> None:
+        if stage == self._stage and monotonic() - self._at < EVERY_S:
+            return
+        self._stage, self._at = stage, monotonic()
+        write_text(self._path, json.dumps({"stage": stage, "done": float(done)}))
+
+
+def main(folder: Path) -> int:
+    """Diagnose what the folder asks for."""
+    asked, model, cache, command = _request(folder)
+    try:
+        report = run_gap(asked, model, cache=cache, on_stage=_Progress(folder / PROGRESS))
+        write_results(report, folder / RESULTS, command=command)
+    except GearsigError as error:
+        write_text(folder / ERROR, json.dumps(error_to_dict(error)))
+        return EXIT_REFUSED
+    return 0
+
+
+def _end_with_parent() -> None:
+    """Wait for the end of standard input in a thread; then end this process and those that it started."""
+
+    def wait() -> None:
+        while os.read(sys.stdin.fileno(), 1024):  # not through sys.stdin: its lock would be in the way at the end
+            pass
+        if hasattr(os, "killpg"):
+            os.killpg(os.getpgrp(), signal.SIGTERM)
+        os._exit(1)
+
+    Thread(target=wait, daemon=True).start()
+
+
+if __name__ == "__main__":
+    _end_with_parent()
+    sys.exit(main(Path(sys.argv[1])))

@@ -7,64 +7,57 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.gap_start_stop.predict import (
-    TORQUE_GAIN,
-    TRIED,
-    CycleFold,
-    DriveAttribution,
-    DriveComparison,
-    DriveEvidence,
-    Predictions,
-    drive_effects,
-    parameters_with,
-    setting_of,
-)
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError
 from gearsig.formatting import readable
-from gearsig.gap import (
-    COMPRESSION,
-    FLOOR,
-    NAMES,
+from gearsig.gap._evidence import weighed_evidence
+from gearsig.gap._simulator import Added, GapEffect, OperatingCondition
+from gearsig.gap._types import (
     NAMING,
     NONE,
-    UNITS,
     UNKNOWN,
-    Added,
     AngleCurves,
     ConditionFacts,
-    DriveFloor,
     Evidence,
-    FittedDriveCause,
     GapCause,
-    GapEffect,
     GapOutcome,
     GapPlace,
     GapReport,
     GapStep,
     Interval,
     NextRecording,
-    OperatingCondition,
     PlaceKind,
-    Predicted,
-    PreparedCycles,
     SpectrumCurves,
-    change_of,
-    fit,
-    fitted_words,
     group_probabilities,
-    prediction_errors,
-    rivals,
-    severity_unit,
-    weighed_evidence,
 )
+from gearsig.gap._verdict import in_order, likeliest_two, rivals
+from gearsig.gap._words import fitted_words, severity_unit
+from gearsig.gap.start_stop._attribution import (
+    FLOOR,
+    NORMAL_90,
+    CycleFold,
+    DriveAttribution,
+    DriveEvidence,
+    DriveFloor,
+    FittedDriveCause,
+    Predicted,
+    fit,
+)
+from gearsig.gap.start_stop._comparison import (
+    CRACK,
+    RIPPLE,
+    TORQUE_GAIN,
+    TRIED,
+    WEAR,
+    DriveComparison,
+    Predictions,
+    SimulatedDrive,
+)
+from gearsig.gap.start_stop._features import COMPRESSION, NAMES, UNITS, change_of, prediction_errors
 
 # --------------------
 # Curves of a start–stop gap: the torque by order of the pinion, and what its teeth yield, one by one.
 # --------------------
-
-
-RIPPLE, CRACK = "torque_ripple", "root_crack"
 
 
 def torque_curves(compared: DriveComparison, fitted: Added | None) -> tuple[SpectrumCurves, ...]:
@@ -129,9 +122,11 @@ def tooth_curves(compared: DriveComparison, fitted: Added | None, predicted_um: 
 # --------------------
 
 
-def least_seen(compared: DriveComparison, predictions: Predictions) -> tuple[str, ...]:
+def least_seen(
+    compared: DriveComparison, predictions: Predictions, effects: Mapping[str, GapEffect]
+) -> tuple[str, ...]:
     """Return one sentence with the least severity of every cause that would exceed the floor of this recording."""
-    floor, effects = compared.floor(), drive_effects()
+    floor = compared.floor()
     told = []
     for name, cause in predictions.causes.items():
         least = least_severity(cause, floor)
@@ -159,7 +154,7 @@ def least_severity(cause: Predicted, floor: DriveFloor) -> float:
 
 FACTORS = (0.7, 1.5)
 """Torques that are tried, over the present one."""
-ANALYTIC = ("tooth_wear", "root_crack", TORQUE_GAIN)
+ANALYTIC = (WEAR, CRACK, TORQUE_GAIN)
 LEAST_GAIN, SAME = 1.1, 0.1
 
 
@@ -168,47 +163,51 @@ def next_drive_recordings(
     predictions: Predictions,
     fits: Mapping[str, FittedDriveCause],
     pair: tuple[str, str],
-    titles: Mapping[str, str],
+    effects: Mapping[str, GapEffect],
 ) -> tuple[NextRecording, ...]:
     """Return starts and stops at other torques that put the predictions of two causes further apart, best first."""
     floor = compared.floor()
     now = _distance(fits[pair[0]].predicted, fits[pair[1]].predicted, floor.scale)
     found = []
     for factor in FACTORS:
-        if not _turns(compared, factor):
+        drive = compared.drive.at_torque(factor)
+        if not _turns(compared, drive):
             continue
         try:
-            first, second = (_change(compared, predictions, fits[name], factor) for name in pair)
+            first, second = (_change(compared, predictions, fits[name], drive, effects) for name in pair)
             apart = _distance(first, second, floor.scale)
         except GearsigError:
             continue
         if apart > LEAST_GAIN * now:
-            point = OperatingCondition(compared.twin.speed_rpm, compared.twin.torque_nm * factor)
+            point = drive.point
+            titles = " and ".join(effects[name].title for name in pair)
             text = (
-                f"starts and stops at {point.torque_nm:.3g} N·m; {titles[pair[0]]} and {titles[pair[1]]} are then "
+                f"starts and stops at {point.torque_nm:.3g} N·m; {titles} are then "
                 f"{apart:.2g} structural floors apart instead of {now:.2g}."
             )
             found.append(NextRecording(point, pair, apart, now, text))
     return tuple(sorted(found, key=lambda one: -one.standard_deviations))
 
 
-def _change(compared: DriveComparison, predictions: Predictions, fitted: FittedDriveCause, factor: float) -> FloatArray:
-    """Return the predicted change at another torque, where the cause is expected to show."""
-    name, twin = fitted.name, compared.twin.at_torque(factor)
+def _change(
+    compared: DriveComparison,
+    predictions: Predictions,
+    fitted: FittedDriveCause,
+    drive: SimulatedDrive,
+    effects: Mapping[str, GapEffect],
+) -> FloatArray:
+    """Return the predicted change of another drive, where the cause is expected to show."""
+    name = fitted.name
     if name in ANALYTIC:
         return fitted.predicted
-    severity = fitted.severity.value
-    told = twin.tell(
-        parameters_with(name, severity, twin.parameters),
-        setting_of(name, severity, predictions.options.get(name, {})),
-    )
-    change = change_of(told, twin.sound, predictions.shape, compared.spot)
-    return np.where(np.isin(NAMES, TRIED[name].shows_in), np.nan_to_num(change), 0.0)
+    added = Added(name, fitted.severity.value, predictions.options.get(name, {}))
+    change = change_of(drive.features(added), drive.healthy, compared.drive.shape, compared.spot)
+    return np.where(np.isin(NAMES, effects[name].shows_in), np.nan_to_num(change), 0.0)
 
 
-def _turns(compared: DriveComparison, factor: float) -> bool:
-    """Whether the sound drive turns its load at another torque: what its cycles tell is then the same."""
-    now, there = compared.twin.sound.load.friction_nm, compared.twin.at_torque(factor).sound.load.friction_nm
+def _turns(compared: DriveComparison, drive: SimulatedDrive) -> bool:
+    """Whether the healthy drive turns its load at another torque: what its cycles tell is then the same."""
+    now, there = compared.drive.healthy.load.friction_nm, drive.healthy.load.friction_nm
     return bool(abs(there - now) < SAME * now)
 
 
@@ -272,15 +271,16 @@ def drive_places(compared: DriveComparison) -> tuple[GapPlace, ...]:
     energies = np.maximum(z**2 - 1.0, 0.0)
     total = float(np.sum(energies))
     order = np.argsort(-energies)
+    shares = energies / total if total > 0.0 else energies
     found = [
-        _place_places(compared, int(i), float(distance[i]), float(repeated[i]), float(z[i]), float(energies[i]) / total)
+        _place_of_change(compared, int(i), float(distance[i]), float(repeated[i]), float(z[i]), float(shares[i]))
         for i in order
-        if total > 0.0 and energies[i] > LEAST_SHARE * total
+        if shares[i] > LEAST_SHARE
     ]
     return (*found, *_phases(compared))
 
 
-def _place_places(
+def _place_of_change(
     compared: DriveComparison, i: int, change_db: float, repeated: float, structural: float, share: float
 ) -> GapPlace:
     name = NAMES[i]
@@ -342,8 +342,8 @@ def _pair(now: float, other: float, unit: str) -> str:
 
 def _phases(compared: DriveComparison) -> list[GapPlace]:
     """Return the phases in which motion or torque are predicted worse than the sound machine's own."""
-    sound: PreparedCycles = compared.sound_run if compared.reference is None else compared.reference
-    now, other = (prediction_errors(one, compared.other) for one in (compared.now, sound))
+    healthy = compared.drive.healthy_run if compared.reference is None else compared.reference
+    now, other = (prediction_errors(one, compared.other) for one in (compared.now, healthy))
     rows = []
     for key, rms in now.items():
         change = 20.0 * np.log10(max(rms, 1e-9) / max(other.get(key, np.nan), 1e-9))
@@ -366,7 +366,6 @@ def _phases(compared: DriveComparison) -> list[GapPlace]:
     return sorted(rows, key=lambda place: -place.change_db)[:MOST_PHASES]
 
 
-NORMAL_90 = 1.645
 MOST_EVIDENCE = 6
 SMALLEST = 0.3
 """Floors from which a predicted change is worth a line."""
@@ -374,17 +373,19 @@ TITLES = {NONE: "nothing beyond what sound drives differ by", UNKNOWN: "nothing 
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class DriveDiagnosis:
     """Everything that a report is made of.
 
     Parameters
     ----------
-    rig : str
-    compared : tuple of Compared
+    rig, simulator : str
+    effects : mapping
+        Those of the simulator.
+    compared : tuple of DriveComparison
         The recording that differs most is `clearest`.
-    seen : tuple of Seen
+    seen : tuple of DriveEvidence
     predictions : tuple of Predictions
-    weighed : Weighed
+    weighed : DriveAttribution
     probabilities : mapping
     outcome : GapOutcome
     references : tuple of str
@@ -392,6 +393,8 @@ class Diagnosis:
     """
 
     rig: str
+    simulator: str
+    effects: Mapping[str, GapEffect]
     compared: tuple[DriveComparison, ...]
     seen: tuple[DriveEvidence, ...]
     predictions: tuple[Predictions, ...]
@@ -407,21 +410,19 @@ class Diagnosis:
         return int(np.argmax([c.floor().size(c.change) for c in self.compared]))
 
 
-def report_of(found: Diagnosis) -> GapReport:
+def drive_report(found: DriveDiagnosis) -> GapReport:
     """Return the report."""
     k = found.clearest
     compared, floor = found.compared[k], found.compared[k].floor()
-    causes = _ordered([_cause(found, name, p) for name, p in found.probabilities.items()], found.outcome)
+    causes = in_order([_cause(found, name, p) for name, p in found.probabilities.items()], found.outcome)
     first = causes[0]
     fitted = first.fitted if found.outcome in NAMING else None
-    named = [c.name for c in causes if c.name not in (NONE, UNKNOWN)]
-    pair = (named[0], named[1]) if len(named) > 1 else None
+    pair = likeliest_two(causes)
     is_gap = found.outcome is not GapOutcome.NO_GAP
-    titles = {c.name: c.title for c in causes}
     extra_um = _extra_um(found.weighed.fits.get(CRACK), compared)
     return GapReport(
         rig=found.rig,
-        simulator="forging",
+        simulator=found.simulator,
         conditions=tuple(_facts(c) for c in found.compared),
         references=found.references,
         outcome=found.outcome,
@@ -432,30 +433,20 @@ def report_of(found: Diagnosis) -> GapReport:
         groups=group_probabilities(causes),
         inseparable=rivals(causes) if found.outcome is GapOutcome.CANNOT_SEPARATE else None,
         steps=_steps(found, first) if found.outcome in NAMING else (),
-        next_recordings=next_drive_recordings(compared, found.predictions[k], found.weighed.fits, pair, titles)
+        next_recordings=next_drive_recordings(compared, found.predictions[k], found.weighed.fits, pair, found.effects)
         if pair and is_gap
         else (),
         spectra=torque_curves(compared, fitted),
         angles=tooth_curves(compared, fitted, extra_um),
-        notices=(*found.notices, *least_seen(compared, found.predictions[k])),
+        notices=(*found.notices, *least_seen(compared, found.predictions[k], found.effects)),
         twin_toml="" if fitted is None else _preset(compared, first, fitted),
     )
 
 
-def _ordered(causes: list[GapCause], outcome: GapOutcome) -> tuple[GapCause, ...]:
-    """Put first what the outcome says; the rest by probability."""
-    ranked = sorted(causes, key=lambda cause: -cause.probability)
-    if outcome is GapOutcome.UNDECIDED:
-        return tuple(ranked)
-    wanted = {GapOutcome.NO_GAP: NONE, GapOutcome.UNKNOWN: UNKNOWN}.get(outcome)
-    first = next(c for c in ranked if (c.name == wanted if wanted else c.name not in (NONE, UNKNOWN)))
-    return (first, *(c for c in ranked if c is not first))
-
-
-def _cause(found: Diagnosis, name: str, probability: float) -> GapCause:
+def _cause(found: DriveDiagnosis, name: str, probability: float) -> GapCause:
     if name in (NONE, UNKNOWN):
         return GapCause(name, name, TITLES[name], "", probability)
-    effect: GapEffect = drive_effects()[name]
+    effect = found.effects[name]
     base = GapCause(name, effect.group, effect.title, effect.unit, probability)
     if name not in found.weighed.fits:
         return base
@@ -474,7 +465,7 @@ def _cause(found: Diagnosis, name: str, probability: float) -> GapCause:
 def _place(name: str, compared: DriveComparison) -> str:
     if name == CRACK:
         return f"tooth {compared.spot.tooth + 1} of the pinion"
-    return f"order {int(compared.now.orders[compared.spot.order])} of the pinion" if name == "torque_ripple" else ""
+    return f"order {int(compared.now.orders[compared.spot.order])} of the pinion" if name == RIPPLE else ""
 
 
 def _evidence(fitted: FittedDriveCause, change: np.ndarray, floor: DriveFloor) -> tuple[Evidence, ...]:
@@ -504,7 +495,7 @@ def _repeatability(compared: DriveComparison) -> float:
     return float(np.sqrt(np.nanmean(z**2)))
 
 
-def _steps(found: Diagnosis, cause: GapCause) -> tuple[GapStep, ...]:
+def _steps(found: DriveDiagnosis, cause: GapCause) -> tuple[GapStep, ...]:
     """Return what is left of the whole gap: before, and with an effect, fitted to the other half of the cycles."""
     seen, floor = found.seen[found.clearest], found.compared[found.clearest].floor("half")
     fitted = [fit(seen.predicted[cause.name], fold.fitted_to, floor).predicted for fold in seen.folds]
@@ -527,7 +518,7 @@ def _left(folds: Sequence[CycleFold], taken: Sequence[FloatArray], floor: DriveF
 def _facts(compared: DriveComparison) -> ConditionFacts:
     m = compared.now.cycles.motion
     top = float(np.quantile(np.abs(m.driver_speed_rad_s), 0.98)) * 30.0 / np.pi
-    torque = float("nan") if m.torque_nm is None else compared.twin.torque_nm
+    torque = float("nan") if m.torque_nm is None else compared.drive.point.torque_nm
     return ConditionFacts(
         compared.name,
         OperatingCondition(top, torque),
@@ -548,8 +539,4 @@ def _extra_um(fitted: FittedDriveCause | None, compared: DriveComparison) -> flo
 
 def _preset(compared: DriveComparison, cause: GapCause, fitted: Added) -> str:
     note = fitted_words(cause, fitted.severity, compared.name)
-    twin = compared.twin
-    parameters = parameters_with(cause.name, fitted.severity, twin.parameters)
-    if cause.name == TORQUE_GAIN:
-        twin = twin.at_torque(1.0 / (1.0 + 0.01 * fitted.severity))
-    return twin.preset(setting_of(cause.name, fitted.severity, fitted.options), parameters, (note,))
+    return compared.drive.twin.preset_toml(fitted, (note,))

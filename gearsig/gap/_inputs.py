@@ -1,25 +1,14 @@
-"""From files to a gap report: the same for the command line and the dashboard."""
+"""What a gap diagnosis is given: files of one machine, each recording with its own operating point, and references."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from app.gap_start_stop.diagnose import MODEL
-from gearsig.checks import closest_match_hint
 from gearsig.errors import InputError
-
-if TYPE_CHECKING:
-    from gearsig.gap import GapEffect, GapReport
-    from gearsig.recording import Recording
-    from gearsig.rig import Rig
-
-
-# --------------------
-# What a gap diagnosis is given: recordings of one rig, each with its own operating point, and healthy references.
-# --------------------
+from gearsig.recording import Recording, read_recording
+from gearsig.rig import Rig, read_rig, rig_file_beside
 
 
 @dataclass(frozen=True)
@@ -49,7 +38,7 @@ class GapRequest:
 
 
 @dataclass(frozen=True)
-class Inputs:
+class GapInputs:
     """Recordings and references, each with its rig and its name for people."""
 
     recordings: tuple[Recording, ...]
@@ -60,12 +49,12 @@ class Inputs:
     reference_names: tuple[str, ...] = ()
 
 
-def read_inputs(asked: GapRequest, on_file: Callable[[str], object] = lambda _: None) -> Inputs:
+def read_gap_inputs(asked: GapRequest, on_file: Callable[[str], object] = lambda _: None) -> GapInputs:
     """Read everything, rigs first.
 
     Parameters
     ----------
-    asked : Asked
+    asked : GapRequest
     on_file : callable
         Is told the name of each file before it is read.
 
@@ -84,12 +73,10 @@ def read_inputs(asked: GapRequest, on_file: Callable[[str], object] = lambda _: 
         recordings.append(_read(path, rig, asked.sampling_rate_hz))
     n = len(asked.recordings)
     names, references = asked.names or _names(asked.recordings), asked.reference_names or _names(asked.references)
-    return Inputs(tuple(recordings[:n]), rigs[:n], names, tuple(recordings[n:]), rigs[n:], references)
+    return GapInputs(tuple(recordings[:n]), rigs[:n], names, tuple(recordings[n:]), rigs[n:], references)
 
 
 def _read(path: Path, rig: Rig, sampling_rate_hz: float | None) -> Recording:
-    from gearsig.recording import read_recording
-
     return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz)
 
 
@@ -115,8 +102,6 @@ def _check_files(asked: GapRequest) -> None:
 
 def _rigs(asked: GapRequest, files: Sequence[Path]) -> tuple[Rig, ...]:
     """Return the rig of each file, all of the same machine."""
-    from gearsig.rig import read_rig, rig_file_beside
-
     common = read_rig(asked.rig) if asked.rig is not None else None
     first = common
     found = []
@@ -196,114 +181,3 @@ def _names(paths: Sequence[Path]) -> tuple[str, ...]:
     """Return the names of files; with their folders where names alone are not unique."""
     plain = [path.name for path in paths]
     return tuple(plain) if len(set(plain)) == len(plain) else tuple(f"{p.parent.name}/{p.name}" for p in paths)
-
-
-READING = 0.03
-"""Share of the progress that is reading."""
-Stage = Callable[[str, float], None]
-
-
-def run_gap(
-    asked: GapRequest, model: str, *, cache: Path | None, fresh: bool = False, on_stage: Stage = lambda *_: None
-) -> GapReport:
-    """Read the files and diagnose the gap.
-
-    Parameters
-    ----------
-    asked : Asked
-    model : str
-        Name of the simulator.
-    cache : Path or None
-        Folder that keeps what is prepared once per rig; None: nothing is kept, nor taken from before.
-    fresh : bool
-        Prepare anew what the folder holds already, and keep that.
-    on_stage : callable
-        Is told what is being done, and which share of the whole is complete.
-
-    Raises
-    ------
-    InputError, RefusalError
-    """
-    from app.gap_start_stop.diagnose import MODEL, refuse_start_stop
-    from gearsig.gap import diagnose_gap
-    from sims.registry import gap_simulator
-
-    checked_model(model)
-
-    def tell(stage: str, done: float) -> None:
-        on_stage(stage, READING + (1 - READING) * done)
-
-    if model == MODEL:
-        return _start_stop(asked, tell)
-    simulator = gap_simulator(model)
-    inputs = read_inputs(asked, lambda name: on_stage(f"reading {name}", 0.0))
-    refuse_start_stop(inputs.recordings, inputs.rigs, inputs.names, model)
-    return diagnose_gap(
-        inputs.recordings,
-        simulator,
-        rigs=inputs.rigs,
-        references=inputs.references,
-        reference_rigs=inputs.reference_rigs,
-        names=inputs.names,
-        reference_names=inputs.reference_names,
-        cache=cache,
-        fresh=fresh,
-        on_stage=tell,
-    )
-
-
-def _start_stop(asked: GapRequest, tell: Stage) -> GapReport:
-    """Diagnose a machine that starts and stops; nothing is kept, as nothing takes long."""
-    from app.gap_start_stop.diagnose import diagnose_start_stop
-
-    inputs = read_inputs(asked, lambda name: tell(f"reading {name}", 0.0))
-    return diagnose_start_stop(
-        inputs.recordings,
-        rigs=inputs.rigs,
-        references=inputs.references,
-        reference_rigs=inputs.reference_rigs,
-        names=inputs.names,
-        reference_names=inputs.reference_names,
-        on_stage=tell,
-    )
-
-
-# --------------------
-# The simulators that a gap can be diagnosed with: of running that goes on, and of a drive that starts and stops.
-# --------------------
-
-
-def gap_models() -> tuple[str, ...]:
-    """Return their names."""
-    from sims.registry import gap_simulators
-
-    return (*gap_simulators(), MODEL)
-
-
-def checked_model(name: str) -> str:
-    """Return a name that is one of them.
-
-    Raises
-    ------
-    InputError
-        If there is none of that name, with the closest.
-    """
-    names = gap_models()
-    if name not in names:
-        raise InputError(
-            f"there is no model {name!r} with a gap diagnosis",
-            allowed=", ".join(names),
-            remedy=closest_match_hint(name, names),
-        )
-    return name
-
-
-def gap_effects_of(model: str) -> Mapping[str, GapEffect]:
-    """Return the effects that are looked for with a model."""
-    if checked_model(model) == MODEL:
-        from app.gap_start_stop.predict import drive_effects
-
-        return drive_effects()
-    from sims.registry import gap_simulator
-
-    return gap_simulator(model).gap_effects()

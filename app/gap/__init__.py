@@ -1,1 +1,0 @@
-"""The gap diagnosis for people: what is given, the diagnosis, what comes out."""

@@ -1,1 +1,0 @@
-"""The gap diagnosis of machines that start and stop: `gearsig gap --model forging`."""
