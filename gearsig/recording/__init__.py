@@ -1,9 +1,15 @@
 """Recordings: channels over time, readers, quality of the data."""
 
-from gearsig.recording._identify import FORMAT_OF_EXTENSION
 from gearsig.recording._limits import check_memory, free_memory_bytes
 from gearsig.recording._quality import ChannelProblem, find_problems
-from gearsig.recording._read import WRITERS, read_pulse_times, read_recording, sha256_of, write_recording
+from gearsig.recording._read import (
+    FORMAT_OF_EXTENSION,
+    WRITERS,
+    read_pulse_times,
+    read_recording,
+    sha256_of,
+    write_recording,
+)
 from gearsig.recording._types import SI_FACTORS, Channel, Provenance, Recording, metres_per_second_squared
 from gearsig.recording.formats._mat import variables
 from gearsig.recording.formats._wav import parse_lea

@@ -1,23 +1,24 @@
-"""Reads a recording from a file of any known format."""
+"""Reads and writes recordings in any known format, and reads pulse times."""
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
+import stat
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count
+from gearsig.checks import FloatArray, closest_match_hint, count
 from gearsig.errors import InputError
 from gearsig.recording._assemble import assemble
-from gearsig.recording._identify import identify
 from gearsig.recording._limits import CHUNK_BYTES, read_text_bytes
-from gearsig.recording._table import SECONDS_PER_UNIT, RawTable
+from gearsig.recording._table import SECONDS_PER_UNIT
 from gearsig.recording._types import Recording, split_unit
-from gearsig.recording.formats import _writers as writers
+from gearsig.recording.formats import CSV, FORMATS, FileFormat
 from gearsig.recording.formats._csv import find_layout, line_of_row, parse_rows
 from gearsig.rig import PulseTimes, Rig, SpeedSource
 
@@ -58,7 +59,7 @@ def read_recording(
         holds columns that make no recording; if no sampling rate is known.
     """
     file = Path(path)
-    table = _reader_of(identify(file))(file)
+    table = identify(file).read(file)
     return assemble(table, file.name, sha256_of(file), rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
 
 
@@ -71,41 +72,131 @@ def sha256_of(path: Path) -> str:
     return digest.hexdigest()
 
 
-def _reader_of(file_format: str) -> Callable[[Path], RawTable]:  # noqa: PLR0911  one line per format
-    """Import a format's reader when it is needed: the libraries behind them are heavy."""
-    match file_format:
-        case "CSV text":
-            from gearsig.recording.formats._csv import read_csv
+# --------------------
+# Which format a file has: by its extension and by its first bytes, which must agree.
+# --------------------
 
-            return read_csv
-        case "MAT v5":
-            from gearsig.recording.formats._mat import read_mat5
 
-            return read_mat5
-        case "MAT v7.3":
-            from gearsig.recording.formats._mat import read_mat73
+FORMAT_OF_EXTENSION = {ending: file_format for file_format in FORMATS for ending in file_format.endings}
+"""What the extension promises."""
 
-            return read_mat73
-        case "WAV":
-            from gearsig.recording.formats._wav import read_wav
+ALLOWED_EXTENSIONS = " ".join(FORMAT_OF_EXTENSION) + ", text also with .gz"
 
-            return read_wav
-        case "HDF5":
-            from gearsig.recording.formats._hdf5 import read_hdf5
+HEAD_BYTES = 4096
 
-            return read_hdf5
-        case "Parquet":
-            from gearsig.recording.formats._parquet import read_parquet
+# What is no recording, so that the error can name it.
+_FOREIGN = (
+    (b"TDSh", "a TDMS index without its data"),
+    (b"\x93NUMPY", "a NumPy array file"),
+    (b"PK\x03\x04", "a ZIP archive (XLSX, NPZ, …)"),
+    (b"\xd0\xcf\x11\xe0", "an old Office document"),
+    (b"%PDF", "a PDF document"),
+    (b"\x89PNG", "a picture"),
+    (b"fLaC", "FLAC audio"),
+    (b"OggS", "Ogg audio"),
+    (b"\x7fELF", "a program"),
+    (b"BZh", "a bzip2 archive"),
+    (b"\xfd7zXZ", "an xz archive"),
+    (b"\x28\xb5\x2f\xfd", "a Zstandard archive"),
+    (b"7z\xbc\xaf", "a 7-Zip archive"),
+)
+_PICKLE_STARTS = (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
+# Pickle protocols 0 and 1 are text: an opening mark, or a global "cmodule\nname\n".
+_TEXT_PICKLE = re.compile(rb"\A(?:\((?:dp|lp|[dl]|i)\d*\n|c[\w.]+\n[\w.]+\n|[\])}]q|\(c[\w.]+\n[\w.]+\n)")
+_MARKUP = re.compile(rb"\A\s*<(?:!doctype|html|\?xml|svg|script)", re.IGNORECASE)
 
-            return read_parquet
-        case "TDMS":
-            from gearsig.recording.formats._tdms import read_tdms
 
-            return read_tdms
-        case _:
-            from gearsig.recording.formats._uff58 import read_uff58
+def identify(path: Path) -> FileFormat:
+    """Return the format of a regular file after checking that content and extension agree.
 
-            return read_uff58
+    Raises
+    ------
+    InputError
+        If there is no such file, it is empty or no regular file, its extension is unknown, or its content is of
+        another kind than the extension says.
+    """
+    _check_regular(path)
+    promised = _promised(path)
+    head = _head(path)
+    kind = content_kind(head)
+    if promised.sniff(head) == kind:
+        return promised
+    hint = "rename it if only the extension is wrong, or export it again"
+    if "zero bytes" in kind:
+        hint = "the file was not written completely: copy or export it again"
+    elif kind == "a Python pickle":
+        hint = "pickles can run code and are never opened; export the data as CSV, MAT or HDF5"
+    raise InputError(
+        f"the extension says {promised.name}, but the content is {kind}",
+        where=path.name,
+        allowed=f"content that fits {path.suffix or 'the extension'}",
+        remedy=hint,
+    )
+
+
+def content_kind(head: bytes) -> str:
+    """Name the kind of content from a file's first bytes, never by trying to open it."""
+    kind = _foreign_kind(head) or next((kind for f in reversed(FORMATS) if (kind := f.sniff(head))), "")
+    if not kind and b"\0" not in head.rstrip(b"\0"):
+        return "text followed by zero bytes" if b"\0" in head else "binary data of an unknown kind"
+    return kind or "binary data of an unknown kind"
+
+
+def _foreign_kind(head: bytes) -> str:
+    if not head.strip(b"\0"):
+        return "zero bytes"
+    if head[:2] in _PICKLE_STARTS or _TEXT_PICKLE.match(head):
+        return "a Python pickle"
+    if head[:4] in (b"RIFF", b"RIFX", b"RF64") and head[8:12] != b"WAVE":
+        return "RIFF but not WAVE"
+    if _MARKUP.match(head):
+        return "HTML or XML"
+    return next((kind for start, kind in _FOREIGN if head.startswith(start)), "")
+
+
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(HEAD_BYTES)
+
+
+def _check_regular(path: Path) -> None:
+    try:
+        status = path.stat()
+    except (OSError, ValueError) as error:
+        hint = ""
+        if path.parent.is_dir() and path.name:
+            hint = closest_match_hint(path.name, (other.name for other in path.parent.iterdir()))
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(
+            f"cannot be opened ({reason})", where=path.name or str(path), allowed="a readable file", remedy=hint
+        ) from None
+    if not stat.S_ISREG(status.st_mode):
+        kind = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
+        raise InputError(f"is {kind}", where=path.name or str(path), allowed="one file", remedy="name the file itself")
+    if status.st_size == 0:
+        raise InputError("is empty", where=path.name, allowed="a file with data", remedy="copy or export it again")
+
+
+def _promised(path: Path) -> FileFormat:
+    suffixes = [suffix.lower() for suffix in path.suffixes]
+    if suffixes[-1:] == [".gz"]:
+        if len(suffixes) > 1 and FORMAT_OF_EXTENSION.get(suffixes[-2]) is CSV:
+            return CSV
+        raise InputError(
+            "only text files are read compressed",
+            where=path.name,
+            allowed=ALLOWED_EXTENSIONS,
+            remedy="unpack it with gunzip",
+        )
+    promised = FORMAT_OF_EXTENSION.get(suffixes[-1] if suffixes else "")
+    if promised is None:
+        raise InputError(
+            f"extension {path.suffix or '(none)'!r} is not known; the content looks like {content_kind(_head(path))}",
+            where=path.name,
+            allowed=ALLOWED_EXTENSIONS,
+            remedy="rename or convert the file",
+        )
+    return promised
 
 
 # --------------------
@@ -113,15 +204,8 @@ def _reader_of(file_format: str) -> Callable[[Path], RawTable]:  # noqa: PLR0911
 # --------------------
 
 
-Writer = Callable[[Recording, Path], None]
-WRITERS: dict[str, Writer] = {
-    ".csv": writers.write_csv,
-    ".h5": writers.write_hdf5,
-    ".hdf5": writers.write_hdf5,
-    ".parquet": writers.write_parquet,
-    ".wav": writers.write_wav,
-    ".mat": writers.write_mat,
-}
+WRITERS = {ending: f.write for f in FORMATS if f.write is not None for ending in f.written_endings}
+"""Ending → function that writes a recording."""
 
 
 def write_recording(recording: Recording, path: str | Path) -> Path:
@@ -221,10 +305,9 @@ def read_pulse_times(path: str | Path, pulses_per_revolution: int = 1, shaft: st
     file = Path(path)
     where = file.name
     count(pulses_per_revolution, "pulses_per_revolution")
-    kind = identify(file)
-    if kind != "CSV text":
+    if (file_format := identify(file)) is not CSV:
         raise InputError(
-            f"is {kind}", where=where, allowed="text with one pulse time per line", remedy="export as text"
+            f"is {file_format.name}", where=where, allowed="text with one pulse time per line", remedy="export as text"
         )
     data = read_text_bytes(file)
     if not any(c in b"0123456789" for c in data[: 1 << 20]):

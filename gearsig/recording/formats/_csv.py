@@ -1,8 +1,9 @@
-"""Reads text files of numbers: CSV, TSV, semicolons, blanks, decimal comma, gzip."""
+"""Text files of numbers: CSV, TSV, semicolons, blanks, decimal comma, gzip."""
 
 from __future__ import annotations
 
 import csv
+import io
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -14,9 +15,10 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_memory, read_text_bytes
-from gearsig.recording._metadata import OWN_TEXT_MARK, table_from_metadata
+from gearsig.recording._metadata import OWN_TEXT_MARK, metadata_json, table_from_metadata
 from gearsig.recording._table import RawColumn, RawTable
-from gearsig.recording._types import is_unit, plain_name, rate_in_line, split_unit
+from gearsig.recording._types import Recording, is_unit, plain_name, rate_in_line, split_unit
+from gearsig.recording.formats._format import FileFormat
 
 # --------------------
 # How a text file of numbers is laid out: separator, decimal sign, header, first line of numbers.
@@ -420,3 +422,32 @@ def _doubtful_comma(layout: CsvLayout, values: list[FloatArray]) -> list[str]:
     if layout.separator == "," and layout.n_columns == 2 and not layout.header and whole:
         return ["two columns of whole numbers were read; if the comma is a decimal comma, add a header line"]
     return []
+
+
+def write_csv(recording: Recording, path: Path) -> None:
+    """Write a line of JSON, a header line and one line per sample, numbers with all their digits."""
+    import pyarrow as pa
+    from pyarrow import csv as arrow_csv
+
+    header = io.StringIO()
+    titles = [f"{c.name} [{c.unit}]" if c.unit else c.name for c in recording.channels]
+    csv.writer(header, lineterminator="\n").writerow(
+        ["".join(c if c.isprintable() else " " for c in title) for title in titles]
+    )
+    table = pa.table({f"column {i}": np.asarray(row) for i, row in enumerate(recording.samples)})
+    with path.open("wb") as file:
+        file.write(f"{OWN_TEXT_MARK}{metadata_json(recording)}\n".encode())
+        file.write(header.getvalue().encode("utf-8", errors="replace"))
+        arrow_csv.write_csv(table, file, arrow_csv.WriteOptions(include_header=False))
+
+
+def _sniff(head: bytes) -> str:
+    if head.startswith(b"\x1f\x8b"):
+        return "gzip"
+    if head[:2] in (b"\xff\xfe", b"\xfe\xff"):  # UTF-16
+        return "CSV text"
+    n_control = sum(c < 9 or 13 < c < 32 for c in head)
+    return "" if b"\0" in head or n_control > 0.01 * len(head) else "CSV text"
+
+
+CSV = FileFormat("CSV text", (".csv", ".txt", ".tsv", ".dat", ".asc"), _sniff, read_csv, write_csv, (".csv",))

@@ -1,4 +1,4 @@
-"""Reads HDF5 files, gearsig's own and others."""
+"""HDF5 files, gearsig's own and others."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ import numpy as np
 
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_memory, foreign_errors
-from gearsig.recording._metadata import table_from_metadata
+from gearsig.recording._metadata import metadata_json, table_from_metadata
 from gearsig.recording._table import NamedArrays, NumberArray, RawTable, table_from_arrays
-from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, plain_name
-from gearsig.recording.formats._writers import HDF5_SAMPLES, OWN_NAME
+from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, Recording, plain_name
+from gearsig.recording.formats._format import OWN_NAME, FileFormat
 
 READER = "gearsig HDF5 reader"
+OWN_SAMPLES = "samples"
 MAX_DEPTH = 8
 MAX_DATASETS = 10_000
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "unit_string")
@@ -42,8 +43,8 @@ def read_hdf5(path: Path) -> RawTable:
         skipped: list[str] = []
         datasets = own_datasets(file, skipped)
         by_path = dict(datasets)
-        if OWN_NAME in by_path and HDF5_SAMPLES in by_path:
-            samples = load_dataset(by_path[HDF5_SAMPLES], where)
+        if OWN_NAME in by_path and OWN_SAMPLES in by_path:
+            samples = load_dataset(by_path[OWN_SAMPLES], where)
             text = by_path[OWN_NAME].asstr()[()]
             return table_from_metadata(str(text), list(np.atleast_2d(samples)), READER, where)
         for dataset_path, dataset in datasets:
@@ -114,3 +115,26 @@ def _unit_of(attributes: Any) -> str:
             value = attributes[name]
             return value.decode("utf-8", errors="replace") if isinstance(value, bytes) else str(value)
     return ""
+
+
+def write_hdf5(recording: Recording, path: Path) -> None:
+    """Write the datasets /samples (channel, time) and /gearsig_recording (JSON).
+
+    /samples carries the attributes sampling_rate_hz, channel_names and units for other software.
+    """
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        samples = file.create_dataset(OWN_SAMPLES, data=recording.samples)
+        samples.attrs["sampling_rate_hz"] = recording.sampling_rate_hz
+        # HDF5 texts end at a NUL.
+        samples.attrs["channel_names"] = [c.name.replace("\0", " ") for c in recording.channels]
+        samples.attrs["units"] = [c.unit.replace("\0", " ") for c in recording.channels]
+        file.create_dataset(OWN_NAME, data=metadata_json(recording))
+
+
+def _sniff(head: bytes) -> str:
+    return "HDF5" if head.startswith(b"\x89HDF\r\n\x1a\n") else ""
+
+
+HDF5 = FileFormat("HDF5", (".h5", ".hdf5", ".hdf"), _sniff, read_hdf5, write_hdf5, (".h5", ".hdf5"))

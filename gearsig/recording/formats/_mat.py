@@ -13,10 +13,11 @@ import numpy as np
 
 from gearsig.errors import InputError
 from gearsig.recording._limits import CHUNK_BYTES, check_memory, foreign_errors
-from gearsig.recording._metadata import table_from_metadata
+from gearsig.recording._metadata import metadata_json, table_from_metadata
 from gearsig.recording._table import NamedArrays, NumberArray, RawTable, table_from_arrays
+from gearsig.recording._types import Recording
+from gearsig.recording.formats._format import OWN_NAME, FileFormat
 from gearsig.recording.formats._hdf5 import load_dataset, own_datasets
-from gearsig.recording.formats._writers import OWN_NAME
 
 # --------------------
 # The arrays, structs, cells and texts in the elements of a MAT v5 file.
@@ -363,7 +364,7 @@ def read_mat73(path: Path) -> RawTable:
             if dataset.size == 0 or dataset.ndim > 2 or "MATLAB_empty" in dataset.attrs:
                 continue
             if _matlab_class(dataset) == "char":
-                texts[name] = _text_mat73(dataset)
+                texts[name] = _text73(dataset)
             elif dataset.dtype.kind in "fiub":
                 # MATLAB stores columns first, HDF5 rows first: every matrix arrives transposed.
                 arrays[name] = np.atleast_2d(load_dataset(dataset, where)).T
@@ -378,9 +379,48 @@ def _matlab_class(dataset: Any) -> str:
     return value.decode("ascii", errors="replace") if isinstance(value, bytes) else str(value)
 
 
-def _text_mat73(dataset: Any) -> str:
+def _text73(dataset: Any) -> str:
     """Return a char array, which MATLAB stores as UTF-16 code units."""
     if dataset.size > MAX_TEXT or dataset.dtype.kind != "u":
         return ""
     units = np.asarray(dataset[()]).reshape(-1).astype("<u2")
     return units.tobytes().decode("utf-16-le", errors="replace").strip()
+
+
+def write_mat(recording: Recording, path: Path) -> None:
+    """Write the contents samples (time, channel), fs, channel_names and gearsig_recording (JSON)."""
+    from scipy.io import savemat
+
+    if recording.samples.nbytes >= 2**31:
+        raise InputError(
+            f"{recording.samples.nbytes / 1e9:.3g} GB do not fit", where="MAT", allowed="below 2 GB", remedy="write .h5"
+        )
+    contents = {
+        "samples": recording.samples.T,
+        "fs": float(recording.sampling_rate_hz),
+        "channel_names": np.array([c.name for c in recording.channels], dtype=object),
+        OWN_NAME: metadata_json(recording),
+    }
+    savemat(path, contents)
+
+
+_VERSIONS = {
+    b"\x00\x01IM": "MAT v5",
+    b"\x01\x00MI": "MAT v5",
+    b"\x00\x02IM": "MAT v7.3",
+    b"\x02\x00MI": "MAT v7.3",
+}
+
+
+def _sniff(head: bytes) -> str:
+    return _VERSIONS.get(head[124:HEADER_BYTES], "")
+
+
+def read_mat(path: Path) -> RawTable:
+    """Read a MAT file of either version."""
+    with path.open("rb") as file:
+        version = _sniff(file.read(HEADER_BYTES))
+    return read_mat5(path) if version == "MAT v5" else read_mat73(path)
+
+
+MAT = FileFormat("MAT", (".mat",), _sniff, read_mat, write_mat, (".mat",))

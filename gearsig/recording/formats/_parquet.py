@@ -1,4 +1,4 @@
-"""Reads Parquet files."""
+"""Parquet files."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any
 
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_memory, foreign_errors
-from gearsig.recording._metadata import table_from_metadata
+from gearsig.recording._metadata import metadata_json, table_from_metadata
 from gearsig.recording._table import RawColumn, RawTable
-from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, plain_name, split_unit
-from gearsig.recording.formats._writers import OWN_NAME
+from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, Recording, plain_name, split_unit
+from gearsig.recording.formats._format import OWN_NAME, FileFormat
 
 READER = "gearsig Parquet reader"
 
@@ -89,3 +89,24 @@ def _stated_rate(metadata: Mapping[bytes, bytes]) -> float | None:
         if name in INTERVAL_NAMES and number > 0:
             return 1.0 / number
     return None
+
+
+def write_parquet(recording: Recording, path: Path) -> None:
+    """Write one column per channel; the JSON stands in the schema's metadata, units in the columns'."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    arrays = [pa.array(row) for row in recording.samples]
+    fields = [
+        pa.field(c.name, array.type, metadata={"unit": c.unit})
+        for c, array in zip(recording.channels, arrays, strict=True)
+    ]
+    facts = {OWN_NAME: metadata_json(recording), "sampling_rate_hz": repr(float(recording.sampling_rate_hz))}
+    parquet.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=facts)), path)
+
+
+def _sniff(head: bytes) -> str:
+    return "Parquet" if head.startswith(b"PAR1") else ""
+
+
+PARQUET = FileFormat("Parquet", (".parquet", ".pq"), _sniff, read_parquet, write_parquet, (".parquet",))

@@ -1,4 +1,4 @@
-"""Reads National Instruments' TDMS files."""
+"""National Instruments' TDMS files."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from gearsig.errors import InputError
 from gearsig.recording._limits import check_memory, foreign_errors
 from gearsig.recording._table import NamedArrays, RawTable, table_from_arrays
 from gearsig.recording._types import RATE_NAMES, plain_name
+from gearsig.recording.formats._format import FileFormat
 
 READER = "gearsig TDMS reader"
 
@@ -100,3 +101,10 @@ def _stated_rates(properties: Any, owner: str) -> dict[str, float]:
         for name, value in properties.items()
         if plain_name(name) in RATE_NAMES and isinstance(value, (int, float)) and not isinstance(value, bool)
     }
+
+
+def _sniff(head: bytes) -> str:
+    return "TDMS" if head.startswith(b"TDSm") else ""
+
+
+TDMS = FileFormat("TDMS", (".tdms",), _sniff, read_tdms)

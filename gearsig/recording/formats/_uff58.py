@@ -1,8 +1,10 @@
-"""Reads time signals from universal files (data set 58, ASCII or binary)."""
+"""Time signals in universal files (data set 58, ASCII or binary)."""
 
 from __future__ import annotations
 
+import re
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,7 @@ import numpy as np
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_memory, foreign_errors
 from gearsig.recording._table import RawColumn, RawTable
+from gearsig.recording.formats._format import FileFormat
 
 READER = "gearsig UFF58 reader"
 TIME_RESPONSE = 1
@@ -86,7 +89,12 @@ def _columns(signals: list[dict[str, Any]]) -> tuple[RawColumn, ...]:
         columns.append(RawColumn(name, np.asarray(signal["data"]), "" if unit == "NONE" else unit, quantity))
     names = [c.name for c in columns]
     if len(set(names)) < len(names):
-        from dataclasses import replace
-
         columns = [replace(c, name=f"{c.name} ({i + 1})") for i, c in enumerate(columns)]
     return tuple(columns)
+
+
+def _sniff(head: bytes) -> str:
+    return "UFF58" if re.match(rb"\A\s*-1[ \t]*\r?\n\s{0,5}\d{1,5}[b ]?", head) else ""
+
+
+UFF58 = FileFormat("UFF58", (".uff", ".unv", ".uf", ".u58"), _sniff, read_uff58)

@@ -1,7 +1,8 @@
-"""Reads WAV files, with channel scales from a LEA chunk where there is one."""
+"""WAV files, with channel scales from a LEA chunk where there is one."""
 
 from __future__ import annotations
 
+import io
 import math
 import struct
 import warnings
@@ -12,9 +13,10 @@ import numpy as np
 
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_memory, foreign_errors
-from gearsig.recording._metadata import table_from_metadata
+from gearsig.recording._metadata import metadata_json, table_from_metadata
 from gearsig.recording._table import NumberArray, RawColumn, RawTable
-from gearsig.recording.formats._writers import WAV_CHUNK
+from gearsig.recording._types import Recording
+from gearsig.recording.formats._format import FileFormat
 
 # --------------------
 # The chunks of a RIFF/WAVE file beside its samples.
@@ -104,6 +106,7 @@ def _counted_text(body: bytes, at: int) -> tuple[str, int]:
 
 
 READER = "gearsig WAV reader"
+OWN_CHUNK = b"gsig"
 
 # Zero and full scale of the integer types as scipy returns them; it left-justifies 24 bit in 32.
 _SCALES = {"uint8": (128.0, 128.0), "int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "int64": (0.0, 2.0**63)}
@@ -131,8 +134,8 @@ def read_wav(path: Path) -> RawTable:
         warnings.filterwarnings("ignore", message="Chunk .*not understood")
         rate_hz, frames = wavfile.read(path)
     rows = [frames] if frames.ndim == 1 else list(frames.T)
-    if WAV_CHUNK in chunks:
-        return table_from_metadata(chunks[WAV_CHUNK].decode("utf-8", errors="replace"), rows, READER, where)
+    if OWN_CHUNK in chunks:
+        return table_from_metadata(chunks[OWN_CHUNK].decode("utf-8", errors="replace"), rows, READER, where)
     described = parse_lea(chunks.get(b"LEA ", b""))
     columns = [_column(i, row, described if len(described) == len(rows) else []) for i, row in enumerate(rows)]
     return RawTable(tuple(columns), READER, sampling_rate_hz=float(rate_hz))
@@ -158,3 +161,43 @@ def _to_full_scale(values: NumberArray) -> NumberArray:
     scaled -= zero
     scaled /= full
     return scaled
+
+
+def write_wav(recording: Recording, path: Path) -> None:
+    """Write float32 samples in the channels' units and a chunk "gsig" with the JSON."""
+    from scipy.io import wavfile
+
+    rate_hz = round(recording.sampling_rate_hz)
+    n_bytes = 4 * recording.samples.size
+    # The header holds the bytes per second in 32 bits, and per frame in 16.
+    if (
+        rate_hz < 1
+        or 4 * rate_hz * len(recording.channels) >= 2**32
+        or len(recording.channels) >= 2**14
+        or n_bytes > 0xF000_0000
+    ):
+        raise InputError(
+            f"{rate_hz} Hz × {len(recording.channels)} channels × {n_bytes / 1e9:.3g} GB does not fit",
+            where="WAV",
+            allowed="from 1 Hz, below 4 GB/s, 16384 channels and 4 GB",
+            remedy="write .h5",
+        )
+    largest = float(np.abs(recording.samples).max())
+    if largest > float(np.finfo(np.float32).max):
+        raise InputError(f"a sample is {largest:g}", where="WAV", allowed="what fits float32", remedy="write .h5")
+    wavfile.write(path, rate_hz, np.ascontiguousarray(recording.samples.T, dtype=np.float32))
+    text = metadata_json(recording).encode()
+    text += b" " * (len(text) % 2)  # chunks begin at even bytes
+    with path.open("r+b") as file:
+        file.seek(0, io.SEEK_END)
+        file.write(OWN_CHUNK + struct.pack("<I", len(text)) + text)
+        n_riff = file.tell() - 8
+        file.seek(4)
+        file.write(struct.pack("<I", n_riff))
+
+
+def _sniff(head: bytes) -> str:
+    return "WAV" if head[:4] in (b"RIFF", b"RIFX", b"RF64") and head[8:12] == b"WAVE" else ""
+
+
+WAV = FileFormat("WAV", (".wav", ".wave"), _sniff, read_wav, write_wav, (".wav",))
