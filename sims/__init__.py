@@ -68,7 +68,7 @@ def simulate(
 
     from gearsig.checks import count
     from sims.registry import simulator
-    from sims.request import effect_settings, operation_of
+    from sims.simulator import effect_settings, operation_of
 
     chosen = simulator(model)
     recording = chosen.simulate(

@@ -132,7 +132,7 @@ def _convergence(request: SimulationChoices) -> str:
     import numpy as np
 
     from sims.registry import ChecksConvergence, simulator
-    from sims.request import operation_of
+    from sims.simulator import operation_of
 
     model = simulator(request.model)
     if not isinstance(model, ChecksConvergence):

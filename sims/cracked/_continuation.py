@@ -14,7 +14,7 @@ from sims.cracked._respond import SIGNALS, PairState, Response, default_step_s, 
 from sims.cracked._simulator import NAME, CrackedPair, PreparedCrackedPair, simulate_with_motion
 from sims.gear_pair import COORDINATES, MIN_MOTION_HZ
 from sims.machine import Machine, Operation, Profile
-from sims.request import operation_of
+from sims.simulator import operation_of
 from sims.sweep import Sweep
 
 SECTIONS = ("mesh", "shaft")

@@ -21,12 +21,12 @@ from sims.gear_pair import (
     ReadyPair,
     SimulationRequest,
     build_machine,
+    check_load,
 )
 from sims.machine import Machine, Operation
 from sims.measure import plain
 from sims.mesh import friction_over_mesh
 from sims.presets import Preset
-from sims.registry import check_load
 from sims.simulator import Parameter, ParameterValue
 
 if TYPE_CHECKING:

@@ -26,8 +26,16 @@ from sims.forging._drive import (
 from sims.machine import Operation, Profile, WeakTooth
 from sims.mesh import PairGeometry
 from sims.presets import preset
-from sims.request import Model, truth_of
-from sims.simulator import Parameter, ParameterValue, ParameterValues, Values, complete_values, parameter
+from sims.simulator import (
+    Model,
+    Parameter,
+    ParameterValue,
+    ParameterValues,
+    Values,
+    complete_values,
+    parameter,
+    truth_of,
+)
 
 if TYPE_CHECKING:
     from sims.forging._respond import ForgingConvergence

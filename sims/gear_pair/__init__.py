@@ -16,7 +16,7 @@ from sims.gear_pair._installed import Installed, completed
 from sims.gear_pair._measurement import COORDINATES, MIN_MOTION_HZ, Measurement
 from sims.gear_pair._parameters import PARAMETERS
 from sims.gear_pair._run import PairResponse, RunPlan, profile_points
-from sims.gear_pair._simulator import PairModel, ReadyPair, SimulationRequest
+from sims.gear_pair._simulator import PairModel, ReadyPair, SimulationRequest, check_load
 from sims.gear_pair._twin import (
     BODY_KG,
     BODY_SHAPES,
@@ -50,6 +50,7 @@ __all__ = [
     "build_machine",
     "build_rig",
     "carried_part",
+    "check_load",
     "completed",
     "draw_roughness",
     "drive_fields",

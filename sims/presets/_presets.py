@@ -8,13 +8,15 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gearsig.checks import closest_match_hint, not_negative
 from gearsig.errors import InputError
 from sims.effects import EffectSetting
 from sims.machine import Operation
-from sims.simulator import ParameterValue
+
+if TYPE_CHECKING:
+    from sims.simulator import ParameterValue
 
 _TABLES = ("about", "parameters", "operation")
 _ABOUT = ("model", "title", "sources", "assumed", "does_not_represent")

@@ -26,6 +26,7 @@ from sims.gear_pair import (
     ReadyPair,
     SimulationRequest,
     build_machine,
+    check_load,
     draw_roughness,
     gear_geometry,
 )
@@ -40,7 +41,6 @@ from sims.reduced_fe._reduced_gear import ReducedGear
 from sims.reduced_fe._reduction import plan_for
 from sims.reduced_fe._respond import STEP_S, FlexResponse, FlexState, followed_step_s, respond
 from sims.reduced_fe._store import READY, cached_gear, ready_gear
-from sims.registry import check_load
 from sims.simulator import Parameter, ParameterValue, ParameterValues, Values
 
 if TYPE_CHECKING:
