@@ -12,7 +12,7 @@ import numpy as np
 from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import positive
 from gearsig.errors import GearsigError, RefusalError
-from gearsig.orders import OrderMap, SynchronousAverage
+from gearsig.orders import AverageLines, OrderMap, SynchronousAverage
 from gearsig.prepared._angle import phase_followed_angle, refined_angle
 from gearsig.prepared._lines import LineExcess, floor_of
 from gearsig.recording import Recording
@@ -217,6 +217,18 @@ class PreparedRecording:
         return self.keep(
             ("average", shaft, channel, self._is_followed(followed)),
             lambda: synchronous_average(self.over_angle(shaft, [channel], followed=followed), channel),
+        )
+
+    def average_lines(
+        self, shaft: str = "", channels: Sequence[str] | None = None, *, followed: bool = False
+    ) -> AverageLines:
+        """Return the complex lines (amplitude, peak) of the synchronous averages of several channels."""
+        from gearsig.orders import average_lines
+
+        names = tuple(channels) if channels is not None else self.recording.vibration_names()
+        return self.keep(
+            ("average lines", shaft, names, self._is_followed(followed)),
+            lambda: average_lines(self.over_angle(shaft, names, followed=followed)),
         )
 
     def spectrum(self, channel: str) -> Spectrum:

@@ -13,11 +13,9 @@ simulation of any gears onto a recording, by any angle, and mesh lines count, to
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-
-ComplexArray = NDArray[np.complex128]
+from gearsig.spectra import ComplexArray
 
 
 def sliding_mean(values: FloatArray, width: int) -> FloatArray:

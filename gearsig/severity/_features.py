@@ -33,7 +33,7 @@ class ShaftLines:
     teeth, other_teeth : int
         Of the gear on it, and of its mate.
     lines : complex array, (n_channels, n_orders)
-        lines[c, n] is the complex amplitude (peak) of order n of this shaft.
+        lines[c, n] is the complex amplitude (peak) of order n of this shaft; the mean at order 0.
     n_revolutions : int
     highest_order : int
     order_hz : float
@@ -72,17 +72,14 @@ def shaft_lines(prepared: PreparedRecording, pair: GearPair, shaft: str, channel
             f"the record holds {angle.n_revolutions:.3g} revolutions of shaft {shaft!r}, {MIN_REVOLUTIONS} are needed",
             remedy="record longer",
         )
-    prepared.over_angle(shaft, channels)  # all channels at once
-    averages = [prepared.average(shaft, name) for name in channels]
-    n = len(averages[0].values)
-    highest = min(int(averages[0].highest_order), (n - 1) // 2)
+    average = prepared.average_lines(shaft, channels)
     return ShaftLines(
         shaft,
         teeth,
         other_teeth,
-        np.stack([2.0 * np.fft.rfft(average.values)[: highest + 1] / n for average in averages]),
-        averages[0].n_revolutions,
-        highest,
+        np.asarray(average.whole, dtype=np.complex128),
+        int(average.n_revolutions.sum()),
+        average.highest_order,
         angle.mean_speed_rpm / 60.0,
         tuple(channels),
         prepared.has_mark(shaft),
