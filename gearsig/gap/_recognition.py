@@ -123,7 +123,7 @@ class LinearRule:
 MOST_BYTES = 200_000_000
 """Of a file's arrays; a real one has a tenth."""
 
-_MODULES = ("change", "contrasts", "features", "floors", "population", "recognise", "relative", "trees")
+_MODULES = ("_change", "_features", "_floors", "_recognition")
 _TREES = ("columns", "thresholds", "left", "right", "roots", "shares")
 _LINEAR = ("weights", "offsets")
 

@@ -1,11 +1,9 @@
 """`gearsig gap` around the diagnosis: what it is given, what it prints and leaves, and that bad input is one line."""
 
 import json
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
@@ -40,9 +38,8 @@ class Stub:
 
 @pytest.fixture
 def stub(monkeypatch: pytest.MonkeyPatch) -> Stub:
-    found, module = Stub(), ModuleType("gearsig.gap._diagnose")
-    module.diagnose_gap = found.diagnose_gap  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "gearsig.gap._diagnose", module)
+    found = Stub()
+    monkeypatch.setattr("gearsig.gap.diagnose_gap", found.diagnose_gap)
     return found
 
 
@@ -135,7 +132,7 @@ def test_a_failure_while_writing_leaves_what_was_there(tmp_path, monkeypatch) ->
     def fail(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("gearsig.report._gap_json.write_gap_json", fail)
+    monkeypatch.setattr("app.gap_job.write_gap_json", fail)
     with pytest.raises(KeyboardInterrupt):
         write_results(no_gap_report(), folder)
     assert {p.name: p.read_bytes() for p in folder.iterdir()} == before

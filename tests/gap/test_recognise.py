@@ -109,7 +109,7 @@ def test_other_features_than_the_population_has_are_an_error(population: Populat
 
 
 def test_a_missing_population_says_how_to_make_it(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"python -m app\.calibration\.gap\.population"):
+    with pytest.raises(InputError, match=r"python -m app\.studies\.gap\.population"):
         load_population(tmp_path / "none.npz")
 
 
