@@ -91,3 +91,8 @@ def one_line(text: object) -> str:
     """Return `text` on one line without control characters."""
     line = "".join(c if c.isprintable() else " " for c in _INVISIBLE.sub(" ", str(text)))
     return " ".join(line.split())
+
+
+def capitalised(text: str) -> str:
+    """Return `text` with a capital first letter, the others as they are."""
+    return text[:1].upper() + text[1:]

@@ -95,7 +95,7 @@ def test_stopped_it_keeps_what_is_complete(monkeypatch):
 
 
 def test_too_much_is_refused_with_the_remedy(monkeypatch):
-    monkeypatch.setattr(bifurcation_view, "MOST_MOTION_S", 1.0)
+    monkeypatch.setattr(bifurcation_view, "MAX_MOTION_S", 1.0)
     page = at_bifurcation()
     button(page, "Draw").click().run()
     assert "of motion" in page.error[0].value

@@ -6,8 +6,7 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 import app.dashboard
-from app.dashboard.laboratory.setup import DriveSetup
-from app.dashboard.start_stop.page import HIGHEST, NUMBERS, VIEWS
+from app.dashboard.laboratory.drive import HIGHEST, NUMBERS, VIEWS, DriveSetup
 from sims.effects import EffectSetting
 
 MAIN = Path(app.dashboard.__file__).parent / "main.py"
@@ -21,9 +20,9 @@ def opened() -> AppTest:
 
 
 @pytest.mark.parametrize("view", VIEWS)
-def test_every_view_of_the_sound_drive(view: str) -> None:
+def test_every_view_of_the_healthy_drive(view: str) -> None:
     page = opened()
-    page.session_state["view of the sound drive"] = view
+    page.session_state["view of the healthy drive"] = view
     page.run()
     assert not page.exception
     assert not page.error
@@ -33,7 +32,7 @@ def test_every_view_of_the_sound_drive(view: str) -> None:
     assert len(page.get("image")) + len(page.dataframe) >= 1
 
 
-def test_an_effect_shows_beside_the_sound_drive() -> None:
+def test_an_effect_shows_beside_the_healthy_drive() -> None:
     page = opened()
     page.sidebar.slider(key="lab severity of backlash of the drive").set_value(100.0).run()
     assert not page.exception
@@ -41,7 +40,7 @@ def test_an_effect_shows_beside_the_sound_drive() -> None:
     assert len(page.get("image")) + len(page.get("imgs")) >= 1
     backlash = next(m for m in page.metric if m.label == "Backlash")
     assert float(backlash.value.split()[0]) == pytest.approx(400.0, rel=0.02)
-    assert backlash.delta.startswith("sound 299")
+    assert backlash.delta.startswith("healthy 299")
 
 
 def test_continuous_rotation_says_what_it_cannot_tell() -> None:
@@ -58,7 +57,7 @@ def test_a_setup_names_its_files_and_makes_the_commands_recording() -> None:
     recording = setup.record()
     assert recording.truth is not None
     assert recording.truth["backlash_um"] == 400.0
-    assert setup.sound.effects == ()
+    assert setup.healthy.effects == ()
 
 
 def test_a_crack_has_its_tooth_and_a_ripple_its_order() -> None:

@@ -14,7 +14,7 @@ from streamlit.errors import StreamlitAPIException
 from app.bifurcation import NAMES, BifurcationRequest, KeptValue, figure_of, measured_of, points_csv, run_value
 from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.laboratory.setup import MODEL, WIDEST, Setup, shown_unit
-from app.dashboard.theme import as_typed
+from app.dashboard.theme import as_typed, capitalised
 from app.dashboard.widgets.charts import show_picture
 from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError, InputError
@@ -52,29 +52,31 @@ class Range:
 
 def parameters_of(setup: Setup) -> dict[str, str]:
     """Return what can be varied, with a title and a unit: operation, the effects that are on, parameters."""
-    found = {SPEED: "Speed (rpm)", TORQUE: "Torque (N·m)"}
+    titles = {SPEED: "Speed (rpm)", TORQUE: "Torque (N·m)"}
     for setting in setup.effects:
         severity = effect(setting.name).severity
-        found[setting.name] = _titled(f"Fault: {effect(setting.name).title}", severity.unit)
+        titles[setting.name] = _titled(f"Fault: {effect(setting.name).title}", severity.unit)
     known = {p.name: p for p in simulator(MODEL).parameters}
     numbers = [p.name for p in known.values() if not p.choices and not p.whole and p.name not in TEETH]
     for name in (*FIRST, *(n for n in numbers if n not in FIRST)):
         meaning = known[name].meaning.split(";")[0]
-        found[name] = _titled(meaning[:1].upper() + meaning[1:], known[name].unit)
-    return found
+        titles[name] = _titled(capitalised(meaning), known[name].unit)
+    return titles
 
 
-def choose_range(run: LaboratoryRun, name: str, places: Sequence[DeltaGenerator], *, most: int, first: int) -> Range:
+def choose_range(
+    run: LaboratoryRun, name: str, places: Sequence[DeltaGenerator], *, max_values: int, first: int
+) -> Range:
     """Let the user choose from, to, and how many."""
     low, high = _suggested(run, name)
     start, stop, number = places
     key = f"bifurcation {run.setup.preset} {name}"
-    one = start.number_input("From", value=low, format="%g", key=f"{key} from", persist_state="session")
-    other = stop.number_input("To", value=high, format="%g", key=f"{key} to", persist_state="session")
-    n = number.number_input("Values", 3, most, first, step=1, key="bifurcation values", persist_state="session")
-    if one is None or other is None or not one < other:
-        raise InputError(f"the range goes from {one} to {other}", allowed="ascending")
-    values = tuple(float(f"{v:.8g}") for v in np.linspace(float(one), float(other), int(n)))
+    from_value = start.number_input("From", value=low, format="%g", key=f"{key} from", persist_state="session")
+    to_value = stop.number_input("To", value=high, format="%g", key=f"{key} to", persist_state="session")
+    n = number.number_input("Values", 3, 80, 25, step=1, key="bifurcation values", persist_state="session")
+    if from_value is None or to_value is None or not from_value < to_value:
+        raise InputError(f"the range goes from {from_value} to {to_value}", allowed="ascending")
+    values = tuple(float(f"{v:.8g}") for v in np.linspace(float(from_value), float(to_value), int(n)))
     return Range(name, parameters_of(run.setup)[name], values)
 
 
@@ -97,32 +99,32 @@ def branch_of(run: LaboratoryRun, chosen: Range, *, signal: str, section: str) -
     return Branch(sweep, signal, section, N_CYCLES[section])
 
 
-def motion_s(run: LaboratoryRun, wanted: BifurcationRequest) -> float:
+def motion_s(run: LaboratoryRun, request: BifurcationRequest) -> float:
     """Motion that is simulated in all, about."""
-    branch, setup = wanted.branch, run.setup
+    branch, setup = request.branch, run.setup
     settle_s = RAMP_S + DECAYS * slowest_decay_s(run.machine, Operation.steady(setup.speed_rpm, setup.torque_nm))
     varied = branch.sweep.axes[0].name == SPEED
     speeds = np.array(branch.values if varied else [setup.speed_rpm] * len(branch.values))
     per_revolution = run.machine.mesh.pair.driver.teeth if branch.section == "mesh" else 1
     cycles_s = branch.n_cycles * 60.0 / (np.maximum(speeds, 1.0) * per_revolution)
-    return float(len(wanted.branches) * np.sum(settle_s + cycles_s))
+    return float(len(request.branches) * np.sum(settle_s + cycles_s))
 
 
 def _suggested(run: LaboratoryRun, name: str) -> tuple[float, float]:
     setup = run.setup
     if name in (SPEED, TORQUE):
-        own = setup.speed_rpm if name == SPEED else setup.torque_nm
-        return _rounded(0.5 * own), _rounded(1.5 * own) or 10.0
+        usual = setup.speed_rpm if name == SPEED else setup.torque_nm
+        return _rounded(0.5 * usual), _rounded(1.5 * usual) or 10.0
     for setting in setup.effects:
         if setting.name == name:
             severity = effect(name).severity
             return float(max(severity.low, 0.0)), _rounded(min(severity.high, WIDEST * severity.typical))
-    wanted = parameter(simulator(MODEL).parameters, name)
+    known = parameter(simulator(MODEL).parameters, name)
     values = {**_preset_values(setup), **dict(setup.parameters)}
-    own = float(values.get(name, wanted.default) or 0.0)
-    low, high = wanted.low or 0.0, wanted.high or 1.0
-    if own > 0.0:
-        return max(low, _rounded(0.5 * own)), min(high, _rounded(2.0 * own))
+    usual = float(values.get(name, known.default) or 0.0)
+    low, high = known.low or 0.0, known.high or 1.0
+    if usual > 0.0:
+        return max(low, _rounded(0.5 * usual)), min(high, _rounded(2.0 * usual))
     return low, min(high, max(_rounded(0.02 * high), low))
 
 
@@ -140,15 +142,14 @@ def _titled(title: str, unit: str) -> str:
     return f"{title} ({shown_unit(unit)})" if unit else title
 
 
-MOST_VALUES, FIRST_VALUES = 80, 25
-MOST_MOTION_S = 240.0
+MAX_MOTION_S = 240.0
 """Motion that is simulated at most: a minute or two of waiting."""
 DIRECTIONS = {"both": "up and down", "up": "up", "down": "down", "rest": "from rest"}
 SECTION_WORDS = {"mesh": "mesh cycle", "shaft": "revolution"}
 PASS_S = 2.5
 """A fragment hears of a click only when it has run: it runs for so long, shows what there is, and goes on."""
-ASKED, FOUND = "bifurcation asked", "bifurcation found"
-Found = dict[str, list[KeptValue]]
+ASKED, DONE = "bifurcation asked", "bifurcation done"
+Branches = dict[str, list[KeptValue]]
 
 
 def show_bifurcation(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
@@ -160,7 +161,7 @@ def show_bifurcation(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> No
     names = parameters_of(run.setup)
     first, *numbers = st.columns((3, 2, 2, 2))
     name = first.selectbox("Varied", list(names), format_func=names.__getitem__, key="bifurcation varied")
-    chosen = choose_range(run, name, numbers, most=MOST_VALUES, first=FIRST_VALUES)
+    chosen = choose_range(run, name, numbers)
     left, middle, right = st.columns((2, 3, 2))
     section = left.segmented_control(
         "A point once per",
@@ -181,27 +182,27 @@ def show_bifurcation(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> No
         "possible, and it is the past that decides.",
     )
     signals = ("transmission_error_m", "driver y", "driven y", "mesh_force_n", *run.vibration_channels)
-    signal = right.selectbox("Signal", signals, format_func=_signal_words, key="bifurcation signal")
-    wanted = BifurcationRequest(branch_of(run, chosen, signal=signal, section=section or "mesh"), direction or "both")
-    _run_and_show(run, wanted, chosen)
+    signal = right.selectbox("Signal", signals, format_func=_signal_title, key="bifurcation signal")
+    request = BifurcationRequest(branch_of(run, chosen, signal=signal, section=section or "mesh"), direction or "both")
+    _run_and_show(run, request, chosen)
 
 
-def _run_and_show(run: LaboratoryRun, wanted: BifurcationRequest, chosen: Range) -> None:
+def _run_and_show(run: LaboratoryRun, request: BifurcationRequest, chosen: Range) -> None:
     """Run what is missing if that was asked for, showing it as it comes; what is complete stays when it is stopped."""
-    question = repr(wanted.definition())
+    question = repr(request.definition())
     with st.container(horizontal=True):
         st.button("Draw", type="primary", icon=":material/play_arrow:", on_click=_ask, args=(question,))
         st.button("Stop", icon=":material/stop:", on_click=_ask, args=("",))
-    known, found = st.session_state.get(FOUND, ("", {}))
+    known, branches = st.session_state.get(DONE, ("", {}))
     if known != question:
-        found = {name: [] for name in wanted.branches}
+        branches = {name: [] for name in request.branches}
     more = False
     if st.session_state.get(ASKED) == question:
-        _check(run, wanted)
-        st.session_state[FOUND] = (question, found)
-        more = _fill(wanted, found)
-    if any(measured_of(values) for values in found.values()):
-        _show(wanted, found, chosen)
+        _check(run, request)
+        st.session_state[DONE] = (question, branches)
+        more = _fill(request, branches)
+    if any(measured_of(values) for values in branches.values()):
+        _show(request, branches, chosen)
     else:
         st.caption("Nothing is drawn yet: a value takes about half a second, in either direction.")
     if more:
@@ -216,51 +217,51 @@ def _go_on() -> None:
         st.rerun()
 
 
-def _fill(wanted: BifurcationRequest, found: Found) -> bool:
+def _fill(request: BifurcationRequest, branches: Branches) -> bool:
     """Run values for a while; return whether some are left."""
-    n, bar, until = wanted.n_values, st.progress(0.0, "Simulating …"), monotonic() + PASS_S
-    for name in wanted.branches:
-        values = wanted.branch.values[:: -1 if name == "down" else 1]
-        for value in values[len(found[name]) :]:
-            done = sum(len(kept) for kept in found.values())
+    n, bar, until = request.n_values, st.progress(0.0, "Simulating …"), monotonic() + PASS_S
+    for name in request.branches:
+        values = request.branch.values[:: -1 if name == "down" else 1]
+        for value in values[len(branches[name]) :]:
+            done = sum(len(kept) for kept in branches.values())
             bar.progress(done / n, f"{NAMES[name]}: {value:.5g} ({done} of {n} values)")
             if monotonic() > until:
                 return True
-            ends = [one.end for one in found[name] if one.end is not None]
+            ends = [kept.end for kept in branches[name] if kept.end is not None]
             before = ends[-1] if ends and name != "rest" else None
-            found[name].append(run_value(wanted, value, before))
+            branches[name].append(run_value(request, value, before))
     bar.empty()
     return False
 
 
-def _show(wanted: BifurcationRequest, found: Found, chosen: Range) -> None:
-    n_done = sum(len(kept) for kept in found.values())
-    show_picture(figure_of(wanted.branch, found), f"Poincaré points over {chosen.title}")
+def _show(request: BifurcationRequest, branches: Branches, chosen: Range) -> None:
+    n_done = sum(len(kept) for kept in branches.values())
+    show_picture(figure_of(request.branch, branches), f"Poincaré points over {chosen.title}")
     st.caption(
         "Upper panel: one point per cycle; a single point is a motion that repeats each cycle, two a motion that takes "
         "two cycles, a smear one that never repeats. Lower panel: how large the motion is. Shaded: two motions are "
         "possible, as far as the values tried tell: a range that begins or ends where the sweep does may go on."
-        + ("" if n_done == wanted.n_values else f" So far {n_done} of {wanted.n_values} values.")
+        + ("" if n_done == request.n_values else f" So far {n_done} of {request.n_values} values.")
     )
-    reasons = [one for kept in found.values() for one in kept if one.reason]
+    reasons = [value for kept in branches.values() for value in kept if value.reason]
     if reasons:
         st.warning(f"{len(reasons)} values gave nothing; at {reasons[0].value:.5g}: {as_typed(reasons[0].reason)}")
     st.download_button(
         "Points (CSV)",
-        data=points_csv(wanted.branch, found),
-        file_name=f"bifurcation_{wanted.branch.sweep.preset}_{wanted.branch.sweep.axes[0].name}.csv",
+        data=points_csv(request.branch, branches),
+        file_name=f"bifurcation_{request.branch.sweep.preset}_{request.branch.sweep.axes[0].name}.csv",
         mime="text/csv",
         on_click="ignore",
         icon=":material/download:",
     )
 
 
-def _check(run: LaboratoryRun, wanted: BifurcationRequest) -> None:
-    motion = motion_s(run, wanted)
-    if motion > MOST_MOTION_S:
+def _check(run: LaboratoryRun, request: BifurcationRequest) -> None:
+    motion = motion_s(run, request)
+    if motion > MAX_MOTION_S:
         raise InputError(
             f"this needs {motion:.0f} s of motion",
-            allowed=f"up to {MOST_MOTION_S:.0f} s here",
+            allowed=f"up to {MAX_MOTION_S:.0f} s here",
             remedy="take fewer values, one direction, the mesh cycle, or `gearsig bifurcation` on the command line",
         )
 
@@ -269,9 +270,9 @@ def _ask(question: str) -> None:
     st.session_state[ASKED] = question
 
 
-def _signal_words(signal: str) -> str:
-    words = {"transmission_error_m": "transmission error", "mesh_force_n": "mesh force"}
-    return words.get(signal, signal if " " in signal else f"sensor {signal}")
+def _signal_title(signal: str) -> str:
+    titles = {"transmission_error_m": "transmission error", "mesh_force_n": "mesh force"}
+    return titles.get(signal, signal if " " in signal else f"sensor {signal}")
 
 
 def show_safely(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import streamlit as st
 
+from app.dashboard.theme import capitalised
 from gearsig.errors import InputError
 from sims.effects import Effect, EffectSetting, Option, effect, effects
 from sims.presets import Preset, preset, presets
@@ -18,7 +19,6 @@ from sims.registry import simulator
 from sims.simulator import ParameterValue, parameter
 
 if TYPE_CHECKING:
-    from gearsig.recording import Recording
     from sims.machine import Machine
     from sims.reduced_fe import ReducedGear
 
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 MODEL = "cracked"
 """Whose motion the bifurcation can follow."""
 MODELS = (MODEL, "reduced-fe")
+DRIVE_MODEL = "forging"
+"""The drive that starts and stops, with a page of its own."""
 
 
 @dataclass(frozen=True)
@@ -87,8 +89,8 @@ class Setup:
 
 def effect_text(setting: EffectSetting) -> str:
     """Name an effect with its severity, e.g. "crack in a tooth root, 2 mm"."""
-    found = effect(setting.name)
-    return f"{found.title}, {setting.severity:.4g} {shown_unit(found.severity.unit)}".rstrip()
+    known = effect(setting.name)
+    return f"{known.title}, {setting.severity:.4g} {shown_unit(known.severity.unit)}".rstrip()
 
 
 def shown_unit(unit: str) -> str:
@@ -185,7 +187,6 @@ def _carry_over() -> None:
 
 
 Options = tuple[tuple[str, float | str], ...]
-HALVINGS = 20
 
 
 def greatest_severity(chosen: Preset, name: str, high: float, options: Options = ()) -> float:
@@ -202,9 +203,9 @@ def greatest_severity(chosen: Preset, name: str, high: float, options: Options =
     options : tuple of (name, value)
         Of the effect, e.g. on which gear it is. Where they fit no severity at all, the end stays: the page says why.
     """
-    found = _greatest(chosen.model, chosen.name, name, high, options)
-    step = slider_step(0.0, found)
-    return found if found == high else floor(found / step * (1.0 + 1e-9)) * step
+    greatest = _greatest(chosen.model, chosen.name, name, high, options)
+    step = slider_step(0.0, greatest)
+    return greatest if greatest == high else floor(greatest / step * (1.0 + 1e-9)) * step
 
 
 @lru_cache(maxsize=256)
@@ -221,7 +222,7 @@ def _greatest(model: str, preset_name: str, name: str, high: float, options: Opt
     if allowed(high):
         return high
     low, end = 0.0, high
-    for _ in range(HALVINGS):
+    for _ in range(20):
         middle = (low + end) / 2.0
         low, end = (middle, end) if allowed(middle) else (low, middle)
     return low or high
@@ -241,7 +242,7 @@ def _meshed(machine: Machine, gears: tuple[ReducedGear, ...]) -> bool:
 
 @lru_cache(maxsize=16)
 def _machine(model: str, preset_name: str) -> tuple[Machine, tuple[ReducedGear, ...]]:
-    """Sound machine of a preset, and its reduced gears."""
+    """Healthy machine of a preset, and its reduced gears."""
     from sims.cracked import CrackedPair
     from sims.reduced_fe import ReducedPair
 
@@ -269,7 +270,6 @@ GROUP_WORDS = {
     "bearing": "bearing",
     "measurement chain": "measurement",
 }
-N_BEARINGS = 4
 
 
 def choose_crack(preset: Preset) -> list[EffectSetting]:
@@ -280,59 +280,59 @@ def choose_crack(preset: Preset) -> list[EffectSetting]:
 
 def choose_effects(preset: Preset, meaningful: Collection[str]) -> list[EffectSetting]:
     """Return the other effects that the user switched on, of those the model knows; each at its typical value first."""
-    found = {name: one for name, one in effects().items() if name in meaningful}
+    known = {name: known for name, known in effects().items() if name in meaningful}
     names = st.multiselect(
         "More effects",
-        [name for name in found if name != CRACK],
+        [name for name in known if name != CRACK],
         format_func=_shown_name,
         key="effects of the laboratory",
         placeholder="Choose what is wrong …",
         persist_state="session",
         help="Any number at once. Each gets a slider of its own.",
     )
-    ordered = [name for name in found if name in names]
-    return [_choose_severity(found[n], preset, start=found[n].severity.typical) for n in ordered]
+    ordered = [known[name] for name in known if name in names]
+    return [_choose_severity(each, preset, start=each.severity.typical) for each in ordered]
 
 
 def _shown_name(name: str) -> str:
-    found = effect(name)
-    return f"{GROUP_WORDS.get(found.group, found.group)}: {found.title}"
+    shown = effect(name)
+    return f"{GROUP_WORDS.get(shown.group, shown.group)}: {shown.title}"
 
 
-def _choose_severity(found: Effect, preset: Preset, *, start: float) -> EffectSetting:
-    s = found.severity
+def _choose_severity(chosen: Effect, preset: Preset, *, start: float) -> EffectSetting:
+    s = chosen.severity
     unit = shown_unit(s.unit)
-    high = greatest_severity(preset, found.name, min(s.high, WIDEST * s.typical), _options_so_far(found))
-    title = found.title[:1].upper() + found.title[1:]
+    high = greatest_severity(preset, chosen.name, min(s.high, WIDEST * s.typical), _options_so_far(chosen))
+    title = capitalised(chosen.title)
     severity = choose_number(
         f"{title} ({unit + ', ' if unit else ''}typical {s.typical:g})",
-        f"severity of {found.name}",
+        f"severity of {chosen.name}",
         min(start, high),
         high,
-        about=f"{s.meaning[:1].upper()}{s.meaning[1:]}; {s.low:g} to {s.high:g} {unit}, as far as the machine "
-        f"allows.\n\n{found.changes}",
+        about=f"{capitalised(s.meaning)}; {s.low:g} to {s.high:g} {unit}, as far as the machine "
+        f"allows.\n\n{chosen.changes}",
     )
     options: dict[str, float | str] = {}
-    if found.options and severity != 0:
+    if chosen.options and severity != 0:
         with st.expander("Where and how", icon=":material/tune:"):
-            options = _choose_options(found)
-    return EffectSetting(found.name, severity, options)
+            options = _choose_options(chosen)
+    return EffectSetting(chosen.name, severity, options)
 
 
-def _options_so_far(found: Effect) -> tuple[tuple[str, float | str], ...]:
+def _options_so_far(of: Effect) -> tuple[tuple[str, float | str], ...]:
     """Options as they stood when the page ran last: their widgets come below the slider."""
-    values = {option.name: st.session_state.get(_option_key(found, option)) for option in found.options}
+    values = {option.name: st.session_state.get(_option_key(of, option)) for option in of.options}
     return tuple((name, value) for name, value in values.items() if isinstance(value, float | int | str))
 
 
-def _option_key(found: Effect, option: Option) -> str:
-    return f"{option.name} of {found.name}"
+def _option_key(of: Effect, option: Option) -> str:
+    return f"{option.name} of {of.name}"
 
 
-def _choose_options(found: Effect) -> dict[str, float | str]:
+def _choose_options(of: Effect) -> dict[str, float | str]:
     """Return the options; one that is left to be drawn is not in it."""
-    chosen = {option.name: _choose_option(option, _option_key(found, option)) for option in found.options}
-    return {name: value for name, value in chosen.items() if value is not None}
+    values = {option.name: _choose_option(option, _option_key(of, option)) for option in of.options}
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def _choose_option(option: Option, key: str) -> float | str | None:
@@ -340,7 +340,7 @@ def _choose_option(option: Option, key: str) -> float | str | None:
     words = option.name.removesuffix("_deg").removesuffix("_percent").removesuffix("_um").removesuffix("_hz")
     label = words.replace("_", " ").capitalize() + (f" ({unit})" if unit else "")
     if isinstance(option.default, str):
-        choices = option.choices or tuple(f"bearing {i + 1}" for i in range(N_BEARINGS))
+        choices = option.choices or tuple(f"bearing {i + 1}" for i in range(4))
         index = choices.index(option.default) if option.default in choices else 0
         return st.selectbox(label, choices, index=index, key=key, help=option.meaning, persist_state="session")
     looks = {"key": key, "help": option.meaning, "persist_state": "session"}
@@ -352,63 +352,6 @@ def _choose_option(option: Option, key: str) -> float | str | None:
 
 
 # --------------------
-# What is set on the page of the start–stop drive.
-# --------------------
-
-
-SETUP_MODEL = "forging"
-
-
-@dataclass(frozen=True)
-class DriveSetup:
-    """Everything that decides a run: equal setups give equal recordings.
-
-    Parameters
-    ----------
-    preset : str
-    speed_rpm, torque_nm : float
-        Of the pinion: what the flow allows, and the motor's.
-    parameters : tuple of (name, value)
-        What differs from the preset, in the sound drive as well.
-    effects : tuple of EffectSetting
-    duration_s, sampling_rate_hz : float
-    """
-
-    preset: str
-    speed_rpm: float
-    torque_nm: float
-    parameters: tuple[tuple[str, ParameterValue], ...] = ()
-    effects: tuple[EffectSetting, ...] = ()
-    duration_s: float = 6.0
-    sampling_rate_hz: float = 1000.0
-
-    @property
-    def sound(self) -> DriveSetup:
-        """The same drive without effects."""
-        return replace(self, effects=())
-
-    @property
-    def file_stem(self) -> str:
-        """Name of its files, without a dot."""
-        return "_".join([self.preset, *(setting.name for setting in self.effects)])
-
-    def record(self) -> Recording:
-        """Simulate the recording that the command line makes of the same settings."""
-        from sims import simulate
-
-        return simulate(
-            SETUP_MODEL,
-            preset=self.preset,
-            parameters=dict(self.parameters),
-            effects=self.effects,
-            speed_rpm=self.speed_rpm,
-            torque_nm=self.torque_nm,
-            duration_s=self.duration_s,
-            sampling_rate_hz=self.sampling_rate_hz,
-        )
-
-
-# --------------------
 # The sidebar of the laboratory: machine and operating point, flanks and oil, faults, measurement.
 # --------------------
 
@@ -417,8 +360,7 @@ Parameters = tuple[tuple[str, ParameterValue], ...]
 
 FIRST = "published_55_75"
 DURATIONS_S = (0.5, 1.0, 2.0, 4.0)
-AUTOMATIC, LONGEST_AUTOMATIC_S, WANTED_REVOLUTIONS = "auto", 1.0, 8.0
-RATES_HZ = (10240.0, 20480.0, 40960.0)
+AUTOMATIC, MAX_AUTOMATIC_S = "auto", 1.0
 
 
 def choose_setup(preset: Preset) -> Setup:
@@ -428,11 +370,11 @@ def choose_setup(preset: Preset) -> Setup:
         with st.expander("Flanks and oil", icon=":material/opacity:"):
             parameters = _choose_flanks(preset)
         st.markdown("**Faults** · *the healthy twin has none*")
-        found = [*choose_crack(preset), *choose_effects(preset, simulator(preset.model).effects)]
+        switched_on = (*choose_crack(preset), *choose_effects(preset, simulator(preset.model).effects))
         with st.expander("Measurement", icon=":material/sensors:"):
             measured, duration, rate, seed = _choose_measurement(preset, speed)
         show_typed_toggle()
-    return Setup(preset.name, speed, torque, (*parameters, *measured), tuple(found), duration, rate, seed, preset.model)
+    return Setup(preset.name, speed, torque, (*parameters, *measured), switched_on, duration, rate, seed, preset.model)
 
 
 def shown_name(preset: str) -> str:
@@ -451,8 +393,8 @@ def shown_name(preset: str) -> str:
 
 def choose_preset() -> Preset:
     """Return the machine: pairs that run at a steady speed, and the drive that starts and stops."""
-    found = {name: preset for model in (*MODELS, SETUP_MODEL) for name, preset in presets(model).items()}
-    names = list(found)
+    known = {name: preset for model in (*MODELS, DRIVE_MODEL) for name, preset in presets(model).items()}
+    names = list(known)
     with st.sidebar:
         name = st.selectbox(
             "Machine",
@@ -462,24 +404,30 @@ def choose_preset() -> Preset:
             key="machine of the laboratory",
             persist_state="session",
         )
-        st.caption(found[name].title)
-    return found[name]
+        st.caption(known[name].title)
+    return known[name]
 
 
 def _choose_operation(preset: Preset) -> tuple[float, float]:
-    own, high = preset.torque_nm, max(3.0 * preset.speed_rpm, 3000.0)
+    usual, high = preset.torque_nm, max(3.0 * preset.speed_rpm, 3000.0)
     speed = choose_number("Speed of the input shaft (rpm)", f"speed of {preset.name}", preset.speed_rpm, high, low=60.0)
-    torque = choose_number("Torque on the input shaft (N·m)", f"torque of {preset.name}", own, 3.0 * own)
+    torque = choose_number("Torque on the input shaft (N·m)", f"torque of {preset.name}", usual, 3.0 * usual)
     return speed, torque
 
 
 def _choose_flanks(preset: Preset) -> Parameters:
     st.caption("Of the healthy and the faulty machine alike.")
-    rough = choose_number("Flank roughness, rms (µm)", f"roughness of {preset.name}", _own(preset, "roughness_um"), 2.0)
+    rough = choose_number(
+        "Flank roughness, rms (µm)", f"roughness of {preset.name}", _preset_number(preset, "roughness_um"), 2.0
+    )
     if not _has(preset, "friction"):
         return (("roughness_um", rough),)
     oil = choose_number(
-        "Oil viscosity at the inlet (cP)", f"oil of {preset.name}", _own(preset, "viscosity_cp"), 100.0, low=1.0
+        "Oil viscosity at the inlet (cP)",
+        f"oil of {preset.name}",
+        _preset_number(preset, "viscosity_cp"),
+        100.0,
+        low=1.0,
     )
     friction = st.toggle(
         "Sliding friction",
@@ -501,10 +449,14 @@ def _choose_measurement(preset: Preset, speed: float) -> tuple[Parameters, float
         "the slower shaft, at most a second.",
     )
     rate = st.selectbox(
-        "Sampling rate (Hz)", RATES_HZ, index=1, format_func="{:g}".format, key="rate of the laboratory"
+        "Sampling rate (Hz)",
+        (10240.0, 20480.0, 40960.0),
+        index=1,
+        format_func="{:g}".format,
+        key="rate of the laboratory",
     )
-    own = _own(preset, "noise_mps2")
-    noise = choose_number("Background noise, rms (m/s²)", f"noise of {preset.name}", own, max(2.0, 4.0 * own))
+    usual = _preset_number(preset, "noise_mps2")
+    noise = choose_number("Background noise, rms (m/s²)", f"noise of {preset.name}", usual, max(2.0, 4.0 * usual))
     seed = st.number_input(
         "Seed",
         min_value=0,
@@ -515,7 +467,7 @@ def _choose_measurement(preset: Preset, speed: float) -> tuple[Parameters, float
         help="Another one draws other roughness, other noise, other angles. Healthy and faulty always share it.",
     )
     limit = choose_number(
-        "Range of the sensors (m/s²)", f"range of {preset.name}", _own(preset, "sensor_range_mps2"), 5e3
+        "Range of the sensors (m/s²)", f"range of {preset.name}", _preset_number(preset, "sensor_range_mps2"), 5e3
     )
     measured: Parameters = (("noise_mps2", noise), ("sensor_range_mps2", limit))
     length = float(duration) if isinstance(duration, float) else automatic_s(preset, speed)
@@ -524,12 +476,12 @@ def _choose_measurement(preset: Preset, speed: float) -> tuple[Parameters, float
 
 def automatic_s(preset: Preset, speed_rpm: float) -> float:
     """Return the shortest of `DURATIONS_S` that shows enough revolutions, or the longest that is still quick."""
-    ratio = _own(preset, "teeth_driver") / _own(preset, "teeth_driven")
-    wanted = WANTED_REVOLUTIONS * 60.0 / max(speed_rpm * min(ratio, 1.0), 1e-6)
-    return next((d for d in DURATIONS_S if wanted <= d < LONGEST_AUTOMATIC_S), LONGEST_AUTOMATIC_S)
+    ratio = _preset_number(preset, "teeth_driver") / _preset_number(preset, "teeth_driven")
+    eight_revolutions_s = 8.0 * 60.0 / max(speed_rpm * min(ratio, 1.0), 1e-6)
+    return next((d for d in DURATIONS_S if eight_revolutions_s <= d < MAX_AUTOMATIC_S), MAX_AUTOMATIC_S)
 
 
-def _own(preset: Preset, name: str) -> float:
+def _preset_number(preset: Preset, name: str) -> float:
     """Return a number of the preset, or else the model's default."""
     value = preset.parameters.get(name, parameter(simulator(preset.model).parameters, name).default)
     return float(value or 0.0)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from math import isfinite
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import streamlit as st
@@ -21,15 +22,16 @@ from app.dashboard.laboratory.run import (
     times_of,
 )
 from app.dashboard.laboratory.setup import effect_text
-from app.dashboard.theme import as_typed, palette
-from app.dashboard.widgets.charts import CONFIG, Axes, ChartLine, show_lines
+from app.dashboard.theme import as_typed, capitalised, palette
+from app.dashboard.widgets.charts import CONFIG, Axes, ChartLine, padded_limits, show_lines
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.indicators import crest_factor, kurtosis, rms
 from gearsig.plot import Cursor, above_zero, envelope, thin, with_unit
 from gearsig.recording import Recording
-from gearsig.spectra import Spectrum
+from gearsig.spectra import Spectrum, amplitude_spectrum, band_envelope, envelope_spectrum
 from sims.effects import EffectSetting, effect
+from sims.mesh import mesh_stiffness
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -40,7 +42,6 @@ if TYPE_CHECKING:
 # --------------------
 
 
-N_POINTS = 3000
 HEIGHT_PX = 300
 MOTION = {
     "driver, along the line of action": ("driver y", 1e6, "displacement (µm)"),
@@ -64,31 +65,26 @@ def show_time(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
         persist_state="session",
     )
     end = _end_s(healthy, SEGMENTS[shown or "3 revolutions"])
-    own, unit = signal_of(healthy, name, end)
+    healthy_line, label = signal_of(healthy, name, end)
     if faulty is None:
-        show_lines([ChartLine(*thin(*own, N_POINTS), "healthy")], Axes("time (s)", unit, (0.0, end)), "time of healthy")
+        _show_line(healthy_line, "healthy", Axes("time (s)", label, (0.0, end)))
         return
-    other, _ = signal_of(faulty, name, end)
-    limits = _limits(own[1], other[1])
-    marks = entries(faulty)
-    for column, line, title in zip(st.columns(2), (own, other), ("healthy", "faulty"), strict=True):
-        colour = "measured" if title == "healthy" else "fault"
-        with column:
-            show_lines(
-                [ChartLine(*thin(*line, N_POINTS), title, colour=colour)],  # type: ignore[arg-type]  # one of the two
-                Axes("time (s)", unit, (0.0, end), limits),
-                f"time of {title}",
-                height_px=HEIGHT_PX,
-            )
+    faulty_line, _ = signal_of(faulty, name, end)
+    axes = Axes("time (s)", label, (0.0, end), padded_limits([healthy_line[1], faulty_line[1]]))
+    left, right = st.columns(2)
+    with left:
+        _show_line(healthy_line, "healthy", axes, height_px=HEIGHT_PX)
+    with right:
+        _show_line(faulty_line, "faulty", axes, height_px=HEIGHT_PX)
     st.markdown("**What the effect adds**: faulty less healthy")
-    difference = other[1] - own[1]
-    show_lines(
-        [ChartLine(*thin(own[0], difference, N_POINTS), "difference", colour="fault")],
-        Axes("time (s)", unit, (0.0, end), _limits(difference)),
-        "time of difference",
-        cursors=marks,
-        height_px=HEIGHT_PX,
-    )
+    difference = faulty_line[1] - healthy_line[1]
+    axes = Axes("time (s)", label, (0.0, end), padded_limits([difference]))
+    _show_line((healthy_line[0], difference), "difference", axes, cursors=entries(faulty), height_px=HEIGHT_PX)
+
+
+def _show_line(line: tuple[FloatArray, FloatArray], name: str, axes: Axes, **looks: Any) -> None:
+    colour: Literal["measured", "fault"] = "measured" if name == "healthy" else "fault"
+    show_lines([ChartLine(*thin(*line, 3000), name, colour=colour)], axes, f"time of {name}", **looks)
 
 
 def signal_of(run: LaboratoryRun, name: str, end_s: float) -> tuple[tuple[FloatArray, FloatArray], str]:
@@ -104,7 +100,7 @@ def signal_of(run: LaboratoryRun, name: str, end_s: float) -> tuple[tuple[FloatA
 
 
 def _shown(name: str) -> str:
-    return name[:1].upper() + name[1:] if name in MOTION else f"Sensor {name}"
+    return capitalised(name) if name in MOTION else f"Sensor {name}"
 
 
 def _end_s(run: LaboratoryRun, revolutions: float) -> float:
@@ -112,33 +108,20 @@ def _end_s(run: LaboratoryRun, revolutions: float) -> float:
     return min(revolutions / turns if turns > 0 else float("inf"), run.setup.duration_s)
 
 
-def _limits(*values: FloatArray) -> tuple[float, float]:
-    low, high = (float(f([f(v) for v in values])) for f in (np.min, np.max))
-    margin = 0.06 * (high - low) or 1.0
-    return low - margin, high + margin
-
-
 # --------------------
 # The band whose envelope shows expected lines best: the answer is known here, so the choice may use it.
 # --------------------
 
 
-N_BANDS = 16
-"""Equal parts of the spectrum, and all runs of one, two and four of them."""
-WIDTHS = (1, 2, 4)
-LINES_PER_BAND = 4.0
-"""A band must be wider than so many times the lowest expected line."""
-
-
-def telling_band_hz(recording: Recording, channel: str, wanted_hz: Sequence[float]) -> tuple[float, float]:
-    """Return the band in whose envelope the wanted lines stand highest above the median of the lines about them.
+def telling_band_hz(recording: Recording, channel: str, expected_hz: Sequence[float]) -> tuple[float, float]:
+    """Return the band in whose envelope the expected lines stand highest above the median of the lines about them.
 
     Parameters
     ----------
     recording : Recording
     channel : str
-    wanted_hz : sequence of float
-        Expected lines; those that the recording is too short for do not count.
+    expected_hz : sequence of float
+        Lines; those that the recording is too short for do not count.
 
     Raises
     ------
@@ -146,15 +129,14 @@ def telling_band_hz(recording: Recording, channel: str, wanted_hz: Sequence[floa
         If no line is expected, or the signal is too short to tell them apart.
     """
     values, rate = recording.values(channel), recording.sampling_rate_hz
-    lines = np.array([f for f in wanted_hz if f * recording.duration_s >= 3.0])
+    lines = np.array([f for f in expected_hz if f * recording.duration_s >= 3.0])
     if not len(lines):
         raise RefusalError("the signal is too short for the lines of shafts", remedy="show a longer one")
-    width = rate / 2.0 / N_BANDS
+    # 16 equal parts of the spectrum, and all runs of one, two and four of them; a band must be clearly wider than the
+    # lowest expected line
+    width = rate / 2.0 / 16
     bands = [
-        (i * width, (i + n) * width)
-        for n in WIDTHS
-        for i in range(N_BANDS - n + 1)
-        if n * width > LINES_PER_BAND * lines.min()
+        (i * width, (i + n) * width) for n in (1, 2, 4) for i in range(16 - n + 1) if n * width > 4.0 * lines.min()
     ] or [(0.0, rate / 2.0)]
     heights = [_height(values, rate, band, lines) for band in bands]
     return bands[int(np.argmax(heights))]
@@ -162,16 +144,14 @@ def telling_band_hz(recording: Recording, channel: str, wanted_hz: Sequence[floa
 
 def _height(values: FloatArray, rate_hz: float, band_hz: tuple[float, float], lines_hz: FloatArray) -> float:
     """Sum of the lines' amplitudes over the median amplitude, in the envelope of a band."""
-    from gearsig.spectra import band_envelope, envelope_spectrum
-
     spectrum = envelope_spectrum(band_envelope(values, rate_hz, band_hz))
     inside = spectrum.values[: spectrum.index_of(1.2 * float(lines_hz.max())) + 1]
     floor = float(np.median(inside))
     if floor <= 0.0:
         return 0.0
     slack = 2.0 * spectrum.resolution
-    found = [spectrum.largest_near(f, slack)[1] for f in lines_hz if f < float(spectrum.positions[-1])]
-    return sum(found) / floor
+    heights = [spectrum.largest_near(f, slack)[1] for f in lines_hz if f < float(spectrum.positions[-1])]
+    return sum(heights) / floor
 
 
 # --------------------
@@ -193,13 +173,11 @@ ENVELOPE_SHAFTS = 12.0
 
 def show_amplitude(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
     """Show the amplitude spectra of a channel."""
-    from gearsig.spectra import amplitude_spectrum
-
     runs = _runs(healthy, faulty)
     spectra = [amplitude_spectrum(run.recording, channel) for run in runs]
     cursors = spectrum_cursors(runs[-1])
     mesh = max((c.position for c in cursors if c.kind == "mesh"), default=0.0)
-    _show_spectrum_view(spectra, cursors, "spectrum", logarithmic=True, first_end=1.04 * mesh)
+    _show_spectra(spectra, cursors, "spectrum", logarithmic=True, first_end=1.04 * mesh)
 
 
 def show_envelope(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
@@ -207,9 +185,8 @@ def show_envelope(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel:
     runs = _runs(healthy, faulty)
     cursors = envelope_cursors(runs[-1])
     marked = [c.position for c in cursors if c.kind == "bearing"]
-    wanted = marked or shaft_lines_hz(runs[-1])
     try:
-        band = telling_band_hz(runs[-1].recording, channel, wanted)
+        band = telling_band_hz(runs[-1].recording, channel, marked or shaft_lines_hz(runs[-1]))
     except RefusalError as error:
         st.info(f"There is no envelope spectrum: {error}")
         return
@@ -220,7 +197,7 @@ def show_envelope(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel:
         f"where the lines of the {lines} stand out most."
     )
     end = max([ENVELOPE_SHAFTS * healthy.setup.revolutions_per_s, *(1.08 * f for f in marked)])
-    _show_spectrum_view(spectra, cursors, "envelope", logarithmic=False, first_end=end)
+    _show_spectra(spectra, cursors, "envelope", logarithmic=False, first_end=end)
 
 
 def _runs(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> list[LaboratoryRun]:
@@ -228,13 +205,11 @@ def _runs(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> list[Laborato
 
 
 def _envelope_spectrum(recording: Recording, channel: str, band_hz: tuple[float, float]) -> Spectrum:
-    from gearsig.spectra import band_envelope, envelope_spectrum
-
     values, rate = recording.values(channel), recording.sampling_rate_hz
     return envelope_spectrum(band_envelope(values, rate, band_hz, unit="m/s^2", source=channel))
 
 
-def _show_spectrum_view(
+def _show_spectra(
     spectra: Sequence[Spectrum], cursors: Sequence[Cursor], name: str, *, logarithmic: bool, first_end: float
 ) -> None:
     kinds = [kind for kind in KIND_NAMES if any(c.kind == kind for c in cursors)]
@@ -295,14 +270,14 @@ POINTS_PER_CYCLE = 250
 
 def show_mesh(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     """Show stiffness and dynamic force of both machines over the same mesh cycles."""
-    runs = [healthy] if faulty is None else [healthy, faulty]
+    runs = _runs(healthy, faulty)
     shown, marks = _segment(runs[-1])
     cycles = np.linspace(*shown, round((shown[1] - shown[0]) * POINTS_PER_CYCLE) + 1)
     x = "mesh cycles (tooth k of the driver enters at k − 1)"
     st.markdown("**Mesh stiffness** of the tooth pairs in contact")
     if runs[0].setup.torque_nm > 0:
         curves = [stiffness(run, cycles) * 1e-8 for run in runs]
-        axes = Axes(x, "mesh stiffness (10⁸ N/m)", shown, _limits_mesh_view(curves))
+        axes = Axes(x, "mesh stiffness (10⁸ N/m)", shown, padded_limits(curves, flat=0.1))
         show_lines(_lines(cycles, curves), axes, "stiffness of the laboratory", cursors=marks, height_px=HEIGHT_PX)
         if len(curves) > 1 and np.allclose(curves[0], curves[1], rtol=1e-6):
             st.caption("What is switched on leaves the stiffness as it is.")
@@ -310,14 +285,12 @@ def show_mesh(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
         st.info("Without a load no tooth is pressed on another: there is no stiffness to show.")
     st.markdown("**Dynamic mesh force** over the same teeth")
     forces = [_force_kn(run, cycles) for run in runs]
-    axes = Axes(x, "mesh force (kN)", shown, _limits_mesh_view([f for f in forces if np.isfinite(f).any()]))
+    axes = Axes(x, "mesh force (kN)", shown, padded_limits(forces, flat=0.1))
     show_lines(_lines(cycles, forces), axes, "force of the laboratory", cursors=marks, height_px=HEIGHT_PX)
 
 
 def stiffness(run: LaboratoryRun, cycles: FloatArray) -> FloatArray:
     """Tangent stiffness at the static mesh force, N/m."""
-    from sims.mesh import mesh_stiffness
-
     if run.pair is not None:
         return run.pair.maps(np.array([run.setup.torque_nm]), cycles).tangent_stiffness_n_per_m[:, 0]
     mesh = run.machine.mesh
@@ -356,13 +329,6 @@ def _lines(x: FloatArray, curves: list[FloatArray]) -> list[ChartLine]:
     return lines
 
 
-def _limits_mesh_view(curves: list[FloatArray]) -> tuple[float, float]:
-    low = min((float(np.nanmin(c)) for c in curves), default=0.0)
-    high = max((float(np.nanmax(c)) for c in curves), default=1.0)
-    margin = 0.06 * (high - low) or 0.1
-    return low - margin, high + margin
-
-
 # --------------------
 # Phase portraits beside each other: displacement against velocity of a gear, with the points of a Poincaré section.
 # --------------------
@@ -375,7 +341,6 @@ MOST_POINTS = 10_000
 """A browser without a graphics card draws so many at once."""
 REVOLUTIONS = 1.3
 """Of the line, so that every tooth is on it; the points are of the whole run."""
-PHASE_VIEW_HEIGHT_PX = 430
 Limits = tuple[tuple[float, float], tuple[float, float]]
 Portrait = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
@@ -394,11 +359,11 @@ def show_phase(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
         persist_state="session",
     )
     n = STROBES[strobe or MESH_PERIOD] or healthy.machine.mesh.pair.driver.teeth
-    runs = [healthy] if faulty is None else [healthy, faulty]
+    runs = _runs(healthy, faulty)
     portraits = [portrait(run, GEARS[gear or "Driver"], n) for run in runs]
-    limits = [_limits_phase_view([p[axis] for p in portraits]) for axis in (0, 1)]
-    for column, found, name in zip(st.columns(2), portraits, ("healthy", "faulty"), strict=False):
-        figure = portrait_figure(found, (limits[0], limits[1]), faulty=name == "faulty")
+    limits = [padded_limits([p[axis] for p in portraits]) for axis in (0, 1)]
+    for column, shown, name in zip(st.columns(2), portraits, ("healthy", "faulty"), strict=False):
+        figure = portrait_figure(shown, (limits[0], limits[1]), faulty=name == "faulty")
         words = f"Velocity over displacement of the {name} machine with its Poincaré points"
         with column:
             st.plotly_chart(figure, width="stretch", key=f"phase of {name}", config=CONFIG, alt=words)
@@ -420,12 +385,12 @@ def portrait(run: LaboratoryRun, signal: str, n_per_revolution: float) -> Portra
     return y[-n::every], v[-n::every], points[0], points[1]
 
 
-def portrait_figure(found: Portrait, limits: Limits, *, faulty: bool) -> Figure:
+def portrait_figure(shown: Portrait, limits: Limits, *, faulty: bool) -> Figure:
     """Draw one portrait."""
     from plotly.graph_objects import Figure
 
     colours, figure = palette(), Figure()
-    y, v, y_points, v_points = found
+    y, v, y_points, v_points = shown
     figure.add_scatter(
         x=y,
         y=v,
@@ -442,7 +407,7 @@ def portrait_figure(found: Portrait, limits: Limits, *, faulty: bool) -> Figure:
         hovertemplate="%{x:.4g} µm, %{y:.4g} mm/s<extra></extra>",
     )
     figure.update_layout(
-        height=PHASE_VIEW_HEIGHT_PX,
+        height=430,
         margin={"l": 8, "r": 8, "t": 30, "b": 8},
         title={"text": "faulty" if faulty else "healthy", "x": 0.5, "font": {"size": 14}},
         showlegend=False,
@@ -450,12 +415,6 @@ def portrait_figure(found: Portrait, limits: Limits, *, faulty: bool) -> Figure:
         yaxis={"title": "velocity (mm/s)", "range": limits[1]},
     )
     return figure
-
-
-def _limits_phase_view(values: list[FloatArray]) -> tuple[float, float]:
-    low, high = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
-    margin = 0.06 * (high - low) or 1.0
-    return low - margin, high + margin
 
 
 NAMES = ("Time", "Spectrum", "Envelope", "Phase portrait", "Bifurcation", "Mesh")
@@ -467,11 +426,11 @@ def show_views(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: st
     for name, tab in zip(NAMES, st.tabs(NAMES, key=TAB, on_change="rerun"), strict=True):
         if tab.open:
             with tab:
-                _show(name, healthy, faulty, channel)
+                _show_view(name, healthy, faulty, channel)
 
 
 @st.fragment
-def _show(name: str, healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
+def _show_view(name: str, healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
     """Show one view; what the user changes in it reruns only this."""
     if name == "Time":
         show_time(healthy, faulty)
@@ -512,7 +471,7 @@ def show_title(healthy: LaboratoryRun, faulty: LaboratoryRun | None, *, impossib
     """Show what is on, and how the machine runs; `impossible` if the faulty machine cannot be."""
     title = " + ".join(effect_text(setting) for setting in _switched_on(faulty))
     otherwise = "The healthy machine alone" if impossible else "Healthy: nothing is switched on"
-    st.subheader(as_typed(title[:1].upper() + title[1:] or otherwise), anchor=False)
+    st.subheader(as_typed(capitalised(title) or otherwise), anchor=False)
     st.caption(" · ".join(frequencies(faulty or healthy)))
 
 
@@ -526,8 +485,8 @@ def show_expectation(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> No
     else:
         with st.expander("Where theory expects them", icon=":material/menu_book:"):
             for setting in on:
-                found = effect(setting.name)
-                st.markdown(f"**{as_typed(found.title[:1].upper() + found.title[1:])}.** {as_typed(found.signature)}")
+                known = effect(setting.name)
+                st.markdown(f"**{as_typed(capitalised(known.title))}.** {as_typed(known.signature)}")
     for note in (faulty or healthy).recording.warnings:
         st.caption(f":material/info: {as_typed(note)}")
 
@@ -550,15 +509,23 @@ def frequencies(run: LaboratoryRun) -> list[str]:
 
 def show_numbers(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
     """Show the numbers of the faulty machine, with the healthy one's below them."""
+    show_metrics(
+        {
+            name: (unit, number(healthy, channel), None if faulty is None else number(faulty, channel))
+            for name, (unit, number) in NUMBERS.items()
+        }
+    )
+
+
+def show_metrics(numbers: Mapping[str, tuple[str, float, float | None]]) -> None:
+    """Show numbers of the faulty machine, with the healthy one's below; name → unit, healthy, faulty."""
     with st.container(horizontal=True):
-        for name, (unit, number) in NUMBERS.items():
-            own = number(healthy, channel)
+        for name, (unit, healthy, faulty) in numbers.items():
             if faulty is None:
-                st.metric(name, shown(own, unit))
+                st.metric(capitalised(name), _with_unit(healthy, unit))
                 continue
-            value = number(faulty, channel)
-            below = f"healthy {shown(own, unit)}{change(own, value)}"
-            st.metric(name, shown(value, unit), below, delta_color="off", delta_arrow="off")
+            below = f"healthy {_with_unit(healthy, unit)}{change(healthy, faulty)}"
+            st.metric(capitalised(name), _with_unit(faulty, unit), below, delta_color="off", delta_arrow="off")
 
 
 def show_legend() -> None:
@@ -571,9 +538,8 @@ def show_legend() -> None:
     )
 
 
-def shown(value: float, unit: str) -> str:
-    """Write a number with its unit."""
-    return f"{value:.4g} {unit}".rstrip()
+def _with_unit(value: float, unit: str) -> str:
+    return f"{value:.4g} {unit}".rstrip() if isfinite(value) else "not known"
 
 
 def change(old: float, new: float) -> str:
@@ -587,6 +553,6 @@ def change(old: float, new: float) -> str:
     if not old or not np.isfinite(new / old):
         return ""
     percent = 100.0 * (new / old - 1.0)
-    return (
-        " (±0 %)" if abs(percent) < 0.05 else f" ({percent:+.2g} %)" if abs(percent) < 100 else f" ({new / old:.3g} ×)"
-    )
+    if abs(percent) < 0.05:
+        return " (±0 %)"
+    return f" ({percent:+.2g} %)" if abs(percent) < 100 else f" ({new / old:.3g} ×)"

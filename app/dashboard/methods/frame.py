@@ -16,7 +16,7 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.cached import safe_file_name
-from app.dashboard.theme import as_plot_text, as_typed, palette
+from app.dashboard.theme import as_plot_text, as_typed, capitalised, palette
 from app.dashboard.widgets.charts import CONFIG, Axes, choose_range
 from gearsig.angle import PASSBAND, ShaftAngle, resample_to_angle
 from gearsig.checks import FloatArray
@@ -356,7 +356,7 @@ def choose_one(
         label,
         list(options),
         default=first,
-        format_func=lambda text: text[:1].upper() + text[1:],
+        format_func=capitalised,
         key=key,
         help=about or None,
         label_visibility="visible" if named else "collapsed",

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import streamlit as st
 
+from app.dashboard.laboratory.drive import show_drive
 from app.dashboard.laboratory.run import LaboratoryRun, show_saving, simulated, with_complete_effects
-from app.dashboard.laboratory.setup import SETUP_MODEL as DRIVE
-from app.dashboard.laboratory.setup import Setup, choose_preset, choose_setup
+from app.dashboard.laboratory.setup import DRIVE_MODEL, Setup, choose_preset, choose_setup
 from app.dashboard.laboratory.views import show_expectation, show_legend, show_numbers, show_title, show_views
-from app.dashboard.start_stop.page import show_drive
 from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError
 from sims.presets import Preset
@@ -17,7 +16,7 @@ from sims.presets import Preset
 def show() -> None:
     """Choose a machine, simulate, show; a drive that starts and stops has controls and figures of its own."""
     preset = choose_preset()
-    if preset.model == DRIVE:
+    if preset.model == DRIVE_MODEL:
         show_drive(preset)
     else:
         show_pair(preset)

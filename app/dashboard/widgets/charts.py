@@ -51,6 +51,15 @@ class Axes:
     x_step: float | None = None
 
 
+def padded_limits(curves: Sequence[FloatArray], *, flat: float = 1.0) -> tuple[float, float]:
+    """Return limits about all known values of several curves, `flat` to both sides where they do not change."""
+    known = [curve for curve in curves if np.isfinite(curve).any()]
+    low = min((float(np.nanmin(curve)) for curve in known), default=0.0)
+    high = max((float(np.nanmax(curve)) for curve in known), default=1.0)
+    margin = 0.06 * (high - low) or flat
+    return low - margin, high + margin
+
+
 def show_lines(
     lines: Sequence[ChartLine],
     axes: Axes,

@@ -2,31 +2,84 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import isfinite
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
 
 import pandas as pd
 import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.laboratory.run import ANALYSIS_ENDING, ENDINGS, chosen_of_files, files_of, zip_of
-from app.dashboard.laboratory.setup import DriveSetup, choose_number, effect_text, show_typed_toggle, shown_unit
-from app.dashboard.laboratory.views import change, shown
-from app.dashboard.theme import as_typed
+from app.dashboard.laboratory.setup import DRIVE_MODEL, choose_number, effect_text, show_typed_toggle, shown_unit
+from app.dashboard.laboratory.views import show_metrics
+from app.dashboard.theme import as_typed, capitalised
 from app.dashboard.widgets.charts import show_picture
 from app.dashboard.widgets.messages import show_error
-from gearsig.errors import GearsigError
+from gearsig.checks import FloatArray
+from gearsig.errors import GearsigError, RefusalError
+from gearsig.gap.start_stop import PreparedCycles, cut_cycles
+from gearsig.motion import (
+    ForceEstimate,
+    PairMotion,
+    StartStop,
+    estimate_forces,
+    examine_start_stop,
+    measure_motion,
+)
+from gearsig.plot import force_figure, impacts_figure, start_stop_figure, start_stop_pair_figure
+from gearsig.recording import Recording
 from gearsig.rig import DAMPING_LAWS
+from sims import simulate
 from sims.effects import EffectSetting, effect
 from sims.forging import MODES, PARAMETERS
 from sims.presets import Preset
 from sims.simulator import ParameterValue, parameter
 
-if TYPE_CHECKING:
-    from gearsig.checks import FloatArray
-    from gearsig.motion import ForceEstimate, PairMotion, StartStop
-    from gearsig.recording import Recording
+
+@dataclass(frozen=True)
+class DriveSetup:
+    """Everything that decides a run: equal setups give equal recordings.
+
+    Parameters
+    ----------
+    preset : str
+    speed_rpm, torque_nm : float
+        Of the pinion: what the flow allows, and the motor's.
+    parameters : tuple of (name, value)
+        What differs from the preset, in the healthy drive as well.
+    effects : tuple of EffectSetting
+    duration_s, sampling_rate_hz : float
+    """
+
+    preset: str
+    speed_rpm: float
+    torque_nm: float
+    parameters: tuple[tuple[str, ParameterValue], ...] = ()
+    effects: tuple[EffectSetting, ...] = ()
+    duration_s: float = 6.0
+    sampling_rate_hz: float = 1000.0
+
+    @property
+    def healthy(self) -> DriveSetup:
+        """The same drive without effects."""
+        return replace(self, effects=())
+
+    @property
+    def file_stem(self) -> str:
+        """Name of its files, without a dot."""
+        return "_".join([self.preset, *(setting.name for setting in self.effects)])
+
+    def record(self) -> Recording:
+        """Simulate the recording that the command line makes of the same settings."""
+        return simulate(
+            DRIVE_MODEL,
+            preset=self.preset,
+            parameters=dict(self.parameters),
+            effects=self.effects,
+            speed_rpm=self.speed_rpm,
+            torque_nm=self.torque_nm,
+            duration_s=self.duration_s,
+            sampling_rate_hz=self.sampling_rate_hz,
+        )
 
 
 # --------------------
@@ -34,7 +87,6 @@ if TYPE_CHECKING:
 # --------------------
 
 
-RATES_HZ = (1000.0, 4000.0, 10000.0)
 CRACK = "root_crack"
 HIGHEST = {CRACK: 2.0, "backlash": 500.0, "tooth_wear": 200.0, "sliding_friction": 0.2, "torque_ripple": 20.0}
 """Ends of the sliders; the crack's is in modules."""
@@ -42,7 +94,7 @@ WORDS = {
     CRACK: "Pairs of the cracked tooth lose stiffness, on the drive flank, where the load opens the crack.",
     "backlash": "Both flanks move apart: longer flights, harder impacts.",
     "tooth_wear": "Worn off the drive flanks where it is most: at their ends, by sliding; nothing at the pitch point.",
-    "sliding_friction": "Coefficient of the flanks, beside the sound one.",
+    "sliding_friction": "Coefficient of the flanks, beside the healthy one.",
     "torque_ripple": "Pistons of the motor, part of its torque.",
 }
 PLACES = {
@@ -65,7 +117,7 @@ def choose_drive(chosen: Preset) -> DriveSetup:
             values = _choose_teeth(chosen)
         with st.expander("Brake, press and load", icon=":material/weight:"):
             values += _choose_load(chosen)
-        st.markdown("**Faults** · *the sound drive has none*")
+        st.markdown("**Faults** · *the healthy drive has none*")
         effects = _choose_effects(chosen)
         with st.expander("Measurement", icon=":material/sensors:"):
             measured, duration, rate = _choose_measurement(chosen)
@@ -108,19 +160,19 @@ def _choose_effects(chosen: Preset) -> list[EffectSetting]:
 
 
 def _choose_effect(name: str, chosen: Preset) -> EffectSetting:
-    found, high = effect(name), HIGHEST[name]
-    s = found.severity
+    chosen_effect, high = effect(name), HIGHEST[name]
+    s = chosen_effect.severity
     if name == CRACK:
         high *= float(chosen.parameters.get("module_mm") or parameter(PARAMETERS, "module_mm").default or 1.0)
     unit = shown_unit(s.unit)
-    label = f"{found.title[:1].upper()}{found.title[1:]}" + (f" ({unit})" if unit else "")
+    label = capitalised(chosen_effect.title) + (f" ({unit})" if unit else "")
     severity = choose_number(label, f"severity of {name} of the drive", 0.0, high, about=WORDS[name])
     if name not in PLACES or severity == 0.0:
         return EffectSetting(name, severity)
     option, words, highest = PLACES[name]
     if name == CRACK:
         highest = int(float(chosen.parameters.get("teeth_driver") or highest))
-    default = next(int(float(o.default or 1)) for o in found.options if o.name == option)
+    default = next(int(float(o.default or 1)) for o in chosen_effect.options if o.name == option)
     place = st.number_input(
         words, 1, highest, min(default, highest), key=f"{option} of {name} of the drive", persist_state="session"
     )
@@ -129,7 +181,9 @@ def _choose_effect(name: str, chosen: Preset) -> EffectSetting:
 
 def _choose_measurement(chosen: Preset) -> tuple[Parameters, float, float]:
     duration = choose_number("Length (s)", "length of the drive", 6.0, 30.0, low=3.5)
-    rate = st.selectbox("Sampling rate (Hz)", RATES_HZ, format_func="{:g}".format, key="rate of the drive")
+    rate = st.selectbox(
+        "Sampling rate (Hz)", (1000.0, 4000.0, 10000.0), format_func="{:g}".format, key="rate of the drive"
+    )
     counts = st.select_slider(
         "Counts of the encoders",
         [2**bits for bits in range(10, 25, 2)],
@@ -151,9 +205,6 @@ def _value(chosen: Preset, name: str, label: str, high: float, *, low: float = 0
 # --------------------
 
 
-N_RUNS = 12
-
-
 @dataclass(frozen=True)
 class DriveRun:
     """What one setup gives.
@@ -167,7 +218,7 @@ class DriveRun:
     refusal : str
         Why there is no force.
     curve_um : array or None
-        Course of the compression over the mesh cycle on the drive flank; None where nothing starts and stops.
+        Profile of the compression over the mesh cycle on the drive flank; None where nothing starts and stops.
     """
 
     setup: DriveSetup
@@ -182,7 +233,7 @@ class DriveRun:
         return next((i.value for i in self.examined.indicators if i.name == name), float("nan"))
 
 
-@st.cache_resource(max_entries=N_RUNS, show_spinner="Simulating …")
+@st.cache_resource(max_entries=12, show_spinner="Simulating …")
 def run_drive(setup: DriveSetup) -> DriveRun:
     """Simulate, measure, examine.
 
@@ -191,9 +242,6 @@ def run_drive(setup: DriveSetup) -> DriveRun:
     InputError
         If a value does not fit.
     """
-    from gearsig.errors import RefusalError
-    from gearsig.motion import estimate_forces, examine_start_stop, measure_motion
-
     recording = setup.record()
     motion = measure_motion(recording)
     try:
@@ -204,9 +252,6 @@ def run_drive(setup: DriveSetup) -> DriveRun:
 
 
 def _curve_um(motion: PairMotion) -> FloatArray | None:
-    from gearsig.errors import RefusalError
-    from gearsig.gap.start_stop import PreparedCycles, cut_cycles
-
     try:
         cycles = PreparedCycles(cut_cycles(motion))
     except RefusalError:
@@ -215,7 +260,7 @@ def _curve_um(motion: PairMotion) -> FloatArray | None:
 
 
 # --------------------
-# What the page of the start–stop drive shows: numbers beside the sound drive's, pictures, impacts, files.
+# What the page of the start–stop drive shows: numbers beside the healthy drive's, pictures, impacts, files.
 # --------------------
 
 
@@ -227,44 +272,36 @@ NUMBERS = {
     "impact loss per cycle": "J",
 }
 """Indicators on top of the page, with the unit for people."""
-TOGETHER = "Sound beside faulty"
+TOGETHER = "Healthy beside faulty"
 VIEWS = ("Motion", "Force between the teeth", "Impacts", "Indicators")
 
 
-def show_numbers(sound: DriveRun, faulty: DriveRun | None) -> None:
-    """Show the indicators, of the faulty drive with the sound one's below."""
-    with st.container(horizontal=True):
-        for name, unit in NUMBERS.items():
-            own = sound.number(name)
-            label = name[:1].upper() + name[1:]
-            if faulty is None:
-                st.metric(label, _told(own, unit))
-                continue
-            value = faulty.number(name)
-            below = f"sound {_told(own, unit)}{change(own, value)}"
-            st.metric(label, _told(value, unit), below, delta_color="off", delta_arrow="off")
+def show_numbers(healthy: DriveRun, faulty: DriveRun | None) -> None:
+    """Show the indicators, of the faulty drive with the healthy one's below."""
+    show_metrics(
+        {
+            name: (unit, healthy.number(name), None if faulty is None else faulty.number(name))
+            for name, unit in NUMBERS.items()
+        }
+    )
 
 
-def _told(value: float, unit: str) -> str:
-    return shown(value, unit) if isfinite(value) else "not told"
-
-
-def show_views(sound: DriveRun, faulty: DriveRun | None) -> None:
+def show_views(healthy: DriveRun, faulty: DriveRun | None) -> None:
     """Show one of the views, of either drive."""
     with st.container(horizontal=True, horizontal_alignment="distribute", vertical_alignment="center"):
         view = st.segmented_control(
             "View", VIEWS if faulty is None else (TOGETHER, *VIEWS), default=VIEWS[0] if faulty is None else TOGETHER,
-            key=f"view of the {'sound' if faulty is None else 'faulty'} drive", label_visibility="collapsed",
+            key=f"view of the {'healthy' if faulty is None else 'faulty'} drive", label_visibility="collapsed",
             persist_state="session",
         )  # fmt: skip
         which = "Faulty"
         if faulty is not None and view != TOGETHER:
             which = st.segmented_control(
-                "Drive", ("Faulty", "Sound"), default="Faulty", key="side of the drive", label_visibility="collapsed"
+                "Drive", ("Faulty", "Healthy"), default="Faulty", key="side of the drive", label_visibility="collapsed"
             ) or "Faulty"  # fmt: skip
-    run = sound if faulty is None or which == "Sound" else faulty
+    run = healthy if faulty is None or which == "Healthy" else faulty
     if view == TOGETHER and faulty is not None:
-        _show_together(sound, faulty)
+        _show_together(healthy, faulty)
     elif view == VIEWS[1]:
         _show_force(run)
     elif view == VIEWS[2]:
@@ -302,23 +339,17 @@ def show_saving(run: DriveRun) -> None:
 
 
 def _show_motion(run: DriveRun) -> None:
-    from gearsig.plot import start_stop_figure
-
     words = "Speed of the pinion with the impacts, phase plane of the teeth, torque over twist"
     show_picture(start_stop_figure(run.examined, title=run.setup.preset), words)
 
 
-def _show_together(sound: DriveRun, faulty: DriveRun) -> None:
-    from gearsig.plot import start_stop_pair_figure
-
-    curves = None if sound.curve_um is None or faulty.curve_um is None else (sound.curve_um, faulty.curve_um)
-    words = "Sound and faulty drive: speed, phase plane, torque over twist, drive flank over the mesh cycle, teeth"
-    show_picture(start_stop_pair_figure(sound.examined, faulty.examined, curves_um=curves), words)
+def _show_together(healthy: DriveRun, faulty: DriveRun) -> None:
+    curves = None if healthy.curve_um is None or faulty.curve_um is None else (healthy.curve_um, faulty.curve_um)
+    words = "Healthy and faulty drive: speed, phase plane, torque over twist, drive flank over the mesh cycle, teeth"
+    show_picture(start_stop_pair_figure(healthy.examined, faulty.examined, curves_um=curves), words)
 
 
 def _show_force(run: DriveRun) -> None:
-    from gearsig.plot import force_figure
-
     if run.force is None:
         st.info(as_typed(run.refusal))
         return
@@ -340,8 +371,6 @@ def _show_impacts(run: DriveRun) -> None:
     if not run.examined.impacts:
         st.info("No impacts were seen.")
         return
-    from gearsig.plot import impacts_figure
-
     motion = run.examined.motion
     figure = impacts_figure(run.examined.impacts, motion.path.teeth[0], restitution=motion.contact.restitution)
     show_picture(figure, "Energy of the impacts over time and over the tooth, restitution over speed")
@@ -362,21 +391,21 @@ def _show_impacts(run: DriveRun) -> None:
 def show_drive(preset: Preset) -> None:
     """Choose, simulate, show."""
     setup = choose_drive(preset)
-    sound = run_drive(setup.sound)
+    healthy = run_drive(setup.healthy)
     faulty = faulty_run(setup)
     head, buttons = st.columns((3, 2), vertical_alignment="top")
     with head:
         titles = [effect_text(setting) for setting in setup.effects] if faulty else []
         title = " + ".join(titles)
-        st.subheader(as_typed(title[:1].upper() + title[1:] or "Sound: nothing is switched on"), anchor=False)
+        st.subheader(as_typed(capitalised(title) or "Healthy: nothing is switched on"), anchor=False)
         st.caption(
             "Forging manipulator: pinion and wheel with gripper and piece. Every number is read from the recording, as "
             "of a measured one."
         )
     with buttons:
-        show_saving(faulty or sound)
-    show_numbers(sound, faulty)
-    show_views(sound, faulty)
+        show_saving(faulty or healthy)
+    show_numbers(healthy, faulty)
+    show_views(healthy, faulty)
 
 
 def faulty_run(setup: DriveSetup) -> DriveRun | None:
