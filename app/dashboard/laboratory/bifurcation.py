@@ -64,9 +64,7 @@ def parameters_of(setup: Setup) -> dict[str, str]:
     return titles
 
 
-def choose_range(
-    run: LaboratoryRun, name: str, places: Sequence[DeltaGenerator], *, max_values: int, first: int
-) -> Range:
+def choose_range(run: LaboratoryRun, name: str, places: Sequence[DeltaGenerator]) -> Range:
     """Let the user choose from, to, and how many."""
     low, high = _suggested(run, name)
     start, stop, number = places
