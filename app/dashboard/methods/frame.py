@@ -335,6 +335,7 @@ def choose_one(
     about: str = "",
     named: bool = True,
     place: Any = st,
+    as_written: bool = False,
 ) -> str:
     """Return the option chosen among few, `default` or else the first one at first.
 
@@ -350,13 +351,15 @@ def choose_one(
     named : bool
         Whether the label is shown; screen readers get it in any case.
     place : container
+    as_written : bool
+        Show the options as they are, without a capital first letter.
     """
     first = default or options[0]
     chosen = place.segmented_control(
         label,
         list(options),
         default=first,
-        format_func=capitalised,
+        format_func=str if as_written else capitalised,
         key=key,
         help=about or None,
         label_visibility="visible" if named else "collapsed",

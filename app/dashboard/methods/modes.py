@@ -34,7 +34,7 @@ def show_modes(page: MethodPage) -> None:
     """Show the modes of one channel."""
     left, right = st.columns(2)
     about = "vmdpy: the reference program, for comparison; slow, and short segments only."
-    engine = page.choose(left, "Engine", get_args(VmdEngine), about=about)
+    engine = page.choose(left, "Engine", get_args(VmdEngine), about=about, as_written=True)
     with right:
         segment = page.segment(n_first=2**16, n_max=2**21 if engine == "gearsig" else MAX_OF_VMDPY)
     with left:

@@ -143,7 +143,7 @@ def choose_map(
     engine, limit = "gearsig", min(transform.n_max, n_max or transform.n_max)
     if transform.squeezed:
         about = "ssqueezepy: another program, for comparison; single precision, and short segments only."
-        engine = page.choose(st, "Engine", get_args(SqueezeEngine), about=about)
+        engine = page.choose(st, "Engine", get_args(SqueezeEngine), about=about, as_written=True)
         limit = limit if engine == "gearsig" else MAX_OF_SSQUEEZEPY
     left, right = st.columns(2)
     with left:
