@@ -68,7 +68,7 @@ METHODS = {
     "order coherence": lambda r, a: order_coherence(r, "a", a, highest_order=4, n_bands=16).coherence_squared,
     "modes": lambda r, _: variational_modes(r.values("a"), FS, VmdSettings(3)).waveforms,
     "suggested modes": lambda r, _: np.array(
-        suggest_modes(r.values("a"), FS, most_modes=2, penalties=(2000.0,), longest=2048).chosen.centres
+        suggest_modes(r.values("a"), FS, max_modes=2, penalties=(2000.0,), longest=2048).chosen.centres
     ),
     "denoising": lambda r, _: denoise(r, "a").values,
     "orders": lambda r, a: track_vold_kalman(r, "a", (29.0, 30.0), bandwidth_hz=5, shaft_angle=a).residual,

@@ -115,7 +115,7 @@ NARROWEST_LIMIT = 0.3
 """With few lines in a mode's reach the width of noise scatters, and the limit goes down to this."""
 GIVE_UP_AFTER = 3
 """Refused trials in a row at one penalty, after which no larger number of modes is tried there."""
-LEAST_SHARE = 1e-4
+MIN_SHARE = 1e-4
 """Modes with less of the signal's energy hold leftovers of their neighbours."""
 
 
@@ -123,7 +123,7 @@ def suggest_modes(
     values: FloatArray,
     sampling_rate: float,
     *,
-    most_modes: int = 8,
+    max_modes: int = 8,
     penalties: Sequence[float] = PENALTIES,
     longest: int = 2**14,
     axis: ModeAxis = "frequency",
@@ -131,7 +131,7 @@ def suggest_modes(
 ) -> ModeSuggestion:
     """Return the number of modes and the penalty that separate a signal's components.
 
-    Every number of modes up to `most_modes` is tried at every penalty until three in a row are refused, from uniform
+    Every number of modes up to `max_modes` is tried at every penalty until three in a row are refused, from uniform
     starts and, where that does not do, from the spectrum's peaks. A trial is refused where two centres lie closer
     than the distance at which a mode's gain is one half (the modes share lines), where a mode is as wide as white noise
     alone would make it, or where a mode is all but empty. Of the others, the one with most modes wins; at equal
@@ -142,7 +142,7 @@ def suggest_modes(
     values : array, (n_samples,)
     sampling_rate : float
         Samples per second, or per revolution where `axis` is "order".
-    most_modes : int
+    max_modes : int
     penalties : sequence of float
     longest : int
         A longer signal is tried on this many samples from its middle.
@@ -167,13 +167,13 @@ def suggest_modes(
     """
     x = checked_signal(values, minimum=8)
     fs = positive(sampling_rate, "sampling_rate")
-    count(most_modes, "most_modes")
+    count(max_modes, "max_modes")
     alphas = sorted({positive(p, "penalties") for p in penalties})
     if not alphas:
         raise InputError("penalties is empty", allowed="one or more values above zero")
     part = _middle(x, count(longest, "longest", minimum=64))
     check_supported(part, 1)
-    most = min(most_modes, len(part) // SAMPLES_PER_MODE)
+    most = min(max_modes, len(part) // SAMPLES_PER_MODE)
     trials = tuple(trial for penalty in alphas for trial in _trials(part, fs, most, penalty))
     good = [t for t in trials if not t.objection]
     if not good:
@@ -210,9 +210,9 @@ def _middle(x: FloatArray, longest: int) -> FloatArray:
     return x[start : start + longest]
 
 
-def _trials(x: FloatArray, fs: float, most_modes: int, penalty: float) -> list[ModeTrial]:
+def _trials(x: FloatArray, fs: float, max_modes: int, penalty: float) -> list[ModeTrial]:
     trials: list[ModeTrial] = []
-    for n_modes in range(1, most_modes + 1):
+    for n_modes in range(1, max_modes + 1):
         trials.append(_better_trial(x, fs, n_modes, penalty))
         if len(trials) >= GIVE_UP_AFTER and all(t.objection for t in trials[-GIVE_UP_AFTER:]):
             break
@@ -253,7 +253,7 @@ def _trial(x: FloatArray, fs: float, settings: VmdSettings) -> ModeTrial:
 def _objection(modes: Modes, gaps: FloatArray, relative_widths: FloatArray, shares: FloatArray) -> str:
     if len(gaps) and gaps.min() < 1.0:
         return "two modes share the same lines"
-    if shares.min() < LEAST_SHARE:
+    if shares.min() < MIN_SHARE:
         return "a mode is all but empty"
     if relative_widths.max() > noise_limit(modes.settings.penalty, len(modes.residual)):
         return "a mode is as wide as noise"

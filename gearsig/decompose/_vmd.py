@@ -18,7 +18,7 @@ from gearsig.spectra import Envelope, Spectrum, amplitude_spectrum, checked_sign
 # --------------------
 
 
-_MOST_CELLS = 2000
+_MAX_CELLS = 2000
 
 
 def first_centres(
@@ -75,7 +75,7 @@ def peak_centres(power: FloatArray, penalty: float, n_modes: int) -> FloatArray:
     n_modes : int
     """
     # Cells of a quarter of the half-gain distance, but no more of them than lines or than a matrix can have.
-    n_cells = int(min(len(power), max(16, np.ceil(2.0 * np.sqrt(penalty))), _MOST_CELLS))
+    n_cells = int(min(len(power), max(16, np.ceil(2.0 * np.sqrt(penalty))), _MAX_CELLS))
     edges = np.arange(n_cells) * len(power) // n_cells
     frequency = np.arange(len(power)) * (0.5 / len(power))
     energy = np.add.reduceat(power, edges)

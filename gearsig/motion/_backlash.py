@@ -18,7 +18,7 @@ MIN_SAMPLES = 12
 """On either flank."""
 FAR = 4.0
 """Standard deviations from the fit beyond which a sample is left out: the middle of a blow, a slipped count."""
-MOST_ROUNDS = 20
+MAX_ROUNDS = 20
 MIN_PART = 0.5
 """Of the rig's play: without torque, less is the deflection of one flank and not the way to the other."""
 
@@ -86,11 +86,11 @@ def estimate_backlash(motion: PairMotion) -> BacklashEstimate:
 def _fitted(motion: PairMotion, design: FloatArray, loaded: NDArray[np.bool_]) -> BacklashEstimate:
     q = motion.compression_m
     keep = loaded
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         x, *_ = np.linalg.lstsq(design[keep], q[keep], rcond=None)
-        left = q - design @ x
-        scatter = 1.4826 * float(np.median(np.abs(left[keep]))) or float(np.finfo(float).tiny)
-        again = loaded & (np.abs(left) < FAR * scatter)
+        residual = q - design @ x
+        scatter = 1.4826 * float(np.median(np.abs(residual[keep]))) or float(np.finfo(float).tiny)
+        again = loaded & (np.abs(residual) < FAR * scatter)
         _check_sides(int(np.sum(again & (design[:, 1] > 0))), int(np.sum(again & (design[:, 1] < 0))))
         if np.array_equal(again, keep):
             break
@@ -101,7 +101,7 @@ def _fitted(motion: PairMotion, design: FloatArray, loaded: NDArray[np.bool_]) -
             remedy="record a start and a braked stop: both flanks must carry",
         )
     inverse = np.linalg.pinv(design[keep].T @ design[keep])
-    deviation = float(np.sqrt(np.mean(left[keep] ** 2) * inverse[1, 1] * dependence(left[keep])))
+    deviation = float(np.sqrt(np.mean(residual[keep] ** 2) * inverse[1, 1] * dependence(residual[keep])))
     stiffness = float(x[2]) ** -motion.contact.exponent if x[2] > 0.0 else float("nan")
     return BacklashEstimate(
         2e6 * float(x[1]),
@@ -218,11 +218,9 @@ def torque_twist(motion: PairMotion, segments: MotionSegments, datum_m: float) -
     RefusalError
         If no torque was measured.
     """
-    if motion.torque_nm is None:
-        raise RefusalError("no torque was measured", remedy="record the torque of the driver's shaft")
+    torque, _ = motion.torque_and_tooth_force()
     r1 = motion.path.base_radii_m[0]
     twist = (motion.compression_m - datum_m) / r1
-    torque = motion.torque_nm
     n_cycles = len(segments.moving) if segments.stops_s or segments.n_reversals else 0
     share = 1.0 / (n_cycles * motion.sampling_rate_hz) if n_cycles else float("nan")
     return TorqueTwist(

@@ -123,8 +123,7 @@ def elastic_depth(motion: PairMotion, force_n: FloatArray) -> FloatArray:
 
 def _from_torque(motion: PairMotion) -> Datum:
     """Median of q − sgn(F) a − g(F) over loaded samples: the mean depth then carries the measured torque."""
-    force = motion.tooth_force_from_torque_n
-    assert force is not None  # noqa: S101  the caller has looked
+    _, force = motion.torque_and_tooth_force()
     loaded = np.abs(force) > LOADED * np.quantile(np.abs(force), 0.95)
     if np.count_nonzero(loaded) < MIN_SAMPLES or not np.any(force):
         raise RefusalError(

@@ -23,7 +23,7 @@ from gearsig.rig import damping_ratio_s_per_m
 
 FAR = 5.0
 """Standard deviations beyond which a sample is left out: flanks that just part, counts that slipped."""
-MOST_ROUNDS = 8
+MAX_ROUNDS = 8
 ALIKE = 0.9
 N_BLOCKS = 8
 """Of the jackknife."""
@@ -80,13 +80,13 @@ def robust_fit(
     residuals: Callable[[FloatArray], FloatArray],
     first: FloatArray,
     scale: FloatArray,
-    wanted: NDArray[np.bool_],
+    usable: NDArray[np.bool_],
     names: tuple[str, ...],
     *,
     min_scatter: float = 0.0,
     with_jackknife: bool = True,
 ) -> RobustFit:
-    """Minimise the squares of the wanted residuals; leave out what is far off, and again.
+    """Minimise the squares of the usable residuals; leave out what is far off, and again.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def robust_fit(
         Values of the parameters, (n,) → (n_samples,).
     first, scale : array, (n,)
         Where to begin, and the parameters' sizes.
-    wanted : array of bool, (n_samples,)
+    usable : array of bool, (n_samples,)
     names : tuple of str
     min_scatter : float
         What the equation itself leaves out: a sample nearer than five times that is never left out.
@@ -106,14 +106,14 @@ def robust_fit(
     RefusalError
         If fewer samples are left than five times the parameters.
     """
-    keep: NDArray[np.bool_] = wanted
+    keep: NDArray[np.bool_] = usable
     x: FloatArray = first / scale
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         _check_samples(keep, len(names))
         x, jacobian = _solve(residuals, x, scale, keep)
-        left = residuals(x * scale)
-        scatter = 1.4826 * float(np.median(np.abs(left[keep])))
-        again = wanted & (np.abs(left) <= FAR * max(scatter, min_scatter))
+        residual = residuals(x * scale)
+        scatter = 1.4826 * float(np.median(np.abs(residual[keep])))
+        again = usable & (np.abs(residual) <= FAR * max(scatter, min_scatter))
         if np.array_equal(again, keep):
             break
         keep = again
@@ -122,7 +122,7 @@ def robust_fit(
     singular = np.linalg.svd(jacobian / np.where(lengths > 0.0, lengths, 1.0), compute_uv=False)
     inverse = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
     inverse[lengths == 0.0, lengths == 0.0] = np.inf  # nothing depends on it: nothing is known of it
-    power = float(np.mean(left[keep] ** 2)) * dependence(left[keep])
+    power = float(np.mean(residual[keep] ** 2)) * dependence(residual[keep])
     covariance = np.where(inverse == 0.0, 0.0, inverse * power)
     widened: FloatArray = np.ones(len(x))
     if with_jackknife:
@@ -144,11 +144,11 @@ def _solve(
     from scipy.optimize import least_squares
 
     def kept(values: FloatArray) -> FloatArray:
-        left: FloatArray = residuals(values * scale)[keep]
-        return left
+        residual: FloatArray = residuals(values * scale)[keep]
+        return residual
 
-    found = least_squares(kept, x, method="lm", x_scale="jac")
-    return np.asarray(found.x), np.asarray(found.jac)
+    solution = least_squares(kept, x, method="lm", x_scale="jac")
+    return np.asarray(solution.x), np.asarray(solution.jac)
 
 
 def _widening(
@@ -198,7 +198,7 @@ LOADED = 0.1
 """Part of the ordinary load from which on a sample is taken."""
 MIN_SCATTER_M = 2e-8
 """What the equation leaves out: bristles that bend, a damping that is latched a little early."""
-LONG_CONTACT, MOST_LONG = 40, 8
+LONG_CONTACT, MAX_LONG = 40, 8
 """Samples from which on a contact whose speed of meeting is not known gets a damping of its own, and how many do."""
 NAMES = ("datum", "half_backlash", "log stiffness", "damping", "driver inertia", "friction")
 
@@ -215,7 +215,7 @@ class ContactEquation:
     meeting_speed_mps : array, (n,)
     group : array of int, (n,)
         Number of the damping that belongs to a sample: 0 for c/v of contacts whose speed v of meeting is known.
-    wanted : array of bool, (n,)
+    usable : array of bool, (n,)
     start : array
         Values of `NAMES`, then one β for each further group.
     free : tuple of int
@@ -229,7 +229,7 @@ class ContactEquation:
     per_friction: FloatArray
     meeting_speed_mps: FloatArray
     group: NDArray[np.int64]
-    wanted: NDArray[np.bool_]
+    usable: NDArray[np.bool_]
     start: FloatArray
     free: tuple[int, ...]
 
@@ -250,11 +250,11 @@ class ContactEquation:
         beta = np.where(self.group == 0, damping / self.meeting_speed_mps, betas)
         growth = np.maximum(1.0 + beta * self.side * m.compression_rate_mps, 0.05)
         yielding = (np.abs(normal) / (self.n_pairs * np.exp(log_k) * growth)) ** (1.0 / m.contact.exponent)
-        left: FloatArray = m.compression_m - zero - self.side * (a + yielding)
-        return left
+        residual: FloatArray = m.compression_m - zero - self.side * (a + yielding)
+        return residual
 
     def solve(self, *, with_jackknife: bool = True) -> RobustFit:
-        """Fit the free parameters; without the jackknife where their intervals are not wanted."""
+        """Fit the free parameters; without the jackknife where their intervals are not needed."""
         names = (*NAMES, *(f"damping {i}" for i in range(1, len(self.start) - len(NAMES) + 1)))
         rows = list(self.free)
         inertia = max(self.motion.contact.driver_inertia_kg_m2, 1e-3)
@@ -263,7 +263,7 @@ class ContactEquation:
             self.residuals,
             self.start[rows],
             scale[rows],
-            self.wanted,
+            self.usable,
             tuple(names[i] for i in rows),
             min_scatter=MIN_SCATTER_M,
             with_jackknife=with_jackknife,
@@ -278,17 +278,15 @@ def contact_equation(motion: PairMotion) -> ContactEquation:
     RefusalError
         If too few samples carry a load.
     """
-    force, torque = motion.tooth_force_from_torque_n, motion.torque_nm
-    assert force is not None  # noqa: S101  the caller has looked
-    assert torque is not None  # noqa: S101
+    torque, force = motion.torque_and_tooth_force()
     side = np.sign(force)
-    wanted = (np.abs(force) > LOADED * float(np.quantile(np.abs(force), 0.95))) & _clear(motion, side)
-    if np.sum(wanted) < 10 * MIN_SAMPLES:
-        raise RefusalError(f"{np.sum(wanted)} samples carry a load", remedy="record while the machine drives")
-    both = min(np.sum(wanted & (side > 0)), np.sum(wanted & (side < 0))) >= MIN_SAMPLES
+    usable = (np.abs(force) > LOADED * float(np.quantile(np.abs(force), 0.95))) & _clear(motion, side)
+    if np.sum(usable) < 10 * MIN_SAMPLES:
+        raise RefusalError(f"{np.sum(usable)} samples carry a load", remedy="record while the machine drives")
+    both = min(np.sum(usable & (side > 0)), np.sum(usable & (side < 0))) >= MIN_SAMPLES
     start = _start(motion, both_flanks=bool(both))
     speed = meeting_speeds(motion, float(start[0]), float(start[1]))
-    group, n_groups = _groups(speed, wanted, side)
+    group, n_groups = _groups(speed, usable, side)
     betas = np.full(n_groups, start[NAMES.index("damping")] / 0.1)
     unit = replace(motion, contact=replace(motion.contact, friction_coefficient=1.0))
     return ContactEquation(
@@ -299,7 +297,7 @@ def contact_equation(motion: PairMotion) -> ContactEquation:
         friction_share(unit, side) - 1.0,
         np.where(np.isnan(speed), 1.0, speed),
         group,
-        wanted & (group >= 0),
+        usable & (group >= 0),
         np.concatenate([start, betas]),
         tuple(i for i in range(len(NAMES) + n_groups) if both or i != NAMES.index("half_backlash")),
     )
@@ -319,17 +317,17 @@ def _start(motion: PairMotion, *, both_flanks: bool) -> FloatArray:
     return np.array([zero, a, np.log(k), damping, c.driver_inertia_kg_m2, c.friction_coefficient])
 
 
-def _groups(speed: FloatArray, wanted: NDArray[np.bool_], side: FloatArray) -> tuple[NDArray[np.int64], int]:
+def _groups(speed: FloatArray, usable: NDArray[np.bool_], side: FloatArray) -> tuple[NDArray[np.int64], int]:
     """Number the long contacts whose speed of meeting is not known from 1; −1 for short ones, which are left out."""
     group = np.where(np.isnan(speed), -1, 0).astype(np.int64)
     unknown = np.flatnonzero(np.isnan(speed))
     if not len(unknown):
         return group, 0
     parts = np.split(unknown, np.flatnonzero((np.diff(unknown) > 1) | (np.diff(side[unknown]) != 0)) + 1)
-    long = sorted((p for p in parts if np.sum(wanted[p]) >= LONG_CONTACT), key=lambda p: -int(np.sum(wanted[p])))
-    for number, part in enumerate(long[:MOST_LONG], 1):
+    long = sorted((p for p in parts if np.sum(usable[p]) >= LONG_CONTACT), key=lambda p: -int(np.sum(usable[p])))
+    for number, part in enumerate(long[:MAX_LONG], 1):
         group[part] = number
-    return group, min(len(long), MOST_LONG)
+    return group, min(len(long), MAX_LONG)
 
 
 def _clear(motion: PairMotion, side: FloatArray) -> NDArray[np.bool_]:
@@ -402,9 +400,9 @@ class Identification:
 
     def parameter(self, name: str) -> FittedParameter:
         """Return one parameter by its name."""
-        for found in self.parameters:
-            if found.name == name:
-                return found
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
         raise InputError(f"there is no parameter {name!r}", allowed=", ".join(p.name for p in self.parameters))
 
 
@@ -495,8 +493,7 @@ def _load_with_inertia(motion: PairMotion, contact: RobustFit) -> RobustFit:
 def _fit_load(motion: PairMotion, inertia_kg_m2: float) -> RobustFit:
     """Fit α2 = (r_b2 F − T_c sgn ω2 − c ω2)/J2, F the driver's tooth force turned by the friction of the flanks."""
     r1, r2 = motion.path.base_radii_m
-    torque, w = motion.torque_nm, motion.driven_speed_rad_s
-    assert torque is not None  # noqa: S101  the caller has looked
+    (torque, _), w = motion.torque_and_tooth_force(), motion.driven_speed_rad_s
     force = (torque - inertia_kg_m2 * motion.driver_acceleration_rad_s2) / r1
     drive = r2 * force * friction_share(motion, force, 1) / friction_share(motion, force, 0)
     turning = np.abs(w) > TURNING * float(np.quantile(np.abs(w), 0.95))
@@ -505,8 +502,8 @@ def _fit_load(motion: PairMotion, inertia_kg_m2: float) -> RobustFit:
 
     def residuals(values: FloatArray) -> FloatArray:
         inverse, level, viscous = values
-        left: FloatArray = motion.driven_acceleration_rad_s2 - inverse * (drive - level * np.sign(w) - viscous * w)
-        return left
+        residual: FloatArray = motion.driven_acceleration_rad_s2 - inverse * (drive - level * np.sign(w) - viscous * w)
+        return residual
 
     guess = motion.contact.driven_inertia_kg_m2 or 10.0
     ordinary = float(np.quantile(np.abs(drive), 0.9)) or 1.0
@@ -614,8 +611,7 @@ N_PLACES = 12
 """Parts of the segment in which a pair carries alone: teeth are compared at equal places of their contact."""
 MIN_PART = 0.02
 """Of the mean deflection: teeth differ by that anyway."""
-TOOTH_COMPLIANCE_MIN_SAMPLES = 4
-"""Of a tooth."""
+MIN_SAMPLES_PER_TOOTH = 4
 
 
 @dataclass(frozen=True)
@@ -670,26 +666,24 @@ def tooth_compliance(motion: PairMotion) -> YieldingTeeth:
     The teeth of the driven gear differ each time round and widen the scatter. Run-out moves the compression over a
     revolution in a wave: it is in the extra deflection as well, over many teeth.
     """
-    if motion.torque_nm is None:
-        raise RefusalError("no torque was measured", remedy="record the driver's torque")
     equation = contact_equation(motion)
     fit = equation.solve(with_jackknife=False)
     single = _alone(equation)
-    left = _at_equal_places(equation, equation.residuals(fit.values), single)
+    residual = _at_equal_places(equation, equation.residuals(fit.values), single)
     tooth = (motion.path.tooth(motion.driver_angle_rad) - 1.0).astype(np.int64)
     n_teeth = motion.path.teeth[0]
     counts = np.bincount(tooth[single], minlength=n_teeth)
-    n_seen = int(np.sum(counts >= TOOTH_COMPLIANCE_MIN_SAMPLES))
+    n_seen = int(np.sum(counts >= MIN_SAMPLES_PER_TOOTH))
     if n_seen < n_teeth // 2:
         raise RefusalError(
-            f"{n_seen} of {n_teeth} teeth of the driver carried alone for {TOOTH_COMPLIANCE_MIN_SAMPLES} samples",
+            f"{n_seen} of {n_teeth} teeth of the driver carried alone for {MIN_SAMPLES_PER_TOOTH} samples",
             remedy="record more revolutions, under load",
         )
     middle, spread = np.full(n_teeth, np.nan), np.full(n_teeth, np.nan)
-    for j in np.flatnonzero(counts >= TOOTH_COMPLIANCE_MIN_SAMPLES):
-        own = left[single & (tooth == j)]
-        middle[j] = np.median(own)
-        spread[j] = 1.4826 * np.median(np.abs(own - middle[j]))
+    for j in np.flatnonzero(counts >= MIN_SAMPLES_PER_TOOTH):
+        of_tooth = residual[single & (tooth == j)]
+        middle[j] = np.median(of_tooth)
+        spread[j] = 1.4826 * np.median(np.abs(of_tooth - middle[j]))
     extra = middle - np.nanmedian(middle)
     # Neighbouring samples are alike; the teeth's own differences say by how much a median can be off.
     alone = 1.25 * np.nanmedian(spread) / np.sqrt(np.maximum(counts, 1))
@@ -704,31 +698,30 @@ def tooth_compliance(motion: PairMotion) -> YieldingTeeth:
 
 def _alone(equation: ContactEquation) -> NDArray[np.bool_]:
     """Samples in which one pair carries alone on the drive flank, calm enough for its equation."""
-    force, speed = equation.motion.tooth_force_from_torque_n, np.abs(equation.motion.driver_speed_rad_s)
-    assert force is not None  # noqa: S101  there is a torque
+    _, force = equation.motion.torque_and_tooth_force()
+    speed = np.abs(equation.motion.driver_speed_rad_s)
     loaded = force > LOADED * float(np.quantile(np.abs(force), 0.95))
     moving = speed > SLOW * float(np.quantile(speed, 0.95))
     alone: NDArray[np.bool_] = loaded & moving & (equation.n_pairs < 1.5) & (equation.group >= 0)
     return alone
 
 
-def _at_equal_places(equation: ContactEquation, left: FloatArray, single: NDArray[np.bool_]) -> FloatArray:
+def _at_equal_places(equation: ContactEquation, residual: FloatArray, single: NDArray[np.bool_]) -> FloatArray:
     """Take off what all teeth have in common at a place: friction that turns, pairs that come and go."""
     path = equation.motion.path
     edge = path.contact_ratio - 1.0
     u = path.position(equation.motion.driver_angle_rad)
     place = np.clip(((u - edge) / (1.0 - edge) * N_PLACES).astype(np.int64), 0, N_PLACES - 1)
-    result = left.copy()
+    result = residual.copy()
     for p in range(N_PLACES):
         here = single & (place == p)
         if np.any(here):
-            result[here] -= np.median(left[here])
+            result[here] -= np.median(residual[here])
     return result
 
 
 def _deflection(equation: ContactEquation, log_stiffness: float, single: NDArray[np.bool_]) -> float:
-    force = equation.motion.tooth_force_from_torque_n
-    assert force is not None  # noqa: S101  there is a torque
+    _, force = equation.motion.torque_and_tooth_force()
     g = (np.abs(force[single]) / np.exp(log_stiffness)) ** (1.0 / equation.motion.contact.exponent)
     return float(np.median(g))
 

@@ -20,7 +20,7 @@ from gearsig.motion._types import PairMotion
 
 LONGEST_S = 3e-3
 """Next to the flank: further away, a valve that moves or a friction that turns has changed the acceleration."""
-MOST_SAMPLES = 60
+MAX_SAMPLES = 60
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def fit_flight(
         Standard deviations of compression and rate.
     at_end : bool
     """
-    most = int(np.clip(round(LONGEST_S * sampling_rate_hz), 3, MOST_SAMPLES))
+    most = int(np.clip(round(LONGEST_S * sampling_rate_hz), 3, MAX_SAMPLES))
     chosen = np.arange(max(first, last - most), last) if at_end else np.arange(first, min(last, first + most))
     t = (chosen - chosen[0]) / sampling_rate_hz
     rows = [np.stack([np.ones_like(t), t, t**2], axis=1) / max(scatter[0], 1e-12)]

@@ -134,8 +134,8 @@ def _side_of(channel: Channel, pair: GearPair) -> str:
 
 WINDOW_S = 0.05
 """Over which changes are compared: longer than flanks ring, shorter than a start."""
-FEWEST_WINDOWS = 8
-MOST_OF_ONE = 0.5
+MIN_WINDOWS = 8
+MAX_OF_ONE = 0.5
 """Of the sum of squares that a single window may have."""
 ALLOWED = {1: 0.03, 2: 0.06}
 """Parts by which scales of speeds and of accelerations may differ."""
@@ -171,7 +171,7 @@ def channel_scale(
     """
     step = max(2, round(WINDOW_S * sampling_rate_hz))
     edges = np.arange(0, len(angle_rad), step)
-    if len(edges) <= FEWEST_WINDOWS:
+    if len(edges) <= MIN_WINDOWS:
         return float("nan"), float("nan")
     summed = rate
     for _ in range(order):
@@ -179,7 +179,7 @@ def channel_scale(
     x, y = np.diff(angle_rad[edges], order), np.diff(summed[edges], order)
     powers, products = x * x, x * y
     total = float(np.sum(powers))
-    if float(np.max(powers)) >= MOST_OF_ONE * total:
+    if float(np.max(powers)) >= MAX_OF_ONE * total:
         return float("nan"), float("nan")
     without = (np.sum(products) - products) / (total - powers)
     error = sqrt((len(x) - 1.0) * float(np.var(without)))
@@ -407,7 +407,7 @@ def local_polynomial(sampling_rate_hz: float, bandwidth_hz: float | None = None)
 RATIO_TOLERANCE = 0.02
 MIN_TURN_RAD = 0.2
 """Turn of the driver below which the ratio of both angles says nothing."""
-MOST_PLAY_TEETH = 0.5
+MAX_PLAY_TEETH = 0.5
 """Of a tooth pitch: both angles may differ by the backlash."""
 
 
@@ -560,9 +560,9 @@ def _check_ratio(driver_rad: FloatArray, driven_rad: FloatArray, path: PathOfCon
     first, last = int(np.argmin(driver_rad)), int(np.argmax(driver_rad))
     turned, follows = driver_rad[last] - driver_rad[first], driven_rad[last] - driven_rad[first]
     expected = turned * z1 / z2
-    if turned < MIN_TURN_RAD or abs(follows - expected) < RATIO_TOLERANCE * expected + MOST_PLAY_TEETH * 2.0 * pi / z2:
+    if turned < MIN_TURN_RAD or abs(follows - expected) < RATIO_TOLERANCE * expected + MAX_PLAY_TEETH * 2.0 * pi / z2:
         return
-    against = abs(follows + expected) < RATIO_TOLERANCE * expected + MOST_PLAY_TEETH * 2.0 * pi / z2
+    against = abs(follows + expected) < RATIO_TOLERANCE * expected + MAX_PLAY_TEETH * 2.0 * pi / z2
     raise InputError(
         f"the driver turns by {turned:.4g} rad and the driven gear by {follows:.4g} rad"
         + (", the other way round" if against else ""),

@@ -62,7 +62,7 @@ class MotionSegments:
 
     Parameters
     ----------
-    segments : tuple of Segment
+    segments : tuple of MotionSegment
         One after the other, without gaps.
     threshold_rad_s : float
         Speed below which the shaft is taken to stand.

@@ -79,10 +79,20 @@ class PairMotion:
     @property
     def tooth_force_from_torque_n(self) -> FloatArray | None:
         """(τ − J1 α1)/r_b1: what is left of the torque for the teeth, with their friction."""
+        return None if self.torque_nm is None else self.torque_and_tooth_force()[1]
+
+    def torque_and_tooth_force(self) -> tuple[FloatArray, FloatArray]:
+        """Return the torque in N m and the tooth force from it in N, (n,) each.
+
+        Raises
+        ------
+        RefusalError
+            If no torque was measured.
+        """
         if self.torque_nm is None:
-            return None
+            raise RefusalError("no torque was measured", remedy="record the torque of the driver's shaft")
         inertia = self.contact.driver_inertia_kg_m2 * self.driver_acceleration_rad_s2
-        return (self.torque_nm - inertia) / self.path.base_radii_m[0]
+        return self.torque_nm, (self.torque_nm - inertia) / self.path.base_radii_m[0]
 
     def _difference(self, driver: FloatArray, driven: FloatArray) -> FloatArray:
         r1, r2 = self.path.base_radii_m

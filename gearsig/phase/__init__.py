@@ -33,7 +33,7 @@ from gearsig.phase._measures import (
     RecurrencePlot,
 )
 from gearsig.phase._neighbours import nearest_apart, spaced
-from gearsig.phase._plane import LEAST_PERIODS, SETTLING_PERIODS, MotionQuantity, phase_plane
+from gearsig.phase._plane import MotionQuantity, lowest_low_cut_hz, phase_plane
 from gearsig.phase._recurrence import recurrence_measures, recurrence_plot
 from gearsig.phase._section import (
     CycleLock,
@@ -45,8 +45,6 @@ from gearsig.phase._section import (
 from gearsig.phase._types import BifurcationDiagram, PhasePortrait, PoincareSection
 
 __all__ = [
-    "LEAST_PERIODS",
-    "SETTLING_PERIODS",
     "BifurcationDiagram",
     "ChaosTest",
     "CycleLock",
@@ -72,6 +70,7 @@ __all__ = [
     "find_lock",
     "kind_of_motion",
     "largest_lyapunov_exponent",
+    "lowest_low_cut_hz",
     "mean_square_displacement",
     "nearest_apart",
     "phase_plane",

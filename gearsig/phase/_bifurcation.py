@@ -27,7 +27,7 @@ def bifurcation_diagram(
     parameter: str,
     unit: str = "",
     axis: int = 0,
-    most_points: int = 400,
+    max_points: int = 400,
     tolerance: float = 0.05,
 ) -> BifurcationDiagram:
     """Return the diagram of one coordinate of Poincaré sections over the parameter they were taken at.
@@ -40,7 +40,7 @@ def bifurcation_diagram(
         E.g. "speed", "rpm".
     axis : int
         Coordinate that is drawn.
-    most_points : int
+    max_points : int
         The last so many points of each section are kept: what comes first may still be a transient.
     tolerance : float
         See `section_period`.
@@ -50,7 +50,7 @@ def bifurcation_diagram(
     InputError
         If there is no section, an axis is missing, or the sections' axes or units differ.
     """
-    count(most_points, "most_points")
+    count(max_points, "max_points")
     kept: list[tuple[float, FloatArray, int, float]] = []
     first: PoincareSection | None = None
     for value, section in sections:
@@ -59,7 +59,7 @@ def bifurcation_diagram(
         if not np.isfinite(value):
             raise InputError(f"{parameter} is {value}", allowed="finite numbers")
         period = section_period(section, tolerance=tolerance)
-        kept.append((float(value), np.array(section.points[-most_points:, axis]), period, float(section.extent[axis])))
+        kept.append((float(value), np.array(section.points[-max_points:, axis]), period, float(section.extent[axis])))
     if first is None:
         raise InputError("there are no sections", remedy="give at least one value of the parameter")
     kept.sort(key=lambda entry: entry[0])
@@ -88,7 +88,7 @@ def bifurcation_of_recordings(
     shaft: str = "",
     axis: int = 0,
     phase_cycles: float = 0.0,
-    most_points: int = 400,
+    max_points: int = 400,
     tolerance: float = 0.05,
 ) -> BifurcationDiagram:
     """Return the diagram of a channel's displacement (axis 0) or velocity (axis 1), once per mesh cycle or revolution.
@@ -99,7 +99,7 @@ def bifurcation_of_recordings(
         A generator is fine: one recording is held at a time.
     channel : str
         Measures acceleration, velocity or displacement; see `phase_plane` for `low_cut_hz`.
-    parameter, unit, axis, most_points, tolerance
+    parameter, unit, axis, max_points, tolerance
         As in `bifurcation_diagram`.
     pair, shaft, phase_cycles
         What the sections are locked to; see `find_lock`, `poincare_section`.
@@ -112,7 +112,7 @@ def bifurcation_of_recordings(
             yield value, poincare_section(portrait, lock, phase_cycles=phase_cycles)
 
     return bifurcation_diagram(
-        sections(), parameter=parameter, unit=unit, axis=axis, most_points=most_points, tolerance=tolerance
+        sections(), parameter=parameter, unit=unit, axis=axis, max_points=max_points, tolerance=tolerance
     )
 
 
@@ -128,7 +128,7 @@ def bifurcation_of_runs(
     units: tuple[str, ...] = ("m", "m/s"),
     transient_s: float = 0.0,
     direction: str = "up",
-    most_points: int = 400,
+    max_points: int = 400,
     tolerance: float = 0.05,
 ) -> BifurcationDiagram:
     """Return the diagram of a model: `run` makes the time series and its period at each value of the parameter.
@@ -147,7 +147,7 @@ def bifurcation_of_runs(
         Left out at the start of each series.
     direction : str
         "up": ascending values, "down": descending, "as given".
-    parameter, unit, axis, most_points, tolerance
+    parameter, unit, axis, max_points, tolerance
         As in `bifurcation_diagram`.
     """
     one_of(direction, "direction", ("up", "down", "as given"))
@@ -165,7 +165,7 @@ def bifurcation_of_runs(
             yield value, poincare_section(portrait, lock)
 
     return bifurcation_diagram(
-        sections(), parameter=parameter, unit=unit, axis=axis, most_points=most_points, tolerance=tolerance
+        sections(), parameter=parameter, unit=unit, axis=axis, max_points=max_points, tolerance=tolerance
     )
 
 

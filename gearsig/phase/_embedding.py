@@ -122,8 +122,8 @@ def _chosen_dimension(x: FloatArray, rate: float, tau: int) -> int:
 N_SAMPLES = 200_000
 """Longer signals are looked at in their first so many samples: the estimate's error is below 1e-3 nats by then."""
 
-MOST_DELAYS = 400
-MOST_BINS = 48
+MAX_DELAYS = 400
+MAX_BINS = 48
 SAMPLES_PER_CELL = 12
 PERIODIC_SHARE = 0.4
 """A periodic signal tells its own future at every delay: its information stays above this share of its entropy."""
@@ -171,7 +171,7 @@ def average_mutual_information(
     rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
     x = checked_series(values, minimum=64)[:N_SAMPLES]
     longest = _longest_delay(x, longest_delay_samples)
-    step = max(1, ceil(longest / MOST_DELAYS))
+    step = max(1, ceil(longest / MAX_DELAYS))
     delays = np.arange(0, longest + 1, step)
     bins, n_bins = equally_filled_bins(x)
     information = np.empty(len(delays))
@@ -182,7 +182,7 @@ def average_mutual_information(
 
 def equally_filled_bins(x: FloatArray) -> tuple[np.ndarray, int]:
     """Return each sample's bin, bounded by quantiles; equal samples always share one (quantised signals)."""
-    n_bins = int(np.clip(np.sqrt(len(x) / SAMPLES_PER_CELL), 4, MOST_BINS))
+    n_bins = int(np.clip(np.sqrt(len(x) / SAMPLES_PER_CELL), 4, MAX_BINS))
     inner = np.quantile(x, np.arange(1, n_bins) / n_bins)
     return np.searchsorted(inner, x, side="right").astype(np.int64), n_bins
 

@@ -28,7 +28,7 @@ from gearsig.phase._types import PhasePortrait, PoincareSection
 # --------------------
 
 
-LEAST_VALUES, MOST_VALUES = 200, 20_000
+MIN_VALUES, MAX_VALUES = 200, 20_000
 LOWEST_C, HIGHEST_C = np.pi / 5.0, 4.0 * np.pi / 5.0
 REGULAR, IRREGULAR = 0.2, 0.8
 GOLDEN = 0.6180339887498949
@@ -78,13 +78,13 @@ def zero_one_test(
     """
     alpha = not_negative(damping, "damping")
     count(n_frequencies, "n_frequencies", minimum=10)
-    x = checked_series(values, minimum=LEAST_VALUES)
+    x = checked_series(values, minimum=MIN_VALUES)
     step = _step(x) if every is None else count(every, "every")
-    phi = x[::step][:MOST_VALUES]
-    if len(phi) < LEAST_VALUES:
+    phi = x[::step][:MAX_VALUES]
+    if len(phi) < MIN_VALUES:
         raise InputError(
             f"{len(phi)} values are left when every {step}-th is taken",
-            allowed=f"at least {LEAST_VALUES}",
+            allowed=f"at least {MIN_VALUES}",
             remedy="record longer",
         )
     c = LOWEST_C + (HIGHEST_C - LOWEST_C) * ((np.arange(n_frequencies) + 0.5) * GOLDEN % 1.0)
@@ -137,8 +137,8 @@ def translation_walk(values: FloatArray, c_rad: float, *, every: int = 1) -> Flo
     -----
     The mean is taken off: it would turn the walk round a circle that says nothing of the motion.
     """
-    x = checked_series(values, minimum=LEAST_VALUES)
-    phi = x[:: count(every, "every")][:MOST_VALUES]
+    x = checked_series(values, minimum=MIN_VALUES)
+    phi = x[:: count(every, "every")][:MAX_VALUES]
     z = np.cumsum((phi - phi.mean()) / phi.std() * np.exp(1j * c_rad * np.arange(1, len(phi) + 1)))
     return np.column_stack([z.real, z.imag])
 
@@ -194,7 +194,7 @@ def _verdict(k: float, oversampled: bool, step: int) -> tuple[ChaosVerdict, str]
 def _step(x: FloatArray) -> int:
     from gearsig.phase._embedding import chosen_delay
 
-    return min(chosen_delay(x, 1.0), len(x) // LEAST_VALUES)
+    return min(chosen_delay(x, 1.0), len(x) // MIN_VALUES)
 
 
 T = TypeVar("T")

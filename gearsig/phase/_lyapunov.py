@@ -20,7 +20,7 @@ from gearsig.phase._types import PhasePortrait
 
 
 N_LIBRARY, N_REFERENCES, N_BLOCKS = 100_000, 4_000, 12
-MOST_NEIGHBOURS = 10
+MAX_NEIGHBOURS = 10
 N_UNRELATED = 20_000
 
 
@@ -72,13 +72,13 @@ def kantz(points: FloatArray, theiler: int, n_steps: int) -> Divergence:
     from scipy.spatial import cKDTree
 
     library, references = _library(points, n_steps)
-    k = min(4 * MOST_NEIGHBOURS, len(library))
+    k = min(4 * MAX_NEIGHBOURS, len(library))
     _, found = cKDTree(np.ascontiguousarray(points[library])).query(np.ascontiguousarray(points[references]), k=k)
     near = library[found]
     apart = np.abs(near - references[:, None]) > theiler
-    apart &= np.cumsum(apart, axis=1) <= MOST_NEIGHBOURS
+    apart &= np.cumsum(apart, axis=1) <= MAX_NEIGHBOURS
     per_reference = apart.sum(axis=1)
-    used = per_reference >= MOST_NEIGHBOURS // 3
+    used = per_reference >= MAX_NEIGHBOURS // 3
     if np.count_nonzero(used) < len(references) // 2:
         raise RefusalError("the path hardly ever comes back to where it was", remedy="record longer")
     starts = np.concatenate([[0], np.cumsum(per_reference[used])])
@@ -125,11 +125,11 @@ Method = Literal["rosenstein", "transverse", "kantz"]
 ROOM = 2.0
 """The fit ends where the mean logarithm of the distance comes this close to that of unrelated points: 14 % of it."""
 
-FLAT, LEAST_MISSING = 0.3, 0.7
+FLAT, MIN_MISSING = 0.3, 0.7
 """A curve is flat if it makes up for less than this share of what it lacks to saturation, where it lacks this much."""
 
 PERIODS_FOLLOWED = 30.0
-LEAST_STEPS = 4
+MIN_STEPS = 4
 
 
 def largest_lyapunov_exponent(
@@ -198,7 +198,7 @@ def largest_lyapunov_exponent(
     rate = portrait.sampling_rate_hz
     curve = replace(curve, saturation=_saturation(curve, memory))
     if fit_s is None:
-        first, stop = fit_limits(curve, memory, max(LEAST_STEPS, round(0.25 * period)))
+        first, stop = fit_limits(curve, memory, max(MIN_STEPS, round(0.25 * period)))
     else:
         first, stop = _asked_limits(fit_s, rate, len(curve.log_distance))
     slope, uncertainty = slope_of(curve, first, stop)
@@ -217,7 +217,7 @@ def largest_lyapunov_exponent(
     )
 
 
-def fit_limits(curve: Divergence, memory: int, n_least: int, room: float = ROOM) -> tuple[int, int]:
+def fit_limits(curve: Divergence, memory: int, n_min: int, room: float = ROOM) -> tuple[int, int]:
     """Return the first step of the fit and the one after its last.
 
     A curve that starts within `room` of saturation but stays there is noise on a motion that does not diverge: it is
@@ -225,11 +225,11 @@ def fit_limits(curve: Divergence, memory: int, n_least: int, room: float = ROOM)
     """
     s = curve.log_distance
     missing = curve.saturation - float(s[memory])
-    if missing > LEAST_MISSING and float(s[memory:].max()) < s[memory] + FLAT * missing:
+    if missing > MIN_MISSING and float(s[memory:].max()) < s[memory] + FLAT * missing:
         return memory, len(s)
     near = np.flatnonzero(s[memory:] >= curve.saturation - room)
     stop = memory + int(near[0]) if len(near) else len(s)
-    if stop - memory >= n_least:
+    if stop - memory >= n_min:
         return memory, stop
     raise RefusalError(
         f"{memory} steps on, neighbours are {np.exp(-missing):.0%} as far apart as unrelated points: no stretch of "
@@ -240,10 +240,10 @@ def fit_limits(curve: Divergence, memory: int, n_least: int, room: float = ROOM)
 
 def _asked_limits(fit_s: tuple[float, float], rate: float, n_steps: int) -> tuple[int, int]:
     first, stop = round(fit_s[0] * rate), round(fit_s[1] * rate) + 1
-    if first < 0 or not first + LEAST_STEPS <= stop <= n_steps:
+    if first < 0 or not first + MIN_STEPS <= stop <= n_steps:
         raise InputError(
             f"fit_s goes from {fit_s[0]:g} to {fit_s[1]:g} s",
-            allowed=f"at least {LEAST_STEPS} steps of {1.0 / rate:.3g} s within 0 to {(n_steps - 1) / rate:.4g} s",
+            allowed=f"at least {MIN_STEPS} steps of {1.0 / rate:.3g} s within 0 to {(n_steps - 1) / rate:.4g} s",
         )
     return first, stop
 
@@ -295,7 +295,7 @@ def _slope(k: FloatArray, s: FloatArray) -> float:
 
 def _steps(asked: int | None, period: float, memory: int, n_points: int, window: int) -> int:
     steps = int(min(PERIODS_FOLLOWED * period + memory, n_points // 4)) if asked is None else count(asked, "n_steps")
-    if n_points - steps < 4 * window + 100 or steps < memory + LEAST_STEPS:
+    if n_points - steps < 4 * window + 100 or steps < memory + MIN_STEPS:
         raise RefusalError(
             f"{n_points} points are too few: {steps} steps are followed, and neighbours lie {window} samples apart",
             remedy=f"record at least {4 * (memory + window) + steps + 200} points or follow fewer steps",

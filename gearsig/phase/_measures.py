@@ -257,7 +257,7 @@ class RecurrenceMeasures:
 # --------------------
 
 
-MOST_PERIOD_SAMPLES = 1 << 20
+MAX_PERIOD_SAMPLES = 1 << 20
 """The mean period is found on the first so many samples."""
 
 
@@ -295,7 +295,7 @@ def mean_period_samples(x: FloatArray) -> float:
     """
     from scipy import fft
 
-    part = x[:MOST_PERIOD_SAMPLES]
+    part = x[:MAX_PERIOD_SAMPLES]
     lines = fft.rfft(part - part.mean(), fft.next_fast_len(len(part), real=True))
     power = np.square(lines.real) + np.square(lines.imag)
     frequency = np.arange(len(power)) / (2.0 * (len(power) - 1))

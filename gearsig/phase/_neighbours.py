@@ -17,9 +17,9 @@ _FIRST_LOOK = 6
 _LARGEST_LOOK = 1500
 
 
-def spaced(n: int, n_most: int) -> IndexArray:
-    """Return at most `n_most` indices spread evenly over 0 to n - 1."""
-    return np.unique(np.linspace(0, n - 1, min(n, n_most)).astype(np.intp))
+def spaced(n: int, n_max: int) -> IndexArray:
+    """Return at most `n_max` indices spread evenly over 0 to n - 1."""
+    return np.unique(np.linspace(0, n - 1, min(n, n_max)).astype(np.intp))
 
 
 def nearest_apart(

@@ -22,8 +22,16 @@ from gearsig.spectra import named_signal
 FADE_PERIODS, SETTLING_PERIODS = 2.0, 5.0
 """Periods of the low cut over which either end is faded, and after which the result has settled."""
 
+MIN_PERIODS = 4.0
+"""Periods of the low cut that must be left between the disturbed ends."""
+
 FADE_SAMPLES, SETTLING_SAMPLES = 64, 256
 """The same where there is no low cut."""
+
+
+def lowest_low_cut_hz(duration_s: float) -> float:
+    """Return the lowest low cut for which a signal is long enough: both ends settle, four periods remain."""
+    return (2.0 * SETTLING_PERIODS + MIN_PERIODS) / positive(duration_s, "duration_s", "s")
 
 
 def n_unsettled(sampling_rate_hz: float, low_cut_hz: float) -> int:
@@ -122,9 +130,6 @@ _INTEGRATIONS = {"acceleration": 2, "velocity": 1, "displacement": 0, "transmiss
 
 # Metres (per second, per second squared) in the units that files use.
 _SI = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "g": 9.80665}
-
-LEAST_PERIODS = 4.0
-"""Periods of the low cut that must be left between the disturbed ends."""
 
 
 def phase_plane(
@@ -233,8 +238,8 @@ def _band(low_cut_hz: float | None, high_cut_hz: float | None, rate: float, n_ti
 def _check_length(n: int, n_lost: int, low: float, rate: float) -> None:
     if low == 0.0 and n < 4 * n_lost:
         raise InputError(f"values has {n} sample(s)", allowed=f"at least {4 * n_lost}", remedy="record longer")
-    if low > 0.0 and n - 2 * n_lost < LEAST_PERIODS * rate / low:
-        need = (2 * SETTLING_PERIODS + LEAST_PERIODS) / low
+    if low > 0.0 and n - 2 * n_lost < MIN_PERIODS * rate / low:
+        need = lowest_low_cut_hz(1.0) / low
         raise RefusalError(
             f"{n / rate:.4g} s are too short for a low cut of {low:g} Hz, which needs {need:.4g} s",
             remedy=f"raise low_cut_hz above {low * need * rate / n:.4g} Hz or record longer",

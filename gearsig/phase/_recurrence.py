@@ -12,7 +12,7 @@ from gearsig.phase._types import PhasePortrait
 
 N_PAIRS = 200_000
 GOLDEN = 0.6180339887498949
-MOST_PLOT_POINTS, MOST_MEASURE_POINTS = 3_000, 20_000
+MAX_PLOT_POINTS, MAX_MEASURE_POINTS = 3_000, 20_000
 
 
 def recurrence_plot(
@@ -48,7 +48,7 @@ def recurrence_plot(
     Source: J.-P. Eckmann, S. Oliffson Kamphorst, D. Ruelle, *Recurrence plots of dynamical systems*, Europhysics
     Letters 4 (1987).
     """
-    within(count(n_points, "n_points", minimum=2), "n_points", 2, MOST_PLOT_POINTS)
+    within(count(n_points, "n_points", minimum=2), "n_points", 2, MAX_PLOT_POINTS)
     points, step = _taken(portrait, n_points, stride)
     limit = _radius(points, recurrence_rate, radius, 0)
     matrix = np.empty((len(points), len(points)), dtype=np.bool_)
@@ -105,7 +105,7 @@ def recurrence_measures(
     Source: N. Marwan, M. C. Romano, M. Thiel, J. Kurths, *Recurrence plots for the analysis of complex systems*,
     Physics Reports 438 (2007).
     """
-    within(count(n_points, "n_points", minimum=100), "n_points", 100, MOST_MEASURE_POINTS)
+    within(count(n_points, "n_points", minimum=100), "n_points", 100, MAX_MEASURE_POINTS)
     count(shortest_line, "shortest_line", minimum=2)
     points, taken = _taken(portrait, n_points, stride)
     window = _theiler(portrait, theiler_samples, taken)

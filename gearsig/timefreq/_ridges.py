@@ -83,7 +83,7 @@ def ridge_scores(power: FloatArray, n_reach: int) -> FloatArray:
 
 
 _N_FIT = 24
-_LEAST_FIT = 4
+_MIN_FIT = 4
 _OF_MEETING = 8
 """A slope is read over so large a share of the meeting that it must tell about."""
 _SEEN_FROM = (3.0, 2.2, 1.6, 1.2, 1.0)
@@ -156,7 +156,7 @@ def _settled_from_afar(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting
         for meeting in meetings(a, b, share * gap):
             room = min(meeting.start, len(a) - meeting.stop)
             known = any(m.start <= meeting.start and meeting.stop <= m.stop for m in found)
-            if not known and room >= (_N_FIT if share > _SEEN_FROM[-1] else _LEAST_FIT):
+            if not known and room >= (_N_FIT if share > _SEEN_FROM[-1] else _MIN_FIT):
                 found.append(meeting)
     return found
 
@@ -272,17 +272,17 @@ def _cubic(p: _End, q: _End, first: int, last: int, columns: NDArray[np.int64]) 
 
 NOT_HIDDEN = -(1 << 14)
 """Mark of cells that no path covers, as in `ridge_path`; written here so that its compiler loads only on use."""
-MOST_COLUMNS = 4000
+MAX_COLUMNS = 4000
 """Columns that the search for a path works on; longer transforms are pooled."""
 _SPARE = 8
 """Ridges looked for beyond those asked, of which the strongest are kept: the clearest need not be strong."""
-_LEAST_SEEN = 0.6  # share of its columns in which a path is not covered by others
-_LEAST_SCORE = 0.25  # mean score of a path: below, it hops between maxima of noise
+_MIN_SEEN = 0.6  # share of its columns in which a path is not covered by others
+_MIN_SCORE = 0.25  # mean score of a path: below, it hops between maxima of noise
 
 
 @dataclass(frozen=True)
 class _Grid:
-    """Power and complex values (where there are any) over line and column, at most `MOST_COLUMNS` of them."""
+    """Power and complex values (where there are any) over line and column, at most `MAX_COLUMNS` of them."""
 
     power: FloatArray
     at: FloatArray
@@ -390,7 +390,7 @@ def _grid(transform: Coefficients | TimeFrequencyMap, part: slice) -> _Grid:
         power = values**2 if transform.scaling == "amplitude peak" else 2.0 * values
         return _pooled(np.asarray(power, dtype=np.float64), transform.at, transform)
     n = len(transform.at)
-    n_per = -(-n // MOST_COLUMNS)
+    n_per = -(-n // MAX_COLUMNS)
     starts = np.arange(0, n, n_per)
     power = np.empty((part.stop - part.start, len(starts)))
     for row, line in enumerate(transform.values[part]):  # one line at a time: the whole may be large
@@ -401,7 +401,7 @@ def _grid(transform: Coefficients | TimeFrequencyMap, part: slice) -> _Grid:
 
 
 def _pooled(power: FloatArray, at: FloatArray, transform: TimeFrequencyMap) -> _Grid:
-    n_per = -(-len(at) // MOST_COLUMNS)
+    n_per = -(-len(at) // MAX_COLUMNS)
     starts = np.arange(0, len(at), n_per)
     ends = np.append(starts[1:], len(at)) - 1
     mean = np.add.reduceat(power, starts, axis=1) / (ends - starts + 1)
@@ -418,7 +418,7 @@ def _paths(grid: _Grid, n_ridges: int, steepest: float, stiffness: float) -> tup
         hidden = _hidden(scores.shape, found, grid.n_reach)
         path = _seen_path(scores, hidden, steepest, stiffness)
         seen = _along(hidden, path) == NOT_HIDDEN
-        if not seen.any() or float(_along(scores, path)[seen].mean()) < _LEAST_SCORE:
+        if not seen.any() or float(_along(scores, path)[seen].mean()) < _MIN_SCORE:
             break
         found.append(path)
         strengths.append(float(_along(power, path)[seen].mean()))
@@ -437,7 +437,7 @@ def _paths(grid: _Grid, n_ridges: int, steepest: float, stiffness: float) -> tup
 def _seen_path(scores: FloatArray, hidden: NDArray[np.int16], steepest: float, stiffness: float) -> FloatArray:
     """Return the best path; one that hides behind others, by weaving across them, is searched without credit."""
     path = best_path(scores, hidden, steepest, stiffness)
-    if float(np.mean(_along(hidden, path) == NOT_HIDDEN)) >= _LEAST_SEEN:
+    if float(np.mean(_along(hidden, path) == NOT_HIDDEN)) >= _MIN_SEEN:
         return path
     return best_path(scores, hidden, steepest, stiffness, credit=0.0)
 
@@ -532,20 +532,20 @@ def _unit(transform: Coefficients | TimeFrequencyMap) -> str:
 # --------------------
 
 
-_MOST_COLUMNS_PER_NODE = 8
+_MAX_COLUMNS_PER_NODE = 8
 _FEWEST_NODES = 48
-_MOST_BEND = 4
+_MAX_BEND = 4
 
 
 CREDIT = 0.3  # score of a hidden cell for a path that crosses: what lies there cannot be seen
 _NOTHING = 0.1  # score below which a cell holds no ridge
 _ASTRAY = 2.0  # columns that a line costs where no ridge is: else paths leap to whatever is clearer for a while
-_LEAST_ANGLE = 2  # lines per node by which slopes must differ to cross
+_MIN_ANGLE = 2  # lines per node by which slopes must differ to cross
 
 
 def nodes_apart(n_columns: int) -> int:
     """Return how many columns lie between nodes: eight, fewer in short tables."""
-    return min(_MOST_COLUMNS_PER_NODE, max(1, n_columns // _FEWEST_NODES))
+    return min(_MAX_COLUMNS_PER_NODE, max(1, n_columns // _FEWEST_NODES))
 
 
 def best_path(
@@ -602,13 +602,13 @@ def _search(scores, hidden, S, stiffness, credit, q):  # type: ignore[no-untyped
                         total += scores[line, column]
                         if scores[line, column] < _NOTHING:
                             total -= stiffness * _ASTRAY * abs(i - S) / q
-                    elif abs(i - S - hidden[line, column]) >= _LEAST_ANGLE:
+                    elif abs(i - S - hidden[line, column]) >= _MIN_ANGLE:
                         total += credit
                 moved[to, i] = total
         for k in range(n_lines):
             for i in range(n_s):
                 top, source = np.float32(-1e30), i
-                for j in range(max(0, i - _MOST_BEND), min(n_s, i + _MOST_BEND + 1)):
+                for j in range(max(0, i - _MAX_BEND), min(n_s, i + _MAX_BEND + 1)):
                     bend = max(abs(i - j) - 1, 0)
                     value = moved[k, j] - stiffness * bend * bend
                     if value > top:

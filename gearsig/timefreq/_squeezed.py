@@ -73,7 +73,7 @@ def _lookup(borders: FloatArray) -> NDArray[np.int64]:
     return result
 
 
-LEAST_SHARE = 1e-6
+MIN_SHARE = 1e-6
 """Coefficients below this share of the signal's rms are rounding: they have no frequency."""
 _GUARD = 1e-3  # response at which a wavelet no longer adds to a line
 
@@ -148,7 +148,7 @@ def squeezed_cwt(
     x, plan, form = _prepared(signal, channel, wavelet, lowest, highest, n_per_octave, edges, engine)
     T = room_for(len(plan.lines), x, step)
     if is_ssqueezepy(engine):
-        T[:] = cwt_by_ssqueezepy(x, plan.lines, plan.analysed, LEAST_SHARE, wavelet, edges)[:, ::step]
+        T[:] = cwt_by_ssqueezepy(x, plan.lines, plan.analysed, MIN_SHARE, wavelet, edges)[:, ::step]
     else:
         _fill(T, x, plan, wavelet, step, edges)
     return form.coefficients(T, x, step, np.ones(len(plan.lines)))
@@ -191,7 +191,7 @@ def squeezed_cwt_map(
     columns = plan_columns(x, n_columns)
     powers = ColumnPowers(columns, len(plan.lines), reduction)
     if is_ssqueezepy(engine):
-        T = cwt_by_ssqueezepy(x, plan.lines, plan.analysed, LEAST_SHARE, wavelet, edges)
+        T = cwt_by_ssqueezepy(x, plan.lines, plan.analysed, MIN_SHARE, wavelet, edges)
         powers.add(np.arange(len(plan.lines)), 0, 1, T)
         return powers.finished(x, form, scaling)
     octave = np.floor(np.log2(plan.lines[-1] / plan.lines) + 1e-9)
@@ -234,7 +234,7 @@ def analysis(
     inside = (analysed >= min(lines[0], lowest_possible(x, wavelet))) & (analysed <= max(lines[-1], x.rate / 2))
     weight = 2.0 * np.log(2.0) / n_per_octave / admissibility(wavelet)
     mean_square = float(np.dot(x.values, x.values)) / x.n_samples
-    return SqueezingWavelets(lines, analysed[inside], weight, LEAST_SHARE**2 * mean_square)
+    return SqueezingWavelets(lines, analysed[inside], weight, MIN_SHARE**2 * mean_square)
 
 
 def _fill(
@@ -386,13 +386,13 @@ def _squeezed(
 ) -> Iterator[tuple[int, ComplexArray]]:
     """Yield (first frame, T) in batches; ssqueezepy knows one batch only."""
     if is_ssqueezepy(engine):
-        yield 0, stft_by_ssqueezepy(x, plan, step, LEAST_SHARE, edges)
+        yield 0, stft_by_ssqueezepy(x, plan, step, MIN_SHARE, edges)
         return
     lines = plan.lines(x.rate)
     table = squeeze_lines(lines, x.rate, "linear")
     omega = 2 * np.pi / x.rate * lines
     weights = np.full(len(lines), plan.weight, dtype=np.float32)
-    smallest = LEAST_SHARE**2 * float(np.dot(x.values, x.values)) / x.n_samples
+    smallest = MIN_SHARE**2 * float(np.dot(x.values, x.values)) / x.n_samples
     for frame, V, slopes in spectra(x, plan, step, edges, slopes=True):
         # With the frame's middle as origin of the phase, ∂V/∂t = -V_g' + iω V: the same rule as for wavelets.
         scaled = (V * plan.gains).T.astype(np.complex64)

@@ -31,7 +31,7 @@ from gearsig.timefreq._uniform import (
 WINDOWS = ("hann", "gaussian")
 _SIGMAS = 4.0  # half length of the Gaussian window in its own standard deviations
 _FRAME_SAMPLES = 1 << 20  # samples in the frames that are transformed at a time
-_FEWEST, _MOST, _SHARE = 16, 8192, 64
+_MIN_WINDOW, _MAX_WINDOW, _SHARE = 16, 8192, 64
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ def spectra(
 
 def _length(x: UniformSignal, window_length: float | None) -> int:
     if window_length is None:
-        n = min(max(x.n_samples // _SHARE, _FEWEST), _MOST)
+        n = min(max(x.n_samples // _SHARE, _MIN_WINDOW), _MAX_WINDOW)
     else:
         n = round(positive(window_length, "window_length") * x.rate)
     unit = "s" if x.axis == "frequency" else "revolutions"

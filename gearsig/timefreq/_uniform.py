@@ -16,7 +16,7 @@ from gearsig.timefreq._types import Axis, Coefficients, ComplexArray, Reduction,
 
 SMALLEST, LARGEST = 1e-12, 1e15
 """Largest values of a signal, in its unit, between which single precision holds its weak coefficients' squares."""
-N_FEWEST = 16
+MIN_SAMPLES = 16
 """Samples below which there is nothing to lay out over time and frequency."""
 
 
@@ -58,9 +58,9 @@ class UniformSignal:
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", frozen_array(self.values, self.source or "signal", ndim=1))
         positive(self.rate, "rate")
-        if len(self.values) < N_FEWEST:
+        if len(self.values) < MIN_SAMPLES:
             raise RefusalError(
-                f"the signal has {len(self.values)} samples, fewer than {N_FEWEST}", remedy="record longer"
+                f"the signal has {len(self.values)} samples, fewer than {MIN_SAMPLES}", remedy="record longer"
             )
         largest = float(max(abs(self.values.max()), abs(self.values.min())))
         if largest and not SMALLEST <= largest <= LARGEST:

@@ -47,7 +47,7 @@ def test_close_tones_ask_for_a_larger_penalty_and_the_text_says_why():
 
 def test_the_table_holds_every_trial_and_marks_one():
     x = _tones(0.05, 0.2) + 0.1 * np.random.default_rng(0).normal(size=N)
-    suggestion = suggest_modes(x, 1.0, most_modes=4, penalties=(2000.0, 500.0), source="a1")
+    suggestion = suggest_modes(x, 1.0, max_modes=4, penalties=(2000.0, 500.0), source="a1")
     assert [(t.penalty, t.n_modes) for t in suggestion.trials] == [
         (p, k) for p in (500.0, 2000.0) for k in (1, 2, 3, 4)
     ]
@@ -58,7 +58,7 @@ def test_the_table_holds_every_trial_and_marks_one():
 
 
 def test_the_largest_number_tried_says_so():
-    suggestion = suggest_modes(_tones(0.05, 0.2, 0.35), 1.0, most_modes=2)
+    suggestion = suggest_modes(_tones(0.05, 0.2, 0.35), 1.0, max_modes=2)
     assert any("No larger number was tried" in reason for reason in suggestion.reasons)
 
 
@@ -94,7 +94,7 @@ def test_starts_at_peaks_find_lines(n_lines, penalty):
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"most_modes": 0}, "most_modes"),
+        ({"max_modes": 0}, "max_modes"),
         ({"penalties": ()}, "penalties is empty"),
         ({"penalties": (-1.0,)}, "penalties"),
         ({"longest": 5}, "longest"),

@@ -169,7 +169,7 @@ def _map_section(x):
 def test_bifurcations_of_the_logistic_map():
     values = (3.5, 2.8, 3.2, 3.55, 3.9, 3.835)  # periods 4, 1, 2, 8, none, 3 (the window)
     diagram = bifurcation_diagram(
-        ((r, _map_section(logistic(300, r))) for r in values), parameter="r", most_points=100, tolerance=1e-3
+        ((r, _map_section(logistic(300, r))) for r in values), parameter="r", max_points=100, tolerance=1e-3
     )
     assert diagram.values.tolist() == sorted(values)
     assert diagram.periods == (1, 2, 4, 8, 3, 0)

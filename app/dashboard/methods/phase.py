@@ -14,8 +14,6 @@ from app.dashboard.theme import as_plot_text, as_typed, one_line, palette
 from app.dashboard.widgets.charts import CONFIG, show_picture
 from gearsig.errors import InputError, RefusalError
 from gearsig.phase import (
-    LEAST_PERIODS,
-    SETTLING_PERIODS,
     CycleLock,
     EmbeddingDimension,
     MotionKind,
@@ -29,6 +27,7 @@ from gearsig.phase import (
     find_lock,
     kind_of_motion,
     largest_lyapunov_exponent,
+    lowest_low_cut_hz,
     phase_plane,
     poincare_section,
     recurrence_measures,
@@ -202,7 +201,7 @@ def suggested_low_cut_hz(page: MethodPage, segment: SignalSegment) -> tuple[floa
 
     Far below the mesh, integrated noise outgrows the motion of the teeth and makes a cloud of the section.
     """
-    possible = 1.05 * (2.0 * SETTLING_PERIODS + LEAST_PERIODS) / segment.recording.duration_s
+    possible = 1.05 * lowest_low_cut_hz(segment.recording.duration_s)
     rig = page.analysis.rig
     meshes = [order for pair in rig.pairs if (order := rig.mesh_order(pair))] if rig is not None else []
     ratios = [ratio for name in rig.shaft_names if (ratio := rig.ratio(name))] if rig is not None else []
