@@ -118,7 +118,7 @@ def _choose_settings(page: MethodPage, engine: VmdEngine) -> VmdSettings:
 @cached(2, "Finding the modes …")
 def modes_of(signal: UniformSignal, settings: VmdSettings) -> Modes:
     """Return the modes by rising centre: the first one shown is number 1."""
-    modes = vmd(signal, settings)
+    modes = vmd(signal, None, settings)
     order = list(modes.by_centre())
     return replace(
         modes,
