@@ -118,9 +118,7 @@ def with_other_teeth(comb: CombLines) -> list[CombLines]:
     return others
 
 
-# --------------------
 # How much each frequency looks like a line: height over the local floor, as log likelihood ratio by rank.
-# --------------------
 
 
 _FLOOR_BINS = 96  # the floor is a median over so many bins
@@ -238,9 +236,7 @@ def _log_likelihood_ratio(rank: FloatArray, present: float) -> FloatArray:
     return ratio
 
 
-# --------------------
 # Scores of comb candidates over speed, and the distribution of the best score by chance.
-# --------------------
 
 
 @dataclass(frozen=True)
@@ -333,9 +329,7 @@ def _score(ratios, per_bin, top, orders, presence, is_mesh, speeds, out):  # typ
         out[i] = total
 
 
-# --------------------
 # Whether the best comb is the true one: against chance, against other speeds, against other teeth.
-# --------------------
 
 
 # Ranges narrower than this ratio come from a known nominal speed: the scale of the speed is then not in question.
@@ -443,15 +437,15 @@ def refine_speed(evidence: LineEvidence, comb: CombLines, speed: float) -> float
     Parabolas through the logarithm of each line's three highest bins give its frequency; the speed is the
     least-squares slope of frequency over order, weighted by the lines' heights, lines off by more than a bin left out.
     """
-    found = [
+    lines = [
         (order, place, height)
         for order in comb.orders
         if order * speed < evidence.top and (line := _line_at(evidence, order * speed)) is not None
         for place, height in (line,)
     ]
-    if not found:
+    if not lines:
         return speed
-    orders, places, weights = np.array(found).T
+    orders, places, weights = np.array(lines).T
     refined = speed
     for _ in range(3):
         near = np.abs(places - orders * refined) < 1.5 * evidence.bin_width
@@ -486,19 +480,17 @@ def _sure(value: float, zero: float, scale: float) -> float:
     return 1.0 - float(np.exp(-max(0.0, value - zero) / scale))
 
 
-# --------------------
 # What is searched where, when the speed is read from the vibration.
-# --------------------
 
 
-LOWEST_QUALITY = 0.5
+MIN_QUALITY = 0.5
 """Below it no speed is claimed: on simulated and measured recordings, hardly a wrong speed lies above."""
 
 TOP = 0.45
 """Share of the sampling rate that is looked at; above it lie the anti-aliasing filters of recorders."""
 
 _WIDEST_RPM = (30.0, 30_000.0)
-_FEWEST_REVOLUTIONS = 20.0
+_MIN_REVOLUTIONS = 20.0
 _DIVISIONS = (1, 4, 16)  # of the recording's length: long segments for steady lines, short ones for wandering lines
 
 
@@ -561,12 +553,12 @@ def _range(
         low, high = nominal * (1 - share) / 60.0, nominal * (1 + share) / 60.0
     else:
         low, high = (v / 60.0 for v in _WIDEST_RPM)
-        low = max(low, _FEWEST_REVOLUTIONS / recording.duration_s)
+        low = max(low, _MIN_REVOLUTIONS / recording.duration_s)
     high = min(high, TOP * recording.sampling_rate_hz / comb.meshes[0])
-    if high * recording.duration_s < _FEWEST_REVOLUTIONS or low >= high:
+    if high * recording.duration_s < _MIN_REVOLUTIONS or low >= high:
         raise RefusalError(
             f"within {recording.duration_s:.3g} s at {recording.sampling_rate_hz:.6g} Hz there are fewer than "
-            f"{_FEWEST_REVOLUTIONS:.0f} revolutions with a mesh line below {TOP * recording.sampling_rate_hz:.4g} Hz "
+            f"{_MIN_REVOLUTIONS:.0f} revolutions with a mesh line below {TOP * recording.sampling_rate_hz:.4g} Hz "
             f"at {60 * low:.4g} to {60 * high:.4g} rpm",
             remedy="record longer or with a higher sampling rate, or check speed and teeth",
         )
@@ -592,4 +584,4 @@ def best_decision(samples: FloatArray, rate: float, comb: CombLines, low: float,
         # Sidebands need four bins between them and the mesh line.
         if n >= 256 and high * n / rate > 4.0
     ]
-    return max(decisions, key=lambda d: (d.quality >= LOWEST_QUALITY, d.score), default=None)
+    return max(decisions, key=lambda d: (d.quality >= MIN_QUALITY, d.score), default=None)

@@ -57,9 +57,7 @@ def local_parabolas(x: FloatArray, half_width: int) -> tuple[FloatArray, FloatAr
     return positions, values, slopes
 
 
-# --------------------
 # From an encoder's angle channel to shaft angle.
-# --------------------
 
 
 # Knots carry a speed error of a thousandth at most where the noise allows, ...
@@ -67,7 +65,7 @@ _WANTED_SPEED_ERROR = 1e-3
 # ... but average over no more than this part of a revolution, so that torsional vibration of low order is kept.
 _LONGEST_AVERAGE_REV = 1.0 / 16.0
 # More than this backwards is a machine that reverses, not noise.
-_MOST_BACKWARDS_REV = 0.05
+_MAX_BACKWARDS_REV = 0.05
 
 
 def encoder_angle(
@@ -143,7 +141,7 @@ def _check_motion(revolutions: FloatArray, noise: float) -> None:
             remedy="check the channel and units_per_revolution",
         )
     backwards = float(np.max(np.maximum.accumulate(revolutions) - revolutions))
-    if backwards > _MOST_BACKWARDS_REV + 6 * noise:
+    if backwards > _MAX_BACKWARDS_REV + 6 * noise:
         raise RefusalError(
             f"the shaft turns back by {backwards:.3g} revolutions",
             remedy="cut the recording where the direction changes; check units_per_revolution and wraps",
@@ -165,9 +163,7 @@ def _half_width(revolutions: FloatArray, noise: float) -> tuple[int, tuple[str, 
     )
 
 
-# --------------------
 # From a speed channel to shaft angle.
-# --------------------
 
 
 # Half the length that a noisy or stepped speed is averaged over: speed channels seldom follow faster than 0.1 s.

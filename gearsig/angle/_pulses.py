@@ -17,7 +17,7 @@ from gearsig.errors import InputError, RefusalError
 # period.
 _LOW_PERCENTILE, _HIGH_PERCENTILE = 0.05, 99.95
 # Share of samples in the middle half between the levels: pulses 0 to 0.1, a sine 0.33, uniform noise 0.5, Gaussian 0.9.
-_MOST_IN_THE_MIDDLE = 0.45
+_MAX_SHARE_IN_THE_MIDDLE = 0.45
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def _check_two_levels(x: FloatArray, low: float, high: float) -> None:
     if step <= 1e-12 * max(abs(low), abs(high)):
         raise RefusalError(f"the tachometer channel stays at {low:g}: there are no pulses", remedy=remedy)
     middle = float(np.mean((x > low + 0.25 * step) & (x < low + 0.75 * step)))
-    if middle > _MOST_IN_THE_MIDDLE:
+    if middle > _MAX_SHARE_IN_THE_MIDDLE:
         raise RefusalError(
             f"the tachometer channel has no two levels: {100 * middle:.0f} % of its samples lie in the middle "
             f"between {low:g} and {high:g}",
@@ -155,15 +155,13 @@ def _schmitt(x, sign, threshold, half_width, near):  # type: ignore[no-untyped-d
     return positions[:count], jumps[:count]
 
 
-# --------------------
 # Spurious and missed pulses in a pulse train, told from real changes of speed.
-# --------------------
 
 
 # An interval is suspicious when it is shorter or longer than the local trend says by these factors.
 _SHORT, _LONG = 0.6, 1.5
 # Without a slowdown around it, a longer gap than this many pulses leaves the count open.
-MOST_MISSED_IN_ONE_GAP = 8
+MAX_MISSED_IN_ONE_GAP = 8
 
 
 @dataclass(frozen=True)
@@ -231,23 +229,23 @@ def local_trend(intervals: FloatArray) -> FloatArray:
 
 def _without_spurious(times_s: FloatArray) -> tuple[FloatArray, list[int]]:
     """Return the times without spurious pulses, and the indices of those."""
-    left = np.arange(len(times_s))
+    remaining = np.arange(len(times_s))
     removed: list[int] = []
     # Each round takes out one pulse of every separate group of short intervals; a train worse than that is refused
     # later.
     for _ in range(20):
-        t = times_s[left]
+        t = times_s[remaining]
         if len(t) < 6:
             break
         d = np.diff(t)
         trend = local_trend(d)
         drop = [_spurious_end(t, trend, k) for k in _shortest_of_each_group(d / np.minimum(trend, _of_neighbours(d)))]
-        found = sorted({k for k in drop if k is not None})
-        if not found:
+        spurious = sorted({k for k in drop if k is not None})
+        if not spurious:
             break
-        removed += [int(left[k]) for k in found]
-        left = np.delete(left, found)
-    return times_s[left], sorted(removed)
+        removed += [int(remaining[k]) for k in spurious]
+        remaining = np.delete(remaining, spurious)
+    return times_s[remaining], sorted(removed)
 
 
 def _shortest_of_each_group(ratio: FloatArray) -> list[int]:
@@ -294,7 +292,7 @@ def _numbered(t: FloatArray, spurious_s: FloatArray) -> PulseCount:
         exact = float(d[k] / trend[k])
         whole = round(exact)
         # The trend is known to a few per cent per pulse; beyond that the count would be a guess.
-        if whole > MOST_MISSED_IN_ONE_GAP + 1 or abs(exact - whole) > 0.35:
+        if whole > MAX_MISSED_IN_ONE_GAP + 1 or abs(exact - whole) > 0.35:
             gaps.append(float(t[k]))
         elif whole > 1:
             steps[k] = whole
@@ -326,9 +324,7 @@ def _slows_down_around(d: FloatArray, k: int) -> bool:
     return bool(left and right)
 
 
-# --------------------
 # The clock that pulse times were taken with: find its tick, and fit the angle within its quantisation.
-# --------------------
 
 
 IntArray = NDArray[np.integer[Any]]
@@ -402,7 +398,7 @@ def fit_within_ticks(t: FloatArray, counts: FloatArray, tick_s: float, breaks: I
     -----
     Source: the penalised fit with third differences is P. H. C. Eilers, *A perfect smoother*, Anal. Chem. 75 (2003);
     choosing the penalty by the known error is C. H. Reinsch, *Smoothing by spline functions*, Numer. Math. 10 (1967).
-    Easing it locally is our own addition.
+    Easing it locally is an addition.
     """
     n = len(t)
     counts = counts.astype(np.float64)
@@ -447,8 +443,8 @@ def late_pulses(t: FloatArray, counts: FloatArray, tick_s: float) -> IntArray:
     # A lone late pulse disturbs the prediction of its neighbours by 4/6 at most, one two places away by 1/6.
     largest = np.maximum.reduce([np.roll(off, k) for k in (-2, -1, 1, 2)])
     beyond = np.maximum.reduce([np.roll(off, k) for k in (-5, -4, -3, 3, 4, 5)])
-    found: IntArray = np.flatnonzero((off > 1.6 * tick_s) & (off > 1.1 * largest) & (beyond < 0.6 * off))
-    return found
+    late: IntArray = np.flatnonzero((off > 1.6 * tick_s) & (off > 1.1 * largest) & (beyond < 0.6 * off))
+    return late
 
 
 def _third_differences(t: FloatArray) -> FloatArray:
@@ -482,13 +478,11 @@ def _penalised(rows: FloatArray, penalty: FloatArray, weights: FloatArray, targe
     return solution
 
 
-# --------------------
 # From tachometer pulse times to shaft angle and speed.
-# --------------------
 
 
 # A tenth of the pulses: a 36-1 or 60-2 tooth wheel stays below, and so does an occasional glitch.
-_MOST_FAULTY = 0.1
+_MAX_FAULTY_SHARE = 0.1
 
 # Pulses are only as good as the recorder's clock, whose scale no pulse can tell: crystals are right to some 50 ppm.
 _CLOCK_SCALE = 5e-5
@@ -558,9 +552,12 @@ def pulse_train_angle(
 def _check_order(t: FloatArray) -> None:
     where = "tachometer pulse times"
     if len(t) < 2:
-        found = "there are no pulses" if len(t) == 0 else "there is only one pulse"
+        problem = "there are no pulses" if len(t) == 0 else "there is only one pulse"
         raise InputError(
-            found, where=where, allowed="at least two pulses", remedy="check the channel, its threshold and its cabling"
+            problem,
+            where=where,
+            allowed="at least two pulses",
+            remedy="check the channel, its threshold and its cabling",
         )
     backwards = np.flatnonzero(np.diff(t) <= 0)
     if len(backwards):
@@ -582,7 +579,7 @@ def _check_faults(counted: PulseCount, n_pulses: int) -> None:
             remedy="analyse the parts before and after by themselves; " + remedy,
         )
     n_faulty = len(counted.spurious_s) + counted.n_missed
-    if n_faulty > _MOST_FAULTY * n_pulses + 1:
+    if n_faulty > _MAX_FAULTY_SHARE * n_pulses + 1:
         raise RefusalError(
             f"{len(counted.spurious_s)} spurious and {counted.n_missed} missed pulses among {n_pulses} are too many "
             "to trust the rest",

@@ -17,9 +17,7 @@ from gearsig.checks import FloatArray, count, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 
-# --------------------
 # Bandlimited interpolation at arbitrary times, and with a lower cut-off where the result is sampled more coarsely.
-# --------------------
 
 
 PASSBAND = 0.4
@@ -136,9 +134,7 @@ def delay(y, first, per_sample, positions, table, out):  # type: ignore[no-untyp
         out[i] = total
 
 
-# --------------------
 # Interpolation with a lower cut-off, where angles are sampled more coarsely than the recording was.
-# --------------------
 
 
 LOWEST_SCALE = 1.0 / 1024.0
@@ -256,9 +252,7 @@ def _dot(x, start, taps):  # type: ignore[no-untyped-def]
     return total / weight if weight != 0.0 else 0.0
 
 
-# --------------------
 # Times at which a shaft passes given angles: the inverse of a piecewise cubic, solved exactly.
-# --------------------
 
 
 # Points per block that start from one cubic guess; short enough for the guess to be good, long enough to pay.
@@ -320,12 +314,12 @@ def _between(a, b, c, low, high, offset, step, start, last, t0, h, out):  # type
     worst = 0.0
     for j in range(start, last):
         s = (j - start + 1) * per_point
-        wanted = offset + j * step
+        target = offset + j * step
         u = low + ((guess_c * s + guess_b) * s + m0) * s
         # The slope hardly changes between the two steps: one division serves both.
         per_slope = 1.0 / ((3.0 * c * u + 2.0 * b) * u + a)
-        u -= (((c * u + b) * u + a) * u - wanted) * per_slope
-        change = (((c * u + b) * u + a) * u - wanted) * per_slope
+        u -= (((c * u + b) * u + a) * u - target) * per_slope
+        change = (((c * u + b) * u + a) * u - target) * per_slope
         worst = max(worst, abs(change))
         out[j] = t0 + (u - change) * h
     # Newton's error squares itself: after a step of 1e-8 the next one would be below rounding.
@@ -333,16 +327,16 @@ def _between(a, b, c, low, high, offset, step, start, last, t0, h, out):  # type
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def solve_cubic(a, b, c, rise, wanted, start):  # type: ignore[no-untyped-def]
-    """Return u in 0 to 1 with ((c u + b) u + a) u = wanted, for a cubic rising to `rise`; Newton in a bracket."""
-    if wanted <= 0.0 or rise <= 0.0:
+def solve_cubic(a, b, c, rise, target, start):  # type: ignore[no-untyped-def]
+    """Return u in 0 to 1 with ((c u + b) u + a) u = target, for a cubic rising to `rise`; Newton in a bracket."""
+    if target <= 0.0 or rise <= 0.0:
         return 0.0
-    if wanted >= rise:
+    if target >= rise:
         return 1.0
     low, high = 0.0, 1.0
-    u = start if 0.0 < start < 1.0 else wanted / rise
+    u = start if 0.0 < start < 1.0 else target / rise
     for _ in range(100):
-        error = ((c * u + b) * u + a) * u - wanted
+        error = ((c * u + b) * u + a) * u - target
         slope = (3.0 * c * u + 2.0 * b) * u + a
         if error > 0.0:
             high = u
@@ -379,8 +373,8 @@ def scales_at(knots, speed, times, factor, lowest, out):  # type: ignore[no-unty
     return smallest
 
 
-_CHUNK = 1 << 15  # angles at a time: positions and a stretch of the signal stay in the cache
-_MOST_VALUES = 1 << 28  # 2 GB of results; beyond it a typing error is likelier than a wish
+_CHUNK = 1 << 15  # angles at a time: positions and a segment of the signal stay in the cache
+_MAX_VALUES = 1 << 28  # 2 GB of results; beyond it a typing error is likelier than a wish
 _SLOW_SHARE = 0.05  # revolutions that may lose bandwidth to the default number of samples per revolution
 
 
@@ -411,7 +405,7 @@ def resample_to_angle(
         them fall below, at most four times as many samples as before), or enough for `highest_order`; rounded up to
         a good FFT length.
     highest_order : float, optional
-        Highest order wanted.
+        Highest order needed.
 
     Returns
     -------
@@ -443,11 +437,11 @@ def resample_to_angle(
     begin, end = _covered_revolutions(recording, shaft_angle, n_per_rev)
     first = math.ceil(begin * n_per_rev - 1e-9)
     n = math.floor(end * n_per_rev + 1e-9) - first + 1
-    if n * len(rows) > _MOST_VALUES:
+    if n * len(rows) > _MAX_VALUES:
         raise InputError(
             f"{n_per_rev} samples per revolution make {n * len(rows):.3g} values",
             where="samples_per_revolution",
-            allowed=f"at most {_MOST_VALUES:.3g} values in all",
+            allowed=f"at most {_MAX_VALUES:.3g} values in all",
             remedy="lower it or cut the recording",
         )
     samples = np.empty((len(rows), n))
@@ -502,21 +496,21 @@ def _covered_speeds(recording: Recording, angle: ShaftAngle) -> FloatArray:
     return np.sort(np.interp(steps, revolutions, speeds))
 
 
-def _grid(recording: Recording, covered: FloatArray, wanted: int | None, highest_order: float | None) -> int:
-    """Samples per revolution, as wanted, as the highest order needs, or keeping the bandwidth on most revolutions."""
+def _grid(recording: Recording, covered: FloatArray, requested: int | None, highest_order: float | None) -> int:
+    """Samples per revolution: as requested, as the highest order needs, or enough for the bandwidth mostly."""
     from scipy.fft import next_fast_len
 
     if highest_order is not None:
         positive(highest_order, "highest_order")
-    if wanted is not None:
-        count(wanted, "samples_per_revolution", minimum=2)
-        if highest_order is not None and highest_order > PASSBAND * wanted:
+    if requested is not None:
+        count(requested, "samples_per_revolution", minimum=2)
+        if highest_order is not None and highest_order > PASSBAND * requested:
             raise InputError(
-                f"samples_per_revolution is {wanted}, too few for order {highest_order:g}",
+                f"samples_per_revolution is {requested}, too few for order {highest_order:g}",
                 allowed=f"at least {math.ceil(highest_order / PASSBAND)}",
                 remedy="leave samples_per_revolution out",
             )
-        return wanted
+        return requested
     if highest_order is not None:
         return int(next_fast_len(math.ceil(highest_order / PASSBAND), real=True))
     # No more than four times the samples there are at the mean speed: a nearly standing shaft asks for endless ones.

@@ -124,9 +124,7 @@ def _to_reference_shaft(angle: ShaftAngle, shaft: str, rig: Rig | None) -> Shaft
     return replace(converted, notes=(*converted.notes, note))
 
 
-# --------------------
 # Shaft angle at a stated, constant speed.
-# --------------------
 
 
 def constant_speed_angle(speed_rpm: float, duration_s: float, *, shaft: str = "") -> ShaftAngle:

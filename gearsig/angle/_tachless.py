@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.angle._comb import (
-    LOWEST_QUALITY,
+    MIN_QUALITY,
     NARROW,
     TOP,
     CombDecision,
@@ -31,9 +31,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 
-# --------------------
 # Speed over time from short-time comb scores: the path that collects most score without jumping.
-# --------------------
 
 
 # Standard deviation of the change of log speed from block to block, in steps of the speed grid, at least.
@@ -124,17 +122,15 @@ def _best_path(places, scores, highest_cost):  # type: ignore[no-untyped-def]
     return path
 
 
-# --------------------
 # A rough shaft angle made exact by the phase of mesh harmonics.
-# --------------------
 
 
 # Half widths around the mesh order, in orders of the shaft: below one, so that the shaft's sidebands stay outside.
 _HALF_WIDTHS = (0.45, 0.45, 0.3, 0.2)
-_MOST_HARMONICS = 3
+_MAX_HARMONICS = 3
 # Power of the band over its median line: noise has 0.5. A band of noise must not take part, or it would be bent into
 # a line.
-_LEAST_RATIO, _LEAST_SHARE = 2.0, 0.05
+_MIN_RATIO, _MIN_SHARE = 2.0, 0.05
 _PER_WIDTH = 4  # points per reciprocal half width; two would do by the sampling theorem
 
 
@@ -185,17 +181,17 @@ def _refined_once(
     recording: Recording, channels: tuple[str, ...], angle: ShaftAngle, orders: tuple[float, ...], half_width: float
 ) -> ShaftAngle | None:
     top_speed = angle.speed_range_rpm[1] / 60.0
-    wanted = [o for o in orders if (o + 1) * top_speed < 0.4 * recording.sampling_rate_hz]
-    if not wanted:
+    usable = [o for o in orders if (o + 1) * top_speed < 0.4 * recording.sampling_rate_hz]
+    if not usable:
         return None
     try:
-        signal = resample_to_angle(recording, angle, channels=channels, highest_order=max(wanted) + 2.0)
+        signal = resample_to_angle(recording, angle, channels=channels, highest_order=max(usable) + 2.0)
     except RefusalError:
         return None
     n_per_rev = signal.samples_per_revolution
-    harmonics = [_demodulate(signal.samples, n_per_rev, o, half_width) for o in wanted]
-    best = sorted((h for h in harmonics if h is not None), key=lambda h: -h.ratio)[:_MOST_HARMONICS]
-    best = [h for h in best if h.ratio > max(_LEAST_RATIO, _LEAST_SHARE * best[0].ratio)]
+    harmonics = [_demodulate(signal.samples, n_per_rev, o, half_width) for o in usable]
+    best = sorted((h for h in harmonics if h is not None), key=lambda h: -h.ratio)[:_MAX_HARMONICS]
+    best = [h for h in best if h.ratio > max(_MIN_RATIO, _MIN_SHARE * best[0].ratio)]
     if not best or best[0].baseband.shape[1] < 8:
         return None
     shift = _common_shift(best)
@@ -267,9 +263,7 @@ def _times(angle: ShaftAngle, revolutions: FloatArray) -> FloatArray:
     return out
 
 
-# --------------------
 # Shaft angle of a changing speed: followed block by block, made exact by phase, weighed over orders.
-# --------------------
 
 
 _BLOCKS = (96, 24, 384)  # per recording
@@ -293,7 +287,7 @@ def varying_speed(search: SpeedSearch, start: SpeedCandidate | None) -> SpeedCan
             if candidate.decision.quality > _CLEAR:
                 break
     best = max(candidates, key=_rank, default=None)
-    if best is None or best.decision.quality < LOWEST_QUALITY or search.high < NARROW * search.low:
+    if best is None or best.decision.quality < MIN_QUALITY or search.high < NARROW * search.low:
         return best
     # With the scale open, half, double and triple speed are refined as well and have to lose.
     others = [
@@ -316,7 +310,7 @@ def _starts(search: SpeedSearch, start: SpeedCandidate | None) -> Iterator[Shaft
 
 
 def _rank(candidate: SpeedCandidate) -> tuple[bool, float]:
-    return candidate.decision.quality >= LOWEST_QUALITY, candidate.decision.score
+    return candidate.decision.quality >= MIN_QUALITY, candidate.decision.score
 
 
 def _refined(search: SpeedSearch, angle: ShaftAngle) -> SpeedCandidate | None:
@@ -471,7 +465,7 @@ def estimate_shaft_angle(
     steady = _constant_speed(search)
     varying = varying_speed(search, steady if _is_sharp(search, steady) else None)
     candidate = _better(search, steady, varying)
-    if candidate is None or candidate.decision.quality < LOWEST_QUALITY:
+    if candidate is None or candidate.decision.quality < MIN_QUALITY:
         raise _refusal(search, candidate, rig)
     usual = _range_without_slips(candidate.angle)
     if usual is None:
@@ -503,7 +497,7 @@ def _is_sharp(search: SpeedSearch, steady: SpeedCandidate | None) -> bool:
     """Whether a constant speed was found from lines as narrow as the recording's length allows."""
     return (
         steady is not None
-        and steady.decision.quality >= LOWEST_QUALITY
+        and steady.decision.quality >= MIN_QUALITY
         and steady.decision.bin_width * search.recording.duration_s < 1.5
     )
 
@@ -517,8 +511,8 @@ def _better(
     if not _is_sharp(search, steady) and not steady.decision.narrow:
         # Smeared lines of an unknown speed: half and double speed look much alike.
         steady = replace(steady, decision=replace(steady.decision, coverage=0.95))
-    sure = steady.decision.quality >= LOWEST_QUALITY
-    if varying is not None and varying.decision.quality >= LOWEST_QUALITY:
+    sure = steady.decision.quality >= MIN_QUALITY
+    if varying is not None and varying.decision.quality >= MIN_QUALITY:
         return varying if not sure or varying.decision.score > steady.decision.score + _GAIN else steady
     return steady if sure or varying is None else varying
 
@@ -534,16 +528,17 @@ def comb_evidence(recording: Recording, rig: Rig, stated_speed_rpm: float) -> st
         search = search_of(recording, rig, None, (stated_speed_rpm / 8.0, stated_speed_rpm * 8.0))
     except (RefusalError, InputError):
         return ""
-    found = _constant_speed(search)
-    if found is None or found.decision.quality < LOWEST_QUALITY:
+    candidate = _constant_speed(search)
+    if candidate is None or candidate.decision.quality < MIN_QUALITY:
         return ""
-    factor = found.decision.speed / stated
+    factor = candidate.decision.speed / stated
     if abs(factor - 1.0) < 0.002:
         return ""
     mesh = search.comb.meshes[0]
     return (
-        f"Mesh lines with sidebands lie at {mesh * found.decision.speed:.5g} Hz and its multiples, {factor:.4g} times "
-        f"where speed and teeth put them ({found.decision.evidence()}): sampling rate, speed or teeth are wrong."
+        f"Mesh lines with sidebands lie at {mesh * candidate.decision.speed:.5g} Hz and its multiples, "
+        f"{factor:.4g} times where speed and teeth put them ({candidate.decision.evidence()}): "
+        "sampling rate, speed or teeth are wrong."
     )
 
 
@@ -558,8 +553,8 @@ def _constant_speed(search: SpeedSearch) -> SpeedCandidate | None:
     return SpeedCandidate(angle, decision)
 
 
-def _finished(search: SpeedSearch, found: SpeedCandidate) -> ShaftAngle:
-    decision, angle = found.decision, found.angle
+def _finished(search: SpeedSearch, candidate: SpeedCandidate) -> ShaftAngle:
+    decision, angle = candidate.decision, candidate.angle
     constant = len(angle.time_s) == 2
     notes = [
         f"estimated from the vibration of {', '.join(search.channels)}: "
@@ -576,18 +571,18 @@ def _finished(search: SpeedSearch, found: SpeedCandidate) -> ShaftAngle:
     return replace(
         angle,
         shaft=search.shaft,
-        relative_speed_uncertainty=_uncertainty(search, found),
+        relative_speed_uncertainty=_uncertainty(search, candidate),
         quality=decision.quality,
         notes=tuple(notes),
     )
 
 
-def _uncertainty(search: SpeedSearch, found: SpeedCandidate) -> float:
+def _uncertainty(search: SpeedSearch, candidate: SpeedCandidate) -> float:
     """A tenth of a bin at the mesh order where its line was sharp, half a bin where it was not."""
-    decision, mesh = found.decision, search.comb.meshes[-1]
-    if len(found.angle.time_s) == 2 and decision.bin_width * search.recording.duration_s > 1.5:
+    decision, mesh = candidate.decision, search.comb.meshes[-1]
+    if len(candidate.angle.time_s) == 2 and decision.bin_width * search.recording.duration_s > 1.5:
         return float(0.5 * decision.bin_width / (search.comb.meshes[0] * decision.speed))
-    speed = found.angle.mean_speed_rpm / 60.0
+    speed = candidate.angle.mean_speed_rpm / 60.0
     return float(0.1 / (search.recording.duration_s * mesh * speed))
 
 
@@ -595,7 +590,7 @@ def _refusal(search: SpeedSearch, best: SpeedCandidate | None, rig: Rig) -> Refu
     """Explain what was searched and found instead, also outside of the nominal range."""
     reason = f"no comb of mesh lines stands out between {60 * search.low:.4g} and {60 * search.high:.4g} rpm"
     if best is not None:
-        reason += f" ({best.decision.evidence()}; quality {best.decision.quality:.2f}, needed {LOWEST_QUALITY})"
+        reason += f" ({best.decision.evidence()}; quality {best.decision.quality:.2f}, needed {MIN_QUALITY})"
     middle = 30.0 * (search.low + search.high)
     if search.high / search.low < 4.0:
         elsewhere = comb_evidence(search.recording, rig, middle)

@@ -175,9 +175,7 @@ class AngleSignal:
         return row
 
 
-# --------------------
 # Slopes of an angle known at knots: local polynomials, limited so that the cubic between the knots never decreases.
-# --------------------
 
 
 def monotone_slopes(t: FloatArray, y: FloatArray) -> FloatArray:

@@ -15,9 +15,7 @@ import numpy as np
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError
 
-# --------------------
 # Standardised moments, the kernel of kurtosis, FM4, M6A and M8A.
-# --------------------
 
 
 _ROUNDING = 1e-12  # scatter below this part of the signal's size is rounding, not signal
@@ -50,9 +48,7 @@ def standardised_moment(x: FloatArray, order: int, size: float | None = None) ->
     return float(np.mean(d**order) / np.mean(d * d) ** (order / 2))
 
 
-# --------------------
 # A number that says something about the condition, with everything needed to read it.
-# --------------------
 
 
 @dataclass(frozen=True)

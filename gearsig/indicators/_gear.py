@@ -32,12 +32,10 @@ from gearsig.errors import InputError
 from gearsig.indicators._amplitude import Indicator, is_constant, standardised_moment
 from gearsig.orders import SynchronousAverage
 
-# --------------------
 # Gear indicators that compare with earlier records of the same gear: NA4, NA4*, NB4, NB4*.
 #
 # Each is a fourth moment of the present record over a variance that includes earlier records, so that it goes on rising
 # when damage grows, where a plain kurtosis would fall back. With no history NA4 is the kurtosis of the residual.
-# --------------------
 
 
 def na4(residual: SynchronousAverage, history: Sequence[SynchronousAverage] = ()) -> float:

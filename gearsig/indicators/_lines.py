@@ -98,9 +98,9 @@ def floor_near(
     """Median peak amplitude of the lines around an order, the order's own surroundings left out; nan below 8 lines."""
     unit = axis_per_order(source, speed_rev_per_s)
     distance = np.abs(source.positions - order * unit)
-    own = max(leave_out_orders * unit, lobe_lines(source) * source.resolution)
+    inner = max(leave_out_orders * unit, lobe_lines(source) * source.resolution)
     # Lines at zero hold the mean of the signal, or what is left of it.
-    near = (distance <= half_width_orders * unit) & (distance > own)
+    near = (distance <= half_width_orders * unit) & (distance > inner)
     near &= source.positions > lobe_lines(source) * source.resolution
     if np.count_nonzero(near) < 8:
         return float("nan")
@@ -161,9 +161,7 @@ def _line_of_average(average: SynchronousAverage, order: float) -> MeasuredLine:
     return MeasuredLine(float(whole), amplitude, amplitude)
 
 
-# --------------------
 # Levels of mesh harmonics and their sidebands.
-# --------------------
 
 
 def mesh_level(
@@ -346,9 +344,7 @@ def _order(line: MeasuredLine) -> str:
     return f"order {line.order:.5g}"
 
 
-# --------------------
 # Amplitudes of the low shaft orders: unbalance (1×), misalignment (2×), looseness and others (3×).
-# --------------------
 
 
 def shaft_order_level(
@@ -426,9 +422,7 @@ def _too_low(source: LineSource, shaft_ratio: float, speed_rev_per_s: float | No
     return "so close to zero that the signal's mean leaks in" if lines_from_zero < 2 * lobe_lines(source) else ""
 
 
-# --------------------
 # Levels of an envelope spectrum at the orders of a rolling bearing.
-# --------------------
 
 
 DEFAULT_SLIP_FRACTION = 0.015

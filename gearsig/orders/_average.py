@@ -338,8 +338,8 @@ def separate_shafts(signals: Sequence[AngleSignal], teeth: Sequence[int], *, n_p
             assert mean is not None  # noqa: S101 - there is at least one pass
             periodic = mean if j == 0 else _without_mesh(mean, teeth[j])
             residual[row] -= _at(periodic, _places(signals[0]) * teeth[0] / teeth[j])
-    own = tuple(_with_samples(signal, samples) for signal, samples in zip(signals, separated, strict=True))
-    return SeparatedShafts(own, _with_samples(signals[0], residual))
+    shaft_signals = tuple(_with_samples(signal, samples) for signal, samples in zip(signals, separated, strict=True))
+    return SeparatedShafts(shaft_signals, _with_samples(signals[0], residual))
 
 
 def _with_samples(signal: AngleSignal, samples: FloatArray) -> AngleSignal:

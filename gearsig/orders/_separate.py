@@ -185,9 +185,7 @@ def _part(average: SynchronousAverage, values: FloatArray, kind: PartKind, share
     return replace(average, values=values, standard_error=average.standard_error * np.sqrt(share), kind=kind)
 
 
-# --------------------
 # Amplitude and phase modulation of a mesh harmonic over one revolution.
-# --------------------
 
 
 @dataclass(frozen=True)

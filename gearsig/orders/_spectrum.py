@@ -115,9 +115,7 @@ def order_spectrum(
     )
 
 
-# --------------------
 # Speed–order and speed–frequency maps: spectra of block after block.
-# --------------------
 
 
 def order_map(

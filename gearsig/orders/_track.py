@@ -64,10 +64,10 @@ def track_orders(
     ----------
     K. R. Fyfe and E. D. S. Munck, "Analysis of computed order tracking", 1997.
     """
-    wanted, plan = plan_track(signal, channel, orders, revolutions_per_block, overlap, window)
-    cycles = wanted / signal.samples_per_revolution
-    c = order_amplitudes(signal.values(channel), plan, cycles, wanted * signal.start_revolution)
-    return tracked_orders(signal, channel, wanted, plan, c)
+    numbers, plan = plan_track(signal, channel, orders, revolutions_per_block, overlap, window)
+    cycles = numbers / signal.samples_per_revolution
+    c = order_amplitudes(signal.values(channel), plan, cycles, numbers * signal.start_revolution)
+    return tracked_orders(signal, channel, numbers, plan, c)
 
 
 def plan_track(
@@ -81,7 +81,7 @@ def plan_track(
     margin: float = 0.0,
 ) -> tuple[FloatArray, BlockPlan]:
     """Check what is to be tracked; return the orders and the blocks."""
-    wanted = _checked_orders(signal, orders, margin)
+    numbers = _checked_orders(signal, orders, margin)
     n = len(signal.values(channel))
     n_per_block = round(positive(revolutions_per_block, "revolutions_per_block") * signal.samples_per_revolution)
     if not 2 <= n_per_block <= n:
@@ -89,7 +89,7 @@ def plan_track(
             f"a block of {revolutions_per_block:g} revolutions does not fit {signal.n_revolutions:.1f} revolutions",
             remedy="shorten the block or record longer",
         )
-    return wanted, plan_blocks(n, n_per_block, overlap, window)
+    return numbers, plan_blocks(n, n_per_block, overlap, window)
 
 
 def tracked_orders(
@@ -170,18 +170,16 @@ def amplitude_at_speeds(tracked: TrackedOrder, speeds_rpm: FloatArray) -> FloatA
 def _checked_orders(signal: AngleSignal, orders: Sequence[float], margin: float) -> FloatArray:
     if len(orders) == 0:
         raise InputError("no orders are given", remedy="name at least one")
-    wanted = np.array([not_negative(order, "order") for order in orders])
-    if wanted.max() + margin > signal.highest_order:
+    numbers = np.array([not_negative(order, "order") for order in orders])
+    if numbers.max() + margin > signal.highest_order:
         raise RefusalError(
-            f"order {wanted.max():g} lies above the highest valid order {signal.highest_order:g} of the signal",
+            f"order {numbers.max():g} lies above the highest valid order {signal.highest_order:g} of the signal",
             remedy="resample with more samples per revolution, or record at a higher rate",
         )
-    return wanted
+    return numbers
 
 
-# --------------------
 # Level of orders along a change of speed, as the power in a band of orders around each.
-# --------------------
 
 
 def track_order_bands(
@@ -230,16 +228,16 @@ def track_order_bands(
             allowed=f"at least {4.0 / positive(revolutions_per_block, 'revolutions_per_block'):g}",
             remedy="widen the band or lengthen the block",
         )
-    wanted, plan = plan_track(signal, channel, orders, revolutions_per_block, overlap, window, margin=width / 2)
+    numbers, plan = plan_track(signal, channel, orders, revolutions_per_block, overlap, window, margin=width / 2)
     per_rev = signal.samples_per_revolution
     half = int(width / 2 * plan.n_per_block / per_rev * (1 + 1e-12))
-    lines = wanted[:, None] + np.arange(-half, half + 1) * per_rev / plan.n_per_block
+    lines = numbers[:, None] + np.arange(-half, half + 1) * per_rev / plan.n_per_block
     if lines.min() <= 0:
         raise InputError(
-            f"the band of order {wanted.min():g} reaches down to {lines.min():g}", remedy="narrow it: above order zero"
+            f"the band of order {numbers.min():g} reaches down to {lines.min():g}", remedy="narrow it: above order zero"
         )
     c = order_amplitudes(signal.values(channel), plan, lines.ravel() / per_rev, lines.ravel() * signal.start_revolution)
     c = c.reshape(plan.n_blocks, *lines.shape)
     amplitude: FloatArray = np.sqrt((np.abs(c) ** 2).sum(axis=2) / plan.window.noise_bandwidth_bins)
-    tracked = tracked_orders(signal, channel, wanted, plan, c[:, :, half])
+    tracked = tracked_orders(signal, channel, numbers, plan, c[:, :, half])
     return tuple(replace(o, amplitude=amplitude[:, i], bandwidth_orders=width) for i, o in enumerate(tracked))

@@ -327,8 +327,8 @@ def kurtogram_figure(kurtogram: Kurtogram, band: BandCandidate | None = None, *,
     _draw_choice(axes, kurtogram, band)
     prepared = "" if kurtogram.preparation == "none" else f", {kurtogram.preparation}"
     style.label_axes(axes, "frequency (Hz)", "number of bands", f"kurtogram of {kurtogram.source}{prepared}")
-    remarks = kurtogram.remarks(band)
-    style.note(axes, remarks[0] if remarks else _named(band))
+    warnings = kurtogram.warnings(band)
+    style.note(axes, warnings[0] if warnings else _named(band))
     style.no_offset(axes)
     axes.set_yticks(range(len(kurtogram.levels)), [f"{round(2**level)}" for level in kurtogram.levels])
     return figure

@@ -99,9 +99,7 @@ def amplitude_spectrum(
     )
 
 
-# --------------------
 # Power spectral density over frequency by Welch's method.
-# --------------------
 
 
 DEFAULT_BLOCK = 8192
@@ -174,12 +172,10 @@ def power_density(
     )
 
 
-# --------------------
 # Local noise floor of a spectrum, robust against its lines.
-# --------------------
 
 
-FEWEST_LINES = 16
+MIN_LINES = 16
 """Fewer lines than that per block make the quantile too uncertain (35 % with one average)."""
 
 
@@ -229,7 +225,7 @@ def noise_floor(spectrum: Spectrum, *, width: float | None = None, quantile: flo
     if spectrum.scaling == "dimensionless":
         raise InputError("a cepstrum has no noise floor", allowed="an amplitude or power spectrum")
     n_lines = len(spectrum.values)
-    if n_lines < FEWEST_LINES:
+    if n_lines < MIN_LINES:
         raise RefusalError(f"{n_lines} lines are too few for a floor", remedy="take a longer block")
     q = within(quantile, "quantile", 0.05, 0.95)
     block = _block_lines(spectrum, width)
@@ -268,10 +264,10 @@ def _block_lines(spectrum: Spectrum, width: float | None) -> int:
         # The floor's own scatter multiplies the false-alarm rate of a search above it; so many lines keep that small.
         return min(n_lines, max(48, 256 // spectrum.n_averages, n_lines // 200))
     block = round(positive(width, "width") / spectrum.resolution)
-    if block < FEWEST_LINES:
+    if block < MIN_LINES:
         raise InputError(
             f"width {width:g} holds {block} lines of {spectrum.resolution:g}",
-            allowed=f"at least {FEWEST_LINES * spectrum.resolution:g}",
+            allowed=f"at least {MIN_LINES * spectrum.resolution:g}",
             remedy="widen it, or take a longer block",
         )
     return min(block, n_lines)
@@ -284,7 +280,7 @@ def _running_quantile(power: FloatArray, block: int, q: float) -> FloatArray:
     blocks = np.lib.stride_tricks.sliding_window_view(power, block)[::half]
     centres = np.arange(len(blocks)) * half + (block - 1) / 2
     levels = np.quantile(blocks, q, axis=1)
-    short = [s for s in (half, half // 2) if s >= FEWEST_LINES // 2]
+    short = [s for s in (half, half // 2) if s >= MIN_LINES // 2]
     left = [(float(np.quantile(power[:s], q)), (s - 1) / 2) for s in reversed(short)]
     right = [(float(np.quantile(power[-s:], q)), n - (s + 1) / 2) for s in short]
     last = float(np.quantile(power[-block:], q)), n - (block + 1) / 2
@@ -292,16 +288,14 @@ def _running_quantile(power: FloatArray, block: int, q: float) -> FloatArray:
         right.insert(0, last)
     x = np.concatenate([[c for _, c in left], centres, [c for _, c in right]])
     y = np.concatenate([[v for v, _ in left], levels, [v for v, _ in right]])
-    # Zeros (a dead stretch of a simulated spectrum) have no logarithm; the least positive double stands for them.
+    # Zeros (a dead segment of a simulated spectrum) have no logarithm; the smallest positive double stands for them.
     logs = np.log(np.maximum(y, np.finfo(np.float64).tiny))
     order = np.argsort(x, kind="stable")
     result: FloatArray = np.exp(np.interp(np.arange(n), x[order], logs[order]))
     return result
 
 
-# --------------------
 # Lines of a spectrum that stand above its noise floor.
-# --------------------
 
 
 SKIRT_BINS = 200
@@ -468,8 +462,8 @@ def _interpolate(three: FloatArray, window: str) -> tuple[float, float]:
 def _ratio_table(window: str) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return offsets 0 … 0.5 of a tone from its highest line, neighbour-to-highest ratio, response at the highest."""
     offsets = np.linspace(0.0, 0.5, 501)
-    own, neighbour = window_response(window, offsets), window_response(window, 1.0 - offsets)
-    return offsets, neighbour / own, own
+    line, neighbour = window_response(window, offsets), window_response(window, 1.0 - offsets)
+    return offsets, neighbour / line, line
 
 
 @lru_cache(maxsize=8)

@@ -161,8 +161,8 @@ def _rahmonic_mask(
     n: int, period: float, n_rahmonics: int | None, half_width: float | None
 ) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Mark the rahmonics on both sides of a cepstrum of n samples, symmetric as the cepstrum is."""
-    most = int(n / 2 / period)
-    k = np.arange(1, (most if n_rahmonics is None else min(most, count(n_rahmonics, "n_rahmonics"))) + 1)
+    n_max = int(n / 2 / period)
+    k = np.arange(1, (n_max if n_rahmonics is None else min(n_max, count(n_rahmonics, "n_rahmonics"))) + 1)
     widths = k.astype(np.float64) if half_width is None else np.full(len(k), max(half_width, 0.5))
     widths = np.minimum(widths, period / 4)  # neighbours must not merge
     q = np.arange(n // 2 + 1, dtype=np.float64)

@@ -22,14 +22,12 @@ from gearsig.spectra._types import (
     scaled_unit,
 )
 
-# --------------------
 # Carrier bands: where they lie, how they weigh the spectrum's lines, and how many cells there may be.
-# --------------------
 
 
-MOST_CELLS = 1 << 26
+MAX_CELLS = 1 << 26
 """1.6 GB of results; beyond it a typing error is likelier than a wish."""
-FEWEST_PRODUCTS = 8
+MIN_PRODUCTS = 8
 """Fewer independent products than that leave coherence near 1 to chance."""
 FIRST_LINE = 4
 """Of α: below it, Hann's main lobe makes neighbouring lines coherent by itself."""
@@ -72,29 +70,27 @@ def lay_bands(n_lines: int, n_bands: int, n_highest: float, inflation: float, n_
     weight = 0.5 + 0.5 * np.cos(np.pi * np.arange(1 - half, half) / max(half, 1))
     first = max(1, int(np.ceil(n_highest / 2 / half)) + 1) if half else 1
     bands = CarrierBands(half, first, (n_lines - 1) // half - first if half else 0, weight)
-    if half < 1 or bands.products_per_band / inflation < FEWEST_PRODUCTS:
-        most = int((n_lines - 1) / (FEWEST_PRODUCTS * inflation) * 1.3)
+    if half < 1 or bands.products_per_band / inflation < MIN_PRODUCTS:
+        n_max = int((n_lines - 1) / (MIN_PRODUCTS * inflation) * 1.3)
         raise RefusalError(
-            f"{n_bands} bands of {n_lines} lines leave fewer than {FEWEST_PRODUCTS} independent products in a cell",
-            remedy=f"take at most {most} bands, or record longer" if most >= 2 else "record longer",
+            f"{n_bands} bands of {n_lines} lines leave fewer than {MIN_PRODUCTS} independent products in a cell",
+            remedy=f"take at most {n_max} bands, or record longer" if n_max >= 2 else "record longer",
         )
     if bands.n_bands < 1:
         raise InputError(
             "the highest cyclic frequency is so high that no carrier band is left above half of it",
             remedy="lower it, or take more bands",
         )
-    if bands.n_bands * n_alphas > MOST_CELLS:
+    if bands.n_bands * n_alphas > MAX_CELLS:
         raise InputError(
             f"{n_alphas} cyclic frequencies × {bands.n_bands} bands are too many cells",
-            allowed=f"at most {MOST_CELLS}",
-            remedy="lower the highest cyclic frequency, take fewer bands or a shorter stretch",
+            allowed=f"at most {MAX_CELLS}",
+            remedy="lower the highest cyclic frequency, take fewer bands or a shorter segment",
         )
     return bands
 
 
-# --------------------
 # Spectral correlation and coherence over modulation frequency (or order) and carrier frequency.
-# --------------------
 
 
 @dataclass(frozen=True)
@@ -373,9 +369,7 @@ def _n_alphas(highest_hz: float, fs: float, n: int) -> int:
     return n_alphas
 
 
-# --------------------
 # Fourier sums over unequally spaced angles.
-# --------------------
 
 
 _SPREAD = 8
@@ -424,12 +418,10 @@ class TurnSums:
         return csr_array((weights.ravel(), (rows, columns)), shape=(self.n_grid, len(theta)))
 
 
-# --------------------
 # Spectral coherence over cyclic order and carrier frequency, for variable speed.
-# --------------------
 
 
-MOST_ENVELOPE_SAMPLES = 1 << 22
+MAX_ENVELOPE_SAMPLES = 1 << 22
 """Beyond it, spreading them over the angles would take more than 2 GB."""
 
 
@@ -581,9 +573,9 @@ def _turning(
     n_envelope = next_fast_len(2 * (bands.half + n_shift) + 8)
     seconds = start_s + np.arange(n_envelope) * (n / fs / n_envelope)
     weight = _weight(angle, seconds)
-    if n_envelope > MOST_ENVELOPE_SAMPLES:
+    if n_envelope > MAX_ENVELOPE_SAMPLES:
         raise InputError(
-            f"{n_envelope} envelope samples are too many", remedy="take more bands, a lower order or a shorter stretch"
+            f"{n_envelope} envelope samples are too many", remedy="take more bands, a lower order or a shorter segment"
         )
     inside = weight > 0.0
     turn = (angle.revolutions_at(seconds[inside]) - float(angle.revolutions[0])) / angle.n_revolutions

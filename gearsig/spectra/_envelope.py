@@ -244,12 +244,10 @@ def band_taper(n_lines: int, edge_fraction: float) -> FloatArray:
     return taper
 
 
-# --------------------
 # Choice of the demodulation band by the kurtosis of its complex envelope.
-# --------------------
 
 
-FEWEST_ENVELOPE_SAMPLES = 256
+MIN_ENVELOPE_SAMPLES = 256
 """Below it the kurtosis of Gaussian noise alone scatters by more than 0.25."""
 
 
@@ -333,25 +331,25 @@ def choose_band(
     low_limit = not_negative(lowest_hz, "lowest_hz", "Hz")
     lines = _whitened(x, fs, tone_limit_db)
     counts = _band_counts(len(lines), fs, narrowest_hz)
-    found = [
+    candidates = [
         candidate
         for n_bands in counts
         for candidate in _candidates(lines, fs, n_bands)
         if candidate.low_hz >= low_limit - 1e-9
     ]
-    if not found:
+    if not candidates:
         raise RefusalError(
-            f"{len(x)} samples are too few to compare bands", remedy=f"take {8 * FEWEST_ENVELOPE_SAMPLES} or more"
+            f"{len(x)} samples are too few to compare bands", remedy=f"take {8 * MIN_ENVELOPE_SAMPLES} or more"
         )
-    return tuple(sorted(found, key=lambda c: -c.kurtosis))
+    return tuple(sorted(candidates, key=lambda c: -c.kurtosis))
 
 
 def _band_counts(n_lines: int, fs: float, narrowest_hz: float | None) -> list[int]:
     """Return 2, 3, 4, 6, 8, 12 … up to 64 bands or the narrowest allowed."""
-    most = 64 if narrowest_hz is None else fs / 2 / positive(narrowest_hz, "narrowest_hz", "Hz")
-    most = min(most, n_lines / FEWEST_ENVELOPE_SAMPLES)
+    n_max = 64 if narrowest_hz is None else fs / 2 / positive(narrowest_hz, "narrowest_hz", "Hz")
+    n_max = min(n_max, n_lines / MIN_ENVELOPE_SAMPLES)
     grid = sorted({2**k for k in range(1, 15)} | {3 * 2**k for k in range(14)})
-    return [n for n in grid if n <= most * (1 + 1e-9)]
+    return [n for n in grid if n <= n_max * (1 + 1e-9)]
 
 
 def _whitened(x: FloatArray, fs: float, tone_limit_db: float | None) -> ComplexArray:
@@ -398,9 +396,7 @@ def _unit_power(lines: ComplexArray) -> ComplexArray:
     return lines / rms if rms > 0 else lines
 
 
-# --------------------
 # What a signal may be rid of before its kurtogram: steady tones, or the colour of its spectrum.
-# --------------------
 
 
 Preparation = Literal["none", "tones removed", "whitened"]

@@ -22,9 +22,7 @@ from gearsig.spectra._envelope import (
 )
 from gearsig.spectra._types import Spectrum, named_signal
 
-# --------------------
 # What Gaussian noise alone does to the spectral kurtosis of a kurtogram's bands.
-# --------------------
 
 
 OVERLAP = 1.66
@@ -58,9 +56,7 @@ def noise_limit(n_samples: FloatArray, standard_error: FloatArray, probability: 
     return result
 
 
-# --------------------
 # A kurtogram: how impulsive each band of a tree of bands is.
-# --------------------
 
 
 LARGE_SHARE = 0.2
@@ -164,35 +160,33 @@ class Kurtogram:
         numbers = (float(a[i]) for a in (self.low_hz, self.high_hz, self.level, self.kurtosis, self.standard_error))
         return BandCandidate(*numbers)
 
-    def remarks(self, band: BandCandidate) -> tuple[str, ...]:
+    def warnings(self, band: BandCandidate) -> tuple[str, ...]:
         """Return what speaks against trusting a band's kurtosis: chance, few samples, a single event."""
         i = int(np.argmin(np.abs(self.low_hz - band.low_hz) + np.abs(self.high_hz - band.high_hz)))
         n, share = int(self.n_envelope_samples[i]), float(self.largest_share[i])
-        remarks = []
+        warnings = []
         limit = float(self.noise_limit[i])
         if band.kurtosis <= limit:
-            remarks.append(
+            warnings.append(
                 f"kurtosis {band.kurtosis:.2g} is what noise alone reaches ({limit:.2g} in one kurtogram of 20): "
                 "no band stands out"
             )
         elif band.kurtosis <= max(2.0 * limit, WEAK_KURTOSIS):
-            remarks.append(f"kurtosis {band.kurtosis:.2g} is small: the band hardly stands out from noise")
+            warnings.append(f"kurtosis {band.kurtosis:.2g} is small: the band hardly stands out from noise")
         if band.standard_error > 0.1:
-            remarks.append(
+            warnings.append(
                 f"rests on {n} envelope samples: noise alone scatters by {band.standard_error:.2g}; record longer or "
                 "allow wider bands only"
             )
         if share > LARGE_SHARE:
-            remarks.append(
+            warnings.append(
                 f"one envelope sample carries {100 * share:.0f} % of the fourth moment: a single event, not a train "
                 "of impulses, may have chosen the band"
             )
-        return tuple(remarks)
+        return tuple(warnings)
 
 
-# --------------------
 # Filters that split a complex band into halves and thirds.
-# --------------------
 
 
 @dataclass(frozen=True)
@@ -257,9 +251,7 @@ def _sign(split: Splitter, k: FloatArray) -> FloatArray:
     return result
 
 
-# --------------------
 # The tree of halves and thirds, fed piece by piece.
-# --------------------
 
 
 PIECE_SAMPLES = 1 << 16
@@ -316,10 +308,10 @@ def tree_moments(x: FloatArray, n_levels: int, mean: float, scale: float) -> lis
     return rows
 
 
-FEWEST_SAMPLES = 512
+MIN_SAMPLES = 512
 """Of a finest band's envelope: below it the kurtosis of noise alone scatters by more than 0.1."""
 DEFAULT_LEVELS = 7
-FEWEST_LINES = 8
+MIN_LINES = 8
 """Of an envelope's spectrum."""
 
 
@@ -334,7 +326,7 @@ class ChosenBand:
     envelope : Envelope
     spectrum : Spectrum
         Of the envelope, over modulation frequency.
-    remarks : tuple of str
+    warnings : tuple of str
         What speaks against the choice; empty if nothing does.
     reason : str
         Why the band was chosen; empty if it was given.
@@ -344,7 +336,7 @@ class ChosenBand:
     kurtogram: Kurtogram
     envelope: Envelope
     spectrum: Spectrum
-    remarks: tuple[str, ...]
+    warnings: tuple[str, ...]
     reason: str = ""
 
 
@@ -387,7 +379,7 @@ def kurtogram(
 
     Notes
     -----
-    Not for few strong shocks among many small impulses: the shocks choose the band. Read `remarks`.
+    Not for few strong shocks among many small impulses: the shocks choose the band. Read `warnings`.
     Borders between bands are half-amplitude points of filters with a skirt of a third of a band on either side. The
     memory needed does not grow with the length unless the signal is prepared.
 
@@ -429,8 +421,8 @@ def best_band(
     highest_hz: float | None = None,
 ) -> BandCandidate:
     """Return the most impulsive band of a channel, by its kurtogram; see `kurtogram` and `Kurtogram.best_band`."""
-    found = kurtogram(recording, channel, n_levels=n_levels, preparation=preparation)
-    return found.best_band(narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
+    grid = kurtogram(recording, channel, n_levels=n_levels, preparation=preparation)
+    return grid.best_band(narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
 
 
 def kurtogram_envelope(
@@ -488,7 +480,7 @@ def kurtogram_envelope(
     unit = "" if preparation == "whitened" else unit
     envelope = band_envelope(x, fs, band.band_hz, kind=kind, unit=unit, source=channel)
     spectrum = envelope_spectrum(envelope, highest_hz=highest_modulation_hz)
-    return ChosenBand(band, grid, envelope, spectrum, grid.remarks(band), reason)
+    return ChosenBand(band, grid, envelope, spectrum, grid.warnings(band), reason)
 
 
 def _reason(grid: Kurtogram, band: BandCandidate, narrowest_hz: float, *, of_modulation: bool) -> str:
@@ -504,11 +496,11 @@ def _reason(grid: Kurtogram, band: BandCandidate, narrowest_hz: float, *, of_mod
 
 
 def _checked_modulation(highest_hz: float, fs: float, n: int) -> float:
-    least = FEWEST_LINES * fs / n
-    if not least <= positive(highest_hz, "highest_modulation_hz", "Hz") <= fs / 6.0:
+    lowest = MIN_LINES * fs / n
+    if not lowest <= positive(highest_hz, "highest_modulation_hz", "Hz") <= fs / 6.0:
         raise InputError(
             f"highest_modulation_hz is {highest_hz:g} Hz",
-            allowed=f"{least:.4g} Hz, {FEWEST_LINES} over the length, to {fs / 6.0:.4g} Hz, a third of the spectrum",
+            allowed=f"{lowest:.4g} Hz, {MIN_LINES} over the length, to {fs / 6.0:.4g} Hz, a third of the spectrum",
         )
     return highest_hz
 
@@ -534,18 +526,18 @@ def given_band(values: FloatArray, sampling_rate_hz: float, band_hz: tuple[float
 
 
 def _checked_levels(n_samples: int, n_levels: int | None) -> int:
-    most = int(np.floor(np.log2(n_samples / FEWEST_SAMPLES))) if n_samples >= FEWEST_SAMPLES else 0
-    if most < 1:
+    n_max = int(np.floor(np.log2(n_samples / MIN_SAMPLES))) if n_samples >= MIN_SAMPLES else 0
+    if n_max < 1:
         raise RefusalError(
-            f"{n_samples} samples are too few for a kurtogram", remedy=f"record at least {2 * FEWEST_SAMPLES} samples"
+            f"{n_samples} samples are too few for a kurtogram", remedy=f"record at least {2 * MIN_SAMPLES} samples"
         )
     if n_levels is None:
-        return min(DEFAULT_LEVELS, most)
-    if count(n_levels, "n_levels") > most:
+        return min(DEFAULT_LEVELS, n_max)
+    if count(n_levels, "n_levels") > n_max:
         raise InputError(
             f"n_levels is {n_levels} for {n_samples} samples",
-            allowed=f"1 to {most}",
-            remedy=f"record at least {FEWEST_SAMPLES * 2**n_levels} samples, or take fewer levels",
+            allowed=f"1 to {n_max}",
+            remedy=f"record at least {MIN_SAMPLES * 2**n_levels} samples, or take fewer levels",
         )
     return n_levels
 
@@ -562,9 +554,7 @@ def _row_of_bands(fs: float, n_bands: int, moments: FloatArray, n: int) -> tuple
     return edges[:-1], edges[1:], full[0], ratio - gaussian, full[1], share, full[2]
 
 
-# --------------------
 # Splitting of bands into halves or thirds, with the moments of the parts, compiled.
-# --------------------
 
 
 # Reordering sums lets the compiler use vector instructions.

@@ -82,9 +82,7 @@ class Spectrum:
         return float(self.positions[best]), float(self.values[best])
 
 
-# --------------------
 # Windows with their coherent gain, equivalent noise bandwidth and transform.
-# --------------------
 
 
 # Coefficients a_m of w[n] = sum over m of (-1)^m a_m cos(2 pi m n / N).
@@ -209,9 +207,7 @@ def window_response(name: str, offset_bins: FloatArray) -> FloatArray:
     return response
 
 
-# --------------------
 # Mean power of windowed blocks of a signal: the one transform behind amplitude spectra and densities.
-# --------------------
 
 
 ComplexArray = NDArray[np.complexfloating[Any, Any]]

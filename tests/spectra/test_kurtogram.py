@@ -104,7 +104,7 @@ def test_standard_error_is_that_of_noise():
         assert z[:, runs[0].level == level].std() == pytest.approx(1.0, abs=0.2)
     exceed = np.mean([(r.kurtosis > r.noise_limit).any() for r in runs])
     assert exceed <= 0.15
-    assert any("noise alone reaches" in remark for remark in runs[0].remarks(runs[0].best_band()))
+    assert any("noise alone reaches" in remark for remark in runs[0].warnings(runs[0].best_band()))
 
 
 @pytest.mark.parametrize("resonance_hz", [2300.0, 6000.0, 8800.0])
@@ -112,7 +112,7 @@ def test_best_band_holds_the_resonance(resonance_hz):
     x = knocks(60_001, np.random.default_rng(1), resonance_hz=resonance_hz)
     band = best_band(recording_of(x), "a", narrowest_hz=300)
     assert band.low_hz <= resonance_hz <= band.high_hz
-    assert kurtogram(x, FS).remarks(band) == ()
+    assert kurtogram(x, FS).warnings(band) == ()
 
 
 def test_envelope_spectrum_in_its_own_band_shows_the_rate():
@@ -124,14 +124,14 @@ def test_envelope_spectrum_in_its_own_band_shows_the_rate():
     position, value = chosen.spectrum.largest_near(97.0, 90.0)
     assert position == pytest.approx(97.0, abs=1.5)
     assert value > 5 * noise_floor(chosen.spectrum).values[chosen.spectrum.index_of(position)]
-    assert chosen.remarks == ()
+    assert chosen.warnings == ()
 
 
 def test_one_shock_is_remarked_upon():
     x = np.random.default_rng(3).normal(size=40_000)
     x[20_000:20_004] += 60.0
     k = kurtogram(x, FS)
-    assert any("single event" in remark for remark in k.remarks(k.best_band()))
+    assert any("single event" in remark for remark in k.warnings(k.best_band()))
 
 
 def test_tones_removed_uncovers_impulses_beside_a_mesh_line():
@@ -201,7 +201,7 @@ def test_bad_input_names_the_remedy():
 def test_bearing_race_is_named_through_the_kurtograms_own_band(file, race_hz, other_hz, preparation):
     recording = read_recording(DATA / file)
     chosen = kurtogram_envelope(recording, "gs", preparation=preparation, highest_modulation_hz=600.0)
-    assert chosen.remarks == ()
+    assert chosen.warnings == ()
     floor = noise_floor(chosen.spectrum).values
 
     def over_floor(hertz: float) -> float:
@@ -256,4 +256,4 @@ def test_a_slow_change_of_level_hardly_stands_out():
     n = 2**18
     x = rng.normal(size=n) * (1.0 + 0.2 * np.cos(2 * np.pi * 3.0 * np.arange(n) / FS))
     k = kurtogram(x, FS, n_levels=3)
-    assert any("hardly stands out" in remark for remark in k.remarks(k.best_band()))
+    assert any("hardly stands out" in remark for remark in k.warnings(k.best_band()))

@@ -101,7 +101,7 @@ def show_kurtogram(page: MethodPage) -> None:
         )
     if caption:
         st.caption(caption)
-    show_warnings(chosen.remarks)
+    show_warnings(chosen.warnings)
     spectrum = _show_envelope_spectrum(page, segment, chosen, settings)
     envelope = chosen.envelope
     step = f"{envelope.source} from {segment.start_s:.6g} to {segment.end_s:.6g} s, {settings.preparation}"

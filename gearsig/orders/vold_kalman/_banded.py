@@ -106,12 +106,10 @@ def _substitute(triangle: Array, right: Array, x: Array, n: int) -> bool:
     return True
 
 
-# --------------------
 # Forward pass of a banded least-squares problem by the normal equations, sample by sample.
 #
 # Gauss's elimination without pivots (L D L*) of the normal equations, formed on the way. Several times faster than
 # rotations; the error grows with r², so it is for weak weights only.
-# --------------------
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -158,7 +156,6 @@ def eliminate(
     return True
 
 
-# --------------------
 # Forward pass of a banded least-squares problem by Givens rotations, sample by sample.
 #
 # Rows of the data equation and of the structural equation are rotated one after the other into a banded triangle (the
@@ -166,7 +163,6 @@ def eliminate(
 # formed: the error is about r times the rounding error, not r².
 #
 # J. A. George, M. T. Heath, "Solution of sparse linear least squares problems using Givens rotations", 1980.
-# --------------------
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]

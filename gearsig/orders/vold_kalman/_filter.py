@@ -48,12 +48,10 @@ from gearsig.orders.vold_kalman._tracks import (
 )
 from gearsig.recording import Recording
 
-# --------------------
 # From a signal and the orders' tracks to separated orders: checks, grouping, solution, notes.
-# --------------------
 
 
-FEWEST_SAMPLES = 16
+MIN_SAMPLES = 16
 NOTED_ERROR = 1e-5
 
 
@@ -98,8 +96,8 @@ def separated(
     method : Method
     unit, source : str
     """
-    if len(y) < FEWEST_SAMPLES:
-        raise InputError(f"the signal has {len(y)} samples", allowed=f"at least {FEWEST_SAMPLES}")
+    if len(y) < MIN_SAMPLES:
+        raise InputError(f"the signal has {len(y)} samples", allowed=f"at least {MIN_SAMPLES}")
     valid = valid_parts(tracks, widths, rate, method.generation)
     check_record_length(tracks, widths, valid, rate)
     neighbours = neighbours_of(tracks, widths, valid, method.skirt_poles)
@@ -111,9 +109,9 @@ def separated(
         problem.cycles, problem.valid, problem.bandwidths, method.p
     )
     groups = grouped(method.coupled, neighbours, len(valid), cheap=cheap)
-    envelopes, waveforms, left = solve_groups(y, problem, groups, share=isinstance(method.coupled, str))
+    envelopes, waveforms, sweep_error = solve_groups(y, problem, groups, share=isinstance(method.coupled, str))
     settled = settled_parts(widths, valid, rate, method.skirt_poles)
-    error = left + max(_expected_error(problem, g) for g in groups)
+    error = sweep_error + max(_expected_error(problem, g) for g in groups)
     residual = y.astype(np.float64)
     for waveform in waveforms:
         residual -= waveform

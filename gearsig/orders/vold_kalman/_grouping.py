@@ -14,9 +14,7 @@ from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.orders.vold_kalman._tracks import HALF_POWER, Tracks, settling_time
 
-# --------------------
 # Which orders of a Vold–Kalman problem lie close to each other, cross, or are the same; and how long each is there.
-# --------------------
 
 
 BoolArray = NDArray[np.bool_]
@@ -123,7 +121,7 @@ def mask_notes(tracks: Tracks, valid: BoolArray) -> list[str]:
 
 Coupling = bool | Literal["automatic"] | Sequence[Sequence[int]]
 Group = NDArray[np.intp]
-LARGEST_LEAK = 1e-4
+MAX_LEAK = 1e-4
 """Share of one order that another's band may let through before both are solved for together: -80 dB."""
 NOTED_LEAK = 0.03
 
@@ -131,7 +129,7 @@ NOTED_LEAK = 0.03
 def grouped(coupled: Coupling, neighbours: Sequence[Neighbours], n_orders: int, *, cheap: bool) -> list[Group]:
     """Return the positions of the orders solved for together; each order is in one group.
 
-    "automatic": orders are in one group if, at any time, more than `LARGEST_LEAK` of one would pass through the band of
+    "automatic": orders are in one group if, at any time, more than `MAX_LEAK` of one would pass through the band of
     the other, and with them those that either is grouped with. Where that is `cheap`, all are.
     """
     if coupled is True or (cheap and isinstance(coupled, str) and coupled == "automatic"):
@@ -141,7 +139,7 @@ def grouped(coupled: Coupling, neighbours: Sequence[Neighbours], n_orders: int, 
     if isinstance(coupled, str):
         if coupled != "automatic":
             raise InputError(f"coupled is {coupled!r}", allowed='True, False, "automatic" or groups of positions')
-        return _connected([(pair.k, pair.m) for pair in neighbours if pair.leak > LARGEST_LEAK], n_orders)
+        return _connected([(pair.k, pair.m) for pair in neighbours if pair.leak > MAX_LEAK], n_orders)
     return _given(coupled, n_orders)
 
 
@@ -151,7 +149,7 @@ def coupling_notes(groups: Sequence[Group], neighbours: Sequence[Neighbours], tr
     unit = tracks.unit
     notes = []
     for pair in neighbours:
-        if pair.leak <= LARGEST_LEAK:
+        if pair.leak <= MAX_LEAK:
             continue
         text = (
             f"orders {tracks.names[pair.k]!r} and {tracks.names[pair.m]!r} come as close as {pair.distance:.3g} {unit}"
@@ -169,7 +167,7 @@ def coupling_notes(groups: Sequence[Group], neighbours: Sequence[Neighbours], tr
     leaks = [p.leak for p in neighbours if group_of[p.k] != group_of[p.m]]
     if len(groups) == 1 and len(tracks.names) > 1 and not notes:
         notes.append("all orders are solved for together, though they lie far apart")
-    if len(groups) > 1 and apart and max(leaks, default=1.0) <= LARGEST_LEAK:
+    if len(groups) > 1 and apart and max(leaks, default=1.0) <= MAX_LEAK:
         names = ", ".join(repr(tracks.names[k]) for k in apart)
         notes.append(
             f"solved for by themselves, at most {_percent(max(leaks))} of another order in their band: {names}"
@@ -205,13 +203,11 @@ def _given(groups: Sequence[Sequence[int]], n_orders: int) -> list[Group]:
             where="coupled",
             allowed=f"positions from 0 to {n_orders - 1}, each in one group at most",
         )
-    left = [[k] for k in range(n_orders) if k not in flat]
-    return [np.array(group) for group in sorted([group for group in members if group] + left)]
+    single = [[k] for k in range(n_orders) if k not in flat]
+    return [np.array(group) for group in sorted([group for group in members if group] + single)]
 
 
-# --------------------
 # Where a separated order is not settled: at the ends, and beside parts that were left out.
-# --------------------
 
 
 def settled_parts(bandwidth: FloatArray, valid: BoolArray, sampling_rate: float, skirt_poles: int) -> BoolArray:

@@ -28,9 +28,7 @@ from gearsig.orders.vold_kalman._tracks import (
     write_phasors,
 )
 
-# --------------------
 # Adding up the cells' parts of the coarse normal equations.
-# --------------------
 
 
 Array = NDArray[Any]
@@ -61,14 +59,12 @@ def add_projections(right: Array, k: int, first: int, projected: Array) -> None:
             right[first + cell + s, k] += projected[cell, s]
 
 
-# --------------------
 # The second-generation Vold–Kalman problem on a coarse grid: the envelope as a quintic spline.
 #
 # A narrow-band envelope changes little from sample to sample. The least-squares problem is restricted to splines
 # x_k(n) = Σ_i a_ki φ(n/d - i) with one knot every d samples (Ritz–Galerkin); all sums over samples stay exact. The
 # error is that of the best spline, 2.4 (dω_h/π)^2p with ω_h half the bandwidth in rad/sample; the rounding error falls
 # from ε/ω_h^2p to ε/(dω_h)^2p. Both meet near 1e-8 where d is chosen by `samples_per_cell`.
-# --------------------
 
 
 DEGREE = 5
@@ -315,9 +311,7 @@ def _sampled(coefficients: ComplexArray, basis: FloatArray, n: int, n_splines: i
     return x
 
 
-# --------------------
 # How much worse a joint Vold–Kalman problem is conditioned for orders that stay closer than the filter is wide.
-# --------------------
 
 
 POINTS_PER_SEGMENT = 16
@@ -584,9 +578,7 @@ def _of_rows(bandwidths: FloatArray, n: int, p: int) -> FloatArray:
     return bandwidths[:, middle : n - p + middle]
 
 
-# --------------------
 # Groups of orders solved for in turn, each on the signal less the others' waveforms.
-# --------------------
 
 
 Rows = Group | slice

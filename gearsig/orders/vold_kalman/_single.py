@@ -454,9 +454,9 @@ def oscillator(cycles: FloatArray, bandwidth: FloatArray, kappa: FloatArray, q: 
         cos_omega, sin_omega = 1.0 - 2.0 * sin_half[i] * sin_half[i], 2.0 * sin_half[i] * cos_half[i]
         product = (sin_omega * c - cos_omega * s) * (sin_omega * c + cos_omega * s)
         # sin(h/2) sin(5h/2) = (cos 2h - cos 3h)/2
-        least = 0.5 * (2.0 * c * c - 1.0 - c * (4.0 * c * c - 3.0))
+        lowest = 0.5 * (2.0 * c * c - 1.0 - c * (4.0 * c * c - 3.0))
         kappa[i] = 4.0 * sin_half[i] * sin_half[i]
-        q[i] = 4.0 * s * s * max(product, least) / (c * c * HALF_POWER * HALF_POWER)
+        q[i] = 4.0 * s * s * max(product, lowest) / (c * c * HALF_POWER * HALF_POWER)
 
 
 def envelope_alone(

@@ -17,9 +17,7 @@ from gearsig.orders._average import times_of_revolutions
 from gearsig.orders._types import TrackedOrder
 from gearsig.rig import Rig
 
-# --------------------
 # What the Vold–Kalman filter takes and gives: frequency tracks, separated orders.
-# --------------------
 
 
 Generation = Literal["first", "second"]
@@ -192,9 +190,7 @@ class OrderSeparation:
         return self.orders[0].time_s
 
 
-# --------------------
 # Bandwidth and weighting of the Vold–Kalman filter: closed forms for each pole count and generation.
-# --------------------
 
 
 N_POLES_MAX = 3
@@ -589,9 +585,7 @@ def _integrated(track: FrequencyTrack, n: int, sampling_rate_hz: float) -> tuple
     return cycles, f
 
 
-# --------------------
 # Cosine and sine of an angle in revolutions.
-# --------------------
 
 
 S3, S5, S7, S9, S11, S13, S15 = -1 / 6, 1 / 120, -1 / 5040, 1 / 362880, -1 / 39916800, 1 / 6227020800, -1 / 1307674368e3
