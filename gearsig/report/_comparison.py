@@ -27,7 +27,8 @@ from gearsig.comparison import (
 )
 from gearsig.formatting import readable, rounded
 from gearsig.plot import Captioned, Cursor, Picture, embed, unit_text
-from gearsig.report._files import Json, members, plain, render
+from gearsig.report._files import render
+from gearsig.report._json import Json, members, plain
 
 # --------------------
 # The pictures of a comparison, and what to look at in each.

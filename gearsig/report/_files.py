@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import re
 import secrets
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import fields, is_dataclass
-from enum import Enum
 from functools import cache
 from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from gearsig.errors import InputError
-from gearsig.formatting import rounded
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -127,59 +122,6 @@ def _unique(name: str, taken: set[str]) -> str:
         choice = f"{name}-{number}"
     taken.add(choice.lower())
     return choice
-
-
-# --------------------
-# Results as dictionaries, lists, texts and numbers, which is what JSON knows.
-# --------------------
-
-
-Json = dict[str, Any]
-
-
-def members(value: object, *names: str) -> Json:
-    """Return attributes and properties of a value by name, in this order, each as `plain` writes it.
-
-    Examples
-    --------
-    >>> members(1.0 + 2.0j, "real", "imag")
-    {'real': 1.0, 'imag': 2.0}
-    """
-    return {name: plain(getattr(value, name)) for name in names}
-
-
-def plain(value: Any, *, arrays: bool = True) -> Any:
-    """Return a value as JSON knows it: dataclasses as their fields, numbers of nine digits, nan and infinity as null.
-
-    Parameters
-    ----------
-    value : object
-    arrays : bool
-        Whether arrays come as lists; otherwise as ``{"shape": […]}``.
-    """
-    if isinstance(value, np.ndarray):
-        return _array(value) if arrays else {"shape": list(value.shape)}
-    if is_dataclass(value):
-        return {field.name: plain(getattr(value, field.name), arrays=arrays) for field in fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): plain(item, arrays=arrays) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(item, arrays=arrays) for item in value]
-    return _scalar(value)
-
-
-def _scalar(value: Any) -> str | bool | float | None:
-    if isinstance(value, Enum):
-        return str(value.value)
-    if value is None or isinstance(value, (str, bool)):
-        return value
-    return int(value) if isinstance(value, (int, np.integer)) else rounded(value)
-
-
-def _array(values: np.ndarray[Any, np.dtype[Any]]) -> list[Any]:
-    if values.ndim > 1:
-        return [_array(row) for row in values]
-    return [rounded(value) for value in values.tolist()]
 
 
 # --------------------

@@ -51,7 +51,7 @@ def test_null_is_nan():
 @pytest.mark.parametrize(
     ("path", "value", "said"),
     [
-        pytest.param(("size", "value"), 10**400, "OverflowError", id="too large"),
+        pytest.param(("size", "value"), 10**400, r"report\.size\.value is too large", id="too large"),
         (("size", "low"), "7", r"report\.size\.low is '7', not number or null"),
         (("rig",), ["a"], r"report\.rig is \['a'\], not string"),
         (("notices",), "abc", "report.notices is 'abc', not array"),
@@ -60,7 +60,7 @@ def test_null_is_nan():
         (("places", 0, "tooth"), "<b>", r"report\.places\[0\]\.tooth is '<b>', not integer or null"),
         (("places", 0, "tooth"), True, r"tooth is True"),
         (("places", 0, "follows"), "yes", "follows is 'yes', not boolean"),
-        (("places", 0, "band_hz"), [], "IndexError"),
+        (("places", 0, "band_hz"), [], r"report\.places\[0\]\.band_hz has 0 values, not 2"),
         (("causes", 0, "severity"), 3, r"severity is 3, not object"),
         pytest.param(("angles", 0, "n_teeth"), "x" * 10_000, r"n_teeth is 'x+\.\.\.x+', not integer", id="too long"),
         (("spectra", 0, "orders", 1), {}, r"report\.spectra\[0\]\.orders\[1\] is {}"),
