@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 # --------------------
 
 
-LEAST_FOR_KIND = 400
+MIN_FOR_KIND = 400
 """Cycles that the 0–1 test and the exponent need to say something."""
 CYCLES = {"mesh": "mesh cycle", "shaft": "revolution of the input shaft"}
 N_ROTATING = 4
@@ -184,7 +184,7 @@ def _is_noise_free(run: SteadyRun, branch: Branch) -> bool:
 # --------------------
 
 
-MOST_BYTES = 1_000_000_000
+MAX_BYTES = 1_000_000_000
 """Of one value's arrays; a usual one has some ten thousand."""
 
 
@@ -222,7 +222,7 @@ def save(kept: KeptValue, path: Path) -> None:
 
 def load(path: Path) -> KeptValue | None:
     """Read one value; None where it is not there, or damaged."""
-    data = read_arrays(path, MOST_BYTES)
+    data = read_arrays(path, MAX_BYTES)
     if data is None:
         return None
     value = float(data["value"])

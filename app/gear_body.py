@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-MOST_MODES = 300
+MAX_MODES = 300
 """Beyond, the search takes many minutes, and teeth alone move."""
 N_SLICES = 5
 """Contact patches along the face, where the mesh has layers enough."""
@@ -123,7 +123,7 @@ def study_gear(
     on_progress : callable
         Told what is done and how much, 0 to 1.
     """
-    within(count(n_modes, "n_modes"), "n_modes", 1, MOST_MODES)
+    within(count(n_modes, "n_modes"), "n_modes", 1, MAX_MODES)
     on_progress("mesh", 0.0)
     size = mesh_size_for(blank, n_dof)
     if reduce:

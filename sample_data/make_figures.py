@@ -46,7 +46,7 @@ CRACKED_TOOTH = 20  # from 0, as mesh cycles count; the parameter counts from 1
 SEED = 1
 SETTLING_S = 0.5
 FELT = 0.01
-"""The reach of a crack ends where the change stays below this part of the sound gear's rms for a mesh cycle."""
+"""The reach of a crack ends where the change stays below this part of the healthy gear's rms for a mesh cycle."""
 
 
 def machine(**changed: ParameterValue) -> Machine:
@@ -144,11 +144,11 @@ def crack_comparison() -> Figure:
         run = steady(cracked(depth), 1.1, "driver angle", "driver y acceleration")
         turned = run["driver angle"] / (2.0 * np.pi)
         values[named(depth)] = CubicSpline(turned, run["driver y acceleration"])(revolutions)
-    sound = values[named(0)]
-    change = {name: a - sound for name, a in values.items() if name != named(0)}
+    healthy = values[named(0)]
+    change = {name: a - healthy for name, a in values.items() if name != named(0)}
     entry = CRACKED_TOOTH / n_teeth
     cycles = (revolutions - 5.0 - entry) * n_teeth
-    reach = {name: felt_until(cycles, a, FELT * float(np.std(sound))) for name, a in change.items()}
+    reach = {name: felt_until(cycles, a, FELT * float(np.std(healthy))) for name, a in change.items()}
     print({name: (round(value, 2), round(float(np.abs(change[name]).max()))) for name, value in reach.items()})  # noqa: T201
     return crack_comparison_figure(
         revolutions,

@@ -37,7 +37,7 @@ from sims.sweep import claimed, written
 
 
 DEFINITION, ANSWERS_FOLDER = "benchmark.json", "answers"
-LONGEST_S = 900.0
+MAX_S = 900.0
 """A diagnosis that takes longer has no answer."""
 
 _SHOWS_ONLY = {"plot", "report", "scoring"}
@@ -138,9 +138,9 @@ def diagnosed(folder: Path, names: Sequence[str], running: Running | None = None
         text=True,
     )
     try:
-        _, said = process.communicate(timeout=LONGEST_S)
+        _, said = process.communicate(timeout=MAX_S)
     except subprocess.TimeoutExpired:
-        return dict.fromkeys(names, Answer("", seconds=LONGEST_S, error=f"no answer within {LONGEST_S:g} s"))
+        return dict.fromkeys(names, Answer("", seconds=MAX_S, error=f"no answer within {MAX_S:g} s"))
     finally:
         stop(process)
         by_itself = runs.ended(process)

@@ -136,7 +136,7 @@ SEED = 0
 def drive_row(done: DriveDone) -> Row:
     """Return a case with its answer as the scores count it; tooth or order are placed right if the setting says so."""
     label, answer = done.label, done.answer
-    effects = (str(label["effect"]),) if label["effect"] else ()
+    effects: tuple[str, ...] = (str(label["effect"]),) if label["effect"] else ()
     truths = effects if label["kind"] == "single" else (str(label["kind"]),)
     cause = answer.cause(truths[0])
     placed = {name: cause is not None and cause.options.get(name) == at for name, at in label["place"].items()}

@@ -104,11 +104,11 @@ def wanted_of(
     with_kind: bool,
 ) -> BifurcationRequest:
     """Return what the options ask for."""
-    from app.bifurcation import LEAST_FOR_KIND, BifurcationRequest
+    from app.bifurcation import MIN_FOR_KIND, BifurcationRequest
     from app.cli.sweep import sweep_of
     from sims.cracked import Branch
 
-    n = n_points if n_points is not None else LEAST_FOR_KIND if with_kind else 100
+    n = n_points if n_points is not None else MIN_FOR_KIND if with_kind else 100
     sweep = sweep_of(request, [vary], common_seed=True, extension=".h5")
     wanted = BifurcationRequest(Branch(sweep, signal, section, n), direction, phase, with_kind)
     wanted.branch.check_signal()

@@ -50,10 +50,10 @@ DEEPEST_SHARE = 0.9
 """Of the deepest crack that the tooth model allows."""
 
 MESH_HZ = (180.0, 1600.0)
-LEAST_REVOLUTIONS = 15
+MIN_REVOLUTIONS = 15
 """Of the slower shaft."""
 
-SOUND_SHARE, SOUND_SHARE_OF_THE_CHECK = 0.2, 0.3
+HEALTHY_SHARE, HEALTHY_SHARE_OF_THE_CHECK = 0.2, 0.3
 """Rigs that get no crack."""
 
 
@@ -137,7 +137,7 @@ def draw_rig(rng: np.random.Generator, *, for_the_check: bool, even: bool = Fals
     z = teeth[0] if gear == "driver" else teeth[1]
     least, most = DEPTHS_OF_THE_CHECK_MM if for_the_check else DEPTHS_MM
     depth = rng.uniform(least, min(most, DEEPEST_SHARE * deepest_crack_mm(GearGeometry(z, module))))
-    sound = rng.uniform() < (SOUND_SHARE_OF_THE_CHECK if for_the_check else SOUND_SHARE)
+    healthy = rng.uniform() < (HEALTHY_SHARE_OF_THE_CHECK if for_the_check else HEALTHY_SHARE)
     parameters = _gears(rng, teeth, module, width, load) | _rest(rng, module, teeth)
     if even:
         parameters |= _even_teeth(rng)
@@ -148,10 +148,10 @@ def draw_rig(rng: np.random.Generator, *, for_the_check: bool, even: bool = Fals
         log_uniform(rng, 0.3, 3.0),
         speed,
         torque,
-        LEAST_REVOLUTIONS * max(1.0, teeth[1] / teeth[0]) * 60.0 / speed,
+        MIN_REVOLUTIONS * max(1.0, teeth[1] / teeth[0]) * 60.0 / speed,
         gear,
         int(rng.integers(z)),
-        0.0 if sound else float(depth),
+        0.0 if healthy else float(depth),
         int(rng.integers(2**31)),
     )
 
@@ -254,12 +254,12 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 # --------------------
-# A drawn gearbox, sound or with its crack, as a recording.
+# A drawn gearbox, healthy or with its crack, as a recording.
 # --------------------
 
 
 SAMPLING_RATE_HZ = 20480.0
-MOST_LEAD_REV = 8
+MAX_LEAD_REV = 8
 
 
 def simulate_rig(
@@ -283,7 +283,7 @@ def simulate_rig(
     drawn : DrawnRig
     effect : str
     severity : float or None
-        None: the drawn depth of the crack; 0: a sound gearbox.
+        None: the drawn depth of the crack; 0: a healthy gearbox.
     run : int
         Another run has other noise and begins at another place of the driven shaft; the flanks stay the same.
     speed_factor, torque_factor : float
@@ -327,7 +327,7 @@ def simulate_rig(
 def _prepared(
     model: str, drawn: DrawnRig, operation: Operation, rng: np.random.Generator
 ) -> PreparedCrackedPair | PreparedPair:
-    """Return the sound machine; finite-element gears are of full discs, with the mesh of a twin's."""
+    """Return the healthy machine; finite-element gears are of full discs, with the mesh of a twin's."""
     if model == CRACKED:
         return CrackedPair().prepare(drawn.parameters, [], operation, rng, sampling_rate_hz=SAMPLING_RATE_HZ)
     values = twin_parameters(drawn.parameters, drawn.teeth) | {"roughness_locked_to": "flank"}
@@ -342,7 +342,7 @@ def turns_before(drawn: DrawnRig, run: int) -> int:
 def _beginning(drawn: DrawnRig, run: int) -> tuple[np.random.Generator, int]:
     """Return a run's generator and the first it draws: whole turns before the recording."""
     rng = np.random.default_rng([drawn.seed, run])
-    return rng, int(rng.integers(0, MOST_LEAD_REV))
+    return rng, int(rng.integers(0, MAX_LEAD_REV))
 
 
 def _with_fixed_flanks(machine: Machine, seed: list[int]) -> Machine:
@@ -413,12 +413,12 @@ SPALL_WIDTH_PERCENT, SPALL_LENGTH_MODULES = (20.0, 90.0), (0.3, 1.2)
 
 @dataclass(frozen=True)
 class CrackCase:
-    """A drawn rig with its recording, a reference of the sound gears, and the sound gears once more."""
+    """A drawn rig with its recording, a reference of the healthy gears, and the healthy gears once more."""
 
     drawn: DrawnRig
     recording: Recording
     reference: Recording
-    sound: Recording
+    healthy: Recording
 
 
 @dataclass(frozen=True)
@@ -455,9 +455,9 @@ class CaseFeatures:
         0 or 1: which gear has the crack.
     percent : float
         Depth of the crack in percent of the root; 0: none.
-    with_reference, alone, sound, sound_with_reference : arrays, (2, n_features)
-        Of both gears: the recording against its reference, by itself, the reference by itself, and the sound gears once
-        more against the reference.
+    with_reference, alone, healthy, healthy_with_reference : arrays, (2, n_features)
+        Of both gears: the recording against its reference, by itself, the reference by itself, and the healthy gears
+        once more against the reference.
     looks : mapping
         (kind, "with_reference" or "alone") → Looks of the cracked gear, and of the gear with the other fault.
     lag_pitches : float
@@ -472,8 +472,8 @@ class CaseFeatures:
     percent: float
     with_reference: FloatArray
     alone: FloatArray
-    sound: FloatArray
-    sound_with_reference: FloatArray
+    healthy: FloatArray
+    healthy_with_reference: FloatArray
     looks: dict[tuple[str, str], Looks]
     lag_pitches: float
     reach: dict[str, float]
@@ -536,13 +536,13 @@ def observe(case: CrackCase, other: OtherFault | None = None, relief_error: floa
     def seen(a: tuple[ShaftLines, ...], b: tuple[ShaftLines, ...] | None) -> tuple[GearEvidence, ...]:
         return gear_evidence(a, b, facts.module_mm, facts.load_mpa, relief_um)
 
-    now, sound = lines(case.recording), lines(case.reference)
-    compared, alone, good = seen(now, sound), seen(now, None), seen(sound, None)
+    now, healthy = lines(case.recording), lines(case.reference)
+    compared, alone, good = seen(now, healthy), seen(now, None), seen(healthy, None)
     gear = ("driver", "driven").index(drawn.gear)
     looks = {(CRACK_KIND, WITH_REFERENCE): _looks(compared[gear]), (CRACK_KIND, ALONE): _looks(alone[gear])}
     if other is not None:
         damaged = lines(other.recording)
-        looks[other.kind, WITH_REFERENCE] = _looks(seen(damaged, sound)[gear])
+        looks[other.kind, WITH_REFERENCE] = _looks(seen(damaged, healthy)[gear])
         looks[other.kind, ALONE] = _looks(seen(damaged, None)[gear])
     return CaseFeatures(
         drawn=drawn,
@@ -550,8 +550,8 @@ def observe(case: CrackCase, other: OtherFault | None = None, relief_error: floa
         percent=drawn.depth_mm * percent_per_mm(drawn.teeth[gear], facts.module_mm),
         with_reference=np.stack([e.features for e in compared]),
         alone=np.stack([e.features for e in alone]),
-        sound=np.stack([e.features for e in good]),
-        sound_with_reference=np.stack([e.features for e in seen(lines(case.sound), sound)]),
+        healthy=np.stack([e.features for e in good]),
+        healthy_with_reference=np.stack([e.features for e in seen(lines(case.healthy), healthy)]),
         looks=looks,
         lag_pitches=_lag(compared[gear], drawn.tooth),
         reach=reach_of(facts, now[0].order_hz * facts.driver_teeth),

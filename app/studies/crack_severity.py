@@ -1,7 +1,7 @@
 """Make the calibration of crack severity: `python -m app.studies.crack_severity [--cases N] [--to FILE]`.
 
-Draws and simulates gearboxes (some 2.5 s each on one core), each with its crack, sound, and with a chip or spall; fits
-the models, and writes the JSON file that the library reads. Errors on cases that were left out of a fit make the
+Draws and simulates gearboxes (some 2.5 s each on one core), each with its crack, healthy, and with a chip or spall;
+fits the models, and writes the JSON file that the library reads. Errors on cases that were left out of a fit make the
 intervals.
 """
 
@@ -59,10 +59,10 @@ from gearsig.severity import (
 
 
 FALSE_ALARMS = 0.02
-"""Part of the sound gear pairs whose score lies above the threshold."""
+"""Part of the healthy gear pairs whose score lies above the threshold."""
 
 TAUGHT = 0.10
-"""Part of the sound gear pairs whose score lies above the least one of a crack that the depth is learned from: cracks
+"""Part of the healthy gear pairs whose score lies above the least one of a crack that the depth is learned from: cracks
 just below the threshold tell as well, and without a reference few are above."""
 
 CLEAR_MM = 1.0
@@ -80,21 +80,21 @@ _SHAPED = [FEATURES.index(name) for name in SHAPED]
 
 @dataclass(frozen=True)
 class Cases:
-    """Cracks with their features, and sound gears.
+    """Cracks with their features, and healthy gears.
 
     Parameters
     ----------
     features : array, (n, n_features)
         Of the cracked gear.
     percent, depth_mm : arrays, (n,)
-    sound : array, (n_sound, 2, n_features)
-        Of both gears of sound pairs.
+    healthy : array, (n_healthy, 2, n_features)
+        Of both gears of healthy pairs.
     """
 
     features: FloatArray
     percent: FloatArray
     depth_mm: FloatArray
-    sound: FloatArray
+    healthy: FloatArray
 
 
 def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
@@ -102,11 +102,11 @@ def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
     rest = [i for i, name in enumerate(FEATURES) if name not in RISING and (relief_known or name not in RELIEF)]
     mean, scale = cases.features.mean(axis=0), cases.features.std(axis=0)
     z = (cases.features - mean) / scale
-    sound = (cases.sound - mean) / scale
-    detection = _detection_weights(z[cases.depth_mm >= CLEAR_MM], sound.reshape(-1, z.shape[1]))
-    sound_scores = np.sort((sound @ detection).max(axis=1))
-    threshold = float(np.quantile(sound_scores, 1.0 - FALSE_ALARMS))
-    taught = z @ detection >= np.quantile(sound_scores, 1.0 - TAUGHT)
+    healthy = (cases.healthy - mean) / scale
+    detection = _detection_weights(z[cases.depth_mm >= CLEAR_MM], healthy.reshape(-1, z.shape[1]))
+    healthy_scores = np.sort((healthy @ detection).max(axis=1))
+    threshold = float(np.quantile(healthy_scores, 1.0 - FALSE_ALARMS))
+    taught = z @ detection >= np.quantile(healthy_scores, 1.0 - TAUGHT)
     y = np.log(cases.percent)
     knots = np.quantile(z[taught][:, _SHAPED], _KNOTS, axis=0).T
     depth, spread = _depth_and_spread(z[taught], y[taught], knots, rest)
@@ -124,7 +124,7 @@ def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
         quantiles=_conformal(_errors_of_others(z[taught], y[taught], knots, rest)),
         detection=detection,
         threshold=threshold,
-        healthy_scores=sound_scores,
+        healthy_scores=healthy_scores,
         precision=precision,
         largest_distance=float(np.quantile(distances, 1.0 - OUTSIDE)),
         lowest=cases.features[taught].min(axis=0),
@@ -161,14 +161,14 @@ def _errors_of_others(z: FloatArray, y: FloatArray, knots: FloatArray, rest: lis
     return scaled
 
 
-def _detection_weights(cracked: FloatArray, sound: FloatArray) -> FloatArray:
+def _detection_weights(cracked: FloatArray, healthy: FloatArray) -> FloatArray:
     """Logistic regression, crack against none, on what a crack raises; weights are not negative."""
     from scipy.optimize import minimize
 
     used = [FEATURES.index(name) for name in ("band_excess", "prominence", "pattern_excess")]
-    x = np.vstack([cracked[:, used], sound[:, used]])
-    sign = np.r_[np.ones(len(cracked)), -np.ones(len(sound))]
-    share = np.r_[np.full(len(cracked), 0.5 / len(cracked)), np.full(len(sound), 0.5 / len(sound))]
+    x = np.vstack([cracked[:, used], healthy[:, used]])
+    sign = np.r_[np.ones(len(cracked)), -np.ones(len(healthy))]
+    share = np.r_[np.full(len(cracked), 0.5 / len(cracked)), np.full(len(healthy), 0.5 / len(healthy))]
 
     def loss(w: FloatArray) -> float:
         return float(share @ np.logaddexp(0.0, -sign * (x @ w[:-1] + w[-1])) + 0.003 * np.sum(w[:-1] ** 2))
@@ -338,14 +338,14 @@ def calibration_of(observed: Sequence[tuple[int, CaseFeatures]], n_drawn: int, s
 
 
 def cases_of(observed: Sequence[tuple[int, CaseFeatures]], kind: str) -> Cases:
-    """Return the cases of one model; each machine is there sound, too."""
+    """Return the cases of one model; each machine is there healthy, too."""
     cracked = [(i, o) for i, o in observed if o.percent > 0]
-    sound = [o.sound if kind == ALONE else o.sound_with_reference for _, o in observed]
+    healthy = [o.healthy if kind == ALONE else o.healthy_with_reference for _, o in observed]
     return Cases(
         np.array([getattr(o, kind)[o.gear] for _, o in cracked]),
         np.array([o.percent for _, o in cracked]),
         np.array([o.drawn.depth_mm for _, o in cracked]),
-        np.array(sound),
+        np.array(healthy),
     )
 
 
@@ -412,7 +412,7 @@ def _provenance(observed: Sequence[tuple[int, CaseFeatures]], n_drawn: int, simu
         "spall_length_modules": list(SPALL_LENGTH_MODULES),
         "crack": "straight, 45 degrees, through the whole face width",
         "teeth": "18 to 100, no pair whose teeth add up to a multiple of three",
-        "least_revolutions": rigs.LEAST_REVOLUTIONS,
+        "least_revolutions": rigs.MIN_REVOLUTIONS,
     }
 
 

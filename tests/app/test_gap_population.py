@@ -50,8 +50,8 @@ def test_a_case_of_the_independent_rig_gives_its_effect_and_the_same_machine_wit
         BY_HAND: independent.N_BY_HAND * n_conditions,
     }
     assert {sample.simulator for sample in outer_race} == {INDEPENDENT}
-    own, sound = (next(s for s in outer_race if s.label == label) for label in ("bearing_outer_race", NONE))
-    assert size(own) > 2.0 * size(sound)
+    own, healthy = (next(s for s in outer_race if s.label == label) for label in ("bearing_outer_race", NONE))
+    assert size(own) > 2.0 * size(healthy)
 
 
 def test_the_table_is_read_as_it_was_written(outer_race: list[PopulationSample], tmp_path) -> None:

@@ -45,7 +45,7 @@ def machine(seed: int = 3) -> StaticMachine:
 
 def test_the_same_day_is_the_same_recording_and_the_teeth_keep_their_mark() -> None:
     made, day = machine(), QuasiStaticDay.drawn(np.random.default_rng(1))
-    one, again = (record(made, made.sound(), day, None) for _ in range(2))
+    one, again = (record(made, made.healthy(), day, None) for _ in range(2))
     assert np.array_equal(one.samples, again.samples)
     crest = reduce_recording(one, made.rig)
     assert crest.n_revolutions > 15
@@ -54,18 +54,18 @@ def test_the_same_day_is_the_same_recording_and_the_teeth_keep_their_mark() -> N
 @pytest.mark.parametrize("name", EFFECTS)
 def test_an_effect_changes_what_is_recorded(name: str) -> None:
     made, day = machine(), QuasiStaticDay.drawn(np.random.default_rng(1))
-    state = made.sound()
+    state = made.healthy()
     EFFECTS[name](made, state, np.random.default_rng(2))
-    sound, faulty = record(made, made.sound(), day, None).samples, record(made, state, day, None).samples
+    healthy, faulty = record(made, made.healthy(), day, None).samples, record(made, state, day, None).samples
     assert np.all(np.isfinite(faulty))
-    assert np.std(faulty[:-1] - sound[:-1]) > 1e-3 * np.std(sound[:-1])
+    assert np.std(faulty[:-1] - healthy[:-1]) > 1e-3 * np.std(healthy[:-1])
 
 
 def test_a_changed_path_is_heard_on_its_channel() -> None:
     made, day = machine(), QuasiStaticDay.drawn(np.random.default_rng(1))
-    state = made.sound()
+    state = made.healthy()
     state.paths = [PathChange(gain=2.0), PathChange()]
-    before, after = record(made, made.sound(), day, None).samples, record(made, state, day, None).samples
+    before, after = record(made, made.healthy(), day, None).samples, record(made, state, day, None).samples
     assert after[0] == pytest.approx(2.0 * before[0], abs=1e-9 * float(np.abs(before[0]).max()))
     assert after[1:] == pytest.approx(before[1:], abs=1e-9 * float(np.abs(before[1]).max()))
 

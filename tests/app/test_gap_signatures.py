@@ -40,12 +40,12 @@ def test_only_the_vibration_changes_and_a_seed_repeats_it(name: str) -> None:
 
 @pytest.mark.parametrize("name", EXPECTED)
 def test_strong_ones_move_their_own_features(name: str) -> None:
-    sound = reduce_recording(record(seed=1), RIG)
+    healthy = reduce_recording(record(seed=1), RIG)
     found = []
     for seed in range(8):
         now, strength = with_signature(SOUND, name, np.random.default_rng(seed))
         if strength > 0.6:
-            change = dict(zip(*change_once(reduce_recording(now, RIG), sound), strict=True))
+            change = dict(zip(*change_once(reduce_recording(now, RIG), healthy), strict=True))
             found.append(max(change[feature] for feature in EXPECTED[name]))
     assert found
     assert np.median(found) > 3.0

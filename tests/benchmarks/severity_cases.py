@@ -3,9 +3,9 @@
 `python tests/benchmarks/severity_cases.py [CASES] [SEED]` draws gearboxes of other teeth, modules, stiffness, damping,
 paths and flanks than the calibration's, simulates each with its crack (or none) and as it was before, and prints for
 "with a reference" and "alone", tip relief unknown or known to 20 %: how many cracks are seen, the error of the depth,
-how often the 90 % interval holds it, false cracks on sound machines, whether gear and tooth are right, what is refused.
-Then cracks as they grow on the same machines, teeth that are chipped or spalled instead, other cracks, and the presets.
-Everything comes from one simulator: real machines are less kind.
+how often the 90 % interval holds it, false cracks on healthy machines, whether gear and tooth are right, what is
+refused. Then cracks as they grow on the same machines, teeth that are chipped or spalled instead, other cracks, and the
+presets. Everything comes from one simulator: real machines are less kind.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Answer = CrackEstimate | NoCrackSeen | RefusalError
 
 @dataclass(frozen=True)
 class Outcome:
-    """An answer beside the truth: depth in mm (0: sound), shaft and tooth (from 1) of the crack."""
+    """An answer beside the truth: depth in mm (0: healthy), shaft and tooth (from 1) of the crack."""
 
     depth_mm: float
     shaft: str
@@ -71,10 +71,10 @@ def roughly_known_relief_um(case: CrackCase) -> float:
 
 def report(title: str, outcomes: list[Outcome]) -> None:
     """Print what the answers are worth."""
-    cracked, sound = [o for o in outcomes if o.depth_mm > 0], [o for o in outcomes if o.depth_mm == 0]
+    cracked, healthy = [o for o in outcomes if o.depth_mm > 0], [o for o in outcomes if o.depth_mm == 0]
     seen = [o for o in cracked if isinstance(o.answer, CrackEstimate)]
     none_seen = [o for o in cracked if isinstance(o.answer, NoCrackSeen)]
-    print(f"\n{title}: {len(cracked)} cracked, {len(sound)} sound machines")
+    print(f"\n{title}: {len(cracked)} cracked, {len(healthy)} healthy machines")
     for low, high in DEPTH_CLASSES_MM:
         inside = [o for o in cracked if low <= o.depth_mm < high]
         print(f"  {low:g} to {high:g} mm: seen {share(isinstance(o.answer, CrackEstimate) for o in inside)}", end="")
@@ -86,8 +86,8 @@ def report(title: str, outcomes: list[Outcome]) -> None:
     held = share(o.depth_mm <= o.answer.below_mm for o in none_seen if isinstance(o.answer, NoCrackSeen))
     print(f'; of these below the stated "below x mm": {held}')
     print(f"  refused: {share(isinstance(o.answer, RefusalError) for o in cracked)} of the cracked,", end="")
-    print(f" {share(isinstance(o.answer, RefusalError) for o in sound)} of the sound")
-    print(f"  crack claimed on a sound machine: {share(isinstance(o.answer, CrackEstimate) for o in sound)}")
+    print(f" {share(isinstance(o.answer, RefusalError) for o in healthy)} of the healthy")
+    print(f"  crack claimed on a healthy machine: {share(isinstance(o.answer, CrackEstimate) for o in healthy)}")
     for reason, n in Counter(str(o.answer)[:60] for o in outcomes if isinstance(o.answer, RefusalError)).most_common():
         print(f"    {n} × {reason} …")
 

@@ -114,7 +114,7 @@ def _order(order: float, options: Mapping[str, Any], places: tuple[AnsweredPlace
 STRONG = 3.0
 """Structural floors from which on a fault should be found."""
 
-FEWEST_HEALTHY = 8
+MIN_HEALTHY = 8
 """Healthy cases of which a floor can be made."""
 
 Floors = Mapping[bool, StructuralFloor | None]
@@ -144,7 +144,7 @@ def batch_floors(truths: Sequence[Truth]) -> dict[bool, StructuralFloor | None]:
 
 
 def _floor(rows: Sequence[Mapping[str, float]]) -> StructuralFloor | None:
-    if len(rows) < FEWEST_HEALTHY:
+    if len(rows) < MIN_HEALTHY:
         return None
     names = tuple(rows[0])
     return StructuralFloor.of_healthy(names, np.array([[row[name] for name in names] for row in rows]))

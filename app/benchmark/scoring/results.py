@@ -220,7 +220,7 @@ def cost_lines(result: Result) -> list[str]:
 
 
 LEVELS = (("weak", 0.0, 1 / 3), ("middle", 1 / 3, 2 / 3), ("strong", 2 / 3, 1.01))
-MOST_CONFUSIONS = 12
+MAX_CONFUSIONS = 12
 
 
 def effects_table(result: Result) -> Table:
@@ -280,7 +280,7 @@ def confusions_table(result: Result) -> Table:
         "What was taken for what",
         "In common: kinds of features in which theory expects both.",
         ("it was", "said", "cases", "in common"),
-        tuple(table[:MOST_CONFUSIONS]),
+        tuple(table[:MAX_CONFUSIONS]),
     )
 
 

@@ -126,7 +126,7 @@ def _named_from(fitted: GapCalibration, cases: Sequence[WeighedCase]) -> float:
 
 
 SEED = 9202
-LEAST_LEVEL = 0.4
+MIN_LEVEL = 0.4
 """Of effects' severities, 0 to 1: nothing can be learned from those that nobody could see."""
 ROUND = 27
 """Cases of a round: each effect once, four healthy ones, four from outside the catalogue."""
@@ -181,7 +181,7 @@ def weigh_case(index: int, most_tried: int) -> list[dict[str, Any]]:
     kind = "single" if place < len(names) else "none" if place < len(names) + 4 else "unknown"
     if index >= FIRST_STRANGE:
         kind = "unknown"
-    wanted = {"effect": names[place], "level": float(rng.uniform(LEAST_LEVEL, 1.0))} if kind == "single" else {}
+    wanted = {"effect": names[place], "level": float(rng.uniform(MIN_LEVEL, 1.0))} if kind == "single" else {}
     case = draw_case(rng, "calibration", kind=kind, with_reference=True, **wanted)  # type: ignore[arg-type]  # as drawn
     truths = [wanted["effect"]] if wanted else [NONE if kind == "none" else UNKNOWN]
     recorded = record_case(case)

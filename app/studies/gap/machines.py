@@ -9,7 +9,7 @@ import numpy as np
 
 from app.studies.crack_cases import DrawnHousingMode, DrawnRig, draw_rig, log_uniform
 from app.studies.gap.signatures import (
-    LARGEST_ADVANCE,
+    MAX_ADVANCE,
     N_MESH_HARMONICS,
     SIGNATURES,
     PathChange,
@@ -73,7 +73,7 @@ class OperatingDay:
 
 
 def draw_machine(rng: np.random.Generator) -> DrawnRig:
-    """Draw a sound gearbox, full or lightly loaded, with the length of its recordings.
+    """Draw a healthy gearbox, full or lightly loaded, with the length of its recordings.
 
     Gears lie side by side, above each other or aslant, and a housing's modes move each in a direction of their own:
     what pushes across the line of action is heard as well. Most housings stand on something that yields, so that the
@@ -140,7 +140,7 @@ def _mounted_anew(mode: DrawnHousingMode, rng: np.random.Generator) -> DrawnHous
 
 
 # --------------------
-# What every machine has, sound or not: run-out, unbalance, uneven pitch, a housing that swallows high frequencies.
+# What every machine has, healthy or not: run-out, unbalance, uneven pitch, a housing that swallows high frequencies.
 #
 # The simulated machines are too good: few lines of their shafts, few sidebands, most of the vibration at high multiples
 # of the mesh. Measured ones have sidebands 15 to 35 dB below the mesh and most energy at its first two harmonics. So
@@ -193,7 +193,7 @@ class Ordinary:
 
     @classmethod
     def of(cls, reference: Recording, seed: int) -> Ordinary:
-        """Draw the tolerances of the machine of a sound recording."""
+        """Draw the tolerances of the machine of a healthy recording."""
         scene = scene_of(reference)
         paths = _paths(seed, scene, len(reference.channels))
         return cls(
@@ -311,7 +311,7 @@ def _tolerances(scene: SyntheticScene, rng: np.random.Generator) -> list[Signatu
         found.append(
             Signature(
                 1.0 + swing * tone(order, scene, rng),
-                LARGEST_ADVANCE * late / scene.teeth[0] * tone(order, scene, rng),
+                MAX_ADVANCE * late / scene.teeth[0] * tone(order, scene, rng),
                 tuple(lines),
             )
         )

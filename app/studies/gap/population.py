@@ -1,6 +1,9 @@
-"""Make the population of the gap diagnosis: `python -m app.studies.gap.population --to FILE`.
+"""Make the population of the gap diagnosis.
 
-Each drawn gearbox is recorded sound as the reference, sound again on other days, with each effect, with foreign
+`python -m app.studies.gap.population simulate --to RAW` draws machines and records them; `… pack RAW…` packs one or
+several such tables into the file that comes with the library.
+
+Each drawn gearbox is recorded healthy as the reference, healthy again on other days, with each effect, with foreign
 vibration, and with each effect's signature by hand; what differs goes into the table, with its label. Gearboxes are
 those of both models of a pair, of the quasi-static simulator, and the independent rig's with development gears.
 """
@@ -8,16 +11,18 @@ those of both models of a pair, of the quasi-static simulator, and the independe
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import typer
+from numpy.typing import NDArray
 
 from app.studies.gap.quasi_static.record import QUASI_STATIC, one_static
 from app.studies.gap.rows import CRACKED, REDUCED, PopulationSample, one_case, one_rig, write
-from gearsig.gap import INDEPENDENT
+from gearsig.gap import BY_HAND, INDEPENDENT, POPULATION_FILE
 
 MACHINES = {CRACKED.name: 80, REDUCED.name: 45, INDEPENDENT: 400, QUASI_STATIC: 150}
 """Of each simulator, unless asked for otherwise."""
@@ -32,26 +37,77 @@ _SAMPLES_OF: dict[str, Callable[[int], list[PopulationSample]]] = {
 
 
 def main() -> None:
-    """Simulate, reduce, write."""
+    """Simulate machines, or pack what was simulated."""
     parser = argparse.ArgumentParser(description=__doc__)
+    steps = parser.add_subparsers(dest="step", required=True)
+    simulation = steps.add_parser("simulate", help="record machines and reduce them to a raw table")
     for name, n in MACHINES.items():
-        parser.add_argument(f"--{name}", type=int, default=n, help=f"machines of this simulator (default: {n})")
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--to", type=Path, required=True)
+        simulation.add_argument(f"--{name}", type=int, default=n, help=f"machines of this simulator (default: {n})")
+    simulation.add_argument("--processes", type=int, default=2)
+    simulation.add_argument("--to", type=Path, required=True)
+    packing = steps.add_parser("pack", help="pack raw tables for the library")
+    packing.add_argument("raw", type=Path, nargs="+")
+    packing.add_argument("--to", type=Path, default=POPULATION_FILE)
     given = vars(parser.parse_args())
-    jobs = [(name, i) for name in MACHINES for i in range(given[name.replace("-", "_")])]
+    if given["step"] == "pack":
+        pack(given["raw"], given["to"])
+    else:
+        jobs = [(name, i) for name in MACHINES for i in range(given[name.replace("-", "_")])]
+        simulate(jobs, given["processes"], given["to"])
+
+
+def simulate(jobs: Sequence[tuple[str, int]], n_processes: int, to: Path) -> None:
+    """Record machines, given by simulator and number, and write the table of their samples now and then."""
     samples: list[PopulationSample] = []
-    with ProcessPoolExecutor(given["processes"]) as pool:
-        for done, found in enumerate(pool.map(_one, jobs), start=1):
-            samples += found
-            if samples and (done % 10 == 0 or done == len(jobs)):
-                write(given["to"], samples)
-            typer.echo(f"{done} of {len(jobs)} machines, {len(samples)} recordings")
+    with ProcessPoolExecutor(n_processes) as pool:
+        for n_done, of_machine in enumerate(pool.map(_samples, jobs), start=1):
+            samples += of_machine
+            if samples and (n_done % 10 == 0 or n_done == len(jobs)):
+                write(to, samples)
+            typer.echo(f"{n_done} of {len(jobs)} machines, {len(samples)} recordings")
 
 
-def _one(job: tuple[str, int]) -> list[PopulationSample]:
+def _samples(job: tuple[str, int]) -> list[PopulationSample]:
     name, index = job
     return _SAMPLES_OF[name](index)
+
+
+TABLES = {
+    "changes": "change",
+    "change_scatter": "change_scatter",
+    "features": "features",
+    "feature_scatter": "feature_scatter",
+}
+"""Name in the library → name in the raw tables."""
+
+
+def pack(paths: Sequence[Path], to: Path) -> None:
+    """Read raw tables, write one packed table."""
+    raw = [np.load(path, allow_pickle=False) for path in paths]
+    tables = {name: _rounded(np.concatenate([one[key] for one in raw])) for name, key in TABLES.items()}
+    rigs = np.concatenate([one["rig"] for one in raw]).astype(np.int64)
+    simulated_rigs, first = np.unique(rigs, return_index=True)  # one twin for all recordings of a machine
+    for name in ("simulated", "simulated_scatter"):
+        tables[name] = _rounded(np.concatenate([one[name] for one in raw])[first])
+    np.savez_compressed(
+        to,
+        allow_pickle=False,
+        rigs=rigs,
+        simulated_rigs=simulated_rigs,
+        simulators=np.concatenate([one["simulator"] for one in raw]),
+        causes=np.concatenate([one["label"] for one in raw]),
+        by_hand=np.concatenate([one["detail"] for one in raw]) == BY_HAND,
+        loads_n_per_mm=np.concatenate([one["load_n_per_mm"] for one in raw]).astype(np.float32),
+        change_names=raw[0]["change_names"],
+        feature_names=raw[0]["feature_names"],
+        **tables,
+    )
+    typer.echo(f"{len(tables['changes'])} recordings; {to.stat().st_size / 1e6:.1f} MB")
+
+
+def _rounded(table: NDArray[np.float32]) -> NDArray[np.float16]:
+    """Return a table that packs well: to 1/16 dB, which no feature is known to."""
+    return (np.round(16.0 * table) / 16.0).astype(np.float16)
 
 
 if __name__ == "__main__":

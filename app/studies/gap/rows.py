@@ -1,8 +1,8 @@
-"""Drawn gearboxes of a model for the population of the gap diagnosis: sound, with effects, with signatures by hand."""
+"""Drawn gearboxes for the population of the gap diagnosis: healthy, with effects, with signatures by hand."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from zlib import crc32
@@ -84,7 +84,7 @@ class PopulationSample:
     names : (tuple of str, tuple of str)
         Of the changes and of the features.
     change, change_scatter : arrays, (n_changes,)
-        Against the sound reference.
+        Against the healthy reference.
     features, feature_scatter : arrays, (n_features,)
         Of the recording itself.
     simulated, simulated_scatter : arrays, (n_features,)
@@ -116,13 +116,13 @@ class PopulationBaseline:
     simulator : str
         Of the machine.
     rig : int
-    sound, simulated : Gathered
+    healthy, simulated : Gathered
         The reference, and the twin that knows the rig file only.
     """
 
     simulator: str
     rig: int
-    sound: ReducedRecording
+    healthy: ReducedRecording
     simulated: ReducedRecording
 
     def sample(
@@ -130,7 +130,7 @@ class PopulationBaseline:
     ) -> PopulationSample:
         """Return a recording's row."""
         now = reduced(recording, self.rig)
-        change, own, twin = change_features(now, self.sound), features_of(now), features_of(self.simulated)
+        change, own, twin = change_features(now, self.healthy), features_of(now), features_of(self.simulated)
         return PopulationSample(
             self.simulator,
             self.rig,
@@ -147,6 +147,14 @@ class PopulationBaseline:
             twin.values,
             twin.scatter,
         )
+
+    def samples(self, recordings: Iterable[tuple[str, str, float, Recording, float]]) -> Iterator[PopulationSample]:
+        """Yield the rows of label, detail, severity, recording and torque; what cannot be reduced is told."""
+        for label, detail, severity, recording, torque_nm in recordings:
+            try:
+                yield self.sample(label, detail, severity, recording, torque_nm)
+            except (InputError, RefusalError) as error:
+                typer.echo(f"machine {self.rig}, {label}: {error}")
 
 
 def reduced(recording: Recording, rig: int) -> ReducedRecording:
@@ -177,7 +185,7 @@ def write(path: Path, samples: Sequence[PopulationSample]) -> None:
 
 
 # --------------------
-# Vibration that no effect of the catalogue makes, added to recordings of sound machines: what "unknown" looks like.
+# Vibration that no effect of the catalogue makes, added to recordings of healthy machines: what "unknown" looks like.
 # --------------------
 
 
@@ -245,7 +253,7 @@ def _whirl(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
 
 def _other_machine(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """Lines at fixed frequencies, and their multiples."""
-    first = float(np.exp(rng.uniform(np.log(17.0), np.log(900.0))))
+    first = log_uniform(rng, 17.0, 900.0)
     waves = [np.sin(2 * np.pi * k * first * scene.time_s + rng.uniform(0, 6)) / k for k in range(1, 6)]
     machine: FloatArray = np.sum(waves, axis=0)
     return machine
@@ -317,7 +325,7 @@ class PopulationModel:
     first_rig : int
         Number of its first gearbox.
     n_mounted_anew, n_foreign, n_by_hand : int
-        Recordings of each gearbox: sound with sensors mounted anew, with foreign vibration, of each signature.
+        Recordings of each gearbox: healthy with sensors mounted anew, with foreign vibration, of each signature.
     simulated : tuple of float
         Of each recording with a simulated effect the share of the range of severities, see `PairTwin.draw`, that is
         left out: what hardly shows tells nothing, and beside what is usual most does not.
@@ -333,7 +341,7 @@ class PopulationModel:
 
 CRACKED = PopulationModel("cracked", 0, 4, 7, 3, (0.3, 0.6))
 REDUCED = PopulationModel("reduced-fe", 50_000, 3, 4, 1, (0.3, 0.6))
-N_SOUND = 3
+N_HEALTHY = 3
 N_PATHS = 2
 """Changed paths for each signature: nothing else shows them."""
 
@@ -353,13 +361,7 @@ def one_rig(model: PopulationModel, index: int) -> list[PopulationSample]:
     except (InputError, RefusalError) as error:
         typer.echo(f"gearbox {rig}: {error}")
         return []
-    samples = []
-    for label, detail, severity, recording, torque_nm in _recordings(model, drawn, twin, ordinary, rig):
-        try:
-            samples.append(compared.sample(label, detail, severity, recording, torque_nm))
-        except (InputError, RefusalError) as error:
-            typer.echo(f"gearbox {rig}, {label}: {error}")
-    return samples
+    return list(compared.samples(_recordings(model, drawn, twin, ordinary, rig)))
 
 
 def _run(twin: CrackedTwin, drawn: DrawnRig, rig: int) -> Recording:
@@ -375,29 +377,29 @@ def _recordings(
     Each draws from a seed of its own: where one effect is drawn otherwise, the others stay as they are.
     """
     bare: list[Recording] = []
-    sound: list[Recording] = []
-    for run in range(1, N_SOUND + 1):
+    healthy: list[Recording] = []
+    for run in range(1, N_HEALTHY + 1):
         rng = _chance(rig, NONE, run)
         day = another_day(drawn, rng)
         bare.append(_record(model, day, run))
-        sound.append(ordinary.on(bare[-1], turns_before(drawn, run), rng))
-        yield NONE, "", 0.0, sound[-1], drawn.torque_nm * day.torque_factor
+        healthy.append(ordinary.on(bare[-1], turns_before(drawn, run), rng))
+        yield NONE, "", 0.0, healthy[-1], drawn.torque_nm * day.torque_factor
     for i in range(model.n_mounted_anew):
-        recording = mounted_anew(sound[i % N_SOUND], _chance(rig, "mounted anew", i))
+        recording = mounted_anew(healthy[i % N_HEALTHY], _chance(rig, "mounted anew", i))
         yield NONE, "mounted anew", 0.0, recording, drawn.torque_nm
     for i in range(model.n_foreign):
-        recording, name = with_foreign_vibration(sound[i % N_SOUND], _chance(rig, UNKNOWN, i))
+        recording, name = with_foreign_vibration(healthy[i % N_HEALTHY], _chance(rig, UNKNOWN, i))
         yield UNKNOWN, name, 0.0, recording, drawn.torque_nm
-    for name in made_by_hand(sound[0], drawn.torque_nm):
+    for name in made_by_hand(healthy[0], drawn.torque_nm):
         for i in range(model.n_by_hand):
-            recording, strength = with_signature(sound[i % N_SOUND], name, _chance(rig, f"{name} {BY_HAND}", i))
+            recording, strength = with_signature(healthy[i % N_HEALTHY], name, _chance(rig, f"{name} {BY_HAND}", i))
             yield name, BY_HAND, strength, recording, drawn.torque_nm
     for i in range(N_PATHS * model.n_by_hand):
-        turns, rng = turns_before(drawn, i % N_SOUND + 1), _chance(rig, f"transfer_path {BY_HAND}", i)
-        recording, strength = _with_changed_path(ordinary, bare[i % N_SOUND], turns, rng)
+        turns, rng = turns_before(drawn, i % N_HEALTHY + 1), _chance(rig, f"transfer_path {BY_HAND}", i)
+        recording, strength = _with_changed_path(ordinary, bare[i % N_HEALTHY], turns, rng)
         yield "transfer_path", BY_HAND, strength, recording, drawn.torque_nm
     names = [e for e in effects() if e not in AT_THE_END]
-    for run, (above, name) in enumerate(((a, e) for a in model.simulated for e in names), start=N_SOUND + 1):
+    for run, (above, name) in enumerate(((a, e) for a in model.simulated for e in names), start=N_HEALTHY + 1):
         rng = _chance(rig, name, run)
         day = another_day(drawn, rng)
         try:
@@ -449,8 +451,8 @@ def _record(model: PopulationModel, day: OperatingDay, run: int, setting: Effect
 # --------------------
 
 
-FIRST_RIG, MOST_CONDITIONS = 100_000, 2
-LEAST_LEVEL = 0.25
+FIRST_RIG, MAX_CONDITIONS = 100_000, 2
+MIN_LEVEL = 0.25
 """0 (barely noticeable) to 1 (strong)."""
 ROUND = (*CATALOGUE, NONE)
 N_BY_HAND = 2
@@ -465,20 +467,20 @@ def one_case(index: int) -> list[PopulationSample]:
         "development",
         kind=NONE if wanted == NONE else "single",
         effect=None if wanted == NONE else wanted,
-        level=None if wanted == NONE else float(rng.uniform(LEAST_LEVEL, 1.0)),
+        level=None if wanted == NONE else float(rng.uniform(MIN_LEVEL, 1.0)),
         with_reference=True,
     )
     made = record_case(case)
-    sound = made.twins or made.conditions
+    healthy = made.twins or made.conditions
     samples: list[PopulationSample] = []
-    for i, (now, sound_now, reference) in enumerate(zip(made.conditions, sound, made.references, strict=True)):
-        rig, torque_nm = FIRST_RIG + MOST_CONDITIONS * index + i, case.conditions[i].stated_nm
+    for i, (now, healthy_now, reference) in enumerate(zip(made.conditions, healthy, made.references, strict=True)):
+        rig, torque_nm = FIRST_RIG + MAX_CONDITIONS * index + i, case.conditions[i].stated_nm
         severity = case.faults[0].severity if case.faults else 0.0
         try:
             compared = PopulationBaseline(INDEPENDENT, rig, reduced(reference, rig), _simulated(now, rig, torque_nm))
             samples += [
                 compared.sample(label, detail, severity if label == wanted else 0.0, recording, torque_nm)
-                for label, detail, recording in _recordings_independent(wanted, now, sound_now, torque_nm, rng)
+                for label, detail, recording in _recordings_independent(wanted, now, healthy_now, torque_nm, rng)
             ]
         except (InputError, RefusalError) as error:
             typer.echo(f"case {index}, {wanted}: {error}")
@@ -486,16 +488,16 @@ def one_case(index: int) -> list[PopulationSample]:
 
 
 def _recordings_independent(
-    wanted: str, now: Recording, sound: Recording, torque_nm: float, rng: np.random.Generator
+    wanted: str, now: Recording, healthy: Recording, torque_nm: float, rng: np.random.Generator
 ) -> Iterator[tuple[str, str, Recording]]:
     """Yield label, detail and recording."""
-    yield NONE, "", sound
+    yield NONE, "", healthy
     if wanted != NONE:
         yield wanted, "", now
-    recording, name = with_foreign_vibration(sound, rng)
+    recording, name = with_foreign_vibration(healthy, rng)
     yield UNKNOWN, name, recording
-    for name in rng.choice(made_by_hand(sound, torque_nm), N_BY_HAND, replace=False):
-        yield str(name), BY_HAND, with_signature(sound, str(name), rng)[0]
+    for name in rng.choice(made_by_hand(healthy, torque_nm), N_BY_HAND, replace=False):
+        yield str(name), BY_HAND, with_signature(healthy, str(name), rng)[0]
 
 
 def _simulated(now: Recording, rig: int, torque_nm: float) -> ReducedRecording:

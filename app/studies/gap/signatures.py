@@ -1,4 +1,4 @@
-"""The catalogue's effects as the literature describes them, put into recordings of sound machines.
+"""The catalogue's effects as the literature describes them, put into recordings of healthy machines.
 
 The population's own simulator shows each effect in one way, with one balance between its lines, sidebands and noise.
 Machines, and other simulators, agree with it on the signature and not on that balance: where a run-out modulates the
@@ -154,9 +154,9 @@ def band_noise(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
 # --------------------
 
 
-LOWEST_HZ, HIGHEST_OF_RATE = 150.0, 0.45
+MIN_HZ, HIGHEST_OF_RATE = 150.0, 0.45
 DAMPING_RATIOS = (0.01, 0.2)
-MOST_MODES = 3
+MAX_MODES = 3
 PEAK, SHIFT, GAIN = 3.0, 0.3, 0.3
 """Logarithms: by how much a mode is louder or softer at its frequency, how far it moves, what all is multiplied by; at
 the largest size, the latter two as standard deviations."""
@@ -223,8 +223,8 @@ def draw_path_changes(
     Unless it is everywhere, one channel alone may change.
     """
     places = [
-        (log_uniform(rng, LOWEST_HZ, HIGHEST_OF_RATE * rate_hz), log_uniform(rng, *DAMPING_RATIOS))
-        for _ in range(int(rng.integers(1, MOST_MODES + 1)))
+        (log_uniform(rng, MIN_HZ, HIGHEST_OF_RATE * rate_hz), log_uniform(rng, *DAMPING_RATIOS))
+        for _ in range(int(rng.integers(1, MAX_MODES + 1)))
     ]
     shifts = np.exp(SHIFT * size * rng.standard_normal(len(places)))
     only = int(rng.integers(n_channels)) if not everywhere and rng.uniform() < ONE_CHANNEL_SHARE else None
@@ -245,7 +245,7 @@ def draw_path_changes(
 
 
 N_MESH_HARMONICS = 6
-LOWEST_ABOUT_MESH = 0.3
+MIN_MESH_ORDER = 0.3
 """Mesh orders below which nothing goes with the mesh."""
 
 
@@ -333,7 +333,7 @@ def _about_the_mesh(values: FloatArray, gains: FloatArray, scene: SyntheticScene
     """Return a vibration with each stretch about a mesh harmonic `gains` times as large; shaft lines as they are."""
     turns_hz = (scene.revolutions[-1] - scene.revolutions[0]) / (scene.time_s[-1] - scene.time_s[0])
     mesh_orders = np.fft.rfftfreq(len(values), 1.0 / scene.sampling_rate_hz) / (turns_hz * scene.teeth[0])
-    logs = np.interp(mesh_orders, [LOWEST_ABOUT_MESH, *range(1, len(gains) + 1)], [0.0, *np.log(gains)])
+    logs = np.interp(mesh_orders, [MIN_MESH_ORDER, *range(1, len(gains) + 1)], [0.0, *np.log(gains)])
     found: FloatArray = np.fft.irfft(np.fft.rfft(values) * np.exp(logs), len(values))
     return found
 
@@ -352,7 +352,7 @@ def _mesh_change(values: FloatArray, gains: FloatArray, scene: SyntheticScene) -
 # --------------------
 
 
-LARGEST_ADVANCE = 0.35
+MAX_ADVANCE = 0.35
 """Of a mesh period, by which a tooth comes too early or too late."""
 
 
@@ -438,7 +438,7 @@ def _swollen(share: float, window: FloatArray) -> FloatArray:
 
 
 def _late(scene: SyntheticScene, share: float, window: FloatArray, rng: np.random.Generator) -> FloatArray:
-    late: FloatArray = sign(rng) * LARGEST_ADVANCE * min(share, 1.0) / scene.teeth[0] * window
+    late: FloatArray = sign(rng) * MAX_ADVANCE * min(share, 1.0) / scene.teeth[0] * window
     return late
 
 
@@ -466,7 +466,7 @@ SIZES = (0.06, 2.5)
 """Of a signature: from what nobody sees to several floors. Effects reach about as far as each other; where one ended
 before its look-alikes do, whatever is large would be one of those."""
 
-MOST_CHANNELS = 2
+MAX_CHANNELS = 2
 """Of vibration, in a simulated recording."""
 
 LOOSE_ORDERS = 10
@@ -544,7 +544,7 @@ def _pitch_error(scene: SyntheticScene, size: float, rng: np.random.Generator) -
     low = np.interp(place, nodes, np.append(run, run[0])) / max(float(run.std()), 1e-12)
     return Signature(
         np.maximum(1.0 + 0.6 * gain * size * louder, 0.0),
-        0.3 * LARGEST_ADVANCE * min(at * size, 1.0) / scene.teeth[0] * np.clip(early, -2.5, 2.5),
+        0.3 * MAX_ADVANCE * min(at * size, 1.0) / scene.teeth[0] * np.clip(early, -2.5, 2.5),
         (0.5 * slow * size * low,),
     )
 
@@ -606,7 +606,7 @@ def _modulated(
     gain, late = swings
     return Signature(
         _swing(scene, order, 0.8 * gain, rng),
-        LARGEST_ADVANCE * min(late, 1.0) / scene.teeth[0] * tone(order, scene, rng),
+        MAX_ADVANCE * min(late, 1.0) / scene.teeth[0] * tone(order, scene, rng),
         tuple(line * tone(n * order, scene, rng) for n, line in enumerate(lines, start=1)),
     )
 
@@ -743,7 +743,7 @@ def _bearing_clearance(scene: SyntheticScene, size: float, rng: np.random.Genera
         paths_scatter=1.4 * mesh * limited,
         around=partly(rng),
         uneven=partly(rng) * _uneven(scene, rng),
-        paths=draw_path_changes(MOST_CHANNELS, limited * partly(rng), scene.sampling_rate_hz, rng, everywhere=True),
+        paths=draw_path_changes(MAX_CHANNELS, limited * partly(rng), scene.sampling_rate_hz, rng, everywhere=True),
     )
 
 
@@ -768,7 +768,7 @@ HAND_MADE = (*SIGNATURES, "clipping")
 """Effects that have a signature here; the others are as the simulator makes them."""
 
 
-def made_by_hand(sound: Recording, torque_nm: float) -> tuple[str, ...]:
-    """Return whose signatures are put into a machine's sound recordings: no backlash where teeth never part."""
-    light = tooth_load_n_per_mm(rig_of(sound).pairs[0], torque_nm) < LIGHT_LOAD_N_PER_MM
+def made_by_hand(healthy: Recording, torque_nm: float) -> tuple[str, ...]:
+    """Return whose signatures are put into a machine's healthy recordings: no backlash where teeth never part."""
+    light = tooth_load_n_per_mm(rig_of(healthy).pairs[0], torque_nm) < LIGHT_LOAD_N_PER_MM
     return tuple(name for name in HAND_MADE if light or name != "backlash")

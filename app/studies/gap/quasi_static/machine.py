@@ -343,7 +343,7 @@ class StaticMachine:
         """Revolutions of either shaft per revolution of the driver."""
         return 1.0, self.drawn.teeth[0] / self.drawn.teeth[1]
 
-    def sound(self) -> QuasiStaticState:
+    def healthy(self) -> QuasiStaticState:
         """Return it with what manufacture left."""
         rng = np.random.default_rng([self.seed, 1])
         unit = self.rated_m

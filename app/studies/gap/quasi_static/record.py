@@ -41,7 +41,7 @@ LEAD_S = 0.3
 OUT_OF_REACH_M = 1.0
 TURNS_BEFORE = 40
 """Whole turns of the driver, at most, by which the teeth that meet differ from day to day."""
-LOWEST_NOISE_HZ = 20.0
+MIN_NOISE_HZ = 20.0
 RIPPLE = 0.3
 """By which play opens and shuts as elements pass."""
 SPEED_SCATTER, TORQUE_SCATTER, GAIN_SCATTER, NOISE_SCATTER, ANEW_SHARE = 0.005, 0.04, 0.1, 0.12, 0.6
@@ -184,7 +184,7 @@ def _noise(n: int, machine: StaticMachine, channel: int, rng: np.random.Generato
     from scipy.fft import irfft, rfft, rfftfreq
 
     slope = np.random.default_rng([machine.seed, 3, channel]).uniform(0.0, 1.0)
-    frequency = np.maximum(rfftfreq(n, 1.0 / machine.rate_hz), LOWEST_NOISE_HZ)
+    frequency = np.maximum(rfftfreq(n, 1.0 / machine.rate_hz), MIN_NOISE_HZ)
     noise = irfft(rfft(rng.standard_normal(n)) * frequency ** (-slope / 2.0), n)
     coloured: FloatArray = noise * (machine.noise_share[channel] / noise.std())
     return coloured
@@ -208,7 +208,7 @@ def _tachometer(turns: FloatArray, time: FloatArray, at: FloatArray, rng: np.ran
 
 QUASI_STATIC = "quasi-static"
 FIRST_RIG = 200_000
-N_SOUND, N_EACH, N_FOREIGN, N_BY_HAND, N_PATHS = 2, 1, 2, 3, 2
+N_HEALTHY, N_EACH, N_FOREIGN, N_BY_HAND, N_PATHS = 2, 1, 2, 3, 2
 
 
 def one_static(index: int) -> list[PopulationSample]:
@@ -216,9 +216,9 @@ def one_static(index: int) -> list[PopulationSample]:
     rng, rig = np.random.default_rng([SEED, 3, index]), FIRST_RIG + index
     machine = StaticMachine.of(rng)
     torque_nm = machine.drawn.torque_nm
-    levels = record(machine, machine.sound(), QuasiStaticDay.drawn(rng), None).samples[:-1].std(axis=1)
+    levels = record(machine, machine.healthy(), QuasiStaticDay.drawn(rng), None).samples[:-1].std(axis=1)
     try:
-        reference = record(machine, machine.sound(), QuasiStaticDay.drawn(rng), levels)
+        reference = record(machine, machine.healthy(), QuasiStaticDay.drawn(rng), levels)
         twin = CrackedTwin(machine.rig, machine.nominal).run(
             OperatingCondition(machine.drawn.speed_rpm, torque_nm),
             seed=rig,
@@ -230,38 +230,33 @@ def one_static(index: int) -> list[PopulationSample]:
     except (InputError, RefusalError) as error:
         typer.echo(f"machine {rig}: {error}")
         return []
-    samples = []
-    for label, detail, recording in (*_recordings(machine, levels, rng), *_changed_paths(machine, levels)):
-        try:
-            samples.append(compared.sample(label, detail, 0.0, recording, torque_nm))
-        except (InputError, RefusalError) as error:
-            typer.echo(f"machine {rig}, {label}: {error}")
-    return samples
+    recordings = (*_recordings(machine, levels, rng), *_changed_paths(machine, levels))
+    return list(compared.samples((label, detail, 0.0, recording, torque_nm) for label, detail, recording in recordings))
 
 
 def _recordings(
     machine: StaticMachine, levels: np.ndarray, rng: np.random.Generator
 ) -> Iterator[tuple[str, str, Recording]]:
     """Yield label, detail and recording."""
-    sound = [record(machine, machine.sound(), QuasiStaticDay.drawn(rng), levels) for _ in range(N_SOUND)]
-    for recording in sound:
+    healthy = [record(machine, machine.healthy(), QuasiStaticDay.drawn(rng), levels) for _ in range(N_HEALTHY)]
+    for recording in healthy:
         yield NONE, "", recording
     for name, effect in EFFECTS.items():
         for _ in range(N_EACH):
-            state = machine.sound()
+            state = machine.healthy()
             effect(machine, state, rng)
             yield name, "", record(machine, state, QuasiStaticDay.drawn(rng), levels)
     for i in range(N_FOREIGN):
-        recording, name = with_foreign_vibration(sound[i % N_SOUND], rng)
+        recording, name = with_foreign_vibration(healthy[i % N_HEALTHY], rng)
         yield UNKNOWN, name, recording
-    for i, name in enumerate(rng.choice(made_by_hand(sound[0], machine.drawn.torque_nm), N_BY_HAND, replace=False)):
-        yield str(name), BY_HAND, with_signature(sound[i % N_SOUND], str(name), rng)[0]
+    for i, name in enumerate(rng.choice(made_by_hand(healthy[0], machine.drawn.torque_nm), N_BY_HAND, replace=False)):
+        yield str(name), BY_HAND, with_signature(healthy[i % N_HEALTHY], str(name), rng)[0]
 
 
 def _changed_paths(machine: StaticMachine, levels: np.ndarray) -> Iterator[tuple[str, str, Recording]]:
     """Yield recordings that come through other paths, from a seed of their own."""
     rng = np.random.default_rng([machine.seed, 5])
     for _ in range(N_PATHS):
-        state = machine.sound()
+        state = machine.healthy()
         state.paths = draw_path_changes(N_CHANNELS, size_of(rng.uniform()), machine.rate_hz, rng)
         yield "transfer_path", "", record(machine, state, QuasiStaticDay.drawn(rng), levels)
