@@ -24,7 +24,8 @@ from app.benchmark.scoring.scores import Measure, Score, brier_of, calibration_e
 from gearsig import __version__
 from gearsig.checks import count, one_of
 from gearsig.gap import NAMING, NONE, UNKNOWN, GapOutcome
-from sims.blind_drive import CATALOGUE, OUTSIDE, ROLES, draw_case, label_of, record_case
+from gearsig.recording import Recording
+from sims.blind_drive import CATALOGUE, OUTSIDE, ROLES, DriveCase, draw_case, label_of, record_case
 from sims.sweep import written
 
 SHARES = {"none": 0.3, "single": 0.55, "unknown": 0.15}
@@ -78,7 +79,7 @@ class DrivePlan:
 
     def with_reference(self, number: int, effect: str) -> bool:
         """Whether a case has a healthy reference: an effect without a sound value in the drawing always has."""
-        if effect and (CATALOGUE | OUTSIDE)[effect].needs_reference:
+        if needs_reference(effect):
             return True
         return number % 2 == 0 if self.reference == "both" else self.reference == "with"
 
@@ -94,10 +95,8 @@ class DriveDone:
 
 def make_drive_case(plan: DrivePlan, number: int, folder: Path | None) -> dict[str, Any]:
     """Make a case; write what may be seen into `folder` (None: nowhere); return the label."""
-    kind, effect, level = planned(plan.n_cases, plan.seed)[number]
-    rng = np.random.default_rng([plan.seed, 1, number])
-    reference = plan.with_reference(number, effect)
-    case = draw_case(rng, plan.role, kind=kind, effect=effect, level=level, with_reference=reference)
+    asked = planned(plan.n_cases, plan.seed)[number]
+    case = drawn_case(plan.role, plan.seed, number, asked, with_reference=plan.with_reference(number, asked[1]))
     if folder is not None:
         from gearsig.recording import write_recording
         from gearsig.rig import write_rig
@@ -108,6 +107,27 @@ def make_drive_case(plan: DrivePlan, number: int, folder: Path | None) -> dict[s
                 write_recording(recording, folder / f"{stem}.h5")
                 write_rig(recording.rig, folder / f"{stem}.toml")
     return label_of(case)
+
+
+def drawn_case(role: str, seed: int, number: int, asked: tuple[str, str, float], *, with_reference: bool) -> DriveCase:
+    """Return a case of a plan: kind, effect and level as asked, all else from the seed and the case's number."""
+    kind, effect, level = asked
+    rng = np.random.default_rng([seed, 1, number])
+    return draw_case(rng, role, kind=kind, effect=effect, level=level, with_reference=with_reference)
+
+
+def labelled_recordings(
+    role: str, seed: int, number: int, asked: tuple[str, str, float]
+) -> tuple[dict[str, Any], Recording, Recording | None]:
+    """Return label, recording and healthy reference of a case for calibration."""
+    case = drawn_case(role, seed, number, asked, with_reference=True)
+    made = record_case(case)
+    return label_of(case), made.recording, made.reference
+
+
+def needs_reference(effect: str) -> bool:
+    """Whether an effect shows against a healthy reference only: no drawing says what is usual."""
+    return bool(effect) and (CATALOGUE | OUTSIDE)[effect].needs_reference
 
 
 def run_drive_benchmark(

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from app.benchmark.start_stop import planned
+from app.benchmark.start_stop import labelled_recordings, needs_reference, planned
 from gearsig.checks import FloatArray
 from gearsig.gap import NONE, UNKNOWN, GapCalibration
 from gearsig.gap.start_stop import (
@@ -29,7 +29,6 @@ from gearsig.gap.start_stop import (
     evidence_of_drive,
     predictions_of,
 )
-from sims.blind_drive import CATALOGUE, OUTSIDE, draw_case, label_of, record_case
 from sims.forging import forging_gap_simulator
 
 ROLE = "calibration"
@@ -47,15 +46,13 @@ Row = tuple[Mapping[str, Any], DriveEvidence]
 
 def collect(role: str, seed: int, number: int, plan: tuple[str, str, float]) -> list[Row]:
     """Make a case and return what is seen of it with its reference and without."""
-    kind, effect, level = plan
-    rng = np.random.default_rng([seed, 1, number])
-    case = draw_case(rng, role, kind=kind, effect=effect, level=level, with_reference=True)
-    made, label = record_case(case), label_of(case)
-    simulator, rows = forging_gap_simulator(), list[Row]()
-    for reference in (made.reference, None):
-        if reference is None and effect and (CATALOGUE | OUTSIDE)[effect].needs_reference:
+    label, recording, healthy = labelled_recordings(role, seed, number, plan)
+    simulator = forging_gap_simulator()
+    rows: list[Row] = []
+    for reference in (healthy, None):
+        if reference is None and needs_reference(plan[1]):
             continue
-        compared = compared_of(made.recording, reference, simulator)
+        compared = compared_of(recording, reference, simulator)
         seen = evidence_of_drive(compared, predictions_of(compared, simulator.gap_effects()).causes)
         rows.append(({**label, "with_reference": reference is not None}, seen))
     return rows
