@@ -54,6 +54,20 @@ def test_the_result_is_the_report_and_its_files(job):
     assert 0.5 < job.progress[1] <= 1.0
 
 
+def test_a_users_own_app_in_the_working_folder_breaks_nothing(tmp_path, monkeypatch):
+    for name, value in environment(tmp_path).items():
+        monkeypatch.setenv(name, value)
+    (tmp_path / "work").mkdir()
+    (tmp_path / "work" / "app.py").write_text("raise SystemExit(3)")
+    monkeypatch.chdir(tmp_path / "work")
+    job = Job(private_folder(), ASKED, "cracked", cache=None)
+    try:
+        wait(lambda: not job.is_running)
+        assert job.report().verdict == effect_report().verdict
+    finally:
+        job.close()
+
+
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at processes where Linux shows them")
 @pytest.mark.parametrize("job", [{SECONDS: "60", CHILD: "{folder}/child"}], indirect=True)
 @pytest.mark.parametrize("way", ["stop", "parent gone"])

@@ -12,7 +12,7 @@ from app.cli.main import main
 from app.samples import sample_folder
 from gearsig.errors import InputError
 from gearsig.gap import NONE, Added, GapOutcome, diagnose_gap
-from gearsig.gap.start_stop import TRIED, compared_of, drive_report, weighed_drive
+from gearsig.gap.start_stop import TRIED, attributed_drive, compared_of, drive_report
 from gearsig.recording import write_recording
 from gearsig.report import gap_schema, read_gap_json
 from gearsig.rig import write_rig
@@ -87,7 +87,7 @@ def wider():
     """All that the report of a drive with more play is made of."""
     now, healthy = made(2, {"backlash": 120.0}), made(1)
     effects = SIMULATOR.gap_effects()
-    return weighed_drive(
+    return attributed_drive(
         [now], [now.rig], [healthy], [healthy.rig], SIMULATOR, effects, ["now"], ["reference 1"], lambda *_: None
     )
 

@@ -256,7 +256,7 @@ def _curve_um(motion: PairMotion) -> FloatArray | None:
         cycles = PreparedCycles(cut_cycles(motion))
     except RefusalError:
         return None
-    return cycles.tell(cycles.every).contact.curve_um
+    return cycles.features(cycles.every).contact.curve_um
 
 
 # --------------------

@@ -66,11 +66,11 @@ def truth_of(label: Mapping[str, Any]) -> str:
 def fit_part(rows: Sequence[Row]) -> dict[str, Any]:
     """Return floors and calibration of all cases with a reference, or of all without, as plain values."""
     healthy = [seen for label, seen in rows if label["kind"] == "none"]
-    whole = DriveFloor.of_sound(
+    whole = DriveFloor.of_healthy(
         np.array([seen.whole for seen in healthy]), np.array([seen.scatter for seen in healthy])
     )
     halves = [(fold.fitted_to, HALF * seen.scatter) for seen in healthy for fold in seen.folds]
-    half = DriveFloor.of_sound(np.array([change for change, _ in halves]), np.array([error for _, error in halves]))
+    half = DriveFloor.of_healthy(np.array([change for change, _ in halves]), np.array([error for _, error in halves]))
     weighed = [(truth_of(label), attribute_drive([seen], (whole, half))) for label, seen in rows]
     calibration = fit_calibration(weighed)
     return {

@@ -21,7 +21,7 @@ from gearsig.gap.start_stop._attribution import (
     shrink,
 )
 from gearsig.gap.start_stop._comparison import TRIED, DriveComparison, SimulatedDrive, evidence_of_drive
-from gearsig.gap.start_stop._diagnose import compared_of, predictions_of, weighed_drive
+from gearsig.gap.start_stop._diagnose import attributed_drive, compared_of, predictions_of
 from gearsig.gap.start_stop._features import (
     COMPRESSION,
     N_PLACES,
@@ -29,9 +29,9 @@ from gearsig.gap.start_stop._features import (
     PHASES,
     UNITS,
     CycledMotion,
+    CycleFeatures,
     LocatedDriveChange,
     PreparedCycles,
-    Told,
     change_of,
     cut_cycles,
     halves,
@@ -51,6 +51,7 @@ __all__ = [
     "PHASES",
     "TRIED",
     "UNITS",
+    "CycleFeatures",
     "CycledMotion",
     "DriveAttribution",
     "DriveComparison",
@@ -62,8 +63,8 @@ __all__ = [
     "Predicted",
     "PreparedCycles",
     "SimulatedDrive",
-    "Told",
     "attribute_drive",
+    "attributed_drive",
     "change_of",
     "compared_of",
     "cut_cycles",
@@ -83,5 +84,4 @@ __all__ = [
     "shrink",
     "spot_of",
     "thin",
-    "weighed_drive",
 ]

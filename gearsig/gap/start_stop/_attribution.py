@@ -18,16 +18,16 @@ from gearsig.gap._types import NONE, UNKNOWN, Interval, Shrinkage
 from gearsig.gap.start_stop._features import NAMES
 
 # --------------------
-# How far sound drives lie from what they are compared with: the structural floor of start–stop changes.
+# How far healthy drives lie from what they are compared with: the structural floor of start–stop changes.
 # --------------------
 
 
 FLOORS_FILE = Path(__file__).with_name("floors.json")
-LEAST_DB, LEAST_SIGNED_DB = 0.15, 0.87
+MIN_DB, MIN_SIGNED_DB = 0.15, 0.87
 """Of a scale: 2 % of a level; a fifth of the step of what is ordinarily near zero."""
 LEVELS = ("play", "deflection", "inertia", "load_friction", "impact", "contact_scatter", "load_scatter")
 FLOOR = 1.96
-"""Scales of the middle of the distribution: 19 of 20 sound machines stay below."""
+"""Scales of the middle of the distribution: 19 of 20 healthy machines stay below."""
 TAIL = 4.0
 """Degrees of freedom: a feature lies far off oftener than a normal one."""
 SUM_POWER = 4.0
@@ -37,14 +37,14 @@ N_BISECTIONS = 40
 
 @dataclass(frozen=True)
 class DriveFloor:
-    """Middle and scale of each change of sound drives.
+    """Middle and scale of each change of healthy drives.
 
     Parameters
     ----------
     centre, scale : array, (n,) by `NAMES`
         dB.
     whole : float
-        Size of the whole change that one sound drive in twenty exceeds.
+        Size of the whole change that one healthy drive in twenty exceeds.
     """
 
     centre: FloatArray
@@ -52,8 +52,8 @@ class DriveFloor:
     whole: float
 
     @classmethod
-    def of_sound(cls, rows: FloatArray, scatters: FloatArray | None = None) -> DriveFloor:
-        """Return the floor of a table of changes of sound drives, (n_drives, n); nan where a change could not be told.
+    def of_healthy(cls, rows: FloatArray, scatters: FloatArray | None = None) -> DriveFloor:
+        """Return the floor of a table of changes of healthy drives, (n_drives, n); nan where a change is not known.
 
         The scale is the half width of the middle 80 % over 1.28: what lies far off is the tail's, see `log_density`.
         What a recording's own cycles scatter by is taken out of it: coarse encoders are no property of other drives.
@@ -71,7 +71,7 @@ class DriveFloor:
         for i in range(table.shape[1]):
             values, own = table[known[:, i], i], errors[known[:, i], i]
             if len(values) >= 5:
-                least = LEAST_DB if NAMES[i] in LEVELS else LEAST_SIGNED_DB
+                least = MIN_DB if NAMES[i] in LEVELS else MIN_SIGNED_DB
                 centre[i], scale[i] = _centre(values, own), least
                 scale[i] = max(_scale(values - centre[i], own), least)
         sizes = [_soft((r - centre) / (FLOOR * np.hypot(scale, e))) for r, e in zip(table, errors, strict=True)]
@@ -82,7 +82,7 @@ class DriveFloor:
         return replace(self, scale=np.hypot(self.scale, np.nan_to_num(scatter)))
 
     def size(self, change: FloatArray) -> float:
-        """Return the size of a whole change; 1: one sound drive in twenty is that far."""
+        """Return the size of a whole change; 1: one healthy drive in twenty is that far."""
         return _soft((change - self.centre) / (FLOOR * self.scale)) / self.whole
 
     def log_density(self, change: FloatArray, predicted: FloatArray, widen: FloatArray | float = 0.0) -> FloatArray:
@@ -232,7 +232,7 @@ class FittedDriveCause:
 
 
 def fit(cause: Predicted, change: FloatArray, floor: DriveFloor) -> FittedDriveCause:
-    """Fit a cause's severity to a change; what would change less than sound machines differ by is none, not a cause.
+    """Fit a cause's severity to a change; what would change less than healthy machines differ by is none, not a cause.
 
     How much is read from what measures it directly, as far as anything does; whether it is this cause, from all changes
     with the same margin, since machines of one drawing answer differently.
@@ -265,13 +265,13 @@ def fit(cause: Predicted, change: FloatArray, floor: DriveFloor) -> FittedDriveC
 def evidences(change: FloatArray, floor: DriveFloor, fits: Sequence[FittedDriveCause]) -> dict[str, float]:
     """Return the logarithm of the evidence of every cause, of none and of unknown.
 
-    Unknown: one change, whichever, is far wider than sound machines', or two, or all of them.
+    Unknown: one change, whichever, is far wider than healthy machines', or two, or all of them.
     """
-    sound = floor.log_density(change, np.zeros(len(change)))
+    healthy = floor.log_density(change, np.zeros(len(change)))
     known = np.flatnonzero(np.isfinite(change))
     wide = floor.log_density(change, np.zeros(len(change)), WIDE * floor.scale)
-    gains = (wide - sound)[known]
-    total = float(np.sum(sound))
+    gains = (wide - healthy)[known]
+    total = float(np.sum(healthy))
     alone = total + float(np.log(np.mean(np.exp(np.minimum(gains, 200.0))))) if len(known) else total
     every = float(np.sum(floor.log_density(change, np.zeros(len(change)), ALL_WIDE * floor.scale)))
     pairs = [a + b for i, a in enumerate(gains) for b in gains[:i]]

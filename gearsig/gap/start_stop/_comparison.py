@@ -25,9 +25,9 @@ from gearsig.gap.start_stop._features import (
     NAMES,
     PHASES,
     CycledMotion,
+    CycleFeatures,
     LocatedDriveChange,
     PreparedCycles,
-    Told,
     change_of,
     cut_cycles,
     halves,
@@ -59,7 +59,7 @@ class SeverityGrid:
     needs : str
         Channel without which it cannot be told: "torque", or empty.
     needs_reference : bool
-        Whether the sound value stands in no drawing.
+        Whether the healthy value stands in no drawing.
     """
 
     severities: tuple[float, ...]
@@ -121,7 +121,7 @@ class SimulatedDrive:
         return self._cycles(())
 
     @cached_property
-    def healthy(self) -> Told:
+    def healthy(self) -> CycleFeatures:
         """What the healthy drive's cycles tell."""
         return _of_all(self.healthy_run)
 
@@ -136,7 +136,7 @@ class SimulatedDrive:
         """See `DriveTwin.worn_curve_um`."""
         return self.twin.worn_curve_um(self.healthy.contact.deflection_um, depth_um, N_PLACES)
 
-    def features(self, *added: Added) -> Told:
+    def features(self, *added: Added) -> CycleFeatures:
         """Run the drive with effects and return what its cycles tell."""
         return _of_all(self._cycles(added))
 
@@ -148,13 +148,15 @@ class SimulatedDrive:
         return PreparedCycles(cut_cycles(measure_motion(self.twin.run(added), use={"force": ""})))
 
 
-def _of_all(run: PreparedCycles) -> Told:
+def _of_all(run: PreparedCycles) -> CycleFeatures:
     """Return what all cycles of a run tell; teeth that a short run does not pass are like the others."""
-    told = run.tell(run.every)
-    return replace(told, contact=replace(told.contact, teeth_um=np.nan_to_num(told.contact.teeth_um)))
+    features = run.features(run.every)
+    return replace(features, contact=replace(features.contact, teeth_um=np.nan_to_num(features.contact.teeth_um)))
 
 
-def simulated_drive(simulator: DriveSimulator, cycles: CycledMotion, told: Told, sound: Told | None) -> SimulatedDrive:
+def simulated_drive(
+    simulator: DriveSimulator, cycles: CycledMotion, features: CycleFeatures, healthy: CycleFeatures | None
+) -> SimulatedDrive:
     """Set a simulated drive to a rig and a recording.
 
     Geometry, inertias, contact, friction of the flanks and play are the rig's; where a healthy recording tells play,
@@ -164,15 +166,15 @@ def simulated_drive(simulator: DriveSimulator, cycles: CycledMotion, told: Told,
     m = cycles.motion
     contact, ratio = m.contact, m.path.teeth[1] / m.path.teeth[0]
     torque_nm, brake_nm = _torques(m)
-    friction_nm = told.load.friction_nm if sound is None else sound.load.friction_nm
+    friction_nm = features.load.friction_nm if healthy is None else healthy.load.friction_nm
     if not 0.0 < friction_nm < 0.9 * torque_nm * ratio:
         friction_nm = ORDINARY_FRICTION * torque_nm * ratio
     inertia = contact.driven_inertia_kg_m2 or USUAL_INERTIA_KG_M2
     contact = replace(contact, driven_inertia_kg_m2=inertia)
-    if sound is not None and sound.contact.play_um > 0.0:
-        contact = replace(contact, half_backlash_um=0.5 * sound.contact.play_um)
-    if sound is not None and sound.load.inertia_kg_m2 > 0.0:
-        contact = replace(contact, driven_inertia_kg_m2=sound.load.inertia_kg_m2)
+    if healthy is not None and healthy.contact.play_um > 0.0:
+        contact = replace(contact, half_backlash_um=0.5 * healthy.contact.play_um)
+    if healthy is not None and healthy.load.inertia_kg_m2 > 0.0:
+        contact = replace(contact, driven_inertia_kg_m2=healthy.load.inertia_kg_m2)
     top_speed = float(np.quantile(np.abs(m.driver_speed_rad_s), 0.98))
     on_s, off_s = _times(cycles)
     facts = DriveFacts(m.path, contact, _module_mm(m), torque_nm, brake_nm, friction_nm, top_speed, on_s, off_s)
@@ -215,12 +217,12 @@ def _times(cycles: CycledMotion) -> tuple[float, float]:
 # --------------------
 
 
-MOST_BLOCKS = 8
+MAX_BLOCKS = 8
 
 
 @dataclass(frozen=True)
 class DriveComparison:
-    """One recording beside its sound reference, or beside the simulated drive.
+    """One recording beside its healthy reference, or beside the simulated drive.
 
     Parameters
     ----------
@@ -236,28 +238,28 @@ class DriveComparison:
     drive: SimulatedDrive
 
     @cached_property
-    def other(self) -> Told:
+    def other(self) -> CycleFeatures:
         """What it is compared with."""
-        return self.drive.healthy if self.reference is None else self.reference.tell(self.reference.every)
+        return self.drive.healthy if self.reference is None else self.reference.features(self.reference.every)
 
     @cached_property
-    def told(self) -> Told:
+    def features(self) -> CycleFeatures:
         """What all cycles tell."""
-        return self.now.tell(self.now.every)
+        return self.now.features(self.now.every)
 
     @cached_property
     def spot(self) -> LocatedDriveChange:
         """Tooth and order that changed most."""
-        return spot_of(self.told, self.other)
+        return spot_of(self.features, self.other)
 
     @cached_property
     def change(self) -> FloatArray:
         """Of all cycles."""
-        return change_of(self.told, self.other, self.drive.shape)
+        return change_of(self.features, self.other, self.drive.shape)
 
     def change_in(self, cycles: tuple[int, ...], at: LocatedDriveChange | None = None) -> FloatArray:
         """Return the change of some cycles."""
-        return change_of(self.now.tell(cycles), self.other, self.drive.shape, at)
+        return change_of(self.now.features(cycles), self.other, self.drive.shape, at)
 
     @property
     def halves(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -281,17 +283,19 @@ class DriveComparison:
         if self.reference is None:
             return np.zeros((1, len(NAMES)))
         kept = _but_each(self.reference.every)
-        return np.array([change_of(self.told, self.reference.tell(one), self.drive.shape, self.spot) for one in kept])
+        return np.array(
+            [change_of(self.features, self.reference.features(one), self.drive.shape, self.spot) for one in kept]
+        )
 
     def floor(self, part: str = "whole") -> DriveFloor:
-        """Return how far sound drives lie from what this is compared with, as far as it can be told of this one."""
+        """Return how far healthy drives lie from what this is compared with, as far as it can be told of this one."""
         floor = load_floor(with_reference=self.reference is not None, part=part)
         return floor.widened(self.scatter * (1.0 if part == "whole" else HALF))
 
 
 def _but_each(every: tuple[int, ...]) -> list[tuple[int, ...]]:
     """Return all cycles but one, for each; or but one of eight blocks."""
-    blocks = np.array_split(np.array(every), min(len(every), MOST_BLOCKS))
+    blocks = np.array_split(np.array(every), min(len(every), MAX_BLOCKS))
     return [tuple(c for c in every if c not in block) for block in blocks]
 
 
@@ -327,8 +331,8 @@ def predict(
     """Simulate every cause at some severities.
 
     Worn flanks and a cracked tooth move the gears against each other by hundredths of a millimetre; that is added to
-    what the sound drive tells, without the noise of a run: the play by the mean depth over the mesh cycle, the curve by
-    its shape (the drive in motion agrees, see the tests), a tooth by what its lost stiffness lets it yield. A sensor
+    what the healthy drive tells, without the noise of a run: the play by the mean depth over the mesh cycle, the curve
+    by its shape (the drive in motion agrees, see the tests), a tooth by what its lost stiffness lets it yield. A sensor
     that misreads changes no motion. All others are run.
 
     Parameters
@@ -343,7 +347,7 @@ def predict(
     tell : callable
         Is told the cause and the share that is done.
     with_reference : bool
-        Whether a sound recording is compared with, and not the simulated drive.
+        Whether a healthy recording is compared with, and not the simulated drive.
     """
     options: dict[str, dict[str, float | str]] = {
         CRACK: {"gear": "driver", "tooth": float(spot.tooth + 1)},
@@ -355,12 +359,12 @@ def predict(
         rows, kept = [], []
         shown = np.isin(NAMES, effect.shows_in)
         for severity in TRIED[name].severities:
-            told = (
+            features = (
                 _misread(drive, severity, with_reference=with_reference)
                 if name == TORQUE_GAIN
-                else _told(drive, name, severity, options.get(name, {}), spot)
+                else _features_with(drive, name, severity, options.get(name, {}), spot)
             )
-            change = None if told is None else change_of(told, drive.healthy, drive.shape, spot)
+            change = None if features is None else change_of(features, drive.healthy, drive.shape, spot)
             if change is not None and np.isfinite(change[shown]).any():  # else it stands still
                 rows.append(change)
                 kept.append(severity)
@@ -371,9 +375,9 @@ def predict(
     return Predictions(causes, {name: options.get(name, {}) for name in causes})
 
 
-def _told(
+def _features_with(
     drive: SimulatedDrive, name: str, severity: float, options: dict[str, float | str], spot: LocatedDriveChange
-) -> Told | None:
+) -> CycleFeatures | None:
     """Return what a drive with a cause tells; None where it cannot run: a load that cannot be moved, say."""
     if name == WEAR:
         return _worn(drive, severity)
@@ -384,40 +388,40 @@ def _told(
         return None
 
 
-def _worn(drive: SimulatedDrive, depth_um: float) -> Told:
-    sound, curve = drive.healthy, drive.worn_curve_um(depth_um)
+def _worn(drive: SimulatedDrive, depth_um: float) -> CycleFeatures:
+    healthy, curve = drive.healthy, drive.worn_curve_um(depth_um)
     mean = float(np.mean(curve))
     contact = replace(
-        sound.contact,
-        play_um=sound.contact.play_um + mean,
-        curve_um=sound.contact.curve_um + curve - mean,
+        healthy.contact,
+        play_um=healthy.contact.play_um + mean,
+        curve_um=healthy.contact.curve_um + curve - mean,
     )
-    return replace(sound, contact=contact)
+    return replace(healthy, contact=contact)
 
 
-def _misread(drive: SimulatedDrive, percent: float, *, with_reference: bool) -> Told:
+def _misread(drive: SimulatedDrive, percent: float, *, with_reference: bool) -> CycleFeatures:
     """Return what a torque sensor of another gain makes of the same motion.
 
     Inertia and friction of the load follow from the torque, and grow with the reading. What the teeth yield does not:
-    it stays as in a sound recording, and falls behind a simulated drive, which is driven by the torque that was read.
+    it stays as in a healthy recording, and falls behind a simulated drive, which is driven by the torque that was read.
     That one also takes the friction of its load from the recording.
     """
-    gain, sound = 1.0 + 0.01 * percent, drive.healthy
-    load = replace(sound.load, inertia_kg_m2=gain * sound.load.inertia_kg_m2)
+    gain, healthy = 1.0 + 0.01 * percent, drive.healthy
+    load = replace(healthy.load, inertia_kg_m2=gain * healthy.load.inertia_kg_m2)
     if with_reference:
-        return replace(sound, load=replace(load, friction_nm=gain * sound.load.friction_nm))
-    yielding = sound.contact.deflection_um * gain ** (-1.0 / drive.exponent)
-    return replace(sound, load=load, contact=replace(sound.contact, deflection_um=yielding))
+        return replace(healthy, load=replace(load, friction_nm=gain * healthy.load.friction_nm))
+    yielding = healthy.contact.deflection_um * gain ** (-1.0 / drive.exponent)
+    return replace(healthy, load=load, contact=replace(healthy.contact, deflection_um=yielding))
 
 
-def _cracked(drive: SimulatedDrive, crack: Added, spot: LocatedDriveChange) -> Told:
+def _cracked(drive: SimulatedDrive, crack: Added, spot: LocatedDriveChange) -> CycleFeatures:
     """Let one tooth yield more, g grows as (1 − loss)^{−1/λ}, among teeth that differ as the recording's do."""
-    sound, loss = drive.healthy, drive.twin.crack_stiffness_loss(crack)
-    extra = sound.contact.deflection_um * ((1.0 - loss) ** (-1.0 / drive.exponent) - 1.0)
-    teeth = sound.contact.teeth_um.copy()
+    healthy, loss = drive.healthy, drive.twin.crack_stiffness_loss(crack)
+    extra = healthy.contact.deflection_um * ((1.0 - loss) ** (-1.0 / drive.exponent) - 1.0)
+    teeth = healthy.contact.teeth_um.copy()
     teeth[(spot.tooth + len(teeth) // 2) % len(teeth)] += spot.next_tooth_um
     teeth[spot.tooth] += max(extra, spot.next_tooth_um)
-    return replace(sound, contact=replace(sound.contact, teeth_um=teeth))
+    return replace(healthy, contact=replace(healthy.contact, teeth_um=teeth))
 
 
 def evidence_of_drive(compared: DriveComparison, predicted: Mapping[str, Predicted]) -> DriveEvidence:
@@ -428,7 +432,7 @@ def evidence_of_drive(compared: DriveComparison, predicted: Mapping[str, Predict
 
 
 def _fold(compared: DriveComparison, ours: tuple[int, ...], theirs: tuple[int, ...]) -> CycleFold:
-    here = compared.now.tell(ours)
+    here = compared.now.features(ours)
     spot = spot_of(here, compared.other)
     blocks = [tuple(c for c in theirs if c != one) for one in theirs] if len(theirs) > 1 else [theirs]
     n_teeth, n_orders = len(here.contact.teeth_um), len(here.ripple)

@@ -82,11 +82,11 @@ def diagnose_start_stop(
         If a recording holds no start and stop, or no motion of both gears, or the rig no contact.
     """
     return drive_report(
-        weighed_drive(recordings, rigs, references, reference_rigs, simulator, effects, names, reference_names, tell)
+        attributed_drive(recordings, rigs, references, reference_rigs, simulator, effects, names, reference_names, tell)
     )
 
 
-def weighed_drive(
+def attributed_drive(
     recordings: Sequence[Recording],
     rigs: Sequence[Rig],
     references: Sequence[Recording],
@@ -167,10 +167,10 @@ def compared_of(
 def _compared(
     name: str, now: PreparedCycles, healthy: Sequence[PreparedCycles], simulator: DriveSimulator
 ) -> DriveComparison:
-    told = now.tell(now.every)
+    features = now.features(now.every)
     nearest = min(healthy, key=lambda each: _apart(each, now), default=None)
-    known = None if nearest is None else nearest.tell(nearest.every)
-    return DriveComparison(name, now, nearest, simulated_drive(simulator, now.cycles, told, known))
+    known = None if nearest is None else nearest.features(nearest.every)
+    return DriveComparison(name, now, nearest, simulated_drive(simulator, now.cycles, features, known))
 
 
 def _apart(one: PreparedCycles, other: PreparedCycles) -> float:
@@ -227,7 +227,7 @@ def _notices(compared: Sequence[DriveComparison], effects: Mapping[str, GapEffec
             found.append(
                 f"{each.name} has {each.now.cycles.n_cycles} starts: how far the gap shrinks rests on few cycles."
             )
-        if not each.told.contact.play_um > 0.0:
+        if not each.features.contact.play_um > 0.0:
             found.append(f"{each.name} loads one flank only: its play cannot be told; record a stop with the brake.")
     return found
 

@@ -26,10 +26,10 @@ from gearsig.motion import (
 # --------------------
 
 
-FEWEST = 2
-LEAST_STANDING = 0.05
+MIN_CYCLES = 2
+MIN_STANDING = 0.05
 """Of the time: a machine that stands so long has stopped."""
-HIGHEST_RATE_HZ = 2000.0
+MAX_RATE_HZ = 2000.0
 """Motion of shafts is slower; vibration is not looked at here."""
 STARTING_S, SETTLING_S = 0.15, 0.1
 """How long a start rings, and a stop: times of the shares over phases, not of the fits."""
@@ -78,13 +78,13 @@ def cut_cycles(motion: PairMotion) -> CycledMotion:
     thinned = thin(motion)
     course = motion_segments(thinned.driver_angle_rad, thinned.sampling_rate_hz)
     where = thinned.source or "the recording"
-    if not is_start_stop(course) and course.standing_part < LEAST_STANDING:
+    if not is_start_stop(course) and course.standing_part < MIN_STANDING:
         raise RefusalError(
             f"{where} turns all the time: no start and stop is in it, and the start–stop diagnosis rests on them",
             remedy="record starts and stops; compare stationary running with --model cracked or reduced-fe",
         )
     moving = course.moving
-    if len(moving) < FEWEST:
+    if len(moving) < MIN_CYCLES:
         n = f"{len(moving)} start{'' if len(moving) == 1 else 's'}"
         raise RefusalError(
             f"{where} has {n}: what is fitted to one cycle must be checked on another",
@@ -111,7 +111,7 @@ def halves(cycles: CycledMotion) -> tuple[tuple[int, ...], tuple[int, ...]]:
 
 def thin(motion: PairMotion) -> PairMotion:
     """Return every n-th sample of a motion that is sampled faster than shafts move: instants stay instants."""
-    step = max(1, int(motion.sampling_rate_hz / HIGHEST_RATE_HZ + 1e-9))
+    step = max(1, int(motion.sampling_rate_hz / MAX_RATE_HZ + 1e-9))
     if step == 1:
         return motion
 
@@ -150,7 +150,7 @@ LOADED = 0.1
 LEAST_SAMPLES, LEAST_OF_A_TOOTH, LEAST_OF_A_PLACE = 12, 3, 5
 EDGE = 0.07
 """Base pitches around the entry and exit of pairs that are left out."""
-FAR, MOST_ROUNDS = 4.0, 4
+FAR, MAX_ROUNDS = 4.0, 4
 PARTED_M = 5e-5
 """A sample further from one level for all places lies in the play: the flanks have just parted. Worn flanks differ by
 less from place to place, as the least worn pair decides."""
@@ -323,7 +323,7 @@ def _robust(design: FloatArray, q: FloatArray, keep: Mask, drive: Mask) -> tuple
     wanted = keep
     size = np.sqrt(np.mean(design[keep] ** 2, axis=0)) + 1e-30
     scaled, least = design / size, 1e-12 * np.eye(design.shape[1])
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         a = scaled[keep]
         x: FloatArray = np.linalg.solve(a.T @ a / len(a) + least, a.T @ q[keep] / len(a)) / size
         left = np.abs(q - design @ x)
@@ -362,7 +362,7 @@ BANDWIDTH_HZ = 40.0
 TURNING = 0.15
 """Part of the ordinary speed from which on friction slides."""
 UNIT_FRICTION = 0.05
-LOAD_PART_FAR, LOAD_PART_MOST_ROUNDS = 5.0, 3
+FAR_LOAD, MAX_LOAD_ROUNDS = 5.0, 3
 
 
 @dataclass(frozen=True)
@@ -463,7 +463,7 @@ def load_part(equation: LoadEquation | None, wanted: Mask) -> LoadPart:
     m = equation.motion
     turned = float(np.ptp(m.driven_angle_rad)) / (2.0 * np.pi)
     used = [0, 1, 2, 3, 4, 5] if turned > FULL_TURN else [0, 1, 2, 3]
-    x = _robust_load_part(equation.columns[:, used], equation.response, keep)
+    x = _robust_load(equation.columns[:, used], equation.response, keep)
     if not x[0] > 0.0:
         return nothing
     inertia = 1.0 / x[0]
@@ -486,19 +486,19 @@ def _flank_friction(equation: LoadEquation, keep: Mask, from_load: float) -> flo
     if equation.flank_loss is None:
         return from_load
     y, per_friction = (values[keep] for values in equation.flank_loss)
-    near = np.abs(y - np.median(y)) < LOAD_PART_FAR * (1.4826 * float(np.median(np.abs(y - np.median(y)))) + 1e-12)
+    near = np.abs(y - np.median(y)) < FAR_LOAD * (1.4826 * float(np.median(np.abs(y - np.median(y)))) + 1e-12)
     power = float(np.sum(per_friction[near] ** 2))
     return float(np.sum(y[near] * per_friction[near]) / power) if power > 0.0 else from_load
 
 
-def _robust_load_part(columns: FloatArray, response: FloatArray, keep: Mask) -> FloatArray:
+def _robust_load(columns: FloatArray, response: FloatArray, keep: Mask) -> FloatArray:
     scale = np.sqrt(np.mean(columns[keep] ** 2, axis=0)) + 1e-30
     wanted, least = keep, 1e-12 * np.eye(columns.shape[1])
-    for _ in range(LOAD_PART_MOST_ROUNDS):
+    for _ in range(MAX_LOAD_ROUNDS):
         a = columns[keep] / scale
         x: FloatArray = np.linalg.solve(a.T @ a / len(a) + least, a.T @ response[keep] / len(a)) / scale
         left = np.abs(response - columns @ x)
-        keep = wanted & (left < LOAD_PART_FAR * (1.4826 * float(np.median(left[keep])) + 1e-12))
+        keep = wanted & (left < FAR_LOAD * (1.4826 * float(np.median(left[keep])) + 1e-12))
     return x
 
 
@@ -509,7 +509,7 @@ def _robust_load_part(columns: FloatArray, response: FloatArray, keep: Mask) -> 
 
 LOWEST_ORDER, N_ORDERS = 4, 40
 """Below, a start and a stop look like a ripple."""
-FEWEST_SAMPLES, RIPPLE_PART_FAR = 50, 6.0
+MIN_CYCLES_SAMPLES, FAR_RIPPLE = 50, 6.0
 TREND_S = 0.25
 """Knots of the trend that is taken off each run."""
 
@@ -527,7 +527,7 @@ def runs_of(cycles: CycledMotion) -> list[FloatArray]:
     """Return the driver's angle in each run that is long enough."""
     runs = cycles.phase == PHASES.index("run")
     found = [cycles.motion.driver_angle_rad[runs & (cycles.number == c)] for c in range(cycles.n_cycles)]
-    return [angle for angle in found if len(angle) >= FEWEST_SAMPLES]
+    return [angle for angle in found if len(angle) >= MIN_CYCLES_SAMPLES]
 
 
 def ripple_part(cycles: CycledMotion, wanted: tuple[int, ...], orders: NDArray[np.int64]) -> FloatArray:
@@ -544,11 +544,11 @@ def ripple_part(cycles: CycledMotion, wanted: tuple[int, ...], orders: NDArray[n
     total, level = np.zeros(len(orders), dtype=np.complex128), 0.0
     for c in wanted:
         rows = np.flatnonzero(runs & (cycles.number == c))
-        if len(rows) < FEWEST_SAMPLES:
+        if len(rows) < MIN_CYCLES_SAMPLES:
             continue
         torque, window = m.torque_nm[rows], np.hanning(len(rows))
         ripple = torque - _trend(torque, window, m.sampling_rate_hz)
-        limit = RIPPLE_PART_FAR * 1.4826 * float(np.median(np.abs(ripple)))
+        limit = FAR_RIPPLE * 1.4826 * float(np.median(np.abs(ripple)))
         ripple = window * np.clip(ripple, -limit, limit)
         total += np.exp(-1j * orders[:, None] * m.driver_angle_rad[rows]) @ ripple
         level += 0.5 * float(np.sum(window * np.abs(torque)))
@@ -586,7 +586,7 @@ NAMES = (
 """Of the changes, see `change_of`."""
 
 CURVE_PART, WAVE_PART = 0.1, 0.2
-"""Of the deflection under the ordinary load: curve and waves of sound gears differ by that."""
+"""Of the deflection under the ordinary load: curve and waves of healthy gears differ by that."""
 TOOTH_PART = 0.01
 """Of it: teeth differ by that at least; by how much they do is read off the recording, see `spot_of`."""
 RIPPLE_PART, OFF_CENTRE_PART, FRICTION_STEP = 0.01, 0.03, 0.02
@@ -596,12 +596,12 @@ FEW_WAVES = 6.0
 ORDINARY_DEFLECTION_UM = 20.0
 BESIDE = 2
 """Orders on either side into which a ripple leaks: a run is short."""
-LEAST_SCATTER_UM, LEAST_SCATTER_PART = 0.5, 0.01
+MIN_SCATTER_UM, MIN_SCATTER_PART = 0.5, 0.01
 
 
 @dataclass(frozen=True)
-class Told:
-    """What some cycles tell.
+class CycleFeatures:
+    """What the equations of motion give for some cycles.
 
     Parameters
     ----------
@@ -686,19 +686,19 @@ class PreparedCycles:
         return tuple(range(self.cycles.n_cycles))
 
     @cached_property
-    def _told(self) -> dict[tuple[int, ...], Told]:
+    def _by_cycles(self) -> dict[tuple[int, ...], CycleFeatures]:
         """By cycles: halves and blocks are asked for again and again."""
         return {}
 
-    def tell(self, wanted: tuple[int, ...]) -> Told:
+    def features(self, wanted: tuple[int, ...]) -> CycleFeatures:
         """Return what some cycles tell."""
-        if wanted not in self._told:
-            self._told[wanted] = self._computed(wanted)
-        return self._told[wanted]
+        if wanted not in self._by_cycles:
+            self._by_cycles[wanted] = self._computed(wanted)
+        return self._by_cycles[wanted]
 
-    def _computed(self, wanted: tuple[int, ...]) -> Told:
+    def _computed(self, wanted: tuple[int, ...]) -> CycleFeatures:
         rows = self.cycles.samples_of(wanted)
-        return Told(
+        return CycleFeatures(
             contact_part(self.flanks, rows),
             load_part(self.equation, rows),
             ripple_part(self.cycles, wanted, self.orders),
@@ -723,7 +723,7 @@ class PreparedCycles:
         return float(np.median(found)) if found else float("nan")
 
 
-def spot_of(now: Told, other: Told) -> LocatedDriveChange:
+def spot_of(now: CycleFeatures, other: CycleFeatures) -> LocatedDriveChange:
     """Return the tooth and the order that changed most over what the others did.
 
     Teeth: the scatter of their changes, 1.4826 of the median deviation, so that a tooth is judged by the other teeth
@@ -742,16 +742,18 @@ def spot_of(now: Told, other: Told) -> LocatedDriveChange:
     )
 
 
-def change_of(now: Told, other: Told, curve_shape: FloatArray, at: LocatedDriveChange | None = None) -> FloatArray:
+def change_of(
+    now: CycleFeatures, other: CycleFeatures, curve_shape: FloatArray, at: LocatedDriveChange | None = None
+) -> FloatArray:
     """Return how far what is told changed, (n,) by `NAMES`; nan where it cannot be told.
 
     Levels (play, deflection, inertia, friction of the load, impact, scatter) in dB. What is ordinarily near zero and
-    may have a sign is given as 20 lg e · asinh(x/2f), f what sound machines differ by: for large x in dB over it. Tooth
-    and ripple are given over the next largest, f as `spot_of` says.
+    may have a sign is given as 20 lg e · asinh(x/2f), f what healthy machines differ by: for large x in dB over it.
+    Tooth and ripple are given over the next largest, f as `spot_of` says.
 
     Parameters
     ----------
-    now, other : Told
+    now, other : CycleFeatures
         Of two machines, or one machine at two times; or measured and simulated.
     curve_shape : array
         Course of the compression over the mesh cycle that worn flanks give; its mean is 0.
@@ -779,13 +781,13 @@ def change_of(now: Told, other: Told, curve_shape: FloatArray, at: LocatedDriveC
         _signed(_size(c.waves_um[2:] - d.waves_um[2:]), WAVE_PART * deflection),
         _signed(_size(a.off_centre_nm - b.off_centre_nm), OFF_CENTRE_PART * drive),
         _level(now.impact_mps, other.impact_mps),
-        _level(np.hypot(c.scatter_um, LEAST_SCATTER_UM), np.hypot(d.scatter_um, LEAST_SCATTER_UM)),
-        _level(np.hypot(a.scatter_nm, LEAST_SCATTER_PART * drive), np.hypot(b.scatter_nm, LEAST_SCATTER_PART * drive)),
+        _level(np.hypot(c.scatter_um, MIN_SCATTER_UM), np.hypot(d.scatter_um, MIN_SCATTER_UM)),
+        _level(np.hypot(a.scatter_nm, MIN_SCATTER_PART * drive), np.hypot(b.scatter_nm, MIN_SCATTER_PART * drive)),
     )
     return np.array(values, dtype=np.float64)
 
 
-def _deflection(now: Told, other: Told) -> float:
+def _deflection(now: CycleFeatures, other: CycleFeatures) -> float:
     """Return what a pair of teeth yields under the ordinary load; an ordinary value where no torque tells it."""
     known = (one.contact.deflection_um for one in (other, now) if np.isfinite(one.contact.deflection_um))
     return float(next(known, ORDINARY_DEFLECTION_UM))
@@ -833,19 +835,19 @@ def _size(vector: FloatArray) -> float:
 # --------------------
 
 
-PREDICTION_ERROR_LEAST_SAMPLES = 20
+MIN_SAMPLES_OF_A_PHASE = 20
 COMPRESSION, TORQUE = "compression", "torque"
 UNITS = {COMPRESSION: "µm", TORQUE: "N·m"}
 MEDIAN_OF_SQUARES = 0.455
 """Of a normal variable of variance 1: single blows do not decide."""
 
 
-def prediction_errors(examined: PreparedCycles, known: Told) -> dict[tuple[str, str, str], float]:
+def prediction_errors(examined: PreparedCycles, known: CycleFeatures) -> dict[tuple[str, str, str], float]:
     """Return the root mean square error of prediction by quantity, phase and flank.
 
     Compression: q − q₀ − s(a + κ(|F|/n)^{1/λ}), a and κ those known, q₀ so that the drive flank lies right on average.
     Keys are "compression" (µm along the line of action) or "torque" (of the driver's shaft, N m); a phase of
-    `gearsig.gap.PHASES`; "drive", "back" or, for either, nothing.
+    `gearsig.gap.start_stop.PHASES`; "drive", "back" or, for either, nothing.
 
     Torque: τ − J1 α1 − (r_b1/r_b2)(J2 α2 + T sgn ω2)/(1 + μ G) within 40 Hz, while the load turns.
 
@@ -853,8 +855,8 @@ def prediction_errors(examined: PreparedCycles, known: Told) -> dict[tuple[str, 
     ----------
     examined : Examined
         Whose motion is predicted.
-    known : Told
-        Of the sound machine, or of its simulation.
+    known : CycleFeatures
+        Of the healthy machine, or of its simulation.
     """
     found = _compressions(examined, examined.flanks, known)
     if examined.equation is not None:
@@ -862,7 +864,7 @@ def prediction_errors(examined: PreparedCycles, known: Told) -> dict[tuple[str, 
     return found
 
 
-def _compressions(examined: PreparedCycles, flanks: Flanks, known: Told) -> dict[tuple[str, str, str], float]:
+def _compressions(examined: PreparedCycles, flanks: Flanks, known: CycleFeatures) -> dict[tuple[str, str, str], float]:
     play = known.contact.play_um
     if not np.isfinite(play):
         return {}
@@ -871,14 +873,16 @@ def _compressions(examined: PreparedCycles, flanks: Flanks, known: Told) -> dict
     per_load = known.contact.deflection_um / ordinary if ordinary > 0.0 else 0.0
     left = q - side * 0.5 * play - np.nan_to_num(per_load) * elastic
     drive = flanks.loaded & (side > 0.0)
-    if np.sum(drive) < PREDICTION_ERROR_LEAST_SAMPLES:
+    if np.sum(drive) < MIN_SAMPLES_OF_A_PHASE:
         return {}
     left = left - float(np.median(left[drive]))
     rows = {"drive": drive, "back": flanks.loaded & (side < 0.0)}
     return _by_phase(examined, COMPRESSION, left, rows)
 
 
-def _torques(examined: PreparedCycles, equation: LoadEquation, known: Told) -> dict[tuple[str, str, str], float]:
+def _torques(
+    examined: PreparedCycles, equation: LoadEquation, known: CycleFeatures
+) -> dict[tuple[str, str, str], float]:
     load = known.load
     if not np.isfinite(load.inertia_kg_m2):
         return {}
@@ -896,7 +900,7 @@ def _by_phase(
     for flank, wanted in rows.items():
         for number, phase in enumerate(PHASES):
             here = wanted & (examined.cycles.phase == number) & (examined.cycles.number >= 0)
-            if np.sum(here) >= PREDICTION_ERROR_LEAST_SAMPLES:
+            if np.sum(here) >= MIN_SAMPLES_OF_A_PHASE:
                 found[quantity, phase, flank] = _root_mean_square(left[here])
     return found
 

@@ -62,12 +62,12 @@ from gearsig.gap.start_stop._features import COMPRESSION, NAMES, UNITS, change_o
 
 def torque_curves(compared: DriveComparison, fitted: Added | None) -> tuple[SpectrumCurves, ...]:
     """Return the torque by order of the pinion while running; none without torque."""
-    m, now, other = compared.now.cycles.motion, compared.told.ripple, compared.other.ripple
+    m, now, other = compared.now.cycles.motion, compared.features.ripple, compared.other.ripple
     if m.torque_nm is None or not np.all(np.isfinite(now)) or not np.all(np.isfinite(other)):
         return ()
     mean_nm = float(np.quantile(np.abs(m.torque_nm), 0.9))
     every = compared.now.every
-    rows = np.array([compared.now.tell(tuple(c for c in every if c != one)).ripple for one in every])
+    rows = np.array([compared.now.features(tuple(c for c in every if c != one)).ripple for one in every])
     scatter = np.sqrt((len(rows) - 1.0) * np.var(rows, axis=0))
     after = other.copy() if fitted is not None else np.zeros(0)
     if fitted is not None and fitted.name == RIPPLE:
@@ -87,7 +87,7 @@ def torque_curves(compared: DriveComparison, fitted: Added | None) -> tuple[Spec
 
 
 def _ripple_floor_db(compared: DriveComparison, other: FloatArray) -> FloatArray:
-    """Return how far a line of sound drives may rise, in dB: the floor of the ripple, from its scale back to a part."""
+    """Return how far a line of healthy drives may rise, in dB: the floor of the ripple, from its scale to a part."""
     floor = compared.floor()
     limit = FLOOR * float(floor.scale[NAMES.index("ripple")])
     part = 2.0 * compared.spot.ripple_step * float(np.sinh(limit * np.log(10.0) / 20.0))
@@ -96,8 +96,8 @@ def _ripple_floor_db(compared: DriveComparison, other: FloatArray) -> FloatArray
 
 
 def tooth_curves(compared: DriveComparison, fitted: Added | None, predicted_um: float) -> tuple[AngleCurves, ...]:
-    """Return what each tooth of the pinion yields beyond the middling one, 1 + (extra/floor)²: sound ones are 1."""
-    now, other = compared.told.contact, compared.other.contact
+    """Return what each tooth of the pinion yields beyond the middling one, 1 + (extra/floor)²: healthy ones are 1."""
+    now, other = compared.features.contact, compared.other.contact
     if np.sum(np.isfinite(now.teeth_um)) < 0.8 * len(now.teeth_um):
         return ()
     step = compared.spot.tooth_step_um
@@ -122,24 +122,24 @@ def tooth_curves(compared: DriveComparison, fitted: Added | None, predicted_um: 
 # --------------------
 
 
-def least_seen(
+def hidden_severities(
     compared: DriveComparison, predictions: Predictions, effects: Mapping[str, GapEffect]
 ) -> tuple[str, ...]:
     """Return one sentence with the least severity of every cause that would exceed the floor of this recording."""
     floor = compared.floor()
-    told = []
+    hidden = []
     for name, cause in predictions.causes.items():
-        least = least_severity(cause, floor)
+        least = minimum_severity(cause, floor)
         unit, title = severity_unit(effects[name].unit), effects[name].title
         if np.isfinite(least):
-            told.append(f"{title} below {readable(least, 2)} {unit}".rstrip())
+            hidden.append(f"{title} below {readable(least, 2)} {unit}".rstrip())
         else:
             most = f"{readable(float(cause.severities[-1]), 2)} {unit}".rstrip()
-            told.append(f"{title} at all (up to {most} were tried)")
-    return (f"This recording would not show: {'; '.join(told)}.",) if told else ()
+            hidden.append(f"{title} at all (up to {most} were tried)")
+    return (f"This recording would not show: {'; '.join(hidden)}.",) if hidden else ()
 
 
-def least_severity(cause: Predicted, floor: DriveFloor) -> float:
+def minimum_severity(cause: Predicted, floor: DriveFloor) -> float:
     """Return the least severity above 0 whose change exceeds the floor; infinite where none that was tried does."""
     severities, changes = cause.fine()
     sizes = np.max(np.abs(changes) / (FLOOR * floor.scale), axis=1, initial=0.0)
@@ -155,7 +155,7 @@ def least_severity(cause: Predicted, floor: DriveFloor) -> float:
 FACTORS = (0.7, 1.5)
 """Torques that are tried, over the present one."""
 ANALYTIC = (WEAR, CRACK, TORQUE_GAIN)
-LEAST_GAIN, SAME = 1.1, 0.1
+MIN_GAIN, SAME = 1.1, 0.1
 
 
 def next_drive_recordings(
@@ -178,7 +178,7 @@ def next_drive_recordings(
             apart = _distance(first, second, floor.scale)
         except GearsigError:
             continue
-        if apart > LEAST_GAIN * now:
+        if apart > MIN_GAIN * now:
             point = drive.point
             titles = " and ".join(effects[name].title for name in pair)
             text = (
@@ -220,10 +220,10 @@ def _distance(first: FloatArray, second: FloatArray, scale: FloatArray) -> float
 # --------------------
 
 
-LEAST_SHARE = 0.01
-LEAST_CHANGE_DB = 3.0
+MIN_SHARE = 0.01
+MIN_CHANGE_DB = 3.0
 """Of a prediction error, to be shown."""
-MOST_PHASES = 3
+MAX_PHASES = 3
 
 KINDS = {
     "curve": PlaceKind.MESH,
@@ -275,7 +275,7 @@ def drive_places(compared: DriveComparison) -> tuple[GapPlace, ...]:
     found = [
         _place_of_change(compared, int(i), float(distance[i]), float(repeated[i]), float(z[i]), float(shares[i]))
         for i in order
-        if shares[i] > LEAST_SHARE
+        if shares[i] > MIN_SHARE
     ]
     return (*found, *_phases(compared))
 
@@ -308,7 +308,7 @@ def _place_of_change(
 
 def title_of(compared: DriveComparison, name: str) -> str:
     """Return a change in one sentence, with its numbers."""
-    now, other, spot = compared.told, compared.other, compared.spot
+    now, other, spot = compared.features, compared.other, compared.spot
     c, d, a, b = now.contact, other.contact, now.load, other.load
     extra = (c.teeth_um - d.teeth_um)[spot.tooth]
     texts = {
@@ -341,13 +341,13 @@ def _pair(now: float, other: float, unit: str) -> str:
 
 
 def _phases(compared: DriveComparison) -> list[GapPlace]:
-    """Return the phases in which motion or torque are predicted worse than the sound machine's own."""
+    """Return the phases in which motion or torque are predicted worse than the healthy machine's own."""
     healthy = compared.drive.healthy_run if compared.reference is None else compared.reference
     now, other = (prediction_errors(one, compared.other) for one in (compared.now, healthy))
     rows = []
     for key, rms in now.items():
         change = 20.0 * np.log10(max(rms, 1e-9) / max(other.get(key, np.nan), 1e-9))
-        if np.isfinite(change) and change > LEAST_CHANGE_DB:
+        if np.isfinite(change) and change > MIN_CHANGE_DB:
             quantity, phase, flank = key
             where = f"{phase}{f', {flank} flank' if flank else ''}"
             rows.append(
@@ -363,13 +363,13 @@ def _phases(compared: DriveComparison) -> list[GapPlace]:
                     follows=True,
                 )
             )
-    return sorted(rows, key=lambda place: -place.change_db)[:MOST_PHASES]
+    return sorted(rows, key=lambda place: -place.change_db)[:MAX_PHASES]
 
 
-MOST_EVIDENCE = 6
+MAX_EVIDENCE = 6
 SMALLEST = 0.3
 """Floors from which a predicted change is worth a line."""
-TITLES = {NONE: "nothing beyond what sound drives differ by", UNKNOWN: "nothing in the catalogue"}
+TITLES = {NONE: "nothing beyond what healthy drives differ by", UNKNOWN: "nothing in the catalogue"}
 
 
 @dataclass(frozen=True)
@@ -438,7 +438,7 @@ def drive_report(found: DriveDiagnosis) -> GapReport:
         else (),
         spectra=torque_curves(compared, fitted),
         angles=tooth_curves(compared, fitted, extra_um),
-        notices=(*found.notices, *least_seen(compared, found.predictions[k], found.effects)),
+        notices=(*found.notices, *hidden_severities(compared, found.predictions[k], found.effects)),
         twin_toml="" if fitted is None else _preset(compared, first, fitted),
     )
 
@@ -474,8 +474,8 @@ def _evidence(fitted: FittedDriveCause, change: np.ndarray, floor: DriveFloor) -
     observed, predicted = np.nan_to_num(change - floor.centre), fitted.predicted
     free = np.isin(NAMES, TRIED[fitted.name].may_move)
     size = np.maximum(np.abs(predicted) / limit, np.where(free, 0.0, np.abs(observed) / limit))
-    told = [i for i in np.argsort(-size) if np.isfinite(change[i])]
-    kept = [i for i in told if abs(predicted[i]) > SMALLEST * limit[i] or size[i] > 1.0][:MOST_EVIDENCE]
+    known = [i for i in np.argsort(-size) if np.isfinite(change[i])]
+    kept = [i for i in known if abs(predicted[i]) > SMALLEST * limit[i] or size[i] > 1.0][:MAX_EVIDENCE]
     return tuple(
         weighed_evidence(FEATURES[NAMES[i]], float(predicted[i]), float(observed[i]), float(limit[i]), least=SMALLEST)
         for i in kept

@@ -47,7 +47,7 @@ def examined(effect: str = "", severity: float = 0.0) -> PreparedCycles:
 
 
 def told(one: PreparedCycles):
-    return one.tell(one.every)
+    return one.features(one.every)
 
 
 def change(name: str, now: PreparedCycles, other: PreparedCycles, at: LocatedDriveChange | None = None) -> float:

@@ -96,9 +96,9 @@ def test_a_right_prediction_takes_all_away(size):
     assert slope == pytest.approx(1.0)
 
 
-def test_a_floor_of_sound_drives_keeps_nineteen_of_twenty():
+def test_a_floor_of_healthy_drives_keeps_nineteen_of_twenty():
     rows = np.random.default_rng(1).normal(2.0, 3.0, (400, N))
-    floor = DriveFloor.of_sound(rows)
+    floor = DriveFloor.of_healthy(rows)
     assert np.mean([floor.size(row) > 1.0 for row in rows]) == pytest.approx(0.05, abs=0.01)
     assert floor.scale == pytest.approx(np.full(N, 3.0), rel=0.15)
     again = DriveFloor.from_dict(floor.to_dict())
@@ -117,9 +117,9 @@ def test_what_a_recording_itself_scatters_by_is_no_property_of_other_drives():
     rng = np.random.default_rng(2)
     scatters = np.where(np.arange(400)[:, None] % 2, 12.0, 0.1) * np.ones(N)
     rows = 1.0 + rng.normal(0.0, np.hypot(2.0, scatters))
-    floor = DriveFloor.of_sound(rows, scatters)
+    floor = DriveFloor.of_healthy(rows, scatters)
     assert floor.scale == pytest.approx(np.full(N, 2.0), rel=0.35)
-    assert DriveFloor.of_sound(rows).scale.min() > 4.0
+    assert DriveFloor.of_healthy(rows).scale.min() > 4.0
     assert np.mean([floor.widened(e).size(row) > 1.0 for row, e in zip(rows, scatters, strict=True)]) == pytest.approx(
         0.05, abs=0.01
     )
