@@ -6,13 +6,16 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gearsig.checks import FloatArray, closest_match_hint, frozen_array, one_of, positive, within
 from gearsig.errors import InputError
 from gearsig.rig import QUANTITIES, Rig, SpeedSource
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 # --------------------
 # What names and units of columns mean: sampling rates, quantities, units in brackets.
@@ -278,7 +281,7 @@ class Recording:
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        where = self.provenance.source or "recording"
+        where = self.name
         remedy = "give --fs or sampling_rate_hz in the rig file"
         positive(self.sampling_rate_hz, f"{where}: sampling rate", "Hz", remedy=remedy)
         within(self.sampling_rate_hz, f"{where}: sampling rate", 1e-3, 1e10, "Hz", remedy=remedy)
@@ -300,6 +303,18 @@ class Recording:
             )
         if self.truth is not None:
             object.__setattr__(self, "truth", MappingProxyType(dict(self.truth)))
+
+    def __repr__(self) -> str:
+        machine = f", rig {self.rig.name!r}" if self.rig is not None else ""
+        head = f"Recording {self.name!r}: {self.duration_s:.6g} s at {self.sampling_rate_hz:.9g} Hz{machine}"
+        shown = [f"  {c.name}: {c.quantity}{f' ({c.unit})' if c.unit else ''}" for c in self.channels[:6]]
+        more = len(self.channels) - len(shown)
+        return "\n".join([head, *shown, *([f"  … and {more} more channels"] if more else [])])
+
+    @property
+    def name(self) -> str:
+        """Name of the file or simulator that it comes from; "recording" if made in memory."""
+        return self.provenance.source or "recording"
 
     @property
     def n_samples(self) -> int:
@@ -332,7 +347,7 @@ class Recording:
         if name not in self.channel_names:
             raise InputError(
                 f"there is no channel {name!r}",
-                where=self.provenance.source or "recording",
+                where=self.name,
                 allowed=", ".join(self.channel_names),
                 remedy=closest_match_hint(name, self.channel_names),
             )
@@ -342,6 +357,12 @@ class Recording:
         """Samples of one channel, (n_samples,), read-only."""
         row: FloatArray = self.samples[self.index(name)]
         return row
+
+    def to_frame(self) -> DataFrame:
+        """Return the samples as a pandas table: one column per channel, the time in seconds as index."""
+        from pandas import DataFrame, Index
+
+        return DataFrame(self.samples.T, columns=list(self.channel_names), index=Index(self.time_s(), name="time_s"))
 
     def vibration_names(self) -> tuple[str, ...]:
         """Names of the channels that the analysis looks at for faults."""

@@ -300,7 +300,7 @@ def analysis_text(analysis: Analysis, *, with_indicators: bool = False) -> str:
     machine = (analysis.rig.name or "rig without a name") if analysis.rig is not None else "no rig file"
     size = f"{len(recording.channels)} channel(s), {recording.duration_s:.6g} s at {recording.sampling_rate_hz:.6g} Hz"
     lines = [
-        f"{recording.provenance.source or 'recording'}: {size}, {machine}",
+        f"{recording.name}: {size}, {machine}",
         *([_paragraph(compared, "", first="")] if (compared := reference_text(analysis.reference)) else []),
         "",
         fill(analysis.verdict, WIDTH),

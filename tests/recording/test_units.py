@@ -32,3 +32,9 @@ def test_a_scale_converts_and_says_nothing() -> None:
     found = recording("g").with_rig(rig(scale=9.81))
     assert found.warnings == ()
     assert found.values("a1") == pytest.approx(9.81 * np.ones(8))
+
+
+def test_a_recording_is_a_table_with_times():
+    frame = Recording(np.arange(8.0).reshape(2, 4), 4.0, (Channel("a"), Channel("b"))).to_frame()
+    assert list(frame.columns) == ["a", "b"]
+    assert frame["b"].loc[0.5] == 6.0

@@ -87,7 +87,7 @@ def test_unexpected_errors_ask_for_a_report(recordings, tmp_path, monkeypatch):
     def fail(*_, **__):
         raise ZeroDivisionError("by\nnothing")
 
-    monkeypatch.setattr("gearsig.recording._read.read_recording", fail)
+    monkeypatch.setattr("gearsig.recording.read_recording", fail)
     result = report_many(recordings, tmp_path / "out", n_processes=1)
     assert result.failures[0] == Failure("one.csv", "unexpected error, please report: ZeroDivisionError: by nothing")
 
@@ -196,8 +196,8 @@ def test_importing_the_batch_is_light():
 def test_drawing_never_loads_pyplot():
     code = (
         "import sys, io, numpy as np\n"
-        "from gearsig.plot._spectrum import time_figure\n"
-        "from gearsig.recording._types import Channel, Recording\n"
+        "from gearsig.plot import time_figure\n"
+        "from gearsig.recording import Channel, Recording\n"
         "time_figure(Recording(np.zeros((1, 9)), 1.0, (Channel('a'),))).savefig(io.BytesIO())\n"
         "print('matplotlib.pyplot' in sys.modules)"
     )
