@@ -114,8 +114,8 @@ def test_an_interruption_leaves_whole_pages_only(recordings, tmp_path, monkeypat
 
 WORK = """
 import os, signal, time
-from gearsig.diagnosis.types import Outcome
-from gearsig.report.entry import Entry
+from gearsig.diagnosis import Outcome
+from gearsig.report import Entry
 
 def work(job):
     if job.name == "killer.csv":
