@@ -89,7 +89,7 @@ def test_simulators_use_only_rig_recording_and_the_protocol_of_the_gap_diagnosis
     assert not offences(wrong)
 
 
-def test_blind_drives_are_for_the_benchmark_alone() -> None:
+def test_blind_drives_are_for_benchmark_and_studies_alone() -> None:
     """Neither the diagnosing simulator nor the diagnosis knows them, and they know nothing of it."""
     blind = "sims.blind_drive"
     own = ("gearsig.rig", "gearsig.recording", "gearsig.checks", "gearsig.errors", blind)
@@ -97,7 +97,7 @@ def test_blind_drives_are_for_the_benchmark_alone() -> None:
     def wrong(name: str, modules: set[str]) -> set[str]:
         if name.startswith("sims/blind_drive/"):
             return starts_with(modules, "sims", "gearsig", "app") - starts_with(modules, *own) - {"gearsig"}
-        return set() if name.startswith("app/benchmark/") else starts_with(modules, blind)
+        return set() if name.startswith(("app/benchmark/", "app/studies/")) else starts_with(modules, blind)
 
     assert not offences(wrong)
 
