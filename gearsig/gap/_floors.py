@@ -508,7 +508,7 @@ def _read(path: Path, left_out: str) -> Population:
         raise InputError(
             "the population is not there, or damaged",
             where=path.name,
-            remedy="make it again: python -m app.studies.gap.population",
+            remedy="make it again: see app.studies.gap.population",
         )
     of_rigs = np.searchsorted(arrays["simulated_rigs"], arrays["rigs"])
     tables = {

@@ -370,7 +370,7 @@ class Recogniser:
         if change.names != self.floor.names:
             raise InputError(
                 "the population belongs to other features than this version computes",
-                remedy="make it again: python -m app.studies.gap.population",
+                remedy="make it again: see app.studies.gap.population",
             )
         load = tooth_load_n_per_mm if tooth_load_n_per_mm > 0.0 else self.usual_load_n_per_mm
         row = input_rows(self.floor, change.values[None], change.scatter[None], np.array([load]))[0]
