@@ -248,7 +248,7 @@ def test_answers_survive_the_way_through_a_file():
 def test_a_diagnoser_that_is_not_there_is_named():
     with pytest.raises(InputError, match="no diagnoser 'nothing'"):
         diagnoser("nothing")
-    with pytest.raises(InputError, match=r"app\.gap:nothing"):
+    with pytest.raises(InputError, match=r"app\.gap_job:nothing"):
         diagnoser("app.gap_job:nothing")
 
     with pytest.raises(InputError, match="no diagnoser '__main__:main'"):
