@@ -34,7 +34,7 @@ from sims.cracked import NAME as CRACKED
 from sims.cracked import CrackedPair, PreparedCrackedPair, default_step_s, simulate_with_motion
 from sims.effects import EffectSetting, with_effects
 from sims.gear_pair import build_rig, draw_roughness
-from sims.machine import Machine, Operation
+from sims.machine import Machine, Operation, log_uniform
 from sims.measure import MeasuredChannel, ModalPath, PathMode
 from sims.mesh import GearGeometry, deepest_crack_mm
 from sims.reduced_fe import TWIN_STEP_S, PreparedPair, ReducedPair, simulate_pair, twin_parameters
@@ -246,11 +246,6 @@ def _modes(rng: np.random.Generator) -> tuple[DrawnHousingMode, ...]:
         )
         for _ in range(n)
     )
-
-
-def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """Draw with even chance per decade."""
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 # --------------------

@@ -60,9 +60,10 @@ def order_map_figure(
     stop = len(order_map.positions)
     if highest is not None:
         stop = max(int(np.searchsorted(order_map.positions, highest, side="right")), min(2, stop))
-    positions, time, values = _coarse(order_map.positions[:stop], order_map.time_s, order_map.values[:, :stop])
+    positions, values = _fewer_cells(order_map.positions[:stop], order_map.values[:, :stop], axis=1, n_max=N_COLUMNS)
+    time, values = _fewer_cells(order_map.time_s, values, axis=0, n_max=N_ROWS)
     level = decibels(values, order_map.scaling)
-    x, y = _edges(positions), _edges(time)
+    x, y = _cell_borders(positions), _cell_borders(time)
     top = float(level.max())
     mesh = axes.pcolormesh(x, y, level, cmap=colours(), vmin=top - DYNAMIC_RANGE_DB, vmax=top, rasterized=True)
     _colour_bar(figure, mesh, f"dB re 1 {unit_text(order_map.unit)}".strip(), height_in)
@@ -108,22 +109,17 @@ def colours() -> Colormap:
     )
 
 
-def _coarse(x: FloatArray, y: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Keep the largest value of neighbouring cells where there are more cells than pixels."""
-    for axis, n_most in ((1, N_COLUMNS), (0, N_ROWS)):
-        n = values.shape[axis]
-        if n > n_most:
-            starts = np.arange(0, n, -(-n // n_most))
-            values = np.maximum.reduceat(values, starts, axis=axis)
-            ends = np.append(starts[1:], n) - 1
-            if axis == 1:
-                x = (x[starts] + x[ends]) / 2
-            else:
-                y = (y[starts] + y[ends]) / 2
-    return x, y, values
+def _fewer_cells(middles: FloatArray, values: FloatArray, *, axis: int, n_max: int) -> tuple[FloatArray, FloatArray]:
+    """Keep the largest of neighbouring cells along an axis where there are more than `n_max`, the pixels there are."""
+    n = values.shape[axis]
+    if n <= n_max:
+        return middles, values
+    starts = np.arange(0, n, -(-n // n_max))
+    ends = np.append(starts[1:], n) - 1
+    return (middles[starts] + middles[ends]) / 2, np.maximum.reduceat(values, starts, axis=axis)
 
 
-def _edges(middles: FloatArray) -> FloatArray:
+def _cell_borders(middles: FloatArray) -> FloatArray:
     """Return the borders of cells from their middles."""
     if len(middles) == 1:
         return np.array([middles[0] - 0.5, middles[0] + 0.5])
@@ -212,10 +208,11 @@ def time_frequency_figure(
 
 
 def _draw_levels(axes: Axes, levels: TimeFrequencyMap, dynamic_range_db: float, *, logarithmic: bool) -> QuadMesh:
-    at, positions, values = _coarse_time_frequency(levels)
+    at, values = _fewer_cells(levels.at, levels.values, axis=0, n_max=N_COLUMNS)
+    positions, values = _fewer_cells(levels.positions, values, axis=1, n_max=N_ROWS)
     shown = decibels(values.T, levels.scaling)
-    x = _borders(at)
-    y = np.exp(_borders(np.log(positions))) if logarithmic else np.maximum(_borders(positions), 0.0)
+    x = _cell_borders(at)
+    y = np.exp(_cell_borders(np.log(positions))) if logarithmic else np.maximum(_cell_borders(positions), 0.0)
     top = float(shown.max())
     mesh = axes.pcolormesh(x, y, shown, cmap=colours(), vmin=top - dynamic_range_db, vmax=top, rasterized=True)
     axes.set_xlim(float(x[0]), float(x[-1]))
@@ -246,39 +243,13 @@ def _number(axes: Axes, ridge: Ridge, number: int) -> None:
     axes.text(*place, str(number), ha="center", va="center", fontsize=style.SMALL_PT, color=style.FAULT, bbox=disc)
 
 
-def _plain_ticks(axes: Axes) -> None:
-    """Label 1, 2 and 5 of each decade in full."""
+def _plain_ticks(axes: Axes, n_digits: int = 6) -> None:
+    """Label 1, 2 and 5 of each decade in full, whole powers of ten included."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.6g}"))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.{n_digits}g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())
-
-
-def _coarse_time_frequency(levels: TimeFrequencyMap) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Keep the largest of neighbouring cells where there are more cells than pixels."""
-    values, at, positions = levels.values, levels.at, levels.positions
-    for axis, n_most in ((0, N_COLUMNS), (1, N_ROWS)):
-        n = values.shape[axis]
-        if n <= n_most:
-            continue
-        starts = np.arange(0, n, -(-n // n_most))
-        ends = np.append(starts[1:], n) - 1
-        values = np.maximum.reduceat(values, starts, axis=axis)
-        if axis == 0:
-            at = (at[starts] + at[ends]) / 2
-        else:
-            positions = (positions[starts] + positions[ends]) / 2
-    return at, positions, values
-
-
-def _borders(middles: FloatArray) -> FloatArray:
-    """Return the borders of cells from their middles."""
-    if len(middles) == 1:
-        return np.array([middles[0] - 0.5, middles[0] + 0.5])
-    between = (middles[1:] + middles[:-1]) / 2
-    result: FloatArray = np.concatenate([[2 * middles[0] - between[0]], between, [2 * middles[-1] - between[-1]]])
-    return result
 
 
 def _colour_bar_time_frequency(figure: Figure, mesh: QuadMesh, label: str, height_in: float) -> None:
@@ -463,10 +434,12 @@ def _draw_map(
 ) -> None:
     from matplotlib.colors import LogNorm
 
-    values, alpha = _coarse_coherence(coherence.coherence_squared[shown], coherence.alpha[shown])
+    alpha, values = _fewer_cells(
+        coherence.alpha[shown], coherence.coherence_squared[shown], axis=0, n_max=COHERENCE_N_COLUMNS
+    )
     low = coherence.level(1e-3)
     high = max(float(values.max()), 2.0 * low)
-    x, y = _borders_coherence(alpha), _borders_coherence(coherence.frequency_hz)
+    x, y = _cell_borders(alpha), _cell_borders(coherence.frequency_hz)
     mesh = axes.pcolormesh(x, y, np.maximum(values.T, low), cmap=colours(), norm=LogNorm(low, high), rasterized=True)
     axes.set_xlim(float(x[0]), float(x[-1]))
     axes.set_ylim(float(y[0]), float(y[-1]))
@@ -476,16 +449,7 @@ def _draw_map(
     figure.colorbar(mesh, cax=bar).outline.set_visible(False)
     bar.tick_params(colors=style.QUIET, labelcolor=style.INK, labelsize=style.SMALL_PT)
     bar.set_ylabel("squared coherence γ²", color=style.INK, fontsize=style.TEXT_PT)
-    _plain_ticks_coherence(bar)
-
-
-def _plain_ticks_coherence(bar: Axes) -> None:
-    """Label 1, 2 and 5 of each decade in full, whole powers of ten included."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    bar.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    bar.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.4g}"))
-    bar.yaxis.set_minor_formatter(NullFormatter())
+    _plain_ticks(bar, n_digits=4)
 
 
 def _draw_mean(axes: Axes, mean: EnhancedEnvelope, carriers: FloatArray, shown: slice) -> None:
@@ -498,20 +462,3 @@ def _draw_mean(axes: Axes, mean: EnhancedEnvelope, carriers: FloatArray, shown: 
     if (low, top) != (float(carriers[0]), float(carriers[-1])):
         where = f"carriers {low:.5g} to {top:.5g} Hz"
         axes.text(0.995, 0.93, where, transform=axes.transAxes, ha="right", va="top", fontsize=style.SMALL_PT)
-
-
-def _coarse_coherence(values: FloatArray, alpha: FloatArray) -> tuple[FloatArray, FloatArray]:
-    n = len(alpha)
-    if n <= COHERENCE_N_COLUMNS:
-        return values, alpha
-    starts = np.arange(0, n, -(-n // COHERENCE_N_COLUMNS))
-    ends = np.append(starts[1:], n) - 1
-    return np.maximum.reduceat(values, starts, axis=0), (alpha[starts] + alpha[ends]) / 2
-
-
-def _borders_coherence(middles: FloatArray) -> FloatArray:
-    if len(middles) == 1:
-        return np.array([middles[0] - 0.5, middles[0] + 0.5])
-    between = (middles[1:] + middles[:-1]) / 2
-    result: FloatArray = np.concatenate([[2 * middles[0] - between[0]], between, [2 * middles[-1] - between[-1]]])
-    return result

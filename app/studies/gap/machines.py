@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.studies.crack_cases import DrawnHousingMode, DrawnRig, draw_rig, log_uniform
+from app.studies.crack_cases import DrawnHousingMode, DrawnRig, draw_rig
 from app.studies.gap.signatures import (
     MAX_ADVANCE,
     N_MESH_HARMONICS,
@@ -24,6 +24,7 @@ from gearsig.checks import FloatArray
 from gearsig.recording import Recording
 from sims.effects import EffectSetting
 from sims.gear_pair import BODY_SHAPES, body_gain
+from sims.machine import log_uniform
 
 LIGHT_SHARE, LIGHT_TORQUE = 0.4, (0.0005, 0.3)
 """Machines that run at light load, and their torque over that of the others: down to what idling takes."""

@@ -10,7 +10,7 @@ from zlib import crc32
 import numpy as np
 import typer
 
-from app.studies.crack_cases import SAMPLING_RATE_HZ, DrawnRig, log_uniform, simulate_rig, turns_before
+from app.studies.crack_cases import SAMPLING_RATE_HZ, DrawnRig, simulate_rig, turns_before
 from app.studies.gap.machines import OperatingDay, Ordinary, another_day, draw_machine, first_day, mounted_anew
 from app.studies.gap.signatures import (
     SyntheticScene,
@@ -47,7 +47,7 @@ from gearsig.recording import Recording
 from sims.blind import CATALOGUE, draw_case, record_case
 from sims.cracked import STEP_ANGLE_RAD, CrackedTwin
 from sims.effects import EffectSetting, effects
-from sims.machine import nominal_of
+from sims.machine import log_uniform, nominal_of
 
 # --------------------
 # One recording of the population, reduced and compared, and how all of them are written.

@@ -22,11 +22,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.studies.crack_cases import log_uniform
 from gearsig.checks import FloatArray
 from gearsig.gap import LIGHT_LOAD_N_PER_MM, tooth_load_n_per_mm
 from gearsig.recording import Recording
 from gearsig.rig import Rig
+from sims.machine import log_uniform
 
 # --------------------
 # What vibration is made of when it is made by hand: rings, knocks, tones, over the angle of a recording's shafts.

@@ -8,14 +8,14 @@ from math import cos, pi, radians, sqrt, tan
 
 import numpy as np
 
-from app.studies.crack_cases import DrawnRig, log_uniform
+from app.studies.crack_cases import DrawnRig
 from app.studies.gap.machines import draw_machine
 from app.studies.gap.signatures import PathChange, draw_side, partly, sign
 from gearsig.checks import FloatArray
 from gearsig.rig import Bearing, Rig
 from sims.cracked import CrackedPair
 from sims.gear_pair import build_rig
-from sims.machine import Nominal, Operation, nominal_of
+from sims.machine import Nominal, Operation, log_uniform, nominal_of
 
 # --------------------
 # What lies between forces and sensors: modes of the machine, shared by all channels, and each channel's own part.
