@@ -366,6 +366,7 @@ def independent_whole(names: tuple[str, ...]) -> float:
 POPULATION_FILE = Path(__file__).with_name("population.npz")
 MOST_BYTES = 1_000_000_000
 """Of its arrays; they have nineteen million."""
+MAKE_POPULATION = "in a checkout of the project: python -m app.studies.gap.population simulate, then pack"
 INDEPENDENT = "independent"
 """Simulator of the rig that makes blind cases; only its development gears are in the population."""
 BY_HAND = "by hand"
@@ -508,7 +509,7 @@ def _read(path: Path, left_out: str) -> Population:
         raise InputError(
             "the population is not there, or damaged",
             where=path.name,
-            remedy="make it again: see app.studies.gap.population",
+            remedy=MAKE_POPULATION,
         )
     of_rigs = np.searchsorted(arrays["simulated_rigs"], arrays["rigs"])
     tables = {

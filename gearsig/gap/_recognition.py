@@ -21,6 +21,7 @@ from gearsig.gap._change import SURPRISE, beyond_the_mesh, counted_from_the_mesh
 from gearsig.gap._features import SIDES, Features
 from gearsig.gap._floors import (
     LEFT_OUT,
+    MAKE_POPULATION,
     POPULATION_FILE,
     REPEATABLE,
     Population,
@@ -370,7 +371,7 @@ class Recogniser:
         if change.names != self.floor.names:
             raise InputError(
                 "the population belongs to other features than this version computes",
-                remedy="make it again: see app.studies.gap.population",
+                remedy=MAKE_POPULATION,
             )
         load = tooth_load_n_per_mm if tooth_load_n_per_mm > 0.0 else self.usual_load_n_per_mm
         row = input_rows(self.floor, change.values[None], change.scatter[None], np.array([load]))[0]
