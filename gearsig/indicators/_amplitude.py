@@ -15,11 +15,6 @@ import numpy as np
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError
 
-# Standardised moments, the kernel of kurtosis, FM4, M6A and M8A.
-
-
-_ROUNDING = 1e-12  # scatter below this part of the signal's size is rounding, not signal
-
 
 def checked_values(values: FloatArray, name: str = "values") -> FloatArray:
     """Return the values as float64, one-dimensional, finite and at least one."""
@@ -33,7 +28,7 @@ def is_constant(x: FloatArray, size: float | None = None) -> bool:
     """Whether the scatter of `x` is only rounding against `size` (default: its own largest magnitude)."""
     scale = float(np.abs(x).max()) if size is None else size
     largest_deviation = float(np.abs(x - x.mean()).max())
-    return largest_deviation <= _ROUNDING * scale or largest_deviation == 0.0
+    return largest_deviation <= 1e-12 * scale or largest_deviation == 0.0
 
 
 def standardised_moment(x: FloatArray, order: int, size: float | None = None) -> float:
@@ -48,12 +43,9 @@ def standardised_moment(x: FloatArray, order: int, size: float | None = None) ->
     return float(np.mean(d**order) / np.mean(d * d) ** (order / 2))
 
 
-# A number that says something about the condition, with everything needed to read it.
-
-
 @dataclass(frozen=True)
 class Indicator:
-    """One condition indicator.
+    """A number that says something about the condition, with everything needed to read it.
 
     Parameters
     ----------
@@ -84,9 +76,6 @@ class Indicator:
     band: str = ""
     note: str = ""
     bearing: str = ""
-
-
-_NOTABLE_OFFSET = 0.1  # mean over rms above which amplitudes say more about the offset than about the vibration
 
 
 def rms(values: FloatArray) -> float:
@@ -170,36 +159,32 @@ def time_indicators(
     M. Lebold et al., "Review of vibration analysis methods for gearbox diagnostics and prognostics", 2000.
     """
     x = checked_values(values)
-    mean, size = float(x.mean()), rms(x)
-    note = ""
-    if size > 0 and abs(mean) > _NOTABLE_OFFSET * size:
-        note = f"the signal has a mean of {mean:.4g} {unit}, which is included".replace(" ,", ",")
-    return tuple(
-        _indicator(
-            name, function(x), u, channel, computed_on, shaft, note if name not in ("skewness", "kurtosis") else ""
-        )
-        for name, (function, u) in _family(unit).items()
-    )
+    mean = float(x.mean())
+    offset = ""
+    if abs(mean) > 0.1 * rms(x):  # then amplitudes say more about the offset than about the vibration
+        offset = f"the signal has a mean of {mean:.4g} {unit}, which is included".replace(" ,", ",")
+    indicators = []
+    for name, function in _OF_AMPLITUDE.items():
+        value = function(x)
+        note = "undefined: the signal is constant" if np.isnan(value) else offset
+        if name in ("skewness", "kurtosis") and note == offset:
+            note = ""  # of central moments
+        own_unit = unit if function in (rms, peak, peak_to_peak) else ""
+        indicators.append(Indicator(name, value, own_unit, channel, computed_on, shaft, note=note))
+    return tuple(indicators)
 
 
-def _family(unit: str) -> dict[str, tuple[Callable[[FloatArray], float], str]]:
-    return {
-        "rms": (rms, unit),
-        "peak": (peak, unit),
-        "peak-to-peak": (peak_to_peak, unit),
-        "crest factor": (crest_factor, ""),
-        "skewness": (skewness, ""),
-        "kurtosis": (kurtosis, ""),
-        "shape factor": (shape_factor, ""),
-        "impulse factor": (impulse_factor, ""),
-        "clearance factor": (clearance_factor, ""),
-    }
-
-
-def _indicator(name: str, value: float, unit: str, channel: str, computed_on: str, shaft: str, note: str) -> Indicator:
-    if np.isnan(value):
-        note = "undefined: the signal is constant"
-    return Indicator(name, value, unit, channel, computed_on, shaft, note=note)
+_OF_AMPLITUDE: dict[str, Callable[[FloatArray], float]] = {
+    "rms": rms,
+    "peak": peak,
+    "peak-to-peak": peak_to_peak,
+    "crest factor": crest_factor,
+    "skewness": skewness,
+    "kurtosis": kurtosis,
+    "shape factor": shape_factor,
+    "impulse factor": impulse_factor,
+    "clearance factor": clearance_factor,
+}
 
 
 def _mean_magnitude(values: FloatArray) -> float:

@@ -22,7 +22,7 @@ sidebands on the regular side, `gearsig.orders` says which it takes: values agre
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from math import isnan
 
 import numpy as np
@@ -32,29 +32,33 @@ from gearsig.errors import InputError
 from gearsig.indicators._amplitude import Indicator, is_constant, standardised_moment
 from gearsig.orders import SynchronousAverage
 
-# Gear indicators that compare with earlier records of the same gear: NA4, NA4*, NB4, NB4*.
+# Gear indicators that compare with earlier records of the same gear.
 #
 # Each is a fourth moment of the present record over a variance that includes earlier records, so that it goes on rising
 # when damage grows, where a plain kurtosis would fall back. With no history NA4 is the kurtosis of the residual.
 
 
-def na4(residual: SynchronousAverage, history: Sequence[SynchronousAverage] = ()) -> float:
+def na4(residual: SynchronousAverage, history: Sequence[SynchronousAverage] = (), *, star: bool = False) -> float:
     """Fourth moment of the residual over the square of its variance averaged over all records so far.
 
     NA4 = (1/N) Σ_i (r_i - r̄)⁴ / ( (1/M) Σ_{j=1}^{M} v_j )², v_j the variance of record j's residual, M counting the
-    present record.
+    present record. NA4* has the mean variance of healthy records only.
 
     Parameters
     ----------
     residual : SynchronousAverage
         The present record's, of kind "residual".
     history : sequence of SynchronousAverage
-        Residuals of earlier records, same gear, speed and load, in any order.
+        Residuals of earlier records, same gear, speed and load, in any order; for NA4* those in good condition, which
+        `healthy_records` finds.
+    star : bool
+        Whether to return NA4*, which counts the history alone.
 
     Returns
     -------
     float
-        3 for Gaussian noise at an unchanged level; nan for a constant residual without history.
+        3 for Gaussian noise at an unchanged level; nan for a constant residual without history, and for NA4* without
+        a healthy record.
 
     Raises
     ------
@@ -63,46 +67,22 @@ def na4(residual: SynchronousAverage, history: Sequence[SynchronousAverage] = ()
 
     Notes
     -----
-    MATLAB's `gearConditionMetrics` takes the residual as well, and the records up to the present one as the history.
-    Not for records at different load: the variance then follows the load.
+    MATLAB's `gearConditionMetrics` takes the residual as well, and the records up to the present one as the history;
+    it has no NA4*. Not for records at different load: the variance then follows the load.
 
     References
     ----------
     J. J. Zakrajsek, D. P. Townsend, H. J. Decker, "An analysis of gear fault detection methods as applied to pitting
-    fatigue failure data", NASA TM-105950, 1993.
+    fatigue failure data", NASA TM-105950, 1993. H. J. Decker, R. F. Handschuh, J. J. Zakrajsek, "An enhancement to the
+    NA4 gear vibration diagnostic parameter", NASA TM-106553, 1994.
     """
     _check(residual, history, "residual")
-    past = [_variance(h.values) for h in history]
-    return _quasi_normalised_kurtosis(residual.values, [*past, _variance(residual.values)])
+    return _trend_value(residual.values, [h.values for h in history], star=star)
 
 
-def na4_star(residual: SynchronousAverage, healthy_history: Sequence[SynchronousAverage]) -> float:
-    """Fourth moment of the residual over the square of the variance that the gear had while it was healthy.
-
-    NA4* = (1/N) Σ_i (r_i - r̄)⁴ / (v̄)², v̄ the mean variance of the healthy records only; `healthy_records` finds them.
-
-    Parameters
-    ----------
-    residual : SynchronousAverage
-        Of kind "residual".
-    healthy_history : sequence of SynchronousAverage
-        Residuals of records in good condition.
-
-    Returns
-    -------
-    float
-        nan without a healthy record.
-
-    References
-    ----------
-    H. J. Decker, R. F. Handschuh, J. J. Zakrajsek, "An enhancement to the NA4 gear vibration diagnostic parameter",
-    NASA TM-106553, 1994. Not in MATLAB's `gearConditionMetrics`.
-    """
-    _check(residual, healthy_history, "residual")
-    return _quasi_normalised_kurtosis(residual.values, [_variance(h.values) for h in healthy_history])
-
-
-def nb4(band_passed_mesh: SynchronousAverage, history: Sequence[SynchronousAverage] = ()) -> float:
+def nb4(
+    band_passed_mesh: SynchronousAverage, history: Sequence[SynchronousAverage] = (), *, star: bool = False
+) -> float:
     """NA4 of the envelope of the mesh band: fluctuating load on few teeth shows in the envelope.
 
     s(θ) = |b(θ) + i H[b](θ)|, b the average band-passed about a mesh harmonic and H the Hilbert transform.
@@ -112,12 +92,14 @@ def nb4(band_passed_mesh: SynchronousAverage, history: Sequence[SynchronousAvera
     band_passed_mesh : SynchronousAverage
         Of kind "band-passed mesh".
     history : sequence of SynchronousAverage
-        The same of earlier records.
+        The same of earlier records; for NB4* of healthy ones.
+    star : bool
+        Whether to return NB4*, which is to NB4 as NA4* is to NA4.
 
     Returns
     -------
     float
-        nan for an unmodulated mesh without history.
+        nan for an unmodulated mesh without history, and for NB4* without a healthy record.
 
     References
     ----------
@@ -125,28 +107,13 @@ def nb4(band_passed_mesh: SynchronousAverage, history: Sequence[SynchronousAvera
     fatigue data", NASA TM-106467, 1994. Not in MATLAB's `gearConditionMetrics`.
     """
     _check(band_passed_mesh, history, "band-passed mesh")
-    present = envelope(band_passed_mesh.values)
-    past = [_variance(envelope(h.values)) for h in history]
-    return _quasi_normalised_kurtosis(present, [*past, _variance(present)])
+    return _trend_value(envelope(band_passed_mesh.values), [envelope(h.values) for h in history], star=star)
 
 
-def nb4_star(band_passed_mesh: SynchronousAverage, healthy_history: Sequence[SynchronousAverage]) -> float:
-    """NB4 over the variance of healthy records only, as NA4* is to NA4.
-
-    Parameters
-    ----------
-    band_passed_mesh : SynchronousAverage
-        Of kind "band-passed mesh".
-    healthy_history : sequence of SynchronousAverage
-
-    Returns
-    -------
-    float
-        nan without a healthy record.
-    """
-    _check(band_passed_mesh, healthy_history, "band-passed mesh")
-    present = envelope(band_passed_mesh.values)
-    return _quasi_normalised_kurtosis(present, [_variance(envelope(h.values)) for h in healthy_history])
+def _trend_value(x: FloatArray, history: Sequence[FloatArray], *, star: bool) -> float:
+    records = [*history] if star else [*history, x]
+    variance = float(np.mean([0.0 if is_constant(r) else float(np.var(r)) for r in records])) if records else 0.0
+    return float(np.mean(((x - x.mean()) / np.sqrt(variance)) ** 4)) if variance > 0.0 else float("nan")
 
 
 def healthy_records(variances: Sequence[float], *, z: float = 2.33, n_first: int = 5) -> tuple[bool, ...]:
@@ -191,22 +158,12 @@ def envelope(values: FloatArray) -> FloatArray:
     return magnitude
 
 
-def _quasi_normalised_kurtosis(x: FloatArray, variances: Sequence[float]) -> float:
-    reference = float(np.mean(variances)) if len(variances) else 0.0
-    if reference <= 0.0:
-        return float("nan")
-    d = (x - x.mean()) / np.sqrt(reference)
-    return float(np.mean(d**4))
-
-
-def _variance(x: FloatArray) -> float:
-    return 0.0 if is_constant(x) else float(np.var(x))
-
-
-def _check(present: SynchronousAverage, history: Sequence[SynchronousAverage], kind: str) -> None:
+def _check(present: SynchronousAverage, history: Sequence[SynchronousAverage], *kinds: str) -> None:
     for a in (present, *history):
-        if a.kind != kind:
-            raise InputError(f"a signal of kind {a.kind!r} was given", allowed=kind, remedy="see gearsig.orders")
+        if a.kind not in kinds:
+            raise InputError(
+                f"a signal of kind {a.kind!r} was given", allowed=", ".join(kinds), remedy="see gearsig.orders"
+            )
         if (a.shaft, a.channel, a.unit) != (present.shaft, present.channel, present.unit):
             raise InputError(
                 f"history of shaft {a.shaft!r}, channel {a.channel!r} [{a.unit}] for a record of shaft"
@@ -238,7 +195,7 @@ def fm0(average: SynchronousAverage, teeth: int, *, n_harmonics: int | None = No
     ----------
     R. M. Stewart, "Some useful data analysis techniques for gearbox diagnostics", ISVR, Southampton, 1977.
     """
-    _check_kind(average, "average")
+    _check(average, (), "average")
     amplitudes = mesh_amplitudes(average, teeth, n_harmonics)
     total = float(np.sum(amplitudes))
     span = float(average.values.max() - average.values.min())
@@ -251,7 +208,7 @@ def fm4(difference: SynchronousAverage, *, size: float | None = None) -> float:
     FM4 = N Σ (d - d̄)⁴ / (Σ (d - d̄)²)². `size`: magnitude against which the difference may be mere rounding.
     Falls back when damage spreads to many teeth. Source: Stewart 1977, see `fm0`.
     """
-    _check_kind(difference, "difference")
+    _check(difference, (), "difference")
     return standardised_moment(difference.values, 4, size)
 
 
@@ -263,7 +220,7 @@ def m6a(difference: SynchronousAverage, *, size: float | None = None) -> float:
     Source: H. R. Martin, "Statistical moment analysis as a means of surface damage detection", 7th International Modal
     Analysis Conference, 1989.
     """
-    _check_kind(difference, "difference")
+    _check(difference, (), "difference")
     return standardised_moment(difference.values, 6, size)
 
 
@@ -272,7 +229,7 @@ def m8a(difference: SynchronousAverage, *, size: float | None = None) -> float:
 
     M8A = N³ Σ (d - d̄)⁸ / (Σ (d - d̄)²)⁴. Source: Martin 1989, see `m6a`.
     """
-    _check_kind(difference, "difference")
+    _check(difference, (), "difference")
     return standardised_moment(difference.values, 8, size)
 
 
@@ -283,9 +240,9 @@ def energy_ratio(difference: SynchronousAverage, regular: SynchronousAverage | F
 
     Source: N. S. Swansson, "Application of vibration signal analysis techniques to signal monitoring", 1980.
     """
-    _check_kind(difference, "difference")
+    _check(difference, (), "difference")
     if isinstance(regular, SynchronousAverage):
-        _check_kind(regular, "regular")
+        _check(regular, (), "regular")
         regular = regular.values
     size = float(np.abs(regular).max())
     if is_constant(regular, max(size, float(np.abs(difference.values).max()))):
@@ -316,7 +273,7 @@ def energy_operator(signal: SynchronousAverage) -> float:
     ----------
     J. Ma, "Energy operator and other demodulation approaches to gear defect detection", 1995.
     """
-    _check_kind(signal, "average", "band-passed mesh", "residual", "difference")
+    _check(signal, (), "average", "band-passed mesh", "residual", "difference")
     scale = float(np.abs(signal.values).max())
     if scale == 0.0:
         return float("nan")
@@ -333,7 +290,7 @@ def sideband_index(average: SynchronousAverage, teeth: int) -> float:
     Source: P. Večeř, M. Kreidl, R. Šmíd, "Condition indicators for gearbox condition monitoring systems", Acta
     Polytechnica 45 (2005).
     """
-    _check_kind(average, "average")
+    _check(average, (), "average")
     z = count(teeth, "teeth", minimum=3)
     return 0.5 * (line_amplitude(average, z - 1) + line_amplitude(average, z + 1))
 
@@ -393,65 +350,61 @@ def gear_indicators(
                 allowed=f"shaft {average.shaft!r}, channel {average.channel!r}, the same number of angles",
             )
     size = float(np.abs(average.values).max())
-    rows = [*_single(average, difference, teeth), *_trend(residual, history, healthy, "NA4", "the residual", size)]
+    regular = average.values - difference.values
+    rounding = "undefined: the difference holds nothing but rounding"
+    no_modulation = "undefined: the signal is one unmodulated order"
+    beyond = f"undefined: order {teeth + 1} lies above the average's highest order {average.highest_order:g}"
+    # Name, value, unit, signal, and the note: of an undefined value alone where it begins so.
+    rows: list[_Row] = [
+        ("FM0", fm0(average, teeth), "", _AVERAGE, "undefined: no mesh harmonic is in the average"),
+        ("FM4", fm4(difference, size=size), "", "difference", rounding),
+        ("M6A", m6a(difference, size=size), "", "difference", rounding),
+        ("M8A", m8a(difference, size=size), "", "difference", rounding),
+        ("energy ratio", energy_ratio(difference, regular), "", "difference", "undefined: no regular signal"),
+        ("energy operator", energy_operator(average), "", _AVERAGE, no_modulation),
+        ("sideband index", sideband_index(average, teeth), average.unit, _AVERAGE, beyond),
+        ("sideband level factor", sideband_level_factor(average, teeth), "", _AVERAGE, beyond),
+        *_trend(na4, residual, history, healthy, "NA4", "the residual", size),
+    ]
     if band_passed_mesh is not None:
-        rows.append(("energy operator", energy_operator(band_passed_mesh), "", "band-passed mesh", _NO_MODULATION))
-        rows += _trend(band_passed_mesh, band_history, healthy, "NB4", "the mesh band's envelope", size)
+        rows.append(("energy operator", energy_operator(band_passed_mesh), "", band_passed_mesh.kind, no_modulation))
+        rows += _trend(nb4, band_passed_mesh, band_history, healthy, "NB4", "the mesh band's envelope", size)
     return tuple(
-        Indicator(name, value, unit, average.channel, computed_on, average.shaft, gear, note=note)
-        for name, value, unit, computed_on, note in _notes_of_undefined_only(rows)
+        Indicator(name, value, unit, average.channel, on, average.shaft, gear, note=_note(value, note))
+        for name, value, unit, on, note in rows
     )
 
 
 _Row = tuple[str, float, str, str, str]
-
-_NO_MODULATION = "undefined: the signal is one unmodulated order"
-_TREND = "trend indicator"
-
-
-def _single(average: SynchronousAverage, difference: SynchronousAverage, teeth: int) -> Iterator[_Row]:
-    size = float(np.abs(average.values).max())
-    empty = "undefined: the difference holds nothing but rounding"
-    out_of_reach = f"undefined: order {teeth + 1} lies above the average's highest order {average.highest_order:g}"
-    yield ("FM0", fm0(average, teeth), "", "synchronous average", "undefined: no mesh harmonic is in the average")
-    for name, function in (("FM4", fm4), ("M6A", m6a), ("M8A", m8a)):
-        yield (name, function(difference, size=size), "", "difference", empty)
-    regular = average.values - difference.values
-    yield ("energy ratio", energy_ratio(difference, regular), "", "difference", "undefined: no regular signal")
-    yield ("energy operator", energy_operator(average), "", "synchronous average", _NO_MODULATION)
-    yield ("sideband index", sideband_index(average, teeth), average.unit, "synchronous average", out_of_reach)
-    yield ("sideband level factor", sideband_level_factor(average, teeth), "", "synchronous average", out_of_reach)
+_AVERAGE = "synchronous average"
 
 
 def _trend(
+    function: Callable[..., float],
     signal: SynchronousAverage,
     history: Sequence[SynchronousAverage],
     healthy: Sequence[bool] | None,
     name: str,
     of: str,
     size: float,
-) -> Iterator[_Row]:
+) -> list[_Row]:
     if is_constant(signal.values, size):
         empty = f"undefined: {signal.kind} holds nothing but rounding"
-        yield from ((n, float("nan"), "", signal.kind, empty) for n in (name, f"{name}*"))
-        return
+        return [(n, float("nan"), "", signal.kind, empty) for n in (name, f"{name}*")]
     good = list(history) if healthy is None else [h for h, ok in zip(history, healthy, strict=True) if ok]
-    plain, star = (na4, na4_star) if name == "NA4" else (nb4, nb4_star)
-    alone = f"{_TREND} without earlier records: the kurtosis of {of}"
-    note = f"{_TREND} over {len(history)} earlier record(s)" if history else alone
-    yield (name, plain(signal, history), "", signal.kind, note)
-    star_note = f"over the variance of {len(good)} healthy record(s)" if good else "undefined: needs healthy records"
-    yield (f"{name}*", star(signal, good), "", signal.kind, star_note)
+    alone = f"trend indicator without earlier records: the kurtosis of {of}"
+    note = f"trend indicator over {len(history)} earlier record(s)" if history else alone
+    star = f"over the variance of {len(good)} healthy record(s)" if good else "undefined: needs healthy records"
+    return [
+        (name, function(signal, history), "", signal.kind, note),
+        (f"{name}*", function(signal, good, star=True), "", signal.kind, star),
+    ]
 
 
-def _notes_of_undefined_only(rows: Sequence[_Row]) -> Iterator[_Row]:
-    for name, value, unit, computed_on, note in rows:
-        said = note
-        if isnan(value) and not note.startswith("undefined"):
-            said = f"undefined: the signal is constant; {note}"
-        elif not isnan(value) and note.startswith("undefined"):
-            said = ""
-        yield (name, value, unit, computed_on, said)
+def _note(value: float, note: str) -> str:
+    if not isnan(value):
+        return "" if note.startswith("undefined") else note
+    return note if note.startswith("undefined") else f"undefined: the signal is constant; {note}"
 
 
 def line_amplitude(average: SynchronousAverage, order: int) -> float:
@@ -470,10 +423,3 @@ def mesh_amplitudes(average: SynchronousAverage, teeth: int, n_harmonics: int | 
     highest = min(average.highest_order, len(average.values) / 2)
     n = int(highest // z) if n_harmonics is None else min(count(n_harmonics, "n_harmonics"), int(highest // z))
     return np.array([line_amplitude(average, h * z) for h in range(1, n + 1)])
-
-
-def _check_kind(signal: SynchronousAverage, *allowed: str) -> None:
-    if signal.kind not in allowed:
-        raise InputError(
-            f"a signal of kind {signal.kind!r} was given", allowed=", ".join(allowed), remedy="see gearsig.orders"
-        )

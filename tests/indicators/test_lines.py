@@ -11,16 +11,12 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.indicators import (
     bearing_indicators,
     defect_orders,
-    envelope_level_over_floor_db,
     find_line,
     floor_near,
     mesh_indicators,
-    mesh_level,
     noise_reaches,
+    over_orders,
     shaft_indicators,
-    shaft_order_level,
-    sideband_levels,
-    sideband_to_carrier_db,
 )
 from gearsig.orders import SynchronousAverage
 from gearsig.rig import Bearing, GearPair, Rig, Shaft
@@ -79,12 +75,12 @@ def test_rms_scaling_and_frequency_axis_give_the_same_peak_amplitude():
         cosine(29, 2.0), axis="frequency", positions=s.positions * 25, resolution=25 / N_REV,
         noise_bandwidth=1.5 * 25 / N_REV,
     )  # fmt: skip
-    for level in (mesh_level(s, 29), mesh_level(as_rms, 29), mesh_level(hz, 29, speed_rev_per_s=25.0)):
-        assert level == pytest.approx(2.0, rel=1e-9)
+    for source in (s, as_rms, over_orders(hz, 25.0)):
+        assert find_line(source, 29).amplitude == pytest.approx(2.0, rel=1e-9)
     with pytest.raises(InputError, match="cannot be placed"):
-        mesh_level(hz, 29)
+        find_line(hz, 29)
     with pytest.raises(InputError, match="scaled as 'power'"):
-        mesh_level(spectrum(cosine(29), scaling="power"), 29)
+        find_line(spectrum(cosine(29), scaling="power"), 29)
 
 
 def modulated(spacing, am, pm):
@@ -105,7 +101,10 @@ def test_sidebands_belong_to_the_shaft_that_modulates(shaft):
 
 
 def test_amplitude_and_phase_modulation_together_lean_to_one_side():
-    ((lower, upper),) = sideband_levels(spectrum(modulated(1.0, 0.1, 0.06)), 29, 1.0)
+    found = {
+        i.name: i.value for i in mesh_indicators(spectrum(modulated(1.0, 0.1, 0.06)), RIG, PAIR) if i.shaft == "input"
+    }
+    lower, upper = found["sideband level 1×-1"], found["sideband level 1×+1"]
     assert lower == pytest.approx(4 * (0.1 - 0.06) / 2, rel=0.02)
     assert upper == pytest.approx(4 * (0.1 + 0.06) / 2, rel=0.02)
 
@@ -123,9 +122,10 @@ def test_average_and_spectrum_agree():
     one = SynchronousAverage(x[:256], np.zeros(256), N_REV, "input", "a1", "m/s^2", "average", 120.0)
     s = spectrum(x)
     for source in (one, s):
-        assert mesh_level(source, 29) == pytest.approx(4.0, rel=1e-6)
-        assert sideband_to_carrier_db(source, 29, 1.0) == pytest.approx(-20.0, abs=1e-6)
-        assert shaft_order_level(source, 1) == pytest.approx(0.5, rel=1e-6)
+        levels = {i.name: i.value for i in mesh_indicators(source, RIG, PAIR) if i.shaft in ("", "input")}
+        assert levels["mesh level 1×"] == pytest.approx(4.0, rel=1e-6)
+        assert levels["sideband ratio 1×"] == pytest.approx(-20.0, abs=1e-6)
+        assert shaft_indicators(source, "input")[0].value == pytest.approx(0.5, rel=1e-6)
     found = mesh_indicators(one, RIG, PAIR)
     assert {i.shaft for i in found} == {"", "input"}
     assert {i.channel for i in found} == {"a1"}
@@ -182,10 +182,12 @@ def test_bearing_order_is_found_within_its_slip():
 
 def test_floor_of_noise_is_exceeded_as_rarely_as_stated():
     over, n_trials = 0, 400
-    for seed in range(n_trials):
+    for seed in range(20):
         s = envelope_with(50.0, 0.0, seed)
-        n_lines = find_line(s, 20.0, search_orders=0.3).n_lines
-        over += envelope_level_over_floor_db(s, 20.0, slip_fraction=0.015) > 20 * math.log10(noise_reaches(n_lines))
+        for order in range(15, 15 + 5 * n_trials // 20, 5):
+            line = find_line(s, order, search_orders=0.3)
+            floor = floor_near(s, order, 2.0, leave_out_orders=0.3)
+            over += line.largest / floor > noise_reaches(line.n_lines)
     # At most 5 % by the docstring; three standard deviations of a binomial count on top.
     assert over / n_trials <= 0.05 + 3 * math.sqrt(0.05 * 0.95 / n_trials)
     assert over > 0
@@ -198,7 +200,7 @@ def test_noise_reaches_is_the_rayleigh_quantile():
 
 
 def test_too_few_lines_for_a_floor():
-    assert math.isnan(floor_near(spectrum(cosine(9)), 9.0, 0.05, leave_out_orders=0.0, speed_rev_per_s=None))
+    assert math.isnan(floor_near(spectrum(cosine(9)), 9.0, 0.05, leave_out_orders=0.0))
 
 
 def test_bearing_without_orders_is_refused():
