@@ -26,14 +26,13 @@ from gearsig.gap import (
     once,
     reduce_recording,
     rivals,
-    rule_strength,
-    sides_of,
+    rule_strengths,
+    textbook_rules,
     without_machines_of,
 )
-from gearsig.gap import RULES as TEXTBOOK_RULES
 from gearsig.recording import Recording, read_recording
 from gearsig.rig import Rig, read_rig
-from sims.effects import effects
+from sims.effects import as_gap_effect, effects
 
 # --------------------
 # What a diagnosing process sees of a case: one folder with recordings and rig files.
@@ -343,11 +342,12 @@ def diagnose_rules(seen: VisibleCase) -> GapReport:
     """Return the rules' strengths as probabilities, by exponentials; conditions count alike."""
     strongest: dict[str, tuple[float, str]] = {NONE: (MIN_STRENGTH, "")}
     each = list(_deviations(seen))
-    for rule in TEXTBOOK_RULES:
-        for side in sides_of(rule):
-            strength = float(np.mean([rule_strength(rule, side, deviations) for deviations in each]))
-            if strength > strongest.get(rule.cause, (-np.inf, ""))[0]:
-                strongest[rule.cause] = strength, side
+    for cause, signs in textbook_rules(map(as_gap_effect, effects().values())):
+        by_side = [rule_strengths(signs, deviations) for deviations in each]
+        for side in by_side[0]:
+            strength = float(np.mean([strengths[side] for strengths in by_side]))
+            if strength > strongest.get(cause, (-np.inf, ""))[0]:
+                strongest[cause] = strength, side
     weights = {cause: float(np.exp(strength)) for cause, (strength, _) in strongest.items()}
     total = sum(weights.values())
     options = {cause: {"gear": side} for cause, (_, side) in strongest.items() if side}

@@ -127,5 +127,5 @@ def _forest(
     for condition in conditions:
         recogniser = load_recogniser(with_reference=condition.reference is not None)
         loads.append(tooth_load_n_per_mm(condition.now.frame.pair, condition.facts.point.torque_nm))
-        found.append(recogniser.probabilities(condition.change, loads[-1]))
+        found.append(recogniser.probabilities(condition.change, loads[-1], known.values()))
     return joint_probabilities(found, loads, allowed)

@@ -25,6 +25,8 @@ class GapEffect:
         Kinds of features, see `sims.effects.Effect.shows_in`.
     is_nuisance : bool
         Of the measurement chain: in every real recording, never a cause in the machine.
+    signs : tuple of (str, int)
+        The textbook's: features that rise (1), fall (−1) or change either way (0); ``{side}`` is driver or driven.
     """
 
     name: str
@@ -35,6 +37,7 @@ class GapEffect:
     signature: str = ""
     shows_in: tuple[str, ...] = ()
     is_nuisance: bool = False
+    signs: tuple[tuple[str, int], ...] = ()
 
 
 @dataclass(frozen=True)

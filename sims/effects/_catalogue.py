@@ -181,6 +181,7 @@ def as_gap_effect(shown: Effect) -> GapEffect:
         shown.signature,
         shown.shows_in,
         shown.group == "measurement chain",
+        shown.textbook.signs if shown.textbook else (),
     )
 
 

@@ -1,7 +1,7 @@
 """What an effect is: a change to a machine or to its measurement chain, with one severity in physical units.
 
-An effect's file holds all of it: physics, range and plausible severities, where it shows, and what it means for the
-models that are no pair of gears between bearings.
+An effect's file holds all of it: physics, range and plausible severities, where it shows, what it means for the models
+that are no pair of gears between bearings, and how the literature says that it shows.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from gearsig.checks import closest_match_hint, one_of, within
 from gearsig.errors import InputError
 from gearsig.rig import Bearing
+from sims.effects._textbook import Textbook
 from sims.machine import Machine, Nominal, WeakTooth
 from sims.mesh import GearGeometry, PairGeometry
 
@@ -232,6 +233,8 @@ class Effect:
         first tooth, other options as by default.
     on_drive : callable or None
         (parameters, severity, options) → change of a start–stop drive; None: it has no meaning there.
+    textbook : Textbook or None
+        How the literature says that it shows.
     """
 
     name: str
@@ -245,6 +248,7 @@ class Effect:
     options: tuple[Option, ...] = ()
     plausible: PlausibleRange | None = None
     on_drive: Callable[[DriveParameters, float, Options], DriveEffect] | None = None
+    textbook: Textbook | None = None
 
     def __post_init__(self) -> None:
         one_of(self.group, f"group of {self.name}", GROUPS)

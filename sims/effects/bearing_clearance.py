@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sims.effects import _textbook as book
 from sims.effects._effect import Effect, Options, PlausibleRange, Severity
 from sims.effects._shared import BEARING_OPTION, any_bearing, chosen_bearing, each_bearing, module_mm, with_bearing
 from sims.machine import Machine
@@ -14,6 +15,37 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
     del rng
     index = chosen_bearing(machine, options)
     return with_bearing(machine, index, clearance_um=machine.bearings[index].clearance_um + severity)
+
+
+def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
+    """A shaft that is held less: other paths from the mesh to each sensor, lines of elements passing.
+
+    And what loose parts show: many orders of the shaft's turn, their halves, a mesh that swings with it, noise. A
+    softer support moves the modes that all comes through, and lets less through at the higher mesh harmonics.
+    """
+    bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
+    mesh, passing, turn, loose = book.balance(rng, 4)
+    turn = max(turn, float(rng.uniform(0.1, 0.5)))  # what tells it from another path
+    limited = min(size, 1.0)
+    softer = rng.standard_normal() - rng.uniform(0.0, 0.7) * np.arange(book.N_MESH_HARMONICS)
+    gains = np.exp(1.4 * mesh * limited * (rng.standard_normal(book.N_MESH_HARMONICS) + softer))
+    lines = [
+        0.4 * passing * size / k * book.tone(k * bearing["BPFO"] * float(rng.uniform(0.99, 1.0)), scene, rng)
+        for k in (1, 2)
+    ]
+    fall, halves = float(rng.uniform(0.2, 1.5)), 0.5 * book.partly(rng)
+    lines += [0.4 * turn * size / k**fall * book.tone(k * bearing["shaft"], scene, rng) for k in range(1, 11)]
+    lines += [0.4 * turn * halves * size / k * book.tone((k - 0.5) * bearing["shaft"], scene, rng) for k in (1, 2, 3)]
+    noise = 0.4 * loose * size * book.at_the_mesh(scene, book.band_noise(scene, rng), rng)
+    return book.Signature(
+        gain=book.swing(scene, bearing["shaft"], 0.5 * turn * book.partly(rng) * size, rng),
+        added=(*lines, noise),
+        mesh_gains=tuple(gains.tolist()),
+        paths_scatter=1.4 * mesh * limited,
+        around=book.partly(rng),
+        uneven=book.partly(rng) * book.uneven(scene, rng),
+        paths=book.draw_path_changes(2, limited * book.partly(rng), scene.sampling_rate_hz, rng, everywhere=True),
+    )
 
 
 EFFECT = Effect(
@@ -38,5 +70,14 @@ EFFECT = Effect(
         module_mm,
         each_bearing,
         any_bearing,
+    ),
+    textbook=book.Textbook(
+        (("shaft.{side}.3", book.UP), ("shaft.{side}.low", book.UP), ("envelope.cage", book.UP)),
+        "looseness: many orders of the shaft",
+        by_the_book,
+        source="J. E. Berry, Illustrated Vibration Diagnostic Chart, 1994: many harmonics of running speed, halves, a "
+        "raised floor; M. Tiwari, K. Gupta, O. Prakash, Effect of radial internal clearance of a ball bearing "
+        "on the dynamics of a balanced horizontal rotor, J. Sound Vib. 238 (2000): a larger clearance makes the "
+        "support softer",
     ),
 )

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from sims.effects import _shared as shared
 from sims.effects._effect import Effect, Options, PlausibleRange, Severity
-from sims.effects._shared import (
-    RACE_OPTIONS,
-    any_race,
-    each_bearing,
-    longest_defect_mm,
-    rolling_element_mm,
-    with_race_defect,
-)
+from sims.effects._textbook import UP, Signature, SyntheticScene, Textbook, race_knocks
 from sims.machine import Machine
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with the defect; the angle counts from tooth 1 at time 0."""
     del rng  # the places of the rolling elements are drawn by the simulator
-    return with_race_defect(machine, "inner", severity, options)
+    return shared.with_race_defect(machine, "inner", severity, options)
+
+
+def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+    """Knocks when elements pass the defect, louder in the load zone, that is once per turn."""
+    return race_knocks(scene, size, rng, "BPFI")
 
 
 EFFECT = Effect(
@@ -34,8 +33,19 @@ EFFECT = Effect(
     "away.",
     shows_in=("envelope_orders", "resonances", "broadband"),
     change=change,
-    options=RACE_OPTIONS,
+    options=shared.RACE_OPTIONS,
     plausible=PlausibleRange(
-        0.01, 0.15, "as on the outer race", rolling_element_mm, each_bearing, any_race, longest_defect_mm("inner")
+        0.01,
+        0.15,
+        "as on the outer race",
+        shared.rolling_element_mm,
+        shared.each_bearing,
+        shared.any_race,
+        shared.longest_defect_mm("inner"),
+    ),
+    textbook=Textbook(
+        (("envelope.inner", UP),),
+        "envelope lines at the ball pass order of the inner race",
+        by_the_book,
     ),
 )

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from sims.effects import _shared as shared
 from sims.effects._effect import Effect, Options, PlausibleRange, Severity
-from sims.effects._shared import (
-    RACE_OPTIONS,
-    any_race,
-    each_bearing,
-    longest_defect_mm,
-    rolling_element_mm,
-    with_race_defect,
-)
+from sims.effects._textbook import UP, Signature, SyntheticScene, Textbook, race_knocks
 from sims.machine import Machine
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with the defect; the angle counts from the middle of the load zone."""
     del rng  # the places of the rolling elements are drawn by the simulator
-    return with_race_defect(machine, "outer", severity, options)
+    return shared.with_race_defect(machine, "outer", severity, options)
+
+
+def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+    """Knocks when elements pass the defect, all alike."""
+    return race_knocks(scene, size, rng, "BPFO")
 
 
 EFFECT = Effect(
@@ -35,14 +34,19 @@ EFFECT = Effect(
     "it away.",
     shows_in=("envelope_orders", "resonances", "broadband"),
     change=change,
-    options=RACE_OPTIONS,
+    options=shared.RACE_OPTIONS,
     plausible=PlausibleRange(
         0.01,
         0.15,
         "of the rolling element's diameter; beyond half a millimetre or so the knocks grow no more",
-        rolling_element_mm,
-        each_bearing,
-        any_race,
-        longest_defect_mm("outer"),
+        shared.rolling_element_mm,
+        shared.each_bearing,
+        shared.any_race,
+        shared.longest_defect_mm("outer"),
+    ),
+    textbook=Textbook(
+        (("envelope.outer", UP),),
+        "envelope lines at the ball pass order of the outer race",
+        by_the_book,
     ),
 )

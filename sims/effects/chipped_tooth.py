@@ -4,16 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from sims.effects import _shared as shared
+from sims.effects import _textbook as book
 from sims.effects._effect import GEAR_OPTION, TOOTH_OPTION, Effect, Option, Options, PlausibleRange, Severity
-from sims.effects._shared import (
-    any_tooth,
-    first_teeth,
-    gear_index,
-    loaded_width_mm,
-    module_mm,
-    tooth_number,
-    with_tooth_fault,
-)
 from sims.machine import Machine
 from sims.mesh import ToothChip
 
@@ -21,8 +14,20 @@ from sims.mesh import ToothChip
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with the chip."""
     del rng
-    chip = ToothChip(severity, loaded_width_mm(machine, options), tooth_number(machine, options))
-    return with_tooth_fault(machine, "chips", gear_index(options), chip)
+    chip = ToothChip(severity, shared.loaded_width_mm(machine, options), shared.tooth_number(machine, options))
+    return shared.with_tooth_fault(machine, "chips", shared.gear_index(options), chip)
+
+
+def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
+    """A missing corner: load is lost, the next tooth takes it with a blow."""
+    side = book.draw_side(rng)
+    window, place = book.tooth_window(scene, side, float(rng.uniform(0.5, 1.2)), rng)
+    blow = book.tooth_knocks(scene, side, place, 0.08, rng)
+    return book.Signature(
+        book.swollen(book.sign(rng) * size * rng.uniform(0.3, 1.2), window),
+        book.late_tooth(scene, size * rng.uniform(0.3, 1.2), window, rng),
+        (4.0 * size * 10.0 ** -rng.uniform(0.0, 0.7) * blow,),
+    )
 
 
 EFFECT = Effect(
@@ -47,11 +52,16 @@ EFFECT = Effect(
         0.2,
         0.9,
         "of the module: a broken corner to half of the tooth's height; smaller chips lie in double contact",
-        module_mm,
-        lambda machine: first_teeth(machine, width_percent=85.0),
+        shared.module_mm,
+        lambda machine: shared.first_teeth(machine, width_percent=85.0),
         lambda machine, rng: {
-            **any_tooth(machine, rng),
+            **shared.any_tooth(machine, rng),
             "width_percent": float(rng.choice((30.0, 60.0, 85.0, 100.0))),
         },
+    ),
+    textbook=book.Textbook(
+        (("tooth.{side}.peak", book.UP), ("tooth.{side}.prominence", book.UP), ("tooth.{side}.second", book.UP)),
+        "a strong impact at one tooth",
+        by_the_book,
     ),
 )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import log10
 
 import numpy as np
 
 from sims.effects._effect import Effect, Options, PlausibleRange, Severity
 from sims.effects._shared import with_each_channel
+from sims.effects._textbook import DOWN, SIZES, UP, Signature, SyntheticScene, Textbook
 from sims.machine import Machine
 from sims.measure import MeasuredChannel
 
@@ -22,6 +24,12 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
         return replace(channel, accelerometer=replace(channel.accelerometer, clip_percent=percent))
 
     return with_each_channel(machine, with_clipping)
+
+
+def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+    """Flat tops: from a thousandth to a third of the samples are cut off."""
+    del scene, rng
+    return Signature(cut_share=1e-3 * (size / SIZES[0]) ** (2.5 / log10(SIZES[1] / SIZES[0])))
 
 
 EFFECT = Effect(
@@ -40,4 +48,9 @@ EFFECT = Effect(
     shows_in=("amplitude_tail", "mesh_harmonics", "broadband"),
     change=change,
     plausible=PlausibleRange(0.3, 12.0, "percent of the time: rare peaks to a grossly wrong range"),
+    textbook=Textbook(
+        (("raw.near_the_extreme", UP), ("raw.kurtosis", DOWN)),
+        "flat tops",
+        by_the_book,
+    ),
 )

@@ -6,30 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 
+from sims.effects import _shared as shared
 from sims.effects._effect import GEAR_OPTION, Effect, Options, PlausibleRange, Severity
-from sims.effects._shared import (
-    ANGLE_OPTION,
-    angle_or_drawn_deg,
-    any_gear,
-    either_gear,
-    gear_index,
-    replaced_item,
-    tolerance_of,
-    vector_sum,
-)
+from sims.effects._textbook import UP, Signature, SyntheticScene, Textbook, draw_side, modulated
 from sims.machine import Machine, runout_tolerance_um
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with run-out, and the unbalance that goes with it."""
-    index, angle = gear_index(options), angle_or_drawn_deg(options, rng)
+    index, angle = shared.gear_index(options), shared.angle_or_drawn_deg(options, rng)
     wheel = machine.wheels[index]
-    runout, runout_angle = vector_sum(wheel.runout_um, wheel.runout_angle_deg, severity, angle)
+    runout, runout_angle = shared.vector_sum(wheel.runout_um, wheel.runout_angle_deg, severity, angle)
     # The body is concentric with the pitch circle, so its centre of mass moves along: 1 kg µm = 1 g mm.
-    unbalance, unbalance_angle = vector_sum(
+    unbalance, unbalance_angle = shared.vector_sum(
         wheel.unbalance_g_mm, wheel.unbalance_angle_deg, wheel.mass_kg * severity, angle
     )
-    wheels = replaced_item(
+    wheels = shared.replaced_item(
         machine.wheels,
         index,
         runout_um=runout,
@@ -38,6 +30,18 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
         unbalance_angle_deg=unbalance_angle,
     )
     return replace(machine, wheels=wheels)
+
+
+def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+    """Run-out: the mesh swings once per turn in size and phase; the shaft's own line, and its second, may show.
+
+    The gear's mass is off the axis as well, so that the line may be as large as that of an unbalance: the mesh tells.
+    """
+    order = scene.shaft_orders[draw_side(rng)]
+    gain, late = 10.0 ** (-rng.uniform(0.0, 0.9, 2))
+    first = float(rng.choice((0.0, 1.0, 1.0))) * 10.0 ** rng.uniform(-1.0, 0.5)
+    second = first * rng.uniform(0.0, 0.2)
+    return modulated(scene, order, (gain * size, late * size), (size * first, size * second), rng)
 
 
 EFFECT = Effect(
@@ -54,13 +58,18 @@ EFFECT = Effect(
     "those further out: a smooth modulation all round the revolution and no pulse. Weak while the torque is steady.",
     shows_in=("shaft_orders", "mesh_sidebands"),
     change=change,
-    options=(GEAR_OPTION, ANGLE_OPTION),
+    options=(GEAR_OPTION, shared.ANGLE_OPTION),
     plausible=PlausibleRange(
         1.0,
         8.0,
         "half of the run-out over F_r of class 5: gears of class 7 to 13, or a bent shaft",
-        tolerance_of(runout_tolerance_um),
-        either_gear,
-        any_gear,
+        shared.tolerance_of(runout_tolerance_um),
+        shared.either_gear,
+        shared.any_gear,
+    ),
+    textbook=Textbook(
+        (("sideband.{side}.1", UP), ("shaft.{side}.1", UP)),
+        "first sidebands of the shaft about the mesh, and its first order",
+        by_the_book,
     ),
 )

@@ -11,6 +11,7 @@ import numpy as np
 from gearsig.errors import InputError
 from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
 from sims.effects._shared import with_each_channel
+from sims.effects._textbook import UP, Textbook
 from sims.machine import Machine
 from sims.measure import MainsHum, MeasuredChannel
 
@@ -65,5 +66,9 @@ EFFECT = Effect(
             "frequency_hz": float(rng.choice((50.0, 60.0))),
             "harmonics_percent": float(rng.uniform(0.0, 80.0)),
         },
+    ),
+    textbook=Textbook(
+        (("hum", UP),),
+        "lines at the supply's frequency",
     ),
 )

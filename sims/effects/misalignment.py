@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.checks import within
+from sims.effects import _textbook as book
 from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
 from sims.effects._shared import GEARS, gear_index, replaced_item
 from sims.machine import Machine
@@ -22,6 +23,38 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
     within(severity, f"angle_deg of misalignment, beside the {now:g}° there are,", 0.0, _MAX_DEG - now, "deg")
     shafts = replaced_item(machine.shafts, index, coupling_angle_deg=now + severity)
     return replace(machine, shafts=shafts)
+
+
+def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
+    """Two stiffness swings per turn, or a load that wanders along the teeth.
+
+    The shaft's second line, mesh harmonics from the second on, sidebands one and two apart: any of them may lead. The
+    contact wanders along the teeth, which are not alike there; forces of a coupling reach one sensor more than another.
+    """
+    order = scene.shaft_orders[book.draw_side(rng)]
+    lines, bands, mesh = book.balance(rng, 3)
+    first, third = rng.uniform(0.0, 0.7, 2)
+    line = size * max(lines, 0.2) * 10.0 ** rng.uniform(0.0, 0.5)
+    waves = sum(
+        (w * book.tone(n * order, scene, rng) for n, w in ((1.0, first), (2.0, 1.0), (3.0, third))),
+        np.zeros(len(scene.time_s)),
+    )
+    once, twice = book.balance(rng, 2)
+    swings = book.swing(scene, 2.0 * order, bands * twice * size, rng) * book.swing(
+        scene, order, bands * once * size, rng
+    )
+    higher = np.append(
+        1.0, np.exp(2.0 * mesh * min(size, 1.0) * np.abs(rng.standard_normal(book.N_MESH_HARMONICS - 1)))
+    )
+    return book.Signature(
+        swings,
+        None,
+        (line * waves,),
+        (1.0, *higher.tolist()),
+        paths_scatter=0.7 * min(size, 1.0) * book.partly(rng),
+        around=book.partly(rng),
+        uneven=book.partly(rng) * book.uneven(scene, rng),
+    )
 
 
 EFFECT = Effect(
@@ -43,5 +76,12 @@ EFFECT = Effect(
         "degrees: elastic couplings bear 1, universal joints more; the model goes to 5",
         choices=lambda _machine: [{"shaft": side} for side in GEARS],
         drawn=lambda _machine, rng: {"shaft": str(rng.choice(GEARS))},
+    ),
+    textbook=book.Textbook(
+        (("shaft.{side}.2", book.UP), ("sideband.{side}.2", book.UP)),
+        "the shaft's second order, second sidebands",
+        by_the_book,
+        source="J. E. Berry, Illustrated Vibration Diagnostic Chart, 1994: higher mesh harmonics with sidebands at "
+        "running speed",
     ),
 )

@@ -7,27 +7,20 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.checks import FloatArray
+from sims.effects import _shared as shared
 from sims.effects._effect import GEAR_OPTION, Effect, Options, PlausibleRange, Severity
-from sims.effects._shared import (
-    any_gear,
-    either_gear,
-    gear_geometry,
-    gear_index,
-    mesh_field,
-    tolerance_of,
-    with_mesh_field,
-)
+from sims.effects._textbook import MAX_ADVANCE, UP, Signature, SyntheticScene, Textbook, balance, draw_side
 from sims.machine import Machine, pitch_tolerance_um
 from sims.mesh import FlankDeviation
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with pitch errors added to those it has."""
-    index = gear_index(options)
-    flank: FlankDeviation = mesh_field(machine, "flank", index)
-    added = severity * cumulative_pitch(gear_geometry(machine, index).teeth, rng)
+    index = shared.gear_index(options)
+    flank: FlankDeviation = shared.mesh_field(machine, "flank", index)
+    added = severity * cumulative_pitch(shared.gear_geometry(machine, index).teeth, rng)
     total = added + np.asarray(flank.pitch_um) if flank.pitch_um else added
-    return with_mesh_field(machine, "flank", index, replace(flank, pitch_um=tuple(total.tolist())))
+    return shared.with_mesh_field(machine, "flank", index, replace(flank, pitch_um=tuple(total.tolist())))
 
 
 def cumulative_pitch(n_teeth: int, rng: np.random.Generator) -> FloatArray:
@@ -42,6 +35,25 @@ def cumulative_pitch(n_teeth: int, rng: np.random.Generator) -> FloatArray:
     cumulative = np.cumsum(closed)
     result: FloatArray = cumulative - cumulative.mean()
     return result
+
+
+def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+    """Each tooth comes early or late by its own amount: lines at all orders of its shaft."""
+    side = draw_side(rng)
+    teeth, turn = scene.teeth[side], scene.revolutions * scene.shaft_orders[side]
+    errors, gains = (rng.standard_normal(teeth) for _ in range(2))
+    at, gain, slow = balance(rng, 3)
+    place = turn * teeth % teeth
+    nodes = np.arange(teeth + 1)
+    early = np.interp(place, nodes, np.append(errors, errors[0]))
+    louder = np.interp(place, nodes, np.append(gains, gains[0]))
+    run = np.cumsum(errors - errors.mean())
+    low = np.interp(place, nodes, np.append(run, run[0])) / max(float(run.std()), 1e-12)
+    return Signature(
+        np.maximum(1.0 + 0.6 * gain * size * louder, 0.0),
+        0.3 * MAX_ADVANCE * min(at * size, 1.0) / scene.teeth[0] * np.clip(early, -2.5, 2.5),
+        (0.5 * slow * size * low,),
+    )
 
 
 EFFECT = Effect(
@@ -64,8 +76,13 @@ EFFECT = Effect(
         0.4,
         3.0,
         "standard deviation over the pitch tolerance of class 5, which is a limit: of classes 5 to 11",
-        tolerance_of(pitch_tolerance_um),
-        either_gear,
-        any_gear,
+        shared.tolerance_of(pitch_tolerance_um),
+        shared.either_gear,
+        shared.any_gear,
+    ),
+    textbook=Textbook(
+        (("tooth.{side}.elsewhere", UP), ("shaft.{side}.low", UP), ("sideband.{side}.3to5", UP)),
+        "all orders of the shaft rise, at every tooth",
+        by_the_book,
     ),
 )

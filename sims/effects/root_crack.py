@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gearsig.checks import within
+from sims.effects import _shared as shared
+from sims.effects import _textbook as book
 from sims.effects._effect import (
     GEAR_OPTION,
     TOOTH_OPTION,
@@ -17,15 +19,6 @@ from sims.effects._effect import (
     PlausibleRange,
     Severity,
 )
-from sims.effects._shared import (
-    GEARS,
-    any_tooth,
-    first_teeth,
-    gear_index,
-    part_of_width_mm,
-    tooth_number,
-    with_tooth_fault,
-)
 from sims.machine import Machine, WeakTooth
 from sims.mesh import GearMesh, RootCrack, deepest_crack_mm, mesh_stiffness
 
@@ -33,9 +26,9 @@ from sims.mesh import GearMesh, RootCrack, deepest_crack_mm, mesh_stiffness
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with the crack."""
     del rng  # nothing is drawn
-    tooth, width_mm = tooth_number(machine, options), part_of_width_mm(machine, options)
+    tooth, width_mm = shared.tooth_number(machine, options), shared.part_of_width_mm(machine, options)
     crack = RootCrack(severity, float(options["angle_deg"]), tooth, width_mm)
-    return with_tooth_fault(machine, "cracks", gear_index(options), crack)
+    return shared.with_tooth_fault(machine, "cracks", shared.gear_index(options), crack)
 
 
 def on_drive(drive: DriveParameters, severity: float, options: Options) -> DriveEffect:
@@ -45,9 +38,9 @@ def on_drive(drive: DriveParameters, severity: float, options: Options) -> Drive
     """
     if severity == 0.0:
         return DriveEffect()
-    gear, pair = gear_index(options), drive.gear_pair()
+    gear, pair = shared.gear_index(options), drive.gear_pair()
     n_teeth = (pair.driver, pair.driven)[gear].teeth
-    tooth = int(within(float(options["tooth"]), f"tooth of the {GEARS[gear]} gear", 1, n_teeth)) - 1
+    tooth = int(within(float(options["tooth"]), f"tooth of the {shared.GEARS[gear]} gear", 1, n_teeth)) - 1
     percent = float(options["width_percent"])
     width = None if percent == 100.0 else percent / 100.0 * pair.face_width_mm
     crack = RootCrack(severity, float(options["angle_deg"]), tooth, width)
@@ -61,7 +54,26 @@ def on_drive(drive: DriveParameters, severity: float, options: Options) -> Drive
 
 
 def _deepest_mm(machine: MachineFacts, options: Options) -> float:
-    return deepest_crack_mm(machine.gears[gear_index(options)], float(options.get("angle_deg", 45.0)))
+    return deepest_crack_mm(machine.gears[shared.gear_index(options)], float(options.get("angle_deg", 45.0)))
+
+
+def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
+    """A softer tooth: it comes late and gives way while it carries, slower than the mesh; the mesh swings on.
+
+    A deep crack lets the next tooth strike.
+    """
+    side = book.draw_side(rng)
+    window, place = book.tooth_window(scene, side, float(rng.uniform(0.8, 2.0)), rng)
+    gain, late = rng.uniform(0.0, 1.0, 2)
+    blow, slow = book.balance(rng, 2) * (4.0, 2.0)
+    knock = book.tooth_knocks(scene, side, place, 0.03, rng)
+    giving_way = np.gradient(np.gradient(window))
+    giving_way /= max(float(np.abs(giving_way).max()), 1e-12)
+    return book.Signature(
+        book.swollen(book.sign(rng) * gain * size, window),
+        book.late_tooth(scene, late * size, window, rng),
+        (blow * size * knock, slow * size * giving_way),
+    )
 
 
 EFFECT = Effect(
@@ -88,9 +100,16 @@ EFFECT = Effect(
         0.85,
         "of the deepest crack that the tooth bears; below a fifth the stiffness hardly changes",
         _deepest_mm,
-        first_teeth,
-        lambda machine, rng: {**any_tooth(machine, rng), "angle_deg": float(rng.uniform(35.0, 75.0))},
+        shared.first_teeth,
+        lambda machine, rng: {**shared.any_tooth(machine, rng), "angle_deg": float(rng.uniform(35.0, 75.0))},
         lambda machine, options: 0.95 * _deepest_mm(machine, options),
     ),
     on_drive=on_drive,
+    textbook=book.Textbook(
+        (("tooth.{side}.prominence", book.UP), ("tooth.{side}.kurtosis", book.UP), ("sideband.{side}.6to12", book.UP)),
+        "once per revolution a dip in stiffness: one tooth in the residual, a wide family of low sidebands",
+        by_the_book,
+        source="P. D. McFadden, Detecting fatigue cracks in gears by amplitude and phase demodulation of the meshing "
+        "vibration, J. Vib. Acoust. 108 (1986)",
+    ),
 )

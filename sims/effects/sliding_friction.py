@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.checks import within
+from sims.effects import _textbook as book
 from sims.effects._effect import DriveEffect, DriveParameters, Effect, Options, PlausibleRange, Severity
 from sims.machine import MAX_DRY_FRICTION, Machine
 
@@ -28,6 +29,27 @@ def on_drive(drive: DriveParameters, severity: float, options: Options) -> Drive
     now, highest = (of("friction_coefficient") for of in (drive.number, drive.highest))
     within(severity, f"added_coefficient of sliding_friction, beside the {now:g} there are,", 0.0, highest - now)
     return DriveEffect({"friction_coefficient": now + severity})
+
+
+def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
+    """A force along the flanks that turns round at the pitch point, and some noise.
+
+    Nearly a square wave of the mesh: its harmonics fall with their number. Across the line of action there is little
+    besides, so that it may be far louder than what was there.
+    """
+    waves = np.abs(1.0 + 0.5 * rng.standard_normal(book.N_MESH_HARMONICS)) * book.steeply(rng)
+    gains = 1.0 + size * 10.0 ** rng.uniform(0.0, 1.0) * waves
+    gains *= np.exp(
+        0.7 * min(size, 1.0) * rng.standard_normal(book.N_MESH_HARMONICS)
+    )  # it may be against what was there
+    noise = 0.8 * size * rng.uniform(0.2, 1.0) * book.at_the_mesh(scene, book.band_noise(scene, rng), rng)
+    return book.Signature(
+        added=(noise,),
+        mesh_gains=tuple(gains.tolist()),
+        paths_scatter=0.7 * min(size, 1.0) * book.partly(rng),
+        around=0.5 * book.partly(rng),
+        uneven=book.partly(rng) * book.uneven(scene, rng),
+    )
 
 
 EFFECT = Effect(
@@ -53,4 +75,11 @@ EFFECT = Effect(
     change=change,
     plausible=PlausibleRange(0.03, 0.4, "mixed film with worn-out oil to dry, rough steel"),
     on_drive=on_drive,
+    textbook=book.Textbook(
+        (("mesh.share.2", book.UP), ("mesh.share.4", book.UP)),
+        "the force reverses at the pitch point",
+        by_the_book,
+        source="S. He, S. Cho, R. Singh, Prediction of dynamic friction forces in spur gears using alternate sliding "
+        "friction formulations, J. Sound Vib. 309 (2008)",
+    ),
 )

@@ -8,6 +8,7 @@ from math import pi
 import numpy as np
 
 from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
+from sims.effects._textbook import UP, Textbook
 from sims.machine import Machine, SpeedSwing, log_uniform
 
 
@@ -35,5 +36,9 @@ EFFECT = Effect(
         "percent: a controlled drive holds 0.1, a hunting one swings by several",
         choices=lambda _machine: [{"frequency_hz": 1.0}],
         drawn=lambda _machine, rng: {"frequency_hz": log_uniform(rng, 0.3, 8.0)},
+    ),
+    textbook=Textbook(
+        (("speed.swing", UP), ("speed.drift", UP)),
+        "the speed wanders",
     ),
 )

@@ -7,8 +7,10 @@ from math import hypot
 
 import numpy as np
 
+from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
+from sims.effects._textbook import UP, Signature, SyntheticScene, Textbook, at_the_mesh, balance, band_noise
 from sims.machine import Machine, Roughness
 
 _AS_IT_IS = "as it is"
@@ -36,6 +38,32 @@ def _locked_to(now: Roughness, wanted: str) -> str:
     return wanted
 
 
+def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+    """Asperities that slide over each other: noise, in bands, more or less with the mesh."""
+    loose, locked = balance(rng, 2)
+    total = sum(
+        (at_the_mesh(scene, band_noise(scene, rng), rng) * rng.uniform(0.3, 1.0) for _ in range(3)),
+        np.zeros(len(scene.time_s)),
+    )
+    sides = [_born_with(scene, side, rng) * rng.uniform(0.0, 1.0) for side in (0, 1)]
+    return Signature(added=(0.8 * size * loose * total, 0.8 * size * locked * (sides[0] + sides[1])))
+
+
+def _born_with(scene: SyntheticScene, side: int, rng: np.random.Generator) -> FloatArray:
+    """Return a waveform, of unit size, that a gear repeats each turn: lines at all its orders in a broad band."""
+    teeth = scene.teeth[side]
+    low, high = teeth * rng.uniform(0.5, 3.0), teeth * rng.uniform(4.0, 9.0)
+    n = 2 * int(high) + 2
+    orders = np.arange(n // 2 + 1)
+    lines = (rng.standard_normal(len(orders)) + 1j * rng.standard_normal(len(orders))) * (
+        (orders > low) & (orders < high)
+    )
+    wave = np.fft.irfft(lines, 8 * n)
+    places = scene.revolutions * scene.shaft_orders[side] % 1.0 * len(wave)
+    found: FloatArray = np.interp(places, np.arange(len(wave) + 1), np.append(wave, wave[0]))
+    return found / max(float(found.std()), 1e-12)
+
+
 EFFECT = Effect(
     name="surface_roughness",
     group="flank",
@@ -61,5 +89,10 @@ EFFECT = Effect(
     ),
     plausible=PlausibleRange(
         0.3, 2.5, "um: ground flanks have 0.4, hobbed or run-out ones 1 to 3; it does not grow with the gear"
+    ),
+    textbook=Textbook(
+        (("floor.band.3", UP), ("floor.band.4", UP), ("tooth.driver.elsewhere", UP)),
+        "noise rises over a wide band",
+        by_the_book,
     ),
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sims.effects import _textbook as book
 from sims.effects._effect import GEAR_OPTION, TOOTH_OPTION, Effect, Option, Options, PlausibleRange, Severity
 from sims.effects._shared import any_tooth, first_teeth, gear_index, tooth_number, with_tooth_fault
 from sims.machine import Machine, log_uniform
@@ -17,6 +18,16 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
     length_mm, depth_um = float(options["length_mm"]), float(options["depth_um"])
     spall = ToothSpall(length_mm, width_mm, depth_um, tooth_number(machine, options))
     return with_tooth_fault(machine, "spalls", gear_index(options), spall)
+
+
+def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
+    """A pit: short blows when the flank enters and leaves it, different each time; the mesh hardly notices."""
+    side = book.draw_side(rng)
+    window, place = book.tooth_window(scene, side, float(rng.uniform(0.3, 0.8)), rng)
+    blows = book.tooth_knocks(scene, side, place, float(rng.uniform(0.05, 0.4)), rng, of=2)
+    return book.Signature(
+        book.swollen(book.sign(rng) * 0.4 * size * rng.uniform(), window), None, (4.0 * size * blows,)
+    )
 
 
 # The severity is the width and not the length: what is left of the face decides how soft the contact gets, and the
@@ -49,5 +60,10 @@ EFFECT = Effect(
             **any_tooth(machine, rng),
             "length_mm": machine.nominal.module_mm * log_uniform(rng, 0.2, 1.0),
         },
+    ),
+    textbook=book.Textbook(
+        (("tooth.{side}.prominence", book.UP), ("tooth.{side}.kurtosis", book.UP), ("tooth.{side}.centroid", book.UP)),
+        "a short impact at one tooth, high in frequency",
+        by_the_book,
     ),
 )

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sims.effects import _textbook as book
 from sims.effects._effect import GEAR_OPTION, DriveEffect, DriveParameters, Effect, Options, PlausibleRange, Severity
 from sims.effects._shared import any_gear, either_gear, gear_index, mesh_field, tolerance_of, with_mesh_field
 from sims.machine import Machine, profile_tolerance_um
@@ -24,6 +25,22 @@ def on_drive(drive: DriveParameters, severity: float, options: Options) -> Drive
     """Wear one gear's drive flanks, most at their ends and nothing at the pitch point: pairs touch later."""
     name = f"sliding_wear_{options['gear']}_um"
     return DriveEffect({name: drive.number(name) + severity})
+
+
+def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
+    """A profile that is worn away from the pitch line: mesh harmonics grow, the higher the more; rough flanks.
+
+    What modulates the mesh grows less than the mesh does: all alike would be another path.
+    """
+    gains = 1.0 + 8.0 * size * np.abs(rng.standard_normal(book.N_MESH_HARMONICS)) * book.steeply(rng)[::-1]
+    noise = size * rng.uniform() ** 2 * book.at_the_mesh(scene, book.band_noise(scene, rng), rng)
+    return book.Signature(
+        added=(noise,),
+        mesh_gains=tuple(gains.tolist()),
+        paths_scatter=0.4 * min(size, 1.0) * book.partly(rng),
+        around=0.5 * book.partly(rng),
+        uneven=book.partly(rng) * book.uneven(scene, rng),
+    )
 
 
 EFFECT = Effect(
@@ -49,4 +66,9 @@ EFFECT = Effect(
         any_gear,
     ),
     on_drive=on_drive,
+    textbook=book.Textbook(
+        (("mesh.total", book.UP), ("mesh.share.2", book.UP), ("mesh.share.3", book.UP)),
+        "mesh harmonics rise, the higher ones most",
+        by_the_book,
+    ),
 )

@@ -8,7 +8,8 @@ from math import pi
 import numpy as np
 
 from sims.effects._effect import DriveEffect, DriveParameters, Effect, Option, Options, PlausibleRange, Severity
-from sims.machine import Machine, TorqueRipple
+from sims.effects._textbook import UP, Signature, SyntheticScene, Textbook, balance, draw_side, modulated
+from sims.machine import Machine, TorqueRipple, log_uniform
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
@@ -28,6 +29,15 @@ def _any_order(rng: np.random.Generator) -> float:
     if rng.uniform() < 2.0 / 3.0:
         return float(rng.choice((1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)))
     return float(rng.uniform(1.5, 16.0))
+
+
+def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+    """The drive pulls n times per turn: that line, and sidebands of the mesh so far apart."""
+    shaft = scene.shaft_orders[draw_side(rng)]
+    pulls = log_uniform(rng, 1.5, 15.0)  # motors and engines pull twice to six times rather than fifteen times
+    order = shaft * (float(round(pulls)) if rng.uniform() < 0.75 else pulls)
+    gain, late, line = balance(rng, 3)
+    return modulated(scene, order, (gain * size, late * size), (size * max(line, 0.2),), rng)
 
 
 EFFECT = Effect(
@@ -59,4 +69,9 @@ EFFECT = Effect(
         drawn=lambda _machine, rng: {"order": _any_order(rng)},
     ),
     on_drive=on_drive,
+    textbook=Textbook(
+        (("sideband.{side}.strongest", UP), ("shaft.{side}.strongest", UP)),
+        "a single pair of sidebands, a single order of the shaft",
+        by_the_book,
+    ),
 )

@@ -8,6 +8,7 @@ import numpy as np
 
 from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
 from sims.effects._shared import with_each_channel
+from sims.effects._textbook import EITHER, Textbook
 from sims.machine import Machine, log_uniform
 from sims.measure import MeasuredChannel, ModalPath, PathMode
 
@@ -64,5 +65,11 @@ EFFECT = Effect(
             "frequency_hz": log_uniform(rng, 400.0, 7000.0),
             "damping_ratio": log_uniform(rng, 0.01, 0.08),
         },
+    ),
+    textbook=Textbook(
+        (("floor.band.2", EITHER), ("floor.band.3", EITHER), ("raw.level", EITHER)),
+        "levels of whole bands change, lines and noise alike",
+        source="R. B. Randall, Vibration-based Condition Monitoring, 2nd ed., 2021, chapter 3 (separation of force and "
+        "path)",
     ),
 )

@@ -7,18 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.checks import within
+from sims.effects import _shared as shared
 from sims.effects._effect import GEAR_OPTION, Effect, MachineFacts, Options, PlausibleRange, Severity
-from sims.effects._shared import (
-    ANGLE_OPTION,
-    GEARS,
-    angle_or_drawn_deg,
-    any_gear,
-    either_gear,
-    gear_geometry,
-    gear_index,
-    replaced_item,
-    vector_sum,
-)
+from sims.effects._textbook import UP, Signature, SyntheticScene, Textbook, draw_side, modulated, partly
 from sims.machine import Machine, usual_mass_kg
 
 _LARGEST_OFFSET = 0.1
@@ -27,27 +18,36 @@ _LARGEST_OFFSET = 0.1
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with the unbalance added."""
-    index, angle = gear_index(options), angle_or_drawn_deg(options, rng)
+    index, angle = shared.gear_index(options), shared.angle_or_drawn_deg(options, rng)
     wheel = machine.wheels[index]
-    length, direction = vector_sum(wheel.unbalance_g_mm, wheel.unbalance_angle_deg, severity, angle)
-    largest = _LARGEST_OFFSET * gear_geometry(machine, index).pitch_radius_mm * wheel.mass_kg * 1e3
-    within(length, f"unbalance_g_mm of the {GEARS[index]} gear", 0.0, largest, "g mm")
-    wheels = replaced_item(machine.wheels, index, unbalance_g_mm=length, unbalance_angle_deg=direction)
+    length, direction = shared.vector_sum(wheel.unbalance_g_mm, wheel.unbalance_angle_deg, severity, angle)
+    largest = _LARGEST_OFFSET * shared.gear_geometry(machine, index).pitch_radius_mm * wheel.mass_kg * 1e3
+    within(length, f"unbalance_g_mm of the {shared.GEARS[index]} gear", 0.0, largest, "g mm")
+    wheels = shared.replaced_item(machine.wheels, index, unbalance_g_mm=length, unbalance_angle_deg=direction)
     return replace(machine, wheels=wheels)
 
 
 def _mesh_force_g_mm(machine: MachineFacts, options: Options) -> float:
     """Unbalance whose force at the nominal speed is the static mesh force."""
     omega = machine.nominal.speed_rpm * np.pi / 30.0
-    if gear_index(options) == 1:
+    if shared.gear_index(options) == 1:
         omega *= machine.nominal.teeth[0] / machine.nominal.teeth[1]
     return float(machine.nominal.mesh_force_n / omega**2 * 1e6)
 
 
 def _largest_g_mm(machine: MachineFacts, options: Options) -> float:
-    side = gear_index(options)
+    side = shared.gear_index(options)
     radius = 0.5 * machine.diameter_mm(side)
     return 0.8 * _LARGEST_OFFSET * radius * usual_mass_kg(machine.nominal, side) * 1e3
+
+
+def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+    """A force that turns with the shaft: its line, and hardly a sideband; a large one bends what holds the shaft."""
+    order = scene.shaft_orders[draw_side(rng)]
+    force = size * 10.0 ** rng.uniform(0.0, 0.8)
+    lines = force * np.array([1.5, 0.15 * partly(rng), 0.15 * partly(rng)])
+    gain, late = 0.03 * force * rng.uniform(0.0, 1.0, 2)
+    return modulated(scene, order, (gain, late), lines.tolist(), rng)
 
 
 EFFECT = Effect(
@@ -65,14 +65,19 @@ EFFECT = Effect(
     "of mass. Faint at low speed.",
     shows_in=("shaft_orders",),
     change=change,
-    options=(GEAR_OPTION, ANGLE_OPTION),
+    options=(GEAR_OPTION, shared.ANGLE_OPTION),
     plausible=PlausibleRange(
         0.01,
         0.15,
         "its force at the nominal speed over the static mesh force; less is lost beside the mesh",
         _mesh_force_g_mm,
-        either_gear,
-        any_gear,
+        shared.either_gear,
+        shared.any_gear,
         _largest_g_mm,
+    ),
+    textbook=Textbook(
+        (("shaft.{side}.1", UP), ("shaft.{side}.1.to_mesh", UP)),
+        "the shaft's first order",
+        by_the_book,
     ),
 )

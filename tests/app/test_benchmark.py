@@ -20,9 +20,9 @@ from app.benchmark.run import ANSWERS_FOLDER, BenchmarkRequest, diagnosed, envir
 from app.cli.main import main
 from gearsig.cache import FOLDERS
 from gearsig.errors import InputError
-from gearsig.gap import INDEPENDENT, NONE, RULES, UNKNOWN, load_population
+from gearsig.gap import INDEPENDENT, NONE, UNKNOWN, load_population, textbook_rules
 from sims.blind import CATALOGUE, OUTSIDE_CATALOGUE
-from sims.effects import effects
+from sims.effects import as_gap_effect, effects
 
 ROOT = Path(__file__).parents[2]
 SHORT = Plan(n_cases=2, seed=4, role="development", reference="with", longest_s=2.0)
@@ -233,8 +233,9 @@ def test_the_same_simulator_repeats_all_but_the_unknown():
 
 
 def test_the_rule_table_names_every_effect_and_known_features_only():
-    assert {rule.cause for rule in RULES} == {*effects(), UNKNOWN}
-    assert {name for rule in RULES for name, _ in rule.signs} == set(USUAL)
+    rules = textbook_rules(map(as_gap_effect, effects().values()))
+    assert {cause for cause, _ in rules} == {*effects(), UNKNOWN}
+    assert {name for _, signs in rules for name, _ in signs} == set(USUAL)
 
 
 def test_answers_survive_the_way_through_a_file():

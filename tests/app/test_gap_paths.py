@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.studies.gap.signatures import ModeChange, PathChange, draw_path_changes
+from sims.effects import ModeChange, PathChange, draw_path_changes
 
 RATE_HZ = 10240.0
 TIME_S = np.arange(10240) / RATE_HZ

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from app.studies.gap.quasi_static.machine import EFFECTS, MESH, N_PAIRS, Path, StaticMachine, Structure, static_contact
 from app.studies.gap.quasi_static.record import QuasiStaticDay, record
-from app.studies.gap.signatures import PathChange
 from gearsig.gap import reduce_recording
+from sims.effects import PathChange
 
 
 @given(st.integers(0, 10**6))

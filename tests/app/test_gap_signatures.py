@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.studies.gap.rows import with_foreign_vibration
-from app.studies.gap.signatures import HAND_MADE, with_signature
+from app.studies.gap.by_hand import SIGNATURES, with_foreign_vibration, with_signature
 from gearsig.gap import change_once, reduce_recording
 from tests.gap.synthetic import RIG, record
 
@@ -28,7 +27,7 @@ EXPECTED = {
 }
 
 
-@pytest.mark.parametrize("name", HAND_MADE)
+@pytest.mark.parametrize("name", SIGNATURES)
 def test_only_the_vibration_changes_and_a_seed_repeats_it(name: str) -> None:
     first, again = (with_signature(SOUND, name, np.random.default_rng(5)) for _ in range(2))
     np.testing.assert_array_equal(first[0].samples, again[0].samples)
@@ -53,5 +52,5 @@ def test_strong_ones_move_their_own_features(name: str) -> None:
 
 def test_foreign_vibration_has_a_name_and_is_no_effect() -> None:
     now, name = with_foreign_vibration(SOUND, np.random.default_rng(2))
-    assert name.replace(" ", "_") not in HAND_MADE
+    assert name.replace(" ", "_") not in SIGNATURES
     assert not np.array_equal(now.samples, SOUND.samples)

@@ -8,21 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.studies.crack_cases import DrawnHousingMode, DrawnRig, draw_rig
-from app.studies.gap.signatures import (
+from app.studies.gap.by_hand import SIGNATURES, scene_of, vibrations
+from gearsig.checks import FloatArray
+from gearsig.recording import Recording
+from sims.effects import (
     MAX_ADVANCE,
     N_MESH_HARMONICS,
-    SIGNATURES,
+    EffectSetting,
     PathChange,
     Signature,
     SyntheticScene,
-    changed,
-    scene_of,
     tone,
-    vibrations,
 )
-from gearsig.checks import FloatArray
-from gearsig.recording import Recording
-from sims.effects import EffectSetting
 from sims.gear_pair import BODY_SHAPES, body_gain
 from sims.machine import log_uniform
 
@@ -154,7 +151,7 @@ def _mounted_anew(mode: DrawnHousingMode, rng: np.random.Generator) -> DrawnHous
 
 
 SWINGS, LINES, PITCH, PULLS = (0.005, 0.2), (0.0006, 0.1), (0.006, 0.4), (0.003, 0.1)
-"""Sizes, as in `app.studies.gap.signatures`: of a swing of the mesh per turn, of a shaft's line, of uneven pitch
+"""Sizes, as in `sims.effects.Signature`: of a swing of the mesh per turn, of a shaft's line, of uneven pitch
 (what the teeth repeat by themselves is 30 dB below the mesh with good ones, as loud as the mesh at light load), of the
 drive's pulling."""
 
@@ -229,7 +226,7 @@ class Ordinary:
             own, scale = np.random.default_rng([self.seed, 12, i]), self.scales[i]
             values = _through(samples[i], self.paths[i], recording.sampling_rate_hz)
             for signature in signatures:
-                values = changed(values, signature, scene, own, scale)
+                values = signature.on(values, scene, own, scale)
             if changed_paths:
                 values = changed_paths[k].of(values, recording.sampling_rate_hz)
             values = values + log_uniform(own, *NOISE) * scale * rng.standard_normal(len(values))
@@ -264,7 +261,7 @@ def mounted_anew(recording: Recording, rng: np.random.Generator) -> Recording:
         signature = Signature(mesh_gains=tuple(gains.tolist()))
         corner_hz = 0.2 * recording.sampling_rate_hz
         moved = corner_hz * float(np.exp(MOUNTING_CORNER * rng.standard_normal()))
-        values = changed(samples[i], signature, scene, rng, 0.0)
+        values = signature.on(samples[i], scene, rng, 0.0)
         values = _shelf(values, corner_hz, moved, recording.sampling_rate_hz)
         samples[i] = values * float(np.exp(MOUNTING_GAIN * rng.standard_normal()))
     return replace(recording, samples=samples)
@@ -317,5 +314,4 @@ def _tolerances(scene: SyntheticScene, rng: np.random.Generator) -> list[Signatu
             )
         )
     found += [SIGNATURES["pitch_error"](scene, log_uniform(rng, *PITCH), rng) for _ in scene.shaft_orders]
-    found.append(SIGNATURES["torque_ripple"](scene, log_uniform(rng, *PULLS), rng))
-    return found
+    return [*found, SIGNATURES["torque_ripple"](scene, log_uniform(rng, *PULLS), rng)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from zlib import crc32
@@ -11,22 +11,8 @@ import numpy as np
 import typer
 
 from app.studies.crack_cases import SAMPLING_RATE_HZ, DrawnRig, simulate_rig, turns_before
+from app.studies.gap.by_hand import made_by_hand, rig_of, vibrations, with_foreign_vibration, with_signature
 from app.studies.gap.machines import OperatingDay, Ordinary, another_day, draw_machine, first_day, mounted_anew
-from app.studies.gap.signatures import (
-    SyntheticScene,
-    band_noise,
-    draw_path_changes,
-    knocks,
-    made_by_hand,
-    rig_of,
-    ring,
-    scene_of,
-    size_of,
-    struck,
-    tone,
-    vibrations,
-    with_signature,
-)
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap import (
@@ -46,8 +32,8 @@ from gearsig.gap import (
 from gearsig.recording import Recording
 from sims.blind import CATALOGUE, draw_case, record_case
 from sims.cracked import STEP_ANGLE_RAD, CrackedTwin
-from sims.effects import EffectSetting, effects
-from sims.machine import log_uniform, nominal_of
+from sims.effects import EffectSetting, draw_path_changes, effects
+from sims.machine import nominal_of
 
 # --------------------
 # One recording of the population, reduced and compared, and how all of them are written.
@@ -184,133 +170,6 @@ def write(path: Path, samples: Sequence[PopulationSample]) -> None:
     part.replace(path)
 
 
-# --------------------
-# Vibration that no effect of the catalogue makes, added to recordings of healthy machines: what "unknown" looks like.
-# --------------------
-
-
-LEVELS = (0.04, 1.5)
-"""Of what is added, over the vibration's standard deviation."""
-
-
-def with_foreign_vibration(recording: Recording, rng: np.random.Generator) -> tuple[Recording, str]:
-    """Return the recording with one foreign vibration, the same on all channels up to gain, and its name."""
-    scene = scene_of(recording)
-    name = str(rng.choice(list(FOREIGN)))
-    added = FOREIGN[name](scene, rng)
-    added = added / max(float(added.std()), 1e-12)
-    samples = recording.samples.copy()
-    level = log_uniform(rng, *LEVELS)
-    for i, channel in enumerate(recording.channels):
-        if channel.is_vibration:
-            samples[i] += added * level * samples[i].std() * rng.uniform(0.4, 1.0)
-    return replace(recording, samples=samples), name
-
-
-def _strange_order(rng: np.random.Generator, low: float, high: float) -> float:
-    """An order that is no whole number and no half of one."""
-    whole = float(rng.integers(int(low), int(high) + 1))
-    return whole + float(rng.choice((rng.uniform(0.07, 0.43), rng.uniform(0.57, 0.93))))
-
-
-def _rolling_element(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    slip = 1.0 - rng.uniform(0.0, 0.015)
-    bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
-    return knocks(2.0 * bearing["BSF"] * slip, 0.02, scene, rng, by=bearing["FTF"] * slip)
-
-
-def _strange_knocks(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    return knocks(_strange_order(rng, 1, 12), float(rng.uniform(0.002, 0.05)), scene, rng)
-
-
-def _once_per_revolution(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """A loose key or coupling: longer than a tooth, and not of one mesh."""
-    order = 1.0 if rng.uniform() < 0.5 else scene.teeth[0] / scene.teeth[1]
-    return knocks(order * float(rng.choice((1.0, 2.0))), 0.01, scene, rng)
-
-
-def _strange_tone(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    return tone(_strange_order(rng, 1, 150), scene, rng)
-
-
-def _ghost(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """A ghost line: a whole order of one shaft that the cutting machine left."""
-    ghost = float(rng.integers(20, 4 * scene.teeth[0]))
-    order = ghost if rng.uniform() < 0.5 else ghost * scene.teeth[0] / scene.teeth[1]
-    line: FloatArray = np.sin(2 * np.pi * order * scene.revolutions) * (
-        1.0 + 0.2 * np.cos(2 * np.pi * scene.revolutions)
-    )
-    return line
-
-
-def _whirl(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Oil whirl or a rub below the shaft's order."""
-    order = float(rng.uniform(0.38, 0.49))
-    waves = [np.sin(2 * np.pi * k * order * scene.revolutions + rng.uniform(0, 6)) / k**2 for k in (1, 2, 3)]
-    whirl: FloatArray = np.sum(waves, axis=0)
-    return whirl
-
-
-def _other_machine(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Lines at fixed frequencies, and their multiples."""
-    first = log_uniform(rng, 17.0, 900.0)
-    waves = [np.sin(2 * np.pi * k * first * scene.time_s + rng.uniform(0, 6)) / k for k in range(1, 6)]
-    machine: FloatArray = np.sum(waves, axis=0)
-    return machine
-
-
-def _inverter(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """A carrier at a fixed frequency with pairs of lines about it."""
-    carrier, apart = float(rng.uniform(2000.0, 0.45 * scene.sampling_rate_hz)), float(rng.uniform(30.0, 250.0))
-    wave: FloatArray = np.sin(2 * np.pi * carrier * scene.time_s) * (
-        1.0 + rng.uniform(0.3, 1.0) * np.cos(2 * np.pi * apart * scene.time_s)
-    )
-    return wave
-
-
-def _random_knocks(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    n = max(3, int(scene.time_s[-1] * rng.uniform(1.0, 20.0)))
-    places = rng.integers(0, len(scene.time_s), n).astype(np.float64)
-    return struck(places, np.abs(rng.standard_normal(n)) + 0.2, scene, ring(scene, rng))
-
-
-def _swelling_noise(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Noise of a band that swells with an order: a pump, a rub, lacking oil."""
-    order = float(rng.choice((1.0, scene.teeth[0] / scene.teeth[1], _strange_order(rng, 2, 9))))
-    swelling: FloatArray = band_noise(scene, rng) * (
-        1.0 + rng.uniform(0.3, 1.0) * np.cos(2 * np.pi * order * scene.revolutions)
-    )
-    return swelling
-
-
-def _steady_noise(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Noise of a band: flow, cavitation, a neighbour."""
-    return band_noise(scene, rng)
-
-
-def _bad_contact(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """A plug that works loose: the signal jumps now and then, and what couples it to the amplifier takes that back."""
-    n = max(2, int(scene.time_s[-1] * log_uniform(rng, 1.0, 60.0)))
-    places = rng.integers(0, len(scene.time_s), n).astype(np.float64)
-    back = np.exp(-np.arange(int(scene.sampling_rate_hz)) / (log_uniform(rng, 0.001, 0.2) * scene.sampling_rate_hz))
-    return struck(places, rng.standard_normal(n), scene, back)
-
-
-FOREIGN: dict[str, Callable[[SyntheticScene, np.random.Generator], FloatArray]] = {
-    "rolling element": _rolling_element,
-    "knocks at a strange order": _strange_knocks,
-    "knocks once per revolution": _once_per_revolution,
-    "tone at a strange order": _strange_tone,
-    "ghost line": _ghost,
-    "whirl": _whirl,
-    "another machine": _other_machine,
-    "inverter": _inverter,
-    "random knocks": _random_knocks,
-    "swelling noise": _swelling_noise,
-    "steady noise": _steady_noise,
-    "bad contact": _bad_contact,
-}
-
 AT_THE_END = ("clipping", "transfer_path")
 """Effects of what records: made by hand only, since what a machine's tolerances do comes before."""
 
@@ -422,7 +281,8 @@ def _with_changed_path(
 ) -> tuple[Recording, float]:
     """Return a recording that came through other paths, and how much other, 0 to 1."""
     strength = float(rng.uniform())
-    paths = draw_path_changes(len(vibrations(bare)), size_of(strength), bare.sampling_rate_hz, rng)
+    # As many changes per decade, of size 0.16 to 1.
+    paths = draw_path_changes(len(vibrations(bare)), 10.0 ** (0.8 * (strength - 1.0)), bare.sampling_rate_hz, rng)
     return ordinary.on(bare, turns, rng, paths), strength
 
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from app.studies.crack_cases import DrawnRig
 from app.studies.gap.machines import draw_machine
-from app.studies.gap.signatures import PathChange, draw_side, partly, sign
 from gearsig.checks import FloatArray
 from gearsig.rig import Bearing, Rig
 from sims.cracked import CrackedPair
+from sims.effects import PathChange, draw_side, partly, sign
 from sims.gear_pair import build_rig
 from sims.machine import Nominal, Operation, log_uniform, nominal_of
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import typer
 
+from app.studies.gap.by_hand import made_by_hand, with_foreign_vibration, with_signature
 from app.studies.gap.quasi_static.machine import (
     BEARINGS,
     EFFECTS,
@@ -25,13 +26,13 @@ from app.studies.gap.quasi_static.machine import (
     meeting,
     static_contact,
 )
-from app.studies.gap.rows import SEED, PopulationBaseline, PopulationSample, reduced, with_foreign_vibration
-from app.studies.gap.signatures import draw_path_changes, made_by_hand, size_of, with_signature
+from app.studies.gap.rows import SEED, PopulationBaseline, PopulationSample, reduced
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap import BY_HAND, NONE, UNKNOWN, OperatingCondition
 from gearsig.recording import Channel, Recording
 from sims.cracked import CrackedTwin
+from sims.effects import draw_path_changes
 from sims.measure import Tachometer, pulse_voltage
 
 FINER = 2
@@ -258,5 +259,5 @@ def _changed_paths(machine: StaticMachine, levels: np.ndarray) -> Iterator[tuple
     rng = np.random.default_rng([machine.seed, 5])
     for _ in range(N_PATHS):
         state = machine.healthy()
-        state.paths = draw_path_changes(N_CHANNELS, size_of(rng.uniform()), machine.rate_hz, rng)
+        state.paths = draw_path_changes(N_CHANNELS, 10.0 ** (0.8 * (rng.uniform() - 1.0)), machine.rate_hz, rng)
         yield "transfer_path", "", record(machine, state, QuasiStaticDay.drawn(rng), levels)

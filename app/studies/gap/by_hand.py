@@ -1,0 +1,211 @@
+"""What is put into healthy recordings by hand: effects as the literature has them, and foreign vibration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.gap import LIGHT_LOAD_N_PER_MM, tooth_load_n_per_mm
+from gearsig.recording import Recording
+from gearsig.rig import Rig
+from sims.effects import SIZES, SyntheticScene, band_noise, effects, knocks, ring, struck, tone
+from sims.machine import log_uniform
+
+
+def rig_of(recording: Recording) -> Rig:
+    """Return the rig of a simulated recording, which always has one."""
+    if recording.rig is None:
+        raise ValueError("a simulated recording has its rig")
+    return recording.rig
+
+
+def scene_of(recording: Recording) -> SyntheticScene:
+    """Return the scene of a simulated recording with one gear pair."""
+    from gearsig.angle import find_shaft_angle
+
+    rig = rig_of(recording)
+    time = np.arange(recording.samples.shape[1]) / recording.sampling_rate_hz
+    pair = rig.pairs[0]
+    teeth = int(pair.driver_teeth or 0), int(pair.driven_teeth or 0)
+    bearings = []
+    for bearing in rig.bearings:
+        shaft = 1.0 if bearing.shaft == pair.driver else teeth[0] / teeth[1]
+        bearings.append({"shaft": shaft} | {name: order * shaft for name, order in bearing.orders().items()})
+    return SyntheticScene(
+        find_shaft_angle(recording, rig).revolutions_at(time),
+        time,
+        recording.sampling_rate_hz,
+        teeth,
+        tuple(bearings),
+    )
+
+
+def vibrations(recording: Recording) -> list[int]:
+    """Return the rows of a recording that hold vibration."""
+    return [i for i, channel in enumerate(recording.channels) if channel.is_vibration]
+
+
+AS_SHIPPED = (
+    "root_crack",
+    "tooth_spall",
+    "chipped_tooth",
+    "tooth_wear",
+    "pitch_error",
+    "surface_roughness",
+    "sliding_friction",
+    "eccentricity",
+    "unbalance",
+    "misalignment",
+    "torque_ripple",
+    "backlash",
+    "bearing_outer_race",
+    "bearing_inner_race",
+    "bearing_clearance",
+    "clipping",
+)
+"""Order in which the shipped population's seeds draw; effects that came later follow by themselves."""
+_BOOKS = {name: effect.textbook.draw for name, effect in effects().items() if effect.textbook and effect.textbook.draw}
+SIGNATURES = {name: _BOOKS[name] for name in dict.fromkeys((*AS_SHIPPED, *_BOOKS))}
+"""Effect → what draws its signature; the others are as the simulators make them."""
+
+
+def with_signature(recording: Recording, name: str, rng: np.random.Generator) -> tuple[Recording, float]:
+    """Return the recording with an effect's signature, and how strong it is, 0 to 1."""
+    scene, strength = scene_of(recording), float(rng.uniform())
+    signature = SIGNATURES[name](scene, SIZES[0] * (SIZES[1] / SIZES[0]) ** strength, rng)
+    samples = recording.samples.copy()
+    for k, i in enumerate(vibrations(recording)):
+        samples[i] = signature.on(samples[i], scene, rng, float(samples[i].std()), k)
+    return replace(recording, samples=samples), strength
+
+
+def made_by_hand(healthy: Recording, torque_nm: float) -> tuple[str, ...]:
+    """Return whose signatures are put into a machine's healthy recordings: no backlash where teeth never part."""
+    light = tooth_load_n_per_mm(rig_of(healthy).pairs[0], torque_nm) < LIGHT_LOAD_N_PER_MM
+    return tuple(name for name in SIGNATURES if light or name != "backlash")
+
+
+# --------------------
+# Vibration that no effect of the catalogue makes, added to recordings of healthy machines: what "unknown" looks like.
+# --------------------
+
+
+def with_foreign_vibration(recording: Recording, rng: np.random.Generator) -> tuple[Recording, str]:
+    """Return the recording with one foreign vibration, the same on all channels up to gain, and its name."""
+    scene = scene_of(recording)
+    name = str(rng.choice(list(FOREIGN)))
+    added = FOREIGN[name](scene, rng)
+    added = added / max(float(added.std()), 1e-12)
+    samples = recording.samples.copy()
+    level = log_uniform(rng, 0.04, 1.5)  # of the standard deviation
+    for i in vibrations(recording):
+        samples[i] += added * level * samples[i].std() * rng.uniform(0.4, 1.0)
+    return replace(recording, samples=samples), name
+
+
+def _strange_order(rng: np.random.Generator, low: float, high: float) -> float:
+    """An order that is no whole number and no half of one."""
+    whole = float(rng.integers(int(low), int(high) + 1))
+    return whole + float(rng.choice((rng.uniform(0.07, 0.43), rng.uniform(0.57, 0.93))))
+
+
+def _rolling_element(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    slip = 1.0 - rng.uniform(0.0, 0.015)
+    bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
+    return knocks(2.0 * bearing["BSF"] * slip, 0.02, scene, rng, by=bearing["FTF"] * slip)
+
+
+def _strange_knocks(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    return knocks(_strange_order(rng, 1, 12), float(rng.uniform(0.002, 0.05)), scene, rng)
+
+
+def _once_per_revolution(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """A loose key or coupling: longer than a tooth, and not of one mesh."""
+    order = 1.0 if rng.uniform() < 0.5 else scene.teeth[0] / scene.teeth[1]
+    return knocks(order * float(rng.choice((1.0, 2.0))), 0.01, scene, rng)
+
+
+def _strange_tone(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    return tone(_strange_order(rng, 1, 150), scene, rng)
+
+
+def _ghost(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """A ghost line: a whole order of one shaft that the cutting machine left."""
+    ghost = float(rng.integers(20, 4 * scene.teeth[0]))
+    order = ghost if rng.uniform() < 0.5 else ghost * scene.teeth[0] / scene.teeth[1]
+    line: FloatArray = np.sin(2 * np.pi * order * scene.revolutions) * (
+        1.0 + 0.2 * np.cos(2 * np.pi * scene.revolutions)
+    )
+    return line
+
+
+def _whirl(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """Oil whirl or a rub below the shaft's order."""
+    order = float(rng.uniform(0.38, 0.49))
+    waves = [np.sin(2 * np.pi * k * order * scene.revolutions + rng.uniform(0, 6)) / k**2 for k in (1, 2, 3)]
+    whirl: FloatArray = np.sum(waves, axis=0)
+    return whirl
+
+
+def _other_machine(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """Lines at fixed frequencies, and their multiples."""
+    first = log_uniform(rng, 17.0, 900.0)
+    waves = [np.sin(2 * np.pi * k * first * scene.time_s + rng.uniform(0, 6)) / k for k in range(1, 6)]
+    machine: FloatArray = np.sum(waves, axis=0)
+    return machine
+
+
+def _inverter(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """A carrier at a fixed frequency with pairs of lines about it."""
+    carrier, apart = float(rng.uniform(2000.0, 0.45 * scene.sampling_rate_hz)), float(rng.uniform(30.0, 250.0))
+    wave: FloatArray = np.sin(2 * np.pi * carrier * scene.time_s) * (
+        1.0 + rng.uniform(0.3, 1.0) * np.cos(2 * np.pi * apart * scene.time_s)
+    )
+    return wave
+
+
+def _random_knocks(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    n = max(3, int(scene.time_s[-1] * rng.uniform(1.0, 20.0)))
+    places = rng.integers(0, len(scene.time_s), n).astype(np.float64)
+    return struck(places, np.abs(rng.standard_normal(n)) + 0.2, scene, ring(scene, rng))
+
+
+def _swelling_noise(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """Noise of a band that swells with an order: a pump, a rub, lacking oil."""
+    order = float(rng.choice((1.0, scene.teeth[0] / scene.teeth[1], _strange_order(rng, 2, 9))))
+    swelling: FloatArray = band_noise(scene, rng) * (
+        1.0 + rng.uniform(0.3, 1.0) * np.cos(2 * np.pi * order * scene.revolutions)
+    )
+    return swelling
+
+
+def _steady_noise(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """Noise of a band: flow, cavitation, a neighbour."""
+    return band_noise(scene, rng)
+
+
+def _bad_contact(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """A plug that works loose: the signal jumps now and then, and what couples it to the amplifier takes that back."""
+    n = max(2, int(scene.time_s[-1] * log_uniform(rng, 1.0, 60.0)))
+    places = rng.integers(0, len(scene.time_s), n).astype(np.float64)
+    back = np.exp(-np.arange(int(scene.sampling_rate_hz)) / (log_uniform(rng, 0.001, 0.2) * scene.sampling_rate_hz))
+    return struck(places, rng.standard_normal(n), scene, back)
+
+
+FOREIGN: dict[str, Callable[[SyntheticScene, np.random.Generator], FloatArray]] = {
+    "rolling element": _rolling_element,
+    "knocks at a strange order": _strange_knocks,
+    "knocks once per revolution": _once_per_revolution,
+    "tone at a strange order": _strange_tone,
+    "ghost line": _ghost,
+    "whirl": _whirl,
+    "another machine": _other_machine,
+    "inverter": _inverter,
+    "random knocks": _random_knocks,
+    "swelling noise": _swelling_noise,
+    "steady noise": _steady_noise,
+    "bad contact": _bad_contact,
+}

@@ -1,0 +1,435 @@
+"""How the literature says that effects show: signs in the features of a diagnosis, and vibration made by hand.
+
+The simulators show each effect in one way, with one balance between its lines, sidebands and noise. Machines, and other
+simulators, agree with it on the signature and not on that balance: where a run-out modulates the mesh in one, it shows
+as a line of the shaft in another. So each effect also draws its signature with another balance each time, and whoever
+learns from recordings that have one put into them learns what the balances have in common.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from sims.machine import log_uniform
+
+UP, DOWN, EITHER = 1, -1, 0
+
+
+@dataclass(frozen=True)
+class Textbook:
+    """How an effect shows by the literature.
+
+    Parameters
+    ----------
+    signs : tuple of (str, int)
+        Features of `gearsig.gap` that rise (`UP`), fall (`DOWN`) or change (`EITHER`); ``{side}`` is driver or driven,
+        whichever shows more.
+    words : str
+        The same as the books say it.
+    draw : callable or None
+        (scene, size, rng) → `Signature`, with its balance drawn; its size is one of `SIZES`. None: no recording is made
+        by hand, the simulators show all there is to it.
+    source : str
+        Beside R. B. Randall, *Vibration-based Condition Monitoring*, 2nd ed., 2021, chapters 2, 5, 6 and 7, and ISO
+        13373-2:2016, annexes, which most of it is from.
+    """
+
+    signs: tuple[tuple[str, int], ...]
+    words: str
+    draw: Callable[[SyntheticScene, float, np.random.Generator], Signature] | None = None
+    source: str = ""
+
+
+# --------------------
+# What vibration is made of when it is made by hand: rings, knocks, tones, over the angle of a recording's shafts.
+# --------------------
+
+
+@dataclass(frozen=True)
+class SyntheticScene:
+    """What a vibration is made for.
+
+    Parameters
+    ----------
+    revolutions : array, (n,)
+        Of the driver at each sample.
+    time_s : array, (n,)
+    sampling_rate_hz : float
+    teeth : (int, int)
+    bearings : tuple of mapping
+        Orders BPFO, BPFI, BSF, FTF of each bearing, in cycles per revolution of the driver; and "shaft", that of its
+        own shaft.
+    """
+
+    revolutions: FloatArray
+    time_s: FloatArray
+    sampling_rate_hz: float
+    teeth: tuple[int, int]
+    bearings: tuple[dict[str, float], ...]
+
+    @property
+    def shaft_orders(self) -> tuple[float, float]:
+        """Revolutions of either shaft per revolution of the driver."""
+        return 1.0, self.teeth[0] / self.teeth[1]
+
+
+def ring(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """Return a housing mode's answer to a knock."""
+    rate = scene.sampling_rate_hz
+    frequency, damping = log_uniform(rng, 700.0, 0.4 * rate), float(rng.uniform(0.02, 0.1))
+    time = np.arange(int(rate * 6.0 / (2 * np.pi * frequency * damping)) + 2) / rate
+    answer: FloatArray = np.exp(-2 * np.pi * frequency * damping * time) * np.sin(2 * np.pi * frequency * time)
+    return answer
+
+
+def struck(places: FloatArray, sizes: FloatArray, scene: SyntheticScene, answer: FloatArray) -> FloatArray:
+    """Return the answer to knocks at samples `places`."""
+    from scipy.signal import oaconvolve
+
+    n = len(scene.time_s)
+    force = np.zeros(n)
+    np.add.at(force, np.clip(places.astype(np.intp), 0, n - 1), sizes)
+    vibration: FloatArray = oaconvolve(force, answer)[:n]
+    return vibration
+
+
+def passings(scene: SyntheticScene, order: float, phase: float = 0.0) -> FloatArray:
+    """Return the samples at which revolutions · order + phase passes a whole number."""
+    return np.flatnonzero(np.diff(np.floor(scene.revolutions * order + phase)) > 0).astype(np.float64)
+
+
+def knocks(order: float, jitter: float, scene: SyntheticScene, rng: np.random.Generator, by: float = 0.0) -> FloatArray:
+    """Return knocks `order` times per revolution, their size swinging at the order `by`."""
+    places = passings(scene, order, rng.uniform())
+    if len(places) > 1:
+        places += jitter * float(np.median(np.diff(places))) * rng.standard_normal(len(places))
+    depth = float(rng.uniform(0.3, 0.9)) if by else 0.0
+    swing = 1.0 + depth * np.cos(2 * np.pi * by * scene.revolutions)
+    kept = np.clip(places.astype(np.intp), 0, len(scene.time_s) - 1)
+    return struck(places, swing[kept] * rng.normal(1.0, 0.1, len(places)), scene, ring(scene, rng))
+
+
+def tone(order: float, scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """Return a sine of an order, with any phase."""
+    sine: FloatArray = np.sin(2 * np.pi * (order * scene.revolutions + rng.uniform()))
+    return sine
+
+
+def band_noise(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """Return noise through a housing mode."""
+    from scipy.signal import oaconvolve
+
+    noise: FloatArray = oaconvolve(rng.standard_normal(len(scene.time_s)), ring(scene, rng), mode="same")
+    return noise
+
+
+# --------------------
+# Paths from the gears to a sensor that have changed: everything that comes through changes with them.
+#
+# Mesh harmonics, sidebands, teeth and the noise of the machine go through the same path; what the sensor itself adds
+# does not. A fault of the flanks changes the mesh and leaves its neighbourhood. So a path is changed behind all that a
+# machine does, its tolerances included, and before the sensor's own noise.
+#
+# Source: R. B. Randall, *Vibration-based Condition Monitoring*, 2nd ed., 2021, chapter 3 (separation of force and
+# path).
+# --------------------
+
+
+@dataclass(frozen=True)
+class ModeChange:
+    """A mode that is louder at its frequency by a factor, and moved from there.
+
+    Parameters
+    ----------
+    frequency_hz, damping_ratio : float
+    factor : float
+        At its frequency.
+    moved_hz : float
+        Where it is now.
+    """
+
+    frequency_hz: float
+    damping_ratio: float
+    factor: float
+    moved_hz: float
+
+    def answer(self, frequency_hz: FloatArray) -> np.ndarray:
+        """Return by what vibration of each frequency is multiplied, (f0² + 2jAζff0 − f²)/(f1² + 2jζff1 − f²)."""
+        f, old, new, zeta = frequency_hz, self.frequency_hz, self.moved_hz, self.damping_ratio
+        above = old**2 - f**2 + 2j * zeta * self.factor * f * old
+        below = new**2 - f**2 + 2j * zeta * f * new
+        found: np.ndarray = above / below * (new / old) ** 2
+        return found
+
+
+@dataclass(frozen=True)
+class PathChange:
+    """What one channel's path is multiplied by."""
+
+    gain: float = 1.0
+    modes: tuple[ModeChange, ...] = ()
+
+    def of(self, values: FloatArray, rate_hz: float) -> FloatArray:
+        """Return a vibration as it comes through the changed path."""
+        frequency = np.fft.rfftfreq(len(values), 1.0 / rate_hz)
+        answer = np.full(len(frequency), self.gain, dtype=np.complex128)
+        for mode in self.modes:
+            answer *= mode.answer(frequency)
+        found: FloatArray = np.fft.irfft(np.fft.rfft(values) * answer, len(values))
+        return found
+
+
+def draw_path_changes(
+    n_channels: int, size: float, rate_hz: float, rng: np.random.Generator, *, everywhere: bool = False
+) -> Sequence[PathChange]:
+    """Draw each channel's change, of size 0 to 1; modes of a housing are the same for all, their shares are not.
+
+    Logarithms, at size 1: a mode is louder or softer by 3 at most; it moves, and all of a channel is multiplied, with
+    a standard deviation of 0.3. Two changes in five are of one sensor alone, which came loose, unless `everywhere`.
+    """
+    modes = [
+        (log_uniform(rng, 150.0, 0.45 * rate_hz), log_uniform(rng, 0.01, 0.2)) for _ in range(int(rng.integers(1, 4)))
+    ]
+    shifts = np.exp(0.3 * size * rng.standard_normal(len(modes))).tolist()
+    only = int(rng.integers(n_channels)) if not everywhere and rng.uniform() < 0.4 else None
+    changes = []
+    for i in range(n_channels):
+        changed = tuple(
+            ModeChange(f, zeta, float(np.exp(3.0 * size * rng.uniform(-1.0, 1.0))), min(f * shift, 0.49 * rate_hz))
+            for (f, zeta), shift in zip(modes, shifts, strict=True)
+        )
+        gain = float(np.exp(0.3 * size * rng.standard_normal()))
+        changes.append(PathChange() if only not in (None, i) else PathChange(gain, changed))
+    return changes
+
+
+# --------------------
+# What an effect does to a vibration: modulation, advance, mesh harmonics with what surrounds them, what is added.
+# --------------------
+
+
+N_MESH_HARMONICS = 6
+
+
+@dataclass(frozen=True)
+class Signature:
+    """What an effect does to every vibration channel: y(t) = m(t) x(t + τ(t)) + Σ of what is added.
+
+    Parameters
+    ----------
+    gain : array, (n,), or None
+        m, of the whole vibration.
+    advance_rev : array, (n,), or None
+        τ, in revolutions of the driver.
+    added : tuple of arrays, (n,)
+        In standard deviations of the channel.
+    mesh_gains : tuple of float
+        By which the mesh harmonics are multiplied.
+    paths_scatter : float
+        Standard deviation of the logarithm of what each channel's own mesh gains differ by.
+    around : float
+        How far sidebands and noise about a mesh harmonic change with it, 0 to 1: a force that grows takes what
+        modulates it along.
+    uneven : array, (n,), or None
+        By which share the change of the harmonics is larger at some teeth than at others.
+    paths : sequence of PathChange
+        Of each channel, for all that was there before; none: they are as ever.
+    cut_share : float
+        Of the samples, beyond a sensor's range.
+    """
+
+    gain: FloatArray | None = None
+    advance_rev: FloatArray | None = None
+    added: tuple[FloatArray, ...] = ()
+    mesh_gains: tuple[float, ...] = ()
+    paths_scatter: float = 0.0
+    around: float = 0.0
+    uneven: FloatArray | None = None
+    paths: Sequence[PathChange] = ()
+    cut_share: float = 0.0
+
+    def on(
+        self, values: FloatArray, scene: SyntheticScene, rng: np.random.Generator, size: float, channel: int = 0
+    ) -> FloatArray:
+        """Return one channel with the signature; what is added is in units of `size`."""
+        if self.paths:
+            values = self.paths[channel].of(values, scene.sampling_rate_hz)
+        shown = values
+        if self.advance_rev is not None:
+            speed = np.gradient(scene.revolutions, scene.time_s)
+            shown = _at(shown, self.advance_rev / speed * scene.sampling_rate_hz)
+        if self.gain is not None:
+            shown = shown * (1.0 + (self.gain - 1.0) * rng.uniform(0.5, 1.0))
+        if self.mesh_gains:
+            of_channel = np.exp(self.paths_scatter * rng.standard_normal(len(self.mesh_gains)))
+            shown = shown + _gears_change(values, np.array(self.mesh_gains) * of_channel, self, scene)
+        for added in self.added:
+            shown = shown + added * size * rng.uniform(0.3, 1.0)
+        return _cut(shown, self.cut_share, rng) if self.cut_share else shown
+
+
+def _cut(values: FloatArray, share: float, rng: np.random.Generator) -> FloatArray:
+    """Return a channel without the extreme samples, on either side alike or at one level."""
+    if rng.uniform() < 0.5:
+        low, high = np.quantile(values, (share / 2.0, 1.0 - share / 2.0))
+    else:
+        high = np.quantile(np.abs(values), 1.0 - share)
+        low = -high
+    cut: FloatArray = np.clip(values, low, high)
+    return cut
+
+
+def _at(values: FloatArray, advance_samples: FloatArray) -> FloatArray:
+    from scipy.ndimage import map_coordinates
+
+    moved: FloatArray = map_coordinates(values, [np.arange(len(values)) + advance_samples], order=3, mode="nearest")
+    return moved
+
+
+def _gears_change(values: FloatArray, gains: FloatArray, signature: Signature, scene: SyntheticScene) -> FloatArray:
+    """Return what must be added for the mesh harmonics, and what surrounds them, to be larger."""
+    around = gains**signature.around
+    wide = _about_the_mesh(values, around, scene) if signature.around else values
+    change = _mesh_change(wide, gains / around, scene)
+    return wide - values + (change if signature.uneven is None else change * (1.0 + signature.uneven))
+
+
+def _about_the_mesh(values: FloatArray, gains: FloatArray, scene: SyntheticScene) -> FloatArray:
+    """Return a vibration with each stretch about a mesh harmonic `gains` times as large; shaft lines as they are."""
+    turns_hz = (scene.revolutions[-1] - scene.revolutions[0]) / (scene.time_s[-1] - scene.time_s[0])
+    mesh_orders = np.fft.rfftfreq(len(values), 1.0 / scene.sampling_rate_hz) / (turns_hz * scene.teeth[0])
+    logs = np.interp(mesh_orders, [0.3, *range(1, len(gains) + 1)], [0.0, *np.log(gains)])
+    found: FloatArray = np.fft.irfft(np.fft.rfft(values) * np.exp(logs), len(values))
+    return found
+
+
+def _mesh_change(values: FloatArray, gains: FloatArray, scene: SyntheticScene) -> FloatArray:
+    """Return what must be added for the mesh harmonics to be `gains` times as large."""
+    change = np.zeros_like(values)
+    for k, gain in enumerate(gains, start=1):
+        wave = np.exp(2j * np.pi * k * scene.teeth[0] * scene.revolutions)
+        change += (gain - 1.0) * 2.0 * np.real(np.mean(values * np.conj(wave)) * wave)
+    return change
+
+
+# --------------------
+# What is drawn of a signature: sides, signs, balances, shares; and what several effects have in common.
+# --------------------
+
+
+MAX_ADVANCE = 0.35
+"""Of a mesh period, by which a tooth comes too early or too late."""
+
+SIZES = (0.06, 2.5)
+"""Of a signature: from what nobody sees to several floors. Effects reach about as far as each other; where one ended
+before its look-alikes do, whatever is large would be one of those."""
+
+
+def draw_side(rng: np.random.Generator) -> int:
+    """Return 0, driver, or 1, driven gear."""
+    return int(rng.integers(2))
+
+
+def sign(rng: np.random.Generator) -> float:
+    """Return 1 or −1."""
+    return float(rng.choice((-1.0, 1.0)))
+
+
+def balance(rng: np.random.Generator, n: int) -> FloatArray:
+    """Return n weights, the largest 1, any of the others nearly nothing."""
+    weights = 10.0 ** (-rng.uniform(0.0, 1.5, n))
+    weights[rng.uniform(size=n) < 0.25] = 0.0
+    weights[int(rng.integers(n))] = 1.0
+    found: FloatArray = weights
+    return found
+
+
+def steeply(rng: np.random.Generator) -> FloatArray:
+    """Return shares of the mesh harmonics that fall with their number, from nearly not to steeply."""
+    shares: FloatArray = np.arange(1.0, N_MESH_HARMONICS + 1.0) ** -rng.uniform(0.2, 2.0)
+    return shares
+
+
+def partly(rng: np.random.Generator) -> float:
+    """Return 0, 1 or anything between."""
+    return float(np.clip(rng.uniform(-0.5, 1.5), 0.0, 1.0))
+
+
+def tooth_window(
+    scene: SyntheticScene, side: int, width_teeth: float, rng: np.random.Generator
+) -> tuple[FloatArray, float]:
+    """Return 1 in the middle of one tooth's mesh, 0 away from it, and that tooth's place in revolutions."""
+    place, teeth = float(rng.uniform()), scene.teeth[side]
+    off = (scene.revolutions * scene.shaft_orders[side] - place + 0.5) % 1.0 - 0.5
+    reach = np.clip(off * teeth / width_teeth, -1.0, 1.0)
+    window: FloatArray = 0.5 + 0.5 * np.cos(np.pi * reach)
+    return window, place
+
+
+def tooth_knocks(
+    scene: SyntheticScene, side: int, place: float, scatter: float, rng: np.random.Generator, of: int = 1
+) -> FloatArray:
+    """Return knocks when a tooth meshes, `of` of them a fraction of a pitch apart, in standard deviations at most 1."""
+    answer, order, total = ring(scene, rng), scene.shaft_orders[side], np.zeros(len(scene.time_s))
+    for _ in range(of):
+        at = passings(scene, order, -place - float(rng.uniform(0.0, 0.7)) / scene.teeth[side])
+        total += struck(at, np.maximum(rng.normal(1.0, scatter, len(at)), 0.0) * sign(rng), scene, answer)
+    return total / max(float(np.abs(total).max()), 1e-12)
+
+
+def swollen(share: float, window: FloatArray) -> FloatArray:
+    swollen: FloatArray = np.maximum(1.0 + share * window, 0.0)
+    return swollen
+
+
+def late_tooth(scene: SyntheticScene, share: float, window: FloatArray, rng: np.random.Generator) -> FloatArray:
+    late: FloatArray = sign(rng) * MAX_ADVANCE * min(share, 1.0) / scene.teeth[0] * window
+    return late
+
+
+def uneven(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """Return what differs from tooth to tooth of both gears, of unit size."""
+    total = np.zeros(len(scene.time_s))
+    for side, weight in zip((0, 1), rng.uniform(0.0, 1.0, 2), strict=True):
+        teeth = scene.teeth[side]
+        own = rng.standard_normal(teeth)
+        place = scene.revolutions * scene.shaft_orders[side] * teeth % teeth
+        total += weight * np.interp(place, np.arange(teeth + 1), np.append(own, own[0]))
+    return np.clip(total, -2.5, 2.5)
+
+
+def at_the_mesh(scene: SyntheticScene, noise: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return noise, of unit size, that swells with the mesh more or less."""
+    swelling = 1.0 + rng.uniform(0.0, 0.9) * np.cos(2 * np.pi * scene.teeth[0] * scene.revolutions)
+    found: FloatArray = noise / max(float(noise.std()), 1e-12) * swelling
+    return found
+
+
+def swing(scene: SyntheticScene, order: float, size: float, rng: np.random.Generator) -> FloatArray:
+    wave: FloatArray = np.maximum(1.0 + size * tone(order, scene, rng), 0.0)
+    return wave
+
+
+def modulated(
+    scene: SyntheticScene, order: float, swings: tuple[float, float], lines: Sequence[float], rng: np.random.Generator
+) -> Signature:
+    """The mesh swings in size and in phase at an order, which shows with its multiples as lines as well."""
+    gain, late = swings
+    return Signature(
+        swing(scene, order, 0.8 * gain, rng),
+        MAX_ADVANCE * min(late, 1.0) / scene.teeth[0] * tone(order, scene, rng),
+        tuple(line * tone(n * order, scene, rng) for n, line in enumerate(lines, start=1)),
+    )
+
+
+def race_knocks(scene: SyntheticScene, size: float, rng: np.random.Generator, name: str) -> Signature:
+    """Knocks when elements pass the defect; on the inner race louder in the load zone, that is once per turn."""
+    bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
+    order = bearing[name] * float(rng.uniform(0.985, 1.0))
+    by = bearing["shaft"] if name == "BPFI" else 0.0
+    vibration = knocks(order, log_uniform(rng, 0.001, 0.02), scene, rng, by=by)
+    return Signature(added=(1.5 * size * vibration / max(float(vibration.std()), 1e-12),))
