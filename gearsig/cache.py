@@ -45,7 +45,7 @@ def cache_folder(room: str) -> Path:
 
 
 def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write a file beside its place and move it there: whole or not at all.
+    """Write a file beside its place and move it there: whole or not at all; its folder is made where there is none.
 
     Raises
     ------
@@ -54,6 +54,7 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
     """
     part = ""
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         handle, part = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem[:32]}-", suffix=".part")
         with os.fdopen(handle, "wb") as file:
             write(file)

@@ -3,7 +3,6 @@
 from sims.reduced_fe._blank import (
     GearBlank,
     MeshSize,
-    blank_from_text,
     check_memory,
     check_reducible,
     craig_bampton_bytes,
@@ -15,9 +14,12 @@ from sims.reduced_fe._blank import (
 )
 from sims.reduced_fe._contact import (
     MARGIN,
+    MeshMaps,
     corner_separation_m,
     folded,
+    force_map,
     hertz_energy,
+    mesh_maps,
     mirror_groups,
     mirrors,
     rolls_rad,
@@ -26,17 +28,22 @@ from sims.reduced_fe._contact import (
     static_table,
 )
 from sims.reduced_fe._crack import (
-    CRACK_SIZE,
     crack_added_m_per_n,
     crack_meshes,
     crack_size,
     deepest_followed_mm,
-    forget_cracks_of_other_versions,
     forget_other_versions,
     open_crack,
     other_sectors,
-    solved_crack_m_per_n,
     tooth_compliance_with,
+)
+from sims.reduced_fe._craig_bampton import (
+    N_COMPARED,
+    CraigBamptonGear,
+    CraigBamptonPlan,
+    Masters,
+    craig_bampton,
+    matched,
 )
 from sims.reduced_fe._cyclic import (
     CyclicGear,
@@ -49,14 +56,20 @@ from sims.reduced_fe._cyclic import (
     modes_of_diameter,
     rigid_part,
 )
-from sims.reduced_fe._elements import MeshQuality, cell_fields, cylindrical_turn, lame_pa, mesh_quality, sector_matrices
 from sims.reduced_fe._integrate import step_coefficients
-from sims.reduced_fe._maps import MeshMaps, force_map, mesh_maps
-from sims.reduced_fe._mesh import FaceView, SectorMesh, face_view, line_weights, parabolic_weights, sector_mesh
+from sims.reduced_fe._mesh import (
+    FaceView,
+    MeshQuality,
+    SectorMesh,
+    cylindrical_turn,
+    face_view,
+    line_weights,
+    mesh_quality,
+    parabolic_weights,
+    sector_matrices,
+    sector_mesh,
+)
 from sims.reduced_fe._pair import (
-    GEAR,
-    HUB,
-    ROTOR,
     FlexiblePair,
     bearing_springs,
     constants,
@@ -66,18 +79,24 @@ from sims.reduced_fe._pair import (
     start_state,
     torsional_mode,
 )
-from sims.reduced_fe._reduced_gear import FlankGrid, ReducedGear, flank_grid, flank_rows, point_and_push
-from sims.reduced_fe._reduction import (
-    N_COMPARED,
-    CraigBamptonGear,
-    CraigBamptonPlan,
-    Masters,
+from sims.reduced_fe._reduced_gear import (
+    PLAN,
+    READY,
+    FlankGrid,
+    ReducedGear,
     ReductionPlan,
-    craig_bampton,
-    matched,
+    cached_gear,
+    flank_grid,
+    flank_rows,
+    gear_key,
+    gear_name,
     plan_for,
+    point_and_push,
+    read_gear,
+    ready_gear,
     reduce_gear,
     static_compliance,
+    write_gear,
 )
 from sims.reduced_fe._respond import (
     STEP_S,
@@ -101,17 +120,6 @@ from sims.reduced_fe._simulator import (
     simulate_pair,
     twin_parameters,
 )
-from sims.reduced_fe._store import (
-    PLAN,
-    READY,
-    cached_gear,
-    forget_gears_of_other_versions,
-    gear_key,
-    gear_name,
-    read_gear,
-    ready_gear,
-    write_gear,
-)
 from sims.reduced_fe._studies import (
     FINER_DOF,
     DiscretisationError,
@@ -125,16 +133,12 @@ from sims.reduced_fe._studies import (
 )
 
 __all__ = [
-    "CRACK_SIZE",
     "FINER_DOF",
-    "GEAR",
-    "HUB",
     "MARGIN",
     "NAME",
     "N_COMPARED",
     "PLAN",
     "READY",
-    "ROTOR",
     "STEP_S",
     "TRANSMISSION_ERROR",
     "TWIN_STEP_S",
@@ -163,9 +167,7 @@ __all__ = [
     "SpreadingCheck",
     "ToothLoad",
     "bearing_springs",
-    "blank_from_text",
     "cached_gear",
-    "cell_fields",
     "check_convergence",
     "check_depth",
     "check_memory",
@@ -189,8 +191,6 @@ __all__ = [
     "folded",
     "followed_step_s",
     "force_map",
-    "forget_cracks_of_other_versions",
-    "forget_gears_of_other_versions",
     "forget_other_versions",
     "gear_key",
     "gear_name",
@@ -198,7 +198,6 @@ __all__ = [
     "hertz_energy",
     "hub_rows",
     "kept_modes",
-    "lame_pa",
     "line_weights",
     "load_tooth",
     "matched",
@@ -231,7 +230,6 @@ __all__ = [
     "sector_mesh",
     "simulate_pair",
     "solve_contacts",
-    "solved_crack_m_per_n",
     "speed_sweep",
     "spreading_check",
     "start_state",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
@@ -97,8 +97,15 @@ class GearBlank:
         return self.geometry.bore_mm + thickness
 
     def as_text(self) -> str:
-        """Return the blank as JSON, from which `blank_from_text` makes it again; equal blanks give equal texts."""
+        """Return the blank as JSON, from which `from_text` makes it again; equal blanks give equal texts."""
         return json.dumps(asdict(self), sort_keys=True)
+
+    @classmethod
+    def from_text(cls, text: str) -> GearBlank:
+        """Return the blank that `as_text` wrote; it is checked again."""
+        values: dict[str, Any] = json.loads(text)
+        values |= {"geometry": GearGeometry(**values["geometry"]), "material": Material(**values["material"])}
+        return cls(**values)
 
     @property
     def _middle_of_body_mm(self) -> float:
@@ -142,17 +149,7 @@ class GearBlank:
             )
 
 
-def blank_from_text(text: str) -> GearBlank:
-    """Return the blank that `GearBlank.as_text` wrote; it is checked again."""
-    values: Mapping[str, Any] = json.loads(text)
-    own = {name: values[name] for name in ("web_thickness_mm", "rim_thickness_mm", "hub_thickness_mm")}
-    return GearBlank(GearGeometry(**values["geometry"]), material=Material(**values["material"]), **own)
-
-
-# --------------------
 # The outline of half a tooth and half a space as curves by arc length, cut in the middle of the fillet.
-# --------------------
-
 
 N_SAMPLES = 2000
 """Points by which arc length is measured along each curve; places stay on the exact curve."""
@@ -282,10 +279,7 @@ def _joined(pieces: tuple[tuple[Curve, float, float], ...]) -> tuple[Curve, floa
     return joined, float(ends[-1])
 
 
-# --------------------
 # How finely a gear is meshed: numbers of cells, and the numbers for a wanted count of degrees of freedom.
-# --------------------
-
 
 MIN_DOF, MAX_DOF = 5_000, 1_100_000
 """Range in which a size is chosen; explicit numbers of cells may leave it."""
@@ -475,10 +469,7 @@ def _size(blank: GearBlank, cell_mm: float) -> MeshSize:
     )
 
 
-# --------------------
 # Memory that a computation will need, estimated before it starts.
-# --------------------
-
 
 BASE_BYTES = 250e6
 """Interpreter and libraries."""
@@ -527,9 +518,7 @@ def check_memory(needed_bytes: float, free_bytes: float | None = None) -> None:
         )
 
 
-# --------------------
 # One thread for linear algebra on small matrices, where more threads wait for each other longer than they work.
-# --------------------
 
 
 @contextmanager

@@ -20,10 +20,18 @@ from gearsig.errors import InputError
 from sims.mesh import RootCrack, check_crack, crack_mouth_mm, crack_tip_mm, deepest_crack_mm
 from sims.reduced_fe._blank import GearBlank, MeshSize, one_thread
 from sims.reduced_fe._cyclic import factorised
-from sims.reduced_fe._elements import sector_matrices
-from sims.reduced_fe._mesh import CrackLine, IntArray, SectorMesh, sector_mesh
-from sims.reduced_fe._reduced_gear import FlankGrid, ReducedGear, Spread, flank_rows
-from sims.reduced_fe._store import FOLDER, READY, code_digest, forget_gears_of_other_versions, ready_gear
+from sims.reduced_fe._mesh import CrackLine, IntArray, SectorMesh, sector_matrices, sector_mesh
+from sims.reduced_fe._reduced_gear import (
+    FOLDER,
+    READY,
+    FlankGrid,
+    ReducedGear,
+    Spread,
+    code_digest,
+    flank_rows,
+    is_of_this_code,
+    ready_gear,
+)
 
 CRACK_SIZE = MeshSize(n_across=8, n_gap=1, n_up=9, n_rim=3, n_body=2, n_along=4)
 """Finer across the root than the whole gear needs: the crack ends in the middle of it."""
@@ -219,10 +227,7 @@ def _free_side(mesh: SectorMesh, side: IntArray) -> IntArray:
     return dof
 
 
-# --------------------
 # What cracks add to the compliance of a reduced gear's tooth, from finite elements, kept over depth and width.
-# --------------------
-
 
 DEPTH_PARTS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 """Of the deepest crack: depths that are solved. What lies between follows from added compliance over squared depth."""
@@ -370,29 +375,6 @@ def _shipped(gear: ReducedGear, angle_deg: float, place: int) -> FloatArray | No
     return cracks[name][place] if same and place < len(cracks[name]) else None
 
 
-def make_ready_cracks() -> None:
-    """Solve the cracks of all ready-made gears and write their file; each gear's end where the mesh cannot follow."""
-    arrays: dict[str, Any] = {}
-    for name in READY:
-        gear, solved = ready_gear(name), []
-        for place in range(len(DEPTH_PARTS)):
-            try:
-                solved.append(solved_crack_m_per_n(gear, READY_ANGLE_DEG, place))
-            except InputError:
-                break
-        arrays |= {name: np.array(solved), f"{name}_roll_rad": gear.grid.roll_rad, f"{name}_z_m": gear.grid.z_m}
-    write_whole(READY_FILE, lambda file: np.savez_compressed(file, **arrays))
-
-
-def forget_cracks_of_other_versions(folder: Path | None = None) -> tuple[Path, ...]:
-    """Delete the kept cracks that another version of the code solved, and damaged ones; return their files."""
-    where = cache_folder("cracks") if folder is None else folder
-    gone = [path for path in sorted(where.glob("*.np[yz]")) if _read(path)[0] != _code()]
-    for path in gone:
-        path.unlink(missing_ok=True)
-    return tuple(gone)
-
-
 def _kept(path: Path, solve: Callable[[], FloatArray], grid: tuple[int, int, int]) -> FloatArray:
     """Return what a file keeps, or solve and keep it; a damaged one is made again."""
     code, added = _read(path)
@@ -400,15 +382,9 @@ def _kept(path: Path, solve: Callable[[], FloatArray], grid: tuple[int, int, int
         raise OtherVersionError("this crack was solved by another version of gearsig", where=str(path), remedy=FRESH)
     if added is not None and added.shape[1:] == (grid[1], grid[2], grid[2]) and np.isfinite(added).all():
         return added
-    found = solve()
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"cannot be made ({error.strerror})", where=str(path.parent), remedy="choose another folder"
-        ) from None
-    write_whole(path, lambda file: np.savez(file, code=np.array(_code()), added=found))
-    return found
+    solved = solve()
+    write_whole(path, lambda file: np.savez(file, code=np.array(_code()), added=solved))
+    return solved
 
 
 def _read(path: Path) -> tuple[str, FloatArray | None]:
@@ -431,8 +407,21 @@ def forget_other_versions() -> tuple[Path, ...]:
     tuple of Path
         The files that are gone. What is needed of them is made again when it is next asked for.
     """
-    return (*forget_gears_of_other_versions(), *forget_cracks_of_other_versions())
+    gone = [path for path in sorted(cache_folder("gears").glob("*.npz")) if not is_of_this_code(path)]
+    gone += [path for path in sorted(cache_folder("cracks").glob("*.np[yz]")) if _read(path)[0] != _code()]
+    for path in gone:
+        path.unlink(missing_ok=True)
+    return tuple(gone)
 
 
-if __name__ == "__main__":
-    make_ready_cracks()
+if __name__ == "__main__":  # solve the cracks of all ready-made gears, each as deep as the mesh can follow
+    arrays: dict[str, Any] = {}
+    for name in READY:
+        gear, solved = ready_gear(name), []
+        for place in range(len(DEPTH_PARTS)):
+            try:
+                solved.append(solved_crack_m_per_n(gear, READY_ANGLE_DEG, place))
+            except InputError:
+                break
+        arrays |= {name: np.array(solved), f"{name}_roll_rad": gear.grid.roll_rad, f"{name}_z_m": gear.grid.z_m}
+    write_whole(READY_FILE, lambda file: np.savez_compressed(file, **arrays))

@@ -14,12 +14,9 @@ from scipy.spatial import cKDTree
 
 from gearsig.checks import FloatArray, count, frozen_array
 from gearsig.errors import InputError
-from sims.reduced_fe._elements import sector_matrices
-from sims.reduced_fe._mesh import IntArray, SectorMesh, whole_weights
+from sims.reduced_fe._mesh import IntArray, SectorMesh, sector_matrices, whole_weights
 
-# --------------------
 # A sector is its own mirror image: in the right coordinates its Hermitian matrices are real.
-# --------------------
 
 
 class RealFolded(NamedTuple):
@@ -122,10 +119,7 @@ class SectorMirror:
         return real
 
 
-# --------------------
 # Mean motion of the bore: one node at the hub, spread over the bore's surface (RBE3).
-# --------------------
-
 
 ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 
@@ -420,10 +414,7 @@ def _node_selection(nodes: IntArray, places: IntArray, n_nodes: int, n_own: int)
     return sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=shape)
 
 
-# --------------------
 # Natural frequencies and modes of a gear by cyclic symmetry.
-# --------------------
-
 
 RIGID_HZ = 10.0
 """Below it a mode of the free gear is rigid; those computed lie below 0.1 Hz, elastic ones far above."""
@@ -599,10 +590,7 @@ def _phased(shapes: ComplexArray) -> ComplexArray:
     return phased
 
 
-# --------------------
 # The motion of every node in a mode, for figures and files.
-# --------------------
-
 
 MOSTLY = 0.9
 """Part of a mode's kinetic energy from which on the gear moves as a whole."""

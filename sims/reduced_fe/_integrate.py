@@ -40,12 +40,9 @@ from sims.reduced_fe._contact import (
     solve_contacts,
 )
 
-# --------------------
 # Compiled: modal coordinates seen from a tooth, and the works of forces on them.
 #
 # Inlined where they are used, as are the phases of a step: calls with many arrays took a fifth of the time.
-# --------------------
-
 
 # Arrays are passed whole, with the places in them: a slice is a new object, whose references are counted at every use.
 
@@ -124,9 +121,7 @@ def spread(rows, side, i, s, t, force, g):
         g[j] -= low * rows[side, i, s, j] + high * rows[side, i + 1, s, j]
 
 
-# --------------------
 # Compiled: what acts on the two sides besides the driving flanks, as modal forces.
-# --------------------
 
 
 @njit(inline="always", error_model="numpy")
@@ -566,14 +561,11 @@ def _energy(k, q, v, modal, inputs, angle, load, r, n, force, back, hertz):
     return total
 
 
-# --------------------
 # One step of each mode as fixed numbers: (q, v) at the end from (q, v) and the forces at either end.
 #
 #     q₁ = a_qq q₀ + a_qv v₀ + b_q0 f₀ + b_q1 f₁,   v₁ = a_vq q₀ + a_vv v₀ + b_v0 f₀ + b_v1 f₁
 #
 # for q̈ + 2ζω q̇ + ω² q = f. Both integrators are of this form; they differ in the numbers.
-# --------------------
-
 
 Method = Literal["exponential", "newmark"]
 METHODS: tuple[Method, ...] = ("exponential", "newmark")

@@ -28,30 +28,30 @@ from sims.reduced_fe._contact import (
     FLANK,
     SIGNS,
     ContactTable,
+    MeshMaps,
+    contact_state,
     contact_table,
     folded,
+    mesh_maps,
     mirror_groups,
     mirrors,
     over_height,
     rolls_rad,
     static_table,
+    teeth_of,
 )
-from sims.reduced_fe._maps import MeshMaps, contact_state, mesh_maps, teeth_of
 from sims.reduced_fe._reduced_gear import ReducedGear
 
 if TYPE_CHECKING:
     from sims.reduced_fe._respond import FlexState
 
 
-# --------------------
 # Bearings with rolling elements as springs about their static load: softness across it, feet that move.
 #
 # A bearing with clearance c that its load presses to one side by δ = Q/k is as stiff as it is along the load, and only
 # k δ/(c + δ) across it, as the shaft may roll along the race. Rolling elements that pass move the spring's foot: over a
 # spall it sinks, with clearance it sways (see `sims.gear_pair`). Their load is that of the torque at this moment,
 # without the vibration; a load that lets the shaft lift is refused.
-# --------------------
-
 
 ROLLING_FIELDS: list[tuple[str, type, tuple[int, ...]]] = [
     *BEARING_FIELDS,
@@ -114,10 +114,7 @@ def _check_load(machine: Machine, operation: Operation) -> None:
         )
 
 
-# --------------------
 # The elastic connection between a gear's body and its hub, where shaft, bearings and hub inertia hold it.
-# --------------------
-
 
 PLANE = (0, 1, 5)
 """Of the hub's six motions those in the gear's plane: along x, along y, about z."""
@@ -184,7 +181,6 @@ def without_hub(
     return replace(table, own=own, cross=cross)
 
 
-# --------------------
 # One side of the pair as modes: rotor, shaft, bearings, hub, the gear's body, and its elastic modes.
 #
 # The elastic modes stay in the frame of the gear and the contact moves over them: no matrix is ever turned under a
@@ -192,8 +188,6 @@ def without_hub(
 # those of n = 0 twist it and are joined with them. Modes of n = 1 move the hub across the shaft, which turns against
 # them; they are left to the static compliance. What is not kept acts between hub and body as springs, see
 # `sims.reduced_fe`.
-# --------------------
-
 
 COORDINATES = (
     "rotor angle",
@@ -762,10 +756,7 @@ def _pad(side: FlexibleSide, single: int, pairs: int, silent: int) -> FlexibleSi
     )
 
 
-# --------------------
 # Where a run starts: the static balance at the first torque, so that no blow has to die out.
-# --------------------
-
 
 DEEPEST_M = 1e-3
 """Beyond any approach of flanks."""
@@ -811,7 +802,7 @@ def _closed(pair: FlexiblePair, own: FlexiblePairConstants, state: FlexState, fo
 
     from scipy.optimize import brentq
 
-    from sims.reduced_fe._maps import force_map
+    from sims.reduced_fe._contact import force_map
 
     table = own.table
     rigid = own.sides[1]
@@ -837,10 +828,7 @@ def _closed(pair: FlexiblePair, own: FlexiblePairConstants, state: FlexState, fo
     return replace(state, q=q)
 
 
-# --------------------
 # The pair as a linear system about its loaded state: eigenfrequencies over the mesh angle.
-# --------------------
-
 
 MIN_TORSIONAL_HZ = 200.0
 """Modes below it are those of rotors on their couplings."""

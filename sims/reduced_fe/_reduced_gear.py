@@ -1,19 +1,43 @@
-"""A reduced gear: what contact and dynamics need to know of a finite-element gear."""
+"""A reduced gear: modes and static compliance at flanks and hub, by cyclic symmetry, and kept on disk."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field, fields
+from functools import cache
+from hashlib import sha256
 from math import cos, pi, sin
-from typing import Literal, NamedTuple
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from gearsig.cache import FRESH, OtherVersionError, cache_folder, modules_digest, read_arrays, write_whole
 from gearsig.checks import FloatArray, count, frozen_array, one_of, positive
 from gearsig.errors import InputError
 from sims.mesh import GearGeometry, involute_outline
-from sims.reduced_fe._blank import GearBlank, flank_place, row_places, side_curve
-from sims.reduced_fe._mesh import IntArray, SectorMesh, line_weights, parabolic_weights
+from sims.reduced_fe._blank import (
+    GearBlank,
+    MeshSize,
+    check_memory,
+    check_reducible,
+    flank_place,
+    mesh_size_for,
+    one_thread,
+    row_places,
+    side_curve,
+)
+from sims.reduced_fe._cyclic import (
+    ComplexArray,
+    CyclicGear,
+    CyclicModes,
+    Held,
+    cyclic_modes,
+    hub_sum,
+)
+from sims.reduced_fe._mesh import IntArray, SectorMesh, line_weights, mesh_quality, parabolic_weights, sector_mesh
 
 Support = Literal["free", "hub_held", "bore_clamped"]
 """How the body is held while a flank is pushed; see `ReducedGear.compliance_m_per_n`."""
@@ -276,10 +300,7 @@ class ReducedGear:
         object.__setattr__(self, name, array)
 
 
-# --------------------
 # Flank points: which nodes share a force at a place on a flank, and whose motion counts there (RBE3).
-# --------------------
-
 
 Spread = Literal["section", "patch", "node"]
 """What a force at a flank point acts on; see `ReducedGear.spread`."""
@@ -423,3 +444,359 @@ def _polar(mesh: SectorMesh, nodes: SectionNodes, row: FloatArray) -> FloatArray
     radius = np.hypot(x[:, 0], x[:, 1])
     radial, around = x / radius[:, None], np.column_stack((-x[:, 1], x[:, 0])) / radius[:, None]
     return np.column_stack((np.sum(row * radial, axis=1), np.sum(row * around, axis=1), np.zeros(len(x))))
+
+
+AnyArray = np.ndarray[Any, Any]
+
+
+@dataclass(frozen=True)
+class ReductionPlan:
+    """What a gear is reduced to.
+
+    Parameters
+    ----------
+    size : MeshSize
+    n_modes : int
+        Elastic modes kept, at least; a pair is never cut.
+    n_heights, n_slices : int
+        Flank points of a tooth: heights over the involute, slices of the face width.
+    n_offsets : int
+        Compliance between teeth up to n_offsets − 1 apart.
+    spread : str
+        "section", "patch" or "node"; see `ReducedGear`.
+    """
+
+    size: MeshSize = field(default_factory=MeshSize)
+    n_modes: int = 40
+    n_heights: int = 9
+    n_slices: int = 5
+    n_offsets: int = 3
+    spread: Spread = "section"
+
+    def __post_init__(self) -> None:
+        count(self.n_modes, "n_modes")
+        count(self.n_heights, "n_heights", minimum=2)
+        count(self.n_slices, "n_slices")
+        count(self.n_offsets, "n_offsets")
+        one_of(self.spread, "spread", ("section", "patch", "node"))
+
+
+class StaticCompliance(NamedTuple):
+    """Static response at the points of a gear; see the fields of `ReducedGear`."""
+
+    flanks: FloatArray
+    hub_flank: FloatArray
+    hub: FloatArray
+
+
+def plan_for(blank: GearBlank, n_dof: int, **wanted: int | Spread) -> ReductionPlan:
+    """Return a plan with a mesh of about `n_dof` degrees of freedom."""
+    return ReductionPlan(mesh_size_for(blank, n_dof), **wanted)  # type: ignore[arg-type]  # checked by the plan
+
+
+def reduce_gear(blank: GearBlank, plan: ReductionPlan) -> ReducedGear:
+    """Mesh a gear and reduce it: its lowest elastic modes, and the exact static compliance at flanks and hub.
+
+    The modes are those of the whole free gear; all the others together act as if without mass, which the static
+    compliance accounts for: C − Σ φφᵀ/ω² (residual attachment modes). Frequencies of the reduced gear are therefore
+    those of the full model, and its static answer too.
+
+    Parameters
+    ----------
+    blank : GearBlank
+    plan : ReductionPlan
+
+    Raises
+    ------
+    InputError
+        If the mesh is too coarse for the fillet, or the memory does not suffice (estimated before starting).
+
+    Source: R. R. Craig, A. J. Kurdila, *Fundamentals of Structural Dynamics*, 2nd ed. (2006), ch. 17, for residual
+    attachment modes; D. L. Thomas, International Journal for Numerical Methods in Engineering 14 (1979), for cyclic
+    symmetry.
+    """
+    from sims.reduced_fe._blank import sector_bytes
+
+    if plan.n_offsets > blank.n_teeth // 2:
+        raise InputError(f"n_offsets is {plan.n_offsets}", allowed=f"at most {blank.n_teeth // 2}, half of the teeth")
+    check_reducible(blank, plan.size)
+    check_memory(sector_bytes(blank, plan.size))
+    mesh = sector_mesh(blank, plan.size)
+    quality, gear = mesh_quality(mesh), CyclicGear(mesh)
+    grid = flank_grid(blank.geometry, plan.n_heights, plan.n_slices)
+    with one_thread():
+        rows = flank_rows(mesh, grid, plan.spread, gear.own_places, 3 * len(gear.own_nodes))
+        modes = cyclic_modes(gear, plan.n_modes, elastic=True)
+        free = static_compliance(gear, rows, grid, plan.n_offsets)
+        clamped = static_compliance(gear, rows, grid, plan.n_offsets, "bore")
+    frequencies, diameters, at_flanks, at_hub = _real_modes(gear, modes, rows)
+    return ReducedGear(
+        blank=blank,
+        key=gear_key(blank, plan),
+        n_dof=mesh.n_dof,
+        spread=plan.spread,
+        mass_kg=quality.mass_kg,
+        polar_inertia_kg_m2=quality.polar_inertia_kg_m2,
+        diametral_inertia_kg_m2=quality.diametral_inertia_kg_m2,
+        grid=grid,
+        frequencies_hz=frequencies,
+        nodal_diameters=diameters,
+        flank_modes=at_flanks,
+        hub_modes=at_hub,
+        free_compliance_m_per_n=free.flanks,
+        clamped_compliance_m_per_n=clamped.flanks,
+        hub_flank_compliance=free.hub_flank,
+        hub_compliance=free.hub,
+    )
+
+
+def static_compliance(
+    gear: CyclicGear, rows: FloatArray, grid: FlankGrid, n_offsets: int, held: Held = "free"
+) -> StaticCompliance:
+    """Compliance between flank points and hub, from one solution per nodal diameter.
+
+    A unit push at tooth 0 alone is the sum over all nodal diameters of 1/z of a push that travels round; with the
+    response H(n) of one sector, C_o = (1/z) Σ_n H(n) e^{2πino/z}.
+
+    Parameters
+    ----------
+    gear : CyclicGear
+    rows : array, (n_points, n_own_dof)
+        Of the flank points.
+    grid : FlankGrid
+    n_offsets : int
+    held : str
+        "free": the response of the free gear without its rigid motion; "bore": every node of the bore held.
+    """
+    z, points = gear.n_sectors, grid.n_points
+    flanks = np.zeros((n_offsets, points, points))
+    hub_flank, hub = np.zeros((6, points)), np.zeros((6, 6))
+    own = _solved_points(grid)
+    for n in gear.diameters:
+        weight = (1.0 if n == 0 or 2 * n == z else 2.0) / z
+        shares = hub_sum(n, z) @ gear.hub if n <= 1 else np.zeros((0, rows.shape[1]))
+        loads = np.hstack((rows[own].T, shares.conj().T))
+        moved = _response(gear, n, loads, held)
+        at_flanks = _mirrored((rows @ moved[:, : len(own)]).astype(np.complex128), grid, own)
+        for offset in range(n_offsets):
+            flanks[offset] += weight * np.real(at_flanks * np.exp(1j * gear.phase_rad(n) * offset))
+        if n <= 1:
+            hub += weight * np.real(shares @ moved[:, len(own) :])
+            hub_flank += weight * np.real(moved[:, len(own) :].conj().T @ rows.T)
+    return StaticCompliance(flanks, hub_flank, hub)
+
+
+def _response(gear: CyclicGear, n: int, loads: AnyArray, held: Held) -> AnyArray:
+    """Displacements for loads of one nodal diameter; of a free gear, what is left beside its rigid motion."""
+    solve = gear.solver(n, held)
+    rigid = gear.rigid(n)
+    if held == "bore" or gear.hub_stiffness is not None or not rigid.shape[1]:
+        return solve(loads)
+    inertia = gear.mass.at(gear.phase_rad(n)) @ rigid
+    balanced = loads - inertia @ (rigid.conj().T @ loads)
+    moved = solve(balanced)
+    elastic: AnyArray = moved - rigid @ (inertia.conj().T @ moved)
+    return elastic
+
+
+def _solved_points(grid: FlankGrid) -> IntArray:
+    """Points on flank 0 in one half of the face, with its middle: the others follow by mirrors."""
+    index = np.arange(grid.n_points).reshape(grid.shape)
+    return index[0, :, : (grid.shape[2] + 1) // 2].ravel()
+
+
+def _mirrored(part: ComplexArray, grid: FlankGrid, own: IntArray) -> ComplexArray:
+    """H of all points from its columns of some.
+
+    H is the same seen from the other end of the shaft, and a mirror at the middle of the tooth makes n to −n, which is
+    the complex conjugate.
+    """
+    index = np.arange(grid.n_points).reshape(grid.shape)
+    end, flank = index[:, :, ::-1].ravel(), index[::-1].ravel()
+    whole = np.zeros((grid.n_points, grid.n_points), dtype=np.complex128)
+    whole[:, own] = part
+    whole[:, end[own]] = part[end]
+    first = index[0].ravel()
+    whole[:, flank[first]] = whole[flank][:, first].conj()
+    return whole
+
+
+def _real_modes(
+    gear: CyclicGear, modes: CyclicModes, rows: FloatArray
+) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
+    """Cosine and sine modes at the flank points of tooth 0 and at the hub."""
+    frequencies, diameters, at_flanks, at_hub = [], [], [], []
+    for k, n in enumerate(modes.nodal_diameters):
+        flank = rows @ modes.shapes[:, k]
+        hub = hub_sum(int(n), gear.n_sectors) @ (gear.hub @ modes.shapes[:, k])
+        parts = (np.real, np.imag) if 0 < 2 * n < gear.n_sectors else (np.real,)
+        for part in parts:
+            frequencies.append(modes.frequencies_hz[k])
+            diameters.append(n)
+            at_flanks.append(part(flank))
+            at_hub.append(part(hub))
+    return np.array(frequencies), np.array(diameters), np.array(at_flanks), np.array(at_hub)
+
+
+# Reduced gears on disk, under the key of what made them: arrays without pickles, whole or not at all.
+
+FORMAT = 1
+"""Of the file and of what its numbers mean; raised when either changes."""
+_SOURCES = (
+    *(f"sims.reduced_fe.{name}" for name in ("_blank", "_mesh", "_cyclic", "_reduced_gear")),
+    "sims.mesh._geometry",
+)
+"""Modules whose code changes a reduced gear; the last makes the outline."""
+_NUMBERS = ("mass_kg", "polar_inertia_kg_m2", "diametral_inertia_kg_m2")
+_ARRAYS = tuple(f.name for f in fields(ReducedGear))[8:]  # all that follow the grid
+MAX_BYTES = 200_000_000
+"""Of a file's arrays; a usual one has half a million."""
+
+
+def gear_name(blank: GearBlank, plan: ReductionPlan) -> str:
+    """Return a digest of what is asked of a reduced gear, the same for every state of the code."""
+    made_of = json.dumps({"blank": asdict(blank), "plan": asdict(plan)}, sort_keys=True)
+    return sha256(made_of.encode()).hexdigest()[:32]
+
+
+def gear_key(blank: GearBlank, plan: ReductionPlan) -> str:
+    """Return what tells reduced gears apart: digests of what is asked for and of the code that makes it."""
+    return f"{gear_name(blank, plan)}-{code_digest()}"
+
+
+@cache
+def code_digest() -> str:
+    """Return a digest of the code that meshes and reduces."""
+    return modules_digest(_SOURCES)
+
+
+def write_gear(path: str | Path, gear: ReducedGear) -> None:
+    """Write a reduced gear beside its place and move it there.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
+    """
+    about = {"format": FORMAT, "key": gear.key, "blank": gear.blank.as_text(), "spread": gear.spread}
+    about |= {name: getattr(gear, name) for name in ("n_dof", *_NUMBERS)}
+    arrays: dict[str, Any] = {name: getattr(gear, name) for name in _ARRAYS} | gear.grid._asdict()
+    write_whole(Path(path), lambda file: np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays))
+
+
+def read_gear(path: str | Path) -> ReducedGear:
+    """Read a reduced gear.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged, not a reduced gear, or (`OtherVersionError`) of another version of this format.
+    """
+    source = Path(path)
+    if not source.exists():
+        raise InputError("no such file", where=str(source))
+    try:
+        data = read_arrays(source, MAX_BYTES)
+        if data is None:
+            raise ValueError(f"no archive of at most {MAX_BYTES:.0e} bytes")  # noqa: TRY301 - one message for all damage
+        about = json.loads(str(data["about"]))
+        if about["format"] != FORMAT:
+            raise OtherVersionError(
+                f"is of format {about['format']!r}: another version of gearsig wrote it",
+                where=str(source),
+                allowed=f"format {FORMAT}",
+                remedy=FRESH,
+            )
+        return ReducedGear(
+            blank=GearBlank.from_text(about["blank"]),
+            key=str(about["key"]),
+            n_dof=int(about["n_dof"]),
+            spread=str(about["spread"]),
+            grid=FlankGrid(data["roll_rad"], data["z_m"]),
+            **{name: float(about[name]) for name in _NUMBERS},
+            **{name: data[name] for name in _ARRAYS},
+        )
+    except InputError:
+        raise
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"is not a reduced gear, or is damaged ({error})", where=str(source), remedy="make it again"
+        ) from error
+
+
+def cached_gear(blank: GearBlank, plan: ReductionPlan, folder: str | Path | None = None) -> ReducedGear:
+    """Return a reduced gear from the cache, or reduce it and keep it there.
+
+    A file that is damaged is made again: it holds nothing that cannot be. One that another version of the code made is
+    left for the user to decide about.
+
+    Parameters
+    ----------
+    blank : GearBlank
+    plan : ReductionPlan
+    folder : path or None
+        None: `gearsig.cache.cache_folder("gears")`.
+
+    Raises
+    ------
+    OtherVersionError
+        If another version of the code kept this gear.
+    InputError
+        If the gear cannot be reduced, or the folder not written.
+    """
+    path = (cache_folder("gears") if folder is None else Path(folder)) / f"{gear_name(blank, plan)}.npz"
+    try:
+        kept = read_gear(path)
+    except OtherVersionError:
+        raise
+    except InputError:  # not there, or damaged
+        gear = reduce_gear(blank, plan)
+        write_gear(path, gear)
+        return gear
+    if kept.key != gear_key(blank, plan):
+        raise OtherVersionError(
+            "this reduced gear was made by another version of gearsig", where=str(path), remedy=FRESH
+        )
+    return kept
+
+
+def is_of_this_code(path: Path) -> bool:
+    """Whether a file is whole and holds a gear that the present state of the code made."""
+    try:
+        return read_gear(path).key.endswith(f"-{code_digest()}")
+    except InputError:
+        return False
+
+
+# Reduced gears that come with the product: `python -m sims.reduced_fe._reduced_gear` makes their files again. Their
+# cracks are in a file of their own.
+
+FOLDER = Path(__file__).parent / "gears"
+
+PLAN = ReductionPlan(MeshSize(n_across=3, n_gap=1, n_up=8, n_rim=2, n_body=3, n_along=4))
+"""300 000 degrees of freedom for 50 teeth, about as many as the published pair; teeth as fine for the others."""
+
+READY = MappingProxyType(
+    {
+        "z50_m3": GearBlank(GearGeometry(50, 3.0, bore_radius_mm=20.0)),
+        "z55_m2": GearBlank(GearGeometry(55, 2.0, bore_radius_mm=17.5)),
+        "z75_m2": GearBlank(GearGeometry(75, 2.0, bore_radius_mm=17.5)),
+    }
+)
+"""Steel, 20°, face width 20 mm, full discs: the 50-tooth gear of the flexible pair, and the two of the 16-DOF pair."""
+
+
+def ready_gear(name: str) -> ReducedGear:
+    """Return a ready-made reduced gear.
+
+    Parameters
+    ----------
+    name : str
+        One of `READY`.
+    """
+    return read_gear(FOLDER / f"{one_of(name, 'name', READY)}.npz")
+
+
+if __name__ == "__main__":
+    for name, blank in READY.items():
+        write_gear(FOLDER / f"{name}.npz", reduce_gear(blank, PLAN))

@@ -25,13 +25,10 @@ from sims.reduced_fe._pair import (
     start_state,
 )
 
-# --------------------
 # Whether a step can be followed: errors must not grow from step to step.
 #
 # A contact that is stiff or strongly damped against the light parts behind it answers a step by more than it was taken
 # with. What comes of it is bounded by the loss of contact and looks like impacts.
-# --------------------
-
 
 MAX_GROWTH = 1e-4
 """Of errors in a step. Without any damping steps of 5 µs have 4e-7; those that cannot be followed 1e-2 and more."""
@@ -298,10 +295,7 @@ def _place(own: FlexiblePairConstants, name: str, factors: FloatArray) -> float:
     return 0.0
 
 
-# --------------------
 # Slow sweeps over speed, up and down: rms of the dynamic transmission error, contact loss, jumps.
-# --------------------
-
 
 STRIDE = 10
 """Steps per kept point."""
@@ -405,10 +399,7 @@ def speed_sweep(
     )
 
 
-# --------------------
 # How far the integrator's step changes the result: the fast way against the reference at a quarter of the step.
-# --------------------
-
 
 CHECK_S = 0.05
 """Time over which runs are compared."""

@@ -37,20 +37,15 @@ from sims.presets import Preset
 from sims.reduced_fe._blank import GearBlank
 from sims.reduced_fe._contact import MARGIN, corner_separation_m
 from sims.reduced_fe._pair import FlexiblePair, FlexiblePairConstants, constants, eigenfrequencies_hz, torsional_mode
-from sims.reduced_fe._reduced_gear import ReducedGear
-from sims.reduced_fe._reduction import plan_for
+from sims.reduced_fe._reduced_gear import READY, ReducedGear, cached_gear, plan_for, ready_gear
 from sims.reduced_fe._respond import STEP_S, FlexResponse, FlexState, followed_step_s, respond
-from sims.reduced_fe._store import READY, cached_gear, ready_gear
 from sims.simulator import Parameter, ParameterValue, ParameterValues, Values
 
 if TYPE_CHECKING:
     from sims.reduced_fe._respond import FlexConvergence
 
 
-# --------------------
 # The parameters of the flexible pair: those it shares with the 16-DOF pair, and those of its gear bodies.
-# --------------------
-
 
 MEANINGLESS: dict[str, ParameterValue | None] = {
     "contact_law": "linear",
@@ -231,10 +226,7 @@ class ReducedPair(PairModel[PreparedPair]):
         return check_convergence(ready.pair, ready.operation, ready.step_s)
 
 
-# --------------------
 # From a flexible pair to a recording: run the model, then measure it.
-# --------------------
-
 
 LARGEST_DEPTH = 0.5
 """Of what corners are apart at the table's ends: the most the static approach may take, to leave room to vibrate."""
@@ -369,10 +361,7 @@ def check_depth(pair: FlexiblePair, operation: Operation) -> None:
         )
 
 
-# --------------------
 # From parameter values to a flexible pair.
-# --------------------
-
 
 SIDES = ("driver", "driven")
 Gears = tuple[ReducedGear, ReducedGear]
@@ -440,10 +429,7 @@ def _gear(blank: GearBlank, n_dof: int) -> ReducedGear:
     return cached_gear(blank, plan_for(blank, n_dof))
 
 
-# --------------------
 # The pair of finite-element gears set to a rig, for the gap diagnosis: see `gearsig.gap`.
-# --------------------
-
 
 MESH_DOF, MESH_DOF_PER_TOOTH = 40_000, 900
 """Of a twin's gears: their compliance is within a few per cent of that of finer meshes, less than a rig file knows."""

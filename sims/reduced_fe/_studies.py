@@ -15,11 +15,9 @@ from gearsig.errors import InputError
 from sims.machine import Operation
 from sims.reduced_fe._blank import MeshSize, mesh_size_for, one_thread
 from sims.reduced_fe._cyclic import ComplexArray, CyclicGear, CyclicModes, Held, cyclic_modes
-from sims.reduced_fe._elements import cell_gradients_at_nodes, lame_pa
-from sims.reduced_fe._mesh import IntArray, SectorMesh, sector_mesh
+from sims.reduced_fe._mesh import IntArray, SectorMesh, cell_gradients_at_nodes, lame_pa, sector_mesh
 from sims.reduced_fe._pair import FlexiblePair, torsional_curve_hz
-from sims.reduced_fe._reduced_gear import FlankGrid, Spread, flank_rows
-from sims.reduced_fe._reduction import ReductionPlan, reduce_gear
+from sims.reduced_fe._reduced_gear import FlankGrid, ReductionPlan, Spread, flank_rows, reduce_gear
 
 SPREADS: tuple[Spread, ...] = ("node", "patch", "section")
 SIZE = MeshSize(n_across=3, n_gap=1, n_up=6, n_rim=2, n_body=2, n_along=1)
@@ -81,9 +79,7 @@ def spreading_check(pair: FlexiblePair, operation: Operation, mesh_cycles: Float
     return SpreadingCheck(mesh_cycles, frequency, ripple)
 
 
-# --------------------
 # One tooth pushed by a static force: displacement and von Mises stress of the gear.
-# --------------------
 
 
 @dataclass(frozen=True)
@@ -183,10 +179,7 @@ def _static_field(gear: CyclicGear, load: FloatArray) -> FloatArray:
     return moved
 
 
-# --------------------
 # How far a mesh is from a finer one: natural frequencies and the compliance of a tooth.
-# --------------------
-
 
 FINER_DOF = 150_000
 """Of the mesh that coarser ones are compared with; its own first frequency is 0.2 % above that of a million."""
@@ -246,10 +239,7 @@ def _by_diameter(modes: CyclicModes) -> dict[tuple[int, int], float]:
     return found
 
 
-# --------------------
 # Meshes, modes and stresses for other finite-element programs, through meshio.
-# --------------------
-
 
 SUFFIXES = (".vtu", ".vtk")
 """Formats that hold 27-node cells."""

@@ -9,26 +9,23 @@ from scipy import sparse
 
 from gearsig.cache import OtherVersionError
 from gearsig.errors import InputError
-from sims.mesh import RootCrack, tooth_compliance
+from sims.mesh import RootCrack, deepest_crack_mm, tooth_compliance
 from sims.reduced_fe import (
-    CRACK_SIZE,
     MeshSize,
     crack_added_m_per_n,
     crack_meshes,
     factorised,
     flank_grid,
     flank_rows,
-    forget_cracks_of_other_versions,
+    forget_other_versions,
     mesh_quality,
     open_crack,
     other_sectors,
     ready_gear,
     sector_matrices,
     sector_mesh,
-    solved_crack_m_per_n,
     tooth_compliance_with,
 )
-from sims.reduced_fe._crack import _ready_cracks
 from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL, small_cyclic, small_reduced
 
 SIZE = MeshSize(4, 1, 4, 2, 1, 2)
@@ -135,7 +132,7 @@ def test_cracks_of_other_gears_are_kept_on_disk(tmp_path, monkeypatch) -> None:
         np.savez(kept[1], code=np.array("of another version"), added=data["added"])
     with pytest.raises(OtherVersionError, match="solved by another version of gearsig; add --fresh"):
         crack_added_m_per_n(gear, crack)
-    assert forget_cracks_of_other_versions() == (kept[1],)
+    assert forget_other_versions() == (kept[1],)
     np.testing.assert_allclose(crack_added_m_per_n(gear, crack), first, rtol=1e-12)
     with pytest.raises(InputError, match=r"cannot follow a crack of 9 mm .*allowed: up to 8\.17 mm"):
         crack_added_m_per_n(ready_gear("z50_m3"), RootCrack(9.0, 45.0))
@@ -144,9 +141,15 @@ def test_cracks_of_other_gears_are_kept_on_disk(tmp_path, monkeypatch) -> None:
 @pytest.mark.slow
 def test_shipped_cracks_are_what_their_script_makes() -> None:
     gear = ready_gear("z50_m3")
-    for place in (0, 4, 9):
-        again = solved_crack_m_per_n(gear, 45.0, place)
-        np.testing.assert_allclose(_ready_cracks()["z50_m3"][place], again, atol=1e-6 * again.max())
+    n_heights, n_slices = gear.grid.shape[1:]
+    for part in (0.05, 0.4, 0.9):  # depths that were solved, over the deepest
+        crack = RootCrack(part * deepest_crack_mm(gear.blank.geometry, 45.0), 45.0)
+        opened = open_crack(gear.blank, crack, gear.grid)
+        for width_mm, layer in ((None, None), (5.0, 2)):  # one of four cells along the face
+            added = opened.added_m_per_n(layer).reshape(n_heights, n_slices, n_heights, n_slices)
+            again = np.array([added[h, :, h] for h in range(n_heights)])
+            kept = crack_added_m_per_n(gear, replace(crack, width_mm=width_mm))
+            np.testing.assert_allclose(kept, again, atol=1e-6 * again.max())
 
 
 @pytest.mark.parametrize("angle", [45.0, 60.0, 90.0])
@@ -173,7 +176,12 @@ def test_a_force_near_the_tip_agrees_with_potential_energy() -> None:
     g, grid = PAPER.geometry, flank_grid(PAPER.geometry, 2, 1)
     healthy = tooth_compliance(g, PAPER.material, grid.roll_rad[1:]).total
     for depth in (2.0, 4.0):
-        opened = open_crack(PAPER, RootCrack(depth, 45.0), grid, size=replace(CRACK_SIZE, n_along=1))
+        opened = open_crack(
+            PAPER,
+            RootCrack(depth, 45.0),
+            grid,
+            size=MeshSize(n_across=8, n_gap=1, n_up=9, n_rim=3, n_body=2, n_along=1),
+        )
         beam = tooth_compliance(g, PAPER.material, grid.roll_rad[1:], (depth, 45.0)).total - healthy
         assert opened.added_m_per_n()[1, 1] == pytest.approx(float(beam[0]) / 0.02, rel=0.08)
 

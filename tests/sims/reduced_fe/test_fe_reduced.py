@@ -21,7 +21,7 @@ from sims.reduced_fe import (
     factorised,
     flank_grid,
     flank_rows,
-    forget_gears_of_other_versions,
+    forget_other_versions,
     gear_name,
     hub_rows,
     line_weights,
@@ -33,7 +33,6 @@ from sims.reduced_fe import (
     static_compliance,
     write_gear,
 )
-from sims.reduced_fe import _store as gear_file
 from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL, full_matrices, small_cyclic, small_reduced
 
 ARRAYS = ("frequencies_hz", "flank_modes", "free_compliance_m_per_n", "clamped_compliance_m_per_n", "hub_compliance")
@@ -205,7 +204,7 @@ def test_files_that_do_not_fit_are_refused(tmp_path: Path, monkeypatch: pytest.M
     flip(path)
     with pytest.raises(InputError, match="is not a reduced gear"):
         read_gear(path)
-    monkeypatch.setattr(gear_file, "FORMAT", 999)
+    monkeypatch.setattr("sims.reduced_fe._reduced_gear.FORMAT", 999)
     write_gear(path, small_reduced())
     monkeypatch.undo()
     with pytest.raises(InputError, match="is of format 999: another version of gearsig wrote it"):
@@ -225,19 +224,21 @@ def test_the_cache_keeps_a_gear_and_remakes_a_damaged_one(tmp_path: Path) -> Non
     assert len(list(tmp_path.iterdir())) == 2
 
 
-def test_a_gear_that_another_version_kept_is_named_and_can_be_cleared_away(tmp_path: Path) -> None:
+def test_a_gear_that_another_version_kept_is_named_and_can_be_cleared_away(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path))
+    folder = tmp_path / "gears"
     plan = ReductionPlan(COARSE, n_modes=4, n_heights=2, n_slices=1, n_offsets=2)
-    first, other = cached_gear(SMALL, plan, tmp_path), cached_gear(SMALL, replace(plan, n_modes=6), tmp_path)
-    kept = tmp_path / f"{gear_name(SMALL, plan)}.npz"
+    first, other = cached_gear(SMALL, plan), cached_gear(SMALL, replace(plan, n_modes=6))
+    kept = folder / f"{gear_name(SMALL, plan)}.npz"
     write_gear(kept, replace(first, key=first.key[:-16] + 16 * "0"))
     with pytest.raises(OtherVersionError) as caught:
-        cached_gear(SMALL, plan, tmp_path)
+        cached_gear(SMALL, plan)
     assert str(caught.value).startswith(f"{kept}: this reduced gear was made by another version of gearsig")
     assert "--fresh" in caught.value.remedy
     assert kept.is_file()
-    assert forget_gears_of_other_versions(tmp_path) == (kept,)
-    assert cached_gear(SMALL, plan, tmp_path).key == first.key
-    assert {read_gear(path).key for path in tmp_path.iterdir()} == {first.key, other.key}
+    assert forget_other_versions() == (kept,)
+    assert cached_gear(SMALL, plan).key == first.key
+    assert {read_gear(path).key for path in folder.iterdir()} == {first.key, other.key}
 
 
 @pytest.mark.parametrize("name", READY)
