@@ -43,8 +43,8 @@ from gearsig.plot._phase import (
 from gearsig.plot._response import ResponseCase, crack_comparison_figure, response_figure
 from gearsig.plot._series import envelope, thin
 from gearsig.plot._spectrum import (
-    LEAST_SPAN,
     METHODS,
+    MIN_SPEED_SPAN,
     order_levels_figure,
     spectrum_figure,
     speed_figure,
@@ -67,9 +67,9 @@ __all__ = [
     "FAULT",
     "FAULTY",
     "INNER",
-    "LEAST_SPAN",
     "LONGEST",
     "METHODS",
+    "MIN_SPEED_SPAN",
     "OUTER",
     "PRIORITY",
     "SOUND",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import floor, log10
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.projections.polar import PolarAxes
-
-
-PANEL_IN = 1.75
-BAND_ANGLES = 1500
 
 
 def average_figure(
@@ -42,30 +38,24 @@ def average_figure(
     -------
     Figure
     """
-    height = 0.6 + PANEL_IN * len(averages)
-    figure = style.new_figure(height)
-    first: Axes | None = None
-    for i, average in enumerate(averages):
-        bottom = 0.55 + PANEL_IN * (len(averages) - 1 - i)
-        axes = style.panel(figure, bottom_in=bottom, top_in=height - bottom - PANEL_IN + 0.38, sharex=first)
-        first = first or axes
+    n = len(averages)
+    figure, panels = style.panels((1.37,) * n, top_in=0.43, row_gap_in=0.38, share_x=True)
+    for axes, average in zip(panels, averages, strict=True):
         _draw(axes, average)
         for mark in marks:
             axes.axvline(mark.angle_deg, color=style.FAULT, linewidth=0.9, linestyle="--", zorder=1.5)
-        last = i == len(averages) - 1
-        axes.tick_params(labelbottom=last)
         shaft = f", shaft {average.shaft}" if average.shaft else ""
         title = f"{average.kind}{shaft}, channel {average.channel}, {average.n_revolutions} revolutions"
-        x = f"angle of {average.shaft or 'the shaft'} (deg)" if last else ""
+        x = f"angle of {average.shaft or 'the shaft'} (deg)" if axes is panels[-1] else ""
         style.label_axes(axes, x, with_unit("amplitude", average.unit), title)
         style.no_offset(axes)
-    if first is not None:
-        first.set_xlim(0, 360)
-        first.set_xticks(range(0, 361, 45))
-        if n_teeth:
-            first.set_xticks(np.arange(n_teeth + 1) * 360.0 / n_teeth, minor=True)
-        for mark in marks:
-            _name(first, mark)
+    first = panels[0]
+    first.set_xlim(0, 360)
+    first.set_xticks(range(0, 361, 45))
+    if n_teeth:
+        first.set_xticks(np.arange(n_teeth + 1) * 360.0 / n_teeth, minor=True)
+    for mark in marks:
+        _name(first, mark)
     return figure
 
 
@@ -73,7 +63,7 @@ def _draw(axes: Axes, average: SynchronousAverage) -> None:
     n = len(average.values)
     angle = np.arange(n) * 360.0 / n
     axes.axhline(0, color=style.QUIET, linewidth=0.6, zorder=1)
-    step = max(1, n // BAND_ANGLES)
+    step = max(1, n // 1500)
     low, high = average.values - 2 * average.standard_error, average.values + 2 * average.standard_error
     axes.fill_between(angle[::step], low[::step], high[::step], color=style.FLOOR, alpha=0.4, linewidth=0, zorder=2)
     axes.plot(*thin(angle, average.values), color=style.MEASURED, linewidth=0.9, zorder=3)
@@ -97,15 +87,8 @@ def _name(axes: Axes, mark: AngleMark) -> None:
     )
 
 
-# --------------------
-# The polar tooth picture: one revolution around the circle, teeth numbered round the rim.
-# --------------------
-
-
 # Radii of the picture, in its own units: zero of the signal, its largest swing, and the gear outside.
 ZERO, SWING, ROOT, TIP, NUMBERS, LABELS, EDGE = 1.0, 0.55, 1.66, 1.81, 1.93, 2.22, 2.36
-N_ANGLES = 1500
-MOST_NUMBERS = 45
 
 
 def polar_figure(
@@ -139,8 +122,7 @@ def polar_figure(
         count(n_teeth, "n_teeth", minimum=3)
     figure = style.new_figure(size_in, size_in)
     axes = style.polar_panel(figure)
-    own = float(np.max(np.abs(average.values) + 2 * average.standard_error, initial=0.0))
-    full = largest or own or 1.0
+    full = largest or float(np.max(np.abs(average.values) + 2 * average.standard_error, initial=0.0)) or 1.0
     _rings(axes, full, average.unit)
     _draw_signal(axes, average, SWING / full)
     if n_teeth:
@@ -160,11 +142,11 @@ def _draw_signal(axes: PolarAxes, average: SynchronousAverage, scale: float) -> 
     turn = np.arange(len(average.values) + 1) * 2 * np.pi / len(average.values)
     values = np.append(average.values, average.values[0])
     band = 2 * np.append(average.standard_error, average.standard_error[0])
-    step = max(1, len(turn) // N_ANGLES)
+    step = max(1, len(turn) // 1500)
     chosen = np.unique(np.append(np.arange(0, len(turn), step), len(turn) - 1))
     low, high = np.maximum(ZERO + scale * (values - band), 0.0), np.maximum(ZERO + scale * (values + band), 0.0)
     axes.fill_between(turn[chosen], low[chosen], high[chosen], color=style.FLOOR, alpha=0.35, linewidth=0, zorder=2)
-    angle, radius = thin(turn, np.maximum(ZERO + scale * values, 0.0), 2 * N_ANGLES)
+    angle, radius = thin(turn, np.maximum(ZERO + scale * values, 0.0), 3000)
     axes.plot(angle, radius, color=style.MEASURED, linewidth=1.0, zorder=3)
 
 
@@ -178,18 +160,8 @@ def _rings(axes: PolarAxes, full: float, unit: str) -> None:
         axes.plot(ring, np.full_like(ring, radius), color=style.RULE, linewidth=0.9, zorder=1)
         text = f"{'+' if sign > 0 else '−'}{value:g} {unit_text(unit)}".strip()
         box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.8}
-        axes.text(
-            np.pi * 1.25,
-            radius,
-            plain(text, 24),
-            ha="center",
-            va="center",
-            fontsize=style.SMALL_PT - 1,
-            color=style.QUIET,
-            zorder=4,
-            bbox=box,
-            parse_math=False,
-        )
+        looks: dict[str, Any] = {"fontsize": style.SMALL_PT - 1, "ha": "center", "va": "center", "bbox": box}
+        style.put_text(axes, np.pi * 1.25, radius, text, n_max=24, zorder=4, **looks)
 
 
 def _round_below(value: float) -> float:
@@ -201,7 +173,7 @@ def _round_below(value: float) -> float:
 def draw_gear(axes: PolarAxes, n_teeth: int, marked_deg: Sequence[float], *, numbered: bool = True) -> None:
     """Draw the toothed rim; marked teeth in the colour of faults. Without a mark on the shaft, teeth have no number."""
     damaged = {int(angle % 360.0 * n_teeth / 360.0) for angle in marked_deg}
-    every = next(step for step in (1, 2, 5, 10, 20, 50, 100, 10_000) if n_teeth / step <= MOST_NUMBERS)
+    every = next(step for step in (1, 2, 5, 10, 20, 50, 100, 10_000) if n_teeth / step <= 45)
     ring = np.linspace(0, 2 * np.pi, 361)
     axes.plot(ring, np.full_like(ring, ROOT), color=style.FLOOR, linewidth=0.8, zorder=1)
     for tooth in range(n_teeth):
@@ -218,7 +190,7 @@ def draw_gear(axes: PolarAxes, n_teeth: int, marked_deg: Sequence[float], *, num
                 str(tooth + 1),
                 ha="center",
                 va="center",
-                fontsize=style.SMALL_PT - (0 if n_teeth <= MOST_NUMBERS else 1),
+                fontsize=style.SMALL_PT - (0 if n_teeth <= 45 else 1),
                 color=style.FAULT if hit else style.QUIET,
                 fontweight="bold" if hit else "normal",
             )
@@ -246,18 +218,8 @@ def draw_mark(axes: PolarAxes, mark: AngleMark, n_teeth: int | None) -> None:
 
 def write_corner(axes: PolarAxes, text: str, height: float, colour: str, weight: str = "normal") -> None:
     """Write into the left corners, where no tooth is."""
-    axes.text(
-        0.0,
-        height,
-        plain(text, 24),
-        transform=axes.transAxes,
-        ha="left",
-        va="top",
-        fontsize=style.TEXT_PT,
-        fontweight=weight,
-        color=colour,
-        parse_math=False,
-    )
+    looks: dict[str, Any] = {"fontsize": style.TEXT_PT, "fontweight": weight, "ha": "left", "va": "top"}
+    style.put_text(axes, 0.0, height, text, colour=colour, n_max=24, transform=axes.transAxes, **looks)
 
 
 def _middle(axes: PolarAxes, average: SynchronousAverage) -> None:

@@ -11,14 +11,11 @@ from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
-from gearsig.plot._maps import colours
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-CELL_IN, LEFT_IN, TOP_IN, BOTTOM_IN = 0.27, 1.75, 0.45, 1.5
-CURVE_IN = 4.4
 COLOURS = (style.MEASURED, style.FLOOR, style.SHAFT)
 
 
@@ -44,12 +41,13 @@ def confusion_figure(true: Sequence[str], said: Sequence[str], counts: np.ndarra
     table = np.asarray(counts)
     if table.shape != (len(true), len(said)):
         raise InputError(f"counts are {table.shape}", allowed=f"({len(true)}, {len(said)}), as there are names")
-    width, height = LEFT_IN + CELL_IN * len(said) + 0.75, BOTTOM_IN + CELL_IN * len(true) + TOP_IN
-    figure = style.new_figure(height, max(width, style.WIDTH_IN))
-    right = figure.get_size_inches()[0] - LEFT_IN - CELL_IN * len(said)
-    axes = style.panel(figure, left_in=LEFT_IN, right_in=right, bottom_in=BOTTOM_IN, top_in=TOP_IN)
+    cells_in = 0.27 * len(said)
+    width = max(style.WIDTH_IN, 1.75 + cells_in + 0.75)
+    figure, (axes,) = style.panels(
+        (0.27 * len(true),), left_in=1.75, right_in=width - 1.75 - cells_in, bottom_in=1.5, top_in=0.45, width_in=width
+    )
     totals = np.maximum(table.sum(axis=1, keepdims=True), 1)
-    axes.imshow(table / totals, cmap=colours(), vmin=0.0, vmax=1.3, aspect="auto")
+    axes.imshow(table / totals, cmap=style.colours(), vmin=0.0, vmax=1.3, aspect="auto")
     for (i, j), n in np.ndenumerate(table):
         if n:
             dark = n / totals[i, 0] > 0.55
@@ -60,8 +58,7 @@ def confusion_figure(true: Sequence[str], said: Sequence[str], counts: np.ndarra
     axes.set_yticks(range(len(true)), [f"{_words(n)} ({t})" for n, t in zip(true, table.sum(axis=1), strict=True)])
     axes.tick_params(length=0)
     axes.grid(visible=False)
-    style.label_axes(axes, "said", "", "")
-    axes.set_ylabel("")
+    style.label_axes(axes, "said")
     series.headline(figure, title)
     return figure
 
@@ -81,8 +78,7 @@ def calibration_figure(
     -------
     Figure
     """
-    figure = style.new_figure(CURVE_IN)
-    axes = style.panel(figure, left_in=0.75, right_in=0.3, top_in=0.45)
+    figure, (axes,) = style.panels((3.4,), left_in=0.75, right_in=0.3, top_in=0.45)
     axes.plot((0, 100), (0, 100), color=style.QUIET, linewidth=0.9, linestyle="--")
     for i, (name, (confidence, right, low, high)) in enumerate(curves.items()):
         colour = COLOURS[i % len(COLOURS)]

@@ -21,12 +21,9 @@ from gearsig.spectra import Spectrum
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 
-LEFT_IN, RIGHT_IN = 0.85, 0.2
-UPPER_IN, LOWER_IN, GAP_IN, BOTTOM_IN = 2.3, 1.5, 0.35, 0.55
-TITLE_IN = 0.68
-POINTS = 1200
 KIND_COLOURS = {"mesh": style.MESH, "shaft": style.SHAFT, "sideband": style.FLOOR, "other": style.INK}
 KIND_WORDS = {"mesh": "mesh harmonics", "shaft": "shaft orders", "sideband": "sidebands", "other": "other lines"}
 SIDES = (("recorded", style.MEASURED), ("simulated", style.SIMULATED))
@@ -64,49 +61,39 @@ def order_overlay_figure(
     InputError
         If axes, units or scalings differ, or the limits do not ascend.
     """
-    _check_alike(recorded, simulated)
-    low, high = limits or (0.0, float(min(recorded.positions[-1], simulated.positions[-1])))
-    if not low < high:
-        raise InputError(f"limits are {low:g} to {high:g}", allowed="ascending")
-    shown = [line for line in lines if line.is_seen and low <= line.order <= high]
-    width = style.WIDTH_IN - LEFT_IN - RIGHT_IN
-    placed = place(cursors, (low, high), width)
-    top = TITLE_IN + ROW_IN * n_rows(placed)
-    below = LOWER_IN + GAP_IN if shown else 0.0
-    figure = style.new_figure(BOTTOM_IN + below + UPPER_IN + top)
-    upper = style.panel(figure, left_in=LEFT_IN, right_in=RIGHT_IN, bottom_in=BOTTOM_IN + below, top_in=top)
-    curves = _draw_spectra(upper, (recorded, simulated), (low, high))
-    draw(upper, placed, (width, UPPER_IN))
-    label = recorded.axis_label
-    style.label_axes(upper, "" if shown else label, with_unit(recorded.scaling, recorded.unit))
-    if shown:
-        upper.tick_params(labelbottom=False)
-        above = top + UPPER_IN + GAP_IN
-        lower = style.panel(figure, left_in=LEFT_IN, right_in=RIGHT_IN, bottom_in=BOTTOM_IN, top_in=above, sharex=upper)
-        curves += _draw_differences(lower, shown)
-        style.label_axes(lower, label, "sim. − rec. (dB)")
-    upper.set_xlim(low, high)
-    series.headline(figure, title)
-    series.legend_row(figure, curves, left_in=LEFT_IN, top_in=series.NAMES_AT_IN)
-    return figure
-
-
-def _check_alike(recorded: Spectrum, simulated: Spectrum) -> None:
     for name in ("axis", "scaling", "unit"):
         a, b = getattr(recorded, name), getattr(simulated, name)
         if a != b:
             raise InputError(f"the spectra differ in {name}: {a!r} and {b!r}", allowed="the same")
+    low, high = limits or (0.0, float(min(recorded.positions[-1], simulated.positions[-1])))
+    if not low < high:
+        raise InputError(f"limits are {low:g} to {high:g}", allowed="ascending")
+    shown = [line for line in lines if line.is_seen and low <= line.order <= high]
+    placed = place(cursors, (low, high), style.WIDTH_IN - 0.85 - 0.2)
+    figure, panels = style.panels(
+        (2.3, 1.5) if shown else (2.3,), top_in=0.68 + ROW_IN * n_rows(placed), row_gap_in=0.35, share_x=True
+    )
+    curves = _draw_spectra(panels[0], (recorded, simulated), (low, high))
+    draw(panels[0], placed)
+    style.label_axes(panels[0], "", with_unit(recorded.scaling, recorded.unit))
+    if shown:
+        curves += _draw_differences(panels[1], shown)
+        style.label_axes(panels[1], "", "sim. − rec. (dB)")
+    style.label_axes(panels[-1], recorded.axis_label, panels[-1].get_ylabel())
+    panels[0].set_xlim(low, high)
+    series.head(figure, title, curves)
+    return figure
 
 
-def _draw_spectra(axes: Axes, spectra: tuple[Spectrum, Spectrum], limits: tuple[float, float]) -> list:  # type: ignore[type-arg]  # of Line2D, imported for checking only
-    curves = []
+def _draw_spectra(axes: Axes, spectra: tuple[Spectrum, Spectrum], limits: tuple[float, float]) -> list[Line2D]:
+    curves: list[Line2D] = []
     tops, floors = [], []
     for spectrum, (name, colour) in zip(spectra, SIDES, strict=True):
         start, stop = spectrum.index_of(limits[0]), spectrum.index_of(limits[1]) + 1
         # The first lines hold the sensor's offset and the window's foot around it.
         start = max(start, min(1 + int(2 * spectrum.noise_bandwidth / spectrum.resolution), stop - 2))
         values = above_zero(spectrum.values[start:stop])
-        at, _, peaks = envelope(spectrum.positions[start:stop], values, POINTS)
+        at, _, peaks = envelope(spectrum.positions[start:stop], values, 1200)
         curves += axes.plot(at, peaks, color=colour, linewidth=0.9, label=name, zorder=2, alpha=0.9)
         tops.append(float(values.max()))
         floors.append(float(np.percentile(values, 5)))
@@ -115,22 +102,22 @@ def _draw_spectra(axes: Axes, spectra: tuple[Spectrum, Spectrum], limits: tuple[
     return curves
 
 
-def _draw_differences(axes: Axes, lines: Sequence[LineLevel]) -> list:  # type: ignore[type-arg]  # of Line2D
+def _draw_differences(axes: Axes, lines: Sequence[LineLevel]) -> list[Line2D]:
     axes.axhline(0.0, color=style.QUIET, linewidth=0.8, zorder=1)
-    marks = []
+    marks: list[Line2D] = []
     for kind, colour in reversed(KIND_COLOURS.items()):
-        own = [line for line in lines if line.kind == kind]
-        if not own:
+        alike = [line for line in lines if line.kind == kind]
+        if not alike:
             continue
-        x = np.array([line.order for line in own])
-        y = np.array([line.level.difference_db for line in own])
-        errors = np.array([BEYOND * line.level.repeatability_db for line in own])
+        x = np.array([line.order for line in alike])
+        y = np.array([line.level.difference_db for line in alike])
+        errors = np.array([BEYOND * line.level.repeatability_db for line in alike])
         axes.vlines(x, 0.0, y, color=colour, linewidth=1.0, alpha=0.45, zorder=2)
-        _whiskers(axes, x, y, errors, colour)
+        axes.vlines(x, y - errors, y + errors, color=colour, linewidth=2.4, alpha=0.28, zorder=2.2)
         size = 3.0 if kind == "sideband" else 4.5
         looks = {"color": colour, "linestyle": "none", "markeredgewidth": 0.0, "markersize": size, "zorder": 3}
         marks += axes.plot(x, y, "o", label=KIND_WORDS[kind], **looks)  # type: ignore[arg-type]
-        bounds = np.array([not (line.simulated_is_seen and line.recorded_is_seen) for line in own])
+        bounds = np.array([not (line.simulated_is_seen and line.recorded_is_seen) for line in alike])
         looks |= {"markersize": size + 1.5}
         for sign, marker in ((1, "^"), (-1, "v")):
             which = bounds & (np.sign(y) == sign)
@@ -139,10 +126,6 @@ def _draw_differences(axes: Axes, lines: Sequence[LineLevel]) -> list:  # type: 
     axes.set_ylim(-largest, largest)
     style.no_offset(axes)
     return marks[::-1]
-
-
-def _whiskers(axes: Axes, x: FloatArray, y: FloatArray, errors: FloatArray, colour: str) -> None:
-    axes.vlines(x, y - errors, y + errors, color=colour, linewidth=2.4, alpha=0.28, zorder=2.2)
 
 
 def difference_bars(axes: Axes, x: FloatArray, levels: Sequence[LevelPair], width: float) -> None:
@@ -157,18 +140,6 @@ def difference_bars(axes: Axes, x: FloatArray, levels: Sequence[LevelPair], widt
     largest = max(3.0, float(np.max(np.abs(y) + errors, initial=0.0)) * 1.1)
     axes.set_ylim(-largest, largest)
     style.no_offset(axes)
-
-
-# --------------------
-# Two aligned synchronous averages: over a revolution, over some teeth, and tooth by tooth.
-# --------------------
-
-
-COMPARE_AVERAGE_LEFT_IN, COMPARE_AVERAGE_RIGHT_IN, COMPARE_AVERAGE_BOTTOM_IN, TOP_IN = 0.85, 0.2, 0.55, 0.68
-PANEL_IN, COMPARE_AVERAGE_GAP_IN = 1.5, 0.5
-TEETH_ZOOMED, DEGREES_ZOOMED = 4, 60.0
-OWN_SCALE_RATIO = 4.0
-"""From this ratio of sizes on each is drawn over its own rms: else one is a flat line."""
 
 
 def average_overlay_figure(
@@ -203,12 +174,13 @@ def average_overlay_figure(
     """
     if len(recorded.values) != len(simulated.values):
         raise InputError(f"{len(recorded.values)} and {len(simulated.values)} angles", allowed="the same angles")
-    n_panels = 3 if tooth_levels else 2
-    height = TOP_IN + COMPARE_AVERAGE_BOTTOM_IN + n_panels * PANEL_IN + (n_panels - 1) * COMPARE_AVERAGE_GAP_IN
-    figure = style.new_figure(height)
-    panels = [_panel(figure, height, i, n_panels) for i in range(n_panels)]
-    scales, label = _scales(recorded, simulated)
-    end = 360.0 * TEETH_ZOOMED / n_teeth if n_teeth else DEGREES_ZOOMED
+    figure, panels = style.panels((1.5,) * (3 if tooth_levels else 2))
+    sizes = [float(np.sqrt(np.mean(a.values**2))) for a in (recorded, simulated)]
+    if min(sizes) > 0 and max(sizes) / min(sizes) <= 4.0:
+        scales, label = (1.0, 1.0), with_unit("average", recorded.unit)
+    else:  # over one scale, the smaller were a flat line
+        scales, label = (sizes[0] or 1.0, sizes[1] or 1.0), "over its own rms"
+    end = 360.0 * 4 / n_teeth if n_teeth else 60.0
     for axes, limit in zip(panels[:2], (360.0, end), strict=True):
         curves = _overlay(axes, (recorded, simulated), scales, limit)
         style.label_axes(axes, "", label)
@@ -216,67 +188,29 @@ def average_overlay_figure(
     if n_teeth:
         panels[0].set_xticks(np.arange(n_teeth + 1) * 360.0 / n_teeth, minor=True)
     panels[0].set_xticks(range(0, 361, 45))
-    last = f"angle of {recorded.shaft or 'the shaft'} (deg)"
-    style.label_axes(panels[1], last, label)
+    style.label_axes(panels[1], f"angle of {recorded.shaft or 'the shaft'} (deg)", label)
     if tooth_levels:
         difference_bars(panels[2], np.arange(1.0, len(tooth_levels) + 1), tooth_levels, 0.75)
         panels[2].set_xlim(0.3, len(tooth_levels) + 0.7)
         style.label_axes(panels[2], "tooth, from angle 0", "sim. − rec. (dB)")
-    series.headline(figure, title)
-    series.legend_row(figure, curves, left_in=COMPARE_AVERAGE_LEFT_IN, top_in=series.NAMES_AT_IN)
+    series.head(figure, title, curves)
     return figure
-
-
-def _panel(figure: Figure, height: float, i: int, n: int) -> Axes:
-    bottom = COMPARE_AVERAGE_BOTTOM_IN + (n - 1 - i) * (PANEL_IN + COMPARE_AVERAGE_GAP_IN)
-    return style.panel(
-        figure,
-        left_in=COMPARE_AVERAGE_LEFT_IN,
-        right_in=COMPARE_AVERAGE_RIGHT_IN,
-        bottom_in=bottom,
-        top_in=height - bottom - PANEL_IN,
-    )
-
-
-def _scales(recorded: SynchronousAverage, simulated: SynchronousAverage) -> tuple[tuple[float, float], str]:
-    sizes = [float(np.sqrt(np.mean(a.values**2))) for a in (recorded, simulated)]
-    alike = min(sizes) > 0 and max(sizes) / min(sizes) <= OWN_SCALE_RATIO
-    if alike:
-        return (1.0, 1.0), with_unit("average", recorded.unit)
-    return (sizes[0] or 1.0, sizes[1] or 1.0), "over its own rms"
 
 
 def _overlay(
     axes: Axes, averages: tuple[SynchronousAverage, SynchronousAverage], scales: tuple[float, float], end: float
-) -> list:  # type: ignore[type-arg]  # of Line2D, imported for checking only
+) -> list[Line2D]:
     axes.axhline(0, color=style.QUIET, linewidth=0.6, zorder=1)
-    curves = []
+    curves: list[Line2D] = []
     for average, scale, (name, colour) in zip(averages, scales, SIDES, strict=True):
-        angle, values, error = _closed(average)
-        shown = angle <= end
-        x, y, e = angle[shown], values[shown] / scale, 2.0 * error[shown] / scale
+        n = len(average.values)
+        around = np.arange(n + 1)[np.arange(n + 1) * 360.0 / n <= end]  # the first one once more at 360°
+        x, y = around * 360.0 / n, average.values[around % n] / scale
+        e = 2.0 * average.standard_error[around % n] / scale
         axes.fill_between(x, y - e, y + e, color=colour, alpha=0.2, linewidth=0, zorder=1.5)
         curves += axes.plot(*thin(x, y), color=colour, linewidth=1.0, label=name, alpha=0.9, zorder=2)
     axes.set_xlim(0.0, end)
     return curves
-
-
-def _closed(average: SynchronousAverage) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Angle, values and errors with the first one once more at 360°."""
-    n = len(average.values)
-    around = np.arange(n + 1) % n
-    return np.arange(n + 1) * 360.0 / n, average.values[around], average.standard_error[around]
-
-
-# --------------------
-# Band levels of a simulation beside those of a recording.
-# --------------------
-
-
-COMPARE_BANDS_LEFT_IN, COMPARE_BANDS_RIGHT_IN, COMPARE_BANDS_TOP_IN = 0.85, 0.2, 0.68
-COMPARE_BANDS_PANEL_IN, COMPARE_BANDS_GAP_IN, LABELS_IN = 1.7, 0.3, 0.95
-CHANCE_MAGNITUDE = np.pi**2 / 16
-"""FRAC of the magnitudes of two noises (Rayleigh distributed): (E|x| E|y|)² / (E|x|² E|y|²)."""
 
 
 def band_levels_figure(bands: Sequence[BandLevel], unit: str = "", *, title: str = "") -> Figure:
@@ -303,14 +237,14 @@ def band_levels_figure(bands: Sequence[BandLevel], unit: str = "", *, title: str
     if not bands:
         raise InputError("there are no bands to draw", allowed="at least one")
     alike = any(band.agreement is not None for band in bands)
-    n_panels = 3 if alike else 2
-    height = (
-        COMPARE_BANDS_TOP_IN + LABELS_IN + n_panels * COMPARE_BANDS_PANEL_IN + (n_panels - 1) * COMPARE_BANDS_GAP_IN
-    )
-    figure = style.new_figure(height)
-    panels = [_panel_compare_bands(figure, height, i, n_panels) for i in range(n_panels)]
+    figure, panels = style.panels((1.7,) * (3 if alike else 2), bottom_in=0.95, row_gap_in=0.3)
     x = np.arange(len(bands), dtype=np.float64)
-    curves = _draw_levels(panels[0], bands)
+    curves: list[Line2D] = []
+    edges = np.repeat(np.arange(len(bands) + 1) - 0.5, 2)[1:-1]
+    for (name, colour), key in zip(SIDES, ("recorded_db", "simulated_db"), strict=True):
+        levels = np.repeat([float(getattr(band.level, key)) for band in bands], 2)
+        curves += panels[0].plot(edges, levels, color=colour, linewidth=1.4, label=name, zorder=2)
+    style.no_offset(panels[0])
     style.label_axes(panels[0], "", f"level (dB re 1 {unit_text(unit)})" if unit else "level (dB)")
     difference_bars(panels[1], x, [band.level for band in bands], 0.7)
     style.label_axes(panels[1], "", "sim. − rec. (dB)")
@@ -320,50 +254,28 @@ def band_levels_figure(bands: Sequence[BandLevel], unit: str = "", *, title: str
         axes.set_xlim(-0.6, len(bands) - 0.4)
         axes.set_xticks(x, [plain(band.label, 22) for band in bands], rotation=45, ha="right", parse_math=False)
         axes.tick_params(labelbottom=axes is panels[-1])
-    series.headline(figure, title)
-    series.legend_row(figure, curves, left_in=COMPARE_BANDS_LEFT_IN, top_in=series.NAMES_AT_IN)
+    series.head(figure, title, curves)
     return figure
 
 
-def _panel_compare_bands(figure: Figure, height: float, i: int, n: int) -> Axes:
-    bottom = LABELS_IN + (n - 1 - i) * (COMPARE_BANDS_PANEL_IN + COMPARE_BANDS_GAP_IN)
-    return style.panel(
-        figure,
-        left_in=COMPARE_BANDS_LEFT_IN,
-        right_in=COMPARE_BANDS_RIGHT_IN,
-        bottom_in=bottom,
-        top_in=height - bottom - COMPARE_BANDS_PANEL_IN,
-    )
-
-
-def _draw_levels(axes: Axes, bands: Sequence[BandLevel]) -> list:  # type: ignore[type-arg]  # of Line2D, imported for checking only
-    edges = np.arange(len(bands) + 1) - 0.5
-    curves = []
-    for (name, colour), key in zip(SIDES, ("recorded_db", "simulated_db"), strict=True):
-        levels = np.array([float(getattr(band.level, key)) for band in bands])
-        steps = (np.repeat(edges, 2)[1:-1], np.repeat(levels, 2))
-        curves += axes.plot(*steps, color=colour, linewidth=1.4, label=name, zorder=2)
-    style.no_offset(axes)
-    return curves
-
-
-def _draw_agreement(axes: Axes, bands: Sequence[BandLevel]) -> list:  # type: ignore[type-arg]  # of Line2D
-    curves = []
-    axes.axhline(CHANCE_MAGNITUDE, color=style.QUIET, linewidth=0.8, linestyle=":", zorder=1)
-    for name, key, marker, colour in (
-        ("FRAC, complex", "complex_frac", "o", style.INK),
-        ("FRAC, magnitudes", "magnitude_frac", "s", style.QUIET),
+def _draw_agreement(axes: Axes, bands: Sequence[BandLevel]) -> list[Line2D]:
+    compared = [(i, band.agreement) for i, band in enumerate(bands) if band.agreement is not None]
+    x = np.array([i for i, _ in compared])
+    # FRAC of the magnitudes of two noises (Rayleigh distributed): (E|x| E|y|)² / (E|x|² E|y|²).
+    axes.axhline(np.pi**2 / 16, color=style.QUIET, linewidth=0.8, linestyle=":", zorder=1)
+    curves: list[Line2D] = []
+    for name, fracs, marker, colour in (
+        ("FRAC, complex", [agreement.complex_frac for _, agreement in compared], "o", style.INK),
+        ("FRAC, magnitudes", [agreement.magnitude_frac for _, agreement in compared], "s", style.QUIET),
     ):
-        found = [(i, getattr(band.agreement, key)) for i, band in enumerate(bands) if band.agreement is not None]
-        x, y = np.array([i for i, _ in found]), np.array([figure.value for _, figure in found])
-        errors = 2.0 * np.array([figure.repeatability for _, figure in found])
+        y, errors = np.array([frac.value for frac in fracs]), 2.0 * np.array([frac.repeatability for frac in fracs])
         axes.vlines(x, np.maximum(y - errors, 0), np.minimum(y + errors, 1), color=colour, linewidth=1.0, zorder=2)
         looks = {"linestyle": "none", "markersize": 5.0, "zorder": 3, "label": name}
         looks |= {"markerfacecolor": "white"} if marker == "s" else {}
         curves += axes.plot(x, y, marker, color=colour, **looks)  # type: ignore[arg-type]
-    chance = [(i, band.agreement.complex_by_chance) for i, band in enumerate(bands) if band.agreement is not None]
+    chance = np.array([agreement.complex_by_chance for _, agreement in compared])
     looks = {"linestyle": "none", "markersize": 12, "markeredgewidth": 1.4, "color": style.FLOOR, "zorder": 1.5}
-    curves += axes.plot(*np.array(chance).T, "_", label="complex, by chance", **looks)  # type: ignore[arg-type]
+    curves += axes.plot(x, chance, "_", label="complex, by chance", **looks)  # type: ignore[arg-type]
     axes.set_ylim(-0.04, 1.04)
     style.label_axes(axes, "", "FRAC (0 to 1)")
     style.no_offset(axes)

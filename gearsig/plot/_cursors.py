@@ -136,36 +136,28 @@ def n_rows(placed: Iterable[tuple[Cursor, LabelPlace | None]]) -> int:
     return max((label.row + 1 for _, label in placed if label is not None), default=0)
 
 
-def draw(
-    axes: Axes,
-    placed: Iterable[tuple[Cursor, LabelPlace | None]],
-    size_in: tuple[float, float],
-    *,
-    through: bool = True,
-) -> None:
-    """Draw placed cursors into a panel of known size, labels in rows above it; through the panel, or only above it."""
-    width, height = size_in
+def draw(axes: Axes, placed: Iterable[tuple[Cursor, LabelPlace | None]], *, through: bool = True) -> None:
+    """Draw placed cursors into a panel, labels in rows above it; through the panel, or only above it."""
+    width, height = style.size_in(axes)
     for cursor, label in placed:
         colour = style.CURSOR_COLOURS.get(cursor.kind, style.QUIET)
         dashes, thickness, alpha = LINE_LOOKS.get(cursor.kind, LINE_LOOKS["sideband"])
         base = 0.05 + ROW_IN * (label.row if label else 0)
-        top = 1.0 + (base if label else 0.05) / height
-        low = 0.0 if through else 1.0
-        transform = axes.get_xaxis_transform()
-        ends = ([cursor.position] * 2, [low, top])
-        looks = {"color": colour, "linestyle": dashes, "linewidth": thickness, "alpha": alpha}
-        axes.plot(*ends, **looks, transform=transform, clip_on=False, zorder=1.5)  # type: ignore[arg-type]
+        ends = ([cursor.position] * 2, [0.0 if through else 1.0, 1.0 + (base if label else 0.05) / height])
+        looks = {"color": colour, "linestyle": dashes, "linewidth": thickness, "alpha": alpha, "zorder": 1.5}
+        axes.plot(*ends, **looks, transform=axes.get_xaxis_transform(), clip_on=False)  # type: ignore[arg-type]
         if label is not None:
-            axes.text(
-                (label.low_in + label.high_in) / 2 / width,
+            middle = (label.low_in + label.high_in) / 2 / width
+            style.put_text(
+                axes,
+                middle,
                 1.0 + base / height,
-                plain(cursor.label, LONGEST),
+                cursor.label,
+                colour=colour,
+                n_max=LONGEST,
                 transform=axes.transAxes,
                 ha="center",
                 va="bottom",
-                fontsize=style.SMALL_PT,
-                color=colour,
-                parse_math=False,
             )
 
 
@@ -194,11 +186,6 @@ def _free_place(taken: Sequence[LabelPlace], at_in: float, text: str, width_in: 
         if not any(new.collides(other) for other in taken):
             return new
     return None
-
-
-# --------------------
-# Marks at shaft angles and teeth, as findings name them.
-# --------------------
 
 
 @dataclass(frozen=True)

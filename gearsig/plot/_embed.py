@@ -9,7 +9,6 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from gearsig.plot import _style as style
-from gearsig.plot._maps import colours
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -97,7 +96,7 @@ def _palette() -> Image.Image:
         for colour in sorted(named)
         for share in (step / N_BLENDS for step in range(1, N_BLENDS + 1))
     ]
-    levels = [colours()(step / (N_LEVELS - 1))[:3] for step in range(N_LEVELS)]
+    levels = [style.colours()(step / (N_LEVELS - 1))[:3] for step in range(N_LEVELS)]
     # Pillow looks colours up in steps of 4 of 255: nothing else may lie so near to the white of the paper.
     tinted = [colour for colour in [*blends, *levels] if min(colour) < 0.965]
     numbers = [round(255 * part) for colour in [(1.0, 1.0, 1.0), *tinted] for part in colour]

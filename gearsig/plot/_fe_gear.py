@@ -18,16 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.image import AxesImage
 
 
-# --------------------
-# Values at the corners of triangles as an image: long thin ones, which renderers streak, come out smooth.
-# --------------------
-
-
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
-PIXELS = 640
-"""Of the image, across."""
-SPACING = 0.8
-"""Of the points at which a triangle is sampled, in pixels."""
 
 
 def draw_shaded(
@@ -53,7 +44,7 @@ def draw_shaded(
         Values at the ends of the colours.
     cmap : str
     """
-    per_unit = PIXELS / (window[1] - window[0])
+    per_unit = 640 / (window[1] - window[0])
     shape = tuple(round((window[i + 1] - window[i]) * per_unit) for i in (2, 0))
     corners = (np.asarray(points)[triangles] - [window[0], window[2]]) * per_unit  # (m, 3, 2), in pixels
     shown = np.all((corners.max(axis=1) >= 0.0) & (corners.min(axis=1) < shape[::-1]), axis=1)
@@ -97,7 +88,7 @@ def _close_holes(image: FloatArray, known: Any) -> None:
 def _samples(corners: FloatArray) -> tuple[FloatArray, Any]:
     """Barycentric coordinates (k, 3) of points close enough for pixels, and their triangles (k,)."""
     sides = np.linalg.norm(corners[:, 1:] - corners[:, :1], axis=2)
-    n = np.maximum(np.ceil(sides / SPACING), 1.0).astype(np.int64)
+    n = np.maximum(np.ceil(sides / 0.8), 1.0).astype(np.int64)
     count = (n[:, 0] + 1) * (n[:, 1] + 1)
     which = np.repeat(np.arange(len(corners)), count)
     number = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
@@ -109,10 +100,7 @@ def _samples(corners: FloatArray) -> tuple[FloatArray, Any]:
 
 
 COLUMNS = 3
-MODE_IN = 2.5
-BAR_IN = 0.16
 TALL_IN = 3.95
-CLOSE_IN = 2.95
 
 
 def gear_mesh_figure(
@@ -134,25 +122,32 @@ def gear_mesh_figure(
     -------
     Figure
     """
+    from matplotlib.collections import PolyCollection
+
     outlines = np.asarray(outlines_mm, dtype=np.float64)
     if outlines.ndim != 3 or outlines.shape[2] != 2:
         raise InputError(f"outlines_mm has shape {outlines.shape}", allowed="(n_faces, n_edge_points, 2)")
     values = series.checked_values(quality, len(outlines), "quality")
-    figure = style.new_figure(4.9)
-    whole = _square(figure, left_in=0.7, width_in=3.95, bottom_in=0.55, height_in=TALL_IN)
-    close = _square(figure, left_in=5.0, width_in=CLOSE_IN, bottom_in=0.55, height_in=TALL_IN)
-    for axes, line in ((whole, 0.15), (close, 0.6)):
-        faces = _faces(axes, outlines, values, line)
+    wide_in, close_in = TALL_IN, 2.95
+    figure, panels = style.panels(
+        (TALL_IN,), (wide_in, close_in), left_in=0.7, right_in=1.05, top_in=0.4, column_gap_in=0.35
+    )
+    for axes, line in zip(panels, (0.15, 0.6), strict=True):
+        _frame(axes)
+        faces = PolyCollection(list(outlines), edgecolors=style.INK, linewidths=line, cmap="viridis")
+        faces.set_array(values)
+        faces.set_clim(0.0, 1.0)
+        axes.add_collection(faces)
+    whole, close = panels
     reach = 1.03 * float(np.abs(outlines).max())
-    whole.set_xlim(-reach, reach)
-    whole.set_ylim(-reach, reach)
+    whole.set(xlim=(-reach, reach), ylim=(-reach, reach))
     x_low, x_high, y_low, y_high = near_mm
-    half = max(y_high - y_low, (x_high - x_low) * TALL_IN / CLOSE_IN) / 2.0
-    close.set_xlim(x_high - 2.0 * half * CLOSE_IN / TALL_IN, x_high)
+    half = max(y_high - y_low, (x_high - x_low) * TALL_IN / close_in) / 2.0
+    close.set_xlim(x_high - 2.0 * half * close_in / TALL_IN, x_high)
     close.set_ylim((y_low + y_high) / 2.0 - half, (y_low + y_high) / 2.0 + half)
     style.label_axes(whole, "x (mm)", "y (mm)")
     style.label_axes(close, "x (mm)", "")
-    _bar(figure, faces, "scaled Jacobian (1: undistorted)", (8.15, 0.55, TALL_IN))
+    style.colour_bar(close, faces, "scaled Jacobian (1: undistorted)")
     series.headline(figure, title)
     return figure
 
@@ -179,19 +174,24 @@ def gear_modes_figure(
     if not shapes:
         raise InputError("shapes is empty", remedy="give at least one mode")
     n_rows = -(-len(shapes) // COLUMNS)
-    figure = style.new_figure(0.4 + n_rows * (MODE_IN + 0.3))
-    for place, (name, shape) in enumerate(shapes.items()):
+    figure, panels = style.panels(
+        (2.45,) * n_rows,
+        (1.0,) * COLUMNS,
+        left_in=0.15,
+        right_in=1.2,
+        bottom_in=0.1,
+        row_gap_in=0.3,
+        column_gap_in=0.15,
+    )
+    for axes, (name, shape) in zip(panels, shapes.items(), strict=False):
         motion = np.asarray(shape, dtype=np.float64)
         if motion.shape != (len(points), 3):
             raise InputError(f"shape of {name!r} is {motion.shape}", allowed=f"({len(points)}, 3)")
-        row, column = divmod(place, COLUMNS)
-        bottom = 0.1 + (n_rows - 1 - row) * (MODE_IN + 0.3)
-        axes = _square(figure, left_in=0.15 + 2.65 * column, width_in=MODE_IN, bottom_in=bottom, height_in=MODE_IN)
         drawn = _draw_shape(axes, points, triangles, motion / np.abs(motion).max())
         series.write(axes, 0.0, 1.0, name, colour=style.INK)
-    height = min(3.0, n_rows * MODE_IN)
-    bottom = (0.1 + n_rows * (MODE_IN + 0.3) - height) / 2.0
-    _bar(figure, drawn, "axial motion (part of the mode's largest motion)", (8.15, bottom, height))
+    style.colour_bar(panels[COLUMNS - 1], drawn, "axial motion over largest motion")
+    for axes in panels[len(shapes) :]:
+        axes.remove()
     series.headline(figure, title)
     return figure
 
@@ -232,8 +232,11 @@ def gear_stress_figure(
     points = np.asarray(points_mm, dtype=np.float64)
     stress = series.checked_values(stress_pa, len(points), "stress_pa") * 1e-6
     wide_in = min(6.8, TALL_IN * (near_mm[1] - near_mm[0]) / (near_mm[3] - near_mm[2]))
-    figure = style.new_figure(4.9, max(5.0, 1.9 + wide_in))
-    axes = _square(figure, left_in=0.75, width_in=wide_in, bottom_in=0.55, height_in=TALL_IN)
+    width_in = max(5.0, 1.9 + wide_in)
+    figure, (axes,) = style.panels(
+        (TALL_IN,), left_in=0.75, right_in=width_in - 0.75 - wide_in, top_in=0.4, width_in=width_in
+    )
+    _frame(axes)
     inside = (points[:, 0] > near_mm[0]) & (points[:, 0] < near_mm[1])
     inside &= (points[:, 1] > near_mm[2]) & (points[:, 1] < near_mm[3])
     top = float(stress[inside].max()) if top_pa is None else top_pa * 1e-6
@@ -247,25 +250,14 @@ def gear_stress_figure(
         tail = place - span * direction / np.hypot(*direction)
         ends = [(float(x), float(y)) for x, y in (place, tail)]
         axes.annotate("", xy=ends[0], xytext=ends[1], arrowprops={"arrowstyle": "-|>", "color": style.FAULT, "lw": 2.0})
-        axes.text(*ends[1], text, color=style.FAULT, fontsize=style.SMALL_PT, ha="center", va="bottom")
+        style.put_text(axes, *ends[1], text, colour=style.FAULT, ha="center", va="bottom")
     style.label_axes(axes, "x (mm)", "y (mm)")
     if note:
-        place_in = (0.75 / figure.get_size_inches()[0], 1.0 - 0.31 / 4.9)
-        figure.text(*place_in, note, fontsize=style.SMALL_PT, color=style.QUIET, va="center", parse_math=False)
+        style.put_text(axes, 0.0, 1.0 + 0.09 / TALL_IN, note, transform=axes.transAxes, va="center")
     beyond = top < float(stress[inside].max())
-    _bar(figure, drawn, "von Mises stress (MPa)", (0.95 + wide_in, 0.55, TALL_IN), extend=beyond)
+    style.colour_bar(axes, drawn, "von Mises stress (MPa)", extend="max" if beyond else "neither")
     series.headline(figure, title)
     return figure
-
-
-def _faces(axes: Axes, outlines: FloatArray, values: FloatArray, line: float) -> Any:
-    from matplotlib.collections import PolyCollection
-
-    faces = PolyCollection(list(outlines), edgecolors=style.INK, linewidths=line, cmap="viridis")
-    faces.set_array(values)
-    faces.set_clim(0.0, 1.0)
-    axes.add_collection(faces)
-    return faces
 
 
 def _draw_shape(axes: Axes, points: FloatArray, triangles: IntArray, motion: FloatArray) -> Any:
@@ -276,10 +268,17 @@ def _draw_shape(axes: Axes, points: FloatArray, triangles: IntArray, motion: Flo
         axes, moved, triangles, motion[:, 2], window=(-end, end, -end, end), limits=(-1.0, 1.0), cmap="RdBu_r"
     )
     _draw_border(axes, moved, points, triangles)
-    axes.set_xlim(-end, end)
-    axes.set_ylim(-end, end)
+    axes.set(xlim=(-end, end), ylim=(-end, end), aspect="equal")
     axes.set_axis_off()
     return drawn
+
+
+def _frame(axes: Axes) -> None:
+    """Draw a box, on which a millimetre is as long both ways."""
+    axes.grid(visible=False)
+    axes.spines[:].set_visible(True)
+    axes.spines[:].set(color=style.QUIET, linewidth=0.8)
+    axes.set_aspect("equal", adjustable="box")
 
 
 def _draw_border(axes: Axes, moved: FloatArray, points: FloatArray, triangles: IntArray) -> None:
@@ -291,25 +290,3 @@ def _draw_border(axes: Axes, moved: FloatArray, points: FloatArray, triangles: I
     edges = np.sort(np.concatenate((corners[:, :2], corners[:, 1:], corners[:, ::2])), axis=1)
     unique, count = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0, return_counts=True)
     axes.add_collection(LineCollection(list(moved[unique[count == 1]]), colors=style.QUIET, linewidths=0.5))
-
-
-def _square(figure: Figure, *, left_in: float, width_in: float, bottom_in: float, height_in: float) -> Axes:
-    """Axes on which a millimetre is as long both ways."""
-    width, height = figure.get_size_inches()
-    axes = figure.add_axes((left_in / width, bottom_in / height, width_in / width, height_in / height))
-    axes.set_aspect("equal", adjustable="box")
-    axes.tick_params(colors=style.QUIET, labelcolor=style.INK, labelsize=style.SMALL_PT, width=0.8)
-    for spine in axes.spines.values():
-        spine.set_color(style.QUIET)
-        spine.set_linewidth(0.8)
-    return axes
-
-
-def _bar(figure: Figure, drawn: Any, label: str, at_in: tuple[float, float, float], *, extend: bool = False) -> None:
-    """Colour bar at left, bottom, with a height."""
-    width, height = figure.get_size_inches()
-    left, bottom, tall = at_in
-    axes = figure.add_axes((left / width, bottom / height, BAR_IN / width, tall / height))
-    bar = figure.colorbar(drawn, cax=axes, extend="max" if extend else "neither")
-    bar.set_label(label, fontsize=style.SMALL_PT, color=style.INK)
-    bar.ax.tick_params(labelsize=style.SMALL_PT, colors=style.QUIET, labelcolor=style.INK)

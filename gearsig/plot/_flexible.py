@@ -11,24 +11,14 @@ from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
-from gearsig.plot._style import plain
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
 
 CYCLES = "mesh cycles (tooth passages)"
-MAP_IN, SWEEP_IN = 3.9, 3.6
-MOST_MAPS = 3
-BAR_IN, GAP_IN = 0.12, 0.95
-STEEP = 0.3
-"""Step between neighbouring angles, of a map's range: beyond it lines of equal values would run into one another."""
-N_LEVELS = 7
-"""Lines of equal values in a map."""
-SPAN = 1e-5
-"""Range of a waterfall's levels below the greatest amplitude."""
+N_LEVELS = 7  # lines of equal values in a map
 
 
 def mesh_maps_figure(
@@ -54,20 +44,26 @@ def mesh_maps_figure(
         On axes that do not ascend, a map of another shape, or more than three.
     """
     x, y = series.checked_axis(mesh_cycles, "mesh_cycles"), series.checked_axis(torque_nm, "torque_nm")
-    if not 1 <= len(maps) <= MOST_MAPS:
-        raise InputError(f"{len(maps)} maps", allowed=f"1 to {MOST_MAPS}")
-    figure = style.new_figure(MAP_IN)
-    width = (style.WIDTH_IN - 0.7 - GAP_IN * len(maps)) / len(maps)
-    for i, (name, values) in enumerate(maps.items()):
+    n = len(maps)
+    series.check_number(n, f"{n} maps", 3)
+    figure, panels = style.panels((2.6,), (1.0,) * n, left_in=0.7, right_in=0.95, top_in=0.75)
+    for axes, (name, values) in zip(panels, maps.items(), strict=True):
         array = frozen_array(values, name, ndim=2)
         if array.shape != (len(x), len(y)):
             raise InputError(f"{name} has shape {array.shape}", allowed=f"{(len(x), len(y))}")
-        left = 0.7 + i * (width + GAP_IN)
-        right = style.WIDTH_IN - left - width
-        axes = style.panel(figure, left_in=left, right_in=right, bottom_in=0.55, top_in=0.75)
-        _draw_map(figure, axes, x, y, array, left + width)
-        _name(figure, left, name)
-        style.label_axes(axes, CYCLES if len(maps) < MOST_MAPS else "mesh cycles", "torque (N·m)" if i == 0 else "")
+        mesh = axes.pcolormesh(x, y, array.T, cmap=style.colours(), shading="gouraud", rasterized=True)
+        axes.grid(visible=False)
+        bar = style.colour_bar(axes, mesh, gap_in=0.1)
+        # Where neighbouring angles are further apart, lines of equal values would run into one another.
+        if np.max(np.abs(np.diff(array, axis=0))) < 0.3 * np.ptp(array):
+            levels = np.linspace(float(array.min()), float(array.max()), N_LEVELS + 2)[1:-1]
+            # Dark lines where the map is light, light ones where it is dark; the bar has them with their values.
+            inks = [style.INK if i < N_LEVELS / 2 else "white" for i in range(N_LEVELS)]
+            axes.contour(x, y, array.T, levels=levels, colors=inks, linewidths=0.7, alpha=0.8)
+            bar.hlines(levels, 0.0, 1.0, colors=inks, linewidths=0.7, transform=bar.get_yaxis_transform())
+            bar.set_yticks([float(f"{level:.3g}") for level in levels])
+        style.put_text(axes, 0.0, 1.03, name, colour=style.INK, fontsize=style.TEXT_PT, transform=axes.transAxes)
+        style.label_axes(axes, CYCLES if n < 3 else "mesh cycles", "torque (N·m)" if axes is panels[0] else "")
     series.headline(figure, title)
     return figure
 
@@ -95,10 +91,8 @@ def speed_sweep_figure(
     -------
     Figure
     """
-    if not 1 <= len(sweeps) <= series.MOST_CURVES:
-        raise InputError(f"{len(sweeps)} sweeps", allowed=f"1 to {series.MOST_CURVES}")
-    figure = style.new_figure(SWEEP_IN)
-    axes = style.panel(figure, bottom_in=0.55, top_in=0.85)
+    series.check_number(len(sweeps), f"{len(sweeps)} sweeps")
+    figure, (axes,) = style.panels((2.2,), top_in=0.85)
     lines = []
     for (name, mesh_hz, up, down), colour in zip(sweeps, series.series_colours(len(sweeps)), strict=True):
         x = series.checked_axis(mesh_hz, f"mesh_hz of {name}")
@@ -107,14 +101,12 @@ def speed_sweep_figure(
         axes.plot(x, rows[1], color=colour, linewidth=1.3, linestyle=(0, (4, 2)))
     axes.set_xlim(min(float(s[1][0]) for s in sweeps), max(float(s[1][-1]) for s in sweeps))
     axes.set_ylim(bottom=0.0)
-    if natural_hz is not None:
-        for part, word in ((1, "ωₙ"), (2, "ωₙ/2"), (3, "ωₙ/3")):
-            _mark(axes, natural_hz / part, word)
-    for word, hertz in (jumps_hz or {}).items():
-        _mark(axes, hertz, word)
+    natural = {} if natural_hz is None else {"ωₙ": natural_hz, "ωₙ/2": natural_hz / 2, "ωₙ/3": natural_hz / 3}
+    for word, hertz in {**natural, **(jumps_hz or {})}.items():
+        axes.axvline(hertz, color=style.FLOOR, linewidth=0.8, linestyle=(0, (3, 2)), zorder=1)
+        series.write(axes, hertz, 1.01, word)
     style.label_axes(axes, "mesh frequency (Hz)", "rms of the DTE (µm)")
-    series.legend_row(figure, lines, left_in=0.85, top_in=series.NAMES_AT_IN, heading="full: up, dashed: down")
-    series.headline(figure, title)
+    series.head(figure, title, lines, "full: up, dashed: down")
     return figure
 
 
@@ -145,30 +137,23 @@ def speed_spectra_figure(
     """
     x = series.checked_axis(frequency_hz, "frequency_hz")
     curves = series.checked_curves(spectra_m, len(x), "spectra_m")
-    each, top, bottom = 1.05, 0.45, 0.55
-    height = top + bottom + each * len(curves)
-    figure = style.new_figure(height)
+    figure, panels = style.panels((0.97,) * len(curves), top_in=0.45, row_gap_in=0.08, share_x=True)
     most = max(float(c.max()) for c in curves.values()) * 1e6
-    for i, (name, values) in enumerate(curves.items()):
-        below = bottom + each * (len(curves) - 1 - i)
-        axes = style.panel(figure, bottom_in=below + 0.08, top_in=height - below - each)
-        level = np.maximum(values * 1e6, most * SPAN)
-        axes.fill_between(x, most * SPAN, level, color=style.SIMULATED, alpha=0.25, linewidth=0)
+    floor = 1e-5 * most  # five decades below the greatest amplitude
+    for i, (axes, (name, values)) in enumerate(zip(panels, curves.items(), strict=True)):
+        level = np.maximum(values * 1e6, floor)
+        axes.fill_between(x, floor, level, color=style.SIMULATED, alpha=0.25, linewidth=0)
         axes.plot(x, level, color=style.SIMULATED, linewidth=style.LINE_PT)
         axes.set_yscale("log")
-        axes.set_ylim(most * SPAN, most * 2.0)
+        axes.set_ylim(floor, most * 2.0)
         axes.set_xlim(float(x[0]), float(x[-1]))
         if i < len(mesh_hz):
             for harmonic in range(1, int(x[-1] / mesh_hz[i]) + 1):
                 axes.axvline(harmonic * mesh_hz[i], color=style.MESH, linewidth=0.6, alpha=0.5, zorder=1)
         if natural_hz is not None:
             axes.axvline(natural_hz, color=style.FAULT, linewidth=0.9, linestyle=(0, (3, 2)), zorder=1)
-        axes.tick_params(labelbottom=i == len(curves) - 1)
-        axes.text(
-            0.995, 0.93, plain(name, 40), transform=axes.transAxes, ha="right", va="top", fontsize=style.SMALL_PT,
-            color=style.INK, parse_math=False,
-        )  # fmt: skip
-        style.label_axes(axes, "frequency (Hz)" if i == len(curves) - 1 else "", "DTE (µm)")
+        style.put_text(axes, 0.995, 0.93, name, colour=style.INK, transform=axes.transAxes, ha="right", va="top")
+        style.label_axes(axes, "frequency (Hz)" if axes is panels[-1] else "", "DTE (µm)")
     series.headline(figure, title)
     return figure
 
@@ -191,8 +176,7 @@ def frequency_curves_figure(
     curves = frozen_array(frequencies_hz, "frequencies_hz", ndim=2)
     if curves.shape[0] != len(x):
         raise InputError(f"frequencies_hz has {curves.shape[0]} rows, its axis {len(x)}", allowed="equal lengths")
-    figure = style.new_figure(SWEEP_IN)
-    axes = style.panel(figure, bottom_in=0.55, top_in=0.85 if uncoupled_hz is not None else 0.5)
+    figure, (axes,) = style.panels((2.3,), top_in=0.85 if uncoupled_hz is not None else 0.5)
     named: dict[str, Line2D] = {}
     for curve in curves.T:
         moves = float(np.ptp(curve)) > 0.01 * float(curve.mean())
@@ -209,9 +193,7 @@ def frequency_curves_figure(
     axes.set_xlim(float(x[0]), float(x[-1]))
     axes.set_ylim(bottom=0.0)
     style.label_axes(axes, CYCLES, "natural frequency (kHz)")
-    if uncoupled_hz is not None:
-        series.legend_row(figure, list(named.values()), left_in=0.85, top_in=series.NAMES_AT_IN)
-    series.headline(figure, title)
+    series.head(figure, title, () if uncoupled_hz is None else list(named.values()))
     return figure
 
 
@@ -229,54 +211,8 @@ def contact_spreading_figure(
     """
     x = series.checked_axis(mesh_cycles, "mesh_cycles")
     curves = series.checked_curves(frequency_hz, len(x), "frequency_hz")
-    figure = style.new_figure(SWEEP_IN)
-    axes = style.panel(figure, bottom_in=0.55, top_in=0.85)
-    colours = series.series_colours(len(curves))
-    lines = [
-        axes.plot(x, values, color=colour, linewidth=1.5, label=name)[0]
-        for (name, values), colour in zip(curves.items(), colours, strict=True)
-    ]
-    axes.set_xlim(float(x[0]), float(x[-1]))
+    figure, (axes,) = style.panels((2.2,), top_in=0.85)
+    lines = series.plot_curves(axes, x, curves)
     style.label_axes(axes, CYCLES, "torsional mode (Hz)")
-    series.legend_row(figure, lines, left_in=0.85, top_in=series.NAMES_AT_IN)
-    series.headline(figure, title)
+    series.head(figure, title, lines)
     return figure
-
-
-def _draw_map(figure: Figure, axes: Axes, x: FloatArray, y: FloatArray, values: FloatArray, right_in: float) -> None:
-    from gearsig.plot._maps import colours
-
-    mesh = axes.pcolormesh(x, y, values.T, cmap=colours(), shading="gouraud", rasterized=True)
-    lines = None
-    if np.max(np.abs(np.diff(values, axis=0))) < STEEP * np.ptp(values):
-        levels = np.linspace(float(values.min()), float(values.max()), N_LEVELS + 2)[1:-1]
-        # Dark lines where the map is light, light ones where it is dark; the bar beside it has them with their values.
-        inks = [style.INK if i < N_LEVELS / 2 else "white" for i in range(N_LEVELS)]
-        lines = axes.contour(x, y, values.T, levels=levels, colors=inks, linewidths=0.7, alpha=0.8)
-    axes.grid(visible=False)
-    height = figure.get_size_inches()[1]
-    place = ((right_in + 0.1) / style.WIDTH_IN, 0.55 / height, BAR_IN / style.WIDTH_IN, (height - 1.3) / height)
-    bar = figure.colorbar(mesh, cax=figure.add_axes(place))
-    bar.outline.set_visible(False)
-    if lines is not None:
-        bar.add_lines(lines)
-        bar.set_ticks([float(f"{level:.3g}") for level in levels])
-    bar.ax.tick_params(colors=style.QUIET, labelcolor=style.INK, labelsize=style.SMALL_PT)
-
-
-def _name(figure: Figure, left_in: float, name: str) -> None:
-    height = figure.get_size_inches()[1]
-    figure.text(
-        left_in / style.WIDTH_IN,
-        1.0 - 0.62 / height,
-        plain(name, 60),
-        fontsize=style.TEXT_PT,
-        color=style.INK,
-        va="center",
-        parse_math=False,
-    )
-
-
-def _mark(axes: Axes, hertz: float, word: str) -> None:
-    axes.axvline(hertz, color=style.FLOOR, linewidth=0.8, linestyle=(0, (3, 2)), zorder=1)
-    series.write(axes, hertz, 1.01, word)

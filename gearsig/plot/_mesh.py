@@ -17,14 +17,11 @@ from gearsig.plot._style import plain
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 
-HEIGHT_IN = 3.3
-ZOOM_IN = 2.55
-GAP_IN = 0.85
 STIFFNESS_UNIT = 1e8
 CYCLES = "mesh cycles (tooth passages)"
+MICRO = 1e6
 
 
 def mesh_stiffness_figure(
@@ -60,22 +57,30 @@ def mesh_stiffness_figure(
     """
     x = series.checked_axis(mesh_cycles, "mesh_cycles")
     curves = series.checked_curves(stiffness_n_per_m, len(x), "stiffness_n_per_m")
-    figure = style.new_figure(HEIGHT_IN)
-    top = 0.36 + series.LEGEND_IN
-    right = 0.2 if single_pair is None else 0.2 + ZOOM_IN + GAP_IN
-    axes = style.panel(figure, right_in=right, bottom_in=0.55, top_in=top)
-    lines = _draw_stiffness(axes, x, curves)
-    axes.set_xlim(float(x[0]), float(x[-1]))
-    style.label_axes(axes, CYCLES, "mesh stiffness (10⁸ N/m)")
+    shown = {label: values / STIFFNESS_UNIT for label, values in curves.items()}
+    label = "mesh stiffness (10⁸ N/m)"
+    figure, (axes, *close) = style.panels((2.1,), (1.0,) if single_pair is None else (1.7, 1.0), top_in=0.65)
+    lines = series.plot_curves(axes, x, shown, 1.4)
+    style.label_axes(axes, CYCLES, label)
     if single_pair is not None:
         low, high = series.checked_limits(single_pair, "single_pair")
-        zoom = style.panel(figure, left_in=style.WIDTH_IN - 0.2 - ZOOM_IN, bottom_in=0.55, top_in=top)
-        _zoom(zoom, x, curves, (low, high))
+        inside = (x >= low) & (x <= high)
+        if np.count_nonzero(inside) < 2:
+            raise InputError(
+                f"single_pair, {low:g} to {high:g}, holds {np.count_nonzero(inside)} point(s) of mesh_cycles",
+                allowed="at least 2",
+                remedy="give a finer axis or a region on it",
+            )
+        zoom = close[0]
+        series.plot_curves(zoom, x[inside], {label: values[inside] for label, values in shown.items()}, 1.4)
+        zoom.set_xlim(low, high)
+        zoom.locator_params(axis="x", nbins=4)
         series.shade(axes, (low, high))
-        style.label_axes(zoom, "mesh cycles", "mesh stiffness (10⁸ N/m)")
+        style.label_axes(zoom, "mesh cycles", label)
         series.write(zoom, (low + high) / 2, 1.01, "one pair in contact (shaded)")
-    series.legend_row(figure, lines, left_in=0.85, top_in=series.NAMES_AT_IN, heading=heading)
-    series.headline(figure, title)
+    for panel in (axes, *close):
+        style.no_offset(panel)
+    series.head(figure, title, lines, heading)
     return figure
 
 
@@ -105,51 +110,20 @@ def load_sharing_figure(
     x = series.checked_axis(mesh_cycles, "mesh_cycles")
     forces = series.checked_curves(pair_forces_n, len(x), "pair_forces_n")
     errors = series.checked_curves(transmission_error_m, len(x), "transmission_error_m")
-    figure = style.new_figure(4.7)
-    upper = style.panel(figure, bottom_in=2.55, top_in=0.55)
-    lower = style.panel(figure, bottom_in=0.55, top_in=2.65, sharex=upper)
+    figure, (upper, lower) = style.panels((1.6, 1.5), top_in=0.55, share_x=True)
     highest = max(float(force.max()) for force in forces.values())
-    for (label, force), colour in zip(forces.items(), series.series_colours(len(forces)), strict=True):
+    for label, force, colour in series.coloured(forces):
         upper.plot(x, _touching(force), color=colour, linewidth=1.6, label=label)
         if force.max() > 0.95 * highest:
             plateau = x[force > 0.98 * force.max()]
             series.write(upper, float(plateau.mean()), 1.02, label, colour=colour)
     upper.set_ylim(0.0, 1.06 * highest or 1.0)
-    upper.tick_params(labelbottom=False)
-    cases = [
-        lower.plot(x, error * 1e6, color=colour, linewidth=1.4, label=label)[0]
-        for (label, error), colour in zip(errors.items(), series.series_colours(len(errors)), strict=True)
-    ]
-    lower.set_xlim(float(x[0]), float(x[-1]))
+    cases = series.plot_curves(lower, x, {label: error * 1e6 for label, error in errors.items()}, 1.4)
     style.label_axes(upper, "", "force of a pair (N)")
     style.label_axes(lower, CYCLES, "transmission error (µm)")
-    series.legend_row(figure, cases, left_in=0.85, top_in=2.46)
+    series.legend_row(figure, cases, top_in=2.46)
     series.headline(figure, title)
     return figure
-
-
-def _draw_stiffness(axes: Axes, x: FloatArray, curves: Mapping[str, FloatArray]) -> list[Line2D]:
-    colours = series.series_colours(len(curves))
-    # The first case is the reference: it lies on top where all coincide.
-    lines = [
-        axes.plot(x, k / STIFFNESS_UNIT, color=colour, linewidth=1.4, label=label, zorder=3 - i * 0.01)[0]
-        for i, ((label, k), colour) in enumerate(zip(curves.items(), colours, strict=True))
-    ]
-    style.no_offset(axes)
-    return lines
-
-
-def _zoom(axes: Axes, x: FloatArray, curves: Mapping[str, FloatArray], limits: tuple[float, float]) -> None:
-    inside = (x >= limits[0]) & (x <= limits[1])
-    if np.count_nonzero(inside) < 2:
-        raise InputError(
-            f"single_pair, {limits[0]:g} to {limits[1]:g}, holds {np.count_nonzero(inside)} point(s) of mesh_cycles",
-            allowed="at least 2",
-            remedy="give a finer axis or a region on it",
-        )
-    _draw_stiffness(axes, x[inside], {label: k[inside] for label, k in curves.items()})
-    axes.set_xlim(*limits)
-    axes.locator_params(axis="x", nbins=4)
 
 
 def _touching(force: FloatArray) -> FloatArray:
@@ -159,14 +133,6 @@ def _touching(force: FloatArray) -> FloatArray:
     inside[1:] &= idle[:-1]
     inside[:-1] &= idle[1:]
     return np.where(inside, np.nan, force)
-
-
-# --------------------
-# The outline of a tooth with cracks at its root.
-# --------------------
-
-
-SIZE_IN = 5.0
 
 
 def tooth_figure(
@@ -197,8 +163,7 @@ def tooth_figure(
     """
     x = series.checked_axis(x_mm, "x_mm")
     y = series.checked_values(y_mm, len(x), "y_mm")
-    figure = style.new_figure(SIZE_IN, 0.8 * SIZE_IN + 0.9)
-    axes = style.panel(figure, left_in=0.75, top_in=0.45)
+    figure, (axes,) = style.panels((4.0,), left_in=0.75, top_in=0.45, width_in=4.9)
     axes.grid(visible=False)
     deepest = min((float(np.min(points)) for points, _ in (cracks_mm or {}).values()), default=float(x[0]))
     _draw_tooth(axes, x, y, min(deepest, float(x[0])) - 0.2 * float(x[-1] - x[0]))
@@ -208,8 +173,7 @@ def tooth_figure(
         beside = series.checked_values(crack_y, len(points), f"y of {label!r}")
         _draw_crack(axes, beside, points, label, number)
         if limiting_lines:
-            looks = {"color": style.FAULT, "linewidth": 0.7, "linestyle": ":"}
-            axes.plot([beside[-1], y[-1]], [points[-1], x[-1]], **looks)  # type: ignore[arg-type]
+            axes.plot([beside[-1], y[-1]], [points[-1], x[-1]], color=style.FAULT, linewidth=0.7, linestyle=":")
     axes.set_aspect("equal", adjustable="datalim")
     style.label_axes(axes, "across the tooth (mm)", "from the gear's centre (mm)", title)
     style.no_offset(axes)
@@ -242,14 +206,6 @@ def _draw_crack(axes: Axes, across: FloatArray, along: FloatArray, label: str, n
         parse_math=False,
         zorder=4 + number,
     )
-
-
-# --------------------
-# What rough flanks do: friction over the mesh, and a backlash that changes with time.
-# --------------------
-
-
-MICRO = 1e6
 
 
 def friction_figure(
@@ -286,28 +242,24 @@ def friction_figure(
     for label, values in curves.items():
         if np.isnan(values).all():
             raise InputError(f"coefficients[{label!r}] holds no number", remedy="leave the case out")
-    figure = style.new_figure(3.4)
-    axes = style.panel(figure, top_in=0.82)
-    lines = _plot_all(axes, x, curves)
+    figure, (axes,) = style.panels((2.0,), top_in=0.82)
+    lines = series.plot_curves(axes, x, curves)
     signed = any(bool((values < 0.0).any()) for values in curves.values())
     if signed:
         axes.axhline(0.0, color=style.QUIET, linewidth=0.7, zorder=1)
     else:
         axes.set_ylim(bottom=0.0)
-    axes.set_xlim(float(x[0]), float(x[-1]))
     name = "friction coefficient × direction (–)" if signed else "friction coefficient (–)"
     style.label_axes(axes, "mesh cycles since the pair's entry (tooth passages)", name)
     if single_pair is not None:
-        low, high = series.checked_limits(single_pair, "single_pair")
-        series.shade(axes, (low, high))
+        series.shade(axes, series.checked_limits(single_pair, "single_pair"))
     if pitch_point is not None:
         axes.axvline(pitch_point, color=style.QUIET, linewidth=0.8, linestyle="--", zorder=1)
         series.write(axes, pitch_point, 1.01, "pitch point")
         series.write(axes, (float(x[0]) + pitch_point) / 2, 1.01, "approach")
         series.write(axes, (float(x[-1]) + pitch_point) / 2, 1.01, "recess")
     style.no_offset(axes)
-    series.legend_row(figure, lines, left_in=0.85, top_in=series.NAMES_AT_IN, heading=heading)
-    series.headline(figure, title)
+    series.head(figure, title, lines, heading)
     return figure
 
 
@@ -344,31 +296,12 @@ def backlash_figure(
     -------
     Figure
     """
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
     t = series.checked_axis(time_s, "time_s")
     f = series.checked_axis(frequency_hz, "frequency_hz")
     curves = series.checked_curves(backlash_m, len(t), "backlash_m")
     spectra = series.checked_curves(amplitude_m, len(f), "amplitude_m")
-    _check_spectra(f, curves, spectra)
-    figure = style.new_figure(5.3)
-    upper = style.panel(figure, bottom_in=3.0, top_in=0.7)
-    drawn = _plot_all(upper, t, {label: values * MICRO for label, values in curves.items()}, 1.0)
-    upper.set_xlim(float(t[0]), float(t[-1]))
-    style.label_axes(upper, "time (s)", "half backlash (µm)")
-    style.no_offset(upper)
-    lower = style.panel(figure, bottom_in=0.55, top_in=5.3 - 0.55 - 1.55)
-    _draw_spectra(lower, f, spectra)
-    _name_lines(lower, [line for line in lines_hz if f[0] <= line <= f[-1]])
-    if mesh_frequency_hz is not None:
-        lower.axvline(mesh_frequency_hz, color=style.MESH, linewidth=1.0, zorder=1)
-        at = mesh_frequency_hz * 1.02
-        series.write(lower, at, 0.9, "mesh", colour=style.MESH, ha="left")
-    style.label_axes(lower, "frequency (Hz)", "amplitude (µm peak)")
-    series.legend_row(figure, drawn, left_in=0.85, top_in=series.NAMES_AT_IN, heading=heading)
-    series.headline(figure, title)
-    return figure
-
-
-def _check_spectra(f: FloatArray, curves: Mapping[str, FloatArray], spectra: Mapping[str, FloatArray]) -> None:
     if f[0] <= 0.0:
         raise InputError(f"frequency_hz begins at {f[0]:g} Hz", allowed="above 0: the axis is logarithmic")
     if list(curves) != list(spectra):
@@ -376,35 +309,26 @@ def _check_spectra(f: FloatArray, curves: Mapping[str, FloatArray], spectra: Map
             f"amplitude_m names {', '.join(spectra)}; backlash_m names {', '.join(curves)}",
             allowed="the same names in the same order",
         )
-
-
-def _plot_all(axes: Axes, x: FloatArray, curves: Mapping[str, FloatArray], width: float = 1.5) -> list[Line2D]:
-    colours = series.series_colours(len(curves))
-    # Later cases are the greater ones: drawn first, they do not hide the others.
-    return [
-        axes.plot(x, values, color=colour, linewidth=width, label=label, zorder=3 - 0.01 * i)[0]
-        for i, ((label, values), colour) in enumerate(zip(curves.items(), colours, strict=True))
-    ]
-
-
-def _draw_spectra(axes: Axes, f: FloatArray, spectra: Mapping[str, FloatArray]) -> None:
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    colours = series.series_colours(len(spectra))
-    highest = max(float(values.max()) for values in spectra.values()) * MICRO
-    for i, (values, colour) in enumerate(zip(spectra.values(), colours, strict=True)):
+    figure, (upper, lower) = style.panels((1.6, 1.55), top_in=0.7, row_gap_in=0.9)
+    drawn = series.plot_curves(upper, t, {label: values * MICRO for label, values in curves.items()}, 1.0)
+    style.label_axes(upper, "time (s)", "half backlash (µm)")
+    for i, (_, values, colour) in enumerate(series.coloured(spectra)):
         if values.max() > 0.0:
-            axes.plot(*thin(f, values * MICRO), color=colour, linewidth=1.1, zorder=3 - 0.01 * i)
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_xlim(float(f[0]), float(f[-1]))
-    axes.set_ylim(0.0, 1.08 * highest or 1.0)
-    style.no_offset(axes)
-
-
-def _name_lines(axes: Axes, lines_hz: Sequence[float]) -> None:
-    for line in lines_hz:
-        axes.axvline(line, color=style.QUIET, linewidth=0.7, linestyle=":", zorder=1)
-        series.write(axes, line, 1.02, f"{line:.4g}")
+            lower.plot(*thin(f, values * MICRO), color=colour, linewidth=1.1, zorder=3 - 0.01 * i)
+    lower.set_xscale("log")
+    lower.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    lower.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    lower.xaxis.set_minor_formatter(NullFormatter())
+    lower.set_xlim(float(f[0]), float(f[-1]))
+    lower.set_ylim(0.0, 1.08 * MICRO * max(float(values.max()) for values in spectra.values()) or 1.0)
+    for line in (line for line in lines_hz if f[0] <= line <= f[-1]):
+        lower.axvline(line, color=style.QUIET, linewidth=0.7, linestyle=":", zorder=1)
+        series.write(lower, line, 1.02, f"{line:.4g}")
+    if mesh_frequency_hz is not None:
+        lower.axvline(mesh_frequency_hz, color=style.MESH, linewidth=1.0, zorder=1)
+        series.write(lower, 1.02 * mesh_frequency_hz, 0.9, "mesh", colour=style.MESH, ha="left")
+    style.label_axes(lower, "frequency (Hz)", "amplitude (µm peak)")
+    for axes in (upper, lower):
+        style.no_offset(axes)
+    series.head(figure, title, drawn, heading)
+    return figure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 
-MOST_CURVES = 8
-LEGEND_IN = 0.28
-"""Height of the row of names above a panel."""
+MAX_CURVES = 8
 NAMES_AT_IN = 0.42
-"""Middle of that row below the figure's top, under a title."""
+"""Middle of the row of names below the figure's top, under a title."""
+N_POINTS = 4000
+"""Points of a thinned line: more than twice the pixel columns of a figure."""
 
 
 def series_colours(n: int) -> tuple[str, ...]:
@@ -53,12 +53,14 @@ def checked_curves(curves: Mapping[str, FloatArray], n: int, name: str, *, gaps:
     InputError
         If there is none, there are more than a figure can tell apart, or a length is wrong.
     """
-    if not 1 <= len(curves) <= MOST_CURVES:
-        raise InputError(f"{name} holds {len(curves)} curves", allowed=f"1 to {MOST_CURVES}")
-    checked = {}
-    for label, values in curves.items():
-        checked[label] = checked_values(values, n, f"{name}[{label!r}]", gaps=gaps)
-    return checked
+    check_number(len(curves), f"{name} holds {len(curves)} curves")
+    return {label: checked_values(values, n, f"{name}[{label!r}]", gaps=gaps) for label, values in curves.items()}
+
+
+def check_number(n: int, what: str, most: int = MAX_CURVES) -> None:
+    """Refuse none, or more than a figure can tell apart."""
+    if not 1 <= n <= most:
+        raise InputError(what, allowed=f"1 to {most}")
 
 
 def checked_values(values: FloatArray, n: int, name: str, *, gaps: bool = False) -> FloatArray:
@@ -69,7 +71,37 @@ def checked_values(values: FloatArray, n: int, name: str, *, gaps: bool = False)
     return array
 
 
-def legend_row(figure: Figure, lines: Sequence[Line2D], *, left_in: float, top_in: float, heading: str = "") -> None:
+def coloured(curves: Mapping[str, FloatArray]) -> Iterator[tuple[str, FloatArray, str]]:
+    """Yield name, values and colour of each curve."""
+    for (name, values), colour in zip(curves.items(), series_colours(len(curves)), strict=True):
+        yield name, values, colour
+
+
+def plot_curves(axes: Axes, x: FloatArray, curves: Mapping[str, FloatArray], width: float = 1.5) -> list[Line2D]:
+    """Draw curves over the whole axis, the first on top where they coincide; return the lines for the legend."""
+    lines = [
+        axes.plot(x, values, color=colour, linewidth=width, label=name, zorder=3 - 0.01 * i)[0]
+        for i, (name, values, colour) in enumerate(coloured(curves))
+    ]
+    axes.set_xlim(float(x[0]), float(x[-1]))
+    return lines
+
+
+def head(figure: Figure, title: str, lines: Sequence[Line2D] = (), heading: str = "") -> None:
+    """Write the title and, below it, the row of names."""
+    headline(figure, title)
+    if lines:
+        legend_row(figure, lines, heading=heading)
+
+
+def legend_row(
+    figure: Figure,
+    lines: Sequence[Line2D],
+    *,
+    left_in: float = 0.85,
+    top_in: float = NAMES_AT_IN,
+    heading: str = "",
+) -> None:
     """Name curves in one row whose middle is `top_in` below the figure's top: it never covers data.
 
     Parameters
@@ -84,17 +116,8 @@ def legend_row(figure: Figure, lines: Sequence[Line2D], *, left_in: float, top_i
     width, height = figure.get_size_inches()
     at = 1.0 - top_in / height
     if heading:
-        figure.text(
-            left_in / width,
-            at,
-            plain(heading, 40),
-            ha="left",
-            va="center",
-            fontsize=style.SMALL_PT,
-            color=style.QUIET,
-            parse_math=False,
-        )
-        left_in += 0.085 * style.SMALL_PT / 8.5 * (len(plain(heading, 40)) + 1)
+        style.put_text(figure, left_in / width, at, heading, n_max=40, va="center")
+        left_in += 0.085 * (len(plain(heading, 40)) + 1)
     legend = figure.legend(
         lines,
         [plain(str(line.get_label()), 30) for line in lines],
@@ -120,16 +143,16 @@ def shade(axes: Axes, limits: tuple[float, float], colour: str = style.FLOOR, al
 
 def write(axes: Axes, x: float, y: float, text: str, *, colour: str = style.QUIET, ha: str = "center") -> None:
     """Write into the panel: `x` in data, `y` as a share of its height (above one: above the panel)."""
-    axes.text(
+    style.put_text(
+        axes,
         x,
         y,
-        plain(text, 40),
+        text,
+        colour=colour,
+        n_max=40,
         transform=axes.get_xaxis_transform(),
         ha=ha,
         va="bottom" if y > 0.98 else "center",
-        fontsize=style.SMALL_PT,
-        color=colour,
-        parse_math=False,
         zorder=4,
     )
 
@@ -144,29 +167,19 @@ def checked_limits(limits: tuple[float, float], name: str) -> tuple[float, float
 
 def headline(figure: Figure, title: str) -> None:
     """Write the title above the row of names."""
-    if not title:
-        return
-    width, height = figure.get_size_inches()
-    figure.text(
-        0.85 / width,
-        1.0 - 0.08 / height,
-        plain(title, 110),
-        ha="left",
-        va="top",
-        fontsize=style.TEXT_PT,
-        fontweight="bold",
-        color=style.INK,
-        parse_math=False,
-    )
-
-
-# --------------------
-# Thin long lines to what a screen can show, without losing a peak.
-# --------------------
-
-
-N_POINTS = 4000
-"""Points of a thinned line: more than twice the pixel columns of a figure."""
+    if title:
+        width, height = figure.get_size_inches()
+        style.put_text(
+            figure,
+            0.85 / width,
+            1.0 - 0.08 / height,
+            title,
+            colour=style.INK,
+            fontsize=style.TEXT_PT,
+            n_max=110,
+            fontweight="bold",
+            va="top",
+        )
 
 
 def thin(x: FloatArray, y: FloatArray, n_points: int = N_POINTS) -> tuple[FloatArray, FloatArray]:

@@ -25,11 +25,7 @@ from gearsig.spectra import Spectrum
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-LEFT_IN, RIGHT_IN, BOTTOM_IN = 0.85, 0.2, 0.55
-TITLE_IN = 0.36
-SPECTRUM_POINTS = N_POINTS // 2
+    from matplotlib.lines import Line2D
 
 
 def spectrum_figure(
@@ -75,19 +71,17 @@ def spectrum_figure(
     one_of(scale, "scale", ("log", "decibel", "linear"))
     if floor is not None and len(floor) != len(spectrum.values):
         raise InputError(f"floor has {len(floor)} values, the spectrum {len(spectrum.values)}")
-    low, high = limits if limits is not None else _whole(spectrum)
+    low, high = limits or (float(spectrum.positions[0]), float(spectrum.positions[-1]))
+    if limits is None and not low < high:  # one line
+        high = low + (spectrum.resolution or 1.0)
     if not low < high:
         raise InputError(f"limits are {low:g} to {high:g}", allowed="ascending")
-    width = style.WIDTH_IN - LEFT_IN - RIGHT_IN
-    placed = place(cursors, (low, high), width)
-    labels_in = ROW_IN * n_rows(placed)
-    top = TITLE_IN + labels_in
-    figure = style.new_figure(BOTTOM_IN + panel_height_in + top)
-    axes = style.panel(figure, left_in=LEFT_IN, right_in=RIGHT_IN, bottom_in=BOTTOM_IN, top_in=top)
+    placed = place(cursors, (low, high), style.WIDTH_IN - 0.85 - 0.2)
+    figure, (axes,) = style.panels((panel_height_in,), top_in=0.36 + ROW_IN * n_rows(placed))
     _draw_lines(axes, spectrum, floor, (low, high), scale, marked)
-    draw(axes, placed, (width, panel_height_in))
+    draw(axes, placed)
     style.label_axes(axes, spectrum.axis_label, _value_label(spectrum, scale))
-    _title(axes, title or spectrum.source, (0.1 + labels_in) / panel_height_in)
+    series.headline(figure, title or spectrum.source)
     return figure
 
 
@@ -113,16 +107,24 @@ def _draw_lines(
         return above_zero(values) if logarithmic else values
 
     if floor is not None:
-        axes.plot(*thin(x, displayed(floor[start:stop]), SPECTRUM_POINTS), color=style.FLOOR, linewidth=1.2, zorder=2.5)
-    at, low, high = envelope(x, displayed(y), SPECTRUM_POINTS // 2)
+        axes.plot(*thin(x, displayed(floor[start:stop]), N_POINTS // 2), color=style.FLOOR, linewidth=1.2, zorder=2.5)
+    at, low, high = envelope(x, displayed(y), N_POINTS // 4)
     if len(at) < len(x):
         axes.fill_between(at, low, high, color=style.MEASURED, alpha=0.22, linewidth=0, zorder=1.8)
     axes.plot(at, high, color=style.MEASURED, linewidth=0.9, zorder=2)
     for position in marked:
         if limits[0] <= position <= limits[1]:
             value = displayed(spectrum.values)[spectrum.index_of(position)]
-            looks = {"marker": "o", "markersize": 9, "markeredgewidth": 1.8, "fillstyle": "none"}
-            axes.plot([position], [value], color=style.FAULT, zorder=3, **looks)  # type: ignore[arg-type]
+            axes.plot(
+                [position],
+                [value],
+                "o",
+                color=style.FAULT,
+                markersize=9,
+                markeredgewidth=1.8,
+                fillstyle="none",
+                zorder=3,
+            )
     axes.set_xlim(*limits)
     if logarithmic:
         axes.set_yscale("log")
@@ -150,35 +152,6 @@ def _value_label(spectrum: Spectrum, scale: Scale) -> str:
     return with_unit(name or "value", spectrum.unit)
 
 
-def _title(axes: Axes, title: str, above: float) -> None:
-    axes.text(
-        0.0,
-        1.0 + above,
-        plain(title, 110),
-        transform=axes.transAxes,
-        ha="left",
-        va="bottom",
-        fontsize=style.TEXT_PT,
-        fontweight="bold",
-        color=style.INK,
-        parse_math=False,
-    )
-
-
-def _whole(spectrum: Spectrum) -> tuple[float, float]:
-    low, high = float(spectrum.positions[0]), float(spectrum.positions[-1])
-    return low, high if high > low else low + (spectrum.resolution or 1.0)
-
-
-# --------------------
-# Signals over time.
-# --------------------
-
-
-PANEL_IN = 1.35
-MARGINS_IN = 0.55
-
-
 def time_figure(
     recording: Recording,
     channels: Sequence[str] = (),
@@ -203,41 +176,21 @@ def time_figure(
     Figure
     """
     names = tuple(channels) or recording.channel_names
-    height = MARGINS_IN + PANEL_IN * len(names)
-    figure = style.new_figure(height)
-    first: Axes | None = None
-    for i, name in enumerate(names):
-        bottom = 0.55 + PANEL_IN * (len(names) - 1 - i)
-        axes = style.panel(figure, bottom_in=bottom, top_in=height - bottom - PANEL_IN + 0.33, sharex=first)
-        first = first or axes
-        channel = recording.channels[recording.index(name)]
-        time, values = _stretch(recording, name, limits_s)
-        axes.plot(*thin(time, values, n_points), color=style.MEASURED, linewidth=0.6)
-        last = i == len(names) - 1
-        axes.tick_params(labelbottom=last)
-        quantity = "" if channel.quantity == "unknown" else ": " + channel.quantity.replace("_", " ")
-        style.label_axes(axes, "time (s)" if last else "", unit_text(channel.unit), f"{plain(name)}{quantity}")
-        style.no_offset(axes)
-        axes.set_xlim(*_limits(time, recording.sampling_rate_hz))
-    return figure
-
-
-def _stretch(recording: Recording, name: str, limits_s: tuple[float, float] | None) -> tuple[FloatArray, FloatArray]:
-    rate, values = recording.sampling_rate_hz, recording.values(name)
+    rate = recording.sampling_rate_hz
     low, high = limits_s if limits_s is not None else (0.0, recording.duration_s)
-    start = int(np.clip(np.floor(low * rate), 0, len(values) - 1))
-    stop = int(np.clip(np.ceil(high * rate) + 1, start + 1, len(values)))
-    return np.arange(start, stop) / rate, values[start:stop]
-
-
-def _limits(time: FloatArray, rate_hz: float) -> tuple[float, float]:
-    """Return the ends of the time axis, a sample apart at least."""
-    return float(time[0]), float(max(time[-1], time[0] + 1 / rate_hz))
-
-
-# --------------------
-# Shaft speed over time.
-# --------------------
+    start = int(np.clip(np.floor(low * rate), 0, recording.n_samples - 1))
+    stop = int(np.clip(np.ceil(high * rate) + 1, start + 1, recording.n_samples))
+    time = np.arange(start, stop) / rate
+    figure, panels = style.panels((1.02,) * len(names), top_in=0.33, row_gap_in=0.33, share_x=True)
+    for axes, name in zip(panels, names, strict=True):
+        channel = recording.channels[recording.index(name)]
+        axes.plot(*thin(time, recording.values(name)[start:stop], n_points), color=style.MEASURED, linewidth=0.6)
+        quantity = "" if channel.quantity == "unknown" else ": " + channel.quantity.replace("_", " ")
+        x = "time (s)" if axes is panels[-1] else ""
+        style.label_axes(axes, x, unit_text(channel.unit), f"{plain(name)}{quantity}")
+        style.no_offset(axes)
+    panels[0].set_xlim(float(time[0]), float(max(time[-1], time[0] + 1 / rate)))
+    return figure
 
 
 METHODS = {
@@ -247,7 +200,7 @@ METHODS = {
     "speed channel": "from a speed channel",
     "tachless": "found in the vibration, no tachometer",
 }
-LEAST_SPAN = 0.002
+MIN_SPEED_SPAN = 0.002
 """The speed axis spans at least this share of the mean: rounding at constant speed must not look like a fluctuation."""
 
 
@@ -262,12 +215,11 @@ def speed_figure(shaft_angle: ShaftAngle) -> Figure:
     -------
     Figure
     """
-    figure = style.new_figure(2.3)
-    axes = style.panel(figure)
+    figure, (axes,) = style.panels((1.4,), top_in=0.35)
     time, speed = thin(shaft_angle.time_s, 60.0 * shaft_angle.speed_rev_per_s)
     axes.plot(time, speed, color=style.MEASURED, linewidth=1.2)
     low, high = float(speed.min()), float(speed.max())
-    least = LEAST_SPAN * max(abs(shaft_angle.mean_speed_rpm), 1.0)
+    least = MIN_SPEED_SPAN * max(abs(shaft_angle.mean_speed_rpm), 1.0)
     margin = max(0.06 * (high - low), (least - (high - low)) / 2)
     axes.set_ylim(low - margin, high + margin)
     axes.set_xlim(shaft_angle.start_s, shaft_angle.end_s)
@@ -278,15 +230,6 @@ def speed_figure(shaft_angle: ShaftAngle) -> Figure:
     style.note(axes, METHODS[shaft_angle.method] + known)
     style.no_offset(axes)
     return figure
-
-
-# --------------------
-# Levels of orders over speed: a run-up or run-down, order by order.
-# --------------------
-
-
-DECADES = 3.5
-"""Below the largest level at most: what lies deeper is noise."""
 
 
 def order_levels_figure(
@@ -313,57 +256,34 @@ def order_levels_figure(
     InputError
         Without levels, or with more than a figure can tell apart.
     """
-    if not 1 <= len(levels) <= series.MOST_CURVES:
-        raise InputError(f"{len(levels)} levels", allowed=f"1 to {series.MOST_CURVES}")
-    figure = style.new_figure(height_in)
-    axes = style.panel(figure, top_in=0.85 if resonances_hz else 0.65)
-    lines = []
+    series.check_number(len(levels), f"{len(levels)} levels")
+    top_in = 0.85 if resonances_hz else 0.65
+    figure, (axes,) = style.panels((height_in - 0.55 - top_in,), top_in=top_in)
+    lines: list[Line2D] = []
     for level, colour in zip(levels, series.series_colours(len(levels)), strict=True):
         lines += axes.plot(level.speed_rpm, level.amplitude, color=colour, linewidth=1.2, label=level.name)
         amplitude, rpm, _ = level.largest
         axes.plot([rpm], [amplitude], "o", color=colour, markersize=5, zorder=4)
-    _scale(axes, levels)
-    for letter, hertz in zip(ascii_uppercase, resonances_hz, strict=False):
-        _mark_crossings(axes, levels, hertz, letter)
-    unit = f" ({unit_text(levels[0].unit)})" if levels[0].unit else ""
-    style.label_axes(axes, "speed (rpm)", f"amplitude{unit}")
-    style.no_offset(axes)
-    series.legend_row(figure, lines, left_in=0.85, top_in=series.NAMES_AT_IN)
-    named = [f"{letter} {hertz:.4g} Hz" for letter, hertz in zip(ascii_uppercase, resonances_hz, strict=False)]
-    series.headline(figure, f"{title}; resonances: {', '.join(named)}" if named else title)
-    return figure
-
-
-def _scale(axes: Axes, levels: Sequence[OrderLevel]) -> None:
     top = max(float(level.amplitude.max()) for level in levels) or 1.0
-    bottom = min(float(level.amplitude.min()) for level in levels)
+    # What lies more than three and a half decades below the largest level is noise.
+    bottom = max(min(float(level.amplitude.min()) for level in levels) / 1.5, top / 10**3.5)
     axes.set_yscale("log")
-    axes.set_ylim(max(bottom / 1.5, top / 10**DECADES), 2.0 * top)
+    axes.set_ylim(bottom, 2.0 * top)
     axes.set_xlim(min(float(x.speed_rpm[0]) for x in levels), max(float(x.speed_rpm[-1]) for x in levels))
-
-
-def _mark_crossings(axes: Axes, levels: Sequence[OrderLevel], hertz: float, letter: str) -> None:
-    """Mark where each order passes a frequency, by its letter."""
-    crossed = []
-    for level in levels:
-        rpm = 60.0 * hertz / level.order
-        if level.speed_rpm[0] < rpm < level.speed_rpm[-1]:
-            crossed.append((rpm, float(np.interp(rpm, level.speed_rpm, level.amplitude))))
-    for rpm, amplitude in crossed:
-        axes.plot([rpm, rpm], [axes.get_ylim()[0], amplitude], color=style.FAULT, linewidth=0.8, linestyle=":")
-        axes.plot([rpm], [amplitude], "v", color=style.FAULT, markersize=6, zorder=5)
-        series.write(axes, rpm, 1.02, letter, colour=style.FAULT)
-
-
-# --------------------
-# Indicators of several recordings side by side.
-# --------------------
-
-
-N_COLUMNS = 3
-TREND_ROW_IN = 0.22
-NAMES_IN = 2.3
-GAP_IN = 0.4
+    named = list(zip(ascii_uppercase, resonances_hz, strict=False))
+    for letter, hertz in named:
+        for level in levels:
+            rpm = 60.0 * hertz / level.order
+            if level.speed_rpm[0] < rpm < level.speed_rpm[-1]:
+                amplitude = float(np.interp(rpm, level.speed_rpm, level.amplitude))
+                axes.plot([rpm, rpm], [bottom, amplitude], color=style.FAULT, linewidth=0.8, linestyle=":")
+                axes.plot([rpm], [amplitude], "v", color=style.FAULT, markersize=6, zorder=5)
+                series.write(axes, rpm, 1.02, letter, colour=style.FAULT)
+    style.label_axes(axes, "speed (rpm)", with_unit("amplitude", levels[0].unit))
+    style.no_offset(axes)
+    resonances = ", ".join(f"{letter} {hertz:.4g} Hz" for letter, hertz in named)
+    series.head(figure, f"{title}; resonances: {resonances}" if named else title, lines)
+    return figure
 
 
 def trend_figure(
@@ -391,48 +311,33 @@ def trend_figure(
     Figure
     """
     defined = dict.fromkeys(i.name for items in recordings.values() for i in items if isfinite(i.value))
-    wanted = [name for name in names or defined if name in defined][:most]
-    n_columns = max(1, min(N_COLUMNS, len(wanted)))
-    n_rows = max(1, -(-len(wanted) // n_columns))
-    panel_in = TREND_ROW_IN * max(len(recordings), 1) + 0.1
-    height = n_rows * (panel_in + 0.75) + 0.05
-    figure = style.new_figure(height)
-    width_in = (style.WIDTH_IN - NAMES_IN - 0.2 - GAP_IN * (n_columns - 1)) / n_columns
-    for number, name in enumerate(wanted):
-        row, column = divmod(number, n_columns)
-        left = NAMES_IN + column * (width_in + GAP_IN)
-        bottom = height - (row + 1) * (panel_in + 0.75) + 0.4
-        axes = style.panel(
-            figure,
-            left_in=left,
-            right_in=style.WIDTH_IN - left - width_in,
-            bottom_in=bottom,
-            top_in=height - bottom - panel_in,
-        )
-        _draw(axes, recordings, name, highlighted, with_names=column == 0)
+    shown = [name for name in names or defined if name in defined][:most]
+    n_columns = max(1, min(3, len(shown)))
+    n_rows = max(1, -(-len(shown) // n_columns))
+    figure, panels = style.panels(
+        (0.22 * max(len(recordings), 1) + 0.1,) * n_rows,
+        (1.0,) * n_columns,
+        left_in=2.3,
+        top_in=0.35,
+        bottom_in=0.45,
+        row_gap_in=0.75,
+        column_gap_in=0.4,
+    )
+    for axes in panels[len(shown) :]:
+        axes.remove()
+    for number, (axes, name) in enumerate(zip(panels, shown, strict=False)):
+        units = set()
+        for row, (recording, indicators) in enumerate(recordings.items()):
+            chosen = [i for i in indicators if i.name == name and isfinite(i.value)]
+            units |= {i.unit for i in chosen}
+            colour = style.FAULT if recording in highlighted else style.MEASURED
+            axes.plot([i.value for i in chosen], [row] * len(chosen), "o", color=colour, markersize=5, alpha=0.75)
+        axes.set_ylim(len(recordings) - 0.5, -0.5)
+        labels = [plain(recording, 30) if number % n_columns == 0 else "" for recording in recordings]
+        axes.set_yticks(range(len(recordings)), labels, parse_math=False)
+        axes.tick_params(axis="y", length=0)
+        axes.spines["left"].set_visible(False)
+        style.label_axes(axes, title=with_unit(name, units.pop() if len(units) == 1 else ""))
+        axes.locator_params(axis="x", nbins=4)
+        style.no_offset(axes)
     return figure
-
-
-def _draw(
-    axes: Axes,
-    recordings: Mapping[str, Sequence[Indicator]],
-    name: str,
-    highlighted: Sequence[str],
-    *,
-    with_names: bool,
-) -> None:
-    units = set()
-    for row, (recording, indicators) in enumerate(recordings.items()):
-        chosen = [i for i in indicators if i.name == name and isfinite(i.value)]
-        units |= {i.unit for i in chosen}
-        colour = style.FAULT if recording in highlighted else style.MEASURED
-        axes.plot([i.value for i in chosen], [row] * len(chosen), "o", color=colour, markersize=5, alpha=0.75)
-    axes.set_ylim(len(recordings) - 0.5, -0.5)
-    labels = [plain(recording, 30) for recording in recordings] if with_names else [""] * len(recordings)
-    axes.set_yticks(range(len(recordings)), labels, parse_math=False)
-    axes.tick_params(axis="y", length=0)
-    axes.spines["left"].set_visible(False)
-    unit = f" ({unit_text(units.pop())})" if len(units) == 1 and "" not in units else ""
-    style.label_axes(axes, title=f"{name}{unit}")
-    axes.locator_params(axis="x", nbins=4)
-    style.no_offset(axes)

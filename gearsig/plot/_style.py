@@ -6,8 +6,9 @@ be made in several threads at once and are freed when the last reference goes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -16,21 +17,16 @@ from gearsig.spectra import Scaling
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
     from matplotlib.projections.polar import PolarAxes
-
-
-# --------------------
-# Display units: decibels, degrees, and units written as people read them.
-# --------------------
 
 
 Scale = Literal["log", "decibel", "linear"]
 """How values are drawn: on a logarithmic axis, in decibels on a linear one, or as they are."""
 
 _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-LOWEST_RATIO = 1e-10
-"""Values below this share of the largest one are drawn there: a logarithm needs a bottom."""
 
 
 def decibels(values: FloatArray, scaling: Scaling) -> FloatArray:
@@ -46,7 +42,7 @@ def decibels(values: FloatArray, scaling: Scaling) -> FloatArray:
 def above_zero(values: FloatArray) -> FloatArray:
     """Return values lifted to a tiny share of the largest one, so that they have a logarithm."""
     largest = float(np.max(values, initial=0.0))
-    lowest = largest * LOWEST_RATIO if largest > 0 else LOWEST_RATIO
+    lowest = 1e-10 * largest if largest > 0 else 1e-10
     return np.maximum(np.asarray(values, dtype=np.float64), max(lowest, float(np.finfo(np.float64).tiny)))
 
 
@@ -139,17 +135,126 @@ def panel(
         (height - bottom_in - top_in) / height,
     )
     axes = figure.add_axes(rectangle, sharex=sharex)
+    _dress(axes)
+    return axes
+
+
+def _dress(axes: Axes) -> None:
+    """Give axes the common look: quiet ticks and rules, no box."""
     axes.set_facecolor("none")
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    for side in ("left", "bottom"):
-        axes.spines[side].set_color(QUIET)
-        axes.spines[side].set_linewidth(0.8)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set(color=QUIET, linewidth=0.8)
     axes.tick_params(which="both", colors=QUIET, labelcolor=INK, labelsize=SMALL_PT, width=0.8, direction="out")
     axes.tick_params(which="minor", length=2, width=0.5)
     axes.grid(visible=True, axis="y", which="major", color=RULE, linewidth=0.7)
     axes.set_axisbelow(True)
-    return axes
+
+
+def panels(
+    heights_in: Sequence[float],
+    widths: Sequence[float] = (1.0,),
+    *,
+    left_in: float = 0.85,
+    right_in: float = 0.2,
+    bottom_in: float = 0.55,
+    top_in: float = 0.68,
+    row_gap_in: float = 0.5,
+    column_gap_in: float = 0.95,
+    width_in: float = WIDTH_IN,
+    share_x: bool = False,
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure with rows and columns of panels.
+
+    Parameters
+    ----------
+    heights_in : sequence of float
+        Of the rows, from the top.
+    widths : sequence of float
+        Of the columns, relative to each other: together they fill the figure.
+    left_in, right_in, bottom_in, top_in : float
+        Margins, for labels, the title and the row of names. Room for a title alone: 0.42.
+    row_gap_in, column_gap_in : float
+    width_in : float
+        Of the figure.
+    share_x : bool
+        Whether panels below each other have one axis, with numbers under the last row only.
+
+    Returns
+    -------
+    Figure
+    list of Axes
+        Row by row.
+    """
+    n_rows, n_columns = len(heights_in), len(widths)
+    height_in = top_in + sum(heights_in) + row_gap_in * (n_rows - 1) + bottom_in
+    figure = new_figure(height_in, width_in)
+    free_in = width_in - left_in - right_in - column_gap_in * (n_columns - 1)
+    grid = figure.add_gridspec(
+        n_rows,
+        n_columns,
+        left=left_in / width_in,
+        right=1.0 - right_in / width_in,
+        bottom=bottom_in / height_in,
+        top=1.0 - top_in / height_in,
+        height_ratios=heights_in,
+        width_ratios=widths,
+        hspace=row_gap_in * n_rows / sum(heights_in),
+        wspace=column_gap_in * n_columns / free_in,
+    )
+    result: list[Axes] = []
+    for row in range(n_rows):
+        for column in range(n_columns):
+            axes = figure.add_subplot(grid[row, column], sharex=result[column] if share_x and row else None)
+            _dress(axes)
+            if share_x:
+                axes.tick_params(labelbottom=row == n_rows - 1)
+            result.append(axes)
+    return figure, result
+
+
+def size_in(axes: Axes) -> tuple[float, float]:
+    """Return width and height of a panel in inches."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None  # noqa: S101 - every panel belongs to one
+    width, height = figure.get_size_inches()
+    place = axes.get_position()
+    return float(place.width * width), float(place.height * height)
+
+
+def colours() -> Colormap:
+    """Return a map from white over blue to nearly black: even steps of lightness, the same for every reader."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list(
+        "level", ["#FFFFFF", "#C9DDF0", "#6FA8D6", "#1F6FB0", "#0B3A69", "#06172E"]
+    )
+
+
+def colour_bar(axes: Axes, drawn: ScalarMappable, label: str = "", *, gap_in: float = 0.15, **looks: Any) -> Axes:
+    """Draw the colours' scale right of a panel, as tall as it is; further `looks` are those of `Figure.colorbar`."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None  # noqa: S101 - every panel belongs to one
+    width, place = figure.get_size_inches()[0], axes.get_position()
+    bar_axes = figure.add_axes((place.x1 + gap_in / width, place.y0, 0.12 / width, place.height))
+    figure.colorbar(drawn, cax=bar_axes, **looks).outline.set_visible(False)
+    bar_axes.tick_params(colors=QUIET, labelcolor=INK, labelsize=SMALL_PT)
+    bar_axes.set_ylabel(plain(label), color=INK, fontsize=TEXT_PT, parse_math=False)
+    return bar_axes
+
+
+def put_text(
+    target: Axes | Figure,
+    x: float,
+    y: float,
+    text: str,
+    *,
+    colour: str = QUIET,
+    fontsize: float = SMALL_PT,
+    n_max: int = 90,
+    **looks: Any,
+) -> None:
+    """Write small quiet text; names from files are never read as markup. Further `looks` are those of `Axes.text`."""
+    target.text(x, y, plain(text, n_max), color=colour, fontsize=fontsize, parse_math=False, **looks)
 
 
 def polar_panel(figure: Figure) -> PolarAxes:
@@ -184,19 +289,5 @@ def no_offset(axes: Axes) -> None:
 
 def note(axes: Axes, text: str) -> None:
     """Write a quiet remark into the upper right corner, above the panel."""
-    axes.text(
-        1.0,
-        1.0 + 0.06 / _height_in(axes),
-        plain(text, 90),
-        transform=axes.transAxes,
-        ha="right",
-        va="bottom",
-        fontsize=SMALL_PT,
-        color=QUIET,
-        parse_math=False,
-    )
-
-
-def _height_in(axes: Axes) -> float:
-    figure = axes.get_figure(root=True)
-    return float(axes.get_position().height * figure.get_size_inches()[1]) if figure is not None else 1.0
+    above = 1.0 + 0.06 / size_in(axes)[1]
+    put_text(axes, 1.0, above, text, transform=axes.transAxes, ha="right", va="bottom")

@@ -49,11 +49,11 @@ def test_coherence_draws_map_mean_and_level(n):
     c = spectral_coherence(_signal(n), FS, highest_alpha_hz=200.0, n_bands=16, source="a$1")
     figure = coherence_figure(c, marked=(31.0,))
     assert {"spectral coherence of a$1", "cyclic frequency (Hz)", "carrier (Hz)"} <= _texts(figure)
-    drawn = figure.axes[0].collections[0].get_array()
+    drawn = figure.axes[1].collections[0].get_array()
     assert drawn.max() == pytest.approx(c.coherence_squared.max())
     assert drawn.shape[0] == len(c.frequency_hz)
     assert drawn.shape[1] <= 500
-    dashed = figure.axes[1].lines[1]
+    dashed = figure.axes[0].lines[1]
     assert dashed.get_ydata()[0] == pytest.approx(enhanced_envelope(c).level)
 
 
@@ -69,7 +69,7 @@ def test_mean_over_a_band_is_named_and_must_belong_to_the_map():
 
 def test_coherence_may_be_drawn_between_limits():
     found = spectral_coherence(_signal(30_001), FS, highest_alpha_hz=200)
-    below, above, *_ = coherence_figure(found, limits=(20.0, 60.0)).axes
+    above, below, *_ = coherence_figure(found, limits=(20.0, 60.0)).axes
     low, high = below.get_xlim()
     assert (low, high) == pytest.approx((20.0, 60.0), abs=found.alpha_resolution)
     x = above.lines[0].get_xdata()

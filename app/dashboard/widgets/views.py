@@ -19,7 +19,7 @@ from gearsig.angle import ShaftAngle
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, IndicatorChange, changes
 from gearsig.indicators import Indicator
-from gearsig.plot import LEAST_SPAN, METHODS, thin, unit_text, with_unit
+from gearsig.plot import MIN_SPEED_SPAN, METHODS, thin, unit_text, with_unit
 from gearsig.recording import Recording
 from gearsig.report import bearing_cursors, highest_order_of_interest, line_cursors, marked_positions, speed_is_constant
 
@@ -71,7 +71,7 @@ def _show_curve(analysis: Analysis, angle: ShaftAngle) -> None:
     time, speed = thin(angle.time_s, 60 * angle.speed_rev_per_s)
     low, high = float(speed.min()), float(speed.max())
     # rounding at constant speed must not look like a fluctuation
-    margin = max(0.06 * (high - low), (LEAST_SPAN * max(abs(angle.mean_speed_rpm), 1) - (high - low)) / 2)
+    margin = max(0.06 * (high - low), (MIN_SPEED_SPAN * max(abs(angle.mean_speed_rpm), 1) - (high - low)) / 2)
     axes = Axes("time (s)", "speed (rpm)", (angle.start_s, angle.end_s), (low - margin, high + margin))
     show_lines([ChartLine(time, speed, "speed")], axes, state.view_key("speed chart", analysis))
 
