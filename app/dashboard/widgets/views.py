@@ -19,7 +19,7 @@ from gearsig.angle import ShaftAngle
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, IndicatorChange, changes
 from gearsig.indicators import Indicator
-from gearsig.plot import MIN_SPEED_SPAN, METHODS, thin, unit_text, with_unit
+from gearsig.plot import METHODS, MIN_SPEED_SPAN, thin, unit_text, with_unit
 from gearsig.recording import Recording
 from gearsig.report import bearing_cursors, highest_order_of_interest, line_cursors, marked_positions, speed_is_constant
 
