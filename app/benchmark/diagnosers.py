@@ -359,7 +359,7 @@ def _deviations(seen: VisibleCase) -> Iterator[dict[str, float]]:
     for i, recording in enumerate(seen.reduced):
         values = dict(zip(*once(recording), strict=True))
         before = dict(zip(*once(seen.reduced_references[i]), strict=True)) if seen.reduced_references else None
-        deviations = {}
+        deviations = dict.fromkeys(values, 0.0)  # what is usual is known of the table's features alone
         for name, (usual, spread, change) in USUAL.items():
             for side in SIDES:
                 feature = name.format(side=side)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.cache import cache_folder, modules_digest, read_arrays, write_whole
-from gearsig.checks import FloatArray
+from gearsig.checks import FloatArray, closest_match_hint
 from gearsig.errors import InputError
 from gearsig.gap._change import SURPRISE, beyond_the_mesh, counted_from_the_mesh, mirrored, seen_rows
 from gearsig.gap._features import SIDES, Features
@@ -194,7 +194,18 @@ def textbook_rules(effects: Iterable[GapEffect]) -> list[tuple[str, Signs]]:
 
 
 def rule_strengths(signs: Signs, deviations: Mapping[str, float]) -> dict[str, float]:
-    """Return the mean of a rule's signs, each over its spread, by side; by an empty one where it asks for none."""
+    """Return the mean of a rule's signs, each over its spread, by side; by an empty one where it asks for none.
+
+    Raises
+    ------
+    InputError
+        If a sign is of no feature.
+    """
+    names = {name.format(side=side) for name, _ in signs for side in SIDES}
+    for name in names - deviations.keys():
+        raise InputError(
+            f"there is no feature {name!r}", where="the textbook's signs", remedy=closest_match_hint(name, deviations)
+        )
     strengths = {}
     for side in SIDES if any("{side}" in name for name, _ in signs) else ("",):
         values = [(deviations[name.format(side=side)], direction) for name, direction in signs]

@@ -15,7 +15,7 @@ import numpy as np
 from gearsig.checks import closest_match_hint, one_of, within
 from gearsig.errors import InputError
 from gearsig.rig import Bearing
-from sims.effects._textbook import Textbook
+from sims.effects.textbook import Textbook
 from sims.machine import Machine, Nominal, WeakTooth
 from sims.mesh import GearGeometry, PairGeometry
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from sims.effects import _shared as shared
 from sims.effects._effect import Effect, Options, PlausibleRange, Severity
-from sims.effects._textbook import UP, Signature, SyntheticScene, Textbook, race_knocks
+from sims.effects.textbook import UP, Signature, SyntheticScene, Textbook, race_knocks
 from sims.machine import Machine
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sims.effects import _shared as shared
-from sims.effects import _textbook as book
+from sims.effects import textbook as book
 from sims.effects._effect import GEAR_OPTION, TOOTH_OPTION, Effect, Option, Options, PlausibleRange, Severity
 from sims.machine import Machine
 from sims.mesh import ToothChip

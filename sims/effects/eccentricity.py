@@ -8,7 +8,7 @@ import numpy as np
 
 from sims.effects import _shared as shared
 from sims.effects._effect import GEAR_OPTION, Effect, Options, PlausibleRange, Severity
-from sims.effects._textbook import UP, Signature, SyntheticScene, Textbook, draw_side, modulated
+from sims.effects.textbook import UP, Signature, SyntheticScene, Textbook, draw_side, modulated
 from sims.machine import Machine, runout_tolerance_um
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.checks import within
-from sims.effects import _textbook as book
+from sims.effects import textbook as book
 from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
 from sims.effects._shared import GEARS, gear_index, replaced_item
 from sims.machine import Machine
@@ -40,12 +40,9 @@ def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generato
         np.zeros(len(scene.time_s)),
     )
     once, twice = book.balance(rng, 2)
-    swings = book.swing(scene, 2.0 * order, bands * twice * size, rng) * book.swing(
-        scene, order, bands * once * size, rng
-    )
-    higher = np.append(
-        1.0, np.exp(2.0 * mesh * min(size, 1.0) * np.abs(rng.standard_normal(book.N_MESH_HARMONICS - 1)))
-    )
+    swings = book.swing(scene, 2.0 * order, bands * twice * size, rng)
+    swings = swings * book.swing(scene, order, bands * once * size, rng)
+    higher = np.exp(2.0 * mesh * min(size, 1.0) * np.abs(rng.standard_normal(book.N_MESH_HARMONICS - 1)))
     return book.Signature(
         swings,
         None,

@@ -9,7 +9,7 @@ import numpy as np
 from gearsig.checks import FloatArray
 from sims.effects import _shared as shared
 from sims.effects._effect import GEAR_OPTION, Effect, Options, PlausibleRange, Severity
-from sims.effects._textbook import MAX_ADVANCE, UP, Signature, SyntheticScene, Textbook, balance, draw_side
+from sims.effects.textbook import MAX_ADVANCE, UP, Signature, SyntheticScene, Textbook, balance, draw_side
 from sims.machine import Machine, pitch_tolerance_um
 from sims.mesh import FlankDeviation
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from gearsig.checks import within
 from sims.effects import _shared as shared
-from sims.effects import _textbook as book
+from sims.effects import textbook as book
 from sims.effects._effect import (
     GEAR_OPTION,
     TOOTH_OPTION,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.checks import within
-from sims.effects import _textbook as book
+from sims.effects import textbook as book
 from sims.effects._effect import DriveEffect, DriveParameters, Effect, Options, PlausibleRange, Severity
 from sims.machine import MAX_DRY_FRICTION, Machine
 

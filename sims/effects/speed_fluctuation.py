@@ -8,7 +8,7 @@ from math import pi
 import numpy as np
 
 from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
-from sims.effects._textbook import UP, Textbook
+from sims.effects.textbook import UP, Textbook
 from sims.machine import Machine, SpeedSwing, log_uniform
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
-from sims.effects._textbook import UP, Signature, SyntheticScene, Textbook, at_the_mesh, balance, band_noise
+from sims.effects.textbook import UP, Signature, SyntheticScene, Textbook, at_the_mesh, balance, band_noise
 from sims.machine import Machine, Roughness
 
 _AS_IT_IS = "as it is"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sims.effects import _textbook as book
+from sims.effects import textbook as book
 from sims.effects._effect import GEAR_OPTION, TOOTH_OPTION, Effect, Option, Options, PlausibleRange, Severity
 from sims.effects._shared import any_tooth, first_teeth, gear_index, tooth_number, with_tooth_fault
 from sims.machine import Machine, log_uniform

@@ -8,7 +8,7 @@ from math import pi
 import numpy as np
 
 from sims.effects._effect import DriveEffect, DriveParameters, Effect, Option, Options, PlausibleRange, Severity
-from sims.effects._textbook import UP, Signature, SyntheticScene, Textbook, balance, draw_side, modulated
+from sims.effects.textbook import UP, Signature, SyntheticScene, Textbook, balance, draw_side, modulated
 from sims.machine import Machine, TorqueRipple, log_uniform
 
 

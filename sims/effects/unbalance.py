@@ -9,7 +9,7 @@ import numpy as np
 from gearsig.checks import within
 from sims.effects import _shared as shared
 from sims.effects._effect import GEAR_OPTION, Effect, MachineFacts, Options, PlausibleRange, Severity
-from sims.effects._textbook import UP, Signature, SyntheticScene, Textbook, draw_side, modulated, partly
+from sims.effects.textbook import UP, Signature, SyntheticScene, Textbook, draw_side, modulated, partly
 from sims.machine import Machine, usual_mass_kg
 
 _LARGEST_OFFSET = 0.1

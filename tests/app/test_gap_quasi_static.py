@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from app.studies.gap.quasi_static.machine import EFFECTS, MESH, N_PAIRS, Path, StaticMachine, Structure, static_contact
 from app.studies.gap.quasi_static.record import QuasiStaticDay, record
 from gearsig.gap import reduce_recording
-from sims.effects import PathChange
+from sims.effects import textbook
 
 
 @given(st.integers(0, 10**6))
@@ -64,7 +64,7 @@ def test_an_effect_changes_what_is_recorded(name: str) -> None:
 def test_a_changed_path_is_heard_on_its_channel() -> None:
     made, day = machine(), QuasiStaticDay.drawn(np.random.default_rng(1))
     state = made.healthy()
-    state.paths = [PathChange(gain=2.0), PathChange()]
+    state.paths = [textbook.PathChange(gain=2.0), textbook.PathChange()]
     before, after = record(made, made.healthy(), day, None).samples, record(made, state, day, None).samples
     assert after[0] == pytest.approx(2.0 * before[0], abs=1e-9 * float(np.abs(before[0]).max()))
     assert after[1:] == pytest.approx(before[1:], abs=1e-9 * float(np.abs(before[1]).max()))

@@ -11,7 +11,7 @@ from gearsig.checks import FloatArray
 from gearsig.gap import LIGHT_LOAD_N_PER_MM, tooth_load_n_per_mm
 from gearsig.recording import Recording
 from gearsig.rig import Rig
-from sims.effects import SIZES, SyntheticScene, band_noise, effects, knocks, ring, struck, tone
+from sims.effects import effects, textbook
 from sims.machine import log_uniform
 
 
@@ -22,7 +22,7 @@ def rig_of(recording: Recording) -> Rig:
     return recording.rig
 
 
-def scene_of(recording: Recording) -> SyntheticScene:
+def scene_of(recording: Recording) -> textbook.SyntheticScene:
     """Return the scene of a simulated recording with one gear pair."""
     from gearsig.angle import find_shaft_angle
 
@@ -34,7 +34,7 @@ def scene_of(recording: Recording) -> SyntheticScene:
     for bearing in rig.bearings:
         shaft = 1.0 if bearing.shaft == pair.driver else teeth[0] / teeth[1]
         bearings.append({"shaft": shaft} | {name: order * shaft for name, order in bearing.orders().items()})
-    return SyntheticScene(
+    return textbook.SyntheticScene(
         find_shaft_angle(recording, rig).revolutions_at(time),
         time,
         recording.sampling_rate_hz,
@@ -75,7 +75,7 @@ SIGNATURES = {name: _BOOKS[name] for name in dict.fromkeys((*AS_SHIPPED, *_BOOKS
 def with_signature(recording: Recording, name: str, rng: np.random.Generator) -> tuple[Recording, float]:
     """Return the recording with an effect's signature, and how strong it is, 0 to 1."""
     scene, strength = scene_of(recording), float(rng.uniform())
-    signature = SIGNATURES[name](scene, SIZES[0] * (SIZES[1] / SIZES[0]) ** strength, rng)
+    signature = SIGNATURES[name](scene, textbook.SIZES[0] * (textbook.SIZES[1] / textbook.SIZES[0]) ** strength, rng)
     samples = recording.samples.copy()
     for k, i in enumerate(vibrations(recording)):
         samples[i] = signature.on(samples[i], scene, rng, float(samples[i].std()), k)
@@ -112,27 +112,27 @@ def _strange_order(rng: np.random.Generator, low: float, high: float) -> float:
     return whole + float(rng.choice((rng.uniform(0.07, 0.43), rng.uniform(0.57, 0.93))))
 
 
-def _rolling_element(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+def _rolling_element(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     slip = 1.0 - rng.uniform(0.0, 0.015)
     bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
-    return knocks(2.0 * bearing["BSF"] * slip, 0.02, scene, rng, by=bearing["FTF"] * slip)
+    return textbook.knocks(2.0 * bearing["BSF"] * slip, 0.02, scene, rng, by=bearing["FTF"] * slip)
 
 
-def _strange_knocks(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    return knocks(_strange_order(rng, 1, 12), float(rng.uniform(0.002, 0.05)), scene, rng)
+def _strange_knocks(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    return textbook.knocks(_strange_order(rng, 1, 12), float(rng.uniform(0.002, 0.05)), scene, rng)
 
 
-def _once_per_revolution(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+def _once_per_revolution(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """A loose key or coupling: longer than a tooth, and not of one mesh."""
     order = 1.0 if rng.uniform() < 0.5 else scene.teeth[0] / scene.teeth[1]
-    return knocks(order * float(rng.choice((1.0, 2.0))), 0.01, scene, rng)
+    return textbook.knocks(order * float(rng.choice((1.0, 2.0))), 0.01, scene, rng)
 
 
-def _strange_tone(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    return tone(_strange_order(rng, 1, 150), scene, rng)
+def _strange_tone(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    return textbook.tone(_strange_order(rng, 1, 150), scene, rng)
 
 
-def _ghost(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+def _ghost(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """A ghost line: a whole order of one shaft that the cutting machine left."""
     ghost = float(rng.integers(20, 4 * scene.teeth[0]))
     order = ghost if rng.uniform() < 0.5 else ghost * scene.teeth[0] / scene.teeth[1]
@@ -142,7 +142,7 @@ def _ghost(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
     return line
 
 
-def _whirl(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+def _whirl(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """Oil whirl or a rub below the shaft's order."""
     order = float(rng.uniform(0.38, 0.49))
     waves = [np.sin(2 * np.pi * k * order * scene.revolutions + rng.uniform(0, 6)) / k**2 for k in (1, 2, 3)]
@@ -150,7 +150,7 @@ def _whirl(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
     return whirl
 
 
-def _other_machine(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+def _other_machine(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """Lines at fixed frequencies, and their multiples."""
     first = log_uniform(rng, 17.0, 900.0)
     waves = [np.sin(2 * np.pi * k * first * scene.time_s + rng.uniform(0, 6)) / k for k in range(1, 6)]
@@ -158,7 +158,7 @@ def _other_machine(scene: SyntheticScene, rng: np.random.Generator) -> FloatArra
     return machine
 
 
-def _inverter(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+def _inverter(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """A carrier at a fixed frequency with pairs of lines about it."""
     carrier, apart = float(rng.uniform(2000.0, 0.45 * scene.sampling_rate_hz)), float(rng.uniform(30.0, 250.0))
     wave: FloatArray = np.sin(2 * np.pi * carrier * scene.time_s) * (
@@ -167,35 +167,35 @@ def _inverter(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
     return wave
 
 
-def _random_knocks(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+def _random_knocks(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     n = max(3, int(scene.time_s[-1] * rng.uniform(1.0, 20.0)))
     places = rng.integers(0, len(scene.time_s), n).astype(np.float64)
-    return struck(places, np.abs(rng.standard_normal(n)) + 0.2, scene, ring(scene, rng))
+    return textbook.struck(places, np.abs(rng.standard_normal(n)) + 0.2, scene, textbook.ring(scene, rng))
 
 
-def _swelling_noise(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+def _swelling_noise(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """Noise of a band that swells with an order: a pump, a rub, lacking oil."""
     order = float(rng.choice((1.0, scene.teeth[0] / scene.teeth[1], _strange_order(rng, 2, 9))))
-    swelling: FloatArray = band_noise(scene, rng) * (
+    swelling: FloatArray = textbook.band_noise(scene, rng) * (
         1.0 + rng.uniform(0.3, 1.0) * np.cos(2 * np.pi * order * scene.revolutions)
     )
     return swelling
 
 
-def _steady_noise(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+def _steady_noise(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """Noise of a band: flow, cavitation, a neighbour."""
-    return band_noise(scene, rng)
+    return textbook.band_noise(scene, rng)
 
 
-def _bad_contact(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+def _bad_contact(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """A plug that works loose: the signal jumps now and then, and what couples it to the amplifier takes that back."""
     n = max(2, int(scene.time_s[-1] * log_uniform(rng, 1.0, 60.0)))
     places = rng.integers(0, len(scene.time_s), n).astype(np.float64)
     back = np.exp(-np.arange(int(scene.sampling_rate_hz)) / (log_uniform(rng, 0.001, 0.2) * scene.sampling_rate_hz))
-    return struck(places, rng.standard_normal(n), scene, back)
+    return textbook.struck(places, rng.standard_normal(n), scene, back)
 
 
-FOREIGN: dict[str, Callable[[SyntheticScene, np.random.Generator], FloatArray]] = {
+FOREIGN: dict[str, Callable[[textbook.SyntheticScene, np.random.Generator], FloatArray]] = {
     "rolling element": _rolling_element,
     "knocks at a strange order": _strange_knocks,
     "knocks once per revolution": _once_per_revolution,

@@ -11,15 +11,7 @@ from app.studies.crack_cases import DrawnHousingMode, DrawnRig, draw_rig
 from app.studies.gap.by_hand import SIGNATURES, scene_of, vibrations
 from gearsig.checks import FloatArray
 from gearsig.recording import Recording
-from sims.effects import (
-    MAX_ADVANCE,
-    N_MESH_HARMONICS,
-    EffectSetting,
-    PathChange,
-    Signature,
-    SyntheticScene,
-    tone,
-)
+from sims.effects import EffectSetting, textbook
 from sims.gear_pair import BODY_SHAPES, body_gain
 from sims.machine import log_uniform
 
@@ -204,7 +196,11 @@ class Ordinary:
         )
 
     def on(
-        self, recording: Recording, turns: int, rng: np.random.Generator, changed_paths: Sequence[PathChange] = ()
+        self,
+        recording: Recording,
+        turns: int,
+        rng: np.random.Generator,
+        changed_paths: Sequence[textbook.PathChange] = (),
     ) -> Recording:
         """Return a recording as this machine makes it; noise and the phase of the hum are that day's.
 
@@ -239,7 +235,7 @@ class Ordinary:
                 samples[i] = self._jittered(samples[i], scene, rng)
         return replace(recording, samples=samples)
 
-    def _jittered(self, pulses: FloatArray, scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    def _jittered(self, pulses: FloatArray, scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
         """Return a tachometer's signal with each of its pulses a little off."""
         from scipy.ndimage import map_coordinates
 
@@ -257,8 +253,8 @@ def mounted_anew(recording: Recording, rng: np.random.Generator) -> Recording:
     scene = scene_of(recording)
     samples = recording.samples.copy()
     for i in vibrations(recording):
-        gains = np.exp(MOUNTING_LINES * rng.standard_normal(N_MESH_HARMONICS))
-        signature = Signature(mesh_gains=tuple(gains.tolist()))
+        gains = np.exp(MOUNTING_LINES * rng.standard_normal(textbook.N_MESH_HARMONICS))
+        signature = textbook.Signature(mesh_gains=tuple(gains.tolist()))
         corner_hz = 0.2 * recording.sampling_rate_hz
         moved = corner_hz * float(np.exp(MOUNTING_CORNER * rng.standard_normal()))
         values = signature.on(samples[i], scene, rng, 0.0)
@@ -279,7 +275,7 @@ def _mains_hz(seed: int) -> float:
     return float(np.random.default_rng([seed, 13]).choice(MAINS_HZ))
 
 
-def _paths(seed: int, scene: SyntheticScene, n_channels: int) -> list[tuple[int, float]]:
+def _paths(seed: int, scene: textbook.SyntheticScene, n_channels: int) -> list[tuple[int, float]]:
     """Return each channel's steepness, 0: flat, and corner frequency in Hz."""
     rng = np.random.default_rng([seed, 10])
     turns_hz = (scene.revolutions[-1] - scene.revolutions[0]) / (scene.time_s[-1] - scene.time_s[0])
@@ -300,16 +296,16 @@ def _through(values: FloatArray, path: tuple[int, float], rate_hz: float) -> Flo
     return found
 
 
-def _tolerances(scene: SyntheticScene, rng: np.random.Generator) -> list[Signature]:
+def _tolerances(scene: textbook.SyntheticScene, rng: np.random.Generator) -> list[textbook.Signature]:
     """Return what the machine's own shafts, gears and drive do."""
     found = []
     for order in scene.shaft_orders:
         swing, late = log_uniform(rng, *SWINGS), log_uniform(rng, *SWINGS)
-        lines = [log_uniform(rng, *LINES) * tone(n * order, scene, rng) for n in (1, 2, 3)]
+        lines = [log_uniform(rng, *LINES) * textbook.tone(n * order, scene, rng) for n in (1, 2, 3)]
         found.append(
-            Signature(
-                1.0 + swing * tone(order, scene, rng),
-                MAX_ADVANCE * late / scene.teeth[0] * tone(order, scene, rng),
+            textbook.Signature(
+                1.0 + swing * textbook.tone(order, scene, rng),
+                textbook.MAX_ADVANCE * late / scene.teeth[0] * textbook.tone(order, scene, rng),
                 tuple(lines),
             )
         )

@@ -32,7 +32,7 @@ from gearsig.gap import (
 from gearsig.recording import Recording
 from sims.blind import CATALOGUE, draw_case, record_case
 from sims.cracked import STEP_ANGLE_RAD, CrackedTwin
-from sims.effects import EffectSetting, draw_path_changes, effects
+from sims.effects import EffectSetting, effects, textbook
 from sims.machine import nominal_of
 
 # --------------------
@@ -281,8 +281,7 @@ def _with_changed_path(
 ) -> tuple[Recording, float]:
     """Return a recording that came through other paths, and how much other, 0 to 1."""
     strength = float(rng.uniform())
-    # As many changes per decade, of size 0.16 to 1.
-    paths = draw_path_changes(len(vibrations(bare)), 10.0 ** (0.8 * (strength - 1.0)), bare.sampling_rate_hz, rng)
+    paths = textbook.draw_path_changes(len(vibrations(bare)), textbook.path_size(strength), bare.sampling_rate_hz, rng)
     return ordinary.on(bare, turns, rng, paths), strength
 
 

@@ -13,7 +13,7 @@ from app.studies.gap.machines import draw_machine
 from gearsig.checks import FloatArray
 from gearsig.rig import Bearing, Rig
 from sims.cracked import CrackedPair
-from sims.effects import PathChange, draw_side, partly, sign
+from sims.effects import textbook
 from sims.gear_pair import build_rig
 from sims.machine import Nominal, Operation, log_uniform, nominal_of
 
@@ -260,7 +260,7 @@ class QuasiStaticState:
     passing: float
     wander: list[tuple[float, float, float]]
     structure: Structure
-    paths: Sequence[PathChange] = ()
+    paths: Sequence[textbook.PathChange] = ()
 
 
 @dataclass(frozen=True)
@@ -430,7 +430,7 @@ Knock = Callable[[FloatArray, FloatArray, np.random.Generator], FloatArray]
 
 
 def _tooth(machine: StaticMachine, rng: np.random.Generator) -> tuple[int, int]:
-    side = draw_side(rng)
+    side = textbook.draw_side(rng)
     return side, int(rng.integers(machine.drawn.teeth[side]))
 
 
@@ -460,7 +460,7 @@ def _root_crack(machine: StaticMachine, state: QuasiStaticState, rng: np.random.
     least, power, softer = rng.uniform(0.0, 0.5), rng.uniform(0.5, 3.0), log_uniform(rng, 0.05, 5.0)
     state.weak[side][tooth] += softer * (least + (1.0 - least) * _towards_tip(machine, side) ** power)
     if rng.uniform() < 0.3:
-        state.gaps_m[side][tooth] += log_uniform(rng, 0.02, 0.5) * machine.rated_m * sign(rng)
+        state.gaps_m[side][tooth] += log_uniform(rng, 0.02, 0.5) * machine.rated_m * textbook.sign(rng)
 
 
 def _tooth_spall(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
@@ -497,12 +497,12 @@ def _tooth_wear(machine: StaticMachine, state: QuasiStaticState, rng: np.random.
         shape = towards * np.abs(off / np.abs(off).max()) ** power + rng.uniform(0.0, 0.3)
         scatter = 1.0 + uneven * rng.standard_normal((machine.drawn.teeth[side], 1))
         state.gaps_m[side] = state.gaps_m[side] + depth * rng.uniform(0.2, 1.0) * shape * scatter
-    state.restless_m *= 1.0 + partly(rng)
+    state.restless_m *= 1.0 + textbook.partly(rng)
 
 
 def _pitch_error(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
     """Teeth off their places: each by itself, adding up, or in a wave."""
-    side = draw_side(rng)
+    side = textbook.draw_side(rng)
     teeth = machine.drawn.teeth[side]
     kind = rng.uniform()
     if kind < 0.5:
@@ -521,7 +521,7 @@ def _surface_roughness(machine: StaticMachine, state: QuasiStaticState, rng: np.
     size = log_uniform(rng, 0.02, 1.5) * machine.rated_m
     for side in (0, 1):
         state.gaps_m[side] = state.gaps_m[side] + textures(machine.drawn.teeth[side], size * rng.uniform(0.3, 1.0), rng)
-    state.restless_m += 0.3 * size * partly(rng)
+    state.restless_m += 0.3 * size * textbook.partly(rng)
     state.friction *= rng.uniform(1.0, 1.8)
 
 
@@ -533,7 +533,7 @@ def _sliding_friction(machine: StaticMachine, state: QuasiStaticState, rng: np.r
 
 def _eccentricity(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
     """A gear off its axis: separation and depth of the teeth once per turn, and its mass off the axis."""
-    side, phase, size = draw_side(rng), rng.uniform(0, 2 * np.pi), log_uniform(rng, 2.0, 60.0)
+    side, phase, size = textbook.draw_side(rng), rng.uniform(0, 2 * np.pi), log_uniform(rng, 2.0, 60.0)
     state.runout_m.append((side, 1.0, size * machine.rated_m, phase))
     state.stiffness.append((side, 1.0, min(size * rng.uniform(5e-4, 1e-2), 0.5), phase + rng.uniform(-1.5, 1.5)))
     state.load.append((side, 1.0, min(size * rng.uniform(0.0, 5e-3), 0.5), phase + rng.uniform(-1.5, 1.5)))
@@ -543,12 +543,12 @@ def _eccentricity(machine: StaticMachine, state: QuasiStaticState, rng: np.rando
 def _unbalance(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
     """A mass off the axis."""
     size = log_uniform(rng, 0.1, 3.0) * machine.force_unit_n
-    state.force_n.append((draw_side(rng), 1.0, size, rng.uniform(0, 2 * np.pi)))
+    state.force_n.append((textbook.draw_side(rng), 1.0, size, rng.uniform(0, 2 * np.pi)))
 
 
 def _misalignment(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
     """Contact on part of the width, some of it turning with a shaft; a coupling that is forced twice a turn."""
-    side, size = draw_side(rng), log_uniform(rng, 0.1, 0.8)
+    side, size = textbook.draw_side(rng), log_uniform(rng, 0.1, 0.8)
     state.soft_spots = size * rng.uniform(0.3, 0.8)
     for order, share in ((1.0, rng.uniform(0.0, 0.6)), (2.0, rng.uniform(0.0, 0.4))):
         state.stiffness.append((side, order, size * share, rng.uniform(0, 2 * np.pi)))
@@ -563,13 +563,13 @@ def _torque_ripple(machine: StaticMachine, state: QuasiStaticState, rng: np.rand
     pulls = log_uniform(rng, 1.0, 12.0)
     order, side, size = (
         float(round(pulls)) if rng.uniform() < 0.75 else pulls,
-        draw_side(rng),
+        textbook.draw_side(rng),
         log_uniform(rng, 0.02, 0.6),
     )
     for n, share in ((1.0, 1.0), (2.0, rng.uniform(0.0, 0.4))):
         phase = rng.uniform(0, 2 * np.pi)
         state.load.append((side, n * order, share * size, phase))
-        state.force_n.append((side, n * order, share * size * machine.load_n * partly(rng), phase))
+        state.force_n.append((side, n * order, share * size * machine.load_n * textbook.partly(rng), phase))
 
 
 def _speed_fluctuation(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:  # noqa: ARG001 - form
@@ -584,7 +584,7 @@ def _race(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Genera
     order = bearing.orders()[name] * shaft * (1.0 - rng.uniform(0.0, 0.015))
     size = log_uniform(rng, 0.02, 3.0) * (machine.load_n + 0.1 * machine.force_unit_n)
     jitter, uneven, width = log_uniform(rng, 1e-3, 2e-2), rng.uniform(0.05, 0.4), log_uniform(rng, 1e-4, 5e-4)
-    falls, across, sharp = partly(rng), rng.uniform(0.02, 0.3), rng.uniform(0.5, 3.0)
+    falls, across, sharp = textbook.partly(rng), rng.uniform(0.02, 0.3), rng.uniform(0.5, 3.0)
 
     def knock(turns: FloatArray, time: FloatArray, chance: np.random.Generator) -> FloatArray:
         passed = turns * order + chance.uniform()
@@ -620,9 +620,9 @@ def _bearing_clearance(machine: StaticMachine, state: QuasiStaticState, rng: np.
     play = log_uniform(rng, 0.3, 30.0)
     state.play += play
     state.passing = bearing.orders()["BPFO"] * shaft * (1.0 - rng.uniform(0.0, 0.01))
-    softer = min(0.08 * play, 0.5) * partly(rng)
+    softer = min(0.08 * play, 0.5) * textbook.partly(rng)
     state.structure = state.structure.softer(softer, log_uniform(rng, 500.0, 6000.0))
-    state.restless_m *= 1.0 + min(play, 5.0) * partly(rng)
+    state.restless_m *= 1.0 + min(play, 5.0) * textbook.partly(rng)
 
 
 EFFECTS: dict[str, Callable[[StaticMachine, QuasiStaticState, np.random.Generator], None]] = {

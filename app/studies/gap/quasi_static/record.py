@@ -32,7 +32,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.gap import BY_HAND, NONE, UNKNOWN, OperatingCondition
 from gearsig.recording import Channel, Recording
 from sims.cracked import CrackedTwin
-from sims.effects import draw_path_changes
+from sims.effects import textbook
 from sims.measure import Tachometer, pulse_voltage
 
 FINER = 2
@@ -259,5 +259,5 @@ def _changed_paths(machine: StaticMachine, levels: np.ndarray) -> Iterator[tuple
     rng = np.random.default_rng([machine.seed, 5])
     for _ in range(N_PATHS):
         state = machine.healthy()
-        state.paths = draw_path_changes(N_CHANNELS, 10.0 ** (0.8 * (rng.uniform() - 1.0)), machine.rate_hz, rng)
+        state.paths = textbook.draw_path_changes(N_CHANNELS, textbook.path_size(rng.uniform()), machine.rate_hz, rng)
         yield "transfer_path", "", record(machine, state, QuasiStaticDay.drawn(rng), levels)

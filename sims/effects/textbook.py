@@ -183,6 +183,11 @@ class PathChange:
         return found
 
 
+def path_size(strength: float) -> float:
+    """Return the size, 0.16 to 1, of a change of a strength from 0 to 1: as many per decade."""
+    return float(10.0 ** (0.8 * (strength - 1.0)))
+
+
 def draw_path_changes(
     n_channels: int, size: float, rate_hz: float, rng: np.random.Generator, *, everywhere: bool = False
 ) -> Sequence[PathChange]:
@@ -382,11 +387,13 @@ def tooth_knocks(
 
 
 def swollen(share: float, window: FloatArray) -> FloatArray:
-    swollen: FloatArray = np.maximum(1.0 + share * window, 0.0)
-    return swollen
+    """Return a gain that is larger by a share where a window is 1."""
+    gain: FloatArray = np.maximum(1.0 + share * window, 0.0)
+    return gain
 
 
 def late_tooth(scene: SyntheticScene, share: float, window: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return the advance, in revolutions, of a tooth that comes too late or too early by a share of the most."""
     late: FloatArray = sign(rng) * MAX_ADVANCE * min(share, 1.0) / scene.teeth[0] * window
     return late
 
@@ -410,6 +417,7 @@ def at_the_mesh(scene: SyntheticScene, noise: FloatArray, rng: np.random.Generat
 
 
 def swing(scene: SyntheticScene, order: float, size: float, rng: np.random.Generator) -> FloatArray:
+    """Return a gain that swings at an order."""
     wave: FloatArray = np.maximum(1.0 + size * tone(order, scene, rng), 0.0)
     return wave
 
