@@ -1,6 +1,20 @@
 """The sim-to-real gap: floor, where it lies, which effect causes it, how far it shrinks."""
 
-from gearsig.gap._attribution import MOST_TRIED, attribute, shared
+from gearsig.gap._attribution import (
+    CALIBRATION_FILE,
+    LIGHT_LOAD_N_PER_MM,
+    MOST_TRIED,
+    NOT_SEEN,
+    Attribution,
+    GapCalibration,
+    attribute,
+    is_calibrated,
+    joint_probabilities,
+    load_gap_calibration,
+    score_of,
+    shared,
+    tooth_load_n_per_mm,
+)
 from gearsig.gap._change import (
     ALIKE,
     APART,
@@ -71,17 +85,6 @@ from gearsig.gap._floors import (
 from gearsig.gap._gearless import Standing, beside_standing, standing_place, stood_out
 from gearsig.gap._inputs import GapInputs, GapRequest, read_gap_inputs
 from gearsig.gap._places import gap_places, mesh_spot, ranked_places, tail_spot
-from gearsig.gap._posterior import (
-    CALIBRATION_FILE,
-    LIGHT_LOAD_N_PER_MM,
-    NOT_SEEN,
-    GapCalibration,
-    is_calibrated,
-    joint_probabilities,
-    load_gap_calibration,
-    score_of,
-    tooth_load_n_per_mm,
-)
 from gearsig.gap._prediction import (
     FLOOR_IN_DEVIATIONS,
     EffectPath,
@@ -204,6 +207,7 @@ __all__ = [
     "UNKNOWN",
     "Added",
     "AngleCurves",
+    "Attribution",
     "AverageCurves",
     "Bank",
     "BearingFrame",

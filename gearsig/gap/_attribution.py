@@ -1,4 +1,4 @@
-"""What speaks for each cause: the forests; of an effect that they do not know, its trial on the twin.
+"""What speaks for each cause, as calibrated probabilities: the forests; of effects that they do not know, a trial.
 
 The trials of effects that they do know say how far the gap shrinks. How well one explains it can weigh as well, and the
 calibration gives that the weight 0: on blind cases look-alikes shrink the gap as far as the true effect does.
@@ -6,65 +6,256 @@ calibration gives that the weight 0: on blind cases look-alikes shrink the gap a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import json
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from math import cos, radians
 from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
 
 from gearsig.gap._conditions import Condition
-from gearsig.gap._posterior import (
-    GapCalibration,
-    joint_probabilities,
-    load_gap_calibration,
-    score_of,
-    tooth_load_n_per_mm,
-)
 from gearsig.gap._recognition import load_recogniser
 from gearsig.gap._simulator import GapEffect, Twin
 from gearsig.gap._trials import TriedEffect, refuse_where_none_ran, try_effects
-from gearsig.gap._types import NONE, UNKNOWN
+from gearsig.gap._types import NONE, UNKNOWN, GapOutcome, Shrinkage
+from gearsig.rig import GearPair
 
-MOST_TRIED, LEAST_TRIED_PROBABILITY = 3, 0.06
-"""Effects that are simulated: so many of the likeliest, none less likely than this."""
+CALIBRATION_FILE = Path(__file__).with_name("calibration.json")
+
+LIKELIER_THAN_NOT = 0.5
+"""Probability from which a cause is likelier than all others together. No effect is named below it, nor are two that
+have less together: then what is wrong is unknown, however sure it is that something is."""
+
+SIZES = (0.3, 6.0)
+"""Structural floors that a gap's size counts from and to."""
+
+_NUMBERS = ("sharpness", "shrink_weight", "neutral_shrink", "none_bias", "unknown_bias", "named_from", "apart")
+_FURTHER = ("sharper", "none_slope")
 
 
 @dataclass(frozen=True)
-class Attribution:
+class GapCalibration:
+    """p ∝ exp(a s^κ ln p_forest + b (score − s0) + c[kind] + d[kind] ln s), s the gap's size, fitted to blind cases.
+
+    Parameters
+    ----------
+    sharpness : float
+        a.
+    shrink_weight : float
+        b; the score is the held-out shrink less that of placebos. Only for effects that were tried.
+    neutral_shrink : float
+        s0, the score that says nothing for the effect nor against it.
+    none_bias, unknown_bias : float
+        c of both causes that are no effect.
+    named_from : float
+        Probability of the machine's effects together from which one is named.
+    apart : float
+        The likeliest effect's share, of the first two together, from which it stands alone.
+    effect_biases : mapping
+        c of effects: of machines that others built some look more often, some less often, like what the population
+        shows than that says. 0 where it is missing.
+    sharper, none_slope : float
+        κ, and d of no gap: of a large gap more can be said, and hardly that it is none.
+    """
+
+    sharpness: float
+    shrink_weight: float
+    neutral_shrink: float
+    none_bias: float
+    unknown_bias: float
+    named_from: float
+    apart: float
+    effect_biases: Mapping[str, float] = field(default_factory=dict)
+    sharper: float = 0.0
+    none_slope: float = 0.0
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> GapCalibration:
+        """Build it from what a JSON file holds."""
+        biases = {name: float(value) for name, value in values.get("effect_biases", {}).items()}
+        further = {name: float(values.get(name, 0.0)) for name in _FURTHER}
+        return cls(**{name: float(values[name]) for name in _NUMBERS}, effect_biases=biases, **further)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return plain values, for a JSON file."""
+        numbers: dict[str, Any] = {name: round(float(getattr(self, name)), 4) for name in (*_NUMBERS, *_FURTHER)}
+        return numbers | ({"effect_biases": dict(self.effect_biases)} if self.effect_biases else {})
+
+    def probabilities(
+        self, forest: Mapping[str, float], scores: Mapping[str, float], size: float = 1.0
+    ) -> dict[str, float]:
+        """Return cause → probability, likeliest first.
+
+        Parameters
+        ----------
+        forest : mapping
+            Cause → probability by the forest.
+        scores : mapping
+            Effect → score of those that were tried.
+        size : float
+            Of the gap, in structural floors.
+        """
+        counted = float(np.clip(size, *SIZES))
+        sharpness = self.sharpness * counted**self.sharper
+        levels = {
+            name: sharpness * float(np.log(max(p, 1e-9)))
+            + self.shrink_weight * (scores.get(name, self.neutral_shrink) - self.neutral_shrink)
+            + self.effect_biases.get(name, 0.0)
+            for name, p in forest.items()
+        }
+        levels[NONE] += self.none_bias + self.none_slope * float(np.log(counted))
+        levels[UNKNOWN] += self.unknown_bias
+        top = max(levels.values())
+        weights = {name: float(np.exp(level - top)) for name, level in levels.items()}
+        total = sum(weights.values())
+        return {name: w / total for name, w in sorted(weights.items(), key=lambda item: -item[1])}
+
+    def outcome(self, probabilities: Mapping[str, float]) -> GapOutcome:
+        """Return what may be said; nothing that is less likely than all else together."""
+        none, unknown = probabilities[NONE], probabilities[UNKNOWN]
+        if max(none, unknown) >= LIKELIER_THAN_NOT:
+            return GapOutcome.NO_GAP if none >= unknown else GapOutcome.UNKNOWN
+        if 1.0 - none - unknown < self.named_from:
+            return GapOutcome.UNDECIDED
+        first, *others = sorted((p for name, p in probabilities.items() if name not in (NONE, UNKNOWN)), reverse=True)
+        second = others[0] if others else 0.0
+        if first + second < LIKELIER_THAN_NOT:
+            return GapOutcome.UNDECIDED
+        alone = first >= LIKELIER_THAN_NOT and first / (first + second) >= self.apart
+        return GapOutcome.EFFECT if alone else GapOutcome.CANNOT_SEPARATE
+
+
+def score_of(shrink: float, placebo: float) -> float:
+    """Return what an effect's held-out shrink says for it: how much more than its placebos', −1 to 1."""
+    return float(np.clip(shrink - max(placebo, 0.0), -1.0, 1.0))
+
+
+@cache
+def load_gap_calibration(*, with_reference: bool) -> GapCalibration:
+    """Return the calibration that comes with this version."""
+    return GapCalibration.from_mapping(_file()["with_reference" if with_reference else "without_reference"])
+
+
+def is_calibrated() -> bool:
+    """Whether the numbers were fitted to blind cases, or are only a start."""
+    return int(_file()["provenance"]["n_cases"]) > 0
+
+
+@cache
+def _file() -> dict[str, Any]:
+    values: dict[str, Any] = json.loads(CALIBRATION_FILE.read_text(encoding="utf-8"))
+    return values
+
+
+USUAL_PRESSURE_ANGLE_DEG = 20.0
+
+LIGHT_LOAD_N_PER_MM = 50.0
+"""Up to which flanks may part and the backlash shows: where dynamic loads can reach the static one, by order."""
+
+
+def tooth_load_n_per_mm(pair: GearPair, torque_nm: float) -> float:
+    """Return the tooth force over the face width, T/(r_b b), N/mm; nan where module or width are not known.
+
+    Parameters
+    ----------
+    pair : GearPair
+    torque_nm : float
+        Of the driver.
+    """
+    if pair.driver_teeth is None or pair.module_mm is None or pair.face_width_mm is None:
+        return float("nan")
+    angle = radians(pair.pressure_angle_deg or USUAL_PRESSURE_ANGLE_DEG)
+    base_radius_mm = pair.driver_teeth * pair.module_mm * cos(angle) / 2.0
+    return 1e3 * abs(torque_nm) / (base_radius_mm * pair.face_width_mm)
+
+
+NOT_SEEN = 0.4
+"""Probability that an effect is too weak to be seen at one of several conditions."""
+
+NOT_SEEN_LOADED = {"backlash": 0.9}
+"""The same at a condition whose load keeps the flanks together, where another one lets them part."""
+
+
+def joint_probabilities(
+    found: Sequence[Mapping[str, float]], loads_n_per_mm: Sequence[float], allowed: Collection[str]
+) -> dict[str, float]:
+    """Return the joint probabilities of several conditions, which are independent of each other.
+
+    At one of several conditions an effect may not show, q: p(x|e) = (1 − q) p_forest(x|e) + q p_forest(x|none).
+
+    Parameters
+    ----------
+    found : sequence of mapping
+        Cause → probability, of each condition.
+    loads_n_per_mm : sequence of float
+        Of the teeth, at each; nan where it is not known.
+    allowed : collection of str
+        Causes, those of no effect among them.
+    """
+    parts_somewhere = any(load <= LIGHT_LOAD_N_PER_MM for load in loads_n_per_mm)
+    joint = dict.fromkeys(sorted(allowed), 1.0)
+    for at, load in zip(found, loads_n_per_mm, strict=True):
+        loaded = parts_somewhere and load > LIGHT_LOAD_N_PER_MM
+        for name in joint:
+            unseen = 0.0 if len(found) == 1 else NOT_SEEN_LOADED.get(name, NOT_SEEN) if loaded else NOT_SEEN
+            joint[name] *= (1.0 - unseen) * at[name] + unseen * at[NONE]
+    total = sum(joint.values())
+    return {name: p / total for name, p in joint.items()}
+
+
+class Tried(Protocol):
+    """A cause that was simulated and fitted."""
+
+    @property
+    def shrinkage(self) -> Shrinkage | None:
+        """How far the gap shrinks with it, on held-out data."""
+        ...
+
+
+TriedT = TypeVar("TriedT", bound=Tried)
+
+
+@dataclass(frozen=True)
+class Attribution(Generic[TriedT]):
     """What calibrated probabilities are made of.
 
     Parameters
     ----------
-    forest : mapping
-        Cause → probability by the forests, uncalibrated.
-    tried : mapping
+    evidence : mapping
+        Cause → probability, uncalibrated: by the forests, or by likelihood.
+    tried : dict
         Effect → how it was tried.
-    with_reference : bool
-        Whether every condition has one.
+    calibration : GapCalibration
+        The one that belongs to this way of comparing.
     size : float
         Of the gap in structural floors; of several conditions the largest.
     unheard_of : tuple of str
         Effects that the forests do not know, the user's own: each was to be tried.
     """
 
-    forest: Mapping[str, float]
-    tried: dict[str, TriedEffect]
-    with_reference: bool
-    size: float
+    evidence: Mapping[str, float]
+    tried: dict[str, TriedT]
+    calibration: GapCalibration
+    size: float = 1.0
     unheard_of: tuple[str, ...] = ()
 
     @property
     def scores(self) -> dict[str, float]:
         """Effect → what its held-out shrink says for it."""
-        return {name: score_of(t.shrinkage.shrink.value, t.shrinkage.placebo) for name, t in self.tried.items()}
+        known = ((name, tried.shrinkage) for name, tried in self.tried.items())
+        return {name: score_of(s.shrink.value, s.placebo) for name, s in known if s is not None}
 
-    @property
-    def calibration(self) -> GapCalibration:
-        """The one that belongs to this way of comparing."""
-        return load_gap_calibration(with_reference=self.with_reference)
-
-    def probabilities(self) -> dict[str, float]:
+    def probabilities(self, calibration: GapCalibration | None = None) -> dict[str, float]:
         """Return cause → probability, likeliest first; calibrated, but for effects that the forests do not know."""
-        found = self.calibration.probabilities(self.forest, self.scores, self.size)
+        found = (calibration or self.calibration).probabilities(self.evidence, self.scores, self.size)
         return shared(found, {name: self.scores[name] for name in self.unheard_of if name in self.tried})
+
+
+MOST_TRIED, LEAST_TRIED_PROBABILITY = 3, 0.06
+"""Effects that are simulated: so many of the likeliest, none less likely than this."""
 
 
 def shared(probabilities: Mapping[str, float], scores: Mapping[str, float]) -> dict[str, float]:
@@ -91,7 +282,7 @@ def attribute(
     *,
     most_tried: int = MOST_TRIED,
     fresh: bool = False,
-) -> Attribution:
+) -> Attribution[TriedEffect]:
     """Ask the forests, then simulate, fit and score the likeliest effects, `most_tried` at most.
 
     Effects that the forests do not know are tried as well, unless nothing is.
@@ -104,14 +295,15 @@ def attribute(
     forest = _forest(conditions, effects, known)
     with_reference = all(c.reference is not None for c in conditions)
     size = max(condition.size.structural.value for condition in conditions)
-    first = load_gap_calibration(with_reference=with_reference).probabilities(forest, {}, size)
+    calibration = load_gap_calibration(with_reference=with_reference)
+    first = calibration.probabilities(forest, {}, size)
     likely = [name for name, p in first.items() if name in known and p >= LEAST_TRIED_PROBABILITY][:most_tried]
     heard_of = _known_to_forests(conditions)
     own = [name for name in effects or known if name not in heard_of] if most_tried else []
     likely += own
     tried = try_effects([known[name] for name in likely], twin, conditions, cache, on_progress, fresh=fresh)
     refuse_where_none_ran(tried, likely, twin)
-    return Attribution(forest, tried, with_reference, size, tuple(own))
+    return Attribution(forest, tried, calibration, size, tuple(own))
 
 
 def _known_to_forests(conditions: Sequence[Condition]) -> set[str]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from gearsig.checks import closest_match_hint
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap._attribution import attribute
+from gearsig.gap._attribution import attribute, is_calibrated
 from gearsig.gap._conditions import Condition, Stage, conditions_of, doubts_of, observed, simulated
 from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
 from gearsig.gap._evidence import evidence_of
@@ -19,7 +19,6 @@ from gearsig.gap._floors import load_population
 from gearsig.gap._gearless import beside_standing, diagnose_gearless, standing_place, stood_out
 from gearsig.gap._next_recording import next_recordings
 from gearsig.gap._places import gap_places, ranked_places
-from gearsig.gap._posterior import is_calibrated
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, GapSimulator, Twin
 from gearsig.gap._trials import TriedEffect, at_its_tooth, cause_place, n_compared, steps_of
 from gearsig.gap._types import (
@@ -34,7 +33,7 @@ from gearsig.gap._types import (
 )
 from gearsig.gap._verdict import in_order, likeliest_two, rivals
 from gearsig.gap._words import fitted_words
-from gearsig.gap.start_stop._diagnose import diagnose_start_stop, refuse_start_stop
+from gearsig.gap.start_stop._diagnose import diagnose_start_stop, drive_report, refuse_start_stop
 from gearsig.recording import Recording, metres_per_second_squared
 from gearsig.rig import Bearing, GearPair, Rig
 
@@ -186,8 +185,8 @@ def diagnose_gap(
     if isinstance(simulator, DriveSimulator):
         allowed = {name: effect for name, effect in known.items() if not effects or name in effects}
         shown = tuple(names) or _numbered("recording", recordings)
-        return diagnose_start_stop(
-            recordings, own_rigs, references, other_rigs, simulator, allowed, shown, called, tell
+        return drive_report(
+            diagnose_start_stop(recordings, own_rigs, references, other_rigs, simulator, allowed, shown, called, tell)
         )
     refuse_start_stop(recordings, own_rigs, names or _numbered("recording", recordings), simulator.name)
     if is_gearless(own_rigs[0]):

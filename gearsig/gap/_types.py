@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from math import isinf
+from math import inf, isinf
 
 import numpy as np
 
@@ -187,6 +187,11 @@ class Interval:
     value: float
     low: float
     high: float
+
+    @classmethod
+    def around(cls, value: float, half: float, low: float = -inf, high: float = inf) -> Interval:
+        """Return value ± half, its ends no further than `low` and `high`."""
+        return cls(value, max(value - half, low), min(value + half, high))
 
     @property
     def is_unbounded(self) -> bool:

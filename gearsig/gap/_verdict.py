@@ -7,7 +7,7 @@ from math import isfinite
 
 import numpy as np
 
-from gearsig.gap._posterior import LIKELIER_THAN_NOT
+from gearsig.gap._attribution import LIKELIER_THAN_NOT
 from gearsig.gap._types import NAMING, NONE, UNKNOWN, GapCause, GapOutcome, GapPlace, GapReport, Interval
 from gearsig.gap._words import hardly_foretold, severity_unit
 

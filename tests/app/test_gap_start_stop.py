@@ -12,7 +12,7 @@ from app.cli.main import main
 from app.samples import sample_folder
 from gearsig.errors import InputError
 from gearsig.gap import NONE, Added, GapOutcome, diagnose_gap
-from gearsig.gap.start_stop import TRIED, attributed_drive, compared_of, drive_report
+from gearsig.gap.start_stop import TRIED, compare_drive, diagnose_start_stop, drive_report, read_cycles
 from gearsig.recording import write_recording
 from gearsig.report import gap_schema, read_gap_json
 from gearsig.rig import write_rig
@@ -87,9 +87,7 @@ def wider():
     """All that the report of a drive with more play is made of."""
     now, healthy = made(2, {"backlash": 120.0}), made(1)
     effects = SIMULATOR.gap_effects()
-    return attributed_drive(
-        [now], [now.rig], [healthy], [healthy.rig], SIMULATOR, effects, ["now"], ["reference 1"], lambda *_: None
-    )
+    return diagnose_start_stop([now], [now.rig], [healthy], [healthy.rig], SIMULATOR, effects, ["now"], ["reference 1"])
 
 
 def test_what_is_left_is_told_on_cycles_that_the_severity_was_not_fitted_to(wider):
@@ -125,7 +123,7 @@ def test_a_sound_drive_has_no_gap():
     assert not report.twin_toml
 
 
-WITHOUT_TORQUE = {name for name, tried in TRIED.items() if tried.needs != "torque"}
+WITHOUT_TORQUE = {name for name, tried in TRIED.items() if not tried.needs_torque}
 
 
 def without_torque(recording):
@@ -180,21 +178,27 @@ def test_models_and_their_effects_are_known():
         gap_simulator("craked")
 
 
-def test_worn_flanks_touch_later_where_they_slide_most():
-    compared = compared_of(made(9), None, SIMULATOR)
-    curve = worn_curve_um(compared.drive.twin.parameters, 20.0, 60.0, 20)
+@pytest.fixture(scope="module")
+def by_its_rig():
+    """A drive that is simulated by the rig of a recording."""
+    return compare_drive(read_cycles(made(9)), [], SIMULATOR).drive
+
+
+def test_worn_flanks_touch_later_where_they_slide_most(by_its_rig):
+    parameters = by_its_rig.twin.parameters
+    curve = worn_curve_um(parameters, 20.0, 60.0, 20)
     assert np.all(curve >= -1e-6)
     assert np.max(curve) < 60.0
     assert np.ptp(curve) > 5.0
-    assert worn_curve_um(compared.drive.twin.parameters, 20.0, 0.0, 20) == pytest.approx(np.zeros(len(curve)), abs=1e-6)
+    assert worn_curve_um(parameters, 20.0, 0.0, 20) == pytest.approx(np.zeros(len(curve)), abs=1e-6)
 
 
 @pytest.mark.parametrize("depth_um", [30.0, 60.0, 120.0])
-def test_a_worn_drive_runs_as_its_teeth_at_rest_say(depth_um):
+def test_a_worn_drive_runs_as_its_teeth_at_rest_say(by_its_rig, depth_um):
     """The course of the compression from the balance of forces of two worn pairs, against the drive in motion."""
-    drive = compared_of(made(9), None, SIMULATOR).drive
-    worn = drive.features(Added("tooth_wear", depth_um, {"gear": "driver"})).contact
-    sound, expected = drive.healthy.contact, drive.worn_curve_um(depth_um)
+    drive = by_its_rig
+    worn = drive.features(Added("tooth_wear", depth_um, {"gear": "driver"}))
+    sound, expected = drive.healthy, drive.worn_curve_um(depth_um)
     known = np.isfinite(worn.curve_um) & np.isfinite(sound.curve_um)
     found = (worn.curve_um - sound.curve_um)[known]
     assert found - found.mean() == pytest.approx(expected[known] - expected[known].mean(), abs=1.5)

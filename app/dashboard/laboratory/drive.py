@@ -16,7 +16,7 @@ from app.dashboard.widgets.charts import show_picture
 from app.dashboard.widgets.messages import show_error
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, RefusalError
-from gearsig.gap.start_stop import PreparedCycles, cut_cycles
+from gearsig.gap.start_stop import cut_cycles
 from gearsig.motion import (
     ForceEstimate,
     PairMotion,
@@ -253,10 +253,9 @@ def run_drive(setup: DriveSetup) -> DriveRun:
 
 def _curve_um(motion: PairMotion) -> FloatArray | None:
     try:
-        cycles = PreparedCycles(cut_cycles(motion))
+        return cut_cycles(motion).features().curve_um
     except RefusalError:
         return None
-    return cycles.features(cycles.every).contact.curve_um
 
 
 # --------------------

@@ -205,9 +205,9 @@ def weigh_case(index: int, most_tried: int) -> list[dict[str, Any]]:
                         "truths": truths,
                         "level": wanted.get("level"),
                         "left_out": left_out,
-                        "with_reference": weighed.with_reference,
+                        "with_reference": all(condition.reference is not None for condition in known),
                         "size": weighed.size,
-                        "forest": dict(weighed.forest),
+                        "forest": dict(weighed.evidence),
                         "scores": weighed.scores,
                     }
                 )

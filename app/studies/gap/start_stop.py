@@ -17,17 +17,17 @@ import numpy as np
 
 from app.benchmark.start_stop import labelled_recordings, needs_reference, planned
 from gearsig.checks import FloatArray
-from gearsig.gap import NONE, UNKNOWN, GapCalibration
+from gearsig.gap import NONE, UNKNOWN, Attribution, GapCalibration
 from gearsig.gap.start_stop import (
     FLOORS_FILE,
     HALF,
-    DriveAttribution,
     DriveEvidence,
     DriveFloor,
+    FittedDriveCause,
     attribute_drive,
-    compared_of,
-    evidence_of_drive,
-    predictions_of,
+    compare_drive,
+    predict,
+    read_cycles,
 )
 from sims.forging import forging_gap_simulator
 
@@ -49,12 +49,11 @@ def collect(role: str, seed: int, number: int, plan: tuple[str, str, float]) -> 
     label, recording, healthy = labelled_recordings(role, seed, number, plan)
     simulator = forging_gap_simulator()
     rows: list[Row] = []
-    for reference in (healthy, None):
-        if reference is None and needs_reference(plan[1]):
-            continue
-        compared = compared_of(recording, reference, simulator)
-        seen = evidence_of_drive(compared, predictions_of(compared, simulator.gap_effects()).causes)
-        rows.append(({**label, "with_reference": reference is not None}, seen))
+    now, then = read_cycles(recording), read_cycles(healthy)
+    for references in ([then],) if needs_reference(plan[1]) else ([then], []):
+        compared = compare_drive(now, references, simulator)
+        seen = compared.evidence(predict(compared, simulator.gap_effects()))
+        rows.append(({**label, "with_reference": bool(references)}, seen))
     return rows
 
 
@@ -71,7 +70,10 @@ def fit_part(rows: Sequence[Row]) -> dict[str, Any]:
     )
     halves = [(fold.fitted_to, HALF * seen.scatter) for seen in healthy for fold in seen.folds]
     half = DriveFloor.of_healthy(np.array([change for change, _ in halves]), np.array([error for _, error in halves]))
-    weighed = [(truth_of(label), attribute_drive([seen], (whole, half))) for label, seen in rows]
+    weighed = [
+        (truth_of(label), attribute_drive([seen], with_reference=label["with_reference"], floors=(whole, half)))
+        for label, seen in rows
+    ]
     calibration = fit_calibration(weighed)
     return {
         "whole": whole.to_dict(),
@@ -80,18 +82,18 @@ def fit_part(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def fit_calibration(weighed: Sequence[tuple[str, DriveAttribution]]) -> GapCalibration:
+def fit_calibration(weighed: Sequence[tuple[str, Attribution[FittedDriveCause]]]) -> GapCalibration:
     """Fit sharpness, weight of the shrink and both biases to what was true: least −log p, drawn to the start."""
     from scipy.optimize import minimize
 
     def loss(values: FloatArray) -> float:
         calibration = _calibration(values)
-        logs = [np.log(max(_probabilities(calibration, w).get(t, 0.0), MIN_SHARE)) for t, w in weighed]
+        logs = [np.log(max(w.probabilities(calibration).get(t, 0.0), MIN_SHARE)) for t, w in weighed]
         return float(-np.mean(logs) + RIDGE * np.sum((values - np.array(START)) ** 2))
 
     found = minimize(loss, np.array(START), method="Nelder-Mead", options={"maxiter": 400, "xatol": 1e-3})
     calibration = _calibration(found.x)
-    healthy = [_probabilities(calibration, w) for t, w in weighed if t == NONE]
+    healthy = [w.probabilities(calibration) for t, w in weighed if t == NONE]
     named = sorted(1.0 - p[NONE] - p[UNKNOWN] for p in healthy)
     limit = float(np.quantile(named, 1.0 - FALSE_ALARMS, method="higher")) if named else MIN_NAMED
     return _calibration(found.x, float(np.clip(limit, MIN_NAMED, MAX_NAMED)))
@@ -100,10 +102,6 @@ def fit_calibration(weighed: Sequence[tuple[str, DriveAttribution]]) -> GapCalib
 def _calibration(values: FloatArray, named_from: float = MIN_NAMED) -> GapCalibration:
     sharpness, weight, none, unknown = (float(v) for v in values)
     return GapCalibration(max(sharpness, 0.05), weight, NEUTRAL_SHRINK, none, unknown, named_from, APART)
-
-
-def _probabilities(calibration: GapCalibration, weighed: DriveAttribution) -> dict[str, float]:
-    return calibration.probabilities(weighed.shares, weighed.scores)
 
 
 def main() -> None:

@@ -15,39 +15,77 @@ whatever the valve and the brake do, so that a simulated drive need not repeat t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, RefusalError
-from gearsig.gap._simulator import DriveSimulator, GapEffect
-from gearsig.gap._types import GapReport
+from gearsig.formatting import readable
+from gearsig.gap import _types as types
+from gearsig.gap._attribution import Attribution
+from gearsig.gap._evidence import weighed_evidence
+from gearsig.gap._prediction import FLOOR_IN_DEVIATIONS
+from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, OperatingCondition
+from gearsig.gap._types import NAMING, NONE, UNKNOWN, GapCause, GapOutcome, GapPlace, GapReport, Interval
+from gearsig.gap._verdict import in_order, likeliest_two, rivals
+from gearsig.gap._words import fitted_words, severity_unit
 from gearsig.gap.start_stop._attribution import (
+    CRACK,
+    RIPPLE,
+    DriveEvidence,
+    FittedDriveCause,
     attribute_drive,
+    fit,
     is_drive_calibrated,
-    load_drive_calibration,
-    load_floor,
 )
 from gearsig.gap.start_stop._comparison import (
+    TORQUE_GAIN,
     TRIED,
+    WEAR,
     DriveComparison,
-    Predictions,
-    evidence_of_drive,
+    SimulatedDrive,
+    compare_drive,
     predict,
-    simulated_drive,
+    read_cycles,
+    tellable,
 )
-from gearsig.gap.start_stop._features import PreparedCycles, cut_cycles
-from gearsig.gap.start_stop._report import DriveDiagnosis, drive_report
-from gearsig.motion import check_turns, find_roles, is_start_stop, measure_motion, motion_segments
+from gearsig.gap.start_stop._cycles import COMPRESSION, FEATURES, NAMES, UNITS, change_of, prediction_errors
+from gearsig.motion import is_start_stop, measure_motion, motion_segments
 from gearsig.recording import Recording
-from gearsig.rig import Rig, contact_pair
+from gearsig.rig import Rig
 
 Stage = Callable[[str, float], object]
-UNCALIBRATED = "The probabilities are not calibrated yet: take them as a ranking only."
-LIKE_CYCLES = (
-    "Tooth and order count from the zero of the pinion's encoder, which must be the same in both recordings. In the "
-    "figures of torque and teeth the healthy reference stands for the simulation before."
-)
-FEW = 4
-"""Cycles below which a hold-out says little."""
+SMALLEST = 0.3
+"""Floors from which a predicted change is worth a line."""
+
+
+@dataclass(frozen=True)
+class DriveDiagnosis:
+    """Everything that a report is made of.
+
+    Parameters
+    ----------
+    rig, simulator : str
+    effects : mapping
+        Those of the simulator.
+    compared : tuple of DriveComparison
+    seen : tuple of DriveEvidence
+        Of each.
+    attribution : Attribution
+    outcome : GapOutcome
+    references : tuple of str
+    """
+
+    rig: str
+    simulator: str
+    effects: Mapping[str, GapEffect]
+    compared: tuple[DriveComparison, ...]
+    seen: tuple[DriveEvidence, ...]
+    attribution: Attribution[FittedDriveCause]
+    outcome: GapOutcome
+    references: tuple[str, ...] = ()
 
 
 def diagnose_start_stop(
@@ -59,8 +97,8 @@ def diagnose_start_stop(
     effects: Mapping[str, GapEffect],
     names: Sequence[str],
     reference_names: Sequence[str],
-    tell: Stage,
-) -> GapReport:
+    tell: Stage = lambda *_: None,
+) -> DriveDiagnosis:
     """Diagnose the gap between start–stop recordings of one machine and its simulated drive; see `diagnose_gap`.
 
     Parameters
@@ -76,168 +114,361 @@ def diagnose_start_stop(
     names, reference_names : sequence of str
     tell : callable
 
+    Returns
+    -------
+    DriveDiagnosis
+        `drive_report` makes the report of it.
+
     Raises
     ------
     RefusalError
         If a recording holds no start and stop, or no motion of both gears, or the rig no contact.
     """
-    return drive_report(
-        attributed_drive(recordings, rigs, references, reference_rigs, simulator, effects, names, reference_names, tell)
-    )
-
-
-def attributed_drive(
-    recordings: Sequence[Recording],
-    rigs: Sequence[Rig],
-    references: Sequence[Recording],
-    reference_rigs: Sequence[Rig],
-    simulator: DriveSimulator,
-    effects: Mapping[str, GapEffect],
-    names: Sequence[str],
-    reference_names: Sequence[str],
-    tell: Stage,
-) -> DriveDiagnosis:
-    """Return all that the report is made of, see `diagnose_start_stop`."""
     tell("reading the motion", 0.02)
-    healthy = [examined(*each) for each in zip(references, reference_rigs, strict=True)]
+    healthy = [read_cycles(*each) for each in zip(references, reference_rigs, strict=True)]
     compared = tuple(
-        _compared(name, examined(recording, rig), healthy, simulator)
+        compare_drive(read_cycles(recording, rig), healthy, simulator, name)
         for name, recording, rig in zip(names, recordings, rigs, strict=True)
     )
-    predictions = []
+    seen = []
     for i, each in enumerate(compared):
-        begun, part = 0.1 + 0.7 * i / len(compared), 0.7 / len(compared)
 
-        def simulating(name: str, done: float, begun: float = begun, part: float = part) -> None:
-            tell(f"simulating {name.replace('_', ' ')}", begun + part * done)
+        def simulating(name: str, done: float, i: int = i) -> None:
+            tell(f"simulating {name.replace('_', ' ')}", 0.1 + 0.7 * (i + done) / len(compared))
 
-        predictions.append(predictions_of(each, effects, simulating))
+        seen.append(each.evidence(predict(each, effects, simulating)))
     tell("weighing", 0.85)
-    seen = tuple(evidence_of_drive(a, b.causes) for a, b in zip(compared, predictions, strict=True))
-    with_reference = bool(references)
-    whole, half = (load_floor(with_reference=with_reference, part=part) for part in ("whole", "half"))
-    weighed = attribute_drive(seen, (whole, half))
-    calibration = load_drive_calibration(with_reference=with_reference)
-    probabilities = calibration.probabilities(weighed.shares, weighed.scores)
+    attribution = attribute_drive(seen, with_reference=bool(references))
+    outcome = attribution.calibration.outcome(attribution.probabilities())
     return DriveDiagnosis(
-        rigs[0].name,
-        simulator.name,
-        effects,
-        compared,
-        seen,
-        tuple(predictions),
-        weighed,
-        probabilities,
-        calibration.outcome(probabilities),
-        tuple(reference_names),
-        tuple(_notices(compared, effects)),
+        rigs[0].name, simulator.name, effects, compared, tuple(seen), attribution, outcome, tuple(reference_names)
     )
 
 
-def examined(recording: Recording, rig: Rig | None = None) -> PreparedCycles:
-    """Measure a recording's motion and cut it into cycles.
-
-    Raises
-    ------
-    RefusalError
-        If neither gear's motion was recorded: vibration alone.
-    """
-    known = rig or recording.rig
-    if known is not None and known.pairs:
-        roles = find_roles(recording, contact_pair(known)) if known.contact or len(known.pairs) == 1 else {}
-        if not any(role.endswith((" angle", " speed")) for role in roles):
-            raise RefusalError(
-                f"{recording.provenance.source or 'the recording'} holds no angle or speed of pinion and wheel, and "
-                "the model forging compares their starts and stops",
-                remedy="compare vibration of stationary running with --model cracked; else name the channels' shafts "
-                "in the rig file's [[sensor]] tables",
-            )
-    motion = measure_motion(recording, known)
-    check_turns(motion)
-    return PreparedCycles(cut_cycles(motion))
-
-
-def compared_of(
-    recording: Recording, reference: Recording | None, simulator: DriveSimulator, name: str = "recording"
-) -> DriveComparison:
-    """Set a recording beside its healthy reference, or beside the drive simulated by its rig."""
-    return _compared(name, examined(recording), [] if reference is None else [examined(reference)], simulator)
-
-
-def _compared(
-    name: str, now: PreparedCycles, healthy: Sequence[PreparedCycles], simulator: DriveSimulator
-) -> DriveComparison:
-    features = now.features(now.every)
-    nearest = min(healthy, key=lambda each: _apart(each, now), default=None)
-    known = None if nearest is None else nearest.features(nearest.every)
-    return DriveComparison(name, now, nearest, simulated_drive(simulator, now.cycles, features, known))
-
-
-def _apart(one: PreparedCycles, other: PreparedCycles) -> float:
-    """Return by how much the largest torques differ; where one has none, the top speeds rank recordings likewise."""
-    a, b = (each.cycles.motion for each in (one, other))
-    first, second = a.torque_nm, b.torque_nm
-    if first is None or second is None:
-        first, second = a.driver_speed_rad_s, b.driver_speed_rad_s
-    return float(abs(abs(first).max() - abs(second).max()))
-
-
-def predictions_of(
-    compared: DriveComparison, effects: Mapping[str, GapEffect], tell: Stage = lambda *_: None
-) -> Predictions:
-    """Simulate every cause that the recording can tell."""
-    order = int(compared.now.orders[compared.spot.order])
-    return predict(
-        compared.drive,
-        compared.spot,
-        order,
-        {name: effects[name] for name in tellable(compared, effects)},
-        tell,
-        with_reference=compared.reference is not None,
+def drive_report(diagnosis: DriveDiagnosis) -> GapReport:
+    """Return the report of a diagnosis; places, curves and steps are of the recording that differs most."""
+    outcome, effects, fits = diagnosis.outcome, diagnosis.effects, diagnosis.attribution.tried
+    k = int(np.argmax([c.floor().size(c.change) for c in diagnosis.compared]))
+    compared, seen = diagnosis.compared[k], diagnosis.seen[k]
+    probabilities = diagnosis.attribution.probabilities()
+    causes = in_order([_cause(diagnosis, k, name, p) for name, p in probabilities.items()], outcome)
+    first, pair, is_named = causes[0], likeliest_two(causes), outcome in NAMING
+    fitted = first.fitted if is_named else None
+    floor = compared.floor()
+    repeated = compared.change / _repeatability_limit(compared)
+    note = () if fitted is None else (fitted_words(first, fitted.severity, compared.name),)
+    return GapReport(
+        rig=diagnosis.rig,
+        simulator=diagnosis.simulator,
+        conditions=tuple(_facts(c) for c in diagnosis.compared),
+        references=diagnosis.references,
+        outcome=outcome,
+        size=floor.size_interval([compared.change], [compared.without]),
+        repeatability=float(np.sqrt(np.nanmean(repeated**2))),
+        places=drive_places(compared),
+        causes=causes,
+        groups=types.group_probabilities(causes),
+        inseparable=rivals(causes) if outcome is GapOutcome.CANNOT_SEPARATE else None,
+        steps=_steps(compared, seen, first) if is_named else (),
+        next_recordings=_next_recordings(compared, seen, fits, pair, effects)
+        if pair and outcome is not GapOutcome.NO_GAP
+        else (),
+        spectra=_torque_curves(compared, fitted),
+        angles=_tooth_curves(compared, fitted, fits),
+        notices=tuple(_notices(diagnosis, compared, seen)),
+        twin_toml="" if fitted is None else compared.drive.twin.preset_toml(fitted, note),
     )
 
 
-def tellable(compared: DriveComparison, effects: Mapping[str, GapEffect]) -> tuple[str, ...]:
-    """Causes that the channels and the reference there are can tell."""
-    has_torque = compared.now.cycles.motion.torque_nm is not None
+def _repeatability_limit(compared: DriveComparison) -> FloatArray:
+    """What the recording's own cycles scatter by, 19 times of 20, in dB, (n,)."""
+    return FLOOR_IN_DEVIATIONS * np.maximum(compared.scatter, 0.05)
+
+
+def _facts(compared: DriveComparison) -> types.ConditionFacts:
+    m = compared.now.motion
+    top_rpm = float(np.quantile(np.abs(m.driver_speed_rad_s), 0.98)) * 30.0 / np.pi
+    torque_nm = float("nan") if m.torque_nm is None else compared.drive.point.torque_nm
+    return types.ConditionFacts(
+        compared.name,
+        OperatingCondition(top_rpm, torque_nm),
+        float(np.ptp(m.driver_angle_rad)) / (2.0 * np.pi),
+        len(m.driver_angle_rad) / m.sampling_rate_hz,
+        m.sampling_rate_hz,
+    )
+
+
+def _cause(diagnosis: DriveDiagnosis, k: int, name: str, probability: float) -> GapCause:
+    if name in (NONE, UNKNOWN):
+        title = "nothing beyond what healthy drives differ by" if name == NONE else "nothing in the catalogue"
+        return GapCause(name, name, title, "", probability)
+    effect = diagnosis.effects[name]
+    base = GapCause(name, effect.group, effect.title, effect.unit, probability)
+    if name not in diagnosis.attribution.tried:
+        return base
+    fitted, compared = diagnosis.attribution.tried[name], diagnosis.compared[k]
+    places = {CRACK: f"tooth {compared.spot.tooth + 1} of the pinion", RIPPLE: f"order {compared.order} of the pinion"}
+    options = diagnosis.seen[k].predicted[name].options
+    return replace(
+        base,
+        severity=fitted.severity,
+        fitted=Added(name, float(f"{fitted.severity.value:.4g}"), options),
+        place=places.get(name, ""),
+        shrinkage=fitted.shrinkage,
+        evidence=_evidence(fitted, compared),
+    )
+
+
+def _evidence(fitted: FittedDriveCause, compared: DriveComparison) -> tuple[types.Evidence, ...]:
+    """Return what it predicts and what was observed: its own changes, and those that it leaves unexplained."""
+    floor, change, predicted = compared.floor(), compared.change, fitted.predicted
+    limit, observed = floor.limit, np.nan_to_num(change - floor.centre)
+    free = np.isin(NAMES, TRIED[fitted.name].may_move)
+    size = np.maximum(np.abs(predicted) / limit, np.where(free, 0.0, np.abs(observed) / limit))
+    known = [i for i in np.argsort(-size) if np.isfinite(change[i])]
+    kept = [i for i in known if abs(predicted[i]) > SMALLEST * limit[i] or size[i] > 1.0][:6]
     return tuple(
-        name
-        for name, tried in TRIED.items()
-        if name in effects
-        and (has_torque or tried.needs != "torque")
-        and (compared.reference is not None or not tried.needs_reference)
+        weighed_evidence(
+            FEATURES[NAMES[i]].words, float(predicted[i]), float(observed[i]), float(limit[i]), least=SMALLEST
+        )
+        for i in kept
     )
 
 
-def _notices(compared: Sequence[DriveComparison], effects: Mapping[str, GapEffect]) -> list[str]:
-    """Say what could not be told, and what was taken for granted."""
-    found = [] if is_drive_calibrated() else [UNCALIBRATED]
-    known = set.intersection(*(set(tellable(each, effects)) for each in compared))
+def _steps(compared: DriveComparison, seen: DriveEvidence, cause: GapCause) -> tuple[types.GapStep, ...]:
+    """Return what is left of the whole gap: before, and with an effect, fitted to the other half of the cycles."""
+    floor, predicted = compared.floor(of_half=True), seen.predicted[cause.name]
+    fitted = [fit(predicted, fold.fitted_to, floor).predicted for fold in seen.folds]
+
+    def left(taken: Sequence[FloatArray]) -> Interval:
+        pairs = list(zip(seen.folds, taken, strict=True))
+        return floor.size_interval([fold.held_out - t for fold, t in pairs], [fold.without - t for fold, t in pairs])
+
+    return types.GapStep("before", left([0.0 * each for each in fitted])), types.GapStep(cause.title, left(fitted))
+
+
+def _notices(diagnosis: DriveDiagnosis, clearest: DriveComparison, seen: DriveEvidence) -> Iterator[str]:
+    """Say what could not be told, what was taken for granted, and what the recording would not show."""
+    effects, every = diagnosis.effects, diagnosis.compared
+    if not is_drive_calibrated():
+        yield "The probabilities are not calibrated yet: take them as a ranking only."
+    known = set.intersection(*(set(tellable(each, effects)) for each in every))
     missing = [effects[name].title for name in TRIED if name in effects and name not in known]
     if missing:
-        lacking = [each.name for each in compared if each.now.cycles.motion.torque_nm is None]
+        lacking = [each.name for each in every if each.now.motion.torque_nm is None]
         why = "only a healthy reference tells what is ordinary"
         if lacking:
             why = f"no torque was recorded in {', '.join(lacking)}"
-        found.append(f"Not weighed, as {why}: {', '.join(missing)}. Such a cause ends in none or unknown.")
-    if compared[0].reference is not None:
-        found.append(LIKE_CYCLES)
-    for each in compared:
-        if each.now.cycles.n_cycles < FEW:
-            found.append(
-                f"{each.name} has {each.now.cycles.n_cycles} starts: how far the gap shrinks rests on few cycles."
+        yield f"Not weighed, as {why}: {', '.join(missing)}. Such a cause ends in none or unknown."
+    if every[0].reference is not None:
+        yield (
+            "Tooth and order count from the zero of the pinion's encoder, which must be the same in both recordings. "
+            "In the figures of torque and teeth the healthy reference stands for the simulation before."
+        )
+    for each in every:
+        if each.now.n_cycles < 4:
+            yield f"{each.name} has {each.now.n_cycles} starts: how far the gap shrinks rests on few cycles."
+        if not each.features.play_um > 0.0:
+            yield f"{each.name} loads one flank only: its play cannot be told; record a stop with the brake."
+    hidden = []
+    for name, cause in seen.predicted.items():
+        least = cause.minimum_severity(clearest.floor())
+        unit, title = severity_unit(effects[name].unit), effects[name].title
+        if np.isfinite(least):
+            hidden.append(f"{title} below {readable(least, 2)} {unit}".rstrip())
+        else:
+            most = f"{readable(float(cause.severities[-1]), 2)} {unit}".rstrip()
+            hidden.append(f"{title} at all (up to {most} were tried)")
+    if hidden:
+        yield f"This recording would not show: {'; '.join(hidden)}."
+
+
+def drive_places(compared: DriveComparison) -> tuple[GapPlace, ...]:
+    """Return where a recording differs, largest share first; then the phases of motion that are predicted worst.
+
+    Size of a change over its floor z; share max(z² − 1, 0)/Σ max(z² − 1, 0), from 1 % on.
+    """
+    floor, spot, m = compared.floor(), compared.spot, compared.now.motion
+    distance = compared.change - floor.centre
+    z = np.nan_to_num(np.abs(distance) / floor.limit)
+    repeated = np.abs(np.nan_to_num(compared.change)) / _repeatability_limit(compared)
+    energies = np.maximum(z**2 - 1.0, 0.0)
+    shares = energies / max(float(np.sum(energies)), 1e-300)
+    titles = _titles(compared)
+    shafts = dict.fromkeys(("tooth", "ripple", "driver_wave"), "pinion")
+    shafts |= dict.fromkeys(("driven_wave", "off_centre"), "wheel")
+    n_teeth, n_driven = m.path.teeth
+    orders = {"ripple": float(compared.order), "driver_wave": 1.0, "driven_wave": n_teeth / n_driven}
+    places = []
+    for i in np.argsort(-energies):
+        name, is_tooth = NAMES[i], NAMES[i] == "tooth"
+        if shares[i] > 0.01:
+            places.append(
+                GapPlace(
+                    FEATURES[name].kind,
+                    titles.get(name, FEATURES[name].words),
+                    float(distance[i]),
+                    float(repeated[i]),
+                    float(z[i]),
+                    float(shares[i]),
+                    shaft=shafts.get(name, ""),
+                    orders=(orders[name],) if name in orders else (),
+                    angle_deg=360.0 * (spot.tooth + 0.5) / n_teeth if is_tooth else None,
+                    tooth=spot.tooth + 1 if is_tooth else None,
+                    follows=FEATURES[name].follows,
+                )
             )
-        if not each.features.contact.play_um > 0.0:
-            found.append(f"{each.name} loads one flank only: its play cannot be told; record a stop with the brake.")
-    return found
+    return (*places, *_phases(compared))
 
 
-# --------------------
-# Which diagnosis a recording is for: starts and stops, or running that goes on.
-# --------------------
+def _titles(compared: DriveComparison) -> dict[str, str]:
+    """Return changes in one sentence each, with their numbers."""
+    now, other, spot = compared.features, compared.other, compared.spot
+
+    def pair(name: str, unit: str) -> str:
+        return beside(getattr(now, name), getattr(other, name), unit)
+
+    def beside(a: float, b: float, unit: str) -> str:
+        return f"{readable(float(a), 3)}{' ' if unit else ''}{unit} against {readable(float(b), 3)}"
+
+    def size(difference: FloatArray, unit: str) -> str:
+        return f"{readable(float(np.hypot(*difference)), 2)} {unit}"
+
+    curve, waves = now.curve_um - other.curve_um, now.waves_um - other.waves_um
+    span = f"{readable(float(np.nanmax(curve) - np.nanmin(curve)), 2)} µm" if np.any(np.isfinite(curve)) else "– µm"
+    extra_um = readable(float((now.teeth_um - other.teeth_um)[spot.tooth]), 2)
+    ripple = beside(100 * now.ripple[spot.order], 100 * other.ripple[spot.order], "% of its mean")
+    return {
+        "play": f"where the drive stops and the back flank takes over: play {pair('play_um', 'µm')}",
+        "deflection": f"under load: teeth yield by {pair('deflection_um', 'µm')}",
+        "curve": f"drive flank, over each mesh cycle: its course differs by {span}",
+        "inertia": f"in starts and stops, torque per acceleration of the load: {pair('inertia_kg_m2', 'kg·m²')}",
+        "load_friction": f"while the load turns, torque that does not accelerate it: {pair('friction_nm', 'N·m')}",
+        "flank_friction": f"loaded flanks, friction coefficient {pair('flank_friction', '')}",
+        "tooth": f"drive flank, tooth {spot.tooth + 1} of the pinion yields {extra_um} µm more than the middling tooth",
+        "ripple": f"torque while running, order {compared.order} of the pinion: {ripple}",
+        "driver_wave": f"compression once per revolution of the pinion: a wave of {size(waves[:2], 'µm')}",
+        "driven_wave": f"compression once per revolution of the wheel: a wave of {size(waves[2:], 'µm')}",
+        "off_centre": "load once per revolution of the wheel: a torque of "
+        f"{size(now.off_centre_nm - other.off_centre_nm, 'N·m')}",
+        "impact": f"hardest impact of the flanks: {pair('impact_mps', 'm/s')}",
+    }
 
 
-MODEL = "forging"
+def _phases(compared: DriveComparison) -> list[GapPlace]:
+    """Return the phases in which motion or torque are predicted worse than the healthy machine's own, by 3 dB."""
+    healthy = compared.drive.healthy_run if compared.reference is None else compared.reference
+    now, other = (prediction_errors(one, compared.other) for one in (compared.now, healthy))
+    nothing = float("nan")
+    places = []
+    for (quantity, phase, flank), rms in now.items():
+        usual = other.get((quantity, phase, flank), nothing)
+        change_db = float(20.0 * np.log10(max(rms, 1e-9) / max(usual, 1e-9)))
+        if np.isfinite(change_db) and change_db > 3.0:
+            title = (
+                f"{phase}{f', {flank} flank' if flank else ''}: measured {quantity} is {readable(rms, 2)} "
+                f"{UNITS[quantity]} off its prediction, {readable(usual, 2)} ordinarily"
+            )
+            channel = "" if quantity == COMPRESSION else quantity
+            kind = types.PlaceKind.SPEED
+            places.append(GapPlace(kind, title, change_db, nothing, nothing, nothing, channel=channel, follows=True))
+    return sorted(places, key=lambda place: -place.change_db)[:3]
+
+
+def _torque_curves(compared: DriveComparison, fitted: Added | None) -> tuple[types.SpectrumCurves, ...]:
+    """Return the torque by order of the pinion while running; none without torque."""
+    cycles, now, other = compared.now, compared.features.ripple, compared.other.ripple
+    if cycles.motion.torque_nm is None or not np.all(np.isfinite(now)) or not np.all(np.isfinite(other)):
+        return ()
+    mean_nm = float(np.quantile(np.abs(cycles.motion.torque_nm), 0.9))
+    every = cycles.every
+    rows = np.array([cycles.features(tuple(c for c in every if c != one)).ripple for one in every])
+    scatter = np.sqrt((len(rows) - 1.0) * np.var(rows, axis=0))
+    after = other.copy() if fitted is not None else np.zeros(0)
+    if fitted is not None and fitted.name == RIPPLE:
+        after[compared.spot.order] = np.hypot(after[compared.spot.order], 0.01 * fitted.severity)
+    # How far a line of healthy drives may rise: the floor of the ripple, from its scale to a part of the mean torque.
+    limit = float(compared.floor().limit[NAMES.index("ripple")])
+    part = 2.0 * compared.spot.ripple_step * float(np.sinh(limit * np.log(10.0) / 20.0))
+    return (
+        types.SpectrumCurves(
+            "torque while running, over the pinion's revolution",
+            "N m",
+            cycles.orders.astype(np.float64),
+            mean_nm * now,
+            mean_nm * other,
+            mean_nm * after,
+            mean_nm * FLOOR_IN_DEVIATIONS * np.maximum(scatter, 1e-5),
+            20.0 * np.log10(1.0 + part / np.maximum(other, 1e-5)),
+        ),
+    )
+
+
+def _tooth_curves(
+    compared: DriveComparison, fitted: Added | None, fits: Mapping[str, FittedDriveCause]
+) -> tuple[types.AngleCurves, ...]:
+    """Return what each tooth of the pinion yields beyond the median one, 1 + (extra/floor)²: healthy ones are 1."""
+    now, other, spot = compared.features.teeth_um, compared.other.teeth_um, compared.spot
+    n = len(now)
+    if np.sum(np.isfinite(now)) < 0.8 * n:
+        return ()
+
+    def energy(extra_um: FloatArray) -> FloatArray:
+        return 1.0 + (np.maximum(np.nan_to_num(extra_um), 0.0) / spot.tooth_step_um) ** 2
+
+    after: FloatArray = np.zeros(0)
+    if fitted is not None:
+        teeth = np.nan_to_num(other)
+        if fitted.name == CRACK:  # from the predicted change back to µm
+            over = float(fits[CRACK].predicted[NAMES.index("tooth")]) * np.log(10.0) / 20.0
+            over += np.arcsinh(0.5 * spot.next_tooth_um / spot.tooth_step_um)
+            teeth[spot.tooth] += 2.0 * spot.tooth_step_um * np.sinh(over)
+        after = energy(teeth)
+    angle = 360.0 * (np.arange(n) + 0.5) / n
+    return (types.AngleCurves("pinion", "µm²", n, True, angle, energy(now), energy(other), after),)
+
+
+def _next_recordings(
+    compared: DriveComparison,
+    seen: DriveEvidence,
+    fits: Mapping[str, FittedDriveCause],
+    pair: tuple[str, str],
+    effects: Mapping[str, GapEffect],
+) -> tuple[types.NextRecording, ...]:
+    """Return starts and stops at other torques that put the predictions of two causes further apart, best first."""
+    limit = compared.floor().limit
+    healthy_friction_nm = compared.drive.healthy.friction_nm
+
+    def predicted(name: str, drive: SimulatedDrive) -> FloatArray:
+        """Return the predicted change of another drive, where the cause is expected to show."""
+        if name in (WEAR, CRACK, TORQUE_GAIN):
+            return fits[name].predicted
+        added = Added(name, fits[name].severity.value, seen.predicted[name].options)
+        change = change_of(drive.features(added), drive.healthy, compared.drive.shape, compared.spot)
+        return np.where(np.isin(NAMES, effects[name].shows_in), np.nan_to_num(change), 0.0)
+
+    def apart(first: FloatArray, second: FloatArray) -> float:
+        return float(np.sqrt(np.sum(((first - second) / limit) ** 2)))
+
+    now = apart(*(fits[name].predicted for name in pair))
+    recordings = []
+    for factor in (0.7, 1.5):
+        drive = compared.drive.at_torque(factor)
+        # Where the healthy drive turns its load at another torque, what its cycles tell is the same.
+        if not abs(drive.healthy.friction_nm - healthy_friction_nm) < 0.1 * healthy_friction_nm:
+            continue
+        try:
+            there = apart(*(predicted(name, drive) for name in pair))
+        except GearsigError:
+            continue
+        if there > 1.1 * now:
+            titles = " and ".join(effects[name].title for name in pair)
+            text = (
+                f"starts and stops at {drive.point.torque_nm:.3g} N·m; {titles} are then "
+                f"{there:.2g} structural floors apart instead of {now:.2g}."
+            )
+            recordings.append(types.NextRecording(drive.point, pair, there, now, text))
+    return tuple(sorted(recordings, key=lambda one: -one.standard_deviations))
 
 
 def refuse_start_stop(recordings: Sequence[Recording], rigs: Sequence[Rig], names: Sequence[str], model: str) -> None:
@@ -249,20 +480,16 @@ def refuse_start_stop(recordings: Sequence[Recording], rigs: Sequence[Rig], name
         With the model that they are for.
     """
     for recording, rig, name in zip(recordings, rigs, names, strict=True):
-        if is_start_stop_recording(recording, rig):
+        if rig.contact is None:
+            continue
+        try:
+            motion = measure_motion(recording, rig)
+            starts = is_start_stop(motion_segments(motion.driver_angle_rad, motion.sampling_rate_hz))
+        except GearsigError:
+            continue
+        if starts:
             raise RefusalError(
                 f"{name} starts and stops: orders, which the model {model} is compared by, need a shaft that goes on "
                 "turning",
-                remedy=f"--model {MODEL}",
+                remedy="--model forging",
             )
-
-
-def is_start_stop_recording(recording: Recording, rig: Rig) -> bool:
-    """Whether a recording holds the motion of both gears of a machine that starts and stops."""
-    if rig.contact is None:
-        return False
-    try:
-        motion = measure_motion(recording, rig)
-        return is_start_stop(motion_segments(motion.driver_angle_rad, motion.sampling_rate_hz))
-    except GearsigError:
-        return False

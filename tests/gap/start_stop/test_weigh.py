@@ -7,15 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.gap import NONE, UNKNOWN, GapCalibration
+from gearsig.gap import FLOOR_IN_DEVIATIONS, NONE, UNKNOWN
 from gearsig.gap.start_stop import (
-    FLOOR,
     NAMES,
     DriveFloor,
-    Predicted,
+    PredictedCause,
     evidences,
     fit,
-    load_floor,
     load_floors,
     own_features,
     shares,
@@ -32,10 +30,10 @@ def direction(place: int, size: float = 1.0) -> np.ndarray:
     return found
 
 
-def cause(name: str, place: int) -> Predicted:
+def cause(name: str, place: int) -> PredictedCause:
     severities = np.array([10.0, 20.0, 40.0])
     changes = np.array([direction(place, 0.5 * s) for s in severities])
-    return Predicted(name, severities, changes, np.zeros(N, dtype=bool))
+    return PredictedCause(name, severities, changes, np.zeros(N, dtype=bool))
 
 
 def test_a_severity_is_recovered():
@@ -57,7 +55,7 @@ def test_what_measures_the_severity_decides_how_much_and_not_whether():
 
 
 def test_two_signs_have_two_sides():
-    both = Predicted(
+    both = PredictedCause(
         "a", np.array([-40.0, 40.0]), np.array([direction(0, -20.0), direction(0, 20.0)]), np.zeros(N, bool)
     )
     assert fit(both, direction(0, -10.0), FLOOR_OF_ONE).severity.value == pytest.approx(-20.0, rel=0.1)
@@ -92,7 +90,7 @@ def test_a_right_prediction_takes_all_away(size):
     own = own_features(change, change, FLOOR_OF_ONE)
     before, after, taken, slope = shrink(change, change, FLOOR_OF_ONE, own)
     assert (after, taken) == (0.0, 1.0)
-    assert before == pytest.approx(size / FLOOR)
+    assert before == pytest.approx(size / FLOOR_IN_DEVIATIONS)
     assert slope == pytest.approx(1.0)
 
 
@@ -107,9 +105,9 @@ def test_a_floor_of_healthy_drives_keeps_nineteen_of_twenty():
 
 @pytest.mark.parametrize("with_reference", [True, False])
 def test_the_shipped_floors_are_whole(with_reference):
-    for part in ("whole", "half"):
-        assert np.all(load_floor(with_reference=with_reference, part=part).scale > 0.0)
-    GapCalibration.from_mapping(load_floors()["with_reference" if with_reference else "without_reference"])
+    floors, calibration = load_floors(with_reference=with_reference)
+    assert all(np.all(floor.scale > 0.0) for floor in floors)
+    assert calibration.sharpness > 0.0
 
 
 def test_what_a_recording_itself_scatters_by_is_no_property_of_other_drives():
