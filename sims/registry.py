@@ -107,10 +107,7 @@ class ChecksConvergence(Protocol):
         ...
 
 
-# --------------------
 # Which state of the simulators' code made a result.
-# --------------------
-
 
 _ROOMS = ("cracked", "effects", "forging", "gear_pair", "machine", "measure", "mesh", "reduced_fe")
 

@@ -48,6 +48,11 @@ class Parameter:
     choices: tuple[str, ...] = ()
     whole: bool = False
 
+    @classmethod
+    def choice(cls, name: str, meaning: str, choices: tuple[str, ...], default: str) -> Parameter:
+        """Return a word."""
+        return cls(name, "", meaning, default=default, choices=choices)
+
 
 class Simulator(Protocol):
     """A model that makes recordings."""
@@ -110,10 +115,7 @@ class Simulator(Protocol):
         ...
 
 
-# --------------------
 # Values of a simulator's parameters: from defaults, preset and user, checked.
-# --------------------
-
 
 Values = dict[str, ParameterValue | None]
 """Every parameter of a simulator by name; None where it is derived from the others."""
@@ -176,9 +178,7 @@ def checked_value(wanted: Parameter, value: object) -> ParameterValue | None:
     return number
 
 
-# --------------------
 # Complete values of the parameters, read by kind.
-# --------------------
 
 
 @dataclass(frozen=True)
@@ -214,9 +214,7 @@ class ParameterValues:
         return self.word(name) == "on"
 
 
-# --------------------
 # Speed, torque and effects as people write them, and what was put in as plain values.
-# --------------------
 
 
 def effect_settings(effects: Mapping[str, float] | Sequence[EffectSetting] | None) -> tuple[EffectSetting, ...]:
@@ -257,9 +255,7 @@ def _profile(profile: ProfileLike, name: str) -> Profile:
         raise InputError(f"{name} is {profile!r}", allowed="a number, or (time in s, value) points") from None
 
 
-# --------------------
 # What was put into a simulation, as plain values.
-# --------------------
 
 
 def truth_of(
@@ -278,9 +274,7 @@ def truth_of(
     }
 
 
-# --------------------
 # What a simulator states of itself: name, parameters, machines, effects, and where its recordings come from.
-# --------------------
 
 
 @dataclass(frozen=True)

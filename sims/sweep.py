@@ -215,10 +215,7 @@ class Sweep:
                     checked_value(parameter(model.parameters, axis.name), value)
 
 
-# --------------------
 # Runs a sweep on all processors, into a folder, so that it can be stopped and resumed.
-# --------------------
-
 
 DEFINITION = "sweep.json"
 INDEX = "index.csv"

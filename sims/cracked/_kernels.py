@@ -10,10 +10,9 @@ import numpy as np
 from numba import njit
 
 from sims.gear_pair import carried_part, foot
-from sims.machine import profile_value, set_speed
+from sims.machine import profile_value, set_speed, torque_ripple
 from sims.mesh import advance, contact_friction_n, cubic, engagement_and_slope, height_now, pair_force
 
-# --------------------
 # Compiled contact of the gear pair: forces of all tooth pairs that touch, on either flank.
 #
 # Each pair k with progress ζ = c − k, c = z1 θ1/2π, has the energy U = w(ζ) u(d; C(ζ)), d = δ − E(ζ) − Δb(t), and the
@@ -28,8 +27,6 @@ from sims.mesh import advance, contact_friction_n, cubic, engagement_and_slope, 
 # contact ratio and phase once per revolution. The forces −∂U/∂(Δx, Δy) are left out: they would follow from the width
 # that is assumed for the ramp, where the geometry of a corner contact gives a tenth of it, and they work over the
 # run-out alone.
-# --------------------
-
 
 MAX_CYCLES = 1e12
 """Mesh cycles beyond which a run has burst; until then, single cycles are resolved to 1e-4."""
@@ -172,7 +169,6 @@ def back_flank_force(k, depth, rate):
     return max(force, 0.0), 0.5 * k.back_stiffness * depth * depth
 
 
-# --------------------
 # Compiled equations of motion of the sixteen coordinates; see `sims.cracked` for their order.
 #
 # Driver (counter-clockwise; c, s of the angle of its centre of mass, ρ its distance from the axis)
@@ -182,7 +178,6 @@ def back_flank_force(k, depth, rate):
 # Its pitch circle's centre lies ε off the axis: y1 + ε1 sin φ1 and y2 − ε2 sin φ2 take the places of y1 and y2 in the
 # compression, and the torque is −N ∂δ/∂θ. Forces on the teeth: `sims.cracked`, and on the flanks behind
 # along their own line of action, 2α_w away from that of the driving flanks.
-# --------------------
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -288,7 +283,7 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
         a[1 + side] = t * k.per_inertia[side]
         a[g], a[g + 1] = ax + k.gravity_x, ay + k.gravity_y
         if side == 0:
-            drive = torque * _ripple(k, q[0]) + k.total_inertia * speed_rate
+            drive = torque * torque_ripple(k, q[0]) + k.total_inertia * speed_rate
             drive += k.governor * (speed - v[0]) + k.governor_spring * (set_angle - q[0])
             a[0] = (drive - slope * carried) * k.per_rotor[0]
         else:
@@ -297,18 +292,7 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
     extra[4] = rough
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _ripple(k, theta):
-    """Drive torque over its set value."""
-    factor = 1.0
-    for i in range(k.n_ripples):
-        factor += k.ripples[i, 1] * cos(k.ripples[i, 0] * theta + k.ripples[i, 2])
-    return factor
-
-
-# --------------------
 # Compiled: energy of the machine, for checks. Valid for bearings without clearance or defect.
-# --------------------
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import cos, floor, pi, radians, sin, sqrt
+from math import cos, floor, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -16,27 +16,23 @@ from sims.cracked._kernels import MAX_LATE
 from sims.gear_pair import (
     BEARING_FIELDS,
     COORDINATES,
-    DRIVE_FIELDS,
-    DRIVE_SCALARS,
-    FRICTION_SCALARS,
+    FRICTION_FIELDS,
+    MACHINE_FIELDS,
     PairResponse,
     RunPlan,
     bearing_fields,
     bearing_loads_n,
     draw_roughness,
-    drive_fields,
     friction_fields,
     governor_nm_s_per_rad,
+    machine_fields,
     profile_points,
     total_inertia_kg_m2,
 )
 from sims.machine import Machine, Operation
-from sims.mesh import MeshTable, TimeLockedRoughness, back_stiffness_n_per_m, mesh_stiffness, mesh_table, share_torque
+from sims.mesh import TimeLockedRoughness, back_stiffness_n_per_m, mesh_stiffness, mesh_table, share_torque
 
-# --------------------
 # Numbers of the sixteen coordinates and of the signals that a run can give.
-# --------------------
-
 
 __all__ = ["COORDINATES", "N_COORDINATES", "SIGNALS"]
 
@@ -59,10 +55,7 @@ tooth pairs' normal forces, below 0 on the back flank. friction_n: sum of the fr
 of a roughness locked to time.
 """
 
-# --------------------
 # The machine as plain numbers, which compiled code reads.
-# --------------------
-
 
 DAMPING_RAMP_M = 2e-7
 """Depth over which the contact's damping comes in."""
@@ -70,54 +63,38 @@ SCALARS = (
     "table_start",
     "table_step",
     "contact_coefficient",
-    "contact_ratio",
     "ramp",
-    "cycles_per_rad",
     "damping_time",
     "damping_ramp",
-    "backlash",
     "back_stiffness",
     "late_x",
     "late_y",
     "turn_x",
     "cos_back",
     "sin_back",
-    *FRICTION_SCALARS,
-    "gravity_x",
-    "gravity_y",
-    *DRIVE_SCALARS,
 )
 PER_SIDE = (
     "base_radius",
-    "mass",
     "inertia",
     "per_mass",
     "per_inertia",
     "per_rotor",
     "mass_offset",
-    "mass_angle",
-    "runout",
-    "runout_angle",
     "bending_stiffness",
     "bending_damping",
-    "torsional_stiffness",
-    "torsional_damping",
     "rotor_inertia",
-    "hooke",
-    "hooke_force",
-    "coupling_bending",
 )
 RECORD = np.dtype(
     [(name, np.float64) for name in SCALARS]
     + [(name, np.float64, (2,)) for name in PER_SIDE]
     + [
         ("load_dependent", np.bool_),
-        ("friction", np.bool_),
         ("turns", np.bool_),
         ("n_slots", np.int64),
         ("teeth", np.int64, (2,)),
     ]
-    + DRIVE_FIELDS
+    + MACHINE_FIELDS
+    + FRICTION_FIELDS
     + BEARING_FIELDS,
     align=True,
 )
@@ -162,23 +139,19 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
     mean_stiffness = mean_stiffness_n_per_m(machine, force)
     inertia = np.array([w.inertia_kg_m2 for w in machine.wheels])
     mass = np.array([w.mass_kg for w in machine.wheels])
-    alpha, beta = pair.working_pressure_angle_rad, radians(machine.line_of_action_deg)
-    hooke_rad = np.array([radians(s.coupling_angle_deg) for s in machine.shafts])
+    alpha = pair.working_pressure_angle_rad
     rotors = np.array([s.rotor_inertia_kg_m2 for s in machine.shafts])
     values: dict[str, Any] = {
         "table_start": table.start,
         "table_step": table.step,
         "contact_coefficient": table.contact_coefficient,
         "load_dependent": table.load_dependent,
-        "contact_ratio": table.contact_ratio,
         "ramp": table.ramp,
         "n_slots": floor(table.contact_ratio + table.ramp + 2.0 * MAX_LATE) + 1,
         "teeth": (pair.driver.teeth, pair.driven.teeth),
         "base_radius": base_radius,
-        "cycles_per_rad": pair.driver.teeth / (2.0 * pi),
         "damping_time": 2.0 * machine.mesh_damping_ratio * sqrt(mesh_mass_kg(machine) / mean_stiffness),
         "damping_ramp": DAMPING_RAMP_M,
-        "backlash": 2e-6 * machine.half_backlash_um,
         "back_stiffness": back_stiffness_n_per_m(mesh),
         # Base pitches per metre that the gears stand apart along their line of centres, (cos α, sin α).
         "late_x": cos(alpha) / (sin(alpha) * pair.base_pitch_mm * 1e-3),
@@ -186,33 +159,23 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
         "turn_x": base_radius[0] / (pair.action_length_mm * pair.base_pitch_mm * 1e-6),
         "cos_back": cos(2.0 * alpha),
         "sin_back": sin(2.0 * alpha),
-        "mass": mass,
         "inertia": inertia,
         "per_mass": 1.0 / mass,
         "per_inertia": 1.0 / inertia,
         "per_rotor": 1.0 / rotors,
         "mass_offset": np.array([w.mass_offset_m for w in machine.wheels]),
-        "mass_angle": np.radians([w.unbalance_angle_deg for w in machine.wheels]),
-        "runout": np.array([w.runout_um * 1e-6 for w in machine.wheels]),
-        "runout_angle": np.radians([w.runout_angle_deg for w in machine.wheels]),
         "turns": any(w.runout_um > 0 or w.unbalance_g_mm > 0 for w in machine.wheels),
         "bending_stiffness": np.array([s.bending_stiffness_n_per_m for s in machine.shafts]),
         "bending_damping": np.array([s.bending_damping_n_s_per_m for s in machine.shafts]),
-        "torsional_stiffness": np.array([s.torsional_stiffness_nm_per_rad for s in machine.shafts]),
-        "torsional_damping": np.array([s.torsional_damping_nm_s_per_rad for s in machine.shafts]),
         "rotor_inertia": rotors,
-        "hooke": hooke_rad**2 / 4.0,
-        "hooke_force": hooke_rad / np.array([2.0 * s.bearing_distance_m for s in machine.shafts]),
-        "coupling_bending": np.array([s.coupling_bending_nm_per_rad for s in machine.shafts]),
-        "gravity_x": -machine.gravity_mps2 * sin(beta),
-        "gravity_y": -machine.gravity_mps2 * cos(beta),
     }
     record = np.zeros((), RECORD)
-    values |= drive_fields(machine) | friction_fields(machine, operation, force) | bearing_fields(machine, force, rng)
+    values |= machine_fields(machine) | friction_fields(machine, operation, force) | bearing_fields(machine, force, rng)
     for name, value in values.items():
         record[name] = value
-    curves, rows, pitch = _stacked(table)
-    return PairConstants(record[()], curves, rows, pitch)
+    curves = np.vstack((table.compliance.rows, table.separation.rows))
+    rows = np.vstack((table.compliance.of, table.separation.of + len(table.compliance.rows)))
+    return PairConstants(record[()], curves, rows, table.pitch_m)
 
 
 def mesh_mass_kg(machine: Machine) -> float:
@@ -232,28 +195,7 @@ def mean_stiffness_n_per_m(machine: Machine, force_n: float) -> float:
     return mesh_stiffness(healthy, force_n=max(force_n, 1.0)).mean_n_per_m
 
 
-def _stacked(table: MeshTable) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
-    """Curves, rows and pitch of a table; see `Constants`."""
-    kinds = (
-        (table.compliance_1, table.variant_1),
-        (table.compliance_2, table.variant_2),
-        (table.separation_1_m, table.surface_1),
-        (table.separation_2_m, table.surface_2),
-    )
-    most = max(len(which) for _, which in kinds)
-    rows, first = np.zeros((4, most), dtype=np.int64), 0
-    for kind, (curves, which) in enumerate(kinds):
-        rows[kind, : len(which)] = first + which
-        first += len(curves)
-    pitch = np.zeros((2, most))
-    for side, values in enumerate((table.pitch_1_m, table.pitch_2_m)):
-        pitch[side, : len(values)] = values
-    return np.ascontiguousarray(np.vstack([curves for curves, _ in kinds])), rows, pitch
-
-
-# --------------------
 # Where a run starts: the static balance at the first torque and speed, so that no blow has to die out.
-# --------------------
 
 
 def start_state(machine: Machine, operation: Operation, start_s: float) -> tuple[FloatArray, FloatArray]:
@@ -294,10 +236,7 @@ def start_state(machine: Machine, operation: Operation, start_s: float) -> tuple
     return q, v
 
 
-# --------------------
 # The linearised machine: mass and stiffness matrices, eigenfrequencies, and the step that follows from them.
-# --------------------
-
 
 STEP_ANGLE_RAD = 0.28
 """Step times the greatest angular eigenfrequency. RK4 is stable up to 2.8 of it; at 0.28 it misses 3e-4 of the

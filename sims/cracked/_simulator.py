@@ -11,7 +11,7 @@ import numpy as np
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 from sims.cracked._respond import PairState, Response, default_step_s, eigenfrequencies_hz, respond
-from sims.effects import EffectSetting, effects, with_effects
+from sims.effects import effects, with_effects
 from sims.gear_pair import (
     PARAMETERS,
     Measurement,
@@ -27,7 +27,7 @@ from sims.machine import Machine, Operation
 from sims.measure import plain
 from sims.mesh import friction_over_mesh
 from sims.presets import Preset
-from sims.simulator import Parameter, ParameterValue
+from sims.simulator import Parameter
 
 if TYPE_CHECKING:
     from sims.cracked._convergence import Convergence
@@ -71,50 +71,16 @@ class CrackedPair(PairModel[PreparedCrackedPair]):
         check_load(healthy, asked.operation)
         return PreparedCrackedPair(asked, with_effects(healthy, asked.effects, rng))
 
-    def record(
-        self,
-        ready: PreparedCrackedPair,
-        rng: np.random.Generator,
-        *,
-        rig: Rig,
-        sampling_rate_hz: float,
-        duration_s: float,
-        step_s: float | None = None,
-        noise_rng: np.random.Generator | None = None,
-    ) -> Recording:
-        """Run a prepared pair and measure it; see `simulate_with_motion`."""
-        recording, _ = simulate_with_motion(
-            ready.machine,
-            ready.operation,
-            rng=rng,
-            sampling_rate_hz=sampling_rate_hz,
-            duration_s=duration_s,
-            rig=rig,
-            truth=ready.truth(),
-            step_s=step_s,
-            noise_rng=noise_rng,
-        )
-        return recording
+    def _run(self, ready: PreparedCrackedPair, **asked: Any) -> Recording:
+        return simulate_with_motion(ready.machine, ready.operation, **asked)[0]
 
-    def check_convergence(
-        self,
-        parameters: Mapping[str, ParameterValue],
-        effects: Sequence[EffectSetting],
-        operation: Operation | None,
-        rng: np.random.Generator,
-        *,
-        preset: str = "",
-    ) -> Convergence:
-        """Tell how far a smaller step of the integrator changes the result of this very machine."""
+    def _converges(self, ready: PreparedCrackedPair, rng: np.random.Generator) -> Convergence:
         from sims.cracked._convergence import check_convergence
 
-        ready = self.prepare(parameters, effects, operation, rng, preset_name=preset)
         return check_convergence(ready.machine, ready.operation, rng)
 
 
-# --------------------
 # From a machine to a recording: run the model, then measure it.
-# --------------------
 
 
 def simulate_with_motion(
@@ -219,10 +185,7 @@ def _force_n(machine: Machine, operation: Operation) -> float:
     return operation.torque_nm.largest / (machine.mesh.pair.driver.base_radius_mm * 1e-3)
 
 
-# --------------------
 # The cracked pair set to a rig, for the gap diagnosis: see `gearsig.gap`.
-# --------------------
-
 
 STEP_ANGLE_RAD = 0.9
 """Step times the greatest angular eigenfrequency: three times that of a single simulation, see `_step_s`."""

@@ -10,9 +10,7 @@ import numpy as np
 from numba import njit
 from scipy.integrate import RK45
 
-# --------------------
 # Compiled: which tooth pairs carry, where worn ones touch, and the force of the flanks that do.
-# --------------------
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -123,9 +121,7 @@ def stored_energy(k, angle, q, flank, younger):
     return total
 
 
-# --------------------
 # Compiled: LuGre friction of a shaft, and of tooth flanks whose normal force varies.
-# --------------------
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -136,9 +132,7 @@ def bristle(v, z, static_ratio, stribeck, presliding, bristle_time):
     return z + bristle_time * near_rest * rate, rate
 
 
-# --------------------
 # Compiled: the equations of motion of the drive.
-# --------------------
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -222,13 +216,10 @@ def energy(k, y, flank, younger):
     return kinetic + stored_energy(k, y[0], y[2], flank, younger)
 
 
-# --------------------
 # Compiled: one step of the Dormand–Prince pair 5(4), its error, and the motion within the step.
 #
 # Source of the coefficients: `scipy.integrate.RK45` (J. R. Dormand, P. J. Prince, A family of embedded Runge-Kutta
 # formulae, 1980; dense output by L. F. Shampine, Some practical Runge-Kutta formulas, 1986).
-# --------------------
-
 
 N_STAGES = 7
 NODES = np.append(RK45.C, 1.0)

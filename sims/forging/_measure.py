@@ -26,10 +26,7 @@ from sims.measure import (
 )
 from sims.simulator import ParameterValues
 
-# --------------------
 # Slow channels as a data logger stores them: through an anti-alias filter, not at instants.
-# --------------------
-
 
 SLOW_FINE_POINTS = 8
 """Points of the motion per sample: what the teeth do above seven times the sampling rate is below a millinewton."""

@@ -17,10 +17,7 @@ from gearsig.rig import damping_ratio_s_per_m
 from sims.forging._drive import CONTINUOUS, Cycle, ForgingDrive, Schedule, schedule
 from sims.machine import Profile
 
-# --------------------
 # The drive as plain numbers, which compiled code reads.
-# --------------------
-
 
 STATES = ("θ1", "ω1", "q", "q̇", "tooth bristle A", "tooth bristle B", "motor bristle", "load bristle")
 """What is integrated: angle and speed of the pinion, compression and its rate, four bristles; then three energies."""
@@ -265,10 +262,7 @@ def _failure(status: int, before_s: float) -> RefusalError:
     )
 
 
-# --------------------
 # Are the steps short enough? A cycle at the tolerance in use, beside one at a hundred-thousandth of it.
-# --------------------
-
 
 EXACT = 1e-5
 """Of the tolerance in use."""

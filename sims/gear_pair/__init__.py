@@ -3,13 +3,12 @@
 from sims.gear_pair._bearing import BEARING_FIELDS, bearing_fields, bearing_loads_n, carried_part, foot
 from sims.gear_pair._build import build_machine, build_rig, gear_geometry
 from sims.gear_pair._drive import (
-    DRIVE_FIELDS,
-    DRIVE_SCALARS,
-    FRICTION_SCALARS,
+    FRICTION_FIELDS,
+    MACHINE_FIELDS,
     draw_roughness,
-    drive_fields,
     friction_fields,
     governor_nm_s_per_rad,
+    machine_fields,
     total_inertia_kg_m2,
 )
 from sims.gear_pair._installed import Installed, completed
@@ -30,9 +29,8 @@ __all__ = [
     "BODY_KG",
     "BODY_SHAPES",
     "COORDINATES",
-    "DRIVE_FIELDS",
-    "DRIVE_SCALARS",
-    "FRICTION_SCALARS",
+    "FRICTION_FIELDS",
+    "MACHINE_FIELDS",
     "MIN_MOTION_HZ",
     "PARAMETERS",
     "Installed",
@@ -53,11 +51,11 @@ __all__ = [
     "check_load",
     "completed",
     "draw_roughness",
-    "drive_fields",
     "foot",
     "friction_fields",
     "gear_geometry",
     "governor_nm_s_per_rad",
+    "machine_fields",
     "profile_points",
     "total_inertia_kg_m2",
 ]

@@ -179,10 +179,7 @@ def _balanced(
     )
 
 
-# --------------------
 # Compiled: where the foot of a bearing's spring stands, and the spring's force with clearance.
-# --------------------
-
 
 MIN_LOAD = 1e-12
 EDGE_M = 5e-5

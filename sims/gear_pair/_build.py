@@ -47,10 +47,7 @@ from sims.mesh import (
 )
 from sims.simulator import ParameterValues, Values
 
-# --------------------
 # The measurement chain of the cracked spur pair: accelerometers at the bearings, a tachometer at the input shaft.
-# --------------------
-
 
 _PLACES = (
     (1, "input shaft, drive end"),

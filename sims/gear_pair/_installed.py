@@ -124,10 +124,7 @@ class Installed:
             positive(bearing.n_rolling_elements or 0, f"n_rolling_elements of bearing {bearing.name!r}")
 
 
-# --------------------
 # What is fitted to a machine, as a table of a preset file and back; files are not trusted.
-# --------------------
-
 
 _LISTS = {"bearings": Bearing, "sensors": SensorSeat, "modes": HousingMode}
 _KEYS = ("shafts", "pickup", *_LISTS)
@@ -163,10 +160,7 @@ def _items(kind: type, rows: object, where: str) -> tuple[Any, ...]:
     return tuple(from_table(kind, row, f"{where} {i}") for i, row in enumerate(rows, 1))
 
 
-# --------------------
 # A rig's bearings and sensors at the places that the model has for them.
-# --------------------
-
 
 BALLS, BALL_MM, PITCH_MM = 9, 7.94, 39.04
 """A usual bearing of a machine of size 1."""

@@ -9,61 +9,51 @@ _SWITCH = ("on", "off")
 _SIDES = ("driver", "driven")
 
 
-def _number(
-    name: str, unit: str, meaning: str, low: float, high: float, default: float | None, *, whole: bool = False
-) -> Parameter:
-    return Parameter(name, unit, meaning, low, high, default, whole=whole)
-
-
-def _word(name: str, meaning: str, choices: tuple[str, ...], default: str) -> Parameter:
-    return Parameter(name, "", meaning, default=default, choices=choices)
-
-
 _GEARS = (
-    _number("teeth_driver", "", "teeth of the driving gear", 5, 400, 29, whole=True),
-    _number("teeth_driven", "", "teeth of the driven gear", 5, 400, 47, whole=True),
-    _number("module_mm", "mm", "module of both gears", 0.3, 30, 2.0),
-    _number("pressure_angle_deg", "deg", "pressure angle of the rack", 10, 30, 20.0),
-    _number("face_width_mm", "mm", "face width of both gears", 1, 500, 20.0),
-    _number("profile_shift_driver", "", "profile shift of the driver, in modules", -1, 1, 0.0),
-    _number("profile_shift_driven", "", "profile shift of the driven gear, in modules", -1, 1, 0.0),
-    _number("addendum", "", "addendum of both gears, in modules", 0.2, 2, 1.0),
-    _number("dedendum", "", "dedendum of both gears, in modules", 0.2, 2.5, 1.25),
-    _number("tool_tip_radius", "", "radius of the rack's tip, in modules; it makes the fillet", 0, 1, 0.38),
-    _number("centre_distance_mm", "mm", "centre distance; none: without backlash", 3, 12000, None),
-    _number("bore_radius_driver_mm", "mm", "bore radius; none: 0.35 of the root radius", 0.1, 5000, None),
-    _number("bore_radius_driven_mm", "mm", "bore radius; none: 0.35 of the root radius", 0.1, 5000, None),
-    _number("mass_driver_kg", "kg", "mass of the driver; none: of a disc with bore", 1e-3, 1e5, None),
-    _number("mass_driven_kg", "kg", "mass of the driven gear; none: of a disc with bore", 1e-3, 1e5, None),
-    _number("inertia_driver_kg_m2", "kg m^2", "moment of inertia; none: of a disc with bore", 1e-8, 1e5, None),
-    _number("inertia_driven_kg_m2", "kg m^2", "moment of inertia; none: of a disc with bore", 1e-8, 1e5, None),
-    _number("youngs_modulus_gpa", "GPa", "Young's modulus of both gears", 1, 500, 206.0),
-    _number("poisson_ratio", "", "Poisson's ratio of both gears", 0, 0.49, 0.3),
-    _number("density_kg_m3", "kg/m^3", "density, where masses come from the geometry", 500, 20000, 7850.0),
+    Parameter("teeth_driver", "", "teeth of the driving gear", 5, 400, 29, whole=True),
+    Parameter("teeth_driven", "", "teeth of the driven gear", 5, 400, 47, whole=True),
+    Parameter("module_mm", "mm", "module of both gears", 0.3, 30, 2.0),
+    Parameter("pressure_angle_deg", "deg", "pressure angle of the rack", 10, 30, 20.0),
+    Parameter("face_width_mm", "mm", "face width of both gears", 1, 500, 20.0),
+    Parameter("profile_shift_driver", "", "profile shift of the driver, in modules", -1, 1, 0.0),
+    Parameter("profile_shift_driven", "", "profile shift of the driven gear, in modules", -1, 1, 0.0),
+    Parameter("addendum", "", "addendum of both gears, in modules", 0.2, 2, 1.0),
+    Parameter("dedendum", "", "dedendum of both gears, in modules", 0.2, 2.5, 1.25),
+    Parameter("tool_tip_radius", "", "radius of the rack's tip, in modules; it makes the fillet", 0, 1, 0.38),
+    Parameter("centre_distance_mm", "mm", "centre distance; none: without backlash", 3, 12000, None),
+    Parameter("bore_radius_driver_mm", "mm", "bore radius; none: 0.35 of the root radius", 0.1, 5000, None),
+    Parameter("bore_radius_driven_mm", "mm", "bore radius; none: 0.35 of the root radius", 0.1, 5000, None),
+    Parameter("mass_driver_kg", "kg", "mass of the driver; none: of a disc with bore", 1e-3, 1e5, None),
+    Parameter("mass_driven_kg", "kg", "mass of the driven gear; none: of a disc with bore", 1e-3, 1e5, None),
+    Parameter("inertia_driver_kg_m2", "kg m^2", "moment of inertia; none: of a disc with bore", 1e-8, 1e5, None),
+    Parameter("inertia_driven_kg_m2", "kg m^2", "moment of inertia; none: of a disc with bore", 1e-8, 1e5, None),
+    Parameter("youngs_modulus_gpa", "GPa", "Young's modulus of both gears", 1, 500, 206.0),
+    Parameter("poisson_ratio", "", "Poisson's ratio of both gears", 0, 0.49, 0.3),
+    Parameter("density_kg_m3", "kg/m^3", "density, where masses come from the geometry", 500, 20000, 7850.0),
 )
 
 _MESH = (
-    _word(
+    Parameter.choice(
         "contact_law",
         "Hertz contact: constant stiffness or growing with the load",
         ("linear", "load-dependent"),
         "linear",
     ),
-    _number("mesh_ramp", "", "base pitches over which a tooth pair takes up its load", 0, 0.1, 0.05),
-    _number("mesh_damping_ratio", "", "damping ratio of the mesh on its mean stiffness", 0, 1, 0.06),
-    _number("half_backlash_um", "um", "half of the play along the line of action", 0, 2000, 20.0),
-    _number("tip_relief_um", "um", "metal taken off at the tips of both gears", 0, 500, 0.0),
-    _number("tip_relief_length_mm", "mm", "length of the relief along the line of action", 0.01, 100, 1.0),
-    _number(
+    Parameter("mesh_ramp", "", "base pitches over which a tooth pair takes up its load", 0, 0.1, 0.05),
+    Parameter("mesh_damping_ratio", "", "damping ratio of the mesh on its mean stiffness", 0, 1, 0.06),
+    Parameter("half_backlash_um", "um", "half of the play along the line of action", 0, 2000, 20.0),
+    Parameter("tip_relief_um", "um", "metal taken off at the tips of both gears", 0, 500, 0.0),
+    Parameter("tip_relief_length_mm", "mm", "length of the relief along the line of action", 0.01, 100, 1.0),
+    Parameter(
         "pitch_deviation_um", "um", "rms deviation of the teeth from their places, an ordinary tolerance", 0, 50, 0.0
     ),
-    _number("tolerance_seed", "", "which specimen: seed of the teeth's deviations", 0, 1e6, 0, whole=True),
-    _number("roughness_um", "um", "composite rms roughness of both flanks", 0, 5, 0.0),
-    _word("roughness_locked_to", "what the rough profile follows", ("flank", "time", "none"), "flank"),
-    _number("roughness_dimension", "", "fractal dimension of the rough profile", 1.001, 1.999, 1.5),
-    _word("friction", "sliding friction of the flanks", _SWITCH, "on"),
-    _number("friction_factor", "", "multiplies the coefficient of friction", 0, 20, 1.0),
-    _number(
+    Parameter("tolerance_seed", "", "which specimen: seed of the teeth's deviations", 0, 1e6, 0, whole=True),
+    Parameter("roughness_um", "um", "composite rms roughness of both flanks", 0, 5, 0.0),
+    Parameter.choice("roughness_locked_to", "what the rough profile follows", ("flank", "time", "none"), "flank"),
+    Parameter("roughness_dimension", "", "fractal dimension of the rough profile", 1.001, 1.999, 1.5),
+    Parameter.choice("friction", "sliding friction of the flanks", _SWITCH, "on"),
+    Parameter("friction_factor", "", "multiplies the coefficient of friction", 0, 20, 1.0),
+    Parameter(
         "dry_friction",
         "",
         "coefficient that is added at every sliding speed: starved flanks",
@@ -71,35 +61,35 @@ _MESH = (
         MAX_DRY_FRICTION,
         0.0,
     ),
-    _number("viscosity_cp", "cP", "dynamic viscosity of the oil at the inlet", 0.1, 1e4, 17.6),
+    Parameter("viscosity_cp", "cP", "dynamic viscosity of the oil at the inlet", 0.1, 1e4, 17.6),
 )
 
 _CRACK = (
-    _number("crack_depth_mm", "mm", "length of a root crack; 0: none", 0, 100, 0.0),
-    _number("crack_angle_deg", "deg", "between the crack and the tooth's centre line", 15, 90, 45.0),
-    _word("crack_gear", "gear with the crack", _SIDES, "driver"),
-    _number("crack_tooth", "", "tooth with the crack, from 1 at the mark", 1, 400, 1, whole=True),
-    _number("crack_width_percent", "%", "part of the face width that the crack covers", 1, 100, 100.0),
+    Parameter("crack_depth_mm", "mm", "length of a root crack; 0: none", 0, 100, 0.0),
+    Parameter("crack_angle_deg", "deg", "between the crack and the tooth's centre line", 15, 90, 45.0),
+    Parameter.choice("crack_gear", "gear with the crack", _SIDES, "driver"),
+    Parameter("crack_tooth", "", "tooth with the crack, from 1 at the mark", 1, 400, 1, whole=True),
+    Parameter("crack_width_percent", "%", "part of the face width that the crack covers", 1, 100, 100.0),
 )
 
 _SHAFTS = (
-    _number("runout_driver_um", "um", "eccentricity of the driver (half its run-out)", 0, 2000, 0.0),
-    _number("runout_driven_um", "um", "eccentricity of the driven gear (half its run-out)", 0, 2000, 0.0),
-    _number("runout_angle_driver_deg", "deg", "where the driver's eccentricity lies, from tooth 1", -360, 360, 0.0),
-    _number("runout_angle_driven_deg", "deg", "where the driven gear's eccentricity lies", -360, 360, 0.0),
-    _number("unbalance_driver_g_mm", "g mm", "unbalance of the driver", 0, 1e6, 0.0),
-    _number("unbalance_driven_g_mm", "g mm", "unbalance of the driven gear", 0, 1e6, 0.0),
-    _number("unbalance_angle_driver_deg", "deg", "where the driver's unbalance lies", -360, 360, 0.0),
-    _number("unbalance_angle_driven_deg", "deg", "where the driven gear's unbalance lies", -360, 360, 0.0),
-    _number("bending_stiffness_n_per_m", "N/m", "of each shaft, gear to bearings", 1e5, 1e12, 2e8),
-    _number("bending_damping_n_s_per_m", "N s/m", "of each shaft, gear to bearings", 0, 1e6, 600.0),
-    _number("torsional_stiffness_nm_per_rad", "N m/rad", "of each shaft, gear to rotor", 1, 1e9, 4e4),
-    _number("torsional_damping_nm_s_per_rad", "N m s/rad", "of each shaft, gear to rotor", 0, 1e5, 8.0),
-    _number("rotor_inertia_input_kg_m2", "kg m^2", "moment of inertia of the motor", 1e-7, 1e5, 2e-3),
-    _number("rotor_inertia_output_kg_m2", "kg m^2", "moment of inertia of the load", 1e-7, 1e5, 1e-2),
-    _number("bearing_distance_mm", "mm", "between the two bearings of a shaft", 5, 10000, 100.0),
-    _number("coupling_bending_nm_per_rad", "N m/rad", "of each coupling, about its stiff axis", 0, 1e7, 0.0),
-    _number(
+    Parameter("runout_driver_um", "um", "eccentricity of the driver (half its run-out)", 0, 2000, 0.0),
+    Parameter("runout_driven_um", "um", "eccentricity of the driven gear (half its run-out)", 0, 2000, 0.0),
+    Parameter("runout_angle_driver_deg", "deg", "where the driver's eccentricity lies, from tooth 1", -360, 360, 0.0),
+    Parameter("runout_angle_driven_deg", "deg", "where the driven gear's eccentricity lies", -360, 360, 0.0),
+    Parameter("unbalance_driver_g_mm", "g mm", "unbalance of the driver", 0, 1e6, 0.0),
+    Parameter("unbalance_driven_g_mm", "g mm", "unbalance of the driven gear", 0, 1e6, 0.0),
+    Parameter("unbalance_angle_driver_deg", "deg", "where the driver's unbalance lies", -360, 360, 0.0),
+    Parameter("unbalance_angle_driven_deg", "deg", "where the driven gear's unbalance lies", -360, 360, 0.0),
+    Parameter("bending_stiffness_n_per_m", "N/m", "of each shaft, gear to bearings", 1e5, 1e12, 2e8),
+    Parameter("bending_damping_n_s_per_m", "N s/m", "of each shaft, gear to bearings", 0, 1e6, 600.0),
+    Parameter("torsional_stiffness_nm_per_rad", "N m/rad", "of each shaft, gear to rotor", 1, 1e9, 4e4),
+    Parameter("torsional_damping_nm_s_per_rad", "N m s/rad", "of each shaft, gear to rotor", 0, 1e5, 8.0),
+    Parameter("rotor_inertia_input_kg_m2", "kg m^2", "moment of inertia of the motor", 1e-7, 1e5, 2e-3),
+    Parameter("rotor_inertia_output_kg_m2", "kg m^2", "moment of inertia of the load", 1e-7, 1e5, 1e-2),
+    Parameter("bearing_distance_mm", "mm", "between the two bearings of a shaft", 5, 10000, 100.0),
+    Parameter("coupling_bending_nm_per_rad", "N m/rad", "of each coupling, about its stiff axis", 0, 1e7, 0.0),
+    Parameter(
         "governor_nm_s_per_rad",
         "N m s/rad",
         "of the drive; it holds the mean speed; none: recovers in 0.06 s",
@@ -107,8 +97,8 @@ _SHAFTS = (
         1e5,
         None,
     ),
-    _number("gravity_mps2", "m/s^2", "gravity", 0, 100, 9.81),
-    _number(
+    Parameter("gravity_mps2", "m/s^2", "gravity", 0, 100, 9.81),
+    Parameter(
         "line_of_action_deg",
         "deg",
         "of the line of action to the vertical; none: centres side by side",
@@ -119,30 +109,30 @@ _SHAFTS = (
 )
 
 _BEARINGS = (
-    _number("bearing_stiffness_n_per_m", "N/m", "of each bearing, to the ground", 1e5, 1e12, 2e8),
-    _number("bearing_damping_n_s_per_m", "N s/m", "of each bearing, to the ground", 0, 1e6, 1500.0),
-    _number("bearing_mass_kg", "kg", "moving with each bearing", 1e-3, 1e4, 0.3),
-    _number("bearing_clearance_um", "um", "radial clearance of each bearing, half of the play", 0, 500, 0.0),
-    _number("n_balls", "", "rolling elements of each bearing", 3, 100, 9, whole=True),
-    _number("ball_diameter_mm", "mm", "diameter of the rolling elements", 0.5, 300, 7.94),
-    _number("ball_pitch_diameter_mm", "mm", "pitch diameter of the rolling elements", 2, 3000, 39.04),
-    _number("ball_contact_angle_deg", "deg", "contact angle of the bearings", 0, 60, 0.0),
+    Parameter("bearing_stiffness_n_per_m", "N/m", "of each bearing, to the ground", 1e5, 1e12, 2e8),
+    Parameter("bearing_damping_n_s_per_m", "N s/m", "of each bearing, to the ground", 0, 1e6, 1500.0),
+    Parameter("bearing_mass_kg", "kg", "moving with each bearing", 1e-3, 1e4, 0.3),
+    Parameter("bearing_clearance_um", "um", "radial clearance of each bearing, half of the play", 0, 500, 0.0),
+    Parameter("n_balls", "", "rolling elements of each bearing", 3, 100, 9, whole=True),
+    Parameter("ball_diameter_mm", "mm", "diameter of the rolling elements", 0.5, 300, 7.94),
+    Parameter("ball_pitch_diameter_mm", "mm", "pitch diameter of the rolling elements", 2, 3000, 39.04),
+    Parameter("ball_contact_angle_deg", "deg", "contact angle of the bearings", 0, 60, 0.0),
 )
 
 _CHAIN = (
-    _word(
+    Parameter.choice(
         "channels", "a1 and a2, vertical at bearings 1 and 3; or vertical and horizontal at all", ("two", "all"), "two"
     ),
-    _word("path_modes", "modes of the housing between bearing and sensor", _SWITCH, "on"),
-    _number("noise_mps2", "m/s^2", "vibration of the surroundings, rms in the band of the recording", 0, 1000, 0.05),
-    _number("noise_slope", "", "power density of it goes as 1/f^slope: 0 white, 1 pink, 2 red", -2, 3, 0.0),
-    _number("sensor_noise_mps2_per_sqrt_hz", "m/s^2/√Hz", "white noise of the accelerometers", 0, 10, 2e-4),
-    _number("sensor_resonance_hz", "Hz", "of the mounted accelerometers; 0: flat", 0, 1e5, 25000.0),
-    _number("sensor_bias_mps2", "m/s^2", "offset of the accelerometers at the recording's start", -1e3, 1e3, 0.0),
-    _number("sensor_drift_mps2_per_s", "m/s^2/s", "change of that offset, as from warming up", -1e3, 1e3, 0.0),
-    _number("sensor_range_mps2", "m/s^2", "range of accelerometers and converter, either way", 0.1, 1e6, 500.0),
-    _number("converter_bits", "", "bits of the converter", 8, 32, 24, whole=True),
-    _number(
+    Parameter.choice("path_modes", "modes of the housing between bearing and sensor", _SWITCH, "on"),
+    Parameter("noise_mps2", "m/s^2", "vibration of the surroundings, rms in the band of the recording", 0, 1000, 0.05),
+    Parameter("noise_slope", "", "power density of it goes as 1/f^slope: 0 white, 1 pink, 2 red", -2, 3, 0.0),
+    Parameter("sensor_noise_mps2_per_sqrt_hz", "m/s^2/√Hz", "white noise of the accelerometers", 0, 10, 2e-4),
+    Parameter("sensor_resonance_hz", "Hz", "of the mounted accelerometers; 0: flat", 0, 1e5, 25000.0),
+    Parameter("sensor_bias_mps2", "m/s^2", "offset of the accelerometers at the recording's start", -1e3, 1e3, 0.0),
+    Parameter("sensor_drift_mps2_per_s", "m/s^2/s", "change of that offset, as from warming up", -1e3, 1e3, 0.0),
+    Parameter("sensor_range_mps2", "m/s^2", "range of accelerometers and converter, either way", 0.1, 1e6, 500.0),
+    Parameter("converter_bits", "", "bits of the converter", 8, 32, 24, whole=True),
+    Parameter(
         "tachometer_pulses",
         "",
         "pulses per revolution of the input shaft, the first where tooth 1 comes in; 0: none",
@@ -151,8 +141,8 @@ _CHAIN = (
         1,
         whole=True,
     ),
-    _number("tachometer_jitter_us", "us", "standard deviation of the time of a pulse", 0, 1e4, 2.0),
-    _number(
+    Parameter("tachometer_jitter_us", "us", "standard deviation of the time of a pulse", 0, 1e4, 2.0),
+    Parameter(
         "encoder_counts",
         "",
         "counts per revolution of an angle channel of the input shaft; 0: none",
@@ -161,8 +151,8 @@ _CHAIN = (
         0,
         whole=True,
     ),
-    _number("hum_mps2", "m/s^2", "mains hum, peak of its first harmonic", 0, 1000, 0.0),
-    _number("hum_frequency_hz", "Hz", "frequency of the mains", 10, 400, 50.0),
+    Parameter("hum_mps2", "m/s^2", "mains hum, peak of its first harmonic", 0, 1000, 0.0),
+    Parameter("hum_frequency_hz", "Hz", "frequency of the mains", 10, 400, 50.0),
 )
 
 PARAMETERS: tuple[Parameter, ...] = (*_GEARS, *_MESH, *_CRACK, *_SHAFTS, *_BEARINGS, *_CHAIN)

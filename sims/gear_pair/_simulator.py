@@ -16,12 +16,10 @@ from sims.effects import EffectSetting, completed
 from sims.gear_pair._installed import Installed, installed_of
 from sims.machine import Machine, Operation
 from sims.presets import Preset, preset
+from sims.registry import HasText
 from sims.simulator import Model, Parameter, ParameterValue, Values, complete_values, truth_of
 
-# --------------------
 # What a simulated gear pair can be asked for: speeds, loads, sampling rates, durations.
-# --------------------
-
 
 SPEED_RANGE_RPM = (0.0, 30000.0)
 BREAKING_STRESS_PA = 2e9
@@ -208,6 +206,13 @@ class PairModel(Model, ABC, Generic[Ready]):
         """Build what is asked for."""
 
     @abstractmethod
+    def _run(self, ready: Ready, **asked: Any) -> Recording:
+        """Run a prepared pair and measure it; `asked` as of `record`, by name."""
+
+    @abstractmethod
+    def _converges(self, ready: Ready, rng: np.random.Generator) -> HasText:
+        """Compare a prepared pair's motion with that of smaller steps."""
+
     def record(
         self,
         ready: Ready,
@@ -234,3 +239,26 @@ class PairModel(Model, ABC, Generic[Ready]):
         noise_rng : numpy.random.Generator or None
             For the chain: the same machine with other noise.
         """
+        asked: dict[str, Any] = {} if step_s is None else {"step_s": step_s}
+        return self._run(
+            ready,
+            rng=rng,
+            rig=rig,
+            sampling_rate_hz=sampling_rate_hz,
+            duration_s=duration_s,
+            truth=ready.truth(),
+            noise_rng=noise_rng,
+            **asked,
+        )
+
+    def check_convergence(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        effects: Sequence[EffectSetting],
+        operation: Operation | None,
+        rng: np.random.Generator,
+        *,
+        preset: str = "",
+    ) -> HasText:
+        """Tell how far a smaller step of the integrator changes the result of this very machine."""
+        return self._converges(self.prepare(parameters, effects, operation, rng, preset_name=preset), rng)

@@ -26,12 +26,9 @@ from sims.presets import Preset, preset_text
 from sims.registry import sources_digest
 from sims.simulator import ParameterValue
 
-# --------------------
 # Parameters of a pair of which only the rig's data are known: the rest is usual for its size.
 #
 # Middles of the ranges from which gearboxes for calibrations are drawn. They are plausible, not measured.
-# --------------------
-
 
 RELIEF_SHARE, RELIEF_LENGTH_MODULES = 0.8, 1.1
 """Tip relief over the deflection under the nominal load; its length along the line of action."""

@@ -26,7 +26,7 @@ from sims.machine._nominal import (
     runout_tolerance_um,
     usual_mass_kg,
 )
-from sims.machine._operation import Operation, Profile, profile_value, set_speed
+from sims.machine._operation import Operation, Profile, profile_value, set_speed, torque_ripple
 
 __all__ = [
     "MAX_DRY_FRICTION",
@@ -54,5 +54,6 @@ __all__ = [
     "profile_value",
     "runout_tolerance_um",
     "set_speed",
+    "torque_ripple",
     "usual_mass_kg",
 ]

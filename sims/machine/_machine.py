@@ -11,10 +11,7 @@ from gearsig.rig import Bearing
 from sims.measure import MeasurementChain
 from sims.mesh import GearMesh
 
-# --------------------
 # The parts of a geared drive as every simulator of one sees them, with what can be wrong with each.
-# --------------------
-
 
 MAX_DRY_FRICTION = 0.6
 """Coefficient of clean dry steel on steel."""

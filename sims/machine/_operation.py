@@ -97,9 +97,7 @@ class Operation:
         return cls(Profile.constant(speed_rpm), Profile.constant(torque_nm))
 
 
-# --------------------
 # Compiled: set speed and torque over time.
-# --------------------
 
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
@@ -137,3 +135,12 @@ def set_speed(k, speed, t):
         factor += amplitude * sin(omega * t + phase)
         rate += amplitude * omega * cos(omega * t + phase)
     return value * factor, slope * factor + value * rate
+
+
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
+def torque_ripple(k, theta):
+    """Drive torque over its set value at the rotor's angle."""
+    factor = 1.0
+    for i in range(k.n_ripples):
+        factor += k.ripples[i, 1] * cos(k.ripples[i, 0] * theta + k.ripples[i, 2])
+    return factor

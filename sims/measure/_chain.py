@@ -17,9 +17,7 @@ from gearsig.rig import EncoderChannel, PulseTimes, Rig, SpeedSource, Tachometer
 from sims.measure._sensors import Accelerometer, ColouredNoise, Converter, MainsHum, ModalPath
 from sims.measure._tachometer import Encoder, PulseCounter, Tachometer, disc_edges, pulse_voltage
 
-# --------------------
 # What a simulator hands to the measurement chain.
-# --------------------
 
 
 @dataclass(frozen=True)
@@ -81,9 +79,7 @@ class Motion:
         return np.arange(self.n_steps) * self.step_s - start_s
 
 
-# --------------------
 # A model's parameters as plain values, for `Recording.truth`.
-# --------------------
 
 
 def plain(part: Any) -> Any:
@@ -97,10 +93,7 @@ def plain(part: Any) -> Any:
     return part
 
 
-# --------------------
 # Anti-alias filter and sampling: from the solver's grid to the recording's rate.
-# --------------------
-
 
 _LARGEST_TERM = 4096  # of the ratio of rates; beyond, the filter's table outgrows the signal
 

@@ -13,10 +13,7 @@ from numpy.typing import ArrayLike
 from gearsig.checks import FloatArray, closest_match_hint, not_negative, positive, within
 from gearsig.errors import InputError
 
-# --------------------
 # Linear systems on a solver's grid, exact for an input that runs straight from step to step.
-# --------------------
-
 
 Section = tuple[tuple[float, float, float], tuple[float, float, float]]
 """b and a of a second-order filter."""
@@ -233,9 +230,7 @@ class Converter:
         return steps * self.step_mps2
 
 
-# --------------------
 # Modal transfer path: from accelerations at bearings to the place where a sensor sits.
-# --------------------
 
 
 @dataclass(frozen=True)
@@ -330,9 +325,7 @@ def _gains(gains: Mapping[str, float]) -> dict[str, float]:
     return dict(gains)
 
 
-# --------------------
 # Compiled bank of second-order filters, side by side.
-# --------------------
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -367,9 +360,7 @@ def filter_bank(inputs, gains, b, a, out):  # type: ignore[no-untyped-def]
         out[t] += total
 
 
-# --------------------
 # Noise of a measurement chain: Gaussian, white or coloured.
-# --------------------
 
 
 @dataclass(frozen=True)
@@ -411,9 +402,7 @@ class ColouredNoise:
         return coloured
 
 
-# --------------------
 # Mains hum: pick-up from the electric supply.
-# --------------------
 
 
 @dataclass(frozen=True)

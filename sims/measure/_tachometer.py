@@ -70,9 +70,7 @@ def pulse_voltage(tacho: Tachometer, rising_s: FloatArray, falling_s: FloatArray
     return tacho.low_v + (tacho.high_v - tacho.low_v) * up
 
 
-# --------------------
 # Angle channels beside the voltage of a tachometer: pulses timed by a counter, and an encoder.
-# --------------------
 
 
 @dataclass(frozen=True)
@@ -151,9 +149,7 @@ class Encoder:
         return reading
 
 
-# --------------------
 # Where a simulated shaft passes the edges of a pulse disc.
-# --------------------
 
 
 def disc_edges(

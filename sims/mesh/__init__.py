@@ -1,6 +1,6 @@
 """Shared gear physics: involute geometry and mesh stiffness of spur pairs."""
 
-from sims.mesh._deviation import FlankDeviation, pitch_separation_m, wear_profile
+from sims.mesh._deviation import FlankDeviation, wear_profile
 from sims.mesh._faults import (
     RootCrack,
     ToothChip,
@@ -45,6 +45,7 @@ from sims.mesh._mesh_stiffness import (
     LoadSharing,
     MeshStiffness,
     MeshTable,
+    ToothRows,
     back_stiffness_n_per_m,
     cubic,
     engagement,
@@ -54,8 +55,9 @@ from sims.mesh._mesh_stiffness import (
     one_mesh_cycle,
     pair_force,
     pair_states,
-    separation_rows,
+    separation_table,
     share_torque,
+    tooth_rows,
 )
 from sims.mesh._pair import PairGeometry, arc_length_mm, curvature_radius_mm, flank_length_mm, part_inside
 from sims.mesh._roughness import FlankRoughness, FractalSurface, TimeLockedRoughness, advance, height_now
@@ -93,6 +95,7 @@ __all__ = [
     "TimeLockedRoughness",
     "ToothChip",
     "ToothFaults",
+    "ToothRows",
     "ToothSpall",
     "advance",
     "arc_length_mm",
@@ -135,13 +138,13 @@ __all__ = [
     "pair_force",
     "pair_states",
     "part_inside",
-    "pitch_separation_m",
     "reduced_modulus_pa",
     "root_half_angle_rad",
-    "separation_rows",
+    "separation_table",
     "share_torque",
     "spans_face",
     "tooth_compliance",
     "tooth_outline_mm",
+    "tooth_rows",
     "wear_profile",
 ]

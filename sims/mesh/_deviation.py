@@ -93,10 +93,7 @@ def pitch_separation_m(gear: GearGeometry, deviation: FlankDeviation) -> FloatAr
     return np.asarray(deviation.pitch_um, dtype=np.float64) * 1e-6
 
 
-# --------------------
 # Wear of all flanks of a gear by sliding.
-# --------------------
-
 
 MIN_RADIUS = 0.1
 """In modules: below this radius of curvature specific sliding no longer grows, as the zone of contact is wider."""

@@ -157,10 +157,7 @@ def _angle_rad(angle_deg: float) -> float:
     return radians(within(angle_deg, "angle_deg of the crack", 15.0, 90.0, "°"))
 
 
-# --------------------
 # A spall: metal broken out of one flank, below the zone of contact.
-# --------------------
-
 
 LARGEST_PART = 0.9
 """Greatest part of the face width that damage may take if it does not take all: what is left must carry the load."""
@@ -303,10 +300,7 @@ def _ends_mm(pair: PairGeometry, side: int, spall: ToothSpall) -> tuple[float, f
     return middle - spall.length_mm / 2.0, middle + spall.length_mm / 2.0
 
 
-# --------------------
 # A chipped tooth: a piece broken off its tip.
-# --------------------
-
 
 GAP_M = 0.3e-3
 """Separation beyond the edge of a chip over the whole face: many times the deflection of a loaded pair."""

@@ -185,10 +185,7 @@ def _checked(value: ArrayLike, name: str, *, signed: bool = False, above_zero: b
     return array
 
 
-# --------------------
 # Compiled friction of one line contact, for right-hand sides; `sims.mesh` states the formulas and units.
-# --------------------
-
 
 B1, B2, B3, B4, B5 = -8.916465, 1.03303, 1.036077, -0.354068, 2.812084
 B6, B7, B8, B9 = -0.100601, 0.752755, -0.390958, 0.620305
@@ -270,10 +267,7 @@ def contact_friction_n(  # type: ignore[no-untyped-def]
     return mu * normal_force_n * smooth_sign(sliding + vibration_mps, threshold_mps)
 
 
-# --------------------
 # Friction of each tooth pair over the mesh at a steady load and speed.
-# --------------------
-
 
 MIN_RADIUS = 1e-3
 """In modules: radius of curvature below which a contact, on the base circle, is taken as this curved."""

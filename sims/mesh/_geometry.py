@@ -12,9 +12,7 @@ import numpy as np
 from gearsig.checks import FloatArray, count, not_negative, positive, within
 from gearsig.errors import InputError
 
-# --------------------
 # The involute function and its inverse.
-# --------------------
 
 
 def involute(pressure_angle_rad: FloatArray | float) -> FloatArray:
@@ -263,11 +261,9 @@ def disc_inertia_kg_m2(gear: GearGeometry, density_kg_m3: float = 7850.0) -> flo
     return disc_mass_kg(gear, density_kg_m3) * square_m2 / 2.0
 
 
-# --------------------
 # The true outline of half a tooth: trochoid fillet from the root circle, then involute to the tip.
 #
 # Axes of a tooth: x along its centre line, outwards from the gear's centre; y across, positive to the loaded flank.
-# --------------------
 
 
 class Outline(NamedTuple):
@@ -372,9 +368,7 @@ def _round_offset_mm(gear: GearGeometry) -> float:
     return m * (pi / 4.0 + depth * tan(alpha) + gear.tool_tip_radius / cos(alpha))
 
 
-# --------------------
 # What the gears are made of.
-# --------------------
 
 
 @dataclass(frozen=True)

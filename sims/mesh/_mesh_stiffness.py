@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -16,16 +17,22 @@ from sims.mesh._pair import arc_length_mm, contact_ends_mm
 from sims.mesh._roughness import FlankRoughness
 from sims.mesh._stiffness import GearMesh
 
-# --------------------
-# Metal missing on the flanks of each tooth, over the path of contact.
-# --------------------
 
+def separation_table(mesh: GearMesh, progress: FloatArray) -> tuple[ToothRows, FloatArray]:
+    """Metal missing on the flanks of each tooth along the line of action over ζ, and pitch deviations, (2, z), in m.
 
-def separation_rows(mesh: GearMesh, number: int, progress: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Rows of separation of one gear over ζ, in m, and the row of each tooth.
-
-    Row 0 is an ordinary tooth; each faulty tooth has a row of its own. With roughness, row i is tooth i.
+    It is below 0 where metal stands out. The first row of a gear is an ordinary tooth: tip relief, profile deviation,
+    wear; each tooth with a damaged flank has a row of its own. With roughness, row i is tooth i.
     """
+    rows = tooth_rows(_separation_rows(mesh, 1, progress), _separation_rows(mesh, 2, progress))
+    pitch_m = np.zeros(rows.of.shape)
+    for row, side in enumerate((mesh.side(1), mesh.side(2))):
+        pitch_m[row, : side.gear.teeth] = pitch_separation_m(side.gear, side.flank)
+    return rows, pitch_m
+
+
+def _separation_rows(mesh: GearMesh, number: int, progress: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Rows of one gear, and the row of each tooth."""
     side, rho = mesh.side(number), mesh.roll_length_mm(number, progress)
     ordinary = _ordinary(mesh, number, progress)
     n_teeth = side.gear.teeth
@@ -67,35 +74,60 @@ def _ordinary(mesh: GearMesh, number: int, progress: FloatArray) -> FloatArray:
     return result
 
 
-# --------------------
-# The mesh as arrays over its progress, which compiled code reads while it integrates.
-# --------------------
+class ToothRows(NamedTuple):
+    """Curves of single teeth over ζ, those of the driver's teeth first, as compiled code reads them.
+
+    Attributes
+    ----------
+    rows : array, (n_rows, n, ...)
+    of : int array, (2, z)
+        Row of each tooth of the driver and of the driven gear; z is the greater number of teeth.
+    n_driver : int
+        Rows of the driver.
+    """
+
+    rows: FloatArray
+    of: NDArray[np.int64]
+    n_driver: int
+
+    def gear(self, number: int) -> FloatArray:
+        """Rows of the driver (1) or the driven gear (2)."""
+        return self.rows[: self.n_driver] if number == 1 else self.rows[self.n_driver :]
+
+
+def tooth_rows(
+    driver: tuple[FloatArray, NDArray[np.int64]],
+    driven: tuple[FloatArray, NDArray[np.int64]],
+    *,
+    share_first: bool = False,
+) -> ToothRows:
+    """Put the rows of both gears, each with the row of its teeth, together; `share_first`: row 0 is that of both."""
+    (first, of_1), (second, of_2) = driver, driven
+    of = np.zeros((2, max(len(of_1), len(of_2))), dtype=np.int64)
+    of[0, : len(of_1)] = of_1
+    if share_first:
+        second, of_2 = second[1:], np.where(of_2 > 0, of_2 - 1, -len(first))
+    of[1, : len(of_2)] = of_2 + len(first)
+    return ToothRows(np.ascontiguousarray(np.concatenate((first, second))), of, len(first))
 
 
 @dataclass(frozen=True)
 class MeshTable:
     """Compliance and separation of a tooth pair over ζ, base pitches since its ideal entry.
 
-    A pair made of tooth i of the driver and tooth j of the driven gear has the compliance
-    compliance_1[variant_1[i]] + compliance_2[variant_2[j]] + that of the contact, and the separation
-    separation_1_m[surface_1[i]] + separation_2_m[surface_2[j]] + pitch_1_m[i] + pitch_2_m[j].
+    A pair made of tooth i of the driver and tooth j of the driven gear has the sums of both teeth's compliance,
+    separation and pitch deviation, and the compliance of the contact besides.
 
     Parameters
     ----------
     start, step : float
         ζ of the first column and between columns; one column lies beyond either end, for cubic interpolation. All
         rows share the columns: n = `n_points` + 2.
-    compliance_1, compliance_2 : arrays, (n_variants, n)
-        Tooth and foundation of either gear, m/N. Row 0 is a healthy tooth, each further row a faulty one.
-    variant_1, variant_2 : int arrays, (z,)
-        Row of `compliance_1`, `compliance_2` for each tooth.
-    separation_1_m, separation_2_m : arrays, (n_surfaces, n)
-        Metal missing on the flank of either gear along the line of action, below 0 where metal stands out. Row 0 is an
-        ordinary tooth of the gear: tip relief, profile deviation, wear. Further rows belong to teeth whose flank is
-        damaged. A gear with roughness of its own has a row for each tooth, row 0 being that of tooth 0.
-    surface_1, surface_2 : int arrays, (z,)
-        Row of `separation_1_m`, `separation_2_m` for each tooth.
-    pitch_1_m, pitch_2_m : arrays, (z,)
+    compliance : ToothRows
+        Tooth and foundation, m/N. The first row of a gear is a healthy tooth, each further row a faulty one.
+    separation : ToothRows
+        m; see `separation_table`.
+    pitch_m : array, (2, z)
         Cumulative pitch deviation of each tooth; not in the rows above.
     contact_coefficient : float
         m/N, or m/N^0.9 if `load_dependent`.
@@ -107,25 +139,20 @@ class MeshTable:
         Base pitches over which a pair takes up and gives up its stiffness, centred on ζ = 0 and ζ = ε.
     n_slots : int
         Most pairs that carry load at once.
+    teeth : (int, int)
     """
 
     start: float
     step: float
-    compliance_1: FloatArray
-    compliance_2: FloatArray
-    variant_1: NDArray[np.int64]
-    variant_2: NDArray[np.int64]
-    separation_1_m: FloatArray
-    separation_2_m: FloatArray
-    surface_1: NDArray[np.int64]
-    surface_2: NDArray[np.int64]
-    pitch_1_m: FloatArray
-    pitch_2_m: FloatArray
+    compliance: ToothRows
+    separation: ToothRows
+    pitch_m: FloatArray
     contact_coefficient: float
     load_dependent: bool
     contact_ratio: float
     ramp: float
     n_slots: int
+    teeth: tuple[int, int]
 
 
 def mesh_table(mesh: GearMesh, n_points: int = 512) -> MeshTable:
@@ -143,28 +170,19 @@ def mesh_table(mesh: GearMesh, n_points: int = 512) -> MeshTable:
     low, high = -mesh.ramp / 2.0, mesh.pair.contact_ratio + mesh.ramp / 2.0
     step = (high - low) / (n - 1)
     progress = low + step * np.arange(-1, n + 1)
-    rows_1, variant_1 = _compliance_rows(mesh, 1, progress)
-    rows_2, variant_2 = _compliance_rows(mesh, 2, progress)
-    flanks_1, surface_1 = separation_rows(mesh, 1, progress)
-    flanks_2, surface_2 = separation_rows(mesh, 2, progress)
+    separation, pitch_m = separation_table(mesh, progress)
     return MeshTable(
         start=low - step,
         step=step,
-        compliance_1=rows_1,
-        compliance_2=rows_2,
-        variant_1=variant_1,
-        variant_2=variant_2,
-        separation_1_m=flanks_1,
-        separation_2_m=flanks_2,
-        surface_1=surface_1,
-        surface_2=surface_2,
-        pitch_1_m=pitch_separation_m(mesh.pair.driver, mesh.flank_1),
-        pitch_2_m=pitch_separation_m(mesh.pair.driven, mesh.flank_2),
+        compliance=tooth_rows(_compliance_rows(mesh, 1, progress), _compliance_rows(mesh, 2, progress)),
+        separation=separation,
+        pitch_m=pitch_m,
         contact_coefficient=mesh.contact_coefficient,
         load_dependent=mesh.contact_law == "load-dependent",
         contact_ratio=mesh.pair.contact_ratio,
         ramp=mesh.ramp,
         n_slots=mesh.n_slots,
+        teeth=(mesh.pair.driver.teeth, mesh.pair.driven.teeth),
     )
 
 
@@ -328,16 +346,12 @@ def pair_states(table: MeshTable, mesh_cycles: FloatArray) -> tuple[FloatArray, 
         np.ascontiguousarray(mesh_cycles, dtype=np.float64),
         table.start,
         table.step,
-        table.compliance_1,
-        table.compliance_2,
-        table.variant_1,
-        table.variant_2,
-        table.separation_1_m,
-        table.separation_2_m,
-        table.surface_1,
-        table.surface_2,
-        table.pitch_1_m,
-        table.pitch_2_m,
+        np.array(table.teeth),
+        table.compliance.rows,
+        table.compliance.of,
+        table.separation.rows,
+        table.separation.of,
+        table.pitch_m,
         table.contact_ratio,
         table.ramp,
         compliance,
@@ -365,9 +379,7 @@ def _tangents(table: MeshTable, compliance: FloatArray, weight: FloatArray, forc
     return np.where(carrying, weight / (compliance + contact), 0.0)
 
 
-# --------------------
 # Compiled: what each pair carries. Imported only where it is used, since it loads the compiler.
-# --------------------
 
 
 @njit(cache=True)
@@ -494,16 +506,12 @@ def fill_pairs(
     mesh_cycles: FloatArray,
     start: float,
     step: float,
-    rows_1: FloatArray,
-    rows_2: FloatArray,
-    variant_1: FloatArray,
-    variant_2: FloatArray,
-    separation_1: FloatArray,
-    separation_2: FloatArray,
-    surface_1: FloatArray,
-    surface_2: FloatArray,
-    pitch_1: FloatArray,
-    pitch_2: FloatArray,
+    teeth: NDArray[np.int64],
+    curves: FloatArray,
+    of: NDArray[np.int64],
+    flanks: FloatArray,
+    flank_of: NDArray[np.int64],
+    pitch: FloatArray,
     contact_ratio: float,
     ramp: float,
     compliance: FloatArray,
@@ -516,12 +524,12 @@ def fill_pairs(
         for j in range(compliance.shape[1]):
             k = newest - j
             progress = mesh_cycles[row] - k
-            tooth_1, tooth_2 = k % variant_1.size, k % variant_2.size
-            compliance[row, j] = cubic(rows_1[variant_1[tooth_1]], start, step, progress) + cubic(
-                rows_2[variant_2[tooth_2]], start, step, progress
+            one, two = k % teeth[0], k % teeth[1]
+            compliance[row, j] = cubic(curves[of[0, one]], start, step, progress) + cubic(
+                curves[of[1, two]], start, step, progress
             )
-            flanks = cubic(separation_1[surface_1[tooth_1]], start, step, progress) + cubic(
-                separation_2[surface_2[tooth_2]], start, step, progress
+            missing = cubic(flanks[flank_of[0, one]], start, step, progress) + cubic(
+                flanks[flank_of[1, two]], start, step, progress
             )
-            separation[row, j] = flanks + pitch_1[tooth_1] + pitch_2[tooth_2]
+            separation[row, j] = missing + pitch[0, one] + pitch[1, two]
             weight[row, j] = engagement(progress, contact_ratio, ramp)

@@ -182,10 +182,7 @@ def _roll_length_mm(gear: GearGeometry, radius_mm: float) -> float:
     return sqrt(radius_mm**2 - gear.base_radius_mm**2)
 
 
-# --------------------
 # Places on a flank: roll length, arc length, and how far a zone of contact reaches.
-# --------------------
-
 
 WORKING_PRESSURE_PA = 1e9
 """Hertz pressure for which the width of the contact is taken where a table cannot know the load: that of gears well

@@ -224,9 +224,7 @@ def _phases(phases_rad: FloatArray, ndim: int, n_lines: int) -> FloatArray:
     return phases
 
 
-# --------------------
 # Compiled roughness for right-hand sides: phasors stepped in time, tables looked up on the flank.
-# --------------------
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]

@@ -37,10 +37,7 @@ from sims.mesh._geometry import (
 from sims.mesh._pair import WORKING_PRESSURE_PA, PairGeometry, contact_half_width_mm
 from sims.mesh._roughness import FlankRoughness
 
-# --------------------
 # Compliance of one tooth as a cantilever: bending, shear and axial compression along its true outline.
-# --------------------
-
 
 SHEAR_FACTOR = 1.2
 """Of a rectangular section."""
@@ -195,10 +192,7 @@ def _gauss(n: int) -> tuple[FloatArray, FloatArray]:
     return (x + 1.0) / 2.0, w / 2.0
 
 
-# --------------------
 # Compliance of the contact itself.
-# --------------------
-
 
 CONTACT_LAWS = ("linear", "load-dependent")
 
@@ -226,10 +220,7 @@ def load_dependent_contact_coefficient(one: Material, two: Material, face_width_
     return float(1.275 / (e**0.9 * face_width_m**0.8))
 
 
-# --------------------
 # Compliance of the gear body below a tooth: fillet foundation.
-# --------------------
-
 
 _COEFFICIENTS = np.array(
     [

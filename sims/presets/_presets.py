@@ -201,9 +201,7 @@ def _check_keys(table: Mapping[str, Any], keys: tuple[str, ...], where: str, opt
         raise InputError(f"{', '.join(missing)} must be given", where=where)
 
 
-# --------------------
 # Writes a preset as a file that `read_preset` reads back to the same machine.
-# --------------------
 
 
 def preset_text(preset: Preset, comments: Sequence[str] = ()) -> str:

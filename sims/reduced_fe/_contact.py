@@ -20,10 +20,11 @@ from sims.mesh import (
     SOUND,
     GearMesh,
     PairGeometry,
+    ToothRows,
     load_dependent_contact_coefficient,
     one_mesh_cycle,
-    pitch_separation_m,
-    separation_rows,
+    separation_table,
+    tooth_rows,
 )
 from sims.reduced_fe._crack import crack_added_m_per_n
 from sims.reduced_fe._reduced_gear import ReducedGear
@@ -161,13 +162,11 @@ class ContactTable:
         Between a pair at ζ (first slice) and the pair that entered o + 1 pitches earlier (second), m/N.
     corner_m : array, (n,)
         Separation of unloaded perfect flanks.
-    extra_1, extra_2 : arrays, (n_variants, n, n_slices, n_slices)
-        What faulty teeth add to the compliance between their slices; row 0, of healthy teeth, is 0.
-    variant_1, variant_2 : int arrays, (z,)
-    separation_1_m, separation_2_m : arrays, (n_surfaces, n)
-        Metal missing on the flanks, see `sims.mesh.MeshTable`.
-    surface_1, surface_2 : int arrays, (z,)
-    pitch_1_m, pitch_2_m : arrays, (z,)
+    extra : ToothRows, (n_rows, n, n_slices, n_slices)
+        What faulty teeth add to the compliance between their slices; row 0, of healthy teeth of both gears, is 0.
+    separation : ToothRows
+    pitch_m : array, (2, z)
+        See `sims.mesh.separation_table`.
     lead_m : array, (n_slices,)
         Separation of each slice by misaligned axes, its least being 0.
     hertz : array, (n_slices,)
@@ -180,16 +179,9 @@ class ContactTable:
     own: FloatArray
     cross: FloatArray
     corner_m: FloatArray
-    extra_1: FloatArray
-    extra_2: FloatArray
-    variant_1: NDArray[np.int64]
-    variant_2: NDArray[np.int64]
-    separation_1_m: FloatArray
-    separation_2_m: FloatArray
-    surface_1: NDArray[np.int64]
-    surface_2: NDArray[np.int64]
-    pitch_1_m: FloatArray
-    pitch_2_m: FloatArray
+    extra: ToothRows
+    separation: ToothRows
+    pitch_m: FloatArray
     lead_m: FloatArray
     hertz: FloatArray
 
@@ -216,23 +208,9 @@ class ContactTable:
     @property
     def arrays(self) -> tuple[FloatArray | NDArray[np.int64], ...]:
         """In the order in which kernels take them; one of each kind for both gears, the driver's rows first."""
-        n1 = len(self.extra_1) - 1, len(self.separation_1_m)  # healthy teeth of both gears share row 0
-        rows = np.zeros((4, max(len(self.variant_1), len(self.variant_2))), dtype=np.int64)
-        pitch = np.zeros((2, rows.shape[1]))
-        for i, values in enumerate(
-            (
-                self.variant_1,
-                np.where(self.variant_2 > 0, self.variant_2 + n1[0], 0),
-                self.surface_1,
-                self.surface_2 + n1[1],
-            )
-        ):
-            rows[i, : len(values)] = values
-        for i, places in enumerate((self.pitch_1_m, self.pitch_2_m)):
-            pitch[i, : len(places)] = places
-        extra = np.ascontiguousarray(np.concatenate((self.extra_1, self.extra_2[1:])))
-        separation = np.ascontiguousarray(np.vstack((self.separation_1_m, self.separation_2_m)))
-        return self.own, self.cross, self.corner_m, extra, separation, rows, pitch, self.lead_m, self.hertz
+        of = np.vstack((self.extra.of, self.separation.of))
+        extra, separation = self.extra.rows, self.separation.rows
+        return self.own, self.cross, self.corner_m, extra, separation, of, self.pitch_m, self.lead_m, self.hertz
 
 
 def contact_table(
@@ -267,7 +245,7 @@ def contact_table(
     places = np.linspace(0.0, 1.0, len(gears[0].grid.z_m))
     lead = 1e-6 * abs(lead_um) * (places if lead_um >= 0.0 else 1.0 - places)
     faults = [fault_compliance_rows(gears[side - 1], mesh, side, inside) for side in (1, 2)]
-    flanks = [separation_rows(mesh, side, inside) for side in (1, 2)]
+    separation, pitch_m = separation_table(mesh, inside)
     whole = load_dependent_contact_coefficient(mesh.material_1, mesh.material_2, mesh.face_width_m)
     return ContactTable(
         start=-MARGIN,
@@ -276,16 +254,9 @@ def contact_table(
         own=own,
         cross=cross,
         corner_m=corner_separation_m(mesh.pair, progress),
-        extra_1=faults[0][0],
-        extra_2=faults[1][0],
-        variant_1=faults[0][1],
-        variant_2=faults[1][1],
-        separation_1_m=flanks[0][0],
-        separation_2_m=flanks[1][0],
-        surface_1=flanks[0][1],
-        surface_2=flanks[1][1],
-        pitch_1_m=pitch_separation_m(mesh.pair.driver, mesh.flank_1),
-        pitch_2_m=pitch_separation_m(mesh.pair.driven, mesh.flank_2),
+        extra=tooth_rows(*faults, share_first=True),
+        separation=separation,
+        pitch_m=pitch_m,
         lead_m=lead,
         # An evenly loaded pair yields as the whole width does: h(N_s) = B (n N_s)^0.9.
         hertz=np.full(len(lead), whole * len(lead) ** 0.9),
@@ -386,7 +357,7 @@ def mirrors(table: ContactTable) -> bool:
         return False
     return all(
         bool(np.max(np.abs(c - c[..., ::-1, ::-1])) <= ALIKE * np.max(np.abs(table.own)))
-        for c in (table.own, table.cross, table.extra_1, table.extra_2)
+        for c in (table.own, table.cross, table.extra.rows)
     )
 
 
@@ -406,8 +377,7 @@ def folded(table: ContactTable) -> ContactTable:
         table,
         own=grouped(table.own),
         cross=grouped(table.cross),
-        extra_1=grouped(table.extra_1),
-        extra_2=grouped(table.extra_2),
+        extra=table.extra._replace(rows=grouped(table.extra.rows)),
         lead_m=np.zeros(len(size)),
         hertz=table.hertz @ mean * size**-0.9,
     )
@@ -835,9 +805,9 @@ def _separations(table: ContactTable, mesh: GearMesh, cycles: FloatArray) -> Flo
         progress = cycles - pair
         inside = progress <= table.progress[-1]
         one, two = (np.mod(pair[inside], z).astype(int) for z in teeth_of(mesh))
-        total = table.pitch_1_m[one] + table.pitch_2_m[two]
-        for i, (a, b) in enumerate(zip(table.surface_1[one], table.surface_2[two], strict=True)):
-            whole = table.corner_m + table.separation_1_m[a] + table.separation_2_m[b]
+        total = table.pitch_m[0, one] + table.pitch_m[1, two]
+        for i, (a, b) in enumerate(zip(table.separation.of[0, one], table.separation.of[1, two], strict=True)):
+            whole = table.corner_m + table.separation.rows[a] + table.separation.rows[b]
             total[i] += np.interp(progress[inside][i], table.progress, whole)
         apart[inside, slot] = total
     return apart

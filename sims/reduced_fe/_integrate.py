@@ -28,7 +28,7 @@ from numba import njit
 from gearsig.checks import FloatArray, one_of, positive
 from sims.compiled import UNCOUNTED
 from sims.gear_pair import foot
-from sims.machine import profile_value, set_speed
+from sims.machine import profile_value, set_speed, torque_ripple
 from sims.mesh import contact_friction_n
 from sims.reduced_fe._contact import (
     FAST,
@@ -129,7 +129,7 @@ def outer_forces(k, inputs, q, v, angle, omega, rate, load, out):
     """Fill `out` with drive and load, the turning set speed, unbalance and weight, rolling elements."""
     for side in range(2):
         if side == 0:
-            drive = load * _ripple(k, angle + on_input(inputs, 0, 0, q)) + k.total_inertia * rate
+            drive = load * torque_ripple(k, angle + on_input(inputs, 0, 0, q)) + k.total_inertia * rate
             drive -= k.governor * on_input(inputs, 0, 0, v) + k.governor_spring * on_input(inputs, 0, 0, q)
         else:
             drive = -load * k.ratio
@@ -161,15 +161,6 @@ def friction_of_pair(k, force, progress, omega, slip_x):
         k.dry_friction,
     )
     return rubbing, rubbing * rho_1, rubbing * rho_2
-
-
-@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
-def _ripple(k, theta):
-    """Drive torque over its set value."""
-    factor = 1.0
-    for i in range(k.n_ripples):
-        factor += k.ripples[i, 1] * cos(k.ripples[i, 0] * theta + k.ripples[i, 2])
-    return factor
 
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)

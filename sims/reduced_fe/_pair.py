@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from math import cos, pi, radians, sin
+from math import cos, pi, sin
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,13 +14,12 @@ from gearsig.checks import FloatArray, positive, within
 from gearsig.errors import InputError
 from sims.gear_pair import (
     BEARING_FIELDS,
-    DRIVE_FIELDS,
-    DRIVE_SCALARS,
-    FRICTION_SCALARS,
+    FRICTION_FIELDS,
+    MACHINE_FIELDS,
     bearing_fields,
     bearing_loads_n,
-    drive_fields,
     friction_fields,
+    machine_fields,
 )
 from sims.machine import BearingSupport, Machine, Operation
 from sims.mesh import PairGeometry, one_mesh_cycle
@@ -489,37 +488,18 @@ _SCALARS = (
     "column_step",
     "small",
     "nominal_force",
-    "cycles_per_rad",
     "damping_time",
-    "backlash",
     "back_stiffness",
     "restitution",
-    "gravity_x",
-    "gravity_y",
-    *DRIVE_SCALARS,
     "nominal_torque",
-    "contact_ratio",
-    *FRICTION_SCALARS,
-)
-_PER_SIDE = (
-    "teeth",
-    "mass",
-    "unbalance",
-    "mass_angle",
-    "runout",
-    "runout_angle",
-    "torsional_stiffness",
-    "torsional_damping",
-    "hooke",
-    "hooke_force",
-    "coupling_bending",
 )
 RECORD = np.dtype(
     [(name, np.float64) for name in _SCALARS]
-    + [(name, np.float64, (2,)) for name in _PER_SIDE]
-    + [(name, np.bool_) for name in ("pushes", "rolls", "friction", "moving_force")]
+    + [(name, np.float64, (2,)) for name in ("teeth", "unbalance")]
+    + [(name, np.bool_) for name in ("pushes", "rolls", "moving_force")]
     + [("n_single", np.int64), ("n_pairs", np.int64)]
-    + DRIVE_FIELDS
+    + MACHINE_FIELDS
+    + FRICTION_FIELDS
     + ROLLING_FIELDS,
     align=True,
 )
@@ -631,42 +611,28 @@ def constants(
         build_side, machine, table=table, groups=groups, body_damping_ratio=pair.body_damping_ratio, loads_n=loads
     )
     sides = _padded([make(i, gear=pair.gears[i], kept=kept[i]) for i in (0, 1)])
-    beta = radians(machine.line_of_action_deg)
-    wheels, shafts = machine.wheels, machine.shafts
-    hooke = np.array([radians(s.coupling_angle_deg) for s in shafts])
+    wheels = machine.wheels
     nominal = force / table.n_slices
     values: dict[str, Any] = {
         "start": table.start,
         "column_step": table.step,
         "small": SMALL_PART * nominal,
         "nominal_force": nominal,
-        "cycles_per_rad": mesh.pair.driver.teeth / (2.0 * pi),
-        "backlash": 2e-6 * machine.half_backlash_um,
         "back_stiffness": stiffness,
         "restitution": -1.0 if pair.restitution is None else pair.restitution,
-        "gravity_x": -machine.gravity_mps2 * sin(beta),
-        "gravity_y": -machine.gravity_mps2 * cos(beta),
         "teeth": teeth_of(mesh),
-        "mass": [w.mass_kg for w in wheels],
         "unbalance": [w.unbalance_g_mm * 1e-6 for w in wheels],
-        "mass_angle": np.radians([w.unbalance_angle_deg for w in wheels]),
-        "runout": [w.runout_um * 1e-6 for w in wheels],
-        "runout_angle": np.radians([w.runout_angle_deg for w in wheels]),
-        "torsional_stiffness": [s.torsional_stiffness_nm_per_rad for s in shafts],
-        "torsional_damping": [s.torsional_damping_nm_s_per_rad for s in shafts],
-        "hooke": hooke**2 / 4.0,
-        "hooke_force": hooke / np.array([2.0 * s.bearing_distance_m for s in shafts]),
-        "coupling_bending": [s.coupling_bending_nm_per_rad for s in shafts],
-        "pushes": machine.gravity_mps2 > 0.0 or bool(hooke.any()) or any(w.unbalance_g_mm > 0.0 for w in wheels),
+        "pushes": machine.gravity_mps2 > 0.0
+        or any(s.coupling_angle_deg != 0.0 for s in machine.shafts)
+        or any(w.unbalance_g_mm > 0.0 for w in wheels),
         "rolls": any(b.defect is not None or b.clearance_um > 0.0 for b in machine.bearings),
         "moving_force": moving_force,
         "nominal_torque": force * base[0],
-        "contact_ratio": mesh.pair.contact_ratio,
         "n_single": sides[0].n_single,
         "n_pairs": sides[0].n_pairs,
     }
     record = np.zeros((), RECORD)
-    values |= drive_fields(machine) | friction_fields(machine, operation, force)
+    values |= machine_fields(machine) | friction_fields(machine, operation, force)
     values |= rolling_fields(machine, operation, force, loads, np.random.default_rng(0) if rng is None else rng)
     for name, value in values.items():
         record[name] = value

@@ -13,7 +13,7 @@ from gearsig.checks import positive
 from gearsig.errors import InputError
 from gearsig.recording import Recording
 from gearsig.rig import Rig
-from sims.effects import EffectSetting, effects, with_effects
+from sims.effects import effects, with_effects
 from sims.gear_pair import (
     PARAMETERS as SHARED,
 )
@@ -69,29 +69,25 @@ _CHANGED = {
 }
 
 
-def _number(name: str, unit: str, meaning: str, low: float, high: float, default: float | None) -> Parameter:
-    return Parameter(name, unit, meaning, low, high, default)
-
-
 def _bodies() -> tuple[Parameter, ...]:
     found: list[Parameter] = []
     for side, whose in (("driver", "the driver"), ("driven", "the driven gear")):
         found += [
-            _number(f"web_thickness_{side}_mm", "mm", f"web of {whose}; none: a full disc", 0.1, 500, None),
-            _number(f"rim_thickness_{side}_mm", "mm", f"rim of {whose}; none: 3 modules", 0.1, 500, None),
-            _number(f"hub_thickness_{side}_mm", "mm", f"hub of {whose}; none: 3 modules", 0.1, 500, None),
-            _number(
+            Parameter(f"web_thickness_{side}_mm", "mm", f"web of {whose}; none: a full disc", 0.1, 500, None),
+            Parameter(f"rim_thickness_{side}_mm", "mm", f"rim of {whose}; none: 3 modules", 0.1, 500, None),
+            Parameter(f"hub_thickness_{side}_mm", "mm", f"hub of {whose}; none: 3 modules", 0.1, 500, None),
+            Parameter(
                 f"hub_inertia_{side}_kg_m2", "kg m^2", f"what hub and shaft add to the inertia of {whose}", 0, 1e5, 0.0
             ),
-            _number(f"hub_mass_{side}_kg", "kg", f"what hub and shaft add to the mass of {whose}", 0, 1e5, 0.0),
+            Parameter(f"hub_mass_{side}_kg", "kg", f"what hub and shaft add to the mass of {whose}", 0, 1e5, 0.0),
         ]
     return tuple(found)
 
 
 _DYNAMICS = (
-    _number("body_damping_ratio", "", "damping ratio of the elastic modes of the gears", 0, 0.5, 0.08),
-    _number("mode_limit_hz", "Hz", "elastic modes up to here move; those above follow at once", 500, 1e5, 20000.0),
-    _number(
+    Parameter("body_damping_ratio", "", "damping ratio of the elastic modes of the gears", 0, 0.5, 0.08),
+    Parameter("mode_limit_hz", "Hz", "elastic modes up to here move; those above follow at once", 500, 1e5, 20000.0),
+    Parameter(
         "restitution",
         "",
         "of the gears' impact at first contact after a loss, on top of the compliance, which counts it twice; none: "
@@ -100,8 +96,8 @@ _DYNAMICS = (
         1,
         None,
     ),
-    _number("lead_error_um", "um", "misalignment of the flanks over the face width", -500, 500, 0.0),
-    _number(
+    Parameter("lead_error_um", "um", "misalignment of the flanks over the face width", -500, 500, 0.0),
+    Parameter(
         "step_us",
         "us",
         "longest step of the integrator; shortened to what the contact needs and to a part of the sampling interval",
@@ -185,44 +181,13 @@ class ReducedPair(PairModel[PreparedPair]):
             )
         return PreparedPair(asked, flexible_pair(asked.values, machine, gears))
 
-    def record(
-        self,
-        ready: PreparedPair,
-        rng: np.random.Generator,
-        *,
-        rig: Rig,
-        sampling_rate_hz: float,
-        duration_s: float,
-        step_s: float | None = None,
-        noise_rng: np.random.Generator | None = None,
-    ) -> Recording:
-        """Run a prepared pair and measure it; see `simulate_pair`."""
-        recording, _ = simulate_pair(
-            ready.pair,
-            ready.operation,
-            rng=rng,
-            sampling_rate_hz=sampling_rate_hz,
-            duration_s=duration_s,
-            rig=rig,
-            truth=ready.truth(),
-            step_s=ready.step_s if step_s is None else step_s,
-            noise_rng=noise_rng,
-        )
-        return recording
+    def _run(self, ready: PreparedPair, **asked: Any) -> Recording:
+        return simulate_pair(ready.pair, ready.operation, **({"step_s": ready.step_s} | asked))[0]
 
-    def check_convergence(
-        self,
-        parameters: Mapping[str, ParameterValue],
-        effects: Sequence[EffectSetting],
-        operation: Operation | None,
-        rng: np.random.Generator,
-        *,
-        preset: str = "",
-    ) -> FlexConvergence:
-        """Tell how far a smaller step of the integrator changes the result of this very pair."""
+    def _converges(self, ready: PreparedPair, rng: np.random.Generator) -> FlexConvergence:
         from sims.reduced_fe._respond import check_convergence
 
-        ready = self.prepare(parameters, effects, operation, rng, preset_name=preset)
+        del rng
         return check_convergence(ready.pair, ready.operation, ready.step_s)
 
 

@@ -68,9 +68,9 @@ def test_chip_over_part_of_the_face_softens_tooth_and_contact(width_mm: float) -
 
 def test_whole_width_given_as_a_number_is_the_whole_width() -> None:
     one, two = (mesh_table(replace(MESH, chips_1=(ToothChip(1.0, w),))) for w in (None, 20.0))
-    np.testing.assert_array_equal(one.separation_1_m, two.separation_1_m)
-    assert one.separation_1_m[1].max() == pytest.approx(0.3e-3)
-    assert np.all(one.compliance_1[1] == one.compliance_1[0])
+    np.testing.assert_array_equal(one.separation.gear(1), two.separation.gear(1))
+    assert one.separation.gear(1)[1].max() == pytest.approx(0.3e-3)
+    assert np.all(one.compliance.gear(1)[1] == one.compliance.gear(1)[0])
 
 
 @given(st.floats(0.0, 3.7), st.floats(1.0, 600.0))
@@ -99,8 +99,8 @@ def test_small_chips_change_little_and_none_changes_nothing(width_mm: float | No
 
 def test_chip_of_no_width_changes_nothing() -> None:
     table = mesh_table(replace(MESH, chips_1=(ToothChip(1.0, 0.0),)))
-    assert np.all(table.compliance_1[1] == table.compliance_1[0])
-    assert np.all(table.separation_1_m == 0.0)
+    assert np.all(table.compliance.gear(1)[1] == table.compliance.gear(1)[0])
+    assert np.all(table.separation.gear(1) == 0.0)
 
 
 def test_chip_and_spall_over_the_face_add_on_one_tooth() -> None:

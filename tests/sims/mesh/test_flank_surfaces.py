@@ -86,7 +86,7 @@ def test_worn_flanks_in_the_table() -> None:
     relief = FlankDeviation(10.0, 2.0)
     worn = replace(MESH, flank_1=replace(relief, wear_um=25.0), flank_2=FlankDeviation(wear_um=8.0))
     table, plain = mesh_table(worn), mesh_table(replace(MESH, flank_1=relief))
-    assert table.separation_1_m.shape[0] == table.separation_2_m.shape[0] == 1
+    assert table.separation.gear(1).shape[0] == table.separation.gear(2).shape[0] == 1
     stretch = own_stretch(MESH)[2:-2]  # at the very ends the interpolation rounds the profile off
     rho_1, rho_2 = PAIR.contact_radii_mm(stretch)
     expected = 25e-6 * wear_profile(PAIR, 1, rho_1) + 8e-6 * wear_profile(PAIR, 2, rho_2)
@@ -94,7 +94,7 @@ def test_worn_flanks_in_the_table() -> None:
     assert extra == pytest.approx(expected, abs=3e-8)
     assert own_separation(table, np.array([PITCH_POINT])) == pytest.approx(0.0, abs=4e-8)
     none = mesh_table(replace(MESH, flank_1=replace(relief, wear_um=0.0)))
-    np.testing.assert_array_equal(none.separation_1_m, plain.separation_1_m)
+    np.testing.assert_array_equal(none.separation.gear(1), plain.separation.gear(1))
 
 
 def test_wear_shows_in_the_transmission_error() -> None:
@@ -133,8 +133,8 @@ def test_roughness_returns_with_the_pair_of_teeth() -> None:
     """Teeth 55 and 75 meet again after 825 pairs, and one gear's own part after one of its turns."""
     mesh = rough(3)
     stretch, table = own_stretch(MESH, 60), mesh_table(mesh)
-    assert table.separation_1_m.shape[0] == 55
-    assert table.separation_2_m.shape[0] == 75
+    assert table.separation.gear(1).shape[0] == 55
+    assert table.separation.gear(2).shape[0] == 75
     first = own_separation(table, stretch, pair=0)
     assert own_separation(table, stretch, pair=825) == pytest.approx(first, abs=1e-15)
     assert np.abs(own_separation(table, stretch, pair=55) - first).max() > 0.2e-6
@@ -146,14 +146,14 @@ def test_roughness_returns_with_the_pair_of_teeth() -> None:
 def test_rms_of_the_separations_is_that_of_both_surfaces() -> None:
     """√2 · 0.84 µm over all teeth of both gears. The lines are independent, so that variances add."""
     table = mesh_table(rough(7))
-    together = np.mean(table.separation_1_m**2) + np.mean(table.separation_2_m**2)
+    together = np.mean(table.separation.gear(1) ** 2) + np.mean(table.separation.gear(2) ** 2)
     assert np.sqrt(together) == pytest.approx(np.sqrt(2) * 0.84e-6, rel=0.1)
 
 
 def test_smooth_profiles_change_nothing() -> None:
     flat = FlankRoughness.draw(FractalSurface.of_roughness(0.0), 55, np.random.default_rng(0))
     table = mesh_table(replace(MESH, roughness_1=flat))
-    assert np.all(table.separation_1_m == 0.0)
+    assert np.all(table.separation.gear(1) == 0.0)
 
 
 def test_roughness_moves_the_error_in_single_contact_by_its_height() -> None:
@@ -174,15 +174,15 @@ def test_rough_gear_with_a_spall_keeps_a_row_per_tooth() -> None:
         extra = own_separation(mesh_table(pitted), stretch, pair=pair)
         extra -= own_separation(mesh_table(mesh), stretch, pair=pair)
         assert extra == pytest.approx(own_separation(mesh_table(only), stretch, pair=pair), abs=1e-12)
-    assert mesh_table(pitted).separation_1_m.shape[0] == 55
-    assert mesh_table(only).separation_1_m.shape[0] == 2
+    assert mesh_table(pitted).separation.gear(1).shape[0] == 55
+    assert mesh_table(only).separation.gear(1).shape[0] == 2
 
 
 def test_pitch_stays_apart_from_the_rows() -> None:
     pitch = tuple(float(i % 7) for i in range(55))
     mesh = replace(rough(4), flank_1=FlankDeviation(pitch_um=pitch))
     with_pitch, without = mesh_table(mesh), mesh_table(rough(4))
-    np.testing.assert_array_equal(with_pitch.separation_1_m, without.separation_1_m)
+    np.testing.assert_array_equal(with_pitch.separation.gear(1), without.separation.gear(1))
     _, separation, _ = pair_states(with_pitch, np.array([3.5]))
     _, plain, _ = pair_states(without, np.array([3.5]))
     assert separation - plain == pytest.approx(np.array([[3e-6, 2e-6]]), abs=1e-15)
