@@ -1,7 +1,7 @@
 """Spectra over time: STFT, wavelets, synchrosqueezing, over time or shaft angle."""
 
-from gearsig.timefreq._component import component
-from gearsig.timefreq._cwt import cwt, cwt_map, inverse
+from gearsig.timefreq._cwt import cwt, cwt_map, squeezed_cwt, squeezed_cwt_map
+from gearsig.timefreq._inverse import component, inverse
 from gearsig.timefreq._packets import (
     WaveletPackets,
     natural_order,
@@ -10,10 +10,9 @@ from gearsig.timefreq._packets import (
     wavelet_packet_map,
     wavelet_packets,
 )
-from gearsig.timefreq._ridges import NOT_HIDDEN, best_path, meetings, ridges, untangled
-from gearsig.timefreq._squeezed import squeeze_lines, squeezed_cwt, squeezed_cwt_map, squeezed_stft, squeezed_stft_map
-from gearsig.timefreq._ssqueezepy import SqueezeEngine
-from gearsig.timefreq._stft import stft, stft_map
+from gearsig.timefreq._ridges import NOT_HIDDEN, best_path, meetings, ridges, tops_beside, untangled
+from gearsig.timefreq._squeezing import SqueezeEngine, squeeze_lines
+from gearsig.timefreq._stft import squeezed_stft, squeezed_stft_map, stft, stft_map
 from gearsig.timefreq._types import Axis, Reduction, Ridge, TimeFrequencyMap, at_label, axis_label
 from gearsig.timefreq._uniform import Source, UniformSignal, uniform
 from gearsig.timefreq._wavelets import (
@@ -66,6 +65,7 @@ __all__ = [
     "squeezed_stft_map",
     "stft",
     "stft_map",
+    "tops_beside",
     "uniform",
     "untangled",
     "wavelet_packet_map",

@@ -1,33 +1,44 @@
-"""Continuous wavelet transform over time or shaft angle."""
+"""Continuous wavelet transform over time or shaft angle, plain and synchrosqueezed."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 
-from gearsig.checks import FloatArray, not_negative, one_of
+from gearsig.checks import FloatArray, one_of
 from gearsig.errors import InputError
-from gearsig.timefreq._types import Coefficients, ComplexArray, Reduction, Spacing, TimeFrequencyMap
-from gearsig.timefreq._uniform import (
-    EDGES,
-    ColumnPowers,
-    Edges,
-    Form,
-    Source,
-    UniformSignal,
-    plan_columns,
-    room_for,
-    uniform,
+from gearsig.timefreq._squeezing import (
+    MIN_SHARE,
+    SqueezeEngine,
+    check_memory,
+    is_ssqueezepy,
+    squeeze,
+    squeeze_lines,
+    ssqueezepy,
+    unit_rms,
 )
+from gearsig.timefreq._types import Coefficients, ComplexArray, Reduction, Spacing, TimeFrequencyMap
+from gearsig.timefreq._uniform import EDGES, Edges, LinePlan, Piece, Source, UniformSignal, plan_columns, uniform
 from gearsig.timefreq._wavelets import (
     DEFAULT,
     Wavelet,
     admissibility,
+    band,
+    block_pieces,
     given_lines,
     half_support,
     logarithmic_lines,
+    lowest_possible,
     pieces,
+    plan_group,
     plan_groups,
+    sampled_pieces,
+    workspace,
 )
+
+_GUARD = 1e-3  # response at which a wavelet no longer adds to a squeezed line
 
 
 def cwt(
@@ -80,15 +91,14 @@ def cwt(
 
     Source: S. Mallat, *A Wavelet Tour of Signal Processing*, 3rd ed. (2009), chapter 4.
     """
-    x, form = _prepared(signal, channel, wavelet, positions, lowest, highest, n_per_octave, edges)
-    W = room_for(len(form.lines), x, step)
-    own = largest_power_of_two_in(step)
-    for group in plan_groups(form.lines / x.rate, wavelet, x.n_samples, step=own):
-        for piece in pieces(x.values, group, edges):
-            column = -(-piece.start // step)
-            thinned = piece.values[:, (column * step - piece.start) // own :: step // own]
-            W[piece.lines, column : column + thinned.shape[1]] = thinned
-    return form.coefficients(W, x, step, inverse_weights(form.lines, wavelet))
+    x = uniform(signal, channel)
+    lines, spacing = _lines(x, wavelet, positions, lowest, highest, n_per_octave)
+    transform = _transform(x, lines, spacing, wavelet, edges)
+    W = transform.room(step)
+    for piece, column, thinned, _ in sampled_pieces(x, lines, wavelet, step, edges):
+        W[piece.lines, column : column + thinned.shape[1]] = thinned
+    weights = 2.0 * np.gradient(np.log(lines)) / admissibility(wavelet) if len(lines) > 1 else np.ones(1)
+    return transform.coefficients(W, step, weights)
 
 
 def cwt_map(
@@ -128,33 +138,123 @@ def cwt_map(
     InputError, RefusalError
         As in `cwt`.
     """
-    x, form = _prepared(signal, channel, wavelet, positions, lowest, highest, n_per_octave, edges)
-    columns = plan_columns(x, n_columns)
-    powers = ColumnPowers(columns, len(form.lines), reduction)
-    for group in plan_groups(form.lines / x.rate, wavelet, x.n_samples, step=columns.largest_step, follow_band=True):
-        for piece in pieces(x.values, group, edges):
-            powers.add(piece.lines, piece.start, piece.step, piece.values)
-    return powers.finished(x, form, scaling)
-
-
-def _prepared(
-    signal: Source,
-    channel: str | float | None,
-    wavelet: Wavelet,
-    positions: FloatArray | None,
-    lowest: float | None,
-    highest: float | None,
-    n_per_octave: int,
-    edges: Edges,
-) -> tuple[UniformSignal, Form]:
-    """Check what both functions are given, and lay the lines."""
     x = uniform(signal, channel)
-    lines, spacing = chosen_lines(x, wavelet, positions, lowest, highest, n_per_octave)
-    one_of(edges, "edges", EDGES)
-    return x, Form(lines, spacing, f"CWT, {wavelet.name}", edge_of(lines, wavelet), n_reach(lines, wavelet))
+    lines, spacing = _lines(x, wavelet, positions, lowest, highest, n_per_octave)
+    transform, columns = _transform(x, lines, spacing, wavelet, edges), plan_columns(x, n_columns)
+    groups = plan_groups(lines / x.rate, wavelet, x.n_samples, step=columns.largest_step, follow_band=True)
+    parts = ((p.lines, p.start, p.step, p.values) for group in groups for p in pieces(x.values, group, edges))
+    return transform.level_map(columns, reduction, scaling, parts)
 
 
-def chosen_lines(
+def squeezed_cwt(
+    signal: Source,
+    channel: str | float | None = None,
+    *,
+    wavelet: Wavelet = DEFAULT,
+    lowest: float | None = None,
+    highest: float | None = None,
+    n_per_octave: int = 32,
+    step: int = 1,
+    edges: Edges = "reflect",
+    engine: SqueezeEngine = "gearsig",
+) -> Coefficients:
+    """Return the wavelet coefficients moved to their momentary frequency, at every `step`-th sample.
+
+    T(f_l, t) = (2 Δ ln f / C) Σ_j W(f_j, t) over the j with f̂(f_j, t) in line l, f̂ = Im(∂W/∂t / W) / 2π: a unit
+    sine reads 1 in one line, and the sum over all lines is the analytic signal between `lowest` and `highest`.
+
+    Parameters
+    ----------
+    signal, channel, wavelet, lowest, highest, step, edges
+        As in `cwt`.
+    n_per_octave : int
+        Lines, and wavelets, per octave.
+    engine : str
+        "gearsig", or "ssqueezepy" for comparison: single precision, the whole matrix at once in memory, each
+        frequency on the line that is nearest on the logarithm.
+
+    Returns
+    -------
+    Coefficients
+        complex64.
+
+    Raises
+    ------
+    InputError, RefusalError
+        As in `cwt`.
+
+    Notes
+    -----
+    Sharp only for components that the wavelet separates and whose frequency changes little within it; over angle,
+    orders stay put where frequencies sweep. Use a longer wavelet (larger β) for close components.
+
+    Source: I. Daubechies, J. Lu, H.-T. Wu, *Synchrosqueezed wavelet transforms: an empirical mode decomposition-like
+    tool*, Applied and Computational Harmonic Analysis 30 (2011).
+    """
+    x = uniform(signal, channel)
+    plan = analysis(x, wavelet, lowest, highest, n_per_octave)
+    transform = _transform(x, plan.lines, "logarithmic", wavelet, edges, engine)
+    T = transform.room(step)
+    if is_ssqueezepy(engine):
+        T[:] = _by_ssqueezepy(x, plan, wavelet, edges)[:, ::step]
+    else:
+        table = squeeze_lines(plan.lines, x.rate, "logarithmic")
+        weights = np.full(len(plan.analysed), plan.weight, dtype=np.float32)
+        for _, column, W, dW in sampled_pieces(x, plan.analysed, wavelet, step, edges, derivatives=True):
+            squeeze(W, dW, weights, plan.smallest, table.borders, table.lookup, T, column)
+    return transform.coefficients(T, step, np.ones(len(T)))
+
+
+def squeezed_cwt_map(
+    signal: Source,
+    channel: str | float | None = None,
+    *,
+    wavelet: Wavelet = DEFAULT,
+    lowest: float | None = None,
+    highest: float | None = None,
+    n_per_octave: int = 32,
+    n_columns: int = 1000,
+    reduction: Reduction = "mean",
+    scaling: str = "amplitude peak",
+    edges: Edges = "reflect",
+    engine: SqueezeEngine = "gearsig",
+) -> TimeFrequencyMap:
+    """Return levels of the synchrosqueezed wavelet transform in stretches, never holding the whole matrix.
+
+    Parameters
+    ----------
+    signal, channel, wavelet, lowest, highest, n_per_octave, edges, engine
+        As in `squeezed_cwt`.
+    n_columns, reduction, scaling
+        As in `cwt_map`.
+
+    Returns
+    -------
+    TimeFrequencyMap
+        A line is read as often as the bandwidth of the wavelets that add to it asks.
+
+    Raises
+    ------
+    InputError, RefusalError
+        As in `squeezed_cwt`.
+    """
+    x = uniform(signal, channel)
+    plan = analysis(x, wavelet, lowest, highest, n_per_octave)
+    transform = _transform(x, plan.lines, "logarithmic", wavelet, edges, engine)
+    columns = plan_columns(x, n_columns)
+    if is_ssqueezepy(engine):
+        whole = ((np.arange(len(plan.lines)), 0, 1, _by_ssqueezepy(x, plan, wavelet, edges)) for _ in range(1))
+        return transform.level_map(columns, reduction, scaling, whole)
+    octave = np.floor(np.log2(plan.lines[-1] / plan.lines) + 1e-9)
+    blocks = (
+        block
+        for o in np.unique(octave)
+        for block in _blocks(x, plan, wavelet, np.flatnonzero(octave == o), columns.largest_step, edges)
+    )
+    return transform.level_map(columns, reduction, scaling, blocks)
+
+
+def _lines(
     x: UniformSignal,
     wavelet: Wavelet,
     positions: FloatArray | None,
@@ -162,7 +262,7 @@ def chosen_lines(
     highest: float | None,
     n_per_octave: int,
 ) -> tuple[FloatArray, Spacing]:
-    """Return the asked lines and how they are spaced."""
+    """Return the lines asked for and how they are spaced."""
     if positions is None:
         return logarithmic_lines(x, wavelet, lowest, highest, n_per_octave), "logarithmic"
     if lowest is not None or highest is not None:
@@ -172,80 +272,109 @@ def chosen_lines(
     return lines, "linear" if even else "logarithmic"
 
 
-def edge_of(lines: FloatArray, wavelet: Wavelet) -> FloatArray:
-    """Return how far the ends reach into each line: half of the support carries all but a thousandth."""
-    return half_support(wavelet) / 2 / lines
-
-
-def n_reach(lines: FloatArray, wavelet: Wavelet) -> int:
-    """Return how many lines from its middle a component falls to e⁻² of its power, at the middle line."""
+def _transform(
+    x: UniformSignal,
+    lines: FloatArray,
+    spacing: Spacing,
+    wavelet: Wavelet,
+    edges: Edges,
+    engine: SqueezeEngine | None = None,
+) -> LinePlan:
+    """Check the edges and the engine (None: not squeezed); return the lines with the reach of ends and components."""
+    one_of(edges, "edges", EDGES)
+    by = " by ssqueezepy" if engine is not None and is_ssqueezepy(engine) else ""
+    method = f"CWT, {wavelet.name}" if engine is None else f"synchrosqueezed CWT{by}, {wavelet.name}"
+    edge = half_support(wavelet) / 2 / lines  # half of the support carries all but a thousandth
     middle = len(lines) // 2
-    reach = lines[middle] * (1.0 + np.sqrt(2.0) / wavelet.duration)
-    return max(1, int(np.searchsorted(lines, reach)) - middle)
+    # At the middle line, a component falls to e⁻² of its power so many lines from its own middle.
+    reach = int(np.searchsorted(lines, lines[middle] * (1.0 + np.sqrt(2.0) / wavelet.duration))) - middle
+    return LinePlan(x, lines, spacing, method, edge, max(1, reach), engine is not None)
 
 
-def inverse_weights(lines: FloatArray, wavelet: Wavelet) -> FloatArray:
-    """Return 2 Δ(ln f) / C of each line: the weighted sum of the coefficients is the analytic signal."""
-    if len(lines) < 2:
-        return np.ones(len(lines))
-    return 2.0 * np.gradient(np.log(lines)) / admissibility(wavelet)
-
-
-def largest_power_of_two_in(step: int) -> int:
-    """Return the largest power of two, up to 1024, that divides `step`."""
-    return min(step & -step, 1024)
-
-
-# --------------------
-# Back from coefficients to the signal, whole or between lines.
-# --------------------
-
-
-def inverse(
-    coefficients: Coefficients, *, lowest: FloatArray | float | None = None, highest: FloatArray | float | None = None
-) -> ComplexArray:
-    """Return the analytic signal at the columns; its real part is the signal.
-
-    z(t) = Σ_l weight_l · value(l, t) over the lines between `lowest` and `highest`.
+@dataclass(frozen=True)
+class SqueezingWavelets:
+    """Wavelets of a squeezed transform: they reach beyond its lines, so that the outermost ones are complete.
 
     Parameters
     ----------
-    coefficients : Coefficients
-    lowest, highest : float, array (n_columns,) or None
-        In Hz or orders; an array follows a component. None: all lines.
-
-    Returns
-    -------
-    complex array, (n_columns,)
-        Peak amplitude in the coefficients' unit. Whole signals come back, as error over amplitude: from the STFT
-        with all lines to 1e-6, ends included; from the CWT to 1e-4 away from the ends for frequencies that lie √2 or
-        more inside the outermost lines (the default wavelet), 1e-2 next to them; from the squeezed transforms to 1e-4
-        rms, with single samples 1e-2 off where components cancel. What lies outside the lines, the mean
-        included, is lost.
-
-    Raises
-    ------
-    InputError
-        If limits have another length than the columns.
+    lines : array, (n_lines,)
+        In Hz or orders.
+    analysed : array, (n_analysed,)
+        The wavelets' own frequencies or orders.
+    weight : float
+        2 Δ(ln f) / C: the sum over the wavelets is the analytic signal.
+    smallest : float
+        Power below which a coefficient is rounding.
     """
-    values, lines = coefficients.values, coefficients.positions
-    n = values.shape[1]
-    low, high = _limit(lowest, -np.inf, n, "lowest"), _limit(highest, np.inf, n, "highest")
-    result = np.zeros(n, dtype=np.complex128)
-    for line, weight, row in zip(lines, coefficients.weights, values, strict=True):
-        inside = (line >= low) & (line <= high)
-        if inside.any():
-            result += np.where(inside, weight * row, 0.0)
-    return result
+
+    lines: FloatArray
+    analysed: FloatArray
+    weight: float
+    smallest: float
 
 
-def _limit(value: FloatArray | float | None, default: float, n: int, name: str) -> FloatArray:
-    if value is None:
-        return np.full(1, default)
-    limit = np.atleast_1d(np.asarray(value, dtype=np.float64))
-    if limit.shape not in ((1,), (n,)):
-        raise InputError(f"{name} has shape {limit.shape}", allowed=f"a number, or an array of {n} columns")
-    if np.isnan(limit).any():
-        raise InputError(f"{name} holds NaN", allowed="numbers")
-    not_negative(float(limit.min()), name)
-    return limit
+def analysis(
+    x: UniformSignal, wavelet: Wavelet, lowest: float | None, highest: float | None, n_per_octave: int
+) -> SqueezingWavelets:
+    """Return lines, and wavelets that reach as far beyond them as they answer to them."""
+    lines = logarithmic_lines(x, wavelet, lowest, highest, n_per_octave)
+    v_low, v_high = band(wavelet, _GUARD)
+    n_below, n_above = (int(np.ceil(n_per_octave * np.log2(r))) for r in (v_high, 1 / v_low))
+    k = np.arange(1 - len(lines) - n_below, n_above + 1)
+    analysed = lines[-1] * 2.0 ** (k / n_per_octave)
+    inside = (analysed >= min(lines[0], lowest_possible(x, wavelet))) & (analysed <= max(lines[-1], x.rate / 2))
+    weight = 2.0 * np.log(2.0) / n_per_octave / admissibility(wavelet)
+    mean_square = float(np.dot(x.values, x.values)) / x.n_samples
+    return SqueezingWavelets(lines, analysed[inside], weight, MIN_SHARE**2 * mean_square)
+
+
+def _blocks(
+    x: UniformSignal, plan: SqueezingWavelets, wavelet: Wavelet, part: np.ndarray, largest_step: int, edges: Edges
+) -> Iterator[Piece]:
+    """Yield T of some neighbouring lines, block after block."""
+    lines = plan.lines[part]
+    table = squeeze_lines(lines, x.rate, "logarithmic")
+    v_low, v_high = band(wavelet, _GUARD)
+    chosen = np.flatnonzero((plan.analysed > lines[0] / v_high / 1.02) & (plan.analysed < lines[-1] / v_low * 1.02))
+    cycles = plan.analysed / x.rate
+    # The largest power of two that reads the band twice as often as it must.
+    width = cycles[chosen[-1]] * (v_high - v_low)
+    step = int(min(largest_step, 1 << max(0, int(np.floor(np.log2(0.5 / width))))))
+    group = plan_group(chosen, cycles, wavelet, x.n_samples, step=step)
+    weights = np.full(len(chosen), plan.weight, dtype=np.float32)
+    space = workspace(group)
+    for start in group.starts(x.n_samples):
+        length = -(-min(group.n_core, x.n_samples - start) // step)
+        T = np.zeros((len(part), length), dtype=np.complex64)
+        for piece in block_pieces(x.values, group, start, edges, space, derivatives=True):
+            squeeze(piece.values, piece.derivatives, weights, plan.smallest, table.borders, table.lookup, T, 0)
+        yield part, start, step, T
+
+
+def _by_ssqueezepy(x: UniformSignal, plan: SqueezingWavelets, wavelet: Wavelet, edges: Edges) -> ComplexArray:
+    """Return the squeezed wavelet transform of every sample by ssqueezepy.
+
+    ssqueezepy sums W Δ(ln f) over the wavelets, with W of peak gain 2 too; 2/C makes a unit sine read 1.
+    It puts what lies beyond its lines on the outermost ones, so it is given one more on either side than is analysed.
+    """
+    lines, analysed = plan.lines, plan.analysed
+    ratio = analysed[1] / analysed[0]
+    grid = np.concatenate([[analysed[0] / ratio], analysed, [analysed[-1] * ratio]])
+    # Wavelets, their derivatives, a copy, the result, and two of these padded to the next power of two.
+    check_memory(len(grid) * 8 * (4 * x.n_samples + 2 * (4 << (x.n_samples - 1).bit_length() - 1)))
+    scaled, rms = unit_rms(x)
+    with ssqueezepy() as ssq:
+        T = ssq.ssq_cwt(
+            scaled,
+            ssq.Wavelet(lambda w: wavelet.response(w).astype(np.float32)),
+            scales=(x.rate / (2 * np.pi * grid))[::-1].copy(),
+            ssq_freqs=grid / x.rate,
+            padtype=edges,
+            gamma=MIN_SHARE,
+            flipud=False,
+            preserve_transform=False,
+            cache_wavelet=False,
+        )[0]
+        first = 1 + int(np.argmin(np.abs(np.log(analysed / lines[0]))))
+        rows = np.asarray(T)[first : first + len(lines)]
+        return np.asarray(rows * np.float32(2.0 * rms / admissibility(wavelet)))

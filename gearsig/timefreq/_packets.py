@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, count, frozen_array, one_of
 from gearsig.errors import InputError, RefusalError
-from gearsig.spectra import Scaling, scaled_unit
 from gearsig.timefreq._types import Axis, Reduction, TimeFrequencyMap
-from gearsig.timefreq._uniform import SCALINGS, Source, UniformSignal, plan_columns, uniform
+from gearsig.timefreq._uniform import Columns, LinePlan, Source, plan_columns, uniform
 
 _MODE = "periodization"  # as many coefficients as samples: the only one that keeps the energy
 
@@ -233,41 +231,22 @@ def wavelet_packet_map(
     InputError, RefusalError
         As in `wavelet_packets`.
     """
-    one_of(reduction, "reduction", ("mean", "max"))
-    one_of(scaling, "scaling", SCALINGS)
     x = uniform(signal, channel)
     packets = wavelet_packets(x, wavelet=wavelet, level=level)
     n_bands, n = packets.values.shape
-    stretch = _coarser(x, min(count(n_columns, "n_columns", minimum=2), n), n_bands)
-    starts = np.arange(0, n, stretch)
-    power = packets.values**2 / n_bands  # mean square over the samples that a coefficient stands for
-    if reduction == "mean":
-        per_column = np.add.reduceat(power, starts, axis=1) / np.diff(starts, append=n)
-    else:
-        per_column = np.maximum.reduceat(power, starts, axis=1)
-    kind = cast("Scaling", scaling)
-    middles = (starts + np.append(starts[1:], n)) / 2 * n_bands - 0.5
-    edge = np.full(n_bands, _orthogonal(wavelet).dec_len * n_bands / 2 / x.rate)
-    return TimeFrequencyMap(
-        np.sqrt(2.0 * per_column.T) if kind == "amplitude peak" else per_column.T,
+    per_column = plan_columns(x, min(count(n_columns, "n_columns", minimum=2), n)).n_per_column
+    columns = Columns(n * n_bands, max(1, -(-per_column // n_bands)) * n_bands)
+    transform = LinePlan(
+        x,
         (np.arange(n_bands) + 0.5) * packets.band_width,
-        x.start + middles / x.rate,
-        x.axis,
         "linear",
-        kind,
-        scaled_unit(x.unit, kind),
         f"wavelet packets, {wavelet}, level {level}",
-        reduction,
-        edge,
-        source=x.source,
-        shaft=x.shaft,
+        np.full(n_bands, _orthogonal(wavelet).dec_len * n_bands / 2 / x.rate),
     )
-
-
-def _coarser(x: UniformSignal, n_columns: int, n_bands: int) -> int:
-    """Return how many coefficients of a band make a column."""
-    per_column = plan_columns(x, n_columns).n_per_column
-    return max(1, -(-per_column // n_bands))
+    # A coefficient stands for n_bands samples: its square over them is their mean square, half a sine's amplitude².
+    gain = np.sqrt(2.0 / n_bands)
+    pieces = ((np.array([band]), 0, n_bands, gain * packets.values[band : band + 1]) for band in range(n_bands))
+    return transform.level_map(columns, reduction, scaling, pieces)
 
 
 def _orthogonal(name: str):  # type: ignore[no-untyped-def]

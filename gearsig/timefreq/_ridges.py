@@ -145,7 +145,7 @@ def untangled(
     for i in range(len(paths)):
         for j in range(i + 1, len(paths)):
             for meeting in _settled_from_afar(paths[i], paths[j], gap):
-                _settle((paths[i], levels[i]), (paths[j], levels[j]), meeting, level_weight, _Ground(power, gap))
+                _settle((paths[i], levels[i]), (paths[j], levels[j]), meeting, level_weight, power, gap)
     return paths
 
 
@@ -184,15 +184,7 @@ class _End:
     level: float
 
 
-@dataclass(frozen=True)
-class _Ground:
-    """What the paths run over, and the lines within which two components cannot be told apart."""
-
-    power: FloatArray | None
-    gap: float
-
-
-def _settle(a: _Track, b: _Track, meeting: Meeting, level_weight: float, ground: _Ground) -> None:
+def _settle(a: _Track, b: _Track, meeting: Meeting, level_weight: float, power: FloatArray | None, gap: float) -> None:
     """Let two paths cross or part again after a meeting, in place, whichever goes on more smoothly."""
     start, stop, n = meeting.start, meeting.stop, len(a[0])
     first, last = start - 1, stop
@@ -205,9 +197,9 @@ def _settle(a: _Track, b: _Track, meeting: Meeting, level_weight: float, ground:
     )
     crosses_now = (before[0].place - before[1].place) * (after[0].place - after[1].place) < 0
     crossed, parted = (keep, swap) if crosses_now else (swap, keep)
-    if ground.power is not None and _valley(ground.power, crossed, start, ground.gap):
+    if power is not None and _valley(power, crossed, start, gap):
         if crosses_now:
-            _exchange(a, b, meeting, _tops_beside(ground.power, parted, start))
+            _exchange(a, b, meeting, tops_beside(power, parted, start))
         return
     cost = [[_change(p, q, last - first, level_weight) for q in after] for p in before]
     if cost[0][1] + cost[1][0] < cost[0][0] + cost[1][1]:
@@ -236,7 +228,7 @@ def _largest_near(power: FloatArray, lines: NDArray[np.int64], columns: NDArray[
     return result
 
 
-def _tops_beside(power: FloatArray, parted: list[FloatArray], start: int) -> list[FloatArray]:
+def tops_beside(power: FloatArray, parted: list[FloatArray], start: int) -> list[FloatArray]:
     """Return the largest power's line on either side of the middle between two paths that part again."""
     middle = np.clip(np.round((parted[0] + parted[1]) / 2), 0, len(power) - 1).astype(np.int64)
     half = np.ceil(np.abs(parted[0] - parted[1])).astype(np.int64)
@@ -385,27 +377,20 @@ def _check_room(n_ridges: int, part: slice, n_reach: int) -> None:
 
 
 def _grid(transform: Coefficients | TimeFrequencyMap, part: slice) -> _Grid:
-    if isinstance(transform, TimeFrequencyMap):
-        values = transform.values[:, part].T
-        power = values**2 if transform.scaling == "amplitude peak" else 2.0 * values
-        return _pooled(np.asarray(power, dtype=np.float64), transform.at, transform)
     n = len(transform.at)
-    n_per = -(-n // MAX_COLUMNS)
-    starts = np.arange(0, n, n_per)
+    starts = np.arange(0, n, -(-n // MAX_COLUMNS))
+    n_pooled = np.diff(starts, append=n)
     power = np.empty((part.stop - part.start, len(starts)))
-    for row, line in enumerate(transform.values[part]):  # one line at a time: the whole may be large
-        power[row] = np.add.reduceat(line.real**2 + line.imag**2, starts) / np.diff(starts, append=n)
-    ends = np.append(starts[1:], n) - 1
-    at = (transform.at[starts] + transform.at[ends]) / 2
+    scaling = transform.scaling if isinstance(transform, TimeFrequencyMap) else ""
+    values = transform.values[:, part].T if scaling else transform.values[part]
+    for row, line in enumerate(values):  # one line at a time: the whole may be large
+        if not scaling:
+            square = line.real**2 + line.imag**2
+        else:
+            square = (line**2 if scaling == "amplitude peak" else 2.0 * line).astype(np.float64)
+        power[row] = np.add.reduceat(square, starts) / n_pooled
+    at = (transform.at[starts] + transform.at[starts + n_pooled - 1]) / 2
     return _Grid(power, at, transform.n_reach, transform.squeezed)
-
-
-def _pooled(power: FloatArray, at: FloatArray, transform: TimeFrequencyMap) -> _Grid:
-    n_per = -(-len(at) // MAX_COLUMNS)
-    starts = np.arange(0, len(at), n_per)
-    ends = np.append(starts[1:], len(at)) - 1
-    mean = np.add.reduceat(power, starts, axis=1) / (ends - starts + 1)
-    return _Grid(mean, (at[starts] + at[ends]) / 2, transform.n_reach, transform.squeezed)
 
 
 def _paths(grid: _Grid, n_ridges: int, steepest: float, stiffness: float) -> tuple[list[FloatArray], FloatArray]:

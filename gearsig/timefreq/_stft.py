@@ -1,4 +1,4 @@
-"""Short-time Fourier transform over time or shaft angle."""
+"""Short-time Fourier transform over time or shaft angle, plain and synchrosqueezed."""
 
 from __future__ import annotations
 
@@ -6,177 +6,22 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, count, one_of, positive
 from gearsig.errors import InputError, RefusalError
-from gearsig.timefreq._types import Coefficients, ComplexArray, Reduction, TimeFrequencyMap
-from gearsig.timefreq._uniform import (
-    EDGES,
-    ColumnPowers,
-    Edges,
-    Form,
-    Source,
-    UniformSignal,
-    plan_columns,
-    room_for,
-    stretch,
-    uniform,
+from gearsig.timefreq._squeezing import (
+    MIN_SHARE,
+    SqueezeEngine,
+    check_memory,
+    is_ssqueezepy,
+    squeeze,
+    squeeze_lines,
+    ssqueezepy,
+    unit_rms,
 )
-
-# --------------------
-# Windowed frames of a signal, centred on every so-many-th sample, and their spectra.
-# --------------------
-
-
-WINDOWS = ("hann", "gaussian")
-_SIGMAS = 4.0  # half length of the Gaussian window in its own standard deviations
-_FRAME_SAMPLES = 1 << 20  # samples in the frames that are transformed at a time
-_MIN_WINDOW, _MAX_WINDOW, _SHARE = 16, 8192, 64
-
-
-@dataclass(frozen=True)
-class FramePlan:
-    """Window g and its derivative per sample, from -n/2 to n/2; n_fft points; lines first to last (excluded)."""
-
-    window: FloatArray
-    slope: FloatArray
-    n_fft: int
-    first: int
-    last: int
-    name: str
-
-    @property
-    def n_window(self) -> int:
-        """Samples in the window."""
-        return len(self.window)
-
-    @property
-    def n_lines(self) -> int:
-        """Lines that are kept."""
-        return self.last - self.first
-
-    def lines(self, rate: float) -> FloatArray:
-        """Frequencies or orders of the lines that are kept."""
-        result: FloatArray = np.arange(self.first, self.last) * (rate / self.n_fft)
-        return result
-
-    @property
-    def gains(self) -> FloatArray:
-        """Factors that make a unit sine read 1; the lines at zero and half the rate have no twin."""
-        k = np.arange(self.first, self.last)
-        twins: FloatArray = np.where((k == 0) | (2 * k == self.n_fft), 1.0, 2.0)
-        return twins / float(self.window.sum())
-
-    @property
-    def weight(self) -> float:
-        """Factor of the sum over lines that gives the signal back."""
-        return float(self.window.sum() / self.n_fft / self.window[self.n_window // 2])
-
-    @property
-    def n_reach(self) -> int:
-        """Lines from a component's middle to where its power has fallen to e⁻²."""
-        spread = float(np.sum(self.slope**2) / np.sum(self.window**2)) ** 0.5  # rms width, rad per sample
-        return max(2, int(np.rint(spread / np.pi * self.n_fft)))
-
-
-def plan_frames(
-    x: UniformSignal,
-    window: str,
-    window_length: float | None,
-    zero_padding: int,
-    lowest: float | None,
-    highest: float | None,
-) -> FramePlan:
-    """Return window and lines.
-
-    Parameters
-    ----------
-    window : str
-        "hann" or "gaussian".
-    window_length : float or None
-        Seconds or revolutions; None: 1/64 of the signal, 16 to 8192 samples.
-    zero_padding : int
-        Points of the FFT over those of the window, at least.
-    lowest, highest : float or None
-        Lines that are kept, in Hz or orders; None: all that are valid.
-    """
-    from scipy.fft import next_fast_len
-
-    one_of(window, "window", WINDOWS)
-    n = _length(x, window_length)
-    n_fft = int(next_fast_len(n * count(zero_padding, "zero_padding"), real=True))
-    n_fft += n_fft % 2
-    resolution = x.rate / n_fft
-    low = 0.0 if lowest is None else lowest
-    high = x.highest_valid if highest is None else positive(highest, "highest")
-    if not 0.0 <= low < high <= x.highest_valid * (1 + 1e-9):
-        raise InputError(
-            f"lines from {low:g} to {high:g} {x.position_unit} are asked",
-            where="lowest, highest",
-            allowed=f"0 <= lowest < highest <= {x.highest_valid:g} {x.position_unit}",
-        )
-    first, last = int(np.ceil(low / resolution - 1e-9)), int(np.floor(high / resolution * (1 + 1e-12))) + 1
-    if last - first < 2:
-        raise InputError(
-            f"lines are {resolution:g} {x.position_unit} apart: fewer than two lie between {low:g} and {high:g}",
-            where="window_length",
-            remedy="lengthen the window or widen the range",
-        )
-    g, slope = _window(window, n)
-    return FramePlan(g, slope, n_fft, first, last, f"{window} window of {n} samples")
-
-
-def spectra(
-    x: UniformSignal, plan: FramePlan, step: int, edges: Edges, *, slopes: bool = False
-) -> Iterator[tuple[int, ComplexArray, ComplexArray]]:
-    """Yield (first frame, spectra with the window, spectra with its derivative), (n_frames, n_lines), in batches."""
-    from scipy.fft import rfft
-
-    n_frames = -(-x.n_samples // step)
-    n_batch = max(1, _FRAME_SAMPLES // plan.n_fft)
-    half, n = plan.n_window // 2, plan.n_window
-    for frame in range(0, n_frames, n_batch):
-        n_here = min(n_batch, n_frames - frame)
-        part = stretch(x.values, frame * step - half, (n_here - 1) * step + n, edges)
-        frames = np.lib.stride_tricks.sliding_window_view(part, n)[::step]
-        found = []
-        for window in (plan.window, plan.slope) if slopes else (plan.window,):
-            turned = np.zeros((n_here, plan.n_fft))
-            turned[:, : n - half] = frames[:, half:] * window[half:]
-            turned[:, plan.n_fft - half :] = frames[:, :half] * window[:half]
-            found.append(rfft(turned, axis=1)[:, plan.first : plan.last])
-        yield frame, found[0], found[-1]
-
-
-def _length(x: UniformSignal, window_length: float | None) -> int:
-    if window_length is None:
-        n = min(max(x.n_samples // _SHARE, _MIN_WINDOW), _MAX_WINDOW)
-    else:
-        n = round(positive(window_length, "window_length") * x.rate)
-    unit = "s" if x.axis == "frequency" else "revolutions"
-    if n < 4:
-        raise InputError(
-            f"the window of {window_length:g} {unit} holds {n} samples",
-            where="window_length",
-            allowed=f"at least {4 / x.rate:.4g} {unit}",
-        )
-    if n > x.n_samples:
-        raise RefusalError(
-            f"the signal of {x.length:.4g} {unit} is shorter than the window of {n / x.rate:.4g}",
-            remedy="shorten window_length or record longer",
-        )
-    return n
-
-
-def _window(name: str, n: int) -> tuple[FloatArray, FloatArray]:
-    """Return the window around its middle sample n // 2, and its derivative per sample."""
-    tau = np.arange(n) - n // 2
-    if name == "hann":
-        turn = 2 * np.pi / n
-        return 0.5 + 0.5 * np.cos(turn * tau), -0.5 * turn * np.sin(turn * tau)
-    sigma = n / 2 / _SIGMAS
-    g = np.exp(-0.5 * (tau / sigma) ** 2)
-    return g, -tau / sigma**2 * g
+from gearsig.timefreq._types import Coefficients, ComplexArray, Reduction, TimeFrequencyMap
+from gearsig.timefreq._uniform import EDGES, Edges, LinePlan, Source, UniformSignal, plan_columns, stretch, uniform
 
 
 def stft(
@@ -232,11 +77,8 @@ def stft(
 
     Source: L. Cohen, *Time-Frequency Analysis* (1995), chapter 7.
     """
-    x, plan, form = prepared(signal, channel, window, window_length, zero_padding, lowest, highest, edges)
-    V = room_for(plan.n_lines, x, step)
-    for frame, part, _ in spectra(x, plan, step, edges):
-        V[:, frame : frame + len(part)] = (part * plan.gains).T
-    return form.coefficients(V, x, step, np.full(plan.n_lines, plan.weight))
+    frames = _frames(signal, channel, window, window_length, zero_padding, lowest, highest, edges)
+    return frames.coefficients(step)
 
 
 def stft_map(
@@ -272,17 +114,203 @@ def stft_map(
     InputError, RefusalError
         As in `stft`.
     """
-    x, plan, form = prepared(signal, channel, window, window_length, zero_padding, lowest, highest, edges)
-    columns = plan_columns(x, n_columns)
-    powers = ColumnPowers(columns, plan.n_lines, reduction)
-    step = max(1, min(columns.n_per_column, plan.n_window // 8))
-    everything = np.arange(plan.n_lines)
-    for frame, part, _ in spectra(x, plan, step, edges):
-        powers.add(everything, frame * step, step, (part * plan.gains).T)
-    return powers.finished(x, form, scaling)
+    frames = _frames(signal, channel, window, window_length, zero_padding, lowest, highest, edges)
+    return frames.level_map(n_columns, reduction, scaling)
 
 
-def prepared(
+def squeezed_stft(
+    signal: Source,
+    channel: str | float | None = None,
+    *,
+    window: str = "gaussian",
+    window_length: float | None = None,
+    zero_padding: int = 2,
+    lowest: float | None = None,
+    highest: float | None = None,
+    step: int = 1,
+    edges: Edges = "reflect",
+    engine: SqueezeEngine = "gearsig",
+) -> Coefficients:
+    """Return the short-time spectra moved to their momentary frequency, at every `step`-th sample.
+
+    f̂ = f - Im(V_g' / V_g) / 2π, with g' the window's derivative; T(f_l, t) is the weighted sum of V over the lines
+    whose f̂ lies in line l. A unit sine reads 1 in one line, and the sum over the lines is the analytic signal.
+
+    Parameters
+    ----------
+    signal, channel, window, window_length, zero_padding, lowest, highest, step, edges
+        As in `stft`.
+    engine : str
+        As in `squeezed_cwt`.
+
+    Returns
+    -------
+    Coefficients
+        complex64.
+
+    Raises
+    ------
+    InputError, RefusalError
+        As in `stft`.
+
+    Notes
+    -----
+    Sharp only for components whose frequency changes little within the window: take the angle signal of a sweep.
+
+    Source: G. Thakur, H.-T. Wu, *Synchrosqueezing-based recovery of instantaneous frequency from nonuniform samples*,
+    SIAM Journal on Mathematical Analysis 43 (2011).
+    """
+    frames = _frames(signal, channel, window, window_length, zero_padding, lowest, highest, edges, engine)
+    return frames.coefficients(step)
+
+
+def squeezed_stft_map(
+    signal: Source,
+    channel: str | float | None = None,
+    *,
+    window: str = "gaussian",
+    window_length: float | None = None,
+    zero_padding: int = 2,
+    lowest: float | None = None,
+    highest: float | None = None,
+    n_columns: int = 1000,
+    reduction: Reduction = "mean",
+    scaling: str = "amplitude peak",
+    edges: Edges = "reflect",
+    engine: SqueezeEngine = "gearsig",
+) -> TimeFrequencyMap:
+    """Return levels of the synchrosqueezed short-time Fourier transform, never holding the whole matrix.
+
+    Parameters
+    ----------
+    signal, channel, window, window_length, zero_padding, lowest, highest, edges, engine
+        As in `squeezed_stft`.
+    n_columns, reduction, scaling
+        As in `cwt_map`.
+
+    Returns
+    -------
+    TimeFrequencyMap
+
+    Raises
+    ------
+    InputError, RefusalError
+        As in `stft`.
+    """
+    frames = _frames(signal, channel, window, window_length, zero_padding, lowest, highest, edges, engine)
+    return frames.level_map(n_columns, reduction, scaling)
+
+
+@dataclass(frozen=True)
+class FramePlan:
+    """Windowed frames of a signal: window g and its slope per sample; n_fft points; lines first to last (excluded).
+
+    `engine` None: plain spectra; else they are squeezed.
+    """
+
+    signal: UniformSignal
+    window: FloatArray
+    slope: FloatArray
+    n_fft: int
+    first: int
+    last: int
+    edges: Edges
+    engine: SqueezeEngine | None
+    name: str
+
+    @property
+    def k(self) -> NDArray[np.int64]:
+        """Numbers of the lines that are kept."""
+        return np.arange(self.first, self.last)
+
+    @property
+    def twins(self) -> FloatArray:
+        """2 where a line has a mirror image, 1 at zero and at half the rate."""
+        return np.where((self.k == 0) | (2 * self.k == self.n_fft), 1.0, 2.0)
+
+    @property
+    def gains(self) -> FloatArray:
+        """Factors that make a unit sine read 1."""
+        return np.asarray(self.twins / float(self.window.sum()))
+
+    @property
+    def weight(self) -> float:
+        """Factor of the sum over lines that gives the signal back."""
+        return float(self.window.sum() / self.n_fft / self.window[len(self.window) // 2])
+
+    @property
+    def transform(self) -> LinePlan:
+        """Lines, and how far the ends and one component reach."""
+        squeezed, n, rate = self.engine is not None, len(self.window), self.signal.rate
+        by = " by ssqueezepy" if self.engine == "ssqueezepy" else ""
+        spread = float(np.sum(self.slope**2) / np.sum(self.window**2)) ** 0.5  # rms width, rad per sample
+        return LinePlan(
+            self.signal,
+            self.k * (rate / self.n_fft),
+            "linear",
+            f"{'synchrosqueezed ' if squeezed else ''}STFT{by}, {self.name}",
+            np.full(len(self.k), n / 2 / rate),
+            max(2, int(np.rint(spread / np.pi * self.n_fft))),  # to where the power has fallen to e⁻²
+            squeezed,
+        )
+
+    def coefficients(self, step: int) -> Coefficients:
+        """Return the spectra of frames at every `step`-th sample."""
+        transform = self.transform
+        V = transform.room(step)
+        for frame, part in self.batches(step):
+            V[:, frame : frame + part.shape[1]] = part
+        return transform.coefficients(V, step, np.full(len(V), 1.0 if transform.squeezed else self.weight))
+
+    def level_map(self, n_columns: int, reduction: Reduction, scaling: str) -> TimeFrequencyMap:
+        """Return the levels of frames that overlap by at least 7/8, 15/16 where they are squeezed."""
+        columns = plan_columns(self.signal, n_columns)
+        step = max(1, min(columns.n_per_column, len(self.window) // (8 if self.engine is None else 16)))
+        pieces = ((self.k - self.first, frame * step, step, part) for frame, part in self.batches(step))
+        return self.transform.level_map(columns, reduction, scaling, pieces)
+
+    def batches(self, step: int) -> Iterator[tuple[int, ComplexArray]]:
+        """Yield (first frame, spectra), (n_lines, n_frames); ssqueezepy knows one batch only."""
+        if self.engine == "ssqueezepy":
+            yield 0, _by_ssqueezepy(self, step)
+            return
+        x, gains = self.signal, self.gains
+        lines = self.transform.lines
+        table = squeeze_lines(lines, x.rate, "linear")
+        omega = 2 * np.pi / x.rate * lines
+        weights = np.full(len(lines), self.weight, dtype=np.float32)
+        smallest = MIN_SHARE**2 * float(np.dot(x.values, x.values)) / x.n_samples
+        for frame, V, slopes in self._spectra(step):
+            if self.engine is None:
+                yield frame, (V * gains).T
+                continue
+            # With the frame's middle as origin of the phase, ∂V/∂t = -V_g' + iω V: the same rule as for wavelets.
+            scaled = (V * gains).T.astype(np.complex64)
+            rates = ((1j * omega * V - slopes) * gains).T.astype(np.complex64)
+            T = np.zeros(scaled.shape, dtype=np.complex64)
+            squeeze(scaled, rates, weights, smallest, table.borders, table.lookup, T, 0)
+            yield frame, T
+
+    def _spectra(self, step: int) -> Iterator[tuple[int, ComplexArray, ComplexArray]]:
+        """Yield (first frame, spectra with the window, with its slope where squeezed), (n_frames, n_lines)."""
+        from scipy.fft import rfft
+
+        n_frames, n = -(-self.signal.n_samples // step), len(self.window)
+        n_batch, half = max(1, (1 << 19) // self.n_fft), n // 2
+        for frame in range(0, n_frames, n_batch):
+            n_here = min(n_batch, n_frames - frame)
+            part = stretch(self.signal.values, frame * step - half, (n_here - 1) * step + n, self.edges)
+            frames = np.lib.stride_tricks.sliding_window_view(part, n)[::step]
+            spectra = []
+            for window in (self.window,) if self.engine is None else (self.window, self.slope):
+                turned = np.zeros((n_here, self.n_fft))
+                turned[:, : n - half] = frames[:, half:] * window[half:]
+                turned[:, self.n_fft - half :] = frames[:, :half] * window[:half]
+                spectra.append(rfft(turned, axis=1)[:, self.first : self.last])
+            yield frame, spectra[0], spectra[-1]
+
+
+def _frames(
     signal: Source,
     channel: str | float | None,
     window: str,
@@ -291,14 +319,95 @@ def prepared(
     lowest: float | None,
     highest: float | None,
     edges: Edges,
-    *,
-    squeezed_by: str | None = None,
-) -> tuple[UniformSignal, FramePlan, Form]:
+    engine: SqueezeEngine | None = None,
+) -> FramePlan:
     """Check what all transforms by frames are given, and plan the frames."""
+    from scipy.fft import next_fast_len
+
+    if engine is not None:
+        is_ssqueezepy(engine)
     x = uniform(signal, channel)
-    plan = plan_frames(x, window, window_length, zero_padding, lowest, highest)
+    one_of(window, "window", ("hann", "gaussian"))
     one_of(edges, "edges", EDGES)
-    squeezed = squeezed_by is not None
-    method = f"{'synchrosqueezed ' if squeezed else ''}STFT{squeezed_by or ''}, {plan.name}"
-    edge = np.full(plan.n_lines, plan.n_window / 2 / x.rate)
-    return x, plan, Form(plan.lines(x.rate), "linear", method, edge, plan.n_reach, squeezed)
+    n = _length(x, window_length)
+    n_fft = int(next_fast_len(n * count(zero_padding, "zero_padding"), real=True))
+    n_fft += n_fft % 2
+    resolution = x.rate / n_fft
+    low = 0.0 if lowest is None else lowest
+    high = x.highest_valid if highest is None else positive(highest, "highest")
+    if not 0.0 <= low < high <= x.highest_valid * (1 + 1e-9):
+        raise InputError(
+            f"lines from {low:g} to {high:g} {x.position_unit} are asked",
+            where="lowest, highest",
+            allowed=f"0 <= lowest < highest <= {x.highest_valid:g} {x.position_unit}",
+        )
+    first, last = int(np.ceil(low / resolution - 1e-9)), int(np.floor(high / resolution * (1 + 1e-12))) + 1
+    if last - first < 2:
+        raise InputError(
+            f"lines are {resolution:g} {x.position_unit} apart: fewer than two lie between {low:g} and {high:g}",
+            where="window_length",
+            remedy="lengthen the window or widen the range",
+        )
+    g, slope = _window(window, n)
+    return FramePlan(x, g, slope, n_fft, first, last, edges, engine, f"{window} window of {n} samples")
+
+
+def _length(x: UniformSignal, window_length: float | None) -> int:
+    if window_length is None:
+        n = min(max(x.n_samples // 64, 16), 8192)
+    else:
+        n = round(positive(window_length, "window_length") * x.rate)
+    unit = "s" if x.axis == "frequency" else "revolutions"
+    if n < 4:
+        raise InputError(
+            f"the window of {window_length:g} {unit} holds {n} samples",
+            where="window_length",
+            allowed=f"at least {4 / x.rate:.4g} {unit}",
+        )
+    if n > x.n_samples:
+        raise RefusalError(
+            f"the signal of {x.length:.4g} {unit} is shorter than the window of {n / x.rate:.4g}",
+            remedy="shorten window_length or record longer",
+        )
+    return n
+
+
+def _window(name: str, n: int) -> tuple[FloatArray, FloatArray]:
+    """Return the window around its middle sample n // 2, and its derivative per sample."""
+    tau = np.arange(n) - n // 2
+    if name == "hann":
+        turn = 2 * np.pi / n
+        return 0.5 + 0.5 * np.cos(turn * tau), -0.5 * turn * np.sin(turn * tau)
+    sigma = n / 2 / 4.0  # four standard deviations to either side
+    g = np.exp(-0.5 * (tau / sigma) ** 2)
+    return g, -tau / sigma**2 * g
+
+
+def _by_ssqueezepy(plan: FramePlan, step: int) -> ComplexArray:
+    """Return the squeezed spectra by ssqueezepy.
+
+    ssqueezepy sums V / n_fft over the lines; 2 / g(0) makes a unit sine read 1, and 1 / g(0) where there is no twin.
+    """
+    x, n = plan.signal, len(plan.window)
+    n_frames = -(-x.n_samples // step)
+    # Spectra and their derivatives, a copy and the result, complex; frames of both windows before, real.
+    check_memory((plan.n_fft // 2 + 1) * n_frames * 8 * 6)
+    window = np.zeros(plan.n_fft)
+    start = plan.n_fft // 2 - n // 2
+    window[start : start + n] = plan.window
+    scaled, rms = unit_rms(x)
+    with ssqueezepy() as ssq:
+        T = ssq.ssq_stft(
+            scaled,
+            window,
+            n_fft=plan.n_fft,
+            win_len=plan.n_fft,
+            hop_len=step,
+            fs=1.0,
+            padtype=plan.edges,
+            gamma=MIN_SHARE * plan.window.sum() / 2,
+            preserve_transform=False,
+        )[0]
+        rows = np.asarray(T)[plan.first : plan.last, :n_frames]
+        gains = plan.twins * (rms / plan.window[n // 2])
+        return np.asarray(rows * gains.astype(np.float32)[:, None])

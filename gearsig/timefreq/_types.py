@@ -181,23 +181,3 @@ def at_label(axis: Axis, shaft: str) -> str:
 def axis_label(axis: Axis, shaft: str) -> str:
     """Name the direction of the lines."""
     return "frequency (Hz)" if axis == "frequency" else f"order (of {shaft or 'the shaft'})"
-
-
-# --------------------
-# How many coefficients may be held at once.
-# --------------------
-
-
-MAX_COEFFICIENTS = 1 << 28
-"""Complex coefficients that are held at once: 2 GB."""
-
-
-def check_size(n_lines: int, n_columns: int) -> None:
-    """Raise if the coefficients would take more than 2 GB."""
-    if n_lines * n_columns > MAX_COEFFICIENTS:
-        raise InputError(
-            f"{n_lines} lines × {n_columns} columns make {8e-9 * n_lines * n_columns:.3g} GB of coefficients",
-            where="step",
-            allowed=f"at most {8e-9 * MAX_COEFFICIENTS:.2g} GB",
-            remedy=f"set step to {-(-n_lines * n_columns // MAX_COEFFICIENTS)} times as much, or take the map",
-        )

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.angle import AngleSignal
 from gearsig.checks import FloatArray, count, frozen_array, one_of, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.spectra import Scaling, scaled_unit
-from gearsig.timefreq._types import Axis, Coefficients, ComplexArray, Reduction, Spacing, TimeFrequencyMap, check_size
+from gearsig.timefreq._types import Axis, Coefficients, ComplexArray, Reduction, Spacing, TimeFrequencyMap
 
 SMALLEST, LARGEST = 1e-12, 1e15
 """Largest values of a signal, in its unit, between which single precision holds its weak coefficients' squares."""
-MIN_SAMPLES = 16
-"""Samples below which there is nothing to lay out over time and frequency."""
+MAX_COEFFICIENTS = 1 << 28
+"""Complex coefficients that are held at once: 2 GB."""
 
 
 @dataclass(frozen=True)
@@ -58,10 +60,8 @@ class UniformSignal:
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", frozen_array(self.values, self.source or "signal", ndim=1))
         positive(self.rate, "rate")
-        if len(self.values) < MIN_SAMPLES:
-            raise RefusalError(
-                f"the signal has {len(self.values)} samples, fewer than {MIN_SAMPLES}", remedy="record longer"
-            )
+        if len(self.values) < 16:
+            raise RefusalError(f"the signal has {len(self.values)} samples, fewer than 16", remedy="record longer")
         largest = float(max(abs(self.values.max()), abs(self.values.min())))
         if largest and not SMALLEST <= largest <= LARGEST:
             raise InputError(
@@ -143,11 +143,6 @@ def uniform(signal: Source, channel: str | float | None = None) -> UniformSignal
     )
 
 
-# --------------------
-# What a signal is taken to be beyond its ends.
-# --------------------
-
-
 Edges = Literal["reflect", "zero"]
 EDGES = ("reflect", "zero")
 
@@ -167,12 +162,8 @@ def stretch(values: FloatArray, start: int, n: int, edges: Edges) -> FloatArray:
     return result
 
 
-# --------------------
-# Power of coefficients per stretch of time or angle, gathered piece by piece.
-# --------------------
-
-
-SCALINGS = ("amplitude peak", "power")
+Piece = tuple[NDArray[np.int64], int, int, ComplexArray]
+"""Lines, first sample, samples between columns, and the coefficients, (n_lines, n_columns)."""
 
 
 @dataclass(frozen=True)
@@ -192,112 +183,93 @@ class Columns:
         """Largest power of two that leaves at least eight coefficients in every stretch, if it has as many samples."""
         return 1 << min(20, max(0, self.n_per_column.bit_length() - 4))
 
-    def middles(self, signal: UniformSignal) -> FloatArray:
-        """Return the middle of each stretch in seconds or revolutions."""
-        first = np.arange(self.n_columns) * self.n_per_column
-        last = np.minimum(first + self.n_per_column, self.n_samples) - 1
-        result: FloatArray = signal.start + (first + last) / 2 / signal.rate
-        return result
-
 
 def plan_columns(signal: UniformSignal, n_columns: int) -> Columns:
     """Return at most `n_columns` stretches of equal length."""
-    count(n_columns, "n_columns", minimum=2)
-    return Columns(signal.n_samples, -(-signal.n_samples // n_columns))
+    return Columns(signal.n_samples, -(-signal.n_samples // count(n_columns, "n_columns", minimum=2)))
 
 
 @dataclass(frozen=True)
-class Form:
-    """What maps and coefficients say about their transform; fields as in `TimeFrequencyMap`."""
+class LinePlan:
+    """A signal and the lines that it is transformed to; fields as in `TimeFrequencyMap`."""
 
+    signal: UniformSignal
     lines: FloatArray
     spacing: Spacing
     method: str
     edge: FloatArray
-    n_reach: int
+    n_reach: int = 1
     squeezed: bool = False
 
-    def coefficients(self, values: ComplexArray, signal: UniformSignal, step: int, weights: FloatArray) -> Coefficients:
+    def room(self, step: int) -> ComplexArray:
+        """Return zeros for the coefficients of every `step`-th sample; raise InputError beyond 2 GB."""
+        n_lines, n_columns = len(self.lines), -(-self.signal.n_samples // count(step, "step"))
+        if n_lines * n_columns > MAX_COEFFICIENTS:
+            raise InputError(
+                f"{n_lines} lines × {n_columns} columns make {8e-9 * n_lines * n_columns:.3g} GB of coefficients",
+                where="step",
+                allowed=f"at most {8e-9 * MAX_COEFFICIENTS:.2g} GB",
+                remedy=f"set step to {-(-n_lines * n_columns // MAX_COEFFICIENTS)} times as much, or take the map",
+            )
+        return np.zeros((n_lines, n_columns), dtype=np.complex64)
+
+    def coefficients(self, values: ComplexArray, step: int, weights: FloatArray) -> Coefficients:
         """Return the complex values of every `step`-th sample; the weights give the signal back."""
+        x = self.signal
         return Coefficients(
             values,
             self.lines,
-            signal.instants(step),
-            signal.axis,
+            x.instants(step),
+            x.axis,
             self.spacing,
-            signal.unit,
+            x.unit,
             self.method,
             weights,
             self.n_reach,
             self.squeezed,
-            signal.source,
-            signal.shaft,
+            x.source,
+            x.shaft,
         )
 
+    def level_map(
+        self, columns: Columns, reduction: Reduction, scaling: str, pieces: Iterable[Piece]
+    ) -> TimeFrequencyMap:
+        """Return mean or maximum of |W|² in each column, from pieces in any order.
 
-def room_for(n_lines: int, signal: UniformSignal, step: int) -> ComplexArray:
-    """Return zeros for the coefficients of every `step`-th sample.
-
-    Raises
-    ------
-    InputError
-        If the step is no count, or they would take more than 2 GB.
-    """
-    n_columns = -(-signal.n_samples // count(step, "step"))
-    check_size(n_lines, n_columns)
-    return np.zeros((n_lines, n_columns), dtype=np.complex64)
-
-
-class ColumnPowers:
-    """Gathers |W|² of pieces in any order.
-
-    Parameters
-    ----------
-    columns : Columns
-    n_lines : int
-    reduction : str
-        "mean" or "max".
-    """
-
-    def __init__(self, columns: Columns, n_lines: int, reduction: Reduction) -> None:
+        |W|² / 2 is the power of a sine of amplitude |W|.
+        """
         one_of(reduction, "reduction", ("mean", "max"))
-        self.columns, self.reduction = columns, reduction
-        self._gathered = np.zeros((n_lines, columns.n_columns))
-        self._n_read = np.zeros((n_lines, columns.n_columns), dtype=np.int64)
-
-    def add(self, lines: np.ndarray[tuple[int], np.dtype[np.int64]], start: int, step: int, W: ComplexArray) -> None:
-        """Add W[line, i] at samples start + i·step."""
-        power = W.real**2 + W.imag**2
-        n_per_column = self.columns.n_per_column
-        column = (start + step * np.arange(W.shape[1])) // n_per_column
-        first = np.flatnonzero(np.diff(column, prepend=-1))
-        where = slice(int(column[0]), int(column[-1]) + 1)
-        if self.reduction == "max":
-            best = np.maximum.reduceat(power, first, axis=1)
-            self._gathered[lines, where] = np.maximum(self._gathered[lines, where], best)
-            self._n_read[lines, where] = 1
-            return
-        self._gathered[lines, where] += np.add.reduceat(power, first, axis=1, dtype=np.float64)
-        self._n_read[lines, where] += np.diff(first, append=len(column))
-
-    def finished(self, signal: UniformSignal, form: Form, scaling: str) -> TimeFrequencyMap:
-        """Return the map; |W|² / 2 is the power of a sine of amplitude |W|."""
-        one_of(scaling, "scaling", SCALINGS)
-        power = (self._gathered / np.maximum(self._n_read, 1)).T
-        kind = cast("Scaling", scaling)
+        kind = cast("Scaling", one_of(scaling, "scaling", ("amplitude peak", "power")))
+        x, n_per_column = self.signal, columns.n_per_column
+        gathered = np.zeros((len(self.lines), columns.n_columns))
+        n_read = np.zeros(gathered.shape, dtype=np.int64)
+        for lines, start, step, W in pieces:
+            power = W.real**2 + W.imag**2
+            column = (start + step * np.arange(W.shape[1])) // n_per_column
+            first = np.flatnonzero(np.diff(column, prepend=-1))
+            at = slice(int(column[0]), int(column[-1]) + 1)
+            if reduction == "max":
+                gathered[lines, at] = np.maximum(gathered[lines, at], np.maximum.reduceat(power, first, axis=1))
+                n_read[lines, at] = 1
+            else:
+                gathered[lines, at] += np.add.reduceat(power, first, axis=1, dtype=np.float64)
+                n_read[lines, at] += np.diff(first, append=len(column))
+        level = (gathered / np.maximum(n_read, 1)).T
+        begin = np.arange(columns.n_columns) * n_per_column
+        last = np.minimum(begin + n_per_column, columns.n_samples) - 1
         return TimeFrequencyMap(
-            np.sqrt(power) if kind == "amplitude peak" else power / 2,
-            form.lines,
-            self.columns.middles(signal),
-            signal.axis,
-            form.spacing,
+            np.sqrt(level) if kind == "amplitude peak" else level / 2,
+            self.lines,
+            x.start + (begin + last) / 2 / x.rate,
+            x.axis,
+            self.spacing,
             kind,
-            scaled_unit(signal.unit, kind),
-            form.method,
-            self.reduction,
-            form.edge,
-            form.n_reach,
-            form.squeezed,
-            signal.source,
-            signal.shaft,
+            scaled_unit(x.unit, kind),
+            self.method,
+            reduction,
+            self.edge,
+            self.n_reach,
+            self.squeezed,
+            x.source,
+            x.shaft,
         )

@@ -381,6 +381,21 @@ def pieces(values: FloatArray, group: LineGroup, edges: Edges, *, derivatives: b
         yield from block_pieces(values, group, start, edges, space, derivatives=derivatives)
 
 
+def sampled_pieces(
+    x: UniformSignal, positions: FloatArray, wavelet: Wavelet, step: int, edges: Edges, *, derivatives: bool = False
+) -> Iterator[tuple[Piece, int, ComplexArray, ComplexArray]]:
+    """Yield pieces at every `step`-th sample: piece, first column, coefficients and derivatives there.
+
+    They are computed at the largest power of two that divides the step.
+    """
+    every = min(step & -step, 1024)
+    for group in plan_groups(positions / x.rate, wavelet, x.n_samples, step=every):
+        for piece in pieces(x.values, group, edges, derivatives=derivatives):
+            column = -(-piece.start // step)
+            thin = slice((column * step - piece.start) // every, None, step // every)
+            yield piece, column, piece.values[:, thin], piece.derivatives[:, thin]
+
+
 def workspace(group: LineGroup) -> ComplexArray:
     """Return room for the coefficients of a piece and their derivatives: asking for it each time costs more."""
     most = max(_rows_at_once(batch, group) * group.n_block // batch.step for batch in group.batches)

@@ -8,8 +8,15 @@ import pytest
 from gearsig.angle import find_shaft_angle
 from gearsig.recording import read_recording
 from gearsig.rig import read_rig
-from gearsig.timefreq import Morse, TimeFrequencyMap, UniformSignal, cwt_map, ridges, squeezed_cwt_map
-from gearsig.timefreq._ridges import _tops_beside
+from gearsig.timefreq import (
+    Morse,
+    TimeFrequencyMap,
+    UniformSignal,
+    cwt_map,
+    ridges,
+    squeezed_cwt_map,
+    tops_beside,
+)
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 RATE = 4096.0
@@ -61,5 +68,5 @@ def test_a_ridge_in_noise_of_more_power_is_followed(transform, seed: int, course
 
 def test_paths_that_would_meet_beyond_the_map_part_at_its_edge():
     beyond = [np.array([19.0, 20.5, 21.0]), np.array([17.0, 19.5, 20.0])]
-    upper, lower = _tops_beside(np.ones((18, 3)), beyond, 0)
+    upper, lower = tops_beside(np.ones((18, 3)), beyond, 0)
     assert np.all((lower >= 0) & (lower <= upper) & (upper <= 17))

@@ -1,0 +1,123 @@
+"""Squeezing: coefficients moved to their momentary frequency, by compiled kernels or by ssqueezepy."""
+
+from __future__ import annotations
+
+import os
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Literal, get_args
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray, one_of
+from gearsig.engines import engine_module
+from gearsig.errors import InputError
+from gearsig.timefreq._types import Spacing
+from gearsig.timefreq._uniform import UniformSignal
+
+MIN_SHARE = 1e-6
+"""Coefficients below this share of the signal's rms are rounding: they have no frequency."""
+
+
+SqueezeEngine = Literal["gearsig", "ssqueezepy"]
+
+
+def is_ssqueezepy(engine: str) -> bool:
+    """Check the name of an engine, and tell whether it is ssqueezepy."""
+    return one_of(engine, "engine", get_args(SqueezeEngine)) == "ssqueezepy"
+
+
+@dataclass(frozen=True)
+class SqueezeLines:
+    """Borders of the lines in radians per sample, (n_lines + 1,), and the line at the left end of equal cells."""
+
+    borders: FloatArray
+    lookup: NDArray[np.int64]
+
+
+def squeeze_lines(lines: FloatArray, rate: float, spacing: Spacing) -> SqueezeLines:
+    """Return borders half-way between the lines, on the logarithm where they are spaced on it."""
+    logarithmic = spacing == "logarithmic"
+    places = np.log(lines) if logarithmic else np.asarray(lines)
+    half = np.diff(places) / 2 if len(places) > 1 else np.array([0.5 if not logarithmic else 0.02])
+    borders = np.concatenate([[places[0] - half[0]], places[:-1] + half[: len(places) - 1], [places[-1] + half[-1]]])
+    borders = (np.exp(borders) if logarithmic else borders) * (2 * np.pi / rate)
+    # One cell more than used: the highest frequency may round into it.
+    cells = borders[0] + np.arange(4097) * (borders[-1] - borders[0]) / 4097
+    lookup = np.clip(np.searchsorted(borders, cells, side="right") - 1, 0, len(borders) - 2)
+    return SqueezeLines(borders, lookup.astype(np.int64))
+
+
+def ssqueezepy() -> AbstractContextManager[ModuleType]:
+    """Load the engine, whose results the transforms bring to the lines, scaling and phase of gearsig's own."""
+    # Its parallel kernels abort the process when they are called from several threads; it reads this at every call.
+    os.environ.setdefault("SSQ_PARALLEL", "0")
+    return engine_module("ssqueezepy")
+
+
+def unit_rms(x: UniformSignal) -> tuple[FloatArray, float]:
+    """Return the signal over its rms: ssqueezepy computes in single precision, with absolute limits."""
+    rms = float(np.sqrt(np.dot(x.values, x.values) / x.n_samples)) or 1.0
+    return np.asarray(x.values / rms), rms
+
+
+def check_memory(n_bytes: int) -> None:
+    """Raise where ssqueezepy's matrices, all held at once, would push a usual machine into swapping."""
+    if n_bytes > 4 << 30:
+        raise InputError(
+            f"ssqueezepy would take about {n_bytes / 1e9:.3g} GB for this signal",
+            where="engine",
+            allowed=f"at most {(4 << 30) / 1e9:.2g} GB",
+            remedy='choose engine="gearsig", a shorter signal, fewer lines, or a larger step of the STFT',
+        )
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def squeeze(W, dW, weights, smallest, borders, lookup, T, first):  # type: ignore[no-untyped-def]
+    """T[l, first + t] += weights[j] W[j, t], l being the line whose borders hold the momentary frequency.
+
+    ω̂ = Im(W' / W), in the unit of `borders` (n_lines + 1, increasing). `lookup` gives the line at the left end of each
+    of its equal cells between the outermost borders. Coefficients with |W|² <= `smallest` have no frequency.
+    """
+    n_lines = T.shape[0]
+    bottom, top = borders[0], borders[n_lines]
+    per_cell = lookup.shape[0] / (top - bottom)
+    for j in range(W.shape[0]):
+        for t in range(W.shape[1]):
+            a, b = W[j, t].real, W[j, t].imag
+            power = a * a + b * b
+            if power <= smallest:
+                continue
+            omega = (dW[j, t].imag * a - dW[j, t].real * b) / power
+            if omega < bottom or omega >= top:
+                continue
+            line = lookup[int((omega - bottom) * per_cell)]
+            while omega >= borders[line + 1]:
+                line += 1
+            T[line, first + t] += weights[j] * W[j, t]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def gather_near(W, dW, weight, smallest, low, high, out):  # type: ignore[no-untyped-def]
+    """out[t] += weight · W[j, t] wherever low[t] <= ω̂ <= high[t]."""
+    for j in range(W.shape[0]):
+        for t in range(W.shape[1]):
+            a, b = W[j, t].real, W[j, t].imag
+            power = a * a + b * b
+            if power <= smallest:
+                continue
+            omega = (dW[j, t].imag * a - dW[j, t].real * b) / power
+            if low[t] <= omega <= high[t]:
+                out[t] += weight * W[j, t]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def gather_lines(W, omegas, weight, low, high, out):  # type: ignore[no-untyped-def]
+    """out[t] += weight · W[j, t] wherever low[t] <= omegas[j] <= high[t]."""
+    for j in range(W.shape[0]):
+        for t in range(W.shape[1]):
+            if low[t] <= omegas[j] <= high[t]:
+                out[t] += weight * W[j, t]
