@@ -3,123 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 
 import numpy as np
 
+from gearsig import indicators
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis._bearing import detect_bearings
 from gearsig.diagnosis._crack import crack_depth, with_crack
-from gearsig.diagnosis._mesh import detect_mesh
+from gearsig.diagnosis._lines import detect_lines, detect_mesh, speed_finding
 from gearsig.diagnosis._modulation import detect_sidebands
 from gearsig.diagnosis._reference import beside_reference
 from gearsig.diagnosis._resonance import detect_resonances, order_levels
 from gearsig.diagnosis._signals import (
     AnalysisSignals,
     BandEnvelope,
-    ExaminedSignals,
-    ShaftSignals,
     band_envelopes,
     channel_analysis,
     compute_signals,
     kurtogram_bands,
 )
-from gearsig.diagnosis._single_lines import detect_lines
-from gearsig.diagnosis._speed import speed_finding
 from gearsig.diagnosis._start_stop import start_stop_analysis
 from gearsig.diagnosis._tooth import detect_tooth_damage
-from gearsig.diagnosis._types import Analysis, AnalysisSettings, CannotTell, Finding, Kind
+from gearsig.diagnosis._types import Analysis, AnalysisSettings, CannotTell, cannot_tell
 from gearsig.diagnosis._verdict import detect_data_problems, ranked, verdict_of
 from gearsig.errors import InputError, RefusalError
-from gearsig.indicators import Indicator
-from gearsig.orders import SynchronousAverage
+from gearsig.orders import SeparatedAverage, band_passed_mesh
 from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording
 from gearsig.rig import Rig
-
-# --------------------
-# All indicators of an analysis: per channel, per gear, per shaft, per bearing.
-# --------------------
-
-
-def indicator_table(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> tuple[Indicator, ...]:
-    """Return every indicator that the recording and the rig allow, channel by channel."""
-    return tuple(
-        indicator
-        for channel in signals.recording.channels
-        for indicator in _of_channel(signals, channel.name, channel.unit, envelopes)
-    )
-
-
-def _of_channel(signals: AnalysisSignals, name: str, unit: str, envelopes: list[BandEnvelope]) -> Iterator[Indicator]:
-    from gearsig.indicators import time_indicators
-
-    yield from time_indicators(signals.recording.values(name), name, unit)
-    yield from _of_orders(signals, name)
-    for shaft in signals.shafts:
-        yield from time_indicators(
-            shaft.averages[name].values, name, unit, computed_on="synchronous average", shaft=shaft.shaft
-        )
-        yield from _of_gears(signals, shaft, name)
-    if signals.angle is not None:
-        yield from _of_bearings(signals, name, envelopes)
-
-
-def _of_orders(signals: AnalysisSignals, name: str) -> Iterator[Indicator]:
-    from gearsig.indicators import mesh_indicators, shaft_indicators
-
-    if name not in signals.order_excess:
-        return
-    spectrum = signals.order_excess[name].spectrum
-    for pair in signals.rig.pairs:
-        if signals.rig.mesh_order(pair) is not None:
-            yield from mesh_indicators(spectrum, signals.rig, pair, channel=name)
-    for shaft, order in signals.known_shaft_orders.items():
-        yield from shaft_indicators(spectrum, shaft, shaft_ratio=order, channel=name)
-
-
-def _of_gears(signals: AnalysisSignals, shaft: ShaftSignals, name: str) -> Iterator[Indicator]:
-    from gearsig.indicators import gear_indicators
-
-    if name not in shaft.separated:
-        return
-    parts = shaft.separated[name]
-    for pair in signals.rig.pairs:
-        if shaft.shaft not in (pair.driver, pair.driven) or (teeth := pair.teeth(shaft.shaft)) is None:
-            continue
-        yield from gear_indicators(
-            parts.average,
-            parts.residual,
-            parts.difference,
-            _band_passed(parts.average, teeth),
-            teeth=teeth,
-            gear=f"{pair.name}/{shaft.shaft}",
-        )
-
-
-def _band_passed(average: SynchronousAverage, teeth: int) -> SynchronousAverage | None:
-    from gearsig.orders import band_passed_mesh
-
-    try:
-        return band_passed_mesh(average, teeth)
-    except RefusalError:  # the band reaches beyond the sampling rate
-        return None
-
-
-def _of_bearings(signals: AnalysisSignals, name: str, envelopes: list[BandEnvelope]) -> Iterator[Indicator]:
-    """Take the band whose envelope has the clearest lines; a quiet one would only state its floor."""
-    from gearsig.indicators import bearing_indicators
-
-    of_channel = [e for e in envelopes if e.channel == name]
-    if not of_channel:
-        return
-    envelope = max(of_channel, key=lambda e: float(e.excess.scores().sum()))
-    band = f"{envelope.band_hz[0]:.0f} to {envelope.band_hz[1]:.0f} Hz"
-    for bearing in signals.rig.bearings:
-        ratio = signals.rig.ratio(bearing.shaft)
-        if ratio is not None and bearing.orders():
-            yield from bearing_indicators(envelope.excess.spectrum, bearing, shaft_ratio=ratio, channel=name, band=band)
-
 
 MINIMUM_SAMPLES = 256
 """Below it no spectrum has a noise floor to compare with."""
@@ -172,70 +84,63 @@ def analyze(
     prepared = prepare(recording, rig)
     recording, known = prepared.recording, prepared.rig
     _check_size(recording)
-    prepared_reference = None
-    if reference is not None:
-        prepared_reference = prepare(reference, recording.rig)
-        _check_reference(recording, prepared_reference.recording)
+    healthy = None if reference is None else prepare(reference, recording.rig)
+    if healthy is not None:
+        _check_reference(recording, healthy.recording)
+
     announce("finding the speed")
     findings, dead = detect_data_problems(recording)
-    names = [name for name in recording.vibration_names() if name not in dead]
-    unsteady = start_stop_analysis(
-        recording,
-        known,
-        findings,
-        asdict(settings),
-        prepared_reference.recording if prepared_reference is not None else None,
-    )
+    healthy_recording = healthy.recording if healthy is not None else None
+    unsteady = start_stop_analysis(recording, known, findings, asdict(settings), healthy_recording)
     if unsteady is not None:
         return unsteady
     _check_vibration(recording)
     angle = _angle_of(prepared)
     findings.append(speed_finding(angle))
+    names = [name for name in recording.vibration_names() if name not in dead]
     if not names:
-        findings.append(Finding("all-channels-dead", Kind.CANNOT_TELL, "Every vibration channel is dead."))
-        order = ranked(findings)
+        order = ranked([*findings, cannot_tell("all-channels-dead", "Every vibration channel is dead.")])
         return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings))
-    usable = angle if not isinstance(angle, CannotTell) else None
-    material = _material(prepared, names, usable, settings, announce, has_reference=reference is not None)
+
+    announce("averages and spectra")
+    usable = angle if isinstance(angle, ShaftAngle) else None
+    signals = compute_signals(prepared, names, usable, settings, has_reference=healthy is not None)
+    announce("envelopes")
+    envelopes, own_bands = list(band_envelopes(signals)), kurtogram_bands(signals)
+    announce("levels over speed")
+    levels = order_levels(signals)
+
     announce("gears, bearings and shafts")
-    findings += _detect(material)
+    if not (known.pairs or known.bearings):
+        title = "No gears and no bearings are described, so that none can be examined."
+        surer = "A rig file with teeth and bearings; `gearsig rig example` prints one to start from."
+        findings.append(cannot_tell("machine-not-described", title, surer=surer))
+    findings += detect_mesh(signals)
+    findings += detect_tooth_damage(signals)
+    findings += detect_bearings(signals, envelopes, own_bands)
+    findings += detect_sidebands(signals)
+    findings += detect_lines(signals)
+    findings += detect_resonances(levels)
+
     reference_analysis = None
-    if prepared_reference is not None:
+    if healthy is not None:
         announce("the reference")
-        reference_analysis = analyze(prepared_reference, settings=settings)
+        reference_analysis = analyze(healthy, settings=settings)
         findings = beside_reference(findings, reference_analysis)
-    crack = crack_depth(prepared, known, prepared_reference, torque_nm, dead)
+    crack = crack_depth(prepared, known, healthy, torque_nm, dead)
     order = ranked(with_crack(findings, crack, known))
     return Analysis(
         recording=recording,
         rig=recording.rig,
         shaft_angle=angle,
-        channels=tuple(channel_analysis(material, name, order) for name in names),
-        indicators=indicator_table(material.signals, material.envelopes),
+        channels=tuple(channel_analysis(signals, n, envelopes, own_bands, levels.get(n, ()), order) for n in names),
+        indicators=tuple(_indicators(signals, envelopes)),
         findings=order,
-        verdict=verdict_of(order, has_reference=reference is not None),
+        verdict=verdict_of(order, has_reference=healthy is not None),
         settings=asdict(settings),
         crack=crack,
         reference=reference_analysis,
     )
-
-
-def _material(
-    prepared: PreparedRecording,
-    names: Sequence[str],
-    angle: ShaftAngle | None,
-    settings: AnalysisSettings,
-    announce: Callable[[str], object],
-    *,
-    has_reference: bool,
-) -> ExaminedSignals:
-    """Compute everything that is looked at."""
-    announce("averages and spectra")
-    signals = replace(compute_signals(prepared, names, angle, settings), has_reference=has_reference)
-    announce("envelopes")
-    envelopes, chosen = list(band_envelopes(signals)), kurtogram_bands(signals)
-    announce("levels over speed")
-    return ExaminedSignals(signals, envelopes, chosen, order_levels(signals))
 
 
 def _angle_of(prepared: PreparedRecording) -> ShaftAngle | CannotTell:
@@ -251,30 +156,53 @@ def _angle_of(prepared: PreparedRecording) -> ShaftAngle | CannotTell:
         raise InputError(error.what, where=where, allowed=error.allowed, remedy=remedy) from None
 
 
-def _detect(material: ExaminedSignals) -> list[Finding]:
-    signals = material.signals
-    return [
-        *_nothing_to_examine(signals.rig),
-        *detect_mesh(signals),
-        *detect_tooth_damage(signals),
-        *detect_bearings(signals, material.envelopes, material.kurtogram_bands),
-        *detect_sidebands(signals),
-        *detect_lines(signals),
-        *detect_resonances(material.order_levels),
-    ]
+def _indicators(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Iterator[indicators.Indicator]:
+    """Yield every indicator that the recording and the rig allow: per channel, per gear, per shaft, per bearing."""
+    rig = signals.rig
+    for channel in signals.recording.channels:
+        name, unit = channel.name, channel.unit
+        yield from indicators.time_indicators(signals.recording.values(name), name, unit)
+        if name in signals.order_excess:
+            spectrum = signals.order_excess[name].spectrum
+            for pair in rig.pairs:
+                if rig.mesh_order(pair) is not None:
+                    yield from indicators.mesh_indicators(spectrum, rig, pair, channel=name)
+            for shaft, order in signals.known_shaft_orders.items():
+                yield from indicators.shaft_indicators(spectrum, shaft, shaft_ratio=order, channel=name)
+        for turning in signals.shafts:
+            values, on = turning.averages[name].values, "synchronous average"
+            yield from indicators.time_indicators(values, name, unit, computed_on=on, shaft=turning.shaft)
+            yield from _of_gears(rig, turning.shaft, turning.separated.get(name))
+        if signals.angle is not None:
+            yield from _of_bearings(signals, name, envelopes)
 
 
-def _nothing_to_examine(rig: Rig) -> list[Finding]:
-    if rig.pairs or rig.bearings:
-        return []
-    return [
-        Finding(
-            "machine-not-described",
-            Kind.CANNOT_TELL,
-            "No gears and no bearings are described, so that none can be examined.",
-            surer="A rig file with teeth and bearings; `gearsig rig example` prints one to start from.",
+def _of_gears(rig: Rig, shaft: str, parts: SeparatedAverage | None) -> Iterator[indicators.Indicator]:
+    for pair in rig.pairs:
+        teeth = pair.teeth(shaft) if shaft in (pair.driver, pair.driven) else None
+        if parts is None or teeth is None:
+            continue
+        try:
+            band = band_passed_mesh(parts.average, teeth)
+        except RefusalError:  # the band reaches beyond the sampling rate
+            band = None
+        gear = f"{pair.name}/{shaft}"
+        yield from indicators.gear_indicators(
+            parts.average, parts.residual, parts.difference, band, teeth=teeth, gear=gear
         )
-    ]
+
+
+def _of_bearings(
+    signals: AnalysisSignals, name: str, envelopes: Sequence[BandEnvelope]
+) -> Iterator[indicators.Indicator]:
+    """Take the band whose envelope has the clearest lines; a quiet one would only state its floor."""
+    of_channel = [e for e in envelopes if e.channel == name]
+    clearest = max(of_channel, key=lambda e: float(e.excess.scores().sum()), default=None)
+    for bearing in signals.rig.bearings if clearest is not None else ():
+        ratio = signals.rig.ratio(bearing.shaft)
+        if clearest is not None and ratio is not None and bearing.orders():
+            band, spectrum = f"{clearest.band_hz[0]:.0f} to {clearest.band_hz[1]:.0f} Hz", clearest.excess.spectrum
+            yield from indicators.bearing_indicators(spectrum, bearing, shaft_ratio=ratio, channel=name, band=band)
 
 
 def _check_size(recording: Recording) -> None:

@@ -21,8 +21,8 @@ from gearsig.diagnosis._bearing_families import (
     speed_is_only_stated,
     without_synchronous,
 )
+from gearsig.diagnosis._lines import speed_is_confirmed
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope, KurtogramBand, witness_text
-from gearsig.diagnosis._speed import speed_is_confirmed
 from gearsig.diagnosis._types import WITH_ASSUMED_DATA, Finding, Kind, Strength, Where, from_p_value, p_text
 from gearsig.prepared import LOG_RATIO_LIMIT, score_needed
 from gearsig.rig import hunting_tooth_order

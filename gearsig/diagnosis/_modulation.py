@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from math import log10
 
 import numpy as np
 
-from gearsig.diagnosis._mesh import teeth_are_contradicted
-from gearsig.diagnosis._signals import AnalysisSignals
-from gearsig.diagnosis._speed import mesh_is_confirmed
-from gearsig.diagnosis._types import WITH_ASSUMED_DATA, Finding, Kind, Strength, Where, from_p_value, p_text
+from gearsig.diagnosis._lines import CLEAR_DB, mesh_is_confirmed, teeth_are_contradicted
+from gearsig.diagnosis._signals import AnalysisSignals, line_at
+from gearsig.diagnosis._types import WITH_ASSUMED_DATA, Finding, Kind, Strength, from_p_value, p_text
 from gearsig.indicators import lobe_lines
 from gearsig.prepared import INNER_LINES, RUN_UP_FOOT_ORDERS, Comb, LineExcess, best_comb, level_beside
 from gearsig.rig import GearPair
@@ -26,27 +26,10 @@ N_CARRIERS = 3
 MAX_TIMES = 8
 """Modulations per revolution that are looked for: planets, jaws of couplings, bolts."""
 
-CLEAR_DB = 12.0
-"""Of a sideband over its floor: among the four lines searched, noise is above it once in two million."""
-
-NOISE_MAXIMUM = 2.0
-"""Expected largest power of four lines of noise over their mean: 1 + 1/2 + 1/3 + 1/4 of independent ones."""
-
-WITHIN_LINES = 1.5
-AROUND_LINES = 6.0
-"""A sideband is the highest line of its surroundings; the foot of its carrier is not."""
-
-MIRROR_DB = 10.0
-"""A line that exceeds its mirror image by more may be another machine's."""
-
-_LIMIT = 10 ** (MIRROR_DB / 10)
-
-SHARE_OF_PERIOD = 0.9
-"""Of the sidebands' power at multiples of k, for "k times per revolution"."""
+MIRROR_RATIO = 10.0
+"""Power over its mirror image from which a line may be another machine's."""
 
 APART_LINES = 3.0
-N_OTHER_HARMONICS = 10
-N_SHAFT_MULTIPLES = 3
 
 Cells = dict[tuple[int, int], tuple[float, float]]
 """(mesh harmonic, k) → power of the lower and of the upper sideband."""
@@ -80,14 +63,21 @@ def mesh_modulation(signals: AnalysisSignals, pair: GearPair, shaft: str) -> dic
     mesh, order = signals.rig.mesh_order(pair), signals.rig.ratio(shaft)
     if mesh is None or order is None:
         return {}
+    others = [other for name, other in signals.known_shaft_orders.items() if name != shaft]
+    # Where lines of other elements stand: of the meshes, and the first of other shafts themselves.
+    foreign = [h * other for other in {mesh, *signals.known_mesh_orders.values()} for h in range(1, 11)]
+    foreign += [k * other for other in others for k in range(1, 4)]
     by_channel = {}
     for name, excess in signals.order_excess.items():
-        narrowest = sideband_distance(excess.spectrum, RUN_UP_FOOT_ORDERS if signals.speed_varies else 0.0)
-        if order < narrowest:
+        if order < sideband_distance(excess.spectrum, RUN_UP_FOOT_ORDERS if signals.speed_varies else 0.0):
             continue
-        foreign = _foreign_orders(signals, shaft, mesh)
-        multiples = _multiples_of_its_own(signals, shaft, APART_LINES * excess.spectrum.resolution)
-        modulation = modulation_of(excess, mesh, order, foreign, multiples)
+        near = APART_LINES * excess.spectrum.resolution
+        multiples = tuple(  # that are no smaller multiple of another shaft: that would be the simpler cause
+            k
+            for k in range(1, MAX_TIMES + 1)
+            if not any(abs(k * order - j * other) <= near for other in others for j in range(1, k))
+        )
+        modulation = modulation_of(excess, mesh, order, tuple(foreign), multiples)
         if modulation is not None:
             by_channel[name] = modulation
     return by_channel
@@ -120,7 +110,7 @@ def modulation_of(
     for h in range(1, N_CARRIERS + 1):
         if h * mesh + 2 * order > excess.spectrum.positions[-1]:
             break
-        carriers[h] = _power(excess, h * mesh, CLEAR_DB)
+        carriers[h] = _power(excess, h * mesh)
         floor = max(floor, _floor_power(excess, h * mesh))
         for k in multiples:
             places = [h * mesh - k * order, h * mesh + k * order]
@@ -148,10 +138,10 @@ def _summed(cells: Cells, order: float, carriers: float, floor: float) -> Modula
 
 
 def _times_per_revolution(power: dict[int, float]) -> int:
-    """Return the largest k whose multiples hold nearly all of the sidebands' power."""
+    """Return the largest k whose multiples hold 90 % of the sidebands' power."""
     total = sum(power.values())
     for k in range(MAX_TIMES, 1, -1):
-        if total > 0 and sum(p for own, p in power.items() if own % k == 0) >= SHARE_OF_PERIOD * total:
+        if total > 0 and sum(p for own, p in power.items() if own % k == 0) >= 0.9 * total:
             return k
     return 1
 
@@ -164,20 +154,20 @@ def _without_one_foreign_line(cells: Cells, carriers: dict[int, float]) -> Cells
     lone: dict[tuple[int, int], float] = {}
     for (h, k), cell in cells.items():
         for side in (0, 1):
-            if cell[side] > _LIMIT * cell[1 - side] and not _comes_again(cells, carriers, h, k, side):
+            if cell[side] > MIRROR_RATIO * cell[1 - side] and not _comes_again(cells, carriers, h, k, side):
                 lone[h, side] = lone.get((h, side), 0.0) + cell[side]
     if not lone:
         return cells
     cut_h, side = max(lone, key=lambda key: lone[key])
     return {
-        (h, k): (cell[1 - side],) * 2 if h == cut_h and cell[side] > _LIMIT * cell[1 - side] else cell
+        (h, k): (cell[1 - side],) * 2 if h == cut_h and cell[side] > MIRROR_RATIO * cell[1 - side] else cell
         for (h, k), cell in cells.items()
     }
 
 
 def _comes_again(cells: Cells, carriers: dict[int, float], h: int, k: int, side: int) -> bool:
     """Whether the same sideband of another harmonic is of the same size, each against its carrier."""
-    size = cells[h, k][side] / _LIMIT
+    size = cells[h, k][side] / MIRROR_RATIO
     return any(
         cell[side] * carriers[h] >= size * carriers[own_h] > 0
         for (own_h, own_k), cell in cells.items()
@@ -187,63 +177,30 @@ def _comes_again(cells: Cells, carriers: dict[int, float], h: int, k: int, side:
 
 def _sideband(excess: LineExcess, place: float, order: float) -> float:
     """Return the power of a sideband, 0 where no line stands out of the floor and of what lies beside it."""
-    spectrum = excess.spectrum
-    apart = order / spectrum.resolution
-    found, amplitude = spectrum.largest_near(place, WITHIN_LINES * spectrum.resolution)
-    if amplitude < spectrum.largest_near(place, min(AROUND_LINES, apart / 2) * spectrum.resolution)[1]:
+    apart = order / excess.spectrum.resolution
+    line = line_at(excess, place, around=min(6.0, apart / 2) * excess.spectrum.resolution)
+    if line is None or not line.is_highest:
+        return 0.0  # a sideband is the highest line of its surroundings; the foot of its carrier is not
+    beside = level_beside(excess.spectrum, line.position, apart - INNER_LINES)
+    if beside is not None and line.amplitude < beside * 10 ** (CLEAR_DB / 20):
         return 0.0
-    beside = level_beside(spectrum, found, apart - INNER_LINES)
-    if beside is not None and amplitude < beside * 10 ** (CLEAR_DB / 20):
-        return 0.0
-    return _power(excess, place, CLEAR_DB)
+    return _power(excess, place)
 
 
-def _power(excess: LineExcess, place: float, clear_db: float) -> float:
-    """Return the power of the line at `place` less what noise adds to it, 0 where it is not clear of the floor."""
-    amplitude = excess.spectrum.largest_near(place, WITHIN_LINES * excess.spectrum.resolution)[1]
-    floor = _floor_power(excess, place)
-    return amplitude**2 - NOISE_MAXIMUM * floor if amplitude**2 > floor * 10 ** (clear_db / 10) else 0.0
+def _power(excess: LineExcess, place: float) -> float:
+    """Return the power of the line at `place` less what noise adds to it, 0 where it is not clear of the floor.
+
+    Noise adds the expected largest of its four lines there: 1 + 1/2 + 1/3 + 1/4 of their mean. Clear of the floor is
+    among four lines what noise is above once in two million.
+    """
+    line, floor = line_at(excess, place), _floor_power(excess, place)
+    if line is None or line.amplitude**2 <= floor * 10 ** (CLEAR_DB / 10):
+        return 0.0
+    return line.amplitude**2 - 2.0 * floor
 
 
 def _floor_power(excess: LineExcess, place: float) -> float:
     return float(excess.floor[excess.spectrum.index_of(place)]) ** 2
-
-
-def _foreign_orders(signals: AnalysisSignals, shaft: str, mesh: float) -> tuple[float, ...]:
-    """Return where lines of other elements stand: of other meshes, and the first of other shafts themselves."""
-    rig = signals.rig
-    meshes = [m for pair in rig.pairs if (m := rig.mesh_order(pair)) is not None]
-    shafts = [order for name, order in signals.known_shaft_orders.items() if name != shaft]
-    lines = [h * other for other in {mesh, *meshes} for h in range(1, N_OTHER_HARMONICS + 1)]
-    return tuple(lines + [k * order for order in shafts for k in range(1, N_SHAFT_MULTIPLES + 1)])
-
-
-def _multiples_of_its_own(signals: AnalysisSignals, shaft: str, near: float) -> tuple[int, ...]:
-    """Return the k for which k·shaft is no smaller multiple of another shaft: that would be the simpler cause."""
-    ratio = signals.rig.ratio(shaft) or 0.0
-    others = [order for name, order in signals.known_shaft_orders.items() if name != shaft]
-    return tuple(
-        k
-        for k in range(1, MAX_TIMES + 1)
-        if not any(abs(k * ratio - j * other) <= near for other in others for j in range(1, k))
-    )
-
-
-# --------------------
-# Modulation of the mesh: sidebands of known shafts, and families whose shaft is not known.
-# --------------------
-
-
-TIMES = {1: "once", 2: "twice"}
-
-MIN_LINES = 3
-"""Of a family whose shaft is not known."""
-
-LINE_OVER_SURROUNDINGS_DB = 6.0
-"""Of a family's line over what lies beside it: the foot of a mesh line is above the floor and no family."""
-
-WIDEST_PULSE_ERROR = 4
-"""Pulses per revolution are mistaken by factors up to this: the marks of a coupling, of a four-hole disc."""
 
 
 def detect_sidebands(signals: AnalysisSignals) -> list[Finding]:
@@ -252,101 +209,102 @@ def detect_sidebands(signals: AnalysisSignals) -> list[Finding]:
     for pair in signals.rig.pairs:
         if not mesh_is_confirmed(signals, pair) or teeth_are_contradicted(signals, pair) is not None:
             continue  # without a carrier there are no sidebands of it
-        findings += _known_shafts(signals, pair)
+        for shaft in (pair.driver, pair.driven):
+            by_channel = mesh_modulation(signals, pair, shaft)
+            median = float(np.median([m.level_db for m in by_channel.values()])) if by_channel else -np.inf
+            if median >= NOTABLE_DB:
+                findings.append(_modulated(signals, pair, shaft, by_channel, median))
         findings += _unknown_family(signals, pair)
-    return findings
-
-
-def _known_shafts(signals: AnalysisSignals, pair: GearPair) -> list[Finding]:
-    findings = []
-    for shaft in (pair.driver, pair.driven):
-        by_channel = mesh_modulation(signals, pair, shaft)
-        if not by_channel:
-            continue
-        median = float(np.median([m.level_db for m in by_channel.values()]))
-        if median >= NOTABLE_DB:
-            findings.append(_modulated(signals, pair, shaft, by_channel, median))
     return findings
 
 
 def _modulated(
     signals: AnalysisSignals, pair: GearPair, shaft: str, by_channel: dict[str, Modulation], median: float
 ) -> Finding:
+    rig = signals.rig
     channel = max(by_channel, key=lambda name: by_channel[name].level_db)
     strongest = by_channel[channel]
-    times = TIMES.get(strongest.times, f"{strongest.times} times")
-    suspect = median >= STRONG_DB and not signals.rig.assumed
+    n = strongest.times
+    times = {1: "once", 2: "twice"}.get(n, f"{n} times")
+    suspect = median >= STRONG_DB and not rig.assumed
     how = "strongly modulated" if median >= STRONG_DB else "modulated"
     basis = "how much modulation is usual depends on the machine and the sensor's place"
+    evidence = [
+        f"Sidebands against mesh harmonics: {median:.1f} dB (median), {strongest.level_db:.1f} dB in {channel}."
+    ]
+    if n <= 2:
+        evidence.append("An eccentric gear, a bent shaft, misalignment and a fluctuating load all do this.")
+    else:
+        evidence.append(f"{n} planets that pass, a coupling of {n} jaws or a gear clamped out of round all do this.")
+    driver, driven = rig.ratio(pair.driver), rig.ratio(pair.driven)
+    if driver is not None and driver == driven:
+        twins = f"Shafts {pair.driver} and {pair.driven} turn equally fast"
+        evidence.append(f"{twins}: which of them it is cannot be told.")
+    value, limit = 10 ** (median / 20), 10 ** (NOTABLE_DB / 20)
+    surer = "Compare with a recording of the same gearbox known to be good, or look for it at another load."
     return Finding(
         "mesh-modulated",
         Kind.SUSPICION if suspect else Kind.NOTICE,
         f"The mesh of {pair.name} is {how} {times} per revolution of shaft {shaft}.",
-        Where(
-            (channel,),
-            shaft=shaft,
-            gear=f"{pair.name}/{shaft}",
-            order=strongest.spacing,
-            order_shaft=signals.rig.reference_shaft,
-        ),
-        Strength(
-            10 ** (median / 20),
-            "sideband/carrier",
-            10 ** (NOTABLE_DB / 20),
-            "common on healthy machines",
-            median - NOTABLE_DB,
-        ),
-        confidence=0.5 if suspect else 0.95 * (WITH_ASSUMED_DATA if signals.rig.assumed else 1.0),
+        # Of a ratio between lines, a frequency says nothing.
+        replace(signals.where(strongest.spacing, channel, shaft=shaft, gear=f"{pair.name}/{shaft}"), frequency_hz=None),
+        Strength(value, "sideband/carrier", limit, "common on healthy machines", median - NOTABLE_DB),
+        confidence=0.5 if suspect else 0.95 * (WITH_ASSUMED_DATA if rig.assumed else 1.0),
         confidence_basis=f"that it is a fault: {basis}" if suspect else f"that it is there; {basis}",
-        evidence=(
-            f"Sidebands against mesh harmonics: {median:.1f} dB (median), {strongest.level_db:.1f} dB in {channel}.",
-            _usual_causes(strongest.times),
-            *_same_speed(signals, pair),
-        ),
-        surer="Look for it at another load."
-        if signals.has_reference
-        else "Compare with a recording of the same gearbox known to be good, or look for it at another load.",
+        evidence=tuple(evidence),
+        surer="Look for it at another load." if signals.has_reference else surer,
     )
 
 
-def _usual_causes(times: int) -> str:
-    if times <= 2:
-        return "An eccentric gear, a bent shaft, misalignment and a fluctuating load all do this."
-    return f"{times} planets that pass, a coupling of {times} jaws or a gear clamped out of round all do this."
-
-
-def _same_speed(signals: AnalysisSignals, pair: GearPair) -> tuple[str, ...]:
-    driver, driven = signals.rig.ratio(pair.driver), signals.rig.ratio(pair.driven)
-    if driver is None or driver != driven:
-        return ()
-    return (f"Shafts {pair.driver} and {pair.driven} turn equally fast: which of them it is cannot be told.",)
-
-
-def _unknown_family(signals: AnalysisSignals, pair: GearPair) -> list[Finding]:
+def _unknown_family(signals: AnalysisSignals, pair: GearPair) -> Iterator[Finding]:
     """Find sidebands whose spacing is no known shaft's: that is how a wheel shows whose teeth are not given."""
     mesh = signals.rig.mesh_order(pair)
     if mesh is None:
-        return []
-    best: tuple[Comb, str] | None = None
-    for name, excess in signals.order_excess.items():
-        comb = _family(signals, excess, mesh)
-        if comb is not None and (best is None or comb.p_value < best[0].p_value):
-            best = (comb, name)
-    if best is None:
-        return []
-    comb, channel = best
-    p_value = min(1.0, comb.p_value * len(signals.order_excess))
-    if p_value > signals.settings.false_alarm_probability or _is_known(signals, comb):
-        return []
-    if not _is_family(signals.order_excess[channel], comb, mesh):
-        return []
-    return [_unknown(signals, pair, mesh, comb, channel, p_value)]
+        return
+    combs = {name: _family(signals, excess, mesh) for name, excess in signals.order_excess.items()}
+    found = {name: comb for name, comb in combs.items() if comb is not None}
+    channel = min(found, key=lambda name: found[name].p_value, default=None)
+    if channel is None:
+        return
+    comb, excess = found[channel], signals.order_excess[channel]
+    p_value = min(1.0, comb.p_value * len(combs))
+    shafts = signals.known_shaft_orders.values()
+    # The spacing may be a known shaft's after all: skirts of its lines, where the speed is not exactly known.
+    is_known = any(abs(k * order / comb.fundamental - 1) < 0.01 for order in shafts for k in (1, 2))
+    if p_value > signals.settings.false_alarm_probability or is_known or not _is_family(excess, comb, mesh):
+        return
+    evidence = [f"{len(comb.positions)} of the sidebands stand 6 dB or more over the floor."]
+    surer = "Give the teeth of all gears: a shaft of that order would explain it."
+    teeth = mesh / comb.fundamental
+    if None in (pair.driver_teeth, pair.driven_teeth) and abs(teeth - round(teeth)) <= 0.1:
+        other = pair.driven if pair.driven_teeth is None else pair.driver
+        evidence.append(f"A gear with {round(teeth)} teeth on shaft {other} would modulate the mesh just so.")
+        surer = f"Count the teeth on shaft {other}; with them in the rig file that gear is examined as well."
+    if signals.angle is not None and signals.angle.method == "pulses":
+        # Pulses per revolution are mistaken by factors up to 4: the marks of a coupling, of a four-hole disc.
+        wrong = [n for n in (2, 3, 4) if abs(comb.fundamental - 1 / n) <= excess.spectrum.resolution]
+        of_speed = "of the speed found from the pulses: pulses_per_revolution may be wrong by"
+        evidence += [f"The spacing is 1/{n} {of_speed} {n}." for n in wrong[:1]]
+    where = signals.where(comb.fundamental, channel, gear=pair.name)
+    ratio = max(comb.ratios_db, default=None)
+    yield Finding(
+        "sidebands-of-unknown-shaft",
+        Kind.NOTICE,
+        f"The mesh of {pair.name} has sidebands spaced by order {comb.fundamental:.4f} of {where.order_shaft} "
+        f"({where.frequency_hz:.4g} Hz), which no known shaft explains.",
+        replace(where, frequency_hz=None),
+        Strength(comb.amplitude, excess.spectrum.unit, comb.floor, "noise floor of the order spectrum", ratio),
+        confidence=from_p_value(p_value, prior=0.3, limit=0.99),
+        confidence_basis=f"at most this; chance that noise makes such a family: {p_text(p_value)}, over all spacings "
+        "and channels tried",
+        evidence=tuple(evidence),
+        surer=surer,
+    )
 
 
 def _family(signals: AnalysisSignals, excess: LineExcess, mesh: float) -> Comb | None:
     foot = RUN_UP_FOOT_ORDERS if signals.speed_varies else 0.0
-    meshes = {mesh} | {m for pair in signals.rig.pairs if (m := signals.rig.mesh_order(pair)) is not None}
-    for other in meshes:
+    for other in {mesh, *signals.known_mesh_orders.values()}:
         excess = excess.without_multiples(other, half_width=foot)
     for order in signals.known_shaft_orders.values():
         wide = foot if order >= 4 * foot else 0.0
@@ -361,69 +319,16 @@ def _family(signals: AnalysisSignals, excess: LineExcess, mesh: float) -> Comb |
 
 
 def _is_family(excess: LineExcess, comb: Comb, mesh: float) -> bool:
-    """Whether enough of the lines stand out of what lies beside them, two of them on either side of one carrier."""
+    """Whether three of the lines stand out of what lies beside them by 6 dB, two of them on both sides of one carrier.
+
+    The foot of a mesh line is above the floor and no family.
+    """
     own_reach = comb.fundamental / excess.spectrum.resolution - 3
     places = []
     for position in comb.positions:
         level = level_beside(excess.spectrum, position, own_reach)
         amplitude = excess.spectrum.largest_near(position, excess.spectrum.resolution)[1]
-        if level is None or amplitude >= level * 10 ** (LINE_OVER_SURROUNDINGS_DB / 20):
+        if level is None or amplitude >= level * 10 ** (6.0 / 20):
             h = max(1, round(position / mesh))
             places.append((h, round((position - h * mesh) / comb.fundamental)))
-    return len(places) >= MIN_LINES and any((h, -k) in places for h, k in places)
-
-
-def _is_known(signals: AnalysisSignals, comb: Comb) -> bool:
-    """Whether the spacing is a known shaft's after all: skirts of its lines, where the speed is not exactly known."""
-    return any(
-        abs(k * order / comb.fundamental - 1) < 0.01 for order in signals.known_shaft_orders.values() for k in (1, 2)
-    )
-
-
-def _unknown(
-    signals: AnalysisSignals, pair: GearPair, mesh: float, comb: Comb, channel: str, p_value: float
-) -> Finding:
-    reference = signals.rig.reference_shaft
-    evidence = [f"{len(comb.positions)} of the sidebands stand 6 dB or more over the floor."]
-    surer = "Give the teeth of all gears: a shaft of that order would explain it."
-    unknown_teeth = pair.driver_teeth is None or pair.driven_teeth is None
-    teeth = mesh / comb.fundamental
-    if unknown_teeth and abs(teeth - round(teeth)) <= 0.1:
-        other = pair.driven if pair.driven_teeth is None else pair.driver
-        evidence.append(f"A gear with {round(teeth)} teeth on shaft {other} would modulate the mesh just so.")
-        surer = f"Count the teeth on shaft {other}; with them in the rig file that gear is examined as well."
-    spectrum = signals.order_excess[channel].spectrum
-    evidence += _pulses_doubted(signals, comb, spectrum.resolution)
-    return Finding(
-        "sidebands-of-unknown-shaft",
-        Kind.NOTICE,
-        f"The mesh of {pair.name} has sidebands spaced by order {comb.fundamental:.4f} of {reference} "
-        f"({comb.fundamental * signals.frequency_per_order_hz:.4g} Hz), which no known shaft explains.",
-        Where((channel,), gear=pair.name, order=comb.fundamental, order_shaft=reference),
-        Strength(
-            comb.amplitude,
-            spectrum.unit,
-            comb.floor,
-            "noise floor of the order spectrum",
-            max(comb.ratios_db, default=None),
-        ),
-        confidence=from_p_value(p_value, prior=0.3, limit=0.99),
-        confidence_basis=(
-            f"at most this; chance that noise makes such a family: {p_text(p_value)}, "
-            "over all spacings and channels tried"
-        ),
-        evidence=tuple(evidence),
-        surer=surer,
-    )
-
-
-def _pulses_doubted(signals: AnalysisSignals, comb: Comb, resolution: float) -> list[str]:
-    """Say so where the shaft that the pulses come from would turn at a whole fraction of the speed found."""
-    if signals.angle is None or signals.angle.method != "pulses":
-        return []
-    for n in range(2, WIDEST_PULSE_ERROR + 1):
-        if abs(comb.fundamental - 1 / n) <= resolution:
-            return [
-                f"The spacing is 1/{n} of the speed found from the pulses: pulses_per_revolution may be wrong by {n}."
-            ]
-    return []
+    return len(places) >= 3 and any((h, -k) in places for h, k in places)

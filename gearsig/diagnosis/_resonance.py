@@ -9,8 +9,8 @@ from math import log
 import numpy as np
 
 from gearsig.checks import FloatArray
+from gearsig.diagnosis._lines import mesh_is_confirmed
 from gearsig.diagnosis._signals import AnalysisSignals
-from gearsig.diagnosis._speed import mesh_is_confirmed
 from gearsig.diagnosis._types import Finding, Kind, OrderLevel, Strength, Where, from_p_value, p_text
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import SeparatedOrder

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import log10
 
 import numpy as np
 
 from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray
-from gearsig.diagnosis._types import AnalysisSettings, ChannelAnalysis, Finding, Kind, OrderLevel
+from gearsig.diagnosis._types import AnalysisSettings, ChannelAnalysis, Finding, Kind, OrderLevel, Strength, Where
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import OrderMap, SeparatedAverage, SynchronousAverage, separate, whole_revolutions
-from gearsig.prepared import Comb, LineExcess, PreparedRecording, best_comb, envelope_bands, floor_of
+from gearsig.prepared import Comb, LineExcess, PreparedRecording, best_comb, envelope_bands, floor_of, over_floor_db
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 from gearsig.spectra import BandCandidate, Kurtogram, Spectrum
-
-SPEED_CHANGE = 0.01
-"""Relative range of speed above which a spectrum over frequency smears and a map along speed is made."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +93,12 @@ class AnalysisSignals:
         return known or {self.angle.shaft: 1.0}
 
     @property
+    def known_mesh_orders(self) -> dict[str, float]:
+        """Mesh order of each pair whose order is known."""
+        orders = {pair.name: self.rig.mesh_order(pair) for pair in self.rig.pairs}
+        return {name: order for name, order in orders.items() if order is not None}
+
+    @property
     def frequency_per_order_hz(self) -> float:
         """Mean rotational frequency of the reference shaft."""
         if self.angle is None:
@@ -103,46 +107,104 @@ class AnalysisSignals:
 
     @property
     def speed_varies(self) -> bool:
-        """Whether the speed changes by more than `SPEED_CHANGE` over the record."""
+        """Whether the speed changes by more than 1 %: a spectrum over frequency smears, a map along speed is made."""
         if self.angle is None:
             return False
         low, high = self.angle.speed_range_rpm
-        return (high - low) > SPEED_CHANGE * self.angle.mean_speed_rpm
+        return (high - low) > 0.01 * self.angle.mean_speed_rpm
+
+    def where(self, order: float, channel: str = "", *, shaft: str = "", gear: str = "", bearing: str = "") -> Where:
+        """Return the place of what is at an order of the reference shaft, with its mean frequency."""
+        hertz = order * self.frequency_per_order_hz if self.angle is not None else None
+        channels = (channel,) if channel else ()
+        return Where(channels, shaft, gear, bearing, order, self.rig.reference_shaft, hertz)
+
+
+@dataclass(frozen=True)
+class PlacedLine:
+    """The largest line about a place of a spectrum.
+
+    Parameters
+    ----------
+    position, amplitude : float
+    floor : float
+        Of the noise there.
+    unit : str
+    is_highest : bool
+        Whether nothing around the place is higher: then it is that place's own line, and no foot of another.
+    """
+
+    position: float
+    amplitude: float
+    floor: float
+    unit: str
+    is_highest: bool = True
+
+    @classmethod
+    def at(cls, excess: LineExcess, i: int) -> PlacedLine:
+        """Return line number i."""
+        spectrum = excess.spectrum
+        return cls(float(spectrum.positions[i]), float(spectrum.values[i]), float(excess.floor[i]), spectrum.unit)
+
+    @property
+    def level_db(self) -> float:
+        """20 lg(amplitude), of a vanishing one too."""
+        return 20 * log10(max(self.amplitude, 1e-300))
+
+    @property
+    def ratio_db(self) -> float:
+        """20 lg(amplitude/floor)."""
+        return over_floor_db(self.amplitude, self.floor)
+
+    def strength(self, floor_is: str) -> Strength:
+        """Return the line's amplitude against its floor."""
+        return Strength(self.amplitude, self.unit, self.floor, floor_is, self.ratio_db)
+
+
+def line_at(
+    excess: LineExcess, place: float, within: float | None = None, around: float | None = None
+) -> PlacedLine | None:
+    """Return the largest line within 1.5 lines of a place, and whether it is the highest within six lines.
+
+    None beyond the end of the spectrum. `within` and `around`, in the axis' unit, replace these widths.
+    """
+    spectrum = excess.spectrum
+    if place > spectrum.positions[-1]:
+        return None
+    found, amplitude = spectrum.largest_near(place, 1.5 * spectrum.resolution if within is None else within)
+    highest = spectrum.largest_near(place, 6.0 * spectrum.resolution if around is None else around)[1]
+    return replace(PlacedLine.at(excess, spectrum.index_of(found)), is_highest=amplitude >= highest)
 
 
 def compute_signals(
-    prepared: PreparedRecording, names: Sequence[str], angle: ShaftAngle | None, settings: AnalysisSettings
+    prepared: PreparedRecording,
+    names: Sequence[str],
+    angle: ShaftAngle | None,
+    settings: AnalysisSettings,
+    *,
+    has_reference: bool,
 ) -> AnalysisSignals:
     """Compute what the detectors need of the named channels, as far as the speed and the rig allow."""
     spectra = {name: prepared.spectrum(name) for name in names}
     excess: dict[str, LineExcess] = {}
     shafts: tuple[ShaftSignals, ...] = ()
-    maps: dict[str, OrderMap] = {}
     if angle is not None and angle.n_revolutions >= settings.minimum_revolutions:
         try:
             prepared.over_angle(channels=names)  # all channels at once
             excess = {name: prepared.order_lines(name) for name in names}
-            shafts = _shaft_signals(prepared, names, angle, settings)
+            ratios = {shaft: prepared.rig.ratio(shaft) for shaft in prepared.rig.shaft_names} or {angle.shaft: 1.0}
+            shafts = tuple(
+                _one_shaft(prepared, shaft, names)
+                for shaft, ratio in ratios.items()
+                if ratio is not None and angle.n_revolutions * ratio >= settings.minimum_revolutions
+            )
         except RefusalError:  # too few samples per revolution or too short: the detectors say that nothing is known
             excess, shafts = {}, ()
     recording = prepared.recording.select(names)
-    result = AnalysisSignals(recording, prepared.rig, angle, settings, spectra, excess, shafts, maps)
-    if excess and result.speed_varies:
-        maps.update({name: prepared.order_map(name) for name in names})
-    return result
-
-
-def _shaft_signals(
-    prepared: PreparedRecording, names: Sequence[str], angle: ShaftAngle, settings: AnalysisSettings
-) -> tuple[ShaftSignals, ...]:
-    """Average each shaft's revolutions, wherever its order is known and it turns often enough."""
-    rig = prepared.rig
-    ratios = {shaft: rig.ratio(shaft) for shaft in rig.shaft_names} or {angle.shaft: 1.0}
-    return tuple(
-        _one_shaft(prepared, shaft, names)
-        for shaft, ratio in ratios.items()
-        if ratio is not None and angle.n_revolutions * ratio >= settings.minimum_revolutions
-    )
+    signals = AnalysisSignals(recording, prepared.rig, angle, settings, spectra, excess, shafts, {}, has_reference)
+    if not (excess and signals.speed_varies):
+        return signals
+    return replace(signals, order_maps={name: prepared.order_map(name) for name in names})
 
 
 def _one_shaft(prepared: PreparedRecording, shaft: str, names: Sequence[str]) -> ShaftSignals:
@@ -170,11 +232,6 @@ def _halves(signal: AngleSignal, average: SynchronousAverage) -> tuple[Synchrono
         for start in (0, 1)
     )
     return odd, even
-
-
-# --------------------
-# Envelope spectra of several bands, where impacts of bearings show.
-# --------------------
 
 
 @dataclass(frozen=True)
@@ -232,26 +289,6 @@ def envelopes_in(signals: AnalysisSignals, recording: Recording, band: tuple[flo
         yield BandEnvelope(name, band, floor_of(spectrum), float(envelopes.values(name).mean()))
 
 
-# --------------------
-# The band that a channel's own kurtogram chooses: searched beside the fixed ones, and a witness for bearings.
-# --------------------
-
-
-N_HARMONICS = 6
-"""Of the fastest race, which the band must be wide enough to carry."""
-
-SAME_FAMILY = 3e-3
-"""Relative: the same bearing slips alike in all bands."""
-
-SHOWS = 0.01
-"""p-value of a family at a given order in this one band, from which on it bears the other bands out."""
-
-MIN_LINES = 3
-
-ROUNDING = 1e-9
-"""Of the signal: what is left without its tones and lies below is no vibration."""
-
-
 @dataclass(frozen=True)
 class KurtogramBand:
     """A channel's kurtogram, the band it chooses, and the envelope there.
@@ -269,14 +306,6 @@ class KurtogramBand:
     band: BandCandidate
     envelope: BandEnvelope
 
-    @property
-    def text(self) -> str:
-        """The band in words."""
-        low, high = self.band.band_hz
-        return (
-            f"The kurtogram's own band, {low / 1000:.3g} to {high / 1000:.3g} kHz (kurtosis {self.band.kurtosis:.2g})"
-        )
-
 
 def kurtogram_bands(signals: AnalysisSignals) -> tuple[KurtogramBand, ...]:
     """Return each channel's own band; none where no bearing's speed is known or no band is wide enough."""
@@ -289,15 +318,15 @@ def kurtogram_bands(signals: AnalysisSignals) -> tuple[KurtogramBand, ...]:
     ]
     if signals.angle is None or not races:
         return ()
-    narrowest_hz = N_HARMONICS * max(races) * signals.frequency_per_order_hz
+    narrowest_hz = 6 * max(races) * signals.frequency_per_order_hz  # carries six harmonics of the fastest race
     bands = (_kurtogram_band(signals, name, narrowest_hz) for name in signals.recording.channel_names)
     return tuple(band for band in bands if band is not None)
 
 
 def witness(band: KurtogramBand, order: float) -> Comb | None:
     """Return the family at an order found elsewhere, if the own band shows it too."""
-    comb = best_comb(band.envelope.excess, order * (1 - SAME_FAMILY), order * (1 + SAME_FAMILY))
-    return comb if comb is not None and comb.p_value <= SHOWS and len(comb.positions) >= MIN_LINES else None
+    comb = best_comb(band.envelope.excess, order * (1 - 3e-3), order * (1 + 3e-3))  # a bearing slips alike in all bands
+    return comb if comb is not None and comb.p_value <= 0.01 and len(comb.positions) >= 3 else None
 
 
 def witness_text(
@@ -307,13 +336,13 @@ def witness_text(
     band = next((b for b in bands if b.envelope.channel == channel), None)
     if band is None:
         return ()
+    low, high = (f"{edge / 1000:.3g}" for edge in band.band.band_hz)
+    text = f"The kurtogram's own band, {low} to {high} kHz (kurtosis {band.band.kurtosis:.2g}), "
     comb = witness(band, order)
     if comb is None:
-        return (f"{band.text}, does not show it.",)
-    largest = f"{max(comb.ratios_db):.0f} dB over its floor"
-    if band.envelope.band_hz == band_hz:
-        return (f"{band.text}, shows it clearest of all bands, {largest}.",)
-    return (f"{band.text}, shows the same family, {largest}.",)
+        return (f"{text}does not show it.",)
+    shows = "shows it clearest of all bands" if band.envelope.band_hz == band_hz else "shows the same family"
+    return (f"{text}{shows}, {max(comb.ratios_db):.0f} dB over its floor.",)
 
 
 def _kurtogram_band(signals: AnalysisSignals, channel: str, narrowest_hz: float) -> KurtogramBand | None:
@@ -322,7 +351,7 @@ def _kurtogram_band(signals: AnalysisSignals, channel: str, narrowest_hz: float)
     fs = signals.recording.sampling_rate_hz
     recorded = signals.recording.values(channel)
     x = prepared_signal(recorded, fs, "tones removed")
-    if np.std(x) < ROUNDING * np.std(recorded):
+    if np.std(x) < 1e-9 * np.std(recorded):
         return None  # a model's tones are all there is: what is left of them are the rounding errors of their removal
     try:
         grid = kurtogram(x, fs, source=f"{channel}, tones removed")
@@ -334,39 +363,39 @@ def _kurtogram_band(signals: AnalysisSignals, channel: str, narrowest_hz: float)
     return None if envelope is None else KurtogramBand(grid, band, envelope)
 
 
-# --------------------
-# What an analysis keeps of each channel: the signals that were looked at, and the bands that told most.
-# --------------------
+def channel_analysis(
+    signals: AnalysisSignals,
+    name: str,
+    envelopes: Sequence[BandEnvelope],
+    kurtogram_bands: Sequence[KurtogramBand],
+    levels: Sequence[OrderLevel],
+    findings: Sequence[Finding],
+) -> ChannelAnalysis:
+    """Return the signals and spectra of one channel: those that were looked at, and the bands that told most.
 
-
-@dataclass(frozen=True)
-class ExaminedSignals:
-    """Everything that the detectors look at.
-
-    Parameters
-    ----------
-    signals : AnalysisSignals
-    envelopes : list of BandEnvelope
-        Of fixed bands.
-    kurtogram_bands : tuple of KurtogramBand
-        Bands that the kurtograms choose, at most one per channel.
-    order_levels : mapping
-        Channel → levels over speed, where the speed runs through a range.
+    The envelope shown is the one in which the surest family of impacts was found, else the one whose lines stand out
+    most; the channel's own band is shown where it bears out a damage that is claimed of a bearing.
     """
-
-    signals: AnalysisSignals
-    envelopes: list[BandEnvelope]
-    kurtogram_bands: tuple[KurtogramBand, ...]
-    order_levels: Mapping[str, tuple[OrderLevel, ...]]
-
-
-def channel_analysis(material: ExaminedSignals, name: str, findings: Sequence[Finding]) -> ChannelAnalysis:
-    """Return the signals and spectra of one channel."""
     from gearsig.spectra import power_density
 
-    signals = material.signals
-    envelope = _shown_envelope(material, name, findings)
-    shown_band = _shown_kurtogram_band(material, name, findings)
+    own = next((band for band in kurtogram_bands if band.envelope.channel == name), None)
+    candidates = [e for e in (*envelopes, *([own.envelope] if own else [])) if e.channel == name]
+    named = (e for f in findings for e in candidates if f.where.band_hz == e.band_hz and name in f.where.channels)
+    clearest = max(candidates, key=lambda e: float(e.excess.scores().sum()), default=None)
+    envelope = next(named, clearest)
+    orders = [
+        f.where.order
+        for f in findings
+        if f.where.bearing and f.kind in (Kind.FAULT, Kind.SUSPICION) and name in f.where.channels
+    ]
+    if own is not None and not any(witness(own, order) for order in orders if order is not None):
+        own = None
+    averages = {}
+    for shaft in signals.shafts:
+        averages[shaft.shaft, "average"] = shaft.averages[name]
+        if name in shaft.separated:
+            parts = shaft.separated[name]
+            averages |= {(shaft.shaft, p.kind): p for p in (parts.residual, parts.difference, parts.regular)}
     return ChannelAnalysis(
         channel=name,
         spectrum=signals.spectra[name],
@@ -375,42 +404,8 @@ def channel_analysis(material: ExaminedSignals, name: str, findings: Sequence[Fi
         envelope_band_hz=envelope.band_hz if envelope else None,
         order_spectrum=signals.order_excess[name].spectrum if name in signals.order_excess else None,
         order_map=signals.order_maps.get(name),
-        averages=_averages(signals, name),
-        kurtogram=shown_band.kurtogram if shown_band else None,
-        kurtogram_band=shown_band.band if shown_band else None,
-        order_levels=material.order_levels.get(name, ()),
+        averages=averages,
+        kurtogram=own.kurtogram if own else None,
+        kurtogram_band=own.band if own else None,
+        order_levels=tuple(levels),
     )
-
-
-def _averages(signals: AnalysisSignals, name: str) -> dict[tuple[str, str], SynchronousAverage]:
-    averages = {}
-    for shaft in signals.shafts:
-        averages[shaft.shaft, "average"] = shaft.averages[name]
-        if name in shaft.separated:
-            parts = shaft.separated[name]
-            for part in (parts.residual, parts.difference, parts.regular):
-                averages[shaft.shaft, part.kind] = part
-    return averages
-
-
-def _shown_envelope(material: ExaminedSignals, name: str, findings: Sequence[Finding]) -> BandEnvelope | None:
-    """Return the envelope in which the surest family of impacts was found, else the one whose lines stand out most."""
-    envelopes = [*material.envelopes, *(candidates.envelope for candidates in material.kurtogram_bands)]
-    candidates = [e for e in envelopes if e.channel == name]
-    if not candidates:
-        return None
-    for finding in findings:
-        for envelope in candidates:
-            if finding.where.band_hz == envelope.band_hz and name in finding.where.channels:
-                return envelope
-    return max(candidates, key=lambda e: float(e.excess.scores().sum()))
-
-
-def _shown_kurtogram_band(material: ExaminedSignals, name: str, findings: Sequence[Finding]) -> KurtogramBand | None:
-    """Return the channel's own band where it shows a damage that is claimed of a bearing, on this channel."""
-    band = next((band for band in material.kurtogram_bands if band.envelope.channel == name), None)
-    places = [f.where for f in findings if f.where.bearing and f.kind in (Kind.FAULT, Kind.SUSPICION)]
-    if band is None:
-        return None
-    orders = [where.order for where in places if name in where.channels and where.order is not None]
-    return band if any(witness(band, order) for order in orders) else None

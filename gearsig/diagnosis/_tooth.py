@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import combinations
@@ -11,23 +11,20 @@ from math import log10
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.diagnosis._mesh import teeth_are_contradicted
+from gearsig.diagnosis._lines import mesh_is_confirmed, teeth_are_contradicted
 from gearsig.diagnosis._signals import AnalysisSignals, ShaftSignals
-from gearsig.diagnosis._speed import mesh_is_confirmed
-from gearsig.diagnosis._types import WITH_ASSUMED_DATA, Finding, Kind, Strength, Where, from_p_value, p_text
+from gearsig.diagnosis._types import (
+    WITH_ASSUMED_DATA,
+    Finding,
+    Kind,
+    Strength,
+    Where,
+    cannot_tell,
+    from_p_value,
+    p_text,
+)
 from gearsig.orders import whole_revolutions
 from gearsig.prepared import has_mark, sliding_mean, strongest_window
-
-# --------------------
-# Whether the energy of a periodic signal is gathered at one angle, more than its spectrum alone would make it.
-# --------------------
-
-
-_SURROGATES_AT_ONCE = 256
-"""Bounds the memory: 256 × 4 channels × 4096 angles in double precision are 34 MB."""
-
-_ENOUGH_HIGHER = 30
-"""Surrogates with as high a ratio after which the p-value is known to a fifth of itself, and is no small one."""
 
 
 @dataclass(frozen=True)
@@ -103,23 +100,28 @@ def localise(
     x = signals[used] / scale[used]
     energies = sliding_mean(x**2, width)
     start, ratio = strongest_window(energies.sum(axis=0))
-    drawn = np.empty(0)
-    for surrogates in _surrogates(x, n_surrogates, rng):
-        drawn = np.append(drawn, _ratios(surrogates, width))
-        if np.sum(drawn >= ratio) >= _ENOUGH_HIGHER:
-            break
+    lines, drawn = np.fft.rfft(x, axis=1), np.empty(0)
+    # In portions that bound the memory: 256 × 4 channels × 4096 angles in double precision are 34 MB. With 30
+    # surrogates as high the p-value is known to a fifth of itself, and is no small one.
+    while len(drawn) < n_surrogates and np.sum(drawn >= ratio) < 30:
+        phases = rng.uniform(0, 2 * np.pi, (min(256, n_surrogates - len(drawn)), 1, lines.shape[1]))
+        phases[..., 0] = 0.0
+        surrogates = np.fft.irfft(lines * np.exp(1j * phases), n, axis=-1)
+        joint = sliding_mean(np.sum(surrogates**2, axis=1), width)
+        drawn = np.append(drawn, joint.max(axis=1) / np.median(joint, axis=1))
     inside = (start + np.arange(width)) % n
-    medians = np.median(energies, axis=1)
     shares = np.zeros(len(signals))
-    shares[used] = energies[:, start] / medians
+    shares[used] = energies[:, start] / np.median(energies, axis=1)
+    odd, even = np.moveaxis(halves[used][:, :, inside] / scale[used][:, None], 1, 0)
+    size = float(np.sqrt(np.sum(odd**2) * np.sum(even**2)))
     return Localisation(
         angle_rev=_onset(x, start, width),
         start_rev=start / n,
         width_rev=width / n,
         ratio_db=10 * float(np.log10(ratio)),
         p_value=max(_p_among_surrogates(ratio, drawn), _p_among_teeth(ratio, n / width)),
-        repeatability=_agreement(halves[used][:, :, inside] / scale[used][:, None]),
-        channel_shares=tuple(float(s) for s in shares),
+        repeatability=float(np.sum(odd * even)) / size if size > 0 else 0.0,
+        channel_shares=tuple(shares.tolist()),
     )
 
 
@@ -146,13 +148,6 @@ def _p_among_teeth(ratio: float, n_teeth: float) -> float:
     return float(-np.expm1(n_teeth * np.log1p(-min(single, 1 - 1e-12))))
 
 
-def _agreement(halves: FloatArray) -> float:
-    """Return the correlation between odd and even revolutions, (n_channels, 2, n_angles), over all channels."""
-    odd, even = halves[:, 0], halves[:, 1]
-    size = float(np.sqrt(np.sum(odd**2) * np.sum(even**2)))
-    return float(np.sum(odd * even)) / size if size > 0 else 0.0
-
-
 def _onset(x: FloatArray, start: int, width: int) -> float:
     """Return the angle within the window at which the energy has risen to half of its highest value.
 
@@ -164,40 +159,6 @@ def _onset(x: FloatArray, start: int, width: int) -> float:
     energy = np.convolve((x[:, inside] ** 2).sum(axis=0), np.ones(short), "valid")
     rise = int(np.argmax(energy >= 0.5 * energy.max()))
     return float(((start - short + rise + short / 2) / n) % 1.0)
-
-
-def _surrogates(x: FloatArray, n_surrogates: int, rng: np.random.Generator) -> Iterator[FloatArray]:
-    """Yield surrogates of all channels, (n, n_channels, n_angles), in bounded portions."""
-    n = x.shape[1]
-    lines = np.fft.rfft(x, axis=1)
-    done = 0
-    while done < n_surrogates:
-        m = min(_SURROGATES_AT_ONCE, n_surrogates - done)
-        phases = rng.uniform(0, 2 * np.pi, (m, 1, lines.shape[1]))
-        phases[..., 0] = 0.0
-        yield np.fft.irfft(lines * np.exp(1j * phases), n, axis=-1)
-        done += m
-
-
-def _ratios(surrogates: FloatArray, width: int) -> FloatArray:
-    joint = sliding_mean(np.sum(surrogates**2, axis=1), width)
-    ratios: FloatArray = joint.max(axis=1) / np.median(joint, axis=1)
-    return ratios
-
-
-# --------------------
-# Local events on a shaft: where, how large, how many per revolution, and in which revolutions.
-# --------------------
-
-
-ABOVE_MESH = 3.5
-"""Multiple of the highest mesh order above which knocks ring and teeth that merely differ do not show."""
-
-PEAK_SHARE = 0.25
-"""Energy, against the largest window's, from which another place of the revolution counts as an event of its own."""
-
-LARGEST_PERIOD = 12
-"""Revolutions over which shafts come back to the same position, up to which events are sorted by revolution."""
 
 
 @dataclass(frozen=True)
@@ -243,51 +204,31 @@ class LocalEvent:
 def largest_event(shaft: ShaftSignals, signals: AnalysisSignals) -> LocalEvent:
     """Return the largest local event of a shaft that has separated averages.
 
-    Two tests are made and paid for: on the difference signals in full, and above the mesh harmonics, where knocks ring.
-    The window is one pitch of the coarsest gear: events last about as long as the tooth is in mesh.
+    Two tests are made and paid for: on the difference signals in full, and above 3.5 times the highest mesh order,
+    where knocks ring and teeth that merely differ do not show. The window is one pitch of the coarsest gear: events
+    last about as long as the tooth is in mesh.
     """
     names = list(shaft.separated)
     full = np.stack([shaft.separated[name].difference.values for name in names])
     halves = np.stack([shaft.halves[name] for name in names])
-    width = 1.0 / min(shaft.teeth)
-    starts = _lowest_orders(shaft, names)
-    results = []
-    for start in starts:
-        rng = np.random.default_rng(signals.settings.seed)
-        n_surrogates = signals.settings.n_surrogates
-        results.append(localise(above(full, start), above(halves, start), width, n_surrogates, rng))
-    best = int(np.argmin([r.p_value for r in results]))
-    place = replace(results[best], p_value=min(1.0, results[best].p_value * len(results)))
-    return _described(shaft, signals, place, above(full, starts[best]), starts[best])
-
-
-def above(values: FloatArray, lowest_order: int) -> FloatArray:
-    """Return periodic signals, (…, n_angles), without the orders below `lowest_order`."""
-    if lowest_order == 0:
-        return values
-    lines = np.fft.rfft(values, axis=-1)
-    lines[..., :lowest_order] = 0
-    return np.asarray(np.fft.irfft(lines, values.shape[-1], axis=-1))
-
-
-def _lowest_orders(shaft: ShaftSignals, names: Iterable[str]) -> tuple[int, ...]:
-    lowest = round(ABOVE_MESH * max(shaft.teeth))
+    n = full.shape[1]
+    lowest = round(3.5 * max(shaft.teeth))
     highest = int(min(shaft.averages[name].highest_order for name in names))
-    return (0,) if highest < 1.5 * lowest else (0, lowest)
+    tests = []
+    for start in (0,) if highest < 1.5 * lowest else (0, lowest):
+        rng, n_surrogates = np.random.default_rng(signals.settings.seed), signals.settings.n_surrogates
+        place = localise(_above(full, start), _above(halves, start), 1.0 / min(shaft.teeth), n_surrogates, rng)
+        tests.append((place, start))
+    place, start = min(tests, key=lambda test: test[0].p_value)
+    place = replace(place, p_value=min(1.0, place.p_value * len(tests)))
 
-
-def _described(
-    shaft: ShaftSignals, signals: AnalysisSignals, place: Localisation, differences: FloatArray, lowest_order: int
-) -> LocalEvent:
-    names = list(shaft.separated)
-    i = int(np.argmax(place.channel_shares))
-    average = shaft.averages[names[i]]
-    n = differences.shape[1]
+    differences = _above(full, start)
     width = round(place.width_rev * n)
     inside = (round(place.start_rev * n) + np.arange(width)) % n
+    i = int(np.argmax(place.channel_shares))
+    share, average = place.channel_shares[i], shaft.averages[names[i]]
     rms = float(np.sqrt(np.mean(differences[i, inside] ** 2)))
-    share = place.channel_shares[i]
-    energies = _energy_by_revolution(shaft, names, inside, lowest_order)
+    energies = _energy_by_revolution(shaft, dict(zip(names, differences[:, inside], strict=True)), inside)
     return LocalEvent(
         place=place,
         channel=names[i],
@@ -301,14 +242,23 @@ def _described(
     )
 
 
+def _above(values: FloatArray, lowest_order: int) -> FloatArray:
+    """Return periodic signals, (…, n_angles), without the orders below `lowest_order`."""
+    if lowest_order == 0:
+        return values
+    lines = np.fft.rfft(values, axis=-1)
+    lines[..., :lowest_order] = 0
+    return np.asarray(np.fft.irfft(lines, values.shape[-1], axis=-1))
+
+
 def _peaks(differences: FloatArray, width: int) -> tuple[float, ...]:
-    """Return the starts of the separate windows whose energy is a good part of the largest one's, largest first."""
+    """Return the starts of the separate windows with a quarter of the largest one's energy or more, largest first."""
     n = differences.shape[1]
     scale = np.mean(differences**2, axis=1, keepdims=True)
     square = np.sum(differences**2 / np.where(scale > 0, scale, 1.0), axis=0)
     energy = sliding_mean(square, width)
     floor = float(np.median(energy))
-    limit = floor + PEAK_SHARE * (float(energy.max()) - floor)
+    limit = floor + 0.25 * (float(energy.max()) - floor)
     starts: list[int] = []
     for start in np.argsort(-energy):
         if energy[start] < limit or len(starts) > 24:
@@ -319,34 +269,33 @@ def _peaks(differences: FloatArray, width: int) -> tuple[float, ...]:
     return tuple(other_start / n for other_start in starts)
 
 
-def _energy_by_revolution(shaft: ShaftSignals, names: list[str], inside: FloatArray, lowest_order: int) -> FloatArray:
+def _energy_by_revolution(shaft: ShaftSignals, patterns: Mapping[str, FloatArray], inside: FloatArray) -> FloatArray:
     """Return, for each revolution, the projection of its window on the mean window, summed over channels.
 
     The projection is signed: noise averages out of it, which energy would not.
     """
     total: FloatArray = np.zeros(0)
-    for name in names:
-        revolutions = whole_revolutions(shaft.signal, name)
-        pattern = above(shaft.separated[name].difference.values, lowest_order)[inside]
+    for name, pattern in patterns.items():
         size = float(np.sum(pattern**2))
         if size == 0:
             continue
         # The pattern has no mesh lines; what the raw revolution holds besides it is nearly orthogonal to it.
-        projection = (revolutions[:, inside] - shaft.averages[name].values[inside]) @ pattern / size + 1.0
+        revolutions, mean = whole_revolutions(shaft.signal, name)[:, inside], shaft.averages[name].values[inside]
+        projection = (revolutions - mean) @ pattern / size + 1.0
         total = projection if len(total) == 0 else total + projection
     return total
 
 
 def _periods(signals: AnalysisSignals, shaft: ShaftSignals) -> set[int]:
-    """Return after how many revolutions each other shaft stands as before; 2 is always tried.
+    """Return after how many revolutions, up to 12, each other shaft stands as before; 2 is always tried.
 
     Two for a machine that works every second revolution, and for pulses that are counted wrongly.
     """
     ratio = signals.rig.ratio(shaft.shaft) or 1.0
     periods = {2}
     for order in signals.known_shaft_orders.values():
-        fraction = Fraction(ratio / order).limit_denominator(LARGEST_PERIOD * 4)
-        if abs(float(fraction) - ratio / order) < 1e-9 and fraction.numerator <= LARGEST_PERIOD:
+        fraction = Fraction(ratio / order).limit_denominator(48)
+        if abs(float(fraction) - ratio / order) < 1e-9 and fraction.numerator <= 12:
             periods.add(fraction.numerator)
     return periods - {1}
 
@@ -371,120 +320,68 @@ def _single(energies: FloatArray) -> int | None:
     return i if total > 0 and len(energies) >= 4 and float(energies[i]) > 0.5 * total else None
 
 
-# --------------------
-# Local events that are no tooth: single shocks, several per revolution, or not in every revolution.
-# --------------------
-
-
-def event_strength(shaft: ShaftSignals, event: LocalEvent) -> Strength:
-    """Return the event's rms against the median window's."""
-    unit = shaft.averages[event.channel].unit
-    ratio_db = 20 * log10(event.rms / event.median_rms) if event.rms > 0 and event.median_rms > 0 else None
-    return Strength(
-        event.rms, unit, event.median_rms, f"median tooth of the difference signal in {event.channel}", ratio_db
-    )
-
-
-def single_shock(shaft: ShaftSignals, event: LocalEvent) -> Finding:
-    """Report an event that one revolution alone has."""
-    first_whole = np.ceil(shaft.signal.start_revolution - 1e-9)
-    revolution = first_whole + (event.single_revolution or 0) + event.place.angle_rev
-    time = float(np.interp(revolution, shaft.angle.revolutions, shaft.angle.time_s))
-    return Finding(
-        "single-shock",
-        Kind.NOTICE,
-        f"A single shock near {time:.3g} s, in one of {shaft.averages[event.channel].n_revolutions} revolutions.",
-        Where((event.channel,), shaft=shaft.shaft, time_s=(time, time)),
-        event_strength(shaft, event),
-        confidence=0.95,
-        confidence_basis="more than half of what the average shows comes from that revolution",
-        surer="Another recording: what the machine does comes back.",
-    )
-
-
-def event_in_some_revolutions(signals: AnalysisSignals, shaft: ShaftSignals, event: LocalEvent) -> Finding:
-    """Report an event that only every second, third, … revolution has."""
-    ratio = signals.rig.ratio(shaft.shaft) or 1.0
-    share = 100 * event.share_of_revolutions
-    slower = [n for n, order in signals.known_shaft_orders.items() if order < ratio * (1 - 1e-9)]
-    return Finding(
-        "event-in-some-revolutions",
-        Kind.CANNOT_TELL,
-        f"A local event on shaft {shaft.shaft}, but only in {share:.0f} % of its revolutions.",
-        Where((event.channel,), shaft=shaft.shaft),
-        event_strength(shaft, event),
-        confidence=0.95,
-        confidence_basis="revolutions sorted by their number",
-        evidence=(
-            "A machine that works every second revolution does this.",
-            "So does a tachometer whose pulses per revolution are stated too low: then speed and teeth are wrong too.",
-            *(f"It may belong to a slower shaft ({', '.join(slower)})." for _ in slower[:1]),
-        ),
-        surer="Check pulses_per_revolution and the teeth.",
-    )
-
-
-def several_events(shaft: ShaftSignals, event: LocalEvent) -> Finding:
-    """Report equally spaced events."""
-    n = len(event.peaks_rev)
-    return Finding(
-        "several-events-per-revolution",
-        Kind.NOTICE,
-        f"{n} equally spaced local events per revolution of shaft {shaft.shaft}: not a single tooth.",
-        Where((event.channel,), shaft=shaft.shaft, angle_deg=360 * event.place.angle_rev),
-        event_strength(shaft, event),
-        confidence=0.9,
-        confidence_basis="equal distances and similar energy",
-        evidence=("Couplings, pumps, presses, pistons and faster shafts of a whole ratio do this.",),
-        surer="A recording at another load, or one with a sensor nearer to the suspected cause.",
-    )
-
-
-WORTH_SAYING = (0.01, 8.0)
-CLEAR = (0.001, 10.0)
+WORTH_SAYING, CLEAR = (0.01, 8.0), (0.001, 10.0)
 """p-value at most, and dB of the window over the median window at least."""
 
-REPEATABLE = 0.7
-"""Correlation of odd and even revolutions in the window; chance impacts give about 0."""
-
-SMALLEST_SHARE = 0.05
-SMALLEST_SIGNIFICANCE = 3.0
+SMALLEST_SHARE, SMALLEST_SIGNIFICANCE = 0.05, 3.0
 """Rms in the window against that of the whole average, and against the average's standard error there: below, an event
 is too small to matter, or is made by the ends of the record."""
-
-EVERY_REVOLUTION = 0.75
-"""Part of the revolutions that must carry an event for it to be this shaft's, and not a slower one's."""
-
-TEETH_THAT_DIFFER_DB = 14.7
-"""Largest of some forty teeth over the median one that one gear in a hundred reaches: chi-square, one degree."""
-
-LARGEST_BLIND_SHARE = 0.5
-"""If an event as large as half of the average's rms would not have shown, nothing is said about the teeth."""
-
-CAUSE = 0.9
-"""Share of once-per-revolution events on a shaft with gears that are damage to a tooth, not a key, coupling or rub."""
-
-NEAR_MARK_DEG = 6.0
-
-ASK_FOR_REFERENCE = (
-    "A recording of the same gears when they were healthy, given with --reference: what teeth are made with cancels."
-)
-MORE_SURER = "More revolutions, a sensor nearer to the gears, a higher load; certain data of the machine."
 
 
 @dataclass(frozen=True)
 class _Examined:
+    """A shaft with its largest local event, and the event's chance after all shafts that were tried."""
+
+    signals: AnalysisSignals
     shaft: ShaftSignals
     event: LocalEvent
     p_value: float
+
+    @property
+    def has_mark(self) -> bool:
+        """Whether the angle of this very shaft counts from a mark that is there once per revolution."""
+        return has_mark(self.signals.recording, self.signals.rig, self.shaft.shaft)
+
+    @property
+    def is_at_mark(self) -> bool:
+        """Whether the event is where the tachometer's pulse is, which crosses over into bad cables."""
+        degrees = 360 * self.event.place.angle_rev
+        return self.has_mark and min(degrees, 360 - degrees) < 6.0
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether the event is of some size, and in odd and even revolutions alike; chance impacts correlate by 0."""
+        event = self.event
+        smallest = max(SMALLEST_SHARE * event.average_rms, SMALLEST_SIGNIFICANCE * event.error_rms)
+        return event.rms >= smallest and event.place.repeatability >= 0.7
+
+    @property
+    def smallest_visible(self) -> float:
+        """Rms in a window from which an event stands out from teeth that merely differ.
+
+        Of some forty teeth the largest is 14.7 dB over the median one on one gear in a hundred: chi-square, one degree.
+        """
+        return self.event.median_rms * float(10 ** (14.7 / 20))
+
+    @property
+    def strength(self) -> Strength:
+        """The event's rms against the median window's."""
+        event = self.event
+        ratio_db = 20 * log10(event.rms / event.median_rms) if event.rms > 0 and event.median_rms > 0 else None
+        floor_is = f"median tooth of the difference signal in {event.channel}"
+        return Strength(event.rms, self.shaft.averages[event.channel].unit, event.median_rms, floor_is, ratio_db)
+
+    def reaches(self, level: tuple[float, float]) -> bool:
+        """Whether the event is as unlikely by chance, and as large, as a level asks for."""
+        return self.p_value <= level[0] and self.event.place.ratio_db >= level[1]
 
 
 def detect_tooth_damage(signals: AnalysisSignals) -> list[Finding]:
     """Look at each shaft's difference signals for a local event, and say which shafts could not be examined."""
     able = [s for s in signals.shafts if s.separated and _why_blind(signals, s) == ""]
     tested = [(s, largest_event(s, signals)) for s in able]
-    examined = [_Examined(s, event, min(1.0, event.place.p_value * len(tested))) for s, event in tested]
-    judged = [(e, _finding(signals, e)) for e in _one_per_pair_of_twins(signals, examined)]
+    examined = [_Examined(signals, s, event, min(1.0, event.place.p_value * len(tested))) for s, event in tested]
+    judged = [(e, _finding(e)) for e in _one_per_pair_of_twins(examined)]
     findings = [f for _, f in judged if f is not None]
     codes = {f.code for f in findings}
     shocks = [f for f in findings if f.code == "single-shock"]
@@ -492,120 +389,127 @@ def detect_tooth_damage(signals: AnalysisSignals) -> list[Finding]:
     if "tooth-local-damage" in codes:  # events of other shafts are its images
         findings = [f for f in findings if f.code in ("tooth-local-damage", "single-shock")]
     elif "event-in-some-revolutions" not in codes:  # with it, even the speed is in doubt
-        findings += _nothing_found(signals, [e for e, f in judged if f is None])
-        covered = [e for e, f in judged if f is not None]
-        reason, given = "other local events would cover damage", signals.has_reference
-        findings += [_undecided(covered, reason, has_reference=given)] if covered else []
+        findings += _nothing_shows(signals, [e for e, f in judged if f is None])
+        findings += _undecided([e for e, f in judged if f is not None], "other local events would cover damage")
     return findings + _not_examined(signals, {s.shaft for s in able})
 
 
-def _finding(signals: AnalysisSignals, examined: _Examined) -> Finding | None:
-    """Return what an event is: damage, several events, one that is not in every revolution; None if it is nothing."""
-    event = examined.event
-    if event.is_equally_spaced and _is_steady(event) and event.place.ratio_db >= WORTH_SAYING[1]:
-        return several_events(examined.shaft, event)  # their own energy raises the median: the test is not for them
-    if not _reaches(WORTH_SAYING, examined) or event.rms < SMALLEST_SHARE * event.average_rms:
-        return None
-    if event.single_revolution is not None:
-        return single_shock(examined.shaft, event)
-    if event.share_of_revolutions < EVERY_REVOLUTION:
-        return event_in_some_revolutions(signals, examined.shaft, event)
-    return _damage(signals, examined) if _is_steady(event) else None
-
-
-def _is_steady(event: LocalEvent) -> bool:
-    """Whether an event is of some size, and in odd and even revolutions alike."""
-    large = event.rms >= max(SMALLEST_SHARE * event.average_rms, SMALLEST_SIGNIFICANCE * event.error_rms)
-    return large and event.place.repeatability >= REPEATABLE
-
-
-def _damage(signals: AnalysisSignals, examined: _Examined) -> Finding:
-    shaft, event = examined.shaft, examined.event
-    assumed = ", ".join(signals.rig.assumed)
-    at_mark = _at_mark(signals, examined)
-    confidence = from_p_value(examined.p_value) * CAUSE * (WITH_ASSUMED_DATA if assumed or at_mark else 1.0)
-    clear = _reaches(CLEAR, examined) and not assumed and not at_mark
-    place = event.place
-    tooth = int(place.angle_rev * shaft.teeth[0]) + 1 if len(shaft.teeth) == 1 and _has_mark(signals, shaft) else None
-    at = f"at {360 * place.angle_rev:.0f}°, tooth {tooth} of {shaft.teeth[0]}," if tooth else "at one place"
-    basis = f"chance of it on a gear whose teeth merely differ: {p_text(examined.p_value)}; one in ten such events has "
-    basis += "another cause on the shaft (key, coupling, rub)"
-    what = "Local tooth damage" if clear else "A local event, perhaps tooth damage,"
-    return Finding(
-        "tooth-local-damage",
-        Kind.FAULT if clear else Kind.SUSPICION,
-        f"{what} {at} of shaft {_names(signals, shaft)}.",
-        Where(
-            _channels(shaft, event),
-            shaft=shaft.shaft,
-            gear=_gear_name(signals, shaft),
-            angle_deg=360 * place.angle_rev,
-            tooth=tooth,
-        ),
-        event_strength(examined.shaft, event),
-        confidence=confidence,
-        confidence_basis=basis + (f"; halved because {assumed} are assumed" if assumed else ""),
-        evidence=_evidence(signals, examined),
-        surer=_surer(signals),
-    )
-
-
-def _one_per_pair_of_twins(signals: AnalysisSignals, examined: list[_Examined]) -> list[_Examined]:
+def _one_per_pair_of_twins(examined: list[_Examined]) -> list[_Examined]:
     """Keep one of two shafts of equal speed: their averages hold the same events."""
     kept = list(examined)
     for one, other in combinations(examined, 2):
-        equal = abs((signals.rig.ratio(one.shaft.shaft) or 1) / (signals.rig.ratio(other.shaft.shaft) or 1) - 1) < 1e-9
+        ratio = one.signals.rig.ratio
+        equal = abs((ratio(one.shaft.shaft) or 1) / (ratio(other.shaft.shaft) or 1) - 1) < 1e-9
         if equal and one in kept and other in kept:
             kept.remove(other)
     return kept
 
 
-def _names(signals: AnalysisSignals, shaft: ShaftSignals) -> str:
+def _finding(examined: _Examined) -> Finding | None:
+    """Return what an event is: damage, several events, one that is not in every revolution; None if it is nothing."""
+    signals, shaft, event = examined.signals, examined.shaft, examined.event
+    name, degrees = shaft.shaft, 360 * event.place.angle_rev
+    if event.is_equally_spaced and examined.is_steady and event.place.ratio_db >= WORTH_SAYING[1]:
+        return Finding(  # their own energy raises the median: the test is not for them
+            "several-events-per-revolution",
+            Kind.NOTICE,
+            f"{len(event.peaks_rev)} equally spaced local events per revolution of shaft {name}: not a single tooth.",
+            Where((event.channel,), shaft=name, angle_deg=degrees),
+            examined.strength,
+            confidence=0.9,
+            confidence_basis="equal distances and similar energy",
+            evidence=("Couplings, pumps, presses, pistons and faster shafts of a whole ratio do this.",),
+            surer="A recording at another load, or one with a sensor nearer to the suspected cause.",
+        )
+    if not examined.reaches(WORTH_SAYING) or event.rms < SMALLEST_SHARE * event.average_rms:
+        return None
+    if event.single_revolution is not None:
+        revolution = np.ceil(shaft.signal.start_revolution - 1e-9) + event.single_revolution + event.place.angle_rev
+        time = float(np.interp(revolution, shaft.angle.revolutions, shaft.angle.time_s))
+        return Finding(
+            "single-shock",
+            Kind.NOTICE,
+            f"A single shock near {time:.3g} s, in one of {shaft.averages[event.channel].n_revolutions} revolutions.",
+            Where((event.channel,), shaft=name, time_s=(time, time)),
+            examined.strength,
+            confidence=0.95,
+            confidence_basis="more than half of what the average shows comes from that revolution",
+            surer="Another recording: what the machine does comes back.",
+        )
+    if event.share_of_revolutions < 0.75:  # then it is a slower shaft's
+        ratio = signals.rig.ratio(name) or 1.0
+        slower = [n for n, order in signals.known_shaft_orders.items() if order < ratio * (1 - 1e-9)]
+        share, low = f"{100 * event.share_of_revolutions:.0f} %", "are stated too low"
+        return Finding(
+            "event-in-some-revolutions",
+            Kind.CANNOT_TELL,
+            f"A local event on shaft {name}, but only in {share} of its revolutions.",
+            Where((event.channel,), shaft=name),
+            examined.strength,
+            confidence=0.95,
+            confidence_basis="revolutions sorted by their number",
+            evidence=(
+                "A machine that works every second revolution does this.",
+                f"So does a tachometer whose pulses per revolution {low}: then speed and teeth are wrong too.",
+                *([f"It may belong to a slower shaft ({', '.join(slower)})."] if slower else []),
+            ),
+            surer="Check pulses_per_revolution and the teeth.",
+        )
+    return _damage(examined) if examined.is_steady else None
+
+
+def _damage(examined: _Examined) -> Finding:
+    signals, shaft, place = examined.signals, examined.shaft, examined.event.place
+    assumed = ", ".join(signals.rig.assumed)
+    # One in ten once-per-revolution events on a shaft with gears is no tooth's, but a key's, a coupling's or a rub's.
+    confidence = from_p_value(examined.p_value) * 0.9
+    confidence *= WITH_ASSUMED_DATA if assumed or examined.is_at_mark else 1.0
+    clear = examined.reaches(CLEAR) and not assumed and not examined.is_at_mark
+    tooth = int(place.angle_rev * shaft.teeth[0]) + 1 if len(shaft.teeth) == 1 and examined.has_mark else None
+    at = f"at {360 * place.angle_rev:.0f}°, tooth {tooth} of {shaft.teeth[0]}," if tooth else "at one place"
     own = signals.rig.ratio(shaft.shaft) or 1.0
-    twins = [n for n, order in signals.known_shaft_orders.items() if abs(order / own - 1) < 1e-9 and n != shaft.shaft]
-    return " or ".join([shaft.shaft, *twins])
+    equal = [n for n, order in signals.known_shaft_orders.items() if abs(order / own - 1) < 1e-9 and n != shaft.shaft]
+    what = "Local tooth damage" if clear else "A local event, perhaps tooth damage,"
+    shares = zip(shaft.separated, place.channel_shares, strict=True)
+    pairs = [p.name for p in signals.rig.pairs if shaft.shaft in (p.driver, p.driven)]
+    return Finding(
+        "tooth-local-damage",
+        Kind.FAULT if clear else Kind.SUSPICION,
+        f"{what} {at} of shaft {' or '.join([shaft.shaft, *equal])}.",
+        Where(
+            tuple(name for name, share in shares if share >= 4.0) or (examined.event.channel,),
+            shaft=shaft.shaft,
+            gear=f"{pairs[0]}/{shaft.shaft}" if len(pairs) == 1 else "",
+            angle_deg=360 * place.angle_rev,
+            tooth=tooth,
+        ),
+        examined.strength,
+        confidence,
+        f"chance of it on a gear whose teeth merely differ: {p_text(examined.p_value)}; one in ten such events has "
+        "another cause on the shaft (key, coupling, rub)"
+        + (f"; halved because {assumed} are assumed" if assumed else ""),
+        tuple(_evidence(examined)),
+        _surer(signals),
+    )
 
 
-def _reaches(level: tuple[float, float], examined: _Examined) -> bool:
-    return examined.p_value <= level[0] and examined.event.place.ratio_db >= level[1]
-
-
-def _has_mark(signals: AnalysisSignals, shaft: ShaftSignals) -> bool:
-    """Whether the angle of this very shaft counts from a mark that is there once per revolution."""
-    return has_mark(signals.recording, signals.rig, shaft.shaft)
-
-
-def _at_mark(signals: AnalysisSignals, examined: _Examined) -> bool:
-    """Whether the event is where the tachometer's pulse is, which crosses over into bad cables."""
-    degrees = 360 * examined.event.place.angle_rev
-    return _has_mark(signals, examined.shaft) and min(degrees, 360 - degrees) < NEAR_MARK_DEG
-
-
-def _channels(shaft: ShaftSignals, event: LocalEvent) -> tuple[str, ...]:
-    strong = [n for n, s in zip(shaft.separated, event.place.channel_shares, strict=True) if s >= 4.0]
-    return tuple(strong) or (event.channel,)
-
-
-def _evidence(signals: AnalysisSignals, examined: _Examined) -> tuple[str, ...]:
+def _evidence(examined: _Examined) -> Iterator[str]:
     shaft, event = examined.shaft, examined.event
-    texts = [
-        f"Energy in one tooth pitch is {event.place.ratio_db:.1f} dB over the median pitch, all channels together.",
-        f"{shaft.averages[event.channel].n_revolutions} revolutions were averaged.",
-        f"It comes back: odd and even revolutions correlate there by {event.place.repeatability:.2f}.",
-        f"Its rms is {100 * event.rms / event.average_rms:.0f} % of the whole average's.",
-    ]
+    yield f"Energy in one tooth pitch is {event.place.ratio_db:.1f} dB over the median pitch, all channels together."
+    yield f"{shaft.averages[event.channel].n_revolutions} revolutions were averaged."
+    yield f"It comes back: odd and even revolutions correlate there by {event.place.repeatability:.2f}."
+    yield f"Its rms is {100 * event.rms / event.average_rms:.0f} % of the whole average's."
     if len(event.peaks_rev) > 1:
-        texts.append(f"It is the largest of {len(event.peaks_rev)} local events: several teeth, or another cause.")
-    if _at_mark(signals, examined):
-        texts.append("It is at the tachometer's mark: cross-talk from its cable would look the same.")
-    if not _has_mark(signals, shaft):
-        texts.append("No once-per-revolution mark is on this shaft: the angle holds for this record's average only.")
+        yield f"It is the largest of {len(event.peaks_rev)} local events: several teeth, or another cause."
+    if examined.is_at_mark:
+        yield "It is at the tachometer's mark: cross-talk from its cable would look the same."
+    if not examined.has_mark:
+        yield "No once-per-revolution mark is on this shaft: the angle holds for this record's average only."
     elif len(shaft.teeth) == 1:
-        texts.append("Teeth count from 1 at the mark, as they engage; the place is good to about one tooth.")
+        yield "Teeth count from 1 at the mark, as they engage; the place is good to about one tooth."
     if len(shaft.teeth) > 1:
         teeth = ", ".join(map(str, shaft.teeth))
-        texts.append(f"The shaft carries {len(shaft.teeth)} gears ({teeth} teeth); it may be on either.")
-    return tuple(texts)
+        yield f"The shaft carries {len(shaft.teeth)} gears ({teeth} teeth); it may be on either."
 
 
 def _surer(signals: AnalysisSignals) -> str:
@@ -617,65 +521,53 @@ def _surer(signals: AnalysisSignals) -> str:
     return f"A recording at another load or speed (damage stays at its tooth){good}."
 
 
-def _nothing_found(signals: AnalysisSignals, examined: list[_Examined]) -> list[Finding]:
-    """State that nothing shows, of those shafts where damage of a useful size would have shown."""
-    given = signals.has_reference
-    if examined and signals.rig.assumed:
-        assumed = ", ".join(signals.rig.assumed)
-        return [_undecided(examined, f"{assumed} are assumed: damage may not show", has_reference=given)]
-    sharp = [e for e in examined if _smallest_visible(e.event) <= LARGEST_BLIND_SHARE * e.event.average_rms]
-    blunt = [e for e in examined if e not in sharp]
+def _nothing_shows(signals: AnalysisSignals, examined: list[_Examined]) -> list[Finding]:
+    """State that nothing shows, of those shafts where damage of a useful size would have shown.
+
+    Where an event as large as half of the average's rms would not have shown, nothing is said about the teeth.
+    """
+    if signals.rig.assumed:
+        return _undecided(examined, f"{', '.join(signals.rig.assumed)} are assumed: damage may not show")
+    sharp = [e for e in examined if e.smallest_visible <= 0.5 * e.event.average_rms]
+    # Of the others the median tooth's part of the difference signal may be mostly noise that the average has left.
+    noisy = [e for e in examined if e not in sharp and e.event.median_rms <= SMALLEST_SIGNIFICANCE * e.event.error_rms]
+    uneven = [e for e in examined if e not in sharp and e not in noisy]
     findings = []
     if sharp:
-        shafts = ", ".join(e.shaft.shaft for e in sharp)
+        first = sharp[0].shaft
         findings.append(
             Finding(
                 "no-tooth-local-damage",
                 Kind.INFORMATION,
-                f"No local tooth damage shows on shaft(s) {shafts}.",
-                Where(channels=tuple(sharp[0].shaft.separated), shaft=sharp[0].shaft.shaft if len(sharp) == 1 else ""),
+                f"No local tooth damage shows on shaft(s) {_names(sharp)}.",
+                Where(tuple(first.separated), shaft=first.shaft if len(sharp) == 1 else ""),
                 confidence=0.8,
                 confidence_basis="small damage may be hidden below the mesh's own variation",
                 evidence=tuple(_visible_text(e) for e in sharp),
                 surer=_surer(signals),
             )
         )
-    noisy = [e for e in blunt if _is_noise(e.event)]
-    uneven = [e for e in blunt if e not in noisy]
-    if noisy:
-        reason = "noise would hide an event of half the average's size"
-        findings.append(_undecided(noisy, reason, has_reference=given))
-    if uneven:
-        reason = "they differ so much from each other that damage may hide among them"
-        findings.append(_undecided(uneven, reason, has_reference=given))
-    return findings
+    findings += _undecided(noisy, "noise would hide an event of half the average's size")
+    return findings + _undecided(uneven, "they differ so much from each other that damage may hide among them")
 
 
-def _undecided(examined: list[_Examined], reason: str, *, has_reference: bool) -> Finding:
-    shafts = ", ".join(e.shaft.shaft for e in examined)
-    return Finding(
-        "tooth-damage-undecided",
-        Kind.CANNOT_TELL,
-        f"Nothing shows at the teeth of shaft(s) {shafts}, but {reason}.",
-        Where(channels=tuple(examined[0].shaft.separated)),
-        evidence=tuple(_visible_text(e) for e in examined),
-        surer=MORE_SURER if has_reference else f"{ASK_FOR_REFERENCE} Or {MORE_SURER[0].lower()}{MORE_SURER[1:]}",
-    )
+def _undecided(examined: list[_Examined], reason: str) -> list[Finding]:
+    if not examined:
+        return []
+    more = "ore revolutions, a sensor nearer to the gears, a higher load; certain data of the machine."
+    healthy = "A recording of the same gears when they were healthy, given with --reference: what teeth are made with"
+    surer = f"M{more}" if examined[0].signals.has_reference else f"{healthy} cancels. Or m{more}"
+    title = f"Nothing shows at the teeth of shaft(s) {_names(examined)}, but {reason}."
+    where, evidence = Where(tuple(examined[0].shaft.separated)), tuple(_visible_text(e) for e in examined)
+    return [cannot_tell("tooth-damage-undecided", title, where, evidence=evidence, surer=surer)]
 
 
-def _is_noise(event: LocalEvent) -> bool:
-    """Whether the median tooth's part of the difference signal is mostly noise that the average has left."""
-    return event.median_rms <= SMALLEST_SIGNIFICANCE * event.error_rms
-
-
-def _smallest_visible(event: LocalEvent) -> float:
-    """Return the rms in a window from which an event stands out from teeth that merely differ."""
-    return event.median_rms * float(10 ** (TEETH_THAT_DIFFER_DB / 20))
+def _names(examined: list[_Examined]) -> str:
+    return ", ".join(e.shaft.shaft for e in examined)
 
 
 def _visible_text(examined: _Examined) -> str:
-    event = examined.event
-    smallest = _smallest_visible(event)
+    event, smallest = examined.event, examined.smallest_visible
     share = 100 * smallest / event.average_rms if event.average_rms > 0 else 0.0
     return (
         f"Shaft {examined.shaft.shaft}: the largest tooth is {event.place.ratio_db:.1f} dB over the median (chance if "
@@ -702,15 +594,11 @@ def _not_examined(signals: AnalysisSignals, examined: set[str]) -> list[Finding]
     for shaft in dict.fromkeys(s for pair in signals.rig.pairs for s in (pair.driver, pair.driven)):
         if shaft not in examined:
             reasons.setdefault(_reason(signals, shaft), []).append(shaft)
-    return [
-        Finding(
-            "tooth-not-examined",
-            Kind.CANNOT_TELL,
-            f"Teeth on shaft(s) {', '.join(shafts)} cannot be examined: {reason}.",
-            surer="A longer recording with a tachometer, the right teeth of all gears, a higher sampling rate.",
-        )
-        for reason, shafts in reasons.items()
+    surer = "A longer recording with a tachometer, the right teeth of all gears, a higher sampling rate."
+    titles = [
+        f"Teeth on shaft(s) {', '.join(shafts)} cannot be examined: {reason}." for reason, shafts in reasons.items()
     ]
+    return [cannot_tell("tooth-not-examined", title, surer=surer) for title in titles]
 
 
 def _reason(signals: AnalysisSignals, name: str) -> str:
@@ -726,8 +614,3 @@ def _reason(signals: AnalysisSignals, name: str) -> str:
         if shaft.shaft == name and shaft.separated:
             return _why_blind(signals, shaft)
     return "its gear has no known teeth, its mesh is above half the sampling rate, or the record is too short"
-
-
-def _gear_name(signals: AnalysisSignals, shaft: ShaftSignals) -> str:
-    pairs = [p.name for p in signals.rig.pairs if shaft.shaft in (p.driver, p.driven)]
-    return f"{pairs[0]}/{shaft.shaft}" if len(pairs) == 1 else ""

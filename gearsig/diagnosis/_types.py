@@ -112,6 +112,13 @@ class Finding:
     surer: str = ""
 
 
+def cannot_tell(
+    code: str, title: str, where: Where | None = None, *, evidence: tuple[str, ...] = (), surer: str = ""
+) -> Finding:
+    """Return the finding that something cannot be told, or could not be examined."""
+    return Finding(code, Kind.CANNOT_TELL, title, where or Where(), evidence=evidence, surer=surer)
+
+
 @dataclass(frozen=True)
 class CannotTell:
     """An answer that is not to be had from these data, and what would give it."""
@@ -262,11 +269,6 @@ def outcome_of(findings: Sequence[Finding]) -> Outcome:
     return Outcome.NO_FAULT if examined and not hindered else Outcome.CANNOT_TELL
 
 
-# --------------------
-# The parameters of an analysis, each with its reason.
-# --------------------
-
-
 @dataclass(frozen=True)
 class AnalysisSettings:
     """What `analyze` may be told.
@@ -303,19 +305,11 @@ class AnalysisSettings:
         positive(self.highest_modulation_order, "highest_modulation_order")
 
 
-# --------------------
-# From a p-value to how sure a statement is.
-# --------------------
-
-
 WITHOUT_REFERENCE = 0.95
 """Upper limit for a fault claimed from one recording: what is there may have been there when the machine was new."""
 
 WITH_ASSUMED_DATA = 0.5
 """Factor where the statement rests on data of the machine that are assumed."""
-
-SMALLEST_SHOWN = 1e-6
-"""Smaller p-values are not shown: no model of the noise is known so well in its tails."""
 
 
 def from_p_value(p_value: float, *, prior: float = 0.1, limit: float = WITHOUT_REFERENCE) -> float:
@@ -348,11 +342,11 @@ def from_p_value(p_value: float, *, prior: float = 0.1, limit: float = WITHOUT_R
 
 
 def p_text(p_value: float) -> str:
-    """Write a p-value with one digit, none below 1e-6.
+    """Write a p-value with one digit, none below 1e-6: no model of the noise is known so well in its tails.
 
     Examples
     --------
     >>> p_text(3.2e-4), p_text(5e-141)
     ('3e-04', '< 1e-6')
     """
-    return "< 1e-6" if p_value < SMALLEST_SHOWN else f"{p_value:.0e}" if p_value < 0.01 else f"{p_value:.1g}"
+    return "< 1e-6" if p_value < 1e-6 else f"{p_value:.0e}" if p_value < 0.01 else f"{p_value:.1g}"

@@ -1,0 +1,324 @@
+"""Lines where speed and teeth put them, or not: the speed, the meshes, the mains, the strongest unexplained line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import isfinite
+
+import numpy as np
+
+from gearsig.angle import ShaftAngle
+from gearsig.diagnosis._signals import AnalysisSignals, PlacedLine, line_at
+from gearsig.diagnosis._types import CannotTell, Finding, Kind, Where, cannot_tell
+from gearsig.prepared import MAINS_HZ, RUN_UP_FOOT_ORDERS, LineExcess, floor_of, levels_beside
+from gearsig.rig import GearPair
+
+N_HARMONICS = 3
+"""Multiples of a mesh or shaft order that are looked at."""
+
+CLEAR_DB = 12.0
+"""A line that noise alone exceeds once in 10⁷: power over mean floor is exponential, exp(-15.8) (12 dB)."""
+
+CONTRADICTED_DB, CONTRADICTED_BY_ONE_DB = 10.0, 20.0
+"""By so much the true mesh lines exceed the stated ones: more than sidebands exceed their carriers in several harmonics
+at once, always on the same side; the second where the first harmonic alone is to be seen."""
+
+UNEXPLAINED_DB = 15.0
+"""Power over mean floor that noise exceeds in one line of 10¹³: also over a million lines, a chance of 10⁻⁷."""
+
+_OVER_FLOOR = "height over the noise floor"
+_UNKNOWN_CAUSE = f"{_OVER_FLOOR}; what causes it is not known"
+
+
+def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:
+    """State the speed and how it was found, or that it is not known."""
+    if isinstance(angle, CannotTell):
+        title = "The speed is not known: orders, synchronous averages and everything that rests on them are left out."
+        return cannot_tell("speed-unknown", title, evidence=(angle.reason,), surer=angle.remedy)
+    low, high = angle.speed_range_rpm
+    uncertainty = angle.relative_speed_uncertainty
+    plus_minus = f" ± {uncertainty * angle.mean_speed_rpm:.2g}" if isfinite(uncertainty) else ""
+    text = f"Shaft {angle.shaft or 'of reference'} turns at {angle.mean_speed_rpm:.6g}{plus_minus} rpm"
+    if high - low > 0.001 * angle.mean_speed_rpm:
+        text += f", between {low:.5g} and {high:.5g} rpm"
+    return Finding(
+        "speed",
+        Kind.INFORMATION,
+        f"{text} ({angle.method}, {angle.n_revolutions:.5g} revolutions).",
+        Where(shaft=angle.shaft, time_s=(angle.start_s, angle.end_s)),
+        confidence=angle.quality,
+        confidence_basis=f"quality figure of the method '{angle.method}'",
+        evidence=angle.notes,
+        surer="" if angle.method in ("pulses", "encoder") else "A tachometer: it also fixes the zero of the angle.",
+    )
+
+
+# Whether the vibration itself confirms the speed and the teeth: only then does "nothing shows" mean anything.
+
+
+def clearest_line(signals: AnalysisSignals, order: float) -> tuple[PlacedLine, str, int] | None:
+    """Return the clearest of the first multiples of `order` over all channels, its channel, and its harmonic.
+
+    None if no multiple is within the spectra.
+    """
+    lines = [
+        (line, channel, h)
+        for channel, excess in signals.order_excess.items()
+        for h in range(1, N_HARMONICS + 1)
+        if (line := line_at(excess, h * order)) is not None
+    ]
+    return max(lines, key=lambda place: (_is_clear(place[0]), place[0].ratio_db), default=None)
+
+
+def _is_clear(line: PlacedLine) -> bool:
+    """Whether a line stands out, where it is expected: a speed a little off moves it away."""
+    return line.is_highest and line.ratio_db >= CLEAR_DB
+
+
+def _is_confirmed(signals: AnalysisSignals, order: float | None) -> bool:
+    clearest = clearest_line(signals, order) if order is not None else None
+    return clearest is not None and _is_clear(clearest[0])
+
+
+def mesh_is_confirmed(signals: AnalysisSignals, pair: GearPair) -> bool:
+    """Whether a mesh line of `pair` stands where speed and teeth put it."""
+    return _is_confirmed(signals, signals.rig.mesh_order(pair))
+
+
+def speed_is_confirmed(signals: AnalysisSignals) -> bool:
+    """Whether any mesh line, or where no mesh is known any shaft's line, stands where the speed puts it."""
+    orders = signals.known_mesh_orders.values() or signals.known_shaft_orders.values()
+    return signals.angle is not None and any(_is_confirmed(signals, order) for order in orders)
+
+
+def detect_mesh(signals: AnalysisSignals) -> list[Finding]:
+    """Report each pair's mesh, or that it is not where it should be."""
+    if signals.angle is None:
+        return []
+    return [finding for pair in signals.rig.pairs if (finding := _mesh_finding(signals, pair)) is not None]
+
+
+def _mesh_finding(signals: AnalysisSignals, pair: GearPair) -> Finding | None:
+    mesh = signals.rig.mesh_order(pair)
+    if mesh is None:
+        surer = "Give the teeth of one of its gears and of all gears between it and the speed's shaft."
+        title = f"The mesh order of {pair.name} is not known."
+        return cannot_tell("mesh-order-unknown", title, Where(gear=pair.name), surer=surer)
+    where = signals.where(mesh, gear=pair.name)
+    hertz, nyquist = mesh * signals.frequency_per_order_hz, signals.recording.sampling_rate_hz / 2
+    if hertz >= nyquist:
+        return cannot_tell(
+            "mesh-above-sampling",
+            f"The mesh of {pair.name} would be at {hertz:.5g} Hz, above half the sampling rate ({nyquist:.5g} Hz).",
+            where,
+            evidence=("Sampling rate, speed and teeth cannot all be right, or the recording was made too slowly.",),
+            surer="Check the sampling rate and the teeth; record at three times the mesh frequency or more.",
+        )
+    order = teeth_are_contradicted(signals, pair)
+    if order is not None:
+        way, above = "lower" if order < mesh else "higher", f"{CONTRADICTED_DB:.0f} dB or more above"
+        return cannot_tell(
+            "teeth-disagree",
+            f"The mesh lines of {pair.name} are at order {order:.6g}, the rig says {mesh:.6g}: check the teeth.",
+            signals.where(order, gear=pair.name),
+            evidence=(
+                f"The lines there are {above} those at {mesh:.6g}, at every harmonic that shows.",
+                f"A speed that is {100 * abs(order / mesh - 1):.2f} % {way} would do the same.",
+            ),
+            surer="Count the teeth, and check pulses per revolution and the shaft that the speed belongs to.",
+        )
+    clearest = clearest_line(signals, mesh)
+    if clearest is None:
+        return None
+    line, channel, harmonic = clearest
+    strength = line.strength("noise floor of the order spectrum")
+    if _is_clear(line):
+        where = signals.where(line.position, channel, gear=pair.name)
+        title = f"The mesh of {pair.name} shows at order {line.position:.6g} ({where.frequency_hz:.6g} Hz, "
+        title += f"harmonic {harmonic})."
+        return Finding("mesh-found", Kind.INFORMATION, title, where, strength, 0.99, _OVER_FLOOR)
+    near = f"The best of {N_HARMONICS} harmonics is {line.ratio_db:.1f} dB over the floor."
+    if not line.is_highest:
+        near = f"Near harmonic {harmonic} a line stands beside its place: the speed may be off by little, and small "
+        near += "errors smear all averages."
+    return Finding(
+        "mesh-absent",
+        Kind.CANNOT_TELL,
+        f"No mesh line of {pair.name} where speed and teeth put it (order {mesh:.6g}, {hertz:.6g} Hz).",
+        where,
+        strength,
+        evidence=(*_where_instead(signals), near),
+        surer="Check sampling rate, speed source (pulses per revolution, shaft) and teeth; or the gears carry no load.",
+    )
+
+
+def _where_instead(signals: AnalysisSignals) -> Iterator[str]:
+    """Say at which multiple of the stated speed the mesh lines do lie, if anywhere."""
+    from gearsig.angle import comb_evidence
+
+    evidence = comb_evidence(signals.recording, signals.rig, signals.frequency_per_order_hz * 60)
+    if evidence:
+        yield evidence
+
+
+def teeth_are_contradicted(signals: AnalysisSignals, pair: GearPair) -> float | None:
+    """Return the order at which the mesh lines of `pair` really are, None where nothing contradicts the stated teeth.
+
+    With d teeth more than stated on the shaft that the mesh is reckoned from (up to three), the lines stand at
+    h·(mesh + d·shaft) instead of h·mesh. Those at the stated place are then mere sidebands, and all that is put down
+    to teeth is wrong.
+
+    Parameters
+    ----------
+    signals : AnalysisSignals
+    pair : GearPair
+
+    Returns
+    -------
+    float or None
+        In cycles per revolution of the reference shaft.
+    """
+    mesh = signals.rig.mesh_order(pair)
+    if mesh is None or not signals.order_excess:
+        return None
+    # The pair's shafts, as far as their orders are known without its own teeth; the contact may be this pair's.
+    without = replace(signals.rig, pairs=tuple(p for p in signals.rig.pairs if p is not pair), contact=None)
+    steps = [without.ratio(shaft, to=signals.rig.reference_shaft) for shaft in (pair.driver, pair.driven)]
+    near = max(3.0 * excess.spectrum.resolution for excess in signals.order_excess.values())
+    meshes = [other for other in signals.known_mesh_orders.values() if abs(other - mesh) > near]
+    others = [h * other for other in meshes for h in range(1, N_HARMONICS + 1)]
+    margins: dict[float, float] = {}
+    for step in (step for step in steps if step is not None):
+        for order in (mesh + d * step for d in (-3, -2, -1, 1, 2, 3)):
+            if order > step and all(abs(other - order) > near for other in others):
+                by_channel = [_margin_db(excess, mesh, order) for excess in signals.order_excess.values()]
+                seen = [margin for margin in by_channel if margin is not None]
+                if seen:
+                    margins[order] = max(float(np.median(seen)), margins.get(order, -np.inf))
+    best = max(margins, key=lambda order: margins[order], default=None)
+    return best if best is not None and margins[best] > 0 else None
+
+
+def _margin_db(excess: LineExcess, mesh: float, order: float) -> float | None:
+    """Return by how much the lines at multiples of `order` contradict those of `mesh` in the worst harmonic.
+
+    Positive: they do. Each is compared with the stated line and with the one as far on its other side, as a
+    modulation has sidebands on both. None if no harmonic shows in either place, or only a higher one.
+    """
+    margins: dict[int, float] = {}
+    for h in range(1, N_HARMONICS + 1):
+        # The true place, the stated one, and the mirror image of the true one.
+        lines = [line_at(excess, h * place) for place in (order, mesh, 2 * mesh - order)]
+        true, stated, mirrored = lines
+        if true is None or stated is None or mirrored is None:
+            break
+        if _is_clear(true):
+            margins[h] = true.level_db - max(stated.level_db, mirrored.level_db)
+        elif _is_clear(stated):
+            margins[h] = -CONTRADICTED_DB
+    if not margins or set(margins) in ({2}, {3}):
+        return None  # a single line of a higher multiple is where a wrong speed puts any mesh by chance
+    return min(margins.values()) - (CONTRADICTED_DB if len(margins) > 1 else CONTRADICTED_BY_ONE_DB)
+
+
+# Single lines: the mains', and the strongest that belongs to nothing known.
+
+
+def detect_lines(signals: AnalysisSignals) -> list[Finding]:
+    """Report mains hum and the strongest unexplained line; without speed the strongest line, as a start."""
+    strongest = _unexplained(signals) if signals.order_excess else _strongest(signals)
+    return [finding for finding in (_mains(signals), strongest) if finding is not None]
+
+
+def _mains(signals: AnalysisSignals) -> Finding | None:
+    """Look for lines at the mains frequency and its first multiples that no shaft explains."""
+    for name, spectrum in signals.spectra.items():
+        excess = floor_of(spectrum)
+        if spectrum.resolution > 0.5:
+            continue  # a mains line is then not told from a shaft's
+        for mains in MAINS_HZ:
+            lines = [line_at(excess, k * mains, 0.1) for k in (1, 2, 3)]
+            near = [line for k, line in enumerate(lines, 1) if line and abs(line.position - k * mains) <= 0.1]
+            clear = [line for line in near if line.ratio_db > UNEXPLAINED_DB]
+            if len(clear) >= 2 and not _is_synchronous(signals, mains):
+                floor = "noise floor of the spectrum"
+                return Finding(
+                    "mains-hum",
+                    Kind.NOTICE,
+                    f"Lines of the {mains:.0f} Hz mains stand in channel {name}.",
+                    Where((name,), frequency_hz=mains),
+                    lines[0].strength(floor) if lines[0] is not None else None,
+                    confidence=0.8,
+                    confidence_basis="two of the first three multiples within 0.1 Hz",
+                    surer="Switch the machine off and record again: hum stays.",
+                )
+    return None
+
+
+def _is_synchronous(signals: AnalysisSignals, hertz: float) -> bool:
+    if signals.angle is None:
+        return False
+    order = hertz / signals.frequency_per_order_hz
+    # Also a half and a third of each: wheels that are not described often turn at those.
+    candidates = [o / part for o in signals.known_shaft_orders.values() for part in (1, 2, 3)]
+    return any(abs(order / o - round(order / o)) * o < 0.01 for o in candidates)
+
+
+def _unexplained(signals: AnalysisSignals) -> Finding | None:
+    """Return the strongest order line that is no multiple of a known shaft's order, and no bearing's."""
+    best: tuple[float, str, int] | None = None
+    foot = RUN_UP_FOOT_ORDERS if signals.speed_varies else 0.0
+    for name, excess in signals.order_excess.items():
+        for order in signals.known_shaft_orders.values():
+            wide = foot if order >= 4 * foot else 0.0  # closer lines are masked at least themselves
+            # The skirt is a line's foot where the speed wanders by as little as that.
+            excess = excess.without_multiples(order, half_width=wide, skirt=5e-4)  # noqa: PLW2901
+        for bearing in signals.rig.bearings:
+            ratio = signals.rig.ratio(bearing.shaft)
+            for order in bearing.orders().values() if ratio is not None else ():
+                excess = excess.without_multiples(order * (ratio or 1.0), half_width=0.02 * order)  # noqa: PLW2901
+        spectrum = excess.spectrum
+        with np.errstate(divide="ignore", invalid="ignore"):
+            clear = 20 * np.log10(spectrum.values / excess.floor) > UNEXPLAINED_DB
+        if signals.speed_varies:
+            # Skirts of lines that pass a resonance are far above the floor, but not above what lies beside them.
+            clear &= spectrum.values > levels_beside(spectrum) * 10 ** (UNEXPLAINED_DB / 20)
+        height = np.where(clear & ~excess.masked & (spectrum.positions > 0.2), spectrum.values, 0.0)
+        i = int(np.argmax(height))
+        if height[i] > 0 and (best is None or height[i] > best[0]):
+            best = (float(height[i]), name, i)
+    if best is None:
+        return None
+    line = PlacedLine.at(signals.order_excess[best[1]], best[2])
+    where = signals.where(line.position, best[1])
+    return Finding(
+        "unexplained-line",
+        Kind.NOTICE,
+        f"The strongest line of no known shaft or mesh is at order {line.position:.4f} ({where.frequency_hz:.5g} Hz).",
+        replace(where, order_shaft=signals.order_excess[best[1]].spectrum.shaft),
+        line.strength("noise floor"),
+        0.95,
+        _UNKNOWN_CAUSE,
+        surer="A run-up: a line of fixed frequency is a resonance or electrical, one of fixed order a shaft's.",
+    )
+
+
+def _strongest(signals: AnalysisSignals) -> Finding | None:
+    lines = []
+    for name, spectrum in signals.spectra.items():
+        start = spectrum.index_of(2.0) + 1
+        lines.append((PlacedLine.at(floor_of(spectrum), start + int(np.argmax(spectrum.values[start:]))), name))
+    clear = [(line, name) for line, name in lines if line.amplitude > line.floor * 10 ** (UNEXPLAINED_DB / 20)]
+    if not clear:
+        return None
+    line, name = max(clear, key=lambda place: place[0].amplitude)
+    return Finding(
+        "strongest-line",
+        Kind.INFORMATION,
+        f"The strongest line of the spectrum is at {line.position:.6g} Hz in channel {name}.",
+        Where((name,), frequency_hz=line.position),
+        line.strength("noise floor of the spectrum"),
+        0.95,
+        _UNKNOWN_CAUSE,
+    )
