@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import exp, gcd
-from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,35 +12,6 @@ from gearsig.checks import FloatArray
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
 from gearsig.prepared import Comb, LineExcess, best_comb, comb_at
 from gearsig.rig import Bearing
-
-# --------------------
-# Whether a family of lines is a part of a slower train of impacts, or no better than families beside it.
-#
-# A train of impacts at a low rate has lines everywhere: a multiple of its rate lies near any order one may look at.
-# --------------------
-
-
-LARGEST_DIVISOR = 30
-LARGEST_NUMERATOR = 3
-"""A family may sit on every third line of a train of which it then has two multiples in three."""
-
-MIN_LINES_APART = 6
-"""Trains with lines closer than that are not told from noise."""
-
-SEEN = float(np.log(4.0))
-"""Log ratio of a line that counts as seen (6 dB); a widened line of noise has it once in 18."""
-
-SHARE_SEEN = 0.5
-"""Share of a train's further lines that must be seen; sidebands of a race's family make few of them."""
-
-MIN_FURTHER = 3
-N_SIDEBANDS = 3
-COST = 0.4
-"""What a line costs, between noise (0) and the family's own mean (1): a train that adds noise lines loses."""
-
-PLACEBO_DISTANCES = (-0.09, -0.05, 0.05, 0.09)
-PLACEBO_RATIO = 0.9
-"""A family that is a part's own scores clearly higher than the best ones beside it."""
 
 
 def slower_train(excess: LineExcess, comb: Comb, shafts: tuple[float, ...] = ()) -> Comb | None:
@@ -70,12 +40,14 @@ def slower_train(excess: LineExcess, comb: Comb, shafts: tuple[float, ...] = ())
     reach = max(comb.positions) + excess.spectrum.resolution
     family = _unmasked(excess, comb.fundamental, reach)
     noise = float(np.median(excess.log_ratio[~excess.masked]))
-    cost = noise + COST * (float(family.mean()) - noise) if len(family) else 0.0
+    # Between noise (0) and the family's own mean (1): a train that adds noise lines loses.
+    cost = noise + 0.4 * (float(family.mean()) - noise) if len(family) else 0.0
     best, best_score = None, float(np.sum(family - cost))
-    for fraction in _fractions():
-        fundamental = comb.fundamental * fraction
-        if fundamental < MIN_LINES_APART * excess.spectrum.resolution:
-            continue
+    # On every third line of a train a family still has two of three multiples.
+    fractions = {p / q for q in range(2, 31) for p in range(1, min(q, 4)) if gcd(p, q) == 1}
+    for fundamental in (comb.fundamental * fraction for fraction in sorted(fractions)):
+        if fundamental < 6 * excess.spectrum.resolution:
+            continue  # trains with lines closer than that are not told from noise
         score = float(np.sum(_unmasked(excess, fundamental, reach) - cost))
         if score > best_score and _is_seen_between(excess, fundamental, comb.fundamental, reach, shafts):
             best, best_score = fundamental, score
@@ -89,40 +61,46 @@ def stands_out_from_neighbours(excess: LineExcess, comb: Comb, slip: float, othe
 
     Neighbours in which one of the `others`, the orders of further parts, lies are left out: they may be families too.
     """
-    for distance in PLACEBO_DISTANCES:
+    for distance in (-0.09, -0.05, 0.05, 0.09):
         low, high = (comb.fundamental * (1 + distance + side * slip) for side in (-1, 1))
         if any(low <= other * (1 + side * slip) <= high for other in others for side in (-1, 0, 1)):
             continue
         placebo = best_comb(excess, low, high)
-        if placebo is not None and placebo.score >= PLACEBO_RATIO * comb.score:
+        if placebo is not None and placebo.score >= 0.9 * comb.score:  # a part's own scores clearly higher
             return False
     return True
 
 
-def _fractions() -> list[float]:
-    """Return the fractions below one, with a numerator to 3 and a denominator to 30."""
-    return sorted(
-        p / q for q in range(2, LARGEST_DIVISOR + 1) for p in range(1, min(q, LARGEST_NUMERATOR + 1)) if gcd(p, q) == 1
-    )
-
-
 def _unmasked(excess: LineExcess, fundamental: float, reach: float) -> FloatArray:
     """Return the log ratios of the multiples up to `reach` that are not explained already."""
-    index = _lines_of(excess, np.arange(1, int(reach / fundamental) + 1) * fundamental)
+    return _free_ratios(excess, np.arange(1, int(reach / fundamental) + 1) * fundamental)
+
+
+def _free_ratios(excess: LineExcess, places: FloatArray) -> FloatArray:
+    index = _line_numbers(excess, places)
+    index = index[(index >= 0) & (index < len(excess.log_ratio))]
     ratios: FloatArray = excess.log_ratio[index[~excess.masked[index]]]
     return ratios
+
+
+def _line_numbers(excess: LineExcess, places: FloatArray) -> NDArray[np.int64]:
+    spectrum = excess.spectrum
+    index: NDArray[np.int64] = np.rint((places - spectrum.positions[0]) / spectrum.resolution).astype(np.int64)
+    return index
 
 
 def _is_seen_between(
     excess: LineExcess, fundamental: float, family: float, reach: float, shafts: tuple[float, ...]
 ) -> bool:
-    """Whether at least half of the train's lines stand out that are none of the family's and none of its sidebands."""
+    """Whether at least half of the train's lines stand out that are none of the family's and none of its sidebands.
+
+    Seen is a line 6 dB over the floor; a widened line of noise is so once in 18. Sidebands of a race's family make few.
+    """
     places = np.arange(1, int(reach / fundamental) + 1) * fundamental
-    sidebands = [0.0, *(side * k * shaft for shaft in shafts for k in range(1, N_SIDEBANDS + 1) for side in (-1, 1))]
+    sidebands = [0.0, *(side * k * shaft for shaft in shafts for k in (1, 2, 3) for side in (-1, 1))]
     explained = np.any([_is_of_family(excess, places, family, sideband) for sideband in sidebands], axis=0)
-    index = _lines_of(excess, places[~explained])
-    further = excess.log_ratio[index[~excess.masked[index]]]
-    return len(further) >= MIN_FURTHER and float(np.mean(further >= SEEN)) >= SHARE_SEEN
+    further = _free_ratios(excess, places[~explained])
+    return len(further) >= 3 and float(np.mean(further >= np.log(4.0))) >= 0.5
 
 
 def _is_of_family(excess: LineExcess, places: FloatArray, family: float, sideband: float) -> NDArray[np.bool_]:
@@ -130,23 +108,10 @@ def _is_of_family(excess: LineExcess, places: FloatArray, family: float, sideban
     others = sideband + np.maximum(np.rint((places - sideband) / family), 0) * family
     near: NDArray[np.bool_] = np.abs(others - places) < 2 * excess.spectrum.resolution
     if sideband:
-        height, other_height = (excess.spectrum.values[_clipped_lines(excess, x)] for x in (places, others))
+        values, last = excess.spectrum.values, len(excess.spectrum.values) - 1
+        height, other_height = (values[np.clip(_line_numbers(excess, x), 0, last)] for x in (places, others))
         near = near & (other_height >= height)
     return near
-
-
-def _clipped_lines(excess: LineExcess, places: FloatArray) -> NDArray[np.int64]:
-    spectrum = excess.spectrum
-    index = np.rint((places - spectrum.positions[0]) / spectrum.resolution).astype(np.int64)
-    clipped: NDArray[np.int64] = np.clip(index, 0, len(spectrum.values) - 1)
-    return clipped
-
-
-def _lines_of(excess: LineExcess, places: FloatArray) -> NDArray[np.int64]:
-    spectrum = excess.spectrum
-    index = np.rint((places - spectrum.positions[0]) / spectrum.resolution).astype(np.int64)
-    inside: NDArray[np.int64] = index[(index >= 0) & (index < len(excess.log_ratio))]
-    return inside
 
 
 PARTS = {
@@ -157,25 +122,8 @@ PARTS = {
 }
 """Part that strikes at each order, and strikes per cycle: a damaged rolling element strikes both races each spin."""
 
-TYPICAL_SLIP = 0.007
-"""Standard deviation of the relative distance from the kinematic order, where parts compete for one family of lines."""
-
-UNCONFIRMED_SLIP = 0.05
-"""Range searched where the speed is stated and nothing confirms it: the slip of a motor comes to the bearing's."""
-
-TYPICAL_UNCONFIRMED_SLIP = 0.02
-
-RARE = 0.3
-"""Prior weight of rolling elements and cages against races, which are damaged far more often."""
-
-SAME_ORDER = 1e-3
-"""Relative distance below which two bearings' orders are the same for any record: slip alone scatters more."""
-
 MINIMUM_LINES = 3
 """Lines of a family over 6 dB that must be there: two may coincide by chance with the harmonics of something else."""
-
-MAX_TRAINS = 3
-"""Trains of impacts looked for, each hidden before the next search."""
 
 
 @dataclass(frozen=True)
@@ -229,7 +177,7 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
     the search begins anew, so that a damaged part beside it is found.
     """
     trains: list[Candidate] = []
-    for _ in range(MAX_TRAINS):
+    for _ in range(3):
         named = _significant(signals, envelopes)
         train = next((t for c in named if (t := _train_of(signals, c)) is not None), None)
         if train is None:
@@ -247,22 +195,18 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
     return Families(tuple(clear), tuple(trains), tuple(unclear))
 
 
-def without_synchronous(signals: AnalysisSignals, excess: LineExcess) -> LineExcess:
-    """Mask the multiples of every known shaft order: gears and shafts, not bearings."""
-    for order in signals.known_shaft_orders.values():
-        excess = excess.without_multiples(order)
-    return excess
-
-
 def speed_is_only_stated(signals: AnalysisSignals) -> bool:
     """Whether the speed is a stated one that no line of the signal has confirmed."""
     return signals.angle is not None and signals.angle.method == "constant" and signals.angle.quality <= 0.5
 
 
 def slip_of(signals: AnalysisSignals) -> float:
-    """Return the relative range in which a part's order is sought."""
+    """Return the relative range in which a part's order is sought.
+
+    Where the speed is stated and nothing confirms it, the slip of a motor comes to the bearing's.
+    """
     slip = signals.settings.bearing_slip
-    return max(slip, UNCONFIRMED_SLIP) if speed_is_only_stated(signals) else slip
+    return max(slip, 0.05) if speed_is_only_stated(signals) else slip
 
 
 def expected_parts(signals: AnalysisSignals) -> list[tuple[Bearing, str, float]]:
@@ -295,11 +239,9 @@ def best_unnamed(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Can
 
 def clearest_family(envelopes: list[BandEnvelope], low: float, high: float) -> Candidate | None:
     """Return the surest family with a fundamental between `low` and `high`, its p-value over all envelopes."""
-    best: Candidate | None = None
-    for envelope in envelopes:
-        comb = best_comb(envelope.excess, low, high)
-        if _is_better(comb, best):
-            best = Candidate(comb, envelope, comb.p_value)
+    combs = [(best_comb(envelope.excess, low, high), envelope) for envelope in envelopes]
+    families = [Candidate(c, e, c.p_value) for c, e in combs if c is not None and len(c.positions) >= MINIMUM_LINES]
+    best = min(families, key=lambda family: (family.p_value, -family.comb.score), default=None)
     return None if best is None else replace(best, p_value=min(1.0, best.p_value * len(envelopes)))
 
 
@@ -310,21 +252,20 @@ def _significant(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> lis
     candidates = []
     for bearing, name, order in expected:
         best = clearest_family(envelopes, order * (1 - slip), order * (1 + slip))
-        if best is not None and _is_within(best.comb, best.envelope, order, slip):
-            p_value = min(1.0, best.p_value * len(expected))
-            if p_value <= signals.settings.false_alarm_probability:
-                candidates.append(replace(best, p_value=p_value, bearing=bearing, name=name, expected=order))
+        if best is None:
+            continue
+        p_value = min(1.0, best.p_value * len(expected))
+        # Once it is fitted to the lines, the fundamental must still be near the order.
+        near = slip * order + best.envelope.excess.spectrum.resolution / 6
+        is_near = abs(best.comb.fundamental - order) <= near
+        if is_near and p_value <= signals.settings.false_alarm_probability:
+            candidates.append(replace(best, p_value=p_value, bearing=bearing, name=name, expected=order))
     candidates.sort(key=lambda c: -_weight(signals, c.name, c.comb.fundamental / c.expected - 1))
     kept: list[Candidate] = []
     for candidate in candidates:
         if not any(_shares_lines(candidate.comb, other.comb) for other in kept):
             kept.append(_with_rivals(signals, candidate))
     return sorted(kept, key=lambda c: c.p_value)
-
-
-def _is_within(comb: Comb, envelope: BandEnvelope, order: float, slip: float) -> bool:
-    """Whether the fundamental is still near the order once it is fitted to the lines."""
-    return abs(comb.fundamental - order) <= slip * order + envelope.excess.spectrum.resolution / 6
 
 
 def _train_of(signals: AnalysisSignals, candidate: Candidate) -> Candidate | None:
@@ -373,9 +314,13 @@ def _stands_out(signals: AnalysisSignals, candidate: Candidate) -> bool:
 
 
 def _weight(signals: AnalysisSignals, name: str, slip: float) -> float:
-    """Return how likely a part is, by how far from its kinematic order the lines are."""
-    typical = TYPICAL_UNCONFIRMED_SLIP if speed_is_only_stated(signals) else TYPICAL_SLIP
-    return exp(-0.5 * (slip / typical) ** 2) * (RARE if name in ("BSF", "FTF") else 1.0)
+    """Return how likely a part is, by how far from its kinematic order the lines are.
+
+    Slip scatters by 0.7 %, with the speed's own error by 2 %. Rolling elements and cages are damaged far more rarely
+    than races.
+    """
+    typical = 0.02 if speed_is_only_stated(signals) else 0.007
+    return exp(-0.5 * (slip / typical) ** 2) * (0.3 if name in ("BSF", "FTF") else 1.0)
 
 
 def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
@@ -387,7 +332,7 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
     for bearing, name, order in parts:
         if (bearing, name) == (candidate.bearing, candidate.name):
             continue
-        if name == candidate.name and abs(order / order_of_part - 1) < SAME_ORDER:
+        if name == candidate.name and abs(order / order_of_part - 1) < 1e-3:  # slip alone scatters more
             twins.append(bearing)
             continue
         slip = min((candidate.comb.fundamental / (order * m) - 1 for m in (0.5, 1.0, 2.0)), key=abs)
@@ -405,13 +350,6 @@ def _known_multiple(signals: AnalysisSignals, candidate: Candidate) -> Candidate
                 named = replace(candidate, bearing=bearing, name=name, expected=m * order)
                 return _with_rivals(signals, named)
     return None
-
-
-def _is_better(comb: Comb | None, best: Candidate | None) -> TypeGuard[Comb]:
-    """Whether a family has lines enough and is surer than the best so far."""
-    if comb is None or len(comb.positions) < MINIMUM_LINES:
-        return False
-    return best is None or (comb.p_value, -comb.score) < (best.p_value, -best.comb.score)
 
 
 def _shares_lines(comb: Comb, surer: Comb) -> bool:
