@@ -2,7 +2,12 @@
 
 from gearsig.diagnosis._analyze import analyze
 from gearsig.diagnosis._bearing import smallest_depth
-from gearsig.diagnosis._bearing_families import slower_train, stands_out_from_neighbours
+from gearsig.diagnosis._bearing_families import (
+    BEARING_PARTS,
+    SAME_BEARING_ORDER,
+    slower_train,
+    stands_out_from_neighbours,
+)
 from gearsig.diagnosis._crack import crack_depth, with_crack
 from gearsig.diagnosis._modulation import Modulation, modulation_of
 from gearsig.diagnosis._reference import (
@@ -33,6 +38,8 @@ from gearsig.diagnosis._types import (
 from gearsig.diagnosis._verdict import ranked, verdict_of
 
 __all__ = [
+    "BEARING_PARTS",
+    "SAME_BEARING_ORDER",
     "Analysis",
     "AnalysisSettings",
     "BandEnvelope",

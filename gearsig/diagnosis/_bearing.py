@@ -10,7 +10,7 @@ from statistics import median, median_high
 import numpy as np
 
 from gearsig.diagnosis._bearing_families import (
-    PARTS,
+    BEARING_PARTS,
     Candidate,
     clearest_family,
     expected_parts,
@@ -94,7 +94,7 @@ def detect_bearings(
 def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int) -> Finding:
     bearing = candidate.bearing
     assert bearing is not None  # noqa: S101 - a named candidate has one; narrows the type
-    part = PARTS[candidate.name][0]
+    part = BEARING_PARTS[candidate.name][0]
     slip, only_stated = candidate.comb.fundamental / candidate.expected - 1, speed_is_only_stated(signals)
     is_beyond_slip = only_stated and abs(slip) > signals.settings.bearing_slip
     is_shared = candidate.name == "FTF" or n_parts > MAX_PARTS
@@ -176,7 +176,7 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
     if candidate.in_train:
         causes = ["The rate is low for a race: another machine, a belt or a shaft that is not in the rig file does it."]
         beside = [
-            f"{PARTS[name][0]} of {bearing.name}"
+            f"{BEARING_PARTS[name][0]} of {bearing.name}"
             for bearing, name, part in expected_parts(signals)
             if abs(part / order - round(part / order)) * order <= slip_of(signals) * part and part > order
         ]
@@ -266,7 +266,7 @@ def _none_shows(
         why = "no line of a mesh or shaft stands where the speed puts it, so that bearing orders may be elsewhere"
         return [_undecided(why, "A tachometer, or a sensor nearer to the gears.", where)]
     if unclear:
-        parts = ", ".join(f"{PARTS[c.name][0]} of {c.bearing.name}" for c in unclear if c.bearing)
+        parts = ", ".join(f"{BEARING_PARTS[c.name][0]} of {c.bearing.name}" for c in unclear if c.bearing)
         why = f"lines stand at the order of the {parts}, but families beside it are as clear"
         return [_undecided(why, "A longer recording, or another sensor.", where)]
     # For each part of each bearing, the depth of modulation from which it would have shown.
@@ -296,7 +296,7 @@ def _none_shows(
         evidence=(
             f"No family at their orders in {len(envelopes)} envelope spectra (channels × bands).",
             f"Six equal harmonics of {limit} would have shown in half of the bands.",
-            f"The most is needed at the {PARTS[name][0]} of {bearing}.",
+            f"The most is needed at the {BEARING_PARTS[name][0]} of {bearing}.",
         ),
         surer=surer,
     )
@@ -315,7 +315,11 @@ def _examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], float])
 
 
 def _not_examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], float], where: Where) -> Iterator[Finding]:
-    hidden = [f"{PARTS[name][0]} of {bearing}" for (bearing, name), depth in depths.items() if depth > CLEAR_MODULATION]
+    hidden = [
+        f"{BEARING_PARTS[name][0]} of {bearing}"
+        for (bearing, name), depth in depths.items()
+        if depth > CLEAR_MODULATION
+    ]
     if hidden:
         yield cannot_tell(
             "bearing-part-hidden",

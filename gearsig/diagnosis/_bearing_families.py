@@ -114,13 +114,16 @@ def _is_of_family(excess: LineExcess, places: FloatArray, family: float, sideban
     return near
 
 
-PARTS = {
+BEARING_PARTS = {
     "BPFO": ("outer race", 1.0),
     "BPFI": ("inner race", 1.0),
     "BSF": ("rolling element", 2.0),
     "FTF": ("cage", 1.0),
 }
 """Part that strikes at each order, and strikes per cycle: a damaged rolling element strikes both races each spin."""
+
+SAME_BEARING_ORDER = 1e-3
+"""Relative distance below which two bearings' orders are the same for any record: slip alone scatters more."""
 
 MINIMUM_LINES = 3
 """Lines of a family over 6 dB that must be there: two may coincide by chance with the harmonics of something else."""
@@ -212,7 +215,7 @@ def slip_of(signals: AnalysisSignals) -> float:
 def expected_parts(signals: AnalysisSignals) -> list[tuple[Bearing, str, float]]:
     """Return every known bearing part with the order at which its damage would strike."""
     return [
-        (bearing, name, order * ratio * PARTS[name][1])
+        (bearing, name, order * ratio * BEARING_PARTS[name][1])
         for bearing in signals.rig.bearings
         if (ratio := signals.rig.ratio(bearing.shaft)) is not None
         for name, order in bearing.orders().items()
@@ -332,13 +335,13 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
     for bearing, name, order in parts:
         if (bearing, name) == (candidate.bearing, candidate.name):
             continue
-        if name == candidate.name and abs(order / order_of_part - 1) < 1e-3:  # slip alone scatters more
+        if name == candidate.name and abs(order / order_of_part - 1) < SAME_BEARING_ORDER:
             twins.append(bearing)
             continue
         slip = min((candidate.comb.fundamental / (order * m) - 1 for m in (0.5, 1.0, 2.0)), key=abs)
         if abs(slip) <= slip_of(signals):
             others += _weight(signals, name, slip)
-            rivals.append(f"{PARTS[name][0]} of {bearing.name}")
+            rivals.append(f"{BEARING_PARTS[name][0]} of {bearing.name}")
     return replace(candidate, rivals=tuple(rivals), twins=tuple(twins), share=own / (own + others))
 
 

@@ -10,6 +10,8 @@ import numpy as np
 
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis import (
+    BEARING_PARTS,
+    SAME_BEARING_ORDER,
     Analysis,
     CannotTell,
     Earlier,
@@ -18,9 +20,6 @@ from gearsig.diagnosis import (
     Outcome,
     analyze,
     in_reference,
-)
-from gearsig.diagnosis import (
-    _bearing_families as bearing_family,
 )
 from gearsig.errors import RefusalError
 from gearsig.formatting import named, signed
@@ -59,7 +58,7 @@ IMPACTS = ("non-synchronous-impacts", "bearing-rolling-element", "bearing-cage")
 
 LINE = "unexplained-line"
 
-PARTS = {f"bearing-{part.replace(' ', '-')}": (part, name) for name, (part, _) in bearing_family.PARTS.items()}
+PARTS = {f"bearing-{part.replace(' ', '-')}": (part, name) for name, (part, _) in BEARING_PARTS.items()}
 """Code of a finding → part of a bearing, and its order's name."""
 
 SAME_EDGE = 0.1
@@ -187,7 +186,7 @@ def bearings_text(finding: Finding, rig: Rig) -> str:
     own = orders.get(finding.where.bearing)
     if not own:
         return ""
-    alike = [other for other, order in orders.items() if abs(order / own - 1.0) < bearing_family.SAME_ORDER]
+    alike = [other for other, order in orders.items() if abs(order / own - 1.0) < SAME_BEARING_ORDER]
     return named("bearing", " or ".join(alike))
 
 
