@@ -15,6 +15,7 @@ from gearsig.diagnosis._bearing_families import (
     clearest_family,
     expected_parts,
     find_families,
+    part_text,
     slip_of,
     slower_train,
     speed_is_only_stated,
@@ -176,7 +177,7 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
     if candidate.in_train:
         causes = ["The rate is low for a race: another machine, a belt or a shaft that is not in the rig file does it."]
         beside = [
-            f"{BEARING_PARTS[name][0]} of {bearing.name}"
+            part_text(name, bearing.name)
             for bearing, name, part in expected_parts(signals)
             if abs(part / order - round(part / order)) * order <= slip_of(signals) * part and part > order
         ]
@@ -266,7 +267,7 @@ def _none_shows(
         why = "no line of a mesh or shaft stands where the speed puts it, so that bearing orders may be elsewhere"
         return [_undecided(why, "A tachometer, or a sensor nearer to the gears.", where)]
     if unclear:
-        parts = ", ".join(f"{BEARING_PARTS[c.name][0]} of {c.bearing.name}" for c in unclear if c.bearing)
+        parts = ", ".join(part_text(c.name, c.bearing.name) for c in unclear if c.bearing)
         why = f"lines stand at the order of the {parts}, but families beside it are as clear"
         return [_undecided(why, "A longer recording, or another sensor.", where)]
     # For each part of each bearing, the depth of modulation from which it would have shown.
@@ -315,11 +316,7 @@ def _examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], float])
 
 
 def _not_examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], float], where: Where) -> Iterator[Finding]:
-    hidden = [
-        f"{BEARING_PARTS[name][0]} of {bearing}"
-        for (bearing, name), depth in depths.items()
-        if depth > CLEAR_MODULATION
-    ]
+    hidden = [part_text(name, bearing) for (bearing, name), depth in depths.items() if depth > CLEAR_MODULATION]
     if hidden:
         yield cannot_tell(
             "bearing-part-hidden",

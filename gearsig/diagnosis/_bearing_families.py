@@ -122,6 +122,12 @@ BEARING_PARTS = {
 }
 """Part that strikes at each order, and strikes per cycle: a damaged rolling element strikes both races each spin."""
 
+
+def part_text(name: str, bearing: str) -> str:
+    """Name a part by its order's name, e.g. "outer race of bearing 1"."""
+    return f"{BEARING_PARTS[name][0]} of {bearing}"
+
+
 SAME_BEARING_ORDER = 1e-3
 """Relative distance below which two bearings' orders are the same for any record: slip alone scatters more."""
 
@@ -341,7 +347,7 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
         slip = min((candidate.comb.fundamental / (order * m) - 1 for m in (0.5, 1.0, 2.0)), key=abs)
         if abs(slip) <= slip_of(signals):
             others += _weight(signals, name, slip)
-            rivals.append(f"{BEARING_PARTS[name][0]} of {bearing.name}")
+            rivals.append(part_text(name, bearing.name))
     return replace(candidate, rivals=tuple(rivals), twins=tuple(twins), share=own / (own + others))
 
 
