@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -116,15 +116,7 @@ class Plan:
 
     def definition(self) -> dict[str, Any]:
         """What decides the cases, as plain values."""
-        return {
-            "n_cases": self.n_cases,
-            "seed": self.seed,
-            "role": self.role,
-            "reference": self.reference,
-            "same_simulator": self.same_simulator,
-            "longest_s": self.longest_s,
-            "least_level": self.least_level,
-        }
+        return asdict(self)
 
     def cases(self) -> list[PlannedCase]:
         """Return the cases in the order of the run."""
@@ -143,6 +135,18 @@ class Plan:
     def rng_of_run(self, case: PlannedCase) -> np.random.Generator:
         """Return the generator of what the diagnosing simulator draws for itself: severities, places, noise."""
         return np.random.default_rng([self.seed, 2, case.number])
+
+    def make(self, planned: PlannedCase, folder: Path | None) -> Truth:
+        """Draw and record a case; write what may be seen into `folder` (None: nowhere); return the truth."""
+        case = _drawn(self, planned)
+        if planned.source == SAME:
+            made, label = record_same(self, planned, case)
+        else:
+            made = record_case(case)
+            label = labels(case, made)
+        if folder is not None:
+            write_seen(made, folder)
+        return _truth(label, made)
 
 
 def _shuffled(plan: Plan, rng: np.random.Generator) -> list[PlannedCase]:
@@ -192,19 +196,6 @@ class Truth:
     fault_changes: tuple[Mapping[str, float], ...]
     healthy: Mapping[str, float]
     healthy_change: Mapping[str, float]
-
-
-def make_case(plan: Plan, planned: PlannedCase, folder: Path | None) -> Truth:
-    """Draw and record a case; write what may be seen into `folder` (None: nowhere); return the truth."""
-    case = _drawn(plan, planned)
-    if planned.source == SAME:
-        made, label = record_same(plan, planned, case)
-    else:
-        made = record_case(case)
-        label = labels(case, made)
-    if folder is not None:
-        write_seen(made, folder)
-    return _truth(label, made)
 
 
 def _drawn(plan: Plan, planned: PlannedCase) -> BlindCase:

@@ -6,17 +6,17 @@ import hashlib
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import app
 from app.benchmark.answer import Answer, from_text, to_text
-from app.benchmark.cases import Plan, PlannedCase, Truth, make_case
+from app.benchmark.cases import Plan, PlannedCase, Truth
 from app.benchmark.diagnose_one import ANSWERS
 from app.benchmark.diagnosers import diagnoser, folders_of
 from app.stopping import Running, stop
@@ -47,72 +47,98 @@ _PASSED_ON = ("PATH", "LANG", "LC_ALL", "HOME", "SYSTEMROOT", "VIRTUAL_ENV", "NU
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _ROOT = Path(app.__file__).resolve().parents[1]
 
-AnyTruth = TypeVar("AnyTruth")
-
 
 @dataclass(frozen=True)
-class BlindRun(Generic[AnyTruth]):
-    """Numbered cases, how one is made, and who answers.
+class BenchmarkRequest:
+    """A benchmark as it is asked for.
 
     Parameters
     ----------
-    numbers : sequence of int
-    make : callable
-        Number and folder → truth; writes what may be seen into the folder, nowhere where it is None. Another process
-        calls it.
+    plan : Plan
     diagnosers : tuple of str
-    definition : mapping
-        What decides the answers, as plain values.
+        The first is judged, the others stand beside it; see `app.benchmark.diagnosers`.
     """
 
-    numbers: Sequence[int]
-    make: Callable[[int, Path | None], AnyTruth]
+    plan: Plan
     diagnosers: tuple[str, ...]
-    definition: Mapping[str, Any]
 
-    def answered(
-        self, folder: Path, *, n_processes: int = 2, on_progress: Callable[[int], object] | None = None
-    ) -> Iterable[tuple[int, AnyTruth, dict[str, Answer]]]:
-        """Return number, truth and answers of all cases, in order, made and diagnosed in as many processes.
+    def __post_init__(self) -> None:
+        for name in self.diagnosers:
+            diagnoser(name)
 
-        After Ctrl-C or SIGTERM the answers so far stay in the folder, and the same call goes on from there.
+    @cached_property
+    def code(self) -> str:
+        """State of the code when it was first asked for."""
+        return state_of_code()
 
-        Raises
-        ------
-        InputError
-            If the folder holds other things or another benchmark.
-        """
-        claimed(folder, dict(self.definition), DEFINITION, "benchmark")
-        (folder / ANSWERS_FOLDER).mkdir(exist_ok=True)
-        workers = count(n_processes, "processes")
-        found: list[tuple[int, AnyTruth, dict[str, Answer]]] = []
-        running = Running()
-        with process_pool(workers) as makers, ThreadPoolExecutor(workers) as threads:
-            futures = [threads.submit(self._one, number, folder, makers, running) for number in self.numbers]
-            try:
-                for future in as_completed(futures):
-                    found.append(future.result())
-                    if on_progress is not None:
-                        on_progress(len(found))
-            finally:
-                for future in futures:
-                    future.cancel()
-                running.stop()
-        return sorted(found, key=lambda one: one[0])
+    def definition(self) -> dict[str, Any]:
+        """What decides the result, as plain values."""
+        return {
+            **self.plan.definition(),
+            "diagnosers": list(self.diagnosers),
+            "version": __version__,
+            "code": self.code,
+        }
 
-    def _one(
-        self, number: int, folder: Path, makers: Executor, running: Running
-    ) -> tuple[int, AnyTruth, dict[str, Answer]]:
-        kept = folder / ANSWERS_FOLDER / f"case_{number:04d}.json"
-        if kept.exists():
-            truth = makers.submit(self.make, number, None).result()
-            return number, truth, from_text(kept.read_text(encoding="utf-8"))
-        with TemporaryDirectory(prefix="gearsig-") as name:
-            place = Path(name)
-            truth = makers.submit(self.make, number, place).result()
-            answers = diagnosed(place, self.diagnosers, running)
-        written(kept, to_text(answers))
-        return number, truth, answers
+
+@dataclass(frozen=True)
+class Done:
+    """One case, made and answered.
+
+    Parameters
+    ----------
+    planned : PlannedCase
+    truth : Truth
+    answers : mapping of str to Answer
+    """
+
+    planned: PlannedCase
+    truth: Truth
+    answers: dict[str, Answer]
+
+
+def run_benchmark(
+    request: BenchmarkRequest, folder: Path, *, n_processes: int = 2, on_progress: Callable[[int], object] | None = None
+) -> list[Done]:
+    """Make and diagnose all cases, in as many processes; return them in the plan's order.
+
+    After Ctrl-C or SIGTERM the answers so far stay in the folder, and the same call goes on from there.
+
+    Raises
+    ------
+    InputError
+        If the folder holds other things or another benchmark, a diagnoser is not there, or the code has changed.
+    """
+    claimed(folder, request.definition(), DEFINITION, "benchmark")
+    (folder / ANSWERS_FOLDER).mkdir(exist_ok=True)
+    workers = count(n_processes, "processes")
+    done: list[Done] = []
+    running = Running()
+    with process_pool(workers) as makers, ThreadPoolExecutor(workers) as threads:
+        futures = [threads.submit(_one, request, case, folder, makers, running) for case in request.plan.cases()]
+        try:
+            for future in as_completed(futures):
+                done.append(future.result())
+                if on_progress is not None:
+                    on_progress(len(done))
+        finally:
+            for future in futures:
+                future.cancel()
+            running.stop()
+    return sorted(done, key=lambda one: one.planned.number)
+
+
+def _one(request: BenchmarkRequest, planned: PlannedCase, folder: Path, makers: Executor, running: Running) -> Done:
+    kept = folder / ANSWERS_FOLDER / f"case_{planned.number:04d}.json"
+    if kept.exists():
+        truth = makers.submit(request.plan.make, planned, None).result()
+        return Done(planned, truth, from_text(kept.read_text(encoding="utf-8")))
+    with TemporaryDirectory(prefix="gearsig-") as name:
+        place = Path(name)
+        truth = makers.submit(request.plan.make, planned, place).result()
+        answers = diagnosed(place, request.diagnosers, running)
+    written(kept, to_text(answers))
+    return Done(planned, truth, answers)
 
 
 def n_answered(folder: Path) -> int:
@@ -172,72 +198,3 @@ def state_of_code() -> str:
             if path.suffix in (".py", ".json", ".toml", ".npz") and not _SHOWS_ONLY & set(own.parts):
                 found.update(own.as_posix().encode() + b"\0" + path.read_bytes())
     return found.hexdigest()[:16]
-
-
-@dataclass(frozen=True)
-class BenchmarkRequest:
-    """A benchmark as it is asked for.
-
-    Parameters
-    ----------
-    plan : Plan
-    diagnosers : tuple of str
-        The first is judged, the others stand beside it; see `app.benchmark.diagnosers`.
-    """
-
-    plan: Plan
-    diagnosers: tuple[str, ...]
-
-    def __post_init__(self) -> None:
-        for name in self.diagnosers:
-            diagnoser(name)
-
-    @cached_property
-    def code(self) -> str:
-        """State of the code when it was first asked for."""
-        return state_of_code()
-
-    def definition(self) -> dict[str, Any]:
-        """What decides the result, as plain values."""
-        return {
-            **self.plan.definition(),
-            "diagnosers": list(self.diagnosers),
-            "version": __version__,
-            "code": self.code,
-        }
-
-
-@dataclass(frozen=True)
-class Done:
-    """One case, made and answered.
-
-    Parameters
-    ----------
-    planned : PlannedCase
-    truth : Truth
-    answers : mapping of str to Answer
-    """
-
-    planned: PlannedCase
-    truth: Truth
-    answers: dict[str, Answer]
-
-
-def run_benchmark(
-    wanted: BenchmarkRequest, folder: Path, *, n_processes: int = 2, on_progress: Callable[[int], object] | None = None
-) -> list[Done]:
-    """Make and diagnose all cases, in as many processes; return them in the plan's order.
-
-    Raises
-    ------
-    InputError
-        See `app.benchmark.run`; or if a diagnoser is not there, or the code has changed.
-    """
-    cases = {planned.number: planned for planned in wanted.plan.cases()}
-    run = BlindRun(sorted(cases), partial(_make, wanted.plan, cases), wanted.diagnosers, wanted.definition())
-    answered = run.answered(folder, n_processes=n_processes, on_progress=on_progress)
-    return [Done(cases[number], truth, answers) for number, truth, answers in answered]
-
-
-def _make(plan: Plan, cases: Mapping[int, PlannedCase], number: int, folder: Path | None) -> Truth:
-    return make_case(plan, cases[number], folder)

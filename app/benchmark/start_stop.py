@@ -1,32 +1,38 @@
-"""`gearsig benchmark gap --model forging`: blind start–stop cases from an independent drive, diagnosed one by one."""
+"""`gearsig benchmark gap --model forging`: blind start–stop cases from an independent drive, and how answers score."""
 
 from __future__ import annotations
 
-import csv
-import json
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
-from functools import partial
-from io import StringIO
-from math import isfinite, nan
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import nan
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from app.benchmark.answer import Answer, AnsweredShrinkage
-from app.benchmark.cases import BLIND, REFERENCES, counts_of
+from app.benchmark.cases import BLIND, Plan, PlannedCase, Truth, counts_of
 from app.benchmark.diagnosers import START_STOP
-from app.benchmark.run import BlindRun, state_of_code
-from app.benchmark.scoring.judged import Located, Row
-from app.benchmark.scoring.scores import Measure, Score, brier_of, calibration_error, counted, median_of, shrink_of
-from gearsig import __version__
-from gearsig.checks import count, one_of
+from app.benchmark.run import BenchmarkRequest, Done
+from app.benchmark.scoring.judged import Located, Row, row_of
+from app.benchmark.scoring.scores import (
+    Figure,
+    Measure,
+    Result,
+    Rows,
+    Score,
+    brier_of,
+    calibration_error,
+    counted,
+    mean_of,
+    median_of,
+    score_parts,
+    shrink_of,
+)
 from gearsig.gap import NAMING, NONE, UNKNOWN, GapOutcome
 from gearsig.recording import Recording
-from sims.blind_drive import CATALOGUE, OUTSIDE, ROLES, DriveCase, draw_case, label_of, record_case
-from sims.sweep import written
+from sims.blind_drive import CATALOGUE, OUTSIDE, DriveCase, draw_case, label_of, record_case
 
 SHARES = {"none": 0.3, "single": 0.55, "unknown": 0.15}
 
@@ -43,70 +49,52 @@ def planned(n_cases: int, seed: int) -> list[tuple[str, str, float]]:
 
 
 @dataclass(frozen=True)
-class DrivePlan:
-    """What decides the cases.
-
-    Parameters
-    ----------
-    n_cases, seed : int
-    role : str
-        "development", "calibration" or "evaluation"; they share no gears.
-    reference : str
-        "with" or "without" healthy references, or "both" in turn.
-    """
+class DrivePlan(Plan):
+    """What decides the cases of drives: as many, the seed, the role and the references of a `Plan`."""
 
     n_cases: int = 140
-    seed: int = 1
-    role: str = "evaluation"
-    reference: str = "both"
-
-    def __post_init__(self) -> None:
-        count(self.n_cases, "cases")
-        one_of(self.role, "role", ROLES)
-        one_of(self.reference, "reference", REFERENCES)
 
     def definition(self) -> dict[str, Any]:
-        """What decides the answers, as plain values."""
-        return {
-            "model": "forging",
-            "n_cases": self.n_cases,
-            "seed": self.seed,
-            "role": self.role,
-            "reference": self.reference,
-            "version": __version__,
-            "code": state_of_code(),
-        }
+        """What decides the cases, as plain values."""
+        return {"model": "forging", **super().definition()}
 
-    def with_reference(self, number: int, effect: str) -> bool:
-        """Whether a case has a healthy reference: an effect without a sound value in the drawing always has."""
-        if needs_reference(effect):
-            return True
-        return number % 2 == 0 if self.reference == "both" else self.reference == "with"
+    def cases(self) -> list[PlannedCase]:
+        """Return the cases in the order of the run; effects without a healthy value in the drawing get a reference."""
+        cases = []
+        for number, (kind, effect, level) in enumerate(planned(self.n_cases, self.seed)):
+            wished = number % 2 == 0 if self.reference == "both" else self.reference == "with"
+            cases.append(PlannedCase(number, BLIND, kind, effect, level, wished or needs_reference(effect), 1))
+        return cases
+
+    def make(self, planned: PlannedCase, folder: Path | None) -> Truth:
+        """Make a case; write what may be seen into `folder` (None: nowhere); return the truth."""
+        asked = planned.kind, planned.effect or "", planned.level
+        case = drawn_case(self.role, self.seed, planned.number, asked, with_reference=planned.with_reference)
+        if folder is not None:
+            from gearsig.recording import write_recording
+            from gearsig.rig import write_rig
+
+            made = record_case(case)
+            for stem, recording in (("condition_1", made.recording), ("reference_1", made.reference)):
+                if recording is not None and recording.rig is not None:
+                    write_recording(recording, folder / f"{stem}.h5")
+                    write_rig(recording.rig, folder / f"{stem}.toml")
+        return Truth(_labels(case), (), {}, {})
 
 
-@dataclass(frozen=True)
-class DriveDone:
-    """A case, made and answered: what was true of it, and the answer."""
-
-    number: int
-    label: dict[str, Any]
-    answer: Answer
-
-
-def make_drive_case(plan: DrivePlan, number: int, folder: Path | None) -> dict[str, Any]:
-    """Make a case; write what may be seen into `folder` (None: nowhere); return the label."""
-    asked = planned(plan.n_cases, plan.seed)[number]
-    case = drawn_case(plan.role, plan.seed, number, asked, with_reference=plan.with_reference(number, asked[1]))
-    if folder is not None:
-        from gearsig.recording import write_recording
-        from gearsig.rig import write_rig
-
-        made = record_case(case)
-        for stem, recording in (("condition_1", made.recording), ("reference_1", made.reference)):
-            if recording is not None and recording.rig is not None:
-                write_recording(recording, folder / f"{stem}.h5")
-                write_rig(recording.rig, folder / f"{stem}.toml")
-    return label_of(case)
+def _labels(case: DriveCase) -> dict[str, Any]:
+    """Return the label, laid out like those of the blind gear pairs."""
+    label = label_of(case)
+    effect = {"name": label["effect"], **{key: label[key] for key in ("severity", "unit", "level", "place")}}
+    return {
+        "kind": label["kind"],
+        "effects": [effect] if label["effect"] else [],
+        "has_reference": label["with_reference"],
+        "conditions": [{}],
+        "pair": dict(zip(("z1", "z2"), label["teeth"], strict=True)),
+        "n_channels": label["n_channels"],
+        "encoder_counts": label["encoder_counts"],
+    }
 
 
 def drawn_case(role: str, seed: int, number: int, asked: tuple[str, str, float], *, with_reference: bool) -> DriveCase:
@@ -130,49 +118,36 @@ def needs_reference(effect: str) -> bool:
     return bool(effect) and (CATALOGUE | OUTSIDE)[effect].needs_reference
 
 
-def run_drive_benchmark(
-    plan: DrivePlan, folder: Path, *, n_processes: int = 2, on_progress: Callable[[int], object] | None = None
-) -> list[DriveDone]:
-    """Make and diagnose all cases, see `app.benchmark.run`."""
-    numbers = range(len(planned(plan.n_cases, plan.seed)))
-    run = BlindRun(numbers, partial(make_drive_case, plan), (START_STOP,), plan.definition())
-    answered = run.answered(folder, n_processes=n_processes, on_progress=on_progress)
-    return [DriveDone(number, label, answers[START_STOP]) for number, label, answers in answered]
-
-
 # --------------------
-# Scores of blind start–stop cases: how often right, what is said of healthy and of unknown ones, how far gaps shrink.
+# Scores: how often right, what is said of healthy and of unknown cases, how far gaps shrink.
 # --------------------
 
 
-TABLE, SCORES, CASES = "table.md", "scores.json", "cases.csv"
 STRONG_LEVEL = 0.5
 """Level from which on an effect is in the upper half of its span."""
-N_BINS = 5
-SEED = 0
-"""Of the draws with replacement that a median's interval comes from."""
+PARTS: dict[str, Callable[[Row], bool]] = {
+    "all": lambda _: True,
+    "with reference": lambda row: row.has_reference,
+    "without reference": lambda row: not row.has_reference,
+}
 
 
-def drive_row(done: DriveDone) -> Row:
-    """Return a case with its answer as the scores count it; tooth or order are placed right if the setting says so."""
-    label, answer = done.label, done.answer
-    effects: tuple[str, ...] = (str(label["effect"]),) if label["effect"] else ()
-    truths = effects if label["kind"] == "single" else (str(label["kind"]),)
-    cause = answer.cause(truths[0])
-    placed = {name: cause is not None and cause.options.get(name) == at for name, at in label["place"].items()}
-    return Row(
-        number=done.number,
-        source=BLIND,
-        kind=label["kind"],
-        effects=effects,
-        truths=truths,
-        level=label["level"],
-        strength=nan,
-        has_reference=bool(label["with_reference"]),
-        n_conditions=1,
-        answer=answer,
-        located=Located(**placed),
+def judge_drives(request: BenchmarkRequest, cases: Sequence[Done]) -> Result:
+    """Score all answers."""
+    rows = {START_STOP: [drive_row(done) for done in cases]}
+    return Result(
+        request, rows, score_parts(request, rows, PARTS, FIGURES, (False,)), nan, strengths_known=False, figures=FIGURES
     )
+
+
+def drive_row(done: Done) -> Row:
+    """Return a case with its answer as the scores count it; tooth or order are placed right if the setting says so."""
+
+    def located(place: Mapping[str, Any], effect: str, answer: Answer) -> Located:
+        cause = answer.cause(effect)
+        return Located(**{key: cause is not None and cause.options.get(key) == at for key, at in place.items()})
+
+    return row_of(done, done.answers[START_STOP], nan, located)
 
 
 def effects_ranked(row: Row) -> list[str]:
@@ -199,137 +174,118 @@ def _is(kind: str) -> Callable[[Row], bool]:
     return lambda row: row.kind == kind
 
 
-def _is_single(row: Row) -> bool:
-    return row.kind == "single"
+_is_single = _is("single")
 
 
-def _is_placed(row: Row) -> bool:
-    return bool(row.located.tooth or row.located.order)
-
-
-def _shrinkages(rows: Sequence[Row]) -> list[AnsweredShrinkage]:
+def _shrinkages(rows: Rows) -> list[AnsweredShrinkage]:
     """Return the shrinkages by the true effects."""
     causes = [row.answer.cause(row.truths[0]) for row in rows if _is_single(row)]
     return [cause.shrinkage for cause in causes if cause is not None and cause.shrinkage is not None]
 
 
-def _wrong_shrinks(rows: Sequence[Row]) -> list[float]:
-    return [shrink_of(row, name) for row in rows if _is_single(row) for name in effects_ranked(row)
-            if name not in row.truths]  # fmt: skip
+def _wrong_shrinks(rows: Rows) -> list[float]:
+    wrong = [(row, name) for row in rows if _is_single(row) for name in effects_ranked(row) if name not in row.truths]
+    return [shrink_of(row, name) for row, name in wrong]
 
 
-def _medians(values: Callable[[Sequence[Row]], list[float]]) -> Measure:
+def _medians(values: Callable[[Rows], list[float]]) -> Measure:
     return lambda rows, rng: median_of(values(rows), rng)
 
 
-def _is_answered(row: Row) -> bool:
-    return bool(row.ranked)
-
-
-def _plain(statistic: Callable[[Sequence[Row]], float], of: Callable[[Row], bool] = _is_answered) -> Measure:
+def _plain(statistic: Callable[[Rows], float], of: Callable[[Row], bool] = lambda row: bool(row.ranked)) -> Measure:
     """Return a statistic of the answered cases without an interval."""
 
-    def measure(rows: Sequence[Row], rng: np.random.Generator) -> Score:  # noqa: ARG001 - all measures have one form
+    def measure(rows: Rows, rng: np.random.Generator) -> Score:  # noqa: ARG001 - all measures have one form
         chosen = [row for row in rows if of(row)]
         return Score(statistic(chosen) if chosen else nan, nan, nan, len(chosen))
 
     return measure
 
 
-MEASURES: dict[str, Measure] = {
-    "likeliest effect right": counted(_is_single, _is_right),
-    "among the first two": counted(_is_single, lambda r: r.truths[0] in effects_ranked(r)[:2]),
-    "likeliest effect right, upper half of the span": counted(
-        lambda r: _is_single(r) and r.level >= STRONG_LEVEL, _is_right
+FIGURES = (
+    Figure("top_1", "likeliest effect right", counted(_is_single, _is_right)),
+    Figure("top_2", "among the first two", counted(_is_single, lambda r: r.truths[0] in effects_ranked(r)[:2])),
+    Figure(
+        "top_1_strong",
+        "likeliest effect right, upper half of the span",
+        counted(lambda r: _is_single(r) and r.level >= STRONG_LEVEL, _is_right),
     ),
-    "named, and right": counted(_is_single, lambda r: r.truths[0] in effects_named(r)),
-    "named, and wrong": counted(_is_single, lambda r: _names_effect(r) and r.truths[0] not in effects_named(r)),
-    "tooth or order right, of effects found": counted(
-        lambda r: _is_single(r) and r.located != Located() and _is_right(r), _is_placed
+    Figure("named_right", "named, and right", counted(_is_single, lambda r: r.truths[0] in effects_named(r))),
+    Figure(
+        "named_wrong",
+        "named, and wrong",
+        counted(_is_single, lambda r: _names_effect(r) and r.truths[0] not in effects_named(r)),
     ),
-    "effect named on a sound machine": counted(_is("none"), _names_effect),
-    "effect named on an unknown": counted(_is("unknown"), _names_effect),
-    "unknown recognised": counted(_is("unknown"), lambda r: r.answer.outcome == GapOutcome.UNKNOWN.value),
-    "held-out shrink by the true effect, median": _medians(lambda rows: [s.shrink for s in _shrinkages(rows)]),
-    "by the same effect elsewhere (placebo), median": _medians(
-        lambda rows: [s.placebo for s in _shrinkages(rows) if s.n_placebos]
+    Figure(
+        "place",
+        "tooth or order right, of effects that were",
+        counted(
+            lambda r: _is_single(r) and r.located != Located() and _is_right(r),
+            lambda r: bool(r.located.tooth or r.located.order),
+        ),
     ),
-    "by wrong effects, median": _medians(_wrong_shrinks),
-    "calibration error": _plain(
-        lambda rows: calibration_error([r.confidence for r in rows], [r.first in r.truths for r in rows], N_BINS)
+    Figure("named_on_none", "effect named on a healthy machine", counted(_is("none"), _names_effect)),
+    Figure("named_on_unknown", "effect named on an unknown", counted(_is("unknown"), _names_effect)),
+    Figure(
+        "unknown_recognised",
+        "unknown recognised",
+        counted(_is("unknown"), lambda r: r.answer.outcome == GapOutcome.UNKNOWN.value),
     ),
-    "Brier score, mean": _plain(lambda rows: float(np.mean([brier_of(r) for r in rows]))),
-    "processor time of a diagnosis in s, median": _medians(lambda rows: [r.answer.cpu_seconds for r in rows]),
-    "longest time of a diagnosis in s": _plain(lambda rows: max(r.answer.seconds for r in rows), lambda _: True),
-    "no answer": counted(lambda _: True, lambda r: not _is_answered(r)),
-}
-"""Figures by their names in table and scores.json."""
+    Figure(
+        "shrink_true",
+        "held-out shrink by the true effect, median",
+        _medians(lambda rows: [s.shrink for s in _shrinkages(rows)]),
+        is_share=False,
+    ),
+    Figure(
+        "placebo",
+        "by the same effect elsewhere (placebo), median",
+        _medians(lambda rows: [s.placebo for s in _shrinkages(rows) if s.n_placebos]),
+        is_share=False,
+    ),
+    Figure("shrink_wrong", "by wrong effects, median", _medians(_wrong_shrinks), is_share=False),
+    Figure(
+        "ece",
+        "calibration error, 5 equal bins",
+        _plain(lambda rows: calibration_error([r.confidence for r in rows], [r.first in r.truths for r in rows], 5)),
+        is_share=False,
+    ),
+    Figure("brier", "Brier score (0 to 2)", mean_of(brier_of), is_share=False),
+    Figure(
+        "cpu_s",
+        "processor time of a diagnosis in s, median",
+        _medians(lambda rows: [r.answer.cpu_seconds for r in rows]),
+        is_share=False,
+    ),
+    Figure(
+        "longest_s",
+        "longest time of a diagnosis in s",
+        _plain(lambda rows: max(r.answer.seconds for r in rows), lambda _: True),
+        is_share=False,
+    ),
+    Figure("no_answer", "no answer", counted(lambda _: True, lambda r: not r.ranked)),
+)
 
 
-def figures(rows: Sequence[Row]) -> dict[str, Score]:
-    """Return the figures of some cases, each with its 90 % interval and its number of cases."""
-    return {name: measure(rows, np.random.default_rng(SEED)) for name, measure in MEASURES.items()}
+def write_drive_results(result: Result, cases: Sequence[Done], folder: Path, command: str) -> Path:
+    """Write table, scores, cases and labels beside the answers, each whole or not at all; return the table's path."""
+    from app.benchmark.scoring.results import TABLE, Table, figures_table, markdown_table, write_files
+
+    parts = {name: result.part(name) for name in PARTS}
+    tables = (figures_table(result, "Blind start–stop cases", "", parts), Table(*_by_effect(result)))
+    lines = [line for table in tables for line in (*markdown_table(table), "")]
+    write_files(result, cases, folder, command, "\n".join([*lines, f"`{command}`"]) + "\n")
+    return folder / TABLE
 
 
-def write_scores(cases: Sequence[DriveDone], folder: Path, command: str) -> Path:
-    """Write table, scores and cases beside the answers, each whole or not at all."""
-    rows = [drive_row(done) for done in cases]
-    parts = {
-        "all": figures(rows),
-        "with reference": figures([row for row in rows if row.has_reference]),
-        "without": figures([row for row in rows if not row.has_reference]),
-    }
-    lines = [
-        f"| blind start–stop cases | {' | '.join(parts)} |",
-        f"|---|{'---|' * len(parts)}",
-        *(f"| {name} | {' | '.join(_cell(scores[name]) for scores in parts.values())} |" for name in MEASURES),
-        "",
-        *_effect_lines(rows),
-        "",
-        f"`{command}`",
-    ]
-    plain = {
-        part: {name: {key: _finite(value) for key, value in asdict(score).items()} for name, score in scores.items()}
-        for part, scores in parts.items()
-    }
-    written(folder / CASES, _cases_csv(cases, rows))
-    written(folder / SCORES, json.dumps(plain, indent=1) + "\n")
-    return written(folder / TABLE, "\n".join(lines) + "\n")
-
-
-def _effect_lines(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield, for each effect, how often the likeliest effect was right and what it was taken for."""
-    yield "| effect | right | in the upper half of its span | most often taken for |"
-    yield "|---|---|---|---|"
+def _by_effect(result: Result) -> tuple[str, str, tuple[str, ...], tuple[tuple[str, ...], ...]]:
+    """Return how often the likeliest effect was right for each effect, and what it was taken for."""
+    table = []
     for name in CATALOGUE:
-        cases = [row for row in rows if row.effects == (name,)]
+        cases = [row for row in result.rows[START_STOP] if row.effects == (name,)]
         strong = [row for row in cases if row.level >= STRONG_LEVEL]
         wrong = Counter(row.first for row in cases if row.ranked and row.first != name).most_common(1)
-        taken_for = f"{wrong[0][0]} ({wrong[0][1]})" if wrong else ""
         shares = (f"{sum(map(_is_right, some))} of {len(some)}" for some in (cases, strong))
-        yield f"| {name} | {' | '.join(shares)} | {taken_for} |"
-
-
-def _cell(score: Score) -> str:
-    if not score.n or not isfinite(score.value):
-        return "–"
-    interval = f" ({score.low:.2f} to {score.high:.2f})" if isfinite(score.low) else ""
-    return f"{score.value:.2f}{interval}, n {score.n}"
-
-
-def _finite(value: float) -> float | None:
-    return value if isfinite(value) else None
-
-
-def _cases_csv(cases: Sequence[DriveDone], rows: Sequence[Row]) -> str:
-    """Return one line per case."""
-    text = StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    stated = ("kind", "effect", "level", "severity", "unit", "with_reference", "n_channels", "encoder_counts")
-    table.writerow(["case", *stated, "outcome", "first", "probability", "second", "seconds", "error"])
-    for done, row in zip(cases, rows, strict=True):
-        answer = done.answer
-        said = (row.first, f"{answer.probability(row.first):.3f}", row.ranked[1] if len(row.ranked) > 1 else "")
-        label = (done.label[name] for name in stated)
-        table.writerow([done.number, *label, answer.outcome, *said, f"{answer.seconds:.1f}", answer.error])
-    return text.getvalue()
+        table.append((name, *shares, f"{wrong[0][0]} ({wrong[0][1]})" if wrong else ""))
+    header = ("effect", "right", "in the upper half of its span", "most often taken for")
+    return "Effect by effect", "Likeliest effect right.", header, tuple(table)

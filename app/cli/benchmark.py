@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from app.cli.console import progress_bar, stopped, typed_command
 from gearsig.errors import InputError
 
-Result = TypeVar("Result")
+if TYPE_CHECKING:
+    from app.benchmark.run import BenchmarkRequest, Done
 
 benchmark_app = typer.Typer(no_args_is_help=True, help="Measure how good a diagnosis is.")
 
@@ -82,17 +82,13 @@ def gap(
         return
     from app.benchmark.cases import Plan
     from app.benchmark.diagnosers import BASELINES, GAP
-    from app.benchmark.run import BenchmarkRequest, run_benchmark
+    from app.benchmark.run import BenchmarkRequest
     from app.benchmark.scoring.results import TABLE, write_results
     from app.benchmark.scoring.scores import judge
 
     names = tuple(dict.fromkeys([*(diagnosers or [GAP]), *BASELINES]))
     request = BenchmarkRequest(Plan(cases, seed, role, wished, same_simulator, longest, least_level), names)
-    done = _run(
-        lambda show: run_benchmark(request, output, n_processes=processes, on_progress=show),
-        len(request.plan.cases()),
-        output,
-    )
+    done = _run(request, output, processes)
     page = write_results(judge(request, done), done, output, typed_command())
     typer.echo((output / TABLE).read_text(encoding="utf-8"))
     typer.echo(f"{page} (report), {TABLE}, scores.json, cases.csv, labels/.")
@@ -106,21 +102,24 @@ def _refuse_others(**given: bool) -> None:
 
 
 def _run_drives(cases: int, seed: int, role: str, reference: str, output: Path, processes: int) -> None:
-    from app.benchmark.start_stop import DrivePlan, run_drive_benchmark, write_scores
+    from app.benchmark.diagnosers import START_STOP
+    from app.benchmark.run import BenchmarkRequest
+    from app.benchmark.start_stop import DrivePlan, judge_drives, write_drive_results
 
-    plan = DrivePlan(cases, seed, role, reference)
-    done = _run(lambda show: run_drive_benchmark(plan, output, n_processes=processes, on_progress=show), cases, output)
-    table = write_scores(done, output, typed_command())
+    request = BenchmarkRequest(DrivePlan(cases, seed, role, reference), (START_STOP,))
+    done = _run(request, output, processes)
+    table = write_drive_results(judge_drives(request, done), done, output, typed_command())
     typer.echo(table.read_text(encoding="utf-8"))
-    typer.echo(f"{table}, scores.json, cases.csv.")
+    typer.echo(f"{table}, scores.json, cases.csv, labels/.")
 
 
-def _run(run: Callable[[Callable[[int], None]], Result], n_cases: int, output: Path) -> Result:
+def _run(request: BenchmarkRequest, output: Path, processes: int) -> list[Done]:
     """Run a benchmark with a progress bar; the answers so far stay after Ctrl-C."""
-    from app.benchmark.run import n_answered
+    from app.benchmark.run import n_answered, run_benchmark
 
+    n_cases = len(request.plan.cases())
     try:
         with progress_bar("diagnosing", n_cases) as show:
-            return run(show)
+            return run_benchmark(request, output, n_processes=processes, on_progress=show)
     except KeyboardInterrupt:
         raise stopped(f"{n_answered(output)} of {n_cases} cases are answered in {output}") from None

@@ -14,7 +14,7 @@ import pytest
 
 from app.benchmark import diagnosers, run
 from app.benchmark.answer import Answer, AnsweredCause, AnsweredPlace, AnsweredShrinkage, from_text, to_text
-from app.benchmark.cases import BLIND, SAME, Plan, PlannedCase, make_case
+from app.benchmark.cases import BLIND, SAME, Plan, PlannedCase
 from app.benchmark.diagnosers import DIAGNOSERS, USUAL, diagnoser, read_seen
 from app.benchmark.run import ANSWERS_FOLDER, BenchmarkRequest, diagnosed, environment, run_benchmark, state_of_code
 from app.cli.main import main
@@ -50,7 +50,7 @@ def folders(tmp_path_factory):
     found = {}
     for kind, effect in (("none", None), ("single", "root_crack"), ("unknown", "coupling_knock")):
         folder = tmp_path_factory.mktemp("seen")
-        found[kind] = folder, make_case(SHORT, case(kind, effect), folder)
+        found[kind] = folder, SHORT.make(case(kind, effect), folder)
     return found
 
 
@@ -120,7 +120,7 @@ def test_the_diagnosing_process_finds_no_label(folders):
 
 
 def test_the_diagnosing_simulator_makes_the_same_cases_too(tmp_path):
-    truth = make_case(SHORT, case("single", "eccentricity", SAME), tmp_path)
+    truth = SHORT.make(case("single", "eccentricity", SAME), tmp_path)
     seen = read_seen(tmp_path)
     assert len(seen.recordings) == len(seen.references) == 1
     assert seen.recordings[0].truth is None
@@ -133,7 +133,7 @@ def test_the_same_cases_have_the_same_gears_conditions_and_effects():
     plan = Plan(n_cases=10, seed=4, role="development", same_simulator=True, longest_s=2.0)
     same = next(c for c in plan.cases() if c.source == SAME and c.kind == "pair" and c.n_conditions == 1)
     blind = next(c for c in plan.cases() if c.number == same.repeats)
-    ours, theirs = (make_case(plan, planned, None).labels for planned in (same, blind))
+    ours, theirs = (plan.make(planned, None).labels for planned in (same, blind))
     assert ours["pair"] == theirs["pair"]
     assert [e["name"] for e in ours["effects"]] == [e["name"] for e in theirs["effects"]]
     kept = ("true_rpm", "true_nm")

@@ -7,15 +7,18 @@ from math import isnan
 import pytest
 
 from app.benchmark.answer import Answer, AnsweredCause, AnsweredShrinkage
+from app.benchmark.cases import BLIND, PlannedCase, Truth
+from app.benchmark.diagnosers import START_STOP
+from app.benchmark.run import BenchmarkRequest, Done
+from app.benchmark.scoring.scores import scores
 from app.benchmark.start_stop import (
-    DriveDone,
+    FIGURES,
     DrivePlan,
     drive_row,
     effects_named,
-    figures,
-    make_drive_case,
+    judge_drives,
     planned,
-    write_scores,
+    write_drive_results,
 )
 from app.cli.main import main
 from app.studies.gap.start_stop import numbers_of
@@ -41,13 +44,14 @@ def test_effects_come_in_turn_and_seeds_decide():
 
 def test_a_case_folder_holds_recordings_and_rigs_and_no_label(tmp_path):
     plan = DrivePlan(10, 2, "development", "with")
-    label = make_drive_case(plan, 0, tmp_path)
+    case = plan.cases()[0]
+    label = plan.make(case, tmp_path).labels
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"condition_1.h5", "condition_1.toml", "reference_1.h5", "reference_1.toml"}
     read = read_recording(tmp_path / "condition_1.h5", rig=read_rig(tmp_path / "condition_1.toml"))
     assert not read.truth
-    assert label["teeth"] == [read.rig.pairs[0].driver_teeth, read.rig.pairs[0].driven_teeth]
-    assert make_drive_case(plan, 0, None) == label
+    assert list(label["pair"].values()) == [read.rig.pairs[0].driver_teeth, read.rig.pairs[0].driven_teeth]
+    assert plan.make(case, None).labels == label
 
 
 def done(
@@ -59,16 +63,26 @@ def done(
     shrink: float = 0.8,
     placebo: float = 0.1,
     inseparable: tuple[str, ...] = (),
-) -> DriveDone:
-    label = {
-        "kind": kind, "effect": effect, "level": 0.7, "severity": 1.0, "unit": "um", "place": {"tooth": 3}
-        if effect == "root_crack" else {}, "with_reference": number % 2 == 0, "n_channels": 8, "encoder_counts": 2**18,
-    }  # fmt: skip
-    found = AnsweredShrinkage(shrink, 1.0, placebo, "starts and stops", 4 if effect == "root_crack" else 0)
+) -> Done:
+    shrinkage = AnsweredShrinkage(shrink, 1.0, placebo, "starts and stops", 4 if effect == "root_crack" else 0)
     answered = [
-        AnsweredCause(name, p, {"tooth": 3.0} if name == "root_crack" else {}, found) for name, p in causes.items()
+        AnsweredCause(name, p, {"tooth": 3.0} if name == "root_crack" else {}, shrinkage) for name, p in causes.items()
     ]
-    return DriveDone(number, label, Answer(outcome, tuple(answered), inseparable, seconds=5.0, cpu_seconds=4.0))
+    answer = Answer(outcome, tuple(answered), inseparable, seconds=5.0, cpu_seconds=4.0)
+    place = {"tooth": 3} if effect == "root_crack" else {}
+    labels = {
+        "kind": kind,
+        "effects": [{"name": effect, "severity": 1.0, "unit": "um", "level": 0.7, "place": place}] if effect else [],
+        "has_reference": number % 2 == 0,
+        "conditions": [{}],
+        "pair": {"z1": 20, "z2": 100},
+    }
+    case = PlannedCase(number, BLIND, kind, effect, 0.7, with_reference=number % 2 == 0, n_conditions=1)
+    return Done(case, Truth(labels, (), {}, {}), {START_STOP: answer})
+
+
+def figures(cases: list[Done]):
+    return scores([drive_row(case) for case in cases], 1, FIGURES)
 
 
 CASES = [
@@ -81,16 +95,16 @@ CASES = [
 
 
 def test_figures_count_what_they_say():
-    found = {name: score.value for name, score in figures([drive_row(case) for case in CASES]).items()}
-    assert found["likeliest effect right"] == 0.5
-    assert found["among the first two"] == 1.0
-    assert found["named, and right"] == 0.5
-    assert found["named, and wrong"] == 0.0
-    assert found["tooth or order right, of effects found"] == 1.0
-    assert found["effect named on a sound machine"] == 0.5
-    assert found["unknown recognised"] == 1.0
-    assert found["held-out shrink by the true effect, median"] == 0.8
-    assert isnan(figures([])["likeliest effect right"].value)
+    found = {name: score.value for name, score in figures(CASES).items()}
+    assert found["top_1"] == 0.5
+    assert found["top_2"] == 1.0
+    assert found["named_right"] == 0.5
+    assert found["named_wrong"] == 0.0
+    assert found["place"] == 1.0
+    assert found["named_on_none"] == 0.5
+    assert found["unknown_recognised"] == 1.0
+    assert found["shrink_true"] == 0.8
+    assert isnan(figures([])["top_1"].value)
 
 
 def test_all_effects_that_cannot_be_separated_are_named():
@@ -98,8 +112,8 @@ def test_all_effects_that_cannot_be_separated_are_named():
     three = ("backlash", "tooth_wear", "root_crack")
     case = done(0, "single", "root_crack", said, "cannot separate", inseparable=three)
     assert effects_named(drive_row(case)) == list(three)
-    assert figures([drive_row(case)])["named, and right"].value == 1.0
-    assert figures([drive_row(case)])["named, and wrong"].value == 0.0
+    assert figures([case])["named_right"].value == 1.0
+    assert figures([case])["named_wrong"].value == 0.0
 
 
 def test_placebos_count_where_there_are_any():
@@ -108,13 +122,13 @@ def test_placebos_count_where_there_are_any():
         ("single", "backlash", {"backlash": 1.0}, "effect"),
     )
     cases = [done(0, *crack, placebo=0.0), done(1, *crack, placebo=0.3), done(2, *play, placebo=0.0)]
-    found = figures([drive_row(case) for case in cases])["by the same effect elsewhere (placebo), median"]
+    found = figures(cases)["placebo"]
     assert (found.value, found.n) == (pytest.approx(0.15), 2)
 
 
 def test_the_interval_of_a_median_is_its_own_and_not_that_of_its_values():
     cases = [done(i, "single", "root_crack", {"root_crack": 1.0}, "effect", shrink=0.01 * i) for i in range(1, 102)]
-    found = figures([drive_row(case) for case in cases])["held-out shrink by the true effect, median"]
+    found = figures(cases)["shrink_true"]
     assert found.value == pytest.approx(0.51)
     assert 0.35 < found.low < 0.51 < found.high < 0.67
 
@@ -127,16 +141,24 @@ def test_as_many_cases_are_planned_as_are_asked_for(n_cases):
 def test_scores_are_written_whole(tmp_path):
     out = tmp_path / "out"
     out.mkdir()
-    write_scores(CASES[:1], out, "gearsig benchmark gap")
-    before = {path.name: path.read_text(encoding="utf-8") for path in out.iterdir()}
+    request = BenchmarkRequest(DrivePlan(5), (START_STOP,))
+
+    def write(cases: list[Done]):
+        return write_drive_results(judge_drives(request, cases), cases, out, "gearsig benchmark gap")
+
+    write(CASES[:1])
+    before = {path.name: path.read_text(encoding="utf-8") for path in out.iterdir() if path.is_file()}
     for name in before:  # who has the old file open keeps all of it
         (tmp_path / name).hardlink_to(out / name)
-    table = write_scores(CASES, out, "gearsig benchmark gap")
+    table = write(CASES)
     for name, text in before.items():
         assert (tmp_path / name).read_text(encoding="utf-8") == text != (out / name).read_text(encoding="utf-8")
-    assert "| likeliest effect right | 0.50" in table.read_text()
-    assert json.loads((out / "scores.json").read_text())["all"]["no answer"]["value"] == 0.0
+    assert "| likeliest effect right | 50 % (" in table.read_text()
+    parts = json.loads((out / "scores.json").read_text())["parts"]
+    assert {part["cases"]: part["n_cases"] for part in parts} == {"all": 5, "with reference": 3, "without reference": 2}
+    assert parts[0]["scores"]["no_answer"]["value"] == 0.0
     assert len((out / "cases.csv").read_text().splitlines()) == 1 + len(CASES)
+    assert len(list((out / "labels").iterdir())) == len(CASES)
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ FLOOR = load_population().floor(with_reference=True)
 
 
 def size(sample: PopulationSample) -> float:
-    return soft_size(FLOOR.names, FLOOR.from_centre(FLOOR.names, sample.change) / FLOOR.of(FLOOR.names))
+    return soft_size(FLOOR.names, FLOOR.from_centre(FLOOR.names, sample.change.values) / FLOOR.of(FLOOR.names))
 
 
 @pytest.fixture(scope="module")
@@ -58,8 +58,8 @@ def test_the_table_is_read_as_it_was_written(outer_race: list[PopulationSample],
     write(tmp_path / "raw.npz", outer_race)
     with np.load(tmp_path / "raw.npz", allow_pickle=False) as raw:
         assert raw["label"].tolist() == [s.label for s in outer_race]
-        assert tuple(raw["change_names"]) == outer_race[0].names[0]
-        np.testing.assert_allclose(raw["change"][1], outer_race[1].change, rtol=1e-6)
+        assert tuple(raw["change_names"]) == outer_race[0].change.names
+        np.testing.assert_allclose(raw["change"][1], outer_race[1].change.values, rtol=1e-6)
 
 
 def drawn_machine() -> DrawnRig:
@@ -116,5 +116,5 @@ def test_an_unbalance_is_heard_where_the_housing_yields() -> None:
 
 def test_a_damaged_population_is_named(tmp_path) -> None:
     (tmp_path / "population.npz").write_bytes(POPULATION_FILE.read_bytes()[:10_000])
-    with pytest.raises(InputError, match=r"population\.npz: the population is not there, or damaged; make it again"):
+    with pytest.raises(InputError, match=r"population\.npz: the population is not there, or damaged"):
         load_population(tmp_path / "population.npz")

@@ -7,8 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.studies.gap.quasi_static.machine import EFFECTS, MESH, N_PAIRS, Path, StaticMachine, Structure, static_contact
-from app.studies.gap.quasi_static.record import QuasiStaticDay, record
+from app.studies.gap.quasi_static import (
+    EFFECTS,
+    MESH,
+    N_PAIRS,
+    Path,
+    QuasiStaticDay,
+    StaticMachine,
+    Structure,
+    record,
+    static_contact,
+)
 from gearsig.gap import reduce_recording
 from sims.effects import textbook
 

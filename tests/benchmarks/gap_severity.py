@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.benchmark.cases import Plan, PlannedCase, make_case
+from app.benchmark.cases import Plan, PlannedCase
 from app.benchmark.diagnosers import VisibleCase, read_seen
 from gearsig.errors import GearsigError
 from gearsig.gap import GapEffect, Interval, conditions_of, try_effects
@@ -37,7 +37,7 @@ class Fitted:
 def fitted(plan: Plan, planned: PlannedCase) -> Fitted | None:
     """Try the true effect of a case; None where it is not tried, or the twin comes no nearer with it."""
     with tempfile.TemporaryDirectory() as name:
-        effects = make_case(plan, planned, Path(name)).labels["effects"]
+        effects = plan.make(planned, Path(name)).labels["effects"]
         seen = read_seen(Path(name))
     (one,) = effects
     known = gap_simulator("cracked").gap_effects()[one["name"]]

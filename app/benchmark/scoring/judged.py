@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -241,10 +241,17 @@ class Row:
 
 def rows_of(cases: Sequence[Done], diagnoser: str, floors: Floors) -> list[Row]:
     """Return one row per case."""
-    return [_row(done, done.answers[diagnoser], strength(done.truth, floors)) for done in cases]
+
+    def on_gears(done: Done) -> Callable[[Mapping[str, Any], str, Answer], Located]:
+        return lambda place, effect, answer: located(place, effect, answer, done.truth.labels["pair"])
+
+    return [row_of(done, done.answers[diagnoser], strength(done.truth, floors), on_gears(done)) for done in cases]
 
 
-def _row(done: Done, answer: Answer, strength_floors: float) -> Row:
+def row_of(
+    done: Done, answer: Answer, strength_floors: float, placed: Callable[[Mapping[str, Any], str, Answer], Located]
+) -> Row:
+    """Return a case with an answer; `placed` says of the label's place, the effect and the answer what was right."""
     labels = done.truth.labels
     effects = tuple(e["name"] for e in labels["effects"])
     truths = {"none": (NONE,), "unknown": (UNKNOWN,)}.get(labels["kind"], effects)
@@ -260,7 +267,7 @@ def _row(done: Done, answer: Answer, strength_floors: float) -> Row:
         has_reference=labels["has_reference"],
         n_conditions=len(labels["conditions"]),
         answer=answer,
-        located=located(place, effects[0] if effects else "", answer, labels["pair"]),
+        located=placed(place, effects[0] if effects else "", answer),
     )
 
 

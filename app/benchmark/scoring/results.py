@@ -5,10 +5,11 @@ from __future__ import annotations
 import csv
 import json
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from io import StringIO
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from app.benchmark.scoring.scores import (
     WITH,
     WITHOUT,
     Figure,
+    Part,
     Result,
     Score,
     bins_of,
@@ -95,38 +97,34 @@ def same_table(result: Result) -> Table | None:
     return Table("Same simulator", note, ("", WITHOUT, "drop", WITH, "drop"), tuple(rows))
 
 
+def figures_table(result: Result, title: str, note: str, columns: Mapping[str, Part], *, with_n: bool = True) -> Table:
+    """Return the figures of some parts of the cases side by side, without those that no case has."""
+    rows = []
+    for figure in result.figures:
+        of_parts = [part.scores[figure.key] for part in columns.values()]
+        if any(score.n for score in of_parts):
+            rows.append((figure.title, *(cell(figure, score, with_n=with_n) for score in of_parts)))
+    return Table(title, note, ("", *columns), tuple(rows))
+
+
 def beside_table(result: Result) -> Table:
     """Return the same figures of the diagnosers beside, on the very same cases."""
     names = result.wanted.diagnosers
-    header = ["", *(f"{name}, {part}" for name in names for part in ("without", "with"))]
-    rows = []
-    for figure in FIGURES:
-        found = [result.part(part, diagnoser=name).scores[figure.key] for name in names for part in (WITHOUT, WITH)]
-        if any(score.n for score in found):
-            rows.append((figure.title, *(cell(figure, score, with_n=False) for score in found)))
+    parts = (("without", WITHOUT), ("with", WITH))
+    columns = {f"{name}, {word}": result.part(part, diagnoser=name) for name in names for word, part in parts}
     words = {"majority": "majority: always the commonest answer", "rules": "rules: a table of textbook signatures"}
-    note = "; ".join(words[name] for name in BASELINES if name in names)
-    return Table(
-        "Beside other diagnosers",
-        f"On the same cases, without and with reference. {note.capitalize()}.",
-        tuple(header),
-        tuple(rows),
-    )
+    note = "; ".join(words[name] for name in BASELINES if name in names).capitalize()
+    text = f"On the same cases, without and with reference. {note}."
+    return figures_table(result, "Beside other diagnosers", text, columns, with_n=False)
 
 
 def parts_table(result: Result) -> Table:
     """Return the figures of one and two conditions, and of faults of every strength."""
-    columns = [
-        *((name, None) for name in ("one condition", "two conditions")),
-        *((name, False) for name in (WITHOUT, WITH)),
-    ]
-    header = ["", "one condition", "two conditions", "every strength, without", "with reference"]
-    rows = []
-    for figure in FIGURES:
-        found = [result.part(name, strong=strong).scores[figure.key] for name, strong in columns]
-        if any(score.n for score in found):
-            rows.append((figure.title, *(cell(figure, score) for score in found)))
-    return Table("By conditions, and with weak faults", "", tuple(header), tuple(rows))
+    columns = {name: result.part(name) for name in ("one condition", "two conditions")} | {
+        "every strength, without": result.part(WITHOUT, strong=False),
+        "with reference": result.part(WITH, strong=False),
+    }
+    return figures_table(result, "By conditions, and with weak faults", "", columns)
 
 
 def cell(figure: Figure, score: Score, *, with_n: bool = True) -> str:
@@ -136,7 +134,8 @@ def cell(figure: Figure, score: Score, *, with_n: bool = True) -> str:
     n = f" of {score.n}" if with_n else ""
     if figure.is_share:
         return f"{100 * score.value:.0f} % ({100 * score.low:.0f}–{100 * score.high:.0f}){n}"
-    return f"{score.value:.2f} ({score.low:.2f}–{score.high:.2f}){n}".replace("-", "−")
+    interval = f" ({score.low:.2f}–{score.high:.2f})" if isfinite(score.low) else ""
+    return f"{score.value:.2f}{interval}{n}".replace("-", "−")
 
 
 def target_cell(figure: Figure, score: Score, column: int) -> str:
@@ -176,18 +175,19 @@ def markdown(result: Result, command: str, date: datetime) -> str:
     text = [
         f"{plan.n_cases} blind cases, {plan.role}; gearsig {__version__}, {date:%d %B %Y}; `{command}`.",
         "",
-        *_table(main_table(result)),
+        *markdown_table(main_table(result)),
         "",
-        *(_table(same) if (same := same_table(result)) is not None else ()),
+        *(markdown_table(same) if (same := same_table(result)) is not None else ()),
         "",
-        *_table(beside_table(result)),
+        *markdown_table(beside_table(result)),
         "",
         *cost_lines(result),
     ]
     return "\n".join(text) + "\n"
 
 
-def _table(table: Table) -> Iterator[str]:
+def markdown_table(table: Table) -> Iterator[str]:
+    """Yield a table's lines, its title and note above."""
     yield f"**{table.title}.** {table.note}"
     yield ""
     yield "| " + " | ".join(table.header) + " |"
@@ -198,8 +198,6 @@ def _table(table: Table) -> Iterator[str]:
 
 def cost_lines(result: Result) -> list[str]:
     """Return what a diagnosis took, and the calibration error that chance alone would give."""
-    import numpy as np
-
     answers = [row.answer for row in result.rows[result.judged]]
     wall = np.array([a.seconds for a in answers])
     cpu = np.array([a.cpu_seconds for a in answers])
@@ -325,14 +323,21 @@ def write_results(
 ) -> Path:
     """Write everything; return the page's path. Nothing may be left to diagnose when this is called."""
     now = date or datetime.now().astimezone()
+    write_files(result, cases, folder, command, markdown(result, command, now), now)
+    return written(folder / REPORT, page(result, command, now))
+
+
+def write_files(
+    result: Result, cases: Sequence[Done], folder: Path, command: str, table: str, date: datetime | None = None
+) -> None:
+    """Write labels, cases, scores and the tables' text, each whole or not at all."""
     (folder / LABELS).mkdir(exist_ok=True)
     for done in cases:
         text = json.dumps({"source": done.planned.source, **done.truth.labels}, indent=1, ensure_ascii=False)
         written(folder / LABELS / f"case_{done.planned.number:04d}.json", text + "\n")
     written(folder / CASES, cases_csv(result, cases))
-    written(folder / SCORES, scores_json(result, command, now))
-    written(folder / TABLE, markdown(result, command, now))
-    return written(folder / REPORT, page(result, command, now))
+    written(folder / SCORES, scores_json(result, command, date or datetime.now().astimezone()))
+    written(folder / TABLE, table)
 
 
 def scores_json(result: Result, command: str, date: datetime) -> str:

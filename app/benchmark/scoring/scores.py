@@ -212,7 +212,7 @@ def _resampled(of: Callable[[Row], bool], statistic: Callable[[Rows], float], *,
     return measure
 
 
-def _mean(value: Callable[[Row], float]) -> Measure:
+def mean_of(value: Callable[[Row], float]) -> Measure:
     """Return the mean over the rows that have the value."""
 
     def measure(rows: Rows, rng: np.random.Generator) -> Score:
@@ -379,7 +379,7 @@ FIGURES: tuple[Figure, ...] = (
         targets=(0.06, 0.06),
         is_least=False,
     ),
-    Figure("brier", "Brier score (0 to 2)", _mean(brier_of), is_share=False),
+    Figure("brier", "Brier score (0 to 2)", mean_of(brier_of), is_share=False),
     Figure("tooth", "right tooth, within one", _of_place("tooth")),
     Figure("shaft", "right shaft", _of_place("shaft")),
     Figure("bearing", "right bearing", _of_place("bearing")),
@@ -403,7 +403,7 @@ FIGURES: tuple[Figure, ...] = (
     Figure(
         "regret",
         "regret of shrink, mean",
-        _mean(_regret),
+        mean_of(_regret),
         is_share=False,
         targets=(0.08, 0.05),
         is_least=False,
@@ -413,9 +413,9 @@ FIGURES: tuple[Figure, ...] = (
 )
 
 
-def scores(rows: Rows, seed: int) -> dict[str, Score]:
+def scores(rows: Rows, seed: int, figures: Sequence[Figure] = FIGURES) -> dict[str, Score]:
     """Return every figure of these rows; nothing where no row applies."""
-    return {f.key: f.measure(rows, np.random.default_rng(seed)) if rows else NOTHING for f in FIGURES}
+    return {f.key: f.measure(rows, np.random.default_rng(seed)) if rows else NOTHING for f in figures}
 
 
 def strong_only(rows: Rows, least: float) -> list[Row]:
@@ -484,6 +484,7 @@ class Result:
         Calibration error that true probabilities would show with so many cases.
     strengths_known : bool
         Whether there is a floor to measure strength in; if not, figures are of all faults.
+    figures : tuple of Figure
     """
 
     wanted: BenchmarkRequest
@@ -491,6 +492,7 @@ class Result:
     parts: tuple[Part, ...]
     chance_error: float
     strengths_known: bool
+    figures: Sequence[Figure] = FIGURES
 
     @property
     def judged(self) -> str:
@@ -509,24 +511,32 @@ def judge(wanted: BenchmarkRequest, cases: Sequence[Done]) -> Result:
     floors = known_floors([done.truth for done in cases if done.planned.source == BLIND])
     rows = {name: rows_of(cases, name, floors) for name in wanted.diagnosers}
     first = rows[wanted.diagnosers[0]]
-    parts = [
-        _part(name, source, part, strong, own, wanted.plan.seed)
-        for name, own in rows.items()
-        for source in ((BLIND, SAME) if wanted.plan.same_simulator else (BLIND,))
-        for part in PARTS
-        for strong in (True, False)
-    ]
+    parts = score_parts(wanted, rows, PARTS, FIGURES, (True, False))
     confidence = [r.confidence for r in first if r.source == BLIND and is_one_answer(r)]
     return Result(
         wanted,
         rows,
-        tuple(parts),
+        parts,
         error_by_chance(confidence, np.random.default_rng(wanted.plan.seed)),
         any(isfinite(row.strength) for row in first),
     )
 
 
-def _part(diagnoser: str, source: str, name: str, strong: bool, rows: Sequence[Row], seed: int) -> Part:
-    own = [row for row in rows if row.source == source and PARTS[name](row)]
-    chosen = strong_only(own, STRONG) if strong else own
-    return Part(diagnoser, source, name, strong, len(chosen), scores(chosen, seed))
+def score_parts(
+    request: BenchmarkRequest,
+    rows: Mapping[str, Rows],
+    parts: Mapping[str, Callable[[Row], bool]],
+    figures: Sequence[Figure],
+    strengths: Sequence[bool],
+) -> tuple[Part, ...]:
+    """Return the figures of every part of the cases, by diagnoser and source, of strong faults only and of all."""
+    scored = []
+    for name, of_all in rows.items():
+        for source in (BLIND, SAME) if request.plan.same_simulator else (BLIND,):
+            for part, belongs in parts.items():
+                own = [row for row in of_all if row.source == source and belongs(row)]
+                for strong in strengths:
+                    chosen = strong_only(own, STRONG) if strong else own
+                    figured = scores(chosen, request.plan.seed, figures)
+                    scored.append(Part(name, source, part, strong, len(chosen), figured))
+    return tuple(scored)

@@ -20,7 +20,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from app.studies.gap.quasi_static.record import QUASI_STATIC, one_static
+from app.studies.gap.quasi_static import QUASI_STATIC, one_static
 from app.studies.gap.rows import CRACKED, REDUCED, PopulationSample, one_case, one_rig, write
 from gearsig.gap import BY_HAND, INDEPENDENT, POPULATION_FILE
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from zlib import crc32
 
@@ -13,13 +14,14 @@ import typer
 from app.studies.crack_cases import SAMPLING_RATE_HZ, DrawnRig, simulate_rig, turns_before
 from app.studies.gap.by_hand import made_by_hand, rig_of, vibrations, with_foreign_vibration, with_signature
 from app.studies.gap.machines import OperatingDay, Ordinary, another_day, draw_machine, first_day, mounted_anew
-from gearsig.checks import FloatArray
+from gearsig.cache import write_whole
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap import (
     BY_HAND,
     INDEPENDENT,
     NONE,
     UNKNOWN,
+    Features,
     OperatingCondition,
     ReducedRecording,
     change_features,
@@ -45,11 +47,9 @@ SEED = 4107
 ONE_SENSOR_SHARE = 0.4
 """Machines of which one sensor's signal is known."""
 
-_COLUMNS = ("simulator", "rig", "label", "detail", "severity", "torque_nm", "load_n_per_mm")
-_TABLES = ("change", "change_scatter", "features", "feature_scatter", "simulated", "simulated_scatter")
-
-
-Names = tuple[tuple[str, ...], tuple[str, ...]]
+Recorded = tuple[str, str, float, Recording, float]
+"""Label, detail, severity, recording and torque."""
+Made = tuple[Recording, ReducedRecording, Iterable[Recorded]]
 
 
 @dataclass(frozen=True)
@@ -63,18 +63,11 @@ class PopulationSample:
     rig : int
     label, detail : str
         Effect, "none" or "unknown"; `BY_HAND`, options, or the foreign vibration's name.
-    severity : float
-    torque_nm : float
+    severity, torque_nm : float
     load_n_per_mm : float
         Of the teeth.
-    names : (tuple of str, tuple of str)
-        Of the changes and of the features.
-    change, change_scatter : arrays, (n_changes,)
-        Against the healthy reference.
-    features, feature_scatter : arrays, (n_features,)
-        Of the recording itself.
-    simulated, simulated_scatter : arrays, (n_features,)
-        Of the twin that knows the rig file only.
+    change, features, simulated : Features
+        Against the healthy reference; of the recording itself; of the twin that knows the rig file only.
     """
 
     simulator: str
@@ -84,63 +77,42 @@ class PopulationSample:
     severity: float
     torque_nm: float
     load_n_per_mm: float
-    names: Names
-    change: FloatArray
-    change_scatter: FloatArray
-    features: FloatArray
-    feature_scatter: FloatArray
-    simulated: FloatArray
-    simulated_scatter: FloatArray
+    change: Features
+    features: Features
+    simulated: Features
 
 
-@dataclass(frozen=True)
-class PopulationBaseline:
-    """What a machine's recordings are compared with.
+def samples_of(simulator: str, rig: int, made: Callable[[], Made]) -> list[PopulationSample]:
+    """Return what the recordings of a simulator's machine show; what cannot be made or reduced is told and left out.
 
     Parameters
     ----------
     simulator : str
-        Of the machine.
     rig : int
-    healthy, simulated : Gathered
-        The reference, and the twin that knows the rig file only.
+    made : callable
+        Makes the healthy reference, the reduced run of the twin that knows the rig file only, and all recordings.
     """
+    samples: list[PopulationSample] = []
+    try:
+        reference, run, recordings = made()
+        healthy, twin = reduced(reference, rig), _alone(features_of(run))
+    except (InputError, RefusalError) as error:
+        typer.echo(f"machine {rig}: {error}")
+        return samples
+    for label, detail, severity, recording, torque_nm in recordings:
+        try:
+            now = reduced(recording, rig)
+            load = tooth_load_n_per_mm(now.frame.pair, torque_nm)
+            shown = _alone(change_features(now, healthy)), _alone(features_of(now)), twin
+        except (InputError, RefusalError) as error:
+            typer.echo(f"machine {rig}, {label}: {error}")
+            continue
+        samples.append(PopulationSample(simulator, rig, label, detail, severity, torque_nm, load, *shown))
+    return samples
 
-    simulator: str
-    rig: int
-    healthy: ReducedRecording
-    simulated: ReducedRecording
 
-    def sample(
-        self, label: str, detail: str, severity: float, recording: Recording, torque_nm: float
-    ) -> PopulationSample:
-        """Return a recording's row."""
-        now = reduced(recording, self.rig)
-        change, own, twin = change_features(now, self.healthy), features_of(now), features_of(self.simulated)
-        return PopulationSample(
-            self.simulator,
-            self.rig,
-            label,
-            detail,
-            severity,
-            torque_nm,
-            tooth_load_n_per_mm(now.frame.pair, torque_nm),
-            (change.names, own.names),
-            change.values,
-            change.scatter,
-            own.values,
-            own.scatter,
-            twin.values,
-            twin.scatter,
-        )
-
-    def samples(self, recordings: Iterable[tuple[str, str, float, Recording, float]]) -> Iterator[PopulationSample]:
-        """Yield the rows of label, detail, severity, recording and torque; what cannot be reduced is told."""
-        for label, detail, severity, recording, torque_nm in recordings:
-            try:
-                yield self.sample(label, detail, severity, recording, torque_nm)
-            except (InputError, RefusalError) as error:
-                typer.echo(f"machine {self.rig}, {label}: {error}")
+def _alone(features: Features) -> Features:
+    return replace(features, left_out=())
 
 
 def reduced(recording: Recording, rig: int) -> ReducedRecording:
@@ -155,19 +127,14 @@ def reduced(recording: Recording, rig: int) -> ReducedRecording:
 
 def write(path: Path, samples: Sequence[PopulationSample]) -> None:
     """Write the table as arrays of numbers and text."""
-    rows = {key: np.array([getattr(s, key) for s in samples]) for key in _COLUMNS}
-    tables = {key: np.array([getattr(s, key) for s in samples], dtype=np.float32) for key in _TABLES}
-    changes, features = samples[0].names
-    part = path.with_suffix(".part.npz")
-    np.savez_compressed(
-        part,
-        allow_pickle=False,
-        change_names=np.array(changes),
-        feature_names=np.array(features),
-        **rows,
-        **tables,
-    )
-    part.replace(path)
+    columns = ("simulator", "rig", "label", "detail", "severity", "torque_nm", "load_n_per_mm")
+    rows = {key: np.array([getattr(s, key) for s in samples]) for key in columns}
+    for name, stem in (("change", "change"), ("features", "feature"), ("simulated", "simulated")):
+        figures = [getattr(s, name) for s in samples]
+        rows[name] = np.array([f.values for f in figures], dtype=np.float32)
+        rows[f"{stem}_scatter"] = np.array([f.scatter for f in figures], dtype=np.float32)
+    names = {"change_names": np.array(samples[0].change.names), "feature_names": np.array(samples[0].features.names)}
+    write_whole(path, lambda file: np.savez_compressed(file, allow_pickle=False, **names, **rows))
 
 
 AT_THE_END = ("clipping", "transfer_path")
@@ -208,30 +175,26 @@ N_PATHS = 2
 def one_rig(model: PopulationModel, index: int) -> list[PopulationSample]:
     """Return the samples of one drawn gearbox; none where its teeth cannot be made."""
     rig = model.first_rig + index
-    rng = np.random.default_rng([SEED, rig])
-    drawn = draw_machine(rng)
-    try:
+
+    def made() -> Made:
+        rng = np.random.default_rng([SEED, rig])
+        drawn = draw_machine(rng)
         new = _record(model, first_day(drawn, rng), 0)
         ordinary = Ordinary.of(new, rig)
         reference = ordinary.on(new, 0, rng)
-        rig_file = rig_of(reference)
-        twin = CrackedTwin(rig_file, nominal_of(rig_file))
-        compared = PopulationBaseline(model.name, rig, reduced(reference, rig), reduced(_run(twin, drawn, rig), rig))
-    except (InputError, RefusalError) as error:
-        typer.echo(f"gearbox {rig}: {error}")
-        return []
-    return list(compared.samples(_recordings(model, drawn, twin, ordinary, rig)))
+        known = rig_of(reference)
+        twin = CrackedTwin(known, nominal_of(known))
+        point = OperatingCondition(drawn.speed_rpm, drawn.torque_nm)
+        run = twin.run(point, seed=rig, duration_s=drawn.duration_s, sampling_rate_hz=SAMPLING_RATE_HZ, noise=1)
+        return reference, reduced(run, rig), _recordings(model, drawn, twin, ordinary, rig)
 
-
-def _run(twin: CrackedTwin, drawn: DrawnRig, rig: int) -> Recording:
-    point = OperatingCondition(drawn.speed_rpm, drawn.torque_nm)
-    return twin.run(point, seed=rig, duration_s=drawn.duration_s, sampling_rate_hz=SAMPLING_RATE_HZ, noise=1)
+    return samples_of(model.name, rig, made)
 
 
 def _recordings(
     model: PopulationModel, drawn: DrawnRig, twin: CrackedTwin, ordinary: Ordinary, rig: int
-) -> Iterator[tuple[str, str, float, Recording, float]]:
-    """Yield label, detail, severity, recording and torque of everything that is recorded of one gearbox.
+) -> Iterator[Recorded]:
+    """Yield everything that is recorded of one gearbox.
 
     Each draws from a seed of its own: where one effect is drawn otherwise, the others stay as they are.
     """
@@ -255,8 +218,10 @@ def _recordings(
             yield name, BY_HAND, strength, recording, drawn.torque_nm
     for i in range(N_PATHS * model.n_by_hand):
         turns, rng = turns_before(drawn, i % N_HEALTHY + 1), _chance(rig, f"transfer_path {BY_HAND}", i)
-        recording, strength = _with_changed_path(ordinary, bare[i % N_HEALTHY], turns, rng)
-        yield "transfer_path", BY_HAND, strength, recording, drawn.torque_nm
+        healthy_now, strength = bare[i % N_HEALTHY], float(rng.uniform())
+        size, rate_hz = textbook.path_size(strength), healthy_now.sampling_rate_hz
+        paths = textbook.draw_path_changes(len(vibrations(healthy_now)), size, rate_hz, rng)
+        yield "transfer_path", BY_HAND, strength, ordinary.on(healthy_now, turns, rng, paths), drawn.torque_nm
     names = [e for e in effects() if e not in AT_THE_END]
     for run, (above, name) in enumerate(((a, e) for a in model.simulated for e in names), start=N_HEALTHY + 1):
         rng = _chance(rig, name, run)
@@ -274,15 +239,6 @@ def _recordings(
 
 def _chance(rig: int, name: str, i: int) -> np.random.Generator:
     return np.random.default_rng([SEED, rig, crc32(name.encode()), i])
-
-
-def _with_changed_path(
-    ordinary: Ordinary, bare: Recording, turns: int, rng: np.random.Generator
-) -> tuple[Recording, float]:
-    """Return a recording that came through other paths, and how much other, 0 to 1."""
-    strength = float(rng.uniform())
-    paths = textbook.draw_path_changes(len(vibrations(bare)), textbook.path_size(strength), bare.sampling_rate_hz, rng)
-    return ordinary.on(bare, turns, rng, paths), strength
 
 
 def _record(model: PopulationModel, day: OperatingDay, run: int, setting: EffectSetting | None = None) -> Recording:
@@ -329,45 +285,44 @@ def one_case(index: int) -> list[PopulationSample]:
         level=None if wanted == NONE else float(rng.uniform(MIN_LEVEL, 1.0)),
         with_reference=True,
     )
-    made = record_case(case)
-    healthy = made.twins or made.conditions
+    recorded = record_case(case)
+    severity = case.faults[0].severity if case.faults else 0.0
     samples: list[PopulationSample] = []
-    for i, (now, healthy_now, reference) in enumerate(zip(made.conditions, healthy, made.references, strict=True)):
-        rig, torque_nm = FIRST_RIG + MAX_CONDITIONS * index + i, case.conditions[i].stated_nm
-        severity = case.faults[0].severity if case.faults else 0.0
-        try:
-            compared = PopulationBaseline(INDEPENDENT, rig, reduced(reference, rig), _simulated(now, rig, torque_nm))
-            samples += [
-                compared.sample(label, detail, severity if label == wanted else 0.0, recording, torque_nm)
-                for label, detail, recording in _recordings_independent(wanted, now, healthy_now, torque_nm, rng)
-            ]
-        except (InputError, RefusalError) as error:
-            typer.echo(f"case {index}, {wanted}: {error}")
+    for i, now in enumerate(recorded.conditions):
+        rig, healthy = FIRST_RIG + MAX_CONDITIONS * index + i, (recorded.twins or recorded.conditions)[i]
+        three = now, healthy, recorded.references[i]
+        made = partial(_condition, rig, wanted, severity, case.conditions[i].stated_nm, three, rng)
+        samples += samples_of(INDEPENDENT, rig, made)
     return samples
 
 
-def _recordings_independent(
-    wanted: str, now: Recording, healthy: Recording, torque_nm: float, rng: np.random.Generator
-) -> Iterator[tuple[str, str, Recording]]:
-    """Yield label, detail and recording."""
-    yield NONE, "", healthy
-    if wanted != NONE:
-        yield wanted, "", now
-    recording, name = with_foreign_vibration(healthy, rng)
-    yield UNKNOWN, name, recording
-    for name in rng.choice(made_by_hand(healthy, torque_nm), N_BY_HAND, replace=False):
-        yield str(name), BY_HAND, with_signature(healthy, str(name), rng)[0]
-
-
-def _simulated(now: Recording, rig: int, torque_nm: float) -> ReducedRecording:
-    """Return a twin that knows the rig file only, at a recording's speed and stated torque."""
+def _condition(
+    rig: int,
+    wanted: str,
+    severity: float,
+    torque_nm: float,
+    recordings: tuple[Recording, Recording, Recording],
+    rng: np.random.Generator,
+) -> Made:
+    """Return what one condition is compared with, the twin at its speed and stated torque, and what is compared."""
+    now, healthy, reference = recordings
     here, known = reduced(now, rig), rig_of(now)
-    twin = CrackedTwin(known, nominal_of(known))
-    run = twin.run(
+    run = CrackedTwin(known, nominal_of(known)).run(
         OperatingCondition(60.0 * here.speed_hz, torque_nm),
         seed=rig,
         duration_s=run_length_s(here),
         sampling_rate_hz=now.sampling_rate_hz,
         noise=1,
     )
-    return with_channels_of(reduce_recording(run, known), here)
+
+    def compared() -> Iterator[Recorded]:
+        yield NONE, "", 0.0, healthy, torque_nm
+        if wanted != NONE:
+            yield wanted, "", severity, now, torque_nm
+        recording, foreign = with_foreign_vibration(healthy, rng)
+        yield UNKNOWN, foreign, 0.0, recording, torque_nm
+        for name in map(str, rng.choice(made_by_hand(healthy, torque_nm), N_BY_HAND, replace=False)):
+            signed, _ = with_signature(healthy, name, rng)
+            yield name, BY_HAND, severity if name == wanted else 0.0, signed, torque_nm
+
+    return reference, with_channels_of(reduce_recording(run, known), here), compared()
