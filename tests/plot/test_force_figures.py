@@ -12,7 +12,7 @@ from tests.motion.recordings import start_stop, without
 def test_forces_above_errors_below_and_the_blow_beside() -> None:
     estimate = estimate_forces(measure_motion(start_stop()))
     figure = force_figure(estimate)
-    upper, lower, near, near_errors = figure.axes
+    upper, near, lower, near_errors = figure.axes
     assert [line.get_label() for line in upper.lines] == ["torque / rb1", "piecewise", "Hunt–Crossley"]
     measured = estimate.references_n["torque / rb1"]
     assert max(upper.lines[0].get_ydata()) == pytest.approx(measured.max() * 1e-3)
