@@ -1,9 +1,8 @@
-"""The gap by order: spectra measured and simulated, and their difference against both floors."""
+"""Figures of a gap: spectra measured and simulated, teeth, averages, evidence, and how far it shrinks."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from textwrap import wrap
 from typing import TYPE_CHECKING
@@ -18,7 +17,7 @@ from gearsig.plot import _style as style
 from gearsig.plot._average import ROOT, draw_degrees, draw_gear, draw_mark, write_corner
 from gearsig.plot._cursors import AngleMark
 from gearsig.plot._series import thin
-from gearsig.plot._style import plain, unit_text, with_unit
+from gearsig.plot._style import plain, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,29 +26,14 @@ if TYPE_CHECKING:
     from matplotlib.projections.polar import PolarAxes
 
 
-TOP_IN, SPECTRA_IN, BETWEEN_IN, GAP_IN, BOTTOM_IN = 0.66, 2.3, 0.5, 1.5, 0.55
-DECADES = 4.5
-"""Below the largest line at most: what lies deeper is noise."""
-N_POINTS = 2000
-LEAST_GAP_DB = 12.0
-"""Of the lower panel's half height: a smaller gap shall look small."""
-
-
 def gap_orders_figure(
-    curves: SpectrumCurves,
-    *,
-    limits: tuple[float, float] | None = None,
-    title: str = "",
-    beside: str = "simulated",
-    marked: bool = True,
+    curves: SpectrumCurves, *, title: str = "", beside: str = "simulated", marked: bool = True
 ) -> Figure:
     """Draw the order spectra of a recording and of what it is compared with, and below them their difference in dB.
 
     Parameters
     ----------
     curves : SpectrumCurves
-    limits : (float, float) or None
-        Orders to show; None: all.
     title : str
         Default: the curves' label.
     beside : str
@@ -73,53 +57,48 @@ def gap_orders_figure(
     names = ("measured", "before", "floor", *(n for n in ("after", "structural_db") if len(getattr(curves, n))))
     for name in names:
         series.checked_values(getattr(curves, name), len(x), name)
-    low, high = limits or (float(x[0]), float(x[-1]))
-    if not np.any((x >= low) & (x <= high)):
-        raise InputError(f"limits {low:g} to {high:g} hold no order", allowed=f"{x[0]:g} to {x[-1]:g}")
-    figure = style.new_figure(TOP_IN + SPECTRA_IN + BETWEEN_IN + GAP_IN + BOTTOM_IN)
-    above = style.panel(figure, bottom_in=BOTTOM_IN + GAP_IN + BETWEEN_IN, top_in=TOP_IN)
-    below = style.panel(figure, bottom_in=BOTTOM_IN, top_in=TOP_IN + SPECTRA_IN + BETWEEN_IN, sharex=above)
+    figure, (above, below) = style.panels((2.3, 1.5), top_in=0.66, share_x=True)
     keys = _draw_spectra(above, x, curves, beside)
     _draw_gap(below, x, curves, marked=marked)
-    above.set_xlim(low, high)
-    above.tick_params(labelbottom=False)
-    unit = f" ({unit_text(curves.unit)})" if curves.unit else ""
-    style.label_axes(above, "", f"peak amplitude{unit}")
+    above.set_xlim(float(x[0]), float(x[-1]))
+    style.label_axes(above, "", with_unit("peak amplitude", curves.unit))
     style.label_axes(below, "order of the driver's shaft", "gap (dB)", f"measured over {beside}, against the floors")
     style.no_offset(below)
-    series.legend_row(figure, keys, left_in=0.85, top_in=series.NAMES_AT_IN)
-    series.headline(figure, title or curves.label)
+    series.head(figure, title or curves.label, keys)
     return figure
 
 
 def _draw_spectra(axes: Axes, x: FloatArray, curves: SpectrumCurves, beside: str) -> list[Line2D]:
     top = max(float(curves.measured.max()), float(curves.before.max())) or 1.0
-    bottom = max(top / 10.0**DECADES, 0.3 * float(np.median(curves.floor)))
+    bottom = max(top / 10.0**4.5, 0.3 * float(np.median(curves.floor)))  # what lies deeper is noise
     axes.set_yscale("log")
     axes.set_ylim(bottom, 2.0 * top)
     axes.fill_between(x, bottom, np.maximum(curves.floor, bottom), color=style.FLOOR, alpha=0.25, linewidth=0)
     # Where the effect changes little both simulations coincide: dashes over a wider line show either.
-    drawn: list[tuple[FloatArray, str, float, str | tuple[float, tuple[float, float]], str]]
-    drawn = [(curves.measured, style.MEASURED, 1.1, "-", "measured")]
-    if len(curves.after):
-        drawn.append((curves.after, style.MESH, 2.0, "-", f"{beside} with the effect"))
     name = f"{beside} before" if len(curves.after) else beside
-    drawn.append((curves.before, style.INK, 0.9, (0.0, (3.0, 2.0)), name))
     lines = []
-    for values, colour, width, dashes, label in drawn:
-        points = thin(x, np.maximum(values, bottom), N_POINTS)
-        lines += axes.plot(*points, color=colour, linewidth=width, linestyle=dashes, label=label, alpha=0.85)
-    floor = axes.plot([], [], color=style.FLOOR, alpha=0.4, linewidth=7, label="repeatability floor")
-    return [*lines, *floor]
+    for values, colour, width, dashes, label in (
+        (curves.measured, style.MEASURED, 1.1, "-", "measured"),
+        (curves.after, style.MESH, 2.0, "-", f"{beside} with the effect"),
+        (curves.before, style.INK, 0.9, (0.0, (3.0, 2.0)), name),
+    ):
+        if len(values):
+            points = thin(x, np.maximum(values, bottom), 2000)
+            lines += axes.plot(*points, color=colour, linewidth=width, linestyle=dashes, label=label, alpha=0.85)
+    return [*lines, *_floor_key(axes, "repeatability floor")]
+
+
+def _floor_key(axes: Axes, label: str) -> list[Line2D]:
+    return axes.plot([], [], color=style.FLOOR, alpha=0.4, linewidth=7, label=label)
 
 
 def _draw_gap(axes: Axes, x: FloatArray, curves: SpectrumCurves, *, marked: bool) -> None:
     before = gap_by_order(curves, curves.before)
-    structural = curves.structural_db if len(curves.structural_db) else np.zeros(len(x))
     beyond = is_beyond(curves, before)
-    largest = 1.15 * max(LEAST_GAP_DB, float(np.max(np.abs(before), initial=0.0, where=np.isfinite(before))))
+    # A gap below 12 dB shall look small.
+    largest = 1.15 * max(12.0, float(np.max(np.abs(before), initial=0.0, where=np.isfinite(before))))
     if len(curves.structural_db):
-        band = np.minimum(structural, largest)
+        band = np.minimum(curves.structural_db, largest)
         axes.fill_between(x, -band, band, step="mid", color=style.FLOOR, alpha=0.22, linewidth=0, zorder=1)
     strong = beyond & marked
     for chosen, colour, alpha in ((~strong, style.QUIET, 0.55), (strong, style.FAULT, 0.95)):
@@ -133,15 +112,6 @@ def _draw_gap(axes: Axes, x: FloatArray, curves: SpectrumCurves, *, marked: bool
     axes.set_ylim(-largest, largest)
 
 
-# --------------------
-# Lines of a spectrum over its noise, where there is no simulation beside them.
-# --------------------
-
-
-GAP_LINES_TOP_IN, PANEL_IN, GAP_LINES_BOTTOM_IN = 0.66, 2.6, 0.55
-N_MULTIPLES = 6
-
-
 def gap_lines_figure(curves: SpectrumCurves, order: float | None = None, *, title: str = "") -> Figure:
     """Draw a measured spectrum over its noise floor, with the first six multiples of an order marked.
 
@@ -150,7 +120,7 @@ def gap_lines_figure(curves: SpectrumCurves, order: float | None = None, *, titl
     curves : SpectrumCurves
         Of which `before`, `after` and `structural_db` are not looked at.
     order : float or None
-        Of the family that was found; None: nothing is marked.
+        Of the family that stands out; None: nothing is marked.
     title : str
         Default: the curves' label.
 
@@ -167,58 +137,38 @@ def gap_lines_figure(curves: SpectrumCurves, order: float | None = None, *, titl
     x = series.checked_axis(curves.orders, "orders")
     measured = series.checked_values(curves.measured, len(x), "measured")
     floor = series.checked_values(curves.floor, len(x), "floor")
-    figure = style.new_figure(GAP_LINES_TOP_IN + PANEL_IN + GAP_LINES_BOTTOM_IN)
-    axes = style.panel(figure, bottom_in=GAP_LINES_BOTTOM_IN, top_in=GAP_LINES_TOP_IN)
-    top = 1.15 * float(measured[x >= _least(order)].max(initial=0.0)) or 1.0
+    figure, (axes,) = style.panels((2.6,), top_in=0.66)
+    # The envelope's mean and its slow drift do not set the height.
+    top = 1.15 * float(measured[x >= 0.1 * (order or 0.0)].max(initial=0.0)) or 1.0
     axes.fill_between(x, 0.0, floor, color=style.FLOOR, alpha=0.3, linewidth=0)
     keys = axes.plot(x, measured, color=style.MEASURED, linewidth=1.1, label="measured")
     if order is not None:
-        multiples = order * np.arange(1, N_MULTIPLES + 1)
-        marked = multiples[multiples <= x[-1]]
-        label = f"multiples of order {order:.4g}"
-        keys += axes.plot(
-            marked, np.full(len(marked), 0.96 * top), "v", color=style.FAULT, markersize=6, linewidth=0, label=label
-        )
-    keys += axes.plot([], [], color=style.FLOOR, alpha=0.4, linewidth=7, label="noise floor")
+        marked = order * np.arange(1, 7)
+        marked = marked[marked <= x[-1]]
+        height, label = np.full(len(marked), 0.96 * top), f"multiples of order {order:.4g}"
+        keys += axes.plot(marked, height, "v", color=style.FAULT, markersize=6, linewidth=0, label=label)
+    keys += _floor_key(axes, "noise floor")
     axes.set_xlim(float(x[0]), float(x[-1]))
     axes.set_ylim(0.0, top)
-    unit = f" ({unit_text(curves.unit)})" if curves.unit else ""
-    style.label_axes(axes, "order", f"peak amplitude{unit}")
+    style.label_axes(axes, "order", with_unit("peak amplitude", curves.unit))
     style.no_offset(axes)
-    series.legend_row(figure, keys, left_in=0.85, top_in=series.NAMES_AT_IN)
-    series.headline(figure, title or curves.label)
+    series.head(figure, title or curves.label, keys)
     return figure
 
 
-def _least(order: float | None) -> float:
-    """Return where lines begin that set the height: the envelope's mean and its slow drift are not of interest."""
-    return 0.0 if order is None else 0.1 * order
-
-
-# --------------------
-# Energy tooth by tooth around a shaft, measured against simulated.
-# --------------------
-
-
-LOWEST_DB, LEAST_TOP_DB = -9.0, 9.0
-"""Re the measured middling tooth: the inner edge of the picture, and its outer edge at least."""
+LOWEST_DB = -9.0
+"""Re the measured median tooth: the inner edge of the picture."""
 INNER, OUTER = 0.42, ROOT - 0.08
-RINGS_DB = 6.0
 
 
-def gap_teeth_figure(
-    curves: AngleCurves, *, mark: AngleMark | None = None, top_db: float | None = None, size_in: float = 5.4
-) -> Figure:
-    """Draw the energy within one pitch around the circle, in dB over the measured middling tooth.
+def gap_teeth_figure(curves: AngleCurves, *, mark: AngleMark | None = None) -> Figure:
+    """Draw the energy within one pitch around the circle, in dB over the measured median tooth.
 
     Parameters
     ----------
     curves : AngleCurves
     mark : AngleMark or None
         The tooth that the gap names.
-    top_db : float or None
-        Outer edge, for pictures that are to be compared; None: this shaft's own.
-    size_in : float
 
     Returns
     -------
@@ -226,50 +176,47 @@ def gap_teeth_figure(
         Angle clockwise from the top. Teeth have numbers only where the shaft has a mark.
     """
     angle = series.checked_axis(curves.angle_deg, "angle_deg")
-    drawn = [("simulated before", curves.before, style.QUIET, 1.0), ("with the effect", curves.after, style.MESH, 1.2)]
-    drawn = [(*one[:1], _decibels(one[1], len(angle), one[0]), *one[2:]) for one in drawn if len(one[1])]
-    measured = _decibels(curves.measured, len(angle), "measured")
-    top = top_db or max(LEAST_TOP_DB, *(float(values.max()) for values in (measured, *(one[1] for one in drawn))))
+    every = [
+        (name, series.checked_values(energy, len(angle), name), colour, width)
+        for name, energy, colour, width in (
+            ("measured", curves.measured, style.MEASURED, 1.2),
+            ("simulated before", curves.before, style.QUIET, 1.0),
+            ("with the effect", curves.after, style.MESH, 1.2),
+        )
+        if len(energy) or name == "measured"
+    ]
+    drawn = [(n, 10.0 * np.log10(np.maximum(e, 10.0 ** (LOWEST_DB / 10.0))), *looks) for n, e, *looks in every]
+    top = max(-LOWEST_DB, *(float(decibels.max()) for _, decibels, *_ in drawn))
+    size_in = 5.4
     figure = style.new_figure(size_in, size_in)
     axes = style.polar_panel(figure)
     _rings(axes, top)
     turn = np.radians(np.append(angle, angle[0] + 360.0))
-    _fill(axes, turn, measured, top)
-    for _, values, colour, width in drawn:
-        axes.plot(turn, _radius(np.append(values, values[0]), top), color=colour, linewidth=width, zorder=3)
+    for i, (name, decibels, colour, width) in enumerate(drawn):
+        radius = _radius(np.append(decibels, decibels[0]), top)
+        if not i:
+            axes.fill_between(turn, INNER, radius, color=colour, alpha=0.18, linewidth=0, zorder=2)
+        axes.plot(turn, radius, color=colour, linewidth=width, zorder=3 if i else 3.5)
+        write_corner(axes, name, 0.05 + (len(drawn) - 1 - i) * 0.2 / size_in, str(colour))
     draw_gear(axes, curves.teeth, [mark.angle_deg] if mark else [], numbered=curves.has_mark)
     draw_degrees(axes, has_teeth=True)
     if mark:
         draw_mark(axes, mark, curves.teeth)
         write_corner(axes, mark.label, 0.985, style.FAULT, "bold")
-    _keys(axes, [("measured", style.MEASURED), *((one[0], one[2]) for one in drawn)], size_in)
     axes.text(0, 0, plain(curves.shaft, 12), ha="center", va="center", fontsize=style.SMALL_PT, parse_math=False)
     axes.set_ylim(0, 2.36)
     return figure
 
 
-def _decibels(energy: FloatArray, n: int, name: str) -> FloatArray:
-    values = series.checked_values(energy, n, name)
-    decibels: FloatArray = 10.0 * np.log10(np.maximum(values, 10.0 ** (LOWEST_DB / 10.0)))
-    return decibels
-
-
 def _radius(decibels: FloatArray, top: float) -> FloatArray:
-    share = (np.clip(decibels, LOWEST_DB, top) - LOWEST_DB) / (top - LOWEST_DB)
-    radius: FloatArray = INNER + share * (OUTER - INNER)
+    radius: FloatArray = INNER + (np.clip(decibels, LOWEST_DB, top) - LOWEST_DB) / (top - LOWEST_DB) * (OUTER - INNER)
     return radius
 
 
-def _fill(axes: PolarAxes, turn: FloatArray, measured: FloatArray, top: float) -> None:
-    radius = _radius(np.append(measured, measured[0]), top)
-    axes.fill_between(turn, INNER, radius, color=style.MEASURED, alpha=0.18, linewidth=0, zorder=2)
-    axes.plot(turn, radius, color=style.MEASURED, linewidth=1.2, zorder=3.5)
-
-
 def _rings(axes: PolarAxes, top: float) -> None:
-    """Draw a ring for every 6 dB, that of the middling tooth in stronger ink."""
+    """Draw a ring for every 6 dB, that of the median tooth in stronger ink."""
     ring = np.linspace(0, 2 * np.pi, 361)
-    step = RINGS_DB * (1.0 if top < 20.0 else 2.0)
+    step = 6.0 if top < 20.0 else 12.0
     for value in np.arange(np.ceil(LOWEST_DB / step) * step, top + 1e-9, step):
         radius = float(_radius(np.array([value]), top)[0])
         colour = style.QUIET if value == 0 else style.RULE
@@ -282,23 +229,8 @@ def _rings(axes: PolarAxes, top: float) -> None:
         )  # fmt: skip
 
 
-def _keys(axes: PolarAxes, keys: list[tuple[str, str]], size_in: float) -> None:
-    """Name the curves in the lower left corner."""
-    for row, (name, colour) in enumerate(reversed(keys)):
-        write_corner(axes, name, 0.05 + row * 0.2 / size_in, colour)
-
-
-# --------------------
-# The teeth's pattern of a recording over that of the healthy reference, and what has changed between them.
-# --------------------
-
-
-GAP_AVERAGES_TOP_IN, GAP_AVERAGES_PANEL_IN, GAP_AVERAGES_BETWEEN_IN, GAP_AVERAGES_BOTTOM_IN = 0.66, 1.35, 0.42, 0.55
-EVERY_DEG = 45
-
-
 def gap_averages_figure(curves: AverageCurves, *, mark: AngleMark | None = None, title: str = "") -> Figure:
-    """Draw both patterns over one revolution, and below them their difference on the same scale.
+    """Draw the teeth's pattern of recording and reference over one revolution, and below them their difference.
 
     Parameters
     ----------
@@ -311,7 +243,7 @@ def gap_averages_figure(curves: AverageCurves, *, mark: AngleMark | None = None,
     Returns
     -------
     Figure
-        Small ticks stand at the teeth.
+        Both panels on one scale; small ticks stand at the teeth.
 
     Raises
     ------
@@ -321,33 +253,18 @@ def gap_averages_figure(curves: AverageCurves, *, mark: AngleMark | None = None,
     angle = series.checked_axis(curves.angle_deg, "angle_deg")
     measured = series.checked_values(curves.measured, len(angle), "measured")
     reference = series.checked_values(curves.reference, len(angle), "reference")
-    figure = style.new_figure(
-        GAP_AVERAGES_TOP_IN + 2 * GAP_AVERAGES_PANEL_IN + GAP_AVERAGES_BETWEEN_IN + GAP_AVERAGES_BOTTOM_IN
-    )
-    above = style.panel(
-        figure,
-        bottom_in=GAP_AVERAGES_BOTTOM_IN + GAP_AVERAGES_PANEL_IN + GAP_AVERAGES_BETWEEN_IN,
-        top_in=GAP_AVERAGES_TOP_IN,
-    )
-    below = style.panel(
-        figure,
-        bottom_in=GAP_AVERAGES_BOTTOM_IN,
-        top_in=GAP_AVERAGES_TOP_IN + GAP_AVERAGES_PANEL_IN + GAP_AVERAGES_BETWEEN_IN,
-        sharex=above,
-    )
-    (reference_line,) = above.plot(*thin(angle, reference), color=style.QUIET, linewidth=0.9, label="reference")
-    (own,) = above.plot(*thin(angle, measured), color=style.MEASURED, linewidth=0.9, label="measured", alpha=0.8)
-    keys = [own, reference_line]
-    keys += below.plot(
-        *thin(angle, measured - reference), color=style.SIMULATED, linewidth=1.0, label="measured less reference"
-    )
-    largest = 1.08 * max(float(np.max(np.abs([measured, reference, measured - reference]))), 1e-300)
+    change = measured - reference
+    shaft, sensor = plain(curves.shaft, 24), plain(curves.channel, 24)
+    figure, (above, below) = style.panels((1.35, 1.35), top_in=0.66, row_gap_in=0.42, share_x=True)
+    (old,) = above.plot(*thin(angle, reference), color=style.QUIET, linewidth=0.9, label="reference")
+    (new,) = above.plot(*thin(angle, measured), color=style.MEASURED, linewidth=0.9, label="measured", alpha=0.8)
+    changed = below.plot(*thin(angle, change), color=style.SIMULATED, linewidth=1.0, label="measured less reference")
+    largest = 1.08 * max(float(np.max(np.abs([measured, reference, change]))), 1e-300)
     for axes in (above, below):
         axes.set_ylim(-largest, largest)  # one scale: a small change shall look small
         axes.axhline(0.0, color=style.QUIET, linewidth=0.6, zorder=1)
         if mark is not None:
             axes.axvline(mark.angle_deg, color=style.FAULT, linewidth=0.9, linestyle=":", zorder=1.5)
-        style.label_axes(axes, "", with_unit("average", curves.unit))
         style.no_offset(axes)
     if mark is not None:
         left = mark.angle_deg > 270.0  # its name stays within the panel
@@ -357,126 +274,49 @@ def gap_averages_figure(curves: AverageCurves, *, mark: AngleMark | None = None,
             color=style.FAULT, fontsize=style.SMALL_PT, parse_math=False,
         )  # fmt: skip
     above.set_xlim(0.0, 360.0)
-    above.set_xticks(range(0, 361, EVERY_DEG))
+    above.set_xticks(range(0, 361, 45))
     above.set_xticks(np.arange(curves.teeth + 1) * 360.0 / max(curves.teeth, 1), minor=True)
-    above.tick_params(labelbottom=False)
-    style.label_axes(below, f"angle of shaft {plain(curves.shaft, 24)} (deg)", with_unit("change", curves.unit))
-    series.legend_row(figure, keys, left_in=0.85, top_in=series.NAMES_AT_IN)
-    series.headline(figure, title or _title(curves))
+    style.label_axes(above, "", with_unit("average", curves.unit))
+    style.label_axes(below, f"angle of shaft {shaft} (deg)", with_unit("change", curves.unit))
+    what = f"average over shaft {shaft} without mesh harmonics, sensor {sensor}: recording against reference"
+    series.head(figure, title or what, [new, old, *changed])
     return figure
 
 
-def _title(curves: AverageCurves) -> str:
-    shaft, sensor = plain(curves.shaft, 24), plain(curves.channel, 24)
-    return f"average over shaft {shaft} without mesh harmonics, sensor {sensor}: recording against reference"
-
-
 # --------------------
-# Figures of rows: a text, a horizontal bar, and figures beside it.
+# Figures of rows: a text, a horizontal bar, and what it comes to beside it.
 # --------------------
-
 
 BAR = 0.56
 """Height of a bar, of its row."""
-_LINE_IN = 0.155
-_CHARACTERS_PER_IN, _BOLD_PER_IN = 15.5, 13.5
 
 
-@dataclass(frozen=True)
-class RowPanel:
-    """Axes whose rows lie at y = 0, 1, … from the top.
-
-    Parameters
-    ----------
-    figure : Figure
-    axes : Axes
-    n_rows : int
-    left_in, right_in : float
-        Room for texts.
-    """
-
-    figure: Figure
-    axes: Axes
-    n_rows: int
-    left_in: float
-    right_in: float
-
-    def name(self, row: int, text: str, *, below: str = "", colour: str = style.INK, bold: bool = False) -> None:
-        """Write left of a row, in two lines at most, and a quiet line below."""
-        per_line = int((self.left_in - 0.25) * (_BOLD_PER_IN if bold else _CHARACTERS_PER_IN))
-        lines = _broken(text, per_line, 1 if below else 2)
-        top = (len(lines) + bool(below) - 1) / 2.0
-        for i, line in enumerate([*lines, *([below] if below else [])]):
-            quiet = below and i == len(lines)
-            self._write(
-                0.0,
-                row,
-                plain(line, int((self.left_in - 0.2) * _CHARACTERS_PER_IN) + 1),
-                (-8.0, (top - i) * _LINE_IN * 72.0),
-                "right",
-                style.QUIET if quiet else colour,
-                bold=bold and not quiet,
-            )
-
-    def say(self, row: int, text: str, *, below: str = "", colour: str = style.INK) -> None:
-        """Write right of a row, beyond the panel."""
-        texts = [text, *([below] if below else [])]
-        for i, line in enumerate(texts):
-            up = ((len(texts) - 1) / 2.0 - i) * _LINE_IN * 72.0
-            n_max = int((self.right_in - 0.15) * _CHARACTERS_PER_IN) + 1
-            self._write(1.0, row, plain(line, n_max), (8.0, up), "left", style.QUIET if i else colour, bold=not i)
-
-    def _write(
-        self, x: float, row: int, text: str, offset_pt: tuple[float, float], ha: str, colour: str, *, bold: bool = False
-    ) -> None:
-        self.axes.annotate(
-            text,
-            (x, row),
-            xycoords=self.axes.get_yaxis_transform(),
-            xytext=offset_pt,
-            textcoords="offset points",
-            ha=ha,
-            va="center",
-            fontsize=style.SMALL_PT,
-            fontweight="bold" if bold else "normal",
-            color=colour,
-            parse_math=False,
-            annotation_clip=False,
-        )
-
-
-def row_panel(
-    n_rows: int,
-    *,
-    left_in: float,
-    right_in: float,
-    row_in: float = 0.46,
-    top_in: float = 0.4,
-    bottom_in: float = 0.55,
-    width_in: float = style.WIDTH_IN,
-) -> RowPanel:
-    """Return an empty figure with `n_rows` rows."""
-    figure = style.new_figure(top_in + bottom_in + row_in * n_rows, width_in)
-    axes = style.panel(figure, left_in=left_in, right_in=right_in, bottom_in=bottom_in, top_in=top_in)
-    axes.set_ylim(n_rows - 0.5, -0.5)
-    axes.set_yticks([])
+def _rows(
+    names: Sequence[str], *, left_in: float, right_in: float, row_in: float, top_in: float
+) -> tuple[Figure, Axes]:
+    """Return a panel with a row for each name, at y = 0, 1, … from the top; names in two lines at most."""
+    figure, (axes,) = style.panels((row_in * len(names),), left_in=left_in, right_in=right_in, top_in=top_in)
+    n_max = int((left_in - 0.25) * 13.5)
+    texts = []
+    for name in names:  # a longer one is cut in its middle
+        lines = wrap(plain(name, 400), n_max)
+        texts.append("\n".join(lines if len(lines) <= 2 else wrap(plain(name, 2 * n_max - 6), n_max)[:2]))
+    axes.set_yticks(range(len(names)), texts)
+    for label in axes.get_yticklabels():
+        label.set_parse_math(False)
+    axes.tick_params(axis="y", length=0, pad=8)
+    axes.set_ylim(len(names) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
     axes.grid(visible=True, axis="x", which="major", color=style.RULE, linewidth=0.7)
-    return RowPanel(figure, axes, n_rows, left_in, right_in)
+    return figure, axes
 
 
-def _broken(text: str, n_max: int, n_lines: int) -> list[str]:
-    """Return the text in at most `n_lines` lines of `n_max` characters; a longer one is cut in its middle."""
-    lines = wrap(plain(text, 400), n_max)
-    return lines if len(lines) <= n_lines else wrap(plain(text, n_lines * n_max - 6), n_max)[:n_lines] or [""]
-
-
-# --------------------
-# The evidence for a cause: what it predicts beside what was observed.
-# --------------------
-
-
-MOST_ROWS = 10
+def _say(axes: Axes, row: int, text: str, below: str = "", colour: str = style.INK) -> None:
+    """Write right of a row, beyond the panel; a quiet line below."""
+    place, up = axes.get_yaxis_transform(), 0.17 if below else 0.0
+    style.put_text(axes, 1.02, row - up, text, colour=colour, n_max=24, fontweight="bold", va="center", transform=place)
+    if below:
+        style.put_text(axes, 1.02, row + up, below, n_max=24, va="center", transform=place)
 
 
 def gap_evidence_figure(evidence: Sequence[Evidence], *, title: str = "") -> Figure:
@@ -500,61 +340,32 @@ def gap_evidence_figure(evidence: Sequence[Evidence], *, title: str = "") -> Fig
     """
     if not evidence:
         raise InputError("no evidence to draw", allowed="one or more")
-    shown = evidence[:MOST_ROWS]
-    panel = row_panel(len(shown), left_in=3.6, right_in=1.15, row_in=0.44, top_in=0.66)
+    shown = evidence[:10]
+    names = [one.feature for one in shown]
+    figure, axes = _rows(names, left_in=3.6, right_in=1.15, row_in=0.44, top_in=0.66)
+    rows = np.arange(len(shown))
+    floors, observed, predicted = np.array([(e.floor_db, e.observed_db, e.predicted_db) for e in shown]).T
+    axes.barh(rows, 2.0 * floors, left=-floors, height=0.8, color=style.FLOOR, alpha=0.2, linewidth=0, zorder=1)
+    axes.barh(rows, observed, height=0.6 * BAR, color=style.MEASURED, alpha=0.85, linewidth=0, zorder=2)
+    keys = axes.plot([], [], color=style.MEASURED, linewidth=6, label="observed")
     for row, one in enumerate(shown):
-        _draw_row(panel.axes, row, one)
-        panel.name(row, one.feature)
-        text, colour = _stance(one)
-        panel.say(row, text, colour=colour)
-    panel.axes.axvline(0.0, color=style.QUIET, linewidth=0.9, zorder=1)
-    reach = max(max(abs(e.predicted_db), abs(e.observed_db), e.floor_db) for e in shown)
-    lowest = min(min(e.predicted_db, e.observed_db, -e.floor_db) for e in shown)
-    panel.axes.set_xlim(lowest - 0.06 * reach, reach * 1.08)
-    style.label_axes(panel.axes, "change (dB)")
-    style.no_offset(panel.axes)
-    series.legend_row(panel.figure, _keys_gap_evidence(), left_in=3.6, top_in=0.46)
-    series.headline(panel.figure, title)
-    return panel.figure
-
-
-def _stance(one: Evidence) -> tuple[str, str]:
-    """Return what stands beside a row, and its colour."""
-    if one.speaks_for:
-        return "for", style.MESH
-    return ("further", style.QUIET) if one.is_further else ("against", style.FAULT)
-
-
-def _draw_row(axes: Axes, row: int, one: Evidence) -> None:
-    axes.barh(
-        row, 2.0 * one.floor_db, left=-one.floor_db, height=0.8, color=style.FLOOR, alpha=0.2, linewidth=0, zorder=1
-    )
-    axes.barh(row, one.observed_db, height=0.6 * BAR, color=style.MEASURED, alpha=0.85, linewidth=0, zorder=2)
-    axes.plot(
-        [one.predicted_db], [row], "D", markersize=7, markerfacecolor="white", markeredgecolor=style.MESH,
-        markeredgewidth=1.8, zorder=3,
-    )  # fmt: skip
-
-
-def _keys_gap_evidence() -> list[Line2D]:
-    from matplotlib.lines import Line2D
-
-    return [
-        Line2D([], [], color=style.MEASURED, linewidth=6, label="observed"),
-        Line2D(
-            [], [], linestyle="none", marker="D", markersize=7, markerfacecolor="white", markeredgecolor=style.MESH,
-            markeredgewidth=1.8, label="predicted",
-        ),
-        Line2D([], [], color=style.FLOOR, alpha=0.35, linewidth=9, label="structural floor"),
-    ]  # fmt: skip
-
-
-# --------------------
-# How far the gap shrinks: from before, through each added effect, to what is left.
-# --------------------
-
-
-LEFT_OVER = "what is left"
+        key = axes.plot(
+            [one.predicted_db], [row], "D", markersize=7, markerfacecolor="white", markeredgecolor=style.MESH,
+            markeredgewidth=1.8, zorder=3, label="predicted",
+        )  # fmt: skip
+        keys += key if not row else []
+        against = ("further", style.QUIET) if one.is_further else ("against", style.FAULT)
+        text, colour = ("for", style.MESH) if one.speaks_for else against
+        _say(axes, row, text, colour=colour)
+    keys += axes.plot([], [], color=style.FLOOR, alpha=0.35, linewidth=9, label="structural floor")
+    axes.axvline(0.0, color=style.QUIET, linewidth=0.9, zorder=1)
+    reach = float(np.max(np.abs([floors, observed, predicted])))
+    axes.set_xlim(float(np.min([-floors, observed, predicted])) - 0.06 * reach, reach * 1.08)
+    style.label_axes(axes, "change (dB)")
+    style.no_offset(axes)
+    series.headline(figure, title)
+    series.legend_row(figure, keys, left_in=3.6)
+    return figure
 
 
 def gap_waterfall_figure(steps: Sequence[GapStep], *, held_out: str = "", title: str = "") -> Figure:
@@ -571,7 +382,7 @@ def gap_waterfall_figure(steps: Sequence[GapStep], *, held_out: str = "", title:
     Returns
     -------
     Figure
-        The shaded stretch is the structural floor: healthy machines are in it.
+        The shaded band is the structural floor: healthy machines are in it.
 
     Raises
     ------
@@ -580,54 +391,39 @@ def gap_waterfall_figure(steps: Sequence[GapStep], *, held_out: str = "", title:
     """
     if not steps:
         raise InputError("no steps to draw", allowed="the gap before, and one for each effect")
-    panel = row_panel(len(steps) + (len(steps) > 1), left_in=3.0, right_in=1.6)
-    axes = panel.axes
+    n = len(steps)
+    names = [steps[0].label, *(f"with {step.label}" for step in steps[1:]), *(["what is left"] if n > 1 else [])]
+    figure, axes = _rows(names, left_in=3.0, right_in=1.6, row_in=0.46, top_in=0.4)
     axes.axvspan(0.0, 1.0, facecolor=style.FLOOR, alpha=0.16, linewidth=0, zorder=0.5)
     axes.axvline(1.0, color=style.FLOOR, linewidth=0.9, zorder=1)
-    _whole(panel, 0, steps[0], style.FAULT)
-    for row, (before, step) in enumerate(pairwise(steps), start=1):
-        _step(panel, row, before.left, step)
-    if len(steps) > 1:
-        _whole(panel, len(steps), GapStep(LEFT_OVER, steps[-1].left), style.MEASURED)
+    _draw_whole(axes, 0, steps[0].left, style.FAULT)
+    for row, (last, step) in enumerate(pairwise(steps), start=1):
+        before, after = last.left.value, step.left.value
+        sign, colour = ("−", style.MESH) if after <= before else ("+", style.FAULT)  # a larger gap in faults' colour
+        _draw_bar(axes, row, before, step.left, colour)
+        for x, y in ((before, row - 0.5), (after, row + 0.5)):
+            ends = [y - 0.5 + BAR / 2, y + 0.5 - BAR / 2]
+            axes.plot([x, x], ends, color=style.QUIET, linewidth=0.8, linestyle=":", zorder=1.5)
+        share = abs(100.0 * (1.0 - after / before)) if before > 0 else 0.0
+        _say(axes, row, f"{sign}{abs(after - before):.2g}", f"{sign}{share:.0f} % of the gap", colour)
+    if n > 1:
+        _draw_whole(axes, n, steps[-1].left, style.MEASURED)
     axes.set_xlim(0.0, 1.06 * max(1.2, *(step.left.high for step in steps)))
     scored = f", on {held_out}" if held_out else ""
     style.label_axes(axes, f"gap (structural floors{scored}; 90 % intervals)", "", title)
     style.no_offset(axes)
-    return panel.figure
+    return figure
 
 
-def _whole(panel: RowPanel, row: int, step: GapStep, colour: str) -> None:
-    panel.axes.barh(row, step.left.value, height=BAR, color=colour, alpha=0.85, linewidth=0, zorder=2)
-    _interval(panel, row, step.left)
-    panel.name(row, step.label, bold=True)
-    panel.say(row, f"{step.left.value:.2g}", below=f"{step.left.low:.2g} to {step.left.high:.2g}")
+def _draw_whole(axes: Axes, row: int, left: Interval, colour: str) -> None:
+    _draw_bar(axes, row, 0.0, left, colour)
+    _say(axes, row, f"{left.value:.2g}", f"{left.low:.2g} to {left.high:.2g}")
+    axes.get_yticklabels()[row].set_fontweight("bold")
 
 
-def _step(panel: RowPanel, row: int, before: Interval, step: GapStep) -> None:
-    """Draw what an effect takes away; what it adds, where it makes the gap larger, in the colour of faults."""
-    left = step.left
-    smaller = left.value <= before.value
-    low, high = sorted((left.value, before.value))
-    colour = style.MESH if smaller else style.FAULT
-    panel.axes.barh(row, high - low, left=low, height=BAR, color=colour, alpha=0.75, linewidth=0, zorder=2)
-    for x in (before.value, left.value):
-        ends = (row - 1 + BAR / 2, row - BAR / 2) if x == before.value else (row + BAR / 2, row + 1 - BAR / 2)
-        panel.axes.plot([x, x], ends, color=style.QUIET, linewidth=0.8, linestyle=":", zorder=1.5)
-    _interval(panel, row, left)
-    panel.name(row, f"with {step.label}")
-    share = 100.0 * (1.0 - left.value / before.value) if before.value > 0 else 0.0
-    sign = "−" if smaller else "+"
-    panel.say(row, f"{sign}{high - low:.2g}", below=f"{sign}{abs(share):.0f} % of the gap", colour=colour)
-
-
-def _interval(panel: RowPanel, row: int, left: Interval) -> None:
-    panel.axes.errorbar(
-        [left.value],
-        [row],
-        xerr=[[max(left.value - left.low, 0.0)], [max(left.high - left.value, 0.0)]],
-        fmt="none",
-        ecolor=style.INK,
-        elinewidth=1.1,
-        capsize=3.5,
-        zorder=3,
-    )
+def _draw_bar(axes: Axes, row: int, start: float, left: Interval, colour: str) -> None:
+    """Draw a bar up to what is left, and its interval."""
+    low, high = sorted((start, left.value))
+    wide = [[max(left.value - left.low, 0.0)], [max(left.high - left.value, 0.0)]]
+    axes.barh(row, high - low, left=low, height=BAR, color=colour, alpha=0.8, linewidth=0, zorder=2)
+    axes.errorbar([left.value], [row], xerr=wide, fmt="none", ecolor=style.INK, elinewidth=1.1, capsize=3.5, zorder=3)
