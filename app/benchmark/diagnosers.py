@@ -127,14 +127,14 @@ def folders_of(name: str) -> tuple[Path, ...]:
     return tuple(Path(place).absolute().parent for place in spec.submodule_search_locations or origin)
 
 
-def diagnose(seen: VisibleCase) -> GapReport:
+def diagnose(seen: VisibleCase, model: str = "cracked") -> GapReport:
     """Diagnose a case with the product itself; what is kept for its rig lies with the case and goes with it."""
     from gearsig.gap import diagnose_gap
     from sims.registry import gap_simulator
 
     return diagnose_gap(
         seen.recordings,
-        gap_simulator("cracked"),
+        gap_simulator(model),
         rigs=seen.rigs,
         references=seen.references,
         reference_rigs=seen.reference_rigs,
@@ -145,17 +145,7 @@ def diagnose(seen: VisibleCase) -> GapReport:
 
 def diagnose_drive(seen: VisibleCase) -> GapReport:
     """Diagnose a case of starts and stops with the product itself."""
-    from gearsig.gap import diagnose_gap
-    from sims.registry import gap_simulator
-
-    return diagnose_gap(
-        seen.recordings,
-        gap_simulator("forging"),
-        rigs=seen.rigs,
-        references=seen.references,
-        reference_rigs=seen.reference_rigs,
-        names=seen.names,
-    )
+    return diagnose(seen, "forging")
 
 
 # --------------------

@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,6 +31,7 @@ from app.studies.crack_cases import (
     draw_other_fault,
     observe,
 )
+from app.studies.pool import answers_of
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.severity import (
@@ -234,9 +234,6 @@ def _conformal(scaled: FloatArray) -> tuple[float, float]:
 # --------------------
 
 
-_FIT_KIND_RIDGE = 2.0
-
-
 def fit_kind(vectors: FloatArray, kinds: list[str]) -> KindModel:
     """Fit a softmax regression; cracks weigh as much as chips and spalls together.
 
@@ -247,28 +244,16 @@ def fit_kind(vectors: FloatArray, kinds: list[str]) -> KindModel:
     kinds : list of str
         What each is.
     """
-    from scipy.optimize import minimize
+    from sklearn.linear_model import LogisticRegression
 
     mean, scale = vectors.mean(axis=0), vectors.std(axis=0)
     z = np.clip((vectors - mean) / scale, -4.0, 4.0)
-    rows = np.c_[np.ones(len(z)), z]
-    truth = np.array([[kind == name for name in KINDS] for kind in kinds], dtype=np.float64)
-    shares = np.array([0.5 if name == CRACKED else 0.5 / (len(KINDS) - 1) for name in KINDS])
-    weight = truth @ (len(z) * shares / truth.sum(axis=0))
-
-    def loss(flat: FloatArray) -> tuple[float, FloatArray]:
-        weights = flat.reshape(len(KINDS), -1)
-        levels = rows @ weights.T
-        levels -= levels.max(axis=1, keepdims=True)
-        logs = levels - np.log(np.exp(levels).sum(axis=1, keepdims=True))
-        slope = ((np.exp(logs) - truth) * weight[:, None]).T @ rows
-        slope[:, 1:] += 2.0 * _FIT_KIND_RIDGE * weights[:, 1:]
-        return float(
-            -weight @ (truth * logs).sum(axis=1) + _FIT_KIND_RIDGE * np.sum(weights[:, 1:] ** 2)
-        ), slope.ravel()
-
-    best = minimize(loss, np.zeros(len(KINDS) * rows.shape[1]), jac=True, method="L-BFGS-B").x
-    return KindModel(mean, scale, best.reshape(len(KINDS), -1))
+    shares = {name: 0.5 if name == CRACKED else 0.5 / (len(KINDS) - 1) for name in KINDS}
+    weights = [len(kinds) * shares[kind] / kinds.count(kind) for kind in kinds]
+    # Penalty: the sum of the squared weights, without the offsets, doubled.
+    model = LogisticRegression(C=0.25, tol=1e-9, max_iter=10_000)
+    model.fit(z, [KINDS.index(kind) for kind in kinds], sample_weight=weights)
+    return KindModel(mean, scale, np.c_[model.intercept_, model.coef_])
 
 
 SEED = 2611
@@ -276,7 +261,6 @@ N_CASES = 540
 EVEN_EVERY = 6
 """The last of so many cases has teeth that hardly differ."""
 
-BATCH = 20
 _DIGITS = 7
 
 
@@ -296,14 +280,10 @@ def main() -> None:
 
 def observe_all(n_cases: int, n_processes: int) -> list[tuple[int, CaseFeatures]]:
     """Return what the drawn cases show, by their index; some cannot be made, or show too few mesh harmonics."""
-    found: list[tuple[int, CaseFeatures]] = []
-    with ProcessPoolExecutor(n_processes) as pool:
-        for first in range(0, n_cases, BATCH):
-            indices = range(first, min(first + BATCH, n_cases))
-            answers = zip(indices, pool.map(observe_one, indices), strict=True)
-            found += [(index, answer) for index, answer in answers if isinstance(answer, CaseFeatures)]
-            typer.echo(f"{indices.stop} of {n_cases} cases drawn")
-    return found
+    from app.studies.crack_severity import observe_one
+
+    answers = answers_of(observe_one, range(n_cases), n_processes)
+    return [(index, answer) for index, answer in answers if isinstance(answer, CaseFeatures)]
 
 
 def observe_one(index: int) -> CaseFeatures | str:

@@ -23,16 +23,17 @@ Making cases
     Runs it in memory: `conditions`, `references`, `twins`, `places`. A twin is the same run from the same seeds
     without the fault, so that the true place and size of the change can be measured. All recordings of a case are of
     one assembly, begun wherever it stood: what is fixed to a shaft turns with it, and teeth keep their partners.
-`write_case(case, folder, labels_folder)`
-    Writes ``folder`` for the diagnosing side: ``condition_1.h5``, with two conditions ``condition_2.h5``, with
+`write_seen(made, folder)`
+    Writes a folder for the diagnosing side: ``condition_1.h5``, with two conditions ``condition_2.h5``, with
     references ``reference_1.h5`` (same operating point as ``condition_1.h5``) and so on; each beside a rig file of the
     same name that states its nominal speed and torque; and ``rig.toml``, which is condition_1's. Channels: ``a1``,
     perhaps ``a2`` (m/s^2), ``tacho`` (one pulse per turn of the input shaft). Nominal torque is within some 20 %,
-    nominal speed within some 1.5 % of the truth. And ``labels_folder`` for the scoring side: ``labels.json`` and
-    ``twin_1.h5`` …
+    nominal speed within some 1.5 % of the truth.
+`labels(case, made)`
+    Returns the answers, for the scoring side.
 
-labels.json
------------
+Labels
+------
 ==============  ====================================================================================================
 layout          "gearsig blind labels 1"
 role, kind      as above
@@ -42,17 +43,16 @@ effects         list, empty for "none": name, group ("outside" where the catalog
                 channels)
 has_reference   whether there are healthy recordings
 conditions      file, stated_rpm, stated_nm, true_rpm, true_nm (input shaft), load_share of the rated torque
-twins           files of the twins, in the order of the conditions; empty where nothing is wrong
 pair            z1, z2, module_mm
 ==============  ====================================================================================================
 
 "Pinion" is the gear on the input shaft, "wheel" that on the output shaft, whichever is larger.
 
 Names: `CATALOGUE` (19), `MECHANICAL` (16 of them), `OUTSIDE_CATALOGUE` (10). For the benchmark's own cases:
-`RunCondition`, `SHAFTS`; `labels` and `write_seen` are the two halves of `write_case`.
+`RunCondition`, `SHAFTS`.
 """
 
-from sims.blind._cases import BlindCase, CaseRecordings, Fault, draw_case, labels, record_case, write_case, write_seen
+from sims.blind._cases import BlindCase, CaseRecordings, Fault, draw_case, labels, record_case, write_seen
 from sims.blind._changes import (
     CATALOGUE,
     EVERY,
@@ -127,6 +127,5 @@ __all__ = [
     "stiffness_matrix",
     "teeth_of",
     "wear_shape",
-    "write_case",
     "write_seen",
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -222,58 +221,21 @@ def _draw_conditions(
 
 
 # --------------------
-# Cases on disk: what the diagnosing side may see in one folder, the answers in another.
+# Cases on disk: what the diagnosing side may see; and the answers.
 # --------------------
 
 
 LAYOUT = "gearsig blind labels 1"
-LABELS_NAME = "labels.json"
 FILE_TIME = 1_700_000_000
 """Every file is given the same time: when it was made says what it took to make it."""
 
 
-def write_case(case: BlindCase, folder: str | Path, labels_folder: str | Path) -> tuple[Path, Path]:
-    """Run a case and write it.
-
-    Parameters
-    ----------
-    case : Case
-    folder : str or Path
-        For the diagnosing side: condition_1.h5 (and _2), reference_1.h5 … if there are any, each with a rig file of the
-        same name that states its operating point, and rig.toml, which is condition_1's.
-    labels_folder : str or Path
-        For the scoring side: labels.json, twin_1.h5 … unless nothing is wrong. Neither inside `folder` nor around it.
-
-    Returns
-    -------
-    tuple of Path
-        Both folders.
-
-    Raises
-    ------
-    InputError
-        If one folder holds the other or is not empty.
-    """
-    seen, hidden = Path(folder).resolve(), Path(labels_folder).resolve()
-    if seen == hidden or seen in hidden.parents or hidden in seen.parents:
-        raise InputError(
-            "the labels would lie with the recordings", where=str(labels_folder), remedy="give a folder beside it"
-        )
-    for place in (seen, hidden):
-        place.mkdir(parents=True, exist_ok=True)
-        if any(place.iterdir()):
-            raise InputError("the folder is not empty", where=str(place), remedy="give a new one for each case")
-    made = record_case(case)
-    write_seen(made, seen)
-    if case.faults:
-        for i, twin in enumerate(made.twins, 1):
-            _write(twin, hidden / f"twin_{i}.h5")
-    (hidden / LABELS_NAME).write_text(json.dumps(labels(case, made), indent=1), encoding="utf-8")
-    return seen, hidden
-
-
 def write_seen(made: CaseRecordings, folder: Path) -> None:
-    """Write what the diagnosing side may see, and nothing else."""
+    """Write what the diagnosing side may see, and nothing else.
+
+    condition_1.h5 (and _2), reference_1.h5 … if there are any, each with a rig file of the same name that states its
+    operating point, and rig.toml, which is condition_1's.
+    """
     for stem, recordings in (("condition", made.conditions), ("reference", made.references)):
         for i, recording in enumerate(recordings, 1):
             _write(recording, folder / f"{stem}_{i}.h5")
@@ -312,7 +274,6 @@ def labels(case: BlindCase, made: CaseRecordings) -> dict[str, Any]:
         "effects": effects,
         "has_reference": bool(case.references),
         "conditions": conditions,
-        "twins": [f"twin_{i}.h5" for i in range(1, len(made.twins) + 1)] if case.faults else [],
         "pair": {"z1": case.rig.pair.z1, "z2": case.rig.pair.z2, "module_mm": case.rig.pair.module_mm},
     }
 

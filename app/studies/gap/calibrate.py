@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,8 @@ from typing import Any
 import numpy as np
 import typer
 
+from app.studies.gap.by_hand import rig_of
+from app.studies.pool import answers_of
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError
 from gearsig.gap import (
@@ -136,6 +137,8 @@ FIRST_STRANGE = 10_000
 
 def main() -> None:
     """Make cases, weigh them, fit, write."""
+    from app.studies.gap.calibrate import weigh_case
+
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=216)
     parser.add_argument("--strange", type=int, default=64)
@@ -147,9 +150,9 @@ def main() -> None:
     done = _read(given.work)
     wanted = [*range(given.cases), *range(FIRST_STRANGE, FIRST_STRANGE + given.strange)]
     missing = [i for i in wanted if i not in done]
-    with given.work.open("a", encoding="utf-8") as file, ProcessPoolExecutor(given.processes) as pool:
-        weighed = pool.map(weigh_case, missing, [MOST_TRIED if i < given.tried else 0 for i in missing])
-        for i, rows in zip(missing, weighed, strict=True):
+    jobs = [(i, MOST_TRIED if i < given.tried else 0) for i in missing]
+    with given.work.open("a", encoding="utf-8") as file:
+        for (i, _), rows in answers_of(weigh_case, jobs, given.processes):
             file.write(json.dumps({"case": i, "rows": rows}) + "\n")
             file.flush()
             typer.echo(f"case {i}: {', '.join(rows[0]['truths']) if rows else 'refused'}")
@@ -167,15 +170,17 @@ def main() -> None:
     typer.echo(json.dumps(values, indent=1))
 
 
-def weigh_case(index: int, most_tried: int) -> list[dict[str, Any]]:
+def weigh_case(job: tuple[int, int]) -> list[dict[str, Any]]:
     """Return what is said of a blind case with its reference and without, and the truth; less where it is refused.
 
-    Each by all that is known, and by what is known without the machines of the rig that made the case.
+    Each by all that is known, and by what is known without the machines of the rig that made the case. A job is the
+    case's number and how many effects are tried at most.
     """
     from gearsig.gap import attribute, compare, conditions_of
     from sims.blind import CATALOGUE, draw_case, record_case
     from sims.cracked import cracked_gap_simulator
 
+    index, most_tried = job
     rng = np.random.default_rng([SEED, index])
     place, names = index % ROUND, list(CATALOGUE)
     kind = "single" if place < len(names) else "none" if place < len(names) + 4 else "unknown"
@@ -185,14 +190,14 @@ def weigh_case(index: int, most_tried: int) -> list[dict[str, Any]]:
     case = draw_case(rng, "calibration", kind=kind, with_reference=True, **wanted)  # type: ignore[arg-type]  # as drawn
     truths = [wanted["effect"]] if wanted else [NONE if kind == "none" else UNKNOWN]
     recorded = record_case(case)
-    rigs = [_rig(r) for r in recorded.conditions]
+    rigs = [rig_of(r) for r in recorded.conditions]
     simulator = cracked_gap_simulator()
     rows = []
     for references in (recorded.references, ()):
         try:
             twin = simulator.twin_of(rigs[0])
             conditions, _ = conditions_of(
-                recorded.conditions, rigs, references, [_rig(r) for r in references], twin, (), lambda *_: None
+                recorded.conditions, rigs, references, [rig_of(r) for r in references], twin, (), lambda *_: None
             )
             for left_out in ("", INDEPENDENT):
                 with without_machines_of(left_out):
@@ -214,10 +219,6 @@ def weigh_case(index: int, most_tried: int) -> list[dict[str, Any]]:
         except GearsigError as error:
             typer.echo(f"case {index}: {error}")
     return rows
-
-
-def _rig(recording: Any) -> Any:
-    return recording.rig
 
 
 def _read(path: Path) -> dict[int, list[dict[str, Any]]]:

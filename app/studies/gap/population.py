@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 
 from app.studies.gap.quasi_static import QUASI_STATIC, one_static
 from app.studies.gap.rows import CRACKED, REDUCED, PopulationSample, one_case, one_rig, write
+from app.studies.pool import answers_of
 from gearsig.gap import BY_HAND, INDEPENDENT, POPULATION_FILE
 
 MACHINES = {CRACKED.name: 80, REDUCED.name: 45, INDEPENDENT: 400, QUASI_STATIC: 150}
@@ -58,16 +58,17 @@ def main() -> None:
 
 def simulate(jobs: Sequence[tuple[str, int]], n_processes: int, to: Path) -> None:
     """Record machines, given by simulator and number, and write the table of their samples now and then."""
+    from app.studies.gap.population import samples_of_job
+
     samples: list[PopulationSample] = []
-    with ProcessPoolExecutor(n_processes) as pool:
-        for n_done, of_machine in enumerate(pool.map(_samples, jobs), start=1):
-            samples += of_machine
-            if samples and (n_done % 10 == 0 or n_done == len(jobs)):
-                write(to, samples)
-            typer.echo(f"{n_done} of {len(jobs)} machines, {len(samples)} recordings")
+    for n_done, (_, of_machine) in enumerate(answers_of(samples_of_job, jobs, n_processes), start=1):
+        samples += of_machine
+        if samples and (n_done % 10 == 0 or n_done == len(jobs)):
+            write(to, samples)
 
 
-def _samples(job: tuple[str, int]) -> list[PopulationSample]:
+def samples_of_job(job: tuple[str, int]) -> list[PopulationSample]:
+    """Return the samples of a simulator's machine."""
     name, index = job
     return _SAMPLES_OF[name](index)
 

@@ -9,10 +9,9 @@ import h5py
 import numpy as np
 import pytest
 
-from gearsig.errors import InputError
 from gearsig.recording import read_recording
 from gearsig.rig import read_rig
-from sims.blind import CATALOGUE, OUTSIDE_CATALOGUE, BlindCase, draw_case, write_case
+from sims.blind import CATALOGUE, OUTSIDE_CATALOGUE, BlindCase, draw_case, labels, record_case, write_seen
 
 WORDS = [*CATALOGUE, *OUTSIDE_CATALOGUE, "severity", "seed", "twin", "sims", "blind", "none\"", "single",
          "unknown_effect",
@@ -29,23 +28,20 @@ def short_case(seed: int, **wishes: object) -> BlindCase:
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[BlindCase, Path, Path]]:
+def written(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[BlindCase, Path, dict]]:
     made = []
-    for i, wishes in enumerate(
-        ({"kind": "none"}, {"effect": "root_crack"}, {"effect": "coupling_knock"}, {"effect": "clipping"})
-    ):
+    for wishes in ({"kind": "none"}, {"effect": "root_crack"}, {"effect": "coupling_knock"}, {"effect": "clipping"}):
         case = short_case(5, **wishes)
-        base = tmp_path_factory.mktemp("cases")
-        made.append((case, *write_case(case, base / "seen" / f"{i}", base / "hidden" / f"{i}")))
+        recorded, seen = record_case(case), tmp_path_factory.mktemp("seen")
+        write_seen(recorded, seen)
+        made.append((case, seen, labels(case, recorded)))
     return made
 
 
 def test_the_folder_holds_what_the_page_says(written: list) -> None:
-    for case, seen, hidden in written:
+    for _, seen, _ in written:
         stems = ("condition_1", "condition_2", "reference_1", "reference_2")
         assert {p.name for p in seen.iterdir()} == {f"{s}{e}" for s in stems for e in (".h5", ".toml")} | {"rig.toml"}
-        twins = {"twin_1.h5", "twin_1.toml", "twin_2.h5", "twin_2.toml"} if case.faults else set()
-        assert {p.name for p in hidden.iterdir()} == {"labels.json"} | twins
 
 
 def test_recordings_and_rig_read_back(written: list) -> None:
@@ -99,25 +95,11 @@ def test_the_raw_bytes_hold_no_label(written: list) -> None:
 
 
 def test_labels_tell_everything(written: list) -> None:
-    for case, _, hidden in written:
-        labels = json.loads((hidden / "labels.json").read_text(encoding="utf-8"))
-        assert labels["kind"] == case.kind
-        assert labels["role"] == "calibration"
-        assert [e["name"] for e in labels["effects"]] == [f.name for f in case.faults]
-        assert labels["has_reference"] is True
-        assert len(labels["conditions"]) == 2
-        for effect in labels["effects"]:
+    for case, _, label in written:
+        assert label["kind"] == case.kind
+        assert label["role"] == "calibration"
+        assert [e["name"] for e in label["effects"]] == [f.name for f in case.faults]
+        assert label["has_reference"] is True
+        assert len(label["conditions"]) == 2
+        for effect in label["effects"]:
             assert {"name", "group", "severity", "unit", "level", "resembles", "place"} == set(effect)
-        for twin in labels["twins"]:
-            assert read_recording(hidden / twin).n_samples > 0
-
-
-def test_labels_never_lie_with_the_recordings(tmp_path: Path) -> None:
-    case = short_case(1, kind="none")
-    for seen, hidden in (("a", "a"), ("a", "a/labels"), ("a/b", "a")):
-        with pytest.raises(InputError, match="lie with"):
-            write_case(case, tmp_path / seen, tmp_path / hidden)
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "x").write_text("")
-    with pytest.raises(InputError, match="not empty"):
-        write_case(case, tmp_path / "full", tmp_path / "other")
