@@ -1,13 +1,13 @@
 """The cracked spur pair: 16 degrees of freedom, contact tooth pair by tooth pair, cracks, friction, backlash."""
 
 from sims.cracked._continuation import DECAYS, RAMP_S, SECTIONS, TRANSMISSION_ERROR, Branch, End, SteadyRun
-from sims.cracked._convergence import check_convergence
 from sims.cracked._kernels import contact_forces, derivative, integrate, late_entry, place_of_entry, potential_energy
 from sims.cracked._respond import (
     SIGNALS,
     PairConstants,
     PairState,
     Response,
+    check_convergence,
     default_step_s,
     eigenfrequencies_hz,
     matrices,

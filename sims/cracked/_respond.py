@@ -20,6 +20,7 @@ from sims.gear_pair import (
     MACHINE_FIELDS,
     PairResponse,
     RunPlan,
+    StepConvergence,
     bearing_fields,
     bearing_loads_n,
     draw_roughness,
@@ -503,3 +504,45 @@ def _place(name: str) -> int:
             remedy=closest_match_hint(name, SIGNALS),
         )
     return SIGNALS.index(name)
+
+
+TOLERANCE = 1e-4
+"""Relative error of the transmission error's rms that counts as converged."""
+
+
+def check_convergence(
+    machine: Machine,
+    operation: Operation,
+    rng: np.random.Generator,
+    *,
+    duration_s: float = 0.5,
+    step_s: float | None = None,
+) -> StepConvergence:
+    """Compare the step in use, half and a quarter of it on the same machine, with the same roughness.
+
+    Parameters
+    ----------
+    machine : Machine
+    operation : Operation
+    rng : numpy.random.Generator
+    duration_s : float
+        Of each run; its second half is compared. In a chaotic motion (light load, rattle) no step converges, as two
+        runs part however close they start.
+    step_s : float or None
+        None: the default.
+    """
+    step = default_step_s(machine, operation) if step_s is None else step_s
+    seed = int(rng.integers(2**63))
+    runs = [
+        respond(
+            machine,
+            operation,
+            duration_s=duration_s,
+            rng=np.random.default_rng(seed),
+            signals=("transmission_error_m",),
+            step_s=step / part,
+            stride=part,
+        )
+        for part in (1, 2, 4)
+    ]
+    return StepConvergence.of(runs, TOLERANCE, first=0.5)

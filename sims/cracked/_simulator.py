@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gearsig.recording import Recording
 from gearsig.rig import Rig
-from sims.cracked._respond import PairState, Response, default_step_s, eigenfrequencies_hz, respond
+from sims.cracked._respond import PairState, Response, check_convergence, default_step_s, eigenfrequencies_hz, respond
 from sims.effects import effects, with_effects
 from sims.gear_pair import (
     PARAMETERS,
@@ -20,6 +20,7 @@ from sims.gear_pair import (
     PairTwin,
     ReadyPair,
     SimulationRequest,
+    StepConvergence,
     build_machine,
     check_load,
 )
@@ -28,10 +29,6 @@ from sims.measure import plain
 from sims.mesh import friction_over_mesh
 from sims.presets import Preset
 from sims.simulator import Parameter
-
-if TYPE_CHECKING:
-    from sims.cracked._convergence import Convergence
-
 
 NAME = "cracked"
 
@@ -74,9 +71,7 @@ class CrackedPair(PairModel[PreparedCrackedPair]):
     def _run(self, ready: PreparedCrackedPair, **asked: Any) -> Recording:
         return simulate_with_motion(ready.machine, ready.operation, **asked)[0]
 
-    def _converges(self, ready: PreparedCrackedPair, rng: np.random.Generator) -> Convergence:
-        from sims.cracked._convergence import check_convergence
-
+    def _converges(self, ready: PreparedCrackedPair, rng: np.random.Generator) -> StepConvergence:
         return check_convergence(ready.machine, ready.operation, rng)
 
 

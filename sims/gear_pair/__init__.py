@@ -14,7 +14,7 @@ from sims.gear_pair._drive import (
 from sims.gear_pair._installed import Installed, completed
 from sims.gear_pair._measurement import COORDINATES, MIN_MOTION_HZ, Measurement
 from sims.gear_pair._parameters import PARAMETERS
-from sims.gear_pair._run import PairResponse, RunPlan, profile_points
+from sims.gear_pair._run import PairResponse, RunPlan, StepConvergence, profile_points
 from sims.gear_pair._simulator import PairModel, ReadyPair, SimulationRequest, check_load
 from sims.gear_pair._twin import (
     BODY_KG,
@@ -42,6 +42,7 @@ __all__ = [
     "ReadyPair",
     "RunPlan",
     "SimulationRequest",
+    "StepConvergence",
     "bearing_fields",
     "bearing_loads_n",
     "body_gain",

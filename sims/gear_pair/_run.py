@@ -128,6 +128,55 @@ class RunPlan:
         return dict(zip(signals, rows.T, strict=True)), energies
 
 
+@dataclass(frozen=True)
+class StepConvergence:
+    """What a shorter step of the integrator changes.
+
+    Parameters
+    ----------
+    steps_s : tuple of float
+        The step in use first, the most exact run last.
+    rms : mapping
+        Name of a signal → rms about its mean at each step.
+    allowed : float
+        Relative error that counts as converged.
+    """
+
+    steps_s: tuple[float, ...]
+    rms: Mapping[str, tuple[float, ...]]
+    allowed: float
+
+    @classmethod
+    def of(cls, runs: Sequence[PairResponse[State]], allowed: float, *, first: float = 0.0) -> StepConvergence:
+        """Compare runs with the same signals, from the part `first` of each on."""
+
+        def rms(values: FloatArray) -> float:
+            return float(np.std(values[int(first * len(values)) :]))
+
+        return cls(tuple(r.step_s for r in runs), {n: tuple(rms(r[n]) for r in runs) for n in runs[0].signals}, allowed)
+
+    @property
+    def error(self) -> float:
+        """Greatest relative difference of an rms at the step in use from that of the most exact run."""
+        return max(abs(values[0] / values[-1] - 1.0) for values in self.rms.values())
+
+    @property
+    def converged(self) -> bool:
+        """Whether the error is allowed."""
+        return self.error <= self.allowed
+
+    @property
+    def text(self) -> str:
+        """For people: a line for each step and signal, and the verdict."""
+        lines = [
+            f"step {1e6 * step:8.4f} us: rms of {name} {values[i]:.6g}"
+            for name, values in self.rms.items()
+            for i, step in enumerate(self.steps_s)
+        ]
+        verdict = "converged" if self.converged else "NOT converged: take a shorter step"
+        return "\n".join([*lines, f"relative error {self.error:.1e} (allowed {self.allowed:.0e}): {verdict}"])
+
+
 def profile_points(profile: Profile, factor: float) -> FloatArray:
     """Times and values as kernels take them, (2, n)."""
     return np.ascontiguousarray(np.vstack((profile.times_s, factor * np.asarray(profile.values))), dtype=np.float64)

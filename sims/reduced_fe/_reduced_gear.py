@@ -707,14 +707,16 @@ def read_gear(path: str | Path) -> ReducedGear:
                 allowed=f"format {FORMAT}",
                 remedy=FRESH,
             )
+        values: dict[str, Any] = {name: float(about[name]) for name in _NUMBERS} | {
+            name: data[name] for name in _ARRAYS
+        }
         return ReducedGear(
             blank=GearBlank.from_text(about["blank"]),
             key=str(about["key"]),
             n_dof=int(about["n_dof"]),
             spread=str(about["spread"]),
             grid=FlankGrid(data["roll_rad"], data["z_m"]),
-            **{name: float(about[name]) for name in _NUMBERS},
-            **{name: data[name] for name in _ARRAYS},
+            **values,
         )
     except InputError:
         raise

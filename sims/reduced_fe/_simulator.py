@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from sims.gear_pair import (
     PairTwin,
     ReadyPair,
     SimulationRequest,
+    StepConvergence,
     build_machine,
     check_load,
     draw_roughness,
@@ -38,12 +39,8 @@ from sims.reduced_fe._blank import GearBlank
 from sims.reduced_fe._contact import MARGIN, corner_separation_m
 from sims.reduced_fe._pair import FlexiblePair, FlexiblePairConstants, constants, eigenfrequencies_hz, torsional_mode
 from sims.reduced_fe._reduced_gear import READY, ReducedGear, cached_gear, plan_for, ready_gear
-from sims.reduced_fe._respond import STEP_S, FlexResponse, FlexState, followed_step_s, respond
+from sims.reduced_fe._respond import STEP_S, FlexResponse, FlexState, check_convergence, followed_step_s, respond
 from sims.simulator import Parameter, ParameterValue, ParameterValues, Values
-
-if TYPE_CHECKING:
-    from sims.reduced_fe._respond import FlexConvergence
-
 
 # The parameters of the flexible pair: those it shares with the 16-DOF pair, and those of its gear bodies.
 
@@ -184,9 +181,7 @@ class ReducedPair(PairModel[PreparedPair]):
     def _run(self, ready: PreparedPair, **asked: Any) -> Recording:
         return simulate_pair(ready.pair, ready.operation, **({"step_s": ready.step_s} | asked))[0]
 
-    def _converges(self, ready: PreparedPair, rng: np.random.Generator) -> FlexConvergence:
-        from sims.reduced_fe._respond import check_convergence
-
+    def _converges(self, ready: PreparedPair, rng: np.random.Generator) -> StepConvergence:
         del rng
         return check_convergence(ready.pair, ready.operation, ready.step_s)
 

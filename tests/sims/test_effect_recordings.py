@@ -1,5 +1,7 @@
 """Whole recordings with each effect: settled from the first sample on, inside the range, told by their truth."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ CASES = [("workshop_29_47", name) for name in effects()] + [
 ]
 
 
+@cache
 def recorded(preset: str, effect: str) -> Recording:
     return simulate(
         "cracked", preset=preset, effects={effect: effects()[effect].severity.typical}, duration_s=0.8, seed=3

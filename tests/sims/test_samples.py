@@ -51,11 +51,17 @@ def test_made_again_the_samples_are_the_same(file, made_again):
         np.testing.assert_allclose(a, b, atol=1.01 * step + 1e-3)
 
 
-def test_made_again_nothing_else_is_there(made_again):
+@pytest.mark.slow
+def test_made_again_the_truth_names_the_same_files(made_again):
     written = {path.name for path in made_again.iterdir()}
-    scripts = {"README.md", *(path.name for path in FOLDER.glob("*.py"))}
-    assert written == {path.name for path in FOLDER.iterdir() if path.is_file()} - scripts
+    assert written == {"truth.json", *FILES, *(f"{file.split('.')[0]}.toml" for file in FILES)}
     assert list(json.loads((made_again / "truth.json").read_text(encoding="utf-8"))) == list(FILES)
+
+
+def test_nothing_else_is_there():
+    scripts = {"README.md", *(path.name for path in FOLDER.glob("*.py"))}
+    kept = {path.name for path in FOLDER.iterdir() if path.is_file()} - scripts
+    assert kept == {"truth.json", *FILES, *(f"{file.split('.')[0]}.toml" for file in FILES)}
 
 
 @pytest.mark.parametrize("file", FILES)
