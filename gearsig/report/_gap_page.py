@@ -9,11 +9,11 @@ from datetime import datetime
 from importlib.metadata import version
 from math import isfinite
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from gearsig import __version__
+from gearsig import __version__, plot
 from gearsig.formatting import named, readable, signed
 from gearsig.gap import (
     NONE,
@@ -38,7 +38,6 @@ from gearsig.gap import (
     severity_unit,
     stance_words,
 )
-from gearsig.plot import AngleMark, Picture, embed
 from gearsig.report._files import render, write_text
 from gearsig.report._sections import Rows
 
@@ -49,8 +48,7 @@ from gearsig.report._sections import Rows
 
 N_DETAILED = 3
 """Causes whose evidence is shown."""
-MOST_ORDERS = 4
-LEAST_SHOWN = 0.01
+MIN_SHOWN = 0.01
 """Below this a group is left out, and a share is said to be below one percent."""
 OUTCOME_CLASSES = {
     "no gap": "no-fault",
@@ -61,8 +59,7 @@ OUTCOME_CLASSES = {
 }
 
 
-@dataclass(frozen=True)
-class PlaceRow:
+class PlaceRow(NamedTuple):
     """A place of the gap as the page shows it."""
 
     title: str
@@ -75,8 +72,7 @@ class PlaceRow:
     bar_percent: float
 
 
-@dataclass(frozen=True)
-class EvidenceRow:
+class EvidenceRow(NamedTuple):
     """A predicted change beside the observed one, in dB; the stance in words, its sign, and the class of its look."""
 
     feature: str
@@ -88,8 +84,7 @@ class EvidenceRow:
     look: str
 
 
-@dataclass(frozen=True)
-class CauseRow:
+class CauseRow(NamedTuple):
     """A cause as the page shows it; statements and evidence of the first ones only."""
 
     name: str
@@ -101,16 +96,6 @@ class CauseRow:
     place: str
     statements: tuple[str, ...] = ()
     evidence: tuple[EvidenceRow, ...] = ()
-
-
-@dataclass(frozen=True)
-class StepRow:
-    """A step of the waterfall: what is left, and how much less than before the step."""
-
-    label: str
-    left: str
-    interval: str
-    taken: str
 
 
 def verdict_rows(report: GapReport) -> Rows:
@@ -149,52 +134,45 @@ def floors_text(report: GapReport) -> str:
 
 def place_rows(report: GapReport) -> tuple[PlaceRow, ...]:
     """Return the places in their order."""
-    return tuple(
-        PlaceRow(
-            place.title[:1].upper() + place.title[1:],
-            _where(place),
-            f"{signed(place.change_db)} dB",
-            readable(place.repeatability, 2),
-            readable(place.structural, 2),
-            _sizes(place),
-            percent(place.share),
-            _bar(place.share),
-        )
-        for place in report.places
+    return tuple(map(_place_row, report.places))
+
+
+def _place_row(place: GapPlace) -> PlaceRow:
+    change, structural, repeatability = (
+        f"{signed(place.change_db)} dB",
+        readable(place.structural, 2),
+        readable(place.repeatability, 2),
     )
-
-
-def _sizes(place: GapPlace) -> str:
-    """Write the change against both floors, or that it was found without them."""
-    if place.follows and not isfinite(place.structural):
-        return f"{signed(place.change_db)} dB over what it is compared with"
-    if not isfinite(place.structural):
-        return "stands out by itself, over the noise beside it"
-    floors = (
-        f"{readable(place.structural, 2)} × structural floor · {readable(place.repeatability, 2)} × repeatability floor"
-    )
-    return f"{signed(place.change_db)} dB · {floors}"
-
-
-def _where(place: GapPlace) -> tuple[str, ...]:
-    orders = ", ".join(readable(order) for order in place.orders[:MOST_ORDERS])
-    more = " …" if len(place.orders) > MOST_ORDERS else ""
-    texts = (
+    sizes = f"{change} · {structural} × structural floor · {repeatability} × repeatability floor"
+    if not isfinite(place.structural):  # it was found without floors
+        over = f"{change} over what it is compared with"
+        sizes = over if place.follows else "stands out by itself, over the noise beside it"
+    orders = ", ".join(readable(order) for order in place.orders[:4]) + (" …" if len(place.orders) > 4 else "")
+    where = (
         place.kind.value,
         named("shaft", place.shaft),
         f"tooth {place.tooth}" if place.tooth is not None else "",
         f"at {readable(place.angle_deg)}°" if place.angle_deg is not None else "",
-        f"{'order' if len(place.orders) == 1 else 'orders'} {orders}{more}" if place.orders else "",
+        f"{'order' if len(place.orders) == 1 else 'orders'} {orders}" if place.orders else "",
         f"{readable(place.band_hz[0])} to {readable(place.band_hz[1])} Hz" if place.band_hz is not None else "",
         named("sensor", place.channel),
     )
-    return tuple(text for text in texts if text)
+    return PlaceRow(
+        place.title[:1].upper() + place.title[1:],
+        tuple(text for text in where if text),
+        change,
+        repeatability,
+        structural,
+        sizes,
+        percent(place.share),
+        _bar(place.share),
+    )
 
 
 def cause_rows(report: GapReport) -> tuple[CauseRow, ...]:
     """Return the causes that have a chance, likeliest first; the first effects with what speaks for and against."""
     detailed = detailed_causes(report)
-    shown = [cause for cause in report.causes if not cause.probability < LEAST_SHOWN or cause in detailed]
+    shown = [cause for cause in report.causes if not cause.probability < MIN_SHOWN or cause in detailed]
     return tuple(_cause_row(cause, detailed=cause in detailed) for cause in shown)
 
 
@@ -245,24 +223,22 @@ def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
     shrink, wrong = shrinkage.shrink, shrinkage.placebo
     taken, low, high = (percent(x) for x in (shrink.value, shrink.low, shrink.high))
     checked = f"checked on {shrinkage.held_out}"
-    placebo = f"takes away at most {percent(wrong)}" if wrong >= LEAST_SHOWN else "takes away nothing"
+    placebo = f"takes away at most {percent(wrong)}" if wrong >= MIN_SHOWN else "takes away nothing"
     if not shrinkage.n_placebos:
         placebo = "could not be tried, as the machine has no other place for it that would look different"
-    elsewhere = shrinkage.elsewhere
+    elsewhere: tuple[str, ...] = ()
+    if shrinkage.elsewhere is not None:
+        part = percent(shrinkage.elsewhere) if shrinkage.elsewhere >= MIN_SHOWN else "nothing"
+        elsewhere = (f"At an operating condition of which only its level was fitted it takes away {part}.",)
     return (
         f"Gap on its own features: {before} structural floors without it, {after} with it.",
         f"It takes away nothing: with it the gap grows, {checked}."
         if shrink.value < 0.0
         else f"It takes away {taken} ({low} to {high}) of what exceeds the floor, {checked}.",
-        *(() if elsewhere is None else (_elsewhere_statement(elsewhere),)),
+        *elsewhere,
         f"In a wrong place (placebo) it {placebo}.",
         f"The observed change is {readable(shrinkage.slope, 2)} times the predicted one; 1 is right.",
     )
-
-
-def _elsewhere_statement(shrink: float) -> str:
-    taken = f"it takes away {percent(shrink)}" if shrink >= LEAST_SHOWN else "it takes away nothing"
-    return f"At an operating condition of which only its level was fitted {taken}."
 
 
 def _evidence_row(one: Evidence) -> EvidenceRow:
@@ -281,7 +257,7 @@ def _evidence_row(one: Evidence) -> EvidenceRow:
 def group_texts(report: GapReport) -> tuple[str, ...]:
     """Return the groups that have a chance, likeliest first."""
     ranked = sorted(report.groups.items(), key=lambda item: -item[1] if isfinite(item[1]) else 0.0)
-    return tuple(f"{group} {percent(p)}" for group, p in ranked if p >= LEAST_SHOWN)
+    return tuple(f"{group} {percent(p)}" for group, p in ranked if p >= MIN_SHOWN)
 
 
 def inseparable_text(report: GapReport) -> str:
@@ -293,11 +269,11 @@ def inseparable_text(report: GapReport) -> str:
     return f"These recordings cannot tell {', '.join(others)} and {last} apart."
 
 
-def step_rows(report: GapReport) -> tuple[StepRow, ...]:
-    """Return the steps of the waterfall."""
+def step_rows(report: GapReport) -> tuple[tuple[str, str, str, str], ...]:
+    """Return the steps of the waterfall: what is left, its interval, and how much less than before the step."""
     before = (None, *(step.left for step in report.steps))
     return tuple(
-        StepRow(
+        (
             step.label,
             readable(step.left.value, 2),
             f"{readable(step.left.low, 2)} to {readable(step.left.high, 2)}",
@@ -373,7 +349,7 @@ def percent(share: float) -> str:
     """
     if not isfinite(share):
         return "–"
-    return "< 1 %" if 0 < share < LEAST_SHOWN else f"{round(100 * share)} %".replace("-", "−")
+    return "< 1 %" if 0 < share < MIN_SHOWN else f"{round(100 * share)} %".replace("-", "−")
 
 
 def _bar(share: float) -> float:
@@ -424,14 +400,14 @@ class GapFigure:
 class GapGallery:
     """The pictures of one question: one per line, side by side, and by the cause that they belong to."""
 
-    wide: tuple[Picture, ...]
-    small: tuple[Picture, ...]
-    of: Mapping[str, Picture]
+    wide: tuple[plot.Picture, ...]
+    small: tuple[plot.Picture, ...]
+    of: Mapping[str, plot.Picture]
 
 
 def gap_galleries(report: GapReport) -> dict[str, GapGallery]:
     """Return the pictures of a page by question."""
-    drawn = [(one, embed(one.figure, one.look, one.shows, vector=one.vector)) for one in gap_figures(report)]
+    drawn = [(one, plot.embed(one.figure, one.look, one.shows, vector=one.vector)) for one in gap_figures(report)]
     return {
         question: GapGallery(
             tuple(p for one, p in drawn if one.question == question and not one.is_small and not one.of),
@@ -456,15 +432,13 @@ def gap_figures(report: GapReport) -> Iterator[GapFigure]:
 
 def _against_reference(report: GapReport) -> Iterator[GapFigure]:
     """Draw what was scored where there is a reference: what has changed since."""
-    from gearsig.plot import gap_averages_figure, gap_orders_figure
-
     for curves in report.spectra:
         if not len(curves.orders) or not len(curves.reference) or not is_finite(curves):
             continue
         view = against_reference(curves)
         yield GapFigure(
             "where",
-            gap_orders_figure(
+            plot.gap_orders_figure(
                 view, beside="reference", marked=report.is_beyond, title=f"{curves.label}: recording against reference"
             ),
             "Above, lines in the grey repeatability floor say nothing. Below, what has changed since the reference, "
@@ -475,7 +449,7 @@ def _against_reference(report: GapReport) -> Iterator[GapFigure]:
         if len(average.angle_deg) and is_finite(average):
             yield GapFigure(
                 "where",
-                gap_averages_figure(average, mark=_mark(report, average)),
+                plot.gap_averages_figure(average, mark=_mark(report, average)),
                 f"One mean revolution of shaft {average.shaft} without what all teeth have in common, on the sensor "
                 "where most has changed. What one tooth does otherwise stands at its angle; noise and other speeds "
                 "leave a little everywhere.",
@@ -485,8 +459,6 @@ def _against_reference(report: GapReport) -> Iterator[GapFigure]:
 
 
 def _spectra(report: GapReport) -> Iterator[GapFigure]:
-    from gearsig.plot import gap_orders_figure
-
     for curves in report.spectra:
         if not len(curves.orders) or not is_finite(curves):
             continue
@@ -499,7 +471,7 @@ def _spectra(report: GapReport) -> Iterator[GapFigure]:
         left = " Green dots: what is left with the likeliest effect." if len(curves.after) else ""
         yield GapFigure(
             "where",
-            gap_orders_figure(curves, marked=scored and report.is_beyond, title=title),
+            plot.gap_orders_figure(curves, marked=scored and report.is_beyond, title=title),
             f"Above, lines in the grey repeatability floor say nothing. Below, the gap line by line. {beyond}{left}",
             f"Order spectrum, {curves.label}: measured, simulated, and their difference in dB.",
         )
@@ -528,21 +500,17 @@ def _beyond_text(report: GapReport, curves: SpectrumCurves) -> str:
 
 def _lines(report: GapReport, curves: SpectrumCurves) -> GapFigure:
     """Draw an envelope spectrum that there is no simulation beside."""
-    from gearsig.plot import gap_lines_figure
-
     families = [place.orders[0] for place in report.places if place.kind is PlaceKind.ENVELOPE and place.orders]
     marks = "Triangles: multiples of the order that was found. " if families else ""
     return GapFigure(
         "where",
-        gap_lines_figure(curves, families[0] if families else None),
+        plot.gap_lines_figure(curves, families[0] if families else None),
         f"{marks}Lines in the grey noise floor say nothing; nothing was simulated beside it.",
         f"Spectrum, {curves.label}: measured, and the noise floor.",
     )
 
 
 def _teeth(report: GapReport) -> Iterator[GapFigure]:
-    from gearsig.plot import gap_teeth_figure
-
     for curves in report.angles:
         if not len(curves.angle_deg) or not is_finite(curves):
             continue
@@ -551,14 +519,14 @@ def _teeth(report: GapReport) -> Iterator[GapFigure]:
         )
         yield GapFigure(
             "where",
-            gap_teeth_figure(curves, mark=_mark(report, curves)),
+            plot.gap_teeth_figure(curves, mark=_mark(report, curves)),
             f"Shaft {curves.shaft}, tooth by tooth: sound teeth draw an even ring, a damaged one swings out.{numbers}",
             f"Energy around one revolution of shaft {curves.shaft}, measured and simulated.",
             is_small=True,
         )
 
 
-def _mark(report: GapReport, curves: AngleCurves | AverageCurves) -> AngleMark | None:
+def _mark(report: GapReport, curves: AngleCurves | AverageCurves) -> plot.AngleMark | None:
     """Return the tooth that the gap names on this shaft."""
     for place in report.places:
         if place.kind is PlaceKind.TOOTH and place.shaft == curves.shaft and place.angle_deg is not None:
@@ -567,19 +535,17 @@ def _mark(report: GapReport, curves: AngleCurves | AverageCurves) -> AngleMark |
                 if place.tooth is not None and curves.has_mark
                 else f"{readable(place.angle_deg)}°"
             )
-            return AngleMark(place.angle_deg, label) if np.isfinite(place.angle_deg) else None
+            return plot.AngleMark(place.angle_deg, label) if np.isfinite(place.angle_deg) else None
     return None
 
 
 def _evidence(report: GapReport) -> Iterator[GapFigure]:
-    from gearsig.plot import gap_evidence_figure
-
     for cause in detailed_causes(report):
         evidence = [one for one in cause.evidence if is_finite(one)]
         if evidence:
             yield GapFigure(
                 "which",
-                gap_evidence_figure(evidence),
+                plot.gap_evidence_figure(evidence),
                 "Where diamond and bar end together, sign and size are right; further: it moved the foretold way, and "
                 "more. Grey: what a healthy machine may change.",
                 f"Predicted and observed changes of the own features of {cause.title}.",
@@ -589,13 +555,11 @@ def _evidence(report: GapReport) -> Iterator[GapFigure]:
 
 
 def _waterfall(report: GapReport) -> Iterator[GapFigure]:
-    from gearsig.plot import gap_waterfall_figure
-
     if len(report.steps) > 1 and all(is_finite(step) for step in report.steps):
         shrinkage = report.causes[0].shrinkage if report.causes else None
         yield GapFigure(
             "how far",
-            gap_waterfall_figure(report.steps, held_out=shrinkage.held_out if shrinkage is not None else ""),
+            plot.gap_waterfall_figure(report.steps, held_out=shrinkage.held_out if shrinkage is not None else ""),
             "What each effect takes away. Within the shaded structural floor there is nothing left to explain.",
             "The gap before, what each added effect takes away, and what is left.",
             vector=True,

@@ -13,7 +13,7 @@ from sims.forging._drive import (
     build_rig,
     schedule,
 )
-from sims.forging._gap_twin import ForgingGapSimulator, ForgingTwin, forging_gap_simulator, worn_curve_um
+from sims.forging._gap_twin import ForgingGapSimulator, ForgingTwin, forging_gap_simulator
 from sims.forging._kernels import bristle, position, reach, weight, younger_pair
 from sims.forging._measure import record, sensors
 from sims.forging._respond import DriveResponse, FirstState, check_convergence, drive_numbers, respond
@@ -50,6 +50,5 @@ __all__ = [
     "sensors",
     "weight",
     "with_effects",
-    "worn_curve_um",
     "younger_pair",
 ]

@@ -46,32 +46,26 @@ _SHOWS_IN = {
 of vibration."""
 
 _WRONG_VALUES = {
-    found.name: found
-    for found in (
-        GapEffect(
+    name: GapEffect(name, group, title, "added_percent", "%", signature, shows_in)
+    for name, group, title, signature, shows_in in (
+        (
             "load_inertia",
             "drive and load",
             "another inertia of the load",
-            "added_percent",
-            "%",
             "torque against acceleration of the driven gear, in starts and stops",
             ("inertia",),
         ),
-        GapEffect(
+        (
             "load_friction",
             "drive and load",
             "more friction of the load's bearings",
-            "added_percent",
-            "%",
             "torque that turns the load without accelerating it",
             ("load_friction",),
         ),
-        GapEffect(
+        (
             "torque_gain",
             "measurement",
             "a torque sensor that reads too much or too little",
-            "added_percent",
-            "%",
             "inertia and friction of the load seem to change alike",
             ("inertia", "load_friction", "deflection"),
         ),
@@ -114,8 +108,41 @@ class ForgingTwin:
         return replace(self, point=replace(self.point, torque_nm=self.point.torque_nm * factor))
 
     def worn_curve_um(self, deflection_um: float, depth_um: float, n_places: int) -> FloatArray:
-        """Return how much further the driver turns, at each place of the mesh cycle, with worn teeth, (n_places,)."""
-        return worn_curve_um(self.parameters, deflection_um, depth_um, n_places)
+        """Return how much further the driver turns, at each place of the mesh cycle, with worn teeth, (n_places,).
+
+        A pair whose flank has lost h touches later: Σ (δ − h_i)₊^λ = n g^λ at an equal load, g the deflection of n
+        healthy pairs. Where two pairs share the load, the less worn one decides. Wear is that of the driver's teeth,
+        by Archard's law (`sims.mesh.wear_profile`).
+
+        Parameters
+        ----------
+        deflection_um : float
+            Of one pair under the ordinary load; 20 µm where it is not known.
+        depth_um : float
+            Where the wear is greatest.
+        n_places : int
+        """
+        module = float(self.parameters["module_mm"])
+        teeth = int(float(self.parameters["teeth_driver"])), int(float(self.parameters["teeth_driven"]))
+        driver, driven = (GearGeometry(z, module, 20.0, face_width_mm=16.0 * module) for z in teeth)
+        pair = PairGeometry(driver, driven)
+        path = standard_path(teeth, 1e-3 * module, radians(20.0))
+        u = (np.arange(n_places) + 0.5) / n_places
+        positions = np.stack([u, u + 1.0])
+        touches = positions < path.contact_ratio
+        worn = depth_um * np.stack([wear_profile(pair, 1, 1e3 * path.driver_lever_m(row)) for row in positions])
+        exponent = float(self.parameters["exponent"])
+        g = deflection_um if np.isfinite(deflection_um) and deflection_um > 0.0 else 20.0
+        n = np.sum(touches, axis=0)
+        load = g**exponent  # of one pair: with two the compression is less
+        healthy = g / n ** (1.0 / exponent)
+        low, high = np.zeros(n_places), healthy + depth_um
+        for _ in range(40):  # bisections: 1e-12 of the first interval
+            middle = 0.5 * (low + high)
+            carried = np.sum(np.where(touches, np.maximum(middle - worn, 0.0) ** exponent, 0.0), axis=0)
+            low, high = np.where(carried < load, middle, low), np.where(carried < load, high, middle)
+        curve: FloatArray = 0.5 * (low + high) - healthy
+        return curve
 
     def crack_stiffness_loss(self, crack: Added) -> float:
         """Return which part of its stiffness a cracked tooth loses."""
@@ -151,7 +178,11 @@ class ForgingGapSimulator:
 
     def gap_effects(self) -> dict[str, GapEffect]:
         """Return the effects that have a meaning for this model."""
-        return {name: _of_catalogue(name) for name in _SHOWS_IN} | _WRONG_VALUES
+        known = [(effect(name), shows_in) for name, shows_in in _SHOWS_IN.items()]
+        return {
+            one.name: GapEffect(one.name, one.group, one.title, one.severity.name, one.severity.unit, shows_in=shows_in)
+            for one, shows_in in known
+        } | _WRONG_VALUES
 
     def drive_twin_of(self, facts: DriveFacts) -> ForgingTwin:
         """Return the drive by the rig's contact; what neither rig nor recording tells is usual for its size."""
@@ -199,11 +230,6 @@ def forging_gap_simulator() -> ForgingGapSimulator:
     return ForgingGapSimulator()
 
 
-def _of_catalogue(name: str) -> GapEffect:
-    known, severity = effect(name), effect(name).severity
-    return GapEffect(known.name, known.group, known.title, severity.name, severity.unit, shows_in=_SHOWS_IN[name])
-
-
 def _settings(added: Sequence[Added]) -> tuple[EffectSetting, ...]:
     """Return the catalogue's settings; none of what is a parameter's wrong value."""
     return tuple(
@@ -223,43 +249,3 @@ def _with_wrong_value(added: Added, parameters: Parameters) -> Parameters:
         read = ("brake_nm", "drag_nm", "drag_viscous_nm_s_per_rad")
         return {**parameters, **{key: float(parameters[key]) / factor for key in read}, "torque_gain": factor}
     return parameters
-
-
-def worn_curve_um(parameters: Parameters, deflection_um: float, depth_um: float, n_places: int) -> FloatArray:
-    """Return how much further the driver turns, at each place of the mesh cycle, with worn teeth, (n_places,).
-
-    A pair whose flank has lost h touches later: Σ (δ − h_i)₊^λ = n g^λ at an equal load, g the deflection of n healthy
-    pairs. Where two pairs share the load, the less worn one decides. Wear is that of the driver's teeth, by Archard's
-    law (`sims.mesh.wear_profile`).
-
-    Parameters
-    ----------
-    parameters : mapping
-        Of the drive.
-    deflection_um : float
-        Of one pair under the ordinary load; 20 µm where it is not known.
-    depth_um : float
-        Where the wear is greatest.
-    n_places : int
-    """
-    module = float(parameters["module_mm"])
-    teeth = int(float(parameters["teeth_driver"])), int(float(parameters["teeth_driven"]))
-    driver, driven = (GearGeometry(z, module, 20.0, face_width_mm=16.0 * module) for z in teeth)
-    pair = PairGeometry(driver, driven)
-    path = standard_path(teeth, 1e-3 * module, radians(20.0))
-    u = (np.arange(n_places) + 0.5) / n_places
-    positions = np.stack([u, u + 1.0])
-    touches = positions < path.contact_ratio
-    worn = depth_um * np.stack([wear_profile(pair, 1, 1e3 * path.driver_lever_m(row)) for row in positions])
-    exponent = float(parameters["exponent"])
-    g = deflection_um if np.isfinite(deflection_um) and deflection_um > 0.0 else 20.0
-    n = np.sum(touches, axis=0)
-    load = g**exponent  # of one pair: with two the compression is less
-    healthy = g / n ** (1.0 / exponent)
-    low, high = np.zeros(n_places), healthy + depth_um
-    for _ in range(40):  # bisections: 1e-12 of the first interval
-        middle = 0.5 * (low + high)
-        carried = np.sum(np.where(touches, np.maximum(middle - worn, 0.0) ** exponent, 0.0), axis=0)
-        low, high = np.where(carried < load, middle, low), np.where(carried < load, high, middle)
-    curve: FloatArray = 0.5 * (low + high) - healthy
-    return curve

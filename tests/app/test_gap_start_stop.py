@@ -17,7 +17,7 @@ from gearsig.recording import write_recording
 from gearsig.report import gap_schema, read_gap_json
 from gearsig.rig import write_rig
 from sims import simulate
-from sims.forging import forging_gap_simulator, worn_curve_um
+from sims.forging import forging_gap_simulator
 from sims.registry import gap_simulator, gap_simulators
 
 SIMULATOR = forging_gap_simulator()
@@ -185,12 +185,12 @@ def by_its_rig():
 
 
 def test_worn_flanks_touch_later_where_they_slide_most(by_its_rig):
-    parameters = by_its_rig.twin.parameters
-    curve = worn_curve_um(parameters, 20.0, 60.0, 20)
+    twin = by_its_rig.twin
+    curve = twin.worn_curve_um(20.0, 60.0, 20)
     assert np.all(curve >= -1e-6)
     assert np.max(curve) < 60.0
     assert np.ptp(curve) > 5.0
-    assert worn_curve_um(parameters, 20.0, 0.0, 20) == pytest.approx(np.zeros(len(curve)), abs=1e-6)
+    assert twin.worn_curve_um(20.0, 0.0, 20) == pytest.approx(np.zeros(len(curve)), abs=1e-6)
 
 
 @pytest.mark.parametrize("depth_um", [30.0, 60.0, 120.0])

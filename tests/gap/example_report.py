@@ -366,7 +366,7 @@ def with_reference(curves: SpectrumCurves) -> SpectrumCurves:
 
 def average(shaft: str, teeth: int, tooth: int | None = None) -> AverageCurves:
     """Return teeth that differ a little, and a burst at a tooth where one is given."""
-    angle = np.arange(1440) / 4.0
+    angle = np.arange(480) * 0.75
     born = 2.0 * np.sin(np.radians(31 * angle)) + np.sin(np.radians(17 * angle))
     burst = np.zeros_like(angle)
     if tooth is not None:
@@ -377,7 +377,7 @@ def average(shaft: str, teeth: int, tooth: int | None = None) -> AverageCurves:
 
 def angles(shaft: str, teeth: int, tooth: int | None = None) -> AngleCurves:
     """Return the energy along one revolution, with a peak at a tooth where one is given."""
-    angle = np.arange(720) / 2.0
+    angle = np.arange(360) * 1.0
     even = 1 + 0.15 * np.sin(np.radians(3 * angle))
     peak = np.zeros_like(angle)
     if tooth is not None:

@@ -114,10 +114,18 @@ def test_what_is_not_finite_becomes_null(a, b, c):
         shrinkage=replace(shrinkage(a, b, c), slope=c, placebo=a),
         evidence=(Evidence("f", a, b, c, speaks_for=True),),
     )
-    curves = replace(report.spectra[0], measured=np.full(4, a), floor=np.full(4, b))
+    four = {name: values[:4] for name, values in vars(report.spectra[0]).items() if isinstance(values, np.ndarray)}
+    curves = replace(report.spectra[0], **four | {"measured": np.full(4, a), "floor": np.full(4, b)})
     place = replace(report.places[0], change_db=a, structural=b, angle_deg=c, orders=(a, b))
     strange = replace(
-        report, causes=(cause,), places=(place,), spectra=(curves,), size=Interval(a, b, c), repeatability=b
+        report,
+        causes=(cause,),
+        places=(place,),
+        spectra=(curves,),
+        angles=(),
+        averages=(),
+        size=Interval(a, b, c),
+        repeatability=b,
     )
     found = strict(gap_to_json(strange))
     VALIDATOR.validate(found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any
@@ -297,14 +298,9 @@ def _show_how_far(finished: Finished) -> None:
             "What is left of the whole gap as the simulator gets more effects, on data that no severity was fitted to, "
             "in structural floors."
         )
-        _table(
-            {
-                "simulator": [row.label if i == 0 else f"+ {row.label}" for i, row in enumerate(rows)],
-                "left": [row.left for row in rows],
-                "90 % interval": [row.interval for row in rows],
-                "change": [row.taken for row in rows],
-            }
-        )
+        labels, left, intervals, taken = zip(*rows, strict=True)
+        simulators = [label if i == 0 else f"+ {label}" for i, label in enumerate(labels)]
+        _table({"simulator": simulators, "left": left, "90 % interval": intervals, "change": taken})
     else:
         st.markdown("No effect was added to the simulator. The gap stays as it is.")
     _show_figures(finished, "how far")
@@ -341,7 +337,9 @@ def _show_figure(finished: Finished, one: GapFigure) -> None:
     st.caption(as_typed(one.look))
 
 
-def _table(columns: dict[str, list[Any]], bars: tuple[str, ...] = (), widths: dict[str, int] | None = None) -> None:
+def _table(
+    columns: Mapping[str, Sequence[Any]], bars: tuple[str, ...] = (), widths: dict[str, int] | None = None
+) -> None:
     """Show a table; columns of stated widths, in pixels, are broken into two lines."""
     config: dict[str, Any] = {
         name: st.column_config.ProgressColumn(format="%.0f %%", min_value=0, max_value=100, width="small")
