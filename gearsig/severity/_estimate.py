@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, exp, log, pi, radians, sin, tan
 
@@ -44,11 +44,6 @@ from gearsig.severity._model import (
     kind_vector,
     load_calibration,
 )
-
-# --------------------
-# From a recording to what it says of each gear of its pair: the most conspicuous tooth and its features.
-# --------------------
-
 
 MIN_HARMONICS = 4
 """Mesh harmonics below the highest order: with fewer, one resonance decides."""
@@ -124,22 +119,18 @@ def _one_gear(
     marked = any(a.has_mark and b.has_mark for a, b in zip(now, healthy, strict=True))
     _check_harmonics(healthy[i], "the reference's")
     difference, agreement = difference_lines(shaft, healthy[i], whole_teeth=marked)
-    _check_differs(difference, shaft)
+    left, largest = np.abs(without_regular_lines(difference)).max(axis=1), np.abs(shaft.lines).max(axis=1)
+    if not np.all(left > SMALLEST_DIFFERENCE * largest):
+        raise RefusalError(
+            "the reference holds the same samples as the recording",
+            remedy="give a recording that was taken before the crack",
+        )
     n = n_bands(difference)
     mesh = np.sqrt(mesh_energies(shaft, n) * mesh_energies(healthy[i], n))
     event = find_event(difference)
     features = feature_vector(difference, healthy[i], mesh, event, conditions)
     shape = event_shape(difference, event)
     return GearEvidence(shaft, event, features, difference, healthy[i], shape, agreement)
-
-
-def _check_differs(difference: ShaftLines, shaft: ShaftLines) -> None:
-    largest = np.max(np.abs(shaft.lines), axis=1)
-    if not np.all(np.max(np.abs(without_regular_lines(difference)), axis=1) > SMALLEST_DIFFERENCE * largest):
-        raise RefusalError(
-            "the reference holds the same samples as the recording",
-            remedy="give a recording that was taken before the crack",
-        )
 
 
 def _check_harmonics(shaft: ShaftLines, whose: str = "the recording's") -> None:
@@ -151,11 +142,6 @@ def _check_harmonics(shaft: ShaftLines, whose: str = "the recording's") -> None:
         )
     if not np.all(mesh_energies(shaft, MIN_HARMONICS) > 0):
         raise RefusalError("a channel holds no mesh vibration at all", remedy="leave the dead channel out")
-
-
-# --------------------
-# What the rig file must say for crack severity, checked: one spur pair, its size, its load.
-# --------------------
 
 
 PRESSURE_ANGLE_DEG = 20.0
@@ -264,11 +250,6 @@ def check_alive(recording: Recording, names: tuple[str, ...], whose: str = "") -
         )
 
 
-# --------------------
-# Whether a recording and its reference belong together: gears, load, speed, gain; and which of both is damaged.
-# --------------------
-
-
 LARGEST_TORQUE_CHANGE = 0.10
 """Relative, as in the calibration."""
 
@@ -286,11 +267,12 @@ def check_same_rig(now: Rig, healthy: Rig) -> None:
     ------
     RefusalError
     """
-    teeth, reference_teeth = ([(p.driver_teeth, p.driven_teeth) for p in rig.pairs] for rig in (now, healthy))
+    teeth, reference_teeth = (
+        ", ".join(f"{p.driver_teeth or '?'}/{p.driven_teeth or '?'}" for p in rig.pairs) for rig in (now, healthy)
+    )
     if reference_teeth and teeth != reference_teeth:
         raise RefusalError(
-            f"the reference is of another machine: its teeth are {_teeth_text(reference_teeth)}, "
-            f"the recording's {_teeth_text(teeth)}",
+            f"the reference is of another machine: its teeth are {reference_teeth}, the recording's {teeth}",
             remedy=_REMEDY,
         )
     torque, reference_torque = now.operating_point.torque_nm, healthy.operating_point.torque_nm
@@ -310,7 +292,9 @@ def check_same_level(now: Sequence[ShaftLines], healthy: Sequence[ShaftLines]) -
     RefusalError
     """
     check_same_speed(now[0], healthy[0])
-    for name, change_db in zip(now[0].channels, mesh_change_db(now[0], healthy[0]), strict=True):
+    n = min(n_bands(now[0]), n_bands(healthy[0]))
+    levels = [10.0 * np.log10(np.maximum(mesh_energies(s, n), np.finfo(float).tiny)) for s in (now[0], healthy[0])]
+    for name, change_db in zip(now[0].channels, np.median(levels[0] - levels[1], axis=0), strict=True):
         if abs(change_db) > LARGEST_LEVEL_CHANGE_DB:
             side = "above" if change_db > 0 else "below"
             raise RefusalError(
@@ -318,14 +302,6 @@ def check_same_level(now: Sequence[ShaftLines], healthy: Sequence[ShaftLines]) -
                 "unit or load",
                 remedy=_REMEDY,
             )
-
-
-def mesh_change_db(now: ShaftLines, healthy: ShaftLines) -> FloatArray:
-    """Return for each channel by how much the median mesh harmonic has risen since the reference, in dB."""
-    n = min(n_bands(now), n_bands(healthy))
-    energies = (np.maximum(mesh_energies(shaft, n), np.finfo(float).tiny) for shaft in (now, healthy))
-    ratios: FloatArray = np.median(np.subtract(*(10.0 * np.log10(e) for e in energies)), axis=0)
-    return ratios
 
 
 def share_of_the_recording(now: ShaftLines, difference: ShaftLines, event: ToothEvent) -> tuple[float, float]:
@@ -358,22 +334,6 @@ def share_of_the_recording(now: ShaftLines, difference: ShaftLines, event: Tooth
     return float(shares.mean()), float(shares.std() / np.sqrt(shares.size))
 
 
-def _teeth_text(teeth: Sequence[tuple[int | None, int | None]]) -> str:
-    return ", ".join("/".join(str(z) if z is not None else "?" for z in pair) for pair in teeth)
-
-
-# --------------------
-# How thick the root of a standard spur gear's tooth is, and which part of it a crack takes away.
-# --------------------
-
-
-DEDENDUM, TOOL_TIP_RADIUS = 1.25, 0.38
-"""Of the standard rack, in modules (ISO 53, profile A)."""
-
-CRACK_ANGLE_DEG = 45.0
-"""Between the crack and the tooth's centre line, as in the calibration."""
-
-
 def root_thickness_mm(teeth: int, module_mm: float, pressure_angle_deg: float = 20.0) -> float:
     """Return the thickness of the tooth at the middle of its fillet, where cracks start.
 
@@ -404,17 +364,18 @@ def root_thickness_mm(teeth: int, module_mm: float, pressure_angle_deg: float = 
     """
     alpha = radians(pressure_angle_deg)
     gamma = 0.5 * (pi / 2.0 + alpha)
-    h = DEDENDUM - TOOL_TIP_RADIUS
-    b1 = pi / 4.0 + h * tan(alpha) + TOOL_TIP_RADIUS / cos(alpha)
+    tip_radius = 0.38  # of the standard rack, in modules, as its dedendum of 1.25 (ISO 53, profile A)
+    h = 1.25 - tip_radius
+    b1 = pi / 4.0 + h * tan(alpha) + tip_radius / cos(alpha)
     r = 0.5 * teeth
     phi = (h / tan(gamma) + b1) / r
-    reach = h / sin(gamma) + TOOL_TIP_RADIUS
+    reach = h / sin(gamma) + tip_radius
     return 2.0 * module_mm * (r * sin(phi) - reach * cos(gamma - phi))
 
 
 def percent_per_mm(teeth: int, module_mm: float, pressure_angle_deg: float = 20.0) -> float:
-    """Return the percentage of the root's thickness that 1 mm of a crack at 45° takes away."""
-    return 100.0 * sin(radians(CRACK_ANGLE_DEG)) / root_thickness_mm(teeth, module_mm, pressure_angle_deg)
+    """Return the percentage of the root's thickness that 1 mm of a crack at 45° to the tooth's centre line takes."""
+    return 100.0 * sin(radians(45.0)) / root_thickness_mm(teeth, module_mm, pressure_angle_deg)
 
 
 SMALLEST_AGREEMENT = 0.4
@@ -506,7 +467,10 @@ def estimate_crack(
     prepared = prepare(recording, rig)
     facts = pair_facts(prepared.rig, torque_nm)
     used = calibration or load_calibration()
-    _check_relief(tip_relief_um, used.reach)
+    if tip_relief_um is not None:  # beyond any in the calibration it is a wrong unit's
+        most = MAX_RELIEF_SHARE * used.reach["load_mpa"][1] * used.reach["module_mm"][1] / STIFFNESS_N_PER_MM_UM
+        remedy = "give what is ground off at the tips, in µm"
+        within(tip_relief_um, "tip_relief_um", 0.0, round(most), "µm", remedy=remedy)
     names = acceleration_channels(prepared.recording, tuple(channels))
     check_alive(prepared.recording, names)
     now = pair_lines(prepared, None, facts.pair, names)
@@ -524,14 +488,6 @@ def estimate_crack(
     return judge(evidence, used.models[way + ("" if tip_relief_um is None else RELIEF_KNOWN)], used, facts)
 
 
-def _check_relief(tip_relief_um: float | None, reach: Mapping[str, tuple[float, float]]) -> None:
-    """Refuse a tip relief beyond any in the calibration, as a wrong unit makes."""
-    if tip_relief_um is None:
-        return
-    most_um = round(MAX_RELIEF_SHARE * reach["load_mpa"][1] * reach["module_mm"][1] / STIFFNESS_N_PER_MM_UM)
-    within(tip_relief_um, "tip_relief_um", 0.0, most_um, "µm", remedy="give what is ground off at the tips, in µm")
-
-
 def reach_of(facts: PairFacts, mesh_hz: float) -> dict[str, float]:
     """Return the quantities whose range limits the calibration."""
     return {
@@ -547,25 +503,20 @@ def judge(
     gears: Sequence[GearEvidence], model: DepthModel, calibration: Calibration, facts: PairFacts
 ) -> CrackEstimate | NoCrackSeen:
     """Decide whether the clearest event is a crack, and how deep it is or may be."""
-    scores = [model.score(evidence.features) for evidence in gears]
-    best = max(range(len(gears)), key=lambda i: scores[i])
-    clear = scores[best] >= model.threshold
-    if clear and _strange_reference(gears):  # then its pattern is in the difference: ask for as much as without it
+    best = max(gears, key=lambda evidence: model.score(evidence.features))
+    clear = model.score(best.features) >= model.threshold
+    agreements = {evidence.shaft.shaft: evidence.agreement for evidence in gears if evidence.agreement is not None}
+    weakest = min(agreements, key=lambda shaft: agreements[shaft], default=None)
+    strange = weakest is not None and agreements[weakest] < SMALLEST_AGREEMENT
+    if clear and strange:  # then the reference's pattern is in the difference: ask for as much as without it
         alone = calibration.models[ALONE]
-        clear = alone.score(gears[best].features) >= alone.threshold
-    return _seen(gears, best, model, calibration, facts) if clear else _none_seen(gears, best, model, facts)
-
-
-def _strange_reference(gears: Sequence[GearEvidence]) -> bool:
-    return any(e.agreement is not None and e.agreement < SMALLEST_AGREEMENT for e in gears)
-
-
-def _none_seen(gears: Sequence[GearEvidence], best: int, model: DepthModel, facts: PairFacts) -> NoCrackSeen:
-    if _strange_reference(gears):
-        weakest = min(gears, key=lambda e: e.agreement if e.agreement is not None else 1.0)
+        clear = alone.score(best.features) >= alone.threshold
+    if clear:
+        return _seen(gears, best, model, calibration, facts)
+    if strange and weakest is not None:
         raise RefusalError(
-            f"the teeth's own pattern on shaft {weakest.shaft.shaft!r} agrees with that of the reference by "
-            f"{weakest.agreement:.2f} only",
+            f"the teeth's own pattern on shaft {weakest!r} agrees with that of the reference by "
+            f"{agreements[weakest]:.2f} only",
             remedy="take a reference of the same gears, same sensors, same speed and load; or leave it out. Teeth that "
             "hardly differ have no pattern to agree by: then a longer recording may help",
         )
@@ -575,82 +526,73 @@ def _none_seen(gears: Sequence[GearEvidence], best: int, model: DepthModel, fact
         limits.append((percent / percent_per_mm(evidence.shaft.teeth, facts.module_mm), percent))
     below_mm, below_percent = max(limits)
     if below_percent > LARGEST_BOUND_PERCENT:
-        alone = gears[best].agreement is None
+        healthy = "give a reference of the same gears when they were healthy"
         raise RefusalError(
             f"no crack stands out, but one of up to {below_mm:.1f} mm ({below_percent:.0f} % of the root) might hide "
             "among the teeth's own differences",
-            remedy="give a reference of the same gears when they were healthy"
-            if alone
-            else "record longer, at higher load",
+            remedy=healthy if best.agreement is None else "record longer, at higher load",
         )
-    features = gears[best].features
     return NoCrackSeen(
         below_mm,
         below_percent,
-        model.p_value(model.score(features)),
-        gears[best].agreement is not None,
-        dict(zip(FEATURES, features.tolist(), strict=True)),
-        (_reference_text(gears[best]),),
+        model.p_value(model.score(best.features)),
+        best.agreement is not None,
+        dict(zip(FEATURES, best.features.tolist(), strict=True)),
+        (_reference_text(best),),
     )
 
 
 def _seen(
-    gears: Sequence[GearEvidence], best: int, model: DepthModel, calibration: Calibration, facts: PairFacts
+    gears: Sequence[GearEvidence], best: GearEvidence, model: DepthModel, calibration: Calibration, facts: PairFacts
 ) -> CrackEstimate:
-    evidence = gears[best]
-    if evidence.agreement is not None:
-        _check_direction(evidence)
-    unlike = model.unlike(evidence.features)
+    shaft, teeth, features = best.shaft.shaft, best.shaft.teeth, best.features
+    if best.agreement is not None:
+        share, error = share_of_the_recording(best.shaft, best.searched, best.event)
+        if share < CLEARLY_OF_THE_REFERENCE and share < -STANDARD_ERRORS * error:
+            raise RefusalError(
+                f"what stands out at one tooth of shaft {shaft!r} seems to be in the reference, not in the recording",
+                remedy="swap both if they were exchanged, or take a reference of healthy gears",
+            )
+    unlike = model.unlike(features)
     if unlike:
         raise RefusalError(
-            f"one tooth stands out on shaft {evidence.shaft.shaft!r}, but unlike the calibration's cracks: {unlike}",
+            f"one tooth stands out on shaft {shaft!r}, but unlike the calibration's cracks: {unlike}",
             remedy="look at the tooth: it may be chipped or spalled, or the machine is unlike the calibration's",
         )
     low, high = model.percent_range
-    centre, reasons = exp(model.log_percent(evidence.features)), [_reference_text(evidence)]
+    centre, reasons = exp(model.log_percent(features)), [_reference_text(best)]
     if not low <= centre <= high:
         reasons.append(f"The estimate of {centre:.0f} % lies beyond the calibration's {low:.0f} to {high:.0f} %.")
     percent = min(max(centre, low), high)
-    bounds = tuple(exp(bound) for bound in model.log_interval(evidence.features))
+    bounds = tuple(exp(bound) for bound in model.log_interval(features))
     interval = min(bounds[0], percent), max(min(bounds[1], 100.0), percent)
-    per_mm = percent_per_mm(evidence.shaft.teeth, facts.module_mm)
-    place = (evidence.event.centre_rev - calibration.lag_pitches / evidence.shaft.teeth) % 1.0
-    others = [e.event.prominence for e in gears if e is not evidence]
-    if evidence.shaft.has_mark:
+    per_mm = percent_per_mm(teeth, facts.module_mm)
+    place = (best.event.centre_rev - calibration.lag_pitches / teeth) % 1.0
+    others = [e.event.prominence for e in gears if e is not best]
+    if best.shaft.has_mark:
         reasons.append("Teeth count from 1 at the mark, as they engage; the place is good to about one tooth.")
     else:
         reasons.append("There is no mark on this shaft: the angle holds for this record only, and names no tooth.")
     reasons.append("The depth supposes a crack through the whole face width.")
-    way = ALONE if evidence.agreement is None else WITH_REFERENCE
-    kinds = calibration.kinds[way].probabilities(kind_vector(evidence.features, evidence.shape))
+    way = ALONE if best.agreement is None else WITH_REFERENCE
     return CrackEstimate(
-        shaft=evidence.shaft.shaft,
-        gear=f"{facts.pair.name}/{evidence.shaft.shaft}",
-        tooth=int(place * evidence.shaft.teeth) % evidence.shaft.teeth + 1 if evidence.shaft.has_mark else None,
+        shaft=shaft,
+        gear=f"{facts.pair.name}/{shaft}",
+        tooth=int(place * teeth) % teeth + 1 if best.shaft.has_mark else None,
         angle_deg=360.0 * place,
-        gear_is_certain=all(log(evidence.event.prominence / other) >= CLEARLY_LARGER for other in others),
+        gear_is_certain=all(log(best.event.prominence / other) >= CLEARLY_LARGER for other in others),
         depth_mm=percent / per_mm,
         depth_percent=percent,
         interval_mm=(interval[0] / per_mm, interval[1] / per_mm),
         interval_percent=interval,
-        p_value=model.p_value(model.score(evidence.features)),
-        with_reference=evidence.agreement is not None,
-        features=dict(zip(FEATURES, evidence.features.tolist(), strict=True)),
+        p_value=model.p_value(model.score(features)),
+        with_reference=best.agreement is not None,
+        features=dict(zip(FEATURES, features.tolist(), strict=True)),
         reasons=tuple(reasons),
-        kind_probabilities=kinds,
-        reach_cycles=reach_cycles(evidence.searched, evidence.event),
-        squeezed_rise_db=squeezed_rise_db(evidence.searched, evidence.healthy, evidence.event),
+        kind_probabilities=calibration.kinds[way].probabilities(kind_vector(features, best.shape)),
+        reach_cycles=reach_cycles(best.searched, best.event),
+        squeezed_rise_db=squeezed_rise_db(best.searched, best.healthy, best.event),
     )
-
-
-def _check_direction(evidence: GearEvidence) -> None:
-    share, error = share_of_the_recording(evidence.shaft, evidence.searched, evidence.event)
-    if share < CLEARLY_OF_THE_REFERENCE and share < -STANDARD_ERRORS * error:
-        raise RefusalError(
-            f"what stands out at one tooth of shaft {evidence.shaft.shaft!r} seems to be in the reference, not in the "
-            "recording",
-            remedy="swap both if they were exchanged, or take a reference of healthy gears",
-        )
 
 
 def _reference_text(evidence: GearEvidence) -> str:

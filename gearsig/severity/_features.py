@@ -14,11 +14,6 @@ from gearsig.errors import RefusalError
 from gearsig.prepared import PreparedRecording, shift_scores, sliding_mean, strongest_window, turned_lines
 from gearsig.rig import GearPair
 
-# --------------------
-# Synchronous averages of the two shafts of a gear pair, as spectra over the order of each shaft.
-# --------------------
-
-
 MIN_REVOLUTIONS = 13
 """Of either shaft: fewer leave the other shaft's orders in its average, and the calibration has no fewer."""
 
@@ -90,11 +85,6 @@ def orders_from_mesh(orders: NDArray[np.intp], teeth: int) -> NDArray[np.intp]:
     """Return how many orders of a shaft lie between each order and the nearest mesh harmonic."""
     distance: NDArray[np.intp] = np.abs((orders + teeth // 2) % teeth - teeth // 2)
     return distance
-
-
-# --------------------
-# The tooth at which a shaft's vibration differs most from that at the other teeth.
-# --------------------
 
 
 MAX_BANDS = 10
@@ -198,11 +188,6 @@ def without_regular_lines(shaft: ShaftLines) -> np.ndarray:
     return lines
 
 
-# --------------------
-# The numbers that the depth is read from.
-# --------------------
-
-
 FEATURES = (
     "band_excess",
     "line_excess",
@@ -244,7 +229,6 @@ _SUB_BANDS = 4
 _MIN_SHARE = 0.1
 """What is left of an energy at least when the background's is taken off: a logarithm follows."""
 _N_OTHER_GATES = 6
-_MESH_WEIGHT = 0.25
 
 
 @dataclass(frozen=True)
@@ -302,7 +286,8 @@ def feature_vector(
     event : ToothEvent
     conditions : Conditions
     """
-    excess, weights = _band_excess(event, mesh)
+    energy = _less_background(event.window[1:], event.background[1:])  # (n_harmonics, n_channels)
+    excess, weights = np.log(energy / mesh), (mesh / mesh.max(axis=0)) ** 0.25  # no gain of a channel changes either
     positions, event_levels = _gated_levels(shaft, event, len(mesh))
     mesh_levels = np.log(mesh)
     harmonics = np.arange(1, len(mesh) + 1)
@@ -312,7 +297,7 @@ def feature_vector(
             float(np.sum(weights * excess) / np.sum(weights)),
             float(np.mean(event_levels - between)),
             np.log(event.prominence),
-            float(np.mean(np.log(_event_energy(event) / _pattern_energies(healthy, len(mesh))))),
+            float(np.mean(np.log(energy / _pattern_energies(healthy, len(mesh))))),
             np.polyfit(positions, event_levels.mean(axis=1), 1)[0],
             np.polyfit(harmonics, mesh_levels.mean(axis=1), 1)[0],
             event_levels.std(axis=0).mean(),
@@ -332,17 +317,6 @@ def mesh_energies(shaft: ShaftLines, n_harmonics: int) -> FloatArray:
     """Return |x[kz]|² for k = 1 …, (n_harmonics, n_channels)."""
     energies: FloatArray = np.abs(shaft.lines[:, shaft.teeth * np.arange(1, n_harmonics + 1)].T) ** 2
     return energies
-
-
-def _band_excess(event: ToothEvent, mesh: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return ln(event/mesh) of each band and channel, and weights that no gain of a channel changes."""
-    return np.log(_event_energy(event) / mesh), (mesh / mesh.max(axis=0)) ** _MESH_WEIGHT
-
-
-def _event_energy(event: ToothEvent) -> FloatArray:
-    """Return the mean square in the window that is the event's, (n_harmonics, n_channels)."""
-    energy: FloatArray = _less_background(event.window[1:], event.background[1:])
-    return energy
 
 
 def _pattern_energies(healthy: ShaftLines, n_harmonics: int) -> FloatArray:
@@ -385,19 +359,10 @@ def _less_background(energy: FloatArray, background: FloatArray) -> FloatArray:
     return left
 
 
-# --------------------
-# The difference between a shaft's average and that of the healthy gear: what every tooth is born with cancels.
-# --------------------
-
-
 LARGEST_SPEED_DIFFERENCE = 0.02
 """Relative, as in the calibration; beyond, resonances amplify both recordings differently."""
 
 LARGEST_GAIN_CHANGE = 0.15
-
-_MESH_HARMONICS = 6
-_FINE_STEPS_PER_TOOTH = 16
-_SHAFT_ORDERS = 4
 
 
 def difference_lines(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool) -> tuple[ShaftLines, float]:
@@ -427,8 +392,13 @@ def difference_lines(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool)
     check_same_speed(now, healthy)
     highest = min(now.highest_order, healthy.highest_order)
     x, r = now.lines[:, : highest + 1], healthy.lines[:, : highest + 1]
-    cross = _weighted_cross(x, r, now.teeth)
-    shifts = _shifts(now, healthy, whole_teeth)
+    # The cross spectrum, summed over channels; strong lines count by their root.
+    orders = np.arange(highest + 1)
+    used = telling_teeth_apart(orders, now.teeth) & (orders <= 6 * now.teeth)
+    size = np.sqrt(np.abs(x) * np.abs(r))
+    cross = np.divide(x * np.conj(r), size, out=np.zeros_like(x), where=(size > 0) & used).sum(axis=0)
+    n = now.teeth * (1 if whole_teeth else 16)
+    shifts = np.zeros(1) if now.has_mark and healthy.has_mark else np.arange(n) / n
     scores = shift_scores(cross, shifts)
     best = int(np.argmax(scores))
     agreement = float(scores[best] / np.abs(cross).sum()) if np.any(cross) else 0.0
@@ -470,29 +440,8 @@ def _matched(reference: np.ndarray, x: np.ndarray, teeth: int) -> np.ndarray:
 
 def telling_teeth_apart(orders: np.ndarray, teeth: int) -> np.ndarray:
     """Return which orders tell one tooth from another; shaft orders, mesh lines and their sidebands hardly do."""
-    used: np.ndarray = (orders > _SHAFT_ORDERS) & (orders_from_mesh(orders, teeth) > 1)
+    used: np.ndarray = (orders > 4) & (orders_from_mesh(orders, teeth) > 1)
     return used
-
-
-def _shifts(now: ShaftLines, healthy: ShaftLines, whole_teeth: bool) -> FloatArray:
-    if now.has_mark and healthy.has_mark:
-        return np.zeros(1)
-    n = now.teeth * (1 if whole_teeth else _FINE_STEPS_PER_TOOTH)
-    return np.arange(n) / n
-
-
-def _weighted_cross(x: np.ndarray, r: np.ndarray, teeth: int) -> np.ndarray:
-    """Cross spectrum, summed over channels; strong lines count by their root."""
-    orders = np.arange(x.shape[1])
-    used = telling_teeth_apart(orders, teeth) & (orders <= _MESH_HARMONICS * teeth)
-    size = np.sqrt(np.abs(x) * np.abs(r))
-    cross: np.ndarray = np.divide(x * np.conj(r), size, out=np.zeros_like(x), where=(size > 0) & used).sum(axis=0)
-    return cross
-
-
-# --------------------
-# What an event looks like in its tooth's engagement: by this a crack is told from a chipped or spalled tooth.
-# --------------------
 
 
 SHAPE = ("lead", "tail", "duration", "kurtosis", "peak", "window_slope")
@@ -526,7 +475,12 @@ def event_shape(searched: ShaftLines, event: ToothEvent) -> FloatArray:
     """
     levels = np.log(np.maximum(event.window, _TINY * event.window.max())).mean(axis=1)
     slope = float(np.polyfit(np.arange(len(levels)), levels, 1)[0])
-    return np.array([*_around(searched, event), *_durations(searched, event), slope])
+    energy = _relative_energy(searched, event)
+    middle, pitch = len(energy) // 2, round(len(energy) / searched.teeth)
+    largest = energy[middle - 3 * pitch // 4 : middle + 3 * pitch // 4].max()
+    before, after = energy[middle - 3 * pitch : middle - pitch], energy[middle + pitch : middle + 3 * pitch]
+    around = [float(np.log(part.mean() / largest)) for part in (before, after)]
+    return np.array([*around, *_durations(searched, event), slope])
 
 
 def reach_cycles(searched: ShaftLines, event: ToothEvent) -> float:
@@ -555,14 +509,6 @@ def _relative_energy(searched: ShaftLines, event: ToothEvent) -> FloatArray:
     shift = len(energy) // 2 - round(event.centre_rev * len(energy)) + width // 2
     relative_energy: FloatArray = np.roll(energy, shift) / np.median(energy)
     return relative_energy
-
-
-def _around(searched: ShaftLines, event: ToothEvent) -> tuple[float, float]:
-    energy = _relative_energy(searched, event)
-    middle, pitch = len(energy) // 2, round(len(energy) / searched.teeth)
-    largest = energy[middle - 3 * pitch // 4 : middle + 3 * pitch // 4].max()
-    before, after = energy[middle - 3 * pitch : middle - pitch], energy[middle + pitch : middle + 3 * pitch]
-    return float(np.log(before.mean() / largest)), float(np.log(after.mean() / largest))
 
 
 def _durations(searched: ShaftLines, event: ToothEvent) -> tuple[float, float, float]:
@@ -596,11 +542,6 @@ def band_signal(searched: ShaftLines, lowest: float, highest: float, centre_rev:
     spectrum[:, used] = lines[:, used]
     signal: FloatArray = np.roll(np.fft.irfft(spectrum, n, axis=1) * n / 2, n // 2 - round(centre_rev * n), axis=1)
     return signal
-
-
-# --------------------
-# How far the synchrosqueezed plane rises at high orders near the tooth.
-# --------------------
 
 
 LOWEST_HARMONIC = 3.5

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,11 +15,17 @@ from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError, RefusalError
 from gearsig.severity._features import FEATURES, RELIEF, RISING, SHAPE, SHAPED
 
-RANGE_MARGIN = 0.05
-"""Of a feature's range in the calibration, by which it may lie beyond."""
-
 MIN_SPREAD = 0.1
 """Of ln percent: no machine is known better than to ten percent."""
+
+
+def _freeze(model: object, shapes: Mapping[str, tuple[int, ...]]) -> None:
+    """Make the arrays of a frozen model read-only, if they have the shapes they must have."""
+    for name, shape in shapes.items():
+        array = frozen_array(getattr(model, name), f"{name} of the model", ndim=len(shape))
+        if array.shape != shape:
+            raise InputError(f"{name} of the model has shape {array.shape}", allowed=str(shape))
+        object.__setattr__(model, name, array)
 
 
 def segments(values: FloatArray, knots: FloatArray) -> FloatArray:
@@ -31,13 +37,8 @@ def segments(values: FloatArray, knots: FloatArray) -> FloatArray:
     [[-2.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 1.0, 3.0]]
     """
     first, second = knots
-    parts = (
-        np.minimum(values, first) - first,
-        np.clip(values, first, second) - first,
-        np.maximum(values, second) - second,
-    )
-    result: FloatArray = np.stack(parts, axis=-1)
-    return result
+    below, between = np.minimum(values, first) - first, np.clip(values, first, second) - first
+    return np.stack([below, between, np.maximum(values, second) - second], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -91,18 +92,10 @@ class DepthModel:
     percent_range: tuple[float, float]
 
     def __post_init__(self) -> None:
-        n = len(FEATURES)
-        for name in ("mean", "scale", "coefficients", "spread", "detection", "lowest", "highest"):
-            length = n + 1 if name == "spread" else n
-            array = frozen_array(getattr(self, name), f"{name} of the model", ndim=1)
-            if len(array) != length:
-                raise InputError(f"{name} of the model has {len(array)} entries", allowed=str(length))
-            object.__setattr__(self, name, array)
-        object.__setattr__(self, "healthy_scores", frozen_array(self.healthy_scores, "healthy_scores", ndim=1))
-        for name in ("precision", "knots", "slopes"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=2))
-        if self.knots.shape != (len(SHAPED), 2) or self.slopes.shape != (len(SHAPED), 3):
-            raise InputError(f"the curves of the model have shapes {self.knots.shape} and {self.slopes.shape}")
+        n, curves = len(FEATURES), len(SHAPED)
+        shapes = dict.fromkeys(("mean", "scale", "coefficients", "detection", "lowest", "highest"), (n,))
+        shapes |= {"spread": (n + 1,), "precision": (n, n), "knots": (curves, 2), "slopes": (curves, 3)}
+        _freeze(self, shapes | {"healthy_scores": self.healthy_scores.shape[:1]})
         rising = [FEATURES.index(name) for name in RISING]
         falls = np.any(self.coefficients[rising] < 0) or np.any(self.slopes < 0) or np.any(self.detection < 0)
         if np.any(self.scale <= 0) or np.any(np.diff(self.knots) <= 0) or falls:
@@ -110,38 +103,15 @@ class DepthModel:
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> DepthModel:
-        """Build it from what a JSON file holds."""
-
-        def array(name: str) -> FloatArray:
-            return np.asarray(values[name], dtype=np.float64)
-
-        def two(name: str) -> tuple[float, float]:
-            low, high = values[name]
-            return float(low), float(high)
-
-        return cls(
-            mean=array("mean"),
-            scale=array("scale"),
-            intercept=float(values["intercept"]),
-            coefficients=array("coefficients"),
-            knots=array("knots"),
-            slopes=array("slopes"),
-            spread=array("spread"),
-            quantiles=two("quantiles"),
-            detection=array("detection"),
-            threshold=float(values["threshold"]),
-            healthy_scores=array("sound_scores"),
-            precision=array("precision"),
-            largest_distance=float(values["largest_distance"]),
-            lowest=array("lowest"),
-            highest=array("highest"),
-            percent_range=two("percent_range"),
-        )
+        """Build it from what a JSON file holds, where the healthy pairs' scores are called sound_scores."""
+        read: dict[str, Callable[[Any], Any]] = {"float": float, "FloatArray": np.asarray}
+        kinds = {f.name: read.get(str(f.type), lambda pair: (float(pair[0]), float(pair[1]))) for f in fields(cls)}
+        named = {"healthy_scores": "sound_scores"}
+        return cls(**{name: kind(values[named.get(name, name)]) for name, kind in kinds.items()})
 
     def standardised(self, features: FloatArray) -> FloatArray:
         """Return (f − m)/s."""
-        result: FloatArray = (features - self.mean) / self.scale
-        return result
+        return np.asarray((features - self.mean) / self.scale)
 
     def log_percent(self, features: FloatArray) -> float:
         """Return the predicted ln of the depth in percent of the root's thickness."""
@@ -154,13 +124,10 @@ class DepthModel:
 
     def log_interval(self, features: FloatArray) -> tuple[float, float]:
         """Return the 90 % interval of ln percent."""
-        centre, spread = self.log_percent(features), self.spread_of(features)
+        # No machine is known better than to ten percent.
+        spread = max(float(self.spread[0] + self.standardised(features) @ self.spread[1:]), MIN_SPREAD)
+        centre = self.log_percent(features)
         return centre + self.quantiles[0] * spread, centre + self.quantiles[1] * spread
-
-    def spread_of(self, features: FloatArray) -> float:
-        """Return σ of ln percent."""
-        spread = float(self.spread[0] + self.standardised(features) @ self.spread[1:])
-        return max(spread, MIN_SPREAD)
 
     def score(self, features: FloatArray) -> float:
         """Return the detection score."""
@@ -171,21 +138,17 @@ class DepthModel:
         higher = len(self.healthy_scores) - int(np.searchsorted(self.healthy_scores, score, side="left"))
         return (1.0 + higher) / (1.0 + len(self.healthy_scores))
 
-    def distance(self, features: FloatArray) -> float:
-        """Return the Mahalanobis distance from the calibration's cracks."""
-        z = self.standardised(features)
-        return float(np.sqrt(z @ self.precision @ z))
-
     def unlike(self, features: FloatArray) -> str:
         """Say in which way a feature vector is unlike the calibration's cracks; empty if it is not."""
-        margin = RANGE_MARGIN * (self.highest - self.lowest)
+        margin = 0.05 * (self.highest - self.lowest)
         beyond = np.maximum(self.lowest - margin - features, features - self.highest - margin)
         beyond[np.diag(self.precision) == 0] = 0.0  # a clearer event than any in the calibration is no harm
         i = int(np.argmax(beyond))
         if beyond[i] > 0:
             allowed = f"{self.lowest[i]:.2f} to {self.highest[i]:.2f}"
             return f"its {FEATURES[i]} is {features[i]:.2f}, the calibration has {allowed}"
-        distance = self.distance(features)
+        z = self.standardised(features)
+        distance = float(np.sqrt(z @ self.precision @ z))  # Mahalanobis
         if distance > self.largest_distance:
             return f"its features lie {distance:.1f} from their middle, the limit is {self.largest_distance:.1f}"
         return ""
@@ -204,12 +167,8 @@ class DepthModel:
         return result
 
 
-# --------------------
-# Whether what was seen is a crack, or a chipped or spalled tooth.
-# --------------------
-
-
 CRACKED, CHIPPED, SPALLED = KINDS = ("cracked", "chipped", "spalled")
+OTHER_DAMAGE = "chipped or spalled"
 
 _OF_SIZE = ("band_excess", "line_excess", "prominence", "pattern_excess")
 """How large the event is and how far it stands out: a deep crack is no chip for being large."""
@@ -220,8 +179,7 @@ KIND_FEATURES = (*(FEATURES[i] for i in _USED), *SHAPE)
 
 def kind_vector(features: FloatArray, shape: FloatArray) -> FloatArray:
     """Return what the kind is read from, in the order of `KIND_FEATURES`."""
-    vector: FloatArray = np.concatenate([np.asarray(features)[_USED], shape])
-    return vector
+    return np.concatenate([np.asarray(features)[_USED], shape])
 
 
 @dataclass(frozen=True)
@@ -242,11 +200,7 @@ class KindModel:
 
     def __post_init__(self) -> None:
         n = len(KIND_FEATURES)
-        for name, shape in (("mean", (n,)), ("scale", (n,)), ("weights", (len(KINDS), n + 1))):
-            array = frozen_array(getattr(self, name), f"{name} of the kind's model", ndim=len(shape))
-            if array.shape != shape:
-                raise InputError(f"{name} of the kind's model has shape {array.shape}", allowed=str(shape))
-            object.__setattr__(self, name, array)
+        _freeze(self, {"mean": (n,), "scale": (n,), "weights": (len(KINDS), n + 1)})
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> KindModel:
@@ -259,11 +213,6 @@ class KindModel:
         levels = self.weights[:, 0] + self.weights[:, 1:] @ z
         shares = np.exp(levels - levels.max())
         return dict(zip(KINDS, (shares / shares.sum()).tolist(), strict=True))
-
-
-# --------------------
-# The calibration that is kept with the product: its models, and the machines they were made from.
-# --------------------
 
 
 FILE = Path(__file__).with_name("calibration.json")
@@ -345,19 +294,6 @@ def load_calibration() -> Calibration:
     return Calibration.from_mapping(json.loads(FILE.read_text(encoding="utf-8")))
 
 
-# --------------------
-# What an estimate of crack severity says: a depth with its interval, or how deep a crack may be without showing.
-# --------------------
-
-
-COVERAGE = 0.90
-"""Part of the cases in which the interval is meant to hold the true depth."""
-
-CRACKED_FROM, OTHER_UP_TO = 0.7, 0.1
-"""Probabilities of a crack from which it is called cracked, and up to which chipped or spalled; between, it is left
-open. Very even gears, as in the demonstrations, let deep cracks look like chips: the second needs more evidence."""
-
-
 @dataclass(frozen=True)
 class CrackEstimate:
     """A damaged tooth was seen; whether it is cracked, and how deep the crack is, if it is one.
@@ -377,7 +313,7 @@ class CrackEstimate:
     depth_mm, depth_percent : float
         Length of a straight crack at 45° through the face width, and the part of the root's thickness it takes away.
     interval_mm, interval_percent : tuples of two floats
-        Holds the depth in `COVERAGE` of the cases, among machines like the calibration's.
+        Holds the depth in 90 % of the cases, among machines like the calibration's.
     p_value : float
         Chance of as clear an event on a healthy gear pair, among the calibration's healthy ones.
     with_reference : bool
@@ -420,11 +356,12 @@ class CrackEstimate:
 
     @property
     def kind(self) -> str:
-        """What the event looks like: "cracked", "chipped or spalled", or "undecided"."""
+        """What the event looks like: "cracked", "chipped or spalled", or "undecided".
+
+        Very even gears, as in the demonstrations, let deep cracks look like chips: that takes more evidence.
+        """
         cracked = self.kind_probabilities.get(CRACKED, 1.0)
-        if cracked >= CRACKED_FROM:
-            return CRACKED
-        return "chipped or spalled" if cracked <= OTHER_UP_TO else "undecided"
+        return CRACKED if cracked >= 0.7 else OTHER_DAMAGE if cracked <= 0.1 else "undecided"
 
     @property
     def likelier_other(self) -> bool:
@@ -432,21 +369,27 @@ class CrackEstimate:
         return self.kind_probabilities.get(CRACKED, 1.0) < 0.5
 
     @property
+    def place(self) -> str:
+        """Tooth or angle, and the gear, in words."""
+        where = f"tooth {self.tooth}" if self.tooth is not None else f"{self.angle_deg:.0f}°"
+        return f"{where} of {self.gear}{'' if self.gear_is_certain else ' (or its mate)'}"
+
+    @property
+    def size(self) -> str:
+        """The depth with its interval, in words."""
+        return f"{self.depth_mm:.1f} mm ({self.interval_mm[0]:.1f} to {self.interval_mm[1]:.1f} mm)"
+
+    @property
     def text(self) -> str:
         """The statement in one sentence, or two."""
-        where = f"tooth {self.tooth}" if self.tooth is not None else f"{self.angle_deg:.0f}°"
-        doubt = "" if self.gear_is_certain else " (or its mate)"
-        size = f"{self.depth_mm:.1f} mm ({self.interval_mm[0]:.1f} to {self.interval_mm[1]:.1f} mm)"
-        place = f"{where} of {self.gear}{doubt}"
-        other = 100.0 * (1.0 - self.kind_probabilities.get(CRACKED, 1.0))
-        if self.kind == "chipped or spalled":
-            return (
-                f"Damage at {place}, chipped or spalled rather than cracked ({other:.0f} %); a crack would be {size}."
-            )
+        other = f"{100.0 * (1.0 - self.kind_probabilities.get(CRACKED, 1.0)):.0f} %"
+        if self.kind == OTHER_DAMAGE:
+            rather = f"{OTHER_DAMAGE} rather than cracked ({other})"
+            return f"Damage at {self.place}, {rather}; a crack would be {self.size}."
         if self.likelier_other:
-            return f"Damage at {place}: chipped or spalled ({other:.0f} %), or a crack of {size}."
-        text = f"Crack of {size}, {self.depth_percent:.0f} % of the root, at {place}."
-        return text if self.kind == CRACKED else f"{text} Or it is chipped or spalled ({other:.0f} %)."
+            return f"Damage at {self.place}: {OTHER_DAMAGE} ({other}), or a crack of {self.size}."
+        text = f"Crack of {self.size}, {self.depth_percent:.0f} % of the root, at {self.place}."
+        return text if self.kind == CRACKED else f"{text} Or it is {OTHER_DAMAGE} ({other})."
 
 
 @dataclass(frozen=True)
