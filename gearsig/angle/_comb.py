@@ -60,6 +60,11 @@ class CombLines:
         return tuple(sorted({m for m, _ in self.stages}))
 
     @property
+    def mesh_harmonics(self) -> tuple[float, ...]:
+        """The first three harmonics of each mesh."""
+        return tuple(k * m for m in self.meshes for k in (1, 2, 3))
+
+    @property
     def highest(self) -> float:
         """Highest order of all."""
         return float(self.orders.max())
@@ -121,12 +126,6 @@ def with_other_teeth(comb: CombLines) -> list[CombLines]:
 # How much each frequency looks like a line: height over the local floor, as log likelihood ratio by rank.
 
 
-_FLOOR_BINS = 96  # the floor is a median over so many bins
-_HIGHEST_LOG_RATIO = 9.0  # 78 dB in power; beyond it a line is no more of a line
-# A line that is there stands among the top ranks: density a·q^(a-1) of its rank q, with this a.
-_RANK_EXPONENT = 0.3
-
-
 @dataclass(frozen=True)
 class LineEvidence:
     """Log likelihood ratio of "a line of the comb is here" for each interval between two bins.
@@ -166,21 +165,22 @@ def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float) 
         In the unit of `rate`.
     """
     from scipy.fft import prev_fast_len
+    from scipy.ndimage import maximum_filter1d
 
     n_segment = prev_fast_len(n_segment, real=True)
     n_keep = min(n_segment // 2, int(top / rate * n_segment) + 4)
     ratios = [_log_ratio(_mean_power(row, n_segment)[:n_keep]) for row in samples]
     log_ratio = np.mean(ratios, axis=0)
-    peaks = _only_peaks(log_ratio)
+    # The flanks of a line are not lines: only what is the largest within two bins each way counts.
+    largest = maximum_filter1d(log_ratio, 5, mode="nearest")
+    peaks = np.where((log_ratio >= largest) & (log_ratio > 0), log_ratio, 0.0)
     # Interval i holds the higher of its two ends, so that a candidate may miss a line's middle by half a bin.
     height = np.maximum(peaks[:-1], peaks[1:])
-    rank = _tail_share(height)
-    return LineEvidence(
-        np.array([_log_likelihood_ratio(rank, present) for present in PRESENCE]),
-        log_ratio,
-        rate / n_segment,
-        top,
-    )
+    rank = (len(height) - np.searchsorted(np.sort(height), height, side="left")) / len(height)
+    # A line that is there stands among the top ranks q: density a·q^(a-1), a = 0.3. ln(1 - p + p·a·q^(a-1)): a line
+    # missing costs little, a line of high rank gives a lot, none decides alone.
+    likelihoods = np.array([np.log(1.0 - present + present * 0.3 * rank ** (0.3 - 1.0)) for present in PRESENCE])
+    return LineEvidence(likelihoods, log_ratio, rate / n_segment, top)
 
 
 @lru_cache(maxsize=8)
@@ -203,113 +203,37 @@ def _mean_power(x: FloatArray, n_segment: int) -> FloatArray:
 
 
 def _log_ratio(power: FloatArray) -> FloatArray:
-    """ln(power/floor); the floor is the median in blocks, straight lines (in decibels) between their middles."""
+    """ln(power/floor); the floor is the median in blocks of 96 bins, straight lines (in decibels) between the middles.
+
+    Cut at 9, 78 dB in power: beyond it a line is no more of a line.
+    """
     tiny = max(float(power.max()) * 1e-24, 1e-300)
     log_power = np.log(np.maximum(power, tiny))
-    length = min(_FLOOR_BINS, len(power))
+    length = min(96, len(power))
     n_blocks = len(power) // length
     medians = np.median(log_power[: n_blocks * length].reshape(n_blocks, length), axis=1)
     middles = (np.arange(n_blocks) + 0.5) * length
     over: FloatArray = log_power - np.interp(np.arange(len(power)), middles, medians)
-    return np.clip(over, -2.0, _HIGHEST_LOG_RATIO)
-
-
-def _only_peaks(x: FloatArray) -> FloatArray:
-    """Keep values that are the largest within two bins each way; the flanks of a line are not lines."""
-    largest = x.copy()
-    for k in (1, 2):
-        largest[k:] = np.maximum(largest[k:], x[:-k])
-        largest[:-k] = np.maximum(largest[:-k], x[k:])
-    return np.where((x >= largest) & (x > 0), x, 0.0)
-
-
-def _tail_share(x: FloatArray) -> FloatArray:
-    """Share of values at least as large as each one."""
-    ordered = np.sort(x)
-    share: FloatArray = (len(x) - np.searchsorted(ordered, x, side="left")) / len(x)
-    return share
-
-
-def _log_likelihood_ratio(rank: FloatArray, present: float) -> FloatArray:
-    """ln(1 - p + p·a·q^(a-1)): a line missing costs little, a line of high rank gives a lot, none decides alone."""
-    ratio: FloatArray = np.log(1.0 - present + present * _RANK_EXPONENT * rank ** (_RANK_EXPONENT - 1.0))
-    return ratio
+    return np.clip(over, -2.0, 9.0)
 
 
 # Scores of comb candidates over speed, and the distribution of the best score by chance.
 
 
-@dataclass(frozen=True)
-class CombScores:
-    """Score of each candidate speed.
-
-    Parameters
-    ----------
-    speeds : array, (n,)
-        rev/s, or relative speed; equal steps of the logarithm.
-    scores : array, (n,)
-        Sum of the lines' log likelihood ratios.
-    """
-
-    speeds: FloatArray
-    scores: FloatArray
-
-    def best(self) -> tuple[float, float]:
-        """Return (speed, score) of the best candidate."""
-        i = int(np.argmax(self.scores))
-        return float(self.speeds[i]), float(self.scores[i])
-
-    def best_beyond(self, speed: float, relative: float) -> tuple[float, float]:
-        """Return (speed, score) of the best candidate further than `relative` from `speed`, else (0, -inf)."""
-        away = np.abs(self.speeds / speed - 1.0) > relative
-        if not away.any():
-            return 0.0, -np.inf
-        i = int(np.argmax(np.where(away, self.scores, -np.inf)))
-        return float(self.speeds[i]), float(self.scores[i])
-
-
-def candidate_speeds(low: float, high: float, highest_line: float, evidence: LineEvidence) -> FloatArray:
+def candidate_speeds(low: float, high: float, comb: CombLines, evidence: LineEvidence) -> FloatArray:
     """Return speeds in equal ratios, so close that the highest line in sight moves by one bin."""
     # Lines above the top are not looked at, so the step of the highest line is at most that of the top.
-    reach = min(highest_line * high, evidence.top)
-    step = evidence.bin_width / reach
+    step = evidence.bin_width / min(comb.highest * high, evidence.top)
     n = int(np.clip(np.ceil(np.log(high / low) / step), 2, 4_000_000))
     return np.geomspace(low, high, n + 1)
 
 
-def score_speeds(evidence: LineEvidence, comb: CombLines, low: float, high: float) -> CombScores:
-    """Score all speeds between `low` and `high`."""
-    speeds = candidate_speeds(low, high, comb.highest, evidence)
-    return CombScores(speeds, score_candidates(evidence, comb, speeds))
-
-
-def score_candidates(evidence: LineEvidence, comb: CombLines, speeds: FloatArray) -> FloatArray:
-    """Return the score of each given speed, (n_speeds,)."""
-    return _raw(evidence, comb, comb.orders, speeds)
-
-
-def chance_scores(
-    evidence: LineEvidence, comb: CombLines, low: float, high: float, n_trials: int
-) -> tuple[float, float]:
-    """Return mean and standard deviation of the best score of combs whose lines lie at wrong places.
-
-    Each line of the comb is moved by its own random share of up to ± 12 %, which keeps number and spread of the
-    lines but not their harmony. The search range is that of the real comb, so that its many trials are accounted for.
-    """
-    # A fixed seed: the same recording gives the same answer.
-    rng = np.random.default_rng(20_230_501)
-    speeds = candidate_speeds(low, high, comb.highest, evidence)
-    if len(speeds) > 200_000:
-        speeds = speeds[:: len(speeds) // 200_000 + 1]
-    best = [
-        float(_raw(evidence, comb, comb.orders * np.exp(rng.uniform(-0.12, 0.12, len(comb.orders))), speeds).max())
-        for _ in range(n_trials)
-    ]
-    return float(np.mean(best)), max(float(np.std(best, ddof=1)), 1.0)
-
-
-def _raw(evidence: LineEvidence, comb: CombLines, orders: FloatArray, speeds: FloatArray) -> FloatArray:
+def score_speeds(
+    evidence: LineEvidence, comb: CombLines, speeds: FloatArray, orders: FloatArray | None = None
+) -> FloatArray:
+    """Return the score of each speed, the sum of its lines' log likelihood ratios; `orders` replaces the comb's."""
     scores = np.empty(len(speeds))
+    orders = comb.orders if orders is None else orders
     _score(evidence.ratios, 1.0 / evidence.bin_width, evidence.top, orders, comb.presence, comb.is_mesh, speeds, scores)
     return scores
 
@@ -334,7 +258,6 @@ def _score(ratios, per_bin, top, orders, presence, is_mesh, speeds, out):  # typ
 
 # Ranges narrower than this ratio come from a known nominal speed: the scale of the speed is then not in question.
 NARROW = 1.35
-_N_CHANCE = 16
 
 
 @dataclass(frozen=True)
@@ -405,29 +328,39 @@ class CombDecision:
 
 
 def decide(evidence: LineEvidence, comb: CombLines, low: float, high: float) -> CombDecision:
-    """Find the best comb between `low` and `high` and weigh it."""
-    scores = score_speeds(evidence, comb, low, high)
-    speed, score = scores.best()
-    speed = refine_speed(evidence, comb, speed)
+    """Find the best comb between `low` and `high` and weigh it against chance, other speeds, and other teeth.
+
+    By chance: combs each line of which is moved by its own random share of up to ± 12 %, which keeps number and spread
+    of the lines but not their harmony. They are searched over the same range, so that its many trials are accounted
+    for.
+    """
+    speeds = candidate_speeds(low, high, comb, evidence)
+    scores = score_speeds(evidence, comb, speeds)
+    best = int(np.argmax(scores))
+    speed = refine_speed(evidence, comb, float(speeds[best]))
     # Within three bins of the lowest mesh line it is the same comb.
     same = 3.0 * evidence.bin_width / (comb.meshes[0] * speed)
-    runner_up_speed, runner_up = scores.best_beyond(speed, same)
-    mean, deviation = chance_scores(evidence, comb, low, high, _N_CHANCE)
+    elsewhere = np.where(np.abs(speeds / speed - 1.0) > same, scores, -np.inf)
+    other = int(np.argmax(elsewhere))
+    rng = np.random.default_rng(20_230_501)  # fixed: the same recording gives the same answer
+    tried = speeds if len(speeds) <= 200_000 else speeds[:: len(speeds) // 200_000 + 1]
+    moved = [comb.orders * np.exp(rng.uniform(-0.12, 0.12, len(comb.orders))) for _ in range(16)]
+    chance = [float(score_speeds(evidence, comb, tried, orders).max()) for orders in moved]
     around = (speed * (1 - same / 2), speed * (1 + same / 2))
-    others = max(
-        (score_speeds(evidence, other, *around).best()[1] for other in with_other_teeth(comb)), default=-np.inf
-    )
+    teeth = (score_speeds(evidence, c, candidate_speeds(*around, c, evidence)).max() for c in with_other_teeth(comb))
+    places = (comb.orders * speed / evidence.bin_width).astype(int)
+    side = ~comb.is_mesh & (places < evidence.ratios.shape[1]) & (places * evidence.bin_width < evidence.top)
     return CombDecision(
-        speed,
-        score,
-        mean,
-        deviation,
-        runner_up_speed,
-        runner_up,
-        others,
-        _side_score(evidence, comb, speed),
-        high / low <= NARROW,
-        evidence.bin_width,
+        speed=speed,
+        score=float(scores[best]),
+        chance_mean=float(np.mean(chance)),
+        chance_deviation=max(float(np.std(chance, ddof=1)), 1.0),
+        runner_up_speed=float(speeds[other]) if np.isfinite(elsewhere[other]) else 0.0,
+        runner_up_score=float(elsewhere[other]),
+        other_teeth_score=max((float(score) for score in teeth), default=-np.inf),
+        side_score=float(evidence.ratios[comb.presence[side], places[side]].sum()),
+        narrow=high / low <= NARROW,
+        bin_width=evidence.bin_width,
     )
 
 
@@ -468,12 +401,6 @@ def _line_at(evidence: LineEvidence, position: float) -> tuple[float, float] | N
     bend = x[p - 1] - 2 * x[p] + x[p + 1]
     shift = 0.5 * (x[p - 1] - x[p + 1]) / bend if bend < 0 else 0.0
     return float((p + shift) * evidence.bin_width), float(x[p])
-
-
-def _side_score(evidence: LineEvidence, comb: CombLines, speed: float) -> float:
-    places = (comb.orders * speed / evidence.bin_width).astype(int)
-    counts = ~comb.is_mesh & (places < evidence.ratios.shape[1]) & (places * evidence.bin_width < evidence.top)
-    return float(evidence.ratios[comb.presence[counts], places[counts]].sum())
 
 
 def _sure(value: float, zero: float, scale: float) -> float:

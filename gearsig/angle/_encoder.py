@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearsig.angle._types import ShaftAngle
+from gearsig.angle._types import ShaftAngle, limited_slopes
 from gearsig.checks import FloatArray, frozen_array, positive
 from gearsig.errors import InputError, RefusalError
 
@@ -44,28 +44,14 @@ def local_parabolas(x: FloatArray, half_width: int) -> tuple[FloatArray, FloatAr
     # Values relative to the centre: an angle of thousands of revolutions would lose digits otherwise.
     windows = np.lib.stride_tricks.sliding_window_view(x, 2 * m + 1)[centres - m] - x[centres][:, None]
     a, b, c = basis @ windows.T
-    positions = np.concatenate([[0.0], centres, [n - 1.0]])
-    first, last = -float(m), float(m)
-    values = np.concatenate(
-        [
-            [x[centres[0]] + a[0] + b[0] * first + c[0] * first**2],
-            x[centres] + a,
-            [x[centres[-1]] + a[-1] + b[-1] * last + c[-1] * last**2],
-        ]
-    )
-    slopes = np.concatenate([[b[0] + 2 * c[0] * first], b, [b[-1] + 2 * c[-1] * last]])
-    return positions, values, slopes
+    # The parabolas at their own middles, and the outermost ones at the ends too.
+    at = np.concatenate([[0], np.arange(len(centres)), [len(centres) - 1]])
+    off = np.concatenate([[-m], np.zeros(len(centres)), [m]])
+    a, b, c, middles = a[at], b[at], c[at], x[centres][at]
+    return centres[at] + off, middles + a + b * off + c * off**2, b + 2 * c * off
 
 
 # From an encoder's angle channel to shaft angle.
-
-
-# Knots carry a speed error of a thousandth at most where the noise allows, ...
-_WANTED_SPEED_ERROR = 1e-3
-# ... but average over no more than this part of a revolution, so that torsional vibration of low order is kept.
-_LONGEST_AVERAGE_REV = 1.0 / 16.0
-# More than this backwards is a machine that reverses, not noise.
-_MAX_BACKWARDS_REV = 0.05
 
 
 def encoder_angle(
@@ -141,7 +127,7 @@ def _check_motion(revolutions: FloatArray, noise: float) -> None:
             remedy="check the channel and units_per_revolution",
         )
     backwards = float(np.max(np.maximum.accumulate(revolutions) - revolutions))
-    if backwards > _MAX_BACKWARDS_REV + 6 * noise:
+    if backwards > 0.05 + 6 * noise:  # a machine that reverses, not noise
         raise RefusalError(
             f"the shaft turns back by {backwards:.3g} revolutions",
             remedy="cut the recording where the direction changes; check units_per_revolution and wraps",
@@ -152,9 +138,11 @@ def _half_width(revolutions: FloatArray, noise: float) -> tuple[int, tuple[str, 
     """Samples on each side of a knot, and a note where the noise asks for more than the shortest parabola."""
     n = len(revolutions)
     per_sample = float(revolutions[-1] - revolutions[0]) / (n - 1)
-    # The slope of a line over 2m + 1 samples has the standard deviation noise·√(3/(2m³)), nearly.
-    m = (1.5 * (noise / (_WANTED_SPEED_ERROR * per_sample)) ** 2) ** (1 / 3)
-    longest = max(2, int(0.5 * _LONGEST_AVERAGE_REV / per_sample))
+    # The slope of a line over 2m + 1 samples has the standard deviation noise·√(3/(2m³)), nearly. Knots carry a speed
+    # error of a thousandth at most where the noise allows, but average over no more than a sixteenth of a revolution,
+    # so that torsional vibration of low order is kept.
+    m = (1.5 * (noise / (1e-3 * per_sample)) ** 2) ** (1 / 3)
+    longest = max(2, int(0.5 / 16.0 / per_sample))
     half_width = int(np.clip(np.ceil(m), 2, min(longest, (n - 1) // 2)))
     if half_width <= 2:
         return half_width, ()
@@ -164,10 +152,6 @@ def _half_width(revolutions: FloatArray, noise: float) -> tuple[int, tuple[str, 
 
 
 # From a speed channel to shaft angle.
-
-
-# Half the length that a noisy or stepped speed is averaged over: speed channels seldom follow faster than 0.1 s.
-_SMOOTHING_S = 0.05
 
 
 def speed_channel_angle(
@@ -197,15 +181,18 @@ def speed_channel_angle(
     RefusalError
         If the channel says that the machine is at rest, or that it reverses.
     """
+    from scipy.integrate import cumulative_trapezoid
+
     x = frozen_array(values, "speed channel", ndim=1)
     positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
     positive(rpm_per_unit, "rpm_per_unit")
     if len(x) < 8:
         raise InputError(f"the speed channel has {len(x)} samples", allowed="at least 8")
     speed, notes = _forwards(np.asarray(x, dtype=np.float64) * (rpm_per_unit / 60.0))
-    half_width = max(2, round(_SMOOTHING_S * sampling_rate_hz))
+    # Noisy or stepped speeds are averaged over ±0.05 s: speed channels seldom follow faster.
+    half_width = max(2, round(0.05 * sampling_rate_hz))
     positions, smooth, _ = local_parabolas(speed, half_width)
-    cumulative = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / sampling_rate_hz
+    cumulative = cumulative_trapezoid(speed, dx=1.0 / sampling_rate_hz, initial=0)
     angle = np.maximum.accumulate(cumulative[np.round(positions).astype(int)])
     noise = noise_of(speed)
     if noise > 0:
@@ -216,7 +203,7 @@ def speed_channel_angle(
         shaft,
         positions / sampling_rate_hz,
         angle,
-        _monotone(positions / sampling_rate_hz, angle, np.maximum(smooth, 0.0)),
+        limited_slopes(positions / sampling_rate_hz, angle, smooth),
         "speed channel",
         notes=(*notes, "the angle is integrated from a speed: its phase is relative"),
     )
@@ -241,11 +228,3 @@ def _forwards(speed: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     if speed.min() < 0:
         notes += ("speeds slightly below zero are taken as zero",)
     return np.maximum(speed, 0.0), notes
-
-
-def _monotone(t: FloatArray, angle: FloatArray, slopes: FloatArray) -> FloatArray:
-    """Limit slopes to three times the smaller adjacent secant, so that the cubic does not decrease."""
-    secants = np.diff(angle) / np.diff(t)
-    limit = 3.0 * np.minimum(np.append(secants, secants[-1]), np.insert(secants, 0, secants[0]))
-    limited: FloatArray = np.minimum(slopes, limit)
-    return limited

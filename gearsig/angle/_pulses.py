@@ -13,12 +13,6 @@ from gearsig.angle._types import ShaftAngle, monotone_slopes
 from gearsig.checks import FloatArray, count, frozen_array, one_of, positive
 from gearsig.errors import InputError, RefusalError
 
-# The levels are read at these percentiles: 0.05 % of spikes do no harm, and pulses may be as short as 0.1 % of a
-# period.
-_LOW_PERCENTILE, _HIGH_PERCENTILE = 0.05, 99.95
-# Share of samples in the middle half between the levels: pulses 0 to 0.1, a sine 0.33, uniform noise 0.5, Gaussian 0.9.
-_MAX_SHARE_IN_THE_MIDDLE = 0.45
-
 
 @dataclass(frozen=True)
 class PulseEdges:
@@ -86,7 +80,8 @@ def find_pulse_edges(
     x = frozen_array(values, "tachometer channel", ndim=1)
     positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
     one_of(edge, "edge", ("rising", "falling"))
-    low, high = (float(v) for v in np.percentile(x, (_LOW_PERCENTILE, _HIGH_PERCENTILE)))
+    # 0.05 % of spikes do no harm, and pulses may be as short as 0.1 % of a period.
+    low, high = (float(v) for v in np.percentile(x, (0.05, 99.95)))
     if high - low < 0.1 * float(np.ptp(x)):  # pulses so short or few that the percentiles pass them by
         low, high = float(x.min()), float(x.max())
     if threshold is None:
@@ -112,7 +107,7 @@ def _check_two_levels(x: FloatArray, low: float, high: float) -> None:
     if step <= 1e-12 * max(abs(low), abs(high)):
         raise RefusalError(f"the tachometer channel stays at {low:g}: there are no pulses", remedy=remedy)
     middle = float(np.mean((x > low + 0.25 * step) & (x < low + 0.75 * step)))
-    if middle > _MAX_SHARE_IN_THE_MIDDLE:
+    if middle > 0.45:  # pulses have 0 to 0.1, a sine 0.33, uniform noise 0.5, Gaussian 0.9
         raise RefusalError(
             f"the tachometer channel has no two levels: {100 * middle:.0f} % of its samples lie in the middle "
             f"between {low:g} and {high:g}",
@@ -160,8 +155,6 @@ def _schmitt(x, sign, threshold, half_width, near):  # type: ignore[no-untyped-d
 
 # An interval is suspicious when it is shorter or longer than the local trend says by these factors.
 _SHORT, _LONG = 0.6, 1.5
-# Without a slowdown around it, a longer gap than this many pulses leaves the count open.
-MAX_MISSED_IN_ONE_GAP = 8
 
 
 @dataclass(frozen=True)
@@ -195,8 +188,25 @@ class PulseCount:
 
 def count_pulses(times_s: FloatArray) -> PulseCount:
     """Number the pulses, leaving out spurious ones and skipping numbers where pulses were missed."""
-    kept, spurious = _without_spurious(times_s)
-    return _numbered(kept, times_s[spurious])
+    t, spurious = _without_spurious(times_s)
+    d = np.diff(t)
+    steps = np.ones(len(d), dtype=np.int64)
+    missed, pauses, gaps = [], [], []
+    trend = local_trend(d) if len(d) >= 3 else d
+    for k in np.flatnonzero((d > _LONG * trend) & (d > _LONG * _of_neighbours(d))):
+        exact = float(d[k] / trend[k])
+        whole = round(exact) if np.isfinite(exact) else 0
+        # The trend is known to a few per cent per pulse; beyond eight missed pulses the count would be a guess.
+        if _slows_down_around(d, int(k)):
+            pauses.append(t[k])
+        elif whole > 9 or abs(exact - whole) > 0.35:
+            gaps.append(t[k])
+        elif whole > 1:
+            steps[k] = whole
+            missed.append(t[k])
+    counts = np.concatenate([[0], np.cumsum(steps)])
+    places = (np.asarray(times, dtype=float) for times in (times_s[spurious], missed, pauses, gaps))
+    return PulseCount(t, counts, *places)
 
 
 def local_trend(intervals: FloatArray) -> FloatArray:
@@ -278,31 +288,6 @@ def _spurious_end(t: FloatArray, trend: FloatArray, k: int) -> int | None:
     return None if best is None else best[1]
 
 
-def _numbered(t: FloatArray, spurious_s: FloatArray) -> PulseCount:
-    d = np.diff(t)
-    steps = np.ones(len(d), dtype=np.int64)
-    missed: list[float] = []
-    pauses: list[float] = []
-    gaps: list[float] = []
-    trend = local_trend(d) if len(d) >= 3 else d
-    for k in np.flatnonzero((d > _LONG * trend) & (d > _LONG * _of_neighbours(d))):
-        if _slows_down_around(d, int(k)):
-            pauses.append(float(t[k]))
-            continue
-        exact = float(d[k] / trend[k])
-        whole = round(exact)
-        # The trend is known to a few per cent per pulse; beyond that the count would be a guess.
-        if whole > MAX_MISSED_IN_ONE_GAP + 1 or abs(exact - whole) > 0.35:
-            gaps.append(float(t[k]))
-        elif whole > 1:
-            steps[k] = whole
-            missed.append(float(t[k]))
-    counts = np.concatenate([[0], np.cumsum(steps)])
-    return PulseCount(
-        t, counts, np.asarray(spurious_s), *(np.asarray(list_, dtype=float) for list_ in (missed, pauses, gaps))
-    )
-
-
 def _of_neighbours(d: FloatArray) -> FloatArray:
     """Return the median of the three intervals on either side of each.
 
@@ -328,11 +313,6 @@ def _slows_down_around(d: FloatArray, k: int) -> bool:
 
 
 IntArray = NDArray[np.integer[Any]]
-
-# Length in pulses over which the smoothest fit averages; slower changes of speed pass whatever the clock.
-_LONGEST_SMOOTHING = 60.0
-# Rounds of local easing; each eases the penalty by 4, so the last ones interpolate.
-_N_EASINGS = 30
 
 
 def clock_tick(times_s: FloatArray) -> float:
@@ -405,14 +385,15 @@ def fit_within_ticks(t: FloatArray, counts: FloatArray, tick_s: float, breaks: I
     if n < 6:
         return counts
     rows = _third_differences(t)
-    penalty = np.full(n - 3, (_LONGEST_SMOOTHING / (2 * np.pi)) ** 6)
+    # The smoothest fit averages over 60 pulses; slower changes of speed pass whatever the clock.
+    penalty = np.full(n - 3, (60.0 / (2 * np.pi)) ** 6)
     for k in () if breaks is None else breaks:
         penalty[max(0, int(k) - 2) : int(k) + 1] = 0.0
     speed = np.gradient(counts, t)
     weights = np.ones(n)
     weights[late_pulses(t, counts, tick_s)] = 0.0
     fitted = counts
-    for _ in range(_N_EASINGS):
+    for _ in range(30):  # each round eases by 4, so that the last ones interpolate
         fitted = counts + _penalised(rows, penalty, weights, -_apply(rows, counts))
         # A hundredth of a tick of slack: the times themselves are rounded numbers.
         off = weights * np.abs(fitted - counts) > 0.51 * tick_s * speed
@@ -481,13 +462,6 @@ def _penalised(rows: FloatArray, penalty: FloatArray, weights: FloatArray, targe
 # From tachometer pulse times to shaft angle and speed.
 
 
-# A tenth of the pulses: a 36-1 or 60-2 tooth wheel stays below, and so does an occasional glitch.
-_MAX_FAULTY_SHARE = 0.1
-
-# Pulses are only as good as the recorder's clock, whose scale no pulse can tell: crystals are right to some 50 ppm.
-_CLOCK_SCALE = 5e-5
-
-
 def pulse_train_angle(
     times_s: FloatArray, pulses_per_revolution: int = 1, *, shaft: str = "", tick_s: float | None = None
 ) -> ShaftAngle:
@@ -531,9 +505,8 @@ def pulse_train_angle(
     tick = clock_tick(t) if tick_s is None else float(tick_s)
     kept = counted.times_s
     pulses = counted.counts.astype(np.float64)
-    notes = _notes(counted, len(t))
+    late_s = kept[late_pulses(kept, pulses, tick)] if tick > 0 and len(kept) > 5 else kept[:0]
     if tick > 0:
-        notes += _clock_notes(tick, kept[late_pulses(kept, pulses, tick)] if len(kept) > 5 else kept[:0])
         breaks = np.searchsorted(kept, counted.pauses_s)
         pulses = np.maximum.accumulate(fit_within_ticks(kept, pulses, tick, breaks))
     revolutions = pulses / n_per_rev
@@ -545,7 +518,7 @@ def pulse_train_angle(
         "pulses",
         relative_speed_uncertainty=_uncertainty(kept, tick),
         quality=max(0.0, 1.0 - 5.0 * (len(counted.spurious_s) + counted.n_missed) / len(t)),
-        notes=notes,
+        notes=_notes(counted, len(t), tick, late_s),
     )
 
 
@@ -579,7 +552,8 @@ def _check_faults(counted: PulseCount, n_pulses: int) -> None:
             remedy="analyse the parts before and after by themselves; " + remedy,
         )
     n_faulty = len(counted.spurious_s) + counted.n_missed
-    if n_faulty > _MAX_FAULTY_SHARE * n_pulses + 1:
+    # A tenth of the pulses: a 36-1 or 60-2 tooth wheel stays below, and so does an occasional glitch.
+    if n_faulty > 0.1 * n_pulses + 1:
         raise RefusalError(
             f"{len(counted.spurious_s)} spurious and {counted.n_missed} missed pulses among {n_pulses} are too many "
             "to trust the rest",
@@ -590,7 +564,7 @@ def _check_faults(counted: PulseCount, n_pulses: int) -> None:
 def _uncertainty(t: FloatArray, tick_s: float) -> float:
     """Error of first and last pulse over the duration; without a tick, from the times' third differences.
 
-    It is never below the error of the clock's own rate.
+    It is never below the error of the clock's own rate, which no pulse can tell: crystals are right to some 50 ppm.
     """
     if tick_s > 0:
         timing_s = tick_s / np.sqrt(12.0)
@@ -599,32 +573,22 @@ def _uncertainty(t: FloatArray, tick_s: float) -> float:
         timing_s = float(np.median(np.abs(np.diff(t, 3)))) / 0.6745 / np.sqrt(20.0)
     else:
         return float("nan")
-    return max(_CLOCK_SCALE, float(np.sqrt(2.0) * timing_s / (t[-1] - t[0])))
+    return max(5e-5, float(np.sqrt(2.0) * timing_s / (t[-1] - t[0])))
 
 
-def _notes(counted: PulseCount, n_pulses: int) -> tuple[str, ...]:
-    notes = []
-    if len(counted.spurious_s):
-        notes.append(
-            f"{len(counted.spurious_s)} of {n_pulses} pulses were spurious and left out: {_at(counted.spurious_s)}"
-        )
-    if counted.n_missed:
-        notes.append(f"{counted.n_missed} missed pulse(s) were counted in: {_at(counted.missed_s)}")
-    if len(counted.pauses_s):
-        notes.append(
-            f"the machine stands still or nearly so within {len(counted.pauses_s)} interval(s): {_at(counted.pauses_s)}"
-        )
-    return tuple(notes)
-
-
-def _clock_notes(tick_s: float, late_s: FloatArray) -> tuple[str, ...]:
-    note = f"pulse times are quantised to {tick_s * 1e6:.4g} µs; the angle is smoothed within half of that"
-    if not len(late_s):
-        return (note,)
-    return (
-        note,
-        f"{len(late_s)} single pulse(s) lie more than that off their neighbours and are bridged: {_at(late_s)}",
+def _notes(counted: PulseCount, n_pulses: int, tick_s: float, late_s: FloatArray) -> tuple[str, ...]:
+    clock = f"pulse times are quantised to {tick_s * 1e6:.4g} µs; the angle is smoothed within half of that"
+    places = (
+        (f"{len(counted.spurious_s)} of {n_pulses} pulses were spurious and left out", counted.spurious_s),
+        (f"{counted.n_missed} missed pulse(s) were counted in", counted.missed_s),
+        (
+            f"the machine stands still or nearly so within {len(counted.pauses_s)} interval(s)",
+            counted.pauses_s,
+        ),
+        (clock, np.empty(int(tick_s > 0))),
+        (f"{len(late_s)} single pulse(s) lie more than that off their neighbours and are bridged", late_s),
     )
+    return tuple(text if text == clock else f"{text}: {_at(times)}" for text, times in places if len(times))
 
 
 def _at(times_s: FloatArray) -> str:

@@ -6,6 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from gearsig.angle._encoder import encoder_angle, speed_channel_angle
+from gearsig.angle._pulses import find_pulse_edges, pulse_train_angle
+from gearsig.angle._tachless import estimate_shaft_angle
 from gearsig.angle._types import ShaftAngle
 from gearsig.checks import not_negative, positive
 from gearsig.errors import InputError, RefusalError
@@ -39,39 +42,36 @@ def find_shaft_angle(recording: Recording, rig: Rig | None = None) -> ShaftAngle
     """
     rig = rig if rig is not None else recording.rig
     source = recording.speed if recording.speed is not None else (rig.speed if rig is not None else None)
-    if source is None:
-        return _tachless(recording, rig)
-    angle = _from_source(recording, source)
-    _check_motion(angle)
-    return _to_reference_shaft(angle, source.shaft, rig)
+    if source is not None:
+        angle = _from_source(recording, source)
+        if angle.n_revolutions <= 0.0:
+            raise RefusalError("the machine is at rest: the shaft angle does not move", remedy="record while it turns")
+        return _to_reference_shaft(angle, source.shaft, rig)
+    if rig is None or not rig.pairs:
+        raise RefusalError(
+            "there is no speed source, and no gear is described whose mesh lines would tell the speed",
+            remedy="give a tachometer, a speed channel or a constant speed, or the teeth in a rig file",
+        )
+    return estimate_shaft_angle(recording, rig)
 
 
 def _from_source(recording: Recording, source: SpeedSource) -> ShaftAngle:
-    """Dispatch on the kind of source; each method is loaded when it is used."""
     rate = recording.sampling_rate_hz
     match source:
         case ConstantSpeed():
             return constant_speed_angle(source.speed_rpm, recording.duration_s)
         case PulseTimes():
-            from gearsig.angle._pulses import pulse_train_angle
-
             return pulse_train_angle(source.times_s, source.pulses_per_revolution)
         case TachometerChannel():
             return _from_tachometer(recording, source)
         case EncoderChannel():
-            from gearsig.angle._encoder import encoder_angle
-
             values = recording.values(source.channel)
             return encoder_angle(values, rate, source.units_per_revolution, wraps=source.wraps)
         case SpeedChannel():
-            from gearsig.angle._encoder import speed_channel_angle
-
             return speed_channel_angle(recording.values(source.channel), rate, source.rpm_per_unit)
 
 
 def _from_tachometer(recording: Recording, source: TachometerChannel) -> ShaftAngle:
-    from gearsig.angle._pulses import find_pulse_edges, pulse_train_angle
-
     edges = find_pulse_edges(
         recording.values(source.channel),
         recording.sampling_rate_hz,
@@ -88,22 +88,6 @@ def _from_tachometer(recording: Recording, source: TachometerChannel) -> ShaftAn
             f"from {edges.low:.4g} to {edges.high:.4g}",
         )
     return pulse_train_angle(edges.times_s, source.pulses_per_revolution, tick_s=edges.tick_s)
-
-
-def _tachless(recording: Recording, rig: Rig | None) -> ShaftAngle:
-    if rig is None or not rig.pairs:
-        raise RefusalError(
-            "there is no speed source, and no gear is described whose mesh lines would tell the speed",
-            remedy="give a tachometer, a speed channel or a constant speed, or the teeth in a rig file",
-        )
-    from gearsig.angle._tachless import estimate_shaft_angle
-
-    return estimate_shaft_angle(recording, rig)
-
-
-def _check_motion(angle: ShaftAngle) -> None:
-    if angle.n_revolutions <= 0.0:
-        raise RefusalError("the machine is at rest: the shaft angle does not move", remedy="record while it turns")
 
 
 def _to_reference_shaft(angle: ShaftAngle, shaft: str, rig: Rig | None) -> ShaftAngle:

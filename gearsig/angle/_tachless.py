@@ -7,25 +7,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from gearsig.angle._comb import (
     MIN_QUALITY,
     NARROW,
     TOP,
-    CombDecision,
     CombLines,
     SpeedCandidate,
     SpeedSearch,
     best_decision,
     candidate_speeds,
     line_evidence,
-    score_candidates,
     score_speeds,
     search_of,
 )
-from gearsig.angle._resample import resample_to_angle
-from gearsig.angle._types import ShaftAngle, monotone_slopes
+from gearsig.angle._resample import resample_to_angle, times_at
+from gearsig.angle._types import AngleSignal, ShaftAngle, monotone_slopes
 from gearsig.checks import FloatArray, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
@@ -34,68 +31,29 @@ from gearsig.rig import Rig
 # Speed over time from short-time comb scores: the path that collects most score without jumping.
 
 
-# Standard deviation of the change of log speed from block to block, in steps of the speed grid, at least.
-_STEPS = 6.0
-_N_KEPT = 200  # best candidates of each block; the others are not on any good path
-_HIGHEST_COST = 20.0  # of a jump: a few blocks without lines must not decide over the rest
-
-
-@dataclass(frozen=True)
-class SpeedRidge:
-    """Speed at the middles of blocks.
-
-    Parameters
-    ----------
-    time_s, speed_rev_per_s : arrays, (n_blocks,)
-    score : float
-        Mean score per block along the path.
-    """
-
-    time_s: FloatArray
-    speed_rev_per_s: FloatArray
-    score: float
-
-
 def track_speed(
-    samples: FloatArray, rate: float, comb: CombLines, low: float, high: float, top: float, n_block: int, change: float
-) -> SpeedRidge:
-    """Return the most likely course of speed.
+    samples: FloatArray, rate: float, comb: CombLines, low: float, high: float, n_block: int, change: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the most likely course of speed: times of the blocks' middles, and the speed there.
 
     `change` is the standard deviation of the change of log speed from block to block, or six steps of the grid if
-    that is more.
-    Blocks at half overlap are scored for all speeds; the path maximises Σ score - Σ min((Δ ln speed)²/(2σ²), 8),
-    found by dynamic
-    programming over the best candidates of each block (A. J. Viterbi, *Error bounds for convolutional codes …*, IEEE
-    Trans. Inf. Theory 13 (1967)).
+    that is more. Blocks at half overlap are scored for all speeds; the path maximises Σ score - Σ min((Δ ln
+    speed)²/(2σ²), 20), found by dynamic programming over the 200 best candidates of each block (A. J. Viterbi, *Error
+    bounds for convolutional codes …*, IEEE Trans. Inf. Theory 13 (1967)). A few blocks without lines must not decide
+    over the rest, hence the limit.
     """
     starts = np.arange(0, samples.shape[1] - n_block + 1, max(1, n_block // 2))
-    speeds: FloatArray | None = None
-    rows = []
-    for start in starts:
-        evidence = line_evidence(samples[:, start : start + n_block], rate, n_block, top)
-        if speeds is None:
-            speeds = candidate_speeds(low, high, comb.highest, evidence)
-        rows.append(score_candidates(evidence, comb, speeds))
-    assert speeds is not None  # noqa: S101  # there is at least one block: the caller chooses n_block
-    scores = np.array(rows)
-    kept = _best_candidates(scores)
-    kept_scores = np.take_along_axis(scores, kept, axis=1)
-    sigma = max(_STEPS * float(np.log(speeds[1] / speeds[0])), change)
-    path = _best_path(np.log(speeds)[kept] / sigma, kept_scores, _HIGHEST_COST)
-    at = np.arange(len(path))
-    return SpeedRidge((starts + n_block / 2) / rate, speeds[kept[at, path]], float(kept_scores[at, path].mean()))
-
-
-def _best_candidates(scores: FloatArray) -> NDArray[np.intp]:
-    """Indices of each block's best local maxima, (n_blocks, n_kept)."""
-    n_kept = min(_N_KEPT, scores.shape[1])
+    evidence = [line_evidence(samples[:, start : start + n_block], rate, n_block, TOP * rate) for start in starts]
+    speeds = candidate_speeds(low, high, comb, evidence[0])
+    scores = np.array([score_speeds(e, comb, speeds) for e in evidence])
+    inner = scores[:, 1:-1]
     peaks = np.full(scores.shape, -np.inf)
-    peaks[:, 1:-1] = np.where(
-        (scores[:, 1:-1] >= scores[:, :-2]) & (scores[:, 1:-1] >= scores[:, 2:]),
-        scores[:, 1:-1],
-        -1e6 + scores[:, 1:-1],
-    )
-    return np.argpartition(peaks, -n_kept, axis=1)[:, -n_kept:]
+    peaks[:, 1:-1] = np.where((inner >= scores[:, :-2]) & (inner >= scores[:, 2:]), inner, inner - 1e6)
+    n_kept = min(200, scores.shape[1])
+    kept = np.argpartition(peaks, -n_kept, axis=1)[:, -n_kept:]
+    sigma = max(6.0 * float(np.log(speeds[1] / speeds[0])), change)
+    path = _best_path(np.log(speeds)[kept] / sigma, np.take_along_axis(scores, kept, axis=1), 20.0)
+    return (starts + n_block / 2) / rate, speeds[kept[np.arange(len(path)), path]]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -125,12 +83,6 @@ def _best_path(places, scores, highest_cost):  # type: ignore[no-untyped-def]
 # A rough shaft angle made exact by the phase of mesh harmonics.
 
 
-# Half widths around the mesh order, in orders of the shaft: below one, so that the shaft's sidebands stay outside.
-_HALF_WIDTHS = (0.45, 0.45, 0.3, 0.2)
-_MAX_HARMONICS = 3
-# Power of the band over its median line: noise has 0.5. A band of noise must not take part, or it would be bent into
-# a line.
-_MIN_RATIO, _MIN_SHARE = 2.0, 0.05
 _PER_WIDTH = 4  # points per reciprocal half width; two would do by the sampling theorem
 
 
@@ -169,7 +121,8 @@ def refine_by_phase(
     order to perform angular resampling*, Mech. Syst. Signal Process. 19 (2005); J. Urbanek, T. Barszcz, J. Antoni, *A
     two-step procedure for estimation of instantaneous rotational speed with large fluctuations*, ibid. 38 (2013).
     """
-    for half_width in _HALF_WIDTHS:
+    # Around the mesh order, in orders of the shaft: below one, so that the shaft's sidebands stay outside.
+    for half_width in (0.45, 0.45, 0.3, 0.2):
         refined = _refined_once(recording, channels, angle, orders, half_width)
         if refined is None:
             return angle
@@ -190,16 +143,24 @@ def _refined_once(
         return None
     n_per_rev = signal.samples_per_revolution
     harmonics = [_demodulate(signal.samples, n_per_rev, o, half_width) for o in usable]
-    best = sorted((h for h in harmonics if h is not None), key=lambda h: -h.ratio)[:_MAX_HARMONICS]
-    best = [h for h in best if h.ratio > max(_MIN_RATIO, _MIN_SHARE * best[0].ratio)]
+    best = sorted((h for h in harmonics if h is not None), key=lambda h: -h.ratio)[:3]
+    # Power of the band over its median line: noise has 0.5. A band of noise must not be bent into a line.
+    best = [h for h in best if h.ratio > max(2.0, 0.05 * best[0].ratio)]
     if not best or best[0].baseband.shape[1] < 8:
         return None
-    shift = _common_shift(best)
     n = best[0].baseband.shape[1]
     revolutions = signal.start_revolution + np.arange(n) * (signal.samples.shape[1] / n_per_rev / n)
-    times = _times(angle, revolutions)
-    refined = np.maximum.accumulate(revolutions + shift)
-    return ShaftAngle(angle.shaft, times, refined, monotone_slopes(times, refined), "tachless")
+    times = np.empty(n)
+    knots, values, slopes = (
+        np.ascontiguousarray(a, dtype=np.float64) for a in (angle.time_s, angle.revolutions, angle.speed_rev_per_s)
+    )
+    k = min(max(0, int(np.searchsorted(values, revolutions[0])) - 1), len(knots) - 2)
+    times_at(knots, values, slopes, k, float(revolutions[0]), float(revolutions[1] - revolutions[0]), times)
+    return _tachless(angle.shaft, times, np.maximum.accumulate(revolutions + _common_shift(best)))
+
+
+def _tachless(shaft: str, time_s: FloatArray, revolutions: FloatArray) -> ShaftAngle:
+    return ShaftAngle(shaft, time_s, revolutions, monotone_slopes(time_s, revolutions), "tachless")
 
 
 def _demodulate(samples: FloatArray, n_per_rev: int, order: float, half_width: float) -> _Harmonic | None:
@@ -251,27 +212,7 @@ def _common_shift(harmonics: list[_Harmonic]) -> FloatArray:
     return centred
 
 
-def _times(angle: ShaftAngle, revolutions: FloatArray) -> FloatArray:
-    from gearsig.angle._resample import times_at
-
-    out = np.empty(len(revolutions))
-    knots, values, slopes = (
-        np.ascontiguousarray(a, dtype=np.float64) for a in (angle.time_s, angle.revolutions, angle.speed_rev_per_s)
-    )
-    k = min(max(0, int(np.searchsorted(values, revolutions[0])) - 1), len(knots) - 2)
-    times_at(knots, values, slopes, k, float(revolutions[0]), float(revolutions[1] - revolutions[0]), out)
-    return out
-
-
 # Shaft angle of a changing speed: followed block by block, made exact by phase, weighed over orders.
-
-
-_BLOCKS = (96, 24, 384)  # per recording
-_ACCELERATION_PER_S = 0.04  # standard deviation of the change of log speed
-_CORRECTION_SPANS = (0.05, 0.02)
-_LARGEST_JUMP = 0.2  # of log speed between blocks; a path that changes to a multiple of the speed jumps further
-_LOST = 4.0  # score by which another speed has to win in a part for the angle to be wrong there
-_CLEAR = 0.9  # quality beyond which no other block length is tried
 
 
 def varying_speed(search: SpeedSearch, start: SpeedCandidate | None) -> SpeedCandidate | None:
@@ -290,23 +231,42 @@ def varying_speed(search: SpeedSearch, start: SpeedCandidate | None) -> SpeedCan
     if best is None or best.decision.quality < MIN_QUALITY or search.high < NARROW * search.low:
         return best
     # With the scale open, half, double and triple speed are refined as well and have to lose.
-    others = [
-        other
-        for factor in (2.0, 0.5, 3.0, 1.0 / 3.0)
-        if search.low <= factor * best.angle.mean_speed_rpm / 60.0 <= search.high
-        and (other := _refined(search, best.angle.of_shaft(best.angle.shaft, factor))) is not None
-        and abs(other.decision.speed - 1.0) <= 0.02
-    ]
-    return max([best, *others], key=_rank)
+    mean = best.angle.mean_speed_rpm / 60.0
+    factors = [factor for factor in (2.0, 0.5, 3.0, 1.0 / 3.0) if search.low <= factor * mean <= search.high]
+    others = [_refined(search, best.angle.of_shaft(best.angle.shaft, factor)) for factor in factors]
+    return max([best, *(o for o in others if o is not None and abs(o.decision.speed - 1.0) <= 0.02)], key=_rank)
+
+
+_CLEAR = 0.9
+"""Quality beyond which no other block length is tried."""
 
 
 def _starts(search: SpeedSearch, start: SpeedCandidate | None) -> Iterator[ShaftAngle]:
     """Yield the constant speed where there is one; unless that is beyond doubt, the courses followed as well."""
     if start is not None:
         yield start.angle
-    if start is None or start.decision.quality < _CLEAR:
-        # One block length is enough to contradict a steady speed; without one, all are tried.
-        yield from _rough_angles(search, _BLOCKS if start is None else _BLOCKS[:1])
+        if start.decision.quality >= _CLEAR:
+            return
+    from scipy.integrate import cumulative_trapezoid
+
+    rate, n = search.recording.sampling_rate_hz, search.samples.shape[1]
+    # Blocks per recording: the middle one first, it fits most machines. One is enough to contradict a steady speed.
+    for n_blocks in (96, 24, 384) if start is None else (96,):
+        n_block = 2 * n // n_blocks
+        low = max(search.low, 2.0 * rate / n_block)  # two turns per block, or its spectrum does not show orders
+        if n_block < 512 or low >= search.high:
+            continue
+        change = 0.04 * 0.5 * n_block / rate  # log speed changes by 0.04 per second
+        time_s, speed = track_speed(search.samples, rate, search.comb, low, search.high, n_block, change)
+        if np.abs(np.diff(np.log(speed))).max() > 0.2:
+            continue  # a path that changes to a multiple of the speed jumps so far
+        smooth = _smooth(speed)
+        t = np.concatenate([[0.0], time_s, [search.recording.duration_s]])
+        v = np.concatenate([[smooth[0]], smooth, [smooth[-1]]])
+        angle = _tachless(search.shaft, t, cumulative_trapezoid(v, t, initial=0))
+        for span in (0.05, 0.02):
+            angle = _corrected(search, angle, span, n_blocks)
+        yield angle
 
 
 def _rank(candidate: SpeedCandidate) -> tuple[bool, float]:
@@ -314,54 +274,53 @@ def _rank(candidate: SpeedCandidate) -> tuple[bool, float]:
 
 
 def _refined(search: SpeedSearch, angle: ShaftAngle) -> SpeedCandidate | None:
-    refined = refine_by_phase(search.recording, search.channels, angle, _mesh_harmonics(search.comb))
-    decision = _decision_over_angle(search, refined)
-    return None if decision is None else SpeedCandidate(refined, decision)
+    """Make an angle exact, and weigh the comb over the order spectrum, where a right angle makes its lines sharp."""
+    refined = refine_by_phase(search.recording, search.channels, angle, search.comb.mesh_harmonics)
+    signal = _over_angle(search, refined)
+    if signal is None:
+        return None
+    mean = refined.mean_speed_rpm / 60.0
+    # The search was at least this wide; a known nominal speed leaves a margin for the runner-up.
+    low = max(search.low / mean, 0.15) if search.high / search.low > NARROW else 0.95
+    high = min(search.high / mean, 6.0) if search.high / search.low > NARROW else 1.05
+    n_per_rev = float(signal.samples_per_revolution)
+    decision = best_decision(signal.samples, n_per_rev, search.comb, min(low, 0.95), max(high, 1.05))
+    if decision is None:
+        return None
+    coverage = _coverage(signal.samples, n_per_rev, search.comb)
+    return SpeedCandidate(refined, replace(decision, coverage=coverage))
 
 
-def _mesh_harmonics(comb: CombLines) -> tuple[float, ...]:
-    return tuple(k * m for m in comb.meshes for k in (1, 2, 3))
+def _over_angle(search: SpeedSearch, angle: ShaftAngle) -> AngleSignal | None:
+    """Resample to twice the comb's highest order, so that twice the true speed shows itself; less where there is less.
 
-
-def _rough_angles(search: SpeedSearch, block_counts: tuple[int, ...]) -> Iterator[ShaftAngle]:
-    """Follow the speed with blocks of several lengths, the middle one first: it fits most machines."""
-    rate, n = search.recording.sampling_rate_hz, search.samples.shape[1]
-    for n_blocks in block_counts:
-        n_block = 2 * n // n_blocks
-        low = max(search.low, 2.0 * rate / n_block)  # two turns per block, or its spectrum does not show orders
-        if n_block < 512 or low >= search.high:
-            continue
-        change = _ACCELERATION_PER_S * 0.5 * n_block / rate
-        ridge = track_speed(search.samples, rate, search.comb, low, search.high, TOP * rate, n_block, change)
-        if np.abs(np.diff(np.log(ridge.speed_rev_per_s))).max() > _LARGEST_JUMP:
-            continue
-        angle = _integrated(search, ridge.time_s, ridge.speed_rev_per_s)
-        for span in _CORRECTION_SPANS:
-            angle = _corrected(search, angle, span, n_blocks)
-        yield angle
+    None where the angle does not cover a revolution of the recording.
+    """
+    top = TOP * search.recording.sampling_rate_hz / (angle.speed_range_rpm[1] / 60.0)
+    highest = min(2.0 * search.comb.highest, top)
+    try:
+        return resample_to_angle(search.recording, angle, channels=search.channels, highest_order=highest)
+    except RefusalError:
+        return None
 
 
 def _corrected(search: SpeedSearch, angle: ShaftAngle, span: float, n_blocks: int) -> ShaftAngle:
     """Follow what is left of the change of speed over the angle found so far, where the lines are already sharper."""
-    try:
-        signal = resample_to_angle(
-            search.recording, angle, channels=search.channels, highest_order=_highest_order(search, angle)
-        )
-    except RefusalError:
+    from scipy.integrate import cumulative_trapezoid
+
+    signal = _over_angle(search, angle)
+    if signal is None:
         return angle
     n_per_rev, n = float(signal.samples_per_revolution), signal.samples.shape[1]
     n_block = max(512, 2 * n // n_blocks)
     if n_block > n // 4:
         return angle
-    ridge = track_speed(signal.samples, n_per_rev, search.comb, 1 - span, 1 + span, TOP * n_per_rev, n_block, 0.0)
-    # The "time" of this ridge is revolutions over the estimated angle.
-    revolutions = signal.start_revolution + ridge.time_s
-    factor = _smooth(ridge.speed_rev_per_s)
+    turned, factor = track_speed(signal.samples, n_per_rev, search.comb, 1 - span, 1 + span, n_block, 0.0)
     fine = np.linspace(angle.start_s, angle.end_s, max(len(angle.time_s), 4 * n_blocks))
     theta = angle.revolutions_at(fine)
-    factor = np.interp(theta, revolutions, factor)
-    corrected = np.concatenate([[0.0], np.cumsum(0.5 * (factor[1:] + factor[:-1]) * np.diff(theta))])
-    return ShaftAngle(search.shaft, fine, corrected, monotone_slopes(fine, corrected), "tachless")
+    # The "time" of this course is revolutions over the estimated angle.
+    factor = np.interp(theta, signal.start_revolution + turned, _smooth(factor))
+    return _tachless(search.shaft, fine, cumulative_trapezoid(factor, theta, initial=0))
 
 
 def _smooth(speed: FloatArray) -> FloatArray:
@@ -372,38 +331,6 @@ def _smooth(speed: FloatArray) -> FloatArray:
     return smooth
 
 
-def _integrated(search: SpeedSearch, time_s: FloatArray, speed: FloatArray) -> ShaftAngle:
-    """Angle from speeds at the middles of blocks."""
-    smooth = _smooth(speed)
-    t = np.concatenate([[0.0], time_s, [search.recording.duration_s]])
-    v = np.concatenate([[smooth[0]], smooth, [smooth[-1]]])
-    angle = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))])
-    return ShaftAngle(search.shaft, t, angle, monotone_slopes(t, angle), "tachless")
-
-
-def _decision_over_angle(search: SpeedSearch, angle: ShaftAngle) -> CombDecision | None:
-    """Weigh the comb over the order spectrum, where a right angle makes all its lines sharp."""
-    try:
-        signal = resample_to_angle(
-            search.recording, angle, channels=search.channels, highest_order=_highest_order(search, angle)
-        )
-    except RefusalError:
-        return None
-    mean = angle.mean_speed_rpm / 60.0
-    # The search was at least this wide; a known nominal speed leaves a margin for the runner-up.
-    low = max(search.low / mean, 0.15) if search.high / search.low > NARROW else 0.95
-    high = min(search.high / mean, 6.0) if search.high / search.low > NARROW else 1.05
-    n_per_rev = float(signal.samples_per_revolution)
-    decision = best_decision(signal.samples, n_per_rev, search.comb, min(low, 0.95), max(high, 1.05))
-    return None if decision is None else replace(decision, coverage=_coverage(signal.samples, n_per_rev, search.comb))
-
-
-def _highest_order(search: SpeedSearch, angle: ShaftAngle) -> float:
-    """Twice the comb, so that a speed of twice the true one shows itself; less where the recording has no more."""
-    top = TOP * search.recording.sampling_rate_hz / (angle.speed_range_rpm[1] / 60.0)
-    return min(2.0 * search.comb.highest, top)
-
-
 def _coverage(samples: FloatArray, n_per_rev: float, comb: CombLines) -> float:
     """Share of the recording, in eighths, in which the comb lies where the angle says and not beside."""
     n_part = samples.shape[1] // 8
@@ -412,14 +339,11 @@ def _coverage(samples: FloatArray, n_per_rev: float, comb: CombLines) -> float:
     right = 0
     for part in range(8):
         evidence = line_evidence(samples[:, part * n_part : (part + 1) * n_part], n_per_rev, n_part, TOP * n_per_rev)
-        scores = score_speeds(evidence, comb, 0.94, 1.06)
-        width = 2.0 * evidence.bin_width / comb.meshes[0]
-        here = np.abs(scores.speeds - 1.0) <= width
-        right += scores.best()[1] - scores.scores[here].max() <= _LOST
+        speeds = candidate_speeds(0.94, 1.06, comb, evidence)
+        scores = score_speeds(evidence, comb, speeds)
+        here = np.abs(speeds - 1.0) <= 2.0 * evidence.bin_width / comb.meshes[0]
+        right += scores.max() - scores[here].max() <= 4.0  # by so much another speed has to win there
     return right / 8.0
-
-
-_GAIN = 3.0  # a varying angle has to score so much better than the constant one
 
 
 def estimate_shaft_angle(
@@ -513,7 +437,7 @@ def _better(
         steady = replace(steady, decision=replace(steady.decision, coverage=0.95))
     sure = steady.decision.quality >= MIN_QUALITY
     if varying is not None and varying.decision.quality >= MIN_QUALITY:
-        return varying if not sure or varying.decision.score > steady.decision.score + _GAIN else steady
+        return varying if not sure or varying.decision.score > steady.decision.score + 3.0 else steady
     return steady if sure or varying is None else varying
 
 

@@ -202,6 +202,12 @@ def monotone_slopes(t: FloatArray, y: FloatArray) -> FloatArray:
         slopes[i] = _lagrange_slope(t, y, np.array([0]), end, i)[0]
     for i in range(n - width + middle + 1, n):
         slopes[i] = _lagrange_slope(t, y, np.array([n - end]), end, i - (n - end))[0]
+    return limited_slopes(t, y, slopes)
+
+
+def limited_slopes(t: FloatArray, y: FloatArray, slopes: FloatArray) -> FloatArray:
+    """Keep slopes between 0 and three times the smaller adjacent secant, so that the cubic does not decrease."""
+    secants = np.diff(y) / np.diff(t)
     limit = 3.0 * np.minimum(np.append(secants, secants[-1]), np.insert(secants, 0, secants[0]))
     return np.clip(slopes, 0.0, limit)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
 from pathlib import Path
@@ -93,7 +93,8 @@ class DepthModel:
 
     def __post_init__(self) -> None:
         n, curves = len(FEATURES), len(SHAPED)
-        shapes = dict.fromkeys(("mean", "scale", "coefficients", "detection", "lowest", "highest"), (n,))
+        each = ("mean", "scale", "coefficients", "detection", "lowest", "highest")
+        shapes: dict[str, tuple[int, ...]] = dict.fromkeys(each, (n,))
         shapes |= {"spread": (n + 1,), "precision": (n, n), "knots": (curves, 2), "slopes": (curves, 3)}
         _freeze(self, shapes | {"healthy_scores": self.healthy_scores.shape[:1]})
         rising = [FEATURES.index(name) for name in RISING]
@@ -104,10 +105,12 @@ class DepthModel:
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> DepthModel:
         """Build it from what a JSON file holds, where the healthy pairs' scores are called sound_scores."""
-        read: dict[str, Callable[[Any], Any]] = {"float": float, "FloatArray": np.asarray}
-        kinds = {f.name: read.get(str(f.type), lambda pair: (float(pair[0]), float(pair[1]))) for f in fields(cls)}
-        named = {"healthy_scores": "sound_scores"}
-        return cls(**{name: kind(values[named.get(name, name)]) for name, kind in kinds.items()})
+        fitted: dict[str, Any] = {}
+        for f in fields(cls):
+            value = values["sound_scores" if f.name == "healthy_scores" else f.name]
+            is_array, is_pair = f.type == "FloatArray", f.type == "tuple[float, float]"
+            fitted[f.name] = np.asarray(value, dtype=float) if is_array else tuple(value) if is_pair else float(value)
+        return cls(**fitted)
 
     def standardised(self, features: FloatArray) -> FloatArray:
         """Return (f − m)/s."""
