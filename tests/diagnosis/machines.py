@@ -1,10 +1,11 @@
 """A test gearbox whose condition is known, and short words for what an analysis says of it."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
-from gearsig.diagnosis import Analysis, Finding, Kind
+from gearsig.diagnosis import Analysis, Finding, Kind, analyze
 from gearsig.recording import Recording
 from gearsig.rig import Bearing, GearPair, Rig, Shaft
 from sims.measure import ColouredNoise, Tachometer
@@ -33,6 +34,12 @@ def record(model: KinematicModel = GOOD, *, seconds: float = 5.0, seed: int = 0,
     """Simulate the gearbox."""
     rng = np.random.default_rng(seed)
     return simulate_kinematic(rig, model, sampling_rate_hz=SAMPLING_RATE_HZ, duration_s=seconds, rng=rng)
+
+
+@cache
+def good_analysis() -> Analysis:
+    """Return what is said of the good gearbox."""
+    return analyze(record())
 
 
 def teeth(driver: int, driven: int) -> Rig:

@@ -5,19 +5,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsig.diagnosis import CannotTell, Kind, Outcome, analyze
+from gearsig.diagnosis import Analysis, CannotTell, Kind, Outcome, analyze
 from gearsig.errors import InputError
 from gearsig.recording import Channel, Recording
 from gearsig.report import analysis_text
 from gearsig.rig import ConstantSpeed, GearPair, TachometerChannel
 from sims.measure import Tachometer
-from tests.diagnosis.machines import GOOD, RIG, codes, finding, record
+from tests.diagnosis.machines import GOOD, RIG, codes, finding, good_analysis, record
 from tests.kinematic.model import BearingFault, MeshModulation, ToothDamage
 from tests.kinematic.speed import ConstantProfile, LinearRamp
 
 
+@pytest.fixture(scope="module")
+def knocking() -> Analysis:
+    """Of a machine with a damaged tooth."""
+    return analyze(record(replace(GOOD, tooth_damages=(ToothDamage("stage", "in", 0.4, impulse_mps2=10.0),))))
+
+
 def test_a_good_machine_is_not_accused() -> None:
-    analysis = analyze(record())
+    analysis = good_analysis()
     assert not codes(analysis, Kind.FAULT, Kind.SUSPICION)
     assert analysis.verdict.startswith("No fault shows.")
     assert analysis.outcome is Outcome.NO_FAULT
@@ -181,26 +187,21 @@ def test_no_vibration_channel_is_an_error() -> None:
         analyze(recording)
 
 
-def test_same_recording_same_answer() -> None:
-    damage = ToothDamage("stage", "in", 0.4, impulse_mps2=4.0)
-    recording = record(replace(GOOD, tooth_damages=(damage,)))
-    assert analyze(recording).findings == analyze(recording).findings
+def test_same_recording_same_answer(knocking: Analysis) -> None:
+    assert analyze(knocking.recording).findings == knocking.findings
 
 
 @pytest.mark.parametrize("gain", [1e-6, 1e6])
-def test_the_unit_of_the_channel_does_not_matter(gain: float) -> None:
-    recording = record(replace(GOOD, tooth_damages=(ToothDamage("stage", "in", 0.4, impulse_mps2=10.0),)))
-    samples = np.array(recording.samples)
+def test_the_unit_of_the_channel_does_not_matter(gain: float, knocking: Analysis) -> None:
+    samples = np.array(knocking.recording.samples)
     samples[0] *= gain
-    here, there = analyze(recording), analyze(replace(recording, samples=samples))
+    here, there = knocking, analyze(replace(knocking.recording, samples=samples))
     assert codes(here) == codes(there)
     assert [f.confidence for f in here.findings] == pytest.approx([f.confidence for f in there.findings])
 
 
-def test_the_text_tells_place_strength_and_remedy() -> None:
-    damage = ToothDamage("stage", "in", 0.4, impulse_mps2=10.0)
-    analysis = analyze(record(replace(GOOD, tooth_damages=(damage,))))
-    text = analysis_text(analysis, with_indicators=True)
+def test_the_text_tells_place_strength_and_remedy(knocking: Analysis) -> None:
+    text = analysis_text(knocking, with_indicators=True)
     for part in ("gear stage/in; tooth 1", "how strong:", "how sure:", "surer with:", "FM4", ", tooth 1"):
         assert part in text
     assert max(len(line) for line in text.splitlines()[:20]) <= 100

