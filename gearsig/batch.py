@@ -98,7 +98,7 @@ def report_many(
     command : str
         The command that makes the report again, for the pages.
     reference : str, Path or None
-        Recording of the same machine when it was sound; all are compared with it but itself.
+        Recording of the same machine when it was healthy; all are compared with it but itself.
     torque_nm : float or None
         For the depth of cracks, instead of the rig's operating point.
 
@@ -112,18 +112,25 @@ def report_many(
         If there are no paths, `n_processes` is below 1, or the folder cannot be made.
     """
     from gearsig.checks import count
-    from gearsig.report import made_folder, remove_parts, write_index
+    from gearsig.report import Entry, Failure, made_folder, page_names, remove_parts, write_index
 
     files = [Path(path) for path in paths]
     if not files:
         raise InputError("there are no recordings to report on", remedy="name at least one file")
     workers = min(len(files), n_processors()) if n_processes is None else count(n_processes, "n_processes")
     folder = made_folder(Path(output_folder))
-    sound = Path(reference) if reference is not None else None
-    jobs = [
-        _compared(replace(job, torque_nm=torque_nm), sound)
-        for job in _jobs(files, folder, rig, sampling_rate_hz, speed, command)
-    ]
+    healthy = Path(reference) if reference is not None else None
+    names = [file.name for file in files]
+    jobs = []
+    for file, page in zip(files, page_names(files), strict=True):
+        # Files of the same name are told apart by their folders.
+        name = file.name if file.name and names.count(file.name) == 1 else str(file)
+        is_healthy = healthy is not None and file.exists() and healthy.exists() and file.samefile(healthy)
+        compared = None if is_healthy else healthy
+        path = folder / f"{page}.html"
+        jobs.append(
+            _Job(file, name, path, rig, sampling_rate_hz, speed, command, compared, torque_nm, is_reference=is_healthy)
+        )
     results: dict[int, Entry | Failure] = {}
     try:
         with closing(_run(jobs, min(workers, len(jobs)), executor)) as running:
@@ -133,42 +140,11 @@ def report_many(
                     on_progress(len(results), len(jobs), result)
     finally:
         remove_parts(folder, [job.page.name for job in jobs])
-    entries, failures = _sorted_out(results)
+    ordered = [results[number] for number in sorted(results)]
+    entries = tuple(item for item in ordered if isinstance(item, Entry))
+    failures = tuple(item for item in ordered if isinstance(item, Failure))
     index = write_index(entries, folder / "index.html", failures=failures, command=command)
     return BatchResult(entries, failures, index)
-
-
-def _compared(job: _Job, sound: Path | None) -> _Job:
-    """Return the job with the recording of the sound machine, unless it is its own."""
-    is_reference = sound is not None and _is_same_file(job.path, sound)
-    return replace(job, reference=None if is_reference else sound, is_reference=is_reference)
-
-
-def _jobs(
-    files: Sequence[Path],
-    folder: Path,
-    rig: Rig | None,
-    sampling_rate_hz: float | None,
-    speed: SpeedSource | None,
-    command: str,
-) -> list[_Job]:
-    from gearsig.report import page_names
-
-    pages = page_names(files)
-    names = [file.name for file in files]
-    return [
-        # Files of the same name are told apart by their folders.
-        _Job(
-            file,
-            file.name if file.name and names.count(file.name) == 1 else str(file),
-            folder / f"{page}.html",
-            rig,
-            sampling_rate_hz,
-            speed,
-            command,
-        )
-        for file, page in zip(files, pages, strict=True)
-    ]
 
 
 def _run(jobs: Sequence[_Job], n_workers: int, executor: Executor | None) -> Results:
@@ -235,7 +211,7 @@ def _report_one(job: _Job) -> Entry | Failure:
 
 
 def _reference_of(job: _Job, rig: Rig | None) -> Recording | None:
-    """Read the recording of the sound machine; pulse times would belong to the other one."""
+    """Read the recording of the healthy machine; pulse times would belong to the other one."""
     from gearsig.diagnosis import rig_of_reference
     from gearsig.recording import read_recording
     from gearsig.rig import PulseTimes
@@ -247,21 +223,7 @@ def _reference_of(job: _Job, rig: Rig | None) -> Recording | None:
     return read_recording(job.reference, rig=own, sampling_rate_hz=job.sampling_rate_hz, speed=speed)
 
 
-def _is_same_file(one: Path, other: Path) -> bool:
-    return one.exists() and other.exists() and one.samefile(other)
-
-
 def _failure(job: _Job, reason: str) -> Failure:
     from gearsig.report import Failure
 
     return Failure(job.name, reason)
-
-
-def _sorted_out(results: Mapping[int, Entry | Failure]) -> tuple[tuple[Entry, ...], tuple[Failure, ...]]:
-    from gearsig.report import Entry, Failure
-
-    ordered = [results[number] for number in sorted(results)]
-    return (
-        tuple(item for item in ordered if isinstance(item, Entry)),
-        tuple(item for item in ordered if isinstance(item, Failure)),
-    )
